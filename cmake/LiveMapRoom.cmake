@@ -1,0 +1,27 @@
+# livemap_room(NAME SOURCES a.cpp ... DEPENDS target ... [SYSTEM_INCLUDES dir ...])
+#
+# One ROS-free room of the house: the static library livemap_NAME from src/NAME, its headers included
+# as "NAME/header.h". DEPENDS spells out every library that the room may use.
+function(livemap_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;DEPENDS;SYSTEM_INCLUDES" ${ARGN})
+  add_library(livemap_${name} STATIC ${ROOM_SOURCES})
+  target_include_directories(livemap_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
+  target_include_directories(livemap_${name} SYSTEM PUBLIC ${ROOM_SYSTEM_INCLUDES})
+  target_link_libraries(livemap_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE livemap_options)
+endfunction()
+
+# livemap_gtest(NAME SOURCES a_test.cpp ... DEPENDS target ...)
+#
+# A GoogleTest program that ctest runs as NAME. Tests that want files of the source tree read
+# LIVEMAP_SOURCE_DIR; the ones that want the real drives read LIVEMAP_DATA_DIR (environment, else
+# ../shared/data beside the source tree) and say "skipped, no data" where it is absent.
+find_package(GTest REQUIRED)
+function(livemap_gtest name)
+  cmake_parse_arguments(TEST "" "" "SOURCES;DEPENDS" ${ARGN})
+  list(TRANSFORM TEST_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/test/)
+  add_executable(${name} ${TEST_SOURCES})
+  target_compile_definitions(${name} PRIVATE LIVEMAP_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_link_libraries(${name} PRIVATE ${TEST_DEPENDS} GTest::gmock GTest::gtest_main livemap_options)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 300)
+endfunction()

@@ -1,0 +1,26 @@
+# The ROS side of the package: messages, catkin export, and helpers for what links roscpp.
+# Debian's interpreter has catkin_pkg and the ROS modules; another python3 may stand first on PATH.
+set(PYTHON_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "The interpreter that has catkin_pkg")
+set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE} CACHE FILEPATH "The same for ament's packages")
+find_package(catkin REQUIRED COMPONENTS
+  camera_info_manager cv_bridge diagnostic_msgs diagnostic_updater geometry_msgs image_geometry
+  image_transport message_generation nav_msgs nodelet pcl_ros pluginlib rosbag roscpp rostest
+  sensor_msgs std_msgs tf2 tf2_geometry_msgs tf2_ros topic_tools visualization_msgs)
+
+file(GLOB message_files RELATIVE ${PROJECT_SOURCE_DIR}/msg CONFIGURE_DEPENDS msg/*.msg)
+add_message_files(FILES ${message_files})
+generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
+catkin_package(CATKIN_DEPENDS message_runtime geometry_msgs sensor_msgs std_msgs)
+
+# Everything ROS as one interface target, its headers as system headers so that our warnings stay ours.
+add_library(livemap_catkin INTERFACE)
+target_include_directories(livemap_catkin SYSTEM INTERFACE
+  ${catkin_INCLUDE_DIRS} ${CATKIN_DEVEL_PREFIX}/${CATKIN_GLOBAL_INCLUDE_DESTINATION})
+target_link_libraries(livemap_catkin INTERFACE ${catkin_LIBRARIES})
+add_dependencies(livemap_catkin livemap_generate_messages_cpp)
+
+install(DIRECTORY launch config rviz web models
+  DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(DIRECTORY scripts/ USE_SOURCE_PERMISSIONS
+  DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION} PATTERN "__pycache__" EXCLUDE)
+install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

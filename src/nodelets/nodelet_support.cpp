@@ -1,0 +1,18 @@
+#include "nodelets/nodelet_support.h"
+
+#include <ros/console.h>
+
+#include "base/error.h"
+
+namespace livemap {
+
+void InitializeOrExplain(const std::string& nodelet_name, const std::function<void()>& initialize) {
+  try {
+    initialize();
+  } catch (const Error& error) {
+    ROS_FATAL_STREAM(nodelet_name << ": " << error.what());
+    throw;
+  }
+}
+
+}  // namespace livemap

@@ -1,0 +1,162 @@
+"""The network: a residual backbone, a top-down feature pyramid and one decoupled head per stride.
+
+Dense 3x3 convolutions and ReLU only: they are what matrix units (AMX, tensor cores) and OpenCV 4.6
+run fastest, and nothing in the graph needs more than ONNX opset 11.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import List, Tuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+STRIDES = (4, 8, 16)
+"""Pixels of the input per cell of each prediction level, finest first."""
+
+PRIOR_PROBABILITY = 0.01
+"""Score of every anchor point before training, so that the first steps are not spent on background."""
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Channels of each part; the defaults give about 1.1 M parameters."""
+
+    stem: int = 16
+    backbone: Tuple[int, int, int] = (32, 64, 128)  # at strides 4, 8, 16
+    pyramid: Tuple[int, int, int] = (32, 64, 64)  # at strides 4, 8, 16
+
+
+class ConvBlock(nn.Sequential):
+    """Convolution, batch normalisation, ReLU."""
+
+    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1):
+        super().__init__(
+            nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, bias=False),
+            nn.BatchNorm2d(channels_out, momentum=0.03),
+            nn.ReLU(inplace=True),
+        )
+
+
+class ResidualBlock(nn.Module):
+    """Two 3x3 convolutions around an identity path."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.body = nn.Sequential(ConvBlock(channels, channels), ConvBlock(channels, channels))
+
+    def forward(self, features: Tensor) -> Tensor:
+        return features + self.body(features)
+
+
+class PooledContext(nn.Module):
+    """Spatial pyramid pooling (He et al. 2014) in YOLOv5's sequential form: windows of 5, 9 and 13 cells."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.reduce = ConvBlock(channels, channels // 2, kernel=1)
+        self.pool = nn.MaxPool2d(5, stride=1, padding=2)
+        self.expand = ConvBlock(channels * 2, channels, kernel=1)
+
+    def forward(self, features: Tensor) -> Tensor:
+        near = self.reduce(features)
+        middle = self.pool(near)
+        far = self.pool(middle)
+        return self.expand(torch.cat([near, middle, far, self.pool(far)], dim=1))
+
+
+class Backbone(nn.Module):
+    """Image to features at strides 4, 8 and 16."""
+
+    def __init__(self, widths: Widths):
+        super().__init__()
+        fine, middle, coarse = widths.backbone
+        self.stride4 = nn.Sequential(
+            ConvBlock(3, widths.stem, stride=2), ConvBlock(widths.stem, fine, stride=2), ResidualBlock(fine)
+        )
+        self.stride8 = nn.Sequential(ConvBlock(fine, middle, stride=2), ResidualBlock(middle), ResidualBlock(middle))
+        self.stride16 = nn.Sequential(
+            ConvBlock(middle, coarse, stride=2), ResidualBlock(coarse), ResidualBlock(coarse), PooledContext(coarse)
+        )
+
+    def forward(self, images: Tensor) -> List[Tensor]:
+        fine = self.stride4(images)
+        middle = self.stride8(fine)
+        return [fine, middle, self.stride16(middle)]
+
+
+class Pyramid(nn.Module):
+    """Feature pyramid (Lin et al. 2017): coarse context flows down to the fine levels."""
+
+    def __init__(self, widths: Widths):
+        super().__init__()
+        backbone, pyramid = widths.backbone, widths.pyramid
+        self.coarse = ConvBlock(backbone[2], pyramid[2], kernel=1)
+        self.middle_in = ConvBlock(backbone[1] + pyramid[2], pyramid[1], kernel=1)
+        self.middle = ConvBlock(pyramid[1], pyramid[1])
+        self.fine_in = ConvBlock(backbone[0] + pyramid[1], pyramid[0], kernel=1)
+        self.fine = ConvBlock(pyramid[0], pyramid[0])
+
+    def forward(self, levels: List[Tensor]) -> List[Tensor]:
+        fine, middle, coarse = levels
+        coarse = self.coarse(coarse)
+        middle = self.middle(self.middle_in(torch.cat([middle, enlarge(coarse)], dim=1)))
+        fine = self.fine(self.fine_in(torch.cat([fine, enlarge(middle)], dim=1)))
+        return [fine, middle, coarse]
+
+
+def enlarge(features: Tensor) -> Tensor:
+    """Nearest-neighbour upsampling by 2."""
+    return F.interpolate(features, scale_factor=2, mode="nearest")
+
+
+class Head(nn.Module):
+    """Box and class predictions of one stride, from separate convolutions (YOLOX, Ge et al. 2021)."""
+
+    def __init__(self, channels: int, class_count: int):
+        super().__init__()
+        self.box = nn.Sequential(ConvBlock(channels, channels), nn.Conv2d(channels, 4, 1))
+        self.score = nn.Sequential(ConvBlock(channels, channels), nn.Conv2d(channels, class_count, 1))
+        nn.init.constant_(self.score[-1].bias, -math.log((1 - PRIOR_PROBABILITY) / PRIOR_PROBABILITY))
+
+    def forward(self, features: Tensor) -> Tensor:
+        """B x C x H x W features to B x HW x (4 + classes), rows first."""
+        return torch.cat([self.box(features), self.score(features)], dim=1).flatten(2).transpose(1, 2)
+
+
+class Detector(nn.Module):
+    """B x 3 x H x W normalised RGB to B x N x (4 + classes): (tx, ty, tw, th) and class logits.
+
+    N runs over the anchor points of all strides, finest first, rows first. H and W are multiples of 16.
+    """
+
+    def __init__(self, class_count: int, widths: Widths = Widths()):
+        super().__init__()
+        self.class_count = class_count
+        self.backbone = Backbone(widths)
+        self.pyramid = Pyramid(widths)
+        self.heads = nn.ModuleList(Head(channels, class_count) for channels in widths.pyramid)
+
+    def forward(self, images: Tensor) -> Tensor:
+        levels = self.pyramid(self.backbone(images))
+        return torch.cat([head(level) for head, level in zip(self.heads, levels)], dim=1)
+
+
+def anchor_points(height: int, width: int) -> Tuple[Tensor, Tensor]:
+    """Cell indices (N x 2: grid_x, grid_y) and strides (N) of all anchor points of an input of that size."""
+    grids, strides = [], []
+    for stride in STRIDES:
+        rows, columns = torch.meshgrid(
+            torch.arange(height // stride), torch.arange(width // stride), indexing="ij"
+        )
+        grids.append(torch.stack([columns, rows], dim=-1).reshape(-1, 2).float())
+        strides.append(torch.full((grids[-1].shape[0],), float(stride)))
+    return torch.cat(grids), torch.cat(strides)
+
+
+def decode_boxes(raw: Tensor, grid: Tensor, strides: Tensor) -> Tensor:
+    """... x N x 4 raw (tx, ty, tw, th) to ... x N x 4 corners (x1, y1, x2, y2) in input pixels."""
+    centres = (raw[..., :2] + grid) * strides[:, None]
+    half_sizes = 0.5 * torch.exp(raw[..., 2:4].clamp(max=8.0)) * strides[:, None]
+    return torch.cat([centres - half_sizes, centres + half_sizes], dim=-1)
