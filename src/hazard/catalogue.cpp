@@ -1,0 +1,154 @@
+#include "hazard/catalogue.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <regex>
+#include <set>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxFileBytes = 1 << 20;
+
+/// Reads the scalars of one YAML map; its errors name source, place and key.
+class EntryReader {
+ public:
+  EntryReader(const YAML::Node& node, std::string place) : node_(node), place_(std::move(place)) {
+    if (!node_.IsMap()) throw Error(place_ + " must be a map of properties");
+  }
+
+  void ReadText(const char* key, const char* pattern, std::string& value) {
+    const std::string* text = Scalar(key);
+    if (text == nullptr) return;
+    if (!std::regex_match(*text, std::regex(pattern))) Refuse(key, *text, pattern);
+    value = *text;
+  }
+
+  void ReadNumber(const char* key, double min, double max, double& value) {
+    const std::string* text = Scalar(key);
+    if (text == nullptr) return;
+    double number = std::nan("");
+    // Written so that NaN and text that is no number are refused too.
+    if (!YAML::convert<double>::decode(node_[key], number) || !(number >= min && number <= max)) {
+      Refuse(key, *text, "a number from " + Shortest(min) + " to " + Shortest(max));
+    }
+    value = number;
+  }
+
+  void RejectUnknown() const {
+    for (const auto& entry : node_) {
+      const auto key = entry.first.as<std::string>("");
+      if (known_.count(key) != 0) continue;
+      std::string accepted;
+      for (const std::string& name : known_) accepted += (accepted.empty() ? "" : ", ") + name;
+      throw Error(place_ + " has the unknown key '" + key + "', accepted are: " + accepted);
+    }
+  }
+
+ private:
+  static std::string Shortest(double number) {
+    std::string text = std::to_string(number);
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+    return text;
+  }
+
+  const std::string* Scalar(const char* key) {
+    known_.insert(key);
+    const YAML::Node value = node_[key];
+    if (!value.IsDefined()) return nullptr;
+    if (!value.IsScalar()) throw Error(place_ + ": '" + key + "' must be a single value");
+    return &value.Scalar();
+  }
+
+  [[noreturn]] void Refuse(const char* key, const std::string& value,
+                           const std::string& accepted) const {
+    throw Error(place_ + ": '" + key + "' is '" + value + "', accepted is " + accepted);
+  }
+
+  const YAML::Node node_;
+  const std::string place_;
+  std::set<std::string> known_;
+};
+
+void ReadProperties(const YAML::Node& node, const std::string& place, HazardClass& entry) {
+  EntryReader reader(node, place);
+  reader.ReadText("label", "[^<>&\"]{1,60}", entry.label);
+  reader.ReadText("icon", "[a-z0-9_]{1,40}", entry.icon);
+  reader.ReadText("colour", "#[0-9a-f]{6}", entry.colour);
+  reader.ReadNumber("duplicate_radius_m", 0.1, 1000.0, entry.duplicate_radius_m);
+  std::string urgency = std::to_string(entry.urgency);
+  reader.ReadText("urgency", "[123]", urgency);
+  entry.urgency = urgency[0] - '0';
+  reader.ReadNumber("expected_life_s", 60.0, 1e10, entry.expected_life_s);
+  reader.RejectUnknown();
+}
+
+}  // namespace
+
+HazardCatalogue HazardCatalogue::Load(const std::string& path) {
+  return Parse(ReadFile(path, kMaxFileBytes), path);
+}
+
+HazardCatalogue HazardCatalogue::Parse(const std::string& yaml, const std::string& source) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(yaml);
+  } catch (const YAML::Exception& error) {
+    throw Error("hazard catalogue '" + source + "' is no YAML: " + error.what());
+  }
+  if (!root.IsMap()) throw Error("hazard catalogue '" + source + "' must be a map");
+  for (const auto& entry : root) {
+    const auto key = entry.first.as<std::string>("");
+    if (key != "defaults" && key != "classes") {
+      throw Error("hazard catalogue '" + source + "' has the unknown key '" + key +
+                  "', accepted are: classes, defaults");
+    }
+  }
+  HazardCatalogue catalogue;
+  const std::string place = "hazard catalogue '" + source + "', ";
+  if (root["defaults"]) ReadProperties(root["defaults"], place + "defaults", catalogue.defaults_);
+  if (!root["classes"].IsDefined() || !root["classes"].IsMap()) {
+    throw Error(place + "classes must be a map of class names");
+  }
+  for (const auto& node : root["classes"]) {
+    const auto name = node.first.as<std::string>("");
+    if (!std::regex_match(name, std::regex("[a-z0-9_]{1,40}"))) {
+      throw Error(place + "class '" + name + "' must be 1 to 40 of a-z, 0-9 and _");
+    }
+    HazardClass entry = catalogue.Get(name);
+    ReadProperties(node.second, place + "class '" + name + "'", entry);
+    if (!catalogue.classes_.emplace(name, entry).second) {
+      throw Error(place + "class '" + name + "' stands there twice");
+    }
+  }
+  return catalogue;
+}
+
+HazardClass HazardCatalogue::Get(const std::string& class_name) const {
+  const auto found = classes_.find(class_name);
+  if (found != classes_.end()) return found->second;
+  HazardClass entry = defaults_;
+  entry.name = class_name;
+  entry.label = class_name;
+  return entry;
+}
+
+double HazardCatalogue::DuplicateRadiusM(const std::string& class_name) const {
+  const auto found = classes_.find(class_name);
+  return (found != classes_.end() ? found->second : defaults_).duplicate_radius_m;
+}
+
+double HazardCatalogue::MaxDuplicateRadiusM() const {
+  double radius_m = defaults_.duplicate_radius_m;
+  for (const auto& entry : classes_) {
+    radius_m = std::max(radius_m, entry.second.duplicate_radius_m);
+  }
+  return radius_m;
+}
+
+}  // namespace livemap
