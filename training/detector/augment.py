@@ -1,0 +1,249 @@
+"""From pictures to training samples: views, mosaics, pasted potholes, colour and blur.
+
+Everything random comes from one numpy generator that the caller seeds per sample, so a sample
+depends on (seed, epoch, index) alone: not on workers, not on an interrupted run.
+"""
+
+from dataclasses import dataclass
+from typing import Dict, List, Tuple
+
+import cv2
+import numpy as np
+
+from . import boxes as box_math
+from .data import POTHOLE, Picture
+
+PAD_VALUE = 114
+"""Grey level outside of pictures, as in inference."""
+
+MIN_VISIBLE_FRACTION = 0.4
+"""A label of which a view shows less is ignored: neither pothole nor background."""
+
+MIN_SIZE_PX = (6.0, 3.0)
+"""A label that a view shows smaller (width, height) is ignored."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How strongly to change pictures. Probabilities are per sample."""
+
+    mosaic: float = 0.5
+    paste: float = 0.5
+    mirror: float = 0.5
+    scale_spread: float = 1.6  # a group's scale is multiplied by up to this or divided by it
+    aspect_spread: float = 1.12
+    focus: float = 0.75  # a view is placed around a label rather than anywhere
+    blur: float = 0.12
+    noise: float = 0.12
+    grey: float = 0.05
+    hue: float = 6.0  # degrees of cv2's 180
+    saturation: float = 0.5
+    brightness: float = 0.35
+
+
+SETTLING = Recipe(
+    mosaic=0.0, paste=0.25, mirror=0.0, scale_spread=1.12, aspect_spread=1.03, focus=0.0, blur=0.05, noise=0.05,
+    grey=0.0, hue=3.0, saturation=0.25, brightness=0.2,
+)
+"""The last epochs: nearly what the network will see in a vehicle."""
+
+GROUP_SHARES = {"survey_potholes": 0.60, "survey_empty": 0.22, "closeups": 0.06, "cones": 0.12}
+"""How often each group of pictures is drawn; survey frames rule because they are what is measured."""
+
+GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8}
+"""Typical scale of a group's pictures in a view: close-ups shrink to the size of potholes seen from a car."""
+
+
+@dataclass
+class Sample:
+    """A finished training sample."""
+
+    image: np.ndarray  # H x W x 3 uint8, RGB
+    boxes: np.ndarray  # G x 4 corners
+    classes: np.ndarray  # G
+    ignored: np.ndarray  # K x 4 corners
+    labelled: np.ndarray  # C, 1 where background of the class is known everywhere
+
+
+def ratio(rng: np.random.Generator, spread: float) -> float:
+    """A random factor between 1 / spread and spread, uniform in its logarithm."""
+    return float(np.exp(rng.uniform(-1, 1) * np.log(spread)))
+
+
+class Augmenter:
+    """Draws samples of one size from groups of pictures."""
+
+    def __init__(self, groups: Dict[str, List[Picture]], class_count: int, recipe: Recipe, width: int, height: int):
+        self.groups, self.class_count, self.recipe = groups, class_count, recipe
+        self.width, self.height = width, height
+        self.names = [name for name in GROUP_SHARES if groups.get(name)]
+        shares = np.array([GROUP_SHARES[name] for name in self.names])
+        self.shares = shares / shares.sum()
+
+    def draw(self, rng: np.random.Generator) -> Sample:
+        """One sample: a view or a mosaic of views, then colour, noise and blur."""
+        if rng.random() < self.recipe.mosaic:
+            sample = self.mosaic(rng)
+        else:
+            sample = self.view(rng, self.width, self.height)
+        sample.image = self.recolour(rng, sample.image)
+        return sample
+
+    def mosaic(self, rng: np.random.Generator) -> Sample:
+        """Four views around a random corner (YOLOv4). A class is background only in tiles that label it."""
+        corner_x = int(self.width * rng.uniform(0.3, 0.7))
+        corner_y = int(self.height * rng.uniform(0.3, 0.7))
+        tiles = [
+            (x, y, width, height)
+            for y, height in ((0, corner_y), (corner_y, self.height - corner_y))
+            for x, width in ((0, corner_x), (corner_x, self.width - corner_x))
+        ]
+        canvas = np.empty((self.height, self.width, 3), np.uint8)
+        # Tiles of one mosaic share the labelled class, as the loss masks classes per image.
+        name = self.names[rng.choice(len(self.names), p=self.shares)]
+        names = ["cones"] if name == "cones" else [n for n in self.names if n != "cones"]
+        views = []
+        for x, y, width, height in tiles:
+            view = self.view(rng, width, height, names)
+            canvas[y : y + height, x : x + width] = view.image
+            offset = np.array([x, y, x, y], np.float32)
+            view.boxes, view.ignored = view.boxes + offset, view.ignored + offset
+            views.append(view)
+        return Sample(
+            canvas,
+            np.concatenate([view.boxes for view in views]),
+            np.concatenate([view.classes for view in views]),
+            np.concatenate([view.ignored for view in views]),
+            views[0].labelled,
+        )
+
+    def view(self, rng: np.random.Generator, width: int, height: int, names: List[str] = ()) -> Sample:
+        """A scaled, shifted, perhaps mirrored window of one random picture."""
+        names = list(names) or self.names
+        shares = np.array([GROUP_SHARES[name] for name in names])
+        name = names[rng.choice(len(names), p=shares / shares.sum())]
+        picture = self.groups[name][rng.integers(len(self.groups[name]))]
+        if name.startswith("survey") and rng.random() < self.recipe.paste:
+            picture = self.paste_potholes(rng, picture)
+        scale_y = GROUP_SCALES[name] * ratio(rng, self.recipe.scale_spread)
+        scale_x = scale_y * ratio(rng, self.recipe.aspect_spread)
+        left, top = self.place_window(rng, picture, width / scale_x, height / scale_y)
+        transform = np.array([[scale_x, 0, -left * scale_x], [0, scale_y, -top * scale_y]])
+        if rng.random() < self.recipe.mirror:
+            transform[0] = [-scale_x, 0, width + left * scale_x]
+        return self.render(picture, transform, width, height)
+
+    def place_window(
+        self, rng: np.random.Generator, picture: Picture, width: float, height: float
+    ) -> Tuple[float, float]:
+        """Left and top of a window, in pixels of the picture: around a label, or anywhere inside."""
+        image_height, image_width = picture.image.shape[:2]
+        spare = np.array([image_width - width, image_height - height])
+        origin = rng.uniform(0, 1, 2) * spare
+        if len(picture.boxes) and rng.random() < self.recipe.focus:
+            box = picture.boxes[rng.integers(len(picture.boxes))]
+            centre = (box[:2] + box[2:]) / 2
+            origin = centre - rng.uniform(0.15, 0.85, 2) * [width, height]
+            margin = 0.1 * np.array([width, height])
+            origin = np.clip(origin, np.minimum(-margin, spare), np.maximum(spare + margin, 0))
+        return float(origin[0]), float(origin[1])
+
+    def render(self, picture: Picture, transform: np.ndarray, width: int, height: int) -> Sample:
+        """Warp a picture and its labels by a 2 x 3 transform without rotation."""
+        image, shrink = picture.image, abs(transform[0, 0])
+        warp = transform.copy()
+        if shrink < 0.6:  # linear interpolation would skip pixels
+            factor = max(shrink, 0.1)
+            image = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+            warp[:, :2] /= [[image.shape[1] / picture.image.shape[1], image.shape[0] / picture.image.shape[0]]]
+        image = cv2.warpAffine(
+            image, warp, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(PAD_VALUE,) * 3,
+        )
+        xs = picture.boxes[:, 0::2] * transform[0, 0] + transform[0, 2]
+        ys = picture.boxes[:, 1::2] * transform[1, 1] + transform[1, 2]
+        moved = np.stack([xs.min(1), ys.min(1), xs.max(1), ys.max(1)], axis=1) if len(xs) else picture.boxes
+        clipped = box_math.clip_to_image(moved, width, height)
+        sizes = clipped[:, 2:] - clipped[:, :2]
+        clear = (box_math.areas(clipped) > MIN_VISIBLE_FRACTION * box_math.areas(moved)) & (sizes > MIN_SIZE_PX).all(1)
+        labelled = np.zeros(self.class_count, np.float32)
+        labelled[picture.labelled_class] = 1
+        return Sample(
+            image,
+            clipped[clear].astype(np.float32),
+            np.full(int(clear.sum()), picture.labelled_class, np.int64),
+            clipped[~clear & (sizes > 0).all(1)].astype(np.float32),
+            labelled,
+        )
+
+    def paste_potholes(self, rng: np.random.Generator, picture: Picture) -> Picture:
+        """Up to three potholes of other survey frames, blended in at about the image row they came from."""
+        image, boxes = picture.image.copy(), picture.boxes
+        donors = self.groups["survey_potholes"]
+        for _ in range(rng.integers(1, 4)):
+            donor = donors[rng.integers(len(donors))]
+            box = donor.boxes[rng.integers(len(donor.boxes))]
+            pasted = blend_patch(rng, image, donor.image, box, boxes)
+            if pasted is not None:
+                boxes = np.vstack([boxes, pasted]).astype(np.float32)
+        return Picture(image, boxes, POTHOLE, picture.name)
+
+    def recolour(self, rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
+        """Hue, saturation, brightness and gamma; sometimes grey, blurred or noisy."""
+        recipe = self.recipe
+        levels = np.arange(256, dtype=np.float32)
+        gain = 1 + recipe.brightness * rng.uniform(-1, 1)
+        gamma = ratio(rng, 1 + recipe.brightness)
+        value_table = (255 * (levels / 255) ** gamma * gain).clip(0, 255).astype(np.uint8)
+        saturation_table = (levels * (1 + recipe.saturation * rng.uniform(-1, 1))).clip(0, 255).astype(np.uint8)
+        hue_table = ((levels + recipe.hue * rng.uniform(-1, 1)) % 180).astype(np.uint8)
+        hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_RGB2HSV))
+        if rng.random() < recipe.grey:
+            saturation[:] = 0
+        image = cv2.cvtColor(
+            cv2.merge([cv2.LUT(hue, hue_table), cv2.LUT(saturation, saturation_table), cv2.LUT(value, value_table)]),
+            cv2.COLOR_HSV2RGB,
+        )
+        if rng.random() < recipe.blur:
+            image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.5, 1.3))
+        if rng.random() < recipe.noise:
+            noise = rng.normal(0, rng.uniform(2, 8), image.shape[:2] + (1,)).astype(np.float32)
+            image = (image + noise).clip(0, 255).astype(np.uint8)
+        return image
+
+
+def blend_patch(
+    rng: np.random.Generator, image: np.ndarray, donor: np.ndarray, box: np.ndarray, taken: np.ndarray
+) -> np.ndarray:
+    """Carry the patch around `box` of `donor` into `image` (changed in place).
+
+    What is carried is the patch's brightness relative to its rim, faded out towards the rim: the new
+    surroundings keep their own colour. Returns the new box (1 x 4), or None where there is no free place.
+    """
+    size = box[2:] - box[:2]
+    if size.min() < 6 or size.max() > 160:
+        return None
+    margin = np.maximum(4, 0.25 * size)
+    height, width = image.shape[:2]
+    x1, y1 = np.floor(box[:2] - margin).astype(int)
+    x2, y2 = np.ceil(box[2:] + margin).astype(int)
+    if x1 < 0 or y1 < 0 or x2 > donor.shape[1] or y2 > donor.shape[0]:
+        return None
+    patch = donor[y1:y2, x1:x2].astype(np.float32) + 1
+    local_box = box - [x1, y1, x1, y1]
+    if rng.random() < 0.5:
+        patch = patch[:, ::-1]
+        local_box[[0, 2]] = patch.shape[1] - local_box[[2, 0]]
+    x = int(rng.uniform(0.25, 0.85) * width - patch.shape[1] / 2)
+    y = int(np.clip(y1 + rng.uniform(-30, 30), 0, height - patch.shape[0]))
+    new_box = (local_box + [x, y, x, y])[None]
+    if x < 0 or x + patch.shape[1] > width or (len(taken) and box_math.pairwise_iou(new_box, taken).max() > 0):
+        return None
+    rim = np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]]).mean(axis=0)
+    mask = np.zeros(patch.shape[:2], np.float32)
+    left, top, right, bottom = np.round(local_box).astype(int)
+    mask[top:bottom, left:right] = 1
+    mask = cv2.GaussianBlur(mask, (0, 0), float(margin.min()) / 2.5)[..., None]
+    place = image[y : y + patch.shape[0], x : x + patch.shape[1]]
+    place[:] = (place * (1 + mask * (patch / rim - 1))).clip(0, 255).astype(np.uint8)
+    return new_box

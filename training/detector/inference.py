@@ -1,0 +1,73 @@
+"""From a picture to detections, as the vehicle does it: letterbox, network, decode, suppression."""
+
+from dataclasses import dataclass
+from typing import List, Tuple
+
+import cv2
+import numpy as np
+
+from .boxes import clip_to_image, non_maximum_suppression
+from .network import STRIDES
+
+MEAN, STD = 114.0, 58.0
+"""Normalisation of all channels: (pixel - MEAN) / STD, pixel 0..255."""
+
+PAD_VALUE = 114
+LOWEST_SCORE = 0.05
+NMS_IOU = 0.5
+INPUT_WIDTH, INPUT_HEIGHT = 640, 400
+
+
+def letterbox(image: np.ndarray, width: int, height: int) -> Tuple[np.ndarray, float]:
+    """Scale an H x W x 3 picture to fit, pad right and bottom; returns the picture and the scale."""
+    scale = min(width / image.shape[1], height / image.shape[0])
+    fitted = (round(image.shape[1] * scale), round(image.shape[0] * scale))
+    if fitted != (image.shape[1], image.shape[0]):
+        image = cv2.resize(image, fitted, interpolation=cv2.INTER_LINEAR)
+    right, bottom = width - fitted[0], height - fitted[1]
+    if right or bottom:
+        image = cv2.copyMakeBorder(image, 0, bottom, 0, right, cv2.BORDER_CONSTANT, value=(PAD_VALUE,) * 3)
+    return image, scale
+
+
+def normalise(image: np.ndarray) -> np.ndarray:
+    """H x W x 3 uint8 to 3 x H x W float32."""
+    return np.ascontiguousarray(((image.astype(np.float32) - MEAN) / STD).transpose(2, 0, 1))
+
+
+@dataclass(frozen=True)
+class AnchorGrid:
+    """Where the rows of the network's output lie in the picture."""
+
+    cells: np.ndarray  # N x 2: grid_x, grid_y
+    strides: np.ndarray  # N x 1
+
+    @staticmethod
+    def of(width: int, height: int, level_strides: Tuple[int, ...] = STRIDES) -> "AnchorGrid":
+        """All anchor points: levels in the order of the strides, rows first."""
+        cells, strides = [], []
+        for stride in level_strides:
+            rows, columns = np.mgrid[: height // stride, : width // stride]
+            cells.append(np.stack([columns.ravel(), rows.ravel()], axis=1))
+            strides.append(np.full((rows.size, 1), stride))
+        return AnchorGrid(np.concatenate(cells).astype(np.float32), np.concatenate(strides).astype(np.float32))
+
+
+def decode(
+    raw_boxes: np.ndarray, scores: np.ndarray, grid: AnchorGrid, scale: float, image_size: Tuple[int, int],
+    nms_iou: float = NMS_IOU,
+) -> List[np.ndarray]:
+    """Raw boxes (N x 4: tx, ty, tw, th) and scores (N x C) to M x 5 detections per class.
+
+    `scale` is the letterbox's; `image_size` is (width, height) of the picture, to which boxes are cut.
+    """
+    detections = []
+    for class_scores in scores.T:
+        rows = np.flatnonzero(class_scores >= LOWEST_SCORE)
+        raw, cells, strides = raw_boxes[rows], grid.cells[rows], grid.strides[rows]
+        centres = (raw[:, :2] + cells) * strides
+        half_sizes = 0.5 * np.exp(np.minimum(raw[:, 2:4], 8)) * strides
+        boxes = clip_to_image(np.hstack([centres - half_sizes, centres + half_sizes]) / scale, *image_size)
+        kept = non_maximum_suppression(boxes, class_scores[rows], nms_iou)
+        detections.append(np.hstack([boxes[kept], class_scores[rows][kept, None]]))
+    return detections

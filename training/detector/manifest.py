@@ -1,0 +1,70 @@
+"""Model manifests: what a weights file is, how to feed it and how to read it. See models/README.md."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Dict, Tuple
+
+import yaml
+
+from . import CLASSES, inference
+from .network import STRIDES
+
+
+class ManifestError(Exception):
+    """A manifest or its weights are not usable; the text is one sentence for the user."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The checked fields that running the model needs."""
+
+    weights: Path
+    classes: Tuple[str, ...]
+    width: int
+    height: int
+    thresholds: Dict[str, float]
+
+
+def sha256_of(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def write_manifest(path: Path, weights: Path, thresholds: Dict[str, float]) -> None:
+    """Describe `weights`, which lies beside the manifest."""
+    content = {
+        "name": path.stem,
+        "file": weights.name,
+        "sha256": sha256_of(weights),
+        "classes": list(CLASSES),
+        "input": {
+            "width": inference.INPUT_WIDTH, "height": inference.INPUT_HEIGHT, "channels": "rgb",
+            "resize": "letterbox", "pad_value": inference.PAD_VALUE,
+        },
+        "normalisation": {"mean": [inference.MEAN] * 3, "std": [inference.STD] * 3},
+        "head": {"type": "yolox", "strides": list(STRIDES), "output": "predictions"},
+        "thresholds": thresholds,
+        "nms_iou": inference.NMS_IOU,
+    }
+    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None))
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read a manifest and check its weights against it."""
+    try:
+        content = yaml.safe_load(path.read_text())
+        manifest = Manifest(
+            path.parent / content["file"], tuple(content["classes"]), int(content["input"]["width"]),
+            int(content["input"]["height"]), {name: float(value) for name, value in content["thresholds"].items()},
+        )
+        digest = content["sha256"]
+    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ManifestError(f"Cannot read the manifest {path}: {error!r}.") from error
+    if manifest.classes != CLASSES:
+        raise ManifestError(f"{path}: classes are {manifest.classes}, this program evaluates {CLASSES}.")
+    if not manifest.weights.is_file():
+        raise ManifestError(f"{path}: the weights {manifest.weights} do not exist.")
+    if sha256_of(manifest.weights) != digest:
+        raise ManifestError(f"{path}: the SHA-256 of {manifest.weights} is not the manifest's {digest}.")
+    return manifest

@@ -1,0 +1,150 @@
+"""Detection figures: average precision, event recall and false reports along a drive.
+
+The same definitions as `livemap evaluate detection`. All boxes are N x 4 corners in pixels; detections
+are N x 5, corners and score.
+"""
+
+from dataclasses import dataclass
+from typing import Dict, List, Sequence
+
+import numpy as np
+
+from .boxes import pairwise_iou
+
+NEAR_M = 12.0
+"""Labelled frames at most this far apart belong to one event, false detections to one false report."""
+
+
+@dataclass
+class ScoredFrame:
+    """Labels and detections of one class in one frame."""
+
+    labels: np.ndarray  # N x 4
+    detections: np.ndarray  # M x 5
+    chainage_m: float = 0.0
+
+
+Drive = Sequence[ScoredFrame]
+"""Frames in the order of their chainage."""
+
+
+def average_precision(frames: Sequence[ScoredFrame], iou: float) -> float:
+    """Area under the precision envelope over all recalls (all-point interpolation).
+
+    Detections are matched greedily from the best score down; a label is matched once.
+    """
+    label_count = sum(len(frame.labels) for frame in frames)
+    scores, hits = [], []
+    for frame in frames:
+        free = np.ones(len(frame.labels), bool)
+        order = np.argsort(-frame.detections[:, 4], kind="stable")
+        overlaps = pairwise_iou(frame.detections[order, :4], frame.labels)
+        for score, overlap in zip(frame.detections[order, 4], overlaps):
+            overlap = np.where(free, overlap, -1.0)
+            best = int(overlap.argmax()) if len(overlap) else -1
+            hit = best >= 0 and overlap[best] >= iou
+            if hit:
+                free[best] = False
+            scores.append(score)
+            hits.append(hit)
+    if not label_count or not scores:
+        return 0.0
+    hits = np.array(hits)[np.argsort(-np.array(scores), kind="stable")]
+    true_positives = np.cumsum(hits)
+    precision = true_positives / np.arange(1, len(hits) + 1)
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(envelope[hits].sum() / label_count)
+
+
+def driven_km(drive: Drive) -> float:
+    """Road that the frames cover: gaps between neighbours, of which one over NEAR_M counts NEAR_M."""
+    return float(np.minimum(np.diff([frame.chainage_m for frame in drive]), NEAR_M).sum() / 1000)
+
+
+def events(drive: Drive) -> List[List[ScoredFrame]]:
+    """Maximal runs of labelled frames whose neighbours are at most NEAR_M apart."""
+    runs: List[List[ScoredFrame]] = []
+    for frame in drive:
+        if not len(frame.labels):
+            continue
+        if runs and frame.chainage_m - runs[-1][-1].chainage_m <= NEAR_M:
+            runs[-1].append(frame)
+        else:
+            runs.append([frame])
+    return runs
+
+
+def recall_score(event: List[ScoredFrame], iou: float) -> float:
+    """The best score that overlaps a label of the event: it is recalled at thresholds up to this."""
+    best = -1.0
+    for frame in event:
+        overlaps = pairwise_iou(frame.detections[:, :4], frame.labels)
+        matching = frame.detections[(overlaps >= iou).any(axis=1), 4]
+        best = max(best, matching.max(initial=-1.0))
+    return best
+
+
+def false_scores(frame: ScoredFrame, iou: float) -> np.ndarray:
+    """Scores of the detections that overlap no label."""
+    overlaps = pairwise_iou(frame.detections[:, :4], frame.labels)
+    return frame.detections[~(overlaps >= iou).any(axis=1), 4]
+
+
+def false_reports(drive: Drive, threshold: float, iou: float) -> int:
+    """Reports that false detections cause: one per NEAR_M of road, as the vehicle would merge them."""
+    count, last_began_m = 0, -np.inf
+    for frame in drive:
+        if (false_scores(frame, iou) >= threshold).any() and frame.chainage_m - last_began_m > NEAR_M:
+            count, last_began_m = count + 1, frame.chainage_m
+    return count
+
+
+@dataclass
+class DriveFigures:
+    """Figures of all drives together at one threshold."""
+
+    threshold: float
+    event_count: int
+    event_recall: float
+    event_recall_iou30: float
+    km: float
+    false_reports_per_km: float
+    false_detections_per_km: float
+
+
+def drive_figures(drives: Dict[str, Drive], threshold: float) -> DriveFigures:
+    """Event recall and false reports at a threshold. False means IoU below 0.5 with every label."""
+    km = max(sum(driven_km(drive) for drive in drives.values()), 1e-9)
+    runs = [run for drive in drives.values() for run in events(drive)]
+    recall = lambda iou: float(np.mean([recall_score(run, iou) >= threshold for run in runs])) if runs else 0.0
+    reports = sum(false_reports(drive, threshold, 0.5) for drive in drives.values())
+    detections = sum((false_scores(frame, 0.5) >= threshold).sum() for drive in drives.values() for frame in drive)
+    return DriveFigures(threshold, len(runs), recall(0.5), recall(0.3), km, reports / km, float(detections / km))
+
+
+def calibrate_threshold(drives: Dict[str, Drive], reports_per_km: float) -> float:
+    """The lowest threshold, in hundredths, from which on upwards false reports stay within the limit."""
+    threshold = 1.0
+    while threshold > 0.05:
+        lower = round(threshold - 0.01, 2)
+        if drive_figures(drives, lower).false_reports_per_km > reports_per_km:
+            break
+        threshold = lower
+    return threshold
+
+
+def best_f1_threshold(frames: Sequence[ScoredFrame], iou: float) -> float:
+    """The threshold, in hundredths, with the best harmonic mean of precision and recall."""
+    return max((round(0.01 * step, 2) for step in range(5, 100)), key=lambda limit: f1_score(frames, limit, iou))
+
+
+def f1_score(frames: Sequence[ScoredFrame], threshold: float, iou: float) -> float:
+    """Harmonic mean of precision and recall of the detections at a threshold."""
+    true_positives = detection_count = 0
+    for frame in frames:
+        detections = frame.detections[frame.detections[:, 4] >= threshold]
+        overlaps = pairwise_iou(detections[:, :4], frame.labels)
+        true_positives += min((overlaps >= iou).any(axis=1).sum(), (overlaps >= iou).any(axis=0).sum())
+        detection_count += len(detections)
+    label_count = sum(len(frame.labels) for frame in frames)
+    return 2 * true_positives / max(detection_count + label_count, 1)

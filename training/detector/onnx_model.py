@@ -1,0 +1,92 @@
+"""The network as one ONNX graph that OpenCV 4.6 loads, and running it there."""
+
+import copy
+from pathlib import Path
+from typing import Tuple
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from .network import ConvBlock, Detector
+from .validation import Runner
+
+CERTAIN = 30.0
+"""A logit whose sigmoid is exactly 1 in float32: the objectness of every anchor point."""
+
+
+class ExportableDetector(nn.Module):
+    """1 x 3 x H x W to 1 x N x (5 + C) in YOLOX's layout: tx, ty, tw, th, objectness, class scores.
+
+    The detector has no objectness of its own. Decoders multiply it with the class score, so it is
+    exported as 1: a channel with zero weights and a large bias, which needs no constant in the graph.
+    """
+
+    def __init__(self, detector: Detector):
+        super().__init__()
+        detector = copy.deepcopy(detector).cpu().eval()
+        fuse_batch_norms(detector)
+        self.detector = detector
+        for head in detector.heads:
+            head.score[-1] = with_certain_objectness(head.score[-1])
+
+    def forward(self, images: Tensor) -> Tensor:
+        levels = self.detector.pyramid(self.detector.backbone(images))
+        outputs = []
+        for head, level in zip(self.detector.heads, levels):
+            rows = torch.cat([head.box(level), head.score(level).sigmoid()], dim=1)
+            outputs.append(rows.reshape(1, rows.shape[1], int(rows.shape[2]) * int(rows.shape[3])))
+        return torch.cat(outputs, dim=2).permute(0, 2, 1)
+
+
+def fuse_batch_norms(module: nn.Module) -> None:
+    """Fold every ConvBlock's batch normalisation into its convolution, in place."""
+    for child in module.modules():
+        if isinstance(child, ConvBlock):
+            child[0], child[1] = fuse_conv_bn_eval(child[0], child[1]), nn.Identity()
+
+
+def with_certain_objectness(scores: nn.Conv2d) -> nn.Conv2d:
+    """A 1x1 convolution with one more output in front that is always CERTAIN."""
+    extended = nn.Conv2d(scores.in_channels, scores.out_channels + 1, 1)
+    with torch.no_grad():
+        extended.weight.copy_(torch.cat([torch.zeros_like(scores.weight[:1]), scores.weight]))
+        extended.bias.copy_(torch.cat([torch.full_like(scores.bias[:1], CERTAIN), scores.bias]))
+    return extended
+
+
+def export(detector: Detector, path: Path, width: int, height: int) -> ExportableDetector:
+    """Write the graph; returns the module that it was traced from."""
+    exportable = ExportableDetector(detector)
+    torch.onnx.export(
+        exportable, torch.zeros(1, 3, height, width), str(path), opset_version=11,
+        input_names=["images"], output_names=["predictions"],
+    )
+    return exportable
+
+
+def opencv_outputs(path: Path, images: np.ndarray) -> np.ndarray:
+    """Predictions (1 x N x (5 + C)) of OpenCV for a 1 x 3 x H x W float32 input."""
+    network = cv2.dnn.readNetFromONNX(str(path))
+    network.setInput(images)
+    return network.forward("predictions")
+
+
+def opencv_runner(path: Path) -> Runner:
+    """A runner as validation uses it, on OpenCV's own backend."""
+    network = cv2.dnn.readNetFromONNX(str(path))
+
+    def run(image: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        network.setInput(image[None])
+        predictions = network.forward("predictions")[0]
+        return predictions[:, :4], predictions[:, 4:5] * predictions[:, 5:]
+
+    return run
+
+
+def golden_image(width: int, height: int) -> np.ndarray:
+    """H x W x 3 uint8: (x (c + 1) + 2 y + x y / 64) mod 256, integer division, c = 0 for red."""
+    y, x, channel = np.mgrid[:height, :width, :3]
+    return ((x * (channel + 1) + 2 * y + x * y // 64) % 256).astype(np.uint8)

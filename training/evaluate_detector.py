@@ -1,0 +1,80 @@
+#!/usr/bin/python3
+"""Measure a model on the validation parts of the data, run by OpenCV as in a vehicle.
+
+    training/evaluate_detector.py --manifest models/hazards-first.yaml --data ../shared/data
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import List, Optional
+
+import cv2
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from detector import data
+from detector.manifest import Manifest, ManifestError, read_manifest
+from detector.metrics import drive_figures, f1_score
+from detector.onnx_model import opencv_runner
+from detector.validation import Runner, Validation, validate
+
+
+def milliseconds_per_frame(run: Runner, manifest: Manifest, repeats: int = 30) -> float:
+    """Median time of the network alone."""
+    image = np.zeros((3, manifest.height, manifest.width), np.float32)
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        run(image)
+        times.append(time.perf_counter() - began)
+    return 1000 * float(np.median(times))
+
+
+def print_figures(found: Validation, manifest: Manifest) -> None:
+    """All figures, one per line."""
+    frames = [frame for drive in found.potholes.values() for frame in drive]
+    pothole_limit, cone_limit = manifest.thresholds["pothole"], manifest.thresholds["traffic_cone"]
+    figures = drive_figures(found.potholes, pothole_limit)
+    print(f"pothole_frames: {len(frames)}")
+    print(f"pothole_labels: {sum(len(frame.labels) for frame in frames)}")
+    print(f"pothole_ap50: {found.pothole_ap(0.5):.3f}")
+    print(f"pothole_ap30: {found.pothole_ap(0.3):.3f}")
+    print(f"pothole_threshold: {pothole_limit}")
+    print(f"events: {figures.event_count}")
+    print(f"event_recall_iou50: {figures.event_recall:.3f}")
+    print(f"event_recall_iou30: {figures.event_recall_iou30:.3f}")
+    print(f"driven_km: {figures.km:.3f}")
+    print(f"false_reports_per_km: {figures.false_reports_per_km:.2f}")
+    print(f"false_detections_per_km: {figures.false_detections_per_km:.2f}")
+    print(f"cone_photos: {len(found.cones)}")
+    print(f"cone_ap50: {found.cone_ap(0.5):.3f}")
+    print(f"cone_threshold: {cone_limit}")
+    print(f"cone_f1: {f1_score(found.cones, cone_limit, 0.5):.3f}")
+    on_drives = drive_figures(found.cones_on_drives, cone_limit).false_reports_per_km
+    print(f"cone_reports_per_km_on_survey_drives: {on_drives:.2f}")
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Exit status: 0 measured, 2 the command line, the model or the data is wrong."""
+    parser = argparse.ArgumentParser(description="Measure a model on the validation parts of the data.")
+    parser.add_argument("--manifest", type=Path, default=Path("models/hazards-first.yaml"))
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV")
+    options = parser.parse_args(arguments)
+    cv2.setNumThreads(options.threads)
+    try:
+        manifest = read_manifest(options.manifest)
+        drives, cones = data.read_validation_drives(options.data), data.read_validation_cones(options.data)
+        run = opencv_runner(manifest.weights)
+        print_figures(validate(run, drives, cones, manifest.width, manifest.height), manifest)
+        print(f"milliseconds_per_frame: {milliseconds_per_frame(run, manifest):.0f}")
+    except (ManifestError, data.DataError) as error:
+        print(f"evaluate_detector: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,110 @@
+#!/usr/bin/python3
+"""Export a checkpoint as ONNX with its manifest and golden outputs.
+
+    training/export_detector.py --checkpoint build/training/hazards/last.pt --name hazards-first --data ../shared/data
+
+The averaged weights are exported. Thresholds are calibrated on the validation parts of the data, with
+the exported file run by OpenCV: the pothole's by the limit on false reports, the cone's by the best F1.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import List, Optional
+
+import numpy as np
+import torch
+import yaml
+
+sys.path.insert(0, str(Path(__file__).parent))
+from detector import CLASSES, data, inference, onnx_model
+from detector.manifest import write_manifest
+from detector.metrics import best_f1_threshold
+from detector.network import Detector
+from detector.validation import validate
+
+TOLERANCE = 1e-3
+"""Largest difference between OpenCV and torch, in raw units, that an export may have."""
+
+GOLDEN_ROWS = 24
+
+
+class ExportError(Exception):
+    """Nothing usable was exported; the text is one sentence for the user."""
+
+
+def load_averaged(checkpoint: Path) -> Detector:
+    """The averaged weights of a checkpoint."""
+    try:
+        state = torch.load(checkpoint, map_location="cpu")
+        detector = Detector(len(CLASSES))
+        detector.load_state_dict(state["average"])
+    except (OSError, KeyError, RuntimeError) as error:
+        raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
+    return detector.eval()
+
+
+def check_against_torch(weights: Path, exportable: torch.nn.Module) -> None:
+    """Compare OpenCV with torch on random input."""
+    shape = (1, 3, inference.INPUT_HEIGHT, inference.INPUT_WIDTH)
+    images = np.random.default_rng(1).normal(size=shape).astype(np.float32)
+    with torch.no_grad():
+        expected = exportable(torch.from_numpy(images)).numpy()
+    difference = float(np.abs(onnx_model.opencv_outputs(weights, images) - expected).max())
+    if not difference <= TOLERANCE:
+        raise ExportError(f"OpenCV's output of {weights} differs from torch's by {difference:.2g} > {TOLERANCE}.")
+    print(f"OpenCV and torch differ by at most {difference:.2g}")
+
+
+def write_golden(path: Path, weights: Path) -> None:
+    """Expected output rows for the golden image, at equal steps over all anchor points."""
+    image = inference.normalise(onnx_model.golden_image(inference.INPUT_WIDTH, inference.INPUT_HEIGHT))
+    predictions = onnx_model.opencv_outputs(weights, image[None])[0]
+    rows = np.linspace(0, len(predictions) - 1, GOLDEN_ROWS).astype(int)
+    content = {
+        "image": "pixel(x, y, c) = (x * (c + 1) + 2 * y + x * y / 64) mod 256, integer division, c = 0 red",
+        "width": inference.INPUT_WIDTH, "height": inference.INPUT_HEIGHT, "tolerance": TOLERANCE,
+        "anchor_points": len(predictions),
+        "rows": [
+            {"index": int(row), "values": [round(float(value), 6) for value in predictions[row]]} for row in rows
+        ],
+    }
+    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120))
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Export, check, calibrate, describe."""
+    if not arguments.out.is_dir():
+        raise ExportError(f"The folder {arguments.out} does not exist.")
+    detector = load_averaged(arguments.checkpoint)
+    drives = data.read_validation_drives(arguments.data)
+    cones = data.read_validation_cones(arguments.data)
+
+    weights = arguments.out / f"{arguments.name}.onnx"
+    exportable = onnx_model.export(detector, weights, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+    check_against_torch(weights, exportable)
+    write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights)
+
+    found = validate(onnx_model.opencv_runner(weights), drives, cones)
+    thresholds = {"pothole": found.best_drive_figures().threshold, "traffic_cone": best_f1_threshold(found.cones, 0.5)}
+    write_manifest(arguments.out / f"{arguments.name}.yaml", weights, thresholds)
+    print(f"wrote {weights} and its manifest, thresholds {thresholds}")
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Exit status: 0 exported, 2 the command line, the checkpoint or the data is wrong."""
+    parser = argparse.ArgumentParser(description="Export a checkpoint as ONNX with its manifest.")
+    parser.add_argument("--checkpoint", type=Path, default=Path("build/training/hazards/last.pt"))
+    parser.add_argument("--name", default="hazards-first", help="name of the model")
+    parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    try:
+        run(parser.parse_args(arguments))
+    except (ExportError, data.DataError) as error:
+        print(f"export_detector: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,185 @@
+#!/usr/bin/python3
+"""Train the hazard detector.
+
+    training/train_detector.py --data ../shared/data --out build/training/hazards --seed 1 --epochs 120
+
+A run that was stopped, at whatever moment, continues with the same command and --resume.
+"""
+
+import argparse
+import sys
+import time
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import List, Optional
+
+import cv2
+import torch
+
+sys.path.insert(0, str(Path(__file__).parent))
+from detector import CLASSES, data, inference
+from detector.augment import SETTLING, Augmenter, Recipe
+from detector.loss import TaskAlignedLoss
+from detector.network import Detector
+from detector.training import (
+    AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
+)
+from detector.validation import torch_runner, validate
+
+
+class UsageError(Exception):
+    """The command line or a file it names is wrong; the text is one sentence for the user."""
+
+
+class Trainer:
+    """One training run: state, one epoch, and its checkpoints."""
+
+    def __init__(self, settings: Settings, device: torch.device):
+        torch.manual_seed(settings.seed)
+        self.settings, self.device = settings, device
+        self.model = Detector(len(CLASSES)).to(device, memory_format=torch.channels_last)
+        self.average = AveragedModel(self.model)
+        self.optimizer = make_optimizer(self.model, settings)
+        self.epoch = 0
+        self.best_ap = 0.0
+
+    def state(self) -> dict:
+        """Everything that the next epoch depends on."""
+        return {
+            "settings": asdict(self.settings), "epoch": self.epoch, "best_ap": self.best_ap,
+            "model": self.model.state_dict(), "average": self.average.model.state_dict(),
+            "updates": self.average.updates, "optimizer": self.optimizer.state_dict(),
+        }
+
+    def restore(self, state: dict) -> None:
+        """Continue from `state`, which must come from a run with the same settings."""
+        for name, value in asdict(self.settings).items():
+            if state["settings"].get(name) != value:
+                raise UsageError(
+                    f"The checkpoint was written with {name} {state['settings'].get(name)}, not {value}; "
+                    "resume with the same settings or choose another --out."
+                )
+        self.model.load_state_dict(state["model"])
+        self.average.model.load_state_dict(state["average"])
+        self.average.updates = state["updates"]
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.epoch, self.best_ap = state["epoch"], state["best_ap"]
+
+    def train_epoch(self, pictures: dict, workers: int) -> dict:
+        """One pass over freshly drawn samples; returns mean losses."""
+        settings = self.settings
+        settling = self.epoch >= settings.settling_from()
+        # Whole frames have twice the pixels of a training view: half the batch keeps steps equally dear.
+        width, height = (inference.INPUT_WIDTH, inference.INPUT_HEIGHT) if settling else (settings.width, settings.height)
+        batch, count = (settings.batch // 2, settings.samples_per_epoch // 2) if settling else (settings.batch, settings.samples_per_epoch)
+        augmenter = Augmenter(pictures, len(CLASSES), SETTLING if settling else Recipe(), width, height)
+        loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
+        loss_of = TaskAlignedLoss(height, width, self.device)
+        sums = torch.zeros(2)
+        self.model.train()
+        for step, (images, targets) in enumerate(loader):
+            progress = (self.epoch + step / len(loader)) / settings.epochs
+            for group in self.optimizer.param_groups:
+                group["lr"] = settings.learning_rate * learning_rate_factor(progress)
+            images, targets = to_device(images, targets, self.device)
+            with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=settings.precision == "bf16"):
+                raw = self.model(images)
+            losses = torch.stack(loss_of(raw, targets))
+            self.optimizer.zero_grad(set_to_none=True)
+            losses.sum().backward()
+            torch.nn.utils.clip_grad_norm_(self.model.parameters(), 10.0)
+            self.optimizer.step()
+            self.average.update(self.model)
+            sums += losses.detach().cpu()
+        self.epoch += 1
+        box_loss, score_loss = (sums / len(loader)).tolist()
+        return {"box_loss": box_loss, "score_loss": score_loss}
+
+    def validate(self, drives: dict, cones: list) -> dict:
+        """Figures of the averaged weights on the validation parts."""
+        result = validate(torch_runner(self.average.model, self.device, self.settings.precision), drives, cones)
+        figures = result.best_drive_figures()
+        return {
+            "AP50": result.pothole_ap(0.5), "AP30": result.pothole_ap(0.3), "cone_AP50": result.cone_ap(0.5),
+            "threshold": figures.threshold, "event_recall": figures.event_recall,
+            "event_recall_iou30": figures.event_recall_iou30, "false_per_km": figures.false_reports_per_km,
+        }
+
+
+def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
+    """The command line; argparse itself exits with 2 on a wrong flag."""
+    defaults = {field.name: field.default for field in fields(Settings)}
+    parser = argparse.ArgumentParser(description="Train the hazard detector.")
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
+    parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
+    parser.add_argument("--workers", type=int, default=1, help="processes that prepare samples")
+    parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
+    parser.add_argument("--validate-every", type=int, default=10, metavar="EPOCHS")
+    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    for name in ("seed", "epochs", "samples_per_epoch", "batch"):
+        parser.add_argument("--" + name.replace("_", "-"), type=int, default=defaults[name])
+    parser.add_argument("--learning-rate", type=float, default=defaults["learning_rate"])
+    parser.add_argument("--precision", choices=("bf16", "fp32"), default=defaults["precision"])
+    return parser.parse_args(arguments)
+
+
+def settings_from(arguments: argparse.Namespace) -> Settings:
+    """Settings of the command line, checked."""
+    for name in ("epochs", "samples_per_epoch", "validate_every", "threads"):
+        if getattr(arguments, name) < 1:
+            raise UsageError(f"--{name.replace('_', '-')} must be at least 1, not {getattr(arguments, name)}.")
+    if arguments.batch < 2 or arguments.samples_per_epoch < arguments.batch:
+        raise UsageError(f"--batch must be from 2 to --samples-per-epoch, not {arguments.batch}.")
+    if arguments.seed < 0 or arguments.workers < 0 or not arguments.learning_rate > 0:
+        raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
+    known = {field.name for field in fields(Settings)}
+    return Settings(**{name: value for name, value in vars(arguments).items() if name in known})
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train from the checkpoint, or from the start, to the last epoch."""
+    settings = settings_from(arguments)
+    cuda = torch.cuda.is_available()
+    if arguments.device == "cuda" and not cuda:
+        raise UsageError("--device cuda: this torch sees no CUDA device.")
+    device = torch.device("cuda" if cuda and arguments.device != "cpu" else "cpu")
+    torch.set_num_threads(arguments.threads)
+    cv2.setNumThreads(0)
+
+    trainer = Trainer(settings, device)
+    last = arguments.out / "last.pt"
+    if last.exists():
+        if not arguments.resume:
+            raise UsageError(f"{last} exists; continue it with --resume or choose another --out.")
+        trainer.restore(torch.load(last, map_location=device))
+    pictures = data.read_training_pictures(arguments.data)
+    drives = data.read_validation_drives(arguments.data)
+    cones = data.read_validation_cones(arguments.data)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+
+    while trainer.epoch < settings.epochs:
+        began = time.monotonic()
+        report = trainer.train_epoch(pictures, arguments.workers)
+        if trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs:
+            report.update(trainer.validate(drives, cones))
+            if report["AP50"] > trainer.best_ap:
+                trainer.best_ap = report["AP50"]
+                save_atomically(trainer.state(), arguments.out / "best.pt")
+        save_atomically(trainer.state(), last)
+        line = " ".join(f"{name} {value:.3f}" for name, value in report.items())
+        print(f"epoch {trainer.epoch}/{settings.epochs} {line} {time.monotonic() - began:.0f} s", flush=True)
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Exit status: 0 trained, 2 the command line or the data is wrong."""
+    try:
+        run(parse_arguments(arguments))
+    except (UsageError, data.DataError) as error:
+        print(f"train_detector: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
