@@ -1,0 +1,46 @@
+"""A tiny data set in the layouts of the real ones, generated: grey road, dark ellipses, orange triangles."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+TRAINING_SECTION, VALIDATION_SECTION = "999TEST", "386RS169832"
+
+
+def write_picture(folder: Path, stem: str, seed: int, cone: bool = False, empty: bool = False) -> None:
+    """One 640x400 image with one object in the middle, and its label."""
+    rng = np.random.default_rng(seed)
+    image = rng.normal(120, 6, (400, 640, 3)).clip(0, 255).astype(np.uint8)
+    x, y, width, height = 320 + int(rng.integers(-60, 60)), 200, 60, 40
+    label = ""
+    if not empty:
+        if cone:
+            corners = np.array([[x, y - height // 2], [x - width // 2, y + height // 2], [x + width // 2, y + height // 2]])
+            cv2.fillPoly(image, [corners], (0, 100, 255))
+        else:
+            cv2.ellipse(image, (x, y), (width // 2, height // 2), 0, 0, 360, (40, 40, 40), -1)
+        label = f"0 {x / 640} {y / 400} {width / 640} {height / 400}\n"
+    image_path, label_path = folder / "images" / f"{stem}.jpg", folder / "labels" / f"{stem}.txt"
+    for path in (image_path, label_path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(image_path), image)
+    label_path.write_text(label)
+
+
+def write_data(root: Path) -> Path:
+    """A whole data folder; returns it."""
+    for number, section in enumerate((TRAINING_SECTION, VALIDATION_SECTION)):
+        folder = root / "road_survey" / section
+        for index in range(4):
+            write_picture(folder, f"frame{index}", 10 * number + index, empty=index == 3)
+        rows = [f"frame{index},{100 + 5 * index},{int(index != 3)}" for index in range(4)]
+        (folder / "frames.csv").write_text("\n".join(["frame,chainage_m,potholes"] + rows) + "\n")
+    write_picture(root / "pothole_closeups", "0000", 30)
+    for split in ("train", "val"):
+        folder = root / "traffic_cones"
+        write_picture(folder / split, "cone", 40, cone=True)
+        for kind in ("images", "labels"):
+            (folder / kind).mkdir(parents=True, exist_ok=True)
+            (folder / split / kind).rename(folder / kind / split)
+    return root

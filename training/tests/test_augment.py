@@ -1,0 +1,85 @@
+"""Samples: repeatable, and their labels stay on the objects."""
+
+import unittest
+
+import numpy as np
+
+from detector.augment import SETTLING, Augmenter, Recipe
+from detector.boxes import non_maximum_suppression
+from detector.data import POTHOLE, TRAFFIC_CONE, Picture
+from detector.inference import AnchorGrid, decode, letterbox
+
+CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0)
+
+
+def bright_square() -> Picture:
+    """A white square on black, 60 x 40 px."""
+    image = np.zeros((400, 640, 3), np.uint8)
+    image[180:220, 300:360] = 255
+    return Picture(image, np.array([[300, 180, 360, 220]], np.float32), POTHOLE)
+
+
+def augmenter(recipe: Recipe) -> Augmenter:
+    """An augmenter of one pothole picture and one cone picture."""
+    cone = bright_square()
+    cone.labelled_class = TRAFFIC_CONE
+    return Augmenter({"survey_potholes": [bright_square()], "cones": [cone]}, 2, recipe, 416, 320)
+
+
+class Samples(unittest.TestCase):
+    def test_same_generator_same_sample(self):
+        for recipe in (Recipe(), SETTLING):
+            first, second = (augmenter(recipe).draw(np.random.default_rng([1, 2, 3])) for _ in range(2))
+            np.testing.assert_array_equal(first.image, second.image)
+            np.testing.assert_array_equal(first.boxes, second.boxes)
+
+    def test_labels_stay_on_the_square(self):
+        labels = 0
+        for index in range(60):
+            sample = augmenter(Recipe(**CALM)).draw(np.random.default_rng(index))
+            for x1, y1, x2, y2 in sample.boxes:
+                inside = sample.image[int(y1) + 2 : int(y2) - 1, int(x1) + 2 : int(x2) - 1]
+                self.assertGreater(inside.mean(), 240)
+                labels += 1
+        self.assertGreater(labels, 40)
+
+    def test_mosaic_labels_one_class(self):
+        for index in range(20):
+            sample = augmenter(Recipe(mosaic=1.0)).draw(np.random.default_rng(index))
+            self.assertEqual(sample.labelled.sum(), 1)
+            self.assertTrue((sample.labelled[sample.classes] == 1).all())
+
+    def test_pasting_leaves_the_picture_alone(self):
+        source = augmenter(Recipe())
+        picture = source.groups["survey_potholes"][0]
+        before = picture.image.copy()
+        pasted = [source.paste_potholes(np.random.default_rng(index), picture) for index in range(20)]
+        np.testing.assert_array_equal(picture.image, before)
+        self.assertTrue(any(len(result.boxes) > 1 for result in pasted))
+
+
+class Inference(unittest.TestCase):
+    def test_letterbox_pads_right_and_bottom(self):
+        image, scale = letterbox(np.zeros((480, 640, 3), np.uint8), 640, 400)
+        self.assertEqual(image.shape, (400, 640, 3))
+        self.assertAlmostEqual(scale, 400 / 480)
+        self.assertEqual((image[0, 0, 0], image[0, 639, 0]), (0, 114))
+
+    def test_decode_one_anchor_point(self):
+        grid = AnchorGrid.of(64, 32)
+        self.assertEqual(len(grid.cells), 16 * 8 + 8 * 4 + 4 * 2)
+        raw, scores = np.zeros((168, 4), np.float32), np.zeros((168, 1), np.float32)
+        row = 16 * 8 + 8 + 3  # stride 8, second row, fourth column
+        raw[row], scores[row] = [0.5, 0.25, np.log(3), np.log(2)], 0.7
+        (detections,) = decode(raw, scores, grid, 0.5, (128, 64))
+        # Centre (28, 10), size 24 x 16 in the input; the picture is twice as large.
+        np.testing.assert_allclose(detections, [[32, 4, 80, 36, 0.7]], rtol=1e-5)
+
+    def test_suppression_keeps_the_best(self):
+        boxes = np.array([[0, 0, 10, 10], [1, 0, 11, 10], [50, 50, 60, 60]], float)
+        kept = non_maximum_suppression(boxes, np.array([0.5, 0.9, 0.1]), 0.5)
+        self.assertEqual(kept.tolist(), [1, 2])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,129 @@
+"""The command lines end to end on a generated data set: resume, export, evaluate, refusals."""
+
+import contextlib
+import io
+import tempfile
+import unittest
+from pathlib import Path
+
+import torch
+
+import evaluate_detector
+import export_detector
+import train_detector
+from detector import onnx_model
+from detector.network import Detector
+
+from .synthetic import write_data
+
+
+def quietly(program, *arguments):
+    """Exit status and standard error of a program."""
+    errors = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(errors):
+        try:
+            status = program.main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            status = stop.code
+    return status, errors.getvalue()
+
+
+def scattered_detector() -> Detector:
+    """An untrained network whose biases all differ, as trained ones do.
+
+    The exporter shares equal tensors through Identity nodes, which OpenCV 4.6 cannot load.
+    """
+    torch.manual_seed(1)
+    detector = Detector(2)
+    with torch.no_grad():
+        for parameter in detector.parameters():
+            parameter.add_(0.01 * torch.randn_like(parameter))
+    return detector
+
+
+class Programs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = Path(cls.folder.name)
+        cls.data = write_data(cls.root / "data")
+        cls.threads = torch.get_num_threads()
+
+    @classmethod
+    def tearDownClass(cls):
+        torch.set_num_threads(cls.threads)
+        cls.folder.cleanup()
+
+    def train(self, out, *more):
+        """Three tiny epochs, the last one of whole frames."""
+        return quietly(
+            train_detector, "--data", self.data, "--out", self.root / out, "--epochs", 3, "--samples-per-epoch", 4,
+            "--batch", 2, "--workers", 0, "--threads", 1, "--device", "cpu", "--validate-every", 3, *more,
+        )
+
+    def test_a_stopped_run_continues_as_if_it_had_not(self):
+        self.assertEqual(self.train("whole"), (0, ""))
+        whole = torch.load(self.root / "whole" / "last.pt")
+
+        save = train_detector.save_atomically
+
+        def stop_after_second(content, path):
+            save(content, path)
+            if content["epoch"] == 2:
+                raise KeyboardInterrupt
+
+        train_detector.save_atomically = stop_after_second
+        try:
+            with self.assertRaises(KeyboardInterrupt):
+                self.train("stopped")
+        finally:
+            train_detector.save_atomically = save
+        self.assertEqual(self.train("stopped", "--resume"), (0, ""))
+        continued = torch.load(self.root / "stopped" / "last.pt")
+        self.assertEqual(continued["epoch"], 3)
+        for name, tensor in whole["average"].items():
+            torch.testing.assert_close(continued["average"][name], tensor, msg=name)
+
+    def test_export_and_evaluate(self):
+        models = self.root / "models"
+        models.mkdir()
+        checkpoint = self.root / "random.pt"
+        torch.save({"average": scattered_detector().state_dict()}, checkpoint)
+        exported = quietly(
+            export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data
+        )
+        self.assertEqual(exported, (0, ""))
+        arguments = ("--manifest", models / "tiny.yaml", "--data", self.data)
+        self.assertEqual(quietly(evaluate_detector, *arguments), (0, ""))
+        (models / "tiny.onnx").write_bytes(b"something else")
+        status, errors = quietly(evaluate_detector, *arguments)
+        self.assertEqual(status, 2)
+        self.assertIn("SHA-256", errors)
+
+    def test_objectness_is_one(self):
+        exportable = onnx_model.ExportableDetector(Detector(2))
+        with torch.no_grad():
+            predictions = exportable(torch.rand(1, 3, 64, 64))
+        self.assertEqual(tuple(predictions.shape), (1, 336, 7))
+        self.assertTrue((predictions[..., 4] == 1).all())
+
+    def test_refusals_are_one_sentence_and_status_2(self):
+        nowhere = self.root / "nowhere"
+        cases = [
+            (train_detector, ("--data", nowhere, "--out", self.root / "new")),
+            (train_detector, ("--epochs", 0)),
+            (train_detector, ("--batch", 1)),
+            (train_detector, ("--frobnicate",)),
+            (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
+            (export_detector, ("--out", nowhere)),
+            (evaluate_detector, ("--manifest", nowhere)),
+        ]
+        for program, arguments in cases:
+            status, errors = quietly(program, *arguments)
+            self.assertEqual(status, 2, arguments)
+            self.assertEqual(errors.strip().splitlines()[-1].count("\n"), 0)
+            self.assertNotIn("Traceback", errors)
+
+
+if __name__ == "__main__":
+    unittest.main()
