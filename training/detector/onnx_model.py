@@ -37,7 +37,7 @@ class ExportableDetector(nn.Module):
         outputs = []
         for head, level in zip(self.detector.heads, levels):
             rows = torch.cat([head.box(level), head.score(level).sigmoid()], dim=1)
-            outputs.append(rows.reshape(1, rows.shape[1], int(rows.shape[2]) * int(rows.shape[3])))
+            outputs.append(rows.reshape(1, 5 + self.detector.class_count, -1))
         return torch.cat(outputs, dim=2).permute(0, 2, 1)
 
 
