@@ -1,0 +1,107 @@
+#include "transport/mosquitto_handle.h"
+
+#include <mqtt_protocol.h>
+
+#include <cerrno>
+#include <mutex>
+#include <system_error>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr int kMinKeepaliveS = 5;  // libmosquitto refuses less.
+constexpr int kMaxKeepaliveS = 65535;
+constexpr int kMaxInflight = 65535;
+
+void Require(bool holds, const std::string& name, const std::string& value,
+             const std::string& accepted) {
+  if (!holds) throw Error("MQTT " + name + " is '" + value + "', accepted is " + accepted);
+}
+
+void RequireSuccess(int code, const std::string& what) {
+  if (code != MOSQ_ERR_SUCCESS) throw Error(what + ": " + DescribeMosquittoError(code));
+}
+
+void InitializeLibraryOnce() {
+  static std::once_flag once;
+  std::call_once(once, [] { mosquitto_lib_init(); });
+}
+
+void SetTls(mosquitto* handle, const MqttTlsOptions& tls) {
+  const auto path = [](const std::string& text) { return text.empty() ? nullptr : text.c_str(); };
+  RequireSuccess(mosquitto_tls_set(handle, path(tls.ca_file), nullptr, path(tls.certificate_file),
+                                   path(tls.key_file), nullptr),
+                 "cannot use the TLS files '" + tls.ca_file + "', '" + tls.certificate_file +
+                     "', '" + tls.key_file + "'");
+  constexpr int kVerifyPeer = 1;
+  RequireSuccess(mosquitto_tls_opts_set(handle, kVerifyPeer, "tlsv1.3", nullptr),
+                 "cannot set TLS 1.3");
+}
+
+}  // namespace
+
+void CheckMqttOptions(const MqttOptions& options) {
+  Require(!options.host.empty(), "host", options.host, "a host name or an address");
+  Require(options.port > 0 && options.port <= 65535, "port", std::to_string(options.port),
+          "1 to 65535");
+  Require(!options.client_id.empty(), "client id", options.client_id, "a text");
+  Require(options.keepalive_s >= kMinKeepaliveS && options.keepalive_s <= kMaxKeepaliveS,
+          "keepalive_s", std::to_string(options.keepalive_s), "5 to 65535");
+  Require(options.connect_timeout_s > 0 && options.connect_timeout_s <= 3600, "connect_timeout_s",
+          std::to_string(options.connect_timeout_s), "above 0 and at most 3600");
+  Require(options.max_inflight > 0 && options.max_inflight <= kMaxInflight, "max_inflight",
+          std::to_string(options.max_inflight), "1 to 65535");
+  Require(options.max_packet_bytes > 0, "max_packet_bytes",
+          std::to_string(options.max_packet_bytes), "above 0");
+}
+
+MosquittoHandle MakeMosquittoHandle(const MqttOptions& options, void* user_data) {
+  InitializeLibraryOnce();
+  MosquittoHandle handle(mosquitto_new(options.client_id.c_str(), options.clean_start, user_data));
+  if (!handle) throw Error("cannot create an MQTT client with id '" + options.client_id + "'");
+  RequireSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_PROTOCOL_VERSION, MQTT_PROTOCOL_V5),
+                 "cannot choose MQTT v5");
+  RequireSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_SEND_MAXIMUM, options.max_inflight),
+                 "cannot set the number of messages in flight");
+  RequireSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_TCP_NODELAY, 1),
+                 "cannot set TCP_NODELAY");
+  if (!options.user.empty()) {
+    RequireSuccess(
+        mosquitto_username_pw_set(handle.get(), options.user.c_str(), options.password.c_str()),
+        "cannot set MQTT user '" + options.user + "'");
+  }
+  if (options.tls) SetTls(handle.get(), *options.tls);
+  return handle;
+}
+
+int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::string& address) {
+  // The certificate is checked against the name that was asked for, so TLS resolves it again.
+  const std::string& host = options.tls ? options.host : address;
+  mosquitto_property* properties = nullptr;
+  int code = mosquitto_property_add_int32(&properties, MQTT_PROP_SESSION_EXPIRY_INTERVAL,
+                                          options.session_expiry_s);
+  if (code == MOSQ_ERR_SUCCESS) {
+    code = mosquitto_property_add_int32(&properties, MQTT_PROP_MAXIMUM_PACKET_SIZE,
+                                        options.max_packet_bytes);
+  }
+  if (code == MOSQ_ERR_SUCCESS) {
+    code = mosquitto_connect_bind_v5(handle, host.c_str(), options.port, options.keepalive_s,
+                                     nullptr, properties);
+  }
+  mosquitto_property_free_all(&properties);
+  return code;
+}
+
+std::string DescribeMosquittoError(int code) {
+  if (code == MOSQ_ERR_ERRNO) return std::generic_category().message(errno);
+  return mosquitto_strerror(code);
+}
+
+std::string DescribeReason(int reason_code) {
+  return std::string(mosquitto_reason_string(reason_code)) + " (MQTT reason " +
+         std::to_string(reason_code) + ")";
+}
+
+}  // namespace livemap

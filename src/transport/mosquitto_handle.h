@@ -1,0 +1,33 @@
+#pragma once
+
+#include <mosquitto.h>
+
+#include <memory>
+#include <string>
+
+#include "transport/mqtt_client.h"
+
+namespace livemap {
+
+struct MosquittoDeleter {
+  void operator()(mosquitto* handle) const { mosquitto_destroy(handle); }
+};
+using MosquittoHandle = std::unique_ptr<mosquitto, MosquittoDeleter>;
+
+/// Throws Error naming the first option that is out of range.
+void CheckMqttOptions(const MqttOptions& options);
+
+/// A library handle that speaks MQTT v5 with the login and TLS of `options` and hands `user_data`
+/// to its callbacks. Throws Error when the library refuses an option or a TLS file.
+MosquittoHandle MakeMosquittoHandle(const MqttOptions& options, void* user_data);
+
+/// One blocking connection attempt to an address that was just seen to answer; 0 or a library code.
+int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::string& address);
+
+/// The library's result code in words, with the system's own error where that is the cause.
+std::string DescribeMosquittoError(int code);
+
+/// "Not authorized (MQTT reason 135)".
+std::string DescribeReason(int reason_code);
+
+}  // namespace livemap

@@ -1,0 +1,357 @@
+#include "transport/mqtt_client.h"
+
+#include <mqtt_protocol.h>
+#include <poll.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "base/error.h"
+#include "transport/backoff.h"
+#include "transport/event_fd.h"
+#include "transport/mosquitto_handle.h"
+#include "transport/outgoing_queue.h"
+#include "transport/tcp_probe.h"
+
+namespace livemap {
+namespace {
+
+// libmosquitto's keepalive clock needs to be looked at about this often.
+constexpr int kPollMs = 500;
+// A connection that lived this long ends the back-off: one that is thrown out at once (another
+// client with our name, a message the broker will not have) must not hammer the broker.
+constexpr std::chrono::seconds kSettled{5};
+
+void BlockSignalsInThisThread() {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+}
+
+/// Waits up to `timeout_s` or until `fd` becomes readable.
+void WaitReadable(int fd, double timeout_s) {
+  pollfd waited{fd, POLLIN, 0};
+  poll(&waited, 1, static_cast<int>(std::ceil(timeout_s * 1000)));
+}
+
+int ReasonOfLibraryError(int code) {
+  if (code == MOSQ_ERR_OVERSIZE_PACKET || code == MOSQ_ERR_PAYLOAD_SIZE) {
+    return MQTT_RC_PACKET_TOO_LARGE;
+  }
+  if (code == MOSQ_ERR_INVAL || code == MOSQ_ERR_MALFORMED_UTF8) return MQTT_RC_TOPIC_NAME_INVALID;
+  return MQTT_RC_UNSPECIFIED;
+}
+
+}  // namespace
+
+/// Everything behind the header. Members below `thread side` belong to the network thread.
+class MqttClient::Connection {
+ public:
+  Connection(const MqttOptions& options, std::vector<MqttSubscription> subscriptions,
+             MqttCallbacks callbacks)
+      : options_(options),
+        subscriptions_(std::move(subscriptions)),
+        callbacks_(std::move(callbacks)),
+        queue_(options.queue_messages, options.queue_bytes),
+        backoff_(options.reconnect_min_s, options.reconnect_max_s, options.reconnect_jitter_seed) {
+    CheckMqttOptions(options_);
+    handle_ = MakeMosquittoHandle(options_, this);
+    mosquitto_connect_v5_callback_set(handle_.get(), &OnConnect);
+    mosquitto_disconnect_v5_callback_set(handle_.get(), &OnDisconnect);
+    mosquitto_publish_v5_callback_set(handle_.get(), &OnPublish);
+    mosquitto_subscribe_v5_callback_set(handle_.get(), &OnSubscribe);
+    mosquitto_message_v5_callback_set(handle_.get(), &OnMessage);
+    thread_ = std::thread([this] { Run(); });
+  }
+
+  ~Connection() {
+    stopping_ = true;
+    stop_.Signal();
+    thread_.join();
+  }
+
+  MqttPublishStatus Publish(OutgoingMessage message) {
+    if (message.qos != 0 && message.qos != 1) {
+      throw Error("MQTT QoS of a message on '" + message.topic + "' is " +
+                  std::to_string(message.qos) + ", accepted are 0 and 1");
+    }
+    if (stopping_) return MqttPublishStatus::kStopped;
+    if (!queue_.Push(std::move(message))) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++statistics_.queue_overflows;
+      return MqttPublishStatus::kQueueFull;
+    }
+    wake_.Signal();
+    return MqttPublishStatus::kQueued;
+  }
+
+  MqttStatistics statistics() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    MqttStatistics snapshot = statistics_;
+    snapshot.queued = queue_.size();
+    return snapshot;
+  }
+
+ private:
+  void Run() {
+    BlockSignalsInThisThread();
+    while (!stopping_) {
+      const auto started = std::chrono::steady_clock::now();
+      Attempt();
+      if (stopping_) break;
+      if (logged_in_ && std::chrono::steady_clock::now() - started > kSettled) backoff_.Reset();
+      EndConnection();
+      WaitReadable(stop_.fd(), backoff_.NextDelayS());
+    }
+    if (logged_in_) mosquitto_disconnect_v5(handle_.get(), MQTT_RC_NORMAL_DISCONNECTION, nullptr);
+  }
+
+  /// One connection from the probe to its loss; leaves the cause in loss_reason_.
+  void Attempt() {
+    loss_reason_.clear();
+    // The library's blocking connect cannot be interrupted and waits minutes for a silent host:
+    // let it try only what has just answered.
+    const TcpProbeResult probe =
+        ProbeTcp(options_.host, options_.port, options_.connect_timeout_s, stop_.fd());
+    if (!probe.error.empty()) {
+      loss_reason_ = probe.error;
+      return;
+    }
+    const int code = ConnectMosquitto(handle_.get(), options_, probe.numeric_address);
+    if (code != MOSQ_ERR_SUCCESS) {
+      loss_reason_ = "cannot connect to the broker: " + DescribeMosquittoError(code);
+      return;
+    }
+    Serve();
+  }
+
+  void Serve() {
+    while (!stopping_) {
+      if (logged_in_) SendQueued();
+      const int fd = mosquitto_socket(handle_.get());
+      if (fd < 0) return;
+      const short write = mosquitto_want_write(handle_.get()) ? POLLOUT : short{0};
+      std::array<pollfd, 3> waited = {pollfd{fd, static_cast<short>(POLLIN | write), 0},
+                                      pollfd{wake_.fd(), POLLIN, 0}, pollfd{stop_.fd(), POLLIN, 0}};
+      poll(waited.data(), waited.size(), kPollMs);
+      if (waited[1].revents != 0) wake_.Clear();
+      int code = MOSQ_ERR_SUCCESS;
+      if ((waited[0].revents & ~POLLOUT) != 0) code = mosquitto_loop_read(handle_.get(), 1);
+      if (code == MOSQ_ERR_SUCCESS && (waited[0].revents & POLLOUT) != 0) {
+        code = mosquitto_loop_write(handle_.get(), 1);
+      }
+      if (code == MOSQ_ERR_SUCCESS) code = mosquitto_loop_misc(handle_.get());
+      if (code != MOSQ_ERR_SUCCESS) {
+        Explain("the connection to the broker was lost: " + DescribeMosquittoError(code));
+        return;
+      }
+    }
+  }
+
+  /// Keeps the library's own unbounded queue empty: at most max_inflight messages are with it.
+  void SendQueued() {
+    while (inflight_.size() < static_cast<std::size_t>(options_.max_inflight)) {
+      std::optional<OutgoingMessage> message = queue_.Pop();
+      if (!message) return;
+      int id = 0;
+      const int code = mosquitto_publish_v5(handle_.get(), &id, message->topic.c_str(),
+                                            static_cast<int>(message->payload.size()),
+                                            message->payload.data(), message->qos, false, nullptr);
+      const std::size_t bytes = message->bytes();
+      // With QoS 1 the library keeps the message when the connection breaks here, and sends it
+      // after the next login.
+      const bool broken =
+          code == MOSQ_ERR_NO_CONN || code == MOSQ_ERR_CONN_LOST || code == MOSQ_ERR_ERRNO;
+      if (code == MOSQ_ERR_SUCCESS || (broken && message->qos > 0)) {
+        {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          statistics_.sent_bytes += bytes;
+        }
+        MqttPublishOutcome outcome{message->tag, std::move(message->topic), bytes, 0, ""};
+        if (message->qos == 0) {
+          Finish(std::move(outcome));
+        } else {
+          inflight_[id] = std::move(outcome);
+          CountInflight();
+        }
+      } else {
+        Finish({message->tag, std::move(message->topic), bytes, ReasonOfLibraryError(code),
+                DescribeMosquittoError(code)});
+      }
+      if (broken) return;
+    }
+  }
+
+  void Finish(MqttPublishOutcome outcome) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++(outcome.accepted() ? statistics_.published : statistics_.publishes_refused);
+      if (!outcome.accepted()) {
+        statistics_.last_error =
+            "a message on '" + outcome.topic + "' was refused: " + outcome.reason;
+      }
+    }
+    if (!callbacks_.on_published) return;
+    Guarded(this, [&](Connection& connection) { connection.callbacks_.on_published(outcome); });
+  }
+
+  void CountInflight() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    statistics_.inflight = inflight_.size();
+  }
+
+  /// The first cause counts: what follows from it says less.
+  void Explain(const std::string& reason) {
+    if (loss_reason_.empty()) loss_reason_ = reason;
+  }
+
+  void EndConnection() {
+    logged_in_ = false;
+    Explain("the connection to the broker was lost");
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!statistics_.connected) ++statistics_.connection_failures;
+      statistics_.connected = false;
+      statistics_.subscriptions_granted = 0;
+      statistics_.last_error = loss_reason_;
+    }
+    if (!callbacks_.on_connection) return;
+    Guarded(this, [](Connection& connection) {
+      connection.callbacks_.on_connection(false, connection.loss_reason_);
+    });
+  }
+
+  void HandleConnect(int reason_code) {
+    if (reason_code != MQTT_RC_SUCCESS) {
+      Explain("the broker refused the login of '" + options_.user +
+              "': " + DescribeReason(reason_code));
+      return;
+    }
+    logged_in_ = true;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      statistics_.connected = true;
+      ++statistics_.connections;
+    }
+    for (const MqttSubscription& subscription : subscriptions_) {
+      mosquitto_subscribe_v5(handle_.get(), nullptr, subscription.filter.c_str(), subscription.qos,
+                             0, nullptr);
+    }
+    if (callbacks_.on_connection) callbacks_.on_connection(true, "");
+  }
+
+  void HandleSubscribe(int count, const int* granted) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (int i = 0; i < count; ++i) {
+      if (granted[i] < MQTT_RC_UNSPECIFIED) {
+        ++statistics_.subscriptions_granted;
+      } else {
+        ++statistics_.subscriptions_refused;
+        statistics_.last_error = "a subscription was refused: " + DescribeReason(granted[i]);
+      }
+    }
+  }
+
+  void HandlePublish(int id, int reason_code) {
+    const auto found = inflight_.find(id);
+    if (found == inflight_.end()) return;  // QoS 0, finished when it was sent.
+    MqttPublishOutcome outcome = std::move(found->second);
+    inflight_.erase(found);
+    CountInflight();
+    outcome.reason_code = reason_code;
+    outcome.reason = DescribeReason(reason_code);
+    Finish(std::move(outcome));
+  }
+
+  void HandleMessage(const mosquitto_message& message) {
+    const MqttMessage received{message.topic,
+                               {static_cast<const std::uint8_t*>(message.payload),
+                                static_cast<std::size_t>(message.payloadlen)}};
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++statistics_.received;
+      statistics_.received_bytes += received.topic.size() + received.payload.size;
+    }
+    if (callbacks_.on_message) callbacks_.on_message(received);
+  }
+
+  /// Runs a handler; no exception of a callback may pass through the C library or end the thread.
+  template <typename Handler>
+  static void Guarded(void* self, Handler handler) {
+    auto& connection = *static_cast<Connection*>(self);
+    try {
+      handler(connection);
+    } catch (const std::exception& error) {
+      const std::lock_guard<std::mutex> lock(connection.mutex_);
+      connection.statistics_.last_error = std::string("an MQTT callback failed: ") + error.what();
+    }
+  }
+
+  static void OnConnect(mosquitto*, void* self, int reason_code, int, const mosquitto_property*) {
+    Guarded(self, [=](Connection& connection) { connection.HandleConnect(reason_code); });
+  }
+  static void OnDisconnect(mosquitto*, void* self, int code, const mosquitto_property*) {
+    // From 128 on this is the broker's own reason, below it is a result of the library, which the
+    // loop functions return as well.
+    if (code < MQTT_RC_UNSPECIFIED) return;
+    Guarded(self, [=](Connection& connection) {
+      connection.Explain("the broker closed the connection: " + DescribeReason(code));
+    });
+  }
+  static void OnPublish(mosquitto*, void* self, int id, int reason_code,
+                        const mosquitto_property*) {
+    Guarded(self, [=](Connection& connection) { connection.HandlePublish(id, reason_code); });
+  }
+  static void OnSubscribe(mosquitto*, void* self, int, int count, const int* granted,
+                          const mosquitto_property*) {
+    Guarded(self, [=](Connection& connection) { connection.HandleSubscribe(count, granted); });
+  }
+  static void OnMessage(mosquitto*, void* self, const mosquitto_message* message,
+                        const mosquitto_property*) {
+    Guarded(self, [=](Connection& connection) { connection.HandleMessage(*message); });
+  }
+
+  const MqttOptions options_;
+  const std::vector<MqttSubscription> subscriptions_;
+  const MqttCallbacks callbacks_;
+  OutgoingQueue queue_;
+  EventFd wake_;
+  EventFd stop_;
+  std::atomic<bool> stopping_{false};
+
+  mutable std::mutex mutex_;
+  MqttStatistics statistics_;
+
+  // Thread side.
+  MosquittoHandle handle_;
+  Backoff backoff_;
+  std::map<int, MqttPublishOutcome> inflight_;  ///< By packet id.
+  bool logged_in_ = false;
+  std::string loss_reason_;
+
+  std::thread thread_;  // Last: it uses everything above.
+};
+
+MqttClient::MqttClient(const MqttOptions& options, std::vector<MqttSubscription> subscriptions,
+                       MqttCallbacks callbacks)
+    : connection_(
+          std::make_unique<Connection>(options, std::move(subscriptions), std::move(callbacks))) {}
+
+MqttClient::~MqttClient() = default;
+
+MqttPublishStatus MqttClient::Publish(std::string topic, std::vector<std::uint8_t> payload, int qos,
+                                      std::uint64_t tag) {
+  return connection_->Publish({std::move(topic), std::move(payload), qos, tag});
+}
+
+bool MqttClient::connected() const { return statistics().connected; }
+
+MqttStatistics MqttClient::statistics() const { return connection_->statistics(); }
+
+}  // namespace livemap
