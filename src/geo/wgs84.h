@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <GeographicLib/LocalCartesian.hpp>
+#include <cstdint>
+
+namespace livemap {
+
+/// A position on the WGS84 ellipsoid, degrees, north and east positive.
+struct GeoPoint {
+  double latitude_deg = 0;
+  double longitude_deg = 0;
+};
+
+/// Finite, latitude within [-90, 90] and longitude within [-180, 180].
+bool IsValid(const GeoPoint& point);
+
+/// Length of the geodesic between two valid points, metres, to a few nanometres.
+/// Source: C. F. F. Karney, "Algorithms for geodesics", J. Geodesy 87 (2013), as in GeographicLib.
+double GeodesicDistanceM(const GeoPoint& a, const GeoPoint& b);
+
+/// The point that lies `distance_m` from `start` along the geodesic that leaves it at
+/// `bearing_rad`, clockwise from true north. `start` must be valid.
+GeoPoint GeodesicDestination(const GeoPoint& start, double bearing_rad, double distance_m);
+
+/// A position in units of 1e-7 degree (at most 11.2 mm): the integers that indexes and stores keep.
+struct GeoPointE7 {
+  std::int32_t latitude_e7 = 0;
+  std::int32_t longitude_e7 = 0;
+
+  friend bool operator==(const GeoPointE7& a, const GeoPointE7& b) {
+    return a.latitude_e7 == b.latitude_e7 && a.longitude_e7 == b.longitude_e7;
+  }
+};
+
+/// Rounds a valid point to the nearest 1e-7 degree.
+GeoPointE7 ToE7(const GeoPoint& point);
+GeoPoint FromE7(const GeoPointE7& point);
+
+/// East-north plane that touches the ellipsoid at a datum: x east, y north, metres. Heights are
+/// dropped: a point 10 km away lies 8 m below the plane, which moves it 6 mm horizontally.
+class LocalFrame {
+ public:
+  /// Throws Error when the datum is not valid.
+  explicit LocalFrame(const GeoPoint& datum);
+
+  Eigen::Vector2d ToEnu(const GeoPoint& point) const;
+  /// Inverse of ToEnu to better than a micrometre for points within 100 km of the datum.
+  GeoPoint ToGeo(const Eigen::Vector2d& east_north_m) const;
+  const GeoPoint& datum() const { return datum_; }
+
+ private:
+  GeoPoint datum_;
+  GeographicLib::LocalCartesian cartesian_;
+};
+
+}  // namespace livemap
