@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <random>
+#include <vector>
+
+#include "base/uuid.h"
+
+namespace livemap {
+
+/// Says which unfinished reports are to be sent now: each at once, then again after a pause that
+/// doubles, with jitter so that vehicles which lost the same link do not return in step. Urgent
+/// classes go first, then older reports. Times are steady seconds from any origin.
+class ResendSchedule {
+ public:
+  struct Config {
+    double first_pause_s = 1.0;
+    double longest_pause_s = 30.0;
+    double jitter = 0.2;  ///< A pause is drawn from (1 - jitter) to (1 + jitter) times its length.
+  };
+
+  ResendSchedule(const Config& config, std::mt19937_64 random);
+
+  /// A report to send from `now_s` on. `urgency` as in HazardClass; `created_ns` orders equals.
+  void Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s);
+  /// The report is finished; unknown ones are ignored.
+  void Remove(const Uuid& report);
+  /// At most `limit` reports whose time has come, in the order to send them; plans their next time.
+  std::vector<Uuid> TakeDue(double now_s, std::size_t limit);
+
+  std::size_t size() const { return entries_.size(); }
+
+ private:
+  struct Entry {
+    int urgency;
+    std::int64_t created_ns;
+    double due_s;
+    double pause_s;
+  };
+
+  Config config_;
+  std::mt19937_64 random_;
+  std::map<Uuid, Entry> entries_;
+};
+
+}  // namespace livemap

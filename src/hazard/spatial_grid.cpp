@@ -1,0 +1,143 @@
+#include "hazard/spatial_grid.h"
+
+#include <GeographicLib/Geocentric.hpp>
+#include <cmath>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+/// Earth-centred position of a place on the ellipsoid, metres.
+Eigen::Vector3d ToEarth(const GeoPoint& place) {
+  Eigen::Vector3d earth_m;
+  GeographicLib::Geocentric::WGS84().Forward(place.latitude_deg, place.longitude_deg, 0.0,
+                                             earth_m.x(), earth_m.y(), earth_m.z());
+  return earth_m;
+}
+
+}  // namespace
+
+SpatialGrid::SpatialGrid(double cell_m) : cell_m_(cell_m), slots_(16) {
+  if (!(cell_m >= 0.01 && cell_m <= 1e6)) {
+    throw Error("the cell of a spatial grid is " + std::to_string(cell_m) +
+                " m, accepted is 0.01 to 1000000 m");
+  }
+}
+
+void SpatialGrid::Insert(const GeoPoint& place, std::uint64_t id) {
+  if (!IsValid(place)) throw Error("a place of a spatial grid is no valid position");
+  if (2 * (entries_.size() + 1) > slots_.size()) Grow();
+  const Eigen::Vector3d earth_m = ToEarth(place);
+  PutSlot({Hash(CellAt(earth_m)), static_cast<std::uint32_t>(entries_.size())});
+  entries_.push_back({earth_m, place, id});
+}
+
+bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
+  if (!IsValid(place)) return false;
+  const std::uint32_t hash = Hash(CellAt(ToEarth(place)));
+  for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
+    const std::uint32_t index = slots_[i].entry;
+    if (slots_[i].hash != hash || entries_[index].id != id ||
+        entries_[index].place.latitude_deg != place.latitude_deg ||
+        entries_[index].place.longitude_deg != place.longitude_deg) {
+      continue;
+    }
+    ClearSlot(i);
+    // The last entry fills the hole, so that entries stay dense.
+    const auto last = static_cast<std::uint32_t>(entries_.size() - 1);
+    if (index != last) {
+      slots_[FindSlot(Hash(CellAt(entries_[last].earth_m)), last)].entry = index;
+      entries_[index] = entries_[last];
+    }
+    entries_.pop_back();
+    return true;
+  }
+  return false;
+}
+
+std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centre,
+                                                           double radius_m) const {
+  if (!IsValid(centre) || !(radius_m >= 0)) return std::nullopt;
+  const Eigen::Vector3d earth_m = ToEarth(centre);
+  // A chord is never longer than the geodesic, so no place within the radius is missed; the
+  // micrometre absorbs rounding. The geodesic decides.
+  const double chord_m = radius_m + 1e-6;
+  const Cell low = CellAt(earth_m.array() - chord_m);
+  const Cell high = CellAt(earth_m.array() + chord_m);
+  std::optional<Neighbour> nearest;
+  Cell cell;
+  for (cell[0] = low[0]; cell[0] <= high[0]; ++cell[0]) {
+    for (cell[1] = low[1]; cell[1] <= high[1]; ++cell[1]) {
+      for (cell[2] = low[2]; cell[2] <= high[2]; ++cell[2]) {
+        const std::uint32_t hash = Hash(cell);
+        for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
+          if (slots_[i].hash != hash) continue;
+          const Entry& entry = entries_[slots_[i].entry];
+          if ((entry.earth_m - earth_m).squaredNorm() > chord_m * chord_m) continue;
+          const double distance_m = GeodesicDistanceM(entry.place, centre);
+          if (distance_m > radius_m) continue;
+          if (!nearest || distance_m < nearest->distance_m) nearest = {entry.id, distance_m};
+        }
+      }
+    }
+  }
+  return nearest;
+}
+
+SpatialGrid::Cell SpatialGrid::CellAt(const Eigen::Vector3d& earth_m) const {
+  Cell cell;
+  for (int axis = 0; axis < 3; ++axis) {
+    cell[static_cast<std::size_t>(axis)] =
+        static_cast<std::int32_t>(std::floor(earth_m[axis] / cell_m_));
+  }
+  return cell;
+}
+
+std::uint32_t SpatialGrid::Hash(const Cell& cell) {
+  // Multiply and fold per axis (the finaliser of splitmix64), so that neighbouring cells scatter.
+  std::uint64_t hash = 0x9e3779b97f4a7c15u;
+  for (const std::int32_t index : cell) {
+    hash ^= static_cast<std::uint32_t>(index);
+    hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
+    hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
+    hash ^= hash >> 31;
+  }
+  return static_cast<std::uint32_t>(hash);
+}
+
+std::size_t SpatialGrid::FindSlot(std::uint32_t hash, std::uint32_t entry) const {
+  std::size_t i = Home(hash);
+  while (slots_[i].entry != entry) i = Next(i);
+  return i;
+}
+
+void SpatialGrid::PutSlot(Slot slot) {
+  std::size_t i = Home(slot.hash);
+  while (slots_[i].entry != kEmpty) i = Next(i);
+  slots_[i] = slot;
+}
+
+void SpatialGrid::ClearSlot(std::size_t slot) {
+  // Backward shift (Knuth, TAOCP 6.4 R): what follows in the run moves up unless it stands between
+  // its home and the hole already; no tombstones, so searches stay short for ever.
+  std::size_t hole = slot;
+  for (std::size_t i = Next(slot); slots_[i].entry != kEmpty; i = Next(i)) {
+    const std::size_t home = Home(slots_[i].hash);
+    const bool stays = hole <= i ? (hole < home && home <= i) : (hole < home || home <= i);
+    if (stays) continue;
+    slots_[hole] = slots_[i];
+    hole = i;
+  }
+  slots_[hole] = Slot{};
+}
+
+void SpatialGrid::Grow() {
+  std::vector<Slot> old(2 * slots_.size());
+  old.swap(slots_);
+  for (const Slot& slot : old) {
+    if (slot.entry != kEmpty) PutSlot(slot);
+  }
+}
+
+}  // namespace livemap

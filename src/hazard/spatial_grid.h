@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+/// Places on the earth, found by distance at a cost that does not grow with their number.
+///
+/// The grid has cubic cells in earth-centred axes, hashed into one flat table. So there is no
+/// seam at the antimeridian, no pole, and no cell whose width depends on the latitude. Cells should
+/// be several times as wide as the usual search radius: a search then reads about two cells.
+/// Not thread-safe.
+class SpatialGrid {
+ public:
+  struct Neighbour {
+    std::uint64_t id;
+    double distance_m;  ///< Geodesic.
+  };
+
+  /// `cell_m`: edge of a cell in metres, positive.
+  explicit SpatialGrid(double cell_m);
+
+  /// Adds a place. Ids are the caller's; the same id may stand at several places.
+  void Insert(const GeoPoint& place, std::uint64_t id);
+  /// Removes what Insert added with exactly these values; false when there is none.
+  bool Erase(const GeoPoint& place, std::uint64_t id);
+  /// The nearest place within `radius_m` (inclusive) of `centre`.
+  std::optional<Neighbour> Nearest(const GeoPoint& centre, double radius_m) const;
+
+  std::size_t size() const { return entries_.size(); }
+
+ private:
+  struct Entry {
+    Eigen::Vector3d earth_m;
+    GeoPoint place;
+    std::uint64_t id;
+  };
+  // One place of the hash table: the hash of the cell and where its entry stands.
+  struct Slot {
+    std::uint32_t hash = 0;
+    std::uint32_t entry = kEmpty;
+  };
+  using Cell = std::array<std::int32_t, 3>;
+  static constexpr std::uint32_t kEmpty = 0xffffffff;
+
+  Cell CellAt(const Eigen::Vector3d& earth_m) const;
+  static std::uint32_t Hash(const Cell& cell);
+  std::size_t Next(std::size_t slot) const { return (slot + 1) & (slots_.size() - 1); }
+  std::size_t Home(std::uint32_t hash) const { return hash & (slots_.size() - 1); }
+  std::size_t FindSlot(std::uint32_t hash, std::uint32_t entry) const;
+  void PutSlot(Slot slot);
+  void ClearSlot(std::size_t slot);
+  void Grow();
+
+  double cell_m_;
+  std::vector<Slot> slots_;  // Size a power of two, at most half full, linear probing.
+  std::vector<Entry> entries_;
+};
+
+}  // namespace livemap
