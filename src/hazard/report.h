@@ -52,4 +52,20 @@ struct Receipt {
   std::string reason;      ///< One sentence, empty when committed.
 };
 
+/// The zone tells a vehicle what changed on its map (HazardNotice.msg without ROS).
+struct Notice {
+  enum class Action { kAdded, kUpdated, kRemoved };
+  Action action = Action::kAdded;
+  std::uint64_t sequence = 0;  ///< Of the zone's event log, strictly increasing.
+  Uuid hazard_uuid;
+  std::int64_t stamp_ns = 0;  ///< When the zone decided, zone clock (UTC).
+  std::string class_name;
+  float confidence = 0;  ///< 0..1.
+  GeoPoint position;
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
+  std::uint32_t sightings = 0;                              ///< Reports merged so far.
+  std::int64_t first_seen_ns = 0;                           ///< Image stamp of the first report.
+  std::int64_t last_seen_ns = 0;                            ///< Image stamp of the newest report.
+};
+
 }  // namespace livemap

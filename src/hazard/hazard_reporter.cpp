@@ -1,0 +1,276 @@
+#include "hazard/hazard_reporter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxClassNameBytes = 64;
+constexpr std::size_t kMaxEarlyPictures = 8;
+constexpr std::size_t kMaxWaitingNotices = 20000;
+constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
+
+}  // namespace
+
+HazardReporter::HazardReporter(const Config& config, const HazardCatalogue& catalogue,
+                               std::mt19937_64 random, std::int64_t now_ns, double steady_s)
+    : config_(config),
+      catalogue_(catalogue),
+      random_(random),
+      map_(config.map, catalogue, now_ns),
+      track_(config.track),
+      schedule_(config.resend, std::mt19937_64(random_())) {
+  config_.projection.max_range_m = kEndlessRangeM;
+  for (const auto& pending : map_.Pending()) {
+    schedule_.Add(pending.uuid, catalogue_.Get(pending.class_name).urgency, pending.created_ns,
+                  steady_s);
+    if (!pending.sent) unsent_.insert(pending.uuid);
+  }
+}
+
+void HazardReporter::SetMounting(const std::string& frame_id,
+                                 const Eigen::Isometry3d& base_from_optical) {
+  mountings_[frame_id] = base_from_optical;
+}
+
+void HazardReporter::AddFix(const Fix& fix) {
+  ++counters_.fixes;
+  switch (track_.Add(fix)) {
+    case FixTrack::Verdict::kAccepted:
+    case FixTrack::Verdict::kRestarted:
+      break;
+    case FixTrack::Verdict::kNoFix:
+      ++counters_.no_fixes;
+      break;
+    case FixTrack::Verdict::kInvalid:
+    case FixTrack::Verdict::kOutOfOrder:
+      ++counters_.invalid_fixes;
+      break;
+    case FixTrack::Verdict::kJump:
+      ++counters_.jumps;
+      break;
+  }
+}
+
+bool HazardReporter::IsUsable(const Sighting& sighting) {
+  const Box& box = sighting.box;
+  const bool finite = std::isfinite(box.x_min) && std::isfinite(box.y_min) &&
+                      std::isfinite(box.x_max) && std::isfinite(box.y_max);
+  if (!finite || box.x_min >= box.x_max || box.y_min >= box.y_max ||
+      !(sighting.confidence >= 0 && sighting.confidence <= 1) || sighting.class_name.empty() ||
+      sighting.class_name.size() > kMaxClassNameBytes) {
+    ++counters_.invalid_detections;
+    return false;
+  }
+  if (sighting.confidence < config_.min_confidence) {
+    ++counters_.below_confidence;
+    return false;
+  }
+  return true;
+}
+
+void HazardReporter::AddFrame(const SightingFrame& frame, double now_s) {
+  counters_.detections += frame.sightings.size();
+  WaitingFrame waiting;
+  waiting.frame = frame;
+  waiting.arrival_s = now_s;
+  auto& sightings = waiting.frame.sightings;
+  sightings.erase(std::remove_if(sightings.begin(), sightings.end(),
+                                 [this](const Sighting& sighting) { return !IsUsable(sighting); }),
+                  sightings.end());
+  const auto picture = early_pictures_.find(frame.stamp_ns);
+  if (picture != early_pictures_.end()) {
+    waiting.picture = picture->second;
+    early_pictures_.erase(picture);
+  }
+  if (sightings.empty()) return;
+  waiting_.push_back(std::move(waiting));
+  while (waiting_.size() > static_cast<std::size_t>(config_.max_waiting_frames)) {
+    counters_.dropped_no_fix += waiting_.front().frame.sightings.size();
+    waiting_.pop_front();
+  }
+}
+
+void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
+  for (WaitingFrame& waiting : waiting_) {
+    if (waiting.frame.stamp_ns != stamp_ns) continue;
+    waiting.picture = picture;
+    return;
+  }
+  early_pictures_[stamp_ns] = picture;
+  if (early_pictures_.size() > kMaxEarlyPictures) early_pictures_.erase(early_pictures_.begin());
+}
+
+void HazardReporter::AddNotice(const Notice& notice) {
+  ++counters_.notices;
+  notices_.push_back(notice);
+  if (notices_.size() > kMaxWaitingNotices) notices_.pop_front();
+}
+
+void HazardReporter::AddReceipt(const Receipt& receipt) {
+  try {
+    if (!map_.Apply(receipt)) return;
+  } catch (const StoreError& error) {
+    // The report stays unfinished and is sent again; so the zone answers again.
+    TellStoreError(error);
+    return;
+  }
+  schedule_.Remove(receipt.report_uuid);
+  unsent_.erase(receipt.report_uuid);
+  ++(receipt.status == Receipt::Status::kCommitted ? counters_.committed : counters_.refused);
+}
+
+void HazardReporter::ApplyNotices() {
+  if (notices_.empty()) return;
+  try {
+    counters_.invalid_notices += map_.Apply({notices_.begin(), notices_.end()});
+    notices_.clear();
+    store_error_.clear();
+  } catch (const StoreError& error) {
+    TellStoreError(error);  // They stay and are tried again.
+  }
+}
+
+void HazardReporter::Process(double now_s, double steady_s) {
+  ApplyNotices();
+  while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
+}
+
+/// True when the frame is done, whatever became of it.
+bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_s) {
+  // A clock that was set back must not make a frame wait for ever.
+  waiting.arrival_s = std::min(waiting.arrival_s, now_s);
+  const double waited_s = now_s - waiting.arrival_s;
+  if (!waiting.placed && !Place(waiting, waited_s)) return false;
+  const bool news = std::any_of(
+      waiting.candidates.begin(), waiting.candidates.end(), [this](const Candidate& candidate) {
+        return !map_.Find(candidate.sighting.class_name, candidate.place.position);
+      });
+  if (news && waiting.picture.bgr.empty() && waited_s < config_.picture_wait_s) return false;
+  ReportCandidates(waiting, steady_s);
+  return true;
+}
+
+bool HazardReporter::HasCamera(const SightingFrame& frame) const {
+  return intrinsics_ && HasMounting(frame.frame_id) &&
+         static_cast<std::uint32_t>(intrinsics_->width) == frame.image_width &&
+         static_cast<std::uint32_t>(intrinsics_->height) == frame.image_height;
+}
+
+/// Places the frame's sightings as soon as camera and position are known; false while they may yet
+/// come. A frame for which they never come ends up placed, without candidates.
+bool HazardReporter::Place(WaitingFrame& waiting, double waited_s) {
+  const std::size_t count = waiting.frame.sightings.size();
+  const bool patient = waited_s < config_.max_wait_s;
+  if (!HasCamera(waiting.frame)) {
+    if (patient) return false;
+    counters_.dropped_no_camera += count;
+    waiting.placed = true;
+    return true;
+  }
+  const FixTrack::Lookup lookup = track_.At(waiting.frame.stamp_ns);
+  if (lookup.answer == FixTrack::Answer::kReady ||
+      (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s)) {
+    PlaceSightings(waiting, lookup.pose);
+    return true;
+  }
+  if (lookup.answer == FixTrack::Answer::kExtrapolated) return false;
+  if (!waiting.held_back) counters_.held_back_no_fix += count;
+  waiting.held_back = true;
+  if (lookup.answer == FixTrack::Answer::kWait && patient) return false;
+  counters_.dropped_no_fix += count;
+  waiting.placed = true;
+  return true;
+}
+
+void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose) {
+  const Eigen::Isometry3d& mounting = mountings_.at(waiting.frame.frame_id);
+  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
+  for (const Sighting& sighting : waiting.frame.sightings) {
+    // Bottom centre of the box. Box edges count from the first pixel's outer corner, the camera
+    // model from its centre.
+    const Eigen::Vector2d foot(0.5 * (sighting.box.x_min + sighting.box.x_max) - 0.5,
+                               sighting.box.y_max - 0.5);
+    const auto ground = ProjectToGround(foot, *intrinsics_, mounting, config_.projection);
+    if (!ground) {
+      ++counters_.not_on_ground;
+    } else if (ground->position_m.norm() > config_.max_range_m) {
+      ++counters_.too_far;
+    } else {
+      waiting.candidates.push_back({sighting, PlaceHazard(pose, antenna_m, *ground)});
+    }
+  }
+  waiting.placed = true;
+}
+
+void HazardReporter::ReportCandidates(const WaitingFrame& waiting, double steady_s) {
+  std::optional<std::vector<std::uint8_t>> jpeg;  // Encoded once, when first needed.
+  for (const Candidate& candidate : waiting.candidates) {
+    if (map_.Find(candidate.sighting.class_name, candidate.place.position)) {
+      ++counters_.duplicates_suppressed;
+      continue;
+    }
+    if (!jpeg) {
+      jpeg = EncodeJpeg(waiting.picture, config_.jpeg_quality,
+                        static_cast<std::size_t>(config_.max_image_bytes));
+    }
+    Report report;
+    report.uuid = Uuid::Random(random_);
+    report.drive_id = config_.drive_id;
+    report.stamp_ns = waiting.frame.stamp_ns;
+    report.class_name = candidate.sighting.class_name;
+    report.confidence = candidate.sighting.confidence;
+    report.box = candidate.sighting.box;
+    report.position = candidate.place.position;
+    report.covariance_m2 = candidate.place.covariance_m2;
+    report.image_width = waiting.frame.image_width;
+    report.image_height = waiting.frame.image_height;
+    report.image_frame_id = waiting.frame.frame_id;
+    report.image_format = jpeg->empty() ? "" : "jpeg";
+    report.image = *jpeg;
+    try {
+      if (map_.Add(report) == LocalHazardMap::AddResult::kFull) {
+        ++counters_.refused_map_full;
+        continue;
+      }
+      store_error_.clear();
+    } catch (const StoreError& error) {
+      TellStoreError(error);  // Not known either: the next sight of it tries again.
+      continue;
+    }
+    ++counters_.reports_created;
+    if (jpeg->empty()) ++counters_.reports_without_picture;
+    unsent_.insert(report.uuid);
+    schedule_.Add(report.uuid, catalogue_.Get(report.class_name).urgency, report.stamp_ns,
+                  steady_s);
+  }
+}
+
+std::vector<Report> HazardReporter::TakeDue(double steady_s, std::size_t limit) {
+  std::vector<Report> reports;
+  try {
+    for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
+      auto report = map_.LoadPending(uuid);
+      if (!report) continue;
+      if (unsent_.count(uuid) != 0) {
+        map_.MarkSent(uuid);
+        unsent_.erase(uuid);
+        ++counters_.reports_sent;
+      } else {
+        ++counters_.resends;
+      }
+      reports.push_back(std::move(*report));
+    }
+  } catch (const StoreError& error) {
+    TellStoreError(error);
+  }
+  return reports;
+}
+
+void HazardReporter::TellStoreError(const StoreError& error) {
+  ++counters_.store_errors;
+  store_error_ = error.what();
+}
+
+}  // namespace livemap

@@ -1,0 +1,167 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "geo/ground_projection.h"
+#include "hazard/catalogue.h"
+#include "hazard/fix_track.h"
+#include "hazard/hazard_placement.h"
+#include "hazard/local_hazard_map.h"
+#include "hazard/picture.h"
+#include "hazard/report.h"
+#include "hazard/resend_schedule.h"
+
+namespace livemap {
+
+/// One thing that the detector saw in an image.
+struct Sighting {
+  std::string class_name;
+  float confidence = 0;
+  Box box;
+};
+
+/// What the detector saw in one image.
+struct SightingFrame {
+  std::int64_t stamp_ns = 0;
+  std::string frame_id;  ///< Optical frame of the image.
+  std::uint32_t image_width = 0;
+  std::uint32_t image_height = 0;
+  std::vector<Sighting> sightings;
+};
+
+/// Turns what the detector sees into reports: places each hazard on the ground, sends nothing for a
+/// known one, keeps the others until the zone has answered (thesis, sections 3.1 and 3.2.2).
+///
+/// Fixes, frames, pictures, notices and receipts come in as they arrive; Process works off what can
+/// be worked off; TakeDue gives the reports to send now. Two clocks: `now_s` is the clock of the
+/// stamps (it may be a simulated one that pauses), `steady_s` never pauses. Not thread-safe.
+class HazardReporter {
+ public:
+  struct Config {
+    std::string drive_id;
+    /// Sightings below this confidence are ignored; the detector's own threshold stands before it.
+    double min_confidence = 0.0;
+    /// A sighting further away than this waits for a nearer view: its place is too uncertain, m.
+    double max_range_m = 30.0;
+    /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
+    double max_wait_s = 5.0;
+    /// A frame whose position can only be carried on waits this long for a fix after it, s.
+    double bracket_wait_s = 0.3;
+    /// A frame with something to report waits this long for its picture, s.
+    double picture_wait_s = 0.5;
+    /// Frames that wait at the same time; beyond it the oldest is dropped.
+    int max_waiting_frames = 50;
+    /// Antenna in base_link: forward and left of its origin, m.
+    double antenna_x_m = 0.0;
+    double antenna_y_m = 0.0;
+    int jpeg_quality = 80;  ///< 1..100.
+    int max_image_bytes = 100000;
+    FixTrack::Config track;
+    GroundProjectionNoise projection;
+    ResendSchedule::Config resend;
+    LocalHazardMap::Config map;
+  };
+
+  /// Since the start; sightings unless it says otherwise.
+  struct Counters {
+    std::uint64_t detections = 0;          ///< All that came in.
+    std::uint64_t invalid_detections = 0;  ///< NaN, empty box, overlong class: dropped.
+    std::uint64_t below_confidence = 0;
+    std::uint64_t held_back_no_fix = 0;   ///< Had to wait for a fix or course.
+    std::uint64_t dropped_no_fix = 0;     ///< Waited in vain, or overflowed the waiting room.
+    std::uint64_t dropped_no_camera = 0;  ///< No camera_info or mounting, or another image size.
+    std::uint64_t not_on_ground = 0;      ///< Box ends at or above the horizon.
+    std::uint64_t too_far = 0;            ///< Waits for a nearer view.
+    std::uint64_t duplicates_suppressed = 0;
+    std::uint64_t reports_created = 0;
+    std::uint64_t reports_without_picture = 0;
+    std::uint64_t refused_map_full = 0;  ///< Too many unfinished reports.
+    std::uint64_t reports_sent = 0;      ///< Distinct reports, at their first sending.
+    std::uint64_t resends = 0;
+    std::uint64_t committed = 0;  ///< Reports that the zone stored.
+    std::uint64_t refused = 0;    ///< Reports that the zone will never accept.
+    std::uint64_t notices = 0;
+    std::uint64_t invalid_notices = 0;
+    std::uint64_t fixes = 0;
+    std::uint64_t invalid_fixes = 0;  ///< NaN, out of range, out of order.
+    std::uint64_t no_fixes = 0;       ///< The receiver said that it had none.
+    std::uint64_t jumps = 0;          ///< Fixes that need an impossible speed.
+    std::uint64_t store_errors = 0;
+  };
+
+  /// `random` makes uuids and jitter; `now_ns` (UTC) names a corrupt database's new name.
+  HazardReporter(const Config& config, const HazardCatalogue& catalogue, std::mt19937_64 random,
+                 std::int64_t now_ns, double steady_s);
+
+  void SetIntrinsics(const CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
+  /// Pose of the camera's optical frame in base_link.
+  void SetMounting(const std::string& frame_id, const Eigen::Isometry3d& base_from_optical);
+  bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
+
+  void AddFix(const Fix& fix);
+  void AddFrame(const SightingFrame& frame, double now_s);
+  /// The annotated image of the frame with this stamp, before or after it.
+  void AddPicture(std::int64_t stamp_ns, const Picture& picture);
+  void AddNotice(const Notice& notice);
+  void AddReceipt(const Receipt& receipt);
+
+  /// Works off waiting notices and frames, in their order.
+  void Process(double now_s, double steady_s);
+  /// At most `limit` reports to send now.
+  std::vector<Report> TakeDue(double steady_s, std::size_t limit);
+
+  const FixTrack& track() const { return track_; }
+  const LocalHazardMap& map() const { return map_; }
+  const Counters& counters() const { return counters_; }
+  std::size_t waiting_frames() const { return waiting_.size(); }
+  /// The store's last complaint; empty while it works.
+  const std::string& store_error() const { return store_error_; }
+
+ private:
+  struct Candidate {
+    Sighting sighting;
+    PlacedHazard place;
+  };
+  struct WaitingFrame {
+    SightingFrame frame;
+    double arrival_s;
+    bool held_back = false;
+    bool placed = false;
+    std::vector<Candidate> candidates;  // Once placed.
+    Picture picture;
+  };
+
+  bool IsUsable(const Sighting& sighting);
+  bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
+  bool HasCamera(const SightingFrame& frame) const;
+  bool Place(WaitingFrame& waiting, double waited_s);
+  void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose);
+  void ReportCandidates(const WaitingFrame& waiting, double steady_s);
+  void ApplyNotices();
+  void TellStoreError(const StoreError& error);
+
+  Config config_;
+  HazardCatalogue catalogue_;
+  std::mt19937_64 random_;
+  LocalHazardMap map_;
+  FixTrack track_;
+  ResendSchedule schedule_;
+  std::optional<CameraIntrinsics> intrinsics_;
+  std::map<std::string, Eigen::Isometry3d> mountings_;
+  std::deque<WaitingFrame> waiting_;
+  std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
+  std::deque<Notice> notices_;
+  std::set<Uuid> unsent_;
+  Counters counters_;
+  std::string store_error_;
+};
+
+}  // namespace livemap

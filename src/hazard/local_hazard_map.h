@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/sqlite.h"
+#include "hazard/catalogue.h"
+#include "hazard/duplicate_filter.h"
+#include "hazard/report.h"
+
+namespace livemap {
+
+/// What the vehicle knows about one hazard.
+struct KnownHazard {
+  Uuid id;  ///< The zone's once it has told; until then that of the vehicle's own report.
+  bool of_zone = false;
+  std::string class_name;
+  float confidence = 0;
+  GeoPoint position;
+};
+
+/// The vehicle's memory: the hazards it knows, its own and those that the zone announced, and its
+/// reports that the zone has not answered yet. Both stand in one durable SQLite database, so that
+/// "known" and "to be sent" are one transaction: what Add accepted is reported whatever dies.
+/// Not thread-safe. Every method that writes throws StoreError when the store fails; then nothing
+/// has changed.
+class LocalHazardMap {
+ public:
+  struct Config {
+    std::string path;  ///< The database file; its directory exists.
+    /// Hazards kept; beyond it the ones longest without news are forgotten (and would be reported
+    /// anew), never one whose report is unfinished.
+    int max_known = 100000;
+    /// Unfinished reports kept; beyond it new hazards are refused, nothing accepted is dropped.
+    int max_pending = 1000;
+  };
+
+  enum class AddResult {
+    kAdded,      ///< Durably known and to be sent.
+    kDuplicate,  ///< Of a known hazard; nothing is stored.
+    kFull,       ///< Too many unfinished reports; nothing is stored.
+  };
+
+  struct PendingReport {
+    Uuid uuid;
+    std::string class_name;
+    std::int64_t created_ns = 0;  ///< The report's stamp.
+    bool sent = false;            ///< At least once.
+  };
+
+  /// Opens or creates the database. A corrupt file is renamed to `<path>.corrupt-<now_ns>` with
+  /// its companions and a new one started: see set_aside(). Throws Error for every other failure.
+  LocalHazardMap(const Config& config, const HazardCatalogue& catalogue, std::int64_t now_ns);
+
+  /// Where a corrupt database was moved; empty when the file was sound.
+  const std::string& set_aside() const { return set_aside_; }
+
+  /// The known hazard that a sighting duplicates.
+  std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
+                                             const GeoPoint& position) const;
+  AddResult Add(const Report& report);
+
+  /// Takes in what the zone announced, in one transaction. Returns how many were unusable (nil id,
+  /// impossible position, overlong class name) and left out.
+  std::size_t Apply(const std::vector<Notice>& notices);
+  /// Ends the report that the receipt answers; false when no such report is unfinished. A committed
+  /// hazard goes on under the zone's id. A refused one stays known, or it would be reported anew
+  /// at the next sight.
+  bool Apply(const Receipt& receipt);
+
+  std::vector<PendingReport> Pending() const;
+  /// The whole report, as it was added.
+  std::optional<Report> LoadPending(const Uuid& uuid) const;
+  void MarkSent(const Uuid& uuid);
+
+  /// At most `limit` known hazards, those with the newest news first.
+  std::vector<KnownHazard> Known(std::size_t limit) const;
+  std::size_t known_count() const { return filter_.size(); }
+  std::size_t pending_count() const { return pending_count_; }
+  /// Changes whenever a known hazard does.
+  std::uint64_t revision() const { return revision_; }
+
+ private:
+  void Open();
+  void SetAside(std::int64_t now_ns);
+  void LoadFilter();
+  bool IsNews(const Notice& notice) const;
+  void StoreNotice(const Notice& notice);
+  std::vector<Uuid> EvictBeyondLimit();
+
+  Config config_;
+  HazardCatalogue catalogue_;
+  std::string set_aside_;
+  std::unique_ptr<SqliteDatabase> database_;
+  DuplicateFilter filter_;
+  std::size_t pending_count_ = 0;
+  std::uint64_t revision_ = 0;
+};
+
+}  // namespace livemap
