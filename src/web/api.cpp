@@ -1,0 +1,206 @@
+#include "web/api.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "web/json.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxPictureBytes = 32 << 20;
+constexpr std::string_view kImagePrefix = "/images/";
+constexpr std::string_view kHazardPrefix = "/api/v1/hazards/";
+constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
+
+/// Only this server's own files run or load; tiles are the one exception, and only as images.
+std::string PagePolicy(const std::string& tile_source) {
+  return "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:" +
+         (tile_source.empty() ? "" : " " + tile_source) +
+         "; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+         "frame-ancestors 'none'";
+}
+
+bool StartsWith(std::string_view text, std::string_view prefix) {
+  return text.substr(0, prefix.size()) == prefix;
+}
+
+HttpAnswer JsonAnswer(const Json& json, const char* type = "application/json") {
+  HttpAnswer answer;
+  answer.content_type = type;
+  answer.content = ToText(json);
+  answer.headers.emplace_back("Cache-Control", "no-store");
+  return answer;
+}
+
+/// 304 where the client already has this very content.
+HttpAnswer CacheableAnswer(StaticFile file, const char* cache_control,
+                           const HttpQuestion& question) {
+  HttpAnswer answer;
+  answer.headers.emplace_back("ETag", file.etag);
+  answer.headers.emplace_back("Cache-Control", cache_control);
+  answer.content_type = std::move(file.content_type);
+  if (question.if_none_match.find(file.etag) != std::string::npos) {
+    answer.status = 304;
+  } else {
+    answer.content = std::move(file.content);
+  }
+  return answer;
+}
+
+}  // namespace
+
+Api::Api(const WebOptions& options, ZoneService& zone, const HazardCatalogue& catalogue,
+         const VehicleTrails& trails)
+    : options_(options),
+      zone_(zone),
+      catalogue_(catalogue),
+      trails_(trails),
+      page_(options.web_root),
+      leaflet_(options.leaflet_root + "/leaflet"),
+      page_policy_(PagePolicy(TileSource(options.tile_url))) {}
+
+HttpAnswer Api::Answer(const HttpQuestion& question) const {
+  HttpAnswer answer;
+  try {
+    if (question.method != "GET" && question.method != "HEAD") {
+      answer = ErrorAnswer(405, "the method is not allowed, accepted are GET and HEAD");
+      answer.headers.emplace_back("Allow", "GET, HEAD");
+    } else {
+      answer = Route(ParseTarget(question.target), question);
+    }
+  } catch (const BadRequest& mistake) {
+    answer = ErrorAnswer(400, mistake.what());
+  } catch (const std::exception&) {
+    // The zone's log names the cause; a stranger gets no paths or SQL.
+    answer = ErrorAnswer(503, "the zone's store does not answer");
+  }
+  const bool has_policy =
+      std::any_of(answer.headers.begin(), answer.headers.end(),
+                  [](const auto& header) { return header.first == "Content-Security-Policy"; });
+  if (!has_policy) answer.headers.emplace_back("Content-Security-Policy", page_policy_);
+  answer.headers.emplace_back("X-Content-Type-Options", "nosniff");
+  answer.headers.emplace_back("X-Frame-Options", "DENY");
+  answer.headers.emplace_back("Referrer-Policy", "strict-origin-when-cross-origin");
+  answer.headers.emplace_back("Cross-Origin-Resource-Policy", "same-origin");
+  answer.headers.emplace_back("Cross-Origin-Opener-Policy", "same-origin");
+  return answer;
+}
+
+HttpAnswer Api::ErrorAnswer(int status, const std::string& sentence) const {
+  HttpAnswer answer = JsonAnswer({{"error", sentence}});
+  answer.status = status;
+  return answer;
+}
+
+HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question) const {
+  const std::string& path = target.path;
+  if (StartsWith(path, "/api/")) return RouteApi(target);
+  if (StartsWith(path, kImagePrefix)) return Picture(path.substr(kImagePrefix.size()), question);
+  if (path == "/healthz") {
+    return JsonAnswer({{"status", "ok"}, {"sequence", zone_.Sequence()}});
+  }
+  if (path == "/ws") {
+    HttpAnswer answer = ErrorAnswer(426, "this address speaks WebSocket only");
+    answer.headers.emplace_back("Upgrade", "websocket");
+    return answer;
+  }
+  if (StartsWith(path, kLeafletPrefix)) {
+    return File(leaflet_, std::string_view(path).substr(kLeafletPrefix.size()), question);
+  }
+  if (path == "/") return File(page_, "index.html", question);
+  return File(page_, std::string_view(path).substr(1), question);
+}
+
+HttpAnswer Api::RouteApi(const RequestTarget& target) const {
+  const std::string& path = target.path;
+  if (path == "/api/v1/hazards") return Hazards(ParseHazardQuery(target));
+  RefuseParameters(target);
+  if (StartsWith(path, kHazardPrefix)) return OneHazard(path.substr(kHazardPrefix.size()));
+  if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
+  if (path == "/api/v1/vehicles") return Vehicles();
+  if (path == "/api/v1/config") return PageConfig();
+  return ErrorAnswer(404, "there is nothing at this address");
+}
+
+HttpAnswer Api::Hazards(const HazardQuery& query) const {
+  // Read before the list: an event that comes between the two is in the list and told again.
+  std::uint64_t sequence = zone_.Sequence();
+  const std::vector<Hazard> hazards = zone_.Query(query.box, query.since.value_or(0), query.limit);
+  const bool truncated = hazards.size() == query.limit;
+  Json features = Json::array();
+  std::uint64_t newest = 0;
+  for (const Hazard& hazard : hazards) {
+    newest = std::max(newest, hazard.sequence);
+    Json feature = HazardFeature(hazard, catalogue_);
+    if (query.since) feature["properties"]["action"] = ActionName(ReplayAction(hazard));
+    features.push_back(std::move(feature));
+  }
+  // The list comes in the order of the sequence, so a cut one is complete up to its last hazard.
+  sequence = truncated ? newest : std::max(sequence, newest);
+  Json collection;
+  collection["type"] = "FeatureCollection";
+  collection["sequence"] = sequence;
+  collection["truncated"] = truncated;
+  collection["features"] = std::move(features);
+  return JsonAnswer(collection, "application/geo+json");
+}
+
+HttpAnswer Api::OneHazard(const std::string& id) const {
+  const auto uuid = Uuid::Parse(id);
+  if (!uuid) throw BadRequest("the hazard's id is no UUID");
+  const auto hazard = zone_.Find(*uuid);
+  if (!hazard) return ErrorAnswer(404, "the zone knows no hazard with this id");
+  Json feature = HazardFeature(*hazard, catalogue_);
+  feature["properties"]["active"] = hazard->active;
+  return JsonAnswer(feature, "application/geo+json");
+}
+
+HttpAnswer Api::Vehicles() const {
+  Json features = Json::array();
+  for (const VehicleState& vehicle : zone_.Vehicles()) {
+    features.push_back(VehicleFeature(vehicle, trails_.Get(vehicle.vehicle_id)));
+  }
+  Json collection;
+  collection["type"] = "FeatureCollection";
+  collection["features"] = std::move(features);
+  return JsonAnswer(collection, "application/geo+json");
+}
+
+HttpAnswer Api::PageConfig() const {
+  Json config;
+  config["title"] = options_.title;
+  config["tile_url"] = options_.tile_url.empty() ? Json(nullptr) : Json(options_.tile_url);
+  config["tile_attribution"] = options_.tile_attribution;
+  config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
+  return JsonAnswer(config);
+}
+
+HttpAnswer Api::Picture(const std::string& sha256, const HttpQuestion& question) const {
+  const auto path = zone_.ImagePath(sha256);
+  if (!path) return ErrorAnswer(404, "the zone has no picture of this name");
+  StaticFile file;
+  try {
+    file.content = ReadFile(*path, kMaxPictureBytes);
+  } catch (const Error&) {
+    return ErrorAnswer(404, "the zone has no picture of this name");  // Evicted in between.
+  }
+  const auto type = ImageType(file.content);
+  if (!type) return ErrorAnswer(404, "the zone has no picture of this name");
+  file.content_type = *type;
+  file.etag = '"' + sha256 + '"';
+  HttpAnswer answer =
+      CacheableAnswer(std::move(file), "public, max-age=31536000, immutable", question);
+  // A vehicle sent these bytes: even opened on their own they may do nothing.
+  answer.headers.emplace_back("Content-Security-Policy", "default-src 'none'; sandbox");
+  return answer;
+}
+
+HttpAnswer Api::File(const StaticFiles& files, std::string_view name,
+                     const HttpQuestion& question) const {
+  auto file = files.Find(name);
+  if (!file) return ErrorAnswer(404, "there is nothing at this address");
+  return CacheableAnswer(*std::move(file), "no-cache", question);
+}
+
+}  // namespace livemap

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+/// Settings of the zone's web server, with their defaults.
+struct WebOptions {
+  std::string address = "127.0.0.1";  ///< Where to listen; "0.0.0.0" serves the whole network.
+  int port = 8080;                    ///< 0 takes any free port.
+  std::string web_root;               ///< Folder of the page (index.html).
+  std::string leaflet_root = "/usr/share/javascript";  ///< Holds leaflet/ with its cluster plugin.
+  std::string tile_url;          ///< E.g. "https://tiles.example/{z}/{x}/{y}.png"; empty: offline.
+  std::string tile_attribution;  ///< Plain text; most tile providers require it.
+  std::string title = "LiveMap";
+  GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
+  /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
+  std::vector<std::string> allowed_origins;
+  int threads = 2;
+  std::size_t max_connections = 256;  ///< Further ones are answered 503 and closed.
+  double request_timeout_s = 15;      ///< For a request's header, also the idle time between two.
+  double answer_timeout_s = 60;       ///< For writing one answer.
+  double ping_timeout_s = 30;         ///< A stream that answers no ping for this long is closed.
+  double heartbeat_s = 10;            ///< A stream says something at least this often.
+  /// Messages that wait for one live-stream client; one that falls further behind is closed with a
+  /// reason and catches up when it reconnects.
+  std::size_t max_queued_messages = 2048;
+  std::size_t max_queued_bytes = 4 << 20;
+  std::size_t socket_send_buffer_bytes = 0;  ///< SO_SNDBUF; 0 leaves it to the system.
+};
+
+/// Throws Error naming the first option that cannot be served, its value and what is accepted.
+void Validate(const WebOptions& options);
+
+/// The source expression of a Content-Security-Policy that admits the tiles' host, e.g.
+/// "https://*.tiles.example" for "https://{s}.tiles.example/{z}/{x}/{y}.png"; empty for no tiles or
+/// tiles of this server. Throws Error for anything that is no http(s) address or absolute path.
+std::string TileSource(const std::string& tile_url);
+
+}  // namespace livemap

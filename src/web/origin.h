@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace livemap {
+
+/// Whether a page of `origin` (the Origin header) may open the live stream of the server that the
+/// client called `host` (the Host header): its own pages may, those of `allowed` ("https://a:1")
+/// may, and clients that are no browser, which send no Origin, may.
+bool IsAllowedOrigin(const std::string& origin, const std::string& host,
+                     const std::vector<std::string>& allowed);
+
+}  // namespace livemap

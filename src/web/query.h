@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "zone/hazard.h"
+
+namespace livemap {
+
+/// A request that the client must mend; answered with status 400 and this sentence.
+class BadRequest : public Error {
+ public:
+  using Error::Error;
+};
+
+/// An HTTP request target in origin form, percent-decoded.
+struct RequestTarget {
+  std::string path;  ///< Starts with '/'; may hold any byte but NUL.
+  std::vector<std::pair<std::string, std::string>> parameters;  ///< In the order of the query.
+};
+
+/// Splits and decodes "/path?key=value&...". Throws BadRequest when it does not start with '/', has
+/// a malformed %-escape, a NUL byte, more than 32 parameters, or is longer than 4096 bytes.
+RequestTarget ParseTarget(std::string_view target);
+
+/// What `GET /api/v1/hazards` asks for.
+struct HazardQuery {
+  std::optional<GeoBox> box;           ///< May cross the antimeridian (west > east).
+  std::optional<std::uint64_t> since;  ///< Only what changed after this sequence.
+  std::size_t limit = 20000;
+};
+
+/// The most hazards that one answer may hold.
+constexpr std::size_t kMaxHazardsPerAnswer = 50000;
+
+/// Reads `bbox=minLon,minLat,maxLon,maxLat` (degrees, RFC 7946 section 5), `since` and `limit`.
+/// Throws BadRequest naming the parameter, its value and what is accepted; unknown and repeated
+/// parameters are refused, so that a misspelt filter never answers with everything.
+HazardQuery ParseHazardQuery(const RequestTarget& target);
+
+/// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
+std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);
+
+/// Throws BadRequest when the target has any parameter.
+void RefuseParameters(const RequestTarget& target);
+
+}  // namespace livemap

@@ -1,0 +1,157 @@
+// Hazards on the map: one icon per class, gathered into rings that show the mix of classes where
+// they are dense, so that the browser never holds more than some hundred markers.
+
+import { svgElement, element } from './dom.js';
+
+const L = window.L;
+const PULSE_MS = 4500;
+
+const HazardIcon = L.Icon.extend({
+  options: { iconSize: [34, 42], iconAnchor: [17, 40], popupAnchor: [0, -36] },
+
+  createIcon() {
+    const { catalogue, className } = this.options;
+    const pin = element('div', { class: 'pin' }, catalogue.badge(className));
+    pin.style.setProperty('--colour', catalogue.colour(className));
+    this._setIconStyles(pin, 'icon');
+    return pin;
+  },
+
+  createShadow() {
+    return null;
+  },
+});
+
+const ClusterIcon = L.Icon.extend({
+  createIcon() {
+    const { count, shares, iconSize } = this.options;
+    const node = element('div', { class: 'cluster' }, ring(shares, count, iconSize[0]));
+    this._setIconStyles(node, 'icon');
+    return node;
+  },
+
+  createShadow() {
+    return null;
+  },
+});
+
+/** A ring whose arcs are the classes' shares, the count in its middle. */
+function ring(shares, count, size) {
+  const middle = size / 2;
+  const radius = middle - 5;
+  const around = 2 * Math.PI * radius;
+  const svg = svgElement('svg', { width: size, height: size, viewBox: `0 0 ${size} ${size}` },
+    svgElement('circle', { class: 'cluster-disc', cx: middle, cy: middle, r: middle - 1 }));
+  let start = 0;
+  for (const [colour, amount] of shares) {
+    const length = (amount / count) * around;
+    const arc = svgElement('circle', {
+      class: 'cluster-arc', cx: middle, cy: middle, r: radius, stroke: colour,
+      'stroke-dasharray': `${length} ${around - length}`, 'stroke-dashoffset': -start,
+      transform: `rotate(-90 ${middle} ${middle})`,
+    });
+    svg.append(arc);
+    start += length;
+  }
+  svg.append(svgElement('text', { class: 'cluster-count', x: middle, y: middle }, shortCount(count)));
+  return svg;
+}
+
+function shortCount(count) {
+  return count < 10000 ? String(count) : `${Math.round(count / 1000)}k`;
+}
+
+export class HazardLayer {
+  /** `onOpen(hazard)` answers the popup's content. */
+  constructor(map, catalogue, onOpen) {
+    this.map = map;
+    this.catalogue = catalogue;
+    this.onOpen = onOpen;
+    this.markers = new Map();
+    this.icons = new Map();
+    this.group = L.markerClusterGroup({
+      maxClusterRadius: 56,
+      spiderfyOnMaxZoom: true,
+      showCoverageOnHover: false,
+      animate: !matchMedia('(prefers-reduced-motion: reduce)').matches,
+      iconCreateFunction: (cluster) => this.clusterIcon(cluster),
+    });
+    this.group.addTo(map);
+  }
+
+  replaceAll(hazards) {
+    this.group.clearLayers();
+    this.markers.clear();
+    this.group.addLayers(hazards.map((hazard) => this.createMarker(hazard)));
+  }
+
+  put(hazard) {
+    const marker = this.markers.get(hazard.id);
+    if (!marker) {
+      this.group.addLayer(this.createMarker(hazard));
+      return;
+    }
+    const { lat, lng } = marker.getLatLng();
+    const open = marker.isPopupOpen();
+    marker.hazard = hazard;
+    if (lat !== hazard.latitude || lng !== hazard.longitude) {
+      marker.setLatLng([hazard.latitude, hazard.longitude]);
+      if (open) marker.getPopup().setLatLng(marker.getLatLng());
+    }
+    if (open) marker.setPopupContent(this.onOpen(hazard));
+  }
+
+  remove(hazard) {
+    const marker = this.markers.get(hazard.id);
+    if (!marker) return;
+    this.group.removeLayer(marker);
+    this.markers.delete(hazard.id);
+  }
+
+  /** Brings the hazard into view, out of its cluster, and opens its popup. */
+  open(hazard) {
+    const marker = this.markers.get(hazard.id);
+    if (!marker) return;
+    this.group.zoomToShowLayer(marker, () => marker.openPopup());
+  }
+
+  /** A ring that spreads for a moment where something is new, also above a cluster. */
+  highlight(hazard) {
+    const icon = L.divIcon({ className: 'pulse', iconSize: [64, 64] });
+    const pulse = L.marker([hazard.latitude, hazard.longitude],
+      { icon, interactive: false, zIndexOffset: -1000 }).addTo(this.map);
+    pulse.getElement().style.setProperty('--colour', this.catalogue.colour(hazard.className));
+    setTimeout(() => pulse.remove(), PULSE_MS);
+  }
+
+  createMarker(hazard) {
+    const marker = L.marker([hazard.latitude, hazard.longitude],
+      { icon: this.icon(hazard.className), riseOnHover: true });
+    marker.hazard = hazard;
+    marker.bindPopup(() => this.onOpen(marker.hazard),
+      { minWidth: 264, maxWidth: 300, autoPanPadding: [16, 16], className: 'hazard-popup' });
+    this.markers.set(hazard.id, marker);
+    return marker;
+  }
+
+  icon(className) {
+    let icon = this.icons.get(className);
+    if (!icon) {
+      icon = new HazardIcon({ catalogue: this.catalogue, className });
+      this.icons.set(className, icon);
+    }
+    return icon;
+  }
+
+  clusterIcon(cluster) {
+    const shares = new Map();
+    for (const marker of cluster.getAllChildMarkers()) {
+      const colour = this.catalogue.colour(marker.hazard.className);
+      shares.set(colour, (shares.get(colour) ?? 0) + 1);
+    }
+    const count = cluster.getChildCount();
+    const size = count < 10 ? 38 : count < 100 ? 44 : count < 1000 ? 50 : 58;
+    const ordered = [...shares].sort((a, b) => b[1] - a[1]);
+    return new ClusterIcon({ count, shares: ordered, iconSize: [size, size] });
+  }
+}

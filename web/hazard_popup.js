@@ -1,0 +1,62 @@
+// What a click on a hazard shows.
+
+import { element } from './dom.js';
+import { localTime, percent, plural, position, utcTime } from './format.js';
+
+/** Only the server's own pictures: a path of /images with a content hash. */
+function safeImage(url) {
+  return typeof url === 'string' && /^\/images\/[0-9a-f]{64}$/.test(url) ? url : null;
+}
+
+function picture(hazard) {
+  const url = safeImage(hazard.image);
+  if (!url) return element('p', { class: 'no-picture' }, 'No picture came with this report');
+  const image = element('img', {
+    class: 'picture', src: url, width: 300, height: 200,
+    alt: `Camera picture with the ${hazard.label} marked`,
+  });
+  image.addEventListener('error', () => {
+    image.closest('.picture-link')
+      .replaceWith(element('p', { class: 'no-picture' }, 'The picture is no longer kept'));
+  });
+  return element('a', {
+    class: 'picture-link', href: url, target: '_blank', rel: 'noopener',
+    title: 'Open the picture in full size',
+  }, image);
+}
+
+function time(value) {
+  return element('time', { datetime: new Date(value).toISOString(), title: utcTime(value) },
+    localTime(value));
+}
+
+function row(name, ...content) {
+  return [element('dt', {}, name), element('dd', {}, ...content)];
+}
+
+function confidenceBar(share) {
+  const bar = element('span', { class: 'meter', 'aria-hidden': 'true' }, element('span'));
+  bar.firstChild.style.width = `${Math.round(Math.min(Math.max(share, 0), 1) * 100)}%`;
+  return [bar, percent(share)];
+}
+
+/** The popup's content as a detached element. */
+export function popupContent(hazard, catalogue) {
+  const sigma = hazard.sigma === null ? '' : ` \u00b1 ${hazard.sigma.toFixed(1)} m`;
+  const facts = [
+    ...row('Position', element('span', { class: 'copyable' },
+      position(hazard.latitude, hazard.longitude)), sigma),
+    ...row('Last seen', time(hazard.lastSeen)),
+    ...(hazard.firstSeen === hazard.lastSeen ? [] : row('First seen', time(hazard.firstSeen))),
+    ...row('Confidence', ...confidenceBar(hazard.confidence)),
+    ...row('Seen', plural(hazard.sightings, 'time')),
+  ];
+  return element('article', {
+    class: 'popup', role: 'dialog', tabindex: '-1', 'aria-label': hazard.label,
+    'data-hazard': hazard.id,
+  },
+  picture(hazard),
+  element('h3', { class: 'popup-title' }, catalogue.badge(hazard.className),
+    element('span', {}, hazard.label)),
+  element('dl', { class: 'facts' }, ...facts));
+}
