@@ -33,7 +33,7 @@ struct MqttOptions {
   int keepalive_s = 15;                  ///< 5 to 65535; a dead connection is noticed after 1.5x.
   double connect_timeout_s = 5;          ///< For the TCP connection, per address.
   double reconnect_min_s = 0.5;          ///< First wait after a loss; doubles up to the maximum.
-  double reconnect_max_s = 30;
+  double reconnect_max_s = 10;
   std::uint64_t reconnect_jitter_seed = 0;
   int max_inflight = 20;                     ///< QoS 1 messages sent and not yet answered.
   std::size_t queue_messages = 1000;         ///< Waiting messages, beyond which Publish refuses.

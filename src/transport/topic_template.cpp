@@ -67,6 +67,7 @@ TopicTemplate::TopicTemplate(const std::string& text) : text_(text) {
                   " more than once");
     }
   }
+  has_zone_ = std::count(levels_.begin(), levels_.end(), kZone) == 1;
   has_vehicle_ = std::count(levels_.begin(), levels_.end(), kVehicle) == 1;
 }
 

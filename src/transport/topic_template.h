@@ -26,6 +26,7 @@ class TopicTemplate {
   explicit TopicTemplate(const std::string& text);
 
   const std::string& text() const { return text_; }
+  bool has_zone() const { return has_zone_; }
   bool has_vehicle() const { return has_vehicle_; }
 
   /// The topic to publish on. Throws Error when a name that the template needs is no valid id.
@@ -44,6 +45,7 @@ class TopicTemplate {
 
   std::string text_;
   std::vector<std::string> levels_;
+  bool has_zone_ = false;
   bool has_vehicle_ = false;
 };
 
