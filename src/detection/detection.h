@@ -1,0 +1,16 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace livemap {
+
+/// One hazard seen in one image.
+struct Detection {
+  std::string class_name;  ///< A name of the model's class list.
+  int class_index = 0;     ///< Its place in that list.
+  float confidence = 0;    ///< 0..1, objectness times class score.
+  cv::Rect2f box;          ///< px of the given image, inside it, never empty.
+};
+
+}  // namespace livemap

@@ -1,0 +1,22 @@
+#include "detection/hazard_detector.h"
+
+#include <utility>
+
+#include "detection/yolox_decoder.h"
+
+namespace livemap {
+
+HazardDetector::HazardDetector(const ModelManifest& manifest, int threads)
+    : HazardDetector(manifest, MakeInferenceEngine(manifest, threads)) {}
+
+HazardDetector::HazardDetector(const ModelManifest& manifest,
+                               std::unique_ptr<InferenceEngine> engine)
+    : manifest_(manifest), engine_(std::move(engine)), letterbox_(manifest) {}
+
+std::vector<Detection> HazardDetector::Detect(const cv::Mat& bgr) {
+  const cv::Mat& input = letterbox_.Fill(bgr);
+  const cv::Mat predictions = engine_->Run(input);
+  return DecodeYolox(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());
+}
+
+}  // namespace livemap

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "detection/detection.h"
+#include "detection/letterbox.h"
+#include "inference/inference_engine.h"
+#include "inference/model_manifest.h"
+
+namespace livemap {
+
+/// Finds hazards in single images: letterbox, network, decoding, thresholds, suppression. Not
+/// thread-safe: one detector per thread.
+class HazardDetector {
+ public:
+  /// Loads the model; throws Error when it is not what the manifest says. `threads` as in
+  /// MakeInferenceEngine.
+  explicit HazardDetector(const ModelManifest& manifest, int threads = 0);
+  /// With another engine, which must have been made for the same manifest.
+  HazardDetector(const ModelManifest& manifest, std::unique_ptr<InferenceEngine> engine);
+
+  /// Detections in `bgr` (8 bit, 3 channels, not empty; anything else throws Error), in pixels of
+  /// that image, descending confidence.
+  std::vector<Detection> Detect(const cv::Mat& bgr);
+
+  const ModelManifest& manifest() const { return manifest_; }
+
+ private:
+  ModelManifest manifest_;
+  std::unique_ptr<InferenceEngine> engine_;
+  Letterbox letterbox_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "detection/detection.h"
+#include "inference/model_manifest.h"
+
+namespace livemap {
+
+/// Turns the raw output of a YOLOX head into detections.
+///
+/// `predictions` is float32 1 x N x (5 + classes) as ModelManifest::Head says; per row the centre
+/// is (tx + column, ty + row) * stride, the size exp(tw) * stride by exp(th) * stride px of the
+/// network's input, the score objectness * class score. `scale` is input pixels per image pixel
+/// (the letterbox's) and `image_size` the image, to which boxes are cut. Rows with a number that is
+/// not finite, scores outside 0..1 and boxes outside the image are dropped. Returns what is at
+/// least at its class's threshold and survives suppression, descending confidence. Throws Error
+/// when the shape of `predictions` is another.
+std::vector<Detection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
+                                   double scale, cv::Size image_size);
+
+/// Greedy non-maximum suppression within each class: going down in confidence, a box that overlaps
+/// a kept one of its class by more than `iou_limit` goes. At most `kMostCandidates` of each class,
+/// the most confident, are looked at, which bounds the time that a wild output can cost. Returns
+/// the kept detections, descending confidence.
+std::vector<Detection> SuppressOverlaps(std::vector<Detection> candidates, float iou_limit);
+constexpr std::size_t kMostCandidates = 3000;
+
+/// Intersection over union of two boxes, 0 when both are empty.
+double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b);
+
+}  // namespace livemap

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace livemap {
+
+/// Order of the three channels in which a network wants an image.
+enum class ChannelOrder { kRgb, kBgr };
+
+/// Everything that must be known about a model to run it: the content of models/NAME.yaml, checked.
+/// models/README.md describes the file key by key.
+struct ModelManifest {
+  std::string name;                  ///< Goes into DetectionArray.model.
+  std::string file;                  ///< Path of the ONNX file.
+  std::string sha256;                ///< Of that file, 64 lower-case hexadecimal digits.
+  std::vector<std::string> classes;  ///< By class index; names as in config/hazards.yaml.
+
+  /// The network's input tensor `images`: 1 x 3 x height x width, float32. An image is scaled to
+  /// fit and padded on the right and at the bottom with `pad_value` (letterbox).
+  struct Input {
+    int width = 0;   ///< px
+    int height = 0;  ///< px
+    ChannelOrder channels = ChannelOrder::kRgb;
+    int pad_value = 114;  ///< 0..255, before normalisation
+  } input;
+
+  /// x = (pixel - mean) / std, pixel 0..255, per channel in the order of `input.channels`.
+  struct Normalisation {
+    std::array<float, 3> mean{};
+    std::array<float, 3> std{};
+  } normalisation;
+
+  /// YOLOX head (Ge et al. 2021): one output 1 x N x (5 + classes), rows (tx, ty, tw, th,
+  /// objectness, class scores) of all grid cells, level by level in the order of `strides`, rows of
+  /// cells first.
+  struct Head {
+    std::vector<int> strides;  ///< px of the input per cell
+    std::string output;        ///< name of the output tensor
+  } head;
+
+  std::vector<float> thresholds;  ///< Least confidence that is reported, by class index, (0, 1).
+  float nms_iou = 0.5F;           ///< Of two boxes of a class overlapping more, the weaker goes.
+
+  /// Rows of the output tensor: the cells of all levels.
+  int AnchorCount() const;
+};
+
+/// Reads and checks a manifest file; `file` is resolved against the manifest's folder. The model
+/// itself is not touched. Throws Error naming the file, the key, its value and what is accepted;
+/// unknown, missing and repeated keys are errors too.
+ModelManifest ReadModelManifest(const std::string& path);
+
+/// The same from text; `origin` names it in errors and `directory` is what `file` is relative to.
+ModelManifest ParseModelManifest(const std::string& yaml, const std::string& origin,
+                                 const std::string& directory);
+
+/// The bytes of the model file, whose SHA-256 is the manifest's: what is checked is what is loaded.
+/// Throws Error when the file is missing, too large (256 MiB) or another one.
+std::string ReadModelFile(const ModelManifest& manifest);
+
+}  // namespace livemap

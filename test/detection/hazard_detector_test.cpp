@@ -1,0 +1,65 @@
+#include "detection/hazard_detector.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+const cv::Scalar kRed(0, 0, 255);
+const cv::Scalar kGreen(0, 255, 0);
+
+/// The model of test/inference/make_tiny_model.py: red blocks are potholes, green ones cones.
+HazardDetector TinyDetector() {
+  return HazardDetector(ReadModelManifest(LIVEMAP_SOURCE_DIR "/test/inference/tiny.yaml"));
+}
+
+TEST(HazardDetector, FindsWhatTheModelFindsInPixelsOfTheImage) {
+  HazardDetector detector = TinyDetector();
+  // Twice the input: an 8 x 8 cell is 16 x 16 px here.
+  cv::Mat image(96, 128, CV_8UC3, cv::Scalar(0, 0, 0));
+  image(cv::Rect(32, 16, 16, 16)) = kRed;
+  image(cv::Rect(96, 64, 16, 16)) = kGreen;
+  const std::vector<Detection> found = detector.Detect(image);
+  ASSERT_EQ(found.size(), 2U);
+  const Detection& pothole = found[found[0].class_index == 0 ? 0 : 1];
+  const Detection& cone = found[found[0].class_index == 0 ? 1 : 0];
+  EXPECT_EQ(pothole.class_name, "pothole");
+  EXPECT_GT(pothole.confidence, 0.99F);
+  // Two cells wide and one high around the cell's centre (40, 24).
+  EXPECT_NEAR(pothole.box.x, 24, 0.1);
+  EXPECT_NEAR(pothole.box.y, 16, 0.1);
+  EXPECT_NEAR(pothole.box.width, 32, 0.1);
+  EXPECT_NEAR(pothole.box.height, 16, 0.1);
+  EXPECT_EQ(cone.class_name, "traffic_cone");
+  EXPECT_NEAR(cone.box.x, 96, 0.1);
+  EXPECT_NEAR(cone.box.y, 64, 0.1);
+}
+
+TEST(HazardDetector, AnEmptyRoadGivesNothing) {
+  HazardDetector detector = TinyDetector();
+  EXPECT_TRUE(detector.Detect(cv::Mat(96, 128, CV_8UC3, cv::Scalar(90, 90, 90))).empty());
+}
+
+TEST(HazardDetector, ImagesOfDifferentSizesFollowEachOther) {
+  HazardDetector detector = TinyDetector();
+  for (const cv::Size size : {cv::Size(64, 48), cv::Size(640, 480), cv::Size(200, 48),
+                              cv::Size(48, 200), cv::Size(1, 1), cv::Size(64, 48)}) {
+    for (const Detection& detection : detector.Detect(cv::Mat(size, CV_8UC3, kRed))) {
+      const cv::Rect2f image({0, 0}, cv::Size2f(size));
+      EXPECT_EQ(detection.box & image, detection.box) << size;
+      EXPECT_FALSE(detection.box.empty()) << size;
+    }
+  }
+}
+
+TEST(HazardDetector, AnImageThatItCannotUseIsRefusedAndTheNextOneWorks) {
+  HazardDetector detector = TinyDetector();
+  EXPECT_THROW(detector.Detect(cv::Mat()), Error);
+  EXPECT_THROW(detector.Detect(cv::Mat(48, 64, CV_16UC1, cv::Scalar(0))), Error);
+  EXPECT_FALSE(detector.Detect(cv::Mat(48, 64, CV_8UC3, kRed)).empty());
+}
+
+}  // namespace
+}  // namespace livemap

@@ -1,0 +1,161 @@
+#include "detection/yolox_decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "detection/synthetic_head.h"
+
+namespace livemap {
+namespace {
+
+using test::NothingSeen;
+using test::TwoLevelManifest;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+const cv::Size kImage(128, 96);  // twice the input
+constexpr double kScale = 0.5;
+
+void SetRow(cv::Mat& predictions, int row, const std::vector<float>& values) {
+  std::copy(values.begin(), values.end(), predictions.ptr<float>(0, row));
+}
+
+Detection Candidate(int class_index, float confidence, cv::Rect2f box) {
+  return {class_index == 0 ? "pothole" : "traffic_cone", class_index, confidence, box};
+}
+
+TEST(YoloxDecoder, ABoxOfEachLevelLandsWhereItsCellSays) {
+  const ModelManifest manifest = TwoLevelManifest();
+  cv::Mat predictions = NothingSeen(manifest);
+  // Stride 8, column 3, row 2: centre ((0.5 + 3) * 8, (0.25 + 2) * 8) = (28, 18), size 16 x 8.
+  SetRow(predictions, 2 * 8 + 3, {0.5F, 0.25F, std::log(2.0F), 0, 0.9F, 1.0F, 0});
+  // Stride 16, column 1, row 2: centre ((0 + 1) * 16, (0.5 + 2) * 16) = (16, 40), size 8 x 16.
+  SetRow(predictions, 48 + 2 * 4 + 1, {0, 0.5F, std::log(0.5F), 0, 1.0F, 0, 0.85F});
+  const std::vector<Detection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].class_name, "pothole");
+  EXPECT_EQ(found[0].class_index, 0);
+  EXPECT_FLOAT_EQ(found[0].confidence, 0.9F);
+  EXPECT_FLOAT_EQ(found[0].box.x, 2 * (28 - 8));
+  EXPECT_FLOAT_EQ(found[0].box.y, 2 * (18 - 4));
+  EXPECT_FLOAT_EQ(found[0].box.width, 32);
+  EXPECT_FLOAT_EQ(found[0].box.height, 16);
+  EXPECT_EQ(found[1].class_name, "traffic_cone");
+  EXPECT_FLOAT_EQ(found[1].confidence, 0.85F);
+  EXPECT_FLOAT_EQ(found[1].box.x, 2 * (16 - 4));
+  EXPECT_FLOAT_EQ(found[1].box.y, 2 * (40 - 8));
+  EXPECT_FLOAT_EQ(found[1].box.width, 16);
+  EXPECT_FLOAT_EQ(found[1].box.height, 32);
+}
+
+TEST(YoloxDecoder, EachClassHasItsOwnThresholdOnObjectnessTimesClassScore) {
+  const ModelManifest manifest = TwoLevelManifest();  // pothole 0.5, traffic cone 0.8
+  cv::Mat predictions = NothingSeen(manifest);
+  SetRow(predictions, 0, {0.5F, 0.5F, 0, 0, 0.75F, 0.75F, 1.0F});  // 0.5625 and 0.75
+  SetRow(predictions, 20, {0.5F, 0.5F, 0, 0, 0.75F, 0.5F, 0});     // 0.375
+  const std::vector<Detection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].class_name, "pothole");
+  EXPECT_FLOAT_EQ(found[0].confidence, 0.5625F);
+}
+
+TEST(YoloxDecoder, BoxesAreCutToTheImage) {
+  const ModelManifest manifest = TwoLevelManifest();
+  cv::Mat predictions = NothingSeen(manifest);
+  SetRow(predictions, 0, {0, 0, std::log(100.0F), std::log(2.0F), 1, 1, 0});
+  SetRow(predictions, 47, {0.5F, 0.5F, 200, 200, 0.9F, 0, 1});  // exp(200) overflows a float
+  const std::vector<Detection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].box, cv::Rect2f(0, 0, 128, 16));
+  EXPECT_EQ(found[1].box, cv::Rect2f(0, 0, 128, 96));
+}
+
+TEST(YoloxDecoder, BoxesOutsideTheImageAreDropped) {
+  const ModelManifest manifest = TwoLevelManifest();
+  cv::Mat predictions = NothingSeen(manifest);
+  SetRow(predictions, 0, {-5, 0.5F, 0, 0, 1, 1, 0});
+  SetRow(predictions, 1, {0.5F, 100, 0, 0, 1, 1, 0});
+  SetRow(predictions, 2, {0.5F, 0.5F, -300, 0, 1, 1, 0});  // exp(-300) is nothing
+  EXPECT_TRUE(DecodeYolox(predictions, manifest, kScale, kImage).empty());
+}
+
+TEST(YoloxDecoder, NumbersThatAreNotFiniteOrNoScoresAreDropped) {
+  const ModelManifest manifest = TwoLevelManifest();
+  cv::Mat predictions = NothingSeen(manifest);
+  int row = 0;
+  for (const float bad : {kNan, kInfinity, -kInfinity}) {
+    for (std::size_t column = 0; column < 6; ++column) {
+      std::vector<float> values = {0.5F, 0.5F, 0, 0, 1, 1, 0};
+      values[column] = bad;
+      SetRow(predictions, row++, values);
+    }
+  }
+  SetRow(predictions, row++, {0.5F, 0.5F, 0, 0, -1, -0.9F, 0});
+  SetRow(predictions, row++, {0.5F, 0.5F, 0, 0, 2, 0.5F, 0});
+  SetRow(predictions, row++, {0.5F, 0.5F, 0, 0, 0.5F, 2, 0});
+  EXPECT_TRUE(DecodeYolox(predictions, manifest, kScale, kImage).empty());
+}
+
+TEST(YoloxDecoder, AnotherShapeIsRefused) {
+  const ModelManifest manifest = TwoLevelManifest();
+  const int too_few_rows[] = {1, 59, 7};
+  const int too_few_columns[] = {1, 60, 6};
+  const int flat[] = {60, 7};
+  for (const cv::Mat& predictions : {cv::Mat(3, too_few_rows, CV_32F, cv::Scalar(0)),
+                                     cv::Mat(3, too_few_columns, CV_32F, cv::Scalar(0)),
+                                     cv::Mat(2, flat, CV_32F, cv::Scalar(0)), cv::Mat()}) {
+    EXPECT_THROW(DecodeYolox(predictions, manifest, kScale, kImage), Error);
+  }
+}
+
+TEST(Suppression, TheWeakerOfTwoOverlappingBoxesOfAClassGoes) {
+  const std::vector<Detection> kept = SuppressOverlaps(
+      {Candidate(0, 0.6F, {0, 0, 10, 10}), Candidate(0, 0.9F, {1, 0, 10, 10})}, 0.5F);
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_FLOAT_EQ(kept[0].confidence, 0.9F);
+}
+
+TEST(Suppression, BoxesOfOtherClassesAndFarBoxesStayInDescendingConfidence) {
+  const std::vector<Detection> kept =
+      SuppressOverlaps({Candidate(0, 0.6F, {0, 0, 10, 10}), Candidate(1, 0.9F, {0, 0, 10, 10}),
+                        Candidate(0, 0.7F, {50, 0, 10, 10})},
+                       0.5F);
+  ASSERT_EQ(kept.size(), 3U);
+  EXPECT_FLOAT_EQ(kept[0].confidence, 0.9F);
+  EXPECT_FLOAT_EQ(kept[1].confidence, 0.7F);
+  EXPECT_FLOAT_EQ(kept[2].confidence, 0.6F);
+}
+
+TEST(Suppression, ASuppressedBoxSuppressesNoOther) {
+  // A chain: the first overlaps the second, the second the third, the first not the third.
+  const std::vector<Detection> kept =
+      SuppressOverlaps({Candidate(0, 0.9F, {0, 0, 10, 10}), Candidate(0, 0.8F, {3, 0, 10, 10}),
+                        Candidate(0, 0.7F, {6, 0, 10, 10})},
+                       0.5F);
+  ASSERT_EQ(kept.size(), 2U);
+  EXPECT_FLOAT_EQ(kept[1].box.x, 6);
+}
+
+TEST(Suppression, OnlyTheMostConfidentCandidatesAreLookedAt) {
+  std::vector<Detection> candidates;
+  for (std::size_t i = 0; i < kMostCandidates + 10; ++i) {
+    const auto x = static_cast<float>(i);
+    candidates.push_back(Candidate(0, 0.5F + 1e-5F * x, {20 * x, 0, 10, 10}));
+  }
+  const std::vector<Detection> kept = SuppressOverlaps(candidates, 0.5F);
+  ASSERT_EQ(kept.size(), kMostCandidates);
+  EXPECT_FLOAT_EQ(kept.front().box.x, 20.0F * (kMostCandidates + 9));
+}
+
+TEST(IntersectionOverUnion, OfKnownBoxes) {
+  EXPECT_DOUBLE_EQ(IntersectionOverUnion({0, 0, 10, 10}, {0, 0, 10, 10}), 1);
+  EXPECT_DOUBLE_EQ(IntersectionOverUnion({0, 0, 10, 10}, {5, 0, 10, 10}), 50.0 / 150);
+  EXPECT_DOUBLE_EQ(IntersectionOverUnion({0, 0, 10, 10}, {10, 0, 10, 10}), 0);
+  EXPECT_DOUBLE_EQ(IntersectionOverUnion({0, 0, 0, 0}, {0, 0, 0, 0}), 0);
+}
+
+}  // namespace
+}  // namespace livemap

@@ -1,0 +1,84 @@
+// Every model that ships must answer in this build as it answered where it was trained.
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "inference/inference_engine.h"
+
+namespace livemap {
+namespace {
+
+/// Paths of the models/NAME.yaml that have a NAME.golden.yaml beside them.
+std::vector<std::string> ShippedManifests() {
+  std::vector<std::string> paths;
+  const std::string suffix = ".golden.yaml";
+  for (const auto& entry : std::filesystem::directory_iterator(LIVEMAP_SOURCE_DIR "/models")) {
+    const std::string path = entry.path().string();
+    if (path.size() > suffix.size() &&
+        path.compare(path.size() - suffix.size(), suffix.size(), suffix) == 0) {
+      paths.push_back(path.substr(0, path.size() - suffix.size()) + ".yaml");
+    }
+  }
+  return paths;
+}
+
+/// The image that models/README.md defines by a formula, as the normalised input tensor.
+cv::Mat FormulaImage(const ModelManifest& manifest) {
+  const int shape[] = {1, 3, manifest.input.height, manifest.input.width};
+  cv::Mat images(4, shape, CV_32F);
+  for (int plane = 0; plane < 3; ++plane) {
+    const int channel = manifest.input.channels == ChannelOrder::kRgb ? plane : 2 - plane;
+    const auto index = static_cast<std::size_t>(plane);
+    float* pixel = images.ptr<float>(0, plane);
+    for (int y = 0; y < manifest.input.height; ++y) {
+      for (int x = 0; x < manifest.input.width; ++x) {
+        const int value = (x * (channel + 1) + 2 * y + x * y / 64) % 256;
+        *pixel++ = (static_cast<float>(value) - manifest.normalisation.mean[index]) /
+                   manifest.normalisation.std[index];
+      }
+    }
+  }
+  return images;
+}
+
+class GoldenTest : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
+  const std::string golden_path =
+      GetParam().substr(0, GetParam().size() - std::string("yaml").size()) + "golden.yaml";
+  const YAML::Node golden = YAML::LoadFile(golden_path);
+  const ModelManifest manifest = ReadModelManifest(GetParam());
+  const cv::Mat output = MakeInferenceEngine(manifest, 0)->Run(FormulaImage(manifest));
+  const auto tolerance = golden["tolerance"].as<double>();
+  ASSERT_LE(tolerance, 1e-3);
+  ASSERT_GT(golden["rows"].size(), 0U);
+  for (const YAML::Node& row : golden["rows"]) {
+    const int index = row["index"].as<int>();
+    const auto values = row["values"].as<std::vector<double>>();
+    ASSERT_TRUE(index >= 0 && index < output.size[1]) << index;
+    ASSERT_EQ(values.size(), static_cast<std::size_t>(output.size[2]));
+    for (std::size_t column = 0; column < values.size(); ++column) {
+      EXPECT_NEAR(output.ptr<float>(0, index)[column], values[column], tolerance)
+          << "row " << index << ", column " << column;
+    }
+  }
+}
+
+std::string NameOf(const ::testing::TestParamInfo<std::string>& manifest) {
+  std::string name = std::filesystem::path(manifest.param).stem().string();
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest, ::testing::ValuesIn(ShippedManifests()), NameOf);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenTest);
+
+}  // namespace
+}  // namespace livemap
