@@ -112,7 +112,8 @@ class VehicleObserver:
         self.values = {}
         self.clock_sim, self.clock_wall = [], []
         wait_for_master(master_uri)
-        rospy.init_node("livemap_demo", anonymous=True, disable_signals=True)
+        if not rospy.core.is_initialized():
+            rospy.init_node("livemap_demo", anonymous=True, disable_signals=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._take_diagnostics, queue_size=100)
         rospy.Subscriber("/clock", Clock, self._take_clock, queue_size=1000)
 
@@ -138,11 +139,19 @@ class VehicleObserver:
             wall0, wall1 = self.clock_wall[i - 1], self.clock_wall[i]
             return wall0 + (stamp - sim0) * (wall1 - wall0) / (sim1 - sim0)
 
-    def wait_until_up(self, timeout_s):
+    def clock_share(self, drive):
+        """How much of a drive the replay's clock has shown, 0 to 1."""
+        with self.lock:
+            if not self.clock_sim:
+                return 0.0
+            return (self.clock_sim[-1] - drive.start_s) / drive.duration_s
+
+    def wait_until_up(self, timeout_s, nodelets=tuple(COUNTS)):
+        """Until every one of `nodelets` has told its counts."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             with self.lock:
-                missing = [name for name in COUNTS if name not in self.values]
+                missing = [name for name in nodelets if name not in self.values]
             if not missing:
                 return
             time.sleep(0.1)

@@ -12,7 +12,7 @@ import urllib.request
 
 import rosbag
 
-Drive = collections.namedtuple("Drive", "frames duration_s")
+Drive = collections.namedtuple("Drive", "frames start_s duration_s")
 PROGRAMS = pathlib.Path(__file__).resolve().parent
 CAMERA_TOPICS = ("camera/image_raw/compressed", "camera/image_raw")
 
@@ -27,8 +27,18 @@ def free_port():
         return probe.getsockname()[1]
 
 
+def program(name):
+    """Path of one of the package's programs: beside this file, or in a workspace of the environment."""
+    folders = [PROGRAMS] + [pathlib.Path(prefix) / "lib/livemap" for prefix in
+                            os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if prefix]
+    for folder in folders:
+        if (folder / name).is_file():
+            return str(folder / name)
+    raise StartError(f"program '{name}' is not built; ./livemap setup builds it")
+
+
 def run_tool(command, log):
-    command = [str(PROGRAMS / command[0])] + command[1:]
+    command = [program(command[0])] + command[1:]
     with open(log, "w") as output:
         code = subprocess.call(command, stdout=output, stderr=subprocess.STDOUT)
     if code != 0:
@@ -44,7 +54,7 @@ def read_bag(path):
                   if name.lstrip("/") in CAMERA_TOPICS]
         if not counts:
             raise StartError(f"bag '{path}' has no topic {' or '.join(CAMERA_TOPICS)}")
-        return Drive(frames=sum(counts),
+        return Drive(frames=sum(counts), start_s=bag.get_start_time(),
                      duration_s=max(bag.get_end_time() - bag.get_start_time(), 1e-3))
 
 
@@ -91,12 +101,12 @@ class LiveMapSystem:
                 stdin=subprocess.DEVNULL, start_new_session=True)
 
     def launch(self, name, port, file, arguments):
-        self.start(name, ["roslaunch", "--wait" if port is None else f"--port={port}", "livemap",
-                          file] + [f"{key}:={value}" for key, value in arguments.items()],
+        self.start(name, ["roslaunch", f"--port={port}", "livemap", file]
+                   + [f"{key}:={value}" for key, value in arguments.items()],
                    master=f"http://127.0.0.1:{port}")
 
     def start_broker(self):
-        self.start("broker", [str(PROGRAMS / "livemap_broker"),
+        self.start("broker", [program("livemap_broker"),
                               "--directory", str(self.directory / "broker"),
                               "--port", str(self.broker_port), "--zone", self.zone,
                               "--vehicles", self.vehicle])
@@ -104,6 +114,9 @@ class LiveMapSystem:
 
     def start_zone(self, rviz=False):
         self.start_broker()
+        self.launch_zone(rviz)
+
+    def launch_zone(self, rviz=False):
         self.launch("zone", self.zone_port, "zone.launch", {
             "zone": self.zone, "directory": self.directory / "zone",
             "broker_port": self.broker_port, "password_file": self.password_file("zone"),
