@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "hazard/catalogue.h"
+#include "hazard/report.h"
+#include "zone/hazard.h"
+#include "zone/hazard_fusion.h"
+#include "zone/hazard_grid.h"
+
+namespace livemap {
+
+/// A stored picture by content; both empty without one.
+struct PictureName {
+  std::string sha256;
+  std::string format;
+};
+
+/// All hazards of the zone in memory: which known hazard a report belongs to, and what changed
+/// since when. Knows no clock, no store and no threads; the same calls give the same state.
+///
+/// Changes between Begin and Commit can be taken back with Rollback, so that memory and store stay
+/// the same when a commit fails. Without Begin every change is final.
+class HazardRegistry {
+ public:
+  using Slot = HazardGrid::Slot;
+
+  /// Radii come from the catalogue. `hash_seed`: see HazardGrid.
+  HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule = {});
+
+  /// Takes in a hazard as the store kept it; in ascending order of sequence.
+  /// Throws Error when its uuid or sequence is not new.
+  void Restore(Hazard hazard);
+
+  /// The nearest active hazard of this class within the class's radius (geodesic), the older one
+  /// among equals. `position` must be valid.
+  std::optional<Slot> FindMatch(const std::string& class_name, const GeoPoint& position) const;
+
+  /// Puts a new hazard on the map.
+  Slot Add(const Report& report, const PictureName& picture, const Uuid& uuid,
+           std::uint64_t sequence, std::int64_t now_ns);
+  /// Counts the report as a sighting of `slot`; the newer image's picture stays.
+  void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
+             std::int64_t now_ns);
+  /// Takes an active hazard off the map.
+  void Deactivate(Slot slot, std::uint64_t sequence, std::int64_t now_ns);
+
+  const Hazard& Get(Slot slot) const { return hazards_[slot]; }
+  std::optional<Slot> Find(const Uuid& uuid) const;
+  std::size_t size() const { return hazards_.size(); }
+  std::size_t active_count() const { return active_count_; }
+
+  /// As ZoneService::Query.
+  std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
+                            std::size_t limit) const;
+  /// As ZoneService::QueryNear.
+  std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
+
+  void Begin();
+  void Commit();
+  void Rollback();
+
+ private:
+  struct Change {
+    std::uint64_t sequence = 0;
+    Slot slot = 0;
+  };
+  struct Undo {
+    Slot slot = 0;
+    std::optional<Hazard> before;  ///< None: the slot was new.
+  };
+
+  HazardGrid& GridOf(const std::string& class_name);
+  const HazardGrid* FindGrid(const std::string& class_name) const;
+  Slot Append(Hazard hazard);
+  void RememberForUndo(Slot slot);
+  void NoteChange(Slot slot);
+  void CompactChanges();
+  void TakeBack(Undo& undo);
+
+  HazardCatalogue catalogue_;
+  std::uint64_t hash_seed_;
+  FusionRule rule_;
+  std::deque<Hazard> hazards_;  ///< By slot; a deque, because growth must not move them.
+  std::unordered_map<Uuid, Slot> slots_;
+  std::unordered_map<std::string, HazardGrid> grids_;  ///< By class name.
+  /// In ascending order of sequence; an entry is stale once its hazard has a newer sequence.
+  std::vector<Change> changes_;
+  std::size_t active_count_ = 0;
+  bool in_transaction_ = false;
+  std::size_t changes_at_begin_ = 0;
+  std::vector<Undo> undo_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace livemap {
+
+/// Pictures on disk, each in `<directory>/<first two hex digits>/<sha256>.<format>`, so that the
+/// same picture is kept once. Thread-safe.
+///
+/// A picture is written to a temporary file, synchronised and renamed: a name always has its whole
+/// content. Beyond the cap the oldest pictures go, those that no hazard refers to first.
+class ImageStore {
+ public:
+  /// Makes the directory when missing, takes stock of what is there, and removes what an
+  /// interrupted write left. Throws StoreError when the directory cannot be used.
+  ImageStore(std::string directory, std::uint64_t cap_bytes);
+
+  /// Keeps the picture and returns its SHA-256. `format` is the file's extension. Throws StoreError
+  /// when it cannot be written.
+  std::string Put(const std::vector<std::uint8_t>& bytes, const std::string& format);
+  /// The file; none for what is not 64 lower-case hex digits, never stored or evicted.
+  std::optional<std::string> Path(const std::string& sha256) const;
+
+  /// A hazard shows this picture, or no longer does. Empty and unknown names are ignored.
+  void Retain(const std::string& sha256);
+  void Release(const std::string& sha256);
+  /// Deletes pictures until the cap holds. Called between batches, when references are settled.
+  void EvictBeyondCap();
+
+  std::uint64_t total_bytes() const;
+
+ private:
+  struct Entry {
+    std::string format;
+    std::uint64_t bytes = 0;
+    std::uint64_t age = 0;  ///< Rises with every stored picture.
+    std::uint32_t references = 0;
+  };
+  /// Unreferenced pictures first, then by age.
+  struct Rank {
+    bool referenced;
+    std::uint64_t age;
+    std::string sha256;
+    bool operator<(const Rank& other) const;
+  };
+
+  std::string FilePath(const std::string& sha256, const std::string& format) const;
+  void TakeStock();
+  void AddEntry(const std::string& sha256, const std::string& format, std::uint64_t bytes);
+  void ChangeReferences(const std::string& sha256, bool retain);
+
+  const std::string directory_;
+  const std::uint64_t cap_bytes_;
+  mutable std::mutex mutex_;
+  std::map<std::string, Entry> entries_;  ///< By SHA-256.
+  std::set<Rank> eviction_order_;
+  std::uint64_t total_bytes_ = 0;
+  std::uint64_t next_age_ = 0;
+};
+
+}  // namespace livemap

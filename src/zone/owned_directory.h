@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+namespace livemap {
+
+/// A directory that one process has for itself while this object lives: a second zone on the same
+/// store would give out the same sequence numbers. The kernel frees it when the process dies.
+class OwnedDirectory {
+ public:
+  /// Makes the directory when missing. Throws StoreError when it cannot be used or is taken.
+  explicit OwnedDirectory(const std::string& path);
+  ~OwnedDirectory();
+  OwnedDirectory(const OwnedDirectory&) = delete;
+  OwnedDirectory& operator=(const OwnedDirectory&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  int lock_file_ = -1;
+};
+
+}  // namespace livemap
