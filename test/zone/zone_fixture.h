@@ -1,0 +1,83 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "hazard/report.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+
+constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+
+/// A directory of its own for each test, removed afterwards.
+class ZoneTest : public testing::Test {
+ protected:
+  ZoneTest() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "livemap_zone_XXXXXX").string();
+    directory_ = mkdtemp(pattern.data());
+  }
+  ~ZoneTest() override { std::filesystem::remove_all(directory_); }
+
+  ZoneService::Config Config() const {
+    ZoneService::Config config;
+    config.directory = directory_ + "/zone";
+    return config;
+  }
+  std::string DatabasePath() const { return directory_ + "/zone/zone.sqlite3"; }
+  /// A clock that stands still.
+  static ZoneService::Clock Clock() {
+    return [] { return kNowNs; };
+  }
+
+  std::string directory_;
+};
+
+/// An acceptable report of a pothole, without a picture, with a uuid of its own.
+inline Report MakeReport(const GeoPoint& position = {40.44, -79.94}) {
+  static std::mt19937_64 generator(1);
+  Report report;
+  report.uuid = Uuid::Random(generator);
+  report.vehicle_id = "car-1";
+  report.drive_id = "drive-1";
+  report.stamp_ns = kNowNs - 1'000'000'000;
+  report.class_name = "pothole";
+  report.confidence = 0.5F;
+  report.box = {10, 20, 110, 90};
+  report.position = position;
+  report.covariance_m2 = Eigen::Vector2d(1.0, 4.0).asDiagonal();
+  report.image_width = 640;
+  report.image_height = 480;
+  return report;
+}
+
+/// The header of a JPEG of this size, followed by `filler` bytes that nothing needs to decode.
+inline std::vector<std::uint8_t> MakeJpeg(std::uint16_t width, std::uint16_t height,
+                                          std::size_t filler = 0, std::uint8_t value = 0) {
+  const auto high = [](std::uint16_t x) { return static_cast<std::uint8_t>(x >> 8); };
+  const auto low = [](std::uint16_t x) { return static_cast<std::uint8_t>(x & 0xff); };
+  std::vector<std::uint8_t> bytes{
+      0xff, 0xd8, 0xff,         0xe0,        0,           4,          0, 0, 0xff, 0xc0, 0,
+      11,   8,    high(height), low(height), high(width), low(width), 1, 1, 0x11, 0};
+  bytes.insert(bytes.end(), filler, value);
+  return bytes;
+}
+
+inline bool SameHazard(const Hazard& a, const Hazard& b) {
+  return a.uuid == b.uuid && a.class_name == b.class_name && a.confidence == b.confidence &&
+         a.position.latitude_deg == b.position.latitude_deg &&
+         a.position.longitude_deg == b.position.longitude_deg &&
+         a.covariance_m2 == b.covariance_m2 && a.sightings == b.sightings &&
+         a.first_seen_ns == b.first_seen_ns && a.last_seen_ns == b.last_seen_ns &&
+         a.updated_ns == b.updated_ns && a.sequence == b.sequence &&
+         a.image_sha256 == b.image_sha256 && a.image_format == b.image_format &&
+         a.active == b.active;
+}
+
+}  // namespace livemap
