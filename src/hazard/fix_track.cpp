@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 namespace livemap {
 namespace {
@@ -10,6 +11,7 @@ namespace {
 constexpr double kSecond = 1e-9;           // Per nanosecond.
 constexpr double kMaxSigmaM = 1000.0;      // A fix less certain than this is none.
 constexpr double kMinSigmaM = 1e-3;        // No receiver is better; keeps covariances invertible.
+constexpr double kStandingMps = 0.3;       // Slower than this the vehicle stands.
 constexpr double kMaxJumpAllowanceM = 30;  // What uncertainty may excuse between two fixes.
 
 double Seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecond; }
@@ -30,6 +32,23 @@ FixTrack::FixTrack(const Config& config) : config_(config) {}
 std::optional<std::int64_t> FixTrack::newest_ns() const {
   if (points_.empty()) return std::nullopt;
   return points_.back().stamp_ns;
+}
+
+std::optional<TrackPose> FixTrack::Newest() const {
+  if (points_.empty()) return std::nullopt;
+  TrackPose pose;
+  pose.position = points_.back().position;
+  pose.covariance_m2 = points_.back().covariance_m2;
+  pose.course_rad = std::numeric_limits<double>::quiet_NaN();
+  if (const auto motion = MotionAt(points_.back().stamp_ns)) {
+    pose.speed_mps = motion->velocity_mps.norm();
+    const auto course = CourseOf(*motion);
+    if (course && pose.speed_mps >= kStandingMps) {
+      pose.course_rad = course->course_rad;
+      pose.course_variance_rad2 = course->variance_rad2;
+    }
+  }
+  return pose;
 }
 
 FixTrack::Verdict FixTrack::Add(const Fix& fix) {

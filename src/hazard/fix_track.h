@@ -90,6 +90,8 @@ class FixTrack {
   Lookup At(std::int64_t stamp_ns) const;
   /// The newest accepted fix's moment; nothing before the first.
   std::optional<std::int64_t> newest_ns() const;
+  /// Where the vehicle was then; course NaN when it is not known or the vehicle stands.
+  std::optional<TrackPose> Newest() const;
 
  private:
   struct Point {

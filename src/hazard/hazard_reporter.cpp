@@ -152,7 +152,7 @@ bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_
   return true;
 }
 
-bool HazardReporter::HasCamera(const SightingFrame& frame) const {
+bool HazardReporter::FitsCamera(const SightingFrame& frame) const {
   return intrinsics_ && HasMounting(frame.frame_id) &&
          static_cast<std::uint32_t>(intrinsics_->width) == frame.image_width &&
          static_cast<std::uint32_t>(intrinsics_->height) == frame.image_height;
@@ -163,7 +163,7 @@ bool HazardReporter::HasCamera(const SightingFrame& frame) const {
 bool HazardReporter::Place(WaitingFrame& waiting, double waited_s) {
   const std::size_t count = waiting.frame.sightings.size();
   const bool patient = waited_s < config_.max_wait_s;
-  if (!HasCamera(waiting.frame)) {
+  if (!FitsCamera(waiting.frame)) {
     if (patient) return false;
     counters_.dropped_no_camera += count;
     waiting.placed = true;

@@ -118,6 +118,8 @@ class HazardReporter {
   /// At most `limit` reports to send now.
   std::vector<Report> TakeDue(double steady_s, std::size_t limit);
 
+  /// Intrinsics and some camera's mounting are known.
+  bool HasCamera() const { return intrinsics_ && !mountings_.empty(); }
   const FixTrack& track() const { return track_; }
   const LocalHazardMap& map() const { return map_; }
   const Counters& counters() const { return counters_; }
@@ -141,7 +143,7 @@ class HazardReporter {
 
   bool IsUsable(const Sighting& sighting);
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
-  bool HasCamera(const SightingFrame& frame) const;
+  bool FitsCamera(const SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
   void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);

@@ -1,0 +1,273 @@
+#include <cv_bridge/cv_bridge.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <nav_msgs/Path.h>
+#include <nodelet/nodelet.h>
+#include <ros/package.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/image_encodings.h>
+#include <tf2_eigen/tf2_eigen.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <pluginlib/class_list_macros.hpp>
+#include <string>
+
+#include "hazard/hazard_reporter.h"
+#include "nodelets/nodelet_support.h"
+#include "ros/hazard_conversions.h"
+#include "ros/hazard_reporting_parameters.h"
+#include "ros/hazard_view.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kSayAgainS = 60;
+constexpr double kTickS = 0.05;
+constexpr double kViewPeriodS = 1.0;
+constexpr std::size_t kSendPerTick = 10;
+
+double SteadyS() { return ros::SteadyTime::now().toSec(); }
+
+}  // namespace
+
+/// Reports what hazard_detection sees to the zone: HazardReporter with topics, tf and clocks. All
+/// callbacks run one at a time, in the nodelet's own queue. Timers are steady, so that a paused bag
+/// does not stop the delivery.
+class HazardReportingNodelet : public nodelet::Nodelet {
+ private:
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    const std::int64_t now_ns = static_cast<std::int64_t>(ros::WallTime::now().toNSec());
+    ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ReadHazardReportingConfig(parameters, now_ns);
+    if (config_.catalogue.empty()) {
+      config_.catalogue = ros::package::getPath("livemap") + "/config/hazards.yaml";
+    }
+    catalogue_ = HazardCatalogue::Load(config_.catalogue);
+    MakeDirectoryOf(config_.reporter.map.path);
+    reporter_ = std::make_unique<HazardReporter>(config_.reporter, catalogue_,
+                                                 EntropySeededGenerator(), now_ns, SteadyS());
+    if (!reporter_->map().set_aside().empty()) {
+      NODELET_ERROR("the local hazard map '%s' was corrupt: moved to '%s', starting an empty one",
+                    config_.reporter.map.path.c_str(), reporter_->map().set_aside().c_str());
+    }
+    if (config_.map_datum) map_.emplace(*config_.map_datum);
+    path_.header.frame_id = config_.map_frame;
+    Connect();
+  }
+
+  static void MakeDirectoryOf(const std::string& path) {
+    const auto directory = std::filesystem::path(path).parent_path();
+    std::error_code error;
+    if (!directory.empty()) std::filesystem::create_directories(directory, error);
+    if (error) {
+      throw Error("parameter 'database' is '" + path +
+                  "', its directory cannot be made: " + error.message());
+    }
+  }
+
+  void Connect() {
+    using Self = HazardReportingNodelet;
+    ros::NodeHandle& node = getNodeHandle();
+    report_publisher_ = node.advertise<HazardReport>("hazard/report", 100);
+    position_publisher_ = node.advertise<VehiclePosition>("vehicle/position", 10);
+    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/local_map", 1);
+    path_publisher_ = node.advertise<nav_msgs::Path>("path", 1);
+    subscribers_ = {
+        node.subscribe("hazard/detections", 100, &Self::OnDetections, this),
+        node.subscribe("hazard/annotated", 10, &Self::OnAnnotated, this),
+        node.subscribe("fix", 100, &Self::OnFix, this),
+        node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
+        node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
+        node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
+    };
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node);
+    updater_ =
+        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("hazard_reporting");
+    updater_->add("hazard reporting", this, &Self::Diagnose);
+    timers_ = {
+        node.createSteadyTimer(ros::WallDuration(kTickS), &Self::OnTick, this),
+        node.createSteadyTimer(ros::WallDuration(kViewPeriodS), &Self::OnViewTimer, this),
+        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
+                               &Self::OnDiagnosticsTimer, this),
+    };
+  }
+
+  void OnDetections(const DetectionArray& message) {
+    LearnMounting(message.header.frame_id);
+    reporter_->AddFrame(ToSightingFrame(message), ros::Time::now().toSec());
+    Work();
+  }
+
+  void OnAnnotated(const sensor_msgs::ImageConstPtr& message) {
+    try {
+      // Shares the pixels with the detector's message where it is bgr8 already.
+      const auto shared = cv_bridge::toCvShare(message, sensor_msgs::image_encodings::BGR8);
+      const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
+      reporter_->AddPicture(FromRosTime(message->header.stamp), {shared->image, owner});
+    } catch (const cv::Exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "annotated image dropped: %s", error.what());
+    } catch (const cv_bridge::Exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "annotated image dropped: %s", error.what());
+    }
+    Work();
+  }
+
+  void OnFix(const sensor_msgs::NavSatFix& message) {
+    const auto before_ns = reporter_->track().newest_ns();
+    reporter_->AddFix(ToFix(message));
+    const auto newest_ns = reporter_->track().newest_ns();
+    if (newest_ns && newest_ns != before_ns) PublishVehicle(*newest_ns);
+    Work();
+  }
+
+  void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
+    CameraIntrinsics intrinsics;  // Of the rectified image: P, not K.
+    intrinsics.fx = message.P[0];
+    intrinsics.fy = message.P[5];
+    intrinsics.cx = message.P[2];
+    intrinsics.cy = message.P[6];
+    intrinsics.width = static_cast<int>(message.width);
+    intrinsics.height = static_cast<int>(message.height);
+    if (!(intrinsics.fx > 0 && intrinsics.fy > 0) || !std::isfinite(intrinsics.cx) ||
+        !std::isfinite(intrinsics.cy) || intrinsics.width <= 0 || intrinsics.height <= 0) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "camera_rect/camera_info dropped: its P is no camera");
+      return;
+    }
+    reporter_->SetIntrinsics(intrinsics);
+  }
+
+  void OnNotice(const HazardNotice& message) {
+    try {
+      reporter_->AddNotice(FromMessage(message));
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+    }
+  }
+
+  void OnReceipt(const ReportReceipt& message) {
+    try {
+      const Receipt receipt = FromMessage(message);
+      if (receipt.status == Receipt::Status::kRefused) {
+        NODELET_WARN_THROTTLE(kSayAgainS, "the zone refused report %s: %s",
+                              receipt.report_uuid.ToString().c_str(), receipt.reason.c_str());
+      }
+      reporter_->AddReceipt(receipt);
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+    }
+  }
+
+  void OnTick(const ros::SteadyTimerEvent&) { Work(); }
+
+  void Work() {
+    reporter_->Process(ros::Time::now().toSec(), SteadyS());
+    if (!reporter_->store_error().empty()) {
+      NODELET_ERROR_THROTTLE(kSayAgainS, "%s", reporter_->store_error().c_str());
+    }
+    // Without a listener a report would be spent, not sent.
+    if (report_publisher_.getNumSubscribers() == 0) return;
+    for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
+      report_publisher_.publish(ToMessage(report));
+    }
+  }
+
+  /// The mounting does not change: looked up until it is known, then kept.
+  void LearnMounting(const std::string& frame_id) {
+    if (reporter_->HasMounting(frame_id)) return;
+    try {
+      const auto transform = tf_buffer_.lookupTransform(config_.base_frame, frame_id, ros::Time(0));
+      reporter_->SetMounting(frame_id, tf2::transformToEigen(transform));
+    } catch (const tf2::TransformException& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "no mounting of the camera yet: %s", error.what());
+    }
+  }
+
+  void PublishVehicle(std::int64_t stamp_ns) {
+    const auto antenna = reporter_->track().Newest();
+    const ros::Time stamp = ToRosTime(stamp_ns);
+    if (!position_stamp_ || stamp < *position_stamp_ ||
+        stamp - *position_stamp_ >= ros::Duration(config_.position_period_s)) {
+      position_stamp_ = stamp;
+      const VehicleState vehicle{"",
+                                 config_.reporter.drive_id,
+                                 antenna->position,
+                                 antenna->course_rad,
+                                 antenna->speed_mps,
+                                 stamp_ns};
+      const double sigma_m = std::sqrt(antenna->covariance_m2.trace() / 2);
+      position_publisher_.publish(ToMessage(vehicle, sigma_m));
+    }
+    if (!map_) map_.emplace(antenna->position);
+    const auto base = reporter_->track().At(stamp_ns);
+    if (base.answer == FixTrack::Answer::kReady) ShowVehicle(base.pose, stamp);
+  }
+
+  void ShowVehicle(const TrackPose& antenna, const ros::Time& stamp) {
+    const Eigen::Vector2d antenna_m(config_.reporter.antenna_x_m, config_.reporter.antenna_y_m);
+    const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+    const Eigen::Vector2d base_m = map_->ToEnu(PlaceHazard(antenna, antenna_m, origin).position);
+    const auto pose = VehiclePose(base_m, antenna.course_rad, config_.map_frame, stamp);
+    if (config_.publish_tf) {
+      geometry_msgs::TransformStamped transform;
+      transform.header = pose.header;
+      transform.child_frame_id = config_.base_frame;
+      transform.transform.translation.x = base_m.x();
+      transform.transform.translation.y = base_m.y();
+      transform.transform.rotation = pose.pose.orientation;
+      tf_broadcaster_.sendTransform(transform);
+    }
+    if (!path_.poses.empty()) {
+      const auto& last = path_.poses.back().pose.position;
+      if (std::hypot(base_m.x() - last.x, base_m.y() - last.y) < config_.path_spacing_m) return;
+    }
+    path_.header.stamp = stamp;
+    path_.poses.push_back(pose);
+    if (path_.poses.size() > static_cast<std::size_t>(config_.path_max_poses)) {
+      path_.poses.erase(path_.poses.begin());
+    }
+  }
+
+  void OnViewTimer(const ros::SteadyTimerEvent&) {
+    if (path_publisher_.getNumSubscribers() > 0) path_publisher_.publish(path_);
+    if (marker_publisher_.getNumSubscribers() == 0 || !map_) return;
+    const auto known = reporter_->map().Known(static_cast<std::size_t>(config_.max_markers));
+    marker_publisher_.publish(
+        HazardMarkers(known, catalogue_, *map_, config_.map_frame, ros::Time::now()));
+  }
+
+  // Not the updater's own timer: that one follows the simulated clock.
+  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    DescribeHazardReporter(*reporter_, status);
+  }
+
+  HazardReportingConfig config_;
+  HazardCatalogue catalogue_;
+  std::unique_ptr<HazardReporter> reporter_;
+  std::optional<LocalFrame> map_;
+  std::optional<ros::Time> position_stamp_;
+  nav_msgs::Path path_;
+  tf2_ros::Buffer tf_buffer_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  tf2_ros::TransformBroadcaster tf_broadcaster_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::Publisher report_publisher_, position_publisher_, marker_publisher_, path_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::vector<ros::SteadyTimer> timers_;
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::HazardReportingNodelet, nodelet::Nodelet)

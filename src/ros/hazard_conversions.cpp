@@ -1,0 +1,270 @@
+#include "ros/hazard_conversions.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+template <typename Message>
+void CheckVersion(const Message& message, const char* name) {
+  if (message.schema_version == Message::SCHEMA_VERSION) return;
+  throw Error(std::string(name) + " has schema version " + std::to_string(message.schema_version) +
+              ", accepted is " + std::to_string(Message::SCHEMA_VERSION));
+}
+
+Uuid ToUuid(const boost::array<std::uint8_t, 16>& bytes) {
+  Uuid uuid;
+  std::copy(bytes.begin(), bytes.end(), uuid.bytes.begin());
+  return uuid;
+}
+
+boost::array<std::uint8_t, 16> ToBytes(const Uuid& uuid) {
+  boost::array<std::uint8_t, 16> bytes;
+  std::copy(uuid.bytes.begin(), uuid.bytes.end(), bytes.begin());
+  return bytes;
+}
+
+// Row-major 2x2, as in HazardReport.msg.
+boost::array<double, 4> ToArray(const Eigen::Matrix2d& matrix) {
+  return {{matrix(0, 0), matrix(0, 1), matrix(1, 0), matrix(1, 1)}};
+}
+
+Eigen::Matrix2d ToMatrix(const boost::array<double, 4>& array) {
+  Eigen::Matrix2d matrix;
+  matrix << array[0], array[1], array[2], array[3];
+  return matrix;
+}
+
+}  // namespace
+
+ros::Time ToRosTime(std::int64_t stamp_ns) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  constexpr std::int64_t kLatest = std::numeric_limits<std::uint32_t>::max() * kSecond;
+  const std::int64_t clamped = std::clamp<std::int64_t>(stamp_ns, 0, kLatest);
+  return {static_cast<std::uint32_t>(clamped / kSecond),
+          static_cast<std::uint32_t>(clamped % kSecond)};
+}
+
+HazardReport ToMessage(const Report& report) {
+  HazardReport message;
+  message.schema_version = HazardReport::SCHEMA_VERSION;
+  message.uuid = ToBytes(report.uuid);
+  message.vehicle_id = report.vehicle_id;
+  message.drive_id = report.drive_id;
+  message.stamp = ToRosTime(report.stamp_ns);
+  message.class_name = report.class_name;
+  message.confidence = report.confidence;
+  message.x_min = report.box.x_min;
+  message.y_min = report.box.y_min;
+  message.x_max = report.box.x_max;
+  message.y_max = report.box.y_max;
+  message.latitude = report.position.latitude_deg;
+  message.longitude = report.position.longitude_deg;
+  message.covariance = ToArray(report.covariance_m2);
+  message.image_width = report.image_width;
+  message.image_height = report.image_height;
+  message.image.header.stamp = message.stamp;
+  message.image.header.frame_id = report.image_frame_id;
+  message.image.format = report.image_format;
+  message.image.data = report.image;
+  return message;
+}
+
+Report FromMessage(const HazardReport& message) {
+  CheckVersion(message, "hazard report");
+  Report report;
+  report.uuid = ToUuid(message.uuid);
+  report.vehicle_id = message.vehicle_id;
+  report.drive_id = message.drive_id;
+  report.stamp_ns = FromRosTime(message.stamp);
+  report.class_name = message.class_name;
+  report.confidence = message.confidence;
+  report.box = {message.x_min, message.y_min, message.x_max, message.y_max};
+  report.position = {message.latitude, message.longitude};
+  report.covariance_m2 = ToMatrix(message.covariance);
+  report.image_width = message.image_width;
+  report.image_height = message.image_height;
+  report.image_frame_id = message.image.header.frame_id;
+  report.image_format = message.image.format;
+  report.image = message.image.data;
+  return report;
+}
+
+ReportReceipt ToMessage(const Receipt& receipt) {
+  ReportReceipt message;
+  message.schema_version = ReportReceipt::SCHEMA_VERSION;
+  message.status = receipt.status == Receipt::Status::kCommitted ? ReportReceipt::COMMITTED
+                                                                 : ReportReceipt::REFUSED;
+  message.report_uuid = ToBytes(receipt.report_uuid);
+  message.hazard_uuid = ToBytes(receipt.hazard_uuid);
+  message.vehicle_id = receipt.vehicle_id;
+  message.reason = receipt.reason;
+  return message;
+}
+
+Receipt FromMessage(const ReportReceipt& message) {
+  CheckVersion(message, "report receipt");
+  Receipt receipt;
+  switch (message.status) {
+    case ReportReceipt::COMMITTED:
+      receipt.status = Receipt::Status::kCommitted;
+      break;
+    case ReportReceipt::REFUSED:
+      receipt.status = Receipt::Status::kRefused;
+      break;
+    default:
+      throw Error("report receipt has status " + std::to_string(message.status) +
+                  ", accepted is 0 (committed) or 1 (refused)");
+  }
+  receipt.report_uuid = ToUuid(message.report_uuid);
+  receipt.hazard_uuid = ToUuid(message.hazard_uuid);
+  receipt.vehicle_id = message.vehicle_id;
+  receipt.reason = message.reason;
+  return receipt;
+}
+
+HazardNotice ToMessage(const HazardEvent& event) {
+  const Hazard& hazard = event.hazard;
+  Notice notice;
+  switch (event.action) {
+    case HazardAction::kAdded:
+      notice.action = Notice::Action::kAdded;
+      break;
+    case HazardAction::kUpdated:
+      notice.action = Notice::Action::kUpdated;
+      break;
+    case HazardAction::kRemoved:
+      notice.action = Notice::Action::kRemoved;
+      break;
+  }
+  notice.sequence = hazard.sequence;
+  notice.hazard_uuid = hazard.uuid;
+  notice.stamp_ns = hazard.updated_ns;
+  notice.class_name = hazard.class_name;
+  notice.confidence = hazard.confidence;
+  notice.position = hazard.position;
+  notice.covariance_m2 = hazard.covariance_m2;
+  notice.sightings = hazard.sightings;
+  notice.first_seen_ns = hazard.first_seen_ns;
+  notice.last_seen_ns = hazard.last_seen_ns;
+  return ToMessage(notice);
+}
+
+HazardNotice ToMessage(const Notice& notice) {
+  HazardNotice message;
+  message.schema_version = HazardNotice::SCHEMA_VERSION;
+  switch (notice.action) {
+    case Notice::Action::kAdded:
+      message.action = HazardNotice::ADDED;
+      break;
+    case Notice::Action::kUpdated:
+      message.action = HazardNotice::UPDATED;
+      break;
+    case Notice::Action::kRemoved:
+      message.action = HazardNotice::REMOVED;
+      break;
+  }
+  message.sequence = notice.sequence;
+  message.hazard_uuid = ToBytes(notice.hazard_uuid);
+  message.stamp = ToRosTime(notice.stamp_ns);
+  message.class_name = notice.class_name;
+  message.confidence = notice.confidence;
+  message.latitude = notice.position.latitude_deg;
+  message.longitude = notice.position.longitude_deg;
+  message.covariance = ToArray(notice.covariance_m2);
+  message.sightings = notice.sightings;
+  message.first_seen = ToRosTime(notice.first_seen_ns);
+  message.last_seen = ToRosTime(notice.last_seen_ns);
+  return message;
+}
+
+Notice FromMessage(const HazardNotice& message) {
+  CheckVersion(message, "hazard notice");
+  Notice notice;
+  switch (message.action) {
+    case HazardNotice::ADDED:
+      notice.action = Notice::Action::kAdded;
+      break;
+    case HazardNotice::UPDATED:
+      notice.action = Notice::Action::kUpdated;
+      break;
+    case HazardNotice::REMOVED:
+      notice.action = Notice::Action::kRemoved;
+      break;
+    default:
+      throw Error("hazard notice has action " + std::to_string(message.action) +
+                  ", accepted is 0 (added), 1 (updated) or 2 (removed)");
+  }
+  notice.sequence = message.sequence;
+  notice.hazard_uuid = ToUuid(message.hazard_uuid);
+  notice.stamp_ns = FromRosTime(message.stamp);
+  notice.class_name = message.class_name;
+  notice.confidence = message.confidence;
+  notice.position = {message.latitude, message.longitude};
+  notice.covariance_m2 = ToMatrix(message.covariance);
+  notice.sightings = message.sightings;
+  notice.first_seen_ns = FromRosTime(message.first_seen);
+  notice.last_seen_ns = FromRosTime(message.last_seen);
+  return notice;
+}
+
+VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m) {
+  VehiclePosition message;
+  message.schema_version = VehiclePosition::SCHEMA_VERSION;
+  message.vehicle_id = vehicle.vehicle_id;
+  message.drive_id = vehicle.drive_id;
+  message.stamp = ToRosTime(vehicle.stamp_ns);
+  message.latitude = vehicle.position.latitude_deg;
+  message.longitude = vehicle.position.longitude_deg;
+  message.course = static_cast<float>(vehicle.course_rad);
+  message.speed = static_cast<float>(vehicle.speed_mps);
+  message.horizontal_sigma = static_cast<float>(horizontal_sigma_m);
+  return message;
+}
+
+VehicleState FromMessage(const VehiclePosition& message) {
+  CheckVersion(message, "vehicle position");
+  VehicleState vehicle;
+  vehicle.vehicle_id = message.vehicle_id;
+  vehicle.drive_id = message.drive_id;
+  vehicle.position = {message.latitude, message.longitude};
+  vehicle.course_rad = static_cast<double>(message.course);
+  vehicle.speed_mps = static_cast<double>(message.speed);
+  vehicle.stamp_ns = FromRosTime(message.stamp);
+  return vehicle;
+}
+
+SightingFrame ToSightingFrame(const DetectionArray& message) {
+  SightingFrame frame;
+  frame.stamp_ns = FromRosTime(message.header.stamp);
+  frame.frame_id = message.header.frame_id;
+  frame.image_width = message.image_width;
+  frame.image_height = message.image_height;
+  for (const auto& detection : message.detections) {
+    frame.sightings.push_back(
+        {detection.class_name,
+         detection.confidence,
+         {detection.x_min, detection.y_min, detection.x_max, detection.y_max}});
+  }
+  return frame;
+}
+
+Fix ToFix(const sensor_msgs::NavSatFix& message) {
+  Fix fix;
+  fix.stamp_ns = FromRosTime(message.header.stamp);
+  fix.has_fix = message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX;
+  fix.position = {message.latitude, message.longitude};
+  if (message.position_covariance_type != sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) {
+    // East-north part of the row-major 3x3 east-north-up covariance.
+    Eigen::Matrix2d covariance_m2;
+    covariance_m2 << message.position_covariance[0], message.position_covariance[1],
+        message.position_covariance[3], message.position_covariance[4];
+    fix.covariance_m2 = covariance_m2;
+  }
+  return fix;
+}
+
+}  // namespace livemap

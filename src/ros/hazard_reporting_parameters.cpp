@@ -1,0 +1,105 @@
+#include "ros/hazard_reporting_parameters.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+
+namespace livemap {
+namespace {
+
+/// "drive-20260131T235959Z".
+std::string DriveName(std::int64_t now_ns) {
+  const auto seconds = static_cast<std::time_t>(now_ns / 1'000'000'000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[40];
+  std::strftime(text, sizeof(text), "drive-%Y%m%dT%H%M%SZ", &utc);
+  return text;
+}
+
+/// Where ROS keeps a user's files.
+std::string DefaultDatabase() {
+  if (const char* ros_home = std::getenv("ROS_HOME")) {
+    return std::string(ros_home) + "/livemap/local_hazards.sqlite3";
+  }
+  const char* home = std::getenv("HOME");
+  return std::string(home != nullptr ? home : ".") + "/.ros/livemap/local_hazards.sqlite3";
+}
+
+std::optional<GeoPoint> ReadDatum(ParameterReader& parameters) {
+  std::string text;
+  parameters.Read("map_datum", text);
+  if (text.empty()) return std::nullopt;
+  GeoPoint datum;
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf%n", &datum.latitude_deg, &datum.longitude_deg, &used) !=
+          2 ||
+      static_cast<std::size_t>(used) != text.size() || !IsValid(datum)) {
+    throw Error("parameter 'map_datum' is '" + text +
+                "', accepted is LATITUDE,LONGITUDE in degrees, or nothing for the first fix");
+  }
+  return datum;
+}
+
+void ReadTrack(ParameterReader& parameters, FixTrack::Config& track) {
+  parameters.Read("max_extrapolation_s", track.max_extrapolation_s, {0, 10});
+  parameters.Read("max_gap_s", track.max_gap_s, {0.01, 60});
+  parameters.Read("min_baseline_m", track.min_baseline_m, {0.01, 100});
+  parameters.Read("course_window_s", track.course_window_s, {0.1, 20});
+  parameters.Read("course_noise_m", track.course_noise_m, {0.001, 100});
+  parameters.Read("turn_rate_rps", track.turn_rate_rps, {0, 3});
+  parameters.Read("max_course_sigma_rad", track.max_course_sigma_rad, {0.001, 3});
+  parameters.Read("acceleration_mps2", track.acceleration_mps2, {0, 20});
+  parameters.Read("default_sigma_m", track.default_sigma_m, {0.01, 100});
+  parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
+}
+
+}  // namespace
+
+HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns) {
+  HazardReportingConfig config;
+  HazardReporter::Config& reporter = config.reporter;
+  parameters.Read("drive_id", reporter.drive_id);
+  if (reporter.drive_id.empty()) reporter.drive_id = DriveName(now_ns);
+  if (reporter.drive_id.size() > 64) {
+    throw Error("parameter 'drive_id' has " + std::to_string(reporter.drive_id.size()) +
+                " bytes, accepted are at most 64");
+  }
+  parameters.Read("catalogue", config.catalogue);
+  parameters.Read("database", reporter.map.path);
+  if (reporter.map.path.empty()) reporter.map.path = DefaultDatabase();
+  parameters.Read("max_known", reporter.map.max_known, {1, 10e6});
+  parameters.Read("max_pending", reporter.map.max_pending, {1, 1e6});
+
+  parameters.Read("min_confidence", reporter.min_confidence, {0, 1});
+  parameters.Read("max_range_m", reporter.max_range_m, {0.1, 1000});
+  parameters.Read("max_wait_s", reporter.max_wait_s, {0, 600});
+  parameters.Read("bracket_wait_s", reporter.bracket_wait_s, {0, 60});
+  parameters.Read("picture_wait_s", reporter.picture_wait_s, {0, 60});
+  parameters.Read("max_waiting_frames", reporter.max_waiting_frames, {1, 10000});
+  parameters.Read("antenna_x_m", reporter.antenna_x_m, {-50, 50});
+  parameters.Read("antenna_y_m", reporter.antenna_y_m, {-50, 50});
+  parameters.Read("jpeg_quality", reporter.jpeg_quality, {1, 100});
+  parameters.Read("max_image_bytes", reporter.max_image_bytes, {0, 10e6});
+  parameters.Read("pixel_sigma_px", reporter.projection.pixel_sigma_px, {0, 100});
+  parameters.Read("pitch_sigma_rad", reporter.projection.pitch_sigma_rad, {0, 0.5});
+  parameters.Read("height_sigma_m", reporter.projection.height_sigma_m, {0, 2});
+  ReadTrack(parameters, reporter.track);
+  parameters.Read("resend_first_s", reporter.resend.first_pause_s, {0.05, 600});
+  parameters.Read("resend_longest_s", reporter.resend.longest_pause_s, {0.05, 3600});
+  parameters.Read("resend_jitter", reporter.resend.jitter, {0, 0.9});
+
+  parameters.Read("base_frame", config.base_frame);
+  parameters.Read("map_frame", config.map_frame);
+  config.map_datum = ReadDatum(parameters);
+  parameters.Read("publish_tf", config.publish_tf);
+  parameters.Read("position_period_s", config.position_period_s, {0.01, 3600});
+  parameters.Read("path_spacing_m", config.path_spacing_m, {0.01, 1000});
+  parameters.Read("path_max_poses", config.path_max_poses, {1, 1e6});
+  parameters.Read("max_markers", config.max_markers, {0, 100000});
+  parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});
+  parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
+  return config;
+}
+
+}  // namespace livemap

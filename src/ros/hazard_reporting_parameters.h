@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "geo/wgs84.h"
+#include "hazard/hazard_reporter.h"
+#include "ros/parameters.h"
+
+namespace livemap {
+
+/// Defaults of the hazard_reporting nodelet; config/hazard_reporting.yaml explains each.
+struct HazardReportingConfig {
+  HazardReporter::Config reporter;
+  std::string catalogue;  ///< Path of hazards.yaml; empty: the package's own.
+  std::string base_frame = "base_link";
+  std::string map_frame = "map";
+  std::optional<GeoPoint> map_datum;  ///< Of the map frame; nothing: the first fix.
+  bool publish_tf = false;            ///< map_frame -> base_frame, where no odometry does it.
+  double position_period_s = 1.0;     ///< Stamp to stamp.
+  double path_spacing_m = 1.0;
+  int path_max_poses = 5000;
+  int max_markers = 1000;
+  double diagnostics_period_s = 1.0;
+};
+
+/// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.
+HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns);
+
+}  // namespace livemap

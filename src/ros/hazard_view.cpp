@@ -1,0 +1,120 @@
+#include "ros/hazard_view.h"
+
+#include <cmath>
+#include <cstdlib>
+
+namespace livemap {
+namespace {
+
+constexpr double kDiameterM = 1.2;
+constexpr double kHeightM = 0.4;
+constexpr double kTextM = 0.8;
+constexpr float kOwnAlpha = 0.5F;
+
+std_msgs::ColorRGBA ColourOf(const HazardClass& entry, float alpha) {
+  const long rgb = std::strtol(entry.colour.c_str() + 1, nullptr, 16);  // "#rrggbb"
+  std_msgs::ColorRGBA colour;
+  colour.r = static_cast<float>((rgb >> 16) & 0xff) / 255.0F;
+  colour.g = static_cast<float>((rgb >> 8) & 0xff) / 255.0F;
+  colour.b = static_cast<float>(rgb & 0xff) / 255.0F;
+  colour.a = alpha;
+  return colour;
+}
+
+}  // namespace
+
+visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& hazards,
+                                              const HazardCatalogue& catalogue,
+                                              const LocalFrame& map, const std::string& map_frame,
+                                              const ros::Time& stamp) {
+  visualization_msgs::MarkerArray array;
+  visualization_msgs::Marker marker;
+  marker.header.frame_id = map_frame;
+  marker.header.stamp = stamp;
+  marker.action = visualization_msgs::Marker::DELETEALL;
+  array.markers.push_back(marker);
+  marker.action = visualization_msgs::Marker::ADD;
+  marker.pose.orientation.w = 1;
+  for (const KnownHazard& hazard : hazards) {
+    const HazardClass entry = catalogue.Get(hazard.class_name);
+    const Eigen::Vector2d place_m = map.ToEnu(hazard.position);
+    ++marker.id;
+    marker.ns = "hazards";
+    marker.type = visualization_msgs::Marker::CYLINDER;
+    marker.pose.position.x = place_m.x();
+    marker.pose.position.y = place_m.y();
+    marker.pose.position.z = kHeightM / 2;
+    marker.scale.x = marker.scale.y = kDiameterM;
+    marker.scale.z = kHeightM;
+    marker.color = ColourOf(entry, hazard.of_zone ? 1.0F : kOwnAlpha);
+    marker.text.clear();
+    array.markers.push_back(marker);
+    marker.ns = "labels";
+    marker.type = visualization_msgs::Marker::TEXT_VIEW_FACING;
+    marker.pose.position.z = kHeightM + kTextM;
+    marker.scale.z = kTextM;
+    marker.text = entry.label;
+    array.markers.push_back(marker);
+  }
+  return array;
+}
+
+geometry_msgs::PoseStamped VehiclePose(const Eigen::Vector2d& east_north_m, double course_rad,
+                                       const std::string& map_frame, const ros::Time& stamp) {
+  geometry_msgs::PoseStamped pose;
+  pose.header.frame_id = map_frame;
+  pose.header.stamp = stamp;
+  pose.pose.position.x = east_north_m.x();
+  pose.pose.position.y = east_north_m.y();
+  // Yaw counts counterclockwise from east.
+  const double yaw_rad = M_PI / 2 - course_rad;
+  pose.pose.orientation.z = std::sin(yaw_rad / 2);
+  pose.pose.orientation.w = std::cos(yaw_rad / 2);
+  return pose;
+}
+
+void DescribeHazardReporter(const HazardReporter& reporter,
+                            diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using diagnostic_msgs::DiagnosticStatus;
+  const HazardReporter::Counters& counters = reporter.counters();
+  if (!reporter.store_error().empty()) {
+    status.summary(DiagnosticStatus::ERROR, reporter.store_error());
+  } else if (!reporter.map().set_aside().empty()) {
+    status.summary(DiagnosticStatus::WARN,
+                   "started anew after a corrupt store: " + reporter.map().set_aside());
+  } else if (!reporter.track().newest_ns()) {
+    status.summary(DiagnosticStatus::WARN, "no fix yet");
+  } else if (!reporter.HasCamera()) {
+    status.summary(DiagnosticStatus::WARN, "no camera_info or no mounting of the camera yet");
+  } else {
+    status.summary(DiagnosticStatus::OK, "reporting");
+  }
+  status.add("detections", counters.detections);
+  status.add("invalid_detections", counters.invalid_detections);
+  status.add("below_confidence", counters.below_confidence);
+  status.add("held_back_no_fix", counters.held_back_no_fix);
+  status.add("dropped_no_fix", counters.dropped_no_fix);
+  status.add("dropped_no_camera", counters.dropped_no_camera);
+  status.add("not_on_ground", counters.not_on_ground);
+  status.add("too_far", counters.too_far);
+  status.add("duplicates_suppressed", counters.duplicates_suppressed);
+  status.add("reports_created", counters.reports_created);
+  status.add("reports_without_picture", counters.reports_without_picture);
+  status.add("refused_map_full", counters.refused_map_full);
+  status.add("reports_sent", counters.reports_sent);
+  status.add("resends", counters.resends);
+  status.add("committed", counters.committed);
+  status.add("refused", counters.refused);
+  status.add("pending", reporter.map().pending_count());
+  status.add("known", reporter.map().known_count());
+  status.add("waiting_frames", reporter.waiting_frames());
+  status.add("notices", counters.notices);
+  status.add("invalid_notices", counters.invalid_notices);
+  status.add("fixes", counters.fixes);
+  status.add("invalid_fixes", counters.invalid_fixes);
+  status.add("no_fixes", counters.no_fixes);
+  status.add("jumps", counters.jumps);
+  status.add("store_errors", counters.store_errors);
+}
+
+}  // namespace livemap

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <geometry_msgs/PoseStamped.h>
+#include <ros/time.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <string>
+#include <vector>
+
+#include "geo/wgs84.h"
+#include "hazard/catalogue.h"
+#include "hazard/hazard_reporter.h"
+#include "hazard/local_hazard_map.h"
+
+namespace livemap {
+
+/// The known hazards for rviz: a cylinder in the class's colour, pale while only this vehicle knows
+/// it, and its label above. Replaces what was shown before.
+visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& hazards,
+                                              const HazardCatalogue& catalogue,
+                                              const LocalFrame& map, const std::string& map_frame,
+                                              const ros::Time& stamp);
+
+/// Pose of base_link in the map frame (x east, y north, z up). `course_rad` clockwise from north.
+geometry_msgs::PoseStamped VehiclePose(const Eigen::Vector2d& east_north_m, double course_rad,
+                                       const std::string& map_frame, const ros::Time& stamp);
+
+/// What hazard_reporting did since its start, each counter under its own name; a warning while it
+/// lacks fixes or camera, an error while its store fails.
+void DescribeHazardReporter(const HazardReporter& reporter,
+                            diagnostic_updater::DiagnosticStatusWrapper& status);
+
+}  // namespace livemap
