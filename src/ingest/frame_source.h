@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace livemap {
+
+/// One frame of a source that is no ROS topic: either still encoded or decoded already.
+struct SourceFrame {
+  std::vector<std::uint8_t> encoded;  ///< A whole JPEG or PNG file; empty when `image` is set.
+  cv::Mat image;                      ///< CV_8UC1 or CV_8UC3 (BGR).
+  std::string name;                   ///< File name or running number, for messages.
+};
+
+/// Hands out frames one after the other. Not thread-safe.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  /// The next frame, waiting for it where it is a live device. None at the end (file, folder) or
+  /// while the device gives nothing. Throws Error for one unreadable frame; the next call goes on.
+  virtual std::optional<SourceFrame> Next() = 0;
+  /// Back to the first frame. Throws Error when the source cannot be opened again.
+  virtual void Rewind() = 0;
+  /// Frames per second that the source itself names (a video's header); 0 when it names none.
+  virtual double rate_hz() const { return 0; }
+};
+
+/// The JPEG and PNG files of `directory` in the order of their names, read one by one. Throws Error
+/// when the folder cannot be read or holds no image. `max_bytes` bounds one file.
+std::unique_ptr<FrameSource> OpenFolder(const std::string& directory, std::size_t max_bytes);
+
+/// A video file through cv::VideoCapture. Throws Error when it cannot be opened.
+std::unique_ptr<FrameSource> OpenVideo(const std::string& path);
+
+/// A V4L2 device: "/dev/videoN" or "N". Throws Error when it cannot be opened.
+std::unique_ptr<FrameSource> OpenDevice(const std::string& device);
+
+}  // namespace livemap

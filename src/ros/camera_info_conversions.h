@@ -1,0 +1,16 @@
+#pragma once
+
+#include <sensor_msgs/CameraInfo.h>
+#include <std_msgs/Header.h>
+
+#include "ingest/rectifier.h"
+
+namespace livemap {
+
+CameraCalibration FromMessage(const sensor_msgs::CameraInfo& message);
+
+/// Binning and region of interest stay at their defaults: the whole image at full resolution.
+sensor_msgs::CameraInfo ToMessage(const CameraCalibration& calibration,
+                                  const std_msgs::Header& header);
+
+}  // namespace livemap
