@@ -65,6 +65,11 @@ class Trainer:
         self.optimizer.load_state_dict(state["optimizer"])
         self.epoch, self.best_ap = state["epoch"], state["best_ap"]
 
+    def start_from(self, state: dict) -> None:
+        """Begin a new schedule with the averaged weights of another run (a warm restart, SGDR)."""
+        self.model.load_state_dict(state["average"])
+        self.average = AveragedModel(self.model)
+
     def train_epoch(self, pictures: dict, workers: int) -> dict:
         """One pass over freshly drawn samples; returns mean losses."""
         settings = self.settings
@@ -113,6 +118,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
+    parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with")
     parser.add_argument("--workers", type=int, default=1, help="processes that prepare samples")
     parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
     parser.add_argument("--validate-every", type=int, default=10, metavar="EPOCHS")
@@ -153,6 +159,10 @@ def run(arguments: argparse.Namespace) -> None:
         if not arguments.resume:
             raise UsageError(f"{last} exists; continue it with --resume or choose another --out.")
         trainer.restore(torch.load(last, map_location=device))
+    elif arguments.start_from:
+        if not arguments.start_from.is_file():
+            raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
+        trainer.start_from(torch.load(arguments.start_from, map_location=device))
     pictures = data.read_training_pictures(arguments.data)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)

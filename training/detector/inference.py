@@ -15,6 +15,9 @@ MEAN, STD = 114.0, 58.0
 PAD_VALUE = 114
 LOWEST_SCORE = 0.05
 NMS_IOU = 0.5
+MOST_CANDIDATES = 3000
+"""Per class, only this many of the best enter the suppression, as in the vehicle."""
+
 INPUT_WIDTH, INPUT_HEIGHT = 640, 400
 
 
@@ -63,7 +66,8 @@ def decode(
     """
     detections = []
     for class_scores in scores.T:
-        rows = np.flatnonzero(class_scores >= LOWEST_SCORE)
+        rows = np.argsort(-class_scores, kind="stable")[:MOST_CANDIDATES]
+        rows = rows[class_scores[rows] >= LOWEST_SCORE]
         raw, cells, strides = raw_boxes[rows], grid.cells[rows], grid.strides[rows]
         centres = (raw[:, :2] + cells) * strides
         half_sizes = 0.5 * np.exp(np.minimum(raw[:, 2:4], 8)) * strides

@@ -6,7 +6,7 @@ import numpy as np
 
 from detector.metrics import (
     ScoredFrame, average_precision, best_f1_threshold, calibrate_threshold, drive_figures, driven_km, events,
-    false_reports,
+    false_reports, highest_false_scores,
 )
 
 BOX = [100, 100, 140, 120]
@@ -48,8 +48,9 @@ class Drives(unittest.TestCase):
 
     def test_false_detections_of_12_m_are_one_report(self):
         drive = [frame(metres, detections=[FAR + [0.6]]) for metres in (0, 5, 12, 13, 20, 26)]
-        self.assertEqual(false_reports(drive, 0.5, 0.5), 3)  # begun at 0, 13 and 26
-        self.assertEqual(false_reports(drive, 0.7, 0.5), 0)
+        scores = highest_false_scores(drive, 0.5)
+        self.assertEqual(false_reports(drive, scores, 0.5), 3)  # begun at 0, 13 and 26
+        self.assertEqual(false_reports(drive, scores, 0.7), 0)
 
     def test_figures(self):
         drive = [frame(0, [BOX], [SHIFTED + [0.6]]), frame(10), frame(20, detections=[FAR + [0.4]]), frame(30, [FAR])]

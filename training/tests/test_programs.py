@@ -112,6 +112,7 @@ class Programs(unittest.TestCase):
         cases = [
             (train_detector, ("--data", nowhere, "--out", self.root / "new")),
             (train_detector, ("--epochs", 0)),
+            (train_detector, ("--start-from", nowhere, "--out", self.root / "new")),
             (train_detector, ("--batch", 1)),
             (train_detector, ("--frobnicate",)),
             (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
