@@ -1,0 +1,64 @@
+#include "zone_fixture.h"
+
+#include <chrono>
+
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+std::vector<std::uint8_t> OnePixelPng() {
+  return {0x89, 'P',  'N',  'G',  0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 'I',  'H',
+          'D',  'R',  0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x08, 0x00, 0x00, 0x00,
+          0x00, 0x3a, 0x7e, 0x9b, 0x55, 0x00, 0x00, 0x00, 0x0a, 'I',  'D',  'A',  'T',  0x78,
+          0x9c, 0x63, 0xf8, 0x0f, 0x00, 0x01, 0x01, 0x01, 0x00, 0x1b, 0xb6, 0xee, 0x56, 0x00,
+          0x00, 0x00, 0x00, 'I',  'E',  'N',  'D',  0xae, 0x42, 0x60, 0x82};
+}
+
+std::int64_t UtcNowNs() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(since_1970).count();
+}
+
+ZoneFixture::ZoneFixture() {
+  catalogue = HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
+  ZoneService::Config config;
+  config.directory = folder_.path();
+  config.catalogue = catalogue;
+  zone = std::make_unique<ZoneService>(
+      config, [this] { return now_ns.load(); }, 1);
+}
+
+Report ZoneFixture::MakeReport(const std::string& class_name, const GeoPoint& position) {
+  Report report;
+  report.uuid = Uuid::Random(generator_);
+  report.vehicle_id = "car-1";
+  report.drive_id = "drive-1";
+  report.stamp_ns = now_ns;
+  report.class_name = class_name;
+  report.confidence = 0.87F;
+  report.box = {100, 120, 180, 160};
+  report.position = position;
+  report.covariance_m2 << 4, 0, 0, 1;
+  report.image_width = 640;
+  report.image_height = 480;
+  return report;
+}
+
+void ZoneFixture::AddRow(const std::string& class_name, const GeoPoint& start, std::size_t count) {
+  std::vector<Report> reports;
+  reports.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double step_deg = 0.00018 * static_cast<double>(i);
+    reports.push_back(MakeReport(class_name, {start.latitude_deg + step_deg, start.longitude_deg}));
+  }
+  zone->HandleBatch(reports);
+}
+
+WebOptions TestOptions() {
+  WebOptions options;
+  options.port = 0;
+  options.web_root = LIVEMAP_SOURCE_DIR "/web";
+  return options;
+}
+
+}  // namespace livemap

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "hazard/catalogue.h"
+#include "web/server.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+
+/// A folder of its own that goes away with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "livemap_web_XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw Error("mkdtemp failed for '" + pattern + "'");
+    path_ = pattern;
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// A picture of one white pixel.
+std::vector<std::uint8_t> OnePixelPng();
+
+/// The system's clock, UTC, nanoseconds since 1970.
+std::int64_t UtcNowNs();
+
+/// A real zone with a real store in a temporary folder.
+class ZoneFixture {
+ public:
+  static constexpr std::int64_t kStartNs = 1'767'225'600'000'000'000;  // 2026-01-01T00:00:00Z
+
+  ZoneFixture();
+
+  /// A report that the zone accepts, without a picture.
+  Report MakeReport(const std::string& class_name, const GeoPoint& position);
+  /// Adds `count` hazards of `class_name` about 20 m apart, going north from `start`.
+  void AddRow(const std::string& class_name, const GeoPoint& start, std::size_t count);
+
+  HazardCatalogue catalogue;
+  std::atomic<std::int64_t> now_ns{kStartNs};
+  std::unique_ptr<ZoneService> zone;
+
+ private:
+  TemporaryFolder folder_;
+  std::mt19937_64 generator_{7};
+};
+
+/// Options that serve the source tree's page on any free port of the loopback.
+WebOptions TestOptions();
+
+}  // namespace livemap
