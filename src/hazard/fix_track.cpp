@@ -1,5 +1,6 @@
 #include "hazard/fix_track.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <iterator>

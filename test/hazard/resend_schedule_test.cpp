@@ -1,0 +1,72 @@
+#include "hazard/resend_schedule.h"
+
+#include <gmock/gmock.h>
+
+namespace livemap {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+Uuid Id(std::uint8_t number) {
+  Uuid id;
+  id.bytes[15] = number;
+  return id;
+}
+
+ResendSchedule WithoutJitter() {
+  ResendSchedule::Config config;
+  config.jitter = 0;
+  return ResendSchedule(config, std::mt19937_64(1));
+}
+
+TEST(ResendSchedule, PausesDoubleUpToTheLongest) {
+  ResendSchedule schedule = WithoutJitter();
+  schedule.Add(Id(1), 2, 0, 100.0);
+  std::vector<double> sent_s;
+  for (int tick = 0; tick < 1300; ++tick) {
+    const double now_s = 100.0 + 0.125 * tick;
+    if (!schedule.TakeDue(now_s, 10).empty()) sent_s.push_back(now_s - 100.0);
+  }
+  EXPECT_THAT(sent_s, ElementsAre(0, 1, 3, 7, 15, 31, 61, 91, 121, 151));
+}
+
+TEST(ResendSchedule, JitterVariesThePausesWithinItsBounds) {
+  ResendSchedule schedule({1.0, 1.0, 0.2}, std::mt19937_64(7));
+  schedule.Add(Id(1), 2, 0, 0.0);
+  double last_s = 0, shortest_s = 10, longest_s = 0;
+  schedule.TakeDue(0, 1);
+  for (int tick = 1; tick < 500000; ++tick) {
+    const double now_s = tick * 1e-3;
+    if (schedule.TakeDue(now_s, 1).empty()) continue;
+    shortest_s = std::min(shortest_s, now_s - last_s);
+    longest_s = std::max(longest_s, now_s - last_s);
+    last_s = now_s;
+  }
+  EXPECT_GE(shortest_s, 0.8 - 1e-6);
+  EXPECT_LT(shortest_s, 0.85);
+  EXPECT_LE(longest_s, 1.2 + 2e-3);
+  EXPECT_GT(longest_s, 1.15);
+}
+
+TEST(ResendSchedule, UrgentGoesFirstThenTheOlder) {
+  ResendSchedule schedule = WithoutJitter();
+  schedule.Add(Id(1), 3, 10, 0.0);
+  schedule.Add(Id(2), 1, 30, 0.0);
+  schedule.Add(Id(3), 1, 20, 0.0);
+  EXPECT_THAT(schedule.TakeDue(0.0, 2), ElementsAre(Id(3), Id(2)));
+  EXPECT_THAT(schedule.TakeDue(0.0, 2), ElementsAre(Id(1)));
+  EXPECT_THAT(schedule.TakeDue(0.0, 2), IsEmpty());
+}
+
+TEST(ResendSchedule, FinishedReportIsNotSentAgain) {
+  ResendSchedule schedule = WithoutJitter();
+  schedule.Add(Id(1), 3, 10, 0.0);
+  schedule.Remove(Id(1));
+  schedule.Remove(Id(2));
+  EXPECT_THAT(schedule.TakeDue(100.0, 10), IsEmpty());
+  EXPECT_EQ(schedule.size(), 0u);
+}
+
+}  // namespace
+}  // namespace livemap
