@@ -1,0 +1,217 @@
+"""A real broker, a second ROS master, bridges and peers for the tests of the MQTT bridge."""
+
+import base64
+import ctypes
+import io
+import json
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import threading
+import time
+import xmlrpc.client
+
+import yaml
+
+TEST_DIRECTORY = os.path.dirname(os.path.realpath(__file__))
+SOURCE_DIRECTORY = os.path.dirname(TEST_DIRECTORY)
+# Keeps a broken test from hanging; nothing is measured by it.
+PATIENCE_S = 60
+
+
+def start_child(command, **options):
+    """A process that ends with this one, however this one ends, and holds none of its pipes."""
+    pr_set_pdeathsig = 1
+    options.setdefault("stdin", subprocess.DEVNULL)
+    options.setdefault("stdout", subprocess.DEVNULL)
+    options.setdefault("stderr", subprocess.DEVNULL)
+    libc = ctypes.CDLL(None)
+    return subprocess.Popen(
+        command, preexec_fn=lambda: libc.prctl(pr_set_pdeathsig, signal.SIGTERM), **options)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def eventually(condition, what):
+    """The first true value of `condition`; AssertionError naming `what` when patience ends."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError("never happened: " + what)
+        time.sleep(0.05)
+
+
+def port_answers(port):
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=1).close()
+        return True
+    except OSError:
+        return False
+
+
+def envelope(message, type_name=None, md5=None, version=1, payload=None):
+    """The wire format of docs/transport.md, written a second time on purpose."""
+    name = (type_name or message._type).encode()
+    if payload is None:
+        payload = serialise(message)
+    return (b"LMAP" + struct.pack("<HHB", version, 0, len(name)) + name +
+            bytes.fromhex(md5 or message._md5sum) + struct.pack("<I", len(payload)) + payload)
+
+
+def serialise(message):
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+class Broker:
+    """scripts/livemap_broker with zone "test" and vehicles car-1 to car-3."""
+
+    def __init__(self):
+        self.port = free_port()
+        self.directory = tempfile.mkdtemp(prefix="livemap_broker_")
+        self.process = None
+
+    def start(self):
+        self.process = start_child(
+            [os.path.join(SOURCE_DIRECTORY, "scripts", "livemap_broker"), "--directory",
+             self.directory, "--port", str(self.port), "--zone", "test", "--vehicles",
+             "car-1,car-2,car-3", "__name:=broker", "__log:=/dev/null"])
+        eventually(lambda: port_answers(self.port), "the broker answers")
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def password_file(self, user):
+        return os.path.join(self.directory, "credentials", user)
+
+    def publish_raw(self, user, topic, payload):
+        """Publishes bytes as `user` with the plain client, no bridge between; its exit code."""
+        with open(self.password_file(user), encoding="ascii") as file:
+            password = file.readline().strip()
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(payload)
+            file.flush()
+            return subprocess.run(
+                ["mosquitto_pub", "-V", "5", "-q", "1", "-p", str(self.port), "-u", user, "-P",
+                 password, "-t", topic, "-f", file.name], check=False).returncode
+
+
+class Master:
+    """A ROS master: the one at `uri`, or a new one on a free port."""
+
+    def __init__(self, uri=None):
+        self.process = None
+        self.uri = uri
+        if uri is None:
+            port = free_port()
+            self.uri = f"http://127.0.0.1:{port}"
+            self.process = start_child(["roscore", "-p", str(port)], env=self.environment())
+            eventually(lambda: port_answers(port), "the vehicle's master answers")
+
+    def environment(self):
+        return dict(os.environ, ROS_MASTER_URI=self.uri)
+
+    def set_parameters(self, name, values):
+        xmlrpc.client.ServerProxy(self.uri).setParam("/test", name, values)
+
+    def stop(self):
+        if self.process is not None:
+            self.process.terminate()
+            self.process.wait()
+
+
+class Bridge:
+    """An mqtt_bridge nodelet in a process of its own, with the defaults of config/mqtt_bridge_SIDE
+    except for `parameters`, its ROS topics below `prefix`."""
+
+    def __init__(self, master, side, name, prefix="/", **parameters):
+        path = os.path.join(SOURCE_DIRECTORY, "config", f"mqtt_bridge_{side}.yaml")
+        with open(path, encoding="utf-8") as file:
+            values = yaml.safe_load(file)
+        for topic in values["topics"]:
+            topic["ros_topic"] = prefix + topic["ros_topic"]
+        values.update(parameters)
+        master.set_parameters("/" + name, values)
+        self.log = tempfile.NamedTemporaryFile(suffix=".log")
+        self.process = start_child(
+            ["rosrun", "nodelet", "nodelet", "standalone", "livemap/MqttBridgeNodelet",
+             f"__name:={name}"],
+            env=master.environment(), stdout=self.log, stderr=subprocess.STDOUT)
+
+    def output(self):
+        with open(self.log.name, encoding="utf-8", errors="replace") as file:
+            return re.sub(r"\x1b\[[0-9;]*m", "", file.read())
+
+    def alive(self):
+        return self.process.poll() is None
+
+    def stop(self):
+        self.process.terminate()
+        try:
+            self.process.wait(timeout=PATIENCE_S)
+        finally:
+            self.process.kill()
+
+
+class Peer:
+    """mqtt_bridge_peer.py on a master, with what it has received so far."""
+
+    def __init__(self, master, topics):
+        """`topics`: {"pub:TOPIC" or "sub:TOPIC": message class}."""
+        arguments = [f"{key}:{message_class._type}" for key, message_class in topics.items()]
+        self.classes = {key.split(":")[1]: value for key, value in topics.items()}
+        self.lock = threading.Lock()
+        self.messages = {}
+        self.ready = threading.Event()
+        self.process = start_child(
+            [os.path.join(TEST_DIRECTORY, "mqtt_bridge_peer.py")] + arguments,
+            env=master.environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        threading.Thread(target=self._read, daemon=True).start()
+        if not self.ready.wait(PATIENCE_S):
+            raise AssertionError("the peer does not start")
+
+    def _read(self):
+        for line in self.process.stdout:
+            told = json.loads(line)
+            if "ready" in told:
+                self.ready.set()
+                continue
+            message = self.classes[told["topic"]]()
+            message.deserialize(base64.b64decode(told["data"]))
+            with self.lock:
+                self.messages.setdefault(told["topic"], []).append(message)
+
+    def received(self, topic):
+        with self.lock:
+            return list(self.messages.get(topic, []))
+
+    def publish(self, topic, message):
+        data = base64.b64encode(serialise(message)).decode()
+        self.process.stdin.write(json.dumps({"topic": topic, "data": data}) + "\n")
+        self.process.stdin.flush()
+
+    def diagnostics(self, name):
+        """The newest values of the bridge called `name`, as a map of texts."""
+        for message in reversed(self.received("/diagnostics")):
+            for status in message.status:
+                if status.hardware_id == "mqtt_bridge" and status.name.startswith(name + ":"):
+                    return {pair.key: pair.value for pair in status.values}
+        return {}
+
+    def stop(self):
+        self.process.stdin.close()
+        self.process.kill()
+        self.process.wait()
