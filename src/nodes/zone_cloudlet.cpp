@@ -1,0 +1,47 @@
+// The zone cloudlet: see docs/zone.md. Exit code 1 for a bad parameter or store, 2 for wrong usage.
+#include <ros/package.h>
+#include <ros/ros.h>
+
+#include <iostream>
+#include <string>
+
+#include "nodes/zone_node.h"
+
+namespace {
+
+constexpr char kUsage[] =
+    "usage: zone_cloudlet [--help] [ROS remappings and _parameter:=value]\n"
+    "\n"
+    "Keeps a zone's hazards: takes reports from hazard/report and vehicles from vehicle/position,\n"
+    "answers on hazard/receipt, tells every vehicle on hazard/notice, shows the map for rviz on\n"
+    "hazard/markers and for browsers on web_port. Parameters: config/zone_cloudlet.yaml.\n";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--help" || argument == "-h") {
+      std::cout << kUsage;
+      return 0;
+    }
+    if (argument.find(":=") == std::string::npos) {
+      std::cerr << "zone_cloudlet: unknown argument '" << argument << "', try --help\n";
+      return 2;
+    }
+  }
+  ros::init(argc, argv, "zone_cloudlet");
+  try {
+    ros::NodeHandle node;
+    ros::NodeHandle private_node("~");
+    livemap::ParameterReader parameters(private_node);
+    livemap::ZoneNode zone(
+        node, private_node,
+        livemap::ReadZoneCloudletConfig(parameters, ros::package::getPath("livemap")));
+    ros::spin();
+  } catch (const std::exception& error) {
+    std::cerr << "zone_cloudlet: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

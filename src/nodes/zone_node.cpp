@@ -1,0 +1,233 @@
+#include "nodes/zone_node.h"
+
+#include <livemap/HazardNotice.h>
+#include <livemap/ReportReceipt.h>
+
+#include <chrono>
+#include <random>
+#include <utility>
+
+#include "ros/hazard_conversions.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kSayAgainS = 60.0;
+constexpr std::chrono::milliseconds kPatience{500};
+/// Notices for joining vehicles go out in portions, so that those of new hazards are not held up
+/// and nobody's queue overflows.
+constexpr std::size_t kJoinPortion = 200;
+constexpr std::chrono::milliseconds kJoinPause{50};
+/// After a failed commit; the vehicles send the reports again anyway.
+constexpr std::chrono::seconds kStorePause{1};
+
+/// The zone's clock is the system's, never simulated time: a store outlives any replay.
+std::int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::int64_t SteadyNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+ZoneNode::ZoneNode(ros::NodeHandle node, ros::NodeHandle private_node, ZoneCloudletConfig config)
+    : config_(std::move(config)),
+      zone_(config_.zone, NowNs, EntropySeededGenerator()()),
+      queue_(static_cast<std::size_t>(config_.queue_reports),
+             static_cast<std::size_t>(config_.queue_bytes)),
+      updater_(node, private_node) {
+  if (config_.map_datum) map_.emplace(*config_.map_datum);
+  receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
+  notice_publisher_ = node.advertise<HazardNotice>("hazard/notice", 20000);
+  marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
+  if (config_.web) {
+    web_ = std::make_unique<WebServer>(config_.web_options, zone_, config_.zone.catalogue);
+    ROS_INFO("live map at http://%s:%d/", config_.web_options.address.c_str(), web_->port());
+    private_node.setParam("/livemap/web_port", web_->port());
+  }
+  subscription_ = zone_.Subscribe([this](const ZoneEvent& event) { OnEvent(event); });
+  worker_ = std::thread([this] { WorkUntilClosed(); });
+  updater_.setHardwareID("zone_cloudlet");
+  updater_.add("zone", this, &ZoneNode::Diagnose);
+  timers_ = {node.createSteadyTimer(ros::WallDuration(config_.marker_period_s),
+                                    &ZoneNode::OnMarkerTimer, this),
+             node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
+                                    &ZoneNode::OnDiagnosticsTimer, this)};
+  subscribers_ = {
+      node.subscribe("hazard/report", 2000, &ZoneNode::OnReport, this),
+      node.subscribe("vehicle/position", 2000, &ZoneNode::OnPosition, this),
+  };
+  ROS_INFO("zone in '%s': %zu active hazards", config_.zone.directory.c_str(),
+           zone_.Statistics().active_hazards);
+}
+
+ZoneNode::~ZoneNode() {
+  for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
+  for (ros::SteadyTimer& timer : timers_) timer.stop();
+  queue_.Close();
+  worker_.join();
+  zone_.Unsubscribe(subscription_);
+}
+
+template <typename Change>
+void ZoneNode::Count(const Change& change) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  change(counters_);
+}
+
+void ZoneNode::OnReport(const HazardReportConstPtr& message) {
+  Count([](ZoneCloudletCounters& counters) { ++counters.reports_received; });
+  Report report;
+  try {
+    report = FromMessage(*message);
+  } catch (const Error& error) {
+    Count([](ZoneCloudletCounters& counters) { ++counters.reports_malformed; });
+    ReportReceipt receipt;
+    receipt.schema_version = ReportReceipt::SCHEMA_VERSION;
+    receipt.status = ReportReceipt::REFUSED;
+    receipt.report_uuid = message->uuid;
+    receipt.vehicle_id = message->vehicle_id;
+    receipt.reason = error.what();
+    receipt_publisher_.publish(receipt);
+    ROS_WARN_THROTTLE(kSayAgainS, "report refused: %s", error.what());
+    return;
+  }
+  if (queue_.Push(std::move(report))) return;
+  Count([](ZoneCloudletCounters& counters) { ++counters.reports_not_queued; });
+  ROS_WARN_THROTTLE(kSayAgainS,
+                    "%zu reports wait for a commit: further ones are not taken until "
+                    "their vehicles send them again",
+                    queue_.size());
+}
+
+void ZoneNode::OnPosition(const VehiclePosition& message) {
+  try {
+    const VehicleState vehicle = FromMessage(message);
+    if (zone_.UpdateVehicle(vehicle)) NoteJoin(vehicle);
+  } catch (const Error& error) {
+    Count([](ZoneCloudletCounters& counters) { ++counters.positions_malformed; });
+    ROS_WARN_THROTTLE(kSayAgainS, "vehicle position dropped: %s", error.what());
+  }
+}
+
+/// A vehicle that is new, or was silent for long, missed notices: the worker tells it.
+void ZoneNode::NoteJoin(const VehicleState& vehicle) {
+  const std::int64_t now_ns = SteadyNs();
+  const auto gap_ns = static_cast<std::int64_t>(config_.join_gap_s * 1e9);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto [entry, is_new] = last_heard_ns_.try_emplace(vehicle.vehicle_id, now_ns);
+  const bool joins = is_new || now_ns - entry->second > gap_ns;
+  entry->second = now_ns;
+  if (!joins) return;
+  for (auto other = last_heard_ns_.begin(); other != last_heard_ns_.end();) {
+    other = now_ns - other->second > gap_ns ? last_heard_ns_.erase(other) : std::next(other);
+  }
+  ++counters_.vehicles_joined;
+  joined_.push_back(vehicle.position);
+}
+
+void ZoneNode::OnEvent(const ZoneEvent& event) {
+  view_changed_ = true;
+  const GeoPoint place = event.hazard ? event.hazard->hazard.position : event.vehicle->position;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!map_) map_.emplace(place);
+    if (event.vehicle) paths_.Add(*event.vehicle);
+    if (event.hazard) ++counters_.notices_sent;
+  }
+  if (event.hazard) notice_publisher_.publish(ToMessage(*event.hazard));
+}
+
+void ZoneNode::WorkUntilClosed() {
+  while (true) {
+    const bool closing = queue_.closed();
+    const bool telling = TellJoined();
+    const std::vector<Report> reports = queue_.Take(static_cast<std::size_t>(config_.batch_reports),
+                                                    telling ? kJoinPause : kPatience);
+    if (!reports.empty()) CommitBatch(reports);
+    // Closed before the queue was found empty: nothing can have come since.
+    if (closing && reports.empty()) return;
+  }
+}
+
+void ZoneNode::CommitBatch(const std::vector<Report>& reports) {
+  try {
+    for (const Receipt& receipt : zone_.HandleBatch(reports)) {
+      if (receipt.status == Receipt::Status::kRefused) {
+        ROS_WARN_THROTTLE(kSayAgainS, "report of '%.64s' refused: %s", receipt.vehicle_id.c_str(),
+                          receipt.reason.c_str());
+      }
+      receipt_publisher_.publish(ToMessage(receipt));
+    }
+    Count([](ZoneCloudletCounters& counters) {
+      ++counters.commits;
+      counters.store_error.clear();
+    });
+  } catch (const Error& error) {
+    Count([&error](ZoneCloudletCounters& counters) {
+      ++counters.store_errors;
+      counters.store_error = error.what();
+    });
+    ROS_ERROR_THROTTLE(kSayAgainS, "%s; the reports' vehicles will send them again", error.what());
+    std::this_thread::sleep_for(kStorePause);
+  }
+}
+
+/// Publishes the next portion of what joining vehicles must know; true while there is more.
+bool ZoneNode::TellJoined() {
+  std::deque<GeoPoint> joined;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    joined.swap(joined_);
+  }
+  for (const GeoPoint& place : joined) {
+    const auto around = zone_.QueryNear(place, config_.join_radius_m,
+                                        static_cast<std::size_t>(config_.join_max_hazards));
+    for (const Hazard& hazard : around) to_tell_.push_back(hazard.uuid);
+  }
+  for (std::size_t i = 0; i < kJoinPortion && !to_tell_.empty(); ++i) {
+    // As it is now: it may have changed, or gone, since it was put into the list.
+    const auto hazard = zone_.Find(to_tell_.front());
+    to_tell_.pop_front();
+    if (!hazard || !hazard->active) continue;
+    notice_publisher_.publish(ToMessage(HazardEvent{HazardAction::kAdded, *hazard}));
+    Count([](ZoneCloudletCounters& counters) { ++counters.notices_sent; });
+  }
+  return !to_tell_.empty();
+}
+
+void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
+  if (!view_changed_.exchange(false)) return;
+  const auto hazards = zone_.Query(std::nullopt, 0, static_cast<std::size_t>(config_.max_markers));
+  const auto vehicles = zone_.Vehicles();
+  visualization_msgs::MarkerArray markers;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!map_ && hazards.empty()) return;
+    if (!map_) map_.emplace(hazards.front().position);
+    paths_.KeepOnly(vehicles);
+    markers = ZoneMarkers(hazards, vehicles, paths_, config_.zone.catalogue, *map_,
+                          config_.map_frame, ros::Time::now());
+  }
+  marker_publisher_.publish(markers);
+}
+
+void ZoneNode::OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_.force_update(); }
+
+void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  ZoneCloudletCounters counters;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    counters = counters_;
+  }
+  counters.reports_waiting = queue_.size();
+  DescribeZone(counters, zone_.Statistics(), status);
+}
+
+}  // namespace livemap

@@ -1,0 +1,169 @@
+#include "ros/zone_conversions.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <set>
+
+namespace livemap {
+namespace {
+
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+
+constexpr double kHazardDiameterM = 1.5;
+constexpr double kLabelHeightM = 1.0;
+constexpr std::size_t kMaxLabels = 500;
+constexpr double kVehicleLengthM = 4.0;
+constexpr double kVehicleWidthM = 1.8;
+constexpr double kTrailDotM = 0.6;
+constexpr double kTrailSpacingM = 1.0;
+
+std_msgs::ColorRGBA Colour(float red, float green, float blue) {
+  std_msgs::ColorRGBA colour;
+  colour.r = red;
+  colour.g = green;
+  colour.b = blue;
+  colour.a = 1.0F;
+  return colour;
+}
+
+std_msgs::ColorRGBA ColourOf(const HazardClass& entry) {
+  const long rgb = std::strtol(entry.colour.c_str() + 1, nullptr, 16);  // "#rrggbb"
+  return Colour(static_cast<float>((rgb >> 16) & 0xff) / 255.0F,
+                static_cast<float>((rgb >> 8) & 0xff) / 255.0F,
+                static_cast<float>(rgb & 0xff) / 255.0F);
+}
+
+geometry_msgs::Point ToPoint(const Eigen::Vector2d& east_north_m, double z_m) {
+  geometry_msgs::Point point;
+  point.x = east_north_m.x();
+  point.y = east_north_m.y();
+  point.z = z_m;
+  return point;
+}
+
+Marker Begin(const Marker& base, const std::string& name_space, int id, int type, double size_m) {
+  Marker marker = base;
+  marker.ns = name_space;
+  marker.id = id;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.scale.x = marker.scale.y = marker.scale.z = size_m;
+  return marker;
+}
+
+void AppendHazards(const std::vector<Hazard>& hazards, const HazardCatalogue& catalogue,
+                   const LocalFrame& map, const Marker& base, MarkerArray& array) {
+  std::map<std::string, Marker> spheres;
+  std::vector<Marker> labels;
+  for (const Hazard& hazard : hazards) {
+    const auto known = spheres.find(hazard.class_name);
+    Marker& list = known != spheres.end() ? known->second : spheres[hazard.class_name];
+    const HazardClass entry = catalogue.Get(hazard.class_name);
+    if (known == spheres.end()) {
+      list = Begin(base, "hazards", static_cast<int>(spheres.size()), Marker::SPHERE_LIST,
+                   kHazardDiameterM);
+      list.color = ColourOf(entry);
+    }
+    const Eigen::Vector2d place_m = map.ToEnu(hazard.position);
+    list.points.push_back(ToPoint(place_m, kHazardDiameterM / 2));
+    if (hazards.size() > kMaxLabels) continue;
+    labels.push_back(Begin(base, "labels", static_cast<int>(labels.size()),
+                           Marker::TEXT_VIEW_FACING, kLabelHeightM));
+    labels.back().pose.position = ToPoint(place_m, kHazardDiameterM + kLabelHeightM);
+    labels.back().color = Colour(1.0F, 1.0F, 1.0F);
+    labels.back().text = entry.label;
+  }
+  for (const auto& list : spheres) array.markers.push_back(list.second);
+  array.markers.insert(array.markers.end(), labels.begin(), labels.end());
+}
+
+void AppendVehicle(const VehicleState& vehicle, const std::deque<GeoPoint>& path, int id,
+                   const LocalFrame& map, const Marker& base, MarkerArray& array) {
+  Marker body = Begin(base, "vehicles", id, Marker::ARROW, kVehicleWidthM);
+  body.pose.position = ToPoint(map.ToEnu(vehicle.position), kVehicleWidthM / 2);
+  if (std::isfinite(vehicle.course_rad)) {
+    body.scale.x = kVehicleLengthM;
+    const double yaw_rad = M_PI / 2 - vehicle.course_rad;  // Counterclockwise from east.
+    body.pose.orientation.z = std::sin(yaw_rad / 2);
+    body.pose.orientation.w = std::cos(yaw_rad / 2);
+  } else {
+    body.type = Marker::CUBE;
+  }
+  body.color = Colour(0.9F, 0.1F, 0.1F);
+  array.markers.push_back(body);
+  if (path.empty()) return;
+  Marker trail = Begin(base, "trails", id, Marker::SPHERE_LIST, kTrailDotM);
+  trail.color = Colour(0.15F, 0.4F, 1.0F);
+  for (const GeoPoint& point : path) trail.points.push_back(ToPoint(map.ToEnu(point), 0.0));
+  array.markers.push_back(trail);
+}
+
+}  // namespace
+
+void VehiclePaths::Add(const VehicleState& vehicle) {
+  std::deque<GeoPoint>& path = paths_[vehicle.vehicle_id];
+  if (!path.empty() && GeodesicDistanceM(path.back(), vehicle.position) < kTrailSpacingM) return;
+  path.push_back(vehicle.position);
+  if (path.size() > kMaxPoints) path.pop_front();
+}
+
+void VehiclePaths::KeepOnly(const std::vector<VehicleState>& vehicles) {
+  std::set<std::string> kept;
+  for (const VehicleState& vehicle : vehicles) kept.insert(vehicle.vehicle_id);
+  for (auto path = paths_.begin(); path != paths_.end();) {
+    path = kept.count(path->first) != 0 ? std::next(path) : paths_.erase(path);
+  }
+}
+
+MarkerArray ZoneMarkers(const std::vector<Hazard>& hazards,
+                        const std::vector<VehicleState>& vehicles, const VehiclePaths& paths,
+                        const HazardCatalogue& catalogue, const LocalFrame& map,
+                        const std::string& map_frame, const ros::Time& stamp) {
+  Marker base;
+  base.header.frame_id = map_frame;
+  base.header.stamp = stamp;
+  base.pose.orientation.w = 1.0;
+  base.action = Marker::DELETEALL;
+  MarkerArray array;
+  array.markers.push_back(base);
+  AppendHazards(hazards, catalogue, map, base, array);
+  int id = 0;
+  for (const VehicleState& vehicle : vehicles) {
+    const auto path = paths.paths().find(vehicle.vehicle_id);
+    AppendVehicle(vehicle, path == paths.paths().end() ? std::deque<GeoPoint>{} : path->second,
+                  id++, map, base, array);
+  }
+  return array;
+}
+
+void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& statistics,
+                  diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using diagnostic_msgs::DiagnosticStatus;
+  if (!counters.store_error.empty()) {
+    status.summary(DiagnosticStatus::ERROR, counters.store_error);
+  } else if (statistics.active_hazards == 0) {
+    status.summary(DiagnosticStatus::OK, "no hazard yet");
+  } else {
+    status.summary(DiagnosticStatus::OK, "serving");
+  }
+  status.add("hazards_active", statistics.active_hazards);
+  status.add("reports_received", counters.reports_received);
+  status.add("reports_accepted", statistics.added);
+  status.add("reports_merged", statistics.merged);
+  status.add("reports_repeated", statistics.repeated);
+  status.add("reports_refused", statistics.refused);
+  status.add("reports_malformed", counters.reports_malformed);
+  status.add("reports_not_queued", counters.reports_not_queued);
+  status.add("reports_waiting", counters.reports_waiting);
+  status.add("commits", counters.commits);
+  status.add("store_errors", counters.store_errors);
+  status.add("notices_sent", counters.notices_sent);
+  status.add("vehicle_positions", statistics.vehicle_positions);
+  status.add("vehicle_positions_refused",
+             statistics.vehicle_positions_refused + counters.positions_malformed);
+  status.add("vehicles_joined", counters.vehicles_joined);
+  status.add("image_bytes", statistics.image_bytes);
+}
+
+}  // namespace livemap

@@ -1,0 +1,118 @@
+#include "ros/zone_parameters.h"
+
+#include <cstdlib>
+#include <vector>
+
+namespace livemap {
+namespace {
+
+/// The numbers of "A,B,..."; empty when `text` is anything else.
+std::vector<double> ParseNumbers(const std::string& text, std::size_t count) {
+  std::vector<double> numbers;
+  const char* at = text.c_str();
+  while (numbers.size() < count) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(at, &end));
+    const char expected = numbers.size() == count ? '\0' : ',';
+    if (end == at || *end != expected) return {};
+    at = end + 1;
+  }
+  return numbers;
+}
+
+std::optional<GeoPoint> ReadDatum(ParameterReader& parameters) {
+  std::string text;
+  parameters.Read("map_datum", text);
+  if (text.empty()) return std::nullopt;
+  const std::vector<double> numbers = ParseNumbers(text, 2);
+  if (numbers.empty() || !IsValid({numbers[0], numbers[1]})) {
+    throw Error("parameter 'map_datum' is '" + text +
+                "', accepted is LATITUDE,LONGITUDE in degrees, or nothing for the first hazard or "
+                "vehicle");
+  }
+  return GeoPoint{numbers[0], numbers[1]};
+}
+
+std::optional<GeoBox> ReadBounds(ParameterReader& parameters) {
+  std::string text;
+  parameters.Read("zone_bounds", text);
+  if (text.empty()) return std::nullopt;
+  const std::vector<double> numbers = ParseNumbers(text, 4);
+  if (!numbers.empty()) {
+    const GeoBox box{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
+    if (IsValid(box.south_west) && IsValid(box.north_east) && numbers[0] < numbers[2]) return box;
+  }
+  throw Error("parameter 'zone_bounds' is '" + text +
+              "', accepted is SOUTH,WEST,NORTH,EAST in degrees, or nothing for the whole Earth");
+}
+
+template <typename Integer>
+void ReadCount(ParameterReader& parameters, const std::string& name, Integer& value,
+               ParameterRange range) {
+  int number = static_cast<int>(value);
+  parameters.Read(name, number, range);
+  value = static_cast<Integer>(number);
+}
+
+void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
+  parameters.Read("directory", zone.directory);
+  if (zone.directory.empty()) {
+    throw Error("parameter 'directory' is empty, accepted is the folder of the zone's store");
+  }
+  parameters.Read("image_cap_bytes", zone.image_cap_bytes, {0, 1e15});
+  parameters.Read("vehicle_retention_s", zone.vehicle_retention_s, {1, 1e6});
+  ReadCount(parameters, "max_vehicles", zone.max_vehicles, {1, 1e6});
+  ReadCount(parameters, "max_hazards", zone.max_hazards, {1, 1e8});
+  ReportLimits& limits = zone.limits;
+  limits.zone = ReadBounds(parameters);
+  parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000});
+  parameters.Read("max_future_s", limits.max_future_s, {0, 1e9});
+  ReadCount(parameters, "max_image_bytes", limits.max_image_bytes, {0, 64e6});
+  ReadCount(parameters, "max_image_side_px", limits.max_image_side_px, {1, 65535});
+}
+
+void ReadWeb(ParameterReader& parameters, const std::string& package_path,
+             ZoneCloudletConfig& config) {
+  WebOptions& web = config.web_options;
+  web.web_root = package_path + "/web";
+  parameters.Read("web", config.web);
+  parameters.Read("web_address", web.address);
+  parameters.Read("web_port", web.port, {0, 65535});
+  std::string web_root;
+  parameters.Read("web_root", web_root);
+  if (!web_root.empty()) web.web_root = web_root;
+  parameters.Read("leaflet_root", web.leaflet_root);
+  parameters.Read("tile_url", web.tile_url);
+  parameters.Read("tile_attribution", web.tile_attribution);
+  parameters.Read("web_title", web.title);
+  parameters.Read("web_threads", web.threads, {1, 64});
+  ReadCount(parameters, "web_max_connections", web.max_connections, {1, 100000});
+  if (config.map_datum) web.centre = *config.map_datum;
+}
+
+}  // namespace
+
+ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
+                                          const std::string& package_path) {
+  ZoneCloudletConfig config;
+  parameters.Read("hazards", config.hazards);
+  if (config.hazards.empty()) config.hazards = package_path + "/config/hazards.yaml";
+  config.zone.catalogue = HazardCatalogue::Load(config.hazards);
+  ReadZone(parameters, config.zone);
+  parameters.Read("batch_reports", config.batch_reports, {1, 100000});
+  parameters.Read("queue_reports", config.queue_reports, {1, 1e7});
+  parameters.Read("queue_bytes", config.queue_bytes, {1e6, 1e12});
+  parameters.Read("join_radius_m", config.join_radius_m, {0, 100000});
+  parameters.Read("join_max_hazards", config.join_max_hazards, {0, 100000});
+  parameters.Read("join_gap_s", config.join_gap_s, {1, 1e6});
+  parameters.Read("map_frame", config.map_frame);
+  config.map_datum = ReadDatum(parameters);
+  parameters.Read("marker_period_s", config.marker_period_s, {0.05, 3600});
+  parameters.Read("max_markers", config.max_markers, {0, 1e6});
+  parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});
+  ReadWeb(parameters, package_path, config);
+  parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
+  return config;
+}
+
+}  // namespace livemap

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "ros/parameters.h"
+#include "web/options.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+
+/// Defaults of the zone_cloudlet node; config/zone_cloudlet.yaml explains each.
+struct ZoneCloudletConfig {
+  std::string hazards;  ///< Path of the catalogue; empty: config/hazards.yaml.
+  ZoneService::Config zone;
+  int batch_reports = 500;            ///< Most reports of one commit.
+  int queue_reports = 20000;          ///< Waiting for a commit; beyond it they are not taken.
+  double queue_bytes = 256e6;         ///< The same in bytes of pictures.
+  double join_radius_m = 5000;        ///< What a joining vehicle is told lies within this.
+  int join_max_hazards = 2000;        ///< The nearest ones.
+  double join_gap_s = 60;             ///< Silent for this long: the vehicle joins anew.
+  std::string map_frame = "map";      ///< Of hazard/markers: x east, y north.
+  std::optional<GeoPoint> map_datum;  ///< Its origin; none: the first hazard or vehicle.
+  double marker_period_s = 0.5;       ///< Between two pictures of the map for rviz.
+  int max_markers = 20000;            ///< Hazards shown in rviz.
+  double diagnostics_period_s = 1.0;
+  bool web = true;  ///< Serve the live map.
+  WebOptions web_options;
+};
+
+/// Reads and checks every private parameter; `package_path` completes the defaults that name files
+/// of the package. Throws Error with one sentence.
+ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
+                                          const std::string& package_path);
+
+}  // namespace livemap
