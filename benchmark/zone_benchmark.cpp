@@ -1,0 +1,237 @@
+// How fast the zone registers reports: in memory at 1e3 to 1e6 known hazards, and with its store.
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "zone/hazard_registry.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+namespace {
+
+constexpr char kUsage[] =
+    "usage: livemap_zone_benchmark [--max-hazards N] [--store-seconds S] [--help]\n"
+    "\n"
+    "Prints the cost of one registration in memory at 1000 to N (default 1000000) hazards and how\n"
+    "it grows, then committed reports per second on SQLite, S seconds (default 2) for each line.\n";
+
+constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+constexpr double kSpacingM = 12.0;
+constexpr GeoPoint kCorner{40.44, -79.94};
+constexpr double kMetresPerDegree = 111000.0;
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// A town of hazards on a square lattice, and reports that hit or miss them.
+class Town {
+ public:
+  explicit Town(std::size_t hazards)
+      : hazards_(hazards),
+        side_(static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(hazards))))) {}
+
+  GeoPoint Place(double column, double row) const {
+    const double cosine = std::cos(kCorner.latitude_deg * 3.14159265358979 / 180.0);
+    return {kCorner.latitude_deg + row * kSpacingM / kMetresPerDegree,
+            kCorner.longitude_deg + column * kSpacingM / (kMetresPerDegree * cosine)};
+  }
+  Report At(const GeoPoint& position) {
+    Report report;
+    report.uuid = Uuid::Random(generator_);
+    report.vehicle_id = "car-1";
+    report.drive_id = "drive-1";
+    report.stamp_ns = kNowNs;
+    report.class_name = "pothole";
+    report.confidence = 0.5F;
+    report.box = {10, 20, 110, 90};
+    report.position = position;
+    report.covariance_m2 = Eigen::Vector2d(1.0, 4.0).asDiagonal();
+    report.image_width = 640;
+    report.image_height = 480;
+    return report;
+  }
+  Report OfHazard(std::size_t i) {
+    return At(Place(static_cast<double>(i % side_), static_cast<double>(i / side_)));
+  }
+  /// Within 2 m of a random hazard.
+  Report Sighting() {
+    std::uniform_int_distribution<std::size_t> any(0, hazards_ - 1);
+    std::uniform_real_distribution<double> offset(-0.1, 0.1);
+    const std::size_t i = any(generator_);
+    return At(Place(static_cast<double>(i % side_) + offset(generator_),
+                    static_cast<double>(i / side_) + offset(generator_)));
+  }
+  /// In the middle between four hazards, 8.5 m from each.
+  Report News() {
+    std::uniform_int_distribution<std::size_t> any(0, hazards_ - 1);
+    const std::size_t i = any(generator_);
+    return At(Place(static_cast<double>(i % side_) + 0.5, static_cast<double>(i / side_) + 0.5));
+  }
+  Uuid NextUuid() { return Uuid::Random(generator_); }
+
+ private:
+  std::mt19937_64 generator_{1};
+  std::size_t hazards_;
+  std::size_t side_;
+};
+
+struct Cost {
+  double news_ns = 0;
+  double sighting_ns = 0;
+};
+
+/// Registers `reports` inside a transaction that is then taken back, so that the size stays.
+/// Returns seconds of the registration alone.
+double RegisterAndTakeBack(HazardRegistry& registry, const std::vector<Report>& reports, Town& town,
+                           std::uint64_t sequence) {
+  registry.Begin();
+  const auto start = std::chrono::steady_clock::now();
+  for (const Report& report : reports) {
+    const auto match = registry.FindMatch(report.class_name, report.position);
+    if (match) {
+      registry.Merge(*match, report, {}, ++sequence, kNowNs);
+    } else {
+      registry.Add(report, {}, town.NextUuid(), ++sequence, kNowNs);
+    }
+  }
+  const double seconds = SecondsSince(start);
+  registry.Rollback();
+  return seconds;
+}
+
+Cost MeasureRegistry(std::size_t hazards) {
+  Town town(hazards);
+  HazardRegistry registry(HazardCatalogue(), 5);
+  std::uint64_t sequence = 0;
+  for (std::size_t i = 0; i < hazards; ++i) {
+    registry.Add(town.OfHazard(i), {}, town.NextUuid(), ++sequence, kNowNs);
+  }
+  constexpr int kBatches = 400;
+  constexpr int kBatchReports = 250;
+  Cost cost;
+  // The first round warms up and is not counted.
+  for (int batch = 0; batch <= kBatches; ++batch) {
+    std::vector<Report> news;
+    std::vector<Report> sightings;
+    for (int i = 0; i < kBatchReports; ++i) {
+      news.push_back(town.News());
+      sightings.push_back(town.Sighting());
+    }
+    const double news_s = RegisterAndTakeBack(registry, news, town, sequence);
+    const double sighting_s = RegisterAndTakeBack(registry, sightings, town, sequence);
+    if (batch == 0) continue;
+    cost.news_ns += news_s * 1e9 / (kBatches * kBatchReports);
+    cost.sighting_ns += sighting_s * 1e9 / (kBatches * kBatchReports);
+  }
+  return cost;
+}
+
+void PrintRegistry(std::size_t max_hazards) {
+  std::printf("registration without I/O, one thread\n");
+  std::printf("%10s %12s %12s %18s\n", "hazards", "new, ns", "sighting, ns", "registrations/s");
+  Cost first;
+  Cost last;
+  for (std::size_t hazards = 1000; hazards <= max_hazards; hazards *= 10) {
+    last = MeasureRegistry(hazards);
+    if (hazards == 1000) first = last;
+    std::printf("%10zu %12.0f %12.0f %18.0f\n", hazards, last.news_ns, last.sighting_ns,
+                2e9 / (last.news_ns + last.sighting_ns));
+    std::fflush(stdout);
+  }
+  std::printf("cost growth to the largest: new %.2f, sighting %.2f\n", last.news_ns / first.news_ns,
+              last.sighting_ns / first.sighting_ns);
+}
+
+/// A JPEG header with random bytes behind it: the zone reads the header only.
+std::vector<std::uint8_t> MakePicture(std::size_t bytes, std::mt19937& generator) {
+  std::vector<std::uint8_t> picture{0xff, 0xd8, 0xff, 0xc0, 0, 11,   8, 1,
+                                    0xe0, 2,    0x80, 1,    1, 0x11, 0};
+  while (picture.size() < bytes) picture.push_back(static_cast<std::uint8_t>(generator()));
+  return picture;
+}
+
+void PrintStore(std::size_t batch_reports, std::size_t picture_bytes, double seconds) {
+  std::string directory =
+      (std::filesystem::temp_directory_path() / "livemap_zone_benchmark_XXXXXX").string();
+  if (mkdtemp(directory.data()) == nullptr) throw Error("cannot make '" + directory + "'");
+  double spent_s = 0;
+  std::size_t count = 0;
+  {
+    ZoneService::Config config;
+    config.directory = directory;
+    ZoneService zone(
+        config, [] { return kNowNs; }, 1);
+    Town town(100000);
+    std::mt19937 generator(2);
+    while (spent_s < seconds) {
+      std::vector<Report> reports;
+      for (std::size_t i = 0; i < batch_reports; ++i) {
+        reports.push_back(i % 2 == 0 ? town.News() : town.Sighting());
+        if (picture_bytes > 0) reports.back().image = MakePicture(picture_bytes, generator);
+      }
+      const auto start = std::chrono::steady_clock::now();
+      zone.HandleBatch(reports);
+      spent_s += SecondsSince(start);
+      count += batch_reports;
+    }
+  }
+  std::filesystem::remove_all(directory);
+  std::printf("%10zu %14zu %18.0f\n", batch_reports, picture_bytes,
+              static_cast<double>(count) / spent_s);
+  std::fflush(stdout);
+}
+
+/// The positive number after `name`; `fallback` when the option is not given.
+double Option(const std::vector<std::string>& arguments, const std::string& name, double fallback) {
+  for (std::size_t i = 0; i + 1 < arguments.size(); ++i) {
+    if (arguments[i] != name) continue;
+    char* end = nullptr;
+    const double value = std::strtod(arguments[i + 1].c_str(), &end);
+    if (*end == '\0' && value > 0 && value <= 1e8) return value;
+    throw Error(name + " is '" + arguments[i + 1] + "', accepted is a number above 0 up to 1e8");
+  }
+  return fallback;
+}
+
+int Run(const std::vector<std::string>& arguments) {
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (arguments[i] == "--help") {
+      std::cout << kUsage;
+      return 0;
+    }
+    const bool is_known = arguments[i] == "--max-hazards" || arguments[i] == "--store-seconds";
+    if (!is_known || ++i == arguments.size()) {
+      throw Error("unknown or incomplete argument '" + arguments[i - (is_known ? 1 : 0)] +
+                  "', try --help");
+    }
+  }
+  const double max_hazards = Option(arguments, "--max-hazards", 1e6);
+  const double seconds = Option(arguments, "--store-seconds", 2.0);
+  PrintRegistry(static_cast<std::size_t>(max_hazards));
+  std::printf("committed reports/s on SQLite (WAL, synchronous=FULL), half new, half sightings\n");
+  std::printf("%10s %14s %18s\n", "per commit", "picture, bytes", "reports/s");
+  for (const std::size_t batch : {1U, 100U, 500U}) PrintStore(batch, 0, seconds);
+  PrintStore(500, 20000, seconds);
+  return 0;
+}
+
+}  // namespace
+}  // namespace livemap
+
+int main(int argc, char** argv) {
+  try {
+    return livemap::Run(std::vector<std::string>(argv + 1, argv + argc));
+  } catch (const std::exception& error) {
+    std::cerr << "livemap_zone_benchmark: " << error.what() << "\n";
+    return 2;
+  }
+}

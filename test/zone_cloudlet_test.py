@@ -1,0 +1,287 @@
+#!/usr/bin/python3
+"""The zone_cloudlet node by its topics: reports in, receipts, notices, markers and the store out."""
+
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.request
+import uuid
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from livemap.msg import HazardNotice, HazardReport, ReportReceipt, VehiclePosition
+from visualization_msgs.msg import Marker, MarkerArray
+
+# Keeps a broken test from hanging; nothing is measured by it.
+PATIENCE_S = 60
+
+
+def eventually(condition, what):
+    """The first true value of `condition`; AssertionError naming `what` when patience ends."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError("never happened: " + what)
+        time.sleep(0.05)
+
+
+def make_report(latitude=40.44, longitude=-79.94, class_name="pothole"):
+    report = HazardReport(schema_version=HazardReport.SCHEMA_VERSION)
+    report.uuid = uuid.uuid4().bytes
+    report.vehicle_id = "car-1"
+    report.drive_id = "drive-1"
+    report.stamp = rospy.Time.from_sec(time.time() - 1)
+    report.class_name = class_name
+    report.confidence = 0.5
+    report.x_min, report.y_min, report.x_max, report.y_max = 10, 20, 110, 90
+    report.latitude, report.longitude = latitude, longitude
+    report.covariance = [1.0, 0.0, 0.0, 1.0]
+    report.image_width, report.image_height = 640, 480
+    return report
+
+
+def make_position(vehicle_id, latitude, longitude):
+    return VehiclePosition(
+        schema_version=VehiclePosition.SCHEMA_VERSION, vehicle_id=vehicle_id, drive_id="drive-1",
+        stamp=rospy.Time.from_sec(time.time()), latitude=latitude, longitude=longitude,
+        course=1.0, speed=10.0, horizontal_sigma=2.0)
+
+
+class Inbox:
+    """What came on one topic."""
+
+    def __init__(self, topic, message_class):
+        self.lock = threading.Lock()
+        self.messages = []
+        self.subscriber = rospy.Subscriber(topic, message_class, self.add, queue_size=10000)
+
+    def add(self, message):
+        with self.lock:
+            self.messages.append(message)
+
+    def all(self):
+        with self.lock:
+            return list(self.messages)
+
+    def clear(self):
+        with self.lock:
+            self.messages.clear()
+
+
+class ZoneCloudletTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("zone_cloudlet_test")
+        cls.receipts = Inbox("hazard/receipt", ReportReceipt)
+        cls.notices = Inbox("hazard/notice", HazardNotice)
+        cls.markers = Inbox("hazard/markers", MarkerArray)
+        cls.diagnostics = Inbox("/diagnostics", DiagnosticArray)
+        cls.reports = rospy.Publisher("hazard/report", HazardReport, queue_size=1000)
+        cls.positions = rospy.Publisher("vehicle/position", VehiclePosition, queue_size=1000)
+
+    def setUp(self):
+        self.directory = tempfile.mkdtemp(prefix="livemap_zone_")
+        self.process = None
+        self.start()
+
+    def tearDown(self):
+        self.stop(signal.SIGKILL)
+        shutil.rmtree(self.directory, ignore_errors=True)
+
+    def command(self, **parameters):
+        values = {"directory": os.path.join(self.directory, "zone"), "web_port": 0,
+                  "marker_period_s": 0.1, "diagnostics_period_s": 0.2, "join_gap_s": 600.0}
+        values.update(parameters)
+        return (["rosrun", "livemap", "zone_cloudlet", "__name:=zone_cloudlet"] +
+                [f"_{name}:={value}" for name, value in values.items()])
+
+    def start(self):
+        for inbox in (self.receipts, self.notices, self.markers, self.diagnostics):
+            inbox.clear()
+        # Of its own process group: rosrun is a shell that does not pass signals on.
+        self.process = subprocess.Popen(self.command(), start_new_session=True)
+        eventually(lambda: self.reports.get_num_connections() == 1 and
+                   self.positions.get_num_connections() == 1 and
+                   self.receipts.subscriber.get_num_connections() == 1 and
+                   self.notices.subscriber.get_num_connections() == 1, "the zone connects")
+
+    def stop(self, signal_number):
+        if self.process is None:
+            return
+        os.killpg(self.process.pid, signal_number)
+        self.process.wait(PATIENCE_S)
+        self.process = None
+        eventually(lambda: self.reports.get_num_connections() == 0, "the zone is gone")
+
+    def restart(self, signal_number):
+        self.stop(signal_number)
+        self.start()
+
+    def send(self, report):
+        """Publishes a report and returns its receipt."""
+        count = len(self.receipts.all())
+        self.reports.publish(report)
+        eventually(lambda: len(self.receipts.all()) > count, "a receipt")
+        receipt = self.receipts.all()[-1]
+        self.assertEqual(receipt.report_uuid, report.uuid)
+        return receipt
+
+    def stored(self):
+        """Hazards as (uuid, class, latitude, longitude, sightings), straight from the file."""
+        path = os.path.join(self.directory, "zone", "zone.sqlite3")
+        with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
+            return sorted(database.execute(
+                "SELECT uuid, class_name, latitude, longitude, sightings FROM hazards"))
+
+    def count(self, key):
+        for message in reversed(self.diagnostics.all()):
+            for status in message.status:
+                if status.hardware_id == "zone_cloudlet":
+                    return int({pair.key: pair.value for pair in status.values}.get(key, -1))
+        return -1
+
+    def test_a_report_is_answered_announced_stored_and_shown(self):
+        report = make_report()
+        receipt = self.send(report)
+        self.assertEqual(receipt.status, ReportReceipt.COMMITTED)
+        self.assertEqual(receipt.vehicle_id, "car-1")
+        hazard_id = str(uuid.UUID(bytes=receipt.hazard_uuid))
+        self.assertEqual(self.stored(), [(hazard_id, "pothole", 40.44, -79.94, 1)])
+        notice = eventually(self.notices.all, "a notice")[0]
+        self.assertEqual(notice.action, HazardNotice.ADDED)
+        self.assertEqual(notice.hazard_uuid, receipt.hazard_uuid)
+        self.assertEqual(notice.sightings, 1)
+        self.assertEqual(notice.first_seen, report.stamp)
+        spheres = eventually(
+            lambda: [m for a in self.markers.all() for m in a.markers if m.ns == "hazards"],
+            "markers")[-1]
+        self.assertEqual(spheres.header.frame_id, "map")
+        # The first hazard is the datum.
+        self.assertAlmostEqual(spheres.points[0].x, 0.0, places=3)
+        self.assertAlmostEqual(spheres.points[0].y, 0.0, places=3)
+        port = rospy.get_param("/livemap/web_port")
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/hazards") as answer:
+            features = json.load(answer)["features"]
+        self.assertEqual([feature["id"] for feature in features], [hazard_id])
+
+    def test_a_repeated_report_is_one_sighting_and_another_report_nearby_a_second(self):
+        report = make_report()
+        first = self.send(report)
+        again = self.send(report)
+        self.assertEqual(again.status, ReportReceipt.COMMITTED)
+        self.assertEqual(again.hazard_uuid, first.hazard_uuid)
+        self.assertEqual([row[4] for row in self.stored()], [1])
+        other = self.send(make_report(latitude=40.44001))
+        self.assertEqual(other.hazard_uuid, first.hazard_uuid)
+        self.assertEqual([row[4] for row in self.stored()], [2])
+        eventually(lambda: self.count("reports_repeated") == 1, "the repetition is counted")
+        eventually(lambda: self.count("reports_merged") == 1, "the sighting is counted")
+        eventually(lambda: [n.action for n in self.notices.all()] ==
+                   [HazardNotice.ADDED, HazardNotice.UPDATED], "one notice for each change")
+
+    def test_a_restart_keeps_the_same_hazards_and_knows_the_old_reports(self):
+        report = make_report(class_name="<img src=x onerror=alert(1)>")
+        first = self.send(report)
+        self.send(make_report(latitude=40.45))
+        before = self.stored()
+        for signal_number in (signal.SIGINT, signal.SIGKILL):
+            self.restart(signal_number)
+            self.assertEqual(self.stored(), before)
+            self.assertEqual(self.send(report).hazard_uuid, first.hazard_uuid)
+            self.assertEqual(self.stored(), before)
+            eventually(lambda: self.count("hazards_active") == 2, "both hazards are active")
+
+    def test_hostile_reports_are_refused_with_a_reason_and_leave_nothing(self):
+        bad_position = make_report(latitude=float("nan"))
+        huge_name = make_report(class_name="x" * 1000000)
+        negative = make_report()
+        negative.covariance = [-1.0, 0.0, 0.0, 1.0]
+        not_a_picture = make_report()
+        not_a_picture.image.data = b"GIF89a" + bytes(100)
+        newer_schema = make_report()
+        newer_schema.schema_version = 99
+        for report, word in ((bad_position, "position"), (huge_name, "class name"),
+                             (negative, "covariance"), (not_a_picture, "picture"),
+                             (newer_schema, "schema version")):
+            receipt = self.send(report)
+            self.assertEqual(receipt.status, ReportReceipt.REFUSED)
+            self.assertIn(word, receipt.reason)
+            self.assertEqual(receipt.hazard_uuid, bytes(16))
+        self.assertEqual(self.stored(), [])
+        eventually(lambda: self.count("reports_refused") == 4, "refusals are counted")
+        eventually(lambda: self.count("reports_malformed") == 1, "the unknown schema is counted")
+
+    def test_a_joining_vehicle_is_told_what_is_around_it_once(self):
+        near = self.send(make_report())
+        self.send(make_report(latitude=41.44))  # 111 km away.
+        eventually(lambda: len(self.notices.all()) == 2, "both are announced")
+        self.notices.clear()
+        self.positions.publish(make_position("car-2", 40.45, -79.94))
+        told = eventually(self.notices.all, "the vehicle is told")
+        self.positions.publish(make_position("car-2", 40.4501, -79.94))
+        eventually(lambda: self.count("vehicle_positions") == 2, "both positions arrive")
+        self.assertEqual([(n.action, n.hazard_uuid) for n in self.notices.all()],
+                         [(HazardNotice.ADDED, near.hazard_uuid)])
+        self.assertEqual(told[0].class_name, "pothole")
+        eventually(lambda: [m for a in self.markers.all() for m in a.markers
+                            if m.ns == "vehicles" and m.type == Marker.ARROW], "a vehicle marker")
+
+    def test_a_position_that_is_none_is_dropped_and_counted(self):
+        self.positions.publish(make_position("car-2", float("nan"), 0.0))
+        eventually(lambda: self.count("vehicle_positions_refused") == 1, "the position is counted")
+
+    def refusal(self, *arguments, **parameters):
+        """Exit code and standard error of a node started with these parameters."""
+        command = self.command(**parameters)
+        command[3] = "__name:=refused_zone"
+        done = subprocess.run(command + list(arguments), timeout=PATIENCE_S, text=True,
+                              stderr=subprocess.PIPE, check=False)
+        if rospy.has_param("/refused_zone"):
+            rospy.delete_param("/refused_zone")
+        return done.returncode, done.stderr
+
+    def test_wrong_parameters_and_arguments_are_one_sentence_and_an_exit_code(self):
+        self.stop(signal.SIGKILL)
+        for parameters, words in (({"directory": ""}, "directory"),
+                                  ({"directory": "/dev/null/zone"}, "/dev/null/zone"),
+                                  ({"zone_bounds": "1,2,3"}, "zone_bounds"),
+                                  ({"map_datum": "91,0"}, "map_datum"),
+                                  ({"web_port": 70000}, "web_port"),
+                                  ({"hazards": "/nowhere.yaml"}, "/nowhere.yaml"),
+                                  ({"batch_report": 3}, "batch_report")):
+            code, text = self.refusal(**parameters)
+            self.assertEqual(code, 1, text)
+            self.assertIn(words, text)
+        code, text = self.refusal("--colour")
+        self.assertEqual(code, 2, text)
+        self.assertIn("--colour", text)
+
+    def test_a_corrupt_store_is_refused_and_left_alone(self):
+        self.stop(signal.SIGKILL)
+        path = os.path.join(self.directory, "zone", "zone.sqlite3")
+        for end in ("-wal", "-shm"):
+            if os.path.exists(path + end):
+                os.remove(path + end)
+        with open(path, "wb") as file:
+            file.write(b"x" * 5000)
+        code, text = self.refusal()
+        self.assertEqual(code, 1, text)
+        self.assertIn(path, text)
+        with open(path, "rb") as file:
+            self.assertEqual(file.read(), b"x" * 5000)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("livemap", "zone_cloudlet", ZoneCloudletTest, sys.argv)
