@@ -104,7 +104,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void OnDetections(const DetectionArray& message) {
-    LearnMounting(message.header.frame_id);
+    if (!reporter_->HasMounting(message.header.frame_id)) wanted_frame_ = message.header.frame_id;
+    LearnMounting();
     reporter_->AddFrame(ToSightingFrame(message), ros::Time::now().toSec());
     Work();
   }
@@ -168,7 +169,10 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
   }
 
-  void OnTick(const ros::SteadyTimerEvent&) { Work(); }
+  void OnTick(const ros::SteadyTimerEvent&) {
+    LearnMounting();
+    Work();
+  }
 
   void Work() {
     reporter_->Process(ros::Time::now().toSec(), SteadyS());
@@ -183,11 +187,13 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   /// The mounting does not change: looked up until it is known, then kept.
-  void LearnMounting(const std::string& frame_id) {
-    if (reporter_->HasMounting(frame_id)) return;
+  void LearnMounting() {
+    if (wanted_frame_.empty()) return;
     try {
-      const auto transform = tf_buffer_.lookupTransform(config_.base_frame, frame_id, ros::Time(0));
-      reporter_->SetMounting(frame_id, tf2::transformToEigen(transform));
+      const auto transform =
+          tf_buffer_.lookupTransform(config_.base_frame, wanted_frame_, ros::Time(0));
+      reporter_->SetMounting(wanted_frame_, tf2::transformToEigen(transform));
+      wanted_frame_.clear();
     } catch (const tf2::TransformException& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "no mounting of the camera yet: %s", error.what());
     }
@@ -258,6 +264,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   std::unique_ptr<HazardReporter> reporter_;
   std::optional<LocalFrame> map_;
   std::optional<ros::Time> position_stamp_;
+  std::string wanted_frame_;  // Optical frame whose mounting is not known yet.
   nav_msgs::Path path_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;

@@ -215,7 +215,7 @@ TEST_F(HazardReporterTest, WaitsShortlyForAFixAfterTheImageThenCarriesThePositio
   See(3.1, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty());
   EXPECT_EQ(counters().held_back_no_fix, 0u) << "it had a fix";
-  reporter_->Process(3.1 + config_.bracket_wait_s, steady_s_);
+  reporter_->Process(3.1 + config_.bracket_wait_s + 0.01, steady_s_);
   EXPECT_THAT(TakeDue(), SizeIs(1));
 }
 
@@ -224,7 +224,7 @@ TEST_F(HazardReporterTest, WaitsForThePictureThenGoesWithout) {
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.4, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
-  reporter_->Process(3.5, steady_s_);
+  reporter_->Process(3.51, steady_s_);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
   EXPECT_THAT(reports[0].image, IsEmpty());
@@ -282,7 +282,7 @@ TEST_F(HazardReporterTest, TooManyWaitingFramesDropTheOldest) {
 TEST_F(HazardReporterTest, ClockSetBackDoesNotMakeAFrameWaitForEver) {
   See(100.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   reporter_->Process(1.0, steady_s_);
-  reporter_->Process(1.0 + config_.max_wait_s, steady_s_);
+  reporter_->Process(1.0 + config_.max_wait_s + 0.01, steady_s_);
   EXPECT_EQ(reporter_->waiting_frames(), 0u);
 }
 

@@ -1,0 +1,200 @@
+#!/usr/bin/python3
+"""hazard_reporting as the vehicle runs it: fixes and detections in, reports out."""
+
+import glob
+import math
+import sys
+import unittest
+
+import rospy
+import rostest
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import NavSatStatus
+
+from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, decode,
+                                      detection, east_north, fix, on_street, place, stamp)
+from livemap.msg import HazardNotice, HazardReport, ReportReceipt
+from mqtt_bridge_fixture import eventually
+
+
+def receipt(report, status=ReportReceipt.COMMITTED, hazard=9):
+    return ReportReceipt(schema_version=ReportReceipt.SCHEMA_VERSION, status=status,
+                         report_uuid=report.uuid, hazard_uuid=bytes([hazard] * 16))
+
+
+def notice(action, sequence, where):
+    latitude, longitude = place(*where)
+    return HazardNotice(schema_version=HazardNotice.SCHEMA_VERSION, action=action,
+                        sequence=sequence, hazard_uuid=bytes([7] * 16), class_name="pothole",
+                        confidence=0.5, latitude=latitude, longitude=longitude, sightings=1)
+
+
+class HazardReportingTest(unittest.TestCase):
+    number = 0
+
+    def make_vehicle(self, **parameters):
+        HazardReportingTest.number += 1
+        vehicle = Vehicle(f"vehicle{HazardReportingTest.number}", **parameters)
+        self.addCleanup(vehicle.stop)
+        return vehicle
+
+    def driving_vehicle(self, **parameters):
+        vehicle = self.make_vehicle(**parameters)
+        vehicle.start()
+        vehicle.mount_camera()
+        vehicle.drive(0, 4)
+        return vehicle
+
+    def test_reports_the_hazard_itself_at_its_place_with_its_picture(self):
+        vehicle = self.driving_vehicle(drive_id="drive-7")
+        vehicle.see(3.05, detection(12.0, -1.5))
+        report = eventually(vehicle.reports, "a report")[0]
+        where = east_north(report.latitude, report.longitude)
+        self.assertLess(math.dist(where, on_street(3.05, 12.0, -1.5)), 0.02)
+        self.assertEqual(report.schema_version, HazardReport.SCHEMA_VERSION)
+        self.assertEqual((report.class_name, report.drive_id), ("pothole", "drive-7"))
+        self.assertEqual(report.vehicle_id, "")
+        self.assertEqual(report.stamp, stamp(3.05))
+        self.assertEqual(report.image.header.stamp, report.stamp)
+        self.assertEqual(report.image.header.frame_id, OPTICAL)
+        self.assertEqual(decode(report.image).shape, (400, 640, 3))
+        self.assertEqual((report.image_width, report.image_height), (640, 400))
+        self.assertGreater(report.covariance[0] * report.covariance[3], report.covariance[1] ** 2)
+
+    def test_tells_where_the_vehicle_is_once_a_second_and_shows_it(self):
+        vehicle = self.driving_vehicle()
+        eventually(lambda: len(vehicle.received("vehicle/position")) == 5, "five positions")
+        last = vehicle.received("vehicle/position")[-1]
+        self.assertEqual(last.stamp, stamp(4.0))
+        self.assertLess(math.dist(east_north(last.latitude, last.longitude), on_street(4)), 0.01)
+        self.assertAlmostEqual(last.speed, SPEED_MPS, delta=0.01)
+        self.assertAlmostEqual(last.course, COURSE_RAD, delta=0.001)
+        vehicle.see(3.05, detection(12.0))
+        marker = eventually(
+            lambda: [marker for array in vehicle.received("hazard/local_map")
+                     for marker in array.markers if marker.ns == "hazards"], "a marker")[0]
+        self.assertEqual(marker.header.frame_id, "map")
+        # The map's origin is the first fix, where the course was not known yet.
+        self.assertLess(math.dist((marker.pose.position.x, marker.pose.position.y),
+                                  on_street(3.05, 12.0)), 0.05)
+        path = eventually(lambda: [path for path in vehicle.received("path") if path.poses],
+                          "a path")[-1]
+        self.assertLess(math.dist((path.poses[-1].pose.position.x, path.poses[-1].pose.position.y),
+                                  on_street(4.0)), 2.0)
+
+    def test_reports_a_hazard_seen_in_many_frames_once(self):
+        vehicle = self.driving_vehicle()
+        for frame in range(6):
+            vehicle.see(3.0 + 0.1 * frame, detection(16.0 - 1.6 * frame))
+        vehicle.wait_for(detections=6, duplicates_suppressed=5, reports_created=1, reports_sent=1,
+                         pending=1)
+        self.assertEqual(len({bytes(report.uuid) for report in vehicle.reports()}), 1)
+
+    def test_does_not_report_what_the_zone_announced_until_it_is_removed(self):
+        vehicle = self.driving_vehicle()
+        vehicle.publish("hazard/notice", notice(HazardNotice.ADDED, 1, on_street(3.0, 13.0)))
+        vehicle.wait_for(notices=1, known=1)
+        vehicle.see(3.0, detection(12.0))
+        vehicle.wait_for(duplicates_suppressed=1, reports_created=0)
+        vehicle.publish("hazard/notice", notice(HazardNotice.REMOVED, 2, on_street(3.0, 13.0)))
+        vehicle.wait_for(notices=2, known=0)
+        vehicle.see(3.1, detection(10.4))
+        vehicle.wait_for(reports_created=1)
+
+    def test_without_a_fix_holds_back_counts_and_invents_nothing(self):
+        vehicle = self.make_vehicle(max_wait_s=2.0)
+        vehicle.start()
+        vehicle.mount_camera()
+        for tenth in range(40):
+            vehicle.publish("fix", fix(tenth / 10, NavSatStatus.STATUS_NO_FIX))
+        vehicle.see(3.0, detection(12.0))
+        vehicle.wait_for(held_back_no_fix=1)
+        vehicle.wait_for(held_back_no_fix=1, dropped_no_fix=1, reports_created=0, no_fixes=40)
+        self.assertEqual(vehicle.reports(), [])
+        self.assertEqual(vehicle.received("vehicle/position"), [])
+
+    def test_holds_a_detection_back_until_fixes_embrace_it(self):
+        vehicle = self.make_vehicle(max_wait_s=120.0)
+        vehicle.start()
+        vehicle.mount_camera()
+        vehicle.see(3.0, detection(12.0))
+        vehicle.wait_for(held_back_no_fix=1)
+        vehicle.drive(0, 4)
+        report = eventually(vehicle.reports, "a report")[0]
+        self.assertLess(math.dist(east_north(report.latitude, report.longitude),
+                                  on_street(3.0, 12.0)), 0.02)
+        vehicle.wait_for(dropped_no_fix=0)
+
+    def test_sends_again_until_the_receipt_and_remembers_over_kill_nine(self):
+        vehicle = self.driving_vehicle(resend_first_s=0.2, resend_longest_s=0.4)
+        vehicle.see(3.0, detection(12.0))
+        eventually(lambda: len(vehicle.reports()) >= 3, "the report comes again")
+        uuid = bytes(vehicle.reports()[0].uuid)
+        vehicle.kill()
+        before = len(vehicle.reports())
+        vehicle.start()
+        eventually(lambda: len(vehicle.reports()) >= before + 2, "it comes after a restart, too")
+        self.assertEqual({bytes(report.uuid) for report in vehicle.reports()}, {uuid})
+        self.assertEqual(vehicle.reports()[-1].image.data, vehicle.reports()[0].image.data)
+
+        vehicle.publish("hazard/receipt", receipt(vehicle.reports()[0]))
+        vehicle.wait_for(committed=1, pending=0, known=1, reports_sent=0)
+        count = len(vehicle.reports())
+        vehicle.mount_camera()
+        vehicle.drive(0, 4)
+        vehicle.see(3.5, detection(4.0))
+        vehicle.wait_for(duplicates_suppressed=1)
+        rospy.sleep(1.0)
+        self.assertEqual(len(vehicle.reports()), count, "a finished report is not sent again")
+
+    def test_refused_report_ends_and_says_why(self):
+        vehicle = self.driving_vehicle()
+        vehicle.see(3.0, detection(12.0))
+        answer = receipt(eventually(vehicle.reports, "a report")[0], ReportReceipt.REFUSED)
+        answer.reason = "outside of the zone"
+        vehicle.publish("hazard/receipt", answer)
+        vehicle.wait_for(refused=1, committed=0, pending=0)
+        eventually(lambda: "outside of the zone" in vehicle.output(), "the reason in the log")
+
+    def test_paused_simulated_clock_does_not_stop_the_delivery(self):
+        rospy.set_param("/use_sim_time", True)
+        self.addCleanup(rospy.set_param, "/use_sim_time", False)
+        clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+        self.addCleanup(clock.unregister)
+        clock.publish(Clock(stamp(4.0)))
+        vehicle = self.driving_vehicle(resend_first_s=0.2, resend_longest_s=0.4)
+        vehicle.see(3.05, detection(12.0))
+        eventually(lambda: len(vehicle.reports()) >= 4, "the report comes again")
+        vehicle.publish("hazard/receipt", receipt(vehicle.reports()[0]))
+        vehicle.wait_for(committed=1, pending=0)
+
+    def test_corrupt_memory_is_set_aside_loudly(self):
+        vehicle = self.driving_vehicle()
+        vehicle.see(3.0, detection(12.0))
+        vehicle.wait_for(pending=1)
+        vehicle.kill()
+        with open(vehicle.database, "r+b") as file:
+            file.write(b"X" * 2000)
+        vehicle.start()
+        vehicle.wait_for(pending=0, known=0)
+        self.assertEqual(len(glob.glob(vehicle.database + ".corrupt-*[0-9]")), 1)
+        self.assertIn("was corrupt", vehicle.output())
+
+    def test_wrong_parameters_are_one_sentence_and_a_failed_load(self):
+        for parameters, sentence in [
+                ({"max_rang_m": 3.0}, "unknown parameter '/{}/hazard_reporting/max_rang_m'"),
+                ({"max_range_m": -3.0}, "max_range_m' is -3, accepted is a number from 0.1"),
+                ({"catalogue": "/nowhere.yaml"}, "cannot read file '/nowhere.yaml'"),
+                ({"map_datum": "here"}, "parameter 'map_datum' is 'here'")]:
+            vehicle = self.make_vehicle(**parameters)
+            vehicle.start(wait=False)
+            sentence = sentence.format(vehicle.name)
+            try:
+                eventually(lambda: sentence in vehicle.output(), sentence)
+            except AssertionError as error:
+                raise AssertionError(f"{error}, it said: {vehicle.output()}") from None
+
+
+if __name__ == "__main__":
+    rospy.init_node("hazard_reporting_test")
+    rostest.rosrun("livemap", "hazard_reporting", HazardReportingTest, sys.argv)
