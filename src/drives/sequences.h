@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geo/ground_projection.h"
+
+namespace livemap {
+
+/// A pose with its time.
+struct StampedPose {
+  std::int64_t stamp_ns = 0;
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();  ///< Optical frame.
+};
+
+/// One picture of a recorded sequence, with depth where the sequence has it.
+struct SequenceFrame {
+  std::int64_t stamp_ns = 0;
+  std::string image_path;
+  std::int64_t depth_stamp_ns = 0;
+  std::string depth_path;  ///< 16-bit PNG, empty without depth.
+};
+
+/// A folder in TUM RGB-D or KITTI odometry layout, paths checked, images not opened yet.
+struct Sequence {
+  CameraIntrinsics intrinsics;  ///< Width and height zero: as the images.
+  double depth_scale = 1;       ///< Depth units per metre.
+  std::vector<SequenceFrame> frames;
+  std::vector<StampedPose> poses;
+};
+
+/// A TUM stamp "1305031102.175304" to nanoseconds without losing digits; none when malformed.
+std::optional<std::int64_t> ParseStampNs(const std::string& text);
+
+/// TUM RGB-D layout: associations.txt ("rgb_stamp rgb_path depth_stamp depth_path") or else rgb.txt
+/// alone, groundtruth.txt ("stamp tx ty tz qx qy qz qw", camera to world, optional) and camera.yaml
+/// (width, height, fx, fy, cx, cy, depth_scale). Throws Error naming file and line.
+Sequence ReadTumSequence(const std::string& directory);
+
+/// KITTI odometry layout: images/ (or image_0, image_2) with numbered pictures, calib.txt ("P0: 12
+/// numbers" or 12 bare numbers per line, the first line counts), poses.txt (3x4 rows, camera to
+/// world, optional), times.txt (seconds, optional: else frames at `rate_hz`). Throws Error.
+Sequence ReadKittiSequence(const std::string& directory, double rate_hz);
+
+/// For the parsers' tests and fuzzers; `name` is for messages.
+std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const std::string& name);
+std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name);
+std::vector<Eigen::Isometry3d> ParseKittiPoses(const std::string& text, const std::string& name);
+
+}  // namespace livemap

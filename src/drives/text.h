@@ -1,0 +1,22 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace livemap {
+
+/// The whole of `text`, surrounding blanks aside, as a finite decimal number; none otherwise. The
+/// point is the decimal mark whatever the locale.
+std::optional<double> ParseFinite(const std::string& text);
+
+/// Splits at `separator`; "a,,b" has three parts.
+std::vector<std::string> Split(const std::string& line, char separator);
+
+/// Splits at runs of blanks and tabs; no empty parts.
+std::vector<std::string> SplitBlanks(const std::string& line);
+
+/// Lines without their ends ("\n" or "\r\n"); a last empty line does not count.
+std::vector<std::string> Lines(const std::string& text);
+
+}  // namespace livemap

@@ -1,0 +1,164 @@
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include "base/error.h"
+#include "drives/sequences.h"
+#include "drives/text.h"
+
+namespace livemap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxTextBytes = 256U << 20U;
+
+[[noreturn]] void RefuseLine(const std::string& name, std::size_t index, const std::string& line,
+                             const std::string& accepted) {
+  throw Error("line " + std::to_string(index + 1) + " of '" + name + "' is '" + line.substr(0, 80) +
+              "', accepted is '" + accepted + "'");
+}
+
+bool IsCommentOrEmpty(const std::string& line) {
+  const std::size_t first = line.find_first_not_of(" \t");
+  return first == std::string::npos || line[first] == '#';
+}
+
+/// A listed picture must lie inside the folder.
+bool IsInside(const std::string& path) {
+  if (path.empty() || path.size() > 1024 || path.find('\0') != std::string::npos) return false;
+  const fs::path normal = fs::path(path).lexically_normal();
+  return normal.is_relative() && *normal.begin() != "..";
+}
+
+double CameraNumber(const YAML::Node& root, const std::string& key, const std::string& path) {
+  const YAML::Node node = root[key];
+  const std::optional<double> value =
+      node && node.IsScalar() ? ParseFinite(node.Scalar()) : std::nullopt;
+  if (!value || *value <= 0 || *value > 1e6) {
+    throw Error("'" + key + "' of '" + path + "' must be a positive number");
+  }
+  return *value;
+}
+
+void ReadCamera(const std::string& path, Sequence& sequence) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(ReadFile(path, 1U << 16U));
+  } catch (const YAML::Exception& exception) {
+    throw Error("'" + path + "' is no YAML: " + exception.what());
+  }
+  if (!root.IsMap()) throw Error("'" + path + "' must be a map of camera numbers");
+  sequence.intrinsics.width = static_cast<int>(CameraNumber(root, "width", path));
+  sequence.intrinsics.height = static_cast<int>(CameraNumber(root, "height", path));
+  sequence.intrinsics.fx = CameraNumber(root, "fx", path);
+  sequence.intrinsics.fy = CameraNumber(root, "fy", path);
+  sequence.intrinsics.cx = CameraNumber(root, "cx", path);
+  sequence.intrinsics.cy = CameraNumber(root, "cy", path);
+  sequence.depth_scale = root["depth_scale"] ? CameraNumber(root, "depth_scale", path) : 5000;
+}
+
+void Anchor(const fs::path& root, std::string& path, const std::string& listed_in) {
+  if (path.empty()) return;
+  const fs::path whole = root / path;
+  if (!fs::is_regular_file(whole)) {
+    throw Error("the image '" + whole.string() + "' listed in '" + listed_in + "' is missing");
+  }
+  path = whole.string();
+}
+
+}  // namespace
+
+std::optional<std::int64_t> ParseStampNs(const std::string& text) {
+  const std::size_t point = text.find('.');
+  const std::string whole = text.substr(0, point);
+  std::string fraction = point == std::string::npos ? "" : text.substr(point + 1);
+  const auto all_digits = [](const std::string& part) {
+    return std::all_of(part.begin(), part.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
+  if (whole.empty() || whole.size() > 10 || !all_digits(whole) || !all_digits(fraction)) {
+    return std::nullopt;
+  }
+  fraction.resize(9, '0');
+  const std::int64_t seconds = std::stoll(whole);
+  // What ROS's time can hold.
+  if (seconds > 4294967295) return std::nullopt;
+  return seconds * 1'000'000'000 + std::stoll(fraction);
+}
+
+std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const std::string& name) {
+  std::vector<SequenceFrame> frames;
+  const std::vector<std::string> lines = Lines(text);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (IsCommentOrEmpty(lines[i])) continue;
+    const std::vector<std::string> parts = SplitBlanks(lines[i]);
+    const bool has_depth = parts.size() == 4;
+    const std::optional<std::int64_t> stamp = ParseStampNs(parts[0]);
+    const std::optional<std::int64_t> depth_stamp = has_depth ? ParseStampNs(parts[2]) : stamp;
+    if ((parts.size() != 2 && !has_depth) || !stamp || !depth_stamp || !IsInside(parts[1]) ||
+        (has_depth && !IsInside(parts[3]))) {
+      RefuseLine(name, i, lines[i], "stamp image [stamp depth]");
+    }
+    if (!frames.empty() && *stamp <= frames.back().stamp_ns) {
+      RefuseLine(name, i, lines[i], "stamps that increase");
+    }
+    frames.push_back({*stamp, parts[1], *depth_stamp, has_depth ? parts[3] : ""});
+  }
+  if (frames.empty()) throw Error("'" + name + "' lists no image");
+  return frames;
+}
+
+std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name) {
+  std::vector<StampedPose> poses;
+  const std::vector<std::string> lines = Lines(text);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (IsCommentOrEmpty(lines[i])) continue;
+    const std::vector<std::string> parts = SplitBlanks(lines[i]);
+    const std::string accepted = "stamp tx ty tz qx qy qz qw";
+    const std::optional<std::int64_t> stamp = ParseStampNs(parts[0]);
+    if (parts.size() != 8 || !stamp) RefuseLine(name, i, lines[i], accepted);
+    std::array<double, 7> numbers{};
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      const std::optional<double> value = ParseFinite(parts[k + 1]);
+      if (!value || std::abs(*value) > 1e9) RefuseLine(name, i, lines[i], accepted);
+      numbers[k] = *value;
+    }
+    Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+    if (std::abs(rotation.norm() - 1) > 0.01) {
+      RefuseLine(name, i, lines[i], accepted + "' with a unit quaternion '");
+    }
+    rotation.normalize();
+    StampedPose pose;
+    pose.stamp_ns = *stamp;
+    pose.world_from_camera = Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation;
+    if (!poses.empty() && pose.stamp_ns <= poses.back().stamp_ns) {
+      RefuseLine(name, i, lines[i], "stamps that increase");
+    }
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+Sequence ReadTumSequence(const std::string& directory) {
+  const fs::path root(directory);
+  if (!fs::is_directory(root)) throw Error("the TUM folder '" + directory + "' does not exist");
+  Sequence sequence;
+  ReadCamera((root / "camera.yaml").string(), sequence);
+  const bool associated = fs::exists(root / "associations.txt");
+  const std::string list = (root / (associated ? "associations.txt" : "rgb.txt")).string();
+  sequence.frames = ParseTumAssociations(ReadFile(list, kMaxTextBytes), list);
+  for (SequenceFrame& frame : sequence.frames) {
+    Anchor(root, frame.image_path, list);
+    Anchor(root, frame.depth_path, list);
+  }
+  const std::string truth = (root / "groundtruth.txt").string();
+  if (fs::exists(truth)) {
+    sequence.poses = ParseTumTrajectory(ReadFile(truth, kMaxTextBytes), truth);
+  }
+  return sequence;
+}
+
+}  // namespace livemap

@@ -1,0 +1,29 @@
+#include <cstdio>
+
+#include "drives/sequences.h"
+#include "tools/command_line.h"
+#include "tools/sequence_bag.h"
+
+namespace livemap {
+namespace {
+
+int Run(int argc, char** argv) {
+  CommandLine line(
+      "livemap_bag_from_tum DIR OUT.bag",
+      "Makes a bag of a TUM RGB-D folder: associations.txt (or rgb.txt), camera.yaml,\n"
+      "groundtruth.txt and the pictures they list. Stamps are the sequence's own.",
+      2, {});
+  if (!line.Parse(argc, argv)) return 0;
+  const Sequence sequence = ReadTumSequence(line.Positional(0));
+  WriteSequenceBag(sequence, line.Positional(1), ros::Duration(0));
+  std::printf("%s: %zu frames, %zu poses\n", line.Positional(1).c_str(), sequence.frames.size(),
+              sequence.poses.size());
+  return 0;
+}
+
+}  // namespace
+}  // namespace livemap
+
+int main(int argc, char** argv) {
+  return livemap::RunProgram("livemap_bag_from_tum", argc, argv, livemap::Run);
+}

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace livemap {
+
+/// A flag of a command-line program: "--name VALUE", or "--name" alone when `value` is empty.
+struct Flag {
+  std::string name;   ///< Without the dashes.
+  std::string value;  ///< What stands for the value in the help, e.g. "SECONDS".
+  std::string help;   ///< One line, with unit and default.
+};
+
+/// The arguments of a program. Every mistake is an Error of one sentence.
+class CommandLine {
+ public:
+  /// `usage` is the line after "Usage: "; `about` one or more sentences; exactly `positionals`
+  /// arguments without dashes are wanted. "--help" is known by itself.
+  CommandLine(std::string usage, std::string about, std::size_t positionals,
+              std::vector<Flag> flags);
+
+  /// False when the help was asked for and has been printed. Negative numbers are values, not
+  /// flags.
+  bool Parse(int argc, char** argv);
+
+  bool Has(const std::string& flag) const { return values_.count(flag) > 0; }
+  std::string Text(const std::string& flag, const std::string& otherwise) const;
+  /// A finite number in [min, max].
+  double Number(const std::string& flag, double otherwise, double min, double max) const;
+  std::uint64_t Seed(const std::string& flag, std::uint64_t otherwise) const;
+  const std::string& Positional(std::size_t index) const { return positionals_[index]; }
+
+ private:
+  void PrintHelp() const;
+  const Flag* Find(const std::string& name) const;
+
+  std::string usage_;
+  std::string about_;
+  std::size_t wanted_positionals_;
+  std::vector<Flag> flags_;
+  std::map<std::string, std::string> values_;
+  std::vector<std::string> positionals_;
+};
+
+/// How far long work is: one line that rewrites itself on a terminal, else plain lines, each about
+/// a tenth of the whole, on standard error.
+class Progress {
+ public:
+  Progress(std::string what, std::size_t total);
+  void At(std::size_t done);
+
+ private:
+  const std::string what_;
+  const std::size_t total_;
+  const bool terminal_;
+  std::size_t said_tenth_ = 0;
+};
+
+/// Runs a program's body: an Error is printed as its sentence and gives exit status 2, any other
+/// exception 1.
+int RunProgram(const char* name, int argc, char** argv, int (*body)(int, char**));
+
+}  // namespace livemap

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <string>
+
+namespace livemap {
+
+/// A file that the package brings: from its install or source tree as rospack finds it, else `path`
+/// as it stands.
+std::string SharePath(const std::string& path);
+
+}  // namespace livemap
