@@ -92,7 +92,7 @@ export const Graticule = L.Layer.extend({
       : coordinate(degrees, 'N', 'S', digitsFor(step));
     const x = upright ? at + 5 : 8;
     const y = upright ? 15 : at - 5;
-    if (upright ? x > size.x - 60 : y < 30 || y > size.y - 40) return;
+    if (upright ? x > size.x - 60 : y < 30 || y > size.y - 64) return;
     context.lineWidth = 3;
     context.lineJoin = 'round';
     context.strokeStyle = this.colours.halo;

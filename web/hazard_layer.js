@@ -7,12 +7,12 @@ const L = window.L;
 const PULSE_MS = 4500;
 
 const HazardIcon = L.Icon.extend({
-  options: { iconSize: [34, 42], iconAnchor: [17, 40], popupAnchor: [0, -36] },
+  options: { className: 'pin', iconSize: [34, 42], iconAnchor: [17, 40], popupAnchor: [0, -36] },
 
   createIcon() {
-    const { catalogue, className } = this.options;
-    const pin = element('div', { class: 'pin' }, catalogue.badge(className));
-    pin.style.setProperty('--colour', catalogue.colour(className));
+    const { catalogue, hazardClass } = this.options;
+    const pin = element('div', {}, catalogue.badge(hazardClass));
+    pin.style.setProperty('--colour', catalogue.colour(hazardClass));
     this._setIconStyles(pin, 'icon');
     return pin;
   },
@@ -23,9 +23,11 @@ const HazardIcon = L.Icon.extend({
 });
 
 const ClusterIcon = L.Icon.extend({
+  options: { className: 'cluster' },
+
   createIcon() {
     const { count, shares, iconSize } = this.options;
-    const node = element('div', { class: 'cluster' }, ring(shares, count, iconSize[0]));
+    const node = element('div', {}, ring(shares, count, iconSize[0]));
     this._setIconStyles(node, 'icon');
     return node;
   },
@@ -129,7 +131,7 @@ export class HazardLayer {
       { icon: this.icon(hazard.className), riseOnHover: true });
     marker.hazard = hazard;
     marker.bindPopup(() => this.onOpen(marker.hazard),
-      { minWidth: 264, maxWidth: 300, autoPanPadding: [16, 16], className: 'hazard-popup' });
+      { minWidth: 296, maxWidth: 296, autoPanPadding: [16, 16], className: 'hazard-popup' });
     this.markers.set(hazard.id, marker);
     return marker;
   }
@@ -137,7 +139,7 @@ export class HazardLayer {
   icon(className) {
     let icon = this.icons.get(className);
     if (!icon) {
-      icon = new HazardIcon({ catalogue: this.catalogue, className });
+      icon = new HazardIcon({ catalogue: this.catalogue, hazardClass: className });
       this.icons.set(className, icon);
     }
     return icon;

@@ -10,15 +10,15 @@ const MAX_DOTS = 2000;
 const GAP_M = 250;
 
 const VehicleIcon = L.Icon.extend({
-  options: { iconSize: [34, 34], iconAnchor: [17, 17] },
+  options: { className: 'vehicle', iconSize: [34, 34], iconAnchor: [17, 17] },
 
   createIcon() {
     const arrow = svgElement('svg', { viewBox: '0 0 34 34', width: 34, height: 34 },
-      svgElement('path', { class: 'vehicle-heading', d: 'M17 0.5 L23.5 10 L10.5 10 Z' }),
+      svgElement('path', { class: 'vehicle-heading', d: 'M17 -1 L25 12 L9 12 Z' }),
       svgElement('circle', { class: 'vehicle-disc', cx: 17, cy: 17, r: 9 }),
       svgElement('path', { class: 'vehicle-arrow', d: 'M17 11.5 L21 21 L17 18.7 L13 21 Z' }),
       svgElement('rect', { class: 'vehicle-square', x: 14, y: 14, width: 6, height: 6 }));
-    const icon = element('div', { class: 'vehicle' }, arrow);
+    const icon = element('div', {}, arrow);
     this._setIconStyles(icon, 'icon');
     return icon;
   },

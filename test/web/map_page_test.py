@@ -20,6 +20,7 @@ import unittest
 
 try:
     from selenium import webdriver
+    from selenium.common.exceptions import TimeoutException
     from selenium.webdriver.chrome.service import Service
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
@@ -115,19 +116,29 @@ class MapPage(unittest.TestCase):
     size = (1280, 800)
     dark = False
 
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = start_browser(*cls.size, dark=cls.dark)
+        cls.addClassCleanup(stop_browser, cls.browser)
+
     def setUp(self):
         self.zone = ZoneProcess()
         self.addCleanup(self.zone.close)
-        self.browser = start_browser(*self.size, dark=self.dark)
-        self.addCleanup(stop_browser, self.browser)
+        self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
+        self.browser.get_log("browser")
 
     def open(self):
         self.browser.get(self.zone.url)
         self.wait_state("live")
 
     def wait(self, condition, what):
-        return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02).until(
-            lambda _: condition(), message=what)
+        try:
+            return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02).until(
+                lambda _: condition())
+        except TimeoutException:
+            log = [entry["message"] for entry in self.browser.get_log("browser")]
+            self.picture("failed")
+            raise AssertionError(f"{what}; the browser's log: {log}") from None
 
     def wait_state(self, state):
         self.wait(lambda: self.find("#connection").get_attribute("data-state") == state,
@@ -188,7 +199,7 @@ class Desktop(MapPage):
         seen_ms = self.browser.execute_async_script("window.seen.then(arguments[0])")
         self.assertLess(seen_ms - committed_ms, 1000)
 
-        self.assertIn("Pothole", self.find("#hazard-list").text)
+        self.wait(lambda: "Pothole" in self.find("#hazard-list").text, "it is not listed")
         self.wait(lambda: "New hazard: Pothole" in
                   self.find("#announcer").get_attribute("textContent"), "not announced")
         popup = self.open_popup_of(hazard)
@@ -335,7 +346,7 @@ class Desktop(MapPage):
         return math.degrees(float(turn.split("rotate(")[1].split("rad")[0]))
 
     def test_ten_thousand_hazards_load_and_the_page_answers(self):
-        self.assertEqual(self.zone.do("fill", count=10000, lat=LAT, lon=LON)["committed"], 10000)
+        self.assertEqual(self.zone.do("fill", count=10000, lat=LAT, lon=LON)["hazards"], 10000)
         self.open()
         self.wait(lambda: self.find("#list-count").text == "10,000", "not all are listed")
         self.assertLess(self.count("#map .pin, #map .cluster"), 500)
