@@ -16,7 +16,7 @@ const std::array<cv::Scalar, 6> kColours = {cv::Scalar(0, 0, 230),  cv::Scalar(0
                                             cv::Scalar(220, 60, 0), cv::Scalar(200, 0, 200),
                                             cv::Scalar(0, 160, 0),  cv::Scalar(160, 160, 0)};
 
-std::string LabelOf(const Detection& detection) {
+std::string LabelOf(const HazardDetection& detection) {
   std::string label = detection.class_name.substr(0, 40);
   // OpenCV's stroke fonts have no other characters.
   std::replace_if(
@@ -45,7 +45,7 @@ void DrawLabel(cv::Mat& bgr, const cv::Rect& frame, const std::string& label,
 
 }  // namespace
 
-void AnnotateImage(cv::Mat& bgr, const std::vector<Detection>& detections) {
+void AnnotateImage(cv::Mat& bgr, const std::vector<HazardDetection>& detections) {
   if (bgr.empty() || bgr.dims != 2 || bgr.type() != CV_8UC3) {
     throw Error("an image to annotate is empty or of OpenCV type " + cv::typeToString(bgr.type()) +
                 ", accepted is CV_8UC3 (BGR)");

@@ -13,7 +13,7 @@ HazardDetector::HazardDetector(const ModelManifest& manifest,
                                std::unique_ptr<InferenceEngine> engine)
     : manifest_(manifest), engine_(std::move(engine)), letterbox_(manifest) {}
 
-std::vector<Detection> HazardDetector::Detect(const cv::Mat& bgr) {
+std::vector<HazardDetection> HazardDetector::Detect(const cv::Mat& bgr) {
   const cv::Mat& input = letterbox_.Fill(bgr);
   const cv::Mat predictions = engine_->Run(input);
   return DecodeYolox(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());

@@ -23,7 +23,7 @@ class HazardDetector {
 
   /// Detections in `bgr` (8 bit, 3 channels, not empty; anything else throws Error), in pixels of
   /// that image, descending confidence.
-  std::vector<Detection> Detect(const cv::Mat& bgr);
+  std::vector<HazardDetection> Detect(const cv::Mat& bgr);
 
   const ModelManifest& manifest() const { return manifest_; }
 

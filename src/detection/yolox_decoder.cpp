@@ -35,7 +35,7 @@ cv::Rect2f DecodeBox(const float* values, Cell cell, double scale, cv::Size imag
 }
 
 void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest, double scale,
-               cv::Size image_size, std::vector<Detection>& detections) {
+               cv::Size image_size, std::vector<HazardDetection>& detections) {
   const float objectness = values[4];
   for (std::size_t index = 0; index < manifest.classes.size(); ++index) {
     const float confidence = objectness * values[5 + index];
@@ -52,7 +52,9 @@ void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest, do
   }
 }
 
-bool MoreConfident(const Detection& a, const Detection& b) { return a.confidence > b.confidence; }
+bool MoreConfident(const HazardDetection& a, const HazardDetection& b) {
+  return a.confidence > b.confidence;
+}
 
 void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
   const int columns = 5 + static_cast<int>(manifest.classes.size());
@@ -80,17 +82,18 @@ double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
   return together > 0 ? intersection / together : 0;
 }
 
-std::vector<Detection> SuppressOverlaps(std::vector<Detection> candidates, float iou_limit) {
+std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candidates,
+                                              float iou_limit) {
   // Stable, so that equal confidences keep the order of the cells and a run can be repeated.
   std::stable_sort(candidates.begin(), candidates.end(), MoreConfident);
   std::vector<std::size_t> looked_at;  // by class
-  std::vector<Detection> kept;
-  for (Detection& candidate : candidates) {
+  std::vector<HazardDetection> kept;
+  for (HazardDetection& candidate : candidates) {
     const auto index = static_cast<std::size_t>(candidate.class_index);
     if (looked_at.size() <= index) looked_at.resize(index + 1, 0);
     if (looked_at[index] == kMostCandidates) continue;
     ++looked_at[index];
-    const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const Detection& better) {
+    const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const HazardDetection& better) {
       return better.class_index == candidate.class_index &&
              IntersectionOverUnion(better.box, candidate.box) > iou_limit;
     });
@@ -99,12 +102,12 @@ std::vector<Detection> SuppressOverlaps(std::vector<Detection> candidates, float
   return kept;
 }
 
-std::vector<Detection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
-                                   double scale, cv::Size image_size) {
+std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
+                                         double scale, cv::Size image_size) {
   CheckShape(predictions, manifest);
   const std::size_t columns = 5 + manifest.classes.size();
   const float* values = predictions.ptr<float>();
-  std::vector<Detection> candidates;
+  std::vector<HazardDetection> candidates;
   for (const int stride : manifest.head.strides) {
     for (int row = 0; row < manifest.input.height / stride; ++row) {
       for (int column = 0; column < manifest.input.width / stride; ++column) {

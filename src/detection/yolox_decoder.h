@@ -17,14 +17,15 @@ namespace livemap {
 /// not finite, scores outside 0..1 and boxes outside the image are dropped. Returns what is at
 /// least at its class's threshold and survives suppression, descending confidence. Throws Error
 /// when the shape of `predictions` is another.
-std::vector<Detection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
-                                   double scale, cv::Size image_size);
+std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
+                                         double scale, cv::Size image_size);
 
 /// Greedy non-maximum suppression within each class: going down in confidence, a box that overlaps
 /// a kept one of its class by more than `iou_limit` goes. At most `kMostCandidates` of each class,
 /// the most confident, are looked at, which bounds the time that a wild output can cost. Returns
 /// the kept detections, descending confidence.
-std::vector<Detection> SuppressOverlaps(std::vector<Detection> candidates, float iou_limit);
+std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candidates,
+                                              float iou_limit);
 constexpr std::size_t kMostCandidates = 3000;
 
 /// Intersection over union of two boxes, 0 when both are empty.

@@ -21,10 +21,10 @@ TEST(HazardDetector, FindsWhatTheModelFindsInPixelsOfTheImage) {
   cv::Mat image(96, 128, CV_8UC3, cv::Scalar(0, 0, 0));
   image(cv::Rect(32, 16, 16, 16)) = kRed;
   image(cv::Rect(96, 64, 16, 16)) = kGreen;
-  const std::vector<Detection> found = detector.Detect(image);
+  const std::vector<HazardDetection> found = detector.Detect(image);
   ASSERT_EQ(found.size(), 2U);
-  const Detection& pothole = found[found[0].class_index == 0 ? 0 : 1];
-  const Detection& cone = found[found[0].class_index == 0 ? 1 : 0];
+  const HazardDetection& pothole = found[found[0].class_index == 0 ? 0 : 1];
+  const HazardDetection& cone = found[found[0].class_index == 0 ? 1 : 0];
   EXPECT_EQ(pothole.class_name, "pothole");
   EXPECT_GT(pothole.confidence, 0.99F);
   // Two cells wide and one high around the cell's centre (40, 24).
@@ -46,7 +46,7 @@ TEST(HazardDetector, ImagesOfDifferentSizesFollowEachOther) {
   HazardDetector detector = TinyDetector();
   for (const cv::Size size : {cv::Size(64, 48), cv::Size(640, 480), cv::Size(200, 48),
                               cv::Size(48, 200), cv::Size(1, 1), cv::Size(64, 48)}) {
-    for (const Detection& detection : detector.Detect(cv::Mat(size, CV_8UC3, kRed))) {
+    for (const HazardDetection& detection : detector.Detect(cv::Mat(size, CV_8UC3, kRed))) {
       const cv::Rect2f image({0, 0}, cv::Size2f(size));
       EXPECT_EQ(detection.box & image, detection.box) << size;
       EXPECT_FALSE(detection.box.empty()) << size;

@@ -23,7 +23,7 @@ void SetRow(cv::Mat& predictions, int row, const std::vector<float>& values) {
   std::copy(values.begin(), values.end(), predictions.ptr<float>(0, row));
 }
 
-Detection Candidate(int class_index, float confidence, cv::Rect2f box) {
+HazardDetection Candidate(int class_index, float confidence, cv::Rect2f box) {
   return {class_index == 0 ? "pothole" : "traffic_cone", class_index, confidence, box};
 }
 
@@ -34,7 +34,7 @@ TEST(YoloxDecoder, ABoxOfEachLevelLandsWhereItsCellSays) {
   SetRow(predictions, 2 * 8 + 3, {0.5F, 0.25F, std::log(2.0F), 0, 0.9F, 1.0F, 0});
   // Stride 16, column 1, row 2: centre ((0 + 1) * 16, (0.5 + 2) * 16) = (16, 40), size 8 x 16.
   SetRow(predictions, 48 + 2 * 4 + 1, {0, 0.5F, std::log(0.5F), 0, 1.0F, 0, 0.85F});
-  const std::vector<Detection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kImage);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].class_name, "pothole");
   EXPECT_EQ(found[0].class_index, 0);
@@ -56,7 +56,7 @@ TEST(YoloxDecoder, EachClassHasItsOwnThresholdOnObjectnessTimesClassScore) {
   cv::Mat predictions = NothingSeen(manifest);
   SetRow(predictions, 0, {0.5F, 0.5F, 0, 0, 0.75F, 0.75F, 1.0F});  // 0.5625 and 0.75
   SetRow(predictions, 20, {0.5F, 0.5F, 0, 0, 0.75F, 0.5F, 0});     // 0.375
-  const std::vector<Detection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kImage);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].class_name, "pothole");
   EXPECT_FLOAT_EQ(found[0].confidence, 0.5625F);
@@ -67,7 +67,7 @@ TEST(YoloxDecoder, BoxesAreCutToTheImage) {
   cv::Mat predictions = NothingSeen(manifest);
   SetRow(predictions, 0, {0, 0, std::log(100.0F), std::log(2.0F), 1, 1, 0});
   SetRow(predictions, 47, {0.5F, 0.5F, 200, 200, 0.9F, 0, 1});  // exp(200) overflows a float
-  const std::vector<Detection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kImage);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].box, cv::Rect2f(0, 0, 128, 16));
   EXPECT_EQ(found[1].box, cv::Rect2f(0, 0, 128, 96));
@@ -112,14 +112,14 @@ TEST(YoloxDecoder, AnotherShapeIsRefused) {
 }
 
 TEST(Suppression, TheWeakerOfTwoOverlappingBoxesOfAClassGoes) {
-  const std::vector<Detection> kept = SuppressOverlaps(
+  const std::vector<HazardDetection> kept = SuppressOverlaps(
       {Candidate(0, 0.6F, {0, 0, 10, 10}), Candidate(0, 0.9F, {1, 0, 10, 10})}, 0.5F);
   ASSERT_EQ(kept.size(), 1U);
   EXPECT_FLOAT_EQ(kept[0].confidence, 0.9F);
 }
 
 TEST(Suppression, BoxesOfOtherClassesAndFarBoxesStayInDescendingConfidence) {
-  const std::vector<Detection> kept =
+  const std::vector<HazardDetection> kept =
       SuppressOverlaps({Candidate(0, 0.6F, {0, 0, 10, 10}), Candidate(1, 0.9F, {0, 0, 10, 10}),
                         Candidate(0, 0.7F, {50, 0, 10, 10})},
                        0.5F);
@@ -131,7 +131,7 @@ TEST(Suppression, BoxesOfOtherClassesAndFarBoxesStayInDescendingConfidence) {
 
 TEST(Suppression, ASuppressedBoxSuppressesNoOther) {
   // A chain: the first overlaps the second, the second the third, the first not the third.
-  const std::vector<Detection> kept =
+  const std::vector<HazardDetection> kept =
       SuppressOverlaps({Candidate(0, 0.9F, {0, 0, 10, 10}), Candidate(0, 0.8F, {3, 0, 10, 10}),
                         Candidate(0, 0.7F, {6, 0, 10, 10})},
                        0.5F);
@@ -140,12 +140,12 @@ TEST(Suppression, ASuppressedBoxSuppressesNoOther) {
 }
 
 TEST(Suppression, OnlyTheMostConfidentCandidatesAreLookedAt) {
-  std::vector<Detection> candidates;
+  std::vector<HazardDetection> candidates;
   for (std::size_t i = 0; i < kMostCandidates + 10; ++i) {
     const auto x = static_cast<float>(i);
     candidates.push_back(Candidate(0, 0.5F + 1e-5F * x, {20 * x, 0, 10, 10}));
   }
-  const std::vector<Detection> kept = SuppressOverlaps(candidates, 0.5F);
+  const std::vector<HazardDetection> kept = SuppressOverlaps(candidates, 0.5F);
   ASSERT_EQ(kept.size(), kMostCandidates);
   EXPECT_FLOAT_EQ(kept.front().box.x, 20.0F * (kMostCandidates + 9));
 }

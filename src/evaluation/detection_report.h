@@ -1,0 +1,37 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "evaluation/detection_metrics.h"
+
+namespace livemap {
+
+/// The figures of one class as they are printed.
+struct ClassReport {
+  std::string class_name;
+  ClassFigures figures;
+  std::vector<ClassFigures> sweep;  ///< Empty unless asked for.
+};
+
+/// The result of `livemap evaluate detection`.
+struct DetectionReport {
+  std::string model;
+  std::size_t frames = 0;
+  double inference_ms_p50 = 0;  ///< Median wall time of a detection, ms.
+  double inference_ms_p95 = 0;
+  std::vector<ClassReport> classes;
+};
+
+/// docs/evaluation.md names the keys; figures that are not defined (no events, no drive) are null.
+nlohmann::ordered_json ToJson(const DetectionReport& report);
+
+/// A table for people.
+std::string ToText(const DetectionReport& report);
+
+/// The value below which `fraction` (0..1) of the values lie, by the nearest rank; 0 without
+/// values.
+double Quantile(std::vector<double> values, double fraction);
+
+}  // namespace livemap

@@ -1,0 +1,202 @@
+#include <cv_bridge/cv_bridge.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <image_transport/image_transport.h>
+#include <livemap/DetectionArray.h>
+#include <nodelet/nodelet.h>
+
+#include <boost/function.hpp>
+#include <boost/make_shared.hpp>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <pluginlib/class_list_macros.hpp>
+#include <thread>
+
+#include "detection/frame_queue.h"
+#include "detection/hazard_detector.h"
+#include "nodelets/nodelet_support.h"
+#include "ros/detection_conversions.h"
+#include "ros/parameters.h"
+
+namespace livemap {
+
+/// Parameters of the hazard_detection nodelet; config/hazard_detection.yaml explains them.
+struct HazardDetectionConfig {
+  std::string model;            ///< Path of the manifest; must be given.
+  int threads = 2;              ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
+  int queue_size = 4;           ///< Frames that may wait.
+  bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
+  double diagnostics_period_s = 1;  ///< s
+};
+
+/// Detects hazards in the rectified images of the vehicle: exactly one `hazard/detections` with the
+/// image's stamp for each processed frame, also when it is empty, and `hazard/annotated` when
+/// somebody listens.
+///
+/// The subscriber's callback only puts the pointer of the image into a queue, so ROS's own
+/// queue, which would lose frames without a word, never fills: it has no bound. The bound is
+/// queue_size, where the oldest frame goes and is counted: frames_in = frames_processed +
+/// frames_dropped + frames_waiting, at any moment. One worker thread takes from the queue.
+class HazardDetectionNodelet : public nodelet::Nodelet {
+ public:
+  ~HazardDetectionNodelet() override {
+    diagnostics_timer_.stop();
+    subscriber_.shutdown();
+    if (queue_) queue_->Close();
+    if (worker_.joinable()) worker_.join();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Queue = FrameQueue<sensor_msgs::ImageConstPtr>;
+
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    ReadParameters();
+    detector_ = std::make_unique<HazardDetector>(ReadModelManifest(config_.model), config_.threads);
+    queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
+    ros::NodeHandle& node = getNodeHandle();
+    detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
+    image_transport::ImageTransport transport(node);
+    annotated_publisher_ = transport.advertise("hazard/annotated", 10);
+    StartDiagnostics();
+    worker_ = std::thread([this] { Work(); });
+    const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
+                                                getPrivateNodeHandle());
+    subscriber_ = transport.subscribe(
+        "camera_rect/image", 0,
+        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
+            [this](const sensor_msgs::ImageConstPtr& image) { queue_->Push(image); }),
+        ros::VoidConstPtr(), hints);
+  }
+
+  void ReadParameters() {
+    ParameterReader parameters(getPrivateNodeHandle());
+    parameters.Read("model", config_.model);
+    parameters.Read("threads", config_.threads, {0, 256});
+    parameters.Read("queue_size", config_.queue_size, {1, 1000});
+    parameters.Read("annotate_empty", config_.annotate_empty);
+    parameters.Read("diagnostics_period_s", config_.diagnostics_period_s, {0.1, 60});
+    parameters.RejectUnknown({"image_transport", "diagnostic_period"});
+    if (config_.model.empty()) {
+      throw Error("parameter '" + getPrivateNodeHandle().resolveName("model") +
+                  "' is empty, accepted is the path of a model manifest (models/NAME.yaml)");
+    }
+  }
+
+  void Work() {
+    while (const std::optional<sensor_msgs::ImageConstPtr> image = queue_->Pop()) {
+      try {
+        Process(*image);
+      } catch (const std::exception& error) {
+        queue_->Unusable();
+        const std::lock_guard<std::mutex> lock(figures_mutex_);
+        ++figures_.bad;
+        NODELET_ERROR_THROTTLE(60, "dropped an image of %s: %s", subscriber_.getTopic().c_str(),
+                               error.what());
+      }
+    }
+  }
+
+  void Process(const sensor_msgs::ImageConstPtr& image) {
+    const Clock::time_point start = Clock::now();
+    const cv_bridge::CvImageConstPtr bgr = cv_bridge::toCvShare(image, "bgr8");
+    const std::vector<HazardDetection> found = detector_->Detect(bgr->image);
+    const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    // The picture first: who reports a detection wants it at hand.
+    if ((config_.annotate_empty || !found.empty()) &&
+        annotated_publisher_.getNumSubscribers() > 0) {
+      annotated_publisher_.publish(ToAnnotatedMessage(bgr->image, found, image->header));
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      ++figures_.annotated;
+    }
+    detections_publisher_.publish(boost::make_shared<DetectionArray>(
+        ToMessage(found, image->header, detector_->manifest().name, bgr->image.size(), ms)));
+    queue_->Done();
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    figures_.detections += found.size();
+    ++figures_.processed_in_window;
+    figures_.ms_in_window += ms;
+  }
+
+  void StartDiagnostics() {
+    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
+                                                             getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("hazard_detection");
+    updater_->add("hazard_detection", this, &HazardDetectionNodelet::Diagnose);
+    window_start_ = Clock::now();
+    // Wall time: a replay that stands still must not silence the nodelet.
+    diagnostics_timer_ = getNodeHandle().createWallTimer(
+        ros::WallDuration(config_.diagnostics_period_s),
+        [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    Figures figures;
+    {
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      figures = figures_;
+      figures_.processed_in_window = 0;
+      figures_.ms_in_window = 0;
+    }
+    const Queue::Counters counters = queue_->counters();
+    const Clock::time_point now = Clock::now();
+    const double window_s = std::chrono::duration<double>(now - window_start_).count();
+    window_start_ = now;
+    const auto in_window = static_cast<double>(figures.processed_in_window);
+    if (counters.dropped > dropped_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, figures.bad > bad_said_
+                                                                  ? "dropping unusable images"
+                                                                  : "behind: dropping frames");
+    } else if (figures.processed_in_window == 0) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
+    } else {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
+    }
+    dropped_said_ = counters.dropped;
+    bad_said_ = figures.bad;
+    status.add("frames_in", counters.in);
+    status.add("frames_processed", counters.processed);
+    status.add("frames_dropped", counters.dropped);  // unusable ones among them
+    status.add("frames_waiting", counters.waiting);
+    status.add("frames_unusable", figures.bad);
+    status.add("frames_annotated", figures.annotated);
+    status.add("detections", figures.detections);
+    status.add("rate_hz", window_s > 0 ? in_window / window_s : 0.0);
+    status.add("detection_ms", in_window > 0 ? figures.ms_in_window / in_window : 0.0);
+    status.add("model", detector_->manifest().name);
+  }
+
+  /// What the queue does not count.
+  struct Figures {
+    std::uint64_t bad = 0;
+    std::uint64_t annotated = 0;
+    std::uint64_t detections = 0;
+    std::uint64_t processed_in_window = 0;
+    double ms_in_window = 0;
+  };
+
+  HazardDetectionConfig config_;
+  std::unique_ptr<HazardDetector> detector_;  ///< The worker's.
+  std::unique_ptr<Queue> queue_;
+  image_transport::Subscriber subscriber_;
+  ros::Publisher detections_publisher_;
+  image_transport::Publisher annotated_publisher_;
+  std::thread worker_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::WallTimer diagnostics_timer_;
+  // The diagnostics timer's own:
+  Clock::time_point window_start_;
+  std::uint64_t dropped_said_ = 0;
+  std::uint64_t bad_said_ = 0;
+
+  std::mutex figures_mutex_;
+  Figures figures_;
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::HazardDetectionNodelet, nodelet::Nodelet)

@@ -1,0 +1,75 @@
+#include "tools/detection_tool_support.h"
+
+#include <filesystem>
+#include <iostream>
+#include <opencv2/imgproc.hpp>
+#include <sstream>
+
+#include "base/error.h"
+#include "ingest/decode.h"
+
+namespace livemap {
+
+int RunTool(const std::string& name, const std::function<int()>& body) {
+  try {
+    return body();
+  } catch (const std::exception& error) {
+    std::cerr << name << ": " << error.what() << "\n";
+    return 2;
+  }
+}
+
+std::vector<std::string> SplitNames(const std::string& flag, const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream stream(text + ",");
+  for (std::string name; std::getline(stream, name, ',');) {
+    if (name.empty()) {
+      throw Error("option " + flag + " is '" + text + "', accepted are names, like pothole,deer");
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+std::string JoinNames(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+double ParseFlagNumber(const std::string& flag, const std::string& text, double min, double max) {
+  std::istringstream stream(text);
+  double value = 0;
+  // Written so that NaN is refused too.
+  if (!(stream >> value) || !stream.eof() || !(value >= min && value <= max)) {
+    std::ostringstream accepted;
+    accepted << "a number from " << min << " to " << max;
+    throw Error("option " + flag + " is '" + text + "', accepted is " + accepted.str());
+  }
+  return value;
+}
+
+std::string DefaultModelPath() {
+  namespace fs = std::filesystem;
+  const fs::path program = fs::read_symlink("/proc/self/exe");
+  const fs::path installed =
+      program.parent_path() / "../../share/livemap/models/hazards-first.yaml";
+  if (fs::exists(installed)) return installed.lexically_normal().string();
+  return LIVEMAP_SOURCE_DIR "/models/hazards-first.yaml";
+}
+
+cv::Mat ReadImage(const std::string& path) {
+  constexpr std::size_t kMostBytes = 64 * 1024 * 1024;
+  constexpr std::int64_t kMostPixels = 100'000'000;
+  const std::string bytes = ReadFile(path, kMostBytes);
+  try {
+    cv::Mat image =
+        DecodeImage(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), kMostPixels);
+    if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
+    return image;
+  } catch (const Error& error) {
+    throw Error("image '" + path + "': " + error.what());
+  }
+}
+
+}  // namespace livemap
