@@ -11,7 +11,7 @@ namespace livemap {
 /// An image file's bytes as they are, checked.
 struct ImageFile {
   std::vector<std::uint8_t> bytes;
-  ImageHeader header;
+  FrameHeader header;
 };
 
 /// Reads a JPEG or PNG and decodes it once to know that it is whole. Throws Error naming the file

@@ -9,7 +9,7 @@
 namespace livemap {
 
 cv::Mat DecodeImage(const std::uint8_t* bytes, std::size_t size, std::int64_t max_pixels) {
-  const std::optional<ImageHeader> header = ReadImageHeader(bytes, size);
+  const std::optional<FrameHeader> header = ReadFrameHeader(bytes, size);
   if (!header) {
     throw Error("the image of " + std::to_string(size) + " bytes is neither a JPEG nor a PNG");
   }

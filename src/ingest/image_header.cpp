@@ -24,7 +24,7 @@ bool IsFrameHeader(int marker) {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
 
-std::optional<ImageHeader> ReadJpeg(const std::uint8_t* bytes, std::size_t size) {
+std::optional<FrameHeader> ReadJpeg(const std::uint8_t* bytes, std::size_t size) {
   std::size_t at = 2;
   while (at + 4 <= size) {
     if (bytes[at] != 0xff) return std::nullopt;
@@ -42,7 +42,7 @@ std::optional<ImageHeader> ReadJpeg(const std::uint8_t* bytes, std::size_t size)
     if (length < 2 || at + 2 + length > size) return std::nullopt;
     if (IsFrameHeader(marker)) {
       if (length < 8) return std::nullopt;
-      return ImageHeader{ImageHeader::Format::kJpeg, BigEndian16(bytes + at + 7),
+      return FrameHeader{FrameHeader::Format::kJpeg, BigEndian16(bytes + at + 7),
                          BigEndian16(bytes + at + 5), bytes[at + 9]};
     }
     at += 2 + length;
@@ -50,7 +50,7 @@ std::optional<ImageHeader> ReadJpeg(const std::uint8_t* bytes, std::size_t size)
   return std::nullopt;
 }
 
-std::optional<ImageHeader> ReadPng(const std::uint8_t* bytes, std::size_t size) {
+std::optional<FrameHeader> ReadPng(const std::uint8_t* bytes, std::size_t size) {
   constexpr std::size_t kHeaderEnd = 8 + 8 + 13;
   if (size < kHeaderEnd || std::memcmp(bytes + 12, "IHDR", 4) != 0) return std::nullopt;
   const std::uint32_t width = BigEndian32(bytes + 16);
@@ -59,14 +59,14 @@ std::optional<ImageHeader> ReadPng(const std::uint8_t* bytes, std::size_t size) 
   if (width > kLargest || height > kLargest) return std::nullopt;
   const int colour_type = bytes[25];
   const int channels = colour_type == 0 ? 1 : colour_type == 4 ? 2 : colour_type == 6 ? 4 : 3;
-  return ImageHeader{ImageHeader::Format::kPng, static_cast<int>(width), static_cast<int>(height),
+  return FrameHeader{FrameHeader::Format::kPng, static_cast<int>(width), static_cast<int>(height),
                      channels};
 }
 
 }  // namespace
 
-std::optional<ImageHeader> ReadImageHeader(const std::uint8_t* bytes, std::size_t size) {
-  std::optional<ImageHeader> header;
+std::optional<FrameHeader> ReadFrameHeader(const std::uint8_t* bytes, std::size_t size) {
+  std::optional<FrameHeader> header;
   if (size >= 4 && bytes[0] == 0xff && bytes[1] == 0xd8) {
     header = ReadJpeg(bytes, size);
   } else if (size >= kPngSignature.size() &&
@@ -77,12 +77,12 @@ std::optional<ImageHeader> ReadImageHeader(const std::uint8_t* bytes, std::size_
   return header;
 }
 
-bool HasImageEnd(const std::uint8_t* bytes, std::size_t size, ImageHeader::Format format) {
+bool HasImageEnd(const std::uint8_t* bytes, std::size_t size, FrameHeader::Format format) {
   const std::size_t tail = std::min(size, kEndPadding + 8);
   const std::uint8_t* const begin = bytes + (size - tail);
   const std::array<std::uint8_t, 2> eoi = {0xff, 0xd9};
   const std::array<std::uint8_t, 4> iend = {'I', 'E', 'N', 'D'};
-  if (format == ImageHeader::Format::kJpeg) {
+  if (format == FrameHeader::Format::kJpeg) {
     return std::search(begin, bytes + size, eoi.begin(), eoi.end()) != bytes + size;
   }
   return std::search(begin, bytes + size, iend.begin(), iend.end()) != bytes + size;

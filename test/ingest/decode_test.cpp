@@ -40,37 +40,37 @@ std::size_t FrameHeaderAt(const std::vector<std::uint8_t>& jpeg) {
   return 0;
 }
 
-TEST(ImageHeader, StatesSizeAndChannelsOfJpegAndPng) {
+TEST(FrameHeader, StatesSizeAndChannelsOfJpegAndPng) {
   for (const char* extension : {".jpg", ".png"}) {
     const std::vector<std::uint8_t> colour = Encode(extension, 123, 45);
-    const auto header = ReadImageHeader(colour.data(), colour.size());
+    const auto header = ReadFrameHeader(colour.data(), colour.size());
     ASSERT_TRUE(header) << extension;
     EXPECT_EQ(header->width, 123);
     EXPECT_EQ(header->height, 45);
     EXPECT_EQ(header->channels, 3);
     const std::vector<std::uint8_t> grey = Encode(extension, 8, 9, CV_8UC1);
-    EXPECT_EQ(ReadImageHeader(grey.data(), grey.size())->channels, 1);
+    EXPECT_EQ(ReadFrameHeader(grey.data(), grey.size())->channels, 1);
   }
 }
 
-TEST(ImageHeader, IsNoneForAnyStartThatEndsBeforeTheSize) {
+TEST(FrameHeader, IsNoneForAnyStartThatEndsBeforeTheSize) {
   const std::vector<std::uint8_t> jpeg = Encode(".jpg", 64, 64);
   const std::size_t stated_at = FrameHeaderAt(jpeg);
   ASSERT_GT(stated_at, 0U);
   for (std::size_t size = 0; size < stated_at; ++size) {
     const std::vector<std::uint8_t> start(jpeg.begin(),
                                           jpeg.begin() + static_cast<std::ptrdiff_t>(size));
-    EXPECT_FALSE(ReadImageHeader(start.data(), start.size())) << size;
+    EXPECT_FALSE(ReadFrameHeader(start.data(), start.size())) << size;
   }
 }
 
-TEST(ImageHeader, SurvivesRandomBytesBehindAJpegStart) {
+TEST(FrameHeader, SurvivesRandomBytesBehindAJpegStart) {
   std::mt19937 generator(3);
   for (int round = 0; round < 20000; ++round) {
     std::vector<std::uint8_t> bytes = {0xff, 0xd8};
     for (int i = 0; i < 40; ++i)
       bytes.push_back(static_cast<std::uint8_t>(generator() % 4 ? generator() : 0xff));
-    const auto header = ReadImageHeader(bytes.data(), bytes.size());
+    const auto header = ReadFrameHeader(bytes.data(), bytes.size());
     EXPECT_TRUE(!header || header->width > 0);
   }
 }
