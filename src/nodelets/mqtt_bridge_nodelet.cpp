@@ -2,6 +2,8 @@
 #include <nodelet/nodelet.h>
 
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <random>
@@ -17,8 +19,21 @@
 namespace livemap {
 namespace {
 
-// What goes wrong with messages is said once in this time, and counted always.
-constexpr double kSayAgainS = 60;
+/// What goes wrong with messages is counted always and said once a minute: of real time, for a
+/// simulated clock may stand still. Thread-safe.
+class OnceAMinute {
+ public:
+  bool Due() {
+    const std::int64_t now_s = std::chrono::duration_cast<std::chrono::seconds>(
+                                   std::chrono::steady_clock::now().time_since_epoch())
+                                   .count();
+    std::int64_t next_s = next_s_;
+    return now_s >= next_s && next_s_.compare_exchange_strong(next_s, now_s + 60);
+  }
+
+ private:
+  std::atomic<std::int64_t> next_s_{0};
+};
 
 }  // namespace
 
@@ -50,6 +65,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     std::atomic<std::uint64_t> bytes{0};    ///< Of the carried messages: MQTT payload and topic.
     std::atomic<std::uint64_t> refused{0};  ///< By the checks or by the broker.
     std::atomic<std::uint64_t> dropped{0};  ///< Out: no connection, or the queue was full.
+    OnceAMinute say_refusal;
   };
 
   void onInit() override {
@@ -94,8 +110,8 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
       if (connected) {
         NODELET_INFO("connected to broker %s:%d as '%s'", config_.mqtt.host.c_str(),
                      config_.mqtt.port, config_.user.c_str());
-      } else {
-        NODELET_WARN_THROTTLE(kSayAgainS, "%s; trying again", reason.c_str());
+      } else if (say_loss_.Due()) {
+        NODELET_WARN("%s; trying again", reason.c_str());
       }
     };
     client_ =
@@ -173,8 +189,10 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
 
   void Refuse(Topic& topic, const std::string& reason) {
     ++topic.refused;
-    NODELET_WARN_THROTTLE(kSayAgainS, "refused a message of topic '%s': %s",
-                          topic.config.name.c_str(), reason.c_str());
+    if (topic.say_refusal.Due()) {
+      NODELET_WARN("refused a message of topic '%s': %s", topic.config.name.c_str(),
+                   reason.c_str());
+    }
   }
 
   void StartDiagnostics() {
@@ -223,6 +241,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   BridgeConfig config_;
   std::vector<std::unique_ptr<Topic>> topics_;  ///< The index is the tag of a publication.
   std::atomic<std::uint64_t> unexpected_{0};    ///< Received on a topic that is not in the list.
+  OnceAMinute say_loss_;
   std::unique_ptr<MqttClient> client_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;
