@@ -1,0 +1,266 @@
+#!/usr/bin/python3
+"""hazard_detection as the vehicle runs it: images in, detections and annotated images out.
+
+The model is the tiny one of test/inference/make_tiny_model.py: a red block is a pothole, a green one a
+traffic cone.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+import numpy
+import rospy
+import rostest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import Image
+
+from livemap.msg import DetectionArray
+from mqtt_bridge_fixture import SOURCE_DIRECTORY, eventually, start_child
+
+TINY_MODEL = os.path.join(SOURCE_DIRECTORY, "test", "inference", "tiny.yaml")
+WIDTH, HEIGHT = 64, 48
+RED, GREEN = (0, 0, 255), (0, 255, 0)
+BURST = 400
+
+
+def image(number, *blocks):
+    """Image `number` of a stream, with blocks (x, y, colour) of 8 x 8 px, blue green red."""
+    pixels = numpy.zeros((HEIGHT, WIDTH, 3), numpy.uint8)
+    for x, y, colour in blocks:
+        pixels[y:y + 8, x:x + 8] = colour
+    message = Image(width=WIDTH, height=HEIGHT, encoding="bgr8", step=3 * WIDTH)
+    message.header.stamp = rospy.Time(1600000000, 1000 * number)
+    message.header.frame_id = "camera_optical_frame"
+    message.data = pixels.tobytes()
+    return message
+
+
+class Detector:
+    """A nodelet manager with the nodelet in namespace `/name`, and the test's ends of its topics."""
+
+    def __init__(self, name):
+        self.name = name
+        self.log = tempfile.NamedTemporaryFile(suffix=".log")
+        self.lock = threading.Lock()
+        self.messages = {}
+        self.processes = []
+        self.subscribers = []
+        self.publisher = rospy.Publisher(f"/{name}/camera_rect/image", Image, queue_size=2 * BURST)
+        self.subscribe("hazard/detections", DetectionArray)
+        self.subscribers.append(
+            rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep, "diagnostics"))
+        self.manager = self._start("manager", "manager")
+
+    def subscribe(self, topic, message_class):
+        self.subscribers.append(
+            rospy.Subscriber(f"/{self.name}/{topic}", message_class, self._keep, topic))
+
+    def _keep(self, message, topic):
+        with self.lock:
+            self.messages.setdefault(topic, []).append(message)
+
+    def received(self, topic):
+        with self.lock:
+            return list(self.messages.get(topic, []))
+
+    def answers(self):
+        return self.received("hazard/detections")
+
+    def _start(self, node_name, *arguments):
+        process = start_child(
+            ["rosrun", "nodelet", "nodelet", *arguments, f"__name:={node_name}", f"__ns:=/{self.name}"],
+            stdout=self.log, stderr=subprocess.STDOUT, start_new_session=True)
+        self.processes.append(process)
+        return process
+
+    def load(self, **parameters):
+        """Starts loading with the package's own YAML, changed by the parameters."""
+        path = os.path.join(SOURCE_DIRECTORY, "config", "hazard_detection.yaml")
+        with open(path, encoding="utf-8") as file:
+            values = yaml.safe_load(file)
+        values.update({"model": TINY_MODEL, "diagnostics_period_s": 0.2}, **parameters)
+        rospy.set_param(f"/{self.name}/hazard_detection", values)
+        return self._start("hazard_detection", "load", "livemap/HazardDetectionNodelet", "manager")
+
+    def load_and_wait(self, **parameters):
+        self.load(**parameters)
+        eventually(lambda: self.publisher.get_num_connections() > 0, "it listens")
+        eventually(lambda: self.subscribers[0].get_num_connections() > 0, "it speaks")
+
+    def signal_manager(self, number):
+        os.killpg(self.manager.pid, number)
+
+    def stop(self):
+        for process in self.processes:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+        for end in self.subscribers + [self.publisher]:
+            end.unregister()
+
+    def output(self):
+        with open(self.log.name, encoding="utf-8", errors="replace") as file:
+            return re.sub(r"\x1b\[[0-9;]*m", "", file.read())
+
+    def diagnostics(self):
+        """The newest key-values, as a map of texts."""
+        for message in reversed(self.received("diagnostics")):
+            for status in message.status:
+                if status.hardware_id == "hazard_detection" and self.name in status.name:
+                    return {pair.key: pair.value for pair in status.values}
+        return {}
+
+    def wait_for(self, **counters):
+        """Until the diagnostics say so."""
+        expected = {key: str(value) for key, value in counters.items()}
+
+        def reached():
+            values = self.diagnostics()
+            return all(values.get(key) == value for key, value in expected.items())
+
+        try:
+            eventually(reached, f"diagnostics {expected}")
+        except AssertionError as error:
+            raise AssertionError(f"{error}, last were {self.diagnostics()}") from None
+
+
+class HazardDetectionTest(unittest.TestCase):
+    number = 0
+
+    def make_detector(self):
+        HazardDetectionTest.number += 1
+        detector = Detector(f"vehicle{HazardDetectionTest.number}")
+        self.addCleanup(detector.stop)
+        return detector
+
+    def loaded_detector(self, **parameters):
+        detector = self.make_detector()
+        detector.load_and_wait(**parameters)
+        return detector
+
+    def test_every_frame_gets_one_answer_with_its_stamp_also_when_empty(self):
+        detector = self.loaded_detector(queue_size=100)
+        frames = [image(0), image(1, (16, 8, RED)), image(2), image(3, (16, 8, RED), (40, 32, GREEN))]
+        for frame in frames:
+            detector.publisher.publish(frame)
+        answers = eventually(lambda: len(detector.answers()) >= 4 and detector.answers(), "4 answers")
+        detector.wait_for(frames_in=4, frames_processed=4, frames_dropped=0, frames_waiting=0,
+                          detections=3)
+        self.assertEqual(len(detector.answers()), 4)
+        self.assertEqual([answer.header.stamp for answer in answers],
+                         [frame.header.stamp for frame in frames])
+        self.assertEqual([sorted(found.class_name for found in answer.detections) for answer in answers],
+                         [[], ["pothole"], [], ["pothole", "traffic_cone"]])
+        for answer in answers:
+            self.assertEqual(answer.header.frame_id, "camera_optical_frame")
+            self.assertEqual((answer.model, answer.image_width, answer.image_height),
+                             ("tiny", WIDTH, HEIGHT))
+            self.assertGreater(answer.inference_ms, 0)
+        pothole = answers[1].detections[0]
+        for edge, expected in [(pothole.x_min, 12), (pothole.y_min, 8), (pothole.x_max, 28),
+                               (pothole.y_max, 16)]:
+            self.assertAlmostEqual(edge, expected, delta=0.1)
+        self.assertEqual(detector.diagnostics()["model"], "tiny")
+
+    def test_annotated_images_are_drawn_only_for_subscribers_and_only_with_detections(self):
+        detector = self.loaded_detector(queue_size=100)
+        detector.publisher.publish(image(0, (16, 8, RED)))
+        detector.wait_for(frames_processed=1, frames_annotated=0)
+        detector.subscribe("hazard/annotated", Image)
+        eventually(lambda: detector.subscribers[-1].get_num_connections() > 0, "the picture's topic")
+        plain = [image(1), image(2, (16, 8, RED)), image(3)]
+        for frame in plain:
+            detector.publisher.publish(frame)
+        detector.wait_for(frames_processed=4, frames_annotated=1)
+        pictures = eventually(lambda: detector.received("hazard/annotated"), "a picture")
+        self.assertEqual(len(pictures), 1)
+        self.assertEqual(pictures[0].header.stamp, plain[1].header.stamp)
+        self.assertEqual((pictures[0].width, pictures[0].height, pictures[0].encoding),
+                         (WIDTH, HEIGHT, "bgr8"))
+        self.assertNotEqual(bytes(pictures[0].data), bytes(plain[1].data))
+
+    def test_empty_frames_are_annotated_when_asked_for(self):
+        detector = self.loaded_detector(queue_size=100, annotate_empty=True)
+        detector.subscribe("hazard/annotated", Image)
+        eventually(lambda: detector.subscribers[-1].get_num_connections() > 0, "the picture's topic")
+        frame = image(0)
+        detector.publisher.publish(frame)
+        pictures = eventually(lambda: detector.received("hazard/annotated"), "a picture")
+        self.assertEqual(bytes(pictures[0].data), bytes(frame.data))
+
+    def test_other_encodings_work_and_unusable_images_are_dropped_and_counted(self):
+        detector = self.loaded_detector(queue_size=100)
+        blue = image(0, (16, 8, (255, 0, 0)))
+        blue.encoding = "rgb8"  # the first channel is red then
+        grey = Image(width=WIDTH, height=HEIGHT, encoding="mono8", step=WIDTH,
+                     data=bytes(WIDTH * HEIGHT))
+        grey.header.stamp = rospy.Time(1600000000, 1000)
+        unknown = image(2)
+        unknown.encoding = "no encoding"
+        short = image(3)
+        short.data = short.data[:100]
+        empty = Image(encoding="bgr8")
+        for frame in [unknown, short, empty, blue, grey]:
+            detector.publisher.publish(frame)
+        detector.wait_for(frames_in=5, frames_processed=2, frames_dropped=3, frames_unusable=3,
+                          frames_waiting=0)
+        answers = detector.answers()
+        self.assertEqual([len(answer.detections) for answer in answers], [1, 0])
+        self.assertEqual(detector.output().count("dropped an image"), 1, detector.output())
+
+    def test_in_is_processed_plus_dropped_under_overload(self):
+        detector = self.loaded_detector(queue_size=1)
+        detector.signal_manager(signal.SIGSTOP)
+        for number in range(BURST):
+            detector.publisher.publish(image(number, (16, 8, RED)))
+        detector.signal_manager(signal.SIGCONT)
+        detector.wait_for(frames_in=BURST, frames_waiting=0)
+        values = {key: int(value) for key, value in detector.diagnostics().items()
+                  if key.startswith("frames_")}
+        self.assertEqual(values["frames_processed"] + values["frames_dropped"], BURST)
+        self.assertGreater(values["frames_dropped"], 0)
+        answers = eventually(lambda: len(detector.answers()) >= values["frames_processed"]
+                             and detector.answers(), "an answer for each processed frame")
+        self.assertEqual(len(answers), values["frames_processed"])
+        stamps = [answer.header.stamp for answer in answers]
+        self.assertEqual(stamps, sorted(set(stamps)), "each frame once, in order")
+        self.assertEqual(stamps[-1], rospy.Time(1600000000, 1000 * (BURST - 1)), "the newest stays")
+
+    def test_a_bad_manifest_fails_the_load_with_one_sentence_and_the_manager_lives(self):
+        detector = self.make_detector()
+        with open(TINY_MODEL, encoding="utf-8") as file:
+            manifest = yaml.safe_load(file)
+        folder = tempfile.mkdtemp(prefix="livemap_manifest_")
+        bad = os.path.join(folder, "bad.yaml")
+        for key, value, expected in [
+                ("sha256", "0" * 64, "has SHA-256"), ("nms_iou", float("nan"), "nms_iou is"),
+                ("file", "nowhere.onnx", "nowhere.onnx")]:
+            with open(bad, "w", encoding="utf-8") as file:
+                yaml.safe_dump({**manifest, "file": TINY_MODEL.replace(".yaml", ".onnx"), key: value},
+                               file)
+            loader = detector.load(model=bad)
+            self.assertNotEqual(loader.wait(60), 0)
+            said = [line for line in detector.output().splitlines()
+                    if "hazard_detection: " in line and expected in line]
+            self.assertEqual(len(said), 1, detector.output())
+        for parameters, expected in [({"model": ""}, "is empty, accepted is the path"),
+                                     ({"queue_sise": 3}, "unknown parameter"),
+                                     ({"queue_size": 0}, "a whole number from 1")]:
+            self.assertNotEqual(detector.load(**parameters).wait(60), 0)
+            self.assertIn(expected, detector.output())
+        self.assertIsNone(detector.manager.poll(), detector.output())
+        detector.load_and_wait()
+        detector.publisher.publish(image(0))
+        eventually(detector.answers, "an answer from the good one")
+
+
+if __name__ == "__main__":
+    rospy.init_node("hazard_detection_test")
+    rostest.rosrun("livemap", "hazard_detection", HazardDetectionTest, sys.argv)
