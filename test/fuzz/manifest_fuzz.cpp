@@ -1,0 +1,55 @@
+// Whatever a model consists of: the text of a manifest, or the bytes of an ONNX file up to its
+// declared inputs. The first byte chooses.
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+#include "inference/model_manifest.h"
+#include "inference/onnx_inputs.h"
+
+namespace livemap {
+namespace {
+
+void Require(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// What is accepted must hold what the header promises.
+void CheckManifest(const ModelManifest& manifest) {
+  Require(!manifest.name.empty() && manifest.sha256.size() == 64);
+  Require(!manifest.classes.empty());
+  Require(manifest.thresholds.size() == manifest.classes.size());
+  Require(manifest.input.width > 0 && manifest.input.height > 0 && manifest.AnchorCount() > 0);
+  for (const float threshold : manifest.thresholds) Require(threshold > 0 && threshold < 1);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Require(std::isfinite(manifest.normalisation.mean[i]) && manifest.normalisation.std[i] > 0);
+  }
+  for (const int stride : manifest.head.strides) {
+    Require(manifest.input.width % stride == 0 && manifest.input.height % stride == 0);
+  }
+}
+
+void FuzzOne(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return;
+  const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
+  try {
+    if (data[0] == 'o') {
+      ReadOnnxInputs(rest);
+    } else {
+      CheckManifest(ParseModelManifest(std::string(rest), "fuzz", "models"));
+    }
+  } catch (const Error& error) {
+    Require(error.what()[0] != '\0');
+  }
+}
+
+}  // namespace
+}  // namespace livemap
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  livemap::FuzzOne(data, size);
+  return 0;
+}
