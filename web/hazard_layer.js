@@ -81,26 +81,38 @@ export class HazardLayer {
     this.group.addTo(map);
   }
 
-  replaceAll(hazards) {
-    this.group.clearLayers();
-    this.markers.clear();
-    this.group.addLayers(hazards.map((hazard) => this.createMarker(hazard)));
+  /** Exactly these hazards; what stays keeps its marker and its open popup. */
+  show(hazards) {
+    const wanted = new Set(hazards.map((hazard) => hazard.id));
+    const gone = [...this.markers.values()].filter((marker) => !wanted.has(marker.hazard.id));
+    for (const marker of gone) this.markers.delete(marker.hazard.id);
+    this.group.removeLayers(gone);
+    const fresh = [];
+    for (const hazard of hazards) {
+      if (this.markers.has(hazard.id)) this.update(this.markers.get(hazard.id), hazard);
+      else fresh.push(this.createMarker(hazard));
+    }
+    this.group.addLayers(fresh);
   }
 
   put(hazard) {
     const marker = this.markers.get(hazard.id);
-    if (!marker) {
-      this.group.addLayer(this.createMarker(hazard));
-      return;
-    }
-    const { lat, lng } = marker.getLatLng();
-    const open = marker.isPopupOpen();
+    if (marker) this.update(marker, hazard);
+    else this.group.addLayer(this.createMarker(hazard));
+  }
+
+  update(marker, hazard) {
+    if (marker.hazard.sequence === hazard.sequence) return;
     marker.hazard = hazard;
+    const { lat, lng } = marker.getLatLng();
     if (lat !== hazard.latitude || lng !== hazard.longitude) {
       marker.setLatLng([hazard.latitude, hazard.longitude]);
-      if (open) marker.getPopup().setLatLng(marker.getLatLng());
     }
-    if (open) marker.setPopupContent(this.onOpen(hazard));
+    if (!marker.isPopupOpen()) return;
+    const popup = marker.getPopup();
+    const focused = popup.getElement().contains(document.activeElement);
+    popup.update();
+    if (focused) popup.getElement().querySelector('.popup').focus({ preventScroll: true });
   }
 
   remove(hazard) {

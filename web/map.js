@@ -76,7 +76,9 @@ class Page {
     this.map.on('popupclose', (event) => this.onPopupClose(event.popup));
     this.inView.addEventListener('change', () => this.updatePanel());
     document.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape') this.map.closePopup();
+      if (event.key !== 'Escape') return;
+      this.map.closePopup();
+      this.sheet.toggle(false);
     });
     setInterval(() => {
       this.updateSoon();
@@ -120,7 +122,7 @@ class Page {
   }
 
   showAll() {
-    this.layer.replaceAll(this.store.shown());
+    this.layer.show(this.store.shown());
     this.updatePanel();
   }
 

@@ -1,4 +1,4 @@
-// Vehicles: a red marker that points where it drives, behind it the trail of blue dots.
+// Vehicles: a red marker whose tip points where it drives, behind it the trail of blue dots.
 
 import { byId, element, svgElement } from './dom.js';
 import { ago } from './format.js';
@@ -14,10 +14,10 @@ const VehicleIcon = L.Icon.extend({
 
   createIcon() {
     const arrow = svgElement('svg', { viewBox: '0 0 34 34', width: 34, height: 34 },
-      svgElement('path', { class: 'vehicle-heading', d: 'M17 -1 L25 12 L9 12 Z' }),
-      svgElement('circle', { class: 'vehicle-disc', cx: 17, cy: 17, r: 9 }),
-      svgElement('path', { class: 'vehicle-arrow', d: 'M17 11.5 L21 21 L17 18.7 L13 21 Z' }),
-      svgElement('rect', { class: 'vehicle-square', x: 14, y: 14, width: 6, height: 6 }));
+      svgElement('path', { class: 'vehicle-drop',
+        d: 'M17 0 C19 6 26.5 9 26.5 17 A9.5 9.5 0 0 1 7.5 17 C7.5 9 15 6 17 0 Z' }),
+      svgElement('circle', { class: 'vehicle-disc', cx: 17, cy: 17, r: 8.5 }),
+      svgElement('circle', { class: 'vehicle-eye', cx: 17, cy: 17, r: 3.5 }));
     const icon = element('div', {}, arrow);
     this._setIconStyles(icon, 'icon');
     return icon;

@@ -241,6 +241,11 @@ class Desktop(MapPage):
         self.open_popup_of(hazard)
         self.zone.report("deer", LAT, LON)
         self.wait(lambda: "2 times" in self.find(".popup").text, "the sighting is not counted")
+        self.find(".leaflet-popup-close-button").click()
+        self.wait(lambda: self.count(".popup") == 0, "the popup does not close")
+        self.zone.report("deer", LAT, LON)
+        self.wait(lambda: "3 sightings" in self.find("#hazard-list").text, "not counted again")
+        self.assertIn("3 times", self.open_popup_of(hazard).text)
         self.zone.do("remove", id=hazard)
         self.wait(lambda: self.count(".pin") == 0, "the removed hazard stays")
         self.wait(lambda: self.count("#hazard-list button") == 0, "the row stays")
@@ -249,13 +254,15 @@ class Desktop(MapPage):
     def test_the_filter_hides_and_shows_a_class_and_counts_it(self):
         for step in range(3):
             self.zone.report("pothole", LAT + 0.001 * step, LON)
-        self.zone.report("debris", LAT, LON + 0.002)
+        debris = self.zone.report("debris", LAT, LON + 0.002)
         self.open()
         self.wait_for(".pin", 4)
         pothole = self.find('#filter input[data-class="pothole"]')
         self.assertEqual(self.find("#filter li .chip:has([data-class=pothole]) .count").text, "3")
+        self.open_popup_of(debris)
         pothole.click()
         self.wait(lambda: self.count(".pin") == 1, "potholes are still shown")
+        self.assertEqual(self.count(".popup"), 1, "the filter closed another class's popup")
         self.assertEqual(self.count("#hazard-list button"), 1)
         self.zone.report("pothole", LAT + 0.004, LON)
         self.wait(lambda: self.find("#filter .chip:has([data-class=pothole]) .count").text == "4",

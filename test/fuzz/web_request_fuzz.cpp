@@ -1,0 +1,55 @@
+// Addresses as a stranger types them: parsing must refuse with a sentence or give values that keep
+// to the documented ranges, and no name may lead out of the served folder.
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include "web/origin.h"
+#include "web/query.h"
+#include "web/static_files.h"
+
+namespace {
+
+void Require(bool holds) {
+  if (!holds) std::abort();
+}
+
+void CheckHazardQuery(const livemap::RequestTarget& target) {
+  try {
+    const livemap::HazardQuery query = livemap::ParseHazardQuery(target);
+    Require(query.limit >= 1 && query.limit <= livemap::kMaxHazardsPerAnswer);
+    if (query.box) {
+      Require(livemap::IsValid(query.box->south_west) && livemap::IsValid(query.box->north_east));
+      Require(query.box->south_west.latitude_deg <= query.box->north_east.latitude_deg);
+    }
+  } catch (const livemap::BadRequest&) {
+    // Refused: what a bad address deserves.
+  }
+  try {
+    livemap::ParseStreamQuery(target);
+  } catch (const livemap::BadRequest&) {
+    // Refused.
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  static const livemap::StaticFiles files(LIVEMAP_SOURCE_DIR "/web/icons");
+  livemap::ImageType(text);
+  livemap::IsAllowedOrigin(text, "map.example", {"https://city.example"});
+  // The input as a whole, and as what stands behind the address that has parameters.
+  for (const std::string& address : {text, "/api/v1/hazards?" + text}) {
+    try {
+      const livemap::RequestTarget target = livemap::ParseTarget(address);
+      Require(!target.path.empty() && target.path.front() == '/');
+      Require(target.path.find('\0') == std::string::npos);
+      CheckHazardQuery(target);
+      if (files.Find(target.path.substr(1))) Require(target.path.find("..") == std::string::npos);
+    } catch (const livemap::BadRequest&) {
+      // Refused.
+    }
+  }
+  return 0;
+}
