@@ -126,6 +126,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     for name in ("seed", "epochs", "samples_per_epoch", "batch"):
         parser.add_argument("--" + name.replace("_", "-"), type=int, default=defaults[name])
     parser.add_argument("--learning-rate", type=float, default=defaults["learning_rate"])
+    parser.add_argument("--settle", type=float, default=defaults["settle"], help="last fraction of the epochs: whole frames")
     parser.add_argument("--precision", choices=("bf16", "fp32"), default=defaults["precision"])
     return parser.parse_args(arguments)
 
@@ -139,6 +140,8 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--batch must be from 2 to --samples-per-epoch, not {arguments.batch}.")
     if arguments.seed < 0 or arguments.workers < 0 or not arguments.learning_rate > 0:
         raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
+    if not 0 <= arguments.settle <= 1:
+        raise UsageError(f"--settle must be from 0 to 1, not {arguments.settle}.")
     known = {field.name for field in fields(Settings)}
     return Settings(**{name: value for name, value in vars(arguments).items() if name in known})
 

@@ -23,6 +23,10 @@ MIN_SIZE_PX = (6.0, 3.0)
 """A label that a view shows smaller (width, height) is ignored."""
 
 
+MOST_CONTRAST_UNDER_PASTE = 18.0
+"""Standard deviation of grey levels up to which a place takes a pasted pothole: road, not road markings."""
+
+
 @dataclass(frozen=True)
 class Recipe:
     """How strongly to change pictures. Probabilities are per sample."""
@@ -36,6 +40,7 @@ class Recipe:
     blur: float = 0.12
     noise: float = 0.12
     grey: float = 0.05
+    shadow: float = 0.25
     hue: float = 6.0  # degrees of cv2's 180
     saturation: float = 0.5
     brightness: float = 0.35
@@ -43,12 +48,16 @@ class Recipe:
 
 SETTLING = Recipe(
     mosaic=0.0, paste=0.25, mirror=0.0, scale_spread=1.12, aspect_spread=1.03, focus=0.0, blur=0.05, noise=0.05,
-    grey=0.0, hue=3.0, saturation=0.25, brightness=0.2,
+    grey=0.0, shadow=0.15, hue=3.0, saturation=0.25, brightness=0.2,
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
 GROUP_SHARES = {"survey_potholes": 0.60, "survey_empty": 0.22, "closeups": 0.06, "cones": 0.12}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
+
+UNLABELLED_CLASS_WEIGHTS = {"closeups": 0.0, "cones": 0.3}
+"""How much background of a class counts in pictures that do not label it. Cone photos teach that barriers, kerbs and
+cars are no potholes, at a low weight as some do show a pothole; survey frames (0) show unlabelled cones."""
 
 GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8}
 """Typical scale of a group's pictures in a view: close-ups shrink to the size of potholes seen from a car."""
@@ -62,7 +71,7 @@ class Sample:
     boxes: np.ndarray  # G x 4 corners
     classes: np.ndarray  # G
     ignored: np.ndarray  # K x 4 corners
-    labelled: np.ndarray  # C, 1 where background of the class is known everywhere
+    labelled: np.ndarray  # C: how much background of the class counts, 1 where every object is labelled
 
 
 def ratio(rng: np.random.Generator, spread: float) -> float:
@@ -86,6 +95,8 @@ class Augmenter:
             sample = self.mosaic(rng)
         else:
             sample = self.view(rng, self.width, self.height)
+        if rng.random() < self.recipe.shadow:
+            cast_shadows(rng, sample.image)
         sample.image = self.recolour(rng, sample.image)
         return sample
 
@@ -131,7 +142,10 @@ class Augmenter:
         transform = np.array([[scale_x, 0, -left * scale_x], [0, scale_y, -top * scale_y]])
         if rng.random() < self.recipe.mirror:
             transform[0] = [-scale_x, 0, width + left * scale_x]
-        return self.render(picture, transform, width, height)
+        sample = self.render(picture, transform, width, height)
+        sample.labelled[:] = UNLABELLED_CLASS_WEIGHTS.get(name, 0.0)
+        sample.labelled[picture.labelled_class] = 1
+        return sample
 
     def place_window(
         self, rng: np.random.Generator, picture: Picture, width: float, height: float
@@ -166,14 +180,12 @@ class Augmenter:
         clipped = box_math.clip_to_image(moved, width, height)
         sizes = clipped[:, 2:] - clipped[:, :2]
         clear = (box_math.areas(clipped) > MIN_VISIBLE_FRACTION * box_math.areas(moved)) & (sizes > MIN_SIZE_PX).all(1)
-        labelled = np.zeros(self.class_count, np.float32)
-        labelled[picture.labelled_class] = 1
         return Sample(
             image,
             clipped[clear].astype(np.float32),
             np.full(int(clear.sum()), picture.labelled_class, np.int64),
             clipped[~clear & (sizes > 0).all(1)].astype(np.float32),
-            labelled,
+            np.zeros(self.class_count, np.float32),
         )
 
     def paste_potholes(self, rng: np.random.Generator, picture: Picture) -> Picture:
@@ -212,6 +224,19 @@ class Augmenter:
         return image
 
 
+def cast_shadows(rng: np.random.Generator, image: np.ndarray) -> None:
+    """Darken soft blobs of random size, as trees over a sunny road do, in place; flatter than high."""
+    height, width = image.shape[:2]
+    cells = rng.uniform(4, 14)
+    noise = rng.normal(size=(int(cells * rng.uniform(1.0, 2.5)) + 2, int(cells) + 2)).astype(np.float32)
+    field = cv2.resize(noise, (width, height), interpolation=cv2.INTER_CUBIC)
+    cover, edge = rng.uniform(-0.3, 1.0), rng.uniform(4, 12)
+    shade = 1 / (1 + np.exp(-edge * (field - cover)))
+    darkness = rng.uniform(0.35, 0.7)
+    tint = np.array([1.06, 1.0, 0.92], np.float32) * darkness  # shade lacks the sun's red: blue is darkened less
+    image[:] = (image * (1 - shade[..., None] * tint)).clip(0, 255).astype(np.uint8)
+
+
 def blend_patch(
     rng: np.random.Generator, image: np.ndarray, donor: np.ndarray, box: np.ndarray, taken: np.ndarray
 ) -> np.ndarray:
@@ -239,11 +264,13 @@ def blend_patch(
     new_box = (local_box + [x, y, x, y])[None]
     if x < 0 or x + patch.shape[1] > width or (len(taken) and box_math.pairwise_iou(new_box, taken).max() > 0):
         return None
+    place = image[y : y + patch.shape[0], x : x + patch.shape[1]]
+    if place.std(axis=(0, 1)).max() > MOST_CONTRAST_UNDER_PASTE:
+        return None
     rim = np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]]).mean(axis=0)
     mask = np.zeros(patch.shape[:2], np.float32)
     left, top, right, bottom = np.round(local_box).astype(int)
     mask[top:bottom, left:right] = 1
     mask = cv2.GaussianBlur(mask, (0, 0), float(margin.min()) / 2.5)[..., None]
-    place = image[y : y + patch.shape[0], x : x + patch.shape[1]]
     place[:] = (place * (1 + mask * (patch / rim - 1))).clip(0, 255).astype(np.uint8)
     return new_box

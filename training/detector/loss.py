@@ -28,7 +28,7 @@ class Target:
     boxes: Tensor  # G x 4 corners
     classes: Tensor  # G, int64
     ignored: Tensor  # K x 4 corners: regions that say nothing about background
-    labelled: Tensor  # C, 1 where the image's data set labels the class, else 0
+    labelled: Tensor  # C: weight of background per class, 0 where the data set does not label the class
 
 
 @dataclass
@@ -38,7 +38,7 @@ class Assignment:
     scores: Tensor  # N x C in [0, 1]
     boxes: Tensor  # P x 4, one row per positive anchor point
     positive: Tensor  # N, bool
-    weights: Tensor  # N x C in {0, 1}: 0 where the score is not judged
+    weights: Tensor  # N x C in [0, 1]: 0 where the score is not judged
 
 
 def pairwise_iou(first: Tensor, second: Tensor) -> Tensor:
