@@ -25,8 +25,8 @@ bool IsSha256Hex(const std::string& text) {
          });
 }
 
-/// Writes and synchronises a whole file. Returns errno's value, 0 for success.
-int WriteDurably(const std::string& path, const std::vector<std::uint8_t>& bytes) {
+/// Writes a whole file. Returns errno's value, 0 for success.
+int WriteFile(const std::string& path, const std::vector<std::uint8_t>& bytes) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) return errno;
   int error = 0;
@@ -36,8 +36,16 @@ int WriteDurably(const std::string& path, const std::vector<std::uint8_t>& bytes
     if (count < 0 && errno != EINTR) error = errno;
     if (count > 0) written += static_cast<std::size_t>(count);
   }
-  if (error == 0 && fdatasync(file) != 0) error = errno;
   if (close(file) != 0 && error == 0) error = errno;
+  return error;
+}
+
+/// Brings everything written to the directory's file system to disk. Returns errno's value.
+int SynchroniseFileSystemOf(const std::string& directory) {
+  const int file = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return errno;
+  const int error = syncfs(file) == 0 ? 0 : errno;
+  close(file);
   return error;
 }
 
@@ -92,19 +100,45 @@ std::string ImageStore::FilePath(const std::string& sha256, const std::string& f
 std::string ImageStore::Put(const std::vector<std::uint8_t>& bytes, const std::string& format) {
   const std::string sha256 = Sha256Hex(bytes.data(), bytes.size());
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (entries_.count(sha256) != 0) return sha256;
+  if (entries_.count(sha256) != 0 || pending_.count(sha256) != 0) return sha256;
   const std::string path = FilePath(sha256, format);
   const std::string temporary = path + kTemporarySuffix;
   std::error_code ignored;
   fs::create_directory(directory_ + "/" + sha256.substr(0, 2), ignored);
-  int error = WriteDurably(temporary, bytes);
-  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  const int error = WriteFile(temporary, bytes);
   if (error != 0) {
     fs::remove(temporary, ignored);
     throw StoreError("store: picture '" + path + "' cannot be written: " + std::strerror(error));
   }
-  AddEntry(sha256, format, bytes.size());
+  pending_[sha256] = {format, bytes.size()};
   return sha256;
+}
+
+void ImageStore::Publish() {
+  std::map<std::string, Pending> pending;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    pending.swap(pending_);
+  }
+  if (pending.empty()) return;
+  // Without the lock: those who look for pictures need not wait for the disk.
+  int error = SynchroniseFileSystemOf(directory_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const auto& [sha256, picture] : pending) {
+    const std::string path = FilePath(sha256, picture.format);
+    const std::string temporary = path + kTemporarySuffix;
+    if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+    if (error == 0) {
+      AddEntry(sha256, picture.format, picture.bytes);
+    } else {
+      std::error_code ignored;
+      fs::remove(temporary, ignored);
+    }
+  }
+  if (error != 0) {
+    throw StoreError("store: pictures in '" + directory_ +
+                     "' cannot be written: " + std::strerror(error));
+  }
 }
 
 std::optional<std::string> ImageStore::Path(const std::string& sha256) const {

@@ -14,17 +14,21 @@ namespace livemap {
 /// Pictures on disk, each in `<directory>/<first two hex digits>/<sha256>.<format>`, so that the
 /// same picture is kept once. Thread-safe.
 ///
-/// A picture is written to a temporary file, synchronised and renamed: a name always has its whole
-/// content. Beyond the cap the oldest pictures go, those that no hazard refers to first.
+/// Pictures are written to temporary files, synchronised together and then renamed: a name always
+/// has its whole content. Beyond the cap the oldest pictures go, those that no hazard refers to
+/// first.
 class ImageStore {
  public:
   /// Makes the directory when missing, takes stock of what is there, and removes what an
   /// interrupted write left. Throws StoreError when the directory cannot be used.
   ImageStore(std::string directory, std::uint64_t cap_bytes);
 
-  /// Keeps the picture and returns its SHA-256. `format` is the file's extension. Throws StoreError
-  /// when it cannot be written.
+  /// Writes the picture and returns its SHA-256; it is there for others after Publish. `format` is
+  /// the file's extension. Throws StoreError when it cannot be written.
   std::string Put(const std::vector<std::uint8_t>& bytes, const std::string& format);
+  /// Brings what was put since the last call to disk, with one synchronisation for all of it, and
+  /// under its names. Throws StoreError when that fails.
+  void Publish();
   /// The file; none for what is not 64 lower-case hex digits, never stored or evicted.
   std::optional<std::string> Path(const std::string& sha256) const;
 
@@ -43,6 +47,11 @@ class ImageStore {
     std::uint64_t age = 0;  ///< Rises with every stored picture.
     std::uint32_t references = 0;
   };
+  /// Written, but not yet under its name.
+  struct Pending {
+    std::string format;
+    std::uint64_t bytes = 0;
+  };
   /// Unreferenced pictures first, then by age.
   struct Rank {
     bool referenced;
@@ -59,7 +68,8 @@ class ImageStore {
   const std::string directory_;
   const std::uint64_t cap_bytes_;
   mutable std::mutex mutex_;
-  std::map<std::string, Entry> entries_;  ///< By SHA-256.
+  std::map<std::string, Entry> entries_;    ///< By SHA-256.
+  std::map<std::string, Pending> pending_;  ///< By SHA-256.
   std::set<Rank> eviction_order_;
   std::uint64_t total_bytes_ = 0;
   std::uint64_t next_age_ = 0;

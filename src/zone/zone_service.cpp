@@ -147,6 +147,7 @@ void ZoneService::Implementation::Sort(const std::vector<Report>& reports, Work&
     }
     work.candidates.push_back(std::move(candidate));
   }
+  images_.Publish();
 }
 
 void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Work& work) {

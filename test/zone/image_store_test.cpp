@@ -17,6 +17,11 @@ using Bytes = std::vector<std::uint8_t>;
 
 class ImageStoreTest : public ZoneTest {
  protected:
+  static std::string Keep(ImageStore& store, const Bytes& bytes) {
+    const std::string name = store.Put(bytes, "jpeg");
+    store.Publish();
+    return name;
+  }
   std::string Directory() const { return directory_ + "/images"; }
 };
 
@@ -24,8 +29,10 @@ TEST_F(ImageStoreTest, KeepsAPictureUnderItsHashOnce) {
   ImageStore store(Directory(), 1 << 20);
   const Bytes bytes = MakeJpeg(10, 10, 100);
   const std::string name = store.Put(bytes, "jpeg");
+  EXPECT_FALSE(store.Path(name));
+  store.Publish();
   EXPECT_EQ(name, Sha256Hex(bytes.data(), bytes.size()));
-  EXPECT_EQ(store.Put(bytes, "jpeg"), name);
+  EXPECT_EQ(Keep(store, bytes), name);
   EXPECT_EQ(store.total_bytes(), bytes.size());
   ASSERT_TRUE(store.Path(name));
   EXPECT_EQ(ReadFile(*store.Path(name), 10000), std::string(bytes.begin(), bytes.end()));
@@ -33,7 +40,7 @@ TEST_F(ImageStoreTest, KeepsAPictureUnderItsHashOnce) {
 
 TEST_F(ImageStoreTest, GivesNoPathForAnythingButAKnownHash) {
   ImageStore store(Directory(), 1 << 20);
-  const std::string name = store.Put(MakeJpeg(10, 10), "jpeg");
+  const std::string name = Keep(store, MakeJpeg(10, 10));
   std::string upper = name;
   upper[0] = 'A';
   for (const std::string& text : {std::string(), std::string("../zone.sqlite3"), upper, name + "0",
@@ -44,9 +51,7 @@ TEST_F(ImageStoreTest, GivesNoPathForAnythingButAKnownHash) {
 
 TEST_F(ImageStoreTest, EvictsUnreferencedPicturesFirstAndThenTheOldest) {
   ImageStore store(Directory(), 3 * 1021);
-  const auto put = [&](std::uint8_t value) {
-    return store.Put(MakeJpeg(9, 9, 1000, value), "jpeg");
-  };
+  const auto put = [&](std::uint8_t value) { return Keep(store, MakeJpeg(9, 9, 1000, value)); };
   const std::string oldest = put(1);
   const std::string unreferenced = put(2);
   const std::string middle = put(3);
@@ -71,7 +76,7 @@ TEST_F(ImageStoreTest, KnowsItsPicturesAfterARestartAndClearsWhatAnInterruptedWr
   std::string name;
   {
     ImageStore store(Directory(), 1 << 20);
-    name = store.Put(MakeJpeg(10, 10), "jpeg");
+    name = Keep(store, MakeJpeg(10, 10));
   }
   const std::string leftover = Directory() + "/" + name.substr(0, 2) + "/" + name + ".png.tmp";
   std::ofstream(leftover) << "half";
