@@ -20,7 +20,7 @@ import yaml
 TEST_DIRECTORY = os.path.dirname(os.path.realpath(__file__))
 SOURCE_DIRECTORY = os.path.dirname(TEST_DIRECTORY)
 # Keeps a broken test from hanging; nothing is measured by it.
-PATIENCE_S = 60
+PATIENCE_S = 120
 
 
 def start_child(command, **options):

@@ -201,7 +201,8 @@ class MqttBridgeTest(unittest.TestCase):
                    "the vehicle's bridge notices")
         dropped = self.vehicle_count("car_bridge", "reports_dropped")
         self.vehicle_peer.publish("/hazard/report", report("into the void"))
-        eventually(lambda: self.vehicle_count("car_bridge", "reports_dropped") == dropped + 1, "the report is dropped and counted")
+        eventually(lambda: self.vehicle_count("car_bridge", "reports_dropped") == dropped + 1,
+                   "the report is dropped and counted")
         self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=1000))
         shutil.rmtree(os.path.join(self.broker.directory, "data"))
         self.broker.start()
@@ -220,7 +221,8 @@ class MqttBridgeTest(unittest.TestCase):
             ({"keepalive": 3}, "unknown parameter"),
             ({"topics": []}, "parameter 'topics' of the bridge is no list"),
             ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/Nothing",
-                          "direction": "out", "mqtt_topic": "x"}]}, "'livemap/Nothing' is not known"),
+                          "direction": "out", "mqtt_topic": "x"}]},
+             "'livemap/Nothing' is not known"),
             ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/HazardNotice",
                           "direction": "sideways", "mqtt_topic": "x"}]}, "accepted is in or out"),
             ({"password_file": "/nowhere", "password_wait_s": 0.0}, "/nowhere"),
@@ -230,7 +232,7 @@ class MqttBridgeTest(unittest.TestCase):
                 parameters = dict(self.common, user="car-3", **{"password_file": ""})
                 parameters.update(spoiled)
                 bridge = Bridge(self.vehicle_master, "vehicle", f"bad_{number}", **parameters)
-                self.assertNotEqual(bridge.process.wait(timeout=60), 0)
+                self.assertNotEqual(bridge.process.wait(timeout=120), 0)
                 self.assertIn(sentence, bridge.output())
 
 

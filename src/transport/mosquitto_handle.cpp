@@ -90,7 +90,9 @@ int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::s
     code = mosquitto_connect_bind_v5(handle, host.c_str(), options.port, options.keepalive_s,
                                      nullptr, properties);
   }
+  const int system_error = errno;  // Explains MOSQ_ERR_ERRNO.
   mosquitto_property_free_all(&properties);
+  errno = system_error;
   return code;
 }
 

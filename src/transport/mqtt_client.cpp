@@ -91,6 +91,11 @@ class MqttClient::Connection {
     return MqttPublishStatus::kQueued;
   }
 
+  bool connected() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return statistics_.connected;
+  }
+
   MqttStatistics statistics() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     MqttStatistics snapshot = statistics_;
@@ -350,7 +355,7 @@ MqttPublishStatus MqttClient::Publish(std::string topic, std::vector<std::uint8_
   return connection_->Publish({std::move(topic), std::move(payload), qos, tag});
 }
 
-bool MqttClient::connected() const { return statistics().connected; }
+bool MqttClient::connected() const { return connection_->connected(); }
 
 MqttStatistics MqttClient::statistics() const { return connection_->statistics(); }
 

@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -36,58 +35,69 @@ int FreePort() {
   return ntohs(address.sin_port);
 }
 
-BrokerProcess::BrokerProcess(int max_message_bytes)
-    : max_message_bytes_(max_message_bytes), port_(FreePort()) {
-  std::string name = (std::filesystem::temp_directory_path() / "livemap_broker_XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw Error("cannot make directory '" + name + "'");
-  directory_ = name;
+bool IsRoot() { return geteuid() == 0; }
+
+TemporaryDirectory::TemporaryDirectory()
+    : path_((std::filesystem::temp_directory_path() / "livemap_test_XXXXXX").string()) {
+  if (mkdtemp(path_.data()) == nullptr) throw Error("cannot make directory '" + path_ + "'");
 }
 
-BrokerProcess::~BrokerProcess() {
-  Kill();
+TemporaryDirectory::~TemporaryDirectory() {
   std::error_code ignored;
-  std::filesystem::remove_all(directory_, ignored);
+  std::filesystem::remove_all(path_, ignored);
 }
 
-void BrokerProcess::Start() {
-  const std::string script = std::string(LIVEMAP_SOURCE_DIR) + "/scripts/livemap_broker";
-  const std::string port = std::to_string(port_);
-  const std::string bytes = std::to_string(max_message_bytes_);
-  const std::string log = directory_ + "/broker.log";
+void ChildProcess::Start(const std::vector<std::string>& command, int port,
+                         const std::string& log) {
+  // Everything that allocates comes before the fork.
+  std::vector<char*> arguments;
+  for (const std::string& argument : command) {
+    arguments.push_back(const_cast<char*>(argument.c_str()));
+  }
+  arguments.push_back(nullptr);
+  const std::string elsewhere = "/usr/sbin/" + command.front();
   pid_ = fork();
   if (pid_ == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
     dup2(out, STDOUT_FILENO);
     dup2(out, STDERR_FILENO);
-    execl(script.c_str(), script.c_str(), "--directory", directory_.c_str(), "--port", port.c_str(),
-          "--zone", "test", "--vehicles", "car-1,car-2", "--max-message-bytes", bytes.c_str(),
-          static_cast<char*>(nullptr));
+    execvp(arguments[0], arguments.data());
+    execv(elsewhere.c_str(), arguments.data());
     _exit(127);
   }
   const EventFd never;
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (!ProbeTcp("127.0.0.1", port_, 1, never.fd()).error.empty()) {
+  while (!ProbeTcp("127.0.0.1", port, 1, never.fd()).error.empty()) {
     if (waitpid(pid_, nullptr, WNOHANG) == pid_) {
       pid_ = -1;
-      throw Error("the broker ended at once; its words: " + ReadFile(log, 1 << 20));
+      throw Error("'" + command.front() + "' ended at once; its words: " + ReadFile(log, 1 << 20));
     }
-    if (std::chrono::steady_clock::now() > deadline) throw Error("the broker does not answer");
+    if (std::chrono::steady_clock::now() > deadline) {
+      throw Error("'" + command.front() + "' does not answer");
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }
 
-void BrokerProcess::Kill() {
+void ChildProcess::Kill() {
   if (pid_ <= 0) return;
   kill(pid_, SIGKILL);
   waitpid(pid_, nullptr, 0);
   pid_ = -1;
 }
 
-void BrokerProcess::LoseState() { std::filesystem::remove_all(directory_ + "/data"); }
+void BrokerProcess::Start() {
+  process_.Start({std::string(LIVEMAP_SOURCE_DIR) + "/scripts/livemap_broker", "--directory",
+                  directory_.path(), "--port", std::to_string(port_), "--zone", "test",
+                  "--vehicles", "car-1,car-2"},
+                 port_, directory_.path() + "/broker.log");
+}
+
+void BrokerProcess::LoseState() { std::filesystem::remove_all(directory_.path() + "/data"); }
 
 std::string BrokerProcess::Password(const std::string& user) const {
-  std::ifstream file(directory_ + "/credentials/" + user);
+  std::ifstream file(directory_.path() + "/credentials/" + user);
   std::string password;
   std::getline(file, password);
   return password;

@@ -3,39 +3,63 @@
 #include <sys/types.h>
 
 #include <string>
+#include <vector>
 
 namespace livemap {
 
-/// A real mosquitto on a free port of this machine, configured and started by
-/// scripts/livemap_broker for zone "test" with the vehicles "car-1" and "car-2". Its directory and
-/// process end with the object.
-class BrokerProcess {
- public:
-  explicit BrokerProcess(int max_message_bytes = 1 << 20);
-  ~BrokerProcess();
-  BrokerProcess(const BrokerProcess&) = delete;
-  BrokerProcess& operator=(const BrokerProcess&) = delete;
+/// A TCP port that was free a moment ago.
+int FreePort();
 
-  /// Starts and waits until the port answers; throws Error when it does not.
-  void Start();
+bool IsRoot();
+
+/// A directory of its own that goes with the object.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory();
+  ~TemporaryDirectory();
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// A server program that ends with the object, and with this process however it ends.
+class ChildProcess {
+ public:
+  ChildProcess() = default;
+  ~ChildProcess() { Kill(); }
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+  /// Starts `command`, found on PATH and in /usr/sbin, with its output in `log`, and waits until
+  /// `port` answers; throws Error when it does not.
+  void Start(const std::vector<std::string>& command, int port, const std::string& log);
   /// Kills with SIGKILL and waits for the end.
   void Kill();
+
+ private:
+  pid_t pid_ = -1;
+};
+
+/// A real mosquitto on a free port of this machine, configured and started by
+/// scripts/livemap_broker for zone "test" with the vehicles "car-1" and "car-2".
+class BrokerProcess {
+ public:
+  void Start();
+  void Kill() { process_.Kill(); }
   /// Forgets sessions and queued messages, as after a lost disk.
   void LoseState();
 
   int port() const { return port_; }
   /// The random password that the script gave to `user`.
   std::string Password(const std::string& user) const;
-  const std::string& directory() const { return directory_; }
 
  private:
-  int max_message_bytes_;
-  int port_;
-  std::string directory_;
-  pid_t pid_ = -1;
+  const TemporaryDirectory directory_;
+  const int port_ = FreePort();
+  ChildProcess process_;
 };
-
-/// A TCP port that was free a moment ago.
-int FreePort();
 
 }  // namespace livemap

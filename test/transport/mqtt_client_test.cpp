@@ -7,13 +7,13 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <mutex>
 #include <set>
 #include <thread>
 
 #include "base/error.h"
 #include "broker_process.h"
+#include "waiting.h"
 
 namespace livemap {
 namespace {
@@ -22,17 +22,6 @@ using ::testing::HasSubstr;
 
 constexpr char kReport[] = "livemap/v1/test/vehicle/car-1/report";
 constexpr char kReports[] = "livemap/v1/test/vehicle/+/report";
-
-/// Waits for a condition of another thread; the limit only keeps a broken test from hanging.
-template <typename Condition>
-bool Eventually(Condition condition) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return true;
-}
 
 std::vector<std::uint8_t> Bytes(const std::string& text) { return {text.begin(), text.end()}; }
 
