@@ -70,7 +70,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
         "camera_rect/image", 0,
         boost::function<void(const sensor_msgs::ImageConstPtr&)>(
             [this](const sensor_msgs::ImageConstPtr& image) { queue_->Push(image); }),
-        ros::VoidConstPtr(), hints);
+        ros::VoidPtr(), hints);
   }
 
   void ReadParameters() {
