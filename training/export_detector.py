@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import List, Optional
 
+import cv2
 import numpy as np
 import torch
 import yaml
@@ -98,8 +99,12 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--name", default="hazards-first", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
+    options = parser.parse_args(arguments)
+    cv2.setNumThreads(options.threads)
+    torch.set_num_threads(max(options.threads, 1))
     try:
-        run(parser.parse_args(arguments))
+        run(options)
     except (ExportError, data.DataError) as error:
         print(f"export_detector: {error}", file=sys.stderr)
         return 2
