@@ -21,8 +21,8 @@ constexpr int kMaxMessageBytes = 64 << 20;
 /// One entry of the list `topics`, read key by key.
 class TopicReader {
  public:
-  TopicReader(XmlRpc::XmlRpcValue entry, std::string place)
-      : entry_(std::move(entry)), place_(std::move(place)) {
+  TopicReader(const XmlRpc::XmlRpcValue& entry, std::string place)
+      : entry_(entry), place_(std::move(place)) {
     if (entry_.getType() != XmlRpc::XmlRpcValue::TypeStruct) {
       throw Error("parameter '" + place_ + "' is no map of keys and values");
     }
@@ -193,7 +193,7 @@ std::string ReadPassword(const std::string& path, double wait_s) {
     ros::WallDuration(0.1).sleep();
   }
   const std::string text = ReadFile(path, kMaxPasswordFileBytes);
-  const std::string password = text.substr(0, text.find_first_of("\r\n"));
+  std::string password = text.substr(0, text.find_first_of("\r\n"));
   if (password.empty()) throw Error("password file '" + path + "' has an empty first line");
   return password;
 }

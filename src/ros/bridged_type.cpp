@@ -31,10 +31,10 @@ Md5 RequireMd5(const std::string& name, const std::string& text) {
 template <typename Message>
 class TypedBridge : public BridgedType {
  public:
-  TypedBridge(std::size_t max_bytes, LayoutLimits limits)
+  TypedBridge(std::size_t max_bytes, const LayoutLimits& limits)
       : BridgedType(ros::message_traits::datatype<Message>(),
                     ros::message_traits::md5sum<Message>(),
-                    ros::message_traits::definition<Message>(), max_bytes, std::move(limits)) {}
+                    ros::message_traits::definition<Message>(), max_bytes, limits) {}
 
   bool has_vehicle_id() const override { return HasVehicleId<Message>::value; }
 
@@ -106,11 +106,11 @@ const std::map<std::string, Factory>& Registry() {
 }  // namespace
 
 BridgedType::BridgedType(std::string name, const std::string& md5, const std::string& definition,
-                         std::size_t max_bytes, LayoutLimits limits)
+                         std::size_t max_bytes, const LayoutLimits& limits)
     : name_(std::move(name)),
       md5_(RequireMd5(name_, md5)),
       max_bytes_(max_bytes),
-      layout_(name_, definition, std::move(limits)) {}
+      layout_(name_, definition, limits) {}
 
 std::optional<std::string> BridgedType::Check(ByteView serialised) const {
   return layout_.Check(serialised);

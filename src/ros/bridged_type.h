@@ -47,7 +47,7 @@ class BridgedType {
 
  protected:
   BridgedType(std::string name, const std::string& md5, const std::string& definition,
-              std::size_t max_bytes, LayoutLimits limits);
+              std::size_t max_bytes, const LayoutLimits& limits);
 
   std::optional<std::string> Check(ByteView serialised) const;
   std::vector<std::uint8_t> Enclose(const std::vector<std::uint8_t>& serialised) const;

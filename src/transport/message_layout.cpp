@@ -188,7 +188,7 @@ class MessageLayout::Walker {
 };
 
 MessageLayout::MessageLayout(const std::string& type, const std::string& definition,
-                             LayoutLimits limits) {
+                             const LayoutLimits& limits) {
   const MessageDefinition parsed = ParseMessageDefinition(type, definition);
   LayoutBuilder(parsed, limits, *this).Build();
 }

@@ -32,7 +32,8 @@ class MessageLayout {
   /// text, followed by the texts of all types that it uses under lines of "=" and "MSG:
   /// package/Name". Throws Error for a definition that cannot be read, lacks a type, nests too
   /// deeply or recurses, and for a limit on a field that the type does not have.
-  MessageLayout(const std::string& type, const std::string& definition, LayoutLimits limits = {});
+  MessageLayout(const std::string& type, const std::string& definition,
+                const LayoutLimits& limits = {});
 
   /// Nothing when `payload` is one whole message within the limits, else the sentence that names
   /// the field and what is wrong. Reads `payload` once and allocates only for the sentence.

@@ -55,11 +55,12 @@ TopicTemplate::TopicTemplate(const std::string& text) : text_(text) {
                 std::to_string(kMaxTemplateBytes));
   }
   levels_ = SplitLevels(text);
-  for (const std::string& level : levels_) {
-    if (level != kZone && level != kVehicle && !IsPlainLevel(level)) {
-      throw Error("MQTT topic template '" + text + "' has the level '" + level +
-                  "', accepted are {zone}, {vehicle} and characters of A-Z a-z 0-9 . _ -");
-    }
+  const auto wrong = std::find_if(levels_.begin(), levels_.end(), [](const std::string& level) {
+    return level != kZone && level != kVehicle && !IsPlainLevel(level);
+  });
+  if (wrong != levels_.end()) {
+    throw Error("MQTT topic template '" + text + "' has the level '" + *wrong +
+                "', accepted are {zone}, {vehicle} and characters of A-Z a-z 0-9 . _ -");
   }
   for (const std::string_view placeholder : {kZone, kVehicle}) {
     if (std::count(levels_.begin(), levels_.end(), placeholder) > 1) {
