@@ -88,7 +88,7 @@ class MapClient:
 
     def stored_hazards(self):
         """What the zone has stored: id, class, longitude, latitude of each."""
-        features = self._get("api/v1/hazards?limit=100000")["features"]
+        features = self._get("api/v1/hazards?limit=50000")["features"]
         return [{"id": f["properties"]["id"], "class": f["properties"]["class"],
                  "longitude": f["geometry"]["coordinates"][0],
                  "latitude": f["geometry"]["coordinates"][1]} for f in features]
