@@ -1,0 +1,47 @@
+// The readers of files that a drive is made of: survey tables and labels, routes, TUM and KITTI
+// lists, camera files, image headers. The first byte chooses the reader.
+#include <cstdint>
+#include <string>
+
+#include "base/error.h"
+#include "drives/camera_file.h"
+#include "drives/labels.h"
+#include "drives/route.h"
+#include "drives/sequences.h"
+#include "drives/survey.h"
+#include "ingest/image_header.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
+  try {
+    switch (data[0] % 8) {
+      case 0:
+        livemap::ParseSurveyTable(text, "input");
+        break;
+      case 1:
+        livemap::ParseYoloLabels(text, "input");
+        break;
+      case 2:
+        livemap::ParseRoute(text, "input");
+        break;
+      case 3:
+        livemap::ParseTumAssociations(text, "input");
+        break;
+      case 4:
+        livemap::ParseTumTrajectory(text, "input");
+        break;
+      case 5:
+        livemap::ParseKittiPoses(text, "input");
+        break;
+      case 6:
+        livemap::ParseCameraFile(text, "input");
+        break;
+      default:
+        livemap::ReadImageHeader(data + 1, size - 1);
+    }
+  } catch (const livemap::Error&) {
+    // Refused by a sentence: what the readers promise.
+  }
+  return 0;
+}
