@@ -189,11 +189,15 @@ bool ZoneNode::TellJoined() {
   for (const GeoPoint& place : joined) {
     const auto around = zone_.QueryNear(place, config_.join_radius_m,
                                         static_cast<std::size_t>(config_.join_max_hazards));
-    for (const Hazard& hazard : around) to_tell_.push_back(hazard.uuid);
+    for (const Hazard& hazard : around) {
+      // Everybody hears a notice: one suffices for all who join now.
+      if (in_line_.insert(hazard.uuid).second) to_tell_.push_back(hazard.uuid);
+    }
   }
   for (std::size_t i = 0; i < kJoinPortion && !to_tell_.empty(); ++i) {
     // As it is now: it may have changed, or gone, since it was put into the list.
     const auto hazard = zone_.Find(to_tell_.front());
+    in_line_.erase(to_tell_.front());
     to_tell_.pop_front();
     if (!hazard || !hazard->active) continue;
     notice_publisher_.publish(ToMessage(HazardEvent{HazardAction::kAdded, *hazard}));
@@ -203,7 +207,8 @@ bool ZoneNode::TellJoined() {
 }
 
 void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
-  if (!view_changed_.exchange(false)) return;
+  // Nobody looks: whoever comes gets the view of then, or the latched one if it still holds.
+  if (marker_publisher_.getNumSubscribers() == 0 || !view_changed_.exchange(false)) return;
   const auto hazards = zone_.Query(std::nullopt, 0, static_cast<std::size_t>(config_.max_markers));
   const auto vehicles = zone_.Vehicles();
   visualization_msgs::MarkerArray markers;

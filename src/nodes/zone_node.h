@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <unordered_set>
 #include <vector>
 
 #include "ros/zone_conversions.h"
@@ -62,7 +63,8 @@ class ZoneNode {
   std::map<std::string, std::int64_t> last_heard_ns_;  ///< By vehicle, steady clock.
   std::deque<GeoPoint> joined_;                        ///< Places of vehicles still to be told.
 
-  std::deque<Uuid> to_tell_;  ///< The worker's: hazards for vehicles that joined.
+  std::deque<Uuid> to_tell_;          ///< The worker's: hazards for vehicles that joined.
+  std::unordered_set<Uuid> in_line_;  ///< The same, to keep each once.
   std::atomic<bool> view_changed_{true};
   ros::Publisher receipt_publisher_;
   ros::Publisher notice_publisher_;

@@ -112,7 +112,7 @@ class ZoneService::Implementation {
     return std::mt19937_64(sequence_of_seeds);
   }
 
-  void Sort(const std::vector<Report>& reports, Work& work);
+  void Triage(const std::vector<Report>& reports, Work& work);
   void Apply(const std::vector<Report>& reports, Work& work);
   void ApplyOne(const Report& report, const PictureName& picture,
                 std::optional<HazardRegistry::Slot> match, Work& work);
@@ -124,7 +124,7 @@ class ZoneService::Implementation {
 
 /// First pass, without the lock: what needs no change, what is refused, pictures to disk. A picture
 /// whose report is never committed is unreferenced and goes first.
-void ZoneService::Implementation::Sort(const std::vector<Report>& reports, Work& work) {
+void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Work& work) {
   const std::int64_t now_ns = now_ns_();
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const Report& report = reports[i];
@@ -217,7 +217,7 @@ std::vector<Receipt> ZoneService::Implementation::HandleBatch(const std::vector<
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   Work work;
   work.receipts.reserve(reports.size());
-  Sort(reports, work);
+  Triage(reports, work);
   {
     const std::unique_lock<std::shared_mutex> lock(data_mutex_);
     if (!work.candidates.empty()) {
