@@ -11,6 +11,7 @@ import urllib.error
 import urllib.request
 
 import rosbag
+import rospkg
 
 Drive = collections.namedtuple("Drive", "frames start_s duration_s")
 PROGRAMS = pathlib.Path(__file__).resolve().parent
@@ -35,6 +36,13 @@ def program(name):
         if (folder / name).is_file():
             return str(folder / name)
     raise StartError(f"program '{name}' is not built; ./livemap setup builds it")
+
+
+def launch_file(name):
+    """Full path: a source tree with an install folder in it holds every launch file twice."""
+    source = PROGRAMS.parent / "launch" / name
+    return str(source if source.is_file()
+               else pathlib.Path(rospkg.RosPack().get_path("livemap")) / "launch" / name)
 
 
 def run_tool(command, log):
@@ -101,7 +109,7 @@ class LiveMapSystem:
                 stdin=subprocess.DEVNULL, start_new_session=True)
 
     def launch(self, name, port, file, arguments):
-        self.start(name, ["roslaunch", f"--port={port}", "livemap", file]
+        self.start(name, ["roslaunch", f"--port={port}", launch_file(file)]
                    + [f"{key}:={value}" for key, value in arguments.items()],
                    master=f"http://127.0.0.1:{port}")
 

@@ -58,7 +58,7 @@ class Drive:
         self.live_map.__exit__()
 
     def start_vehicle(self):
-        self.live_map.start("vehicle", ["roslaunch", "--wait", "livemap", "replay.launch"] + [
+        self.live_map.start("vehicle", ["roslaunch", "--wait", system.launch_file("replay.launch")] + [
             f"{key}:={value}" for key, value in {
                 "bag": self.bag, "paused": "true", "delay": 0, "use_truth": "true",
                 "vehicle": VEHICLE, "zone": ZONE,
