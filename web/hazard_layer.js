@@ -104,13 +104,13 @@ export class HazardLayer {
   update(marker, hazard) {
     if (marker.hazard.sequence === hazard.sequence) return;
     marker.hazard = hazard;
+    const popup = marker.getPopup();
+    const focused = popup.getElement()?.contains(document.activeElement);
     const { lat, lng } = marker.getLatLng();
     if (lat !== hazard.latitude || lng !== hazard.longitude) {
       marker.setLatLng([hazard.latitude, hazard.longitude]);
     }
     if (!marker.isPopupOpen()) return;
-    const popup = marker.getPopup();
-    const focused = popup.getElement().contains(document.activeElement);
     popup.update();
     if (focused) popup.getElement().querySelector('.popup').focus({ preventScroll: true });
   }

@@ -13,15 +13,15 @@ export class HazardList {
     this.count = byId('list-count');
     this.note = byId('list-note');
     this.fresh = new Set();
-    this.byRow = new Map();
+    this.rows = new Map();
     this.list.addEventListener('click', (event) => {
       const row = event.target.closest('button');
-      if (row) onChoose(this.byRow.get(row.dataset.hazard));
+      if (row) onChoose(this.rows.get(row.dataset.hazard).hazard);
     });
     this.list.addEventListener('keydown', (event) => this.moveFocus(event));
   }
 
-  /** Marks a hazard so that its row lights up when it is drawn the next time. */
+  /** Lights up the hazard's row when it is shown the next time. */
   markFresh(hazard) {
     this.fresh.add(hazard.id);
   }
@@ -30,37 +30,68 @@ export class HazardList {
     const newest = hazards.sort((a, b) => b.updated - a.updated || b.sequence - a.sequence)
       .slice(0, MAX_ROWS);
     const focused = document.activeElement?.dataset?.hazard;
-    this.byRow = new Map(newest.map((hazard) => [hazard.id, hazard]));
-    this.list.replaceChildren(...newest.map((hazard) => this.row(hazard)));
+    this.arrange(newest);
     this.fresh.clear();
-    const rows = [...this.list.querySelectorAll('button')];
-    const keeps = rows.find((row) => row.dataset.hazard === focused);
-    (keeps ?? rows[0])?.setAttribute('tabindex', '0');
-    keeps?.focus({ preventScroll: true });
+    const keeps = this.rows.get(focused);
+    if (keeps && document.activeElement !== keeps.button) {
+      keeps.button.focus({ preventScroll: true });
+    }
+    this.keepOneTabStop();
     this.count.textContent = hazards.length.toLocaleString('en');
     this.note.textContent = noteText(hazards.length, total);
   }
 
   focusHazard(id) {
-    this.rowOf(id)?.focus();
+    this.rows.get(id)?.button.focus();
   }
 
-  rowOf(id) {
-    return [...this.list.querySelectorAll('button')].find((row) => row.dataset.hazard === id);
+  /** Rows that stay keep their nodes and, unless overtaken, their place: a click on one of them
+   * is never lost because something else changed meanwhile. */
+  arrange(hazards) {
+    const wanted = new Set(hazards.map((hazard) => hazard.id));
+    for (const [id, row] of this.rows) {
+      if (wanted.has(id)) continue;
+      row.item.remove();
+      this.rows.delete(id);
+    }
+    let next = this.list.firstChild;
+    for (const hazard of hazards) {
+      const row = this.rows.get(hazard.id) ?? this.add(hazard);
+      this.fill(row, hazard);
+      if (row.item === next) next = next.nextSibling;
+      else this.list.insertBefore(row.item, next);
+    }
   }
 
-  row(hazard) {
-    const facts = [plural(hazard.sightings, 'sighting'), percent(hazard.confidence)];
-    const when = element('time', {
-      datetime: new Date(hazard.updated).toISOString(), title: utcTime(hazard.updated),
-    }, ago(hazard.updated));
-    return element('li', {}, element('button', {
+  add(hazard) {
+    const time = element('time');
+    const facts = element('span', { class: 'row-facts' });
+    const button = element('button', {
       type: 'button', tabindex: '-1', 'data-hazard': hazard.id,
       class: this.fresh.has(hazard.id) ? 'row fresh' : 'row',
     },
     this.catalogue.badge(hazard.className),
-    element('span', { class: 'row-label' }, hazard.label), when,
-    element('span', { class: 'row-facts' }, facts.join(' \u00b7 '))));
+    element('span', { class: 'row-label' }, hazard.label), time, facts);
+    const row = { item: element('li', {}, button), button, time, facts, hazard };
+    this.rows.set(hazard.id, row);
+    return row;
+  }
+
+  fill(row, hazard) {
+    row.hazard = hazard;
+    row.time.dateTime = new Date(hazard.updated).toISOString();
+    row.time.title = utcTime(hazard.updated);
+    setText(row.time, ago(hazard.updated));
+    setText(row.facts,
+      `${plural(hazard.sightings, 'sighting')} \u00b7 ${percent(hazard.confidence)}`);
+  }
+
+  keepOneTabStop() {
+    const rows = [...this.list.querySelectorAll('button')];
+    const stops = rows.filter((row) => row.getAttribute('tabindex') === '0');
+    const stop = rows.find((row) => row === document.activeElement) ?? stops[0] ?? rows[0];
+    for (const row of stops) row.setAttribute('tabindex', '-1');
+    stop?.setAttribute('tabindex', '0');
   }
 
   /** One tab stop for the whole list; the arrows move within it. */
@@ -74,6 +105,10 @@ export class HazardList {
     rows[to].setAttribute('tabindex', '0');
     rows[to].focus();
   }
+}
+
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
 }
 
 function noteText(shown, total) {

@@ -167,7 +167,12 @@ class Page {
     for (const hazard of this.store.hazards.values()) {
       bounds.extend([hazard.latitude, hazard.longitude]);
     }
-    if (bounds.isValid()) this.map.fitBounds(bounds, { padding: [48, 48], maxZoom: 17 });
+    if (!bounds.isValid()) return;
+    // Pins stand above their place, and on a phone the sheet covers the map's foot.
+    this.map.fitBounds(bounds, {
+      paddingTopLeft: [40, 64], paddingBottomRight: [40, 40 + this.sheet.coveredHeight()],
+      maxZoom: 17,
+    });
   }
 
   keepInView(feature) {

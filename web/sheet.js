@@ -29,6 +29,11 @@ export class Sheet {
     return this.panel.classList.contains('open');
   }
 
+  /** Of the map, by the closed sheet, pixels; 0 where the panel stands beside the map. */
+  coveredHeight() {
+    return this.handle.offsetHeight;
+  }
+
   toggle(open) {
     this.panel.classList.toggle('open', open);
     this.handle.setAttribute('aria-expanded', String(open));
