@@ -43,13 +43,18 @@ class EntryReader {
     for (const auto& entry : node_) {
       const auto key = entry.first.as<std::string>("");
       if (known_.count(key) != 0) continue;
-      std::string accepted;
-      for (const std::string& name : known_) accepted += (accepted.empty() ? "" : ", ") + name;
-      throw Error(place_ + " has the unknown key '" + key + "', accepted are: " + accepted);
+      RefuseKey(key);
     }
   }
 
  private:
+  [[noreturn]] void RefuseKey(const std::string& key) const {
+    std::string accepted;
+    for (const std::string& name : known_)
+      accepted.append(accepted.empty() ? "" : ", ").append(name);
+    throw Error(place_ + " has the unknown key '" + key + "', accepted are: " + accepted);
+  }
+
   static std::string Shortest(double number) {
     std::string text = std::to_string(number);
     text.erase(text.find_last_not_of('0') + 1);
@@ -88,6 +93,25 @@ void ReadProperties(const YAML::Node& node, const std::string& place, HazardClas
   reader.RejectUnknown();
 }
 
+void CheckSection(const std::string& key, const std::string& source) {
+  if (key == "defaults" || key == "classes") return;
+  throw Error("hazard catalogue '" + source + "' has the unknown key '" + key +
+              "', accepted are: classes, defaults");
+}
+
+HazardClass ReadClass(const std::string& name, const YAML::Node& node, const std::string& place,
+                      HazardClass entry) {
+  if (!std::regex_match(name, std::regex("[a-z0-9_]{1,40}"))) {
+    throw Error(place + "class '" + name + "' must be 1 to 40 of a-z, 0-9 and _");
+  }
+  ReadProperties(node, place + "class '" + name + "'", entry);
+  return entry;
+}
+
+[[noreturn]] void RefuseTwice(const std::string& name, const std::string& place) {
+  throw Error(place + "class '" + name + "' stands there twice");
+}
+
 }  // namespace
 
 HazardCatalogue HazardCatalogue::Load(const std::string& path) {
@@ -102,13 +126,7 @@ HazardCatalogue HazardCatalogue::Parse(const std::string& yaml, const std::strin
     throw Error("hazard catalogue '" + source + "' is no YAML: " + error.what());
   }
   if (!root.IsMap()) throw Error("hazard catalogue '" + source + "' must be a map");
-  for (const auto& entry : root) {
-    const auto key = entry.first.as<std::string>("");
-    if (key != "defaults" && key != "classes") {
-      throw Error("hazard catalogue '" + source + "' has the unknown key '" + key +
-                  "', accepted are: classes, defaults");
-    }
-  }
+  for (const auto& entry : root) CheckSection(entry.first.as<std::string>(""), source);
   HazardCatalogue catalogue;
   const std::string place = "hazard catalogue '" + source + "', ";
   if (root["defaults"]) ReadProperties(root["defaults"], place + "defaults", catalogue.defaults_);
@@ -117,14 +135,8 @@ HazardCatalogue HazardCatalogue::Parse(const std::string& yaml, const std::strin
   }
   for (const auto& node : root["classes"]) {
     const auto name = node.first.as<std::string>("");
-    if (!std::regex_match(name, std::regex("[a-z0-9_]{1,40}"))) {
-      throw Error(place + "class '" + name + "' must be 1 to 40 of a-z, 0-9 and _");
-    }
-    HazardClass entry = catalogue.Get(name);
-    ReadProperties(node.second, place + "class '" + name + "'", entry);
-    if (!catalogue.classes_.emplace(name, entry).second) {
-      throw Error(place + "class '" + name + "' stands there twice");
-    }
+    const HazardClass entry = ReadClass(name, node.second, place, catalogue.Get(name));
+    if (!catalogue.classes_.emplace(name, entry).second) RefuseTwice(name, place);
   }
   return catalogue;
 }
