@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """The camera_ingest nodelet as other nodes see it: topics in, topics and diagnostics out."""
 import os
 import shutil
@@ -112,7 +112,7 @@ class Ingest:
 
     def on_diagnostics(self, message):
         for status in message.status:
-            if status.hardware_id == "camera_ingest" and f"/{self.namespace}/" in status.name:
+            if status.hardware_id == "camera_ingest" and f"{self.namespace}/camera_ingest" in status.name:
                 with self.changed:
                     self.values = {value.key: value.value for value in status.values}
                     self.changed.notify_all()
@@ -126,10 +126,12 @@ class Ingest:
                 self.changed.wait(left)
 
     def connect(self):
+        end = time.monotonic() + PATIENCE_S
         self.wait(lambda: self.values, "no diagnostics")
         while (self.image_publisher.get_num_connections() < 1
                or self.info_publisher.get_num_connections() < 1
                or any(s.get_num_connections() < 1 for s in self.subscribers)):
+            assert time.monotonic() < end, f"no connection with {self.namespace}"
             time.sleep(0.02)
 
     def count(self, key):
