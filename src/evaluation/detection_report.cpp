@@ -32,12 +32,13 @@ nlohmann::ordered_json ClassJson(const ClassReport& report) {
   json["ap50"] = figures.ap50;
   AddThresholdFigures(figures, json);
   json["ap30"] = figures.ap30;
-  json["threshold"] = figures.threshold;
+  // The detector compares in single precision: 0.4 there is 0.4000000059604645.
+  json["threshold"] = std::round(figures.threshold * 1e6) / 1e6;
   json["n"] = figures.frames;
   json["km"] = figures.km;
   for (const ClassFigures& at : report.sweep) {
     nlohmann::ordered_json entry;
-    entry["threshold"] = at.threshold;
+    entry["threshold"] = std::round(at.threshold * 1e6) / 1e6;
     AddThresholdFigures(at, entry);
     json["sweep"].push_back(entry);
   }
