@@ -5,14 +5,15 @@ Everything is real: two ROS masters, mosquitto, the zone with its store, the veh
 drive's labels stand in for the detector, so that the comparison does not hang on a model.
 """
 
+import contextlib
 import os
 import pathlib
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import xmlrpc.client
 
 import rosnode
 import rospy
@@ -117,11 +118,11 @@ class RestartTest(unittest.TestCase):
         drive.live_map.start_broker()
 
     def kill_zone(self, drive):
-        # Roslaunch first, or it would tidy up; then the zone's own processes.
-        zone_processes = self.processes_of(drive.live_map.zone_port)
+        # Roslaunch first, or it would tidy up; then what it started.
         drive.live_map.stop("zone", signal.SIGKILL)
-        for process in zone_processes:
-            os.kill(process, signal.SIGKILL)
+        for process in self.processes_of(drive.live_map.zone_port):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
         drive.play_until(0.6)
         drive.live_map.launch_zone()
 
@@ -142,7 +143,6 @@ class RestartTest(unittest.TestCase):
 
     @staticmethod
     def pid_of(api_uri):
-        import xmlrpc.client
         return xmlrpc.client.ServerProxy(api_uri).getPid("/restart_test")[2]
 
     @staticmethod
