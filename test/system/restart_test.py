@@ -17,8 +17,8 @@ import xmlrpc.client
 
 import rosnode
 import rospy
-import rosservice
 import rostest
+from std_srvs.srv import SetBool
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
 import demo_observers as observers  # noqa: E402
@@ -77,7 +77,7 @@ class Drive:
         self.live_map.play()
 
     def pause(self):
-        rosservice.call_service("/player/pause_playback", [True])
+        rospy.ServiceProxy("/player/pause_playback", SetBool)(True)
 
     def play_until(self, share):
         """Until this share of the drive's detections has been seen by hazard_reporting."""
