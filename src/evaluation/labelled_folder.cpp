@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostTextBytes = 16 * 1024 * 1024;
+constexpr std::size_t kMostTextBytes = std::size_t{16} * 1024 * 1024;
 constexpr std::size_t kMostFrames = 1000000;
 
 /// Where the images and the labels of a folder are.
@@ -181,8 +181,9 @@ std::vector<std::string> ReadLines(const fs::path& path) {
 /// Lower case, without everything that is no letter or digit.
 std::string Letters(const std::string& text) {
   std::string letters;
-  for (const unsigned char c : text) {
-    if (std::isalnum(c) != 0) letters += static_cast<char>(std::tolower(c));
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0) letters += static_cast<char>(std::tolower(byte));
   }
   return letters;
 }

@@ -14,8 +14,8 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostManifestBytes = 64 * 1024;
-constexpr std::size_t kMostModelBytes = 256 * 1024 * 1024;
+constexpr std::size_t kMostManifestBytes = std::size_t{64} * 1024;
+constexpr std::size_t kMostModelBytes = std::size_t{256} * 1024 * 1024;
 constexpr std::size_t kMostClasses = 1000;
 constexpr int kLargestSide = 4096;
 

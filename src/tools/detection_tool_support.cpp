@@ -59,7 +59,7 @@ std::string DefaultModelPath() {
 }
 
 cv::Mat ReadImage(const std::string& path) {
-  constexpr std::size_t kMostBytes = 64 * 1024 * 1024;
+  constexpr std::size_t kMostBytes = std::size_t{64} * 1024 * 1024;
   constexpr std::int64_t kMostPixels = 100'000'000;
   const std::string bytes = ReadFile(path, kMostBytes);
   try {
