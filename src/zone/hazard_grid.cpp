@@ -47,7 +47,7 @@ std::int64_t HazardGrid::Columns(std::int64_t band) const {
 
 std::uint64_t HazardGrid::Cell(const GeoPointE7& position) const {
   const std::int64_t band = Band(position.latitude_e7);
-  const std::int64_t longitude = (position.longitude_e7 + kTurn / 2) % kTurn;
+  const std::int64_t longitude = (position.longitude_e7 + kHalfTurn) % kTurn;
   const std::int64_t column = longitude * Columns(band) / kTurn;
   return static_cast<std::uint64_t>(band) << 32 | static_cast<std::uint64_t>(column);
 }
@@ -61,7 +61,7 @@ HazardGrid::Search HazardGrid::SearchAround(const GeoPointE7& position) const {
       static_cast<std::int64_t>(std::ceil(radius_m_ / kMetresPerLatitudeE7)) + 2;
   Search search;
   search.latitude_e7 = position.latitude_e7;
-  search.longitude_e7 = (position.longitude_e7 + kTurn / 2) % kTurn;
+  search.longitude_e7 = (position.longitude_e7 + kHalfTurn) % kTurn;
   search.first_band = Band(search.latitude_e7 - half_height);
   search.last_band = Band(search.latitude_e7 + half_height);
   // A geodesic no longer than the radius stays between these latitudes, where a step in longitude
@@ -69,13 +69,14 @@ HazardGrid::Search HazardGrid::SearchAround(const GeoPointE7& position) const {
   search.metres_per_longitude_e7 =
       kMetresPerLongitudeE7 * CosineE7(std::abs(search.latitude_e7) + half_height);
   const double half_width = radius_m_ / search.metres_per_longitude_e7 + 2;
-  search.half_width_e7 =
-      half_width < kTurn / 2 ? static_cast<std::int64_t>(std::ceil(half_width)) : kTurn / 2;
+  search.half_width_e7 = half_width < static_cast<double>(kHalfTurn)
+                             ? static_cast<std::int64_t>(std::ceil(half_width))
+                             : kHalfTurn;
   return search;
 }
 
 double HazardGrid::LeastDistanceM(const Search& search, const GeoPointE7& position) const {
-  const std::int64_t longitude = (position.longitude_e7 + kTurn / 2) % kTurn;
+  const std::int64_t longitude = (position.longitude_e7 + kHalfTurn) % kTurn;
   std::int64_t difference = std::abs(longitude - search.longitude_e7);
   difference = std::min(difference, kTurn - difference);
   const double north_m =

@@ -46,6 +46,7 @@ class HazardGrid {
   };
   /// Longitudes in steps of 1e-7 degree east of the antimeridian: 0 up to kTurn - 1.
   static constexpr std::int64_t kTurn = 3'600'000'000;
+  static constexpr std::int64_t kHalfTurn = kTurn / 2;
   static constexpr std::uint64_t kFree = ~std::uint64_t{0};
 
   /// Around one query: which cells may hold neighbours, and how far a candidate is at least.
