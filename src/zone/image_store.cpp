@@ -98,7 +98,7 @@ std::string ImageStore::FilePath(const std::string& sha256, const std::string& f
 }
 
 std::string ImageStore::Put(const std::vector<std::uint8_t>& bytes, const std::string& format) {
-  const std::string sha256 = Sha256Hex(bytes.data(), bytes.size());
+  std::string sha256 = Sha256Hex(bytes.data(), bytes.size());
   const std::lock_guard<std::mutex> lock(mutex_);
   if (entries_.count(sha256) != 0 || pending_.count(sha256) != 0) return sha256;
   const std::string path = FilePath(sha256, format);
