@@ -38,7 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         livemap::ParseCameraFile(text, "input");
         break;
       default:
-        livemap::ReadImageHeader(data + 1, size - 1);
+        livemap::ReadFrameHeader(data + 1, size - 1);
     }
   } catch (const livemap::Error&) {
     // Refused by a sentence: what the readers promise.
