@@ -15,7 +15,7 @@ import time
 import unittest
 import xmlrpc.client
 
-import rosnode
+import rosgraph
 import rospy
 import rostest
 from std_srvs.srv import SetBool
@@ -133,17 +133,13 @@ class RestartTest(unittest.TestCase):
         drive.play_until(0.6)
         drive.pause()
         self.assertGreater(drive.vehicle.counts()["pending"], 0, "reports wait in the store")
-        manager = rosnode.get_api_uri(rospy.get_master(), "/vehicle_manager")
-        os.kill(self.pid_of(manager), signal.SIGKILL)
+        manager = rosgraph.Master("/restart_test").lookupNode("/vehicle_manager")
+        os.kill(xmlrpc.client.ServerProxy(manager).getPid("/restart_test")[2], signal.SIGKILL)
         drive.watch_vehicle()
         drive.vehicle.wait_until_up(PATIENCE_S, ("hazard_reporting", "mqtt_bridge"))
         self.assertGreater(drive.vehicle.counts()["pending"], 0, "reports survived in the store")
         drive.live_map.start_broker()
         drive.play()
-
-    @staticmethod
-    def pid_of(api_uri):
-        return xmlrpc.client.ServerProxy(api_uri).getPid("/restart_test")[2]
 
     @staticmethod
     def processes_of(master_port):
