@@ -67,22 +67,25 @@ class Town {
     report.image_height = 480;
     return report;
   }
-  Report OfHazard(std::size_t i) {
-    return At(Place(static_cast<double>(i % side_), static_cast<double>(i / side_)));
-  }
+  Report OfHazard(std::size_t i) { return At(Place(Column(i), Row(i))); }
   /// Within 2 m of a random hazard.
   Report Sighting() {
     std::uniform_int_distribution<std::size_t> any(0, hazards_ - 1);
     std::uniform_real_distribution<double> offset(-0.1, 0.1);
     const std::size_t i = any(generator_);
-    return At(Place(static_cast<double>(i % side_) + offset(generator_),
-                    static_cast<double>(i / side_) + offset(generator_)));
+    return At(Place(Column(i) + offset(generator_), Row(i) + offset(generator_)));
   }
   /// In the middle between four hazards, 8.5 m from each.
   Report News() {
     std::uniform_int_distribution<std::size_t> any(0, hazards_ - 1);
     const std::size_t i = any(generator_);
-    return At(Place(static_cast<double>(i % side_) + 0.5, static_cast<double>(i / side_) + 0.5));
+    return At(Place(Column(i) + 0.5, Row(i) + 0.5));
+  }
+  /// Place of a hazard in the square grid of all hazards.
+  double Column(std::size_t i) const { return static_cast<double>(i % side_); }
+  double Row(std::size_t i) const {
+    const std::size_t row = i / side_;
+    return static_cast<double>(row);
   }
   Uuid NextUuid() { return Uuid::Random(generator_); }
 

@@ -135,7 +135,8 @@ void DrawSprite(const cv::Mat& sprite, const cv::Rect2d& target, double haze, cv
       float cover = 0;
       for (int tap = 0; tap < taps * taps; ++tap) {
         const double x = column + (tap % taps + 0.5) / taps - target.x;
-        const double y = row + (tap / taps + 0.5) / taps - target.y;
+        const int tap_row = tap / taps;
+        const double y = row + (tap_row + 0.5) / taps - target.y;
         const int sx = static_cast<int>(std::floor(x * scale_x));
         const int sy = static_cast<int>(std::floor(y * scale_y));
         if (sx < 0 || sy < 0 || sx >= sprite.cols || sy >= sprite.rows) continue;

@@ -36,7 +36,8 @@ std::int64_t SteadyNs() {
 
 }  // namespace
 
-ZoneNode::ZoneNode(ros::NodeHandle node, ros::NodeHandle private_node, ZoneCloudletConfig config)
+ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
+                   ZoneCloudletConfig config)
     : config_(std::move(config)),
       zone_(config_.zone, NowNs, EntropySeededGenerator()()),
       queue_(static_cast<std::size_t>(config_.queue_reports),

@@ -31,7 +31,7 @@ namespace livemap {
 class ZoneNode {
  public:
   /// Opens the store, starts the web server and subscribes. Throws Error with one sentence.
-  ZoneNode(ros::NodeHandle node, ros::NodeHandle private_node, ZoneCloudletConfig config);
+  ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node, ZoneCloudletConfig config);
   /// Commits what is queued and stops.
   ~ZoneNode();
   ZoneNode(const ZoneNode&) = delete;

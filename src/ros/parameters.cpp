@@ -11,8 +11,7 @@ namespace {
 
 std::string ToText(const XmlRpc::XmlRpcValue& value) {
   std::ostringstream text;
-  XmlRpc::XmlRpcValue copy = value;  // XmlRpc writes only from a non-const value.
-  copy.write(text);
+  value.write(text);
   return text.str();
 }
 

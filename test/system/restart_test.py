@@ -120,7 +120,9 @@ class RestartTest(unittest.TestCase):
     def kill_zone(self, drive):
         # Roslaunch first, or it would tidy up; then what it started.
         drive.live_map.stop("zone", signal.SIGKILL)
-        for process in self.processes_of(drive.live_map.zone_port):
+        processes = self.processes_of(drive.live_map.zone_port)
+        self.assertGreaterEqual(len(processes), 2, "zone_cloudlet and its bridge run")
+        for process in processes:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
         drive.play_until(0.6)
@@ -144,11 +146,11 @@ class RestartTest(unittest.TestCase):
     @staticmethod
     def processes_of(master_port):
         """Processes whose ROS master is at this port."""
-        mark = f"ROS_MASTER_URI=http://127.0.0.1:{master_port}".encode()
+        marks = {f"ROS_MASTER_URI=http://127.0.0.1:{master_port}{end}".encode() for end in ("", "/")}
         found = []
         for entry in pathlib.Path("/proc").glob("[0-9]*"):
             try:
-                if mark in (entry / "environ").read_bytes().split(b"\0"):
+                if marks & set((entry / "environ").read_bytes().split(b"\0")):
                     found.append(int(entry.name))
             except OSError:
                 continue
