@@ -2,6 +2,9 @@
 # Debian's interpreter has catkin_pkg and the ROS modules; another python3 may stand first on PATH.
 set(PYTHON_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "The interpreter that has catkin_pkg")
 set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE} CACHE FILEPATH "The same for ament's packages")
+# find_package(catkin) notes down, once, which folders of the devel space the tests' environment shall
+# have, and leaves out those that do not exist yet: the messages' Python modules would be missing.
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/devel/lib/python3/dist-packages)
 find_package(catkin REQUIRED COMPONENTS
   camera_info_manager cv_bridge diagnostic_msgs diagnostic_updater geometry_msgs image_geometry
   image_transport message_generation nav_msgs nodelet pcl_ros pluginlib rosbag roscpp rostest
