@@ -1,4 +1,4 @@
-"""From pictures to training samples: views, mosaics, pasted potholes, colour and blur.
+"""From pictures to training samples: views, mosaics, mixtures, pasted potholes, light, colour and blur.
 
 Everything random comes from one numpy generator that the caller seeds per sample, so a sample
 depends on (seed, epoch, index) alone: not on workers, not on an interrupted run.
@@ -32,27 +32,30 @@ class Recipe:
     """How strongly to change pictures. Probabilities are per sample."""
 
     mosaic: float = 0.5
-    paste: float = 0.5
+    mix: float = 0.25
+    paste: float = 0.65
     mirror: float = 0.5
     scale_spread: float = 1.6  # a group's scale is multiplied by up to this or divided by it
     aspect_spread: float = 1.12
     focus: float = 0.75  # a view is placed around a label rather than anywhere
-    blur: float = 0.12
-    noise: float = 0.12
-    grey: float = 0.05
-    shadow: float = 0.25
-    hue: float = 6.0  # degrees of cv2's 180
-    saturation: float = 0.5
-    brightness: float = 0.35
+    blur: float = 0.2
+    noise: float = 0.2
+    grey: float = 0.12
+    shadow: float = 0.45
+    relight: float = 0.4
+    erase: float = 0.3
+    hue: float = 8.0  # degrees of cv2's 180
+    saturation: float = 0.6
+    brightness: float = 0.45
 
 
 SETTLING = Recipe(
-    mosaic=0.0, paste=0.25, mirror=0.0, scale_spread=1.12, aspect_spread=1.03, focus=0.0, blur=0.05, noise=0.05,
-    grey=0.0, shadow=0.15, hue=3.0, saturation=0.25, brightness=0.2,
+    mosaic=0.0, mix=0.0, paste=0.5, mirror=0.5, scale_spread=1.2, aspect_spread=1.05, focus=0.0, blur=0.1, noise=0.1,
+    grey=0.05, shadow=0.35, relight=0.2, erase=0.0, hue=5.0, saturation=0.4, brightness=0.3,
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.60, "survey_empty": 0.22, "closeups": 0.06, "cones": 0.12}
+GROUP_SHARES = {"survey_potholes": 0.56, "survey_empty": 0.20, "closeups": 0.12, "cones": 0.12}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
 
 UNLABELLED_CLASS_WEIGHTS = {"closeups": 0.0, "cones": 0.3}
@@ -88,6 +91,8 @@ class Augmenter:
         self.names = [name for name in GROUP_SHARES if groups.get(name)]
         shares = np.array([GROUP_SHARES[name] for name in self.names])
         self.shares = shares / shares.sum()
+        weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
+        self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}
 
     def draw(self, rng: np.random.Generator) -> Sample:
         """One sample: a view or a mosaic of views, then colour, noise and blur."""
@@ -95,8 +100,14 @@ class Augmenter:
             sample = self.mosaic(rng)
         else:
             sample = self.view(rng, self.width, self.height)
+        if rng.random() < self.recipe.mix:
+            self.mix_in(rng, sample)
+        if rng.random() < self.recipe.erase:
+            erase_patches(rng, sample)
         if rng.random() < self.recipe.shadow:
             cast_shadows(rng, sample.image)
+        if rng.random() < self.recipe.relight:
+            relight(rng, sample.image)
         sample.image = self.recolour(rng, sample.image)
         return sample
 
@@ -128,12 +139,19 @@ class Augmenter:
             views[0].labelled,
         )
 
+    def mix_in(self, rng: np.random.Generator, sample: Sample) -> None:
+        """Shine another view faintly through (mixup, Zhang et al. 2018), in place; its labels are ignored."""
+        other = self.view(rng, self.width, self.height)
+        share = rng.uniform(0.1, 0.4)
+        sample.image = cv2.addWeighted(sample.image, 1 - share, other.image, share, 0)
+        sample.ignored = np.concatenate([sample.ignored, other.ignored, other.boxes]).astype(np.float32)
+
     def view(self, rng: np.random.Generator, width: int, height: int, names: List[str] = ()) -> Sample:
         """A scaled, shifted, perhaps mirrored window of one random picture."""
         names = list(names) or self.names
         shares = np.array([GROUP_SHARES[name] for name in names])
         name = names[rng.choice(len(names), p=shares / shares.sum())]
-        picture = self.groups[name][rng.integers(len(self.groups[name]))]
+        picture = self.groups[name][rng.choice(len(self.groups[name]), p=self.picture_shares[name])]
         if name.startswith("survey") and rng.random() < self.recipe.paste:
             picture = self.paste_potholes(rng, picture)
         scale_y = GROUP_SCALES[name] * ratio(rng, self.recipe.scale_spread)
@@ -193,7 +211,7 @@ class Augmenter:
         image, boxes = picture.image.copy(), picture.boxes
         donors = self.groups["survey_potholes"]
         for _ in range(rng.integers(1, 4)):
-            donor = donors[rng.integers(len(donors))]
+            donor = donors[rng.choice(len(donors), p=self.picture_shares["survey_potholes"])]
             box = donor.boxes[rng.integers(len(donor.boxes))]
             pasted = blend_patch(rng, image, donor.image, box, boxes)
             if pasted is not None:
@@ -235,6 +253,30 @@ def cast_shadows(rng: np.random.Generator, image: np.ndarray) -> None:
     darkness = rng.uniform(0.35, 0.7)
     tint = np.array([1.06, 1.0, 0.92], np.float32) * darkness  # shade lacks the sun's red: blue is darkened less
     image[:] = (image * (1 - shade[..., None] * tint)).clip(0, 255).astype(np.uint8)
+
+
+def relight(rng: np.random.Generator, image: np.ndarray) -> None:
+    """A smooth ramp of brightness over the picture and a haze that takes contrast away, in place."""
+    height, width = image.shape[:2]
+    corners = rng.uniform(0.6, 1.3, (2, 2)).astype(np.float32)
+    ramp = cv2.resize(corners, (width, height), interpolation=cv2.INTER_LINEAR)[..., None]
+    haze, grey = rng.uniform(0, 0.35), rng.uniform(60, 220)
+    image[:] = ((image * ramp) * (1 - haze) + haze * grey).clip(0, 255).astype(np.uint8)
+
+
+def erase_patches(rng: np.random.Generator, sample: Sample) -> None:
+    """Cover a few rectangles with noise (random erasing, Zhong et al. 2020), never much of a label, in place."""
+    height, width = sample.image.shape[:2]
+    for _ in range(rng.integers(1, 4)):
+        size = rng.integers(12, 90, 2)
+        left, top = rng.integers(0, width - size[0]), rng.integers(0, height - size[1])
+        patch = np.array([[left, top, left + size[0], top + size[1]]], np.float32)
+        cut = np.minimum(sample.boxes[:, 2:], patch[:, 2:]) - np.maximum(sample.boxes[:, :2], patch[:, :2])
+        covered = cut.clip(min=0).prod(axis=1) / np.maximum(box_math.areas(sample.boxes), 1)
+        if len(covered) and covered.max() > 0.3:
+            continue
+        grey = rng.normal(rng.uniform(40, 200), 12, (size[1], size[0], 3))
+        sample.image[top : top + size[1], left : left + size[0]] = grey.clip(0, 255).astype(np.uint8)
 
 
 def blend_patch(

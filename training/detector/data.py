@@ -32,6 +32,7 @@ class Picture:
     boxes: np.ndarray  # N x 4 float32 corners in pixels
     labelled_class: int
     name: str = ""
+    weight: float = 1.0  # how often to draw it, relative to others of its group
 
 
 @dataclass
@@ -111,12 +112,15 @@ def read_validation_cones(data: Path) -> List[Picture]:
 
 def read_training_pictures(data: Path) -> Dict[str, List[Picture]]:
     """Training pictures by group: survey frames with and without potholes, close-ups, cone photos."""
-    frames = [
-        frame.picture
-        for folder in section_folders(data)
-        if folder.name not in VALIDATION_SECTIONS
-        for frame in read_drive(folder)
-    ]
+    frames = []
+    for folder in section_folders(data):
+        if folder.name in VALIDATION_SECTIONS:
+            continue
+        drive = [frame.picture for frame in read_drive(folder)]
+        for picture in drive:
+            # A long section shows one road many times over: its share grows with the root of its length.
+            picture.weight = len(drive) ** -0.5
+        frames += drive
     cones = data / "traffic_cones"
     closeups = data / "pothole_closeups"
     return {

@@ -18,6 +18,9 @@ STRIDES = (4, 8, 16)
 PRIOR_PROBABILITY = 0.01
 """Score of every anchor point before training, so that the first steps are not spent on background."""
 
+DROPPED_CHANNELS = 0.1
+"""Fraction of feature channels that training hides from a head (SpatialDropout, Tompson et al. 2015)."""
+
 PRIOR_BOX = (0.5, 0.5, 1.6, 1.1)
 """Raw (tx, ty, tw, th) of every anchor point before training: its cell's centre, 5 by 3 cells."""
 
@@ -121,12 +124,14 @@ class Head(nn.Module):
         super().__init__()
         self.box = nn.Sequential(ConvBlock(channels, channels), nn.Conv2d(channels, 4, 1))
         self.score = nn.Sequential(ConvBlock(channels, channels), nn.Conv2d(channels, class_count, 1))
+        self.drop = nn.Dropout2d(DROPPED_CHANNELS)  # in training only
         nn.init.constant_(self.score[-1].bias, -math.log((1 - PRIOR_PROBABILITY) / PRIOR_PROBABILITY))
         with torch.no_grad():
             self.box[-1].bias.copy_(torch.tensor(PRIOR_BOX))
 
     def forward(self, features: Tensor) -> Tensor:
         """B x C x H x W features to B x HW x (4 + classes), rows first."""
+        features = self.drop(features)
         return torch.cat([self.box(features), self.score(features)], dim=1).flatten(2).transpose(1, 2)
 
 

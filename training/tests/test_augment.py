@@ -9,7 +9,7 @@ from detector.boxes import non_maximum_suppression
 from detector.data import POTHOLE, TRAFFIC_CONE, Picture
 from detector.inference import AnchorGrid, decode, letterbox
 
-CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0, shadow=0.0)
+CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0, shadow=0.0, mix=0.0, relight=0.0, erase=0.0)
 
 
 def bright_square() -> Picture:
