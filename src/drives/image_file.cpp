@@ -20,7 +20,7 @@ ImageFile ReadImageFile(const std::string& path, int width, int height) {
   } catch (const Error& error) {
     throw Error("'" + path + "': " + error.what());
   }
-  file.header = *ReadFrameHeader(file.bytes.data(), file.bytes.size());
+  file.header = *ReadImageHeader(file.bytes.data(), file.bytes.size());
   if ((width > 0 && file.header.width != width) || (height > 0 && file.header.height != height)) {
     throw Error("'" + path + "' is " + std::to_string(file.header.width) + "x" +
                 std::to_string(file.header.height) + ", the camera's calibration is for " +

@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "ingest/image_header.h"
+#include "base/image_header.h"
 
 namespace livemap {
 
 /// An image file's bytes as they are, checked.
 struct ImageFile {
   std::vector<std::uint8_t> bytes;
-  FrameHeader header;
+  ImageHeader header;
 };
 
 /// Reads a JPEG or PNG and decodes it once to know that it is whole. Throws Error naming the file

@@ -33,15 +33,6 @@ GeoPoint GeodesicDestination(const GeoPoint& start, double bearing_rad, double d
   return end;
 }
 
-GeoPointE7 ToE7(const GeoPoint& point) {
-  return {static_cast<std::int32_t>(std::lround(point.latitude_deg * 1e7)),
-          static_cast<std::int32_t>(std::lround(point.longitude_deg * 1e7))};
-}
-
-GeoPoint FromE7(const GeoPointE7& point) {
-  return {point.latitude_e7 / 1e7, point.longitude_e7 / 1e7};
-}
-
 LocalFrame::LocalFrame(const GeoPoint& datum) : datum_(datum) {
   if (!IsValid(datum)) {
     throw Error("datum (" + std::to_string(datum.latitude_deg) + ", " +

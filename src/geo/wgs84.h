@@ -23,20 +23,6 @@ double GeodesicDistanceM(const GeoPoint& a, const GeoPoint& b);
 /// `bearing_rad`, clockwise from true north. `start` must be valid.
 GeoPoint GeodesicDestination(const GeoPoint& start, double bearing_rad, double distance_m);
 
-/// A position in units of 1e-7 degree (at most 11.2 mm): the integers that indexes and stores keep.
-struct GeoPointE7 {
-  std::int32_t latitude_e7 = 0;
-  std::int32_t longitude_e7 = 0;
-
-  friend bool operator==(const GeoPointE7& a, const GeoPointE7& b) {
-    return a.latitude_e7 == b.latitude_e7 && a.longitude_e7 == b.longitude_e7;
-  }
-};
-
-/// Rounds a valid point to the nearest 1e-7 degree.
-GeoPointE7 ToE7(const GeoPoint& point);
-GeoPoint FromE7(const GeoPointE7& point);
-
 /// East-north plane that touches the ellipsoid at a datum: x east, y north, metres. Heights are
 /// dropped: a point 10 km away lies 8 m below the plane, which moves it 6 mm horizontally.
 class LocalFrame {

@@ -5,14 +5,6 @@
 #include "base/error.h"
 
 namespace livemap {
-namespace {
-
-/// Cells of six radii: a search reads (1 + 2/6)^3, about 2.4 cells, and even a street where a
-/// hazard lies at every radius puts only some dozens into one.
-constexpr double kCellInRadii = 6.0;
-
-}  // namespace
-
 DuplicateFilter::DuplicateFilter(HazardCatalogue catalogue) : catalogue_(std::move(catalogue)) {}
 
 void DuplicateFilter::Put(const Uuid& id, const std::string& class_name, const GeoPoint& position) {
@@ -55,8 +47,7 @@ DuplicateFilter::ClassMap::iterator DuplicateFilter::IndexOf(const std::string& 
   const auto found = classes_.find(class_name);
   if (found != classes_.end()) return found;
   const double radius_m = catalogue_.DuplicateRadiusM(class_name);
-  return classes_.emplace(class_name, ClassIndex{radius_m, SpatialGrid(kCellInRadii * radius_m)})
-      .first;
+  return classes_.emplace(class_name, ClassIndex{radius_m, SpatialGrid::ForRadius(radius_m)}).first;
 }
 
 }  // namespace livemap

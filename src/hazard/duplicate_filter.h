@@ -6,9 +6,9 @@
 #include <unordered_map>
 
 #include "base/uuid.h"
+#include "geo/spatial_grid.h"
 #include "geo/wgs84.h"
 #include "hazard/catalogue.h"
-#include "hazard/spatial_grid.h"
 
 namespace livemap {
 

@@ -4,14 +4,14 @@
 #include <string>
 
 #include "base/error.h"
-#include "ingest/image_header.h"
+#include "base/image_header.h"
 
 namespace livemap {
 
 cv::Mat DecodeImage(const std::uint8_t* bytes, std::size_t size, std::int64_t max_pixels) {
-  const std::optional<FrameHeader> header = ReadFrameHeader(bytes, size);
+  const std::optional<ImageHeader> header = ReadImageHeader(bytes, size);
   if (!header) {
-    throw Error("the image of " + std::to_string(size) + " bytes is neither a JPEG nor a PNG");
+    throw Error("the image of " + std::to_string(size) + " bytes is no JPEG, PNG or WebP");
   }
   const std::string dimensions =
       std::to_string(header->width) + "x" + std::to_string(header->height);

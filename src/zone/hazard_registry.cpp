@@ -11,16 +11,12 @@ namespace livemap {
 HazardRegistry::HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule)
     : catalogue_(std::move(catalogue)), hash_seed_(hash_seed), rule_(rule) {}
 
-HazardGrid& HazardRegistry::GridOf(const std::string& class_name) {
-  const auto found = grids_.find(class_name);
-  if (found != grids_.end()) return found->second;
-  HazardGrid grid(catalogue_.DuplicateRadiusM(class_name), hash_seed_);
-  return grids_.emplace(class_name, std::move(grid)).first->second;
-}
-
-const HazardGrid* HazardRegistry::FindGrid(const std::string& class_name) const {
-  const auto found = grids_.find(class_name);
-  return found == grids_.end() ? nullptr : &found->second;
+SpatialGrid& HazardRegistry::GridOf(const std::string& class_name) {
+  const auto found = classes_.find(class_name);
+  if (found != classes_.end()) return found->second.grid;
+  const double radius_m = catalogue_.DuplicateRadiusM(class_name);
+  ClassIndex index{radius_m, SpatialGrid::ForRadius(radius_m, hash_seed_)};
+  return classes_.emplace(class_name, std::move(index)).first->second.grid;
 }
 
 HazardRegistry::Slot HazardRegistry::Append(Hazard hazard) {
@@ -48,11 +44,10 @@ void HazardRegistry::Restore(Hazard hazard) {
 
 std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string& class_name,
                                                               const GeoPoint& position) const {
-  const HazardGrid* grid = FindGrid(class_name);
-  if (grid == nullptr) return std::nullopt;
-  const auto nearest = grid->Nearest(
-      position, [&](Slot slot) { return GeodesicDistanceM(position, hazards_[slot].position); });
-  return nearest ? std::optional<Slot>(nearest->slot) : std::nullopt;
+  const auto found = classes_.find(class_name);
+  if (found == classes_.end()) return std::nullopt;
+  const auto nearest = found->second.grid.Nearest(position, found->second.radius_m);
+  return nearest ? std::optional<Slot>(static_cast<Slot>(nearest->id)) : std::nullopt;
 }
 
 HazardRegistry::Slot HazardRegistry::Add(const Report& report, const PictureName& picture,
@@ -81,7 +76,7 @@ void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& p
   RememberForUndo(slot);
   Hazard& hazard = hazards_[slot];
   const bool newest = report.stamp_ns >= hazard.last_seen_ns;
-  HazardGrid& grid = GridOf(hazard.class_name);
+  SpatialGrid& grid = GridOf(hazard.class_name);
   grid.Erase(hazard.position, slot);
   Fuse(hazard, report, rule_);
   grid.Insert(hazard.position, slot);
@@ -128,7 +123,7 @@ std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
 
 std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double radius_m,
                                               std::size_t limit) const {
-  // Cheap lower bounds first (see hazard_grid.cpp): most hazards of a zone are not near.
+  // Cheap lower bounds first of the ellipsoid's distance: most hazards of a zone are not near.
   const double max_latitude_difference = radius_m / 110574.0;
   const double poleward_deg =
       std::min(90.0, std::abs(centre.latitude_deg) + max_latitude_difference);
@@ -193,7 +188,7 @@ void HazardRegistry::Rollback() {
 
 void HazardRegistry::TakeBack(Undo& undo) {
   Hazard& hazard = hazards_[undo.slot];
-  HazardGrid& grid = GridOf(hazard.class_name);
+  SpatialGrid& grid = GridOf(hazard.class_name);
   if (hazard.active) {
     grid.Erase(hazard.position, undo.slot);
     --active_count_;

@@ -8,11 +8,11 @@
 #include <unordered_map>
 #include <vector>
 
+#include "geo/spatial_grid.h"
 #include "hazard/catalogue.h"
 #include "hazard/report.h"
 #include "zone/hazard.h"
 #include "zone/hazard_fusion.h"
-#include "zone/hazard_grid.h"
 
 namespace livemap {
 
@@ -29,9 +29,10 @@ struct PictureName {
 /// the same when a commit fails. Without Begin every change is final.
 class HazardRegistry {
  public:
-  using Slot = HazardGrid::Slot;
+  /// A hazard's place in memory; slots count from 0 in the order of arrival.
+  using Slot = std::uint32_t;
 
-  /// Radii come from the catalogue. `hash_seed`: see HazardGrid.
+  /// Radii come from the catalogue. `hash_seed`: see SpatialGrid.
   HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule = {});
 
   /// Takes in a hazard as the store kept it; in ascending order of sequence.
@@ -76,8 +77,12 @@ class HazardRegistry {
     std::optional<Hazard> before;  ///< None: the slot was new.
   };
 
-  HazardGrid& GridOf(const std::string& class_name);
-  const HazardGrid* FindGrid(const std::string& class_name) const;
+  struct ClassIndex {
+    double radius_m;
+    SpatialGrid grid;
+  };
+
+  SpatialGrid& GridOf(const std::string& class_name);
   Slot Append(Hazard hazard);
   void RememberForUndo(Slot slot);
   void NoteChange(Slot slot);
@@ -89,7 +94,7 @@ class HazardRegistry {
   FusionRule rule_;
   std::deque<Hazard> hazards_;  ///< By slot; a deque, because growth must not move them.
   std::unordered_map<Uuid, Slot> slots_;
-  std::unordered_map<std::string, HazardGrid> grids_;  ///< By class name.
+  std::unordered_map<std::string, ClassIndex> classes_;  ///< By name; active hazards only.
   /// In ascending order of sequence; an entry is stale once its hazard has a newer sequence.
   std::vector<Change> changes_;
   std::size_t active_count_ = 0;

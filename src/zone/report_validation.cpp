@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "zone/image_header.h"
+#include "base/image_header.h"
 
 namespace livemap {
 namespace {
@@ -136,7 +136,8 @@ Refusal WhyPictureRefused(const Report& report, const ReportLimits& limits) {
   }
   const auto header = ReadImageHeader(report.image.data(), report.image.size());
   if (!header) return "picture is no JPEG, PNG or WebP";
-  if (header->width > limits.max_image_side_px || header->height > limits.max_image_side_px) {
+  const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
+  if (longer_side > limits.max_image_side_px) {
     return "picture is " + std::to_string(header->width) + " x " + std::to_string(header->height) +
            " pixels, at most " + std::to_string(limits.max_image_side_px) +
            " per side are accepted";

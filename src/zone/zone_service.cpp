@@ -9,9 +9,9 @@
 #include <unordered_map>
 #include <utility>
 
+#include "base/image_header.h"
 #include "zone/event_stream.h"
 #include "zone/hazard_registry.h"
-#include "zone/image_header.h"
 #include "zone/image_store.h"
 #include "zone/owned_directory.h"
 #include "zone/vehicle_table.h"
@@ -142,7 +142,8 @@ void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Wor
     }
     Candidate candidate{i, {}};
     if (!report.image.empty()) {
-      candidate.picture.format = ReadImageHeader(report.image.data(), report.image.size())->format;
+      candidate.picture.format =
+          FormatName(ReadImageHeader(report.image.data(), report.image.size())->format);
       candidate.picture.sha256 = images_.Put(report.image, candidate.picture.format);
     }
     work.candidates.push_back(std::move(candidate));

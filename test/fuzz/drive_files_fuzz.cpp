@@ -9,7 +9,7 @@
 #include "drives/route.h"
 #include "drives/sequences.h"
 #include "drives/survey.h"
-#include "ingest/image_header.h"
+#include "base/image_header.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
@@ -38,7 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         livemap::ParseCameraFile(text, "input");
         break;
       default:
-        livemap::ReadFrameHeader(data + 1, size - 1);
+        livemap::ReadImageHeader(data + 1, size - 1);
     }
   } catch (const livemap::Error&) {
     // Refused by a sentence: what the readers promise.

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "zone/image_header.h"
+#include "base/image_header.h"
 #include "zone/report_validation.h"
 
 namespace livemap {

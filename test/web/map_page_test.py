@@ -20,7 +20,9 @@ import unittest
 
 try:
     from selenium import webdriver
-    from selenium.common.exceptions import TimeoutException
+    from selenium.common.exceptions import (
+        ElementClickInterceptedException, NoSuchElementException, StaleElementReferenceException,
+        TimeoutException)
     from selenium.webdriver.chrome.service import Service
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
@@ -132,9 +134,13 @@ class MapPage(unittest.TestCase):
         self.wait_state("live")
 
     def wait(self, condition, what):
+        # The page redraws its list and moves its map: what was found may be gone or covered when it
+        # is asked or clicked.
+        moving = (NoSuchElementException, StaleElementReferenceException,
+                  ElementClickInterceptedException)
         try:
-            return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02).until(
-                lambda _: condition())
+            return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02,
+                                 ignored_exceptions=moving).until(lambda _: condition())
         except TimeoutException:
             log = [entry["message"] for entry in self.browser.get_log("browser")]
             self.picture("failed")
@@ -158,6 +164,14 @@ class MapPage(unittest.TestCase):
         self.wait(lambda: self.count(selector) >= count, f"no {selector}")
         return self.find(selector)
 
+    def click(self, selector):
+        def clicked():
+            element = self.find(selector)
+            self.browser.execute_script("arguments[0].scrollIntoView({block: 'nearest'})", element)
+            element.click()
+            return True
+        self.wait(clicked, f"{selector} cannot be clicked")
+
     def press(self, *keys):
         self.browser.switch_to.active_element.send_keys(*keys)
 
@@ -175,9 +189,7 @@ class MapPage(unittest.TestCase):
         self.assertEqual(loud, [])
 
     def open_popup_of(self, hazard_id):
-        row = self.wait_for(f'#hazard-list button[data-hazard="{hazard_id}"]')
-        self.browser.execute_script("arguments[0].scrollIntoView()", row)
-        row.click()
+        self.click(f'#hazard-list button[data-hazard="{hazard_id}"]')
         return self.wait_for(f'.popup[data-hazard="{hazard_id}"]')
 
 
@@ -241,7 +253,7 @@ class Desktop(MapPage):
         self.open_popup_of(hazard)
         self.zone.report("deer", LAT, LON)
         self.wait(lambda: "2 times" in self.find(".popup").text, "the sighting is not counted")
-        self.find(".leaflet-popup-close-button").click()
+        self.click(".leaflet-popup-close-button")
         self.wait(lambda: self.count(".popup") == 0, "the popup does not close")
         self.zone.report("deer", LAT, LON)
         self.wait(lambda: "3 sightings" in self.find("#hazard-list").text, "not counted again")
@@ -257,10 +269,9 @@ class Desktop(MapPage):
         debris = self.zone.report("debris", LAT, LON + 0.002)
         self.open()
         self.wait_for(".pin", 4)
-        pothole = self.find('#filter input[data-class="pothole"]')
         self.assertEqual(self.find("#filter li .chip:has([data-class=pothole]) .count").text, "3")
         self.open_popup_of(debris)
-        pothole.click()
+        self.click('#filter input[data-class="pothole"]')
         self.wait(lambda: self.count(".pin") == 1, "potholes are still shown")
         self.assertEqual(self.count(".popup"), 1, "the filter closed another class's popup")
         self.assertEqual(self.count("#hazard-list button"), 1)
@@ -268,9 +279,9 @@ class Desktop(MapPage):
         self.wait(lambda: self.find("#filter .chip:has([data-class=pothole]) .count").text == "4",
                   "a hidden class is not counted")
         self.assertEqual(self.count(".pin"), 1)
-        self.find("#filter-none").click()
+        self.click("#filter-none")
         self.wait(lambda: self.count(".pin") == 0, "none is not none")
-        self.find("#filter-all").click()
+        self.click("#filter-all")
         self.wait(lambda: self.count(".pin") == 5, "all is not all")
         self.assert_quiet()
 
@@ -279,7 +290,7 @@ class Desktop(MapPage):
         far = self.zone.report("debris", LAT + 1, LON + 1)
         self.open()
         self.open_popup_of(far)
-        self.find("#in-view").click()
+        self.click("#in-view")
         self.wait(lambda: self.count("#hazard-list button") == 1, "the list ignores the view")
         self.assertIn("Debris", self.find("#hazard-list").text)
 
@@ -331,7 +342,7 @@ class Desktop(MapPage):
             self.zone.report(name, road[step][0] + 2e-5, road[step][1])
         self.wait(lambda: self.count("#hazard-list button") == 9, "the hazards are missing")
         self.picture("drive")
-        self.find("#vehicles button").click()
+        self.click("#vehicles button")
         self.assertEqual(self.find("#vehicles button").get_attribute("aria-pressed"), "true")
         self.picture("drive_follow")
         self.assert_quiet()
@@ -360,7 +371,7 @@ class Desktop(MapPage):
         self.picture("ten_thousand")
         hazard = self.find("#hazard-list button").get_attribute("data-hazard")
         self.open_popup_of(hazard)
-        self.browser.find_element(By.CSS_SELECTOR, '[data-class="debris"]').click()
+        self.click('#filter [data-class="debris"]')
         self.wait(lambda: self.find("#list-count").text != "10,000", "the filter does nothing")
         self.picture("ten_thousand_near")
         self.assert_quiet()
@@ -421,7 +432,7 @@ class Phone(MapPage):
         self.wait_for(".pin", 3)
         self.picture("phone")
         self.assert_fits()
-        self.find("#sheet-handle").click()
+        self.click("#sheet-handle")
         self.wait(lambda: self.find("#hazard-list").is_displayed(), "the list does not open")
         self.picture("phone_list")
         self.assert_fits()

@@ -32,7 +32,7 @@ class Recipe:
     """How strongly to change pictures. Probabilities are per sample."""
 
     mosaic: float = 0.5
-    mix: float = 0.25
+    mix: float = 0.15
     paste: float = 0.65
     mirror: float = 0.5
     scale_spread: float = 1.6  # a group's scale is multiplied by up to this or divided by it
@@ -43,7 +43,7 @@ class Recipe:
     grey: float = 0.12
     shadow: float = 0.45
     relight: float = 0.4
-    erase: float = 0.3
+    erase: float = 0.15
     hue: float = 8.0  # degrees of cv2's 180
     saturation: float = 0.6
     brightness: float = 0.45

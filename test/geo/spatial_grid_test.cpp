@@ -1,4 +1,4 @@
-#include "hazard/spatial_grid.h"
+#include "geo/spatial_grid.h"
 
 #include <gmock/gmock.h>
 
@@ -94,6 +94,33 @@ TEST(SpatialGrid, KeepsEveryPlaceWhileItGrows) {
     const auto found = grid.Nearest(places[id], 0.001);
     ASSERT_TRUE(found);
     EXPECT_EQ(found->id, id);
+  }
+}
+
+TEST(SpatialGrid, PrefersTheLowestIdAmongEqualDistances) {
+  SpatialGrid grid(30.0);
+  for (const std::uint64_t id : {4U, 2U, 3U}) grid.Insert({10, 10}, id);
+  EXPECT_EQ(grid.Nearest({10, 10.00001}, 5.0)->id, 2U);
+}
+
+TEST(SpatialGrid, FindsTheSameWhateverTheSeed) {
+  std::mt19937_64 random{5};
+  std::uniform_real_distribution<double> offset(0, 0.003);
+  SpatialGrid first = SpatialGrid::ForRadius(5.0, 1);
+  SpatialGrid second = SpatialGrid::ForRadius(5.0, 0xfeedface12345678u);
+  for (std::uint64_t id = 0; id < 3000; ++id) {
+    const GeoPoint place{50 + offset(random), 8 + offset(random)};
+    first.Insert(place, id);
+    second.Insert(place, id);
+  }
+  for (int i = 0; i < 300; ++i) {
+    const GeoPoint query{50 + offset(random), 8 + offset(random)};
+    const auto found = first.Nearest(query, 5.0);
+    const auto expected = second.Nearest(query, 5.0);
+    ASSERT_EQ(found.has_value(), expected.has_value());
+    if (found) {
+      EXPECT_EQ(found->id, expected->id);
+    }
   }
 }
 

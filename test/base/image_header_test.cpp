@@ -1,4 +1,4 @@
-#include "zone/image_header.h"
+#include "base/image_header.h"
 
 #include <gtest/gtest.h>
 
@@ -8,17 +8,15 @@
 #include <random>
 #include <vector>
 
-#include "zone_fixture.h"
-
 namespace livemap {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-Bytes Encoded(const char* extension, int width, int height,
-              const std::vector<int>& parameters = {}) {
+Bytes Encoded(const char* extension, int width, int height, const std::vector<int>& parameters = {},
+              int type = CV_8UC3) {
   Bytes bytes;
-  cv::imencode(extension, cv::Mat(height, width, CV_8UC3, cv::Scalar(10, 120, 200)), bytes,
+  cv::imencode(extension, cv::Mat(height, width, type, cv::Scalar(10, 120, 200)), bytes,
                parameters);
   return bytes;
 }
@@ -37,9 +35,17 @@ TEST(ImageHeader, ReadsWhatARealEncoderWrites) {
   for (const Case& image : cases) {
     const auto header = ReadImageHeader(image.bytes.data(), image.bytes.size());
     ASSERT_TRUE(header) << image.format;
-    EXPECT_EQ(header->format, image.format);
-    EXPECT_EQ(header->width, 321U);
-    EXPECT_EQ(header->height, 123U);
+    EXPECT_STREQ(FormatName(header->format), image.format);
+    EXPECT_EQ(header->channels, 3);
+    EXPECT_EQ(header->width, 321);
+    EXPECT_EQ(header->height, 123);
+  }
+}
+
+TEST(ImageHeader, StatesThatGreyIsOneChannel) {
+  for (const char* extension : {".jpg", ".png"}) {
+    const Bytes grey = Encoded(extension, 8, 9, {}, CV_8UC1);
+    EXPECT_EQ(ReadImageHeader(grey.data(), grey.size())->channels, 1) << extension;
   }
 }
 
@@ -48,16 +54,16 @@ TEST(ImageHeader, ReadsAnExtendedWebp) {
               'X', 10,  0,   0,   0,  0, 0, 0, 0,   0x3f, 0x01, 0,   0x7a, 0,   0};
   const auto header = ReadImageHeader(bytes.data(), bytes.size());
   ASSERT_TRUE(header);
-  EXPECT_EQ(header->width, 320U);
-  EXPECT_EQ(header->height, 123U);
+  EXPECT_EQ(header->width, 320);
+  EXPECT_EQ(header->height, 123);
 }
 
 TEST(ImageHeader, GivesNothingForForeignEmptyOrZeroSizedFiles) {
   EXPECT_FALSE(ReadImageHeader(nullptr, 0));
   const Bytes text{'<', 's', 'v', 'g', '>'};
   EXPECT_FALSE(ReadImageHeader(text.data(), text.size()));
-  const Bytes empty = MakeJpeg(0, 100);
-  EXPECT_FALSE(ReadImageHeader(empty.data(), empty.size()));
+  const Bytes no_width{0xff, 0xd8, 0xff, 0xc0, 0, 11, 8, 0, 100, 0, 0, 1, 1, 0x11, 0};
+  EXPECT_FALSE(ReadImageHeader(no_width.data(), no_width.size()));
   const Bytes scan_first{0xff, 0xd8, 0xff, 0xda, 0, 8, 1, 1, 0, 0, 63, 0, 0, 0, 0};
   EXPECT_FALSE(ReadImageHeader(scan_first.data(), scan_first.size()));
 }
@@ -70,7 +76,7 @@ TEST(ImageHeader, SurvivesEveryTruncationAndRandomDamage) {
       const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
       const auto header = ReadImageHeader(cut.data(), cut.size());
       if (header) {
-        EXPECT_EQ(header->width, 64U);
+        EXPECT_EQ(header->width, 64);
       }
     }
     for (int round = 0; round < 2000; ++round) {
@@ -81,9 +87,19 @@ TEST(ImageHeader, SurvivesEveryTruncationAndRandomDamage) {
       }
       const auto header = ReadImageHeader(damaged.data(), damaged.size());
       if (header) {
-        EXPECT_GT(header->width, 0U);
+        EXPECT_GT(header->width, 0);
       }
     }
+  }
+}
+
+TEST(HasImageEnd, TellsWholeFilesFromCutOnes) {
+  for (const char* extension : {".jpg", ".png", ".webp"}) {
+    const Bytes whole = Encoded(extension, 64, 48);
+    const auto format = ReadImageHeader(whole.data(), whole.size())->format;
+    EXPECT_TRUE(HasImageEnd(whole.data(), whole.size(), format)) << extension;
+    EXPECT_FALSE(HasImageEnd(whole.data(), whole.size() / 2, format)) << extension;
+    EXPECT_FALSE(HasImageEnd(whole.data(), 0, format)) << extension;
   }
 }
 

@@ -14,9 +14,8 @@ namespace livemap {
 /// Places on the earth, found by distance at a cost that does not grow with their number.
 ///
 /// The grid has cubic cells in earth-centred axes, hashed into one flat table. So there is no
-/// seam at the antimeridian, no pole, and no cell whose width depends on the latitude. Cells should
-/// be several times as wide as the usual search radius: a search then reads about two cells.
-/// Not thread-safe.
+/// seam at the antimeridian, no pole, and no cell whose width depends on the latitude. Not
+/// thread-safe.
 class SpatialGrid {
  public:
   struct Neighbour {
@@ -24,14 +23,20 @@ class SpatialGrid {
     double distance_m;  ///< Geodesic.
   };
 
-  /// `cell_m`: edge of a cell in metres, positive.
-  explicit SpatialGrid(double cell_m);
+  /// A grid for searches of about this radius, metres. Cells are six radii wide: a search reads
+  /// (1 + 2/6)^3, about 2.4 of them, and even a street where a hazard lies at every radius puts
+  /// only some dozens into one. `hash_seed` makes the table's order unpredictable to whoever
+  /// chooses the places; results do not depend on it.
+  static SpatialGrid ForRadius(double radius_m, std::uint64_t hash_seed = 0);
+
+  /// `cell_m`: edge of a cell, 0.01 to 1e6 metres; Error otherwise.
+  explicit SpatialGrid(double cell_m, std::uint64_t hash_seed = 0);
 
   /// Adds a place. Ids are the caller's; the same id may stand at several places.
   void Insert(const GeoPoint& place, std::uint64_t id);
   /// Removes what Insert added with exactly these values; false when there is none.
   bool Erase(const GeoPoint& place, std::uint64_t id);
-  /// The nearest place within `radius_m` (inclusive) of `centre`.
+  /// The nearest place within `radius_m` (inclusive) of `centre`, the lowest id among equals.
   std::optional<Neighbour> Nearest(const GeoPoint& centre, double radius_m) const;
 
   std::size_t size() const { return entries_.size(); }
@@ -51,7 +56,7 @@ class SpatialGrid {
   static constexpr std::uint32_t kEmpty = 0xffffffff;
 
   Cell CellAt(const Eigen::Vector3d& earth_m) const;
-  static std::uint32_t Hash(const Cell& cell);
+  std::uint32_t Hash(const Cell& cell) const;
   std::size_t Next(std::size_t slot) const { return (slot + 1) & (slots_.size() - 1); }
   std::size_t Home(std::uint32_t hash) const { return hash & (slots_.size() - 1); }
   std::size_t FindSlot(std::uint32_t hash, std::uint32_t entry) const;
@@ -60,6 +65,7 @@ class SpatialGrid {
   void Grow();
 
   double cell_m_;
+  std::uint64_t hash_seed_;
   std::vector<Slot> slots_;  // Size a power of two, at most half full, linear probing.
   std::vector<Entry> entries_;
 };

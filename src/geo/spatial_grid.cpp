@@ -1,4 +1,4 @@
-#include "hazard/spatial_grid.h"
+#include "geo/spatial_grid.h"
 
 #include <GeographicLib/Geocentric.hpp>
 #include <cmath>
@@ -18,7 +18,13 @@ Eigen::Vector3d ToEarth(const GeoPoint& place) {
 
 }  // namespace
 
-SpatialGrid::SpatialGrid(double cell_m) : cell_m_(cell_m), slots_(16) {
+SpatialGrid SpatialGrid::ForRadius(double radius_m, std::uint64_t hash_seed) {
+  constexpr double kCellInRadii = 6.0;
+  return SpatialGrid(kCellInRadii * radius_m, hash_seed);
+}
+
+SpatialGrid::SpatialGrid(double cell_m, std::uint64_t hash_seed)
+    : cell_m_(cell_m), hash_seed_(hash_seed), slots_(16) {
   if (!(cell_m >= 0.01 && cell_m <= 1e6)) {
     throw Error("the cell of a spatial grid is " + std::to_string(cell_m) +
                 " m, accepted is 0.01 to 1000000 m");
@@ -77,7 +83,10 @@ std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centr
           if ((entry.earth_m - earth_m).squaredNorm() > chord_m * chord_m) continue;
           const double distance_m = GeodesicDistanceM(entry.place, centre);
           if (distance_m > radius_m) continue;
-          if (!nearest || distance_m < nearest->distance_m) nearest = {entry.id, distance_m};
+          if (!nearest || distance_m < nearest->distance_m ||
+              (distance_m == nearest->distance_m && entry.id < nearest->id)) {
+            nearest = {entry.id, distance_m};
+          }
         }
       }
     }
@@ -94,9 +103,9 @@ SpatialGrid::Cell SpatialGrid::CellAt(const Eigen::Vector3d& earth_m) const {
   return cell;
 }
 
-std::uint32_t SpatialGrid::Hash(const Cell& cell) {
+std::uint32_t SpatialGrid::Hash(const Cell& cell) const {
   // Multiply and fold per axis (the finaliser of splitmix64), so that neighbouring cells scatter.
-  std::uint64_t hash = 0x9e3779b97f4a7c15u;
+  std::uint64_t hash = hash_seed_;
   for (const std::int32_t index : cell) {
     hash ^= static_cast<std::uint32_t>(index);
     hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;

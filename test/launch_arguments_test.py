@@ -1,0 +1,58 @@
+#!/usr/bin/python3
+"""What roslaunch makes of our launch files: every parameter has its default and can be set by an argument."""
+
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+NODES = {
+    "vehicle": {"camera_ingest": "camera_ingest", "hazard_detection": "hazard_detection",
+                "hazard_reporting": "hazard_reporting", "mqtt_bridge": "mqtt_bridge_vehicle"},
+    "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone"},
+}
+
+
+def parameters(launch, *arguments):
+    """What roslaunch would put on the parameter server."""
+    result = subprocess.run(["/usr/bin/roslaunch", "--dump-params", str(ROOT / "launch" / launch), *arguments],
+                            check=True, capture_output=True, text=True)
+    return yaml.safe_load(result.stdout)
+
+
+def changed(value):
+    """Another value of the same type."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, (int, float)):
+        return value + 1
+    return "another" if isinstance(value, str) else []
+
+
+class LaunchArguments(unittest.TestCase):
+    def test_every_parameter_of_every_node_can_be_set_by_the_argument_of_its_node(self):
+        # What an argument of its own sets already is not set twice.
+        own_arguments = {"source", "transport", "uri", "camera_info_url", "model", "database", "drive_id",
+                         "catalogue", "publish_tf", "user", "zone", "host", "port", "password_file",
+                         "directory", "hazards", "web_address", "web_port", "tile_url", "tile_attribution"}
+        for launch, nodes in NODES.items():
+            for node, file in nodes.items():
+                defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
+                wanted = {key: changed(value) for key, value in defaults.items() if key not in own_arguments}
+                dumped = parameters(f"{launch}.launch", f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
+                for key, value in wanted.items():
+                    self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
+
+    def test_a_replay_hands_its_arguments_on_to_the_vehicle(self):
+        with tempfile.NamedTemporaryFile(suffix=".bag") as bag:
+            dumped = parameters("replay.launch", f"bag:={bag.name}", "vehicle:=car-7",
+                                "hazard_reporting:={max_range_m: 12.5}")
+        self.assertEqual(dumped["/mqtt_bridge/user"], "car-7")
+        self.assertEqual(dumped["/hazard_reporting/max_range_m"], 12.5)
+
+
+if __name__ == "__main__":
+    unittest.main()
