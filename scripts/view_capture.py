@@ -48,6 +48,17 @@ def rviz_file(name):
     return pathlib.Path(rospkg.RosPack().get_path("livemap")) / "rviz" / f"{name}.rviz"
 
 
+def shifted_view(rviz_file_path, directory, east_m):
+    """A copy of a top-down view, in `directory`, that looks at a place east of the map's origin."""
+    text = pathlib.Path(rviz_file_path).read_text()
+    shifted = text.replace("      X: 0\n", f"      X: {east_m}\n")
+    if shifted == text:
+        raise RuntimeError(f"{rviz_file_path} has no 'X: 0' in its view")
+    path = pathlib.Path(directory) / pathlib.Path(rviz_file_path).name
+    path.write_text(shifted)
+    return path
+
+
 def start_rviz(rviz_file_path, display, master_uri, log=subprocess.DEVNULL):
     environment = dict(os.environ, DISPLAY=display.name, ROS_MASTER_URI=master_uri,
                        ROS_HOSTNAME="127.0.0.1", LIBGL_ALWAYS_SOFTWARE="1",

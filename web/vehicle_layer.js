@@ -51,7 +51,7 @@ export class VehicleLayer {
     const here = L.latLng(latitude, longitude);
     if (properties.trail) this.replaceTrail(vehicle, properties.trail);
     this.extendTrail(vehicle, here);
-    vehicle.time = Date.parse(properties.time);
+    vehicle.heard = Date.parse(properties.heard);
     vehicle.speed = properties.speed_mps;
     vehicle.marker.setLatLng(here);
     this.turn(vehicle, properties.course_rad);
@@ -90,7 +90,7 @@ export class VehicleLayer {
       title: 'Follow this vehicle on the map' },
     element('span', { class: 'vehicle-dot', 'aria-hidden': 'true' }),
     element('span', { class: 'row-label' }, id), facts);
-    const vehicle = { id, marker, dots: [], road: null, facts, button, time: NaN, speed: null };
+    const vehicle = { id, marker, dots: [], road: null, facts, button, heard: NaN, speed: null };
     button.addEventListener('click', () => this.follow(id));
     marker.addTo(this.map);
     this.vehicles.set(id, vehicle);
@@ -101,7 +101,7 @@ export class VehicleLayer {
 
   updateRow(vehicle) {
     const speed = Number.isFinite(vehicle.speed) ? `${Math.round(vehicle.speed * 3.6)} km/h \u00b7 ` : '';
-    vehicle.facts.textContent = speed + ago(vehicle.time);
+    vehicle.facts.textContent = speed + ago(vehicle.heard);
   }
 
   turn(vehicle, course) {

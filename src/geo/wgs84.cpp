@@ -1,8 +1,10 @@
 #include "geo/wgs84.h"
 
+#include <GeographicLib/Geocentric.hpp>
 #include <GeographicLib/Geodesic.hpp>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 
@@ -65,6 +67,17 @@ GeoPoint LocalFrame::ToGeo(const Eigen::Vector2d& east_north_m) const {
     up_m -= height_m;
   }
   return point;
+}
+
+Eigen::Isometry3d LocalFrame::InEarth() const {
+  std::vector<double> axes(9);  // Rows first: columns are east, north, up.
+  Eigen::Vector3d origin_m;
+  GeographicLib::Geocentric::WGS84().Forward(datum_.latitude_deg, datum_.longitude_deg, 0.0,
+                                             origin_m.x(), origin_m.y(), origin_m.z(), axes);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(axes.data());
+  pose.translation() = origin_m;
+  return pose;
 }
 
 }  // namespace livemap

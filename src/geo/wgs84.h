@@ -1,8 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <GeographicLib/LocalCartesian.hpp>
-#include <cstdint>
 
 namespace livemap {
 
@@ -33,6 +32,9 @@ class LocalFrame {
   Eigen::Vector2d ToEnu(const GeoPoint& point) const;
   /// Inverse of ToEnu to better than a micrometre for points within 100 km of the datum.
   GeoPoint ToGeo(const Eigen::Vector2d& east_north_m) const;
+  /// Pose of this frame in the earth frame of REP 105: earth-centred, metres, x to the meridian of
+  /// Greenwich, z to the north pole. The datum lies on the ellipsoid.
+  Eigen::Isometry3d InEarth() const;
   const GeoPoint& datum() const { return datum_; }
 
  private:

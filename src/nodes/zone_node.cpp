@@ -43,7 +43,7 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       queue_(static_cast<std::size_t>(config_.queue_reports),
              static_cast<std::size_t>(config_.queue_bytes)),
       updater_(node, private_node) {
-  if (config_.map_datum) map_.emplace(*config_.map_datum);
+  if (config_.map_datum) SetMap(*config_.map_datum);
   receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
   notice_publisher_ = node.advertise<HazardNotice>("hazard/notice", 20000);
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
@@ -138,7 +138,7 @@ void ZoneNode::OnEvent(const ZoneEvent& event) {
   const GeoPoint place = event.hazard ? event.hazard->hazard.position : event.vehicle->position;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!map_) map_.emplace(place);
+    if (!map_) SetMap(place);
     if (event.vehicle) paths_.Add(*event.vehicle);
     if (event.hazard) ++counters_.notices_sent;
   }
@@ -207,6 +207,24 @@ bool ZoneNode::TellJoined() {
   return !to_tell_.empty();
 }
 
+void ZoneNode::SetMap(const GeoPoint& datum) {
+  map_.emplace(datum);
+  const Eigen::Isometry3d pose = map_->InEarth();
+  const Eigen::Quaterniond rotation(pose.linear());
+  geometry_msgs::TransformStamped transform;
+  transform.transform.translation.x = pose.translation().x();
+  transform.transform.translation.y = pose.translation().y();
+  transform.transform.translation.z = pose.translation().z();
+  transform.transform.rotation.x = rotation.x();
+  transform.transform.rotation.y = rotation.y();
+  transform.transform.rotation.z = rotation.z();
+  transform.transform.rotation.w = rotation.w();
+  transform.header.frame_id = "earth";  // REP 105.
+  transform.header.stamp = ros::Time::now();
+  transform.child_frame_id = config_.map_frame;
+  transform_broadcaster_.sendTransform(transform);
+}
+
 void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
   // Nobody looks: whoever comes gets the view of then, or the latched one if it still holds.
   if (marker_publisher_.getNumSubscribers() == 0 || !view_changed_.exchange(false)) return;
@@ -216,7 +234,7 @@ void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!map_ && hazards.empty()) return;
-    if (!map_) map_.emplace(hazards.front().position);
+    if (!map_) SetMap(hazards.front().position);
     paths_.KeepOnly(vehicles);
     markers = ZoneMarkers(hazards, vehicles, paths_, config_.zone.catalogue, *map_,
                           config_.map_frame, ros::Time::now());

@@ -4,6 +4,7 @@
 #include <livemap/HazardReport.h>
 #include <livemap/VehiclePosition.h>
 #include <ros/ros.h>
+#include <tf2_ros/static_transform_broadcaster.h>
 
 #include <atomic>
 #include <cstdint>
@@ -45,6 +46,8 @@ class ZoneNode {
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&);
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
+  /// Makes `datum` the origin of the map frame; mutex_ is held or no other thread runs yet.
+  void SetMap(const GeoPoint& datum);
   void WorkUntilClosed();
   void CommitBatch(const std::vector<Report>& reports);
   void NoteJoin(const VehicleState& vehicle);
@@ -69,6 +72,7 @@ class ZoneNode {
   ros::Publisher receipt_publisher_;
   ros::Publisher notice_publisher_;
   ros::Publisher marker_publisher_;
+  tf2_ros::StaticTransformBroadcaster transform_broadcaster_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;
   diagnostic_updater::Updater updater_;

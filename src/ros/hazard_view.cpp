@@ -1,25 +1,16 @@
 #include "ros/hazard_view.h"
 
 #include <cmath>
-#include <cstdlib>
+
+#include "ros/class_colour.h"
 
 namespace livemap {
 namespace {
 
 constexpr double kDiameterM = 1.2;
 constexpr double kHeightM = 0.4;
-constexpr double kTextM = 0.8;
-constexpr float kOwnAlpha = 0.5F;
-
-std_msgs::ColorRGBA ColourOf(const HazardClass& entry, float alpha) {
-  const long rgb = std::strtol(entry.colour.c_str() + 1, nullptr, 16);  // "#rrggbb"
-  std_msgs::ColorRGBA colour;
-  colour.r = static_cast<float>((rgb >> 16) & 0xff) / 255.0F;
-  colour.g = static_cast<float>((rgb >> 8) & 0xff) / 255.0F;
-  colour.b = static_cast<float>(rgb & 0xff) / 255.0F;
-  colour.a = alpha;
-  return colour;
-}
+constexpr double kTextM = 1.2;
+constexpr float kOwnAlpha = 0.7F;
 
 }  // namespace
 
@@ -46,13 +37,14 @@ visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& ha
     marker.pose.position.z = kHeightM / 2;
     marker.scale.x = marker.scale.y = kDiameterM;
     marker.scale.z = kHeightM;
-    marker.color = ColourOf(entry, hazard.of_zone ? 1.0F : kOwnAlpha);
+    marker.color = ClassColour(entry, hazard.of_zone ? 1.0F : kOwnAlpha);
     marker.text.clear();
     array.markers.push_back(marker);
     marker.ns = "labels";
     marker.type = visualization_msgs::Marker::TEXT_VIEW_FACING;
     marker.pose.position.z = kHeightM + kTextM;
     marker.scale.z = kTextM;
+    marker.color.r = marker.color.g = marker.color.b = marker.color.a = 1.0F;
     marker.text = entry.label;
     array.markers.push_back(marker);
   }

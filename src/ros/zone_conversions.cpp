@@ -1,8 +1,9 @@
 #include "ros/zone_conversions.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <set>
+
+#include "ros/class_colour.h"
 
 namespace livemap {
 namespace {
@@ -10,12 +11,13 @@ namespace {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-constexpr double kHazardDiameterM = 1.5;
-constexpr double kLabelHeightM = 1.0;
+// Larger than life: a zone is looked at from far above.
+constexpr double kHazardDiameterM = 3.0;
+constexpr double kLabelHeightM = 2.5;
 constexpr std::size_t kMaxLabels = 500;
-constexpr double kVehicleLengthM = 4.0;
-constexpr double kVehicleWidthM = 1.8;
-constexpr double kTrailDotM = 0.6;
+constexpr double kVehicleLengthM = 8.0;
+constexpr double kVehicleWidthM = 3.5;
+constexpr double kTrailDotM = 1.2;
 constexpr double kTrailSpacingM = 1.0;
 
 std_msgs::ColorRGBA Colour(float red, float green, float blue) {
@@ -25,13 +27,6 @@ std_msgs::ColorRGBA Colour(float red, float green, float blue) {
   colour.b = blue;
   colour.a = 1.0F;
   return colour;
-}
-
-std_msgs::ColorRGBA ColourOf(const HazardClass& entry) {
-  const long rgb = std::strtol(entry.colour.c_str() + 1, nullptr, 16);  // "#rrggbb"
-  return Colour(static_cast<float>((rgb >> 16) & 0xff) / 255.0F,
-                static_cast<float>((rgb >> 8) & 0xff) / 255.0F,
-                static_cast<float>(rgb & 0xff) / 255.0F);
 }
 
 geometry_msgs::Point ToPoint(const Eigen::Vector2d& east_north_m, double z_m) {
@@ -63,7 +58,7 @@ void AppendHazards(const std::vector<Hazard>& hazards, const HazardCatalogue& ca
     if (known == spheres.end()) {
       list = Begin(base, "hazards", static_cast<int>(spheres.size()), Marker::SPHERE_LIST,
                    kHazardDiameterM);
-      list.color = ColourOf(entry);
+      list.color = ClassColour(entry, 1.0F);
     }
     const Eigen::Vector2d place_m = map.ToEnu(hazard.position);
     list.points.push_back(ToPoint(place_m, kHazardDiameterM / 2));

@@ -122,6 +122,7 @@ Json VehicleFeature(const VehicleState& vehicle, const TrailPositions& trail) {
   properties["course_rad"] = Rounded(vehicle.course_rad, 4);
   properties["speed_mps"] = Rounded(vehicle.speed_mps, 2);
   properties["time"] = Rfc3339(vehicle.stamp_ns);
+  properties["heard"] = Rfc3339(vehicle.heard_ns);
   if (trail.empty()) return feature;
   Json& positions = properties["trail"] = Json::array();
   for (const auto& [longitude, latitude] : trail) {

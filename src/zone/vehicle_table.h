@@ -16,20 +16,16 @@ class VehicleTable {
  public:
   VehicleTable(double retention_s, std::size_t max_vehicles);
 
-  void Update(const VehicleState& vehicle, std::int64_t now_ns);
+  /// `vehicle.heard_ns` is now.
+  void Update(const VehicleState& vehicle);
   /// Those heard of within the retention time, by id.
   std::vector<VehicleState> List(std::int64_t now_ns) const;
 
  private:
-  struct Entry {
-    VehicleState state;
-    std::int64_t heard_ns = 0;
-  };
-
   const std::int64_t retention_ns_;
   const std::size_t max_vehicles_;
   mutable std::mutex mutex_;
-  std::map<std::string, Entry> entries_;
+  std::map<std::string, VehicleState> vehicles_;
 };
 
 }  // namespace livemap

@@ -64,7 +64,7 @@ class ZoneService::Implementation {
 
   std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
   bool Remove(const Uuid& uuid, const std::string& reason);
-  bool UpdateVehicle(const VehicleState& vehicle);
+  bool UpdateVehicle(const VehicleState& told);
   ZoneStatistics Statistics() const;
 
   const Config config_;
@@ -273,9 +273,10 @@ bool ZoneService::Implementation::Remove(const Uuid& uuid, const std::string& re
   return true;
 }
 
-bool ZoneService::Implementation::UpdateVehicle(const VehicleState& vehicle) {
+bool ZoneService::Implementation::UpdateVehicle(const VehicleState& told) {
+  VehicleState vehicle = told;
+  vehicle.heard_ns = now_ns_();
   const std::size_t max_bytes = config_.limits.max_text_bytes;
-  const std::int64_t now_ns = now_ns_();
   const bool acceptable =
       IsPrintableText(vehicle.vehicle_id, max_bytes) &&
       (vehicle.drive_id.empty() || IsPrintableText(vehicle.drive_id, max_bytes)) &&
@@ -286,9 +287,9 @@ bool ZoneService::Implementation::UpdateVehicle(const VehicleState& vehicle) {
     return false;
   }
   ++vehicle_positions_;
-  vehicles_.Update(vehicle, now_ns);
+  vehicles_.Update(vehicle);
   ZoneEvent message;
-  message.vehicle = vehicle;
+  message.vehicle = std::move(vehicle);
   stream_.Publish(message);
   return true;
 }

@@ -25,6 +25,7 @@ struct VehicleState {
   double course_rad = 0;  ///< Clockwise from true north; NaN when standing.
   double speed_mps = 0;
   std::int64_t stamp_ns = 0;  ///< Of the fix, vehicle clock (UTC).
+  std::int64_t heard_ns = 0;  ///< Zone clock (UTC), set by UpdateVehicle.
 };
 
 /// One message of the zone's stream: exactly one of the two is set.

@@ -56,6 +56,18 @@ TEST(LocalFrame, IsTheInverseOfItself) {
   }
 }
 
+TEST(LocalFrame, StandsOnTheEarthWithEastNorthAndUpAsItsAxes) {
+  // At latitude 0, longitude 90 east is -x, north is z and up is y of the earth.
+  const Eigen::Isometry3d pose = LocalFrame({0, 90}).InEarth();
+  EXPECT_NEAR((pose.translation() - Eigen::Vector3d(0, 6378137.0, 0)).norm(), 0.0, 1e-6);
+  EXPECT_NEAR((pose.linear() * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitX()).norm(), 0,
+              1e-12);
+  EXPECT_NEAR((pose.linear() * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm(), 0,
+              1e-12);
+  EXPECT_NEAR((pose.linear() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm(), 0,
+              1e-12);
+}
+
 TEST(LocalFrame, AgreesWithGeodesicsNearTheDatum) {
   const GeoPoint datum{-29.7, -53.7};
   const LocalFrame frame(datum);

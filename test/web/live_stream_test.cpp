@@ -44,11 +44,13 @@ TEST_F(LiveStreamTest, TellsVehiclePositions) {
   vehicle.vehicle_id = "car-1";
   vehicle.position = kStart;
   vehicle.speed_mps = 12.5;
-  vehicle.stamp_ns = ZoneFixture::kStartNs;
+  vehicle.stamp_ns =
+      ZoneFixture::kStartNs - 3'600'000'000'000;  // A replay: driven long ago, heard now.
   ASSERT_TRUE(fixture_.zone->UpdateVehicle(vehicle));
   const nlohmann::json message = client.NextOfType("vehicle");
   EXPECT_EQ(message["feature"]["properties"]["vehicle"], "car-1");
   EXPECT_EQ(message["feature"]["properties"]["speed_mps"], 12.5);
+  EXPECT_NE(message["feature"]["properties"]["heard"], message["feature"]["properties"]["time"]);
 
   StreamClient later(server_.port());
   EXPECT_EQ(later.NextOfType("vehicle")["feature"]["id"], "car-1");
