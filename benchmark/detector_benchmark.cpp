@@ -7,6 +7,7 @@
 // of OpenCV (default: all cores).
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <opencv2/core.hpp>
@@ -30,7 +31,7 @@ std::string ModelPath() {
 int Threads() {
   const char* threads = std::getenv("LIVEMAP_THREADS");
   if (threads == nullptr) return 0;
-  return static_cast<int>(ParseFlagNumber("LIVEMAP_THREADS", threads, 1, 256));
+  return static_cast<int>(std::clamp(std::strtol(threads, nullptr, 10), 0L, 256L));
 }
 
 /// A frame of noise: what a convolution costs does not depend on the picture.

@@ -6,23 +6,19 @@ traffic cone.
 """
 
 import os
-import re
 import signal
-import subprocess
 import sys
 import tempfile
-import threading
 import unittest
 
 import numpy
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 
 from livemap.msg import DetectionArray
-from mqtt_bridge_fixture import SOURCE_DIRECTORY, eventually, start_child
+from node_testing import SOURCE_DIRECTORY, NodeletUnderTest, eventually, parameters_of
 
 TINY_MODEL = os.path.join(SOURCE_DIRECTORY, "test", "inference", "tiny.yaml")
 WIDTH, HEIGHT = 64, 48
@@ -42,93 +38,32 @@ def image(number, *blocks):
     return message
 
 
-class Detector:
-    """A nodelet manager with the nodelet in namespace `/name`, and the test's ends of its topics."""
+class Detector(NodeletUnderTest):
+    """A nodelet manager with the nodelet, and the test's ends of its topics."""
 
     def __init__(self, name):
-        self.name = name
-        self.log = tempfile.NamedTemporaryFile(suffix=".log")
-        self.lock = threading.Lock()
-        self.messages = {}
-        self.processes = []
-        self.subscribers = []
-        self.publisher = rospy.Publisher(f"/{name}/camera_rect/image", Image, queue_size=2 * BURST)
-        self.subscribe("hazard/detections", DetectionArray)
-        self.subscribers.append(
-            rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep, "diagnostics"))
-        self.manager = self._start("manager", "manager")
-
-    def subscribe(self, topic, message_class):
-        self.subscribers.append(
-            rospy.Subscriber(f"/{self.name}/{topic}", message_class, self._keep, topic))
-
-    def _keep(self, message, topic):
-        with self.lock:
-            self.messages.setdefault(topic, []).append(message)
-
-    def received(self, topic):
-        with self.lock:
-            return list(self.messages.get(topic, []))
+        super().__init__(name, "hazard_detection")
+        self.publisher = self.advertise("camera_rect/image", Image, queue_size=2 * BURST)
+        self.results = self.subscribe("hazard/detections", DetectionArray)
+        self.manager = self.start_nodelet("manager", "manager")
 
     def answers(self):
         return self.received("hazard/detections")
 
-    def _start(self, node_name, *arguments):
-        process = start_child(
-            ["rosrun", "nodelet", "nodelet", *arguments, f"__name:={node_name}", f"__ns:=/{self.name}"],
-            stdout=self.log, stderr=subprocess.STDOUT, start_new_session=True)
-        self.processes.append(process)
-        return process
-
     def load(self, **parameters):
         """Starts loading with the package's own YAML, changed by the parameters."""
-        path = os.path.join(SOURCE_DIRECTORY, "config", "hazard_detection.yaml")
-        with open(path, encoding="utf-8") as file:
-            values = yaml.safe_load(file)
+        values = parameters_of("hazard_detection")
         values.update({"model": TINY_MODEL, "diagnostics_period_s": 0.2}, **parameters)
         rospy.set_param(f"/{self.name}/hazard_detection", values)
-        return self._start("hazard_detection", "load", "livemap/HazardDetectionNodelet", "manager")
+        return self.start_nodelet("hazard_detection", "load", "livemap/HazardDetectionNodelet", "manager")
 
     def load_and_wait(self, **parameters):
         self.load(**parameters)
         eventually(lambda: self.publisher.get_num_connections() > 0, "it listens")
-        eventually(lambda: self.subscribers[0].get_num_connections() > 0, "it speaks")
+        eventually(lambda: self.results.get_num_connections() > 0, "it speaks")
 
     def signal_manager(self, number):
         os.killpg(self.manager.pid, number)
-
-    def stop(self):
-        for process in self.processes:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-        for end in self.subscribers + [self.publisher]:
-            end.unregister()
-
-    def output(self):
-        with open(self.log.name, encoding="utf-8", errors="replace") as file:
-            return re.sub(r"\x1b\[[0-9;]*m", "", file.read())
-
-    def diagnostics(self):
-        """The newest key-values, as a map of texts."""
-        for message in reversed(self.received("diagnostics")):
-            for status in message.status:
-                if status.hardware_id == "hazard_detection" and self.name in status.name:
-                    return {pair.key: pair.value for pair in status.values}
-        return {}
-
-    def wait_for(self, **counters):
-        """Until the diagnostics say so."""
-        expected = {key: str(value) for key, value in counters.items()}
-
-        def reached():
-            values = self.diagnostics()
-            return all(values.get(key) == value for key, value in expected.items())
-
-        try:
-            eventually(reached, f"diagnostics {expected}")
-        except AssertionError as error:
-            raise AssertionError(f"{error}, last were {self.diagnostics()}") from None
 
 
 class HazardDetectionTest(unittest.TestCase):
@@ -173,8 +108,8 @@ class HazardDetectionTest(unittest.TestCase):
         detector = self.loaded_detector(queue_size=100)
         detector.publisher.publish(image(0, (16, 8, RED)))
         detector.wait_for(frames_processed=1, frames_annotated=0)
-        detector.subscribe("hazard/annotated", Image)
-        eventually(lambda: detector.subscribers[-1].get_num_connections() > 0, "the picture's topic")
+        annotated = detector.subscribe("hazard/annotated", Image)
+        eventually(lambda: annotated.get_num_connections() > 0, "the picture's topic")
         plain = [image(1), image(2, (16, 8, RED)), image(3)]
         for frame in plain:
             detector.publisher.publish(frame)
@@ -188,8 +123,8 @@ class HazardDetectionTest(unittest.TestCase):
 
     def test_empty_frames_are_annotated_when_asked_for(self):
         detector = self.loaded_detector(queue_size=100, annotate_empty=True)
-        detector.subscribe("hazard/annotated", Image)
-        eventually(lambda: detector.subscribers[-1].get_num_connections() > 0, "the picture's topic")
+        annotated = detector.subscribe("hazard/annotated", Image)
+        eventually(lambda: annotated.get_num_connections() > 0, "the picture's topic")
         frame = image(0)
         detector.publisher.publish(frame)
         pictures = eventually(lambda: detector.received("hazard/annotated"), "a picture")

@@ -2,17 +2,12 @@
 
 import math
 import os
-import re
 import signal
-import subprocess
 import tempfile
-import threading
 
 import cv2
 import numpy
 import rospy
-import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Path
 from sensor_msgs.msg import CameraInfo, Image, NavSatFix, NavSatStatus
@@ -21,7 +16,7 @@ from visualization_msgs.msg import MarkerArray
 
 from livemap.msg import (Detection, DetectionArray, HazardNotice, HazardReport, ReportReceipt,
                          VehiclePosition)
-from mqtt_bridge_fixture import PATIENCE_S, SOURCE_DIRECTORY, eventually, start_child
+from node_testing import NodeletUnderTest, eventually, parameters_of
 
 LATITUDE, LONGITUDE = 40.4433, -79.9436
 EPOCH_S = 1600000000
@@ -104,54 +99,33 @@ def decode(image):
     return cv2.imdecode(numpy.frombuffer(image.data, numpy.uint8), cv2.IMREAD_COLOR)
 
 
-class Vehicle:
-    """The nodelet in namespace `/name`, its database, and the test's ends of its topics."""
+class Vehicle(NodeletUnderTest):
+    """The nodelet, its database, and the test's ends of its topics."""
 
     def __init__(self, name, **parameters):
-        self.name = name
+        super().__init__(name, "hazard_reporting")
         self.directory = tempfile.mkdtemp(prefix="livemap_vehicle_")
         self.database = os.path.join(self.directory, "memory", "hazards.sqlite3")
         self.parameters = dict(parameters, database=self.database)
         self.process = None
-        self.log = tempfile.NamedTemporaryFile(suffix=".log")
-        self.lock = threading.Lock()
-        self.messages = {}
         self.publishers = {
-            topic: rospy.Publisher(f"/{name}/{topic}", message_class, queue_size=200, latch=latch)
+            topic: self.advertise(topic, message_class, latch=latch)
             for topic, message_class, latch in [
                 ("hazard/detections", DetectionArray, False), ("hazard/annotated", Image, False),
                 ("fix", NavSatFix, False), ("camera_rect/camera_info", CameraInfo, True),
                 ("hazard/notice", HazardNotice, False), ("hazard/receipt", ReportReceipt, False)]}
-        self.subscribers = [
-            rospy.Subscriber(f"/{name}/{topic}", message_class, self._keep, topic)
-            for topic, message_class in [
-                ("hazard/report", HazardReport), ("vehicle/position", VehiclePosition),
-                ("hazard/local_map", MarkerArray), ("path", Path)]]
-        self.subscribers.append(
-            rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep, "diagnostics"))
+        for topic, message_class in [("hazard/report", HazardReport), ("vehicle/position", VehiclePosition),
+                                     ("hazard/local_map", MarkerArray), ("path", Path)]:
+            self.subscribe(topic, message_class)
         self.mounting = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
-
-    def _keep(self, message, topic):
-        with self.lock:
-            self.messages.setdefault(topic, []).append(message)
-
-    def received(self, topic):
-        with self.lock:
-            return list(self.messages.get(topic, []))
+        self.ends.append(self.mounting)
 
     def reports(self):
         return self.received("hazard/report")
 
     def start(self, wait=True):
-        path = os.path.join(SOURCE_DIRECTORY, "config", "hazard_reporting.yaml")
-        with open(path, encoding="utf-8") as file:
-            values = yaml.safe_load(file)
-        values.update(self.parameters)
-        rospy.set_param(f"/{self.name}/hazard_reporting", values)
-        self.process = start_child(
-            ["rosrun", "nodelet", "nodelet", "standalone", "livemap/HazardReportingNodelet",
-             "__name:=hazard_reporting", f"__ns:=/{self.name}"],
-            stdout=self.log, stderr=subprocess.STDOUT, start_new_session=True)
+        rospy.set_param(f"/{self.name}/hazard_reporting", dict(parameters_of("hazard_reporting"), **self.parameters))
+        self.process = self.start_nodelet("hazard_reporting", "standalone", "livemap/HazardReportingNodelet")
         if wait:
             eventually(lambda: all(publisher.get_num_connections() > 0
                                    for publisher in self.publishers.values()), "it listens")
@@ -161,17 +135,6 @@ class Vehicle:
         self.process.wait()
         eventually(lambda: all(publisher.get_num_connections() == 0
                                for publisher in self.publishers.values()), "it is gone")
-
-    def stop(self):
-        if self.process is not None and self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait(PATIENCE_S)
-        for end in self.subscribers + list(self.publishers.values()) + [self.mounting]:
-            end.unregister()
-
-    def output(self):
-        with open(self.log.name, encoding="utf-8", errors="replace") as file:
-            return re.sub(r"\x1b\[[0-9;]*m", "", file.read())
 
     def publish(self, topic, message):
         self.publishers[topic].publish(message)
@@ -201,24 +164,3 @@ class Vehicle:
     def see(self, time_s, *found):
         self.publish("hazard/annotated", annotated(time_s))
         self.publish("hazard/detections", detections(time_s, *found))
-
-    def diagnostics(self):
-        """The newest key-values, as a map of texts."""
-        for message in reversed(self.received("diagnostics")):
-            for status in message.status:
-                if status.hardware_id == "hazard_reporting" and self.name in status.name:
-                    return {pair.key: pair.value for pair in status.values}
-        return {}
-
-    def wait_for(self, **counters):
-        """Until the diagnostics say so."""
-        expected = {key: str(value) for key, value in counters.items()}
-
-        def reached():
-            values = self.diagnostics()
-            return all(values.get(key) == value for key, value in expected.items())
-
-        try:
-            eventually(reached, f"diagnostics {expected}")
-        except AssertionError as error:
-            raise AssertionError(f"{error}, last were {self.diagnostics()}") from None

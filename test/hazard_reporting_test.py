@@ -14,7 +14,7 @@ from sensor_msgs.msg import NavSatStatus
 from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, decode,
                                       detection, east_north, fix, on_street, place, stamp)
 from livemap.msg import HazardNotice, HazardReport, ReportReceipt
-from mqtt_bridge_fixture import eventually
+from node_testing import eventually
 
 
 def receipt(report, status=ReportReceipt.COMMITTED, hazard=9):

@@ -1,55 +1,26 @@
 """A real broker, a second ROS master, bridges and peers for the tests of the MQTT bridge."""
 
 import base64
-import ctypes
 import io
 import json
 import os
 import re
-import signal
 import socket
 import struct
 import subprocess
 import tempfile
 import threading
-import time
 import xmlrpc.client
 
 import yaml
 
-TEST_DIRECTORY = os.path.dirname(os.path.realpath(__file__))
-SOURCE_DIRECTORY = os.path.dirname(TEST_DIRECTORY)
-# Keeps a broken test from hanging; nothing is measured by it.
-PATIENCE_S = 120
-
-
-def start_child(command, **options):
-    """A process that ends with this one, however this one ends, and holds none of its pipes."""
-    pr_set_pdeathsig = 1
-    options.setdefault("stdin", subprocess.DEVNULL)
-    options.setdefault("stdout", subprocess.DEVNULL)
-    options.setdefault("stderr", subprocess.DEVNULL)
-    libc = ctypes.CDLL(None)
-    return subprocess.Popen(
-        command, preexec_fn=lambda: libc.prctl(pr_set_pdeathsig, signal.SIGTERM), **options)
+from node_testing import PATIENCE_S, SOURCE_DIRECTORY, TEST_DIRECTORY, eventually, start_child
 
 
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
-
-
-def eventually(condition, what):
-    """The first true value of `condition`; AssertionError naming `what` when patience ends."""
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError("never happened: " + what)
-        time.sleep(0.05)
 
 
 def port_answers(port):

@@ -21,20 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from livemap.msg import HazardNotice, HazardReport, ReportReceipt, VehiclePosition
 from visualization_msgs.msg import Marker, MarkerArray
 
-# Keeps a broken test from hanging; nothing is measured by it.
-PATIENCE_S = 60
-
-
-def eventually(condition, what):
-    """The first true value of `condition`; AssertionError naming `what` when patience ends."""
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError("never happened: " + what)
-        time.sleep(0.05)
+from node_testing import PATIENCE_S, eventually
 
 
 def make_report(latitude=40.44, longitude=-79.94, class_name="pothole"):

@@ -1,6 +1,7 @@
 #include "geo/spatial_grid.h"
 
 #include <GeographicLib/Geocentric.hpp>
+#include <array>
 #include <cmath>
 
 #include "base/error.h"
@@ -65,33 +66,44 @@ bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
 std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centre,
                                                            double radius_m) const {
   if (!IsValid(centre) || !(radius_m >= 0)) return std::nullopt;
-  const Eigen::Vector3d earth_m = ToEarth(centre);
-  // A chord is never longer than the geodesic, so no place within the radius is missed; the
-  // micrometre absorbs rounding. The geodesic decides.
-  const double chord_m = radius_m + 1e-6;
-  const Cell low = CellAt(earth_m.array() - chord_m);
-  const Cell high = CellAt(earth_m.array() + chord_m);
-  std::optional<Neighbour> nearest;
+  Search search{centre, ToEarth(centre), radius_m, std::nullopt};
+  const Cell low = CellAt(search.earth_m.array() - search.ChordM());
+  const Cell high = CellAt(search.earth_m.array() + search.ChordM());
+  // In a large table every cell is a cache miss: ask for several at once, then read them.
+  std::array<std::uint32_t, 16> waiting;
+  std::size_t count = 0;
+  const auto read_waiting = [&] {
+    for (std::size_t i = 0; i < count; ++i) ReadCell(waiting[i], search);
+    count = 0;
+  };
   Cell cell;
   for (cell[0] = low[0]; cell[0] <= high[0]; ++cell[0]) {
     for (cell[1] = low[1]; cell[1] <= high[1]; ++cell[1]) {
       for (cell[2] = low[2]; cell[2] <= high[2]; ++cell[2]) {
-        const std::uint32_t hash = Hash(cell);
-        for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
-          if (slots_[i].hash != hash) continue;
-          const Entry& entry = entries_[slots_[i].entry];
-          if ((entry.earth_m - earth_m).squaredNorm() > chord_m * chord_m) continue;
-          const double distance_m = GeodesicDistanceM(entry.place, centre);
-          if (distance_m > radius_m) continue;
-          if (!nearest || distance_m < nearest->distance_m ||
-              (distance_m == nearest->distance_m && entry.id < nearest->id)) {
-            nearest = {entry.id, distance_m};
-          }
-        }
+        waiting[count] = Hash(cell);
+        __builtin_prefetch(&slots_[Home(waiting[count])]);
+        if (++count == waiting.size()) read_waiting();
       }
     }
   }
-  return nearest;
+  read_waiting();
+  return search.nearest;
+}
+
+void SpatialGrid::ReadCell(std::uint32_t hash, Search& search) const {
+  for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
+    if (slots_[i].hash != hash) continue;
+    const Entry& entry = entries_[slots_[i].entry];
+    if ((entry.earth_m - search.earth_m).squaredNorm() > search.ChordM() * search.ChordM())
+      continue;
+    const double distance_m = GeodesicDistanceM(entry.place, search.centre);
+    if (distance_m > search.radius_m) continue;
+    const auto& nearest = search.nearest;
+    if (!nearest || distance_m < nearest->distance_m ||
+        (distance_m == nearest->distance_m && entry.id < nearest->id)) {
+      search.nearest = {entry.id, distance_m};
+    }
+  }
 }
 
 SpatialGrid::Cell SpatialGrid::CellAt(const Eigen::Vector3d& earth_m) const {

@@ -52,9 +52,20 @@ class SpatialGrid {
     std::uint32_t hash = 0;
     std::uint32_t entry = kEmpty;
   };
+  struct Search {
+    GeoPoint centre;
+    Eigen::Vector3d earth_m;
+    double radius_m;
+    std::optional<Neighbour> nearest;
+
+    // A chord is never longer than the geodesic, so no place within the radius is missed; the
+    // micrometre absorbs rounding. The geodesic decides.
+    double ChordM() const { return radius_m + 1e-6; }
+  };
   using Cell = std::array<std::int32_t, 3>;
   static constexpr std::uint32_t kEmpty = 0xffffffff;
 
+  void ReadCell(std::uint32_t hash, Search& search) const;
   Cell CellAt(const Eigen::Vector3d& earth_m) const;
   std::uint32_t Hash(const Cell& cell) const;
   std::size_t Next(std::size_t slot) const { return (slot + 1) & (slots_.size() - 1); }

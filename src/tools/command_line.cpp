@@ -59,14 +59,17 @@ bool CommandLine::Parse(int argc, char** argv) {
       throw Error("the flag '--" + name + "' needs a value: " + flag->value);
     }
   }
-  if (positionals_.size() != wanted_positionals_) {
+  const bool as_wanted = wanted_positionals_ == kOneOrMore
+                             ? !positionals_.empty()
+                             : positionals_.size() == wanted_positionals_;
+  if (!as_wanted) {
     throw Error("got " + std::to_string(positionals_.size()) + " arguments, usage is: " + usage_);
   }
   return true;
 }
 
 void CommandLine::PrintHelp() const {
-  std::printf("Usage: %s\n\n%s\n\n", usage_.c_str(), about_.c_str());
+  std::printf("usage: %s\n\n%s\n\n", usage_.c_str(), about_.c_str());
   for (const Flag& flag : flags_) {
     const std::string head = "--" + flag.name + (flag.value.empty() ? "" : " " + flag.value);
     std::printf("  %-30s %s\n", head.c_str(), flag.help.c_str());

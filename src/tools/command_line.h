@@ -17,8 +17,10 @@ struct Flag {
 /// The arguments of a program. Every mistake is an Error of one sentence.
 class CommandLine {
  public:
-  /// `usage` is the line after "Usage: "; `about` one or more sentences; exactly `positionals`
-  /// arguments without dashes are wanted. "--help" is known by itself.
+  static constexpr std::size_t kOneOrMore = ~std::size_t{0};
+
+  /// `usage` is the line after "usage: "; `about` one or more sentences; exactly `positionals`
+  /// arguments without dashes are wanted, or kOneOrMore. "--help" is known by itself.
   CommandLine(std::string usage, std::string about, std::size_t positionals,
               std::vector<Flag> flags);
 
@@ -32,6 +34,7 @@ class CommandLine {
   double Number(const std::string& flag, double otherwise, double min, double max) const;
   std::uint64_t Seed(const std::string& flag, std::uint64_t otherwise) const;
   const std::string& Positional(std::size_t index) const { return positionals_[index]; }
+  const std::vector<std::string>& Positionals() const { return positionals_; }
 
  private:
   void PrintHelp() const;

@@ -1,7 +1,5 @@
 // livemap_detect_image: what a model finds in single images.
 
-#include <getopt.h>
-
 #include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -11,22 +9,11 @@
 #include "base/error.h"
 #include "detection/annotation.h"
 #include "detection/hazard_detector.h"
+#include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
 
 namespace livemap {
 namespace {
-
-constexpr char kUsage[] = R"(usage: livemap_detect_image [OPTIONS] IMAGE...
-
-Prints what the detector finds in each JPEG or PNG image, one line of JSON per image:
-{"image":...,"width":w,"height":h,"detections":[{"class":...,"confidence":c,"box":[x1,y1,x2,y2]}]}
-
-  --model FILE     manifest of the model (default: models/hazards-first.yaml of this package)
-  --threshold X    least confidence, instead of the manifest's
-  --draw FILE      write the image with the detections drawn in (.jpg or .png; one IMAGE only)
-  --threads N      threads of OpenCV, default all cores
-  --help           this text
-)";
 
 struct Options {
   std::vector<std::string> images;
@@ -38,44 +25,28 @@ struct Options {
 
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
-  enum : int { kModel = 1, kThreshold, kDraw, kThreads, kHelp };
-  const option flags[] = {{"model", required_argument, nullptr, kModel},
-                          {"threshold", required_argument, nullptr, kThreshold},
-                          {"draw", required_argument, nullptr, kDraw},
-                          {"threads", required_argument, nullptr, kThreads},
-                          {"help", no_argument, nullptr, kHelp},
-                          {nullptr, 0, nullptr, 0}};
+  CommandLine line(
+      "livemap_detect_image [FLAGS] IMAGE...",
+      "Prints what the detector finds in each image, one line of JSON per image:\n"
+      "{\"image\":...,\"width\":w,\"height\":h,\n"
+      " \"detections\":[{\"class\":...,\"confidence\":c,\"box\":[x1,y1,x2,y2]}]}",
+      CommandLine::kOneOrMore,
+      {{"model", "FILE", "manifest of the model, default models/hazards-first.yaml"},
+       {"threshold", "X", "least confidence, instead of the manifest's"},
+       {"draw", "FILE", "write the image with what was found drawn in (.jpg or .png; one IMAGE)"},
+       {"threads", "N", "threads of OpenCV, default all cores"}});
+  if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
-  opterr = 0;
-  for (int flag = 0; (flag = getopt_long(argc, argv, "", flags, nullptr)) != -1;) {
-    switch (flag) {
-      case kModel:
-        options.model = optarg;
-        break;
-      case kThreshold:
-        options.threshold = ParseFlagNumber("--threshold", optarg, 0.001, 0.999);
-        break;
-      case kDraw:
-        options.draw = optarg;
-        break;
-      case kThreads:
-        options.threads = static_cast<int>(ParseFlagNumber("--threads", optarg, 1, 256));
-        break;
-      case kHelp:
-        std::cout << kUsage;
-        return std::nullopt;
-      default:
-        throw Error(std::string("unknown option or missing value at '") + argv[optind - 1] +
-                    "', see --help");
-    }
-  }
-  options.images.assign(argv + optind, argv + argc);
-  if (options.images.empty()) throw Error("no image given, accepted is IMAGE..., see --help");
+  options.images = line.Positionals();
+  options.model = line.Text("model", "");
+  if (options.model.empty()) options.model = DefaultModelPath();
+  options.draw = line.Text("draw", "");
+  if (line.Has("threshold")) options.threshold = line.Number("threshold", 0, 0.001, 0.999);
+  options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
   if (!options.draw.empty() && options.images.size() != 1) {
-    throw Error("option --draw is given with " + std::to_string(options.images.size()) +
+    throw Error("--draw is given with " + std::to_string(options.images.size()) +
                 " images, accepted is one");
   }
-  if (options.model.empty()) options.model = DefaultModelPath();
   return options;
 }
 
@@ -131,5 +102,5 @@ int Run(int argc, char** argv) {
 }  // namespace livemap
 
 int main(int argc, char** argv) {
-  return livemap::RunTool("livemap_detect_image", [&] { return livemap::Run(argc, argv); });
+  return livemap::RunProgram("livemap_detect_image", argc, argv, livemap::Run);
 }

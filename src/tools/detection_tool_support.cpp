@@ -1,7 +1,6 @@
 #include "tools/detection_tool_support.h"
 
 #include <filesystem>
-#include <iostream>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
@@ -10,17 +9,9 @@
 
 namespace livemap {
 
-int RunTool(const std::string& name, const std::function<int()>& body) {
-  try {
-    return body();
-  } catch (const std::exception& error) {
-    std::cerr << name << ": " << error.what() << "\n";
-    return 2;
-  }
-}
-
 std::vector<std::string> SplitNames(const std::string& flag, const std::string& text) {
   std::vector<std::string> names;
+  if (text.empty()) return names;
   std::istringstream stream(text + ",");
   for (std::string name; std::getline(stream, name, ',');) {
     if (name.empty()) {
@@ -35,18 +26,6 @@ std::string JoinNames(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
   return list;
-}
-
-double ParseFlagNumber(const std::string& flag, const std::string& text, double min, double max) {
-  std::istringstream stream(text);
-  double value = 0;
-  // Written so that NaN is refused too.
-  if (!(stream >> value) || !stream.eof() || !(value >= min && value <= max)) {
-    std::ostringstream accepted;
-    accepted << "a number from " << min << " to " << max;
-    throw Error("option " + flag + " is '" + text + "', accepted is " + accepted.str());
-  }
-  return value;
 }
 
 std::string DefaultModelPath() {

@@ -1,21 +1,14 @@
 #pragma once
 
-#include <functional>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 namespace livemap {
 
-/// Runs a program's body. An exception becomes one sentence on stderr and exit status 2.
-int RunTool(const std::string& name, const std::function<int()>& body);
-
-/// "a,b" to its names; throws Error naming `flag` on an empty one.
+/// "a,b" to its names; none from "". Throws Error naming `flag` on an empty one.
 std::vector<std::string> SplitNames(const std::string& flag, const std::string& text);
 std::string JoinNames(const std::vector<std::string>& names);
-
-/// The whole of `text` as a number from `min` to `max`; throws Error naming `flag`.
-double ParseFlagNumber(const std::string& flag, const std::string& text, double min, double max);
 
 /// models/hazards-first.yaml: of the installed package (share/livemap beside this program's
 /// lib/livemap), else of the source tree that this program was built from.

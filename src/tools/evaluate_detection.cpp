@@ -1,41 +1,21 @@
 // livemap_evaluate_detection: how well a model detects, on labelled folders and drives.
 
-#include <getopt.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <iostream>
 #include <map>
-#include <sstream>
+#include <optional>
 
 #include "base/error.h"
 #include "detection/hazard_detector.h"
 #include "evaluation/detection_report.h"
 #include "evaluation/labelled_folder.h"
 #include "ingest/decode.h"
+#include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
 
 namespace livemap {
 namespace {
-
-constexpr char kUsage[] = R"(usage: livemap_evaluate_detection [OPTIONS] DIR...
-
-Runs the detector over labelled images and prints how well it does, all DIRs pooled. A DIR holds images/
-and labels/ (YOLO: "class x y width height" per line, fractions); with a frames.csv (frame,chainage_m)
-it is a drive, which also gives events and false reports per km. docs/evaluation.md defines the figures.
-
-  --json                 one line of JSON instead of a table
-  --model FILE           manifest of the model (default: models/hazards-first.yaml of this package)
-  --split NAME           part of a DIR whose images/ and labels/ are divided, e.g. val
-  --label-classes A,B    names of the label files' classes 0, 1, ... (default: classes.txt in the DIR,
-                         else from the DIR's name or, in a drive, the column "potholes")
-  --sweep                figures at thresholds from 0.05 to 0.95 too
-  --lowest-score X       least score that the average precision counts, default 0.01
-  --threads N            threads of OpenCV, default all cores
-  --help                 this text
-)";
 
 struct Options {
   std::vector<std::string> folders;
@@ -49,77 +29,33 @@ struct Options {
 
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
-  enum : int { kJson = 1, kModel, kSplit, kClasses, kSweep, kLowest, kThreads, kHelp };
-  const option flags[] = {{"json", no_argument, nullptr, kJson},
-                          {"model", required_argument, nullptr, kModel},
-                          {"split", required_argument, nullptr, kSplit},
-                          {"label-classes", required_argument, nullptr, kClasses},
-                          {"sweep", no_argument, nullptr, kSweep},
-                          {"lowest-score", required_argument, nullptr, kLowest},
-                          {"threads", required_argument, nullptr, kThreads},
-                          {"help", no_argument, nullptr, kHelp},
-                          {nullptr, 0, nullptr, 0}};
+  CommandLine line(
+      "livemap_evaluate_detection [FLAGS] DIR...",
+      "Runs the detector over labelled images and prints how well it does, all DIRs pooled. A DIR\n"
+      "holds images/ and labels/ (YOLO: \"class x y width height\" per line, fractions); with a\n"
+      "frames.csv (frame,chainage_m) it is a drive, which also gives events and false reports per\n"
+      "km. docs/evaluation.md defines the figures.",
+      CommandLine::kOneOrMore,
+      {{"json", "", "one line of JSON instead of a table"},
+       {"model", "FILE", "manifest of the model, default models/hazards-first.yaml"},
+       {"split", "NAME", "part of a DIR whose images/ and labels/ are divided, e.g. val"},
+       {"label-classes", "A,B", "names of the label files' classes 0, 1, ..., default classes.txt"},
+       {"sweep", "", "figures at thresholds from 0.05 to 0.95 too"},
+       {"lowest-score", "X", "least score that the average precision counts, default 0.01"},
+       {"threads", "N", "threads of OpenCV, default all cores"}});
+  if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
-  opterr = 0;
-  for (int flag = 0; (flag = getopt_long(argc, argv, "", flags, nullptr)) != -1;) {
-    switch (flag) {
-      case kJson:
-        options.json = true;
-        break;
-      case kModel:
-        options.model = optarg;
-        break;
-      case kSplit:
-        options.labels.split = optarg;
-        break;
-      case kClasses:
-        options.labels.label_classes = SplitNames("--label-classes", optarg);
-        break;
-      case kSweep:
-        options.sweep = true;
-        break;
-      case kLowest:
-        options.lowest_score = ParseFlagNumber("--lowest-score", optarg, 0.001, 0.999);
-        break;
-      case kThreads:
-        options.threads = static_cast<int>(ParseFlagNumber("--threads", optarg, 1, 256));
-        break;
-      case kHelp:
-        std::cout << kUsage;
-        return std::nullopt;
-      default:
-        throw Error(std::string("unknown option or missing value at '") + argv[optind - 1] +
-                    "', see --help");
-    }
-  }
-  options.folders.assign(argv + optind, argv + argc);
-  if (options.folders.empty()) throw Error("no folder given, accepted is DIR..., see --help");
+  options.folders = line.Positionals();
+  options.model = line.Text("model", "");
   if (options.model.empty()) options.model = DefaultModelPath();
+  options.json = line.Has("json");
+  options.sweep = line.Has("sweep");
+  options.lowest_score = line.Number("lowest-score", options.lowest_score, 0.001, 0.999);
+  options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
+  options.labels.split = line.Text("split", "");
+  options.labels.label_classes = SplitNames("--label-classes", line.Text("label-classes", ""));
   return options;
 }
-
-/// One line that is rewritten on a terminal; plain lines at every tenth otherwise.
-class Progress {
- public:
-  explicit Progress(std::size_t total) : total_(total), terminal_(isatty(STDERR_FILENO) == 1) {}
-
-  void Advance() {
-    ++done_;
-    const std::size_t tenth = 10 * done_ / total_;
-    if (terminal_) {
-      std::fprintf(stderr, "\rdetecting %zu/%zu%s", done_, total_, done_ == total_ ? "\n" : "");
-    } else if (tenth != last_tenth_) {
-      std::fprintf(stderr, "detecting %zu/%zu\n", done_, total_);
-    }
-    last_tenth_ = tenth;
-  }
-
- private:
-  std::size_t total_;
-  bool terminal_;
-  std::size_t done_ = 0;
-  std::size_t last_tenth_ = 0;
-};
 
 /// Frames of one class: what EvaluateClass wants.
 struct ClassFrames {
@@ -142,7 +78,7 @@ class Evaluation {
   void Run(const std::vector<LabelledFolder>& folders) {
     std::size_t total = 0;
     for (const LabelledFolder& folder : folders) total += folder.frames.size();
-    Progress progress(total);
+    Progress progress("detecting", total);
     for (const LabelledFolder& folder : folders) RunFolder(folder, progress);
   }
 
@@ -183,7 +119,7 @@ class Evaluation {
       for (const std::string& name : folder.classes) {
         scored[name].push_back(Score(frame, found, image.size(), name));
       }
-      progress.Advance();
+      progress.At(milliseconds_.size());
     }
     for (auto& [name, frames] : scored) {
       ClassFrames& all = by_class_[name];
@@ -256,5 +192,5 @@ int Run(int argc, char** argv) {
 }  // namespace livemap
 
 int main(int argc, char** argv) {
-  return livemap::RunTool("livemap_evaluate_detection", [&] { return livemap::Run(argc, argv); });
+  return livemap::RunProgram("livemap_evaluate_detection", argc, argv, livemap::Run);
 }

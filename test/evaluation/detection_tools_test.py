@@ -80,7 +80,7 @@ class DetectionToolsTest(unittest.TestCase):
 
     def test_mistakes_are_one_sentence_and_exit_2(self):
         for arguments, expected in [
-                ([], "no folder given"), (["--bogus", self.drive], "--bogus"),
+                ([], "got 0 arguments"), (["--bogus", self.drive], "--bogus"),
                 (["/nowhere"], "/nowhere"), (["--threads", "0", self.drive], "--threads"),
                 (["--lowest-score", "nan", self.drive], "nan"),
                 (["--model", "/nowhere.yaml", self.drive], "/nowhere.yaml"),

@@ -11,7 +11,6 @@ import pathlib
 import signal
 import sys
 import tempfile
-import time
 import unittest
 import xmlrpc.client
 
@@ -20,22 +19,14 @@ import rospy
 import rostest
 from std_srvs.srv import SetBool
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "test")]
 import demo_observers as observers  # noqa: E402
 import demo_system as system  # noqa: E402
+from node_testing import PATIENCE_S, eventually  # noqa: E402
 
 ZONE, VEHICLE = "test", "car-1"
-# Keeps a broken test from hanging; nothing is measured by it.
-PATIENCE_S = 180
 SAME_PLACE_M = 0.5
-
-
-def eventually(condition, what):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError("never happened: " + what)
-        time.sleep(0.1)
 
 
 class Drive:
