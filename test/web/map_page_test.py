@@ -8,189 +8,13 @@ with CI set in the environment that is a failure.
 """
 
 import argparse
-import json
 import math
 import os
-import shutil
-import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-try:
-    from selenium import webdriver
-    from selenium.common.exceptions import (
-        ElementClickInterceptedException, NoSuchElementException, StaleElementReferenceException,
-        TimeoutException)
-    from selenium.webdriver.chrome.service import Service
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
-    from selenium.webdriver.support.ui import WebDriverWait
-except ImportError:
-    webdriver = None
-
-OPTIONS = argparse.Namespace(server=None, screenshots=None)
-LAT, LON = 40.4433, -79.9436
-HOSTILE = "<img src=x onerror=alert(1)>"
-HANG_S = 40  # Bounds a hang; no test measures speed by it.
-
-
-class ZoneProcess:
-    """The C++ server; `do` sends one command and returns its answer."""
-
-    def __init__(self):
-        self.process = subprocess.Popen([OPTIONS.server], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True)
-        self.port = self.read()["port"]
-        self.url = f"http://127.0.0.1:{self.port}/"
-
-    def read(self):
-        line = self.process.stdout.readline()
-        if not line:
-            raise RuntimeError("the zone's process has ended")
-        return json.loads(line)
-
-    def do(self, verb, **arguments):
-        self.process.stdin.write(json.dumps({"do": verb, **arguments}) + "\n")
-        self.process.stdin.flush()
-        return self.read()
-
-    def report(self, class_name, lat, lon, picture=True):
-        answer = self.do("report", **{"class": class_name}, lat=lat, lon=lon, picture=picture)
-        assert answer["status"] == "committed", answer
-        return answer["id"]
-
-    def drive(self, points, vehicle="car-1", speed=13.0):
-        """Moves a vehicle along points, each step as one position."""
-        for (lat, lon), (next_lat, next_lon) in zip(points, points[1:]):
-            east = (next_lon - lon) * math.cos(math.radians(lat))
-            course = math.atan2(east, next_lat - lat) % (2 * math.pi)
-            answer = self.do("vehicle", id=vehicle, lat=next_lat, lon=next_lon, course=course,
-                             speed=speed)
-            assert answer["accepted"], answer
-
-    def close(self):
-        self.process.stdin.close()
-        self.process.wait(timeout=HANG_S)
-        self.process.stdout.close()
-
-
-def street(start=(LAT, LON), length=150, turn=60):
-    """Positions every six metres: north-east, then east."""
-    points = [start]
-    for step in range(length):
-        lat, lon = points[-1]
-        bearing = math.radians(35 if step < turn else 35 + min(50, 2 * (step - turn)))
-        points.append((lat + 6 * math.cos(bearing) / 111132,
-                       lon + 6 * math.sin(bearing) / (111320 * math.cos(math.radians(lat)))))
-    return points
-
-
-def start_browser(width, height, dark=False):
-    profile = tempfile.mkdtemp(prefix="livemap_chromium_")
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which("chromium")
-    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic",
-                 "--no-first-run", "--disable-background-networking",
-                 "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
-                 "--disable-extensions", "--hide-scrollbars", f"--user-data-dir={profile}",
-                 f"--window-size={width},{height}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
-    browser.livemap_profile = profile
-    browser.set_page_load_timeout(HANG_S)
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-        "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
-    if dark:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {
-            "features": [{"name": "prefers-color-scheme", "value": "dark"}]})
-    return browser
-
-
-def stop_browser(browser):
-    browser.quit()
-    shutil.rmtree(browser.livemap_profile, ignore_errors=True)
-
-
-class MapPage(unittest.TestCase):
-    size = (1280, 800)
-    dark = False
-
-    @classmethod
-    def setUpClass(cls):
-        cls.browser = start_browser(*cls.size, dark=cls.dark)
-        cls.addClassCleanup(stop_browser, cls.browser)
-
-    def setUp(self):
-        self.zone = ZoneProcess()
-        self.addCleanup(self.zone.close)
-        self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
-        self.browser.get_log("browser")
-
-    def open(self):
-        self.browser.get(self.zone.url)
-        self.wait_state("live")
-
-    def wait(self, condition, what):
-        # The page redraws its list and moves its map: what was found may be gone or covered when it
-        # is asked or clicked.
-        moving = (NoSuchElementException, StaleElementReferenceException,
-                  ElementClickInterceptedException)
-        try:
-            return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02,
-                                 ignored_exceptions=moving).until(lambda _: condition())
-        except TimeoutException:
-            log = [entry["message"] for entry in self.browser.get_log("browser")]
-            self.picture("failed")
-            raise AssertionError(f"{what}; the browser's log: {log}") from None
-
-    def wait_state(self, state):
-        self.wait(lambda: self.find("#connection").get_attribute("data-state") == state,
-                  f"the page is not {state}")
-
-    def find(self, selector):
-        return self.browser.find_element(By.CSS_SELECTOR, selector)
-
-    def all(self, selector):
-        return self.browser.find_elements(By.CSS_SELECTOR, selector)
-
-    def count(self, selector):
-        return self.browser.execute_script(
-            "return document.querySelectorAll(arguments[0]).length", selector)
-
-    def wait_for(self, selector, count=1):
-        self.wait(lambda: self.count(selector) >= count, f"no {selector}")
-        return self.find(selector)
-
-    def click(self, selector):
-        def clicked():
-            element = self.find(selector)
-            self.browser.execute_script("arguments[0].scrollIntoView({block: 'nearest'})", element)
-            element.click()
-            return True
-        self.wait(clicked, f"{selector} cannot be clicked")
-
-    def press(self, *keys):
-        self.browser.switch_to.active_element.send_keys(*keys)
-
-    def picture(self, name):
-        if OPTIONS.screenshots:
-            os.makedirs(OPTIONS.screenshots, exist_ok=True)
-            time.sleep(0.6)  # Lets animations come to rest; nothing is asserted after it.
-            self.browser.save_screenshot(os.path.join(OPTIONS.screenshots, name + ".png"))
-
-    def assert_quiet(self):
-        """Nothing failed in the page: no script error and no breach of the policy."""
-        loud = [entry for entry in self.browser.get_log("browser")
-                if entry["level"] == "SEVERE" and "WebSocket connection" not in entry["message"]
-                and "ERR_CONNECTION_REFUSED" not in entry["message"]]
-        self.assertEqual(loud, [])
-
-    def open_popup_of(self, hazard_id):
-        self.click(f'#hazard-list button[data-hazard="{hazard_id}"]')
-        return self.wait_for(f'.popup[data-hazard="{hazard_id}"]')
+from map_page_fixture import HOSTILE, LAT, LON, OPTIONS, Keys, MapPage, missing, street
 
 
 class Desktop(MapPage):
@@ -455,15 +279,6 @@ class Phone(MapPage):
             "return [document.documentElement.scrollWidth, window.innerWidth]")
         self.assertLessEqual(width, 390)
         self.assertEqual(inner, 390)
-
-
-def missing():
-    if webdriver is None:
-        return "python3-selenium"
-    for program in ("chromium", "chromedriver"):
-        if shutil.which(program) is None:
-            return program
-    return None
 
 
 def main():
