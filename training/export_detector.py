@@ -3,7 +3,8 @@
 
     training/export_detector.py --checkpoint build/training/hazards/last.pt --name hazards-first --data ../shared/data
 
-The averaged weights are exported. Thresholds are calibrated on the validation parts of the data, with
+The averaged weights are exported; with several --checkpoint flags, of runs that began from one another, the
+mean of all (model soup, Wortsman et al. 2022). Thresholds are calibrated on the validation parts of the data, with
 the exported file run by OpenCV: the pothole's by the limit on false reports, the cone's by the best F1.
 """
 
@@ -29,19 +30,29 @@ TOLERANCE = 1e-3
 
 GOLDEN_ROWS = 24
 
+DEFAULT_CHECKPOINT = Path("build/training/hazards/last.pt")
+
 
 class ExportError(Exception):
     """Nothing usable was exported; the text is one sentence for the user."""
 
 
-def load_averaged(checkpoint: Path) -> Detector:
-    """The averaged weights of a checkpoint."""
-    try:
-        state = torch.load(checkpoint, map_location="cpu")
-        detector = Detector(len(CLASSES))
-        detector.load_state_dict(state["average"])
-    except (OSError, KeyError, RuntimeError) as error:
-        raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
+def load_averaged(checkpoints: List[Path]) -> Detector:
+    """The averaged weights of a checkpoint, or the mean of those of several."""
+    detector = Detector(len(CLASSES))
+    mean = {name: torch.zeros_like(value) for name, value in detector.state_dict().items()}
+    for checkpoint in checkpoints:
+        try:
+            state = torch.load(checkpoint, map_location="cpu")
+            detector.load_state_dict(state["average"])
+        except (OSError, KeyError, RuntimeError) as error:
+            raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
+        for name, value in detector.state_dict().items():
+            if value.dtype.is_floating_point:
+                mean[name] += value / len(checkpoints)
+            else:
+                mean[name] = value
+    detector.load_state_dict(mean)
     return detector.eval()
 
 
@@ -77,7 +88,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
-    detector = load_averaged(arguments.checkpoint)
+    detector = load_averaged(arguments.checkpoint or [DEFAULT_CHECKPOINT])
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
 
@@ -95,7 +106,7 @@ def run(arguments: argparse.Namespace) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 exported, 2 the command line, the checkpoint or the data is wrong."""
     parser = argparse.ArgumentParser(description="Export a checkpoint as ONNX with its manifest.")
-    parser.add_argument("--checkpoint", type=Path, default=Path("build/training/hazards/last.pt"))
+    parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; may be repeated")
     parser.add_argument("--name", default="hazards-first", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")

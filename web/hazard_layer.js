@@ -79,6 +79,9 @@ export class HazardLayer {
       iconCreateFunction: (cluster) => this.clusterIcon(cluster),
     });
     this.group.addTo(map);
+    this.zooming = false;
+    map.on('zoomstart', () => { this.zooming = true; });
+    map.on('zoomend', () => { this.zooming = false; });
   }
 
   /** Exactly these hazards; what stays keeps its marker and its open popup. */
@@ -124,9 +127,19 @@ export class HazardLayer {
 
   /** Brings the hazard into view, out of its cluster, and opens its popup. */
   open(hazard) {
+    // A zoom that was asked for just now begins with the next frame.
+    requestAnimationFrame(() => this.openWhenStill(hazard));
+  }
+
+  /** While the map zooms, and clusters split and merge after it, markers come and go, and one that
+   * goes takes its popup along. */
+  openWhenStill(hazard) {
     const marker = this.markers.get(hazard.id);
     if (!marker) return;
-    this.group.zoomToShowLayer(marker, () => marker.openPopup());
+    const again = () => setTimeout(() => this.openWhenStill(hazard));
+    if (this.zooming) this.map.once('moveend', again);
+    else if (this.group._inZoomAnimation) this.group.once('animationend', again);
+    else this.group.zoomToShowLayer(marker, () => marker.openPopup());
   }
 
   /** A ring that spreads for a moment where something is new, also above a cluster. */

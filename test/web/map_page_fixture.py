@@ -13,8 +13,8 @@ import unittest
 try:
     from selenium import webdriver
     from selenium.common.exceptions import (
-        ElementClickInterceptedException, NoSuchElementException, StaleElementReferenceException,
-        TimeoutException)
+        ElementClickInterceptedException, ElementNotInteractableException, NoSuchElementException,
+        StaleElementReferenceException, TimeoutException)
     from selenium.webdriver.chrome.service import Service
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
@@ -129,7 +129,7 @@ class MapPage(unittest.TestCase):
         # The page redraws its list and moves its map: what was found may be gone or covered when it
         # is asked or clicked.
         moving = (NoSuchElementException, StaleElementReferenceException,
-                  ElementClickInterceptedException)
+                  ElementClickInterceptedException, ElementNotInteractableException)
         try:
             return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02,
                                  ignored_exceptions=moving).until(lambda _: condition())

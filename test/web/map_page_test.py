@@ -87,6 +87,21 @@ class Desktop(MapPage):
         self.wait(lambda: self.count("#hazard-list button") == 0, "the row stays")
         self.assert_quiet()
 
+    def test_a_hazard_chosen_while_the_map_still_zooms_keeps_its_popup(self):
+        hazards = [self.zone.report("pothole", LAT + 0.0004 * step, LON) for step in range(6)]
+        self.open()
+        self.wait(lambda: self.count("#hazard-list button") == 6, "not all are listed")
+        for hazard in hazards[:3]:
+            for zoom in ("in", "out"):
+                self.browser.execute_script("""
+                    document.querySelector('.leaflet-control-zoom-' + arguments[1]).click();
+                    document.querySelector(`#hazard-list button[data-hazard="${arguments[0]}"]`).click();
+                    """, hazard, zoom)
+                self.wait_for(f'.popup[data-hazard="{hazard}"]')
+                # Zoom and cluster animations take half a second; what survives them stays.
+                self.browser.execute_async_script("setTimeout(arguments[0], 1500)")
+                self.assertEqual(self.count(f'.popup[data-hazard="{hazard}"]'), 1, f"zoom {zoom}")
+
     def test_the_filter_hides_and_shows_a_class_and_counts_it(self):
         for step in range(3):
             self.zone.report("pothole", LAT + 0.001 * step, LON)
