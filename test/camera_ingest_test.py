@@ -240,20 +240,42 @@ class CameraIngestTest(unittest.TestCase):
         newest = rospy.Time(1700000000 + frames - 1)
         ingest.wait(lambda: ingest.images and ingest.images[-1].header.stamp == newest, "newest")
 
+    def play(self, namespace, uri, **parameters):
+        """Starts the nodelet on a file or folder."""
+        calibration = os.path.join(self.folder, "camera.yaml")
+        with open(calibration, "w") as file:
+            file.write(CALIBRATION)
+        ingest = Ingest(namespace, "raw")
+        parameters.update(_uri=uri, _camera_info_url=f"file://{calibration}", _stamps="file_order",
+                          _diagnostics_period_s="0.1", _queue_size="20")
+        self.process = subprocess.Popen(
+            ["rosrun", "nodelet", "nodelet", "standalone", "livemap/CameraIngestNodelet",
+             f"__ns:={namespace}", "__name:=camera_ingest"] + [f"{key}:={value}" for key, value in parameters.items()])
+        return ingest
+
+    def test_a_video_is_played_at_its_own_rate_in_order(self):
+        video = os.path.join(self.folder, "drive.avi")
+        writer = cv2.VideoWriter(video, cv2.VideoWriter_fourcc(*"MJPG"), 4.0, (WIDTH, HEIGHT))
+        for i in range(12):
+            writer.write(np.full((HEIGHT, WIDTH, 3), 20 * i, np.uint8))
+        writer.release()
+        ingest = self.play("video", video, _source="video")
+        ingest.wait_until_all_accounted(12)
+        self.assertEqual(ingest.count("published"), 12)
+        ingest.wait(lambda: ingest.images and pixels_of(ingest.images[-1]).mean() > 215, "last")
+        brightness = [pixels_of(image).mean() for image in ingest.images]
+        self.assertEqual(brightness, sorted(brightness))
+        stamps = [image.header.stamp.to_sec() for image in ingest.images]
+        for i in range(1, len(stamps)):
+            frames_between = round((brightness[i] - brightness[i - 1]) / 20)
+            self.assertAlmostEqual(stamps[i] - stamps[i - 1], frames_between / 4, places=4)
+
     def test_folder_is_played_in_order_and_a_corrupt_file_counted(self):
         for i in range(5):
             with open(os.path.join(self.folder, f"{i:03}.jpg"), "wb") as file:
                 file.write(b"not a jpeg" if i == 2 else jpeg(np.full((HEIGHT, WIDTH), 40 * i,
                                                                      np.uint8)))
-        calibration = os.path.join(self.folder, "camera.yaml")
-        with open(calibration, "w") as file:
-            file.write(CALIBRATION)
-        ingest = Ingest("folder", "raw")
-        self.process = subprocess.Popen(
-            ["rosrun", "nodelet", "nodelet", "standalone", "livemap/CameraIngestNodelet",
-             "__ns:=folder", "__name:=camera_ingest", "_source:=folder", f"_uri:={self.folder}",
-             f"_camera_info_url:=file://{calibration}", "_rate_hz:=1", "_stamps:=file_order",
-             "_diagnostics_period_s:=0.1", "_queue_size:=20"])
+        ingest = self.play("folder", self.folder, _source="folder", _rate_hz="1")
         ingest.wait_until_all_accounted(5)
         self.assertEqual((ingest.count("published"), ingest.count("bad")), (4, 1))
         # The subscriber may have come late to the first pictures, never to the last.
