@@ -22,6 +22,10 @@ if(LIVEMAP_SANITIZE)
     # The vptr check wants the type information of SOCI's classes, which its library hides.
     add_compile_options(-fno-sanitize=vptr)
   endif()
+  if(LIVEMAP_SANITIZE MATCHES "thread")
+    # ThreadSanitizer knows no fences; Boost.Asio's queues are guarded by mutexes, which it does know.
+    add_compile_definitions(BOOST_ASIO_DISABLE_FENCED_BLOCK)
+  endif()
   # GCC 12 warns of std::function's own members when sanitizers keep it from inlining (std::regex).
   target_compile_options(livemap_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()

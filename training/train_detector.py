@@ -73,6 +73,8 @@ class Trainer:
     def train_epoch(self, pictures: dict, workers: int) -> dict:
         """One pass over freshly drawn samples; returns mean losses."""
         settings = self.settings
+        # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
+        torch.manual_seed(settings.seed * 100003 + self.epoch)
         settling = self.epoch >= settings.settling_from()
         # Whole frames have twice the pixels of a training view: half the batch keeps steps equally dear.
         width, height = (inference.INPUT_WIDTH, inference.INPUT_HEIGHT) if settling else (settings.width, settings.height)

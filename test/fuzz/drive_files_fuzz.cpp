@@ -4,12 +4,12 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/image_header.h"
 #include "drives/camera_file.h"
 #include "drives/labels.h"
 #include "drives/route.h"
 #include "drives/sequences.h"
 #include "drives/survey.h"
-#include "base/image_header.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
