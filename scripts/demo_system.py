@@ -54,6 +54,15 @@ def run_tool(command, log):
         raise StartError(words[-1] if words else f"{command[0]} ended with code {code}")
 
 
+def is_bag(path):
+    """Whether rosbag can open the file."""
+    try:
+        rosbag.Bag(str(path)).close()
+        return True
+    except (rosbag.ROSBagException, OSError):
+        return False
+
+
 def read_bag(path):
     """Number of camera frames and duration of a drive."""
     with rosbag.Bag(str(path)) as bag:

@@ -72,7 +72,8 @@ export class HazardLayer {
     this.markers = new Map();
     this.icons = new Map();
     this.group = L.markerClusterGroup({
-      maxClusterRadius: 56,
+      // Pixels: near enough to tell hazards apart on a street, wider where a town is in view.
+      maxClusterRadius: (zoom) => (zoom >= 16 ? 26 : 56),
       spiderfyOnMaxZoom: true,
       showCoverageOnHover: false,
       animate: !matchMedia('(prefers-reduced-motion: reduce)').matches,

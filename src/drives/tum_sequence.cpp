@@ -23,7 +23,7 @@ constexpr std::size_t kMaxTextBytes = 256U << 20U;
 }
 
 bool IsCommentOrEmpty(const std::string& line) {
-  const std::size_t first = line.find_first_not_of(" \t");
+  const std::size_t first = line.find_first_not_of(" \t\r");
   return first == std::string::npos || line[first] == '#';
 }
 
@@ -95,12 +95,13 @@ std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const s
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (IsCommentOrEmpty(lines[i])) continue;
     const std::vector<std::string> parts = SplitBlanks(lines[i]);
+    const std::string accepted = "stamp image [stamp depth]";
     const bool has_depth = parts.size() == 4;
+    if (parts.size() != 2 && !has_depth) RefuseLine(name, i, lines[i], accepted);
     const std::optional<std::int64_t> stamp = ParseStampNs(parts[0]);
     const std::optional<std::int64_t> depth_stamp = has_depth ? ParseStampNs(parts[2]) : stamp;
-    if ((parts.size() != 2 && !has_depth) || !stamp || !depth_stamp || !IsInside(parts[1]) ||
-        (has_depth && !IsInside(parts[3]))) {
-      RefuseLine(name, i, lines[i], "stamp image [stamp depth]");
+    if (!stamp || !depth_stamp || !IsInside(parts[1]) || (has_depth && !IsInside(parts[3]))) {
+      RefuseLine(name, i, lines[i], accepted);
     }
     if (!frames.empty() && *stamp <= frames.back().stamp_ns) {
       RefuseLine(name, i, lines[i], "stamps that increase");
@@ -118,8 +119,9 @@ std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::
     if (IsCommentOrEmpty(lines[i])) continue;
     const std::vector<std::string> parts = SplitBlanks(lines[i]);
     const std::string accepted = "stamp tx ty tz qx qy qz qw";
+    if (parts.size() != 8) RefuseLine(name, i, lines[i], accepted);
     const std::optional<std::int64_t> stamp = ParseStampNs(parts[0]);
-    if (parts.size() != 8 || !stamp) RefuseLine(name, i, lines[i], accepted);
+    if (!stamp) RefuseLine(name, i, lines[i], accepted);
     std::array<double, 7> numbers{};
     for (std::size_t k = 0; k < numbers.size(); ++k) {
       const std::optional<double> value = ParseFinite(parts[k + 1]);

@@ -65,7 +65,9 @@ void AppendHazards(const std::vector<Hazard>& hazards, const HazardCatalogue& ca
     if (hazards.size() > kMaxLabels) continue;
     labels.push_back(Begin(base, "labels", static_cast<int>(labels.size()),
                            Marker::TEXT_VIEW_FACING, kLabelHeightM));
-    labels.back().pose.position = ToPoint(place_m, kHazardDiameterM + kLabelHeightM);
+    // North of the sphere: seen from above, height would leave the label on top of it.
+    const Eigen::Vector2d beside_m(0, kHazardDiameterM);
+    labels.back().pose.position = ToPoint(place_m + beside_m, kHazardDiameterM);
     labels.back().color = Colour(1.0F, 1.0F, 1.0F);
     labels.back().text = entry.label;
   }

@@ -90,6 +90,8 @@ TEST(TumStamps, KeepAllDigits) {
 
 TEST(TumAssociations, StayInsideTheFolder) {
   EXPECT_EQ(ParseTumAssociations("# c\n1.5 rgb/a.png 1.6 depth/a.png\n", "a.txt").size(), 1U);
+  EXPECT_EQ(ParseTumAssociations("1 a.png\r\r\n\r\r\n", "a.txt").size(), 1U);
+  EXPECT_TRUE(ParseTumTrajectory("\r\r\n", "t.txt").empty());
   for (const char* bad : {"1 ../a.png 1 d.png", "1 /etc/passwd", "1 a.png 1", "2 a.png\n1 b.png"}) {
     EXPECT_THROW(ParseTumAssociations(bad, "a.txt"), Error) << bad;
   }
