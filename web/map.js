@@ -171,7 +171,7 @@ class Page {
     // Pins stand above their place, and on a phone the sheet covers the map's foot.
     this.map.fitBounds(bounds, {
       paddingTopLeft: [40, 64], paddingBottomRight: [40, 40 + this.sheet.coveredHeight()],
-      maxZoom: 17,
+      maxZoom: 18,
     });
   }
 
