@@ -167,8 +167,13 @@ TEST_F(LiveStreamTest, ABadSinceIsAnswered400) {
 TEST_F(LiveStreamTest, AClientThatTalksTooMuchIsClosed) {
   StreamClient client(server_.port());
   client.NextOfType("live");
-  client.stream().write(boost::asio::buffer(std::string(5000, 'x')));
-  EXPECT_THROW(client.Next(), boost::system::system_error);
+  // The server may close as soon as it has read how long the message is, so either call may fail.
+  EXPECT_THROW(
+      {
+        client.stream().write(boost::asio::buffer(std::string(5000, 'x')));
+        client.Next();
+      },
+      boost::system::system_error);
   EXPECT_EQ(Get(server_.port(), "/healthz").status, 200);
 }
 
