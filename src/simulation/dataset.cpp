@@ -1,0 +1,224 @@
+#include "simulation/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kTumScale = 5000;
+constexpr int kJpegQuality = 90;
+
+std::ofstream Open(const std::string& path) {
+  std::ofstream file(path);
+  if (!file) throw Error("the file '" + path + "' cannot be written");
+  return file;
+}
+
+void Close(std::ofstream& file, const std::string& path) {
+  file.close();
+  if (!file) throw Error("the file '" + path + "' could not be written to its end");
+}
+
+void MakeFolder(const std::string& directory, const std::vector<std::string>& inside) {
+  std::error_code error;
+  if (fs::exists(directory, error) && !fs::is_empty(directory, error)) {
+    throw Error("the folder '" + directory + "' is not empty, accepted is a new or empty one");
+  }
+  for (const std::string& name : inside) {
+    fs::create_directories(fs::path(directory) / name, error);
+    if (error) throw Error("the folder '" + directory + "' cannot be made: " + error.message());
+  }
+}
+
+void WriteImage(const std::string& path, const cv::Mat& image, const std::vector<int>& parameters) {
+  if (!cv::imwrite(path, image, parameters)) {
+    throw Error("the picture '" + path + "' cannot be written");
+  }
+}
+
+std::string Format(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof(text), format, value);
+  return text;
+}
+
+}  // namespace
+
+TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera)
+    : directory_(directory) {
+  MakeFolder(directory, {"rgb", "depth"});
+  const CameraIntrinsics& k = camera.intrinsics;
+  std::ofstream file = Open(directory + "/camera.yaml");
+  file.precision(10);
+  file << "width: " << k.width << "\nheight: " << k.height << "\nfx: " << k.fx << "\nfy: " << k.fy
+       << "\ncx: " << k.cx << "\ncy: " << k.cy << "\ndepth_scale: " << kTumScale << "\n";
+  if (camera.k1 != 0 || camera.k2 != 0) {
+    file << "k1: " << camera.k1 << "\nk2: " << camera.k2 << "\n";
+  }
+  Close(file, directory + "/camera.yaml");
+  rgb_ = Open(directory + "/rgb.txt");
+  depth_ = Open(directory + "/depth.txt");
+  associations_ = Open(directory + "/associations.txt");
+  truth_ = Open(directory + "/groundtruth.txt");
+  rgb_ << "# timestamp filename\n";
+  depth_ << "# timestamp filename\n";
+  truth_ << "# timestamp tx ty tz qx qy qz qw\n";
+}
+
+void TumWriter::Add(double time_s, const SimulatedFrame& frame) {
+  const std::string stamp = Format("%.6f", time_s);
+  const std::string rgb = "rgb/" + stamp + ".png";
+  const std::string depth = "depth/" + stamp + ".png";
+  cv::Mat coded;
+  // What 16 bits cannot hold is unknown, not near.
+  frame.depth.convertTo(coded, CV_16UC1, static_cast<double>(kTumScale));
+  coded.setTo(0, frame.depth > 65534.0F / kTumScale);
+  WriteImage(directory_ + "/" + rgb, frame.bgr, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  WriteImage(directory_ + "/" + depth, coded, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  rgb_ << stamp << " " << rgb << "\n";
+  depth_ << stamp << " " << depth << "\n";
+  associations_ << stamp << " " << rgb << " " << stamp << " " << depth << "\n";
+  const Eigen::Vector3d& t = frame.world_from_optical.translation();
+  const Eigen::Quaterniond q(frame.world_from_optical.linear());
+  truth_ << stamp;
+  for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
+    truth_ << Format(" %.9f", value);
+  }
+  truth_ << "\n";
+}
+
+void TumWriter::Finish() {
+  Close(rgb_, directory_ + "/rgb.txt");
+  Close(depth_, directory_ + "/depth.txt");
+  Close(associations_, directory_ + "/associations.txt");
+  Close(truth_, directory_ + "/groundtruth.txt");
+}
+
+YoloWriter::YoloWriter(const std::string& directory) : directory_(directory) {
+  MakeFolder(directory, {"images", "labels"});
+  std::ofstream classes = Open(directory + "/classes.txt");
+  for (const ObjectClass object_class : HazardClasses()) classes << ClassName(object_class) << "\n";
+  Close(classes, directory + "/classes.txt");
+  frames_ = Open(directory + "/frames.csv");
+  frames_ << "frame,chainage_m\n";
+}
+
+void YoloWriter::Add(double chainage_m, const SimulatedFrame& frame,
+                     const std::vector<HazardInView>& hazards) {
+  char name[16];
+  std::snprintf(name, sizeof(name), "%06zu", count_++);
+  WriteImage(directory_ + "/images/" + name + ".jpg", frame.bgr,
+             {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  const std::string path = directory_ + "/labels/" + name + ".txt";
+  std::ofstream labels = Open(path);
+  const double width = frame.bgr.cols;
+  const double height = frame.bgr.rows;
+  for (const HazardInView& hazard : hazards) {
+    const int class_id =
+        static_cast<int>(hazard.object_class) - static_cast<int>(ObjectClass::kPothole);
+    labels << class_id << Format(" %.6f", (hazard.box.x + 0.5 * hazard.box.width) / width)
+           << Format(" %.6f", (hazard.box.y + 0.5 * hazard.box.height) / height)
+           << Format(" %.6f", hazard.box.width / width)
+           << Format(" %.6f", hazard.box.height / height) << "\n";
+  }
+  Close(labels, path);
+  frames_ << name << Format(",%.3f", chainage_m) << "\n";
+}
+
+void YoloWriter::Finish() { Close(frames_, directory_ + "/frames.csv"); }
+
+void WriteHazards(const std::string& path, const Street& street, const GeoPoint& datum,
+                  const std::map<std::uint32_t, int>& frames_seen) {
+  const LocalFrame frame(datum);
+  nlohmann::json features = nlohmann::json::array();
+  const auto last = static_cast<int>(street.line().length_m() / kBlockM) + 1;
+  for (int index = 0; index <= last; ++index) {
+    for (const StreetHazard& hazard : street.Hazards(index)) {
+      const auto seen = frames_seen.find(hazard.instance);
+      if (seen == frames_seen.end()) continue;
+      const Eigen::Vector3d place = street.line().At(hazard.along_m, hazard.left_m, 0);
+      const GeoPoint position = frame.ToGeo(place.head<2>());
+      features.push_back(
+          {{"type", "Feature"},
+           {"geometry",
+            {{"type", "Point"}, {"coordinates", {position.longitude_deg, position.latitude_deg}}}},
+           {"properties",
+            {{"id", hazard.instance},
+             {"class", ClassName(hazard.object_class)},
+             {"along_m", hazard.along_m},
+             {"left_m", hazard.left_m},
+             {"radius_m", hazard.radius_m},
+             {"frames_seen", seen->second}}}});
+    }
+  }
+  std::ofstream file = Open(path);
+  file << nlohmann::json({{"type", "FeatureCollection"}, {"features", features}}).dump(1) << "\n";
+  Close(file, path);
+}
+
+cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns) {
+  if (pictures.empty()) throw Error("a contact sheet needs at least one picture");
+  constexpr int kGap = 4;
+  const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
+  const cv::Size size = pictures.front().size();
+  cv::Mat sheet(rows * (size.height + kGap) + kGap, columns * (size.width + kGap) + kGap, CV_8UC3,
+                cv::Scalar(24, 24, 24));
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const int column = static_cast<int>(i) % columns;
+    const int row = static_cast<int>(i) / columns;
+    pictures[i].copyTo(sheet(cv::Rect(kGap + column * (size.width + kGap),
+                                      kGap + row * (size.height + kGap), size.width, size.height)));
+  }
+  return sheet;
+}
+
+cv::Mat ColourClasses(const cv::Mat& classes) {
+  cv::Mat hue(classes.size(), CV_8UC3);
+  for (int row = 0; row < classes.rows; ++row) {
+    for (int column = 0; column < classes.cols; ++column) {
+      const int value = classes.at<std::uint8_t>(row, column);
+      const bool hazard = IsHazard(static_cast<ObjectClass>(value));
+      hue.at<cv::Vec3b>(row, column) =
+          cv::Vec3b(static_cast<std::uint8_t>(value * 67 % 180), hazard ? 255 : 90,
+                    value == 0 ? 0 : (hazard ? 255 : 150));
+    }
+  }
+  cv::Mat bgr;
+  cv::cvtColor(hue, bgr, cv::COLOR_HSV2BGR);
+  return bgr;
+}
+
+cv::Mat ColourDepth(const cv::Mat& depth) {
+  cv::Mat coded(depth.size(), CV_8UC1);
+  for (int row = 0; row < depth.rows; ++row) {
+    for (int column = 0; column < depth.cols; ++column) {
+      const float metres = depth.at<float>(row, column);
+      const float share = metres > 0 ? 255.0F * Saturate(3.0F / (metres + 1.0F)) : 0.0F;
+      coded.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(share);
+    }
+  }
+  cv::Mat bgr;
+  cv::applyColorMap(coded, bgr, cv::COLORMAP_TURBO);
+  bgr.setTo(cv::Scalar(0, 0, 0), depth <= 0);
+  return bgr;
+}
+
+void DrawHazards(const std::vector<HazardInView>& hazards, cv::Mat& bgr) {
+  for (const HazardInView& hazard : hazards) {
+    cv::rectangle(bgr, hazard.box, cv::Scalar(0, 255, 255), 1);
+    cv::putText(bgr, ClassName(hazard.object_class), {hazard.box.x, std::max(10, hazard.box.y - 3)},
+                cv::FONT_HERSHEY_SIMPLEX, 0.4, cv::Scalar(0, 255, 255), 1, cv::LINE_AA);
+  }
+}
+
+}  // namespace livemap

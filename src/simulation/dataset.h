@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "drives/camera_file.h"
+#include "geo/wgs84.h"
+#include "simulation/labels_in_view.h"
+#include "simulation/renderer.h"
+
+namespace livemap {
+
+/// Writes a drive in TUM RGB-D layout: rgb/, depth/ (16-bit PNG, 5000 units per metre, 0: sky or
+/// beyond 13.1 m), rgb.txt, depth.txt, associations.txt, groundtruth.txt (optical frame in the
+/// world frame, z up) and camera.yaml. Every Error names the path.
+class TumWriter {
+ public:
+  /// Makes the folder; throws Error when it exists and is not empty.
+  TumWriter(const std::string& directory, const SimulatedCamera& camera);
+  void Add(double time_s, const SimulatedFrame& frame);
+  /// Closes the lists; throws Error when the disk was full.
+  void Finish();
+
+ private:
+  std::string directory_;
+  std::ofstream rgb_;
+  std::ofstream depth_;
+  std::ofstream associations_;
+  std::ofstream truth_;
+};
+
+/// Writes a labelled drive: images/ (JPEG), labels/ (YOLO lines), classes.txt and frames.csv.
+class YoloWriter {
+ public:
+  explicit YoloWriter(const std::string& directory);
+  void Add(double chainage_m, const SimulatedFrame& frame,
+           const std::vector<HazardInView>& hazards);
+  void Finish();
+
+ private:
+  std::string directory_;
+  std::ofstream frames_;
+  std::size_t count_ = 0;
+};
+
+/// The true hazards that at least one frame shows, as GeoJSON points (RFC 7946). `frames_seen`
+/// counts by instance; `datum` is the world's origin.
+void WriteHazards(const std::string& path, const Street& street, const GeoPoint& datum,
+                  const std::map<std::uint32_t, int>& frames_seen);
+
+/// Pictures of one size side by side on dark ground, `columns` per row; CV_8UC3.
+cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns);
+
+/// Each class in its colour, for looking at truth; CV_8UC3.
+cv::Mat ColourClasses(const cv::Mat& classes);
+/// Near warm, far cold, sky black; CV_8UC3.
+cv::Mat ColourDepth(const cv::Mat& depth);
+/// Draws boxes with class names into a picture.
+void DrawHazards(const std::vector<HazardInView>& hazards, cv::Mat& bgr);
+
+}  // namespace livemap

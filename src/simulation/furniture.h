@@ -1,0 +1,24 @@
+#pragma once
+
+#include "simulation/mesh.h"
+#include "simulation/random.h"
+
+namespace livemap {
+
+// Things that stand in every street, on the origin of the builder's frame.
+
+/// A lamp post whose arm reaches to -y; returns the height of its light over the origin.
+float AddLampPost(MeshBuilder& builder);
+/// Where its light hangs, y.
+constexpr float kLampReachM = -1.3F;
+
+/// An ordinary traffic sign on a post, facing -x.
+void AddTrafficSign(CounterRandom& random, MeshBuilder& builder);
+/// A railing or picket fence along x from 0 to `length_m`.
+void AddFence(float length_m, CounterRandom& random, MeshBuilder& builder);
+void AddBin(CounterRandom& random, MeshBuilder& builder);
+void AddRubbishBags(CounterRandom& random, MeshBuilder& builder);
+/// A standing or walking person of about 1.75 m, facing x.
+void AddPerson(CounterRandom& random, MeshBuilder& builder);
+
+}  // namespace livemap

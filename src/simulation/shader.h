@@ -1,0 +1,38 @@
+#pragma once
+
+#include "simulation/lighting.h"
+#include "simulation/scene.h"
+#include "simulation/surface.h"
+
+namespace livemap {
+
+/// Lights what rays meet. Immutable after construction: any thread may ask. Positions are relative
+/// to the scene's origin.
+class Shader {
+ public:
+  /// `eye` and `forward` (unit) are the vehicle's camera: its headlights shine from there.
+  Shader(const StreetScene& scene, const Lighting& lighting, const Vec3& eye, const Vec3& forward);
+
+  /// Radiance along a ray from the eye; `direction` need not be a unit vector, `pixel_angle` is
+  /// what a pixel spans, radians. `instance`, if given, receives what was met.
+  Vec3 Radiance(const Vec3& direction, const SceneHit& hit, float pixel_angle,
+                std::uint32_t* instance) const;
+
+ private:
+  SurfacePoint PointAt(const Vec3& from, const Vec3& direction, const SceneHit& hit,
+                       float pixel_angle, const Material** material) const;
+  Surface Paint(const SurfacePoint& point, const Material& material,
+                const StreetScene::Block& block) const;
+  Vec3 Light(const SurfacePoint& point, const Surface& surface, bool is_leaf) const;
+  Vec3 Lamps(const SurfacePoint& point, const Vec3& normal) const;
+  Vec3 Mirrored(const SurfacePoint& point, const Surface& surface) const;
+  Vec3 ThroughAir(const Vec3& radiance, float distance) const;
+
+  const StreetScene& scene_;
+  const Lighting& lighting_;
+  Vec3 eye_;
+  Vec3 forward_;
+  std::vector<Vec3> lamps_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "simulation/ground_plan.h"
+#include "simulation/mesh.h"
+#include "simulation/road_line.h"
+#include "simulation/world_file.h"
+
+namespace livemap {
+
+/// A street is built block by block, so that a long drive needs no more memory than a short one.
+constexpr double kBlockM = 40;
+
+/// A hazard of the street, where it truly is.
+struct StreetHazard {
+  ObjectClass object_class = ObjectClass::kPothole;
+  double along_m = 0;
+  double left_m = 0;    ///< Of the road's middle line.
+  double radius_m = 0;  ///< Of its footprint, about.
+  bool water = false;   ///< A pothole with water in it.
+  std::uint64_t seed = 0;
+  std::uint32_t instance = 0;
+};
+
+/// The bodies of one block. Positions are relative to `origin` (world frame, metres).
+struct StreetBlock {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Mesh mesh;
+  GroundPlan ground;
+  std::vector<Vec3> lamps;  ///< Lights of the lamp posts.
+};
+
+/// A street in town with everything that stands in it, a pure function of the description, the
+/// seed and the season. Immutable: any thread may ask.
+class Street {
+ public:
+  /// Lays road for at least `length_m`. `leaves`: trees are green.
+  Street(const WorldDescription& description, std::uint64_t seed, double length_m, bool leaves);
+
+  const RoadLine& line() const { return line_; }
+  const WorldDescription& description() const { return description_; }
+  const StreetProfile& profile() const { return profile_; }
+  std::uint64_t seed() const { return seed_; }
+  /// Middle of the lane that the vehicle drives in, metres left of the middle line.
+  double lane_left_m() const { return -0.5 * description_.lane_width_m; }
+
+  /// Of block `index`, which spans [index, index + 1) * kBlockM.
+  std::vector<StreetHazard> Hazards(int index) const;
+  StreetBlock Build(int index) const;
+
+ private:
+  friend class BlockBuilder;
+  std::vector<double> Crossings(int index) const;
+  GroundPlan PlanGround(int index) const;
+
+  WorldDescription description_;
+  std::uint64_t seed_;
+  bool leaves_;
+  RoadLine line_;
+  StreetProfile profile_;
+};
+
+}  // namespace livemap

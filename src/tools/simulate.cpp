@@ -1,0 +1,223 @@
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+#include "drives/text.h"
+#include "simulation/dataset.h"
+#include "simulation/vehicle_motion.h"
+#include "tools/command_line.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kDefaultFieldOfViewDeg = 66;
+constexpr std::size_t kPreviewPictures = 12;
+
+std::vector<Flag> Flags() {
+  return {{"seed", "N", "of the world; the same seed gives the same bytes (1)"},
+          {"condition", "NAME", "day, dusk, rain or snow (day)"},
+          {"seconds", "S", "length of the drive (20)"},
+          {"rate", "HZ", "pictures per second (10)"},
+          {"size", "WxH", "of the pictures, pixels (640x480)"},
+          {"camera", "FILE", "camera file, see config/cameras; instead of --size"},
+          {"distortion", "K1,K2", "radial distortion of the camera (0,0)"},
+          {"blur", "N", "pictures averaged over the exposure of 8 ms (0: no motion blur)"},
+          {"speed", "MPS", "mean speed, m/s (8)"},
+          {"start", "LAT,LON", "of the world's origin, degrees (48.8566,9.0)"},
+          {"world", "FILE", "street and hazards, see docs/simulation.md (drawn by the seed)"},
+          {"threads", "N", "that render (2)"},
+          {"preview", "FILE.png", "contact sheet of twelve moments"},
+          {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
+          {"tum", "DIR", "TUM RGB-D folder"},
+          {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
+          {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
+}
+
+/// "a<separator>b" as two numbers.
+std::pair<double, double> ReadPair(const CommandLine& line, const std::string& flag,
+                                   const std::string& otherwise, char separator,
+                                   const std::string& accepted) {
+  const std::string text = line.Text(flag, otherwise);
+  const std::vector<std::string> parts = Split(text, separator);
+  if (parts.size() == 2) {
+    const auto a = ParseFinite(parts[0]);
+    const auto b = ParseFinite(parts[1]);
+    if (a && b) return {*a, *b};
+  }
+  throw Error("--" + flag + " is '" + text + "', accepted is " + accepted);
+}
+
+struct Setup {
+  SimulatedCamera camera;
+  CameraMounting mounting;
+  GeoPoint datum;
+};
+
+Setup ReadSetup(const CommandLine& line) {
+  Setup setup;
+  setup.mounting.height_m = 1.45;
+  setup.mounting.pitch_deg = 4;
+  CameraIntrinsics& k = setup.camera.intrinsics;
+  if (line.Has("camera")) {
+    if (line.Has("size")) throw Error("--size and --camera exclude each other");
+    const CameraFile file = ReadCameraFile(line.Text("camera", ""));
+    k = file.intrinsics;
+    setup.mounting = file.mounting;
+  } else {
+    const std::string accepted = "WxH in whole pixels from 64 to 4096, such as 640x480";
+    const auto [width, height] = ReadPair(line, "size", "640x480", 'x', accepted);
+    for (const double side : {width, height}) {
+      if (side < 64 || side > 4096 || side != std::floor(side)) {
+        throw Error("--size is '" + line.Text("size", "") + "', accepted is " + accepted);
+      }
+    }
+    k.width = static_cast<int>(width);
+    k.height = static_cast<int>(height);
+    k.fx = k.fy = 0.5 * width / std::tan(0.5 * kDefaultFieldOfViewDeg * M_PI / 180);
+    k.cx = 0.5 * (width - 1);
+    k.cy = 0.5 * (height - 1);
+  }
+  const auto [k1, k2] = ReadPair(line, "distortion", "0,0", ',', "K1,K2 from -0.4 to 0.4");
+  if (std::abs(k1) > 0.4 || std::abs(k2) > 0.4) {
+    throw Error("--distortion is '" + line.Text("distortion", "") +
+                "', accepted is K1,K2 from -0.4 to 0.4");
+  }
+  setup.camera.k1 = k1;
+  setup.camera.k2 = k2;
+  setup.camera.blur_samples = static_cast<int>(line.Number("blur", 0, 0, 64));
+  const std::string place = "LAT,LON in degrees";
+  const auto [latitude, longitude] = ReadPair(line, "start", "48.8566,9.0", ',', place);
+  setup.datum = {latitude, longitude};
+  if (!IsValid(setup.datum)) {
+    throw Error("--start is '" + line.Text("start", "") + "', accepted is " + place);
+  }
+  return setup;
+}
+
+Condition ReadCondition(const CommandLine& line) {
+  const std::string name = line.Text("condition", "day");
+  const std::optional<Condition> condition = ParseCondition(name);
+  if (!condition) {
+    throw Error("--condition is '" + name + "', accepted are: day, dusk, rain, snow");
+  }
+  return *condition;
+}
+
+void WriteSheet(const std::string& path, const std::vector<cv::Mat>& pictures, int columns) {
+  if (!cv::imwrite(path, ContactSheet(pictures, columns))) {
+    throw Error("the contact sheet '" + path + "' cannot be written");
+  }
+}
+
+/// Everything that a run writes; what was not asked for stays null.
+class Outputs {
+ public:
+  Outputs(const CommandLine& line, const SimulatedCamera& camera, std::size_t frames)
+      : preview_path_(line.Text("preview", "")),
+        truth_path_(line.Text("truth-preview", "")),
+        every_(std::max<std::size_t>(1, frames / kPreviewPictures)) {
+    for (const std::string& path : {preview_path_, truth_path_}) {
+      if (!path.empty() && !cv::haveImageWriter(path)) {
+        throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
+      }
+    }
+    if (line.Has("tum")) tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), camera);
+    if (line.Has("yolo")) yolo_ = std::make_unique<YoloWriter>(line.Text("yolo", ""));
+  }
+
+  void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame) {
+    const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
+    for (const HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
+    if (tum_) tum_->Add(time_s, frame);
+    if (yolo_) yolo_->Add(along_m, frame, hazards);
+    if (index % every_ != every_ / 2) return;
+    if (!preview_path_.empty() && preview_.size() < kPreviewPictures) {
+      cv::Mat small;
+      cv::resize(frame.bgr, small, cv::Size(), 480.0 / frame.bgr.cols, 480.0 / frame.bgr.cols,
+                 cv::INTER_AREA);
+      preview_.push_back(small);
+    }
+    if (!truth_path_.empty() && truth_.size() < 12 && index % (3 * every_) == every_ / 2) {
+      cv::Mat boxes = frame.bgr.clone();
+      DrawHazards(hazards, boxes);
+      truth_.push_back(boxes);
+      truth_.push_back(ColourClasses(frame.classes));
+      truth_.push_back(ColourDepth(frame.depth));
+    }
+  }
+
+  void Finish(const CommandLine& line, const Street& street, const GeoPoint& datum) {
+    if (tum_) tum_->Finish();
+    if (yolo_) yolo_->Finish();
+    if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
+    if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
+    if (line.Has("hazards")) WriteHazards(line.Text("hazards", ""), street, datum, frames_seen_);
+  }
+
+  std::size_t hazards() const { return frames_seen_.size(); }
+
+ private:
+  std::string preview_path_;
+  std::string truth_path_;
+  std::size_t every_;
+  std::unique_ptr<TumWriter> tum_;
+  std::unique_ptr<YoloWriter> yolo_;
+  std::vector<cv::Mat> preview_;
+  std::vector<cv::Mat> truth_;
+  std::map<std::uint32_t, int> frames_seen_;
+};
+
+int Run(int argc, char** argv) {
+  CommandLine line(
+      "livemap_simulate [flags]",
+      "Renders a drive through a generated street with the truth about everything in it.", 0,
+      Flags());
+  if (!line.Parse(argc, argv)) return 0;
+  const std::uint64_t seed = line.Seed("seed", 1);
+  const Condition condition = ReadCondition(line);
+  const double seconds = line.Number("seconds", 20, 0.1, 7200);
+  const double rate_hz = line.Number("rate", 10, 0.1, 100);
+  const double speed_mps = line.Number("speed", 8, 0.5, 30);
+  const Setup setup = ReadSetup(line);
+  RenderOptions options;
+  options.threads = static_cast<int>(line.Number("threads", 2, 1, 64));
+  const WorldDescription world =
+      line.Has("world") ? ReadWorldFile(line.Text("world", "")) : WorldDescription();
+
+  const Street street(world, seed, seconds * speed_mps * 1.1 + 300, condition != Condition::kSnow);
+  const VehicleMotion motion(street, speed_mps, 0);
+  StreetRenderer renderer(street, setup.camera, MakeLighting(condition, seed), options);
+  const auto frames =
+      std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * rate_hz)));
+  Outputs outputs(line, setup.camera, frames);
+  Progress progress("frame", frames);
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < frames; ++i) {
+    const double time_s = static_cast<double>(i) / rate_hz;
+    CameraMotion camera;
+    const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
+    camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
+    camera.world_from_optical_end =
+        motion.WorldFromBase(time_s + setup.camera.exposure_s) * base_from_optical;
+    camera.along_m = motion.AlongM(time_s);
+    outputs.Add(i, time_s, camera.along_m, renderer.Render(camera, static_cast<std::uint32_t>(i)));
+    progress.At(i + 1);
+  }
+  outputs.Finish(line, street, setup.datum);
+  const double took_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::printf("%zu frames, %.1f s of driving, %zu hazards seen, %.1f frames/s\n", frames, seconds,
+              outputs.hazards(), static_cast<double>(frames) / took_s);
+  return 0;
+}
+
+}  // namespace
+}  // namespace livemap
+
+int main(int argc, char** argv) {
+  return livemap::RunProgram("livemap_simulate", argc, argv, livemap::Run);
+}
