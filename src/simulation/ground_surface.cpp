@@ -62,7 +62,7 @@ class GroundPainter {
     const float tracks = std::exp(-12.0F * (in_lane - 0.78F) * (in_lane - 0.78F));
     const float oil = std::exp(-9.0F * in_lane * in_lane);
     const float driven = away_ < plan_.profile.lane_width_m ? 1.0F : 0.2F;
-    wide_ = FractalNoise(along_, left_ * 1.7F, 3.1F, 4, footprint_.mean, plan_.seed + 1);
+    wide_ = FractalNoise(along_, left_ * 1.7F, 3.1F, 3, footprint_.mean, plan_.seed + 1);
     float grey = 0.118F * (1 + 0.22F * wide_);
     grey *= 1 + driven * (0.10F * tracks - 0.13F * oil);
     grey *= 1 - 0.25F * SmoothStep(foot_ - 0.55F, foot_ - 0.05F, away_);
@@ -115,6 +115,10 @@ class GroundPainter {
 
   void Repairs(Vec3& colour) const {
     for (const Repair& repair : plan_.repairs) {
+      if (along_ < repair.low.x() - 0.15F || along_ > repair.high.x() + 0.15F ||
+          left_ < repair.low.y() - 0.15F || left_ > repair.high.y() + 0.15F) {
+        continue;
+      }
       const float wobble = 0.03F * Noise(along_ * 2.1F, left_ * 2.1F, repair.seed);
       const float dx = std::min(along_ - repair.low.x(), repair.high.x() - along_) + wobble;
       const float dy = std::min(left_ - repair.low.y(), repair.high.y() - left_) + wobble;
@@ -133,6 +137,7 @@ class GroundPainter {
     for (const Manhole& hole : plan_.manholes) {
       const float x = along_ - hole.along_m;
       const float y = left_ - hole.left_m;
+      if (std::abs(x) > 1 || std::abs(y) > 1) continue;
       const float r = std::sqrt(x * x + y * y);
       if (r > hole.radius_m + 0.16F) continue;
       const float soft = footprint_.mean + 0.004F;
@@ -255,6 +260,12 @@ class GroundPainter {
   /// Wet and white. `tracks` is how much wheels have cleaned the place.
   void Weather(float tracks) {
     if (surface_.mirror > 0.5F) return;
+    // In dry weather only road has anything to show here.
+    const bool dry = lighting_.wetness <= 0 && lighting_.snow <= 0;
+    if (dry &&
+        (away_ > foot_ || Noise(along_ / 2.2F, left_ * 1.4F / 2.2F, plan_.seed + 80) < 0.35F)) {
+      return;
+    }
     const bool paved = away_ - foot_ < kKerbWidthM + plan_.profile.pavement_width_m;
     const float low = FractalNoise(along_, left_ * 1.4F, 2.2F, 3, footprint_.mean, plan_.seed + 80);
     if (lighting_.wetness > 0.5F && paved && point_.normal.z() > 0.7F) {

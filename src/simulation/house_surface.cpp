@@ -12,7 +12,7 @@ float MeanFootprint(const SurfacePoint& point) {
 /// Rain and dirt run down walls and splash up from the pavement.
 float Stains(const SurfacePoint& point, std::uint32_t seed, float footprint) {
   const float streaks =
-      FractalNoise(point.uv.x() * 2.5F, point.uv.y() * 0.35F, 1.0F, 4, footprint * 2, seed + 3);
+      FractalNoise(point.uv.x() * 2.5F, point.uv.y() * 0.35F, 1.0F, 2, footprint * 2, seed + 3);
   const float splash = 1 - SmoothStep(0.0F, 0.9F, point.uv.y());
   return 1 + 0.16F * streaks - 0.22F * splash;
 }
@@ -35,7 +35,7 @@ Vec3 Brick(const Material& material, const SurfacePoint& point, float footprint)
 }
 
 Vec3 Plaster(const Material& material, const SurfacePoint& point, float footprint) {
-  const float wide = FractalNoise(point.uv.x(), point.uv.y(), 2.2F, 5, footprint, material.seed);
+  const float wide = FractalNoise(point.uv.x(), point.uv.y(), 2.2F, 3, footprint, material.seed);
   const float fine = DetailLeft(0.012F, footprint) *
                      Noise(point.uv.x() / 0.008F, point.uv.y() / 0.008F, material.seed + 2);
   return material.colour * (1 + 0.10F * wide + 0.12F * fine);

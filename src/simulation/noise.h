@@ -36,11 +36,21 @@ inline float Noise(float x, float y, std::uint32_t seed) {
   const float fy = y - static_cast<float>(iy);
   const float sx = fx * fx * (3.0F - 2.0F * fx);
   const float sy = fy * fy * (3.0F - 2.0F * fy);
-  const float a = UnitFloat(HashLattice(ix, iy, seed));
-  const float b = UnitFloat(HashLattice(ix + 1, iy, seed));
-  const float c = UnitFloat(HashLattice(ix, iy + 1, seed));
-  const float d = UnitFloat(HashLattice(ix + 1, iy + 1, seed));
-  return 2.0F * Blend(Blend(a, b, sx), Blend(c, d, sx), sy) - 1.0F;
+  // The four corners' hashes share their products: this is where a picture's time goes.
+  const std::uint32_t west = static_cast<std::uint32_t>(ix) * 0x9e3779b1U;
+  const std::uint32_t east = west + 0x9e3779b1U;
+  const std::uint32_t south = static_cast<std::uint32_t>(iy) * 0x85ebca77U + seed * 0xc2b2ae3dU;
+  const std::uint32_t north = south + 0x85ebca77U;
+  const auto corner = [](std::uint32_t h) {
+    h = (h ^ (h >> 15U)) * 0x2c1b3c6dU;
+    h = (h ^ (h >> 12U)) * 0x297a2d39U;
+    return static_cast<float>(static_cast<std::int32_t>(h)) * (1.0F / 2147483648.0F);
+  };
+  const float a = corner(west ^ south);
+  const float b = corner(east ^ south);
+  const float c = corner(west ^ north);
+  const float d = corner(east ^ north);
+  return Blend(Blend(a, b, sx), Blend(c, d, sx), sy);
 }
 
 /// How much of a detail of `size_m` is left when a pixel covers `footprint_m`: 1 when the pixel is
@@ -54,13 +64,14 @@ inline float FractalNoise(float x, float y, float size_m, int octaves, float foo
                           std::uint32_t seed) {
   float sum = 0;
   float amplitude = 0.55F;
-  float size = size_m;
+  float frequency = 1.0F / size_m;
   for (int octave = 0; octave < octaves; ++octave) {
-    const float left = DetailLeft(size, footprint_m);
+    const float left = Saturate(1.6F - 1.1F * footprint_m * frequency);
     if (left <= 0) break;
-    sum += left * amplitude * Noise(x / size, y / size, seed + static_cast<std::uint32_t>(octave));
+    sum += left * amplitude *
+           Noise(x * frequency, y * frequency, seed + static_cast<std::uint32_t>(octave));
     amplitude *= 0.55F;
-    size *= 0.47F;
+    frequency *= 2.13F;
   }
   return sum;
 }

@@ -13,8 +13,13 @@ namespace livemap {
 namespace {
 
 /// Neighbours whose light differs by more than this factor get more rays.
-constexpr float kEdgeContrast = 1.5F;
+constexpr float kEdgeContrast = 1.45F;
+/// The ground's paint is filtered already; only shadows' edges are as strong as this.
+constexpr float kGroundContrast = 2.2F;
+/// Different bodies of the same colour need nothing.
+constexpr float kBodyContrast = 1.07F;
 constexpr float kFaint = 0.02F;
+constexpr float kBrightest = 4;
 
 float Luminance(const cv::Vec3f& p) { return 0.25F * p[0] + 0.65F * p[1] + 0.1F * p[2]; }
 
@@ -66,13 +71,14 @@ class StreetRenderer::Exposure {
       SceneHit hits[8];
       for (int i = 0; i < count; ++i) directions[i] = rotation_ * rays[column + i];
       renderer_.scene_.CastEight(eye_, directions, count, hits);
+      Vec3 radiances[8];
+      std::uint32_t met[8];
+      shader_.Radiances(directions, hits, count, pixel_angle_, radiances, met);
       for (int i = 0; i < count; ++i) {
-        std::uint32_t instance = 0;
-        const Vec3 radiance = shader_.Radiance(directions[i], hits[i], pixel_angle_, &instance);
-        light[column + i] = {radiance.x(), radiance.y(), radiance.z()};
+        light[column + i] = {radiances[i].x(), radiances[i].y(), radiances[i].z()};
         // The ray's z component in the optical frame is 1: its length is the depth.
         depth[column + i] = hits[i].found ? hits[i].distance : 0.0F;
-        instances[column + i] = static_cast<int>(instance);
+        instances[column + i] = static_cast<int>(met[i]);
       }
     }
   }
@@ -101,9 +107,11 @@ class StreetRenderer::Exposure {
       const int r = row + step[0];
       const int c = column + step[1];
       if (r < 0 || c < 0 || r >= height_ || c >= width_) continue;
-      if (instances_.at<int>(r, c) != own) return true;
+      const bool same = instances_.at<int>(r, c) == own;
+      const bool ground = same && own < static_cast<int>(MakeInstance(1, ObjectClass::kSky));
+      const float most = ground ? kGroundContrast : same ? kEdgeContrast : kBodyContrast;
       const float there = Luminance(raw_.at<cv::Vec3f>(r, c)) + kFaint;
-      if (there > kEdgeContrast * here || here > kEdgeContrast * there) return true;
+      if (there > most * here || here > most * there) return true;
     }
     return false;
   }
@@ -111,14 +119,21 @@ class StreetRenderer::Exposure {
   /// Three more rays within the pixel; one alone must not outshine the rest.
   cv::Vec3f Extra(int row, int column) const {
     static constexpr double kOffsets[3][2] = {{-0.375, 0.125}, {0.125, -0.375}, {0.375, 0.375}};
+    Vec3 directions[3];
+    SceneHit hits[3];
+    Vec3 radiances[3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      directions[i] =
+          rotation_ *
+          renderer_.camera_.Ray(column + kOffsets[i][0], row + kOffsets[i][1]).cast<float>();
+    }
+    renderer_.scene_.CastEight(eye_, directions, 3, hits);
+    shader_.Radiances(directions, hits, 3, pixel_angle_, radiances, nullptr);
     cv::Vec3f sum(0, 0, 0);
-    for (const auto& offset : kOffsets) {
-      const Vec3 direction =
-          rotation_ * renderer_.camera_.Ray(column + offset[0], row + offset[1]).cast<float>();
-      const SceneHit hit = renderer_.scene_.Cast(eye_, direction, 0.05F, 1e9F);
-      const Vec3 radiance = shader_.Radiance(direction, hit, pixel_angle_, nullptr);
-      sum += cv::Vec3f(std::min(radiance.x(), 4.0F), std::min(radiance.y(), 4.0F),
-                       std::min(radiance.z(), 4.0F));
+    for (const Vec3& radiance : radiances) {
+      for (int channel = 0; channel < 3; ++channel) {
+        sum[channel] += std::min(radiance[channel], kBrightest);
+      }
     }
     return sum;
   }

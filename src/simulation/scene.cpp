@@ -245,12 +245,37 @@ void StreetScene::CastEight(const Vec3& from, const Vec3* directions, int count,
   }
 }
 
-bool StreetScene::IsBlocked(const Vec3& from, const Vec3& direction, float farthest) const {
+unsigned StreetScene::BlockedOfEight(const Vec3* from, unsigned wanted, const Vec3& direction,
+                                     float farthest) const {
+  if (wanted == 0) return 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  RTCRay ray = MakeRay(from, direction, 0.004F, farthest);
-  rtcOccluded1(scene_, &context, &ray);
-  return ray.tfar < 0;
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  RTCRay8 ray;
+  alignas(32) int valid[8];
+  for (unsigned i = 0; i < 8; ++i) {
+    const bool asked = (wanted >> i & 1U) != 0;
+    valid[i] = asked ? -1 : 0;
+    const Vec3 start = asked ? from[i] : Vec3::Zero();
+    ray.org_x[i] = start.x();
+    ray.org_y[i] = start.y();
+    ray.org_z[i] = start.z();
+    ray.dir_x[i] = direction.x();
+    ray.dir_y[i] = direction.y();
+    ray.dir_z[i] = direction.z();
+    ray.tnear[i] = 0.004F;
+    ray.tfar[i] = farthest;
+    ray.time[i] = 0;
+    ray.mask[i] = 0xffffffffU;
+    ray.id[i] = 0;
+    ray.flags[i] = 0;
+  }
+  rtcOccluded8(valid, scene_, &context, &ray);
+  unsigned blocked = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    if (valid[i] != 0 && ray.tfar[i] < 0) blocked |= 1U << i;
+  }
+  return blocked;
 }
 
 }  // namespace livemap

@@ -37,7 +37,9 @@ class StreetScene {
   SceneHit Cast(const Vec3& from, const Vec3& direction, float nearest, float farthest) const;
   /// The same for eight rays from one point; much quicker when they are neighbours.
   void CastEight(const Vec3& from, const Vec3* directions, int count, SceneHit* hits) const;
-  bool IsBlocked(const Vec3& from, const Vec3& direction, float farthest) const;
+  /// Which of up to eight parallel rays meet anything; bit i of the result is ray i's.
+  unsigned BlockedOfEight(const Vec3* from, unsigned wanted, const Vec3& direction,
+                          float farthest) const;
 
   struct Block {
     StreetBlock street;

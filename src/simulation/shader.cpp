@@ -103,19 +103,31 @@ Vec3 Shader::Lamps(const SurfacePoint& point, const Vec3& normal) const {
   return sum;
 }
 
-Vec3 Shader::Light(const SurfacePoint& point, const Surface& surface, bool is_leaf) const {
+unsigned Shader::Sunlit(const SurfacePoint* points, const Material* const* materials,
+                        int count) const {
+  if (lighting_.sun.x() <= 0) return 0;
+  Vec3 starts[8];
+  unsigned facing = 0;
+  for (int i = 0; i < count; ++i) {
+    if (materials[i] == nullptr) continue;
+    const bool is_leaf = materials[i]->kind == MaterialKind::kLeaf;
+    if (!is_leaf && points[i].normal.dot(lighting_.sun_direction) <= 0) continue;
+    starts[i] = points[i].position + 0.006F * (is_leaf ? Vec3(-points[i].view) : points[i].normal);
+    facing |= 1U << static_cast<unsigned>(i);
+  }
+  return facing & ~scene_.BlockedOfEight(starts, facing, lighting_.sun_direction, 90);
+}
+
+Vec3 Shader::Light(const SurfacePoint& point, const Surface& surface, bool is_leaf,
+                   bool sunlit) const {
   const Vec3& n = surface.normal;
   const float up = 0.5F + 0.5F * n.z();
   Vec3 light = (lighting_.ambient * up + lighting_.bounce * (1 - up)) * surface.openness;
-  if (lighting_.sun.x() > 0) {
+  if (sunlit) {
     float facing = n.dot(lighting_.sun_direction);
     if (surface.through > 0) facing = std::max(facing, -surface.through * facing);
-    if (facing > 0) {
-      const Vec3 start = point.position + 0.006F * (is_leaf ? Vec3(-point.view) : point.normal);
-      if (!scene_.IsBlocked(start, lighting_.sun_direction, 90)) {
-        light += lighting_.sun * (facing * (is_leaf ? 0.35F + 0.65F * surface.openness : 1.0F));
-      }
-    }
+    const float depth = is_leaf ? 0.35F + 0.65F * surface.openness : 1.0F;
+    light += lighting_.sun * (std::max(facing, 0.0F) * depth);
   }
   if (lighting_.lamps.x() > 0 || lighting_.headlights.x() > 0) light += Lamps(point, n);
   return light;
@@ -141,42 +153,62 @@ Vec3 Shader::ThroughAir(const Vec3& radiance, float distance) const {
   return Blend(lighting_.haze, radiance, std::exp(-distance / lighting_.haze_m));
 }
 
-Vec3 Shader::Radiance(const Vec3& direction, const SceneHit& hit, float pixel_angle,
-                      std::uint32_t* instance) const {
-  if (!hit.found) {
-    if (instance != nullptr) *instance = MakeInstance(0, ObjectClass::kSky);
-    const Vec3 way = direction.normalized();
-    return way.z() < 0 ? Blend(lighting_.haze, lighting_.bounce, 0.3F)
-                       : SkyRadiance(lighting_, way);
+void Shader::Radiances(const Vec3* directions, const SceneHit* hits, int count, float pixel_angle,
+                       Vec3* radiances, std::uint32_t* instances) const {
+  SurfacePoint points[8];
+  const Material* materials[8] = {};
+  for (int i = 0; i < count; ++i) {
+    if (hits[i].found) {
+      points[i] = PointAt(eye_, directions[i], hits[i], pixel_angle, &materials[i]);
+    }
   }
-  const Material* material = nullptr;
-  const SurfacePoint point = PointAt(eye_, direction, hit, pixel_angle, &material);
-  const StreetScene::Block& block = scene_.block(hit.block);
-  const Surface surface = Paint(point, *material, block);
-  if (instance != nullptr) *instance = surface.instance;
-  Vec3 radiance =
-      surface.colour.cwiseProduct(Light(point, surface, material->kind == MaterialKind::kLeaf));
+  const unsigned sunlit = Sunlit(points, materials, count);
+  for (int i = 0; i < count; ++i) {
+    std::uint32_t instance = MakeInstance(0, ObjectClass::kSky);
+    if (materials[i] == nullptr) {
+      const Vec3 way = directions[i].normalized();
+      radiances[i] =
+          way.z() < 0 ? Blend(lighting_.haze, lighting_.bounce, 0.3F) : SkyRadiance(lighting_, way);
+    } else {
+      const bool in_sun = (sunlit >> static_cast<unsigned>(i) & 1U) != 0;
+      radiances[i] = ThroughAir(Radiance(points[i], *materials[i], hits[i], in_sun, &instance),
+                                hits[i].distance * directions[i].norm());
+    }
+    if (instances != nullptr) instances[i] = instance;
+  }
+}
+
+Vec3 Shader::Sheen(const SurfacePoint& point, const Surface& surface, float grazing,
+                   bool sunlit) const {
+  const Vec3 way = point.view - 2 * point.view.dot(surface.normal) * surface.normal;
+  const float share =
+      surface.sheen + (1 - surface.sheen) * grazing * std::min(1.0F, 6 * surface.sheen);
+  // Low directions meet the houses across the street rather than the sky.
+  const float sky = SmoothStep(0.08F, 0.42F, way.z());
+  const Vec3 houses = Vec3(0.22F, 0.20F, 0.18F).cwiseProduct(lighting_.ambient);
+  Vec3 light = share * surface.openness * Blend(houses, SmoothSky(lighting_, way), sky);
+  if (sunlit && surface.sheen > 0.05F) {
+    const float glint = std::max(0.0F, way.dot(lighting_.sun_direction));
+    light += lighting_.sun * (share * 9 * std::pow(glint, 180.0F));
+  }
+  return light;
+}
+
+Vec3 Shader::Radiance(const SurfacePoint& point, const Material& material, const SceneHit& hit,
+                      bool sunlit, std::uint32_t* instance) const {
+  const Surface surface = Paint(point, material, scene_.block(hit.block));
+  *instance = surface.instance;
+  const bool is_leaf = material.kind == MaterialKind::kLeaf;
+  Vec3 radiance = surface.colour.cwiseProduct(Light(point, surface, is_leaf, sunlit));
   // Fresnel's law after Schlick: flat views mirror more.
-  const float facing = std::max(0.0F, -point.view.dot(surface.normal));
-  const float grazing = (1 - facing) * (1 - facing) * (1 - facing) * (1 - facing) * (1 - facing);
+  const float away = 1 - std::max(0.0F, -point.view.dot(surface.normal));
+  const float grazing = away * away * away * away * away;
   if (surface.mirror > 0.02F) {
     const float share = surface.mirror * (0.03F + 0.97F * grazing);
     if (share > 0.012F) radiance = Blend(radiance, Mirrored(point, surface), share);
   }
-  if (surface.sheen > 0) {
-    const Vec3 way = point.view - 2 * point.view.dot(surface.normal) * surface.normal;
-    const float share =
-        surface.sheen + (1 - surface.sheen) * grazing * std::min(1.0F, 6 * surface.sheen);
-    // Low directions meet the houses across the street rather than the sky.
-    const float sky = SmoothStep(0.08F, 0.42F, way.z());
-    const Vec3 houses = Vec3(0.22F, 0.20F, 0.18F).cwiseProduct(lighting_.ambient);
-    radiance += share * surface.openness * Blend(houses, SmoothSky(lighting_, way), sky);
-    if (lighting_.sun.x() > 0 && surface.sheen > 0.05F) {
-      const float glint = std::max(0.0F, way.dot(lighting_.sun_direction));
-      radiance += lighting_.sun * (share * 9 * std::pow(glint, 180.0F));
-    }
-  }
-  return ThroughAir(radiance + surface.glow, hit.distance * direction.norm());
+  if (surface.sheen > 0) radiance += Sheen(point, surface, grazing, sunlit);
+  return radiance + surface.glow;
 }
 
 }  // namespace livemap
