@@ -140,10 +140,11 @@ class Body {
     const Ring a = CrossSection(silhouette_, from, crushed, seed);
     const Ring b = CrossSection(silhouette_, to, crushed, seed);
     const float middle = 0.5F * (from + to);
+    const Rounding rounding{Normals(from, crushed, seed), Normals(to, crushed, seed)};
     for (std::size_t i = 0; i + 1 < kRing; ++i) {
       builder_.UseMaterial(IsGlass(i, from, to, middle) ? glass_ : paint_);
-      Quad(a[i], b[i], b[i + 1], a[i + 1], 1);
-      Quad(a[i], b[i], b[i + 1], a[i + 1], -1);
+      Quad(a, b, i, rounding, 1);
+      Quad(a, b, i, rounding, -1);
     }
   }
 
@@ -168,6 +169,28 @@ class Body {
   }
 
  private:
+  struct Rounding {
+    Ring near;
+    Ring far;
+  };
+
+  /// Unit normals of the rounded body at one station.
+  Ring Normals(float share, float crushed, std::uint32_t seed) const {
+    constexpr float kStep = 0.02F;
+    const Ring before = CrossSection(silhouette_, std::max(share - kStep, 0.0F), crushed, seed);
+    const Ring here = CrossSection(silhouette_, share, crushed, seed);
+    const Ring after = CrossSection(silhouette_, std::min(share + kStep, 1.0F), crushed, seed);
+    Ring normals;
+    for (std::size_t i = 0; i < kRing; ++i) {
+      const Vec3 low = here[i > 0 ? i - 1 : 0];
+      const Vec3 high =
+          i + 1 < kRing ? here[i + 1] : Vec3(here[i].x(), -here[i - 1].y(), here[i - 1].z());
+      const Vec3 normal = (after[i] - before[i]).cross(high - low);
+      normals[i] = normal.norm() > 1e-8F ? normal.normalized().eval() : Vec3::UnitZ().eval();
+    }
+    return normals;
+  }
+
   /// Side windows lie between belt and roof edge, wind shields where the roof line falls steeply.
   bool IsGlass(std::size_t i, float from, float to, float middle) const {
     const float top = HeightAt(silhouette_.top, middle);
@@ -179,24 +202,26 @@ class Body {
     return i >= 5 && cabin && slope > 0.32F && middle > 0.04F;
   }
 
-  void Quad(Vec3 a, Vec3 b, Vec3 c, Vec3 d, float side) {
-    for (Vec3* corner : {&a, &b, &c, &d}) corner->y() *= side;
-    Vec3 normal = (c - a).cross(d - b) * side;
-    if (normal.norm() < 1e-8F) return;
-    normal.normalize();
-    // Round the flanks a little: normals lean outwards with height.
-    const std::uint32_t first = builder_.AddVertex(a, Lean(normal, a), {a.x(), a.z()});
-    builder_.AddVertex(b, Lean(normal, b), {b.x(), b.z()});
-    builder_.AddVertex(c, Lean(normal, c), {c.x(), c.z()});
-    builder_.AddVertex(d, Lean(normal, d), {d.x(), d.z()});
+  /// Corners of ring points `i` and `i + 1` at two stations; normals between the flat one and that
+  /// of the rounded body.
+  void Quad(const Ring& near, const Ring& far, std::size_t i, const Rounding& rounding,
+            float side) {
+    Vec3 corners[4] = {near[i], far[i], far[i + 1], near[i + 1]};
+    const Vec3 round[4] = {rounding.near[i], rounding.far[i], rounding.far[i + 1],
+                           rounding.near[i + 1]};
+    const Vec3 flat = (corners[2] - corners[0]).cross(corners[3] - corners[1]);
+    if (flat.norm() < 1e-8F) return;
+    std::uint32_t first = 0;
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+      Vec3 normal = 0.35F * flat.normalized() + 0.65F * round[corner];
+      normal.y() *= side;
+      corners[corner].y() *= side;
+      const std::uint32_t vertex =
+          builder_.AddVertex(corners[corner], normal, {corners[corner].x(), corners[corner].z()});
+      if (corner == 0) first = vertex;
+    }
     builder_.AddTriangle(first, first + 1, first + 2);
     builder_.AddTriangle(first, first + 2, first + 3);
-  }
-
-  Vec3 Lean(const Vec3& normal, const Vec3& place) const {
-    const float lift = 0.5F * (place.z() / silhouette_.belt - 0.65F);
-    const float nose = std::pow(2 * place.x() / silhouette_.length, 3.0F);
-    return normal + Vec3(0.3F * nose, 0, 0.4F * lift);
   }
 
   const Silhouette& silhouette_;

@@ -84,7 +84,7 @@ class GroundPainter {
     if (coarse > 0) {
       const Cell cell = CellNoise(along_ / 0.016F, left_ / 0.016F, plan_.seed + 5);
       const float stone = 0.55F + 0.9F * UnitFloat(HashBits(cell.hash)) - 0.75F * cell.nearest;
-      grey *= 1 + strength * coarse * 0.75F * (stone - 0.55F);
+      grey *= 1 + strength * coarse * 0.58F * (stone - 0.55F);
     }
     grey *= 1 + strength *
                     (0.12F * Grain(0.05F, 7) + 0.09F * Grain(0.16F, 8) + 0.16F * Grain(0.009F, 9));
@@ -94,13 +94,15 @@ class GroundPainter {
     const float visible = DetailLeft(0.05F, footprint_.mean * 0.6F);
     if (visible <= 0) return;
     const float damage =
-        SmoothStep(0.05F, 0.4F, Noise(along_ / 5.3F, left_ / 2.7F, plan_.seed + 12));
+        SmoothStep(0.22F, 0.6F, Noise(along_ / 5.3F, left_ / 2.7F, plan_.seed + 12));
     if (damage > 0) {
-      const float bend_x = 0.16F * Noise(along_ * 3, left_ * 3, plan_.seed + 13);
-      const float bend_y = 0.16F * Noise(along_ * 3, left_ * 3, plan_.seed + 14);
+      const float bend_x = 0.3F * Noise(along_ * 2.3F, left_ * 2.3F, plan_.seed + 13) +
+                           0.07F * Noise(along_ * 11, left_ * 11, plan_.seed + 10);
+      const float bend_y = 0.3F * Noise(along_ * 2.3F, left_ * 2.3F, plan_.seed + 14) +
+                           0.07F * Noise(along_ * 11, left_ * 11, plan_.seed + 11);
       const Cell cell = CellNoise(along_ / 0.62F + bend_x, left_ / 0.48F + bend_y, plan_.seed + 15);
       const float gap = cell.second - cell.nearest;
-      grey *= 1 - 0.72F * visible * damage * (1 - SmoothStep(0.008F, 0.035F, gap));
+      grey *= 1 - 0.72F * visible * damage * (1 - SmoothStep(0.004F, 0.028F, gap));
     }
     // The seam between two lanes of paving, sealed here and there with tar.
     const float seam = left_ - 0.18F + 0.035F * Noise(along_ * 0.9F, 0.5F, plan_.seed + 16);
@@ -292,10 +294,10 @@ class GroundPainter {
     float cover = 0.95F + 0.3F * low;
     if (away_ < foot_) {
       const float lane = away_ < plan_.profile.lane_width_m ? 1.0F : 0.25F;
-      cover = 0.62F + 0.6F * low - 0.30F * lane - 0.75F * tracks;
+      cover = 0.80F + 0.55F * low - 0.30F * lane - 0.75F * tracks;
       if (hole) cover -= 0.45F;
     } else if (away_ < foot_ + kKerbWidthM + plan_.profile.pavement_width_m) {
-      cover = 0.7F + 0.5F * low;
+      cover = 0.92F + 0.45F * low;
     }
     const float share = SmoothStep(0.22F, 0.62F, cover + 0.35F * fine);
     const Vec3 slush(0.42F, 0.41F, 0.40F);

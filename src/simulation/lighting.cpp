@@ -28,17 +28,18 @@ Lighting Day(CounterRandom& random) {
 Lighting Dusk(CounterRandom& random) {
   Lighting light;
   light.sun_direction = SunFrom(random.Uniform(-0.9F, 0.9F), -0.03F);
-  light.zenith = Vec3(0.045F, 0.075F, 0.17F);
-  light.horizon = Vec3(0.42F, 0.24F, 0.17F);
-  light.ambient = Vec3(0.082F, 0.092F, 0.135F);
+  light.zenith = Vec3(0.030F, 0.062F, 0.16F);
+  light.horizon = Vec3(0.30F, 0.19F, 0.17F);
+  light.ambient = Vec3(0.052F, 0.066F, 0.112F);
   light.bounce = Vec3(0.03F, 0.028F, 0.03F);
-  light.haze = Vec3(0.16F, 0.13F, 0.15F);
+  light.haze = Vec3(0.105F, 0.10F, 0.135F);
   light.haze_m = 500;
   light.clouds = random.Uniform(0.3F, 0.6F);
   light.lamps = Vec3(15.0F, 10.0F, 5.2F);
-  light.headlights = Vec3(26.0F, 24.5F, 21.0F);
+  light.headlights = Vec3(9.5F, 9.0F, 7.8F);
   light.lit_windows = 0.38F;
-  light.exposure = 2.6F;
+  light.exposure = 2.3F;
+  light.key = 0.095F;
   return light;
 }
 
@@ -49,12 +50,13 @@ Lighting Rain(CounterRandom& random) {
   light.ambient = Vec3(0.52F, 0.56F, 0.62F);
   light.bounce = Vec3(0.14F, 0.14F, 0.14F);
   light.haze = Vec3(0.60F, 0.64F, 0.69F);
-  light.haze_m = 190;
+  light.haze_m = 430;
   light.clouds = 1;
   light.wetness = 1;
-  light.lit_windows = 0.12F;
+  light.lit_windows = 0.14F;
   light.headlights = Vec3(2.0F, 1.9F, 1.7F);
-  light.exposure = 1.05F;
+  light.exposure = 1.35F;
+  light.key = 0.185F;
   return light;
 }
 
@@ -65,12 +67,13 @@ Lighting Snow(CounterRandom& random) {
   light.ambient = Vec3(0.72F, 0.77F, 0.86F);
   light.bounce = Vec3(0.48F, 0.50F, 0.55F);
   light.haze = Vec3(0.80F, 0.83F, 0.88F);
-  light.haze_m = 150;
+  light.haze_m = 300;
   light.clouds = 1;
   light.snow = 1;
   light.wetness = 0.25F;
   light.lit_windows = 0.15F;
-  light.exposure = 0.92F;
+  light.exposure = 1.05F;
+  light.key = 0.27F;
   return light;
 }
 

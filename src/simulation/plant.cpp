@@ -60,12 +60,15 @@ class Crown {
       tips_.push_back(place);
       return;
     }
-    const int children = level == 0 ? 5 : 3;
+    const int children = level == 0 ? 6 : 3;
     for (int child = 0; child < children; ++child) {
       const float angle =
           2.4F * static_cast<float>(child) + random_.Uniform(-0.5F, 0.5F) + 1.1F * from.x();
-      const Vec3 out(std::cos(angle), std::sin(angle), random_.Uniform(-0.1F, 0.5F));
-      const Vec3 bent = (way * random_.Uniform(0.5F, 1.0F) + 0.9F * out).normalized();
+      const Vec3 out(std::cos(angle), std::sin(angle), random_.Uniform(-0.1F, 0.9F));
+      // The first child goes on upwards, so that the crown grows as high as wide.
+      const bool leads = child == 0 && level < 2;
+      const float bend = leads ? 0.25F : 0.9F;
+      const Vec3 bent = (way * random_.Uniform(0.6F, 1.0F) + bend * out).normalized();
       const float share = level == 0 ? random_.Uniform(0.6F, 0.9F) : random_.Uniform(0.5F, 0.75F);
       Grow(place, bent, length * share, radius * 0.52F, level + 1);
     }
@@ -90,15 +93,15 @@ void AddTree(float height_m, bool leaves, CounterRandom& random, MeshBuilder& bu
                        Vec3::Ones(), random.Bits32()});
   builder.AddTube({0, 0, -0.1F}, {0, 0, 0.35F}, 1.6F * girth, 1.05F * girth, 10);
   Crown crown(height_m, !leaves, random, builder);
-  crown.Grow({0, 0, 0.3F}, Vec3::UnitZ(), 0.38F * height_m, 1.05F * girth, 0);
+  crown.Grow({0, 0, 0.3F}, Vec3::UnitZ(), 0.34F * height_m, 1.05F * girth, 0);
   if (!leaves) return;
   const Vec3 green(random.Uniform(0.065F, 0.13F), random.Uniform(0.15F, 0.21F),
                    random.Uniform(0.03F, 0.05F));
   builder.SetMaterial({MaterialKind::kLeaf, green, green * 0.6F, random.Bits32()});
   const Vec3 middle(0, 0, 0.66F * height_m);
-  const auto count = static_cast<int>(2600.0F / static_cast<float>(crown.tips().size()));
+  const auto count = static_cast<int>(3300.0F / static_cast<float>(crown.tips().size()));
   for (const Vec3& tip : crown.tips()) {
-    const float cluster = 0.10F * height_m * random.Uniform(0.8F, 1.35F);
+    const float cluster = 0.125F * height_m * random.Uniform(0.8F, 1.3F);
     for (int leaf = 0; leaf < count; ++leaf) {
       const Vec3 offset =
           RandomDirection(random) * cluster * std::cbrt(random.Uniform(0.05F, 1.0F));
@@ -108,7 +111,7 @@ void AddTree(float height_m, bool leaves, CounterRandom& random, MeshBuilder& bu
       const float inside = 0.5F + 0.5F * offset.dot(outward) / cluster;
       builder.SetOpenness(Saturate(0.22F + 0.4F * depth * inside + 0.32F * inside));
       AddLeaf(place, (outward + offset / cluster).normalized(),
-              0.034F * height_m * random.Uniform(0.7F, 1.3F), random, builder);
+              0.036F * height_m * random.Uniform(0.7F, 1.3F), random, builder);
     }
   }
   builder.SetOpenness(1);

@@ -39,8 +39,8 @@ void AddPrecipitation(const Lighting& lighting, const CameraIntrinsics& camera,
   const auto width = static_cast<float>(camera.width);
   const auto height = static_cast<float>(camera.height);
   const auto focal = static_cast<float>(camera.fx);
-  const Vec3 colour = snow ? Vec3(lighting.horizon * 1.02F) : Vec3(lighting.horizon * 0.95F);
-  const int count = snow ? 1500 : 420;
+  const Vec3 colour = snow ? Vec3(lighting.horizon * 1.15F) : Vec3(lighting.horizon * 0.95F);
+  const int count = snow ? 2600 : 700;
   for (int i = 0; i < count; ++i) {
     // Equal density in space: most drops are far away.
     const float distance = 1.3F + 24.0F * std::cbrt(random.Uniform(0.0F, 1.0F));
@@ -48,13 +48,13 @@ void AddPrecipitation(const Lighting& lighting, const CameraIntrinsics& camera,
     const float y = random.Uniform(0.0F, height);
     const float scale = focal / distance;
     if (snow) {
-      const float radius = 0.012F * scale * random.Uniform(0.6F, 1.3F);
-      const float visible = std::min(1.0F, radius * radius / 0.6F);
+      const float radius = 0.016F * scale * random.Uniform(0.6F, 1.3F);
+      const float visible = std::min(1.0F, radius * radius / 0.35F);
       const float drawn = std::max(radius, 0.8F);
       Splat(colour, x, y, drawn, drawn * 1.25F, 0.85F * visible, distance, depth, light);
     } else {
       const float length = std::min(0.030F * scale, 26.0F);
-      const float share = std::min(0.22F, 0.0035F * scale);
+      const float share = std::min(0.30F, 0.0060F * scale);
       Splat(colour, x, y, 0.85F, length + 1.0F, share, distance, depth, light);
     }
   }

@@ -193,7 +193,7 @@ SimulatedFrame StreetRenderer::Render(const CameraMotion& motion, std::uint32_t 
   }
   if (instants > 1) light *= 1.0 / instants;
   AddPrecipitation(lighting_, camera_.intrinsics, frame_number, frame.depth, light);
-  const float gain = MeterExposure(light, lighting_.exposure);
+  const float gain = MeterExposure(light, lighting_.exposure, lighting_.key);
   frame.bgr.create(height, width, CV_8UC3);
   frame.classes.create(height, width, CV_8UC1);
   const auto noise_seed =

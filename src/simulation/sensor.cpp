@@ -63,7 +63,7 @@ Eigen::Vector2d SimulatedCamera::Project(const Eigen::Vector3d& point) const {
   return {intrinsics.fx * x * factor + intrinsics.cx, intrinsics.fy * y * factor + intrinsics.cy};
 }
 
-float MeterExposure(const cv::Mat& light, float start) {
+float MeterExposure(const cv::Mat& light, float start, float key) {
   // The lower two thirds count: the sky would make the road dark.
   double sum = 0;
   std::size_t count = 0;
@@ -77,8 +77,7 @@ float MeterExposure(const cv::Mat& light, float start) {
     }
   }
   const double mean = std::exp(sum / static_cast<double>(std::max<std::size_t>(count, 1)));
-  constexpr double kTarget = 0.17;
-  const double wanted = std::pow(kTarget / mean, 0.55);
+  const double wanted = std::pow(static_cast<double>(key) / mean, 0.55);
   return start * static_cast<float>(std::min(std::max(wanted, 0.55), 1.9));
 }
 

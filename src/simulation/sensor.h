@@ -25,8 +25,9 @@ struct SimulatedCamera {
   Eigen::Vector2d Project(const Eigen::Vector3d& point) const;
 };
 
-/// The exposure control's gain for linear light (CV_32FC3), around `start`.
-float MeterExposure(const cv::Mat& light, float start);
+/// The exposure control's gain for linear light (CV_32FC3), around `start`, which brings the mean
+/// towards `key`.
+float MeterExposure(const cv::Mat& light, float start, float key);
 
 /// One row of linear light to 8-bit BGR: gain, vignetting, noise, tone curve. Each pixel's noise
 /// depends on `noise_seed`, its row and its column only.
