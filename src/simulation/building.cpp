@@ -183,6 +183,26 @@ void AddRoof(const Style& style, float width, float depth, float height, Counter
   builder.AddTube({0.12F, -0.08F, 0.1F}, {0.12F, -0.08F, height - 0.1F}, 0.05F, 0.05F, 6);
 }
 
+/// The walls to the neighbours; they are seen where houses end at a crossing or a gap.
+void AddSides(const Style& style, float width, float depth, float ground_floor,
+              MeshBuilder& builder) {
+  const Eigen::Affine3f frame = builder.frame();
+  constexpr float kQuarterTurn = 1.57079633F;
+  for (const bool right : {false, true}) {
+    const Vec3 corner = right ? Vec3(width, 0, 0) : Vec3(0, depth, 0);
+    builder.SetFrame(frame * Eigen::Translation3f(corner) *
+                     Eigen::AngleAxisf(right ? kQuarterTurn : -kQuarterTurn, Vec3::UnitZ()));
+    Front wall(style, depth, builder);
+    wall.Wall(0, 0, depth, ground_floor);
+    float base = ground_floor;
+    for (int floor = 1; floor < style.floors; ++floor) {
+      wall.Floor(base, style.floor_m, 2, -1);
+      base += style.floor_m;
+    }
+  }
+  builder.SetFrame(frame);
+}
+
 }  // namespace
 
 void AddBuilding(float width_m, float depth_m, CounterRandom& random, MeshBuilder& builder) {
@@ -206,11 +226,10 @@ void AddBuilding(float width_m, float depth_m, CounterRandom& random, MeshBuilde
     front.Floor(base, style.floor_m, columns, -1);
     base += style.floor_m;
   }
-  builder.UseMaterial(style.wall);
   const float w = width_m;
   const float d = depth_m;
-  builder.AddQuad({w, 0, 0}, {w, d, 0}, {w, d, base}, {w, 0, base}, {0, 0}, {d, base});
-  builder.AddQuad({0, d, 0}, {0, 0, 0}, {0, 0, base}, {0, d, base}, {0, 0}, {d, base});
+  AddSides(style, w, d, ground_floor, builder);
+  builder.UseMaterial(style.wall);
   builder.AddQuad({w, d, 0}, {0, d, 0}, {0, d, base}, {w, d, base}, {0, 0}, {w, base});
   builder.UseMaterial(style.trim);
   if (!style.shop) builder.AddBox({0, -0.05F, 0}, {w, 0, 0.12F});

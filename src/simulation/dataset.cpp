@@ -189,7 +189,7 @@ cv::Mat ColourClasses(const cv::Mat& classes) {
       const int value = classes.at<std::uint8_t>(row, column);
       const bool hazard = IsHazard(static_cast<ObjectClass>(value));
       hue.at<cv::Vec3b>(row, column) =
-          cv::Vec3b(static_cast<std::uint8_t>(value * 67 % 180), hazard ? 255 : 90,
+          cv::Vec3b(static_cast<std::uint8_t>(value * 41 % 180), hazard ? 255 : 90,
                     value == 0 ? 0 : (hazard ? 255 : 150));
     }
   }

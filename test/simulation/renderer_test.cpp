@@ -1,1 +1,209 @@
+#include "simulation/renderer.h"
+
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "drives/camera_file.h"
+#include "simulation/labels_in_view.h"
+#include "simulation/vehicle_motion.h"
+
+namespace livemap {
+namespace {
+
+SimulatedCamera SmallCamera() {
+  SimulatedCamera camera;
+  camera.intrinsics = CameraIntrinsics{160, 160, 119.5, 79.5, 240, 160};
+  return camera;
+}
+
+CameraMotion View(const Street& street, double time_s) {
+  const VehicleMotion motion(street, 8, 20);
+  CameraMounting mounting;
+  mounting.height_m = 1.4;
+  mounting.pitch_deg = 4;
+  CameraMotion view;
+  view.world_from_optical = motion.WorldFromBase(time_s) * mounting.BaseFromOptical();
+  view.world_from_optical_end = view.world_from_optical;
+  view.along_m = motion.AlongM(time_s);
+  return view;
+}
+
+SimulatedFrame Picture(const Street& street, const SimulatedCamera& camera, int threads,
+                       double time_s, Condition condition = Condition::kDay) {
+  RenderOptions options;
+  options.threads = threads;
+  StreetRenderer renderer(street, camera, MakeLighting(condition, street.seed()), options);
+  return renderer.Render(View(street, time_s), 3);
+}
+
+bool Equal(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() &&
+         std::equal(a.datastart, a.dataend, b.datastart);
+}
+
+bool Equal(const SimulatedFrame& a, const SimulatedFrame& b) {
+  return Equal(a.bgr, b.bgr) && Equal(a.depth, b.depth) && Equal(a.instances, b.instances) &&
+         Equal(a.classes, b.classes);
+}
+
+class Renderer : public ::testing::Test {
+ protected:
+  const Street street_{WorldDescription(), 3, 400, true};
+};
+
+TEST_F(Renderer, GivesTheSameBytesForOneAndTwoThreadsInEveryWeather) {
+  for (const Condition condition : {Condition::kDay, Condition::kRain, Condition::kSnow}) {
+    const SimulatedFrame one = Picture(street_, SmallCamera(), 1, 1, condition);
+    const SimulatedFrame two = Picture(street_, SmallCamera(), 2, 1, condition);
+    EXPECT_TRUE(Equal(one, two)) << ConditionName(condition);
+  }
+}
+
+TEST_F(Renderer, DoesNotDependOnWhatWasRenderedBefore) {
+  RenderOptions options;
+  StreetRenderer renderer(street_, SmallCamera(), MakeLighting(Condition::kDay, 3), options);
+  renderer.Render(View(street_, 0), 0);
+  renderer.Render(View(street_, 6), 60);
+  const SimulatedFrame late = renderer.Render(View(street_, 12), 3);
+  EXPECT_TRUE(Equal(late, Picture(street_, SmallCamera(), 1, 12)));
+}
+
+TEST_F(Renderer, AnotherSeedGivesAnotherPicture) {
+  const Street other(WorldDescription(), 4, 400, true);
+  EXPECT_FALSE(
+      Equal(Picture(street_, SmallCamera(), 2, 1).bgr, Picture(other, SmallCamera(), 2, 1).bgr));
+}
+
+TEST_F(Renderer, EveryInstanceHasOneClassAndTheClassImageAgrees) {
+  const SimulatedFrame frame = Picture(street_, SmallCamera(), 2, 2);
+  std::set<int> classes;
+  for (int row = 0; row < frame.classes.rows; ++row) {
+    for (int column = 0; column < frame.classes.cols; ++column) {
+      const auto instance = static_cast<std::uint32_t>(frame.instances.at<int>(row, column));
+      const int value = frame.classes.at<std::uint8_t>(row, column);
+      ASSERT_EQ(value, static_cast<int>(ClassOfInstance(instance)));
+      ASSERT_LT(value, kObjectClasses);
+      ASSERT_EQ(frame.depth.at<float>(row, column) == 0, value == 0) << "only the sky has no depth";
+      classes.insert(value);
+    }
+  }
+  EXPECT_GE(classes.size(), 5U);
+}
+
+/// Inverse depth between four pixels of one surface; 0 when they are not of one surface.
+double InverseDepth(const SimulatedFrame& frame, const Eigen::Vector2d& at) {
+  const auto column = static_cast<int>(std::floor(at.x()));
+  const auto row = static_cast<int>(std::floor(at.y()));
+  if (column < 0 || row < 0 || column + 1 >= frame.depth.cols || row + 1 >= frame.depth.rows) {
+    return 0;
+  }
+  double corners[2][2];
+  for (int dy = 0; dy < 2; ++dy) {
+    for (int dx = 0; dx < 2; ++dx) {
+      if (frame.instances.at<int>(row + dy, column + dx) != static_cast<int>(ObjectClass::kRoad)) {
+        return 0;
+      }
+      corners[dy][dx] = 1.0 / static_cast<double>(frame.depth.at<float>(row + dy, column + dx));
+    }
+  }
+  const double u = at.x() - column;
+  const double v = at.y() - row;
+  return (1 - v) * ((1 - u) * corners[0][0] + u * corners[0][1]) +
+         v * ((1 - u) * corners[1][0] + u * corners[1][1]);
+}
+
+/// Median and 90th percentile of how far, in pixels, points of one picture's road are from where
+/// the other's depth and pose put them.
+std::pair<double, double> Disagreement(const SimulatedFrame& a, const SimulatedFrame& b,
+                                       const SimulatedCamera& camera) {
+  const Eigen::Isometry3d b_from_a = b.world_from_optical.inverse() * a.world_from_optical;
+  std::vector<double> errors;
+  for (int row = 90; row < a.depth.rows; row += 3) {
+    for (int column = 0; column < a.depth.cols; column += 3) {
+      if (a.instances.at<int>(row, column) != static_cast<int>(ObjectClass::kRoad)) continue;
+      const auto depth = static_cast<double>(a.depth.at<float>(row, column));
+      const Eigen::Vector3d in_b = b_from_a * (camera.Ray(column, row) * depth);
+      if (in_b.z() < 1) continue;
+      const Eigen::Vector2d pixel = camera.Project(in_b);
+      const double inverse = InverseDepth(b, pixel);
+      if (inverse <= 0) continue;
+      const Eigen::Vector3d seen_by_b = camera.Ray(pixel.x(), pixel.y()) / inverse;
+      const Eigen::Vector2d back = camera.Project(b_from_a.inverse() * seen_by_b);
+      errors.push_back((back - Eigen::Vector2d(column, row)).norm());
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  if (errors.size() < 200) return {1e9, 1e9};
+  return {errors[errors.size() / 2], errors[errors.size() * 9 / 10]};
+}
+
+TEST(Truth, DepthPoseAndProjectionAgreeToAHundredthOfAPixel) {
+  WorldDescription world;
+  world.pieces = {{400, 0, 0}};
+  world.hazards.emplace();
+  const Street street(world, 3, 400, true);
+  SimulatedCamera camera = SmallCamera();
+  for (const double k1 : {0.0, -0.2}) {
+    camera.k1 = k1;
+    const SimulatedFrame a = Picture(street, camera, 2, 1.0);
+    const SimulatedFrame b = Picture(street, camera, 2, 1.1);
+    const auto [median, most] = Disagreement(a, b, camera);
+    EXPECT_LT(median, 0.002) << "k1 " << k1;
+    EXPECT_LT(most, 0.01) << "k1 " << k1;
+  }
+}
+
+TEST(Truth, HazardsLieWhereTheyAreSaidToLie) {
+  WorldDescription world;
+  world.hazards.emplace();
+  PlacedHazard placed;
+  placed.object_class = ObjectClass::kTrafficCone;
+  placed.at_m = 30;
+  placed.left_m = -2.2;
+  world.hazards->push_back(placed);
+  world.parked_cars = false;
+  const Street street(world, 3, 400, true);
+  const SimulatedCamera camera = SmallCamera();
+  const SimulatedFrame frame = Picture(street, camera, 2, 0);
+  const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
+  ASSERT_EQ(hazards.size(), 1U);
+  const Eigen::Vector3d foot = street.line().At(30, -2.2, -0.04);
+  const Eigen::Vector2d pixel = camera.Project(frame.world_from_optical.inverse() * foot);
+  const cv::Rect& box = hazards[0].box;
+  EXPECT_NEAR(pixel.x(), box.x + 0.5 * (box.width - 1), 1.5);
+  EXPECT_NEAR(pixel.y(), box.br().y - 1, 2.5);
+}
+
+TEST(Camera, DistortionAndItsInverseAgree) {
+  SimulatedCamera camera;
+  camera.k1 = -0.25;
+  camera.k2 = 0.06;
+  for (double column = 0; column < 640; column += 71) {
+    for (double row = 0; row < 480; row += 53) {
+      const Eigen::Vector2d back = camera.Project(7 * camera.Ray(column, row));
+      EXPECT_LT((back - Eigen::Vector2d(column, row)).norm(), 1e-3);
+    }
+  }
+}
+
+TEST(Camera, NoiseGrowsWithLight) {
+  SimulatedCamera camera;
+  camera.vignetting = 0;
+  camera.intrinsics.width = 200;
+  cv::Mat light(2, 200, CV_32FC3, cv::Scalar(0.4, 0.4, 0.4));
+  light.row(1) = cv::Scalar(0.05, 0.05, 0.05);
+  cv::Mat bgr(2, 200, CV_8UC3);
+  DevelopRow(camera, light, 0, 1, 9, bgr);
+  DevelopRow(camera, light, 1, 1, 9, bgr);
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(bgr.row(0), mean, deviation);
+  EXPECT_GT(deviation[0], 0.3);
+  EXPECT_LT(deviation[0], 4);
+  EXPECT_GT(mean[0], 100);
+}
+
+}  // namespace
+}  // namespace livemap
