@@ -75,7 +75,7 @@ TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera
   truth_ << "# timestamp tx ty tz qx qy qz qw\n";
 }
 
-void TumWriter::Add(double time_s, const SimulatedFrame& frame) {
+void TumWriter::Add(double time_s, const SimulatedFrame& frame, const cv::Mat& right) {
   const std::string stamp = Format("%.6f", time_s);
   const std::string rgb = "rgb/" + stamp + ".png";
   const std::string depth = "depth/" + stamp + ".png";
@@ -85,6 +85,17 @@ void TumWriter::Add(double time_s, const SimulatedFrame& frame) {
   coded.setTo(0, frame.depth > 65534.0F / kTumScale);
   WriteImage(directory_ + "/" + rgb, frame.bgr, {cv::IMWRITE_PNG_COMPRESSION, 1});
   WriteImage(directory_ + "/" + depth, coded, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  if (!right.empty()) {
+    if (!right_.is_open()) {
+      std::error_code error;
+      fs::create_directories(directory_ + "/rgb_right", error);
+      right_ = Open(directory_ + "/rgb_right.txt");
+      right_ << "# timestamp filename\n";
+    }
+    const std::string path = "rgb_right/" + stamp + ".png";
+    WriteImage(directory_ + "/" + path, right, {cv::IMWRITE_PNG_COMPRESSION, 1});
+    right_ << stamp << " " << path << "\n";
+  }
   rgb_ << stamp << " " << rgb << "\n";
   depth_ << stamp << " " << depth << "\n";
   associations_ << stamp << " " << rgb << " " << stamp << " " << depth << "\n";
@@ -98,6 +109,7 @@ void TumWriter::Add(double time_s, const SimulatedFrame& frame) {
 }
 
 void TumWriter::Finish() {
+  if (right_.is_open()) Close(right_, directory_ + "/rgb_right.txt");
   Close(rgb_, directory_ + "/rgb.txt");
   Close(depth_, directory_ + "/depth.txt");
   Close(associations_, directory_ + "/associations.txt");

@@ -131,11 +131,11 @@ void AddDeer(CounterRandom& random, MeshBuilder& builder) {
   builder.AddEllipsoid({0, 0, 0.95F}, {0.52F, 0.19F, 0.25F}, 16);
   builder.AddEllipsoid({0.34F, 0, 0.98F}, {0.26F, 0.18F, 0.27F}, 14);
   builder.AddEllipsoid({-0.36F, 0, 0.98F}, {0.25F, 0.18F, 0.25F}, 14);
-  builder.AddTube({0.44F, 0, 1.05F}, {0.74F, 0, 1.48F}, 0.15F, 0.085F, 12);
-  builder.AddEllipsoid({0.83F, 0, 1.54F}, {0.16F, 0.085F, 0.095F}, 12);
-  builder.AddTube({0.9F, 0, 1.52F}, {1.04F, 0, 1.46F}, 0.065F, 0.04F, 10);
+  builder.AddTube({0.42F, 0, 1.02F}, {0.68F, 0, 1.36F}, 0.16F, 0.09F, 12);
+  builder.AddEllipsoid({0.76F, 0, 1.41F}, {0.16F, 0.085F, 0.095F}, 12);
+  builder.AddTube({0.83F, 0, 1.39F}, {0.97F, 0, 1.33F}, 0.065F, 0.04F, 10);
   for (const float side : {-1.0F, 1.0F}) {
-    builder.AddEllipsoid({0.74F, side * 0.12F, 1.64F}, {0.04F, 0.10F, 0.05F}, 8);
+    builder.AddEllipsoid({0.67F, side * 0.12F, 1.51F}, {0.04F, 0.10F, 0.05F}, 8);
     for (const float x : {0.36F, -0.38F}) {
       const float swing = random.Uniform(-0.12F, 0.12F);
       const Vec3 knee(x + 0.4F * swing - (x < 0 ? 0.06F : 0.0F), side * 0.10F, 0.48F);
@@ -146,9 +146,9 @@ void AddDeer(CounterRandom& random, MeshBuilder& builder) {
   builder.SetMaterial(Plain(Vec3(0.62F, 0.58F, 0.50F)));
   builder.AddEllipsoid({-0.58F, 0, 1.0F}, {0.05F, 0.07F, 0.12F}, 8);
   builder.SetMaterial(Plain(kBlack));
-  builder.AddEllipsoid({1.05F, 0, 1.455F}, {0.025F, 0.03F, 0.025F}, 6);
+  builder.AddEllipsoid({0.98F, 0, 1.325F}, {0.025F, 0.03F, 0.025F}, 6);
   for (const float side : {-1.0F, 1.0F}) {
-    builder.AddEllipsoid({0.88F, side * 0.078F, 1.57F}, {0.02F, 0.012F, 0.02F}, 6);
+    builder.AddEllipsoid({0.81F, side * 0.078F, 1.44F}, {0.02F, 0.012F, 0.02F}, 6);
     for (const float x : {0.36F, -0.38F}) {
       builder.AddTube({x, side * 0.10F, 0}, {x, side * 0.10F, 0.07F}, 0.035F, 0.03F, 6);
     }
@@ -156,11 +156,12 @@ void AddDeer(CounterRandom& random, MeshBuilder& builder) {
   if (random.Chance(0.55)) {
     builder.SetMaterial(Plain(Vec3(0.16F, 0.11F, 0.07F)));
     for (const float side : {-1.0F, 1.0F}) {
-      const Vec3 fork(0.66F, side * 0.22F, 1.88F);
-      builder.AddTube({0.76F, side * 0.05F, 1.62F}, fork, 0.022F, 0.017F, 6);
-      builder.AddTube(fork, {0.78F, side * 0.30F, 2.12F}, 0.016F, 0.006F, 5);
-      builder.AddTube(fork, {0.56F, side * 0.27F, 2.05F}, 0.014F, 0.006F, 5);
-      builder.AddTube({0.71F, side * 0.13F, 1.75F}, {0.9F, side * 0.16F, 1.88F}, 0.014F, 0.005F, 5);
+      const Vec3 fork(0.59F, side * 0.22F, 1.75F);
+      builder.AddTube({0.69F, side * 0.05F, 1.49F}, fork, 0.022F, 0.017F, 6);
+      builder.AddTube(fork, {0.71F, side * 0.30F, 1.99F}, 0.016F, 0.006F, 5);
+      builder.AddTube(fork, {0.49F, side * 0.27F, 1.92F}, 0.014F, 0.006F, 5);
+      builder.AddTube({0.64F, side * 0.13F, 1.62F}, {0.83F, side * 0.16F, 1.75F}, 0.014F, 0.005F,
+                      5);
     }
   }
   builder.SetFrame(frame);

@@ -16,7 +16,7 @@ Lighting Day(CounterRandom& random) {
   light.sun = Vec3(2.55F, 2.30F, 1.95F);
   light.zenith = Vec3(0.20F, 0.40F, 0.88F);
   light.horizon = Vec3(0.78F, 0.92F, 1.12F);
-  light.ambient = Vec3(0.56F, 0.68F, 0.88F);
+  light.ambient = Vec3(0.60F, 0.67F, 0.77F);
   light.bounce = Vec3(0.30F, 0.28F, 0.25F);
   light.haze = Vec3(0.72F, 0.82F, 0.95F);
   light.haze_m = 1100;

@@ -34,7 +34,7 @@ struct Lighting {
   Vec3 lamps = Vec3::Zero();       ///< Of street lamps, at one metre; zero: off.
   Vec3 headlights = Vec3::Zero();  ///< Of the vehicle, at one metre.
   float lit_windows = 0;           ///< Share.
-  float key = 0.17F;  ///< Mean grey that the exposure control aims at.
+  float key = 0.17F;               ///< Mean grey that the exposure control aims at.
   float exposure = 1;              ///< Start value of the camera's exposure control.
 };
 

@@ -139,8 +139,10 @@ Surface PaintObject(const Material& material, const SurfacePoint& point, const L
       break;
     }
     case MaterialKind::kFur:
-      surface.colour = Blend(Grown(material, point, 0.03F, footprint), material.accent,
-                             0.35F * Saturate(-point.normal.z()));
+      surface.colour =
+          Blend(material.colour * (1 + 0.3F * FractalNoise(point.uv.x(), point.uv.y(), 0.05F, 3,
+                                                           footprint, material.seed)),
+                material.accent, 0.35F * Saturate(-point.normal.z()));
       break;
     case MaterialKind::kWood:
       surface.colour = Grown(material, point, 0.12F, footprint);

@@ -114,7 +114,12 @@ Progress::Progress(std::string what, std::size_t total)
 void Progress::At(std::size_t done) {
   if (total_ == 0) return;
   if (terminal_) {
-    std::fprintf(stderr, "\r%s %zu of %zu%s", what_.c_str(), done, total_,
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin_;
+    const double left_s =
+        done > 0 ? passed.count() * static_cast<double>(total_ - done) / static_cast<double>(done)
+                 : 0;
+    // Blanks wipe what a longer line has left.
+    std::fprintf(stderr, "\r%s %zu of %zu, %.0f s left   %s", what_.c_str(), done, total_, left_s,
                  done == total_ ? "\n" : "");
     std::fflush(stderr);
     return;

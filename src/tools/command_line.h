@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -48,8 +49,8 @@ class CommandLine {
   std::vector<std::string> positionals_;
 };
 
-/// How far long work is: one line that rewrites itself on a terminal, else plain lines, each about
-/// a tenth of the whole, on standard error.
+/// How far long work is: one line that rewrites itself on a terminal, with the time left, else
+/// plain lines, each about a tenth of the whole, on standard error.
 class Progress {
  public:
   Progress(std::string what, std::size_t total);
@@ -59,6 +60,7 @@ class Progress {
   const std::string what_;
   const std::size_t total_;
   const bool terminal_;
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   std::size_t said_tenth_ = 0;
 };
 

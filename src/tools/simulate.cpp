@@ -4,10 +4,12 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "base/error.h"
 #include "drives/text.h"
 #include "simulation/dataset.h"
+#include "simulation/depth_sensor.h"
 #include "simulation/vehicle_motion.h"
 #include "tools/command_line.h"
 
@@ -31,10 +33,13 @@ std::vector<Flag> Flags() {
           {"world", "FILE", "street and hazards, see docs/simulation.md (drawn by the seed)"},
           {"threads", "N", "that render (2)"},
           {"one-ray", "", "one ray per pixel: twice as fast, jagged edges"},
+          {"stereo", "M", "baseline of a second eye to the right, for --tum (none)"},
+          {"depth", "SENSOR", "exact, kinect or stereo: how --tum measures depth (exact)"},
           {"preview", "FILE.png", "contact sheet of twelve moments"},
           {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
           {"tum", "DIR", "TUM RGB-D folder"},
           {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
+          {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
 }
 
@@ -52,8 +57,12 @@ std::pair<double, double> ReadPair(const CommandLine& line, const std::string& f
   throw Error("--" + flag + " is '" + text + "', accepted is " + accepted);
 }
 
+constexpr double kDefaultBaselineM = 0.25;
+
 struct Setup {
   SimulatedCamera camera;
+  DepthSensor depth = DepthSensor::kExact;
+  double baseline_m = 0;  ///< 0: one eye.
   CameraMounting mounting;
   GeoPoint datum;
 };
@@ -89,6 +98,17 @@ Setup ReadSetup(const CommandLine& line) {
   }
   setup.camera.k1 = k1;
   setup.camera.k2 = k2;
+  setup.baseline_m = line.Has("stereo") ? line.Number("stereo", 0, 0.02, 2) : 0;
+  const std::optional<DepthSensor> depth = ParseDepthSensor(line.Text("depth", "exact"));
+  if (!depth) {
+    throw Error("--depth is '" + line.Text("depth", "") + "', accepted are: exact, kinect, stereo");
+  }
+  setup.depth = *depth;
+  for (const char* flag : {"stereo", "depth"}) {
+    if (line.Has(flag) && !line.Has("tum")) {
+      throw Error("--" + std::string(flag) + " needs --tum, which writes what it makes");
+    }
+  }
   setup.camera.blur_samples = static_cast<int>(line.Number("blur", 0, 0, 64));
   const std::string place = "LAT,LON in degrees";
   const auto [latitude, longitude] = ReadPair(line, "start", "48.8566,9.0", ',', place);
@@ -117,8 +137,9 @@ void WriteSheet(const std::string& path, const std::vector<cv::Mat>& pictures, i
 /// Everything that a run writes; what was not asked for stays null.
 class Outputs {
  public:
-  Outputs(const CommandLine& line, const SimulatedCamera& camera, std::size_t frames)
-      : preview_path_(line.Text("preview", "")),
+  Outputs(const CommandLine& line, const Setup& setup, double rate_hz, std::size_t frames)
+      : setup_(setup),
+        preview_path_(line.Text("preview", "")),
         truth_path_(line.Text("truth-preview", "")),
         every_(std::max<std::size_t>(1, frames / kPreviewPictures)) {
     for (const std::string& path : {preview_path_, truth_path_}) {
@@ -126,14 +147,29 @@ class Outputs {
         throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
       }
     }
-    if (line.Has("tum")) tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), camera);
+    if (line.Has("tum")) tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera);
     if (line.Has("yolo")) yolo_ = std::make_unique<YoloWriter>(line.Text("yolo", ""));
+    if (!line.Has("video")) return;
+    const std::string path = line.Text("video", "");
+    const CameraIntrinsics& k = setup.camera.intrinsics;
+    if (!video_.open(path, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), rate_hz,
+                     cv::Size(k.width, k.height))) {
+      throw Error("the video '" + path + "' cannot be written, accepted is a file .mp4");
+    }
   }
 
-  void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame) {
+  void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame,
+           const cv::Mat& right) {
     const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
     for (const HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
-    if (tum_) tum_->Add(time_s, frame);
+    if (tum_) {
+      SimulatedFrame sensed = frame;
+      sensed.depth = SenseDepth(frame.depth, setup_.camera.intrinsics, setup_.depth,
+                                setup_.baseline_m > 0 ? setup_.baseline_m : kDefaultBaselineM,
+                                static_cast<std::uint32_t>(index));
+      tum_->Add(time_s, sensed, right);
+    }
+    if (video_.isOpened()) video_.write(frame.bgr);
     if (yolo_) yolo_->Add(along_m, frame, hazards);
     if (index % every_ != every_ / 2) return;
     if (!preview_path_.empty() && preview_.size() < kPreviewPictures) {
@@ -162,6 +198,8 @@ class Outputs {
   std::size_t hazards() const { return frames_seen_.size(); }
 
  private:
+  Setup setup_;
+  cv::VideoWriter video_;
   std::string preview_path_;
   std::string truth_path_;
   std::size_t every_;
@@ -195,7 +233,7 @@ int Run(int argc, char** argv) {
   StreetRenderer renderer(street, setup.camera, MakeLighting(condition, seed), options);
   const auto frames =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * rate_hz)));
-  Outputs outputs(line, setup.camera, frames);
+  Outputs outputs(line, setup, rate_hz, frames);
   Progress progress("frame", frames);
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < frames; ++i) {
@@ -206,7 +244,17 @@ int Run(int argc, char** argv) {
     camera.world_from_optical_end =
         motion.WorldFromBase(time_s + setup.camera.exposure_s) * base_from_optical;
     camera.along_m = motion.AlongM(time_s);
-    outputs.Add(i, time_s, camera.along_m, renderer.Render(camera, static_cast<std::uint32_t>(i)));
+    const auto number = static_cast<std::uint32_t>(i);
+    const SimulatedFrame frame = renderer.Render(camera, number);
+    cv::Mat right;
+    if (setup.baseline_m > 0) {
+      const Eigen::Translation3d beside(setup.baseline_m, 0, 0);
+      camera.world_from_optical = camera.world_from_optical * beside;
+      camera.world_from_optical_end = camera.world_from_optical_end * beside;
+      // The eyes' sensors have noise of their own.
+      right = renderer.Render(camera, number + 0x40000000U).bgr;
+    }
+    outputs.Add(i, time_s, camera.along_m, frame, right);
     progress.At(i + 1);
   }
   outputs.Finish(line, street, setup.datum);
