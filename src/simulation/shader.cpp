@@ -54,7 +54,8 @@ SurfacePoint Shader::PointAt(const Vec3& from, const Vec3& direction, const Scen
   point.width_m = pixel_angle * hit.distance * length;
   point.stretch = 1.0F / std::max(std::abs(facing), 0.02F);
   point.instance = triangle.instance;
-  point.patch = hit.triangle / 2;
+  // Both halves of a quad begin at the same corner.
+  point.patch = c[0];
   *material = &mesh.materials[triangle.material];
   return point;
 }
