@@ -184,7 +184,8 @@ void DriveBag::WriteFixesUntil(double time_s) {
   for (;; ++next_fix_) {
     const double fix_s = static_cast<double>(next_fix_) / setup_.fix_rate_hz;
     if (fix_s > time_s) return;
-    const GeoPoint truth = setup_.route.At(fix_s * setup_.speed_mps).position;
+    const GeoPoint truth =
+        setup_.place ? setup_.place(fix_s) : setup_.route.At(fix_s * setup_.speed_mps).position;
     const ros::Time stamp = Stamp(fix_s);
     bag_.Write("/ground_truth/fix", stamp, ToFix(truth, 0, stamp));
     const std::optional<Eigen::Vector2d> error_m = receiver_.ErrorAt(fix_s);

@@ -5,6 +5,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,7 @@
 
 namespace livemap {
 
-/// What a drive with constant speed needs beside its pictures.
+/// What a drive needs beside its pictures.
 struct DriveSetup {
   Route route;
   double speed_mps;
@@ -25,6 +26,8 @@ struct DriveSetup {
   double fix_rate_hz;
   std::uint64_t seed;
   ros::Time start;  ///< Stamp of distance 0.
+  /// Where the vehicle is at a time; empty: `speed_mps` along the route.
+  std::function<GeoPoint(double time_s)> place = nullptr;
 };
 
 /// The flags that every drive shares; `Setup` reads them. Relative to the first frame's position.

@@ -12,6 +12,7 @@
 #include "simulation/depth_sensor.h"
 #include "simulation/vehicle_motion.h"
 #include "tools/command_line.h"
+#include "tools/simulation_bag.h"
 
 namespace livemap {
 namespace {
@@ -40,6 +41,7 @@ std::vector<Flag> Flags() {
           {"tum", "DIR", "TUM RGB-D folder"},
           {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
           {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
+          {"bag", "FILE.bag", "rosbag with the topics of a real vehicle and truth"},
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
 }
 
@@ -170,6 +172,7 @@ class Outputs {
       tum_->Add(time_s, sensed, right);
     }
     if (video_.isOpened()) video_.write(frame.bgr);
+    if (bag_) bag_->Add(time_s, frame, hazards);
     if (yolo_) yolo_->Add(along_m, frame, hazards);
     if (index % every_ != every_ / 2) return;
     if (!preview_path_.empty() && preview_.size() < kPreviewPictures) {
@@ -187,12 +190,26 @@ class Outputs {
     }
   }
 
-  void Finish(const CommandLine& line, const Street& street, const GeoPoint& datum) {
+  /// `place` is the vehicle's position at a time.
+  void OpenBag(const std::string& path, std::uint64_t seed, std::function<GeoPoint(double)> place) {
+    if (setup_.camera.k1 != 0 || setup_.camera.k2 != 0) {
+      throw Error("--bag and --distortion exclude each other: a bag's camera has none");
+    }
+    SimulationBag::Setup setup;
+    setup.camera = {"simulated", setup_.camera.intrinsics, setup_.mounting};
+    setup.place = std::move(place);
+    setup.seed = seed;
+    bag_ = OpenSimulationBag(path, setup);
+  }
+
+  void Finish(const CommandLine& line, const Street& street, double end_s) {
+    if (bag_) bag_->Finish(end_s);
     if (tum_) tum_->Finish();
     if (yolo_) yolo_->Finish();
     if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
     if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
-    if (line.Has("hazards")) WriteHazards(line.Text("hazards", ""), street, datum, frames_seen_);
+    if (line.Has("hazards"))
+      WriteHazards(line.Text("hazards", ""), street, setup_.datum, frames_seen_);
   }
 
   std::size_t hazards() const { return frames_seen_.size(); }
@@ -200,6 +217,7 @@ class Outputs {
  private:
   Setup setup_;
   cv::VideoWriter video_;
+  std::unique_ptr<SimulationBag> bag_;
   std::string preview_path_;
   std::string truth_path_;
   std::size_t every_;
@@ -234,6 +252,12 @@ int Run(int argc, char** argv) {
   const auto frames =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * rate_hz)));
   Outputs outputs(line, setup, rate_hz, frames);
+  if (line.Has("bag")) {
+    const LocalFrame map(setup.datum);
+    outputs.OpenBag(line.Text("bag", ""), seed, [&motion, map](double time_s) {
+      return map.ToGeo(motion.WorldFromBase(time_s).translation().head<2>());
+    });
+  }
   Progress progress("frame", frames);
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < frames; ++i) {
@@ -257,7 +281,7 @@ int Run(int argc, char** argv) {
     outputs.Add(i, time_s, camera.along_m, frame, right);
     progress.At(i + 1);
   }
-  outputs.Finish(line, street, setup.datum);
+  outputs.Finish(line, street, static_cast<double>(frames) / rate_hz);
   const double took_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::printf("%zu frames, %.1f s of driving, %zu hazards seen, %.1f frames/s\n", frames, seconds,

@@ -1,0 +1,11 @@
+#include "base/error.h"
+#include "tools/simulation_bag.h"
+
+namespace livemap {
+
+std::unique_ptr<SimulationBag> OpenSimulationBag(const std::string& path,
+                                                 const SimulationBag::Setup&) {
+  throw Error("--bag '" + path + "' is not possible, this build has no ROS");
+}
+
+}  // namespace livemap
