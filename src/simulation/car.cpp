@@ -236,7 +236,7 @@ void AddWheel(const Vec3& centre, float side, MeshBuilder& builder, std::uint16_
   constexpr float kRadius = 0.31F;
   builder.UseMaterial(dark);
   builder.SetOpenness(0.3F);
-  builder.AddDisc(centre - 0.02F * out, out, kRadius + 0.07F, 18);
+  builder.AddDisc(centre + 0.008F * out, out, kRadius + 0.05F, 20);
   builder.UseMaterial(rubber);
   builder.SetOpenness(0.7F);
   builder.AddTube(centre - 0.18F * out, centre + 0.015F * out, kRadius, kRadius, 18);

@@ -35,8 +35,8 @@ Lighting Dusk(CounterRandom& random) {
   light.haze = Vec3(0.105F, 0.10F, 0.135F);
   light.haze_m = 500;
   light.clouds = random.Uniform(0.3F, 0.6F);
-  light.lamps = Vec3(15.0F, 10.0F, 5.2F);
-  light.headlights = Vec3(9.5F, 9.0F, 7.8F);
+  light.lamps = Vec3(19.0F, 12.5F, 6.4F);
+  light.headlights = Vec3(13.0F, 12.2F, 10.4F);
   light.lit_windows = 0.38F;
   light.exposure = 2.3F;
   light.key = 0.095F;

@@ -40,7 +40,7 @@ void AddPrecipitation(const Lighting& lighting, const CameraIntrinsics& camera,
   const auto height = static_cast<float>(camera.height);
   const auto focal = static_cast<float>(camera.fx);
   const Vec3 colour = snow ? Vec3(lighting.horizon * 1.15F) : Vec3(lighting.horizon * 0.95F);
-  const int count = snow ? 2600 : 700;
+  const int count = snow ? 3200 : 700;
   for (int i = 0; i < count; ++i) {
     // Equal density in space: most drops are far away.
     const float distance = 1.3F + 24.0F * std::cbrt(random.Uniform(0.0F, 1.0F));
@@ -48,7 +48,7 @@ void AddPrecipitation(const Lighting& lighting, const CameraIntrinsics& camera,
     const float y = random.Uniform(0.0F, height);
     const float scale = focal / distance;
     if (snow) {
-      const float radius = 0.016F * scale * random.Uniform(0.6F, 1.3F);
+      const float radius = 0.021F * scale * random.Uniform(0.6F, 1.3F);
       const float visible = std::min(1.0F, radius * radius / 0.35F);
       const float drawn = std::max(radius, 0.8F);
       Splat(colour, x, y, drawn, drawn * 1.25F, 0.85F * visible, distance, depth, light);

@@ -98,7 +98,9 @@ Vec3 Shader::Lamps(const SurfacePoint& point, const Vec3& normal) const {
     const float ahead = way.dot(forward_);
     const float beam = SmoothStep(0.80F, 0.99F, ahead) * (1 - SmoothStep(0.0F, 0.055F, way.z())) *
                        (1 - SmoothStep(0.25F, 0.55F, std::abs(side)));
-    const float lambert = std::max(0.12F, -normal.dot(way));
+    // Low beams spare the ground right before the car.
+    const float steep = 1 - 0.85F * SmoothStep(0.07F, 0.30F, -way.z());
+    const float lambert = steep * std::max(0.12F, -normal.dot(way));
     sum += lighting_.headlights * (beam * lambert * 6.0F / (squared + 30.0F));
   }
   return sum;
