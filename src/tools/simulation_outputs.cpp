@@ -1,0 +1,104 @@
+#include "tools/simulation_outputs.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kPreviewPictures = 12;
+constexpr double kPreviewWidth = 480;
+/// Of depth as a stereo camera gives it, when the drive has no second eye.
+constexpr double kDefaultBaselineM = 0.25;
+
+void WriteSheet(const std::string& path, const std::vector<cv::Mat>& pictures, int columns) {
+  if (!cv::imwrite(path, ContactSheet(pictures, columns))) {
+    throw Error("the contact sheet '" + path + "' cannot be written");
+  }
+}
+
+}  // namespace
+
+SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSetup& setup,
+                                     double rate_hz, std::size_t frames)
+    : setup_(setup),
+      preview_path_(line.Text("preview", "")),
+      truth_path_(line.Text("truth-preview", "")),
+      every_(std::max<std::size_t>(1, frames / kPreviewPictures)) {
+  for (const std::string& path : {preview_path_, truth_path_}) {
+    if (!path.empty() && !cv::haveImageWriter(path)) {
+      throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
+    }
+  }
+  if (line.Has("tum")) tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera);
+  if (line.Has("yolo")) yolo_ = std::make_unique<YoloWriter>(line.Text("yolo", ""));
+  if (!line.Has("video")) return;
+  const std::string path = line.Text("video", "");
+  const CameraIntrinsics& k = setup.camera.intrinsics;
+  if (!video_.open(path, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), rate_hz,
+                   cv::Size(k.width, k.height))) {
+    throw Error("the video '" + path + "' cannot be written, accepted is a file .mp4");
+  }
+}
+
+void SimulationOutputs::OpenBag(const std::string& path, std::uint64_t seed,
+                                std::function<GeoPoint(double)> place) {
+  if (setup_.camera.k1 != 0 || setup_.camera.k2 != 0) {
+    throw Error("--bag and --distortion exclude each other: a bag's camera has none");
+  }
+  SimulationBag::Setup setup;
+  setup.camera = {"simulated", setup_.camera.intrinsics, setup_.mounting};
+  setup.place = std::move(place);
+  setup.seed = seed;
+  bag_ = OpenSimulationBag(path, setup);
+}
+
+void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
+                            const SimulatedFrame& frame, const cv::Mat& right) {
+  const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
+  for (const HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
+  if (tum_) {
+    SimulatedFrame sensed = frame;
+    sensed.depth = SenseDepth(frame.depth, setup_.camera.intrinsics, setup_.depth,
+                              setup_.baseline_m > 0 ? setup_.baseline_m : kDefaultBaselineM,
+                              static_cast<std::uint32_t>(index));
+    tum_->Add(time_s, sensed, right);
+  }
+  if (video_.isOpened()) video_.write(frame.bgr);
+  if (bag_) bag_->Add(time_s, frame, hazards);
+  if (yolo_) yolo_->Add(along_m, frame, hazards);
+  if (index % every_ == every_ / 2) AddToSheets(index, frame, hazards);
+}
+
+void SimulationOutputs::AddToSheets(std::size_t index, const SimulatedFrame& frame,
+                                    const std::vector<HazardInView>& hazards) {
+  if (!preview_path_.empty() && preview_.size() < kPreviewPictures) {
+    const double scale = kPreviewWidth / frame.bgr.cols;
+    cv::Mat small;
+    cv::resize(frame.bgr, small, cv::Size(), scale, scale, cv::INTER_AREA);
+    preview_.push_back(small);
+  }
+  if (!truth_path_.empty() && truth_.size() < kPreviewPictures &&
+      index % (3 * every_) == every_ / 2) {
+    cv::Mat boxes = frame.bgr.clone();
+    DrawHazards(hazards, boxes);
+    truth_.push_back(boxes);
+    truth_.push_back(ColourClasses(frame.classes));
+    truth_.push_back(ColourDepth(frame.depth));
+  }
+}
+
+void SimulationOutputs::Finish(const CommandLine& line, const Street& street, double end_s) {
+  if (bag_) bag_->Finish(end_s);
+  if (tum_) tum_->Finish();
+  if (yolo_) yolo_->Finish();
+  if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
+  if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
+  if (line.Has("hazards")) {
+    WriteHazards(line.Text("hazards", ""), street, setup_.datum, frames_seen_);
+  }
+}
+
+}  // namespace livemap

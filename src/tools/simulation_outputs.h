@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+#include <string>
+#include <vector>
+
+#include "simulation/dataset.h"
+#include "tools/simulation_bag.h"
+#include "tools/simulation_setup.h"
+
+namespace livemap {
+
+/// Everything that a simulated drive writes; what was not asked for stays null.
+class SimulationOutputs {
+ public:
+  /// Reads --preview, --truth-preview, --tum, --yolo and --video; throws Error naming the path.
+  SimulationOutputs(const CommandLine& line, const SimulationSetup& setup, double rate_hz,
+                    std::size_t frames);
+
+  /// `place` is the vehicle's position at a time, seconds since the first frame.
+  void OpenBag(const std::string& path, std::uint64_t seed, std::function<GeoPoint(double)> place);
+  /// The frame `index`; `right` is the second eye's picture, or empty.
+  void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame,
+           const cv::Mat& right);
+  /// Writes what is written once, --hazards too, and closes every file.
+  void Finish(const CommandLine& line, const Street& street, double end_s);
+
+  /// Hazards that were in view so far.
+  std::size_t hazards() const { return frames_seen_.size(); }
+
+ private:
+  void AddToSheets(std::size_t index, const SimulatedFrame& frame,
+                   const std::vector<HazardInView>& hazards);
+
+  SimulationSetup setup_;
+  cv::VideoWriter video_;
+  std::unique_ptr<SimulationBag> bag_;
+  std::string preview_path_;
+  std::string truth_path_;
+  std::size_t every_;
+  std::unique_ptr<TumWriter> tum_;
+  std::unique_ptr<YoloWriter> yolo_;
+  std::vector<cv::Mat> preview_;
+  std::vector<cv::Mat> truth_;
+  std::map<std::uint32_t, int> frames_seen_;
+};
+
+}  // namespace livemap
