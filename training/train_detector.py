@@ -66,8 +66,16 @@ class Trainer:
         self.epoch, self.best_ap = state["epoch"], state["best_ap"]
 
     def start_from(self, state: dict) -> None:
-        """Begin a new schedule with the averaged weights of another run (a warm restart, SGDR)."""
-        self.model.load_state_dict(state["average"])
+        """Begin a new schedule with the averaged weights of another run (a warm restart, SGDR).
+
+        Where that run knew the first of our classes only, the others' outputs begin untrained.
+        """
+        weights = self.model.state_dict()
+        for name, value in state["average"].items():
+            if value.shape != weights[name].shape:  # outputs per class
+                value = torch.cat([value, weights[name][len(value) :]])
+            weights[name] = value
+        self.model.load_state_dict(weights)
         self.average = AveragedModel(self.model)
 
     def train_epoch(self, pictures: dict, workers: int) -> dict:
@@ -79,7 +87,7 @@ class Trainer:
         # Whole frames have twice the pixels of a training view: half the batch keeps steps equally dear.
         width, height = (inference.INPUT_WIDTH, inference.INPUT_HEIGHT) if settling else (settings.width, settings.height)
         batch, count = (settings.batch // 2, settings.samples_per_epoch // 2) if settling else (settings.batch, settings.samples_per_epoch)
-        augmenter = Augmenter(pictures, len(CLASSES), SETTLING if settling else Recipe(), width, height)
+        augmenter = Augmenter(pictures, SETTLING if settling else Recipe(), width, height)
         loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
         loss_of = TaskAlignedLoss(height, width, self.device)
         sums = torch.zeros(2)
@@ -118,6 +126,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     defaults = {field.name: field.default for field in fields(Settings)}
     parser = argparse.ArgumentParser(description="Train the hazard detector.")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
     parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
     parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with")
@@ -169,6 +178,8 @@ def run(arguments: argparse.Namespace) -> None:
             raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
         trainer.start_from(torch.load(arguments.start_from, map_location=device))
     pictures = data.read_training_pictures(arguments.data)
+    if arguments.simulated:
+        pictures["simulated"] = data.read_simulated(arguments.simulated)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
     arguments.out.mkdir(parents=True, exist_ok=True)

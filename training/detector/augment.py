@@ -10,6 +10,7 @@ from typing import Dict, List, Tuple
 import cv2
 import numpy as np
 
+from . import CLASSES
 from . import boxes as box_math
 from .data import POTHOLE, Picture
 
@@ -55,15 +56,27 @@ SETTLING = Recipe(
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.56, "survey_empty": 0.20, "closeups": 0.12, "cones": 0.12}
+GROUP_SHARES = {"survey_potholes": 0.46, "survey_empty": 0.16, "closeups": 0.08, "cones": 0.10, "simulated": 0.20}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
 
-UNLABELLED_CLASS_WEIGHTS = {"closeups": 0.0, "cones": 0.3}
-"""How much background of a class counts in pictures that do not label it. Cone photos teach that barriers, kerbs and
-cars are no potholes, at a low weight as some do show a pothole; survey frames (0) show unlabelled cones."""
-
-GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8}
+GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0}
 """Typical scale of a group's pictures in a view: close-ups shrink to the size of potholes seen from a car."""
+
+TILES_OF_MOSAICS = {"cones": ["cones"], "simulated": ["simulated"]}
+"""Groups that label other classes than the rest do: as the loss masks classes per image, a mosaic does not mix them."""
+
+
+def background_weight(group: str, class_name: str) -> float:
+    """How much background of a class counts in pictures that do not label it, 0 to 1.
+
+    Cone photos teach that kerbs and cars are no potholes, at a low weight as some do show a pothole; they
+    show unlabelled road works too. Survey frames show unlabelled cones but hardly any of the other hazards.
+    """
+    if group == "cones":
+        return 0.3 if class_name in ("pothole", "deer", "stopped_accident") else 0.0
+    if group.startswith("survey"):
+        return 0.0 if class_name in ("pothole", "traffic_cone") else 0.3
+    return 0.0
 
 
 @dataclass
@@ -85,14 +98,17 @@ def ratio(rng: np.random.Generator, spread: float) -> float:
 class Augmenter:
     """Draws samples of one size from groups of pictures."""
 
-    def __init__(self, groups: Dict[str, List[Picture]], class_count: int, recipe: Recipe, width: int, height: int):
-        self.groups, self.class_count, self.recipe = groups, class_count, recipe
+    def __init__(self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int):
+        self.groups, self.recipe = groups, recipe
         self.width, self.height = width, height
         self.names = [name for name in GROUP_SHARES if groups.get(name)]
         shares = np.array([GROUP_SHARES[name] for name in self.names])
         self.shares = shares / shares.sum()
         weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
         self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}
+        self.backgrounds = {
+            name: np.array([background_weight(name, class_name) for class_name in CLASSES], np.float32) for name in self.names
+        }
 
     def draw(self, rng: np.random.Generator) -> Sample:
         """One sample: a view or a mosaic of views, then colour, noise and blur."""
@@ -121,9 +137,8 @@ class Augmenter:
             for x, width in ((0, corner_x), (corner_x, self.width - corner_x))
         ]
         canvas = np.empty((self.height, self.width, 3), np.uint8)
-        # Tiles of one mosaic share the labelled class, as the loss masks classes per image.
         name = self.names[rng.choice(len(self.names), p=self.shares)]
-        names = ["cones"] if name == "cones" else [n for n in self.names if n != "cones"]
+        names = TILES_OF_MOSAICS.get(name) or [n for n in self.names if n not in TILES_OF_MOSAICS]
         views = []
         for x, y, width, height in tiles:
             view = self.view(rng, width, height, names)
@@ -161,8 +176,8 @@ class Augmenter:
         if rng.random() < self.recipe.mirror:
             transform[0] = [-scale_x, 0, width + left * scale_x]
         sample = self.render(picture, transform, width, height)
-        sample.labelled[:] = UNLABELLED_CLASS_WEIGHTS.get(name, 0.0)
-        sample.labelled[picture.labelled_class] = 1
+        sample.labelled = self.backgrounds[name].copy()
+        sample.labelled[list(picture.labelled_classes)] = 1
         return sample
 
     def place_window(
@@ -201,22 +216,22 @@ class Augmenter:
         return Sample(
             image,
             clipped[clear].astype(np.float32),
-            np.full(int(clear.sum()), picture.labelled_class, np.int64),
+            picture.classes[clear],
             clipped[~clear & (sizes > 0).all(1)].astype(np.float32),
-            np.zeros(self.class_count, np.float32),
+            np.zeros(len(CLASSES), np.float32),
         )
 
     def paste_potholes(self, rng: np.random.Generator, picture: Picture) -> Picture:
         """Up to three potholes of other survey frames, blended in at about the image row they came from."""
-        image, boxes = picture.image.copy(), picture.boxes
+        image, boxes, classes = picture.image.copy(), picture.boxes, picture.classes
         donors = self.groups["survey_potholes"]
         for _ in range(rng.integers(1, 4)):
             donor = donors[rng.choice(len(donors), p=self.picture_shares["survey_potholes"])]
             box = donor.boxes[rng.integers(len(donor.boxes))]
             pasted = blend_patch(rng, image, donor.image, box, boxes)
             if pasted is not None:
-                boxes = np.vstack([boxes, pasted]).astype(np.float32)
-        return Picture(image, boxes, POTHOLE, picture.name)
+                boxes, classes = np.vstack([boxes, pasted]).astype(np.float32), np.append(classes, POTHOLE)
+        return Picture(image, boxes, classes, picture.labelled_classes, picture.name)
 
     def recolour(self, rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
         """Hue, saturation, brightness and gamma; sometimes grey, blurred or noisy."""

@@ -1,4 +1,4 @@
-"""Readers of the data sets: survey drives, close-ups of potholes, street photos with cones.
+"""Readers of the data sets: survey drives, close-ups of potholes, street photos with cones, simulated drives.
 
 Images are kept decoded in memory (about 1.2 GB in all): decoding anew for every draw would cost
 more than the network on a CPU.
@@ -7,7 +7,7 @@ more than the network on a CPU.
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, List
+from typing import Dict, List, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -26,11 +26,12 @@ class DataError(Exception):
 
 @dataclass
 class Picture:
-    """One labelled image. `labelled_class` is the only class whose absence means anything here."""
+    """One labelled image. Only the absence of `labelled_classes` means anything here."""
 
     image: np.ndarray  # H x W x 3 uint8, RGB
     boxes: np.ndarray  # N x 4 float32 corners in pixels
-    labelled_class: int
+    classes: np.ndarray  # N int64, into CLASSES
+    labelled_classes: Sequence[int]
     name: str = ""
     weight: float = 1.0  # how often to draw it, relative to others of its group
 
@@ -43,36 +44,55 @@ class DriveFrame:
     chainage_m: float
 
 
-def read_yolo_labels(path: Path, width: int, height: int) -> np.ndarray:
-    """A label file (class cx cy w h per line, fractions of the image) to N x 4 corners in pixels."""
+def read_yolo_labels(path: Path, width: int, height: int, class_ids: Sequence[int]) -> Tuple[np.ndarray, np.ndarray]:
+    """A label file (class cx cy w h per line, fractions of the image) to N x 4 corners in pixels and N classes.
+
+    `class_ids` are ours in the order of the file's; -1: not one of ours, left out.
+    """
     try:
         rows = [[float(value) for value in line.split()] for line in path.read_text().splitlines() if line.strip()]
     except (OSError, ValueError) as error:
         raise DataError(f"Cannot read the labels {path}: {error}.") from error
     if any(len(row) != 5 for row in rows):
         raise DataError(f"The label file {path} has a line without exactly 5 numbers (class cx cy w h).")
-    if not rows:
-        return np.zeros((0, 4), np.float32)
-    centres_and_sizes = np.array(rows)[:, 1:] * [width, height, width, height]
-    centres, half_sizes = centres_and_sizes[:, :2], centres_and_sizes[:, 2:] / 2
-    return np.hstack([centres - half_sizes, centres + half_sizes]).astype(np.float32)
+    if any(row[0] not in range(len(class_ids)) for row in rows):
+        raise DataError(f"The label file {path} has a class that is not from 0 to {len(class_ids) - 1}.")
+    table = np.array(rows).reshape(-1, 5)
+    classes = np.array(class_ids)[table[:, 0].astype(int)].astype(np.int64)
+    table, classes = table[classes >= 0, 1:] * [width, height, width, height], classes[classes >= 0]
+    centres, half_sizes = table[:, :2], table[:, 2:] / 2
+    return np.hstack([centres - half_sizes, centres + half_sizes]).astype(np.float32), classes
 
 
-def read_picture(image_path: Path, label_path: Path, labelled_class: int) -> Picture:
-    """One image and its labels."""
+def read_picture(image_path: Path, label_path: Path, class_ids: Sequence[int]) -> Picture:
+    """One image and its labels; `class_ids` as in read_yolo_labels."""
     image = cv2.imread(str(image_path), cv2.IMREAD_COLOR)
     if image is None:
         raise DataError(f"Cannot read the image {image_path}.")
-    boxes = read_yolo_labels(label_path, image.shape[1], image.shape[0])
-    return Picture(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, labelled_class, image_path.stem)
+    boxes, classes = read_yolo_labels(label_path, image.shape[1], image.shape[0], class_ids)
+    labelled = [class_id for class_id in class_ids if class_id >= 0]
+    return Picture(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, classes, labelled, image_path.stem)
 
 
-def read_folder(images: Path, labels: Path, labelled_class: int) -> List[Picture]:
+def read_folder(images: Path, labels: Path, class_ids: Sequence[int]) -> List[Picture]:
     """All JPEG images of a folder in the order of their names."""
     paths = sorted(images.glob("*.jpg"))
     if not paths:
         raise DataError(f"The folder {images} holds no .jpg image.")
-    return [read_picture(path, labels / (path.stem + ".txt"), labelled_class) for path in paths]
+    return [read_picture(path, labels / (path.stem + ".txt"), class_ids) for path in paths]
+
+
+def read_simulated(root: Path) -> List[Picture]:
+    """The frames of all labelled drives (images, labels, classes.txt) below `root`."""
+    drives = sorted(path.parent for path in root.glob("*/classes.txt"))
+    if not drives:
+        raise DataError(f"No labelled drive (*/classes.txt) below the folder {root}.")
+    pictures = []
+    for drive in drives:
+        names = (drive / "classes.txt").read_text().split()
+        class_ids = [CLASSES.index(name) if name in CLASSES else -1 for name in names]
+        pictures += read_folder(drive / "images", drive / "labels", class_ids)
+    return pictures
 
 
 def read_drive(section: Path) -> List[DriveFrame]:
@@ -84,7 +104,7 @@ def read_drive(section: Path) -> List[DriveFrame]:
         raise DataError(f"Cannot read {section / 'frames.csv'}: {error}.") from error
     return [
         DriveFrame(
-            read_picture(section / "images" / f"{frame}.jpg", section / "labels" / f"{frame}.txt", POTHOLE),
+            read_picture(section / "images" / f"{frame}.jpg", section / "labels" / f"{frame}.txt", [POTHOLE]),
             chainage_m,
         )
         for chainage_m, frame in sorted(rows)
@@ -107,7 +127,7 @@ def read_validation_drives(data: Path) -> Dict[str, List[DriveFrame]]:
 def read_validation_cones(data: Path) -> List[Picture]:
     """The validation photos of traffic cones."""
     cones = data / "traffic_cones"
-    return read_folder(cones / "images" / "val", cones / "labels" / "val", TRAFFIC_CONE)
+    return read_folder(cones / "images" / "val", cones / "labels" / "val", [TRAFFIC_CONE])
 
 
 def read_training_pictures(data: Path) -> Dict[str, List[Picture]]:
@@ -126,6 +146,6 @@ def read_training_pictures(data: Path) -> Dict[str, List[Picture]]:
     return {
         "survey_potholes": [picture for picture in frames if len(picture.boxes)],
         "survey_empty": [picture for picture in frames if not len(picture.boxes)],
-        "closeups": read_folder(closeups / "images", closeups / "labels", POTHOLE),
-        "cones": read_folder(cones / "images" / "train", cones / "labels" / "train", TRAFFIC_CONE),
+        "closeups": read_folder(closeups / "images", closeups / "labels", [POTHOLE]),
+        "cones": read_folder(cones / "images" / "train", cones / "labels" / "train", [TRAFFIC_CONE]),
     }

@@ -12,18 +12,17 @@ from detector.inference import AnchorGrid, decode, letterbox
 CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0, shadow=0.0, mix=0.0, relight=0.0, erase=0.0)
 
 
-def bright_square() -> Picture:
+def bright_square(class_id: int = POTHOLE) -> Picture:
     """A white square on black, 60 x 40 px."""
     image = np.zeros((400, 640, 3), np.uint8)
     image[180:220, 300:360] = 255
-    return Picture(image, np.array([[300, 180, 360, 220]], np.float32), POTHOLE)
+    return Picture(image, np.array([[300, 180, 360, 220]], np.float32), np.array([class_id]), [class_id])
 
 
 def augmenter(recipe: Recipe) -> Augmenter:
     """An augmenter of one pothole picture and one cone picture."""
-    cone = bright_square()
-    cone.labelled_class = TRAFFIC_CONE
-    return Augmenter({"survey_potholes": [bright_square()], "cones": [cone]}, 2, recipe, 416, 320)
+    groups = {"survey_potholes": [bright_square()], "cones": [bright_square(TRAFFIC_CONE)]}
+    return Augmenter(groups, recipe, 416, 320)
 
 
 class Samples(unittest.TestCase):

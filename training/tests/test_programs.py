@@ -11,7 +11,7 @@ import torch
 import evaluate_detector
 import export_detector
 import train_detector
-from detector import onnx_model
+from detector import CLASSES, onnx_model
 from detector.network import Detector
 
 from .synthetic import write_data
@@ -34,7 +34,7 @@ def scattered_detector() -> Detector:
     The exporter shares equal tensors through Identity nodes, which OpenCV 4.6 cannot load.
     """
     torch.manual_seed(1)
-    detector = Detector(2)
+    detector = Detector(len(CLASSES))
     with torch.no_grad():
         for parameter in detector.parameters():
             parameter.add_(0.01 * torch.randn_like(parameter))
