@@ -22,7 +22,7 @@ target_include_directories(livemap_catkin SYSTEM INTERFACE
 target_link_libraries(livemap_catkin INTERFACE ${catkin_LIBRARIES})
 add_dependencies(livemap_catkin livemap_generate_messages_cpp)
 
-install(DIRECTORY launch config rviz web models
+install(DIRECTORY launch config rviz web models rosbags
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(DIRECTORY scripts/ USE_SOURCE_PERMISSIONS
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION} PATTERN "__pycache__" EXCLUDE)

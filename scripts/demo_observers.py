@@ -230,20 +230,18 @@ def distance_m(a, b):
 
 
 def compare_with_truth(hazards, truth_file, radius_m=5.0):
-    """Found, missed and false hazards and the position error, each true hazard matched once."""
+    """Found and missed true hazards, false ones on the map, and the error of the found ones' positions.
+
+    One hazard on the map stands for all of its class within `radius_m`, as the zone merges them.
+    """
     with open(truth_file) as file:
         features = json.load(file)["features"]
     truth = [{"class": f["properties"]["class"], "longitude": f["geometry"]["coordinates"][0],
               "latitude": f["geometry"]["coordinates"][1]} for f in features]
-    pairs = sorted((distance_m(t, h), i, j) for i, t in enumerate(truth)
-                   for j, h in enumerate(hazards)
-                   if t["class"] == h["class"] and distance_m(t, h) <= radius_m)
-    found, used, errors = set(), set(), []
-    for distance, i, j in pairs:
-        if i not in found and j not in used:
-            found.add(i)
-            used.add(j)
-            errors.append(distance)
+    def nearest(place, places):
+        return min((distance_m(place, other) for other in places if other["class"] == place["class"]),
+                   default=math.inf)
+    errors = [error for error in (nearest(t, hazards) for t in truth) if error <= radius_m]
     mean = round(sum(errors) / len(errors), 2) if errors else None
-    return {"hazards": len(truth), "found": len(found), "missed": len(truth) - len(found),
-            "false": len(hazards) - len(used), "position_error_m_mean": mean}
+    return {"hazards": len(truth), "found": len(errors), "missed": len(truth) - len(errors),
+            "false": sum(nearest(h, truth) > radius_m for h in hazards), "position_error_m_mean": mean}

@@ -38,11 +38,14 @@ def program(name):
     raise StartError(f"program '{name}' is not built; ./livemap setup builds it")
 
 
+def package_file(name):
+    """Full path: a source tree with an install folder in it holds every file of the package twice."""
+    source = PROGRAMS.parent / name
+    return source if source.is_file() else pathlib.Path(rospkg.RosPack().get_path("livemap")) / name
+
+
 def launch_file(name):
-    """Full path: a source tree with an install folder in it holds every launch file twice."""
-    source = PROGRAMS.parent / "launch" / name
-    return str(source if source.is_file()
-               else pathlib.Path(rospkg.RosPack().get_path("livemap")) / "launch" / name)
+    return str(package_file(pathlib.Path("launch") / name))
 
 
 def run_tool(command, log):

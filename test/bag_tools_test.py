@@ -162,24 +162,6 @@ class BagToolsTest(unittest.TestCase):
         self.assertAlmostEqual((images[1].header.stamp - images[0].header.stamp).to_sec(), 0.2)
         self.assertEqual(messages(self.bag, "/ground_truth/pose")[1].pose.position.y, 5)
 
-    def test_generated_drive_says_where_its_hazards_are(self):
-        result = run("generate", self.bag, "--seconds", 4, "--rate-hz", 2, "--start", "40,-80",
-                     "--bearing", 0, "--fix-noise-m", 0)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        with open(self.path("out.geojson")) as file:
-            features = json.load(file)["features"]
-        self.assertGreaterEqual(len(features), 1)
-        for feature in features:
-            longitude, latitude = feature["geometry"]["coordinates"]
-            self.assertIn(feature["properties"]["class"], ("pothole", "traffic_cone"))
-            self.assertTrue(0 < (latitude - 40) * 111035 < 60, latitude)
-            self.assertLess(abs(longitude + 80) * 85394, 4)
-        images = messages(self.bag, "/camera/image_raw/compressed")
-        self.assertEqual(len(images), 8)
-        picture = cv2.imdecode(np.frombuffer(images[0].data, np.uint8), cv2.IMREAD_COLOR)
-        self.assertEqual(picture.shape, (HEIGHT, WIDTH, 3))
-        self.assertTrue(any(array.detections for array in messages(self.bag, "/ground_truth/boxes")))
-
     def test_real_survey_section_becomes_a_bag(self):
         data = os.environ.get("LIVEMAP_DATA_DIR", os.path.join(
             os.path.dirname(os.path.realpath(__file__)), "..", "..", "shared", "data"))

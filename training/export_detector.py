@@ -5,7 +5,8 @@
 
 The averaged weights are exported; with several --checkpoint flags, of runs that began from one another, the
 mean of all (model soup, Wortsman et al. 2022). Thresholds are calibrated on the validation parts of the data, with
-the exported file run by OpenCV: the pothole's by the limit on false reports, the cone's by the best F1.
+the exported file run by OpenCV: the pothole's by the limit on false reports, the cone's by the best F1, those of
+classes without real pictures by the best F1 on simulated drives (--simulated; seeds that training has not seen).
 """
 
 import argparse
@@ -21,14 +22,17 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data, inference, onnx_model
 from detector.manifest import write_manifest
-from detector.metrics import best_f1_threshold
+from detector.metrics import average_precision, best_f1_threshold
 from detector.network import Detector
-from detector.validation import validate
+from detector.validation import detect_simulated, validate
 
 TOLERANCE = 1e-3
 """Largest difference between OpenCV and torch, in raw units, that an export may have."""
 
 GOLDEN_ROWS = 24
+
+UNCALIBRATED_THRESHOLD = 0.5
+"""Of a class without pictures to calibrate it on."""
 
 DEFAULT_CHECKPOINT = Path("build/training/hazards/last.pt")
 
@@ -97,8 +101,15 @@ def run(arguments: argparse.Namespace) -> None:
     check_against_torch(weights, exportable)
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights)
 
-    found = validate(onnx_model.opencv_runner(weights), drives, cones)
-    thresholds = {"pothole": found.best_drive_figures().threshold, "traffic_cone": best_f1_threshold(found.cones, 0.5)}
+    runner = onnx_model.opencv_runner(weights)
+    thresholds = {name: UNCALIBRATED_THRESHOLD for name in CLASSES}
+    if arguments.simulated:
+        for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated)).items():
+            thresholds[name] = best_f1_threshold(frames, 0.5)
+            print(f"simulated {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
+    found = validate(runner, drives, cones)
+    thresholds["pothole"] = found.best_drive_figures().threshold
+    thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
     write_manifest(arguments.out / f"{arguments.name}.yaml", weights, thresholds)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 
@@ -110,6 +121,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--name", default="hazards-first", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(options.threads)

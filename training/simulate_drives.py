@@ -36,7 +36,7 @@ def country_road(rng: np.random.Generator, length_m: float) -> Dict[str, Any]:
             hazards.append({
                 "class": "pothole", "at_m": round(at_m + float(rng.uniform(0, 3)), 2),
                 "left_m": round(float(rng.uniform(-3.1, 1.6)), 2),
-                "radius_m": round(float(np.exp(rng.uniform(np.log(0.13), np.log(0.85)))), 2),
+                "radius_m": round(float(np.exp(rng.uniform(np.log(0.13), np.log(0.8)))), 2),
                 "water": bool(rng.random() < 0.25),
             })
         if rng.random() < 0.15:

@@ -107,13 +107,11 @@ TEST(KittiPoses, RefusesWhatIsNoRotation) {
   }
 }
 
-TEST(CameraFiles, OfThePackageAreValid) {
-  for (const char* name : {"road_survey", "generated"}) {
-    const CameraFile camera =
-        ReadCameraFile(std::string(LIVEMAP_SOURCE_DIR) + "/config/cameras/" + name + ".yaml");
-    EXPECT_EQ(camera.name, name);
-    EXPECT_EQ(camera.intrinsics.width, 640);
-  }
+TEST(CameraFiles, ThatOfTheRoadSurveyIsValid) {
+  const CameraFile camera =
+      ReadCameraFile(std::string(LIVEMAP_SOURCE_DIR) + "/config/cameras/road_survey.yaml");
+  EXPECT_EQ(camera.name, "road_survey");
+  EXPECT_EQ(camera.intrinsics.width, 640);
 }
 
 TEST(CameraFiles, NameTheKeyThatIsWrong) {

@@ -24,6 +24,9 @@ MIN_SIZE_PX = (6.0, 3.0)
 """A label that a view shows smaller (width, height) is ignored."""
 
 
+CLOSEUPS_AMONG_PASTED = 0.4
+"""Share of pasted potholes that come from close-ups: every photo shows another road, a survey section always the same."""
+
 MOST_CONTRAST_UNDER_PASTE = 18.0
 """Standard deviation of grey levels up to which a place takes a pasted pothole: road, not road markings."""
 
@@ -222,16 +225,28 @@ class Augmenter:
         )
 
     def paste_potholes(self, rng: np.random.Generator, picture: Picture) -> Picture:
-        """Up to three potholes of other survey frames, blended in at about the image row they came from."""
+        """Up to three potholes of other pictures, blended into a survey frame."""
         image, boxes, classes = picture.image.copy(), picture.boxes, picture.classes
-        donors = self.groups["survey_potholes"]
         for _ in range(rng.integers(1, 4)):
-            donor = donors[rng.choice(len(donors), p=self.picture_shares["survey_potholes"])]
-            box = donor.boxes[rng.integers(len(donor.boxes))]
-            pasted = blend_patch(rng, image, donor.image, box, boxes)
+            donor, box = self.draw_donor(rng)
+            pasted = blend_patch(rng, image, donor, box, boxes)
             if pasted is not None:
                 boxes, classes = np.vstack([boxes, pasted]).astype(np.float32), np.append(classes, POTHOLE)
         return Picture(image, boxes, classes, picture.labelled_classes, picture.name)
+
+    def draw_donor(self, rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray]:
+        """A picture with a pothole of a size as in survey frames, and its box."""
+        from_closeup = bool(self.groups.get("closeups")) and rng.random() < CLOSEUPS_AMONG_PASTED
+        name = "closeups" if from_closeup else "survey_potholes"
+        picture = self.groups[name][rng.choice(len(self.groups[name]), p=self.picture_shares[name])]
+        box = picture.boxes[rng.integers(len(picture.boxes))] if len(picture.boxes) else np.zeros(4)
+        if not from_closeup or (box[2:] - box[:2]).min() < 8:
+            return picture.image, box
+        # From a car the same hole is smaller and seen at a flatter angle.
+        width = np.exp(rng.uniform(np.log(24), np.log(90)))
+        factors = width / (box[2] - box[0]) * np.array([1.0, rng.uniform(0.4, 0.85)])
+        image = cv2.resize(picture.image, None, fx=factors[0], fy=factors[1], interpolation=cv2.INTER_AREA)
+        return image, box * np.tile([image.shape[1] / picture.image.shape[1], image.shape[0] / picture.image.shape[0]], 2)
 
     def recolour(self, rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
         """Hue, saturation, brightness and gamma; sometimes grey, blurred or noisy."""
@@ -317,9 +332,11 @@ def blend_patch(
         patch = patch[:, ::-1]
         local_box[[0, 2]] = patch.shape[1] - local_box[[2, 0]]
     x = int(rng.uniform(0.25, 0.85) * width - patch.shape[1] / 2)
-    y = int(np.clip(y1 + rng.uniform(-30, 30), 0, height - patch.shape[0]))
+    # At about the row it came from, in a picture of the same height: that keeps the perspective.
+    row = y1 if donor.shape[0] == height else rng.uniform(0.1, 0.9) * (height - patch.shape[0])
+    y = int(np.clip(row + rng.uniform(-30, 30), 0, max(height - patch.shape[0], 0)))
     new_box = (local_box + [x, y, x, y])[None]
-    if x < 0 or x + patch.shape[1] > width or (len(taken) and box_math.pairwise_iou(new_box, taken).max() > 0):
+    if x < 0 or x + patch.shape[1] > width or patch.shape[0] > height or (len(taken) and box_math.pairwise_iou(new_box, taken).max() > 0):
         return None
     place = image[y : y + patch.shape[0], x : x + patch.shape[1]]
     if place.std(axis=(0, 1)).max() > MOST_CONTRAST_UNDER_PASTE:

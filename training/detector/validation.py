@@ -6,7 +6,7 @@ from typing import Callable, Dict, List, Tuple
 import numpy as np
 import torch
 
-from . import inference
+from . import CLASSES, inference
 from .data import POTHOLE, TRAFFIC_CONE, DriveFrame, Picture
 from .metrics import DriveFigures, ScoredFrame, average_precision, calibrate_threshold, drive_figures
 
@@ -58,6 +58,17 @@ class Validation:
     def best_drive_figures(self) -> DriveFigures:
         """Figures at the threshold that the limit on false reports allows."""
         return drive_figures(self.potholes, calibrate_threshold(self.potholes, FALSE_REPORTS_PER_KM))
+
+
+def detect_simulated(run: Runner, pictures: List[Picture]) -> Dict[str, List[ScoredFrame]]:
+    """Detections and labels in frames of simulated drives, by class."""
+    grid = inference.AnchorGrid.of(inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+    frames = {name: [] for name in CLASSES}
+    for picture in pictures:
+        found = detect(picture, run, grid, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+        for class_id, name in enumerate(CLASSES):
+            frames[name].append(ScoredFrame(picture.boxes[picture.classes == class_id], found[class_id]))
+    return frames
 
 
 def validate(

@@ -28,6 +28,15 @@ def write_picture(folder: Path, stem: str, seed: int, cone: bool = False, empty:
     label_path.write_text(label)
 
 
+def write_simulated(root: Path) -> Path:
+    """A folder of one simulated drive whose classes are in another order than ours, one of them unknown; returns it."""
+    write_picture(root / "000001", "000000", 50, cone=True)
+    (root / "000001" / "classes.txt").write_text("traffic_cone\nunicorn\npothole\n")
+    label_path = root / "000001" / "labels" / "000000.txt"
+    label_path.write_text(label_path.read_text() + "1 0.2 0.2 0.1 0.1\n2 0.8 0.7 0.1 0.1\n")
+    return root
+
+
 def write_data(root: Path) -> Path:
     """A whole data folder; returns it."""
     for number, section in enumerate((TRAINING_SECTION, VALIDATION_SECTION)):

@@ -1,13 +1,17 @@
 """Samples: repeatable, and their labels stay on the objects."""
 
+import tempfile
 import unittest
+from pathlib import Path
 
 import numpy as np
 
 from detector.augment import SETTLING, Augmenter, Recipe
 from detector.boxes import non_maximum_suppression
-from detector.data import POTHOLE, TRAFFIC_CONE, Picture
+from detector.data import POTHOLE, TRAFFIC_CONE, DataError, Picture, read_simulated
 from detector.inference import AnchorGrid, decode, letterbox
+
+from .synthetic import write_simulated
 
 CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0, shadow=0.0, mix=0.0, relight=0.0, erase=0.0)
 
@@ -23,6 +27,22 @@ def augmenter(recipe: Recipe) -> Augmenter:
     """An augmenter of one pothole picture and one cone picture."""
     groups = {"survey_potholes": [bright_square()], "cones": [bright_square(TRAFFIC_CONE)]}
     return Augmenter(groups, recipe, 416, 320)
+
+
+class Reading(unittest.TestCase):
+    def test_simulated_drives_are_read_by_class_names(self):
+        with tempfile.TemporaryDirectory() as folder:
+            picture, = read_simulated(write_simulated(Path(folder)))
+        self.assertEqual(picture.classes.tolist(), [TRAFFIC_CONE, POTHOLE])
+        self.assertEqual(sorted(picture.labelled_classes), [POTHOLE, TRAFFIC_CONE])
+        np.testing.assert_allclose(picture.boxes[1], [480, 260, 544, 300], atol=0.01)
+
+    def test_a_class_beyond_the_list_is_refused_by_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = write_simulated(Path(folder))
+            (root / "000001" / "classes.txt").write_text("traffic_cone\n")
+            with self.assertRaisesRegex(DataError, "000000.txt has a class that is not from 0 to 0"):
+                read_simulated(root)
 
 
 class Samples(unittest.TestCase):
