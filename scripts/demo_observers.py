@@ -232,16 +232,18 @@ def distance_m(a, b):
 def compare_with_truth(hazards, truth_file, radius_m=5.0):
     """Found and missed true hazards, false ones on the map, and the error of the found ones' positions.
 
-    One hazard on the map stands for all of its class within `radius_m`, as the zone merges them.
+    Only hazards that the vehicle went by can be missed. One hazard on the map stands for all of its class within `radius_m`, as the zone merges them.
     """
     with open(truth_file) as file:
         features = json.load(file)["features"]
-    truth = [{"class": f["properties"]["class"], "longitude": f["geometry"]["coordinates"][0],
-              "latitude": f["geometry"]["coordinates"][1]} for f in features]
+    seen = [{"class": f["properties"]["class"], "longitude": f["geometry"]["coordinates"][0],
+             "latitude": f["geometry"]["coordinates"][1], "passed": f["properties"].get("passed", True)}
+            for f in features]
+    passed = [hazard for hazard in seen if hazard["passed"]]
     def nearest(place, places):
         return min((distance_m(place, other) for other in places if other["class"] == place["class"]),
                    default=math.inf)
-    errors = [error for error in (nearest(t, hazards) for t in truth) if error <= radius_m]
+    errors = [error for error in (nearest(t, hazards) for t in passed) if error <= radius_m]
     mean = round(sum(errors) / len(errors), 2) if errors else None
-    return {"hazards": len(truth), "found": len(errors), "missed": len(truth) - len(errors),
-            "false": sum(nearest(h, truth) > radius_m for h in hazards), "position_error_m_mean": mean}
+    return {"hazards": len(passed), "found": len(errors), "missed": len(passed) - len(errors),
+            "false": sum(nearest(h, seen) > radius_m for h in hazards), "position_error_m_mean": mean}

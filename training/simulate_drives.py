@@ -44,7 +44,7 @@ def country_road(rng: np.random.Generator, length_m: float) -> Dict[str, Any]:
                             "left_m": round(float(rng.uniform(-3.3, 3.0)), 2)})
         at_m += float(rng.uniform(7, 22))
     return {
-        "road": {"parking_width_m": 0, "pavement_width_m": round(float(rng.uniform(0.6, 2.0)), 2), "crossings_m": [],
+        "road": {"parking_width_m": 0, "pavement_width_m": round(max(1.0, float(rng.uniform(0.6, 2.0))), 2), "crossings_m": [],
                  "lane_width_m": round(float(rng.uniform(3.2, 3.7)), 2)},
         "scene": {"buildings": False, "parked_cars": False, "trees": bool(rng.random() < 0.8)},
         "hazards": sorted(hazards, key=lambda hazard: hazard["at_m"]),

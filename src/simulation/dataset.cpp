@@ -150,7 +150,7 @@ void YoloWriter::Add(double chainage_m, const SimulatedFrame& frame,
 void YoloWriter::Finish() { Close(frames_, directory_ + "/frames.csv"); }
 
 void WriteHazards(const std::string& path, const Street& street, const GeoPoint& datum,
-                  const std::map<std::uint32_t, int>& frames_seen) {
+                  const std::map<std::uint32_t, int>& frames_seen, double end_along_m) {
   const LocalFrame frame(datum);
   nlohmann::json features = nlohmann::json::array();
   const auto last = static_cast<int>(street.line().length_m() / kBlockM) + 1;
@@ -170,7 +170,8 @@ void WriteHazards(const std::string& path, const Street& street, const GeoPoint&
              {"along_m", hazard.along_m},
              {"left_m", hazard.left_m},
              {"radius_m", hazard.radius_m},
-             {"frames_seen", seen->second}}}});
+             {"frames_seen", seen->second},
+             {"passed", hazard.along_m < end_along_m}}}});
     }
   }
   std::ofstream file = Open(path);

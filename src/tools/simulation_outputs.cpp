@@ -26,7 +26,7 @@ SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSe
     : setup_(setup),
       preview_path_(line.Text("preview", "")),
       truth_path_(line.Text("truth-preview", "")),
-      every_(std::max<std::size_t>(1, frames / kPreviewPictures)) {
+      frames_(frames) {
   for (const std::string& path : {preview_path_, truth_path_}) {
     if (!path.empty() && !cv::haveImageWriter(path)) {
       throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
@@ -69,19 +69,24 @@ void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
   if (video_.isOpened()) video_.write(frame.bgr);
   if (bag_) bag_->Add(time_s, frame, hazards);
   if (yolo_) yolo_->Add(along_m, frame, hazards);
-  if (index % every_ == every_ / 2) AddToSheets(index, frame, hazards);
+  along_m_ = along_m;
+  // Evenly over the whole drive.
+  const std::size_t moment = index * kPreviewPictures / frames_;
+  if (moment >= preview_moments_) {
+    preview_moments_ = moment + 1;
+    AddToSheets(frame, hazards);
+  }
 }
 
-void SimulationOutputs::AddToSheets(std::size_t index, const SimulatedFrame& frame,
+void SimulationOutputs::AddToSheets(const SimulatedFrame& frame,
                                     const std::vector<HazardInView>& hazards) {
-  if (!preview_path_.empty() && preview_.size() < kPreviewPictures) {
+  if (!preview_path_.empty()) {
     const double scale = kPreviewWidth / frame.bgr.cols;
     cv::Mat small;
     cv::resize(frame.bgr, small, cv::Size(), scale, scale, cv::INTER_AREA);
     preview_.push_back(small);
   }
-  if (!truth_path_.empty() && truth_.size() < kPreviewPictures &&
-      index % (3 * every_) == every_ / 2) {
+  if (!truth_path_.empty() && preview_moments_ % 3 == 1) {
     cv::Mat boxes = frame.bgr.clone();
     DrawHazards(hazards, boxes);
     truth_.push_back(boxes);
@@ -97,7 +102,7 @@ void SimulationOutputs::Finish(const CommandLine& line, const Street& street, do
   if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
   if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
   if (line.Has("hazards")) {
-    WriteHazards(line.Text("hazards", ""), street, setup_.datum, frames_seen_);
+    WriteHazards(line.Text("hazards", ""), street, setup_.datum, frames_seen_, along_m_);
   }
 }
 

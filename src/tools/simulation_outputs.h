@@ -34,20 +34,21 @@ class SimulationOutputs {
   std::size_t hazards() const { return frames_seen_.size(); }
 
  private:
-  void AddToSheets(std::size_t index, const SimulatedFrame& frame,
-                   const std::vector<HazardInView>& hazards);
+  void AddToSheets(const SimulatedFrame& frame, const std::vector<HazardInView>& hazards);
 
   SimulationSetup setup_;
   cv::VideoWriter video_;
   std::unique_ptr<SimulationBag> bag_;
   std::string preview_path_;
   std::string truth_path_;
-  std::size_t every_;
+  std::size_t frames_;
+  std::size_t preview_moments_ = 0;
   std::unique_ptr<TumWriter> tum_;
   std::unique_ptr<YoloWriter> yolo_;
   std::vector<cv::Mat> preview_;
   std::vector<cv::Mat> truth_;
   std::map<std::uint32_t, int> frames_seen_;
+  double along_m_ = 0;
 };
 
 }  // namespace livemap

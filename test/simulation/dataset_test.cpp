@@ -106,11 +106,14 @@ TEST_F(Dataset, HazardFileNamesWhatWasSeenAtItsPlace) {
   const Street street(world, 1, 200, true);
   fs::create_directories(folder_);
   const std::string path = (folder_ / "hazards.geojson").string();
-  WriteHazards(path, street, {48, 9}, {{street.Hazards(2).at(0).instance, 4}});
+  WriteHazards(path, street, {48, 9}, {{street.Hazards(2).at(0).instance, 4}}, 90);
   const std::string text = ReadFile(path, 10000);
   EXPECT_NE(text.find("\"class\": \"barrier\""), std::string::npos);
   EXPECT_NE(text.find("\"frames_seen\": 4"), std::string::npos);
-  WriteHazards(path, street, {48, 9}, {});
+  EXPECT_NE(text.find("\"passed\": false"), std::string::npos);
+  WriteHazards(path, street, {48, 9}, {{street.Hazards(2).at(0).instance, 4}}, 110);
+  EXPECT_NE(ReadFile(path, 10000).find("\"passed\": true"), std::string::npos);
+  WriteHazards(path, street, {48, 9}, {}, 110);
   EXPECT_EQ(ReadFile(path, 10000).find("barrier"), std::string::npos) << "never in view";
 }
 
