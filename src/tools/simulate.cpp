@@ -31,6 +31,7 @@ std::vector<Flag> Flags() {
           {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
           {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
           {"bag", "FILE.bag", "rosbag with the topics of a real vehicle and truth"},
+          {"jpeg-quality", "Q", "of --bag's pictures, 1 to 100 (88)"},
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
 }
 
@@ -60,7 +61,7 @@ int Run(int argc, char** argv) {
   SimulationOutputs outputs(line, setup, rate_hz, frames);
   if (line.Has("bag")) {
     const LocalFrame map(setup.datum);
-    outputs.OpenBag(line.Text("bag", ""), seed, [&motion, map](double time_s) {
+    outputs.OpenBag(line, seed, [&motion, map](double time_s) {
       return map.ToGeo(motion.WorldFromBase(time_s).translation().head<2>());
     });
   }

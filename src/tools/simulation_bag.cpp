@@ -10,7 +10,6 @@ namespace {
 /// 2026-01-01T12:00:00Z, as other drives begin.
 constexpr std::uint32_t kStartS = 1767268800;
 constexpr double kFixRateHz = 10;
-constexpr int kJpegQuality = 88;
 
 DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
   DriveSetup drive{Route::Straight(setup.place(0), 0),
@@ -26,12 +25,14 @@ DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
 
 class RosSimulationBag : public SimulationBag {
  public:
-  RosSimulationBag(const std::string& path, const Setup& setup) : bag_(path, ToDriveSetup(setup)) {}
+  RosSimulationBag(const std::string& path, const Setup& setup)
+      : bag_(path, ToDriveSetup(setup)), jpeg_quality_(setup.jpeg_quality) {}
 
   void Add(double time_s, const SimulatedFrame& frame,
            const std::vector<HazardInView>& hazards) override {
     std::vector<std::uint8_t> jpeg;
-    cv::imencode(".jpg", frame.bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+    cv::imencode(".jpg", frame.bgr, jpeg,
+                 {cv::IMWRITE_JPEG_QUALITY, jpeg_quality_, cv::IMWRITE_JPEG_OPTIMIZE, 1});
     std::vector<Detection> boxes;
     for (const HazardInView& hazard : hazards) {
       Detection box;
@@ -50,6 +51,7 @@ class RosSimulationBag : public SimulationBag {
 
  private:
   DriveBag bag_;
+  const int jpeg_quality_;
 };
 
 }  // namespace

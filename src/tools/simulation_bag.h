@@ -21,6 +21,7 @@ class SimulationBag {
     std::function<GeoPoint(double time_s)>
         place;               ///< Of base_link; also a second before and after.
     std::uint64_t seed = 1;  ///< Of the receiver's errors.
+    int jpeg_quality = 88;   ///< Of the pictures, 1 to 100.
   };
 
   virtual ~SimulationBag() = default;

@@ -43,7 +43,7 @@ SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSe
   }
 }
 
-void SimulationOutputs::OpenBag(const std::string& path, std::uint64_t seed,
+void SimulationOutputs::OpenBag(const CommandLine& line, std::uint64_t seed,
                                 std::function<GeoPoint(double)> place) {
   if (setup_.camera.k1 != 0 || setup_.camera.k2 != 0) {
     throw Error("--bag and --distortion exclude each other: a bag's camera has none");
@@ -52,7 +52,8 @@ void SimulationOutputs::OpenBag(const std::string& path, std::uint64_t seed,
   setup.camera = {"simulated", setup_.camera.intrinsics, setup_.mounting};
   setup.place = std::move(place);
   setup.seed = seed;
-  bag_ = OpenSimulationBag(path, setup);
+  setup.jpeg_quality = static_cast<int>(line.Number("jpeg-quality", setup.jpeg_quality, 1, 100));
+  bag_ = OpenSimulationBag(line.Text("bag", ""), setup);
 }
 
 void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,

@@ -22,8 +22,9 @@ class SimulationOutputs {
   SimulationOutputs(const CommandLine& line, const SimulationSetup& setup, double rate_hz,
                     std::size_t frames);
 
-  /// `place` is the vehicle's position at a time, seconds since the first frame.
-  void OpenBag(const std::string& path, std::uint64_t seed, std::function<GeoPoint(double)> place);
+  /// Reads --bag and --jpeg-quality. `place` is the vehicle's position at a time, seconds since the
+  /// first frame.
+  void OpenBag(const CommandLine& line, std::uint64_t seed, std::function<GeoPoint(double)> place);
   /// The frame `index`; `right` is the second eye's picture, or empty.
   void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame,
            const cv::Mat& right);
