@@ -121,7 +121,7 @@ Style DrawStyle(float width, CounterRandom& random, MeshBuilder& builder) {
                       : kPlasters[static_cast<std::size_t>(random.Index(8))];
   wall.colour *= random.Uniform(0.85F, 1.12F);
   style.wall = builder.SetMaterial(wall);
-  const Vec3 frame = kFrames[static_cast<std::size_t>(random.Index(5))];
+  const Vec3& frame = kFrames[static_cast<std::size_t>(random.Index(5))];
   style.trim = builder.SetMaterial({MaterialKind::kConcrete,
                                     Vec3(0.52F, 0.50F, 0.46F) * random.Uniform(0.7F, 1.15F),
                                     Vec3::Ones(), wall.seed + 1});

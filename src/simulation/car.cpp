@@ -182,7 +182,7 @@ class Body {
     const Ring after = CrossSection(silhouette_, std::min(share + kStep, 1.0F), crushed, seed);
     Ring normals;
     for (std::size_t i = 0; i < kRing; ++i) {
-      const Vec3 low = here[i > 0 ? i - 1 : 0];
+      const Vec3& low = here[i > 0 ? i - 1 : 0];
       const Vec3 high =
           i + 1 < kRing ? here[i + 1] : Vec3(here[i].x(), -here[i - 1].y(), here[i - 1].z());
       const Vec3 normal = (after[i] - before[i]).cross(high - low);

@@ -74,8 +74,8 @@ void MeshBuilder::AddBox(const Vec3& low, const Vec3& high) {
 
 void MeshBuilder::AddLathe(const std::vector<Vec2>& profile, int sides) {
   for (std::size_t ring = 0; ring + 1 < profile.size(); ++ring) {
-    const Vec2 low = profile[ring];
-    const Vec2 high = profile[ring + 1];
+    const Vec2& low = profile[ring];
+    const Vec2& high = profile[ring + 1];
     const Vec2 along = high - low;
     const Vec2 out = Vec2(along.y(), -along.x()).normalized();
     std::uint32_t before = 0;

@@ -140,7 +140,7 @@ void StreetScene::MeasureSky(int index) {
         rtcOccluded1(scene, &context, &ray);
         if (ray.tfar >= 0) ++open;
       }
-      block.sky[static_cast<std::size_t>(row * kSkyColumns + column)] =
+      block.sky[static_cast<std::size_t>(row) * kSkyColumns + static_cast<std::size_t>(column)] =
           static_cast<float>(open) / kSkyRays;
     }
   }
@@ -156,7 +156,8 @@ float StreetScene::SkyOverGround(const Block& block, float local_along, float le
   const auto at = [&](std::int32_t row, std::int32_t column) {
     row = std::min(std::max(row, 0), kSkyRows - 1);
     column = std::min(std::max(column, 0), kSkyColumns - 1);
-    return block.sky[static_cast<std::size_t>(row * kSkyColumns + column)];
+    return block
+        .sky[static_cast<std::size_t>(row) * kSkyColumns + static_cast<std::size_t>(column)];
   };
   const float fx = x - static_cast<float>(ix);
   const float fy = y - static_cast<float>(iy);

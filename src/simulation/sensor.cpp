@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "simulation/noise.h"
+
 namespace livemap {
 namespace {
 
@@ -104,7 +106,7 @@ void DevelopRow(const SimulatedCamera& camera, const cv::Mat& light, int row, fl
       const auto step = std::min(static_cast<int>(root), kToneSteps - 1);
       const auto index = static_cast<std::size_t>(step);
       const float tone = Blend(table[index], table[index + 1], root - static_cast<float>(step));
-      out[column][2 - channel] = static_cast<std::uint8_t>(255.0F * tone + 0.5F);
+      out[column][2 - channel] = static_cast<std::uint8_t>(FloorToInt(255.0F * tone + 0.5F));
     }
   }
 }
