@@ -232,18 +232,34 @@ def distance_m(a, b):
 def compare_with_truth(hazards, truth_file, radius_m=5.0):
     """Found and missed true hazards, false ones on the map, and the error of the found ones' positions.
 
-    Only hazards that the vehicle went by can be missed. One hazard on the map stands for all of its class within `radius_m`, as the zone merges them.
+    Only hazards that the vehicle went by can be missed. One hazard on the map stands for all of its class
+    within `radius_m`, as the zone merges them.
     """
     with open(truth_file) as file:
         features = json.load(file)["features"]
-    seen = [{"class": f["properties"]["class"], "longitude": f["geometry"]["coordinates"][0],
-             "latitude": f["geometry"]["coordinates"][1], "passed": f["properties"].get("passed", True)}
-            for f in features]
-    passed = [hazard for hazard in seen if hazard["passed"]]
+    truth = [{"class": f["properties"]["class"], "longitude": f["geometry"]["coordinates"][0],
+              "latitude": f["geometry"]["coordinates"][1], "passed": f["properties"].get("passed", True)}
+             for f in features]
+    classes = {name: compare_class([t for t in truth if t["class"] == name],
+                                   [h for h in hazards if h["class"] == name], radius_m)
+               for name in sorted({t["class"] for t in truth} | {h["class"] for h in hazards})}
+    errors = [error for figures in classes.values() for error in figures.pop("errors_m")]
+    total = {key: sum(figures[key] for figures in classes.values())
+             for key in ("hazards", "found", "missed", "false")}
+    return {**total, "position_error_m_mean": mean(errors), "classes": classes}
+
+
+def compare_class(truth, hazards, radius_m):
+    """The same for one class, with the position errors in metres as a list too."""
     def nearest(place, places):
-        return min((distance_m(place, other) for other in places if other["class"] == place["class"]),
-                   default=math.inf)
+        return min((distance_m(place, other) for other in places), default=math.inf)
+    passed = [t for t in truth if t["passed"]]
     errors = [error for error in (nearest(t, hazards) for t in passed) if error <= radius_m]
-    mean = round(sum(errors) / len(errors), 2) if errors else None
     return {"hazards": len(passed), "found": len(errors), "missed": len(passed) - len(errors),
-            "false": sum(nearest(h, seen) > radius_m for h in hazards), "position_error_m_mean": mean}
+            "false": sum(nearest(h, truth) > radius_m for h in hazards),
+            "position_error_m_mean": mean(errors), "errors_m": errors}
+
+
+def mean(values):
+    """Rounded to centimetres; None of no values."""
+    return round(sum(values) / len(values), 2) if values else None

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Render simulated drives for training or for measuring, each with a street, weather and camera of its own.
 
-    training/simulate_drives.py --out build/training/simulated --first-seed 10001 --drives 100
+    training/simulate_drives.py --out build/training/simulated --first-seed 10001 --drives 110
     training/simulate_drives.py --out build/training/simulated_validation --first-seed 20001 --drives 12
 
 A drive that is there already is left as it is, so that a stopped run continues with the same command.
@@ -92,7 +92,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("build/training/simulated"), help="folder for one folder a drive")
     parser.add_argument("--program", default="install/lib/livemap/livemap_simulate", help="the simulator")
     parser.add_argument("--first-seed", type=int, default=10001)
-    parser.add_argument("--drives", type=int, default=100)
+    parser.add_argument("--drives", type=int, default=110)
     parser.add_argument("--frames", type=int, default=20, help="pictures of each drive")
     parser.add_argument("--rate", type=float, default=0.8, help="pictures per second")
     parser.add_argument("--jobs", type=int, default=2, help="drives at once")
