@@ -1,6 +1,7 @@
 #include "simulation/block_builder.h"
 
 #include <cmath>
+#include <optional>
 
 #include "simulation/building.h"
 #include "simulation/car.h"
@@ -24,6 +25,36 @@ enum Stream : std::uint64_t {
 
 std::uint64_t Item(int index, double side) {
   return static_cast<std::uint64_t>(index + 1000) * 2 + (side > 0 ? 1 : 0);
+}
+
+/// What stands on the pavement for a number in [0, 1); none for the rest of it.
+std::optional<ObjectClass> SmallThing(double number) {
+  if (number < 0.16) return ObjectClass::kBin;
+  if (number < 0.24) return ObjectClass::kRubbish;
+  if (number < 0.46) return ObjectClass::kPerson;
+  if (number < 0.62) return ObjectClass::kSign;
+  if (number < 0.73) return ObjectClass::kOtherObject;
+  if (number < 0.84) return ObjectClass::kCycle;
+  return std::nullopt;
+}
+
+/// What may stand where a thing stood; none: a replaced sign just vanishes, for another one could
+/// look the same.
+std::optional<ObjectClass> Successor(ObjectClass thing) {
+  switch (thing) {
+    case ObjectClass::kBin:
+      return ObjectClass::kRubbish;
+    case ObjectClass::kRubbish:
+      return ObjectClass::kCycle;
+    case ObjectClass::kPerson:
+      return ObjectClass::kBin;
+    case ObjectClass::kOtherObject:
+      return ObjectClass::kPerson;
+    case ObjectClass::kCycle:
+      return ObjectClass::kOtherObject;
+    default:
+      return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -72,11 +103,8 @@ void BlockBuilder::Build() {
   if (street_.description().buildings) AddSideStreetHouses();
 }
 
-void BlockBuilder::SetFrame(const Eigen::Isometry3d& world_from_local, ObjectClass object_class) {
-  Eigen::Isometry3d local = world_from_local;
-  local.translation() -= block_.origin;
-  builder_.SetFrame(Eigen::Affine3f(local.cast<float>().matrix()));
-  builder_.SetInstance(MakeInstance(next_serial_++, object_class));
+std::uint32_t BlockBuilder::NewInstance(ObjectClass object_class) {
+  return MakeInstance(next_serial_++, object_class);
 }
 
 void BlockBuilder::StandBeside(double along, double left, ObjectClass object_class) {
@@ -84,11 +112,26 @@ void BlockBuilder::StandBeside(double along, double left, ObjectClass object_cla
 }
 
 void BlockBuilder::StandOn(double along, double left, double yaw, ObjectClass object_class) {
+  MoveTo({along, left, yaw});
+  builder_.SetInstance(NewInstance(object_class));
+}
+
+void BlockBuilder::MoveTo(const Spot& spot) {
   const double up = static_cast<double>(
-      GroundHeight(block_.ground, static_cast<float>(along), static_cast<float>(left)));
-  Eigen::Isometry3d frame = street_.line().Upright(along, left, up);
-  frame.rotate(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
-  SetFrame(frame, object_class);
+      GroundHeight(block_.ground, static_cast<float>(spot.along), static_cast<float>(spot.left)));
+  Eigen::Isometry3d frame = street_.line().Upright(spot.along, spot.left, up);
+  frame.rotate(Eigen::AngleAxisd(spot.yaw, Eigen::Vector3d::UnitZ()));
+  frame.translation() -= block_.origin;
+  builder_.SetFrame(Eigen::Affine3f(frame.cast<float>().matrix()));
+}
+
+bool BlockBuilder::StandIfShown(std::uint32_t instance, ObjectFate fate, const Spot& spot) {
+  if (fate != ObjectFate::kStays) {
+    block_.changes.push_back({instance, fate == ObjectFate::kAppears, spot.along, spot.left});
+  }
+  MoveTo(spot);
+  builder_.SetInstance(instance);
+  return street_.pass().Shows(fate);
 }
 
 bool BlockBuilder::NearCrossing(double along, double margin) const {
@@ -117,8 +160,8 @@ void BlockBuilder::AddHazards() {
     if (hazard.object_class == ObjectClass::kPothole) continue;
     CounterRandom random(hazard.seed, 2);
     const double yaw = random.Uniform(-0.12, 0.12);
-    StandOn(hazard.along_m, hazard.left_m, yaw, hazard.object_class);
-    builder_.SetInstance(hazard.instance);
+    const ObjectFate fate = street_.pass().FateOf(street_.seed(), hazard.instance);
+    if (!StandIfShown(hazard.instance, fate, {hazard.along_m, hazard.left_m, yaw})) continue;
     switch (hazard.object_class) {
       case ObjectClass::kTrafficCone:
         AddTrafficCone(random, builder_);
@@ -163,7 +206,9 @@ void BlockBuilder::AddPlot(double begin, double width, double side, double setba
     const double x = side > 0 ? from : from + static_cast<double>(piece);
     StandBeside(x, edge, hedge ? ObjectClass::kTree : ObjectClass::kFence);
     if (hedge) {
-      AddHedge(piece, random.Uniform(0.9F, 1.3F), street_.leaves_, random, builder_);
+      // Its own, for the number of leaves must not shift what the season leaves alone.
+      CounterRandom own(street_.seed(), kHouses + 100, random.Bits());
+      AddHedge(piece, own.Uniform(0.9F, 1.3F), street_.leaves_, own, builder_);
     } else {
       AddFence(piece, random, builder_);
     }
@@ -224,12 +269,23 @@ void BlockBuilder::AddParkedCars(double side) {
   for (double along = index_ * kBlockM + 3; along < (index_ + 1) * kBlockM - 2.5;
        along += random.Uniform(5.7, 7.0)) {
     const bool wanted = random.Chance(density);
-    CounterRandom own(street_.seed(), kCars + 100, random.Bits());
+    const std::uint64_t item = random.Bits();
     if (!wanted || NearCrossing(along, 9) || !IsFree(along, left, 2.6)) continue;
-    const double yaw = (side > 0 ? M_PI : 0) + own.Uniform(-0.03, 0.03);
-    StandOn(along, left + own.Uniform(-0.12, 0.12), yaw, ObjectClass::kVehicle);
-    AddCar(own, 0, builder_);
+    const std::uint32_t instance = NewInstance(ObjectClass::kVehicle);
+    const ObjectFate fate = street_.pass().FateOf(street_.seed(), instance);
+    AddParkedCar(instance, fate, along, left, side, item);
+    if (fate != ObjectFate::kReplaced) continue;
+    AddParkedCar(SuccessorOf(instance, ObjectClass::kVehicle), ObjectFate::kAppears, along, left,
+                 side, item + 1);
   }
+}
+
+void BlockBuilder::AddParkedCar(std::uint32_t instance, ObjectFate fate, double along, double left,
+                                double side, std::uint64_t item) {
+  CounterRandom random(street_.seed(), kCars + 100, item);
+  const double yaw = (side > 0 ? M_PI : 0) + random.Uniform(-0.03, 0.03);
+  const double askew = random.Uniform(-0.12, 0.12);
+  if (StandIfShown(instance, fate, {along, left + askew, yaw})) AddCar(random, 0, builder_);
 }
 
 void BlockBuilder::AddLampPosts() {
@@ -275,26 +331,53 @@ void BlockBuilder::AddBackTrees(double side) {
 
 void BlockBuilder::AddSmallThings(double side) {
   CounterRandom random(street_.seed(), kThings, Item(index_, side));
-  const double back = Kerb() + street_.description().pavement_width_m - 0.5;
   for (int i = 0; i < 4; ++i) {
     const double along = (index_ + (i + random.Uniform(0.15, 0.85)) / 4) * kBlockM;
-    const double kind = random.Uniform(0.0, 1.0);
-    CounterRandom own(street_.seed(), kThings + 100, random.Bits());
-    if (NearCrossing(along, 5)) continue;
-    if (kind < 0.16) {
-      StandBeside(along, side * back, ObjectClass::kBin);
-      AddBin(own, builder_);
-    } else if (kind < 0.24) {
-      StandBeside(along, side * back, ObjectClass::kRubbish);
-      AddRubbishBags(own, builder_);
-    } else if (kind < 0.46) {
-      const double yaw = own.Chance(0.5) ? 0 : M_PI;
-      StandOn(along, side * (back - own.Uniform(0.0, 0.6)), yaw, ObjectClass::kPerson);
-      AddPerson(own, builder_);
-    } else if (kind < 0.62) {
-      StandOn(along, side * (Kerb() + 0.4), side > 0 ? M_PI : 0, ObjectClass::kSign);
-      AddTrafficSign(own, builder_);
-    }
+    const std::optional<ObjectClass> kind = SmallThing(random.Uniform(0.0, 1.0));
+    const std::uint64_t item = random.Bits();
+    if (!kind || NearCrossing(along, 5)) continue;
+    const std::uint32_t instance = NewInstance(*kind);
+    const ObjectFate fate = street_.pass().FateOf(street_.seed(), instance);
+    AddSmallThing(instance, fate, along, side, item);
+    const std::optional<ObjectClass> successor = Successor(*kind);
+    if (fate != ObjectFate::kReplaced || !successor) continue;
+    AddSmallThing(SuccessorOf(instance, *successor), ObjectFate::kAppears, along, side, item + 1);
+  }
+}
+
+void BlockBuilder::AddSmallThing(std::uint32_t instance, ObjectFate fate, double along, double side,
+                                 std::uint64_t item) {
+  CounterRandom random(street_.seed(), kThings + 100, item);
+  const ObjectClass kind = ClassOfInstance(instance);
+  // Most look to the road from the back of the pavement.
+  Spot spot{along, side * (Kerb() + street_.description().pavement_width_m - 0.5),
+            side > 0 ? 0 : M_PI};
+  if (kind == ObjectClass::kPerson) {
+    spot.yaw = random.Chance(0.5) ? 0 : M_PI;
+    spot.left -= side * random.Uniform(0.0, 0.6);
+  } else if (kind == ObjectClass::kSign) {
+    spot.yaw = side > 0 ? M_PI : 0;
+    spot.left = side * (Kerb() + 0.4);
+  }
+  if (!StandIfShown(instance, fate, spot)) return;
+  switch (kind) {
+    case ObjectClass::kBin:
+      AddBin(random, builder_);
+      break;
+    case ObjectClass::kRubbish:
+      AddRubbishBags(random, builder_);
+      break;
+    case ObjectClass::kPerson:
+      AddPerson(random, builder_);
+      break;
+    case ObjectClass::kSign:
+      AddTrafficSign(random, builder_);
+      break;
+    case ObjectClass::kCycle:
+      AddBicycle(random, builder_);
+      break;
+    default:
+      AddOtherObject(random, builder_);
   }
 }
 

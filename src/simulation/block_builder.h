@@ -14,6 +14,12 @@ class BlockBuilder {
 
  private:
   enum class District { kShops, kHouses, kGardens, kPark };
+  /// Where something stands; `yaw` turns it against the road's direction.
+  struct Spot {
+    double along;
+    double left;
+    double yaw;
+  };
 
   District DistrictOf() const;
   /// Stands the builder on the ground with x along the road, -y towards the road and its own
@@ -21,7 +27,11 @@ class BlockBuilder {
   void StandBeside(double along, double left, ObjectClass object_class);
   /// As StandBeside with x along the road, turned by `yaw`.
   void StandOn(double along, double left, double yaw, ObjectClass object_class);
-  void SetFrame(const Eigen::Isometry3d& world_from_local, ObjectClass object_class);
+  void MoveTo(const Spot& spot);
+  std::uint32_t NewInstance(ObjectClass object_class);
+  /// As StandOn for an object that may come and go between passes, whose instance was drawn; notes
+  /// the change. False when this pass does not show it.
+  bool StandIfShown(std::uint32_t instance, ObjectFate fate, const Spot& spot);
   bool NearCrossing(double along, double margin) const;
   /// True when a body of `half` length at this side's parking lane or walkway meets no hazard.
   bool IsFree(double along, double left, double half) const;
@@ -35,6 +45,10 @@ class BlockBuilder {
   void AddStreetTrees(double side);
   void AddBackTrees(double side);
   void AddSmallThings(double side);
+  void AddSmallThing(std::uint32_t instance, ObjectFate fate, double along, double side,
+                     std::uint64_t item);
+  void AddParkedCar(std::uint32_t instance, ObjectFate fate, double along, double left, double side,
+                    std::uint64_t item);
   double Kerb() const;
 
   const Street& street_;

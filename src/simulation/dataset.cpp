@@ -9,74 +9,31 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "simulation/output_files.h"
 
 namespace livemap {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr float kTumScale = 5000;
 constexpr int kJpegQuality = 90;
-
-std::ofstream Open(const std::string& path) {
-  std::ofstream file(path);
-  if (!file) throw Error("the file '" + path + "' cannot be written");
-  return file;
-}
-
-void Close(std::ofstream& file, const std::string& path) {
-  file.close();
-  if (!file) throw Error("the file '" + path + "' could not be written to its end");
-}
-
-void MakeFolder(const std::string& directory, const std::vector<std::string>& inside) {
-  std::error_code error;
-  if (fs::exists(directory, error) && !fs::is_empty(directory, error)) {
-    throw Error("the folder '" + directory + "' is not empty, accepted is a new or empty one");
-  }
-  for (const std::string& name : inside) {
-    fs::create_directories(fs::path(directory) / name, error);
-    if (error) throw Error("the folder '" + directory + "' cannot be made: " + error.message());
-  }
-}
-
-void WriteImage(const std::string& path, const cv::Mat& image, const std::vector<int>& parameters) {
-  if (!cv::imwrite(path, image, parameters)) {
-    throw Error("the picture '" + path + "' cannot be written");
-  }
-}
-
-std::string Format(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof(text), format, value);
-  return text;
-}
 
 }  // namespace
 
 TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera)
     : directory_(directory) {
-  MakeFolder(directory, {"rgb", "depth"});
-  const CameraIntrinsics& k = camera.intrinsics;
-  std::ofstream file = Open(directory + "/camera.yaml");
-  file.precision(10);
-  file << "width: " << k.width << "\nheight: " << k.height << "\nfx: " << k.fx << "\nfy: " << k.fy
-       << "\ncx: " << k.cx << "\ncy: " << k.cy << "\ndepth_scale: " << kTumScale << "\n";
-  if (camera.k1 != 0 || camera.k2 != 0) {
-    file << "k1: " << camera.k1 << "\nk2: " << camera.k2 << "\n";
-  }
-  Close(file, directory + "/camera.yaml");
-  rgb_ = Open(directory + "/rgb.txt");
-  depth_ = Open(directory + "/depth.txt");
-  associations_ = Open(directory + "/associations.txt");
-  truth_ = Open(directory + "/groundtruth.txt");
+  MakeNewFolder(directory, {"rgb", "depth"});
+  WriteCamera(directory + "/camera.yaml", camera, static_cast<double>(kTumScale));
+  rgb_ = OpenFile(directory + "/rgb.txt");
+  depth_ = OpenFile(directory + "/depth.txt");
+  associations_ = OpenFile(directory + "/associations.txt");
+  truth_ = OpenFile(directory + "/groundtruth.txt");
   rgb_ << "# timestamp filename\n";
   depth_ << "# timestamp filename\n";
   truth_ << "# timestamp tx ty tz qx qy qz qw\n";
 }
 
 void TumWriter::Add(double time_s, const SimulatedFrame& frame, const cv::Mat& right) {
-  const std::string stamp = Format("%.6f", time_s);
+  const std::string stamp = FormatNumber("%.6f", time_s);
   const std::string rgb = "rgb/" + stamp + ".png";
   const std::string depth = "depth/" + stamp + ".png";
   cv::Mat coded;
@@ -88,8 +45,8 @@ void TumWriter::Add(double time_s, const SimulatedFrame& frame, const cv::Mat& r
   if (!right.empty()) {
     if (!right_.is_open()) {
       std::error_code error;
-      fs::create_directories(directory_ + "/rgb_right", error);
-      right_ = Open(directory_ + "/rgb_right.txt");
+      std::filesystem::create_directories(directory_ + "/rgb_right", error);
+      right_ = OpenFile(directory_ + "/rgb_right.txt");
       right_ << "# timestamp filename\n";
     }
     const std::string path = "rgb_right/" + stamp + ".png";
@@ -99,29 +56,23 @@ void TumWriter::Add(double time_s, const SimulatedFrame& frame, const cv::Mat& r
   rgb_ << stamp << " " << rgb << "\n";
   depth_ << stamp << " " << depth << "\n";
   associations_ << stamp << " " << rgb << " " << stamp << " " << depth << "\n";
-  const Eigen::Vector3d& t = frame.world_from_optical.translation();
-  const Eigen::Quaterniond q(frame.world_from_optical.linear());
-  truth_ << stamp;
-  for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
-    truth_ << Format(" %.9f", value);
-  }
-  truth_ << "\n";
+  truth_ << stamp << FormatPose(" %.9f", frame.world_from_optical) << "\n";
 }
 
 void TumWriter::Finish() {
-  if (right_.is_open()) Close(right_, directory_ + "/rgb_right.txt");
-  Close(rgb_, directory_ + "/rgb.txt");
-  Close(depth_, directory_ + "/depth.txt");
-  Close(associations_, directory_ + "/associations.txt");
-  Close(truth_, directory_ + "/groundtruth.txt");
+  if (right_.is_open()) CloseFile(right_, directory_ + "/rgb_right.txt");
+  CloseFile(rgb_, directory_ + "/rgb.txt");
+  CloseFile(depth_, directory_ + "/depth.txt");
+  CloseFile(associations_, directory_ + "/associations.txt");
+  CloseFile(truth_, directory_ + "/groundtruth.txt");
 }
 
 YoloWriter::YoloWriter(const std::string& directory) : directory_(directory) {
-  MakeFolder(directory, {"images", "labels"});
-  std::ofstream classes = Open(directory + "/classes.txt");
+  MakeNewFolder(directory, {"images", "labels"});
+  std::ofstream classes = OpenFile(directory + "/classes.txt");
   for (const ObjectClass object_class : HazardClasses()) classes << ClassName(object_class) << "\n";
-  Close(classes, directory + "/classes.txt");
-  frames_ = Open(directory + "/frames.csv");
+  CloseFile(classes, directory + "/classes.txt");
+  frames_ = OpenFile(directory + "/frames.csv");
   frames_ << "frame,chainage_m\n";
 }
 
@@ -132,22 +83,22 @@ void YoloWriter::Add(double chainage_m, const SimulatedFrame& frame,
   WriteImage(directory_ + "/images/" + name + ".jpg", frame.bgr,
              {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
   const std::string path = directory_ + "/labels/" + name + ".txt";
-  std::ofstream labels = Open(path);
+  std::ofstream labels = OpenFile(path);
   const double width = frame.bgr.cols;
   const double height = frame.bgr.rows;
   for (const HazardInView& hazard : hazards) {
     const int class_id =
         static_cast<int>(hazard.object_class) - static_cast<int>(ObjectClass::kPothole);
-    labels << class_id << Format(" %.6f", (hazard.box.x + 0.5 * hazard.box.width) / width)
-           << Format(" %.6f", (hazard.box.y + 0.5 * hazard.box.height) / height)
-           << Format(" %.6f", hazard.box.width / width)
-           << Format(" %.6f", hazard.box.height / height) << "\n";
+    labels << class_id << FormatNumber(" %.6f", (hazard.box.x + 0.5 * hazard.box.width) / width)
+           << FormatNumber(" %.6f", (hazard.box.y + 0.5 * hazard.box.height) / height)
+           << FormatNumber(" %.6f", hazard.box.width / width)
+           << FormatNumber(" %.6f", hazard.box.height / height) << "\n";
   }
-  Close(labels, path);
-  frames_ << name << Format(",%.3f", chainage_m) << "\n";
+  CloseFile(labels, path);
+  frames_ << name << FormatNumber(",%.3f", chainage_m) << "\n";
 }
 
-void YoloWriter::Finish() { Close(frames_, directory_ + "/frames.csv"); }
+void YoloWriter::Finish() { CloseFile(frames_, directory_ + "/frames.csv"); }
 
 void WriteHazards(const std::string& path, const Street& street, const GeoPoint& datum,
                   const std::map<std::uint32_t, int>& frames_seen, double end_along_m) {
@@ -174,9 +125,9 @@ void WriteHazards(const std::string& path, const Street& street, const GeoPoint&
              {"passed", hazard.along_m < end_along_m}}}});
     }
   }
-  std::ofstream file = Open(path);
+  std::ofstream file = OpenFile(path);
   file << nlohmann::json({{"type", "FeatureCollection"}, {"features", features}}).dump(1) << "\n";
-  Close(file, path);
+  CloseFile(file, path);
 }
 
 cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns) {

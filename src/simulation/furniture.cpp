@@ -118,4 +118,138 @@ void AddPerson(CounterRandom& random, MeshBuilder& builder) {
   builder.AddEllipsoid({-0.015F, 0, 1.675F}, {0.105F, 0.088F, 0.11F}, 12);
 }
 
+namespace {
+
+void AddBench(CounterRandom& random, MeshBuilder& builder) {
+  builder.SetMaterial({MaterialKind::kMetal, Vec3(0.06F, 0.06F, 0.065F), Vec3::Ones(), 0});
+  for (const float x : {-0.72F, 0.72F}) {
+    builder.AddBox({x - 0.03F, -0.22F, 0}, {x + 0.03F, -0.16F, 0.44F});
+    builder.AddBox({x - 0.03F, -0.22F, 0.4F}, {x + 0.03F, 0.24F, 0.44F});
+    builder.AddTube({x, 0.2F, 0}, {x, 0.3F, 0.9F}, 0.03F, 0.03F, 6);
+  }
+  builder.SetMaterial(
+      {MaterialKind::kWood, Vec3(0.24F, 0.14F, 0.07F), Vec3::Ones(), random.Bits32()});
+  for (int slat = 0; slat < 4; ++slat) {
+    const float y = -0.24F + 0.115F * static_cast<float>(slat);
+    builder.AddBox({-0.85F, y, 0.44F}, {0.85F, y + 0.09F, 0.475F});
+  }
+  for (int slat = 0; slat < 3; ++slat) {
+    const float z = 0.55F + 0.125F * static_cast<float>(slat);
+    const float y = 0.2F + 0.1F * z / 0.9F;
+    builder.AddBox({-0.85F, y - 0.03F, z}, {0.85F, y, z + 0.095F});
+  }
+}
+
+void AddPlanter(CounterRandom& random, MeshBuilder& builder) {
+  builder.SetMaterial(
+      {MaterialKind::kConcrete, Vec3(0.36F, 0.35F, 0.33F), Vec3::Ones(), random.Bits32()});
+  builder.AddBox({-0.62F, -0.27F, 0.04F}, {0.62F, 0.27F, 0.46F});
+  builder.AddBox({-0.66F, -0.31F, 0.46F}, {0.66F, 0.31F, 0.54F});
+  builder.AddBox({-0.55F, -0.2F, 0}, {0.55F, 0.2F, 0.04F});
+  const Vec3 green(0.045F, 0.10F, 0.035F);
+  builder.SetMaterial({MaterialKind::kHedge, green, green * 0.5F, random.Bits32()});
+  for (int bush = 0; bush < 4; ++bush) {
+    const float r = random.Uniform(0.2F, 0.28F);
+    builder.AddEllipsoid(
+        {0.32F * static_cast<float>(bush) - 0.48F, random.Uniform(-0.05F, 0.05F), 0.56F + 0.5F * r},
+        {r, r, 1.1F * r}, 9);
+  }
+}
+
+void AddPostBox(CounterRandom& random, MeshBuilder& builder) {
+  const Vec3 colour = random.Chance(0.6) ? Vec3(0.78F, 0.50F, 0.01F) : Vec3(0.50F, 0.025F, 0.02F);
+  builder.SetMaterial({MaterialKind::kMetal, Vec3(0.10F, 0.10F, 0.11F), Vec3::Ones(), 0});
+  builder.AddTube({0, 0, 0}, {0, 0, 0.62F}, 0.06F, 0.06F, 10);
+  builder.SetMaterial({MaterialKind::kMetal, colour, Vec3::Ones(), 0});
+  builder.AddBox({-0.28F, -0.2F, 0.6F}, {0.28F, 0.2F, 1.28F});
+  builder.AddBox({-0.3F, -0.22F, 1.28F}, {0.3F, 0.22F, 1.34F});
+  builder.SetMaterial({MaterialKind::kPlain, Vec3(0.02F, 0.02F, 0.02F), Vec3::Ones(), 0});
+  builder.AddBox({-0.2F, -0.204F, 1.14F}, {0.2F, -0.2F, 1.19F});
+  builder.SetMaterial({MaterialKind::kPlain, Vec3(0.7F, 0.7F, 0.68F), Vec3::Ones(), 0});
+  builder.AddBox({-0.13F, -0.203F, 0.82F}, {0.13F, -0.2F, 1.02F});
+}
+
+/// Tyre, rim and spokes in the plane y = 0 about `hub`.
+void AddWheel(const Vec3& hub, MeshBuilder& builder) {
+  constexpr int kPieces = 20;
+  constexpr float kRadiusM = 0.33F;
+  const auto rim = [&](int piece, float radius) {
+    const float angle = 6.2831853F * static_cast<float>(piece) / kPieces;
+    return Vec3(hub + radius * Vec3(std::cos(angle), 0, std::sin(angle)));
+  };
+  builder.SetMaterial({MaterialKind::kRubber, Vec3(0.015F, 0.015F, 0.015F), Vec3::Ones(), 0});
+  for (int piece = 0; piece < kPieces; ++piece) {
+    builder.AddTube(rim(piece, kRadiusM), rim(piece + 1, kRadiusM), 0.022F, 0.022F, 6);
+  }
+  builder.SetMaterial({MaterialKind::kMetal, Vec3(0.45F, 0.46F, 0.47F), Vec3::Ones(), 0});
+  for (int piece = 0; piece < kPieces; ++piece) {
+    builder.AddTube(rim(piece, 0.305F), rim(piece + 1, 0.305F), 0.01F, 0.01F, 4);
+    if (piece % 2 == 0) builder.AddTube(hub, rim(piece, 0.3F), 0.003F, 0.003F, 3);
+  }
+  builder.AddTube(hub - Vec3(0, 0.05F, 0), hub + Vec3(0, 0.05F, 0), 0.025F, 0.025F, 8);
+}
+
+void AddBicycleFrame(CounterRandom& random, MeshBuilder& builder) {
+  const Vec3 colours[] = {Vec3(0.03F, 0.03F, 0.035F), Vec3(0.35F, 0.02F, 0.02F),
+                          Vec3(0.02F, 0.08F, 0.28F), Vec3(0.50F, 0.50F, 0.48F),
+                          Vec3(0.03F, 0.18F, 0.09F)};
+  builder.SetMaterial({MaterialKind::kMetal, colours[random.Index(5)], Vec3::Ones(), 0});
+  const Vec3 rear(-0.5F, 0, 0.35F);
+  const Vec3 front(0.54F, 0, 0.35F);
+  const Vec3 pedals(-0.06F, 0, 0.29F);
+  const Vec3 saddle(-0.22F, 0, 0.82F);
+  const Vec3 neck(0.34F, 0, 0.84F);
+  builder.AddTube(pedals, saddle, 0.017F, 0.017F, 7);
+  builder.AddTube(pedals, neck - Vec3(-0.02F, 0, 0.08F), 0.02F, 0.02F, 7);
+  builder.AddTube(saddle - Vec3(0, 0, 0.07F), neck, 0.017F, 0.017F, 7);
+  for (const float y : {-0.04F, 0.04F}) {
+    const Vec3 beside(0, y, 0);
+    builder.AddTube(pedals + beside, rear + beside, 0.011F, 0.011F, 5);
+    builder.AddTube(saddle - Vec3(0, 0, 0.07F), rear + beside, 0.01F, 0.01F, 5);
+    builder.AddTube(neck - Vec3(-0.03F, 0, 0.1F) + beside, front + beside, 0.012F, 0.012F, 5);
+  }
+  builder.SetMaterial({MaterialKind::kMetal, Vec3(0.12F, 0.12F, 0.13F), Vec3::Ones(), 0});
+  builder.AddTube(neck, neck + Vec3(-0.03F, 0, 0.16F), 0.014F, 0.014F, 6);
+  const Vec3 bar = neck + Vec3(-0.03F, 0, 0.16F);
+  builder.AddTube(bar - Vec3(0, 0.29F, 0), bar + Vec3(0, 0.29F, 0), 0.013F, 0.013F, 6);
+  builder.AddTube(saddle, saddle + Vec3(-0.03F, 0, 0.12F), 0.013F, 0.013F, 6);
+  builder.AddEllipsoid(saddle + Vec3(-0.03F, 0, 0.14F), {0.14F, 0.08F, 0.035F}, 9);
+  builder.AddDisc(pedals - Vec3(0, 0.05F, 0), -Vec3::UnitY(), 0.1F, 16);
+  builder.AddDisc(pedals + Vec3(0, 0.05F, 0), Vec3::UnitY(), 0.1F, 16);
+  builder.AddBox(pedals + Vec3(0.12F, -0.17F, -0.01F), pedals + Vec3(0.2F, -0.07F, 0.015F));
+  builder.AddBox(pedals + Vec3(-0.2F, 0.07F, -0.01F), pedals + Vec3(-0.12F, 0.17F, 0.015F));
+  for (const Vec3& hub : {rear, front}) AddWheel(hub, builder);
+}
+
+}  // namespace
+
+void AddOtherObject(CounterRandom& random, MeshBuilder& builder) {
+  switch (random.Index(3)) {
+    case 0:
+      AddBench(random, builder);
+      break;
+    case 1:
+      AddPlanter(random, builder);
+      break;
+    default:
+      AddPostBox(random, builder);
+  }
+}
+
+void AddBicycle(CounterRandom& random, MeshBuilder& builder) {
+  // A hoop to lock it to.
+  builder.SetMaterial({MaterialKind::kMetal, Vec3(0.30F, 0.31F, 0.32F), Vec3::Ones(), 0});
+  for (const float x : {-0.32F, 0.32F}) {
+    builder.AddTube({x, 0.14F, 0}, {x, 0.14F, 0.72F}, 0.022F, 0.022F, 8);
+    builder.AddTube({x, 0.14F, 0.72F}, {0.6F * x, 0.14F, 0.82F}, 0.022F, 0.022F, 8);
+  }
+  builder.AddTube({-0.192F, 0.14F, 0.82F}, {0.192F, 0.14F, 0.82F}, 0.022F, 0.022F, 8);
+  const Eigen::Affine3f frame = builder.frame();
+  builder.SetFrame(frame *
+                   Eigen::AngleAxisf(random.Chance(0.5) ? 0.0F : 3.14159265F, Vec3::UnitZ()) *
+                   Eigen::AngleAxisf(random.Uniform(-0.04F, 0.04F), Vec3::UnitX()));
+  AddBicycleFrame(random, builder);
+  builder.SetFrame(frame);
+}
+
 }  // namespace livemap

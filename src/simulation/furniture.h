@@ -20,5 +20,9 @@ void AddBin(CounterRandom& random, MeshBuilder& builder);
 void AddRubbishBags(CounterRandom& random, MeshBuilder& builder);
 /// A standing or walking person of about 1.75 m, facing x.
 void AddPerson(CounterRandom& random, MeshBuilder& builder);
+/// A bench, a planter or a post box along x, its front to -y.
+void AddOtherObject(CounterRandom& random, MeshBuilder& builder);
+/// A bicycle along x that leans to y on a stand.
+void AddBicycle(CounterRandom& random, MeshBuilder& builder);
 
 }  // namespace livemap

@@ -23,6 +23,8 @@ enum class ObjectClass : std::uint8_t {
   kBin,
   kRubbish,
   kPerson,
+  kOtherObject,  ///< A bench, planter or post box.
+  kCycle,        ///< A parked bicycle.
   kPothole,
   kTrafficCone,
   kRoadWorkSign,
@@ -32,7 +34,7 @@ enum class ObjectClass : std::uint8_t {
   kConstructionMachine,
   kStoppedAccident,
 };
-constexpr int kObjectClasses = 22;
+constexpr int kObjectClasses = 24;
 
 /// "sky", "road", ..., "stopped_accident"; hazards as config/hazards.yaml names them.
 const char* ClassName(ObjectClass object_class);

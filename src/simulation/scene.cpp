@@ -69,7 +69,7 @@ RTCRay MakeRay(const Vec3& from, const Vec3& direction, float nearest, float far
 
 }  // namespace
 
-StreetScene::StreetScene(const Street& street) : street_(street) {
+StreetScene::StreetScene(const Street& street, bool lit) : street_(street), lit_(lit) {
   // One thread builds: with more, equal distances could be decided differently from run to run.
   device_ = rtcNewDevice("threads=1");
   if (device_ == nullptr) throw std::runtime_error("Embree cannot start");
@@ -181,7 +181,9 @@ void StreetScene::MoveTo(double along_m) {
     rtcReleaseScene(it->second->scene);
     it = loaded_.erase(it);
   }
-  for (int index = first; index <= last; ++index) MeasureSky(index);
+  if (lit_) {
+    for (int index = first; index <= last; ++index) MeasureSky(index);
+  }
   origin_ = street_.line().At((first + 1) * kBlockM, 0, 0);
   scene_ = Assemble(first, last, origin_);
   visible_.clear();

@@ -24,8 +24,9 @@ struct SceneHit {
 /// to origin(). MoveTo() needs to be alone; rays may be cast by many threads.
 class StreetScene {
  public:
-  /// `street` must outlive the scene.
-  explicit StreetScene(const Street& street);
+  /// `street` must outlive the scene. Without `lit` the scene is built quicker and knows nothing of
+  /// the sky over the ground: enough for what rays meet.
+  explicit StreetScene(const Street& street, bool lit = true);
   ~StreetScene();
   StreetScene(const StreetScene&) = delete;
   StreetScene& operator=(const StreetScene&) = delete;
@@ -59,6 +60,7 @@ class StreetScene {
   RTCScene Assemble(int first, int last, const Eigen::Vector3d& origin);
 
   const Street& street_;
+  const bool lit_;
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();

@@ -82,10 +82,11 @@ double DefaultRadius(ObjectClass object_class, CounterRandom& random) {
 }  // namespace
 
 Street::Street(const WorldDescription& description, std::uint64_t seed, double length_m,
-               bool leaves)
+               bool leaves, const StreetPass& pass)
     : description_(description),
       seed_(seed),
       leaves_(leaves),
+      pass_(pass),
       line_(description.bearing_deg,
             description.pieces.empty() ? DrawRoad(seed, length_m) : description.pieces) {
   profile_.lane_width_m = static_cast<float>(description.lane_width_m);

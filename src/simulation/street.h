@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "simulation/change.h"
 #include "simulation/ground_plan.h"
 #include "simulation/mesh.h"
 #include "simulation/road_line.h"
@@ -30,24 +31,29 @@ struct StreetBlock {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   Mesh mesh;
   GroundPlan ground;
-  std::vector<Vec3> lamps;  ///< Lights of the lamp posts.
+  std::vector<Vec3> lamps;            ///< Lights of the lamp posts.
+  std::vector<StreetChange> changes;  ///< What only one of two passes shows, here or not.
 };
 
 /// A street in town with everything that stands in it, a pure function of the description, the
-/// seed and the season. Immutable: any thread may ask.
+/// seed, the season and the pass. Two passes of one street differ in their changes alone: all else
+/// stands in the same place under the same instance id, in any season. Immutable: any thread may
+/// ask.
 class Street {
  public:
   /// Lays road for at least `length_m`. `leaves`: trees are green.
-  Street(const WorldDescription& description, std::uint64_t seed, double length_m, bool leaves);
+  Street(const WorldDescription& description, std::uint64_t seed, double length_m, bool leaves,
+         const StreetPass& pass = StreetPass());
 
   const RoadLine& line() const { return line_; }
   const WorldDescription& description() const { return description_; }
   const StreetProfile& profile() const { return profile_; }
   std::uint64_t seed() const { return seed_; }
+  const StreetPass& pass() const { return pass_; }
   /// Middle of the lane that the vehicle drives in, metres left of the middle line.
   double lane_left_m() const { return -0.5 * description_.lane_width_m; }
 
-  /// Of block `index`, which spans [index, index + 1) * kBlockM.
+  /// Of block `index`, which spans [index, index + 1) * kBlockM; those that this pass lacks too.
   std::vector<StreetHazard> Hazards(int index) const;
   StreetBlock Build(int index) const;
 
@@ -59,6 +65,7 @@ class Street {
   WorldDescription description_;
   std::uint64_t seed_;
   bool leaves_;
+  StreetPass pass_;
   RoadLine line_;
   StreetProfile profile_;
 };

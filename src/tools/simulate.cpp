@@ -4,6 +4,7 @@
 
 #include "simulation/vehicle_motion.h"
 #include "tools/command_line.h"
+#include "tools/simulate_change.h"
 #include "tools/simulation_outputs.h"
 
 namespace livemap {
@@ -36,11 +37,15 @@ std::vector<Flag> Flags() {
 }
 
 int Run(int argc, char** argv) {
+  std::vector<Flag> flags = Flags();
+  for (const Flag& flag : ChangeFlags()) flags.push_back(flag);
   CommandLine line(
       "livemap_simulate [flags]",
       "Renders a drive through a generated street with the truth about everything in it.", 0,
-      Flags());
+      flags);
   if (!line.Parse(argc, argv)) return 0;
+  if (line.Has("change")) return SimulateChange(line);
+  RefuseChangeFlags(line);
   const std::uint64_t seed = line.Seed("seed", 1);
   const Condition condition = ReadCondition(line, "condition", "day");
   const double seconds = line.Number("seconds", 20, 0.1, 7200);

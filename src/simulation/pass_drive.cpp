@@ -1,0 +1,72 @@
+#include "simulation/pass_drive.h"
+
+#include "simulation/random.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::uint64_t kManner = 42;
+
+/// Motion that is at the manner's start when its clock says so.
+VehicleMotion MakeMotion(const Street& street, const PassManner& manner) {
+  const VehicleMotion from_zero(street, manner.speed_mps, 0);
+  return {street, manner.speed_mps, manner.start_m - from_zero.AlongM(manner.clock_s)};
+}
+
+}  // namespace
+
+PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz) {
+  CounterRandom random(seed, kManner);
+  PassManner manner;
+  manner.speed_mps = speed_mps * random.Uniform(0.8, 1.2);
+  manner.rate_hz = rate_hz;
+  manner.start_m = random.Uniform(0.0, 6.0);
+  manner.clock_s = random.Uniform(3.0, 11.0);
+  manner.left_m = (random.Chance(0.5) ? 1 : -1) * random.Uniform(0.3, 0.8);
+  return manner;
+}
+
+PassDrive::PassDrive(const Street& street, const PassManner& manner, const CameraMounting& mounting,
+                     double exposure_s)
+    : manner_(manner),
+      base_from_optical_(mounting.BaseFromOptical()),
+      exposure_s_(exposure_s),
+      motion_(MakeMotion(street, manner)) {}
+
+double PassDrive::ClockS(std::size_t frame) const {
+  return manner_.clock_s + static_cast<double>(frame) / manner_.rate_hz;
+}
+
+double PassDrive::AlongM(std::size_t frame) const { return motion_.AlongM(ClockS(frame)); }
+
+Eigen::Isometry3d PassDrive::WorldFromOptical(double clock_s) const {
+  return motion_.WorldFromBase(clock_s) * Eigen::Translation3d(0, manner_.left_m, 0) *
+         base_from_optical_;
+}
+
+CameraMotion PassDrive::Camera(std::size_t frame) const {
+  CameraMotion camera;
+  camera.world_from_optical = WorldFromOptical(ClockS(frame));
+  camera.world_from_optical_end = WorldFromOptical(ClockS(frame) + exposure_s_);
+  camera.along_m = AlongM(frame);
+  return camera;
+}
+
+std::size_t PassDrive::Nearest(double along_m) const {
+  std::size_t beyond = 1;
+  while (AlongM(beyond) < along_m) beyond *= 2;
+  // The first picture that is not before the place lies in [low, beyond].
+  std::size_t low = 0;
+  while (low < beyond) {
+    const std::size_t middle = (low + beyond) / 2;
+    if (AlongM(middle) < along_m) {
+      low = middle + 1;
+    } else {
+      beyond = middle;
+    }
+  }
+  if (low > 0 && along_m - AlongM(low - 1) < AlongM(low) - along_m) --low;
+  return low;
+}
+
+}  // namespace livemap

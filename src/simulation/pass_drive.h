@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "drives/camera_file.h"
+#include "simulation/renderer.h"
+#include "simulation/vehicle_motion.h"
+
+namespace livemap {
+
+/// How one of several drives down a lane is driven.
+struct PassManner {
+  double speed_mps = 8;  ///< Mean.
+  double rate_hz = 10;   ///< Pictures per second.
+  double start_m = 0;    ///< Along the road, of the first picture.
+  double clock_s = 0;    ///< Phase of the vehicle's sway and of its breathing speed.
+  double left_m = 0;     ///< Beside the lane's usual line.
+};
+
+/// The second drive of a lane that was first driven at `speed_mps`: 0.3 to 0.8 m to one side, 0.8
+/// to 1.2 times as fast, begun up to 6 m later, swaying otherwise. Drawn by the seed.
+PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz);
+
+/// The camera of a drive, picture by picture.
+class PassDrive {
+ public:
+  /// `street` must outlive the drive; `exposure_s` is the shutter's time.
+  PassDrive(const Street& street, const PassManner& manner, const CameraMounting& mounting,
+            double exposure_s);
+
+  /// Of the picture `frame`, metres along the road's middle line; grows with `frame`.
+  double AlongM(std::size_t frame) const;
+  CameraMotion Camera(std::size_t frame) const;
+  /// The picture whose place along the road is the nearest to `along_m`.
+  std::size_t Nearest(double along_m) const;
+
+ private:
+  double ClockS(std::size_t frame) const;
+  Eigen::Isometry3d WorldFromOptical(double clock_s) const;
+
+  PassManner manner_;
+  Eigen::Isometry3d base_from_optical_;
+  double exposure_s_;
+  VehicleMotion motion_;
+};
+
+}  // namespace livemap

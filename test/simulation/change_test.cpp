@@ -1,0 +1,3 @@
+#include "simulation/change.h"
+
+#include <gtest/gtest.h>
