@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace livemap {
+namespace {
+
+/// An object whose middle lies so far behind the camera may still reach into its view.
+constexpr double kLongestBehindM = 4;
+
+}  // namespace
 
 InstanceCaster::InstanceCaster(const Street& street, const SimulatedCamera& camera, int threads)
     : threads_(threads),
@@ -79,9 +85,13 @@ ChangeTruth::ChangeTruth(const WorldDescription& description, std::uint64_t seed
 ChangeView ChangeTruth::Look(const CameraMotion& motion) {
   const cv::Mat before = before_caster_.Cast(motion);
   const cv::Mat after = after_caster_.Cast(motion);
+  std::map<std::uint32_t, StreetChange> here;
   // Both worlds name the same changes.
-  for (const StreetChange& change : after_caster_.changes()) changes_[change.instance] = change;
-  return CompareInstances(before, after, changes_);
+  for (const StreetChange& change : after_caster_.changes()) {
+    here[change.instance] = change;
+    if (change.along_m > motion.along_m - kLongestBehindM) changes_[change.instance] = change;
+  }
+  return CompareInstances(before, after, here);
 }
 
 }  // namespace livemap

@@ -55,7 +55,7 @@ class ChangeTruth {
 
   /// A later pose of `motion` (motion blur) is left out of account.
   ChangeView Look(const CameraMotion& motion);
-  /// All that changed within the range of sight of the pictures so far, seen or hidden.
+  /// All that changed ahead of the cameras so far, within the range of sight, seen or hidden.
   const std::map<std::uint32_t, StreetChange>& changes() const { return changes_; }
 
  private:
