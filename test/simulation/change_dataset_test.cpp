@@ -140,9 +140,9 @@ TEST_F(ChangeDataset, RefusesAFolderThatIsNotEmpty) {
 
 TEST_F(ChangeDataset, OverlayIsGreyButWhereSomethingChanged) {
   const cv::Mat overlay = OverlayChanges(second_.frame.bgr, view_.mask);
-  const cv::Vec3b calm = overlay.at<cv::Vec3b>(5, 5);
+  const auto& calm = overlay.at<cv::Vec3b>(5, 5);
   EXPECT_TRUE(calm[0] == calm[1] && calm[1] == calm[2]);
-  const cv::Vec3b vehicle = overlay.at<cv::Vec3b>(1, 9);
+  const auto& vehicle = overlay.at<cv::Vec3b>(1, 9);
   EXPECT_GT(vehicle[1], vehicle[0] + 80);
 }
 
