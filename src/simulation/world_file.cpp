@@ -16,6 +16,7 @@ constexpr std::size_t kMostBytes = 1U << 20U;
 constexpr std::size_t kMostItems = 10000;
 constexpr double kTightestRadiusM = 48;
 constexpr double kSteepest = 0.15;
+constexpr double kLongestRoadM = 1e6;
 
 /// One YAML document and its name, for sentences that say where a mistake is.
 class Reader {
@@ -116,7 +117,12 @@ void ReadRoad(const Reader& reader, const YAML::Node& road, WorldDescription& wo
   reader.Read(road, "pavement_width_m", 1, 6, world.pavement_width_m);
   if (const YAML::Node pieces = road["pieces"]) {
     reader.CheckList(pieces, "'pieces'");
-    for (const YAML::Node& piece : pieces) world.pieces.push_back(ReadPiece(reader, piece));
+    double length_m = 0;
+    for (const YAML::Node& piece : pieces) {
+      world.pieces.push_back(ReadPiece(reader, piece));
+      length_m += world.pieces.back().length_m;
+      if (length_m > kLongestRoadM) reader.Refuse(piece, "the road is longer than 1000 km here");
+    }
   }
   if (const YAML::Node crossings = road["crossings_m"]) {
     reader.CheckList(crossings, "'crossings_m'");

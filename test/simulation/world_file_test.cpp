@@ -70,6 +70,10 @@ TEST(WorldFile, RefusesRoadsThatNoGroundCanFollow) {
   EXPECT_NE(Refusal("road:\n  pieces:\n    - {length_m: 20, climb_m: 9}\n").find("steeper"),
             std::string::npos);
   EXPECT_NE(Refusal("road:\n  crossings_m: [50, 60]\n").find("40 m apart"), std::string::npos);
+  std::string endless = "road:\n  pieces:\n";
+  for (int i = 0; i < 11; ++i) endless += "    - {length_m: 100000}\n";
+  EXPECT_EQ(Refusal(endless),
+            "the world file 'town.yaml', line 13: the road is longer than 1000 km here");
 }
 
 TEST(WorldFile, RefusesWhatIsNoWorldAtAll) {

@@ -1,0 +1,19 @@
+// World files of simulated streets, and what a street's road is made of.
+#include <cstdint>
+#include <string>
+
+#include "base/error.h"
+#include "simulation/road_line.h"
+#include "simulation/world_file.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    const livemap::WorldDescription world =
+        livemap::ParseWorldFile(std::string(reinterpret_cast<const char*>(data), size), "input");
+    // What the reader accepts, a road can be made of.
+    if (!world.pieces.empty()) livemap::RoadLine(world.bearing_deg, world.pieces);
+  } catch (const livemap::Error&) {
+    // Refused by a sentence: what the reader promises.
+  }
+  return 0;
+}
