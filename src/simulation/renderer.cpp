@@ -1,5 +1,6 @@
 #include "simulation/renderer.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <exception>
@@ -86,12 +87,14 @@ class StreetRenderer::Exposure {
   void SmoothRow(int row, cv::Mat& light) const {
     const auto* raw = raw_.ptr<cv::Vec3f>(row);
     auto* out = light.ptr<cv::Vec3f>(row);
+    std::copy(raw, raw + width_, out);
+    if (!renderer_.options_.smooth_edges) return;
+    std::vector<int> edges;
     for (int column = 0; column < width_; ++column) {
-      out[column] = raw[column];
-      if (renderer_.options_.smooth_edges && IsEdge(row, column)) {
-        out[column] = (raw[column] + Extra(row, column)) * 0.25F;
-      }
+      if (IsEdge(row, column)) edges.push_back(column);
     }
+    AddRays(row, edges, out);
+    for (const int column : edges) out[column] *= 0.25F;
   }
 
   const cv::Mat& raw() const { return raw_; }
@@ -116,26 +119,33 @@ class StreetRenderer::Exposure {
     return false;
   }
 
-  /// Three more rays within the pixel; one alone must not outshine the rest.
-  cv::Vec3f Extra(int row, int column) const {
+  /// Adds three more rays to each of these pixels; one alone must not outshine the rest.
+  void AddRays(int row, const std::vector<int>& columns, cv::Vec3f* out) const {
     static constexpr double kOffsets[3][2] = {{-0.375, 0.125}, {0.125, -0.375}, {0.375, 0.375}};
-    Vec3 directions[3];
-    SceneHit hits[3];
-    Vec3 radiances[3];
-    for (std::size_t i = 0; i < 3; ++i) {
-      directions[i] =
-          rotation_ *
-          renderer_.camera_.Ray(column + kOffsets[i][0], row + kOffsets[i][1]).cast<float>();
-    }
-    renderer_.scene_.CastEight(eye_, directions, 3, hits);
-    shader_.Radiances(directions, hits, 3, pixel_angle_, radiances, nullptr);
-    cv::Vec3f sum(0, 0, 0);
-    for (const Vec3& radiance : radiances) {
-      for (int channel = 0; channel < 3; ++channel) {
-        sum[channel] += std::min(radiance[channel], kBrightest);
+    Vec3 directions[8];
+    int targets[8];
+    int count = 0;
+    const auto flush = [&] {
+      SceneHit hits[8];
+      Vec3 radiances[8];
+      renderer_.scene_.CastEight(eye_, directions, count, hits);
+      shader_.Radiances(directions, hits, count, pixel_angle_, radiances, nullptr);
+      for (int i = 0; i < count; ++i) {
+        for (int channel = 0; channel < 3; ++channel) {
+          out[targets[i]][channel] += std::min(radiances[i][channel], kBrightest);
+        }
+      }
+      count = 0;
+    };
+    for (const int column : columns) {
+      for (const auto& offset : kOffsets) {
+        directions[count] =
+            rotation_ * renderer_.camera_.Ray(column + offset[0], row + offset[1]).cast<float>();
+        targets[count++] = column;
+        if (count == 8) flush();
       }
     }
-    return sum;
+    if (count > 0) flush();
   }
 
   const StreetRenderer& renderer_;
