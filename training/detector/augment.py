@@ -21,7 +21,8 @@ MIN_VISIBLE_FRACTION = 0.4
 """A label of which a view shows less is ignored: neither pothole nor background."""
 
 MIN_SIZE_PX = (6.0, 3.0)
-"""A label that a view shows smaller (width, height) is ignored."""
+MIN_AREA_PX = 60.0
+"""A label that a view shows smaller (width, height, or their product) is ignored."""
 
 
 CLOSEUPS_AMONG_PASTED = 0.4
@@ -59,7 +60,7 @@ SETTLING = Recipe(
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.46, "survey_empty": 0.16, "closeups": 0.08, "cones": 0.10, "simulated": 0.20}
+GROUP_SHARES = {"survey_potholes": 0.38, "survey_empty": 0.14, "closeups": 0.06, "cones": 0.10, "simulated": 0.32}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
 
 GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0}
@@ -215,7 +216,9 @@ class Augmenter:
         moved = np.stack([xs.min(1), ys.min(1), xs.max(1), ys.max(1)], axis=1) if len(xs) else picture.boxes
         clipped = box_math.clip_to_image(moved, width, height)
         sizes = clipped[:, 2:] - clipped[:, :2]
-        clear = (box_math.areas(clipped) > MIN_VISIBLE_FRACTION * box_math.areas(moved)) & (sizes > MIN_SIZE_PX).all(1)
+        areas = box_math.areas(clipped)
+        whole = (areas > MIN_VISIBLE_FRACTION * box_math.areas(moved)) & (areas > MIN_AREA_PX)
+        clear = whole & (sizes > MIN_SIZE_PX).all(1)
         return Sample(
             image,
             clipped[clear].astype(np.float32),

@@ -92,7 +92,18 @@ def read_simulated(root: Path) -> List[Picture]:
         names = (drive / "classes.txt").read_text().split()
         class_ids = [CLASSES.index(name) if name in CLASSES else -1 for name in names]
         pictures += read_folder(drive / "images", drive / "labels", class_ids)
+    weigh_by_rarest_class(pictures)
     return pictures
+
+
+def weigh_by_rarest_class(pictures: List[Picture]) -> None:
+    """Draw pictures of rare classes more often, by the root of how much rarer they are than the most frequent."""
+    counts = np.zeros(len(CLASSES))
+    for picture in pictures:
+        counts[np.unique(picture.classes)] += 1
+    rarity = np.sqrt(counts.max() / np.maximum(counts, 1))
+    for picture in pictures:
+        picture.weight = float(rarity[picture.classes].max()) if len(picture.classes) else 1.0
 
 
 def read_drive(section: Path) -> List[DriveFrame]:
