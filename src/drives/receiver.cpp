@@ -9,8 +9,6 @@
 namespace livemap {
 namespace {
 
-constexpr double kTwoPi = 6.28318530717958647693;
-
 void CheckValue(const char* name, double value, bool may_be_zero) {
   if (std::isfinite(value) && (value > 0 || (may_be_zero && value == 0)) && value < 1e9) return;
   throw Error("the receiver's " + std::string(name) + " is " + std::to_string(value) +
@@ -28,22 +26,9 @@ void Check(const ReceiverNoise& noise) {
 }
 
 ReceiverSimulator::ReceiverSimulator(const ReceiverNoise& noise, std::uint64_t seed)
-    : noise_(noise), generator_(seed) {
+    : noise_(noise), random_(seed) {
   Check(noise);
 }
-
-double ReceiverSimulator::Uniform() {
-  // 53 bits, shifted by half a step so that neither 0 nor 1 comes.
-  return (static_cast<double>(generator_() >> 11U) + 0.5) / 9007199254740992.0;
-}
-
-Eigen::Vector2d ReceiverSimulator::Normal() {
-  const double radius = std::sqrt(-2 * std::log(Uniform()));
-  const double angle = kTwoPi * Uniform();
-  return {radius * std::cos(angle), radius * std::sin(angle)};
-}
-
-double ReceiverSimulator::Exponential(double mean) { return -mean * std::log(Uniform()); }
 
 double ReceiverSimulator::sigma_m() const {
   return std::hypot(noise_.white_sigma_m, noise_.bias_sigma_m);
@@ -56,18 +41,18 @@ std::optional<Eigen::Vector2d> ReceiverSimulator::ErrorAt(double time_s) {
   if (!started_) {
     started_ = true;
     bias_time_s_ = time_s;
-    bias_m_ = noise_.bias_sigma_m * Normal();
-    dropout_start_s_ = time_s + Exponential(between_dropouts_s);
-    dropout_end_s_ = dropout_start_s_ + Exponential(noise_.dropout_mean_s);
+    bias_m_ = noise_.bias_sigma_m * random_.Normal();
+    dropout_start_s_ = time_s + random_.Exponential(between_dropouts_s);
+    dropout_end_s_ = dropout_start_s_ + random_.Exponential(noise_.dropout_mean_s);
   }
   // Exact discretisation: stationary for any step.
   const double keep = std::exp(-(time_s - bias_time_s_) / noise_.bias_time_constant_s);
-  bias_m_ = keep * bias_m_ + noise_.bias_sigma_m * std::sqrt(1 - keep * keep) * Normal();
+  bias_m_ = keep * bias_m_ + noise_.bias_sigma_m * std::sqrt(1 - keep * keep) * random_.Normal();
   bias_time_s_ = time_s;
-  const Eigen::Vector2d error_m = bias_m_ + noise_.white_sigma_m * Normal();
+  const Eigen::Vector2d error_m = bias_m_ + noise_.white_sigma_m * random_.Normal();
   while (time_s >= dropout_end_s_) {
-    dropout_start_s_ = dropout_end_s_ + Exponential(between_dropouts_s);
-    dropout_end_s_ = dropout_start_s_ + Exponential(noise_.dropout_mean_s);
+    dropout_start_s_ = dropout_end_s_ + random_.Exponential(between_dropouts_s);
+    dropout_end_s_ = dropout_start_s_ + random_.Exponential(noise_.dropout_mean_s);
   }
   if (time_s >= dropout_start_s_) return std::nullopt;
   return error_m;

@@ -3,7 +3,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
-#include <random>
+
+#include "drives/seeded_random.h"
 
 namespace livemap {
 
@@ -34,15 +35,8 @@ class ReceiverSimulator {
   double sigma_m() const;
 
  private:
-  /// Uniform in (0, 1).
-  double Uniform();
-  /// Standard normal per axis, by Box and Muller's method: the library's distributions differ
-  /// between platforms.
-  Eigen::Vector2d Normal();
-  double Exponential(double mean);
-
   const ReceiverNoise noise_;
-  std::mt19937_64 generator_;
+  SeededRandom random_;
   Eigen::Vector2d bias_m_;
   double bias_time_s_ = 0;
   bool started_ = false;
