@@ -122,7 +122,7 @@ RoutePose Route::At(double distance_m) const {
   return pose;
 }
 
-Route ParseRoute(const std::string& geojson, const std::string& name) {
+std::vector<GeoPoint> ParseRoutePoints(const std::string& geojson, const std::string& name) {
   if (geojson.size() > kMaxRouteBytes) {
     throw Error("the route '" + name + "' has " + std::to_string(geojson.size()) +
                 " bytes, accepted are " + std::to_string(kMaxRouteBytes));
@@ -139,11 +139,20 @@ Route ParseRoute(const std::string& geojson, const std::string& name) {
   for (std::size_t i = 0; i < coordinates->size(); ++i) {
     points.push_back(ParsePosition((*coordinates)[i], i + 1, name));
   }
+  return points;
+}
+
+Route ParseRoute(const std::string& geojson, const std::string& name) {
+  const std::vector<GeoPoint> points = ParseRoutePoints(geojson, name);
   try {
     return Route::Through(points);
   } catch (const Error& error) {
     throw Error("the route '" + name + "': " + error.what());
   }
+}
+
+std::vector<GeoPoint> ReadRoutePoints(const std::string& path) {
+  return ParseRoutePoints(ReadFile(path, kMaxRouteBytes), path);
 }
 
 Route ReadRoute(const std::string& path) {

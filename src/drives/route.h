@@ -36,12 +36,16 @@ class Route {
   std::vector<Piece> pieces_;
 };
 
-/// The one LineString of a GeoJSON text (RFC 7946): a bare geometry, a Feature, or the first
-/// feature of a FeatureCollection. Coordinates are [longitude, latitude(, altitude)]. Throws Error
-/// naming the problem: too large (16 MiB), not JSON, not a LineString, a position out of range.
+/// The positions of the one LineString of a GeoJSON text (RFC 7946): a bare geometry, a Feature, or
+/// the first feature of a FeatureCollection. Coordinates are [longitude, latitude(, altitude)].
+/// Throws Error naming the problem: too large (16 MiB), not JSON, not a LineString, a position out
+/// of range.
+std::vector<GeoPoint> ParseRoutePoints(const std::string& geojson, const std::string& name);
+/// The route through them.
 Route ParseRoute(const std::string& geojson, const std::string& name);
 
-/// Reads and parses a file.
+/// Read and parse a file.
+std::vector<GeoPoint> ReadRoutePoints(const std::string& path);
 Route ReadRoute(const std::string& path);
 
 }  // namespace livemap

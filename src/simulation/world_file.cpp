@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::size_t kMostBytes = 1U << 20U;
 constexpr std::size_t kMostItems = 10000;
-constexpr double kTightestRadiusM = 48;
 constexpr double kSteepest = 0.15;
 constexpr double kLongestRoadM = 1e6;
 
@@ -106,11 +105,17 @@ RoadPiece ReadPiece(const Reader& reader, const YAML::Node& node) {
   return piece;
 }
 
-void ReadRoad(const Reader& reader, const YAML::Node& road, WorldDescription& world) {
+void ReadRoad(const Reader& reader, const YAML::Node& road, RoadSource source,
+              WorldDescription& world) {
   reader.CheckKeys(road,
                    {"bearing_deg", "pieces", "crossings_m", "lane_width_m", "parking_width_m",
                     "pavement_width_m"},
                    "'road'");
+  for (const char* key : {"bearing_deg", "pieces"}) {
+    if (source == RoadSource::kRoute && road[key]) {
+      reader.Refuse(road[key], "'" + std::string(key) + "' and --route exclude each other");
+    }
+  }
   reader.Read(road, "bearing_deg", 0, 360, world.bearing_deg);
   reader.Read(road, "lane_width_m", 2.5, 4.5, world.lane_width_m);
   reader.Read(road, "parking_width_m", 0, 3, world.parking_width_m);
@@ -165,10 +170,10 @@ PlacedHazard ReadHazard(const Reader& reader, const YAML::Node& node) {
   return hazard;
 }
 
-WorldDescription Parse(const Reader& reader, const YAML::Node& root) {
+WorldDescription Parse(const Reader& reader, const YAML::Node& root, RoadSource source) {
   reader.CheckKeys(root, {"road", "scene", "hazards"}, "the file");
   WorldDescription world;
-  if (const YAML::Node road = root["road"]) ReadRoad(reader, road, world);
+  if (const YAML::Node road = root["road"]) ReadRoad(reader, road, source, world);
   if (const YAML::Node scene = root["scene"]) {
     reader.CheckKeys(scene, {"buildings", "trees", "parked_cars"}, "'scene'");
     if (scene["buildings"]) world.buildings = reader.Flag(scene["buildings"], "'buildings'");
@@ -189,7 +194,8 @@ WorldDescription Parse(const Reader& reader, const YAML::Node& root) {
 
 }  // namespace
 
-WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name) {
+WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name,
+                                RoadSource source) {
   YAML::Node root;
   try {
     root = YAML::Load(yaml);
@@ -198,11 +204,11 @@ WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name
                 ": no YAML: " + exception.msg);
   }
   if (!root.IsMap()) throw Error("the world file '" + name + "', line 1: must be a map");
-  return Parse(Reader(name), root);
+  return Parse(Reader(name), root, source);
 }
 
-WorldDescription ReadWorldFile(const std::string& path) {
-  return ParseWorldFile(ReadFile(path, kMostBytes), path);
+WorldDescription ReadWorldFile(const std::string& path, RoadSource source) {
+  return ParseWorldFile(ReadFile(path, kMostBytes), path, source);
 }
 
 }  // namespace livemap

@@ -25,6 +25,9 @@ struct PlacedHazard {
   std::optional<bool> water;  ///< In a pothole; none: drawn by the seed.
 };
 
+/// Of every road: what a world file may ask for and what a route's corners become.
+constexpr double kTightestRadiusM = 48;
+
 /// What a person may decide about a street; everything else follows from the seed.
 struct WorldDescription {
   double bearing_deg = 90;                         ///< At the start, clockwise from north.
@@ -39,9 +42,13 @@ struct WorldDescription {
   std::optional<std::vector<PlacedHazard>> hazards;  ///< None: drawn by the seed.
 };
 
+enum class RoadSource { kWorldFile, kRoute };
+
 /// Reads a world from YAML (docs/simulation.md states the keys). Throws Error naming `name`, the
-/// line, the key, its value and what is accepted; unknown keys are refused.
-WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name);
-WorldDescription ReadWorldFile(const std::string& path);
+/// line, the key, its value and what is accepted; unknown keys are refused, and 'pieces' and
+/// 'bearing_deg' when the road's line comes from a route.
+WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name,
+                                RoadSource source = RoadSource::kWorldFile);
+WorldDescription ReadWorldFile(const std::string& path, RoadSource source = RoadSource::kWorldFile);
 
 }  // namespace livemap

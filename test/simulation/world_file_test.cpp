@@ -85,5 +85,15 @@ TEST(WorldFile, RefusesWhatIsNoWorldAtAll) {
   EXPECT_THROW(ReadWorldFile("/nonexistent/town.yaml"), Error);
 }
 
+TEST(WorldFile, LeavesTheRoadsLineToARoute) {
+  const std::string rest = "road: {lane_width_m: 3, crossings_m: [60]}";
+  EXPECT_EQ(ParseWorldFile(rest, "w", RoadSource::kRoute).lane_width_m, 3);
+  for (const std::string key : {"bearing_deg: 10", "pieces: []"}) {
+    const std::string yaml = "road:\n  " + key;
+    EXPECT_NO_THROW(ParseWorldFile(yaml, "w"));
+    EXPECT_THROW(ParseWorldFile(yaml, "w", RoadSource::kRoute), Error);
+  }
+}
+
 }  // namespace
 }  // namespace livemap
