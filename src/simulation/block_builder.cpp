@@ -66,14 +66,14 @@ BlockBuilder::BlockBuilder(const Street& street, int index, StreetBlock& block)
       builder_(block.mesh),
       // Serials below belong to the block's hazards.
       next_serial_(static_cast<std::uint32_t>(index + 8) * 1024U + 256U),
-      district_(DistrictOf()) {
+      district_(DistrictOf(street, index)) {
   for (int near = index - 1; near <= index + 1; ++near) {
     for (const StreetHazard& hazard : street.Hazards(near)) hazards_.push_back(hazard);
   }
 }
 
-BlockBuilder::District BlockBuilder::DistrictOf() const {
-  CounterRandom random(street_.seed(), kDistricts, static_cast<std::uint64_t>((index_ + 1000) / 3));
+BlockBuilder::District BlockBuilder::DistrictOf(const Street& street, int index) {
+  CounterRandom random(street.seed(), kDistricts, static_cast<std::uint64_t>((index + 1000) / 3));
   const double kind = random.Uniform(0.0, 1.0);
   if (kind < 0.3) return District::kShops;
   if (kind < 0.6) return District::kHouses;

@@ -12,8 +12,11 @@ class BlockBuilder {
   BlockBuilder(const Street& street, int index, StreetBlock& block);
   void Build();
 
- private:
   enum class District { kShops, kHouses, kGardens, kPark };
+  /// What stands along block `index`.
+  static District DistrictOf(const Street& street, int index);
+
+ private:
   /// Where something stands; `yaw` turns it against the road's direction.
   struct Spot {
     double along;
@@ -21,7 +24,6 @@ class BlockBuilder {
     double yaw;
   };
 
-  District DistrictOf() const;
   /// Stands the builder on the ground with x along the road, -y towards the road and its own
   /// instance.
   void StandBeside(double along, double left, ObjectClass object_class);

@@ -56,10 +56,11 @@ class Street {
   /// Of block `index`, which spans [index, index + 1) * kBlockM; those that this pass lacks too.
   std::vector<StreetHazard> Hazards(int index) const;
   StreetBlock Build(int index) const;
+  /// Middles of the crossing roads of block `index`, metres along the road.
+  std::vector<double> Crossings(int index) const;
 
  private:
   friend class BlockBuilder;
-  std::vector<double> Crossings(int index) const;
   GroundPlan PlanGround(int index) const;
 
   WorldDescription description_;
