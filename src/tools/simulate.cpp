@@ -59,7 +59,10 @@ int Run(int argc, char** argv) {
       line.Has("world") ? ReadWorldFile(line.Text("world", "")) : WorldDescription();
 
   const Street street(world, seed, seconds * speed_mps * 1.1 + 300, condition != Condition::kSnow);
-  const VehicleMotion motion(street, speed_mps, 0);
+  DrivingStyle style;
+  style.speed_mps = speed_mps;
+  style.seconds = seconds;
+  const VehicleMotion motion(street, style, 0);
   StreetRenderer renderer(street, setup.camera, MakeLighting(condition, seed), options);
   const auto frames =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * rate_hz)));

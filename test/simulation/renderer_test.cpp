@@ -19,7 +19,7 @@ SimulatedCamera SmallCamera() {
 }
 
 CameraMotion View(const Street& street, double time_s) {
-  const VehicleMotion motion(street, 8, 20);
+  const VehicleMotion motion(street, DrivingStyle(), 20);
   CameraMounting mounting;
   mounting.height_m = 1.4;
   mounting.pitch_deg = 4;
