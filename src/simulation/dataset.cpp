@@ -100,8 +100,8 @@ void YoloWriter::Add(double chainage_m, const SimulatedFrame& frame,
 
 void YoloWriter::Finish() { CloseFile(frames_, directory_ + "/frames.csv"); }
 
-void WriteHazards(const std::string& path, const Street& street, const GeoPoint& datum,
-                  const std::map<std::uint32_t, int>& frames_seen, double end_along_m) {
+std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
+                             const std::map<std::uint32_t, int>& frames_seen, double end_along_m) {
   const LocalFrame frame(datum);
   nlohmann::json features = nlohmann::json::array();
   const auto last = static_cast<int>(street.line().length_m() / kBlockM) + 1;
@@ -125,9 +125,7 @@ void WriteHazards(const std::string& path, const Street& street, const GeoPoint&
              {"passed", hazard.along_m < end_along_m}}}});
     }
   }
-  std::ofstream file = OpenFile(path);
-  file << nlohmann::json({{"type", "FeatureCollection"}, {"features", features}}).dump(1) << "\n";
-  CloseFile(file, path);
+  return nlohmann::json({{"type", "FeatureCollection"}, {"features", features}}).dump(1) + "\n";
 }
 
 cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns) {

@@ -53,8 +53,8 @@ class YoloWriter {
 /// The true hazards that at least one frame shows, as GeoJSON points (RFC 7946). `frames_seen`
 /// counts by instance; `datum` is the world's origin; a hazard before `end_along_m`, where the
 /// drive ends, is marked as passed.
-void WriteHazards(const std::string& path, const Street& street, const GeoPoint& datum,
-                  const std::map<std::uint32_t, int>& frames_seen, double end_along_m);
+std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
+                             const std::map<std::uint32_t, int>& frames_seen, double end_along_m);
 
 /// Pictures of one size side by side on dark ground, `columns` per row; CV_8UC3.
 cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns);

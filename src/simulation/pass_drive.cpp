@@ -7,21 +7,22 @@ namespace {
 
 constexpr std::uint64_t kManner = 42;
 
-/// Motion that is at the manner's start when its clock says so.
-VehicleMotion MakeMotion(const Street& street, const PassManner& manner) {
-  const VehicleMotion from_zero(street, manner.speed_mps, 0);
-  return {street, manner.speed_mps, manner.start_m - from_zero.AlongM(manner.clock_s)};
+DrivingStyle StyleOf(const PassManner& manner) {
+  DrivingStyle style;
+  style.speed_mps = manner.speed_mps;
+  style.seconds = manner.seconds;
+  return style;
 }
 
 }  // namespace
 
-PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz) {
+PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz, double seconds) {
   CounterRandom random(seed, kManner);
   PassManner manner;
   manner.speed_mps = speed_mps * random.Uniform(0.8, 1.2);
   manner.rate_hz = rate_hz;
+  manner.seconds = seconds;
   manner.start_m = random.Uniform(0.0, 6.0);
-  manner.clock_s = random.Uniform(3.0, 11.0);
   manner.left_m = (random.Chance(0.5) ? 1 : -1) * random.Uniform(0.3, 0.8);
   return manner;
 }
@@ -31,23 +32,23 @@ PassDrive::PassDrive(const Street& street, const PassManner& manner, const Camer
     : manner_(manner),
       base_from_optical_(mounting.BaseFromOptical()),
       exposure_s_(exposure_s),
-      motion_(MakeMotion(street, manner)) {}
+      motion_(street, StyleOf(manner), manner.start_m) {}
 
-double PassDrive::ClockS(std::size_t frame) const {
-  return manner_.clock_s + static_cast<double>(frame) / manner_.rate_hz;
+double PassDrive::TimeS(std::size_t frame) const {
+  return static_cast<double>(frame) / manner_.rate_hz;
 }
 
-double PassDrive::AlongM(std::size_t frame) const { return motion_.AlongM(ClockS(frame)); }
+double PassDrive::AlongM(std::size_t frame) const { return motion_.AlongM(TimeS(frame)); }
 
-Eigen::Isometry3d PassDrive::WorldFromOptical(double clock_s) const {
-  return motion_.WorldFromBase(clock_s) * Eigen::Translation3d(0, manner_.left_m, 0) *
+Eigen::Isometry3d PassDrive::WorldFromOptical(double time_s) const {
+  return motion_.WorldFromBase(time_s) * Eigen::Translation3d(0, manner_.left_m, 0) *
          base_from_optical_;
 }
 
 CameraMotion PassDrive::Camera(std::size_t frame) const {
   CameraMotion camera;
-  camera.world_from_optical = WorldFromOptical(ClockS(frame));
-  camera.world_from_optical_end = WorldFromOptical(ClockS(frame) + exposure_s_);
+  camera.world_from_optical = WorldFromOptical(TimeS(frame));
+  camera.world_from_optical_end = WorldFromOptical(TimeS(frame) + exposure_s_);
   camera.along_m = AlongM(frame);
   return camera;
 }

@@ -11,16 +11,16 @@ namespace livemap {
 
 /// How one of several drives down a lane is driven.
 struct PassManner {
-  double speed_mps = 8;  ///< Mean.
+  double speed_mps = 8;  ///< Aimed at on an open road.
   double rate_hz = 10;   ///< Pictures per second.
   double start_m = 0;    ///< Along the road, of the first picture.
-  double clock_s = 0;    ///< Phase of the vehicle's sway and of its breathing speed.
+  double seconds = 60;   ///< Length of the drive.
   double left_m = 0;     ///< Beside the lane's usual line.
 };
 
 /// The second drive of a lane that was first driven at `speed_mps`: 0.3 to 0.8 m to one side, 0.8
-/// to 1.2 times as fast, begun up to 6 m later, swaying otherwise. Drawn by the seed.
-PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz);
+/// to 1.2 times as fast, begun up to 6 m later. Drawn by the seed.
+PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz, double seconds);
 
 /// The camera of a drive, picture by picture.
 class PassDrive {
@@ -36,8 +36,8 @@ class PassDrive {
   std::size_t Nearest(double along_m) const;
 
  private:
-  double ClockS(std::size_t frame) const;
-  Eigen::Isometry3d WorldFromOptical(double clock_s) const;
+  double TimeS(std::size_t frame) const;
+  Eigen::Isometry3d WorldFromOptical(double time_s) const;
 
   PassManner manner_;
   Eigen::Isometry3d base_from_optical_;

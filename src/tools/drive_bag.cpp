@@ -16,8 +16,6 @@ namespace livemap {
 namespace {
 
 constexpr char kOpticalFrame[] = "camera_optical_frame";
-// The receiver runs before the first and after the last picture.
-constexpr double kLeadS = 1.0;
 constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
 geometry_msgs::TransformStamped ToTransform(const Eigen::Isometry3d& pose, const ros::Time& stamp,
@@ -164,7 +162,7 @@ sensor_msgs::CameraInfo PinholeCameraInfo(const CameraIntrinsics& k) {
 
 DriveBag::DriveBag(const std::string& path, const DriveSetup& setup)
     : setup_(setup),
-      bag_(path, BagWriter::Compression::kNone),
+      bag_(path, setup.compression),
       receiver_(setup.noise, setup.seed),
       camera_info_(PinholeCameraInfo(setup.camera.intrinsics)) {
   next_fix_ = -static_cast<std::int64_t>(std::floor(kLeadS * setup.fix_rate_hz));
@@ -180,7 +178,7 @@ void DriveBag::WriteStaticTransforms() {
   bag_.WriteLatched("/tf_static", stamp, transforms);
 }
 
-void DriveBag::WriteFixesUntil(double time_s) {
+void DriveBag::AdvanceTo(double time_s) {
   for (;; ++next_fix_) {
     const double fix_s = static_cast<double>(next_fix_) / setup_.fix_rate_hz;
     if (fix_s > time_s) return;
@@ -188,20 +186,23 @@ void DriveBag::WriteFixesUntil(double time_s) {
         setup_.place ? setup_.place(fix_s) : setup_.route.At(fix_s * setup_.speed_mps).position;
     const ros::Time stamp = Stamp(fix_s);
     bag_.Write("/ground_truth/fix", stamp, ToFix(truth, 0, stamp));
-    const std::optional<Eigen::Vector2d> error_m = receiver_.ErrorAt(fix_s);
+    std::optional<Eigen::Vector2d> error_m = receiver_.ErrorAt(fix_s);
+    const Eigen::Vector2d multipath_m =
+        setup_.multipath_m ? setup_.multipath_m(fix_s) : Eigen::Vector2d::Zero();
     if (!error_m) {
       bag_.Write("/fix", stamp, NoFix(stamp));
       continue;
     }
+    *error_m += multipath_m;
     const GeoPoint seen =
         GeodesicDestination(truth, std::atan2(error_m->x(), error_m->y()), error_m->norm());
     bag_.Write("/fix", stamp, ToFix(seen, receiver_.sigma_m(), stamp));
   }
 }
 
-void DriveBag::AddFrame(double time_s, const std::vector<std::uint8_t>& image,
-                        const std::vector<livemap::Detection>& boxes) {
-  WriteFixesUntil(time_s);
+std_msgs::Header DriveBag::AddFrame(double time_s, const std::vector<std::uint8_t>& image,
+                                    const std::vector<livemap::Detection>& boxes) {
+  AdvanceTo(time_s);
   std_msgs::Header header;
   header.seq = frame_number_++;
   header.stamp = Stamp(time_s);
@@ -221,10 +222,11 @@ void DriveBag::AddFrame(double time_s, const std::vector<std::uint8_t>& image,
   truth.image_height = camera_info_.height;
   truth.detections = boxes;
   bag_.Write("/ground_truth/boxes", header.stamp, truth);
+  return header;
 }
 
 void DriveBag::Finish(double end_s) {
-  WriteFixesUntil(end_s + kLeadS);
+  AdvanceTo(end_s + kLeadS);
   bag_.Finish();
 }
 

@@ -3,6 +3,7 @@
 #include <livemap/DetectionArray.h>
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
+#include <std_msgs/Header.h>
 
 #include <cstdint>
 #include <functional>
@@ -28,6 +29,10 @@ struct DriveSetup {
   ros::Time start;  ///< Stamp of distance 0.
   /// Where the vehicle is at a time; empty: `speed_mps` along the route.
   std::function<GeoPoint(double time_s)> place = nullptr;
+  /// What the receiver errs beside `noise`, east and north, metres; called once per fix in order of
+  /// time. Empty: nothing.
+  std::function<Eigen::Vector2d(double time_s)> multipath_m = nullptr;
+  BagWriter::Compression compression = BagWriter::Compression::kNone;
 };
 
 /// The flags that every drive shares; `Setup` reads them. Relative to the first frame's position.
@@ -46,18 +51,25 @@ sensor_msgs::CameraInfo PinholeCameraInfo(const CameraIntrinsics& intrinsics);
 /// camera/camera_info, fix, ground_truth/boxes, ground_truth/fix and tf_static.
 class DriveBag {
  public:
+  /// The receiver runs this long before the first and after the last picture.
+  static constexpr double kLeadS = 1.0;
+
   DriveBag(const std::string& path, const DriveSetup& setup);
 
-  /// The next frame. `image` is a whole JPEG; `boxes` are in its pixels.
-  void AddFrame(double time_s, const std::vector<std::uint8_t>& image,
-                const std::vector<livemap::Detection>& boxes);
+  /// The next frame. `image` is a whole JPEG; `boxes` are in its pixels. Returns the header of what
+  /// was written.
+  std_msgs::Header AddFrame(double time_s, const std::vector<std::uint8_t>& image,
+                            const std::vector<livemap::Detection>& boxes);
+  /// For topics of one's own: the fixes up to `time_s` are written, then `Writer()` may go on
+  /// there.
+  void AdvanceTo(double time_s);
+  BagWriter& Writer() { return bag_; }
+  ros::Time Stamp(double time_s) const { return setup_.start + ros::Duration(time_s); }
   /// Fixes go on for a second after `end_s`, so that the last frame's position is known.
   void Finish(double end_s);
 
  private:
   void WriteStaticTransforms();
-  void WriteFixesUntil(double time_s);
-  ros::Time Stamp(double time_s) const { return setup_.start + ros::Duration(time_s); }
 
   const DriveSetup setup_;
   BagWriter bag_;

@@ -1,3 +1,5 @@
+#include <malloc.h>
+
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -5,6 +7,7 @@
 #include "simulation/vehicle_motion.h"
 #include "tools/command_line.h"
 #include "tools/simulate_change.h"
+#include "tools/simulation_flags.h"
 #include "tools/simulation_outputs.h"
 
 namespace livemap {
@@ -19,70 +22,86 @@ std::vector<Flag> Flags() {
           {"camera", "FILE", "camera file, see config/cameras; instead of --size"},
           {"distortion", "K1,K2", "radial distortion of the camera (0,0)"},
           {"blur", "N", "pictures averaged over the exposure of 8 ms (0: no motion blur)"},
-          {"speed", "MPS", "mean speed, m/s (8)"},
+          {"speed", "MPS", "aimed at on an open road, m/s (8)"},
+          {"stops", "", "wait two seconds at every second crossing"},
+          {"route", "FILE.geojson", "a LineString that the road follows, instead of --start"},
           {"start", "LAT,LON", "of the world's origin, degrees (48.8566,9.0)"},
           {"world", "FILE", "street and hazards, see docs/simulation.md (drawn by the seed)"},
           {"threads", "N", "that render (2)"},
           {"one-ray", "", "one ray per pixel: twice as fast, jagged edges"},
-          {"stereo", "M", "baseline of a second eye to the right, for --tum (none)"},
-          {"depth", "SENSOR", "exact, kinect or stereo: how --tum measures depth (exact)"},
+          {"stereo", "M", "baseline of a second eye to the right, for --tum and --bag (none)"},
+          {"depth", "SENSOR", "exact, kinect or stereo: how --tum and --bag-depth measure (exact)"},
           {"preview", "FILE.png", "contact sheet of twelve moments"},
           {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
           {"tum", "DIR", "TUM RGB-D folder"},
           {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
           {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
-          {"bag", "FILE.bag", "rosbag with the topics of a real vehicle and truth"},
-          {"jpeg-quality", "Q", "of --bag's pictures, 1 to 100 (88)"},
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
+}
+
+DrivingStyle ReadStyle(const CommandLine& line) {
+  DrivingStyle style;
+  style.speed_mps = line.Number("speed", style.speed_mps, 0.5, 30);
+  style.seconds = line.Number("seconds", 20, 0.1, 7200);
+  style.stops = line.Has("stops");
+  return style;
+}
+
+/// The camera's view at a time, and where it will be when the exposure ends.
+CameraMotion ViewAt(const VehicleMotion& motion, const SimulationSetup& setup, double time_s) {
+  const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
+  CameraMotion camera;
+  camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
+  camera.world_from_optical_end =
+      motion.WorldFromBase(time_s + setup.camera.exposure_s) * base_from_optical;
+  camera.along_m = motion.AlongM(time_s);
+  return camera;
+}
+
+/// A street's blocks come and go by megabytes. What they give back shall go back to the system, not
+/// stay in pieces between what lives on: glibc would raise its bound for that with every block.
+void KeepMemoryFlat() {
+  mallopt(M_MMAP_THRESHOLD, 64 * 1024);
+  mallopt(M_TRIM_THRESHOLD, 128 * 1024);
 }
 
 int Run(int argc, char** argv) {
   std::vector<Flag> flags = Flags();
+  for (const Flag& flag : SimulationBagFlags()) flags.push_back(flag);
   for (const Flag& flag : ChangeFlags()) flags.push_back(flag);
   CommandLine line(
       "livemap_simulate [flags]",
       "Renders a drive through a generated street with the truth about everything in it.", 0,
       flags);
   if (!line.Parse(argc, argv)) return 0;
+  KeepMemoryFlat();
   if (line.Has("change")) return SimulateChange(line);
   RefuseChangeFlags(line);
   const std::uint64_t seed = line.Seed("seed", 1);
   const Condition condition = ReadCondition(line, "condition", "day");
-  const double seconds = line.Number("seconds", 20, 0.1, 7200);
+  const DrivingStyle style = ReadStyle(line);
+  const double seconds = style.seconds;
   const double rate_hz = line.Number("rate", 10, 0.1, 100);
-  const double speed_mps = line.Number("speed", 8, 0.5, 30);
-  const SimulationSetup setup = ReadSimulationSetup(line);
+  SimulationSetup setup = ReadSimulationSetup(line);
   RenderOptions options;
   options.threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   options.smooth_edges = !line.Has("one-ray");
-  const WorldDescription world =
-      line.Has("world") ? ReadWorldFile(line.Text("world", "")) : WorldDescription();
+  const WorldDescription world = ReadSimulatedWorld(line, setup);
 
-  const Street street(world, seed, seconds * speed_mps * 1.1 + 300, condition != Condition::kSnow);
-  DrivingStyle style;
-  style.speed_mps = speed_mps;
-  style.seconds = seconds;
+  const Street street(world, seed, seconds * style.speed_mps * 1.1 + 300,
+                      condition != Condition::kSnow);
   const VehicleMotion motion(street, style, 0);
+  CheckRouteHolds(line, street.line().length_m(), motion.AlongM(seconds));
   StreetRenderer renderer(street, setup.camera, MakeLighting(condition, seed), options);
   const auto frames =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * rate_hz)));
   SimulationOutputs outputs(line, setup, rate_hz, frames);
-  if (line.Has("bag")) {
-    const LocalFrame map(setup.datum);
-    outputs.OpenBag(line, seed, [&motion, map](double time_s) {
-      return map.ToGeo(motion.WorldFromBase(time_s).translation().head<2>());
-    });
-  }
+  outputs.OpenBag(line, street, motion);
   Progress progress("frame", frames);
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < frames; ++i) {
     const double time_s = static_cast<double>(i) / rate_hz;
-    CameraMotion camera;
-    const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
-    camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
-    camera.world_from_optical_end =
-        motion.WorldFromBase(time_s + setup.camera.exposure_s) * base_from_optical;
-    camera.along_m = motion.AlongM(time_s);
+    CameraMotion camera = ViewAt(motion, setup, time_s);
     const auto number = static_cast<std::uint32_t>(i);
     const SimulatedFrame frame = renderer.Render(camera, number);
     cv::Mat right;

@@ -12,6 +12,7 @@
 #include "simulation/dataset.h"
 #include "simulation/pass_drive.h"
 #include "simulation/random.h"
+#include "tools/simulation_flags.h"
 #include "tools/simulation_setup.h"
 
 namespace livemap {
@@ -31,6 +32,7 @@ struct ChangeRun {
   double changes = 0.25;
   double speed_mps = 8;
   double rate_hz = 10;
+  double seconds = 20;
   std::size_t pairs = 1;
   double length_m = 0;  ///< Of the road that both passes may need.
   WorldDescription world;
@@ -40,7 +42,8 @@ struct ChangeRun {
 };
 
 ChangeRun ReadRun(const CommandLine& line) {
-  for (const char* flag : {"tum", "yolo", "video", "bag", "hazards", "truth-preview"}) {
+  for (const char* flag :
+       {"tum", "yolo", "video", "bag", "hazards", "truth-preview", "stops", "stereo"}) {
     if (line.Has(flag)) {
       throw Error("--" + std::string(flag) + " and --change exclude each other");
     }
@@ -52,17 +55,18 @@ ChangeRun ReadRun(const CommandLine& line) {
   run.changes = line.Number("changes", 0.25, 0, 1);
   run.speed_mps = line.Number("speed", 8, 0.5, 30);
   run.rate_hz = line.Number("rate", 10, 0.1, 100);
-  const double seconds = line.Number("seconds", 20, 0.1, 7200);
-  run.pairs = std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * run.rate_hz)));
+  run.seconds = line.Number("seconds", 20, 0.1, 7200);
+  run.pairs =
+      std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(run.seconds * run.rate_hz)));
   if (run.pairs > ChangeDatasetWriter::kMostPairs) {
     throw Error("--seconds times --rate is " + std::to_string(run.pairs) +
                 " pairs, accepted are up to " + std::to_string(ChangeDatasetWriter::kMostPairs));
   }
-  run.length_m = seconds * run.speed_mps * 1.4 + 320;
+  run.length_m = run.seconds * run.speed_mps * 1.4 + 320;
   run.setup = ReadSimulationSetup(line);
   run.options.threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   run.options.smooth_edges = !line.Has("one-ray");
-  if (line.Has("world")) run.world = ReadWorldFile(line.Text("world", ""));
+  run.world = ReadSimulatedWorld(line, run.setup);
   run.preview = line.Text("preview", "");
   if (!run.preview.empty() && !cv::haveImageWriter(run.preview)) {
     throw Error("the contact sheet '" + run.preview + "' must end in .png or .jpg");
@@ -98,6 +102,8 @@ class FirstPass {
     PassManner manner;
     manner.speed_mps = run.speed_mps;
     manner.rate_hz = kFirstRateHz;
+    // The second may be a fifth faster.
+    manner.seconds = 1.3 * run.seconds + 10;
     return manner;
   }
 
@@ -139,8 +145,9 @@ int SimulateChange(const CommandLine& line) {
   const ChangeRun run = ReadRun(line);
   FirstPass first(run);
   const Street street = MakeStreet(run, StreetPass::Which::kSecond);
-  const PassDrive drive(street, DrawSecondManner(run.seed, run.speed_mps, run.rate_hz),
+  const PassDrive drive(street, DrawSecondManner(run.seed, run.speed_mps, run.rate_hz, run.seconds),
                         run.setup.mounting, run.setup.camera.exposure_s);
+  CheckRouteHolds(line, street.line().length_m(), drive.AlongM(run.pairs));
   const std::uint64_t light = CounterRandom(run.seed, kSecondLight).Bits();
   StreetRenderer renderer(street, run.setup.camera, MakeLighting(run.second, light), run.options);
   ChangeTruth truth(run.world, run.seed, run.length_m, run.second != Condition::kSnow, run.changes,

@@ -4,6 +4,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "drives/multipath.h"
+#include "simulation/output_files.h"
+#include "simulation/skyline.h"
+#include "tools/simulation_flags.h"
 
 namespace livemap {
 namespace {
@@ -12,6 +16,8 @@ constexpr std::size_t kPreviewPictures = 12;
 constexpr double kPreviewWidth = 480;
 /// Of depth as a stereo camera gives it, when the drive has no second eye.
 constexpr double kDefaultBaselineM = 0.25;
+/// Keeps these numbers apart from the receiver's.
+constexpr std::uint64_t kMultipathStream = 0x6d756c7469706174ULL;
 
 void WriteSheet(const std::string& path, const std::vector<cv::Mat>& pictures, int columns) {
   if (!cv::imwrite(path, ContactSheet(pictures, columns))) {
@@ -43,32 +49,48 @@ SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSe
   }
 }
 
-void SimulationOutputs::OpenBag(const CommandLine& line, std::uint64_t seed,
-                                std::function<GeoPoint(double)> place) {
+void SimulationOutputs::OpenBag(const CommandLine& line, const Street& street,
+                                const VehicleMotion& motion) {
+  SimulationBag::Setup setup;
+  setup.options = ReadBagOptions(line);
+  if (!line.Has("bag")) return;
   if (setup_.camera.k1 != 0 || setup_.camera.k2 != 0) {
     throw Error("--bag and --distortion exclude each other: a bag's camera has none");
   }
-  SimulationBag::Setup setup;
   setup.camera = {"simulated", setup_.camera.intrinsics, setup_.mounting};
-  setup.place = std::move(place);
-  setup.seed = seed;
-  setup.jpeg_quality = static_cast<int>(line.Number("jpeg-quality", setup.jpeg_quality, 1, 100));
+  setup.baseline_m = setup_.baseline_m;
+  setup.datum = setup_.datum;
+  setup.seed = street.seed();
+  setup.state = [&motion](double time_s) { return motion.StateAt(time_s); };
+  const auto multipath =
+      std::make_shared<Multipath>(setup.options.multipath_m, street.seed() ^ kMultipathStream);
+  setup.multipath_m = [&street, &motion, multipath](double time_s) {
+    const double along = motion.AlongM(time_s);
+    return multipath->ErrorAt(time_s, along, street.line().HeadingRad(along),
+                              SkyOver(street, along, street.lane_left_m()));
+  };
+  bag_depth_ = setup.options.depth;
   bag_ = OpenSimulationBag(line.Text("bag", ""), setup);
+}
+
+cv::Mat SimulationOutputs::Sense(std::size_t index, const SimulatedFrame& frame) const {
+  return SenseDepth(frame.depth, setup_.camera.intrinsics, setup_.depth,
+                    setup_.baseline_m > 0 ? setup_.baseline_m : kDefaultBaselineM,
+                    static_cast<std::uint32_t>(index));
 }
 
 void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
                             const SimulatedFrame& frame, const cv::Mat& right) {
   const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
   for (const HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
+  const cv::Mat depth = tum_ || bag_depth_ ? Sense(index, frame) : cv::Mat();
   if (tum_) {
     SimulatedFrame sensed = frame;
-    sensed.depth = SenseDepth(frame.depth, setup_.camera.intrinsics, setup_.depth,
-                              setup_.baseline_m > 0 ? setup_.baseline_m : kDefaultBaselineM,
-                              static_cast<std::uint32_t>(index));
+    sensed.depth = depth;
     tum_->Add(time_s, sensed, right);
   }
   if (video_.isOpened()) video_.write(frame.bgr);
-  if (bag_) bag_->Add(time_s, frame, hazards);
+  if (bag_) bag_->Add(time_s, frame, bag_depth_ ? depth : cv::Mat(), right, hazards);
   if (yolo_) yolo_->Add(along_m, frame, hazards);
   along_m_ = along_m;
   // Evenly over the whole drive.
@@ -97,14 +119,17 @@ void SimulationOutputs::AddToSheets(const SimulatedFrame& frame,
 }
 
 void SimulationOutputs::Finish(const CommandLine& line, const Street& street, double end_s) {
-  if (bag_) bag_->Finish(end_s);
+  const std::string hazards = HazardsAsGeoJson(street, setup_.datum, frames_seen_, along_m_);
+  if (bag_) bag_->Finish(end_s, hazards);
   if (tum_) tum_->Finish();
   if (yolo_) yolo_->Finish();
   if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
   if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
-  if (line.Has("hazards")) {
-    WriteHazards(line.Text("hazards", ""), street, setup_.datum, frames_seen_, along_m_);
-  }
+  if (!line.Has("hazards")) return;
+  const std::string path = line.Text("hazards", "");
+  std::ofstream file = OpenFile(path);
+  file << hazards;
+  CloseFile(file, path);
 }
 
 }  // namespace livemap

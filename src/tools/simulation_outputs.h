@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -22,9 +21,8 @@ class SimulationOutputs {
   SimulationOutputs(const CommandLine& line, const SimulationSetup& setup, double rate_hz,
                     std::size_t frames);
 
-  /// Reads --bag and --jpeg-quality. `place` is the vehicle's position at a time, seconds since the
-  /// first frame.
-  void OpenBag(const CommandLine& line, std::uint64_t seed, std::function<GeoPoint(double)> place);
+  /// Reads --bag and its flags; both must outlive the outputs.
+  void OpenBag(const CommandLine& line, const Street& street, const VehicleMotion& motion);
   /// The frame `index`; `right` is the second eye's picture, or empty.
   void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame,
            const cv::Mat& right);
@@ -35,9 +33,12 @@ class SimulationOutputs {
   std::size_t hazards() const { return frames_seen_.size(); }
 
  private:
+  /// What the depth sensor of --depth sees.
+  cv::Mat Sense(std::size_t index, const SimulatedFrame& frame) const;
   void AddToSheets(const SimulatedFrame& frame, const std::vector<HazardInView>& hazards);
 
   SimulationSetup setup_;
+  bool bag_depth_ = false;
   cv::VideoWriter video_;
   std::unique_ptr<SimulationBag> bag_;
   std::string preview_path_;

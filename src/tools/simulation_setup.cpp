@@ -63,10 +63,11 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
     throw Error("--depth is '" + line.Text("depth", "") + "', accepted are: exact, kinect, stereo");
   }
   setup.depth = *depth;
-  for (const char* flag : {"stereo", "depth"}) {
-    if (line.Has(flag) && !line.Has("tum")) {
-      throw Error("--" + std::string(flag) + " needs --tum, which writes what it makes");
-    }
+  if (line.Has("stereo") && !line.Has("tum") && !line.Has("bag")) {
+    throw Error("--stereo needs --tum or --bag, which write what it makes");
+  }
+  if (line.Has("depth") && !line.Has("tum") && !line.Has("bag-depth")) {
+    throw Error("--depth needs --tum or --bag-depth, which write what it makes");
   }
   setup.camera.blur_samples = static_cast<int>(line.Number("blur", 0, 0, 64));
   const std::string place = "LAT,LON in degrees";

@@ -292,7 +292,7 @@ TEST(PassDrive, SecondPassKeepsItsDistanceBesideTheFirst) {
   std::set<bool> sides;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
     const Street street(straight, seed, kLengthM, true);
-    const PassManner manner = DrawSecondManner(seed, 8, 2);
+    const PassManner manner = DrawSecondManner(seed, 8, 2, 10);
     PassManner beside = manner;
     beside.left_m = 0;
     const PassDrive drive(street, manner, Mounting(), 0);
@@ -301,7 +301,7 @@ TEST(PassDrive, SecondPassKeepsItsDistanceBesideTheFirst) {
                         middle.Camera(5).world_from_optical.translation().y();
     EXPECT_GE(std::abs(left), 0.29);
     EXPECT_LE(std::abs(left), 0.81);
-    EXPECT_NEAR(drive.AlongM(0), manner.start_m, 1e-9);
+    EXPECT_NEAR(drive.AlongM(0), manner.start_m, 0.01);
     EXPECT_GE(manner.start_m, 0);
     sides.insert(left > 0);
   }

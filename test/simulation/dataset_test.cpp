@@ -95,7 +95,7 @@ TEST_F(Dataset, RefusesAFolderThatHoldsSomething) {
   EXPECT_THROW(YoloWriter(folder_.string()), Error);
 }
 
-TEST_F(Dataset, HazardFileNamesWhatWasSeenAtItsPlace) {
+TEST_F(Dataset, HazardsAreNamedWhenTheyWereSeenAndMarkedWhenTheyWerePassed) {
   WorldDescription world;
   world.pieces = {{200, 0, 0}};
   world.hazards.emplace();
@@ -104,17 +104,15 @@ TEST_F(Dataset, HazardFileNamesWhatWasSeenAtItsPlace) {
   placed.at_m = 100;
   world.hazards->push_back(placed);
   const Street street(world, 1, 200, true);
-  fs::create_directories(folder_);
-  const std::string path = (folder_ / "hazards.geojson").string();
-  WriteHazards(path, street, {48, 9}, {{street.Hazards(2).at(0).instance, 4}}, 90);
-  const std::string text = ReadFile(path, 10000);
+  const std::uint32_t instance = street.Hazards(2).at(0).instance;
+  const std::string text = HazardsAsGeoJson(street, {48, 9}, {{instance, 4}}, 90);
   EXPECT_NE(text.find("\"class\": \"barrier\""), std::string::npos);
   EXPECT_NE(text.find("\"frames_seen\": 4"), std::string::npos);
   EXPECT_NE(text.find("\"passed\": false"), std::string::npos);
-  WriteHazards(path, street, {48, 9}, {{street.Hazards(2).at(0).instance, 4}}, 110);
-  EXPECT_NE(ReadFile(path, 10000).find("\"passed\": true"), std::string::npos);
-  WriteHazards(path, street, {48, 9}, {}, 110);
-  EXPECT_EQ(ReadFile(path, 10000).find("barrier"), std::string::npos) << "never in view";
+  const std::string later = HazardsAsGeoJson(street, {48, 9}, {{instance, 4}}, 110);
+  EXPECT_NE(later.find("\"passed\": true"), std::string::npos);
+  EXPECT_EQ(HazardsAsGeoJson(street, {48, 9}, {}, 110).find("barrier"), std::string::npos)
+      << "never in view";
 }
 
 }  // namespace
