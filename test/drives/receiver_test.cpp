@@ -68,6 +68,8 @@ TEST(Receiver, DropoutsHaveTheirRateAndLength) {
   // One loss every 30 + 4 s: 1765 in 60000 s, known to 2.4 %; bounds at 5 of them.
   EXPECT_NEAR(losses, 1765, 220);
   EXPECT_NEAR(lost * 0.1 / losses, 4, 0.5);
+  // 4 s of every 34 s; lengths and pauses are exponential, so that the share is known to 3 %.
+  EXPECT_NEAR(static_cast<double>(lost) / kFixes, 4.0 / 34, 0.018);
 }
 
 TEST(Receiver, SameSeedSameErrors) {
