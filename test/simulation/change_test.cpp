@@ -33,7 +33,7 @@ Street MakeStreet(StreetPass::Which which, bool leaves, double share = kShare) {
 }
 
 CameraMotion View(const Street& street, std::size_t frame) {
-  return PassDrive(street, DrawSecondManner(3, 8, 0.5), Mounting(), 0).Camera(frame);
+  return PassDrive(street, DrawSecondManner(3, 8, 0.5, 20), Mounting(), 0).Camera(frame);
 }
 
 bool Equal(const cv::Mat& a, const cv::Mat& b) {
