@@ -1,5 +1,6 @@
 #include "hazard/hazard_reporter.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +11,12 @@ constexpr std::size_t kMaxClassNameBytes = 64;
 constexpr std::size_t kMaxEarlyPictures = 8;
 constexpr std::size_t kMaxWaitingNotices = 20000;
 constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
+
+/// Standard deviation along the worst axis.
+double LargestSigma(const Eigen::Matrix2d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(axes.eigenvalues().maxCoeff());
+}
 
 }  // namespace
 
@@ -195,7 +202,8 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose
     const auto ground = ProjectToGround(foot, *intrinsics_, mounting, config_.projection);
     if (!ground) {
       ++counters_.not_on_ground;
-    } else if (ground->position_m.norm() > config_.max_range_m) {
+    } else if (ground->position_m.norm() > config_.max_range_m ||
+               LargestSigma(ground->covariance_m2) > config_.max_ground_sigma_m) {
       ++counters_.too_far;
     } else {
       waiting.candidates.push_back({sighting, PlaceHazard(pose, antenna_m, *ground)});

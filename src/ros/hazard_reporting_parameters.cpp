@@ -73,6 +73,7 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
 
   parameters.Read("min_confidence", reporter.min_confidence, {0, 1});
   parameters.Read("max_range_m", reporter.max_range_m, {0.1, 1000});
+  parameters.Read("max_ground_sigma_m", reporter.max_ground_sigma_m, {0.01, 1000});
   parameters.Read("max_wait_s", reporter.max_wait_s, {0, 600});
   parameters.Read("bracket_wait_s", reporter.bracket_wait_s, {0, 60});
   parameters.Read("picture_wait_s", reporter.picture_wait_s, {0, 60});

@@ -163,6 +163,17 @@ TEST_F(HazardReporterTest, FarSightingWaitsForANearerView) {
   EXPECT_THAT(TakeDue(), SizeIs(1));
 }
 
+TEST_F(HazardReporterTest, SightingWhosePlaceIsUncertainWaitsForANearerView) {
+  config_.max_ground_sigma_m = 0.6;
+  Restart();
+  DriveFixes(0, 4);
+  See(3.0, {{"pothole", 0.8F, BoxAt(20, 0)}});
+  EXPECT_THAT(TakeDue(), IsEmpty());
+  EXPECT_EQ(counters().too_far, 1u);
+  See(3.5, {{"pothole", 0.8F, BoxAt(8, 0)}});
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
 TEST_F(HazardReporterTest, BoxAboveTheHorizonIsNotPlaced) {
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, {100, 100, 120, 150}}});
