@@ -155,6 +155,8 @@ TEST_F(HazardReporterTest, HazardThatTheZoneAnnouncedIsNotReported) {
 }
 
 TEST_F(HazardReporterTest, FarSightingWaitsForANearerView) {
+  config_.max_ground_sigma_m = 100;
+  Restart();
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, BoxAt(35, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty());
