@@ -51,8 +51,8 @@ class HazardReporter {
     double min_confidence = 0.0;
     /// A sighting further away than this waits for a nearer view: its place is too uncertain, m.
     double max_range_m = 30.0;
-    /// So does one whose place on the road is less certain than this, seen from the vehicle: standard
-    /// deviation along its worst axis, m. A low camera reaches it before max_range_m.
+    /// So does one whose place on the road is less certain than this, seen from the vehicle:
+    /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m.
     double max_ground_sigma_m = 2.5;
     /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
     double max_wait_s = 5.0;

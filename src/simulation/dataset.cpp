@@ -14,15 +14,15 @@
 namespace livemap {
 namespace {
 
-constexpr float kTumScale = 5000;
 constexpr int kJpegQuality = 90;
 
 }  // namespace
 
-TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera)
-    : directory_(directory) {
+TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera,
+                     double depth_scale)
+    : directory_(directory), depth_scale_(depth_scale) {
   MakeNewFolder(directory, {"rgb", "depth"});
-  WriteCamera(directory + "/camera.yaml", camera, static_cast<double>(kTumScale));
+  WriteCamera(directory + "/camera.yaml", camera, depth_scale);
   rgb_ = OpenFile(directory + "/rgb.txt");
   depth_ = OpenFile(directory + "/depth.txt");
   associations_ = OpenFile(directory + "/associations.txt");
@@ -38,8 +38,8 @@ void TumWriter::Add(double time_s, const SimulatedFrame& frame, const cv::Mat& r
   const std::string depth = "depth/" + stamp + ".png";
   cv::Mat coded;
   // What 16 bits cannot hold is unknown, not near.
-  frame.depth.convertTo(coded, CV_16UC1, static_cast<double>(kTumScale));
-  coded.setTo(0, frame.depth > 65534.0F / kTumScale);
+  frame.depth.convertTo(coded, CV_16UC1, depth_scale_);
+  coded.setTo(0, frame.depth > 65534.0 / depth_scale_);
   WriteImage(directory_ + "/" + rgb, frame.bgr, {cv::IMWRITE_PNG_COMPRESSION, 1});
   WriteImage(directory_ + "/" + depth, coded, {cv::IMWRITE_PNG_COMPRESSION, 1});
   if (!right.empty()) {

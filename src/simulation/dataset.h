@@ -14,14 +14,18 @@
 
 namespace livemap {
 
-/// Writes a drive in TUM RGB-D layout: rgb/, depth/ (16-bit PNG, 5000 units per metre, 0: sky or
-/// beyond 13.1 m), rgb.txt, depth.txt, associations.txt, groundtruth.txt (optical frame in the
-/// world frame, z up), camera.yaml and of a stereo pair rgb_right/ with rgb_right.txt. Every Error
-/// names the path.
+/// Depth units per metre in the TUM RGB-D benchmark's own files.
+constexpr double kTumDepthScale = 5000;
+
+/// Writes a drive in TUM RGB-D layout: rgb/, depth/ (16-bit PNG, `depth_scale` units per metre, 0:
+/// sky or beyond 65535 units), rgb.txt, depth.txt, associations.txt, groundtruth.txt (optical frame
+/// in the world frame, z up), camera.yaml and of a stereo pair rgb_right/ with rgb_right.txt. Every
+/// Error names the path.
 class TumWriter {
  public:
   /// Makes the folder; throws Error when it exists and is not empty.
-  TumWriter(const std::string& directory, const SimulatedCamera& camera);
+  TumWriter(const std::string& directory, const SimulatedCamera& camera,
+            double depth_scale = kTumDepthScale);
   /// `right` is the second eye's picture of a stereo pair, for rgb_right/; empty: none.
   void Add(double time_s, const SimulatedFrame& frame, const cv::Mat& right = cv::Mat());
   /// Closes the lists; throws Error when the disk was full.
@@ -29,6 +33,7 @@ class TumWriter {
 
  private:
   std::string directory_;
+  double depth_scale_;
   std::ofstream rgb_;
   std::ofstream right_;  ///< Open once there is a second eye.
   std::ofstream depth_;

@@ -34,6 +34,7 @@ std::vector<Flag> Flags() {
           {"preview", "FILE.png", "contact sheet of twelve moments"},
           {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
           {"tum", "DIR", "TUM RGB-D folder"},
+          {"depth-scale", "N", "of --tum's depth, units per metre; 1000 reaches 65 m (5000)"},
           {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
           {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};

@@ -38,7 +38,10 @@ SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSe
       throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
     }
   }
-  if (line.Has("tum")) tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera);
+  if (line.Has("tum")) {
+    const double scale = line.Number("depth-scale", kTumDepthScale, 100, 10000);
+    tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera, scale);
+  }
   if (line.Has("yolo")) yolo_ = std::make_unique<YoloWriter>(line.Text("yolo", ""));
   if (!line.Has("video")) return;
   const std::string path = line.Text("video", "");

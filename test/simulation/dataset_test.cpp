@@ -73,6 +73,17 @@ TEST_F(Dataset, TumFolderIsReadBackByTheReaderOfDrives) {
                          cv::imread(sequence.frames[0].image_path).datastart));
 }
 
+TEST_F(Dataset, CoarserTumDepthReachesFurther) {
+  TumWriter writer(folder_.string(), camera_, 1000);
+  writer.Add(0, frame_);
+  writer.Finish();
+  const Sequence sequence = ReadTumSequence(folder_.string());
+  EXPECT_EQ(sequence.depth_scale, 1000);
+  const cv::Mat depth = cv::imread(sequence.frames[0].depth_path, cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(depth.at<std::uint16_t>(60, 60), 4500);
+  EXPECT_EQ(depth.at<std::uint16_t>(1, 5), 50000);
+}
+
 TEST_F(Dataset, YoloFolderHasFractionsOfTheImage) {
   YoloWriter writer(folder_.string());
   writer.Add(12.5, frame_, FindHazards(frame_.instances, LabelLimits()));
