@@ -31,6 +31,9 @@ TOLERANCE = 1e-3
 
 GOLDEN_ROWS = 24
 
+LEAST_THRESHOLD = 0.2
+"""Of a class learnt from simulated drives: one that is hardly found would otherwise be reported everywhere."""
+
 UNCALIBRATED_THRESHOLD = 0.5
 """Of a class without pictures to calibrate it on."""
 
@@ -105,7 +108,7 @@ def run(arguments: argparse.Namespace) -> None:
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in CLASSES}
     if arguments.simulated:
         for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated)).items():
-            thresholds[name] = best_f1_threshold(frames, 0.5)
+            thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
             print(f"simulated {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
     found = validate(runner, drives, cones)
     thresholds["pothole"] = found.best_drive_figures().threshold
