@@ -340,6 +340,7 @@ VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
   VoResult result = last_;
   result.state = VoState::kLost;
   result.twist.reset();
+  result.twist_covariance.setZero();
   result.new_keyframe = false;
   const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
   const double lost_s = Seconds(stamp_ns, tracked_stamp_ns_);

@@ -42,6 +42,7 @@ struct VoResult {
   Matrix6d covariance = Matrix6d::Zero();
   /// Velocity in the camera's axes: m/s, rad/s; none without two tracked frames in a row.
   std::optional<Vector6d> twist;
+  Matrix6d twist_covariance = Matrix6d::Zero();  ///< Same axes, squared units of twist.
   bool new_keyframe = false;
   std::int64_t keyframe_stamp_ns = 0;
   std::size_t points = 0;   ///< Of the finest level that was used.
