@@ -1,5 +1,6 @@
 #include "edge_vo/edge_odometry.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +13,8 @@ namespace {
 constexpr double kSecond = 1e-9;  // Per nanosecond.
 /// A motion is carried on only over a short pause, s.
 constexpr double kMaxPredictionS = 0.5;
+/// Below this reciprocal condition number the information matrix says nothing about some direction.
+constexpr double kLeastCondition = 1e-12;
 
 std::string SizeText(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows);
@@ -282,7 +285,10 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
 }
 
 bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
-  return std::isfinite(result.cost) &&
+  // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
+  const Eigen::LLT<Matrix6d> determined(result.information);
+  return std::isfinite(result.cost) && result.state.new_from_reference.matrix().allFinite() &&
+         determined.info() == Eigen::Success && determined.rcond() > kLeastCondition &&
          result.visible >= static_cast<std::size_t>(config_.least_points) &&
          result.Overlap() >= config_.least_overlap && result.sigma <= config_.lost_sigma &&
          result.state.gain > 0.3 && result.state.gain < 3;

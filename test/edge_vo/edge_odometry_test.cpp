@@ -212,5 +212,19 @@ TEST(EdgeOdometry, ACameraWithoutCalibrationIsRefusedInASentence) {
   EXPECT_THAT(make({260, 260, 160, 120, 1, 1}), ThrowsMessage<Error>(HasSubstr("1x1")));
 }
 
+TEST(EdgeOdometry, StraightEdgesAllOneWayDoNotFixThePose) {
+  RgbdFrame stripes;
+  stripes.grey.create(240, 320, CV_8UC1);
+  for (int x = 0; x < 320; ++x) stripes.grey.col(x).setTo(x / 16 % 2 == 0 ? 60 : 190);
+  stripes.depth = cv::Mat(240, 320, CV_32FC1, cv::Scalar(2));
+  EdgeOdometry odometry({}, kCamera);
+  for (int i = 0; i < 5; ++i) {
+    stripes.stamp_ns = Stamp(i);
+    const VoResult result = odometry.Track(stripes);
+    EXPECT_TRUE(result.covariance.allFinite());
+    EXPECT_LT(result.world_from_camera.translation().norm(), 1e-3);
+  }
+}
+
 }  // namespace
 }  // namespace livemap
