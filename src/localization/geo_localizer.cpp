@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "localization/alignment.h"
 #include "localization/sliding_window.h"
 #include "localization/stamps.h"
+#include "localization/track_alignment.h"
 
 namespace livemap {
 namespace {
@@ -250,7 +250,7 @@ GeoLocalizer::FixVerdict GeoLocalizer::Use(const FixMeasurement& fix) {
 
 /// Fixes the map by the kept fixes, when the vehicle has moved enough among them.
 bool GeoLocalizer::TryStart() {
-  std::vector<AlignmentPair> pairs;
+  std::vector<TrackPair> pairs;
   for (const FixMeasurement& fix : kept_) {
     const PlanarPose antenna = track_.At(MomentOf(fix)) * PlanarPose{config_.receiver.antenna_m, 0};
     // Of the whole error, the shared part included.
@@ -258,7 +258,8 @@ bool GeoLocalizer::TryStart() {
     pairs.push_back(
         {antenna.position_m, fix.place_m, std::sqrt(white_variance + fix.shared_m * fix.shared_m)});
   }
-  const auto alignment = Align(pairs, config_.gate, static_cast<std::size_t>(config_.start_fixes));
+  const auto alignment =
+      AlignTrack(pairs, config_.gate, static_cast<std::size_t>(config_.start_fixes));
   if (!alignment || alignment->yaw_sigma_rad > config_.start_yaw_sigma_rad) return false;
   const std::int64_t first_ns = MomentOf(kept_.front());
   window_->Start(first_ns, alignment->map_from_track * track_.At(first_ns), alignment->widening);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "localization/alignment.h"
 #include "localization/stamps.h"
+#include "localization/track_alignment.h"
 
 namespace livemap {
 namespace {

@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// The same place in the odometry's track and by a fix on the map.
-struct AlignmentPair {
+struct TrackPair {
   Eigen::Vector2d track_m;
   Eigen::Vector2d map_m;
   double sigma_m = 1;  ///< Of the fix, per axis.
@@ -19,7 +19,7 @@ struct AlignmentPair {
 /// in the plane; at least 1 and at most 20.
 double Widening(std::vector<double> squared_distances);
 
-struct Alignment {
+struct TrackAlignment {
   PlanarPose map_from_track;
   double yaw_sigma_rad = 0;
   /// How much wider than stated the fixes scatter, at least 1.
@@ -33,7 +33,7 @@ struct Alignment {
 ///
 /// By the least median of squares, P. J. Rousseeuw, J. Am. Stat. Assoc. 79 (1984): right while less
 /// than half of the fixes are wrong, whatever they state.
-std::optional<Alignment> Align(const std::vector<AlignmentPair>& pairs, double gate,
-                               std::size_t least_pairs);
+std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, double gate,
+                                         std::size_t least_pairs);
 
 }  // namespace livemap

@@ -1,4 +1,4 @@
-#include "localization/alignment.h"
+#include "localization/track_alignment.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +9,14 @@ namespace {
 
 constexpr std::size_t kTriedEnds = 24;  // Pairs of so many evenly chosen places are tried.
 
-double Doubt(const AlignmentPair& pair, const PlanarPose& pose) {
+double Doubt(const TrackPair& pair, const PlanarPose& pose) {
   const Eigen::Vector2d error_m =
       pair.map_m - pose.position_m - Rotation2(pose.yaw_rad) * pair.track_m;
   return error_m.squaredNorm() / (pair.sigma_m * pair.sigma_m);
 }
 
 /// The pose that brings one pair together and turns the line to another into its direction.
-PlanarPose ThroughTwo(const AlignmentPair& a, const AlignmentPair& b) {
+PlanarPose ThroughTwo(const TrackPair& a, const TrackPair& b) {
   const Eigen::Vector2d track_m = b.track_m - a.track_m;
   const Eigen::Vector2d map_m = b.map_m - a.map_m;
   PlanarPose pose;
@@ -32,15 +32,15 @@ double Median(std::vector<double>& values) {
   return *middle;
 }
 
-double MedianDoubt(const std::vector<AlignmentPair>& pairs, const PlanarPose& pose,
+double MedianDoubt(const std::vector<TrackPair>& pairs, const PlanarPose& pose,
                    std::vector<double>& doubts) {
   doubts.clear();
-  for (const AlignmentPair& pair : pairs) doubts.push_back(Doubt(pair, pose));
+  for (const TrackPair& pair : pairs) doubts.push_back(Doubt(pair, pose));
   return Median(doubts);
 }
 
 /// Least squares over the pairs that agree; false when they all lie in one place.
-bool Refine(const std::vector<AlignmentPair>& pairs, Alignment& alignment) {
+bool Refine(const std::vector<TrackPair>& pairs, TrackAlignment& alignment) {
   double weights = 0;
   Eigen::Vector2d track_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d map_m = Eigen::Vector2d::Zero();
@@ -80,10 +80,10 @@ double Widening(std::vector<double> squared_distances) {
   return std::clamp(std::sqrt(Median(squared_distances) / kMedian), 1.0, kMost);
 }
 
-std::optional<Alignment> Align(const std::vector<AlignmentPair>& pairs, double gate,
-                               std::size_t least_pairs) {
+std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, double gate,
+                                         std::size_t least_pairs) {
   if (pairs.size() < std::max<std::size_t>(least_pairs, 2)) return std::nullopt;
-  Alignment best;
+  TrackAlignment best;
   double least_doubt = std::numeric_limits<double>::infinity();
   std::vector<double> doubts;
   const std::size_t tried = std::min(pairs.size(), kTriedEnds);
