@@ -25,6 +25,13 @@ ConstMap Part(const std::vector<float>& values, std::size_t begin, std::size_t c
 
 }  // namespace
 
+void Aligner::Reserve(std::size_t points) {
+  for (Residuals* residuals : {&current_, &candidate_}) {
+    residuals->value.reserve(points);
+    residuals->visible.reserve(points);
+  }
+}
+
 /// Equation (2) of docs/odometry.md for all points.
 void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
                        const CameraIntrinsics& camera, const AlignmentState& state,

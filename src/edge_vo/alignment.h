@@ -53,6 +53,9 @@ class Aligner {
  public:
   explicit Aligner(const AlignmentConfig& config) : config_(config) {}
 
+  /// Memory for so many points.
+  void Reserve(std::size_t points);
+
   /// Aligns on one level from `start` on.
   AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
                         const CameraIntrinsics& camera, const AlignmentState& start);

@@ -66,6 +66,14 @@ cv::v_int16x8 AreRidges(const std::int16_t* above, const std::int16_t* here,
   return (norm > before) & (norm >= after);
 }
 
+/// The upper left part of an image that is kept and only ever grows.
+cv::Mat View(cv::Mat& memory, cv::Size size, int type) {
+  if (memory.cols < size.width || memory.rows < size.height) {
+    memory.create(std::max(memory.rows, size.height), std::max(memory.cols, size.width), type);
+  }
+  return memory(cv::Rect({0, 0}, size));
+}
+
 }  // namespace
 
 const cv::Mat& CannyDetector::Extract(const cv::Mat& grey, double strong_share,
@@ -84,12 +92,28 @@ const cv::Mat& CannyDetector::ExtractAbove(const cv::Mat& grey, int weak, int st
   return edges_;
 }
 
+void CannyDetector::Reserve(cv::Size size) {
+  const cv::Size framed(size.width + 2, size.height + 2);
+  View(dx_memory_, size, CV_16SC1);
+  View(dy_memory_, size, CV_16SC1);
+  View(norm_memory_, framed, CV_16SC1);
+  View(edges_memory_, size, CV_8UC1);
+  smooth_.reserve(static_cast<std::size_t>(size.width));
+  difference_.reserve(static_cast<std::size_t>(size.width));
+  open_.reserve(static_cast<std::size_t>(size.area()));
+}
+
 void CannyDetector::Differentiate(const cv::Mat& grey) {
-  dx_.create(grey.size(), CV_16SC1);
-  dy_.create(grey.size(), CV_16SC1);
+  dx_ = View(dx_memory_, grey.size(), CV_16SC1);
+  dy_ = View(dy_memory_, grey.size(), CV_16SC1);
   // One empty row and column around, so that no pixel needs a special case.
-  const cv::Size framed(grey.cols + 2, grey.rows + 2);
-  if (norm_.size() != framed) norm_ = cv::Mat::zeros(framed, CV_16SC1);
+  norm_ = View(norm_memory_, cv::Size(grey.cols + 2, grey.rows + 2), CV_16SC1);
+  for (const int y : {0, norm_.rows - 1}) {
+    std::memset(norm_.ptr(y), 0, sizeof(std::int16_t) * static_cast<std::size_t>(norm_.cols));
+  }
+  for (int y = 0; y < norm_.rows; ++y) {
+    norm_.ptr<std::int16_t>(y)[0] = norm_.ptr<std::int16_t>(y)[norm_.cols - 1] = 0;
+  }
   const auto width = static_cast<std::size_t>(grey.cols);
   smooth_.resize(width);
   difference_.resize(width);
@@ -121,7 +145,7 @@ int CannyDetector::StrongThreshold(double strong_share, double least_gradient) c
 
 /// Marks ridges above the weak threshold and lists those above the strong one.
 void CannyDetector::ThinAbove(int weak, int strong) {
-  edges_.create(dx_.size(), CV_8UC1);
+  edges_ = View(edges_memory_, dx_.size(), CV_8UC1);
   open_.clear();
   if (edges_.cols < kLanes || edges_.rows < 3) {
     edges_.setTo(0);

@@ -15,6 +15,8 @@ class CannyDetector {
   /// the pixels with the largest gradients start an edge, unless these are below `least_gradient`
   /// (grey levels per px); pixels of at least 0.4 of that gradient continue it.
   const cv::Mat& Extract(const cv::Mat& grey, double strong_share, double least_gradient);
+  /// Memory for images up to this size.
+  void Reserve(cv::Size size);
   /// The same with given thresholds, L1 norm of Sobel's response.
   const cv::Mat& ExtractAbove(const cv::Mat& grey, int weak, int strong);
 
@@ -30,7 +32,8 @@ class CannyDetector {
   void ThinAbove(int weak, int strong);
   void FollowEdges();
 
-  cv::Mat dx_, dy_, norm_, edges_;
+  cv::Mat dx_memory_, dy_memory_, norm_memory_, edges_memory_;
+  cv::Mat dx_, dy_, norm_, edges_;  // Parts of the memory, of the image's size.
   std::vector<std::int16_t> smooth_, difference_;
   std::vector<std::uint8_t*> open_;  // Strong pixels whose neighbours are not looked at yet.
 };

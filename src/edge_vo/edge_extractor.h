@@ -43,6 +43,9 @@ class EdgeExtractor {
   EdgeExtractor(EdgeExtractor&&) noexcept;
   EdgeExtractor& operator=(EdgeExtractor&&) noexcept;
 
+  /// Memory for images up to this size (Canny and Sobel; the other kinds are OpenCV's business).
+  void Reserve(cv::Size size) { canny_.Reserve(size); }
+
   /// CV_8UC1 of the image's size, non-zero at edges; valid until the next call.
   const cv::Mat& Extract(const cv::Mat& grey);
 

@@ -137,13 +137,9 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
 /// when it has no depth or too few edges.
 bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const VoResult& result) {
   if (frame.depth.empty()) return false;
-  std::unique_ptr<Keyframe> fresh;
-  if (!spare_.empty()) {
-    fresh = std::move(spare_.back());
-    spare_.pop_back();
-  } else {
-    fresh = std::make_unique<Keyframe>();
-  }
+  if (keyframes_.empty() && spare_.empty()) ReserveBuffers();
+  std::unique_ptr<Keyframe> fresh = std::move(spare_.back());
+  spare_.pop_back();
   fresh->stamp_ns = frame.stamp_ns;
   fresh->world_from_camera = result.world_from_camera;
   fresh->covariance = result.covariance;
@@ -161,6 +157,34 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const VoResult& result) 
   frames_since_keyframe_ = 0;
   light_ = {};
   return true;
+}
+
+/// All memory of the frames to come, at the first one: later frames allocate nothing.
+void EdgeOdometry::ReserveBuffers() {
+  const auto kept = static_cast<std::size_t>(std::max(2, config_.keyframes_kept));
+  keyframes_.reserve(kept);
+  spare_.reserve(kept + 1);
+  const cv::Size size = frame_images_[0].size();
+  const cv::Mat empty_depth = cv::Mat::zeros(size, CV_32FC1);
+  const std::size_t thumbnail = frame_images_.thumbnail().total();
+  while (spare_.size() < kept + 1) {
+    spare_.push_back(std::make_unique<Keyframe>());
+    Keyframe& keyframe = *spare_.back();
+    keyframe.images.Build(frame_images_[0]);
+    keyframe.depths.Build(empty_depth, 1, config_.depth_range, levels_);
+    for (std::size_t level = 0; level < kMaxLevels; ++level) {
+      keyframe.points[level].Reserve(static_cast<std::size_t>(config_.max_points[level]));
+    }
+    keyframe.thumbnail_points.Reserve(thumbnail);
+  }
+  const std::size_t most =
+      std::max(thumbnail, static_cast<std::size_t>(*std::max_element(config_.max_points.begin(),
+                                                                     config_.max_points.end())));
+  masked_points_.Reserve(most);
+  selector_.Reserve(frame_images_[0].total());
+  extractor_.Reserve(size);
+  aligner_.Reserve(most);
+  rotation_aligner_.Reserve(most);
 }
 
 /// Makes room for a new keyframe: the newest goes when it is close to the one before it, else the
@@ -205,10 +229,10 @@ const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
 }
 
 AlignmentState EdgeOdometry::BestStart(const EdgePoints& points, int level,
-                                       const std::vector<Eigen::Isometry3d>& guesses) {
+                                       const Guesses& guesses) {
   AlignmentState best = light_;
-  best.new_from_reference = guesses.front();
-  if (guesses.size() == 1) return best;
+  best.new_from_reference = *guesses.begin();
+  if (guesses.count == 1) return best;
   double least_cost = std::numeric_limits<double>::infinity();
   for (const Eigen::Isometry3d& guess : guesses) {
     AlignmentState state = light_;
@@ -224,8 +248,7 @@ AlignmentState EdgeOdometry::BestStart(const EdgePoints& points, int level,
 }
 
 /// Coarse to fine from the best of the guesses.
-EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe,
-                                              const std::vector<Eigen::Isometry3d>& guesses) {
+EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses& guesses) {
   Attempt attempt;
   attempt.keyframe = &keyframe;
   AlignmentState state;
@@ -243,14 +266,14 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe,
 
 EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   // Equation (5.7): the motion goes on as it was; or the camera stands.
-  std::vector<Eigen::Isometry3d> guesses;
+  Guesses guesses;
   const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
   const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
   if (last_.twist && step_s <= kMaxPredictionS) {
     const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
-    guesses.push_back(predicted.inverse() * keyframe_->world_from_camera);
+    guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
   }
-  guesses.push_back(world_from_last.inverse() * keyframe_->world_from_camera);
+  guesses.Add(world_from_last.inverse() * keyframe_->world_from_camera);
   return TrackFrom(*keyframe_, guesses);
 }
 
@@ -273,10 +296,14 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
   for (auto candidate = keyframes_.rbegin(); candidate != keyframes_.rend(); ++candidate) {
     Keyframe& keyframe = **candidate;
     const Eigen::Isometry3d held = last_.world_from_camera.inverse() * keyframe.world_from_camera;
-    Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
+    const Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
     light_ = {};
-    Attempt attempt = TrackFrom(keyframe, {RotationGuess(keyframe, held), held, standing,
-                                           RotationGuess(keyframe, standing)});
+    Guesses guesses;
+    for (const auto& guess :
+         {RotationGuess(keyframe, held), held, standing, RotationGuess(keyframe, standing)}) {
+      guesses.Add(guess);
+    }
+    const Attempt attempt = TrackFrom(keyframe, guesses);
     if (attempt.good && (!best.good || attempt.fine.cost < best.fine.cost)) best = attempt;
     // The newest that fits is the nearest in time; older ones only when it does not.
     if (best.good) break;

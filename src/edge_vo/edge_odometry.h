@@ -112,6 +112,14 @@ class EdgeOdometry {
   const cv::Mat& last_image() const { return frame_images_[0]; }
 
  private:
+  /// Starts of an alignment; at most four.
+  struct Guesses {
+    std::array<Eigen::Isometry3d, 4> new_from_reference;
+    std::size_t count = 0;
+    void Add(const Eigen::Isometry3d& guess) { new_from_reference[count++] = guess; }
+    const Eigen::Isometry3d* begin() const { return new_from_reference.data(); }
+    const Eigen::Isometry3d* end() const { return new_from_reference.data() + count; }
+  };
   struct Attempt {
     Keyframe* keyframe = nullptr;
     AlignmentResult fine;
@@ -122,9 +130,8 @@ class EdgeOdometry {
   void Check(const RgbdFrame& frame) const;
   bool MakeKeyframe(const RgbdFrame& frame, const VoResult& result);
   bool SelectPoints(Keyframe& keyframe);
-  Attempt TrackFrom(Keyframe& keyframe, const std::vector<Eigen::Isometry3d>& guesses);
-  AlignmentState BestStart(const EdgePoints& points, int level,
-                           const std::vector<Eigen::Isometry3d>& guesses);
+  Attempt TrackFrom(Keyframe& keyframe, const Guesses& guesses);
+  AlignmentState BestStart(const EdgePoints& points, int level, const Guesses& guesses);
   const EdgePoints& PointsOf(Keyframe& keyframe, int level);
   Eigen::Isometry3d RotationGuess(Keyframe& keyframe, const Eigen::Isometry3d& from);
   Attempt Follow(std::int64_t stamp_ns);
@@ -133,6 +140,7 @@ class EdgeOdometry {
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
   double MotionFrom(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_camera) const;
   void ForgetNearOnes();
+  void ReserveBuffers();
   VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);
   VoResult Hold(std::int64_t stamp_ns);
 

@@ -60,6 +60,11 @@ void EdgePoints::Clear() {
   for (auto& column : jacobian) column.clear();
 }
 
+void EdgePoints::Reserve(std::size_t count) {
+  for (auto* values : {&x, &y, &z, &intensity}) values->reserve(count);
+  for (auto& column : jacobian) column.reserve(count);
+}
+
 void EdgePoints::Add(float u, float v, float depth_m, float grey, float gradient_x,
                      float gradient_y, const CameraIntrinsics& camera) {
   const auto fx = static_cast<float>(camera.fx);

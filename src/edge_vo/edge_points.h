@@ -24,6 +24,7 @@ struct EdgePoints {
 
   std::size_t size() const { return x.size(); }
   void Clear();
+  void Reserve(std::size_t count);
   void Add(float u, float v, float depth_m, float grey, float gradient_x, float gradient_y,
            const CameraIntrinsics& camera);
   /// Means over all points; called once they are complete.
@@ -42,6 +43,8 @@ struct PointSelection {
 /// Gathers points under an edge mask; keeps its list of pixels from call to call.
 class PointSelector {
  public:
+  /// Memory for masks with so many pixels set.
+  void Reserve(std::size_t pixels) { candidates_.reserve(pixels); }
   /// Points of the reference image `grey` with `depth_m` (0 unknown) under `edges`, same sizes.
   void Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv::Mat& edges,
               const CameraIntrinsics& camera, const PointSelection& selection, EdgePoints& points);

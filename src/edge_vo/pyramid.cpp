@@ -2,24 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 
 namespace livemap {
 namespace {
 
-void ConvertDepth(const cv::Mat& depth, double units_per_m, DepthPyramid::Range range,
+template <typename Depth>
+void ConvertDepth(const cv::Mat& depth, float metres_per_unit, DepthPyramid::Range range,
                   cv::Mat& metres) {
-  if (depth.type() == CV_16UC1) {
-    depth.convertTo(metres, CV_32F, 1 / units_per_m);
-  } else {
-    depth.copyTo(metres);
-  }
-  for (int y = 0; y < metres.rows; ++y) {
-    float* row = metres.ptr<float>(y);
-    for (int x = 0; x < metres.cols; ++x) {
+  metres.create(depth.size(), CV_32FC1);
+  for (int y = 0; y < depth.rows; ++y) {
+    const Depth* in = depth.ptr<Depth>(y);
+    float* out = metres.ptr<float>(y);
+    for (int x = 0; x < depth.cols; ++x) {
+      const float value = static_cast<float>(in[x]) * metres_per_unit;
       // Written so that NaN becomes unknown too.
-      row[x] = row[x] >= range.min_m && row[x] <= range.max_m ? row[x] : 0.0F;
+      out[x] = value >= range.min_m && value <= range.max_m ? value : 0.0F;
     }
   }
 }
@@ -52,10 +51,42 @@ void HalveDepth(const cv::Mat& fine, cv::Mat& coarse) {
   }
 }
 
+/// Means of 2x2 pixels. An odd last row or column has no partner and is left out.
 void Halve(const cv::Mat& fine, cv::Mat& coarse) {
-  // An odd last row or column has no partner and is left out, so that pixels stay 2x2.
-  const cv::Mat even = fine(cv::Rect(0, 0, fine.cols / 2 * 2, fine.rows / 2 * 2));
-  cv::resize(even, coarse, cv::Size(fine.cols / 2, fine.rows / 2), 0, 0, cv::INTER_AREA);
+  coarse.create(std::max(1, fine.rows / 2), std::max(1, fine.cols / 2), CV_8UC1);
+  for (int y = 0; y < coarse.rows; ++y) {
+    const std::uint8_t* upper = fine.ptr(std::min(2 * y, fine.rows - 1));
+    const std::uint8_t* lower = fine.ptr(std::min(2 * y + 1, fine.rows - 1));
+    std::uint8_t* out = coarse.ptr(y);
+    for (int x = 0; x < fine.cols / 2; ++x) {
+      out[x] = static_cast<std::uint8_t>(
+          (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2U);
+    }
+    if (fine.cols == 1) out[0] = upper[0];
+  }
+}
+
+/// (1 2 1)/4 along rows and columns; the border sees itself beyond the image. `across` is a buffer
+/// of one row.
+void Smooth(const cv::Mat& grey, std::vector<std::uint16_t>& across, cv::Mat& smooth) {
+  smooth.create(grey.size(), CV_8UC1);
+  const int width = grey.cols;
+  across.resize(static_cast<std::size_t>(width) + 2);
+  std::uint16_t* column = across.data() + 1;
+  for (int y = 0; y < grey.rows; ++y) {
+    const std::uint8_t* above = grey.ptr(std::max(y - 1, 0));
+    const std::uint8_t* here = grey.ptr(y);
+    const std::uint8_t* below = grey.ptr(std::min(y + 1, grey.rows - 1));
+    for (int x = 0; x < width; ++x) {
+      column[x] = static_cast<std::uint16_t>(above[x] + 2 * here[x] + below[x]);
+    }
+    column[-1] = column[0];
+    column[width] = column[width - 1];
+    std::uint8_t* out = smooth.ptr(y);
+    for (int x = 0; x < width; ++x) {
+      out[x] = static_cast<std::uint8_t>((column[x - 1] + 2 * column[x] + column[x + 1] + 8) >> 4U);
+    }
+  }
 }
 
 }  // namespace
@@ -80,7 +111,7 @@ CameraIntrinsics HalvedIntrinsics(const CameraIntrinsics& intrinsics) {
 
 void ImagePyramid::Build(const cv::Mat& grey) {
   levels_ = CountLevels(grey.size());
-  cv::GaussianBlur(grey, images_[0], {3, 3}, 0);
+  Smooth(grey, row_, images_[0]);
   for (std::size_t level = 1; level < static_cast<std::size_t>(levels_); ++level) {
     Halve(images_[level - 1], images_[level]);
   }
@@ -88,7 +119,11 @@ void ImagePyramid::Build(const cv::Mat& grey) {
 }
 
 void DepthPyramid::Build(const cv::Mat& depth, double units_per_m, Range range, int levels) {
-  ConvertDepth(depth, units_per_m, range, depths_[0]);
+  if (depth.type() == CV_16UC1) {
+    ConvertDepth<std::uint16_t>(depth, static_cast<float>(1 / units_per_m), range, depths_[0]);
+  } else {
+    ConvertDepth<float>(depth, 1, range, depths_[0]);
+  }
   for (std::size_t level = 1; level < static_cast<std::size_t>(levels); ++level) {
     HalveDepth(depths_[level - 1], depths_[level]);
   }

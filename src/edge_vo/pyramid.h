@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "geo/ground_projection.h"
 
@@ -22,7 +24,7 @@ CameraIntrinsics HalvedIntrinsics(const CameraIntrinsics& intrinsics);
 /// Grey images, CV_8UC1. The buffers are kept from frame to frame.
 class ImagePyramid {
  public:
-  /// `grey` is copied; its size decides the number of levels.
+  /// `grey` is smoothed by (1 2 1)/4 both ways; its size decides the number of levels.
   void Build(const cv::Mat& grey);
   int levels() const { return levels_; }
   const cv::Mat& operator[](int level) const { return images_[static_cast<std::size_t>(level)]; }
@@ -33,6 +35,7 @@ class ImagePyramid {
   int levels_ = 0;
   std::array<cv::Mat, kMaxLevels> images_;
   cv::Mat thumbnail_;
+  std::vector<std::uint16_t> row_;
 };
 
 /// Depth along the optical axis in metres, CV_32FC1, 0 where it is not known.
