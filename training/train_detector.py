@@ -176,8 +176,8 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--batch must be from 2 to --samples-per-epoch, not {arguments.batch}.")
     if arguments.seed < 0 or arguments.workers < 0 or not arguments.learning_rate > 0:
         raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
-    if not 0 <= arguments.backbone_rate <= 1:
-        raise UsageError(f"--backbone-rate must be from 0 to 1, not {arguments.backbone_rate}.")
+    if not 0 <= arguments.backbone_rate <= 10:
+        raise UsageError(f"--backbone-rate must be from 0 to 10, not {arguments.backbone_rate}.")
     if arguments.pretrained and arguments.start_from:
         raise UsageError("--pretrained and --start-from exclude each other.")
     if not 0 <= arguments.settle <= 1:

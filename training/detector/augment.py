@@ -55,8 +55,11 @@ class Recipe:
     brightness: float = 0.45
 
 
-FRAMES = Recipe(mosaic=0.25, scale_spread=1.4, focus=0.4)
-"""Views of a whole frame's size, strongly changed: large patches of broken road are seen uncut."""
+FRAMES = Recipe(
+    mosaic=0.2, mix=0.05, paste=0.6, scale_spread=1.4, focus=0.4, relight=0.25, shadow=0.35, erase=0.05, hue=6.0, saturation=0.5,
+    brightness=0.35,
+)
+"""Views of a whole frame's size, less changed: large patches of broken road are seen uncut."""
 
 SETTLING = Recipe(
     mosaic=0.0, mix=0.0, paste=0.5, mirror=0.5, scale_spread=1.2, aspect_spread=1.05, focus=0.0, blur=0.1, noise=0.1,
@@ -64,7 +67,7 @@ SETTLING = Recipe(
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.38, "survey_empty": 0.14, "closeups": 0.06, "cones": 0.10, "simulated": 0.32}
+GROUP_SHARES = {"survey_potholes": 0.42, "survey_empty": 0.16, "closeups": 0.06, "cones": 0.10, "simulated": 0.26}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
 
 GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0}

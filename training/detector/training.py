@@ -95,7 +95,7 @@ def to_device(images: Tensor, targets: List[Target], device: torch.device) -> Tu
 class AveragedModel:
     """Exponential moving average of the weights and of the batch-norm statistics."""
 
-    DECAY = 0.999
+    DECAY = 0.998
 
     def __init__(self, model: nn.Module):
         self.model = copy.deepcopy(model).eval()

@@ -136,7 +136,7 @@ class Programs(unittest.TestCase):
             (train_detector, ("--epochs", 0)),
             (train_detector, ("--start-from", nowhere, "--out", self.root / "new")),
             (train_detector, ("--batch", 1)),
-            (train_detector, ("--backbone-rate", 2)),
+            (train_detector, ("--backbone-rate", 20)),
             (convert_backbone, ("--archive", nowhere, "--out", self.root / "new.pt")),
             (train_detector, ("--frobnicate",)),
             (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
