@@ -44,7 +44,7 @@ class Trainer:
         self.settings, self.device = settings, device
         self.model = Detector(len(CLASSES)).to(device, memory_format=torch.channels_last)
         self.average = AveragedModel(self.model)
-        self.frozen = [self.model.backbone.stem, self.model.backbone.stride4] if settings.freeze else []
+        self.frozen = [self.model.backbone.stem] if settings.freeze else []
         for part in self.frozen:
             part.requires_grad_(False)
         self.optimizer = make_optimizer(self.model, settings)
@@ -158,11 +158,11 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
         parser.add_argument("--" + name.replace("_", "-"), type=int, default=defaults[name])
     parser.add_argument("--learning-rate", type=float, default=defaults["learning_rate"])
     parser.add_argument(
-        "--backbone-rate", type=float, default=defaults["backbone_rate"], help="share of the learning rate for the backbone"
+        "--backbone-rate", type=float, default=defaults["backbone_rate"], help="multiple of the learning rate for the backbone"
     )
     parser.add_argument("--settle", type=float, default=defaults["settle"], help="last fraction of the epochs: whole frames")
     parser.add_argument("--views", choices=tuple(VIEWS), default=defaults["views"], help="what epochs before the last show")
-    parser.add_argument("--freeze", action="store_true", help="leave the backbone up to stride 4 as it begins")
+    parser.add_argument("--freeze", action="store_true", help="leave the first convolution as it begins")
     parser.add_argument("--precision", choices=("bf16", "fp32"), default=defaults["precision"])
     return parser.parse_args(arguments)
 

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 
 from . import inference
-from .augment import FRAMES, SETTLING, Augmenter, Recipe, Sample
+from .augment import FRAMES, LIGHT, SETTLING, Augmenter, Recipe, Sample
 from .inference import MEAN, STD
 from .loss import Target
 from .network import Detector
@@ -29,8 +29,8 @@ class Settings:
     batch: int = 16
     views: str = "crops"  # of VIEWS, before settling
     learning_rate: float = 2e-3
-    backbone_rate: float = 1.0  # share of the learning rate that the backbone gets
-    freeze: bool = False  # the backbone up to stride 4 stays as it begins
+    backbone_rate: float = 1.0  # multiple of the learning rate that the backbone gets
+    freeze: bool = False  # the first convolution stays as it begins
     weight_decay: float = 0.05
     settle: float = 0.2  # last fraction of the epochs: whole frames, weak augmentation
     precision: str = "bf16"
@@ -52,7 +52,8 @@ class Views:
 
 
 VIEWS = {
-    "crops": Views(Recipe(), 416, 320, 1.0), "frames": Views(FRAMES, inference.INPUT_WIDTH, inference.INPUT_HEIGHT, 0.5),
+    "crops": Views(Recipe(), 416, 320, 1.0), "light": Views(LIGHT, 416, 320, 1.0),
+    "frames": Views(FRAMES, inference.INPUT_WIDTH, inference.INPUT_HEIGHT, 0.5),
 }
 SETTLING_VIEWS = Views(SETTLING, inference.INPUT_WIDTH, inference.INPUT_HEIGHT, 0.5)
 
@@ -95,7 +96,7 @@ def to_device(images: Tensor, targets: List[Target], device: torch.device) -> Tu
 class AveragedModel:
     """Exponential moving average of the weights and of the batch-norm statistics."""
 
-    DECAY = 0.998
+    DECAY = 0.999
 
     def __init__(self, model: nn.Module):
         self.model = copy.deepcopy(model).eval()
