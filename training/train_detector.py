@@ -114,7 +114,7 @@ class Trainer:
         for step, (images, targets) in enumerate(loader):
             progress = (self.epoch + step / len(loader)) / settings.epochs
             for group in self.optimizer.param_groups:
-                group["lr"] = settings.learning_rate * learning_rate_factor(progress) * group["share"]
+                group["lr"] = settings.learning_rate * learning_rate_factor(progress) * group["multiple"]
             images, targets = to_device(images, targets, self.device)
             with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=settings.precision == "bf16"):
                 raw = self.model(images)

@@ -122,14 +122,14 @@ def learning_rate_factor(progress: float, warm_up: float = 0.02, last: float = 0
 
 
 def make_optimizer(model: Detector, settings: Settings) -> torch.optim.Optimizer:
-    """AdamW; biases and normalisation parameters do not decay. A group's learning rate is its share of the schedule's."""
+    """AdamW; biases and normalisation parameters do not decay. A group has its multiple of the schedule's learning rate."""
     rest = nn.ModuleList([model.pyramid, model.heads])
     groups = []
-    for part, share in ((model.backbone, settings.backbone_rate), (rest, 1.0)):
+    for part, multiple in ((model.backbone, settings.backbone_rate), (rest, 1.0)):
         for decay, matrices in ((settings.weight_decay, True), (0.0, False)):
             trained = (parameter for parameter in part.parameters() if parameter.requires_grad)
             parameters = [parameter for parameter in trained if (parameter.dim() > 1) == matrices]
-            groups.append({"params": parameters, "weight_decay": decay, "share": share})
+            groups.append({"params": parameters, "weight_decay": decay, "multiple": multiple})
     return torch.optim.AdamW(groups, lr=settings.learning_rate)
 
 

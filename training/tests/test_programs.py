@@ -95,7 +95,7 @@ class Programs(unittest.TestCase):
         self.assertEqual(self.train("pretrained", *more), (0, ""))
         model = torch.load(self.root / "pretrained" / "last.pt")["model"]
         for name, block, still in (
-            ("backbone.stem.0", 0, True), ("backbone.stride4.leave", 4, True), ("backbone.stride16.leave", 16, False)
+            ("backbone.stem.0", 0, True), ("backbone.stride4.leave", 4, False), ("backbone.stride16.leave", 16, False)
         ):
             # The normalisation's unfolding scales each filter; its direction stays.
             now, begin = model[name + ".0.weight"].flatten(1), convolutions[block][0].flatten(1)
