@@ -7,8 +7,9 @@ set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE} CACHE FILEPATH "The same for ament's
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/devel/lib/python3/dist-packages)
 find_package(catkin REQUIRED COMPONENTS
   camera_info_manager cv_bridge diagnostic_msgs diagnostic_updater geometry_msgs image_geometry
-  image_transport message_generation nav_msgs nodelet pcl_ros pluginlib rosbag roscpp rostest
-  sensor_msgs std_msgs tf2 tf2_geometry_msgs tf2_ros topic_tools visualization_msgs)
+  image_transport message_filters message_generation nav_msgs nodelet pcl_conversions pcl_ros
+  pluginlib rosbag roscpp rostest sensor_msgs std_msgs std_srvs tf2 tf2_eigen tf2_geometry_msgs
+  tf2_ros topic_tools visualization_msgs)
 
 file(GLOB message_files RELATIVE ${PROJECT_SOURCE_DIR}/msg CONFIGURE_DEPENDS msg/*.msg)
 add_message_files(FILES ${message_files})

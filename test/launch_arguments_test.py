@@ -10,7 +10,7 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NODES = {
-    "vehicle": {"camera_ingest": "camera_ingest", "hazard_detection": "hazard_detection",
+    "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "hazard_detection": "hazard_detection",
                 "hazard_reporting": "hazard_reporting", "mqtt_bridge": "mqtt_bridge_vehicle"},
     "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone"},
 }
@@ -42,7 +42,8 @@ class LaunchArguments(unittest.TestCase):
             for node, file in nodes.items():
                 defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
                 wanted = {key: changed(value) for key, value in defaults.items() if key not in own_arguments}
-                dumped = parameters(f"{launch}.launch", f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
+                optional = ["vo:=true"] if node == "edge_vo" else []
+                dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
 

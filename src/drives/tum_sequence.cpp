@@ -70,6 +70,14 @@ void Anchor(const fs::path& root, std::string& path, const std::string& listed_i
   path = whole.string();
 }
 
+/// As numpy.savetxt writes it, a trajectory's stamp may be "1.305031102160407066e+09".
+std::optional<std::int64_t> ParseTrajectoryStampNs(const std::string& text) {
+  if (text.find_first_of("eE") == std::string::npos) return ParseStampNs(text);
+  const std::optional<double> seconds = ParseFinite(text);
+  if (!seconds || *seconds < 0 || *seconds > 4294967295) return std::nullopt;
+  return std::llround(*seconds * 1e9);
+}
+
 }  // namespace
 
 std::optional<std::int64_t> ParseStampNs(const std::string& text) {
@@ -120,7 +128,7 @@ std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::
     const std::vector<std::string> parts = SplitBlanks(lines[i]);
     const std::string accepted = "stamp tx ty tz qx qy qz qw";
     if (parts.size() != 8) RefuseLine(name, i, lines[i], accepted);
-    const std::optional<std::int64_t> stamp = ParseStampNs(parts[0]);
+    const std::optional<std::int64_t> stamp = ParseTrajectoryStampNs(parts[0]);
     if (!stamp) RefuseLine(name, i, lines[i], accepted);
     std::array<double, 7> numbers{};
     for (std::size_t k = 0; k < numbers.size(); ++k) {
@@ -130,7 +138,7 @@ std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::
     }
     Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
     if (std::abs(rotation.norm() - 1) > 0.01) {
-      RefuseLine(name, i, lines[i], accepted + "' with a unit quaternion '");
+      RefuseLine(name, i, lines[i], accepted + " with a unit quaternion");
     }
     rotation.normalize();
     StampedPose pose;

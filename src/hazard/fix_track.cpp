@@ -41,7 +41,7 @@ std::optional<TrackPose> FixTrack::Newest() const {
   pose.position = points_.back().position;
   pose.covariance_m2 = points_.back().covariance_m2;
   pose.course_rad = std::numeric_limits<double>::quiet_NaN();
-  if (const auto motion = MotionAt(points_.back().stamp_ns)) {
+  if (const auto motion = MotionAt(points_.back().stamp_ns, points_.end())) {
     pose.speed_mps = motion->velocity_mps.norm();
     const auto course = CourseOf(*motion);
     if (course && pose.speed_mps >= kStandingMps) {
@@ -65,7 +65,6 @@ FixTrack::Verdict FixTrack::Add(const Fix& fix) {
     // The clock was set back (a bag starts again): nothing of before can be compared.
     points_.clear();
     suspects_.clear();
-    last_course_.reset();
     Append(*point);
     return Verdict::kRestarted;
   }
@@ -84,7 +83,7 @@ std::optional<FixTrack::Point> FixTrack::ToPoint(const Fix& fix) const {
     if (!IsCovariance(*fix.covariance_m2)) return std::nullopt;
     covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   }
-  return Point{fix.stamp_ns, fix.position, covariance_m2};
+  return Point{fix.stamp_ns, fix.position, covariance_m2, std::nullopt};
 }
 
 bool FixTrack::Reachable(const Point& from, const Point& to) const {
@@ -102,18 +101,28 @@ FixTrack::Verdict FixTrack::AddSuspect(const Point& point) {
   suspects_.push_back(point);
   if (static_cast<int>(suspects_.size()) < config_.jumps_to_restart) return Verdict::kJump;
   points_.clear();
-  last_course_.reset();
   for (const Point& suspect : suspects_) Append(suspect);
   suspects_.clear();
   return Verdict::kRestarted;
 }
 
 void FixTrack::Append(const Point& point) {
+  const std::optional<Course> course_before =
+      points_.empty() ? std::nullopt : points_.back().course;
   points_.push_back(point);
   while (Seconds(point.stamp_ns - points_.front().stamp_ns) > config_.keep_s) points_.pop_front();
-  const auto motion = MotionAt(point.stamp_ns);
-  if (!motion) return;
-  if (const auto course = CourseOf(*motion)) last_course_ = course;
+  const auto motion = MotionAt(point.stamp_ns, points_.end());
+  points_.back().course = motion ? CourseOf(*motion) : std::nullopt;
+  if (!points_.back().course) points_.back().course = course_before;
+}
+
+/// Course of a vehicle that stands at this moment: the one it came with, else the one it leaves
+/// with.
+std::optional<FixTrack::Course> FixTrack::StandingCourse(Points::const_iterator after) const {
+  if (after != points_.begin() && std::prev(after)->course) return std::prev(after)->course;
+  const auto leaving =
+      std::find_if(after, points_.end(), [](const Point& point) { return point.course; });
+  return leaving == points_.end() ? std::nullopt : leaving->course;
 }
 
 FixTrack::Lookup FixTrack::At(std::int64_t stamp_ns) const {
@@ -122,10 +131,11 @@ FixTrack::Lookup FixTrack::At(std::int64_t stamp_ns) const {
       [](const Point& point, std::int64_t moment_ns) { return point.stamp_ns < moment_ns; });
   if (points_.empty()) return {Answer::kWait, {}};
   if (after == points_.begin() && after->stamp_ns != stamp_ns) return {Answer::kNever, {}};
-  const auto motion = MotionAt(stamp_ns);
+  // What lies beyond the first later fix stays out, so that the answer does not hang on how late it
+  // is asked for: a replay places every hazard where the drive placed it.
+  const auto motion = MotionAt(stamp_ns, after == points_.end() ? after : std::next(after));
   std::optional<Course> course = motion ? CourseOf(*motion) : std::nullopt;
-  if (!course) course = last_course_;
-  // Before the first motion only a later fix can show the course.
+  if (!course) course = StandingCourse(after);
   if (!course) return {Answer::kWait, {}};
 
   Lookup lookup;
@@ -176,13 +186,14 @@ TrackPose FixTrack::Extrapolate(const Point& last, const Motion& motion,
   return pose;
 }
 
-std::optional<FixTrack::Motion> FixTrack::MotionAt(std::int64_t stamp_ns) const {
-  if (points_.empty()) return std::nullopt;
+std::optional<FixTrack::Motion> FixTrack::MotionAt(std::int64_t stamp_ns,
+                                                   Points::const_iterator end) const {
+  if (end == points_.begin()) return std::nullopt;
   std::vector<Sample> samples;  // By their distance in time from the moment, nearest first.
   const auto middle = std::lower_bound(
-      points_.begin(), points_.end(), stamp_ns,
+      points_.begin(), end, stamp_ns,
       [](const Point& point, std::int64_t moment_ns) { return point.stamp_ns < moment_ns; });
-  const LocalFrame frame((middle == points_.end() ? points_.back() : *middle).position);
+  const LocalFrame frame((middle == end ? *std::prev(end) : *middle).position);
   auto older = middle;
   auto newer = middle;
   while (true) {
@@ -190,7 +201,7 @@ std::optional<FixTrack::Motion> FixTrack::MotionAt(std::int64_t stamp_ns) const 
                                ? config_.course_window_s + 1
                                : Seconds(stamp_ns - std::prev(older)->stamp_ns);
     const double newer_s =
-        newer == points_.end() ? config_.course_window_s + 1 : Seconds(newer->stamp_ns - stamp_ns);
+        newer == end ? config_.course_window_s + 1 : Seconds(newer->stamp_ns - stamp_ns);
     if (std::min(older_s, newer_s) > config_.course_window_s) break;
     if (older_s <= newer_s) {
       --older;

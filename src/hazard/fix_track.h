@@ -86,7 +86,7 @@ class FixTrack {
   explicit FixTrack(const Config& config);
 
   Verdict Add(const Fix& fix);
-  /// Pose at a moment (ns, the fixes' clock).
+  /// Pose at a moment (ns, the fixes' clock). Once kReady, fixes that come later do not change it.
   Lookup At(std::int64_t stamp_ns) const;
   /// The newest accepted fix's moment; nothing before the first.
   std::optional<std::int64_t> newest_ns() const;
@@ -94,11 +94,6 @@ class FixTrack {
   std::optional<TrackPose> Newest() const;
 
  private:
-  struct Point {
-    std::int64_t stamp_ns;
-    GeoPoint position;
-    Eigen::Matrix2d covariance_m2;
-  };
   struct Motion {
     Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  // East, north.
     double variance = 0;                                     // Per axis, m^2/s^2.
@@ -112,6 +107,13 @@ class FixTrack {
     double course_rad;
     double variance_rad2;
   };
+  struct Point {
+    std::int64_t stamp_ns;
+    GeoPoint position;
+    Eigen::Matrix2d covariance_m2;
+    std::optional<Course> course;  // Of the last motion up to here: a standing vehicle keeps it.
+  };
+  using Points = std::deque<Point>;
 
   std::optional<Point> ToPoint(const Fix& fix) const;
   bool Reachable(const Point& from, const Point& to) const;
@@ -119,14 +121,15 @@ class FixTrack {
   void Append(const Point& point);
   TrackPose Interpolate(const Point& before, const Point& after, std::int64_t stamp_ns) const;
   TrackPose Extrapolate(const Point& last, const Motion& motion, std::int64_t stamp_ns) const;
-  std::optional<Motion> MotionAt(std::int64_t stamp_ns) const;
+  /// Motion at a moment by the fixes before `end`.
+  std::optional<Motion> MotionAt(std::int64_t stamp_ns, Points::const_iterator end) const;
+  std::optional<Course> StandingCourse(Points::const_iterator after) const;
   std::optional<Motion> BestLineFit(const std::vector<Sample>& samples) const;
   std::optional<Course> CourseOf(const Motion& motion) const;
 
   Config config_;
-  std::deque<Point> points_;           // Ascending stamps.
-  std::vector<Point> suspects_;        // Jumps that agree with each other.
-  std::optional<Course> last_course_;  // Of the last motion: stays true while the vehicle stands.
+  Points points_;                // Ascending stamps.
+  std::vector<Point> suspects_;  // Jumps that agree with each other.
 };
 
 }  // namespace livemap

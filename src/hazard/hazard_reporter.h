@@ -53,7 +53,7 @@ class HazardReporter {
     double max_range_m = 30.0;
     /// So does one whose place on the road is less certain than this, seen from the vehicle:
     /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m.
-    double max_ground_sigma_m = 2.5;
+    double max_ground_sigma_m = 1.0;
     /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
     double max_wait_s = 5.0;
     /// A frame whose position can only be carried on waits this long for a fix after it, s.

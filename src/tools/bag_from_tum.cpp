@@ -7,15 +7,23 @@
 namespace livemap {
 namespace {
 
+/// A bag has no time zero: a sequence that begins there is moved by one second.
+ros::Duration Start(const Sequence& sequence) {
+  bool from_zero = sequence.frames.front().stamp_ns <= 0;
+  for (const StampedPose& pose : sequence.poses) from_zero = from_zero || pose.stamp_ns <= 0;
+  return ros::Duration(from_zero ? 1 : 0);
+}
+
 int Run(int argc, char** argv) {
   CommandLine line(
       "livemap_bag_from_tum DIR OUT.bag",
       "Makes a bag of a TUM RGB-D folder: associations.txt (or rgb.txt), camera.yaml,\n"
-      "groundtruth.txt and the pictures they list. Stamps are the sequence's own.",
+      "groundtruth.txt and the pictures they list. Stamps are the sequence's own,\n"
+      "one second later where it begins at zero.",
       2, {});
   if (!line.Parse(argc, argv)) return 0;
   const Sequence sequence = ReadTumSequence(line.Positional(0));
-  WriteSequenceBag(sequence, line.Positional(1), ros::Duration(0));
+  WriteSequenceBag(sequence, line.Positional(1), Start(sequence));
   std::printf("%s: %zu frames, %zu poses\n", line.Positional(1).c_str(), sequence.frames.size(),
               sequence.poses.size());
   return 0;

@@ -7,6 +7,7 @@
 #include "simulation/vehicle_motion.h"
 #include "tools/command_line.h"
 #include "tools/simulate_change.h"
+#include "tools/simulate_room.h"
 #include "tools/simulation_flags.h"
 #include "tools/simulation_outputs.h"
 
@@ -70,6 +71,7 @@ int Run(int argc, char** argv) {
   std::vector<Flag> flags = Flags();
   for (const Flag& flag : SimulationBagFlags()) flags.push_back(flag);
   for (const Flag& flag : ChangeFlags()) flags.push_back(flag);
+  for (const Flag& flag : RoomFlags()) flags.push_back(flag);
   CommandLine line(
       "livemap_simulate [flags]",
       "Renders a drive through a generated street with the truth about everything in it.", 0,
@@ -78,6 +80,7 @@ int Run(int argc, char** argv) {
   KeepMemoryFlat();
   if (line.Has("change")) return SimulateChange(line);
   RefuseChangeFlags(line);
+  if (line.Has("room")) return SimulateRoom(line);
   const std::uint64_t seed = line.Seed("seed", 1);
   const Condition condition = ReadCondition(line, "condition", "day");
   const DrivingStyle style = ReadStyle(line);

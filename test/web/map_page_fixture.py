@@ -182,7 +182,12 @@ class MapPage(unittest.TestCase):
 
     def open_popup_of(self, hazard_id):
         self.click(f'#hazard-list button[data-hazard="{hazard_id}"]')
-        return self.wait_for(f'.popup[data-hazard="{hazard_id}"]')
+        self.wait_for_text(f'.popup[data-hazard="{hazard_id}"]', "")
+
+    def wait_for_text(self, selector, *parts):
+        # What still fades in has no text yet for the driver.
+        self.wait(lambda: (text := self.find(selector).text) and all(p in text for p in parts),
+                  f"{selector} does not show {parts}")
 
 
 def missing():

@@ -1,0 +1,96 @@
+// Visual odometry on 640x480 frames of the simulated room, one thread: a frame that is tracked, a
+// frame that becomes a keyframe, OpenCV's RgbdOdometry for the same pair, and the edges alone.
+#include <benchmark/benchmark.h>
+
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "edge_vo/canny.h"
+#include "edge_vo/edge_odometry.h"
+#include "simulation/room.h"
+#include "tools/vo_method.h"
+
+namespace livemap {
+namespace {
+
+constexpr int kFrames = 6;
+
+const CameraIntrinsics& Camera() {
+  static const CameraIntrinsics camera = SimulatedCamera().intrinsics;
+  return camera;
+}
+
+const std::vector<RgbdFrame>& Frames() {
+  static const std::vector<RgbdFrame> frames = [] {
+    cv::setNumThreads(1);
+    const SimulatedRoom room(1);
+    std::vector<RgbdFrame> made;
+    for (int i = 0; i < kFrames; ++i) {
+      const SimulatedFrame seen = room.Render(SimulatedCamera(), room.WorldFromOptical(i / 30.0, 1),
+                                              static_cast<std::uint32_t>(i), 1.3F, 1, 2);
+      RgbdFrame frame;
+      cv::cvtColor(seen.bgr, frame.grey, cv::COLOR_BGR2GRAY);
+      seen.depth.convertTo(frame.depth, CV_16U, 5000);
+      frame.depth_units_per_m = 5000;
+      made.push_back(frame);
+    }
+    return made;
+  }();
+  return frames;
+}
+
+/// Forwards and backwards through the frames, so that the motion stays that of a hand.
+void TrackFrames(benchmark::State& state, VoMethod& method) {
+  const std::vector<RgbdFrame>& frames = Frames();
+  std::int64_t stamp_ns = 0;
+  int at = 0, step = 1;
+  for (auto _ : state) {
+    RgbdFrame frame = frames[static_cast<std::size_t>(at)];
+    frame.stamp_ns = stamp_ns += 33'333'333;
+    benchmark::DoNotOptimize(method.Track(frame));
+    if (at + step < 0 || at + step >= kFrames) step = -step;
+    at += step;
+  }
+}
+
+void BM_TrackFrame(benchmark::State& state) {
+  EdgeOdometry::Config config;
+  config.keyframe_motion = 1;
+  TrackFrames(state, *MakeVoMethod("edge", config, Camera()));
+}
+
+void BM_TrackFrameThatBecomesAKeyframe(benchmark::State& state) {
+  EdgeOdometry::Config config;
+  config.keyframe_every = 1;
+  TrackFrames(state, *MakeVoMethod("edge", config, Camera()));
+}
+
+void BM_OpenCvRgbdOdometry(benchmark::State& state) {
+  TrackFrames(state, *MakeVoMethod("rgbd", {}, Camera()));
+}
+
+void BM_CannyDetector(benchmark::State& state) {
+  CannyDetector canny;
+  const cv::Mat& grey = Frames().front().grey;
+  for (auto _ : state) benchmark::DoNotOptimize(canny.ExtractAbove(grey, 40, 100).data);
+}
+
+void BM_OpenCvCanny(benchmark::State& state) {
+  const cv::Mat& grey = Frames().front().grey;
+  cv::Mat edges;
+  for (auto _ : state) {
+    cv::Canny(grey, edges, 40, 100);
+    benchmark::DoNotOptimize(edges.data);
+  }
+}
+
+BENCHMARK(BM_TrackFrame)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_TrackFrameThatBecomesAKeyframe)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_OpenCvRgbdOdometry)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_CannyDetector)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_OpenCvCanny)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace livemap
+
+BENCHMARK_MAIN();

@@ -1,0 +1,389 @@
+#include "edge_vo/edge_odometry.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kSecond = 1e-9;  // Per nanosecond.
+/// A motion is carried on only over a short pause, s.
+constexpr double kMaxPredictionS = 0.5;
+/// Below this reciprocal condition number the information matrix says nothing about some direction.
+constexpr double kLeastCondition = 1e-12;
+
+std::string SizeText(const cv::Mat& image) {
+  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
+}
+
+double Seconds(std::int64_t later_ns, std::int64_t earlier_ns) {
+  return static_cast<double>(later_ns - earlier_ns) * kSecond;
+}
+
+const CameraIntrinsics& Checked(const CameraIntrinsics& camera) {
+  const bool finite = std::isfinite(camera.fx) && std::isfinite(camera.fy) &&
+                      std::isfinite(camera.cx) && std::isfinite(camera.cy);
+  if (!finite || camera.fx <= 0 || camera.fy <= 0) {
+    throw Error("the camera has no usable calibration: focal lengths and principal point are fx " +
+                std::to_string(camera.fx) + ", fy " + std::to_string(camera.fy) + ", cx " +
+                std::to_string(camera.cx) + ", cy " + std::to_string(camera.cy));
+  }
+  if (camera.width < 32 || camera.height < 32 || camera.width > 8192 || camera.height > 8192) {
+    throw Error("the camera's image size is " + std::to_string(camera.width) + "x" +
+                std::to_string(camera.height) + "; accepted are 32x32 to 8192x8192");
+  }
+  return camera;
+}
+
+AlignmentConfig RotationOnly(AlignmentConfig config) {
+  config.rotation_only = true;
+  return config;
+}
+
+}  // namespace
+
+const char* VoStateName(VoState state) {
+  switch (state) {
+    case VoState::kInitialising:
+      return "initialising";
+    case VoState::kTracking:
+      return "tracking";
+    case VoState::kLost:
+      return "lost";
+  }
+  return "";
+}
+
+EdgeOdometry::EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics)
+    : config_(config),
+      extractor_(config.edges),
+      aligner_(config.alignment),
+      rotation_aligner_(RotationOnly(config.alignment)) {
+  cameras_[0] = Checked(intrinsics);
+  levels_ = CountLevels({intrinsics.width, intrinsics.height});
+  for (std::size_t level = 1; level < cameras_.size(); ++level) {
+    cameras_[level] = HalvedIntrinsics(cameras_[level - 1]);
+  }
+}
+
+EdgeOdometry::~EdgeOdometry() = default;
+
+void EdgeOdometry::Reset() {
+  for (auto& keyframe : keyframes_) spare_.push_back(std::move(keyframe));
+  keyframes_.clear();
+  keyframe_ = nullptr;
+  last_ = {};
+  last_stamp_ns_.reset();
+  light_ = {};
+}
+
+void EdgeOdometry::Check(const RgbdFrame& frame) const {
+  const cv::Size wanted(cameras_[0].width, cameras_[0].height);
+  if (frame.grey.type() != CV_8UC1 || frame.grey.size() != wanted) {
+    throw Error("an image of " + SizeText(frame.grey) + " came for a camera of " +
+                std::to_string(wanted.width) + "x" + std::to_string(wanted.height) +
+                "; 8-bit grey images of that size are accepted");
+  }
+  if (!frame.depth.empty()) {
+    if (frame.depth.size() != wanted) {
+      throw Error("a depth image of " + SizeText(frame.depth) + " came with an image of " +
+                  SizeText(frame.grey) + "; both must have one size");
+    }
+    if (frame.depth.type() != CV_16UC1 && frame.depth.type() != CV_32FC1) {
+      throw Error("a depth image has OpenCV type " + std::to_string(frame.depth.type()) +
+                  "; accepted are 16UC1 and 32FC1");
+    }
+    if (!(frame.depth_units_per_m > 0) || !std::isfinite(frame.depth_units_per_m)) {
+      throw Error("the depth's units per metre are " + std::to_string(frame.depth_units_per_m) +
+                  "; a positive number is accepted");
+    }
+  }
+  if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
+    throw Error("a frame's stamp of " + std::to_string(frame.stamp_ns) +
+                " ns is not later than the last one's, " + std::to_string(*last_stamp_ns_) + " ns");
+  }
+}
+
+VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
+  Check(frame);
+  frame_images_.Build(frame.grey);
+  VoResult result;
+  if (keyframe_ == nullptr) {
+    result = last_;
+    result.state = VoState::kInitialising;
+    if (MakeKeyframe(frame, result)) result.state = VoState::kTracking;
+  } else {
+    Attempt attempt = last_.state == VoState::kLost ? FindBack() : Follow(frame.stamp_ns);
+    if (!attempt.good && last_.state != VoState::kLost) attempt = FindBack();
+    result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
+    const bool gives_up = result.state == VoState::kLost &&
+                          Seconds(frame.stamp_ns, tracked_stamp_ns_) >= config_.give_up_s;
+    if (gives_up || (attempt.good && WantsKeyframe(attempt.fine, result.world_from_camera))) {
+      result.new_keyframe = MakeKeyframe(frame, result);
+      if (gives_up && result.new_keyframe) result.state = VoState::kTracking;
+    }
+  }
+  if (result.state == VoState::kTracking) tracked_stamp_ns_ = frame.stamp_ns;
+  last_stamp_ns_ = frame.stamp_ns;
+  last_ = result;
+  return result;
+}
+
+/// Makes the current frame the one that later frames are aligned with; false, and nothing changed,
+/// when it has no depth or too few edges.
+bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const VoResult& result) {
+  if (frame.depth.empty()) return false;
+  if (keyframes_.empty() && spare_.empty()) ReserveBuffers();
+  std::unique_ptr<Keyframe> fresh = std::move(spare_.back());
+  spare_.pop_back();
+  fresh->stamp_ns = frame.stamp_ns;
+  fresh->world_from_camera = result.world_from_camera;
+  fresh->covariance = result.covariance;
+  fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, levels_);
+  std::swap(fresh->images, frame_images_);
+  if (!SelectPoints(*fresh)) {
+    std::swap(fresh->images, frame_images_);
+    spare_.push_back(std::move(fresh));
+    return false;
+  }
+  ForgetNearOnes();
+  keyframes_.push_back(std::move(fresh));
+  keyframe_ = keyframes_.back().get();
+  keyframe_first_sigma_ = 0;
+  frames_since_keyframe_ = 0;
+  light_ = {};
+  return true;
+}
+
+/// All memory of the frames to come, at the first one: later frames allocate nothing.
+void EdgeOdometry::ReserveBuffers() {
+  const auto kept = static_cast<std::size_t>(std::max(2, config_.keyframes_kept));
+  keyframes_.reserve(kept);
+  spare_.reserve(kept + 1);
+  const cv::Size size = frame_images_[0].size();
+  const cv::Mat empty_depth = cv::Mat::zeros(size, CV_32FC1);
+  const std::size_t thumbnail = frame_images_.thumbnail().total();
+  while (spare_.size() < kept + 1) {
+    spare_.push_back(std::make_unique<Keyframe>());
+    Keyframe& keyframe = *spare_.back();
+    keyframe.images.Build(frame_images_[0]);
+    keyframe.depths.Build(empty_depth, 1, config_.depth_range, levels_);
+    for (std::size_t level = 0; level < kMaxLevels; ++level) {
+      keyframe.points[level].Reserve(static_cast<std::size_t>(config_.max_points[level]));
+    }
+    keyframe.thumbnail_points.Reserve(thumbnail);
+  }
+  const std::size_t most =
+      std::max(thumbnail, static_cast<std::size_t>(*std::max_element(config_.max_points.begin(),
+                                                                     config_.max_points.end())));
+  masked_points_.Reserve(most);
+  selector_.Reserve(frame_images_[0].total());
+  extractor_.Reserve(size);
+  aligner_.Reserve(most);
+  rotation_aligner_.Reserve(most);
+}
+
+/// Makes room for a new keyframe: the newest goes when it is close to the one before it, else the
+/// oldest once there are too many.
+void EdgeOdometry::ForgetNearOnes() {
+  const std::size_t count = keyframes_.size();
+  auto leaving = keyframes_.end();
+  if (count >= 2 && MotionFrom(*keyframes_[count - 2], keyframes_[count - 1]->world_from_camera) <
+                        config_.kept_motion) {
+    leaving = std::prev(keyframes_.end());
+  } else if (count >= static_cast<std::size_t>(std::max(2, config_.keyframes_kept))) {
+    leaving = keyframes_.begin();
+  }
+  if (leaving == keyframes_.end()) return;
+  spare_.push_back(std::move(*leaving));
+  keyframes_.erase(leaving);
+}
+
+bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
+  for (int level = 0; level < levels_; ++level) {
+    const auto index = static_cast<std::size_t>(level);
+    PointSelection selection = config_.points;
+    selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
+    const cv::Mat& grey = keyframe.images[level];
+    selector_.Select(grey, keyframe.depths[level], extractor_.Extract(grey), cameras_[index],
+                     selection, keyframe.points[index]);
+  }
+  selector_.SelectAll(keyframe.images.thumbnail(), cameras_[static_cast<std::size_t>(levels_)],
+                      keyframe.thumbnail_points);
+  return keyframe.points[0].size() >= static_cast<std::size_t>(config_.least_points);
+}
+
+const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
+  const auto index = static_cast<std::size_t>(level);
+  if (config_.edge_source == EdgeSource::kKeyframe) return keyframe.points[index];
+  PointSelection selection = config_.points;
+  selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
+  selector_.Select(keyframe.images[level], keyframe.depths[level],
+                   extractor_.Extract(frame_images_[level]), cameras_[index], selection,
+                   masked_points_);
+  return masked_points_;
+}
+
+AlignmentState EdgeOdometry::BestStart(const EdgePoints& points, int level,
+                                       const Guesses& guesses) {
+  AlignmentState best = light_;
+  best.new_from_reference = *guesses.begin();
+  if (guesses.count == 1) return best;
+  double least_cost = std::numeric_limits<double>::infinity();
+  for (const Eigen::Isometry3d& guess : guesses) {
+    AlignmentState state = light_;
+    state.new_from_reference = guess;
+    const double cost =
+        aligner_.CostAt(points, frame_images_[level], cameras_[static_cast<std::size_t>(level)],
+                        state, config_.lost_sigma / 2);
+    if (cost >= least_cost) continue;
+    least_cost = cost;
+    best = state;
+  }
+  return best;
+}
+
+/// Coarse to fine from the best of the guesses.
+EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses& guesses) {
+  Attempt attempt;
+  attempt.keyframe = &keyframe;
+  AlignmentState state;
+  for (int level = levels_ - 1; level >= 0; --level) {
+    const EdgePoints& points = PointsOf(keyframe, level);
+    if (level == levels_ - 1) state = BestStart(points, level, guesses);
+    attempt.fine = aligner_.Align(points, frame_images_[level],
+                                  cameras_[static_cast<std::size_t>(level)], state);
+    state = attempt.fine.state;
+    attempt.iterations += attempt.fine.iterations;
+  }
+  attempt.good = IsGood(attempt.fine);
+  return attempt;
+}
+
+EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
+  // Equation (5.7): the motion goes on as it was; or the camera stands.
+  Guesses guesses;
+  const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
+  const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
+  if (last_.twist && step_s <= kMaxPredictionS) {
+    const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
+    guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
+  }
+  guesses.Add(world_from_last.inverse() * keyframe_->world_from_camera);
+  return TrackFrom(*keyframe_, guesses);
+}
+
+/// The rotation that brings the keyframe's thumbnail nearest to the current one's, with the
+/// translation of `from`.
+Eigen::Isometry3d EdgeOdometry::RotationGuess(Keyframe& keyframe, const Eigen::Isometry3d& from) {
+  AlignmentState state;
+  state.new_from_reference.linear() = from.linear();
+  const AlignmentResult turned =
+      rotation_aligner_.Align(keyframe.thumbnail_points, frame_images_.thumbnail(),
+                              cameras_[static_cast<std::size_t>(levels_)], state);
+  Eigen::Isometry3d guess = turned.state.new_from_reference;
+  guess.translation() = from.translation();
+  return guess;
+}
+
+/// Searches the motion anew: from the thumbnails' rotation, with the newest keyframes first.
+EdgeOdometry::Attempt EdgeOdometry::FindBack() {
+  Attempt best;
+  for (auto candidate = keyframes_.rbegin(); candidate != keyframes_.rend(); ++candidate) {
+    Keyframe& keyframe = **candidate;
+    const Eigen::Isometry3d held = last_.world_from_camera.inverse() * keyframe.world_from_camera;
+    const Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
+    light_ = {};
+    Guesses guesses;
+    for (const auto& guess :
+         {RotationGuess(keyframe, held), held, standing, RotationGuess(keyframe, standing)}) {
+      guesses.Add(guess);
+    }
+    const Attempt attempt = TrackFrom(keyframe, guesses);
+    if (attempt.good && (!best.good || attempt.fine.cost < best.fine.cost)) best = attempt;
+    // The newest that fits is the nearest in time; older ones only when it does not.
+    if (best.good) break;
+  }
+  return best;
+}
+
+bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
+  // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
+  const Eigen::LLT<Matrix6d> determined(result.information);
+  return std::isfinite(result.cost) && result.state.new_from_reference.matrix().allFinite() &&
+         determined.info() == Eigen::Success && determined.rcond() > kLeastCondition &&
+         result.visible >= static_cast<std::size_t>(config_.least_points) &&
+         result.Overlap() >= config_.least_overlap && result.sigma <= config_.lost_sigma &&
+         result.state.gain > 0.3 && result.state.gain < 3;
+}
+
+bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
+                                 const Eigen::Isometry3d& world_from_camera) {
+  ++frames_since_keyframe_;
+  if (keyframe_first_sigma_ == 0) keyframe_first_sigma_ = result.sigma;
+  if (config_.keyframe_every > 0 && frames_since_keyframe_ >= config_.keyframe_every) return true;
+  return MotionFrom(*keyframe_, world_from_camera) > config_.keyframe_motion ||
+         result.Overlap() < config_.keyframe_overlap ||
+         result.sigma > config_.keyframe_sigma_ratio * keyframe_first_sigma_;
+}
+
+/// How far the keyframe's points moved over the image on average, if they all were in the middle of
+/// it: share of its width.
+double EdgeOdometry::MotionFrom(const Keyframe& keyframe,
+                                const Eigen::Isometry3d& world_from_camera) const {
+  const Vector6d twist = Se3Log(world_from_camera.inverse() * keyframe.world_from_camera);
+  return cameras_[0].fx / cameras_[0].width *
+         (twist.head<3>().norm() * keyframe.points[0].mean_inverse_depth + twist.tail<3>().norm());
+}
+
+VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
+  keyframe_ = attempt.keyframe;
+  const AlignmentResult& fine = attempt.fine;
+  light_.gain = fine.state.gain;
+  light_.bias = fine.state.bias;
+  VoResult result;
+  result.state = VoState::kTracking;
+  const Eigen::Isometry3d reference_from_new = fine.state.new_from_reference.inverse();
+  result.world_from_camera = Renormalised(keyframe_->world_from_camera * reference_from_new);
+  // new_from_reference Exp(d) turned around is Exp(-d) reference_from_new: carried to the
+  // right-hand side of the new pose by the adjoint.
+  const Matrix6d relative = config_.covariance_factor * fine.sigma * fine.sigma *
+                            fine.information.ldlt().solve(Matrix6d::Identity());
+  const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);
+  result.covariance = to_new * (keyframe_->covariance + relative) * to_new.transpose();
+  result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
+  const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
+  if (last_.state == VoState::kTracking) {
+    result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
+  }
+  result.keyframe_stamp_ns = keyframe_->stamp_ns;
+  result.points = fine.points;
+  result.inliers = fine.inliers;
+  result.sigma = fine.sigma;
+  result.overlap = fine.Overlap();
+  result.iterations = attempt.iterations;
+  return result;
+}
+
+VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
+  VoResult result = last_;
+  result.state = VoState::kLost;
+  result.twist.reset();
+  result.twist_covariance.setZero();
+  result.new_keyframe = false;
+  const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
+  const double lost_s = Seconds(stamp_ns, tracked_stamp_ns_);
+  // The error grows with the time lost: the variance by the difference of the squares.
+  const double growth = lost_s * lost_s - (lost_s - step_s) * (lost_s - step_s);
+  result.covariance.diagonal().head<3>().array() +=
+      growth * config_.lost_speed_mps * config_.lost_speed_mps;
+  result.covariance.diagonal().tail<3>().array() +=
+      growth * config_.lost_turn_rps * config_.lost_turn_rps;
+  return result;
+}
+
+}  // namespace livemap

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "geo/ground_projection.h"
+
+namespace livemap {
+
+/// The pixels of a reference image that take part in an alignment: one array per quantity, because
+/// the alignment's loops run over many points and few quantities.
+struct EdgePoints {
+  /// Position in the reference's optical frame, m.
+  std::vector<float> x, y, z;
+  /// Grey value of the reference there, 0..255.
+  std::vector<float> intensity;
+  /// Derivative of the reference's grey value by the twist delta of a motion Exp(delta) of the
+  /// point: translation (per m), then rotation (per rad). Equation (6) of docs/odometry.md.
+  std::array<std::vector<float>, 6> jacobian;
+  double mean_inverse_depth = 0;  ///< 1/m
+
+  std::size_t size() const { return x.size(); }
+  void Clear();
+  void Reserve(std::size_t count);
+  void Add(float u, float v, float depth_m, float grey, float gradient_x, float gradient_y,
+           const CameraIntrinsics& camera);
+  /// Means over all points; called once they are complete.
+  void Finish();
+};
+
+/// What makes a pixel under an edge mask a point.
+struct PointSelection {
+  std::size_t max_points = 6000;  ///< More than these are thinned evenly.
+  float least_gradient = 2.0F;    ///< Grey levels per px; less says nothing about motion.
+  /// A pixel whose 5x5 neighbourhood holds a depth nearer than its own by this factor lies behind
+  /// an occluding edge: its depth is not the edge's.
+  float occlusion_ratio = 1.08F;
+};
+
+/// Gathers points under an edge mask; keeps its list of pixels from call to call.
+class PointSelector {
+ public:
+  /// Memory for masks with so many pixels set.
+  void Reserve(std::size_t pixels) { candidates_.reserve(pixels); }
+  /// Points of the reference image `grey` with `depth_m` (0 unknown) under `edges`, same sizes.
+  void Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv::Mat& edges,
+              const CameraIntrinsics& camera, const PointSelection& selection, EdgePoints& points);
+  /// Every pixel, as if at one metre: for rotations, which depth does not matter to.
+  void SelectAll(const cv::Mat& grey, const CameraIntrinsics& camera, EdgePoints& points);
+
+ private:
+  struct Pixel {
+    std::int16_t x, y;
+  };
+  std::vector<Pixel> candidates_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,61 @@
+#include "tools/simulate_room.h"
+
+#include <cmath>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+
+#include "base/error.h"
+#include "simulation/dataset.h"
+#include "simulation/room.h"
+#include "tools/simulation_setup.h"
+
+namespace livemap {
+namespace {
+
+constexpr int kPreviewPictures = 12;
+constexpr float kGain = 1.3F;
+
+}  // namespace
+
+std::vector<Flag> RoomFlags() {
+  return {{"room", "", "instead of a street: a hand-held camera in a furnished room, for --tum"},
+          {"vigour", "X", "of --room's hand; 1 is calm, about 0.15 m/s and 8 deg/s (1)"},
+          {"flicker", "X", "of --room's light: gain swings by this share, once a second (0)"}};
+}
+
+int SimulateRoom(const CommandLine& line) {
+  const double rate_hz = line.Number("rate", 30, 0.1, 100);
+  const double vigour = line.Number("vigour", 1, 0, 20);
+  const double flicker = line.Number("flicker", 0, 0, 0.9);
+  const int rays = line.Has("one-ray") ? 1 : 2;
+  const auto threads = static_cast<int>(line.Number("threads", 2, 1, 64));
+  const auto frames = static_cast<int>(line.Number("seconds", 5, 0.1, 600) * rate_hz);
+  const SimulationSetup setup = ReadSimulationSetup(line);
+  const SimulatedRoom room(line.Seed("seed", 1));
+  if (!line.Has("tum")) throw Error("--room needs --tum DIR, where the sequence goes");
+  TumWriter writer(line.Text("tum", ""), setup.camera,
+                   line.Number("depth-scale", kTumDepthScale, 100, 10000));
+  std::vector<cv::Mat> pictures;
+  Progress progress("frame", static_cast<std::size_t>(frames));
+  for (int i = 0; i < frames; ++i) {
+    const double time_s = i / rate_hz;
+    const auto gain = static_cast<float>(kGain * (1 + flicker * std::sin(2 * M_PI * time_s)));
+    SimulatedFrame frame = room.Render(setup.camera, room.WorldFromOptical(time_s, vigour),
+                                       static_cast<std::uint32_t>(i), gain, rays, threads);
+    frame.depth = SenseDepth(frame.depth, setup.camera.intrinsics, setup.depth, setup.baseline_m,
+                             static_cast<std::uint32_t>(i));
+    if (i * kPreviewPictures / frames != (i - 1) * kPreviewPictures / frames || i == 0) {
+      pictures.push_back(frame.bgr.clone());
+    }
+    writer.Add(time_s, frame);
+    progress.At(static_cast<std::size_t>(i) + 1);
+  }
+  writer.Finish();
+  if (line.Has("preview") && !cv::imwrite(line.Text("preview", ""), ContactSheet(pictures, 4))) {
+    throw Error("the contact sheet '" + line.Text("preview", "") + "' cannot be written");
+  }
+  std::printf("%d frames\n", frames);
+  return 0;
+}
+
+}  // namespace livemap

@@ -1,0 +1,103 @@
+#!/usr/bin/python3
+"""livemap_evaluate_vo as a person meets it: on a simulated room, and on real sequences where there are any.
+
+    evaluate_vo_test.py EVALUATE_VO SIMULATE
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SIMULATE = sys.argv.pop()
+PROGRAM = sys.argv.pop()
+SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
+DATA = os.environ.get("LIVEMAP_DATA_DIR", os.path.join(SOURCE, "..", "shared", "data"))
+
+
+def run(*arguments):
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False)
+
+
+class EvaluateVoTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.room = os.path.join(cls.temporary.name, "room")
+        subprocess.run([SIMULATE, "--room", "--tum", cls.room, "--seconds", "2", "--rate", "15", "--size",
+                        "320x240", "--seed", "4"], check=True, capture_output=True, timeout=600)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def figures(self, *arguments):
+        done = run("--json", *arguments)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stdout.count("\n"), 1)
+        return json.loads(done.stdout)
+
+    def refused(self, *arguments):
+        done = run(*arguments)
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(done.stderr.strip().count("\n"), 0, "one sentence")
+        return done.stderr
+
+    def test_a_calm_hand_is_followed_within_millimetres_by_every_kind_of_edges(self):
+        for edges in ("canny", "log", "sobel"):
+            for source in ("keyframe", "new-image"):
+                figures = self.figures(self.room, "--edges", edges, "--edge-source", source)
+                self.assertEqual((figures["frames"], figures["lost"]), (30, 0), edges)
+                self.assertLess(figures["ate_rmse_m"], 0.004, f"{edges} {source}")
+                self.assertLess(figures["rpe_rmse_m_per_s"], 0.006, f"{edges} {source}")
+
+    def test_every_frame_can_be_a_keyframe_and_frames_can_be_left_out(self):
+        self.assertEqual(self.figures(self.room, "--keyframe-every", "1")["keyframes"], 29)
+        figures = self.figures(self.room, "--step", "3")
+        self.assertEqual((figures["frames"], figures["lost"]), (10, 0))
+
+    def test_opencvs_methods_run_beside_ours(self):
+        for method in ("rgbd", "rgbd-icp"):
+            figures = self.figures(self.room, "--method", method)
+            self.assertEqual((figures["method"], figures["frames"]), (method, 30))
+            self.assertLess(figures["ate_rmse_m"], 0.2)
+
+    def test_the_trajectory_is_written_with_the_pictures_stamps(self):
+        out = os.path.join(self.temporary.name, "out.txt")
+        self.figures(self.room, "--out", out)
+        with open(out, encoding="ascii") as file:
+            rows = [line.split() for line in file if not line.startswith("#")]
+        self.assertEqual(len(rows), 30)
+        self.assertEqual(rows[1][0], "0.066667000")
+        self.assertEqual([float(value) for value in rows[0][1:]], [0, 0, 0, 0, 0, 0, 1])
+
+    def test_without_truth_its_figures_are_null(self):
+        os.rename(os.path.join(self.room, "groundtruth.txt"), os.path.join(self.room, "away"))
+        try:
+            figures = self.figures(self.room)
+        finally:
+            os.rename(os.path.join(self.room, "away"), os.path.join(self.room, "groundtruth.txt"))
+        self.assertIsNone(figures["ate_rmse_m"])
+        self.assertGreater(figures["median_ms"], 0)
+
+    def test_mistakes_are_refused_in_one_sentence(self):
+        self.assertIn("/nowhere", self.refused("/nowhere"))
+        self.assertIn("canny, log, sobel", self.refused(self.room, "--edges", "prewitt"))
+        self.assertIn("edge, rgbd, rgbd-icp", self.refused(self.room, "--method", "orb"))
+        self.assertIn("structured_model", self.refused(self.room, "--edges", "structured"))
+
+    def test_real_sequences_are_followed_within_the_bars(self):
+        bars = {"seven_scenes_a": (0.024, 0.039), "realsense_sample": (0.030, 0.030)}
+        if not os.path.isdir(os.path.join(DATA, "rgbd")):
+            self.skipTest("skipped, no data")
+        for name, (ate_m, rpe_mps) in bars.items():
+            figures = self.figures(os.path.join(DATA, "rgbd", name))
+            self.assertEqual(figures["lost"], 0, name)
+            self.assertLessEqual(figures["ate_rmse_m"], ate_m, name)
+            self.assertLessEqual(figures["rpe_rmse_m_per_s"], rpe_mps, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
