@@ -17,14 +17,19 @@ import cv2
 import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import CLASSES, data, inference
-from detector.augment import SETTLING, Augmenter, Recipe
+from detector import CLASSES, data
+from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
 from detector.network import Detector
+from detector.pretrained import ConversionError, load_backbone
 from detector.training import (
-    AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
+    VIEWS, AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
 )
 from detector.validation import torch_runner, validate
+
+
+CALIBRATION_SAMPLES = 64
+"""On so many the normalisation of a pretrained backbone is measured."""
 
 
 class UsageError(Exception):
@@ -39,6 +44,9 @@ class Trainer:
         self.settings, self.device = settings, device
         self.model = Detector(len(CLASSES)).to(device, memory_format=torch.channels_last)
         self.average = AveragedModel(self.model)
+        self.frozen = [self.model.backbone.stem] if settings.freeze else []
+        for part in self.frozen:
+            part.requires_grad_(False)
         self.optimizer = make_optimizer(self.model, settings)
         self.epoch = 0
         self.best_ap = 0.0
@@ -71,6 +79,8 @@ class Trainer:
         Where that run knew the first of our classes only, the others' outputs begin untrained.
         """
         weights = self.model.state_dict()
+        if set(weights) != set(state["average"]):
+            raise UsageError("--start-from: the checkpoint is of another network.")
         for name, value in state["average"].items():
             if value.shape != weights[name].shape:  # outputs per class
                 value = torch.cat([value, weights[name][len(value) :]])
@@ -78,24 +88,33 @@ class Trainer:
         self.model.load_state_dict(weights)
         self.average = AveragedModel(self.model)
 
+    def start_from_backbone(self, path: Path, pictures: dict) -> None:
+        """Begin with the backbone of another network, its normalisation calibrated on our samples."""
+        views = VIEWS["crops"]
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height)
+        samples = EpochSamples(augmenter, self.settings.seed, 0, CALIBRATION_SAMPLES)
+        images, targets = next(iter(batches(samples, CALIBRATION_SAMPLES, 0)))
+        load_backbone(self.model.backbone, path, to_device(images, targets, self.device)[0])
+        self.average = AveragedModel(self.model)
+
     def train_epoch(self, pictures: dict, workers: int) -> dict:
         """One pass over freshly drawn samples; returns mean losses."""
         settings = self.settings
         # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
         torch.manual_seed(settings.seed * 100003 + self.epoch)
-        settling = self.epoch >= settings.settling_from()
-        # Whole frames have twice the pixels of a training view: half the batch keeps steps equally dear.
-        width, height = (inference.INPUT_WIDTH, inference.INPUT_HEIGHT) if settling else (settings.width, settings.height)
-        batch, count = (settings.batch // 2, settings.samples_per_epoch // 2) if settling else (settings.batch, settings.samples_per_epoch)
-        augmenter = Augmenter(pictures, SETTLING if settling else Recipe(), width, height)
+        views = settings.views_of(self.epoch)
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height)
+        batch, count = round(settings.batch * views.share), round(settings.samples_per_epoch * views.share)
         loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
-        loss_of = TaskAlignedLoss(height, width, self.device)
+        loss_of = TaskAlignedLoss(views.height, views.width, self.device)
         sums = torch.zeros(2)
         self.model.train()
+        for part in self.frozen:
+            part.eval()  # their normalisation does not follow the batches either
         for step, (images, targets) in enumerate(loader):
             progress = (self.epoch + step / len(loader)) / settings.epochs
             for group in self.optimizer.param_groups:
-                group["lr"] = settings.learning_rate * learning_rate_factor(progress)
+                group["lr"] = settings.learning_rate * learning_rate_factor(progress) * group["multiple"]
             images, targets = to_device(images, targets, self.device)
             with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=settings.precision == "bf16"):
                 raw = self.model(images)
@@ -130,6 +149,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
     parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with")
+    parser.add_argument("--pretrained", type=Path, metavar="BACKBONE", help="file of training/convert_backbone.py to begin with")
     parser.add_argument("--workers", type=int, default=1, help="processes that prepare samples")
     parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
     parser.add_argument("--validate-every", type=int, default=10, metavar="EPOCHS")
@@ -137,7 +157,12 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     for name in ("seed", "epochs", "samples_per_epoch", "batch"):
         parser.add_argument("--" + name.replace("_", "-"), type=int, default=defaults[name])
     parser.add_argument("--learning-rate", type=float, default=defaults["learning_rate"])
+    parser.add_argument(
+        "--backbone-rate", type=float, default=defaults["backbone_rate"], help="multiple of the learning rate for the backbone"
+    )
     parser.add_argument("--settle", type=float, default=defaults["settle"], help="last fraction of the epochs: whole frames")
+    parser.add_argument("--views", choices=tuple(VIEWS), default=defaults["views"], help="what epochs before the last show")
+    parser.add_argument("--freeze", action="store_true", help="leave the first convolution as it begins")
     parser.add_argument("--precision", choices=("bf16", "fp32"), default=defaults["precision"])
     return parser.parse_args(arguments)
 
@@ -151,6 +176,10 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--batch must be from 2 to --samples-per-epoch, not {arguments.batch}.")
     if arguments.seed < 0 or arguments.workers < 0 or not arguments.learning_rate > 0:
         raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
+    if not 0 <= arguments.backbone_rate <= 10:
+        raise UsageError(f"--backbone-rate must be from 0 to 10, not {arguments.backbone_rate}.")
+    if arguments.pretrained and arguments.start_from:
+        raise UsageError("--pretrained and --start-from exclude each other.")
     if not 0 <= arguments.settle <= 1:
         raise UsageError(f"--settle must be from 0 to 1, not {arguments.settle}.")
     known = {field.name for field in fields(Settings)}
@@ -180,6 +209,8 @@ def run(arguments: argparse.Namespace) -> None:
     pictures = data.read_training_pictures(arguments.data)
     if arguments.simulated:
         pictures["simulated"] = data.read_simulated(arguments.simulated)
+    if arguments.pretrained and not last.exists():
+        trainer.start_from_backbone(arguments.pretrained, pictures)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -201,7 +232,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 trained, 2 the command line or the data is wrong."""
     try:
         run(parse_arguments(arguments))
-    except (UsageError, data.DataError) as error:
+    except (UsageError, ConversionError, data.DataError) as error:
         print(f"train_detector: {error}", file=sys.stderr)
         return 2
     return 0

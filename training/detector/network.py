@@ -1,7 +1,8 @@
-"""The network: a residual backbone, a top-down feature pyramid and one decoupled head per stride.
+"""The network: a backbone, a top-down feature pyramid and one decoupled head per stride.
 
-Dense 3x3 convolutions and ReLU only: they are what matrix units (AMX, tensor cores) and OpenCV 4.6
-run fastest, and nothing in the graph needs more than ONNX opset 11.
+The backbone is that of NanoDet-g (CustomCspNet) up to stride 16, so that its weights, trained on COCO, can be
+loaded (pretrained.py). Dense 3x3 convolutions nearly everywhere: they are what matrix units (AMX, tensor cores)
+and OpenCV 4.6 run fastest, and nothing in the graph needs more than ONNX opset 11.
 """
 
 import math
@@ -21,39 +22,62 @@ PRIOR_PROBABILITY = 0.01
 DROPPED_CHANNELS = 0.1
 """Fraction of feature channels that training hides from a head (SpatialDropout, Tompson et al. 2015)."""
 
+LEAK = 0.1
+"""Slope of the backbone's ReLU below zero, as its pretrained weights expect it."""
+
 PRIOR_BOX = (0.5, 0.5, 1.6, 1.1)
 """Raw (tx, ty, tw, th) of every anchor point before training: its cell's centre, 5 by 3 cells."""
 
 
 @dataclass(frozen=True)
 class Widths:
-    """Channels of each part; the defaults give about 1.1 M parameters."""
+    """Channels of each part; the defaults give about 1.2 M parameters."""
 
-    stem: int = 16
-    backbone: Tuple[int, int, int] = (32, 64, 128)  # at strides 4, 8, 16
-    pyramid: Tuple[int, int, int] = (32, 64, 64)  # at strides 4, 8, 16
+    stem: int = 32  # twice as many at each stride from 4 on: 64, 128, 256
+    pyramid: Tuple[int, int, int] = (32, 64, 96)  # at strides 4, 8, 16
+
+    @property
+    def backbone(self) -> Tuple[int, int, int]:
+        """Channels that the backbone gives at strides 4, 8 and 16."""
+        return 2 * self.stem, 4 * self.stem, 8 * self.stem
 
 
 class ConvBlock(nn.Sequential):
-    """Convolution, batch normalisation, ReLU."""
+    """Convolution, batch normalisation, ReLU (leaky, where a slope is given)."""
 
-    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1):
+    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1, slope: float = 0.0):
         super().__init__(
             nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, bias=False),
             nn.BatchNorm2d(channels_out, momentum=0.03),
-            nn.ReLU(inplace=True),
+            nn.LeakyReLU(slope, inplace=True) if slope else nn.ReLU(inplace=True),
         )
 
 
-class ResidualBlock(nn.Module):
-    """Two 3x3 convolutions around an identity path."""
+class PairBlock(nn.Module):
+    """Two 3x3 convolutions of half the channels each, the second upon the first, side by side."""
 
     def __init__(self, channels: int):
         super().__init__()
-        self.body = nn.Sequential(ConvBlock(channels, channels), ConvBlock(channels, channels))
+        self.first = ConvBlock(channels, channels // 2, slope=LEAK)
+        self.second = ConvBlock(channels // 2, channels // 2, slope=LEAK)
 
     def forward(self, features: Tensor) -> Tensor:
-        return features + self.body(features)
+        first = self.first(features)
+        return torch.cat([self.second(first), first], dim=1)
+
+
+class CspStage(nn.Module):
+    """A cross-stage partial network (Wang et al. 2019) as NanoDet-g has it; doubles the channels."""
+
+    def __init__(self, channels: int, pairs: int, stride: int):
+        super().__init__()
+        self.enter = ConvBlock(channels, channels, stride=stride, slope=LEAK)
+        self.pairs = nn.Sequential(*(PairBlock(channels) for _ in range(pairs)))
+        self.leave = ConvBlock(channels, channels, slope=LEAK)
+
+    def forward(self, features: Tensor) -> Tensor:
+        entered = self.enter(features)
+        return torch.cat([self.leave(self.pairs(entered)), entered], dim=1)
 
 
 class PooledContext(nn.Module):
@@ -77,17 +101,16 @@ class Backbone(nn.Module):
 
     def __init__(self, widths: Widths):
         super().__init__()
-        fine, middle, coarse = widths.backbone
-        self.stride4 = nn.Sequential(
-            ConvBlock(3, widths.stem, stride=2), ConvBlock(widths.stem, fine, stride=2), ResidualBlock(fine)
+        fine, middle, _ = widths.backbone
+        self.stem = nn.Sequential(
+            ConvBlock(3, widths.stem, stride=2, slope=LEAK), nn.MaxPool2d(3, stride=2, padding=1)
         )
-        self.stride8 = nn.Sequential(ConvBlock(fine, middle, stride=2), ResidualBlock(middle), ResidualBlock(middle))
-        self.stride16 = nn.Sequential(
-            ConvBlock(middle, coarse, stride=2), ResidualBlock(coarse), ResidualBlock(coarse), PooledContext(coarse)
-        )
+        self.stride4 = CspStage(widths.stem, pairs=1, stride=1)
+        self.stride8 = CspStage(fine, pairs=2, stride=2)
+        self.stride16 = CspStage(middle, pairs=2, stride=2)
 
     def forward(self, images: Tensor) -> List[Tensor]:
-        fine = self.stride4(images)
+        fine = self.stride4(self.stem(images))
         middle = self.stride8(fine)
         return [fine, middle, self.stride16(middle)]
 
@@ -98,7 +121,7 @@ class Pyramid(nn.Module):
     def __init__(self, widths: Widths):
         super().__init__()
         backbone, pyramid = widths.backbone, widths.pyramid
-        self.coarse = ConvBlock(backbone[2], pyramid[2], kernel=1)
+        self.coarse = nn.Sequential(PooledContext(backbone[2]), ConvBlock(backbone[2], pyramid[2], kernel=1))
         self.middle_in = ConvBlock(backbone[1] + pyramid[2], pyramid[1], kernel=1)
         self.middle = ConvBlock(pyramid[1], pyramid[1])
         self.fine_in = ConvBlock(backbone[0] + pyramid[1], pyramid[0], kernel=1)

@@ -12,9 +12,11 @@ import torch
 from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 
-from .augment import Augmenter, Sample
+from . import inference
+from .augment import FRAMES, LIGHT, SETTLING, Augmenter, Recipe, Sample
 from .inference import MEAN, STD
 from .loss import Target
+from .network import Detector
 
 
 @dataclass(frozen=True)
@@ -25,16 +27,35 @@ class Settings:
     epochs: int = 120
     samples_per_epoch: int = 960
     batch: int = 16
-    width: int = 416  # pixels of a training view
-    height: int = 320
+    views: str = "crops"  # of VIEWS, before settling
     learning_rate: float = 2e-3
+    backbone_rate: float = 1.0  # multiple of the learning rate that the backbone gets
+    freeze: bool = False  # the first convolution stays as it begins
     weight_decay: float = 0.05
     settle: float = 0.2  # last fraction of the epochs: whole frames, weak augmentation
     precision: str = "bf16"
 
-    def settling_from(self) -> int:
-        """The first epoch of whole frames."""
-        return self.epochs - round(self.settle * self.epochs)
+    def views_of(self, epoch: int) -> "Views":
+        """What an epoch shows: the last ones whole frames, weakly changed."""
+        settling = epoch >= self.epochs - round(self.settle * self.epochs)
+        return SETTLING_VIEWS if settling else VIEWS[self.views]
+
+
+@dataclass(frozen=True)
+class Views:
+    """What the samples of an epoch show."""
+
+    recipe: Recipe
+    width: int  # pixels
+    height: int
+    share: float  # of the settings' samples and batch, so that steps cost about the same at all sizes
+
+
+VIEWS = {
+    "crops": Views(Recipe(), 416, 320, 1.0), "light": Views(LIGHT, 416, 320, 1.0),
+    "frames": Views(FRAMES, inference.INPUT_WIDTH, inference.INPUT_HEIGHT, 0.5),
+}
+SETTLING_VIEWS = Views(SETTLING, inference.INPUT_WIDTH, inference.INPUT_HEIGHT, 0.5)
 
 
 class EpochSamples(Dataset):
@@ -100,14 +121,16 @@ def learning_rate_factor(progress: float, warm_up: float = 0.02, last: float = 0
     return last + (1 - last) * 0.5 * (1 + math.cos(math.pi * (progress - warm_up) / (1 - warm_up)))
 
 
-def make_optimizer(model: nn.Module, settings: Settings) -> torch.optim.Optimizer:
-    """AdamW; biases and normalisation parameters do not decay."""
-    decaying = [parameter for parameter in model.parameters() if parameter.dim() > 1]
-    others = [parameter for parameter in model.parameters() if parameter.dim() <= 1]
-    return torch.optim.AdamW(
-        [{"params": decaying, "weight_decay": settings.weight_decay}, {"params": others, "weight_decay": 0.0}],
-        lr=settings.learning_rate,
-    )
+def make_optimizer(model: Detector, settings: Settings) -> torch.optim.Optimizer:
+    """AdamW; biases and normalisation parameters do not decay. A group has its multiple of the schedule's learning rate."""
+    rest = nn.ModuleList([model.pyramid, model.heads])
+    groups = []
+    for part, multiple in ((model.backbone, settings.backbone_rate), (rest, 1.0)):
+        for decay, matrices in ((settings.weight_decay, True), (0.0, False)):
+            trained = (parameter for parameter in part.parameters() if parameter.requires_grad)
+            parameters = [parameter for parameter in trained if (parameter.dim() > 1) == matrices]
+            groups.append({"params": parameters, "weight_decay": decay, "multiple": multiple})
+    return torch.optim.AdamW(groups, lr=settings.learning_rate)
 
 
 def save_atomically(content: Dict[str, Any], path: Path) -> None:

@@ -13,7 +13,7 @@ from detector.inference import AnchorGrid, decode, letterbox
 
 from .synthetic import write_simulated
 
-CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0, shadow=0.0, mix=0.0, relight=0.0, erase=0.0)
+CALM = dict(blur=0.0, noise=0.0, grey=0.0, hue=0.0, saturation=0.0, brightness=0.0, paste=0.0, shadow=0.0, mix=0.0, relight=0.0, erase=0.0, white=0.0)
 
 
 def bright_square(class_id: int = POTHOLE) -> Picture:

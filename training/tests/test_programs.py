@@ -8,11 +8,12 @@ from pathlib import Path
 
 import torch
 
+import convert_backbone
 import evaluate_detector
 import export_detector
 import train_detector
-from detector import CLASSES, onnx_model
-from detector.network import Detector
+from detector import CLASSES, onnx_model, pretrained
+from detector.network import Backbone, Detector, Widths
 
 from .synthetic import write_data
 
@@ -84,6 +85,27 @@ class Programs(unittest.TestCase):
         for name, tensor in whole["average"].items():
             torch.testing.assert_close(continued["average"][name], tensor, rtol=0, atol=0, msg=name)
 
+    def test_begins_with_a_pretrained_backbone_and_leaves_a_frozen_part_of_it(self):
+        torch.manual_seed(2)
+        blocks = pretrained.blocks_of(Backbone(Widths()))
+        convolutions = [(block[0].weight.detach(), 0.1 * torch.randn(len(block[0].weight))) for block in blocks]
+        path = self.root / "backbone.pt"
+        torch.save({"convolutions": convolutions}, path)
+        more = ("--pretrained", path, "--freeze", "--views", "frames", "--backbone-rate", 0.5)
+        self.assertEqual(self.train("pretrained", *more), (0, ""))
+        model = torch.load(self.root / "pretrained" / "last.pt")["model"]
+        for name, block, still in (
+            ("backbone.stem.0", 0, True), ("backbone.stride4.leave", 4, False), ("backbone.stride16.leave", 16, False)
+        ):
+            # The normalisation's unfolding scales each filter; its direction stays.
+            now, begin = model[name + ".0.weight"].flatten(1), convolutions[block][0].flatten(1)
+            same = torch.nn.functional.cosine_similarity(now, begin).min() > 0.999999
+            self.assertEqual(bool(same), still, name)
+        other = ("--start-from", self.root / "pretrained" / "last.pt", "--pretrained", path)
+        self.assertEqual(self.train("both", *other)[0], 2)
+        torch.save({"convolutions": convolutions[:3]}, path)
+        self.assertEqual(self.train("short", "--pretrained", path)[0], 2)
+
     def test_export_and_evaluate(self):
         models = self.root / "models"
         models.mkdir()
@@ -114,6 +136,8 @@ class Programs(unittest.TestCase):
             (train_detector, ("--epochs", 0)),
             (train_detector, ("--start-from", nowhere, "--out", self.root / "new")),
             (train_detector, ("--batch", 1)),
+            (train_detector, ("--backbone-rate", 20)),
+            (convert_backbone, ("--archive", nowhere, "--out", self.root / "new.pt")),
             (train_detector, ("--frobnicate",)),
             (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
             (export_detector, ("--out", nowhere)),
