@@ -87,16 +87,16 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
 
 /// From the median of the absolute residuals, which half of them may spoil.
 double Aligner::RobustSigma(const Residuals& residuals) const {
-  constexpr int kBinsPerLevel = 4;
+  constexpr std::size_t kBinsPerLevel = 4;
   std::array<std::size_t, 256 * kBinsPerLevel> histogram{};
   for (std::size_t i = 0; i < residuals.value.size(); ++i) {
     if (residuals.visible[i] == 0) continue;
-    const float bin = std::abs(residuals.value[i]) * kBinsPerLevel;
+    const float bin = std::abs(residuals.value[i]) * static_cast<float>(kBinsPerLevel);
     ++histogram[std::min(static_cast<std::size_t>(bin), histogram.size() - 1)];
   }
   std::size_t seen = 0, bin = 0;
   while (bin < histogram.size() && 2 * (seen += histogram[bin]) < residuals.count) ++bin;
-  const double median = (static_cast<double>(bin) + 0.5) / kBinsPerLevel;
+  const double median = (static_cast<double>(bin) + 0.5) / static_cast<double>(kBinsPerLevel);
   return std::max(config_.least_sigma, kMadToSigma * median);
 }
 

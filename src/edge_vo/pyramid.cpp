@@ -45,8 +45,8 @@ void HalveDepth(const cv::Mat& fine, cv::Mat& coarse) {
     const float* upper = fine.ptr<float>(2 * y);
     const float* lower = fine.ptr<float>(2 * y + 1);
     float* out = coarse.ptr<float>(y);
-    for (int x = 0; x < coarse.cols; ++x) {
-      out[x] = NearestSurface({upper[2 * x], upper[2 * x + 1], lower[2 * x], lower[2 * x + 1]});
+    for (int x = 0; x < coarse.cols; ++x, upper += 2, lower += 2) {
+      out[x] = NearestSurface({upper[0], upper[1], lower[0], lower[1]});
     }
   }
 }
@@ -58,11 +58,10 @@ void Halve(const cv::Mat& fine, cv::Mat& coarse) {
     const std::uint8_t* upper = fine.ptr(std::min(2 * y, fine.rows - 1));
     const std::uint8_t* lower = fine.ptr(std::min(2 * y + 1, fine.rows - 1));
     std::uint8_t* out = coarse.ptr(y);
-    for (int x = 0; x < fine.cols / 2; ++x) {
-      out[x] = static_cast<std::uint8_t>(
-          (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2U);
-    }
     if (fine.cols == 1) out[0] = upper[0];
+    for (int x = 0; x < fine.cols / 2; ++x, upper += 2, lower += 2) {
+      out[x] = static_cast<std::uint8_t>((upper[0] + upper[1] + lower[0] + lower[1] + 2) / 4);
+    }
   }
 }
 

@@ -118,7 +118,8 @@ void FixTrack::Append(const Point& point) {
 
 /// Course of a vehicle that stands at this moment: the one it came with, else the one it leaves
 /// with.
-std::optional<FixTrack::Course> FixTrack::StandingCourse(Points::const_iterator after) const {
+std::optional<FixTrack::Course> FixTrack::StandingCourse(
+    const Points::const_iterator& after) const {
   if (after != points_.begin() && std::prev(after)->course) return std::prev(after)->course;
   const auto leaving =
       std::find_if(after, points_.end(), [](const Point& point) { return point.course; });
@@ -187,7 +188,7 @@ TrackPose FixTrack::Extrapolate(const Point& last, const Motion& motion,
 }
 
 std::optional<FixTrack::Motion> FixTrack::MotionAt(std::int64_t stamp_ns,
-                                                   Points::const_iterator end) const {
+                                                   const Points::const_iterator& end) const {
   if (end == points_.begin()) return std::nullopt;
   std::vector<Sample> samples;  // By their distance in time from the moment, nearest first.
   const auto middle = std::lower_bound(

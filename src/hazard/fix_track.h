@@ -122,8 +122,8 @@ class FixTrack {
   TrackPose Interpolate(const Point& before, const Point& after, std::int64_t stamp_ns) const;
   TrackPose Extrapolate(const Point& last, const Motion& motion, std::int64_t stamp_ns) const;
   /// Motion at a moment by the fixes before `end`.
-  std::optional<Motion> MotionAt(std::int64_t stamp_ns, Points::const_iterator end) const;
-  std::optional<Course> StandingCourse(Points::const_iterator after) const;
+  std::optional<Motion> MotionAt(std::int64_t stamp_ns, const Points::const_iterator& end) const;
+  std::optional<Course> StandingCourse(const Points::const_iterator& after) const;
   std::optional<Motion> BestLineFit(const std::vector<Sample>& samples) const;
   std::optional<Course> CourseOf(const Motion& motion) const;
 

@@ -189,8 +189,9 @@ SimulatedFrame SimulatedRoom::Render(const SimulatedCamera& camera,
       frame.depth.ptr<float>(row)[column] = Cast(from, ray(column, row)).distance;
       Vec3 sum = Vec3::Zero();
       for (int i = 0; i < rays * rays; ++i) {
+        const int across = i % rays, down = i / rays;
         const Vec3 direction =
-            ray(column + (i % rays + 0.5) / rays - 0.5, row + (i / rays + 0.5) / rays - 0.5);
+            ray(column + (across + 0.5) / rays - 0.5, row + (down + 0.5) / rays - 0.5);
         sum += Shade(from, direction, Cast(from, direction), pixel_angle);
       }
       sum /= static_cast<float>(rays * rays);
