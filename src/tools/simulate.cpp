@@ -17,8 +17,8 @@ namespace {
 std::vector<Flag> Flags() {
   return {{"seed", "N", "of the world; the same seed gives the same bytes (1)"},
           {"condition", "NAME", "day, dusk, rain or snow (day)"},
-          {"seconds", "S", "length of the drive (20)"},
-          {"rate", "HZ", "pictures per second (10)"},
+          {"seconds", "S", "length of the drive (20; --room: 5)"},
+          {"rate", "HZ", "pictures per second (10; --room: 30)"},
           {"size", "WxH", "of the pictures, pixels (640x480)"},
           {"camera", "FILE", "camera file, see config/cameras; instead of --size"},
           {"distortion", "K1,K2", "radial distortion of the camera (0,0)"},
