@@ -159,6 +159,8 @@ class EdgeVoTest(unittest.TestCase):
             covariance = numpy.array(message.pose.covariance).reshape(6, 6)
             numpy.testing.assert_allclose(covariance, covariance.T, atol=1e-12)
             self.assertGreaterEqual(numpy.linalg.eigvalsh(covariance).min(), -1e-12)
+            twist = numpy.array(message.twist.covariance).reshape(6, 6)
+            self.assertGreater(numpy.linalg.eigvalsh(twist).min(), 0, f"frame {i}: a velocity without error")
         eventually(lambda: len(transforms) >= FRAMES, "tf came too")
         for message, transform in zip(vehicle.poses(), transforms):
             t, q = transform.transform.translation, transform.transform.rotation

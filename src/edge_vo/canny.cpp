@@ -10,7 +10,6 @@ namespace livemap {
 namespace {
 
 constexpr double kSobelGain = 8;
-constexpr double kWeakOfStrong = 0.4;
 constexpr std::uint8_t kWeak = 1, kStrong = 255;
 constexpr int kLanes = 8;  // Pixels worked off at once; narrower images have no edges.
 

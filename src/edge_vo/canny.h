@@ -11,9 +11,11 @@ namespace livemap {
 /// have the image's size. Not thread-safe.
 class CannyDetector {
  public:
+  static constexpr double kWeakOfStrong = 0.4;  ///< Ratio of the two thresholds.
+
   /// CV_8UC1 of the image's size, 255 at edges; valid until the next call. The `strong_share` of
   /// the pixels with the largest gradients start an edge, unless these are below `least_gradient`
-  /// (grey levels per px); pixels of at least 0.4 of that gradient continue it.
+  /// (grey levels per px); pixels of at least kWeakOfStrong of that gradient continue it.
   const cv::Mat& Extract(const cv::Mat& grey, double strong_share, double least_gradient);
   /// Memory for images up to this size.
   void Reserve(cv::Size size);

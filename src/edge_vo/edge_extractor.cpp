@@ -1,8 +1,5 @@
 #include "edge_vo/edge_extractor.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
@@ -13,10 +10,8 @@
 namespace livemap {
 namespace {
 
-constexpr double kWeakOfStrong = 0.4;
 constexpr double kNarrowSigmaPx = 1.0;
-constexpr double kWideSigmaPx =
-    1.6;  // The ratio at which the difference is nearest to a Laplacian.
+constexpr double kWideSigmaPx = 1.6;  // At this ratio the difference is nearest to a Laplacian.
 constexpr float kLeastLikelihood = 0.1F;
 
 int GradientL1(const cv::Mat& dx, const cv::Mat& dy, int y, int x) {
@@ -97,8 +92,9 @@ void EdgeExtractor::ExtractSobel(const cv::Mat& grey) {
 
 void EdgeExtractor::ExtractLaplacian(const cv::Mat& grey) {
   canny_.Differentiate(grey);
-  const auto threshold = static_cast<int>(
-      kWeakOfStrong * canny_.StrongThreshold(config_.strong_share, config_.least_gradient));
+  const auto threshold =
+      static_cast<int>(CannyDetector::kWeakOfStrong *
+                       canny_.StrongThreshold(config_.strong_share, config_.least_gradient));
   cv::GaussianBlur(grey, narrow_, {}, kNarrowSigmaPx);
   cv::GaussianBlur(grey, wide_, {}, kWideSigmaPx);
   edges_.create(grey.size(), CV_8UC1);

@@ -15,6 +15,8 @@ constexpr double kSecond = 1e-9;  // Per nanosecond.
 constexpr double kMaxPredictionS = 0.5;
 /// Below this reciprocal condition number the information matrix says nothing about some direction.
 constexpr double kLeastCondition = 1e-12;
+/// Light that fades further than this, or grows, between two images is a covered lens.
+constexpr double kLeastGain = 0.3;
 
 std::string SizeText(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows);
@@ -292,8 +294,9 @@ Eigen::Isometry3d EdgeOdometry::RotationGuess(Keyframe& keyframe, const Eigen::I
 
 /// Searches the motion anew: from the thumbnails' rotation, with the newest keyframes first.
 EdgeOdometry::Attempt EdgeOdometry::FindBack() {
-  Attempt best;
-  for (auto candidate = keyframes_.rbegin(); candidate != keyframes_.rend(); ++candidate) {
+  Attempt attempt;
+  for (auto candidate = keyframes_.rbegin(); candidate != keyframes_.rend() && !attempt.good;
+       ++candidate) {
     Keyframe& keyframe = **candidate;
     const Eigen::Isometry3d held = last_.world_from_camera.inverse() * keyframe.world_from_camera;
     const Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
@@ -303,12 +306,9 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
          {RotationGuess(keyframe, held), held, standing, RotationGuess(keyframe, standing)}) {
       guesses.Add(guess);
     }
-    const Attempt attempt = TrackFrom(keyframe, guesses);
-    if (attempt.good && (!best.good || attempt.fine.cost < best.fine.cost)) best = attempt;
-    // The newest that fits is the nearest in time; older ones only when it does not.
-    if (best.good) break;
+    attempt = TrackFrom(keyframe, guesses);
   }
-  return best;
+  return attempt;
 }
 
 bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
@@ -318,7 +318,7 @@ bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
          determined.info() == Eigen::Success && determined.rcond() > kLeastCondition &&
          result.visible >= static_cast<std::size_t>(config_.least_points) &&
          result.Overlap() >= config_.least_overlap && result.sigma <= config_.lost_sigma &&
-         result.state.gain > 0.3 && result.state.gain < 3;
+         result.state.gain > kLeastGain && result.state.gain < 1 / kLeastGain;
 }
 
 bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
@@ -359,6 +359,8 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
   if (last_.state == VoState::kTracking) {
     result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
+    // Both ends err by the alignment with the keyframe.
+    result.twist_covariance = 2 / (step_s * step_s) * (to_new * relative * to_new.transpose());
   }
   result.keyframe_stamp_ns = keyframe_->stamp_ns;
   result.points = fine.points;

@@ -2,11 +2,9 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "edge_vo/alignment.h"
@@ -105,11 +103,8 @@ class EdgeOdometry {
   /// Forgets everything; the next frame is the world's origin.
   void Reset();
 
-  const Config& config() const { return config_; }
   /// The keyframe that the last frame was aligned with; none before the first.
   const Keyframe* keyframe() const { return keyframe_; }
-  /// Pixels of the last frame's edges: CV_8UC1, empty when none were extracted from it.
-  const cv::Mat& last_image() const { return frame_images_[0]; }
 
  private:
   /// Starts of an alignment; at most four.

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 
@@ -94,6 +95,9 @@ TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
   ASSERT_TRUE(result.twist);
   EXPECT_NEAR((*result.twist)[0], 0.003 / (kStepNs * 1e-9), 0.01);
   EXPECT_NEAR(result.twist->tail<5>().norm(), 0, 0.02);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(result.twist_covariance);
+  EXPECT_GT(axes.eigenvalues().minCoeff(), 0) << "no direction is known without error";
+  EXPECT_LT(std::sqrt(result.twist_covariance(0, 0)), 0.1) << "m/s";
 }
 
 TEST(EdgeOdometry, BlackFramesHoldThePoseWithGrowingUncertaintyAndTrackingComesBack) {
