@@ -18,6 +18,7 @@
 #include "detection/annotation.h"
 #include "detection/hazard_detector.h"
 #include "detection/yolox_decoder.h"
+#include "run_benchmarks.h"
 #include "tools/detection_tool_support.h"
 
 namespace livemap {
@@ -129,4 +130,7 @@ BENCHMARK(BM_Annotate)->Arg(1)->Arg(10)->Unit(benchmark::kMicrosecond);
 }  // namespace
 }  // namespace livemap
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  return livemap::RunBenchmarks(argc, argv, "livemap_detector_benchmark",
+                                "The parts of a frame's detection, from decoding to annotation.");
+}

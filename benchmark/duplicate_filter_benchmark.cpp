@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "hazard/duplicate_filter.h"
+#include "run_benchmarks.h"
 
 namespace livemap {
 namespace {
@@ -115,22 +116,11 @@ class GrowthReporter : public benchmark::ConsoleReporter {
 }  // namespace livemap
 
 int main(int argc, char** argv) {
-  for (int i = 1; i < argc; ++i) {
-    if (std::string(argv[i]) != "--help") continue;
-    std::puts(
-        "usage: livemap_duplicate_filter_benchmark [GOOGLE BENCHMARK OPTIONS]\n\n"
-        "Cost of a question to the vehicle's duplicate filter at 1e3 to 1e6 known hazards.\n"
-        "Useful options: --benchmark_filter=REGEX --benchmark_min_time=SECONDS");
-    return 0;
-  }
-  benchmark::Initialize(&argc, argv);
-  if (argc > 1) {
-    std::fprintf(stderr, "livemap_duplicate_filter_benchmark: unknown argument '%s', see --help\n",
-                 argv[1]);
-    return 2;
-  }
   livemap::GrowthReporter reporter;
-  benchmark::RunSpecifiedBenchmarks(&reporter);
+  const int status = livemap::RunBenchmarks(
+      argc, argv, "livemap_duplicate_filter_benchmark",
+      "Cost of a question to the vehicle's duplicate filter at 1e3 to 1e6 known hazards.",
+      &reporter);
   reporter.PrintGrowth();
-  return 0;
+  return status;
 }

@@ -7,6 +7,7 @@
 
 #include "edge_vo/canny.h"
 #include "edge_vo/edge_odometry.h"
+#include "run_benchmarks.h"
 #include "simulation/room.h"
 #include "tools/vo_method.h"
 
@@ -93,4 +94,8 @@ BENCHMARK(BM_OpenCvCanny)->Unit(benchmark::kMillisecond);
 }  // namespace
 }  // namespace livemap
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  return livemap::RunBenchmarks(argc, argv, "livemap_edge_vo_benchmark",
+                                "A 640x480 frame that is tracked, one that becomes a keyframe, "
+                                "OpenCV's RgbdOdometry, Canny.");
+}

@@ -4,10 +4,9 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
-#include <cstdio>
-#include <string>
 
 #include "localization/geo_localizer.h"
+#include "run_benchmarks.h"
 
 namespace livemap {
 namespace {
@@ -98,20 +97,7 @@ BENCHMARK(AskFused)->Unit(benchmark::kMicrosecond);
 }  // namespace livemap
 
 int main(int argc, char** argv) {
-  for (int i = 1; i < argc; ++i) {
-    if (std::string(argv[i]) != "--help") continue;
-    std::puts(
-        "usage: livemap_localization_benchmark [GOOGLE BENCHMARK OPTIONS]\n\n"
-        "Cost of a fix at 1, 10 and 20 fixes per second, and of asking for the fused pose.\n"
-        "Useful options: --benchmark_filter=REGEX --benchmark_min_time=SECONDS");
-    return 0;
-  }
-  benchmark::Initialize(&argc, argv);
-  if (argc > 1) {
-    std::fprintf(stderr, "livemap_localization_benchmark: unknown argument '%s', see --help\n",
-                 argv[1]);
-    return 2;
-  }
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return livemap::RunBenchmarks(
+      argc, argv, "livemap_localization_benchmark",
+      "Cost of a fix at 1, 10 and 20 fixes per second, and of asking for the fused pose.");
 }

@@ -23,6 +23,7 @@
 
 #include "edge_vo/edge_view.h"
 #include "nodelets/nodelet_support.h"
+#include "ros/camera_info_conversions.h"
 #include "ros/edge_vo_parameters.h"
 #include "ros/odometry_conversions.h"
 

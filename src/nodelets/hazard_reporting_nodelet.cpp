@@ -20,6 +20,7 @@
 
 #include "hazard/hazard_reporter.h"
 #include "nodelets/nodelet_support.h"
+#include "ros/camera_info_conversions.h"
 #include "ros/hazard_conversions.h"
 #include "ros/hazard_reporting_parameters.h"
 #include "ros/hazard_view.h"
@@ -133,19 +134,11 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
-    CameraIntrinsics intrinsics;  // Of the rectified image: P, not K.
-    intrinsics.fx = message.P[0];
-    intrinsics.fy = message.P[5];
-    intrinsics.cx = message.P[2];
-    intrinsics.cy = message.P[6];
-    intrinsics.width = static_cast<int>(message.width);
-    intrinsics.height = static_cast<int>(message.height);
-    if (!(intrinsics.fx > 0 && intrinsics.fy > 0) || !std::isfinite(intrinsics.cx) ||
-        !std::isfinite(intrinsics.cy) || intrinsics.width <= 0 || intrinsics.height <= 0) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "camera_rect/camera_info dropped: its P is no camera");
-      return;
+    try {
+      reporter_->SetIntrinsics(ToRectifiedIntrinsics(message));
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
     }
-    reporter_->SetIntrinsics(intrinsics);
   }
 
   void OnNotice(const HazardNotice& message) {

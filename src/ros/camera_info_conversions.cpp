@@ -1,7 +1,11 @@
 #include "ros/camera_info_conversions.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <string>
+
+#include "base/error.h"
 
 namespace livemap {
 namespace {
@@ -39,6 +43,23 @@ sensor_msgs::CameraInfo ToMessage(const CameraCalibration& calibration,
   std::copy(std::begin(calibration.r.val), std::end(calibration.r.val), message.R.begin());
   std::copy(std::begin(calibration.p.val), std::end(calibration.p.val), message.P.begin());
   return message;
+}
+
+CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info) {
+  constexpr std::uint32_t kMostPixels = 16384;
+  CameraIntrinsics intrinsics{info.P[0], info.P[5], info.P[2], info.P[6], 0, 0};
+  const bool finite = std::isfinite(intrinsics.cx) && std::isfinite(intrinsics.cy) &&
+                      std::isfinite(intrinsics.fx) && std::isfinite(intrinsics.fy);
+  if (!finite || !(intrinsics.fx > 0 && intrinsics.fy > 0) || info.width == 0 || info.height == 0 ||
+      info.width > kMostPixels || info.height > kMostPixels) {
+    throw Error("camera_info of '" + info.header.frame_id + "' is no calibration: its P has fx " +
+                std::to_string(intrinsics.fx) + " and fy " + std::to_string(intrinsics.fy) +
+                " for " + std::to_string(info.width) + "x" + std::to_string(info.height) +
+                " pixels");
+  }
+  intrinsics.width = static_cast<int>(info.width);
+  intrinsics.height = static_cast<int>(info.height);
+  return intrinsics;
 }
 
 }  // namespace livemap

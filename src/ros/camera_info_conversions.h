@@ -3,6 +3,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <std_msgs/Header.h>
 
+#include "geo/ground_projection.h"
 #include "ingest/rectifier.h"
 
 namespace livemap {
@@ -12,5 +13,8 @@ CameraCalibration FromMessage(const sensor_msgs::CameraInfo& message);
 /// Binning and region of interest stay at their defaults: the whole image at full resolution.
 sensor_msgs::CameraInfo ToMessage(const CameraCalibration& calibration,
                                   const std_msgs::Header& header);
+
+/// Of the rectified image: P, not K. Throws Error when it is no calibration of a camera.
+CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info);
 
 }  // namespace livemap

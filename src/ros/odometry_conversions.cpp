@@ -6,10 +6,6 @@
 #include <pcl_conversions/pcl_conversions.h>
 #include <tf2_eigen/tf2_eigen.h>
 
-#include <cmath>
-
-#include "base/error.h"
-
 namespace livemap {
 namespace {
 
@@ -85,23 +81,6 @@ sensor_msgs::PointCloud2 ToEdgeCloud(const Keyframe& keyframe, const OdometryFra
   message.header.stamp = stamp;
   message.header.frame_id = frames.odom;
   return message;
-}
-
-CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info) {
-  constexpr std::uint32_t kMostPixels = 16384;
-  CameraIntrinsics intrinsics{info.P[0], info.P[5], info.P[2], info.P[6], 0, 0};
-  const bool finite = std::isfinite(intrinsics.cx) && std::isfinite(intrinsics.cy) &&
-                      std::isfinite(intrinsics.fx) && std::isfinite(intrinsics.fy);
-  if (!finite || !(intrinsics.fx > 0 && intrinsics.fy > 0) || info.width == 0 || info.height == 0 ||
-      info.width > kMostPixels || info.height > kMostPixels) {
-    throw Error("camera_info of '" + info.header.frame_id + "' is no calibration: its P has fx " +
-                std::to_string(intrinsics.fx) + " and fy " + std::to_string(intrinsics.fy) +
-                " for " + std::to_string(info.width) + "x" + std::to_string(info.height) +
-                " pixels");
-  }
-  intrinsics.width = static_cast<int>(info.width);
-  intrinsics.height = static_cast<int>(info.height);
-  return intrinsics;
 }
 
 }  // namespace livemap

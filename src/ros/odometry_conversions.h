@@ -1,7 +1,6 @@
 #pragma once
 
 #include <nav_msgs/Odometry.h>
-#include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/PointCloud2.h>
 
 #include <string>
@@ -31,8 +30,5 @@ nav_msgs::Odometry ToOdometry(const VoResult& result, const OdometryFrames& fram
 /// cube of `voxel_m` (0: all).
 sensor_msgs::PointCloud2 ToEdgeCloud(const Keyframe& keyframe, const OdometryFrames& frames,
                                      double voxel_m, const ros::Time& stamp);
-
-/// Of the rectified image: P, not K. Throws Error when it is no calibration of a camera.
-CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info);
 
 }  // namespace livemap

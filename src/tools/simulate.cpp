@@ -78,9 +78,10 @@ int Run(int argc, char** argv) {
       flags);
   if (!line.Parse(argc, argv)) return 0;
   KeepMemoryFlat();
+  if (line.Has("room")) return SimulateRoom(line);
+  RefuseRoomFlags(line);
   if (line.Has("change")) return SimulateChange(line);
   RefuseChangeFlags(line);
-  if (line.Has("room")) return SimulateRoom(line);
   const std::uint64_t seed = line.Seed("seed", 1);
   const Condition condition = ReadCondition(line, "condition", "day");
   const DrivingStyle style = ReadStyle(line);

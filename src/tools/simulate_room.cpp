@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
+#include <string>
 
 #include "base/error.h"
 #include "simulation/dataset.h"
@@ -23,7 +24,21 @@ std::vector<Flag> RoomFlags() {
           {"flicker", "X", "of --room's light: gain swings by this share, once a second (0)"}};
 }
 
+void RefuseRoomFlags(const CommandLine& line) {
+  for (const Flag& flag : RoomFlags()) {
+    if (flag.name != "room" && line.Has(flag.name)) {
+      throw Error("--" + flag.name + " needs --room, whose camera it is about");
+    }
+  }
+}
+
 int SimulateRoom(const CommandLine& line) {
+  for (const char* street :
+       {"condition", "speed", "stops", "route", "world", "start", "blur", "yolo", "video", "bag",
+        "hazards", "truth-preview", "change", "stereo"}) {
+    if (line.Has(street)) throw Error("--" + std::string(street) + " is a street's, not --room's");
+  }
+  if (!line.Has("tum")) throw Error("--room needs --tum DIR, where the sequence goes");
   const double rate_hz = line.Number("rate", 30, 0.1, 100);
   const double vigour = line.Number("vigour", 1, 0, 20);
   const double flicker = line.Number("flicker", 0, 0, 0.9);
@@ -32,7 +47,6 @@ int SimulateRoom(const CommandLine& line) {
   const auto frames = static_cast<int>(line.Number("seconds", 5, 0.1, 600) * rate_hz);
   const SimulationSetup setup = ReadSimulationSetup(line);
   const SimulatedRoom room(line.Seed("seed", 1));
-  if (!line.Has("tum")) throw Error("--room needs --tum DIR, where the sequence goes");
   TumWriter writer(line.Text("tum", ""), setup.camera,
                    line.Number("depth-scale", kTumDepthScale, 100, 10000));
   std::vector<cv::Mat> pictures;

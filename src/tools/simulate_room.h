@@ -13,4 +13,7 @@ std::vector<Flag> RoomFlags();
 /// Throws Error naming the flag or the path.
 int SimulateRoom(const CommandLine& line);
 
+/// Throws Error when a flag of RoomFlags() is given without --room.
+void RefuseRoomFlags(const CommandLine& line);
+
 }  // namespace livemap
