@@ -26,6 +26,7 @@ ConstMap Part(const std::vector<float>& values, std::size_t begin, std::size_t c
 }  // namespace
 
 void Aligner::Reserve(std::size_t points) {
+  whitening_.reserve(points);
   for (Residuals* residuals : {&current_, &candidate_}) {
     residuals->value.reserve(points);
     residuals->visible.reserve(points);
@@ -79,9 +80,26 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
           static_cast<float>(lower[0]) + right_share * static_cast<float>(lower[1] - lower[0]);
       residuals.value[point] =
           above + lower_share * (below - above) - gain * points.intensity[point] - bias;
+      if (!whitening_.empty()) residuals.value[point] *= whitening_[point];
       residuals.visible[point] = 1;
       ++residuals.count;
     }
+  }
+}
+
+/// Residuals of points whose depth is not exact err by that, too: equation (14). They are divided
+/// by how much more, at the motion that the alignment starts with.
+void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
+  whitening_.resize(points.inverse_depth_sigma.size());
+  const Eigen::Vector3f way =
+      (new_from_reference.linear().transpose() * new_from_reference.translation()).cast<float>();
+  const auto grey_sigma = static_cast<float>(config_.grey_sigma);
+  for (std::size_t i = 0; i < whitening_.size(); ++i) {
+    const float by_inverse_depth =
+        points.z[i] * (points.jacobian[0][i] * way.x() + points.jacobian[1][i] * way.y() +
+                       points.jacobian[2][i] * way.z());
+    const float more = by_inverse_depth * points.inverse_depth_sigma[i] / grey_sigma;
+    whitening_[i] = 1 / std::sqrt(1 + more * more);
   }
 }
 
@@ -134,6 +152,11 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
     }
     columns.col(6).head(n) = Part(points.intensity, begin, count);
     columns.col(7).head(n).setOnes();
+    if (!whitening_.empty()) {
+      for (int i = 0; i < kUnknowns; ++i) {
+        columns.col(i).head(n) *= Part(whitening_, begin, count);
+      }
+    }
     const Chunk weight_all = [&] {
       Chunk weight;
       weight.head(n) = visible * (k / residual.abs().max(k));
@@ -188,6 +211,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   AlignmentResult result;
   result.state = start;
   result.points = points.size();
+  Whiten(points, start.new_from_reference);
   Evaluate(points, grey, camera, start, current_);
   double sigma = RobustSigma(current_);
   double cost = RobustCost(current_, sigma);
@@ -226,6 +250,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
 
 double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
                        const CameraIntrinsics& camera, const AlignmentState& state, double sigma) {
+  Whiten(points, state.new_from_reference);
   Evaluate(points, grey, camera, state, candidate_);
   return RobustCost(candidate_, sigma);
 }

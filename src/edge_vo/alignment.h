@@ -21,9 +21,10 @@ struct AlignmentState {
 };
 
 struct AlignmentConfig {
-  int max_iterations = 12;     ///< Per level.
-  double huber_k = 2.0;        ///< In standard deviations of the residuals.
-  double least_sigma = 1.5;    ///< Noise below which no residual counts as an outlier, grey levels.
+  int max_iterations = 12;   ///< Per level.
+  double huber_k = 2.0;      ///< In standard deviations of the residuals.
+  double least_sigma = 1.5;  ///< Noise below which no residual counts as an outlier, grey levels.
+  double grey_sigma = 2.0;   ///< Of residuals whose depth is exact, against those where it is not.
   double converged_px = 0.01;  ///< A step that moves points less than this is the last.
   bool estimate_illumination = true;
   bool rotation_only = false;
@@ -80,6 +81,7 @@ class Aligner {
                 const AlignmentState& state, Residuals& residuals) const;
   double RobustSigma(const Residuals& residuals) const;
   double RobustCost(const Residuals& residuals, double sigma) const;
+  void Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference);
   void BuildNormalEquations(const EdgePoints& points, double sigma);
   bool Solve(double damping, Step& step) const;
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
@@ -87,6 +89,7 @@ class Aligner {
 
   AlignmentConfig config_;
   Residuals current_, candidate_;
+  std::vector<float> whitening_;  // Factors of the residuals; empty: all 1.
   Normal normal_;
   Step gradient_;
 };

@@ -117,15 +117,17 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
   if (keyframe_ == nullptr) {
     result = last_;
     result.state = VoState::kInitialising;
-    if (MakeKeyframe(frame, result)) result.state = VoState::kTracking;
+    if (MakeKeyframe(frame, {}, result)) result.state = VoState::kTracking;
   } else {
     Attempt attempt = last_.state == VoState::kLost ? FindBack() : Follow(frame.stamp_ns);
     if (!attempt.good && last_.state != VoState::kLost) attempt = FindBack();
     result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
     const bool gives_up = result.state == VoState::kLost &&
                           Seconds(frame.stamp_ns, tracked_stamp_ns_) >= config_.give_up_s;
-    if (gives_up || (attempt.good && WantsKeyframe(attempt.fine, result.world_from_camera))) {
-      result.new_keyframe = MakeKeyframe(frame, result);
+    result.keyframe_due =
+        gives_up || (attempt.good && WantsKeyframe(attempt.fine, result.world_from_camera));
+    if (result.keyframe_due) {
+      result.new_keyframe = MakeKeyframe(frame, {}, result);
       if (gives_up && result.new_keyframe) result.state = VoState::kTracking;
     }
   }
@@ -135,9 +137,21 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
   return result;
 }
 
+bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
+                               const std::optional<Vector6d>& twist) {
+  if (!last_stamp_ns_ || frame_images_.levels() == 0) return false;
+  const RgbdFrame frame = {*last_stamp_ns_, frame_images_[0], depth_m, 1};
+  if (!MakeKeyframe(frame, inverse_depth_sigma, last_)) return false;
+  last_.state = VoState::kTracking;
+  last_.twist = twist;
+  tracked_stamp_ns_ = *last_stamp_ns_;
+  return true;
+}
+
 /// Makes the current frame the one that later frames are aligned with; false, and nothing changed,
 /// when it has no depth or too few edges.
-bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const VoResult& result) {
+bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
+                                const VoResult& result) {
   if (frame.depth.empty()) return false;
   if (keyframes_.empty() && spare_.empty()) ReserveBuffers();
   std::unique_ptr<Keyframe> fresh = std::move(spare_.back());
@@ -146,6 +160,12 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const VoResult& result) 
   fresh->world_from_camera = result.world_from_camera;
   fresh->covariance = result.covariance;
   fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, levels_);
+  fresh->inverse_depth_sigmas.Clear();
+  if (!inverse_depth_sigma.empty()) {
+    constexpr DepthPyramid::Range kAny = {std::numeric_limits<float>::min(),
+                                          std::numeric_limits<float>::max()};
+    fresh->inverse_depth_sigmas.Build(inverse_depth_sigma, 1, kAny, levels_);
+  }
   std::swap(fresh->images, frame_images_);
   if (!SelectPoints(*fresh)) {
     std::swap(fresh->images, frame_images_);
@@ -211,8 +231,8 @@ bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
     PointSelection selection = config_.points;
     selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
     const cv::Mat& grey = keyframe.images[level];
-    selector_.Select(grey, keyframe.depths[level], extractor_.Extract(grey), cameras_[index],
-                     selection, keyframe.points[index]);
+    selector_.Select(grey, keyframe.depths[level], keyframe.inverse_depth_sigmas[level],
+                     extractor_.Extract(grey), cameras_[index], selection, keyframe.points[index]);
   }
   selector_.SelectAll(keyframe.images.thumbnail(), cameras_[static_cast<std::size_t>(levels_)],
                       keyframe.thumbnail_points);
@@ -225,8 +245,8 @@ const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
   PointSelection selection = config_.points;
   selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
   selector_.Select(keyframe.images[level], keyframe.depths[level],
-                   extractor_.Extract(frame_images_[level]), cameras_[index], selection,
-                   masked_points_);
+                   keyframe.inverse_depth_sigmas[level], extractor_.Extract(frame_images_[level]),
+                   cameras_[index], selection, masked_points_);
   return masked_points_;
 }
 

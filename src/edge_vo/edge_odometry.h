@@ -42,6 +42,7 @@ struct VoResult {
   std::optional<Vector6d> twist;
   Matrix6d twist_covariance = Matrix6d::Zero();  ///< Same axes, squared units of twist.
   bool new_keyframe = false;
+  bool keyframe_due = false;  ///< The rules ask for one; it was made if the frame had depth.
   std::int64_t keyframe_stamp_ns = 0;
   std::size_t points = 0;   ///< Of the finest level that was used.
   std::size_t inliers = 0;  ///< Of them.
@@ -100,6 +101,19 @@ class EdgeOdometry {
   /// its stamp is not later than the last one's.
   VoResult Track(const RgbdFrame& frame);
 
+  /// Throws as Track() would for this frame.
+  void Check(const RgbdFrame& frame) const;
+
+  /// Makes the last frame, which came without depth, a keyframe with this one: CV_32FC1, m, 0
+  /// unknown, and the standard deviations of the inverse depths, 1/m. `twist` (as in VoResult) is
+  /// how the camera moves, where Track() could not tell yet. False, and nothing changed, when there
+  /// are too few edges with depth.
+  bool AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
+                   const std::optional<Vector6d>& twist);
+
+  /// Of the last frame, the finest level smoothed; valid until it is made a keyframe.
+  const ImagePyramid& images() const { return frame_images_; }
+
   /// Forgets everything; the next frame is the world's origin.
   void Reset();
 
@@ -122,8 +136,8 @@ class EdgeOdometry {
     bool good = false;
   };
 
-  void Check(const RgbdFrame& frame) const;
-  bool MakeKeyframe(const RgbdFrame& frame, const VoResult& result);
+  bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
+                    const VoResult& result);
   bool SelectPoints(Keyframe& keyframe);
   Attempt TrackFrom(Keyframe& keyframe, const Guesses& guesses);
   AlignmentState BestStart(const EdgePoints& points, int level, const Guesses& guesses);

@@ -56,12 +56,12 @@ void ForEachSet(const std::uint8_t* mask, int begin, int end, const Visit& visit
 }  // namespace
 
 void EdgePoints::Clear() {
-  for (auto* values : {&x, &y, &z, &intensity}) values->clear();
+  for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma}) values->clear();
   for (auto& column : jacobian) column.clear();
 }
 
 void EdgePoints::Reserve(std::size_t count) {
-  for (auto* values : {&x, &y, &z, &intensity}) values->reserve(count);
+  for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma}) values->reserve(count);
   for (auto& column : jacobian) column.reserve(count);
 }
 
@@ -93,7 +93,8 @@ void EdgePoints::Finish() {
   mean_inverse_depth = z.empty() ? 0 : sum / static_cast<double>(z.size());
 }
 
-void PointSelector::Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv::Mat& edges,
+void PointSelector::Select(const cv::Mat& grey, const cv::Mat& depth_m,
+                           const cv::Mat& inverse_depth_sigma, const cv::Mat& edges,
                            const CameraIntrinsics& camera, const PointSelection& selection,
                            EdgePoints& points) {
   candidates_.clear();
@@ -115,6 +116,9 @@ void PointSelector::Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv
     if (gradient.x * gradient.x + gradient.y * gradient.y < least_square) continue;
     if (IsBehindAnEdge(depth_m, x, y, selection.occlusion_ratio)) continue;
     points.Add(x, y, depth_m.ptr<float>(y)[x], grey.ptr(y)[x], gradient.x, gradient.y, camera);
+    if (!inverse_depth_sigma.empty()) {
+      points.inverse_depth_sigma.push_back(inverse_depth_sigma.ptr<float>(y)[x]);
+    }
   }
   points.Finish();
 }

@@ -20,6 +20,8 @@ struct EdgePoints {
   /// Derivative of the reference's grey value by the twist delta of a motion Exp(delta) of the
   /// point: translation (per m), then rotation (per rad). Equation (6) of docs/odometry.md.
   std::array<std::vector<float>, 6> jacobian;
+  /// Standard deviation of the inverse depth, 1/m; empty: depths are exact.
+  std::vector<float> inverse_depth_sigma;
   double mean_inverse_depth = 0;  ///< 1/m
 
   std::size_t size() const { return x.size(); }
@@ -46,8 +48,10 @@ class PointSelector {
   /// Memory for masks with so many pixels set.
   void Reserve(std::size_t pixels) { candidates_.reserve(pixels); }
   /// Points of the reference image `grey` with `depth_m` (0 unknown) under `edges`, same sizes.
-  void Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv::Mat& edges,
-              const CameraIntrinsics& camera, const PointSelection& selection, EdgePoints& points);
+  /// `inverse_depth_sigma` (CV_32FC1, 1/m) says how well the depths are known; empty: exactly.
+  void Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
+              const cv::Mat& edges, const CameraIntrinsics& camera, const PointSelection& selection,
+              EdgePoints& points);
   /// Every pixel, as if at one metre: for rotations, which depth does not matter to.
   void SelectAll(const cv::Mat& grey, const CameraIntrinsics& camera, EdgePoints& points);
 

@@ -19,6 +19,8 @@ struct Keyframe {
   Matrix6d covariance = Matrix6d::Zero();  ///< Of world_from_camera, see VoResult::covariance.
   ImagePyramid images;
   DepthPyramid depths;
+  /// Standard deviations of the inverse depths, 1/m, where depths are estimates; else no levels.
+  DepthPyramid inverse_depth_sigmas;
   std::array<EdgePoints, kMaxLevels> points;  ///< Under its own edges.
   EdgePoints thumbnail_points;                ///< Every pixel of the thumbnail, for rotations.
 };

@@ -51,6 +51,7 @@ class DepthPyramid {
   /// kSameSurface of the nearest: neither holes nor the step behind an edge are blended in.
   void Build(const cv::Mat& depth, double units_per_m, Range range, int levels);
   const cv::Mat& operator[](int level) const { return depths_[static_cast<std::size_t>(level)]; }
+  void Clear() { depths_ = {}; }
 
   static constexpr float kSameSurface = 1.05F;
 
