@@ -63,6 +63,7 @@ const char* VoStateName(VoState state) {
 EdgeOdometry::EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics)
     : config_(config),
       extractor_(config.edges),
+      selector_(config.points.seed),
       aligner_(config.alignment),
       rotation_aligner_(RotationOnly(config.alignment)) {
   cameras_[0] = Checked(intrinsics);
@@ -271,7 +272,7 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   Guesses guesses;
   const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
   const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
-  if (last_.twist && step_s <= kMaxPredictionS) {
+  if (config_.constant_motion && last_.twist && step_s <= kMaxPredictionS) {
     const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
     guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
   }
