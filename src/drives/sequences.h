@@ -36,9 +36,24 @@ struct Sequence {
 std::optional<std::int64_t> ParseStampNs(const std::string& text);
 
 /// TUM RGB-D layout: associations.txt ("rgb_stamp rgb_path depth_stamp depth_path") or else rgb.txt
-/// alone, groundtruth.txt ("stamp tx ty tz qx qy qz qw", camera to world, optional) and camera.yaml
-/// (width, height, fx, fy, cx, cy, depth_scale). Throws Error naming file and line.
-Sequence ReadTumSequence(const std::string& directory);
+/// and depth.txt ("stamp path", paired by AssociateDepth; rgb.txt alone: no depth), groundtruth.txt
+/// ("stamp tx ty tz qx qy qz qw", camera to world, optional) and camera.yaml (width, height, fx,
+/// fy, cx, cy, depth_scale). `camera_file` is read instead of camera.yaml when it is not empty;
+/// without either the camera is PublishedTumCamera's. Throws Error naming file and line.
+Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file = "");
+
+/// Stamps of picture and depth that are farther apart do not belong together.
+constexpr std::int64_t kMaxDepthDifferenceNs = 20'000'000;
+
+/// Pictures with their depth, as associate.py of the TUM benchmark pairs them (PairNearestStamps);
+/// pictures without one are left out. In both lists `image_path` is what the list names.
+std::vector<SequenceFrame> AssociateDepth(const std::vector<SequenceFrame>& pictures,
+                                          const std::vector<SequenceFrame>& depths);
+
+/// The calibration that TUM publishes for its cameras fr1, fr2 and fr3 (ideal pinhole; the
+/// distortion of fr1 and fr2 is left aside), which of them by the folder's name: it holds
+/// "freiburg1" or "fr1" and so on. None for any other name.
+std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory);
 
 /// KITTI odometry layout: images/ (or image_0, image_2) with numbered pictures, calib.txt ("P0: 12
 /// numbers" or 12 bare numbers per line, the first line counts), poses.txt (3x4 rows, camera to

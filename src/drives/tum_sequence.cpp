@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "drives/sequences.h"
+#include "drives/stamp_pairs.h"
 #include "drives/text.h"
 
 namespace livemap {
@@ -15,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxTextBytes = 256U << 20U;
+constexpr double kPublishedDepthScale = 5000;
 
 [[noreturn]] void RefuseLine(const std::string& name, std::size_t index, const std::string& line,
                              const std::string& accepted) {
@@ -58,7 +60,40 @@ void ReadCamera(const std::string& path, Sequence& sequence) {
   sequence.intrinsics.fy = CameraNumber(root, "fy", path);
   sequence.intrinsics.cx = CameraNumber(root, "cx", path);
   sequence.intrinsics.cy = CameraNumber(root, "cy", path);
-  sequence.depth_scale = root["depth_scale"] ? CameraNumber(root, "depth_scale", path) : 5000;
+  sequence.depth_scale =
+      root["depth_scale"] ? CameraNumber(root, "depth_scale", path) : kPublishedDepthScale;
+}
+
+/// The camera as a file states it, or else as published for the folder's name.
+void FindCamera(const fs::path& root, const std::string& camera_file, Sequence& sequence) {
+  const fs::path beside = root / "camera.yaml";
+  if (!camera_file.empty() || fs::exists(beside)) {
+    ReadCamera(camera_file.empty() ? beside.string() : camera_file, sequence);
+    return;
+  }
+  const std::optional<CameraIntrinsics> published = PublishedTumCamera(root.string());
+  if (!published) {
+    throw Error("'" + root.string() +
+                "' has no camera.yaml, and its name is not one of TUM's (freiburg1, freiburg2, "
+                "freiburg3): its camera is not known");
+  }
+  sequence.intrinsics = *published;
+  sequence.depth_scale = kPublishedDepthScale;
+}
+
+/// rgb.txt and, where there is one, depth.txt.
+std::vector<SequenceFrame> ReadLists(const fs::path& root) {
+  const std::string rgb = (root / "rgb.txt").string();
+  const std::string depth = (root / "depth.txt").string();
+  std::vector<SequenceFrame> pictures = ParseTumAssociations(ReadFile(rgb, kMaxTextBytes), rgb);
+  if (!fs::exists(depth)) return pictures;
+  const std::vector<SequenceFrame> depths =
+      ParseTumAssociations(ReadFile(depth, kMaxTextBytes), depth);
+  std::vector<SequenceFrame> frames = AssociateDepth(pictures, depths);
+  if (frames.empty()) {
+    throw Error("no picture of '" + rgb + "' is within 0.02 s of a depth image of '" + depth + "'");
+  }
+  return frames;
 }
 
 void Anchor(const fs::path& root, std::string& path, const std::string& listed_in) {
@@ -152,17 +187,50 @@ std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::
   return poses;
 }
 
-Sequence ReadTumSequence(const std::string& directory) {
+std::vector<SequenceFrame> AssociateDepth(const std::vector<SequenceFrame>& pictures,
+                                          const std::vector<SequenceFrame>& depths) {
+  const auto stamps = [](const std::vector<SequenceFrame>& frames) {
+    std::vector<std::int64_t> values;
+    values.reserve(frames.size());
+    for (const SequenceFrame& frame : frames) values.push_back(frame.stamp_ns);
+    return values;
+  };
+  std::vector<SequenceFrame> frames;
+  for (const auto& [picture, depth] :
+       PairNearestStamps(stamps(pictures), stamps(depths), kMaxDepthDifferenceNs)) {
+    frames.push_back({pictures[picture].stamp_ns, pictures[picture].image_path,
+                      depths[depth].stamp_ns, depths[depth].image_path});
+  }
+  return frames;
+}
+
+std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory) {
+  const fs::path whole = fs::absolute(directory).lexically_normal();
+  // "fr1/" has no last name but an empty one.
+  const std::string name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+  const auto holds = [&name](const std::string& number) {
+    return name.find("freiburg" + number) != std::string::npos ||
+           name.find("fr" + number) != std::string::npos;
+  };
+  if (holds("1")) return CameraIntrinsics{517.3, 516.5, 318.6, 255.3, 640, 480};
+  if (holds("2")) return CameraIntrinsics{520.9, 521.0, 325.1, 249.7, 640, 480};
+  if (holds("3")) return CameraIntrinsics{535.4, 539.2, 320.1, 247.6, 640, 480};
+  return std::nullopt;
+}
+
+Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file) {
   const fs::path root(directory);
   if (!fs::is_directory(root)) throw Error("the TUM folder '" + directory + "' does not exist");
   Sequence sequence;
-  ReadCamera((root / "camera.yaml").string(), sequence);
+  FindCamera(root, camera_file, sequence);
   const bool associated = fs::exists(root / "associations.txt");
   const std::string list = (root / (associated ? "associations.txt" : "rgb.txt")).string();
-  sequence.frames = ParseTumAssociations(ReadFile(list, kMaxTextBytes), list);
+  sequence.frames =
+      associated ? ParseTumAssociations(ReadFile(list, kMaxTextBytes), list) : ReadLists(root);
+  const std::string depth_list = associated ? list : (root / "depth.txt").string();
   for (SequenceFrame& frame : sequence.frames) {
     Anchor(root, frame.image_path, list);
-    Anchor(root, frame.depth_path, list);
+    Anchor(root, frame.depth_path, depth_list);
   }
   const std::string truth = (root / "groundtruth.txt").string();
   if (fs::exists(truth)) {

@@ -63,6 +63,7 @@ const char* VoStateName(VoState state) {
 EdgeOdometry::EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics)
     : config_(config),
       extractor_(config.edges),
+      selector_(config.points.seed),
       aligner_(config.alignment),
       rotation_aligner_(RotationOnly(config.alignment)) {
   cameras_[0] = Checked(intrinsics);
@@ -231,8 +232,10 @@ bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
     PointSelection selection = config_.points;
     selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
     const cv::Mat& grey = keyframe.images[level];
-    selector_.Select(grey, keyframe.depths[level], keyframe.inverse_depth_sigmas[level],
-                     extractor_.Extract(grey), cameras_[index], selection, keyframe.points[index]);
+    const ReferenceLevel reference = {grey, keyframe.depths[level],
+                                      keyframe.inverse_depth_sigmas[level]};
+    selector_.Select(reference, extractor_.Extract(grey), cameras_[index], selection,
+                     keyframe.points[index]);
   }
   selector_.SelectAll(keyframe.images.thumbnail(), cameras_[static_cast<std::size_t>(levels_)],
                       keyframe.thumbnail_points);
@@ -244,9 +247,10 @@ const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
   if (config_.edge_source == EdgeSource::kKeyframe) return keyframe.points[index];
   PointSelection selection = config_.points;
   selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
-  selector_.Select(keyframe.images[level], keyframe.depths[level],
-                   keyframe.inverse_depth_sigmas[level], extractor_.Extract(frame_images_[level]),
-                   cameras_[index], selection, masked_points_);
+  const ReferenceLevel reference = {keyframe.images[level], keyframe.depths[level],
+                                    keyframe.inverse_depth_sigmas[level]};
+  selector_.Select(reference, extractor_.Extract(frame_images_[level]), cameras_[index], selection,
+                   masked_points_);
   return masked_points_;
 }
 
@@ -291,7 +295,7 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   Guesses guesses;
   const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
   const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
-  if (last_.twist && step_s <= kMaxPredictionS) {
+  if (config_.constant_motion && last_.twist && step_s <= kMaxPredictionS) {
     const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
     guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
   }

@@ -34,6 +34,25 @@ bool IsBehindAnEdge(const cv::Mat& depth_m, int x, int y, float ratio) {
   return false;
 }
 
+bool IsUsable(const ReferenceLevel& reference, const Pixel& pixel,
+              const PointSelection& selection) {
+  const Gradient gradient = GradientAt(reference.grey, pixel.x, pixel.y);
+  return gradient.x * gradient.x + gradient.y * gradient.y >=
+             selection.least_gradient * selection.least_gradient &&
+         !IsBehindAnEdge(reference.depth_m, pixel.x, pixel.y, selection.occlusion_ratio);
+}
+
+void Add(const ReferenceLevel& reference, const Pixel& pixel, const CameraIntrinsics& camera,
+         EdgePoints& points) {
+  const Gradient gradient = GradientAt(reference.grey, pixel.x, pixel.y);
+  points.Add(pixel.x, pixel.y, reference.depth_m.ptr<float>(pixel.y)[pixel.x],
+             reference.grey.ptr(pixel.y)[pixel.x], gradient.x, gradient.y, camera);
+  const cv::Mat& sigma = reference.inverse_depth_sigma;
+  if (!sigma.empty()) {
+    points.inverse_depth_sigma.push_back(sigma.ptr<float>(pixel.y)[pixel.x]);
+  }
+}
+
 /// Calls `visit` with every column of a mask's row, from `begin` on and before `end`, that is set.
 /// Most are not: eight are looked at together.
 template <typename Visit>
@@ -93,32 +112,63 @@ void EdgePoints::Finish() {
   mean_inverse_depth = z.empty() ? 0 : sum / static_cast<double>(z.size());
 }
 
-void PointSelector::Select(const cv::Mat& grey, const cv::Mat& depth_m,
-                           const cv::Mat& inverse_depth_sigma, const cv::Mat& edges,
+void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges,
                            const CameraIntrinsics& camera, const PointSelection& selection,
                            EdgePoints& points) {
   candidates_.clear();
-  for (int y = kBorderPx; y < grey.rows - kBorderPx; ++y) {
+  for (int y = kBorderPx; y < reference.grey.rows - kBorderPx; ++y) {
     const std::uint8_t* mask = edges.ptr(y);
-    const float* depth = depth_m.ptr<float>(y);
-    ForEachSet(mask, kBorderPx, grey.cols - kBorderPx, [&](int x) {
+    const float* depth = reference.depth_m.ptr<float>(y);
+    ForEachSet(mask, kBorderPx, reference.grey.cols - kBorderPx, [&](int x) {
       if (depth[x] <= 0) return;
       candidates_.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y)});
     });
   }
   points.Clear();
+  if (selection.choice != PixelChoice::kEdges) {
+    SelectAtRandom(reference, camera, selection, points);
+    return;
+  }
   const std::size_t count = candidates_.size();
   const std::size_t wanted = std::min(count, selection.max_points);
-  const float least_square = selection.least_gradient * selection.least_gradient;
   for (std::size_t i = 0; i < wanted; ++i) {
-    const auto [x, y] = candidates_[i * count / wanted];
-    const Gradient gradient = GradientAt(grey, x, y);
-    if (gradient.x * gradient.x + gradient.y * gradient.y < least_square) continue;
-    if (IsBehindAnEdge(depth_m, x, y, selection.occlusion_ratio)) continue;
-    points.Add(x, y, depth_m.ptr<float>(y)[x], grey.ptr(y)[x], gradient.x, gradient.y, camera);
-    if (!inverse_depth_sigma.empty()) {
-      points.inverse_depth_sigma.push_back(inverse_depth_sigma.ptr<float>(y)[x]);
+    const Pixel& pixel = candidates_[i * count / wanted];
+    if (IsUsable(reference, pixel, selection)) Add(reference, pixel, camera, points);
+  }
+  points.Finish();
+}
+
+/// From the pixels under the mask. Both random choices take equally many: they are counted and
+/// drawn among those that can be used.
+void PointSelector::SelectAtRandom(const ReferenceLevel& reference, const CameraIntrinsics& camera,
+                                   const PointSelection& selection, EdgePoints& points) {
+  const auto forget_useless = [&](const PointSelection& asked) {
+    candidates_.erase(
+        std::remove_if(candidates_.begin(), candidates_.end(),
+                       [&](const Pixel& pixel) { return !IsUsable(reference, pixel, asked); }),
+        candidates_.end());
+  };
+  forget_useless(selection);
+  const auto asked_for = static_cast<std::size_t>(
+      std::llround(selection.share * static_cast<double>(candidates_.size())));
+  if (selection.choice == PixelChoice::kRandomPixels) {
+    candidates_.clear();
+    for (int y = kBorderPx; y < reference.grey.rows - kBorderPx; ++y) {
+      for (int x = kBorderPx; x < reference.grey.cols - kBorderPx; ++x) {
+        if (reference.depth_m.ptr<float>(y)[x] <= 0) continue;
+        candidates_.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y)});
+      }
     }
+    PointSelection any_gradient = selection;
+    any_gradient.least_gradient = 0;
+    forget_useless(any_gradient);
+  }
+  const std::size_t count = candidates_.size();
+  const std::size_t wanted = std::min({asked_for, selection.max_points, count});
+  for (std::size_t i = 0; i < wanted; ++i) {
+    // Fisher and Yates; the standard's distributions differ from library to library.
+    if (wanted < count) std::swap(candidates_[i], candidates_[i + random_() % (count - i)]);
+    Add(reference, candidates_[i], camera, points);
   }
   points.Finish();
 }

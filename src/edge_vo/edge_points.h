@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <random>
 #include <vector>
 
 #include "geo/ground_projection.h"
@@ -33,33 +34,59 @@ struct EdgePoints {
   void Finish();
 };
 
+/// Which pixels become points. The random ones are for experiments: they ask what edges are worth.
+enum class PixelChoice {
+  kEdges,         ///< Those under the mask, thinned evenly when there are too many.
+  kRandomEdges,   ///< `share` of those under the mask.
+  kRandomPixels,  ///< As many as kRandomEdges would take, but of all pixels with depth.
+};
+
 /// What makes a pixel under an edge mask a point.
 struct PointSelection {
-  std::size_t max_points = 6000;  ///< More than these are thinned evenly.
-  float least_gradient = 2.0F;    ///< Grey levels per px; less says nothing about motion.
+  std::size_t max_points = 6000;  ///< More than these are thinned.
+  PixelChoice choice = PixelChoice::kEdges;
+  double share = 1;  ///< Of the random choices; kRandomPixels may take more than the edges are.
+  std::uint32_t seed = 1;  ///< Of the random choices, read by whoever makes the PointSelector.
+  /// Grey levels per px; less says nothing about motion. Not asked of kRandomPixels.
+  float least_gradient = 2.0F;
   /// A pixel whose 5x5 neighbourhood holds a depth nearer than its own by this factor lies behind
   /// an occluding edge: its depth is not the edge's.
   float occlusion_ratio = 1.08F;
 };
 
+/// A pixel of an image, at most 8192 wide.
+struct Pixel {
+  std::int16_t x, y;
+};
+
+/// What points are made of: one level of a keyframe, images of one size.
+struct ReferenceLevel {
+  const cv::Mat& grey;     ///< CV_8UC1
+  const cv::Mat& depth_m;  ///< CV_32FC1, 0 unknown.
+  /// Standard deviation of the inverse depth, CV_32FC1, 1/m; empty: depths are exact.
+  const cv::Mat& inverse_depth_sigma;
+};
+
 /// Gathers points under an edge mask; keeps its list of pixels from call to call.
 class PointSelector {
  public:
+  /// The seed decides what the random choices take, one after the other.
+  explicit PointSelector(std::uint32_t seed = 1) : random_(seed) {}
+
   /// Memory for masks with so many pixels set.
   void Reserve(std::size_t pixels) { candidates_.reserve(pixels); }
-  /// Points of the reference image `grey` with `depth_m` (0 unknown) under `edges`, same sizes.
-  /// `inverse_depth_sigma` (CV_32FC1, 1/m) says how well the depths are known; empty: exactly.
-  void Select(const cv::Mat& grey, const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
-              const cv::Mat& edges, const CameraIntrinsics& camera, const PointSelection& selection,
-              EdgePoints& points);
+  /// Points of the reference under `edges`, an image of the same size.
+  void Select(const ReferenceLevel& reference, const cv::Mat& edges, const CameraIntrinsics& camera,
+              const PointSelection& selection, EdgePoints& points);
   /// Every pixel, as if at one metre: for rotations, which depth does not matter to.
   void SelectAll(const cv::Mat& grey, const CameraIntrinsics& camera, EdgePoints& points);
 
  private:
-  struct Pixel {
-    std::int16_t x, y;
-  };
+  void SelectAtRandom(const ReferenceLevel& reference, const CameraIntrinsics& camera,
+                      const PointSelection& selection, EdgePoints& points);
+
   std::vector<Pixel> candidates_;
+  std::mt19937 random_;
 };
 
 }  // namespace livemap

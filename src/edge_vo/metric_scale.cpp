@@ -24,7 +24,8 @@ void MetricScale::Drift() {
 
 void MetricScale::Measure(double metres, double sigma_m, double units) {
   // Written so that NaN is refused.
-  if (!(metres > 0 && units > 0 && sigma_m >= 0) || !std::isfinite(metres / units)) return;
+  if (!(metres > 0 && units > 0 && sigma_m >= 0)) return;
+  if (!std::isfinite(metres) || !std::isfinite(units) || !std::isfinite(sigma_m)) return;
   const double relative = sigma_m / metres;
   const double variance = relative * relative + config_.way_sigma * config_.way_sigma;
   const double innovation = std::log(metres / units) - log_scale_;

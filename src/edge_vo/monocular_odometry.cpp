@@ -12,6 +12,7 @@ namespace {
 constexpr double kSecond = 1e-9;  // Per nanosecond.
 /// The shortest way that tells the scale: over less, errors of both sides do not average out, m.
 constexpr double kScaleWayM = 1.0;
+constexpr double kFastestMps = 200;
 /// Of the camera's height: the load, the road's crown.
 constexpr double kHeightSigmaM = 0.05;
 
@@ -65,6 +66,11 @@ void MonocularOdometry::Reset() {
 
 VoResult MonocularOdometry::Track(const MonocularFrame& frame) {
   odometry_.Check({frame.stamp_ns, frame.grey, {}, 1});
+  // Written so that NaN is refused.
+  if (frame.speed_mps && !(*frame.speed_mps >= 0 && *frame.speed_mps < kFastestMps)) {
+    throw Error("a speed of " + std::to_string(*frame.speed_mps) + " m/s came with a frame; 0 to " +
+                std::to_string(kFastestMps) + " is accepted");
+  }
   AddWay(frame);
   last_ = started_ ? Continue(frame) : Start(frame);
   last_frame_ = frame;

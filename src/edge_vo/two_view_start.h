@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <opencv2/core.hpp>
@@ -12,7 +13,7 @@ namespace livemap {
 
 /// The first motion of a single camera, before any depth is known: corners followed from a first
 /// image on, and the essential matrix of their way (OpenCV: Shi-Tomasi, Lucas-Kanade, five points
-/// in RANSAC with a fixed seed).
+/// in a RANSAC with a fixed seed), refined to the least Sampson error.
 class TwoViewStart {
  public:
   struct Config {
@@ -22,6 +23,9 @@ class TwoViewStart {
     /// Corners that must be left, and their share that must agree.
     int least_corners = 60;
     double least_inliers = 0.6;
+    /// Corners that went this far without a motion that they agree on: it begins anew, share of the
+    /// image's width.
+    double longest_way = 0.2;
     double inlier_px = 1.0;
   };
 
@@ -45,6 +49,8 @@ class TwoViewStart {
   void KeepFollowed(const std::vector<cv::Point2f>& now, const std::vector<std::uint8_t>& found);
   double MedianWayPx() const;
   std::optional<Eigen::Isometry3d> Motion() const;
+  void Refine(Eigen::Isometry3d& new_from_first) const;
+  Eigen::VectorXd SampsonErrors(const Eigen::Isometry3d& new_from_first) const;
 
   Config config_;
   CameraIntrinsics camera_;

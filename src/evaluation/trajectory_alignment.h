@@ -21,9 +21,7 @@ struct TrajectoryPairs {
   std::vector<StampedPose> estimate;  ///< Stamps as in the file, without the offset.
 };
 
-/// As the TUM benchmark's associate.py: of all pairs of stamps nearer than the maximum, the nearest
-/// pair first, and every stamp once (of equally near ones the earlier true stamp, then the earlier
-/// estimated one). In O(n log n).
+/// PairNearestStamps over the true stamps and the estimate's.
 TrajectoryPairs Associate(const std::vector<StampedPose>& truth,
                           const std::vector<StampedPose>& estimate,
                           const AssociationOptions& options);

@@ -17,12 +17,13 @@ ros::Duration Start(const Sequence& sequence) {
 int Run(int argc, char** argv) {
   CommandLine line(
       "livemap_bag_from_tum DIR OUT.bag",
-      "Makes a bag of a TUM RGB-D folder: associations.txt (or rgb.txt), camera.yaml,\n"
-      "groundtruth.txt and the pictures they list. Stamps are the sequence's own,\n"
+      "Makes a bag of a TUM RGB-D folder: associations.txt (or rgb.txt and depth.txt),\n"
+      "camera.yaml (or --camera, or TUM's own), groundtruth.txt and the pictures they list. Stamps "
+      "are the sequence's own,\n"
       "one second later where it begins at zero.",
-      2, {});
+      2, {{"camera", "FILE", "the camera, laid out as camera.yaml"}});
   if (!line.Parse(argc, argv)) return 0;
-  const Sequence sequence = ReadTumSequence(line.Positional(0));
+  const Sequence sequence = ReadTumSequence(line.Positional(0), line.Text("camera", ""));
   WriteSequenceBag(sequence, line.Positional(1), Start(sequence));
   std::printf("%s: %zu frames, %zu poses\n", line.Positional(1).c_str(), sequence.frames.size(),
               sequence.poses.size());

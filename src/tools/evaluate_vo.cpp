@@ -1,8 +1,6 @@
 // livemap_evaluate_vo: how well and how fast visual odometry follows an RGB-D sequence.
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -13,10 +11,10 @@
 #include <optional>
 
 #include "base/error.h"
-#include "drives/image_file.h"
 #include "drives/sequences.h"
 #include "evaluation/trajectory_report.h"
 #include "tools/command_line.h"
+#include "tools/sequence_pictures.h"
 #include "tools/vo_method.h"
 
 namespace livemap {
@@ -24,6 +22,7 @@ namespace {
 
 struct Options {
   std::string sequence;
+  std::string camera_file;
   std::string method = "edge";
   std::string out;
   bool json = false;
@@ -42,8 +41,9 @@ EdgeSource ReadEdgeSource(const CommandLine& line) {
 std::optional<Options> ParseOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_vo [FLAGS] SEQ",
-      "Follows the camera of an RGB-D sequence in TUM layout (associations.txt, camera.yaml,\n"
-      "groundtruth.txt if there is one) and prints accuracy and time per frame. Time is that of\n"
+      "Follows the camera of an RGB-D sequence in TUM layout (associations.txt or rgb.txt with\n"
+      "depth.txt, camera.yaml, groundtruth.txt if there is one) and prints accuracy and time per "
+      "frame. Time is that of\n"
       "one thread from the decoded colour picture to the pose. docs/evaluation.md defines the\n"
       "figures.",
       1,
@@ -52,12 +52,15 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"edge-model", "FILE", "OpenCV's model of --edges structured"},
        {"edge-source", "NAME", "keyframe (default) or new-image (thesis, equation 5.2)"},
        {"keyframe-every", "N", "a keyframe every N frames, 1: frame to frame, default adaptive"},
+       {"camera", "FILE",
+        "the camera, laid out as camera.yaml, default the sequence's own or TUM's"},
        {"step", "N", "use every Nth frame only, default 1"},
        {"method", "NAME", "edge (default), or OpenCV's: rgbd, rgbd-icp"},
        {"out", "FILE", "write the trajectory, TUM lines"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
   options.sequence = line.Positional(0);
+  options.camera_file = line.Text("camera", "");
   options.method = line.Text("method", options.method);
   options.out = line.Text("out", "");
   options.json = line.Has("json");
@@ -69,20 +72,6 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
     options.odometry.keyframe_every = static_cast<int>(line.Number("keyframe-every", 1, 1, 10000));
   }
   return options;
-}
-
-cv::Mat ReadPicture(const std::string& path, const CameraIntrinsics& camera, int flags) {
-  const ImageFile file = ReadImageFile(path, camera.width, camera.height);
-  return cv::imdecode(file.bytes, flags);
-}
-
-/// A sequence without width and height has those of its first picture.
-CameraIntrinsics IntrinsicsOf(const Sequence& sequence) {
-  CameraIntrinsics camera = sequence.intrinsics;
-  const ImageFile first = ReadImageFile(sequence.frames.front().image_path, 0, 0);
-  if (camera.width == 0) camera.width = static_cast<int>(first.header.width);
-  if (camera.height == 0) camera.height = static_cast<int>(first.header.height);
-  return camera;
 }
 
 struct Run {
@@ -136,12 +125,6 @@ void WriteTrajectory(const std::string& path, const std::vector<StampedPose>& tr
   if (!file) throw Error("the trajectory '" + path + "' cannot be written");
 }
 
-double Quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(
-      std::lround(share * static_cast<double>(values.size() - 1)))];
-}
-
 nlohmann::ordered_json Report(const Sequence& sequence, const Options& options, const Run& run) {
   nlohmann::ordered_json json;
   if (sequence.poses.empty()) {
@@ -164,7 +147,7 @@ int RunEvaluation(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
   cv::setNumThreads(1);
-  const Sequence sequence = ReadTumSequence(options->sequence);
+  const Sequence sequence = ReadTumSequence(options->sequence, options->camera_file);
   const Run run = FollowSequence(sequence, *options);
   if (!options->out.empty()) WriteTrajectory(options->out, run.trajectory);
   const nlohmann::ordered_json report = Report(sequence, *options, run);

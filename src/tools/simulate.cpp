@@ -78,7 +78,7 @@ int Run(int argc, char** argv) {
       flags);
   if (!line.Parse(argc, argv)) return 0;
   KeepMemoryFlat();
-  if (line.Has("room")) return SimulateRoom(line);
+  if (WantsRoom(line)) return SimulateRoom(line);
   RefuseRoomFlags(line);
   if (line.Has("change")) return SimulateChange(line);
   RefuseChangeFlags(line);

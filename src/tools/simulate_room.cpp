@@ -3,10 +3,12 @@
 #include <cmath>
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "base/error.h"
 #include "simulation/dataset.h"
+#include "simulation/patterned_wall.h"
 #include "simulation/room.h"
 #include "tools/simulation_setup.h"
 
@@ -16,29 +18,49 @@ namespace {
 constexpr int kPreviewPictures = 12;
 constexpr float kGain = 1.3F;
 
+/// The wall as the simulator's other pictures are: with depth, grey in all three channels.
+SimulatedFrame SeeWall(const SimulatedCamera& camera, const Eigen::Isometry3d& world_from_optical,
+                       double gain) {
+  const PatternedWall::View view =
+      PatternedWall::See(camera.intrinsics, world_from_optical, gain, 0);
+  SimulatedFrame frame;
+  cv::cvtColor(view.grey, frame.bgr, cv::COLOR_GRAY2BGR);
+  frame.depth = view.depth;
+  frame.world_from_optical = world_from_optical;
+  return frame;
+}
+
 }  // namespace
 
 std::vector<Flag> RoomFlags() {
   return {{"room", "", "instead of a street: a hand-held camera in a furnished room, for --tum"},
-          {"vigour", "X", "of --room's hand; 1 is calm, about 0.15 m/s and 8 deg/s (1)"},
-          {"flicker", "X", "of --room's light: gain swings by this share, once a second (0)"}};
+          {"wall", "", "as --room, but a wall with a smooth pattern: exact to the grey level"},
+          {"vigour", "X",
+           "of the hand of --room and --wall; 1 is calm, about 0.15 m/s and 8 deg/s (1)"},
+          {"flicker", "X", "of their light: gain swings by this share, once a second (0)"}};
 }
 
 void RefuseRoomFlags(const CommandLine& line) {
   for (const Flag& flag : RoomFlags()) {
-    if (flag.name != "room" && line.Has(flag.name)) {
-      throw Error("--" + flag.name + " needs --room, whose camera it is about");
+    if (line.Has(flag.name)) {
+      throw Error("--" + flag.name + " needs --room or --wall, whose camera it is about");
     }
   }
 }
 
+bool WantsRoom(const CommandLine& line) { return line.Has("room") || line.Has("wall"); }
+
 int SimulateRoom(const CommandLine& line) {
+  const bool wall = line.Has("wall");
+  const std::string name = wall ? "--wall" : "--room";
+  if (wall && line.Has("room")) throw Error("--room and --wall are two worlds; give one of them");
   for (const char* street :
        {"condition", "speed", "stops", "route", "world", "start", "blur", "yolo", "video", "bag",
         "hazards", "truth-preview", "change", "stereo"}) {
-    if (line.Has(street)) throw Error("--" + std::string(street) + " is a street's, not --room's");
+    if (line.Has(street))
+      throw Error("--" + std::string(street) + " is a street's, not " + name + "'s");
   }
-  if (!line.Has("tum")) throw Error("--room needs --tum DIR, where the sequence goes");
+  if (!line.Has("tum")) throw Error(name + " needs --tum DIR, where the sequence goes");
   const double rate_hz = line.Number("rate", 30, 0.1, 100);
   const double vigour = line.Number("vigour", 1, 0, 20);
   const double flicker = line.Number("flicker", 0, 0, 0.9);
@@ -49,13 +71,16 @@ int SimulateRoom(const CommandLine& line) {
   const SimulatedRoom room(line.Seed("seed", 1));
   TumWriter writer(line.Text("tum", ""), setup.camera,
                    line.Number("depth-scale", kTumDepthScale, 100, 10000));
+  const Eigen::Isometry3d first_pose = room.WorldFromOptical(0, vigour);
   std::vector<cv::Mat> pictures;
   Progress progress("frame", static_cast<std::size_t>(frames));
   for (int i = 0; i < frames; ++i) {
     const double time_s = i / rate_hz;
-    const auto gain = static_cast<float>(kGain * (1 + flicker * std::sin(2 * M_PI * time_s)));
-    SimulatedFrame frame = room.Render(setup.camera, room.WorldFromOptical(time_s, vigour),
-                                       static_cast<std::uint32_t>(i), gain, rays, threads);
+    const double gain = 1 + flicker * std::sin(2 * M_PI * time_s);
+    const Eigen::Isometry3d pose = room.WorldFromOptical(time_s, vigour);
+    SimulatedFrame frame = wall ? SeeWall(setup.camera, first_pose.inverse() * pose, gain)
+                                : room.Render(setup.camera, pose, static_cast<std::uint32_t>(i),
+                                              static_cast<float>(kGain * gain), rays, threads);
     frame.depth = SenseDepth(frame.depth, setup.camera.intrinsics, setup.depth, setup.baseline_m,
                              static_cast<std::uint32_t>(i));
     if (i * kPreviewPictures / frames != (i - 1) * kPreviewPictures / frames || i == 0) {

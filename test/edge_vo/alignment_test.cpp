@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <set>
+#include <utility>
 
 #include "edge_vo/edge_extractor.h"
 #include "synthetic_scene.h"
@@ -12,12 +14,14 @@ namespace livemap {
 namespace {
 
 constexpr CameraIntrinsics kCamera{260, 260, 159.5, 119.5, 320, 240};
+const cv::Mat kExact;  // No uncertainty of the depths.
 
 EdgePoints PointsOf(const RgbdFrame& frame) {
   EdgeExtractor extractor({});
   PointSelector selector;
   EdgePoints points;
-  selector.Select(frame.grey, frame.depth, extractor.Extract(frame.grey), kCamera, {}, points);
+  selector.Select({frame.grey, frame.depth, kExact}, extractor.Extract(frame.grey), kCamera, {},
+                  points);
   return points;
 }
 
@@ -56,7 +60,7 @@ TEST(PointSelector, AStepInDepthGivesItsEdgeToTheNearerSide) {
   mask.colRange(158, 162).setTo(255);
   PointSelector selector;
   EdgePoints points;
-  selector.Select(grey, depth, mask, kCamera, {}, points);
+  selector.Select({grey, depth, kExact}, mask, kCamera, {}, points);
   ASSERT_GT(points.size(), 100U);
   for (const float z : points.z) EXPECT_EQ(z, 1);
 }
@@ -69,11 +73,62 @@ TEST(PointSelector, ThinsEvenlyToTheAllowedNumber) {
   selection.least_gradient = 0;
   PointSelector selector;
   EdgePoints points;
-  selector.Select(frame.grey, frame.depth, all, kCamera, selection, points);
+  selector.Select({frame.grey, frame.depth, kExact}, all, kCamera, selection, points);
   ASSERT_EQ(points.size(), 1000U);
   std::size_t upper = 0;
   for (const float y : points.y) upper += y < 0 ? 1U : 0U;
   EXPECT_NEAR(static_cast<double>(upper), 500, 60);
+}
+
+/// The wall under its edges, chosen as asked.
+EdgePoints PointsChosen(PixelChoice choice, double share, std::uint32_t seed,
+                        std::size_t max_points = 100000) {
+  const RgbdFrame frame = SyntheticWall(kCamera).See(1, Eigen::Isometry3d::Identity());
+  EdgeExtractor extractor({});
+  PointSelection selection;
+  selection.max_points = max_points;
+  selection.choice = choice;
+  selection.share = share;
+  PointSelector selector(seed);
+  EdgePoints points;
+  selector.Select({frame.grey, frame.depth, kExact}, extractor.Extract(frame.grey), kCamera,
+                  selection, points);
+  return points;
+}
+
+double MeanGradient(const EdgePoints& points) {
+  double sum = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    sum += std::hypot(points.jacobian[0][i], points.jacobian[1][i]) * points.z[i] / kCamera.fx;
+  }
+  return sum / static_cast<double>(points.size());
+}
+
+TEST(PointSelector, RandomPixelsAreAsManyAsRandomEdgesButFlatter) {
+  const EdgePoints all = PointsChosen(PixelChoice::kEdges, 1, 1);
+  for (const double share : {0.05, 0.5, 1.0}) {
+    const EdgePoints edges = PointsChosen(PixelChoice::kRandomEdges, share, 1);
+    const EdgePoints pixels = PointsChosen(PixelChoice::kRandomPixels, share, 1);
+    EXPECT_NEAR(static_cast<double>(edges.size()), share * static_cast<double>(all.size()), 1);
+    EXPECT_EQ(edges.size(), pixels.size());
+    EXPECT_GT(MeanGradient(edges), 1.5 * MeanGradient(pixels)) << share;
+  }
+}
+
+TEST(PointSelector, TheSeedDecidesWhichPixelsAreDrawn) {
+  const EdgePoints first = PointsChosen(PixelChoice::kRandomPixels, 0.2, 7);
+  EXPECT_EQ(first.x, PointsChosen(PixelChoice::kRandomPixels, 0.2, 7).x);
+  EXPECT_NE(first.x, PointsChosen(PixelChoice::kRandomPixels, 0.2, 8).x);
+}
+
+TEST(PointSelector, NoPixelIsDrawnTwiceAndNoMoreThanThereAre) {
+  const EdgePoints all = PointsChosen(PixelChoice::kRandomPixels, 1000, 1);
+  EXPECT_EQ(all.size(), (320U - 4) * (240U - 4)) << "but for the border, the wall is everywhere";
+  EdgePoints most = PointsChosen(PixelChoice::kRandomPixels, 1000, 1, 60000);
+  ASSERT_EQ(most.size(), 60000U);
+  std::set<std::pair<float, float>> places;
+  for (std::size_t i = 0; i < most.size(); ++i) places.emplace(most.x[i], most.y[i]);
+  EXPECT_EQ(places.size(), most.size());
 }
 
 class AlignerMotion : public ::testing::TestWithParam<Eigen::Isometry3d> {};

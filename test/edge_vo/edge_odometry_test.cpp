@@ -48,6 +48,37 @@ TEST_P(EdgeOdometryOf, FollowsASwayingHandWithinMillimetres) {
 INSTANTIATE_TEST_SUITE_P(EdgesOf, EdgeOdometryOf,
                          ::testing::Values(EdgeSource::kKeyframe, EdgeSource::kNewImage));
 
+TEST(EdgeOdometry, FollowsByRandomPixelsAndWithoutConstantMotion) {
+  const SyntheticWall wall(kCamera);
+  for (const PixelChoice choice : {PixelChoice::kRandomEdges, PixelChoice::kRandomPixels}) {
+    EdgeOdometry::Config config;
+    config.points.choice = choice;
+    config.points.share = 0.5;
+    config.constant_motion = false;
+    EdgeOdometry odometry(config, kCamera);
+    for (int i = 0; i < 30; ++i) {
+      const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i)));
+      ASSERT_EQ(result.state, VoState::kTracking) << i;
+      ASSERT_LT(ErrorM(result, i), 0.01) << i;
+    }
+  }
+}
+
+TEST(EdgeOdometry, AnotherSeedDrawsOtherPixels) {
+  const SyntheticWall wall(kCamera);
+  EdgeOdometry::Config config;
+  config.points.choice = PixelChoice::kRandomEdges;
+  config.points.share = 0.2;
+  const auto last = [&](std::uint32_t seed) {
+    config.points.seed = seed;
+    EdgeOdometry odometry(config, kCamera);
+    odometry.Track(wall.See(Stamp(0), Sway(0)));
+    return odometry.Track(wall.See(Stamp(1), Sway(1))).world_from_camera.matrix();
+  };
+  EXPECT_EQ(last(1), last(1));
+  EXPECT_NE(last(1), last(2));
+}
+
 TEST(EdgeOdometry, SixteenBitAndFloatDepthAgree) {
   const SyntheticWall wall(kCamera);
   EdgeOdometry with_float({}, kCamera), with_units({}, kCamera);

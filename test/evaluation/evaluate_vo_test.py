@@ -73,6 +73,21 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertEqual(rows[1][0], "0.066667000")
         self.assertEqual([float(value) for value in rows[0][1:]], [0, 0, 0, 0, 0, 0, 1])
 
+    def test_a_folder_as_tum_packs_it_needs_neither_associations_nor_a_camera(self):
+        folder = os.path.join(self.temporary.name, "rgbd_dataset_freiburg1_made_up")
+        subprocess.run([SIMULATE, "--wall", "--tum", folder, "--seconds", "0.5", "--rate", "10"], check=True,
+                       capture_output=True, timeout=600)
+        as_simulated = self.figures(folder)
+        self.assertEqual((as_simulated["frames"], as_simulated["lost"]), (5, 0))
+        self.assertLess(as_simulated["ate_rmse_m"], 0.001)
+        os.remove(os.path.join(folder, "associations.txt"))
+        camera = os.path.join(self.temporary.name, "camera.yaml")
+        os.rename(os.path.join(folder, "camera.yaml"), camera)
+        by_name = self.figures(folder)
+        self.assertEqual(by_name["frames"], 5)
+        self.assertNotEqual(by_name["ate_rmse_m"], as_simulated["ate_rmse_m"], "the Kinect's focal length")
+        self.assertEqual(self.figures(folder, "--camera", camera)["ate_rmse_m"], as_simulated["ate_rmse_m"])
+
     def test_without_truth_its_figures_are_null(self):
         os.rename(os.path.join(self.room, "groundtruth.txt"), os.path.join(self.room, "away"))
         try:
@@ -86,6 +101,7 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertIn("/nowhere", self.refused("/nowhere"))
         self.assertIn("canny, log, sobel", self.refused(self.room, "--edges", "prewitt"))
         self.assertIn("edge, rgbd, rgbd-icp", self.refused(self.room, "--method", "orb"))
+        self.assertIn("/no/camera", self.refused(self.room, "--camera", "/no/camera.yaml"))
         self.assertIn("structured_model", self.refused(self.room, "--edges", "structured"))
 
     def test_real_sequences_are_followed_within_the_bars(self):

@@ -1,7 +1,11 @@
 // The readers of files that a drive is made of: survey tables and labels, routes, TUM and KITTI
-// lists, camera files, image headers. The first byte chooses the reader.
+// lists, camera files, image headers. The first byte chooses the reader. A TUM list is also paired
+// with itself, every second line, as pictures with depth images.
+#include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/image_header.h"
@@ -10,6 +14,21 @@
 #include "drives/route.h"
 #include "drives/sequences.h"
 #include "drives/survey.h"
+
+namespace {
+
+void PairWithItself(const std::vector<livemap::SequenceFrame>& list) {
+  std::vector<livemap::SequenceFrame> pictures, depths;
+  for (std::size_t i = 0; i < list.size(); ++i) (i % 2 == 0 ? pictures : depths).push_back(list[i]);
+  const std::vector<livemap::SequenceFrame> paired = livemap::AssociateDepth(pictures, depths);
+  if (paired.size() > std::min(pictures.size(), depths.size())) __builtin_trap();
+  for (const livemap::SequenceFrame& frame : paired) {
+    const std::int64_t apart = frame.stamp_ns - frame.depth_stamp_ns;
+    if (std::abs(apart) >= livemap::kMaxDepthDifferenceNs) __builtin_trap();
+  }
+}
+
+}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
@@ -26,7 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         livemap::ParseRoute(text, "input");
         break;
       case 3:
-        livemap::ParseTumAssociations(text, "input");
+        PairWithItself(livemap::ParseTumAssociations(text, "input"));
         break;
       case 4:
         livemap::ParseTumTrajectory(text, "input");

@@ -1,0 +1,115 @@
+#include <chrono>
+#include <vector>
+
+#include "measurements.h"
+#include "tools/command_line.h"
+#include "tools/sequence_pictures.h"
+
+namespace livemap {
+namespace {
+
+/// A run of EdgeOdometry that also says how many points it used and what a keyframe took.
+struct PointRun {
+  MethodRun all;
+  std::vector<double> tracked_ms;   // Frames that did not become a keyframe.
+  std::vector<double> keyframe_ms;  // Those that did.
+  std::vector<double> points;       // Of the finest level.
+};
+
+/// No limit on the points but the pixels of each level.
+EdgeOdometry::Config UnlimitedPoints(const CameraIntrinsics& camera) {
+  EdgeOdometry::Config config;
+  int pixels = camera.width * camera.height;
+  for (int& most : config.max_points) {
+    most = pixels;
+    pixels /= 4;
+  }
+  return config;
+}
+
+PointRun Follow(const std::vector<RgbdFrame>& frames, const EdgeOdometry::Config& config,
+                const CameraIntrinsics& camera) {
+  EdgeOdometry odometry(config, camera);
+  PointRun run;
+  for (const RgbdFrame& frame : frames) {
+    const auto start = std::chrono::steady_clock::now();
+    const VoResult result = odometry.Track(frame);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    run.all.trajectory.push_back({frame.stamp_ns, result.world_from_camera});
+    run.all.milliseconds.push_back(took.count());
+    run.all.lost += result.state == VoState::kLost ? 1U : 0U;
+    run.all.keyframes += result.new_keyframe ? 1U : 0U;
+    if (result.points == 0) continue;  // The first frame, or a lost one.
+    run.points.push_back(static_cast<double>(result.points));
+    (result.new_keyframe ? run.keyframe_ms : run.tracked_ms).push_back(took.count());
+  }
+  return run;
+}
+
+nlohmann::ordered_json MedianOf(const std::vector<double>& values) {
+  if (values.empty()) return nullptr;
+  return Quantile(values, 0.5);
+}
+
+nlohmann::ordered_json RowOf(const Recording& recording, const PointRun& run) {
+  nlohmann::ordered_json row = FiguresOf(recording.truth(), run.all);
+  row["points"] = MedianOf(run.points);
+  row["tracked_ms"] = MedianOf(run.tracked_ms);
+  row["keyframe_ms"] = MedianOf(run.keyframe_ms);
+  return row;
+}
+
+const char* NameOf(PixelChoice choice) {
+  return choice == PixelChoice::kRandomPixels ? "random" : "edges";
+}
+
+}  // namespace
+
+nlohmann::ordered_json MeasureAblation(const Recording& recording, std::size_t runs) {
+  const std::vector<RgbdFrame> frames = recording.ReadAll();
+  const std::vector<double> shares = {0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
+  nlohmann::ordered_json json = DescriptionOf(recording);
+  Progress progress("ablation", runs * shares.size() * 2);
+  std::size_t done = 0;
+  for (std::size_t run = 0; run < runs; ++run) {
+    for (const double share : shares) {
+      for (const PixelChoice choice : {PixelChoice::kRandomEdges, PixelChoice::kRandomPixels}) {
+        EdgeOdometry::Config config = UnlimitedPoints(recording.camera());
+        config.constant_motion = false;
+        config.points.choice = choice;
+        config.points.share = share;
+        config.points.seed = static_cast<std::uint32_t>(run + 1);
+        nlohmann::ordered_json row = {
+            {"pixels", NameOf(choice)}, {"share", share}, {"seed", run + 1}};
+        row.update(RowOf(recording, Follow(frames, config, recording.camera())));
+        json["rows"].push_back(row);
+        progress.At(++done);
+      }
+    }
+  }
+  return json;
+}
+
+nlohmann::ordered_json MeasurePixels(const Recording& recording) {
+  const std::vector<RgbdFrame> frames = recording.ReadAll();
+  nlohmann::ordered_json json = DescriptionOf(recording);
+  // Shares of the edge pixels; the last is more than any image has.
+  const std::vector<double> of_edges = {0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
+  const std::vector<double> of_all = {1, 2, 4, 8, 1000};
+  Progress progress("pixels", of_edges.size() + of_all.size());
+  std::size_t done = 0;
+  const auto measure = [&](PixelChoice choice, double share) {
+    EdgeOdometry::Config config = UnlimitedPoints(recording.camera());
+    config.points.choice = choice;
+    config.points.share = share;
+    nlohmann::ordered_json row = {{"pixels", NameOf(choice)}, {"share", share}};
+    row.update(RowOf(recording, Follow(frames, config, recording.camera())));
+    json["rows"].push_back(row);
+    progress.At(++done);
+  };
+  for (const double share : of_edges) measure(PixelChoice::kRandomEdges, share);
+  for (const double share : of_all) measure(PixelChoice::kRandomPixels, share);
+  return json;
+}
+
+}  // namespace livemap

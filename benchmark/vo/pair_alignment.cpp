@@ -1,0 +1,105 @@
+#include "pair_alignment.h"
+
+#include <array>
+#include <utility>
+
+#include "tools/opencv_odometry.h"
+
+namespace livemap {
+namespace {
+
+class EdgePairAlignment : public PairAlignment {
+ public:
+  explicit EdgePairAlignment(const CameraIntrinsics& camera)
+      : extractor_(config_.edges),
+        aligner_(config_.alignment),
+        levels_(CountLevels({camera.width, camera.height})) {
+    cameras_[0] = camera;
+    for (std::size_t level = 1; level < cameras_.size(); ++level) {
+      cameras_[level] = HalvedIntrinsics(cameras_[level - 1]);
+    }
+  }
+
+  std::string name() const override { return "edge"; }
+
+  void Take(const RgbdFrame& reference, const RgbdFrame& image) override {
+    reference_.Build(reference.grey);
+    image_.Build(image.grey);
+    depths_.Build(reference.depth, reference.depth_units_per_m, config_.depth_range, levels_);
+    for (int level = 0; level < levels_; ++level) {
+      const auto index = static_cast<std::size_t>(level);
+      PointSelection selection = config_.points;
+      selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
+      const cv::Mat& grey = reference_[level];
+      selector_.Select(grey, depths_[level], extractor_.Extract(grey), cameras_[index], selection,
+                       points_[index]);
+    }
+  }
+
+  std::optional<Eigen::Isometry3d> Align(const Eigen::Isometry3d& guess) override {
+    AlignmentState state;
+    state.new_from_reference = guess;
+    for (int level = levels_ - 1; level >= 0; --level) {
+      const auto index = static_cast<std::size_t>(level);
+      state = aligner_.Align(points_[index], image_[level], cameras_[index], state).state;
+    }
+    return state.new_from_reference;
+  }
+
+ private:
+  EdgeOdometry::Config config_;
+  EdgeExtractor extractor_;
+  PointSelector selector_;
+  Aligner aligner_;
+  int levels_;
+  std::array<CameraIntrinsics, kMaxLevels> cameras_;
+  ImagePyramid reference_, image_;
+  DepthPyramid depths_;
+  std::array<EdgePoints, kMaxLevels> points_;
+};
+
+class OpenCvPairAlignment : public PairAlignment {
+ public:
+  OpenCvPairAlignment(std::string name, const cv::Ptr<cv::rgbd::Odometry>& odometry)
+      : name_(std::move(name)), odometry_(odometry) {}
+
+  std::string name() const override { return name_; }
+
+  void Take(const RgbdFrame& reference, const RgbdFrame& image) override {
+    reference_ = PrepareOpenCvFrame(*odometry_, reference);
+    image_ = PrepareOpenCvFrame(*odometry_, image);
+  }
+
+  std::optional<Eigen::Isometry3d> Align(const Eigen::Isometry3d& guess) override {
+    cv::Mat motion;
+    if (!odometry_->compute(reference_, image_, motion, MatrixOf(guess))) return std::nullopt;
+    return PoseOf(motion);
+  }
+
+ private:
+  std::string name_;
+  cv::Ptr<cv::rgbd::Odometry> odometry_;
+  cv::Ptr<cv::rgbd::OdometryFrame> reference_, image_;
+};
+
+template <typename Kind>
+std::unique_ptr<PairAlignment> WithoutLimits(const std::string& name, const std::string& type,
+                                             const CameraIntrinsics& camera) {
+  const cv::Ptr<Kind> odometry = MakeOpenCvOdometry(type, camera).dynamicCast<Kind>();
+  odometry->setMaxTranslation(1000);  // m
+  odometry->setMaxRotation(360);      // degrees
+  return std::make_unique<OpenCvPairAlignment>(name, odometry);
+}
+
+}  // namespace
+
+std::vector<std::unique_ptr<PairAlignment>> MakePairAlignments(const CameraIntrinsics& camera) {
+  std::vector<std::unique_ptr<PairAlignment>> methods;
+  methods.push_back(std::make_unique<EdgePairAlignment>(camera));
+  methods.push_back(WithoutLimits<cv::rgbd::RgbdOdometry>("rgbd", "RgbdOdometry", camera));
+  methods.push_back(
+      WithoutLimits<cv::rgbd::RgbdICPOdometry>("rgbd-icp", "RgbdICPOdometry", camera));
+  return methods;
+}
+
+}  // namespace livemap

@@ -1,0 +1,296 @@
+"""The page of visual odometry's figures: tables of what livemap_measure_vo measured, and what they say."""
+
+import statistics
+
+import vo_plots
+
+KINDS = ("canny", "log", "sobel", "structured")
+RULES = (("adaptive", "KF"), ("every-5", "K5"), ("frame-to-frame", "FF"))
+OPENCV = (("rgbd", "OpenCV RgbdOdometry"), ("rgbd-icp", "OpenCV RgbdICPOdometry"))
+TIME_BAR = 0.13
+# Per sequence: measure, key, unit, bar, earlier figures of others on it.
+BARS = {
+    "seven_scenes_a": (("ATE", "ate_rmse_m", "m", 0.024, "author's 0.0266, OpenCV's 0.0239, REVO's 0.0321"),
+                       ("RPE", "rpe_rmse_m_per_s", "m/s", 0.039, "author's 0.0392, OpenCV's 0.0396, REVO's 0.0437")),
+    "realsense_sample": (("ATE", "ate_rmse_m", "m", 0.030, "author's 0.0441, OpenCV's 0.1116"),),
+    "room": (("ATE", "ate_rmse_m", "m", 0.002, "like room: author's 0.0149, OpenCV's 0.0277, REVO's 0.0025"),
+             ("RPE", "rpe_rmse_m_per_s", "m/s", 0.003, "like room: author's 0.0171, OpenCV's 0.0285, REVO's 0.0035")),
+}
+
+
+def row_of(sequence, method, edges="canny", source="keyframe", rule="adaptive"):
+    """The row of one method; None where it was not measured."""
+    for row in sequence["tables"]["rows"]:
+        if row["method"] != method:
+            continue
+        if method != "edge" or (row["edges"], row["source"], row["keyframe_rule"]) == (edges, source, rule):
+            return row
+    return None
+
+
+def number(value, digits=4):
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]) + "\n"
+
+
+def bold_least(values, digits):
+    """The cells of a row, the least in bold."""
+    known = [round(value, digits) for value in values if value is not None]
+    least = min(known) if known else None
+    return [f"**{number(value, digits)}**" if value is not None and round(value, digits) == least
+            else number(value, digits) for value in values]
+
+
+def time_ratio(sequence):
+    return row_of(sequence, "edge")["median_ms"] / row_of(sequence, "rgbd")["median_ms"]
+
+
+def bar_rows(sequences):
+    rows = []
+    for sequence in sequences:
+        if sequence["kind"] == "your own":
+            continue
+        for measure, key, unit, bar, others in BARS.get(sequence["name"], ()):
+            value, rgbd = row_of(sequence, "edge")[key], row_of(sequence, "rgbd")[key]
+            verdict = "holds" if value is not None and value <= bar else "**missed**"
+            rows.append([sequence["name"], f"{measure} ({unit})", number(bar, 3), number(value), verdict, number(rgbd),
+                         others])
+    for sequence in sequences:
+        ratio = time_ratio(sequence)
+        rows.append([sequence["name"], "time / RgbdOdometry's", TIME_BAR, number(ratio, 3),
+                     "holds" if ratio <= TIME_BAR else "**missed**", "1", ""])
+    return rows
+
+
+def better_ones(sequences):
+    """Where one of OpenCV's methods has the smaller error."""
+    found = []
+    for sequence in sequences:
+        ours = row_of(sequence, "edge")["ate_rmse_m"]
+        for method, name in OPENCV:
+            theirs = row_of(sequence, method)["ate_rmse_m"]
+            if None not in (ours, theirs) and theirs < ours:
+                found.append(f"{sequence['name']} ({name} {number(theirs)} m, LiveMap {number(ours)} m)")
+    if not found:
+        return "\nNeither of OpenCV's methods has a smaller ATE than LiveMap's defaults on any of the sequences.\n"
+    return ("\nOne of OpenCV's methods has a smaller ATE than LiveMap's defaults on: " + "; ".join(found) +
+            ". RgbdICPOdometry aligns the depths as well: where they are exact, as in simulated and generated sequences, that "
+            "is worth much.\n")
+
+
+def bars_section(sequences):
+    text = "## The bars\n" + table(
+        ["sequence", "measure", "bar", "LiveMap", "", "OpenCV RgbdOdometry, this run", "earlier figures of others"],
+        bar_rows(sequences))
+    missed = [sequence for sequence in sequences if time_ratio(sequence) > TIME_BAR]
+    if missed:
+        shares = ", ".join(f"{s['name']} {share_of_keyframes(s):.0%}" for s in missed)
+        text += ("\nWhere the bar of time is missed, look at the share of frames that became keyframes, which cost their "
+                 f"edges, depth and Jacobians too ({shares}), and at OpenCV's own time: it leaves out depth beyond 4 m "
+                 "and is quick where there is much of it.\n")
+    return text + better_ones(sequences) + ("\nLiveMap is Canny edges of adaptive keyframes, the defaults. The earlier figures (the thesis author's "
+                   "program, OpenCV, REVO) come with the bars; they are not of this run, and those of the room are of "
+                   "another rendering.\n")
+
+
+def share_of_keyframes(sequence):
+    return row_of(sequence, "edge")["keyframes"] / sequence["tables"]["frames"]
+
+
+def sequences_section(sequences, missing):
+    rows = [[s["name"], s["kind"], s["tables"]["frames"], f"{s['tables']['width']}x{s['tables']['height']}",
+             number(s["tables"]["length_m"], 2) if s["tables"]["frames_with_truth"] > 1 else "no truth", s["source"]]
+            for s in sequences]
+    text = "## Sequences\n" + table(["name", "kind", "frames", "size", "path (m)", "from"], rows)
+    if missing:
+        text += f"\nSkipped, no data: {', '.join(missing)}.\n"
+    return text
+
+
+def accuracy_columns(sequences):
+    kinds = [kind for kind in KINDS if any(row_of(s, "edge", kind) for s in sequences)]
+    columns = [("edge", kind, rule, f"{kind} {short}") for rule, short in RULES for kind in kinds]
+    return columns + [(method, None, None, name) for method, name in OPENCV]
+
+
+def accuracy_table(sequences, key, digits):
+    columns = accuracy_columns(sequences)
+    rows = []
+    for sequence in sequences:
+        for source in ("keyframe", "new-image"):
+            values = [row_of(sequence, method, kind, source, rule)[key] if method == "edge"
+                      else row_of(sequence, method)[key] for method, kind, rule, _ in columns]
+            if any(value is not None for value in values):
+                rows.append([sequence["name"], "keyframe's" if source == "keyframe" else "new image's",
+                             *bold_least(values, digits)])
+    return table(["sequence", "edges of", *(name for _, _, _, name in columns)], rows)
+
+
+def accuracy_section(sequences, structured):
+    text = ("## Kinds of edges and keyframes\nThe thesis's table 5.1. KF: adaptive keyframes; K5: one every 5 frames; FF: "
+            "frame to frame. *Edges of*: whose edges choose the pixels, the keyframe's own or, as in the thesis, the new "
+            "image's as a mask on it. The least of each row is bold. RPE is over 1 s; sequences shorter than that have "
+            "none.\n")
+    if not structured:
+        text += "Structured edges need OpenCV's model (`--edge-model FILE`), which was not given: they were not measured.\n"
+    for title, key, digits in (("Relative pose error (m/s)", "rpe_rmse_m_per_s", 4),
+                               ("Relative pose error (deg/s)", "rpe_rmse_deg_per_s", 3),
+                               ("Absolute trajectory error (m)", "ate_rmse_m", 4)):
+        text += f"\n### {title}\n" + accuracy_table(sequences, key, digits)
+    lost = [f"{s['name']}: {describe(row)} {row['lost']} of {s['tables']['frames']}"
+            for s in sequences for row in s["tables"]["rows"] if row["lost"]]
+    text += "\nLost frames: " + ("; ".join(lost) if lost else "none") + ".\n"
+    return text + "\n" + sources_sentence(sequences)
+
+
+def describe(row):
+    if row["method"] != "edge":
+        return row["method"]
+    whose = "" if row["source"] == "keyframe" else " of the new image"
+    return f"{row['edges']}{whose} {dict(RULES)[row['keyframe_rule']]}"
+
+
+def sources_sentence(sequences):
+    """Counts in how many cells of the table each source of edges is the better one."""
+    better = {"keyframe": 0, "new-image": 0}
+    for sequence in sequences:
+        for kind in KINDS:
+            for rule, _ in RULES:
+                rows = {source: row_of(sequence, "edge", kind, source, rule) for source in better}
+                values = {source: row and row["rpe_rmse_m_per_s"] for source, row in rows.items()}
+                if None not in values.values() and values["keyframe"] != values["new-image"]:
+                    better[min(values, key=values.get)] += 1
+    return (f"The keyframe's own edges have the smaller RPE in {better['keyframe']} of the "
+            f"{sum(better.values())} comparisons, the new image's in {better['new-image']}; the latter need edges of "
+            "every frame (see the times).\n")
+
+
+def time_section(sequences):
+    columns = (("canny KF", ("edge",)), ("canny FF", ("edge", "canny", "keyframe", "frame-to-frame")),
+               ("canny KF, new image's edges", ("edge", "canny", "new-image")), ("log KF", ("edge", "log")),
+               ("sobel KF", ("edge", "sobel")), ("RgbdOdometry", ("rgbd",)), ("RgbdICPOdometry", ("rgbd-icp",)))
+    rows = []
+    for sequence in sequences:
+        cells = [row_of(sequence, *key) for _, key in columns]
+        rows.append([sequence["name"], sequence["tables"]["frames"],
+                     *(f"{cell['median_ms']:.2f} ({cell['p95_ms']:.2f})" for cell in cells),
+                     f"{share_of_keyframes(sequence):.0%}", f"{time_ratio(sequence):.3f}"])
+    return ("## Time\nMilliseconds per frame, median (95th percentile), from the decoded colour picture to the pose, one "
+            "thread. *Ratio*: canny KF to RgbdOdometry; *keyframes*: share of the frames that became one with canny KF. "
+            "Every frame is given to all methods in turn, so that the machine's other work meets all alike and each finds "
+            "cold caches.\n\n" +
+            table(["sequence", "n", *(name for name, _ in columns), "keyframes", "ratio"], rows))
+
+
+def spread(values):
+    values = [value for value in values if value is not None]
+    if not values:
+        return "-"
+    return f"{statistics.mean(values):.4f} ({min(values):.4f}-{max(values):.4f})"
+
+
+def ablation_section(sequences):
+    chosen = [s for s in sequences if "ablation" in s]
+    text = ("## Edge pixels against random pixels\nThe thesis's figure 5.6, left: a share of the edge pixels against as many "
+            "pixels drawn from the whole image (those with depth that is not behind an occluding edge). Adaptive "
+            "keyframes, no constant motion, no limit on the points; mean (least-most) of the runs, each with a seed of its "
+            "own. *Lost* counts frames of all runs. Of the edges 100 % are no draw: their runs are one.\n"
+            "\n![Error against the share of edge pixels](odometry_ablation.png)\n")
+    for sequence in chosen:
+        rows = []
+        all_rows = sequence["ablation"]["rows"]
+        for share in sorted({row["share"] for row in all_rows}):
+            cells = [f"{share:.0%}"]
+            for pixels in ("edges", "random"):
+                runs = [row for row in all_rows if row["share"] == share and row["pixels"] == pixels]
+                points = [row["points"] for row in runs if row["points"]]
+                if pixels == "edges":
+                    cells.append(f"{statistics.median(points):.0f}" if points else "-")
+                cells += [spread([row["ate_rmse_m"] for row in runs]),
+                          spread([row["rpe_rmse_m_per_s"] for row in runs]), sum(row["lost"] for row in runs)]
+            rows.append(cells)
+        runs = max(row["seed"] for row in all_rows)
+        text += (f"\n**{sequence['name']}**, {sequence['ablation']['frames']} frames, {runs} runs:\n\n" +
+                 table(["share", "points", "ATE (m), edges", "RPE (m/s), edges", "lost", "ATE (m), random",
+                        "RPE (m/s), random", "lost"], rows))
+    return text
+
+
+def pixels_section(sequences):
+    chosen = [s for s in sequences if "pixels" in s]
+    text = ("## Time against the number of pixels\nThe thesis's figure 5.6, right. Growing shares of the edge pixels, then "
+            "as many pixels from anywhere, up to all that have depth: no limit on the points, other parameters the "
+            "defaults. *Tracked*: median of the frames that were aligned with a keyframe and did not become one; "
+            "*keyframe*: of those that did, with the drawing of random pixels, which the defaults have not.\n"
+            "\n![Time against the number of pixels](odometry_pixels.png)\n")
+    for sequence in chosen:
+        rows = [["edges" if row["pixels"] == "edges" else "anywhere", number(row["points"], 0),
+                 number(row["tracked_ms"], 2), number(row["keyframe_ms"], 2), number(row["ate_rmse_m"]), row["lost"]]
+                for row in sequence["pixels"]["rows"]]
+        fit = vo_plots.line_through(sequence["pixels"]["rows"])
+        text += (f"\n**{sequence['name']}**, {sequence['pixels']['frames']} frames; a line through the tracked times: "
+                 f"{fit[1]:.2f} ms + {1000 * fit[0]:.3f} us per pixel of the finest level (R^2 {fit[2]:.3f}):\n\n" +
+                 table(["pixels", "points of the finest level", "tracked (ms)", "keyframe (ms)", "ATE (m)", "lost"], rows))
+    return text
+
+
+def basin_section(sequences):
+    chosen = [s for s in sequences if "basin" in s]
+    if not chosen:
+        return ""
+    bounds = chosen[0]["basin"]
+    text = ("## Convergence basin\nPairs of neighbouring frames are aligned from guesses that are off by a translation or a "
+            "rotation in random directions, the same for all methods. Converged: the motion found is within "
+            f"{1000 * bounds['bound_m']:.0f} mm and {bounds['bound_deg']} degrees of the truth. Ours is the alignment alone, "
+            "coarse to fine, without the search that follows when tracking is lost; OpenCV's limits on the motion are "
+            "lifted.\n\n![Share that converges against the guess's error](odometry_basin.png)\n")
+    for sequence in chosen:
+        rows = []
+        for row in sequence["basin"]["rows"]:
+            off = (f"{1000 * row['translation_m']:.0f} mm" if row["translation_m"] else
+                   f"{row['rotation_deg']:.0f} degrees" if row["rotation_deg"] else "nothing")
+            rows.append([off, *(f"{row[method]:.0%}" for method in ("edge", "rgbd", "rgbd-icp"))])
+        text += (f"\n**{sequence['name']}**, {sequence['basin']['pairs']} pairs:\n\n" +
+                 table(["guess off by", "LiveMap", "RgbdOdometry", "RgbdICPOdometry"], rows))
+    return text
+
+
+def head_section(results):
+    machine = results["machine"]
+    load = statistics.median(sequence["load"] for sequence in results["sequences"])
+    others = "otherwise quiet" if load < 1.4 else f"shared: load average {load:.1f}, of which this run is 1"
+    text = ("# Visual odometry: the benchmark\nMade by `./livemap bench vo`; do not edit. [../odometry.md](../odometry.md) is "
+            "about the method and its parameters.\n\n"
+            f"Machine: {machine['cores']} cores of an {machine['cpu']}, {others}. All methods run on one thread "
+            "(`cv::setNumThreads(1)`) in one process, beside each other, OpenCV's with their default settings; n is the "
+            "number of frames. Errors are defined in [../evaluation.md](../evaluation.md#trajectories) (SE(3) alignment, "
+            "RPE over 1 s, RMSE).\n\n```\n./livemap bench vo                               # this page\n"
+            "./livemap bench vo --sequence rgbd_dataset_freiburg1_desk      # with a sequence of your own\n"
+            "./livemap bench edge_vo                          # single frames, Google Benchmark\n```\n")
+    if results["quick"]:
+        text += "\n**A quick run over tiny sequences: its figures show that everything runs, and nothing else.**\n"
+    return text
+
+
+def paths_section(sequences):
+    if not vo_plots.with_paths(sequences):
+        return ""
+    return ("## Paths\nThe thesis's figure 5.7: truth, LiveMap (canny KF) and RgbdOdometry, moved onto the truth.\n"
+            "\n![Positions over time](odometry_paths.png)\n")
+
+
+def write(results, out):
+    """Writes odometry.md and its plots into the folder `out`; returns the page's path."""
+    sequences = results["sequences"]
+    out.mkdir(parents=True, exist_ok=True)
+    vo_plots.draw_all(sequences, out)
+    sections = [head_section(results), bars_section(sequences), sequences_section(sequences, results["missing"]),
+                accuracy_section(sequences, results["structured"]), time_section(sequences), ablation_section(sequences),
+                pixels_section(sequences), basin_section(sequences), paths_section(sequences)]
+    page = out / "odometry.md"
+    page.write_text("\n".join(section for section in sections if section), encoding="utf-8")
+    return page

@@ -1,0 +1,133 @@
+"""The plots of visual odometry's page."""
+
+import statistics
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402  (the backend comes first)
+
+# Told apart by colour-blind readers too (Okabe and Ito), and by their markers.
+COLOURS = {"edge": "#0072B2", "rgbd": "#D55E00", "rgbd-icp": "#009E73", "truth": "#000000"}
+MARKERS = {"edge": "o", "rgbd": "s", "rgbd-icp": "^"}
+NAMES = {"edge": "LiveMap", "rgbd": "RgbdOdometry", "rgbd-icp": "RgbdICPOdometry"}
+WIDTH_IN, HEIGHT_IN, DPI = 9, 3.4, 100
+
+
+def save(figure, path):
+    figure.tight_layout()
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    plt.close(figure)
+
+
+def panels(rows, columns):
+    figure, axes = plt.subplots(rows, columns, figsize=(WIDTH_IN, HEIGHT_IN * rows), squeeze=False)
+    for axis in axes.flat:
+        axis.grid(True, alpha=0.3)
+    return figure, axes
+
+
+def line_through(rows):
+    """Slope, intercept and R^2 of the least-squares line through tracked_ms over points."""
+    points = [(row["points"], row["tracked_ms"]) for row in rows if row["points"] and row["tracked_ms"]]
+    mean_x, mean_y = (statistics.mean(values) for values in zip(*points))
+    spread_x = sum((x - mean_x) ** 2 for x, _ in points)
+    slope = sum((x - mean_x) * (y - mean_y) for x, y in points) / spread_x
+    intercept = mean_y - slope * mean_x
+    rest = sum((y - intercept - slope * x) ** 2 for x, y in points)
+    return slope, intercept, 1 - rest / sum((y - mean_y) ** 2 for _, y in points)
+
+
+def label_plainly(axis):
+    """Numbers on a logarithmic axis as 2 and 20, not as powers; between the decades when there are few."""
+    low, high = axis.get_ylim()
+    minor = (lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "") if high / low < 100 else lambda *_: ""
+    axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.yaxis.set_minor_formatter(minor)
+
+
+def draw_ablation(sequences, path):
+    chosen = [s for s in sequences if "ablation" in s]
+    figure, axes = panels(1, len(chosen))
+    for axis, sequence in zip(axes.flat, chosen):
+        for pixels, colour, marker in (("edges", COLOURS["edge"], "o"), ("random", COLOURS["rgbd"], "s")):
+            rows = [row for row in sequence["ablation"]["rows"]
+                    if row["pixels"] == pixels and row["ate_rmse_m"] is not None]
+            shares = sorted({row["share"] for row in rows})
+            runs = [[1000 * row["ate_rmse_m"] for row in rows if row["share"] == share] for share in shares]
+            percent = [100 * share for share in shares]
+            axis.plot(percent, [statistics.mean(run) for run in runs], color=colour, marker=marker,
+                      label="edge pixels" if pixels == "edges" else "as many random pixels")
+            axis.fill_between(percent, [min(run) for run in runs], [max(run) for run in runs], color=colour, alpha=0.2)
+        axis.set(title=sequence["name"], xlabel="share of the edge pixels (%)", ylabel="ATE (mm)", yscale="log")
+        label_plainly(axis)
+        axis.legend()
+    save(figure, path)
+
+
+def draw_pixels(sequences, path):
+    chosen = [s for s in sequences if "pixels" in s]
+    figure, axes = panels(1, len(chosen))
+    for axis, sequence in zip(axes.flat, chosen):
+        rows = [row for row in sequence["pixels"]["rows"] if row["points"] and row["tracked_ms"]]
+        for pixels, colour, marker in (("edges", COLOURS["edge"], "o"), ("random", COLOURS["rgbd"], "s")):
+            own = [row for row in rows if row["pixels"] == pixels]
+            axis.plot([row["points"] / 1000 for row in own], [row["tracked_ms"] for row in own], color=colour,
+                      marker=marker, linestyle="", label="edge pixels" if pixels == "edges" else "pixels from anywhere")
+        slope, intercept, _ = line_through(rows)
+        ends = [0, max(row["points"] for row in rows)]
+        axis.plot([end / 1000 for end in ends], [intercept + slope * end for end in ends], color="#888888",
+                  linewidth=1, zorder=0, label=f"{intercept:.1f} ms + {1000 * slope:.3f} us per pixel")
+        axis.set(title=sequence["name"], xlabel="pixels of the finest level (thousands)", ylabel="tracked frame (ms)",
+                 ylim=(0, None))
+        axis.legend()
+    save(figure, path)
+
+
+def draw_basin(sequences, path):
+    chosen = [s for s in sequences if "basin" in s]
+    if not chosen:
+        return
+    figure, axes = panels(len(chosen), 2)
+    kinds = (("translation_m", "rotation_deg", 1000, "guess off by (mm)"),
+             ("rotation_deg", "translation_m", 1, "guess off by (degrees)"))
+    for line, sequence in zip(axes, chosen):
+        for axis, (key, other, unit, label) in zip(line, kinds):
+            rows = [row for row in sequence["basin"]["rows"] if not row[other]]
+            for method, colour in ((m, COLOURS[m]) for m in NAMES):
+                axis.plot([unit * row[key] for row in rows], [100 * row[method] for row in rows], color=colour,
+                          marker=MARKERS[method], label=NAMES[method])
+            axis.set(title=sequence["name"], xlabel=label, ylabel="converged (%)", ylim=(-4, 104))
+    axes[0][0].legend()
+    save(figure, path)
+
+
+def with_paths(sequences):
+    return [s for s in sequences if s["tables"]["paths"] and len(s["tables"]["paths"]["time_s"]) > 20][:4]
+
+
+def draw_paths(sequences, path):
+    chosen = with_paths(sequences)
+    if not chosen:
+        return
+    figure, axes = panels((len(chosen) + 1) // 2, 2)
+    for axis, sequence in zip(axes.flat, chosen):
+        paths = sequence["tables"]["paths"]
+        centre = [statistics.mean(values) for values in zip(*paths["truth"])]
+        for method, style, width in (("truth", "--", 1.4), ("rgbd", "-", 1), ("edge", "-", 1.4)):
+            for index in range(3):
+                axis.plot(paths["time_s"], [at[index] - centre[index] for at in paths[method]], style,
+                          color=COLOURS[method], linewidth=width, zorder=3 if method == "truth" else 2,
+                          label=NAMES.get(method, "truth") if index == 0 else None)
+        axis.set(title=sequence["name"], xlabel="time (s)", ylabel="x, y, z from the mean (m)")
+    axes[0][0].legend(fontsize="small")
+    for axis in list(axes.flat)[len(chosen):]:
+        axis.remove()
+    save(figure, path)
+
+
+def draw_all(sequences, out):
+    draw_ablation(sequences, out / "odometry_ablation.png")
+    draw_pixels(sequences, out / "odometry_pixels.png")
+    draw_basin(sequences, out / "odometry_basin.png")
+    draw_paths(sequences, out / "odometry_paths.png")

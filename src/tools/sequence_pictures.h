@@ -1,0 +1,20 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "drives/sequences.h"
+
+namespace livemap {
+
+/// A picture of the camera's size, decoded with OpenCV's `flags`. Throws Error naming the file.
+cv::Mat ReadPicture(const std::string& path, const CameraIntrinsics& camera, int flags);
+
+/// The sequence's camera; one without width and height has those of the first picture.
+CameraIntrinsics IntrinsicsOf(const Sequence& sequence);
+
+/// The value that this share (0..1) of `values`, which are not empty, is not above.
+double Quantile(std::vector<double> values, double share);
+
+}  // namespace livemap
