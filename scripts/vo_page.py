@@ -13,8 +13,8 @@ BARS = {
     "seven_scenes_a": (("ATE", "ate_rmse_m", "m", 0.024, "author's 0.0266, OpenCV's 0.0239, REVO's 0.0321"),
                        ("RPE", "rpe_rmse_m_per_s", "m/s", 0.039, "author's 0.0392, OpenCV's 0.0396, REVO's 0.0437")),
     "realsense_sample": (("ATE", "ate_rmse_m", "m", 0.030, "author's 0.0441, OpenCV's 0.1116"),),
-    "room": (("ATE", "ate_rmse_m", "m", 0.002, "like room: author's 0.0149, OpenCV's 0.0277, REVO's 0.0025"),
-             ("RPE", "rpe_rmse_m_per_s", "m/s", 0.003, "like room: author's 0.0171, OpenCV's 0.0285, REVO's 0.0035")),
+    "room": (("ATE", "ate_rmse_m", "m", 0.002, "a like room: author's 0.0149, OpenCV's 0.0277, REVO's 0.0025"),
+             ("RPE", "rpe_rmse_m_per_s", "m/s", 0.003, "a like room: author's 0.0171, OpenCV's 0.0285, REVO's 0.0035")),
 }
 
 
@@ -30,6 +30,11 @@ def row_of(sequence, method, edges="canny", source="keyframe", rule="adaptive"):
 
 def number(value, digits=4):
     return "-" if value is None else f"{value:.{digits}f}"
+
+
+def prose(text):
+    """A paragraph of its own."""
+    return "\n" + " ".join(text.split()) + "\n"
 
 
 def table(head, rows):
@@ -73,13 +78,13 @@ def better_ones(sequences):
         ours = row_of(sequence, "edge")["ate_rmse_m"]
         for method, name in OPENCV:
             theirs = row_of(sequence, method)["ate_rmse_m"]
-            if None not in (ours, theirs) and theirs < ours:
+            if None not in (ours, theirs) and round(theirs, 4) < round(ours, 4):
                 found.append(f"{sequence['name']} ({name} {number(theirs)} m, LiveMap {number(ours)} m)")
     if not found:
-        return "\nNeither of OpenCV's methods has a smaller ATE than LiveMap's defaults on any of the sequences.\n"
-    return ("\nOne of OpenCV's methods has a smaller ATE than LiveMap's defaults on: " + "; ".join(found) +
-            ". RgbdICPOdometry aligns the depths as well: where they are exact, as in simulated and generated sequences, that "
-            "is worth much.\n")
+        return prose("Neither of OpenCV's methods has a smaller ATE than LiveMap's defaults on any of the sequences.")
+    return prose(f"""One of OpenCV's methods has a smaller ATE than LiveMap's defaults on: {"; ".join(found)}.
+        RgbdICPOdometry aligns the depths as well: where they are exact and the scene has shape, as in the simulated
+        room, that is worth much.""")
 
 
 def bars_section(sequences):
@@ -89,12 +94,12 @@ def bars_section(sequences):
     missed = [sequence for sequence in sequences if time_ratio(sequence) > TIME_BAR]
     if missed:
         shares = ", ".join(f"{s['name']} {share_of_keyframes(s):.0%}" for s in missed)
-        text += ("\nWhere the bar of time is missed, look at the share of frames that became keyframes, which cost their "
-                 f"edges, depth and Jacobians too ({shares}), and at OpenCV's own time: it leaves out depth beyond 4 m "
-                 "and is quick where there is much of it.\n")
-    return text + better_ones(sequences) + ("\nLiveMap is Canny edges of adaptive keyframes, the defaults. The earlier figures (the thesis author's "
-                   "program, OpenCV, REVO) come with the bars; they are not of this run, and those of the room are of "
-                   "another rendering.\n")
+        text += prose(f"""Where the bar of time is missed, look at the share of frames that became keyframes, which
+            cost their edges, depth and Jacobians too ({shares}), and at OpenCV's own time: it leaves out depth
+            beyond 4 m and is quick where there is much of it.""")
+    return text + better_ones(sequences) + prose("""LiveMap is Canny edges of adaptive keyframes, the defaults. The
+        earlier figures (the thesis author's program, OpenCV, REVO) come with the bars; they are not of this run,
+        and those of the room are of another rendering.""")
 
 
 def share_of_keyframes(sequence):
@@ -131,12 +136,12 @@ def accuracy_table(sequences, key, digits):
 
 
 def accuracy_section(sequences, structured):
-    text = ("## Kinds of edges and keyframes\nThe thesis's table 5.1. KF: adaptive keyframes; K5: one every 5 frames; FF: "
-            "frame to frame. *Edges of*: whose edges choose the pixels, the keyframe's own or, as in the thesis, the new "
-            "image's as a mask on it. The least of each row is bold. RPE is over 1 s; sequences shorter than that have "
-            "none.\n")
+    text = "## Kinds of edges and keyframes\n" + prose("""The thesis's table 5.1. KF: adaptive keyframes; K5: one
+        every 5 frames; FF: frame to frame. *Edges of*: whose edges choose the pixels, the keyframe's own or, as in
+        the thesis, the new image's as a mask on it. The least of each row is bold. RPE is over 1 s; sequences
+        shorter than that have none.""")
     if not structured:
-        text += "Structured edges need OpenCV's model (`--edge-model FILE`), which was not given: they were not measured.\n"
+        text += prose("Structured edges need OpenCV's model (`--edge-model FILE`), which was not given: not measured.")
     for title, key, digits in (("Relative pose error (m/s)", "rpe_rmse_m_per_s", 4),
                                ("Relative pose error (deg/s)", "rpe_rmse_deg_per_s", 3),
                                ("Absolute trajectory error (m)", "ate_rmse_m", 4)):
@@ -144,7 +149,7 @@ def accuracy_section(sequences, structured):
     lost = [f"{s['name']}: {describe(row)} {row['lost']} of {s['tables']['frames']}"
             for s in sequences for row in s["tables"]["rows"] if row["lost"]]
     text += "\nLost frames: " + ("; ".join(lost) if lost else "none") + ".\n"
-    return text + "\n" + sources_sentence(sequences)
+    return text + sources_sentence(sequences)
 
 
 def describe(row):
@@ -164,9 +169,9 @@ def sources_sentence(sequences):
                 values = {source: row and row["rpe_rmse_m_per_s"] for source, row in rows.items()}
                 if None not in values.values() and values["keyframe"] != values["new-image"]:
                     better[min(values, key=values.get)] += 1
-    return (f"The keyframe's own edges have the smaller RPE in {better['keyframe']} of the "
-            f"{sum(better.values())} comparisons, the new image's in {better['new-image']}; the latter need edges of "
-            "every frame (see the times).\n")
+    return prose(f"""The keyframe's own edges have the smaller RPE in {better['keyframe']} of the
+        {sum(better.values())} comparisons, the new image's in {better['new-image']}; the latter need edges of every
+        frame (see the times).""")
 
 
 def time_section(sequences):
@@ -179,11 +184,12 @@ def time_section(sequences):
         rows.append([sequence["name"], sequence["tables"]["frames"],
                      *(f"{cell['median_ms']:.2f} ({cell['p95_ms']:.2f})" for cell in cells),
                      f"{share_of_keyframes(sequence):.0%}", f"{time_ratio(sequence):.3f}"])
-    return ("## Time\nMilliseconds per frame, median (95th percentile), from the decoded colour picture to the pose, one "
-            "thread. *Ratio*: canny KF to RgbdOdometry; *keyframes*: share of the frames that became one with canny KF. "
-            "Every frame is given to all methods in turn, so that the machine's other work meets all alike and each finds "
-            "cold caches.\n\n" +
-            table(["sequence", "n", *(name for name, _ in columns), "keyframes", "ratio"], rows))
+    return "## Time\n" + prose("""Milliseconds of processor time per frame, median (95th percentile), from the decoded
+        colour picture to the pose, one thread. *Ratio*: canny KF to RgbdOdometry; *keyframes*: share of the frames that
+        became one with canny KF. Every frame is given to all methods in turn, so that the machine's other work meets all
+        alike and each finds cold caches. On a busy machine all need more processor time than on a quiet one; the ratio
+        is what to compare.""") + "\n" + table(
+            ["sequence", "n", *(name for name, _ in columns), "keyframes", "ratio"], rows)
 
 
 def spread(values):
@@ -193,13 +199,27 @@ def spread(values):
     return f"{statistics.mean(values):.4f} ({min(values):.4f}-{max(values):.4f})"
 
 
+def ablation_sentence(rows):
+    """At how many shares edges have the smaller mean error."""
+    shares = sorted({row["share"] for row in rows})
+    means = {(share, pixels): [row["ate_rmse_m"] for row in rows
+                               if row["share"] == share and row["pixels"] == pixels and row["ate_rmse_m"] is not None]
+             for share in shares for pixels in ("edges", "random")}
+    if not all(means.values()):
+        return ""
+    better = sum(statistics.mean(means[share, "edges"]) < statistics.mean(means[share, "random"]) for share in shares)
+    verdict = ("as the thesis found" if better == len(shares) else
+               "against what the thesis found" if better == 0 else "so that neither is the better choice everywhere")
+    return prose(f"Edge pixels have the smaller mean ATE at {better} of {len(shares)} shares, {verdict}.")
+
+
 def ablation_section(sequences):
     chosen = [s for s in sequences if "ablation" in s]
-    text = ("## Edge pixels against random pixels\nThe thesis's figure 5.6, left: a share of the edge pixels against as many "
-            "pixels drawn from the whole image (those with depth that is not behind an occluding edge). Adaptive "
-            "keyframes, no constant motion, no limit on the points; mean (least-most) of the runs, each with a seed of its "
-            "own. *Lost* counts frames of all runs. Of the edges 100 % are no draw: their runs are one.\n"
-            "\n![Error against the share of edge pixels](odometry_ablation.png)\n")
+    text = "## Edge pixels against random pixels\n" + prose("""The thesis's figure 5.6, left: a share of the edge
+        pixels against as many pixels drawn from the whole image (those with depth that is not behind an occluding
+        edge). Adaptive keyframes, no constant motion, no limit on the points; mean (least-most) of the runs, each
+        with a seed of its own. *Lost* counts frames of all runs. Of the edges 100 % are no draw: their runs are
+        one.""") + "\n![Error against the share of edge pixels](odometry_ablation.png)\n"
     for sequence in chosen:
         rows = []
         all_rows = sequence["ablation"]["rows"]
@@ -216,17 +236,17 @@ def ablation_section(sequences):
         runs = max(row["seed"] for row in all_rows)
         text += (f"\n**{sequence['name']}**, {sequence['ablation']['frames']} frames, {runs} runs:\n\n" +
                  table(["share", "points", "ATE (m), edges", "RPE (m/s), edges", "lost", "ATE (m), random",
-                        "RPE (m/s), random", "lost"], rows))
+                        "RPE (m/s), random", "lost"], rows) + ablation_sentence(all_rows))
     return text
 
 
 def pixels_section(sequences):
     chosen = [s for s in sequences if "pixels" in s]
-    text = ("## Time against the number of pixels\nThe thesis's figure 5.6, right. Growing shares of the edge pixels, then "
-            "as many pixels from anywhere, up to all that have depth: no limit on the points, other parameters the "
-            "defaults. *Tracked*: median of the frames that were aligned with a keyframe and did not become one; "
-            "*keyframe*: of those that did, with the drawing of random pixels, which the defaults have not.\n"
-            "\n![Time against the number of pixels](odometry_pixels.png)\n")
+    text = "## Time against the number of pixels\n" + prose("""The thesis's figure 5.6, right. Growing shares of the
+        edge pixels, then as many pixels from anywhere, up to all that have depth: no limit on the points, other
+        parameters the defaults. *Tracked*: median of the frames that were aligned with a keyframe and did not
+        become one; *keyframe*: of those that did, with the drawing of random pixels, which the defaults have
+        not.""") + "\n![Time against the number of pixels](odometry_pixels.png)\n"
     for sequence in chosen:
         rows = [["edges" if row["pixels"] == "edges" else "anywhere", number(row["points"], 0),
                  number(row["tracked_ms"], 2), number(row["keyframe_ms"], 2), number(row["ate_rmse_m"]), row["lost"]]
@@ -234,7 +254,8 @@ def pixels_section(sequences):
         fit = vo_plots.line_through(sequence["pixels"]["rows"])
         text += (f"\n**{sequence['name']}**, {sequence['pixels']['frames']} frames; a line through the tracked times: "
                  f"{fit[1]:.2f} ms + {1000 * fit[0]:.3f} us per pixel of the finest level (R^2 {fit[2]:.3f}):\n\n" +
-                 table(["pixels", "points of the finest level", "tracked (ms)", "keyframe (ms)", "ATE (m)", "lost"], rows))
+                 table(["pixels", "points of the finest level", "tracked (ms)", "keyframe (ms)", "ATE (m)", "lost"],
+                       rows))
     return text
 
 
@@ -243,16 +264,16 @@ def basin_section(sequences):
     if not chosen:
         return ""
     bounds = chosen[0]["basin"]
-    text = ("## Convergence basin\nPairs of neighbouring frames are aligned from guesses that are off by a translation or a "
-            "rotation in random directions, the same for all methods. Converged: the motion found is within "
-            f"{1000 * bounds['bound_m']:.0f} mm and {bounds['bound_deg']} degrees of the truth. Ours is the alignment alone, "
-            "coarse to fine, without the search that follows when tracking is lost; OpenCV's limits on the motion are "
-            "lifted.\n\n![Share that converges against the guess's error](odometry_basin.png)\n")
+    text = "## Convergence basin\n" + prose(f"""Pairs of neighbouring frames are aligned from guesses that are off
+        by a translation or a rotation in random directions, the same for all methods. Converged: the motion found
+        is within {1000 * bounds['bound_m']:.0f} mm and {bounds['bound_deg']} deg of the truth. Ours is the
+        alignment alone, coarse to fine, without the search that follows when tracking is lost; OpenCV's limits on
+        the motion are lifted.""") + "\n![Share that converges against the guess's error](odometry_basin.png)\n"
     for sequence in chosen:
         rows = []
         for row in sequence["basin"]["rows"]:
             off = (f"{1000 * row['translation_m']:.0f} mm" if row["translation_m"] else
-                   f"{row['rotation_deg']:.0f} degrees" if row["rotation_deg"] else "nothing")
+                   f"{row['rotation_deg']:.0f} deg" if row["rotation_deg"] else "nothing")
             rows.append([off, *(f"{row[method]:.0%}" for method in ("edge", "rgbd", "rgbd-icp"))])
         text += (f"\n**{sequence['name']}**, {sequence['basin']['pairs']} pairs:\n\n" +
                  table(["guess off by", "LiveMap", "RgbdOdometry", "RgbdICPOdometry"], rows))
@@ -261,16 +282,20 @@ def basin_section(sequences):
 
 def head_section(results):
     machine = results["machine"]
-    load = statistics.median(sequence["load"] for sequence in results["sequences"])
-    others = "otherwise quiet" if load < 1.4 else f"shared: load average {load:.1f}, of which this run is 1"
-    text = ("# Visual odometry: the benchmark\nMade by `./livemap bench vo`; do not edit. [../odometry.md](../odometry.md) is "
-            "about the method and its parameters.\n\n"
-            f"Machine: {machine['cores']} cores of an {machine['cpu']}, {others}. All methods run on one thread "
-            "(`cv::setNumThreads(1)`) in one process, beside each other, OpenCV's with their default settings; n is the "
-            "number of frames. Errors are defined in [../evaluation.md](../evaluation.md#trajectories) (SE(3) alignment, "
-            "RPE over 1 s, RMSE).\n\n```\n./livemap bench vo                               # this page\n"
-            "./livemap bench vo --sequence rgbd_dataset_freiburg1_desk      # with a sequence of your own\n"
-            "./livemap bench edge_vo                          # single frames, Google Benchmark\n```\n")
+    load = statistics.median(sequence["tables"]["load"] for sequence in results["sequences"])
+    others = "otherwise quiet" if load < 1.4 else f"shared with other work: load average {load:.1f}"
+    text = "# Visual odometry: the benchmark\n" + prose(f"""Made by `./livemap bench vo`; do not edit.
+        [../odometry.md](../odometry.md) is about the method and its parameters.""") + prose(
+            f"""Machine: {machine['cores']} cores, {machine['cpu']}, {others}. All methods run on one thread
+        (`cv::setNumThreads(1)`) in one process, beside each other, OpenCV's with their default settings; n is the
+        number of frames. Errors are defined in [../evaluation.md](../evaluation.md#trajectories) (SE(3) alignment,
+        RPE over 1 s, RMSE).""") + """
+```
+./livemap bench vo                                         # this page
+./livemap bench vo --sequence rgbd_dataset_freiburg1_desk  # with a sequence of your own
+./livemap bench edge_vo                                    # single frames, Google Benchmark
+```
+"""
     if results["quick"]:
         text += "\n**A quick run over tiny sequences: its figures show that everything runs, and nothing else.**\n"
     return text
@@ -289,8 +314,9 @@ def write(results, out):
     out.mkdir(parents=True, exist_ok=True)
     vo_plots.draw_all(sequences, out)
     sections = [head_section(results), bars_section(sequences), sequences_section(sequences, results["missing"]),
-                accuracy_section(sequences, results["structured"]), time_section(sequences), ablation_section(sequences),
-                pixels_section(sequences), basin_section(sequences), paths_section(sequences)]
+                accuracy_section(sequences, results["structured"]), time_section(sequences),
+                ablation_section(sequences), pixels_section(sequences), basin_section(sequences),
+                paths_section(sequences)]
     page = out / "odometry.md"
     page.write_text("\n".join(section for section in sections if section), encoding="utf-8")
     return page

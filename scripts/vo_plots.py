@@ -38,29 +38,33 @@ def line_through(rows):
     return slope, intercept, 1 - rest / sum((y - mean_y) ** 2 for _, y in points)
 
 
-def label_plainly(axis):
-    """Numbers on a logarithmic axis as 2 and 20, not as powers; between the decades when there are few."""
-    low, high = axis.get_ylim()
-    minor = (lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "") if high / low < 100 else lambda *_: ""
-    axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.yaxis.set_minor_formatter(minor)
+def scale_errors(axis, most, least):
+    """From zero; logarithmic where lost runs are much worse than the others."""
+    if least > 0 and most > 10 * least:
+        axis.set_yscale("log")
+        axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    else:
+        axis.set_ylim(0, 1.05 * most)
 
 
 def draw_ablation(sequences, path):
     chosen = [s for s in sequences if "ablation" in s]
     figure, axes = panels(1, len(chosen))
     for axis, sequence in zip(axes.flat, chosen):
+        drawn = []
         for pixels, colour, marker in (("edges", COLOURS["edge"], "o"), ("random", COLOURS["rgbd"], "s")):
             rows = [row for row in sequence["ablation"]["rows"]
                     if row["pixels"] == pixels and row["ate_rmse_m"] is not None]
             shares = sorted({row["share"] for row in rows})
             runs = [[1000 * row["ate_rmse_m"] for row in rows if row["share"] == share] for share in shares]
+            drawn += [error for run in runs for error in run]
             percent = [100 * share for share in shares]
             axis.plot(percent, [statistics.mean(run) for run in runs], color=colour, marker=marker,
                       label="edge pixels" if pixels == "edges" else "as many random pixels")
             axis.fill_between(percent, [min(run) for run in runs], [max(run) for run in runs], color=colour, alpha=0.2)
-        axis.set(title=sequence["name"], xlabel="share of the edge pixels (%)", ylabel="ATE (mm)", yscale="log")
-        label_plainly(axis)
+        axis.set(title=sequence["name"], xlabel="share of the edge pixels (%)", ylabel="ATE (mm)")
+        if drawn:
+            scale_errors(axis, max(drawn), min(drawn))
         axis.legend()
     save(figure, path)
 
@@ -103,7 +107,8 @@ def draw_basin(sequences, path):
 
 
 def with_paths(sequences):
-    return [s for s in sequences if s["tables"]["paths"] and len(s["tables"]["paths"]["time_s"]) > 20][:4]
+    return [s for s in sequences if s["kind"] != "generated" and s["tables"]["paths"] and
+            len(s["tables"]["paths"]["time_s"]) > 20][:4]
 
 
 def draw_paths(sequences, path):
@@ -114,7 +119,7 @@ def draw_paths(sequences, path):
     for axis, sequence in zip(axes.flat, chosen):
         paths = sequence["tables"]["paths"]
         centre = [statistics.mean(values) for values in zip(*paths["truth"])]
-        for method, style, width in (("truth", "--", 1.4), ("rgbd", "-", 1), ("edge", "-", 1.4)):
+        for method, style, width in (("truth", "--", 1), ("rgbd", "-", 1), ("edge", "-", 2.6)):
             for index in range(3):
                 axis.plot(paths["time_s"], [at[index] - centre[index] for at in paths[method]], style,
                           color=COLOURS[method], linewidth=width, zorder=3 if method == "truth" else 2,

@@ -1,7 +1,7 @@
-#include <chrono>
 #include <vector>
 
 #include "measurements.h"
+#include "thread_time.h"
 #include "tools/command_line.h"
 #include "tools/sequence_pictures.h"
 
@@ -32,16 +32,16 @@ PointRun Follow(const std::vector<RgbdFrame>& frames, const EdgeOdometry::Config
   EdgeOdometry odometry(config, camera);
   PointRun run;
   for (const RgbdFrame& frame : frames) {
-    const auto start = std::chrono::steady_clock::now();
+    const double start_ms = ThreadTimeMs();
     const VoResult result = odometry.Track(frame);
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    const double took_ms = ThreadTimeMs() - start_ms;
     run.all.trajectory.push_back({frame.stamp_ns, result.world_from_camera});
-    run.all.milliseconds.push_back(took.count());
+    run.all.milliseconds.push_back(took_ms);
     run.all.lost += result.state == VoState::kLost ? 1U : 0U;
     run.all.keyframes += result.new_keyframe ? 1U : 0U;
     if (result.points == 0) continue;  // The first frame, or a lost one.
     run.points.push_back(static_cast<double>(result.points));
-    (result.new_keyframe ? run.keyframe_ms : run.tracked_ms).push_back(took.count());
+    (result.new_keyframe ? run.keyframe_ms : run.tracked_ms).push_back(took_ms);
   }
   return run;
 }

@@ -44,7 +44,7 @@ class Recording {
 /// What one method made of a recording.
 struct MethodRun {
   std::vector<StampedPose> trajectory;
-  std::vector<double> milliseconds;  ///< Per frame.
+  std::vector<double> milliseconds;  ///< Per frame, ThreadTimeMs.
   std::size_t lost = 0;
   std::size_t keyframes = 0;
 };

@@ -1,4 +1,3 @@
-#include <chrono>
 #include <limits>
 #include <memory>
 #include <opencv2/imgproc.hpp>
@@ -8,6 +7,7 @@
 
 #include "evaluation/trajectory_alignment.h"
 #include "measurements.h"
+#include "thread_time.h"
 #include "tools/command_line.h"
 #include "tools/vo_method.h"
 
@@ -71,11 +71,10 @@ std::vector<Variant> MakeVariants(const CameraIntrinsics& camera, const std::str
 }
 
 void Track(const cv::Mat& colour, RgbdFrame frame, Variant& variant) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start_ms = ThreadTimeMs();
   cv::cvtColor(colour, frame.grey, cv::COLOR_BGR2GRAY);
   const VoMethod::Step step = variant.method->Track(frame);
-  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-  variant.run.milliseconds.push_back(took.count());
+  variant.run.milliseconds.push_back(ThreadTimeMs() - start_ms);
   variant.run.trajectory.push_back({frame.stamp_ns, step.world_from_camera});
   variant.run.lost += step.lost ? 1U : 0U;
   variant.run.keyframes += step.keyframe ? 1U : 0U;

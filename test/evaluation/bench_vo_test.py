@@ -69,7 +69,7 @@ class BenchVoTest(unittest.TestCase):
         self.assertEqual([row[0] for row in self.rows("Edge pixels against random pixels") if row[0].endswith("%")],
                          2 * ["5%", "10%", "20%", "40%", "70%", "100%"], "of the room and the own sequence")
         self.assertGreater(len(self.rows("Time against the number of pixels")), 20)
-        self.assertEqual(sum(row[0] == "12 degrees" for row in self.rows("Convergence basin")), 2)
+        self.assertEqual(sum(row[0] == "12 deg" for row in self.rows("Convergence basin")), 2)
         self.assertIn("quick run", self.page)
 
     def test_a_bar_that_holds_and_one_that_is_missed_are_told_apart(self):
@@ -84,6 +84,23 @@ class BenchVoTest(unittest.TestCase):
         results.write_text(json.dumps(by_hand), encoding="utf-8")
         self.assertEqual(run(SCRIPT, "--again", results, "--out", out).returncode, 0)
         self.assertIn("| room | ATE (m) | 0.002 | 0.5000 | **missed** |", (out / "odometry.md").read_text())
+
+    def test_an_interrupted_run_is_taken_up_where_it_ended(self):
+        figures = self.cache / "quick" / "figures"
+        before = {file.name: file.stat().st_mtime_ns for file in figures.iterdir()}
+        (figures / "room_basin.json").unlink()
+        done = run(SCRIPT, "--quick", "--resume", "--out", self.out, "--cache", self.cache, "--programs", PROGRAMS,
+                   "--sequence", self.own)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        after = {file.name: file.stat().st_mtime_ns for file in figures.iterdir()}
+        self.assertEqual([name for name in before if after[name] != before[name]], ["room_basin.json"])
+
+    def test_two_sequences_of_one_name_are_refused(self):
+        other = self.folder / "elsewhere" / "room"
+        other.mkdir(parents=True)
+        done = run(SCRIPT, "--quick", "--cache", self.cache, "--programs", PROGRAMS, "--sequence", other)
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+        self.assertIn("'room'", done.stderr)
 
     def test_plots_that_the_page_shows_are_there_and_small(self):
         shown = re.findall(r"!\[[^]]+\]\(([^)]+)\)", self.page)
@@ -139,7 +156,8 @@ class BenchVoTest(unittest.TestCase):
     def test_help_names_every_flag(self):
         done = run(SCRIPT, "--help")
         self.assertEqual(done.returncode, 0)
-        for flag in ("--sequence", "--camera", "--edge-model", "--quick", "--again", "--out", "--cache", "--data"):
+        for flag in ("--sequence", "--camera", "--edge-model", "--quick", "--resume", "--again", "--out", "--cache",
+                     "--data"):
             self.assertIn(flag, done.stdout)
 
 

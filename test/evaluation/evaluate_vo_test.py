@@ -88,6 +88,13 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertNotEqual(by_name["ate_rmse_m"], as_simulated["ate_rmse_m"], "the Kinect's focal length")
         self.assertEqual(self.figures(folder, "--camera", camera)["ate_rmse_m"], as_simulated["ate_rmse_m"])
 
+    def test_the_wall_is_refused_with_what_belongs_to_other_worlds(self):
+        for wrong, words in (("--wall --room", "--room and --wall"), ("--wall --condition rain", "--wall's"),
+                             ("--wall", "--tum"), ("--vigour 2", "--room or --wall")):
+            done = subprocess.run([SIMULATE, *wrong.split()], capture_output=True, text=True, timeout=60, check=False)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn(words, done.stderr)
+
     def test_without_truth_its_figures_are_null(self):
         os.rename(os.path.join(self.room, "groundtruth.txt"), os.path.join(self.room, "away"))
         try:
