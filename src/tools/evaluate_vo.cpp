@@ -1,8 +1,9 @@
-// livemap_evaluate_vo: how well and how fast visual odometry follows an RGB-D sequence.
+// livemap_evaluate_vo: how well and how fast visual odometry follows an RGB-D or stereo sequence.
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -11,12 +12,14 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <sstream>
 
 #include "base/error.h"
 #include "drives/image_file.h"
 #include "drives/sequences.h"
 #include "evaluation/trajectory_report.h"
 #include "tools/command_line.h"
+#include "tools/stereo_source.h"
 #include "tools/vo_method.h"
 
 namespace livemap {
@@ -27,6 +30,7 @@ struct Options {
   std::string method = "edge";
   std::string out;
   bool json = false;
+  std::optional<StereoConfig> stereo;  ///< None: the sequence's own depth.
   int step = 1;
   EdgeOdometry::Config odometry;
 };
@@ -38,14 +42,25 @@ EdgeSource ReadEdgeSource(const CommandLine& line) {
   throw Error("--edge-source is '" + name + "'; accepted are keyframe, new-image");
 }
 
+std::optional<StereoConfig> ReadStereo(const CommandLine& line) {
+  if (!line.Has("stereo")) {
+    if (line.Has("stereo-scale")) throw Error("--stereo-scale needs --stereo, which it is about");
+    return std::nullopt;
+  }
+  StereoConfig config;
+  config.scale = static_cast<int>(line.Number("stereo-scale", config.scale, 1, 4));
+  return config;
+}
+
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_vo [FLAGS] SEQ",
       "Follows the camera of an RGB-D sequence in TUM layout (associations.txt, camera.yaml,\n"
       "groundtruth.txt if there is one) and prints accuracy and time per frame. Time is that of\n"
-      "one thread from the decoded colour picture to the pose. docs/evaluation.md defines the\n"
-      "figures.",
+      "one thread from the decoded colour picture to the pose, that of stereo depth apart.\n"
+      "With --stereo also KITTI's layout (image_0, image_1, calib.txt, poses.txt).\n"
+      "docs/evaluation.md defines the figures.",
       1,
       {{"json", "", "one line of JSON instead of a table"},
        {"edges", "KIND", "canny, log, sobel or structured, default canny"},
@@ -53,6 +68,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"edge-source", "NAME", "keyframe (default) or new-image (thesis, equation 5.2)"},
        {"keyframe-every", "N", "a keyframe every N frames, 1: frame to frame, default adaptive"},
        {"step", "N", "use every Nth frame only, default 1"},
+       {"stereo", "", "depth from the left and right pictures, as camera_ingest computes it"},
+       {"stereo-scale", "N", "--stereo matches pictures smaller by 1, 2 (default) or 4"},
        {"method", "NAME", "edge (default), or OpenCV's: rgbd, rgbd-icp"},
        {"out", "FILE", "write the trajectory, TUM lines"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
@@ -65,6 +82,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.odometry.edges.kind = ParseEdgeKind(line.Text("edges", "canny"));
   options.odometry.edges.structured_model = line.Text("edge-model", "");
   options.odometry.edge_source = ReadEdgeSource(line);
+  options.stereo = ReadStereo(line);
   if (line.Has("keyframe-every")) {
     options.odometry.keyframe_every = static_cast<int>(line.Number("keyframe-every", 1, 1, 10000));
   }
@@ -85,9 +103,17 @@ CameraIntrinsics IntrinsicsOf(const Sequence& sequence) {
   return camera;
 }
 
+/// In TUM's layout, or in KITTI's, which has a calib.txt.
+Sequence ReadSequence(const std::string& directory) {
+  constexpr double kKittiRateHz = 10;
+  const bool kitti = std::filesystem::exists(std::filesystem::path(directory) / "calib.txt");
+  return kitti ? ReadKittiSequence(directory, kKittiRateHz) : ReadTumSequence(directory);
+}
+
 struct Run {
   std::vector<StampedPose> trajectory;
   std::vector<double> milliseconds;
+  std::vector<double> stereo_milliseconds;
   std::size_t lost = 0;
   std::size_t keyframes = 0;
 };
@@ -96,15 +122,20 @@ Run FollowSequence(const Sequence& sequence, const Options& options) {
   const CameraIntrinsics camera = IntrinsicsOf(sequence);
   const auto method = MakeVoMethod(options.method, options.odometry, camera);
   Run run;
+  std::optional<StereoSource> stereo;
+  if (options.stereo) stereo.emplace(sequence, camera, *options.stereo);
   Progress progress("following", sequence.frames.size());
   cv::Mat grey;
   for (std::size_t i = 0; i < sequence.frames.size(); i += static_cast<std::size_t>(options.step)) {
     const SequenceFrame& source = sequence.frames[i];
-    if (source.depth_path.empty()) {
-      throw Error("sequence '" + options.sequence + "' has no depth (associations.txt)");
+    if (!stereo && source.depth_path.empty()) {
+      throw Error("sequence '" + options.sequence +
+                  "' has no depth (associations.txt); of a pair of eyes --stereo finds it");
     }
     const cv::Mat colour = ReadPicture(source.image_path, camera, cv::IMREAD_COLOR);
-    const cv::Mat depth = ReadPicture(source.depth_path, camera, cv::IMREAD_UNCHANGED);
+    const cv::Mat depth = stereo ? stereo->Depth(source, colour)
+                                 : ReadPicture(source.depth_path, camera, cv::IMREAD_UNCHANGED);
+    if (stereo) run.stereo_milliseconds.push_back(stereo->milliseconds());
     const auto start = std::chrono::steady_clock::now();
     cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
     const VoMethod::Step step = method->Track({source.stamp_ns, grey, depth, sequence.depth_scale});
@@ -153,6 +184,7 @@ nlohmann::ordered_json Report(const Sequence& sequence, const Options& options, 
   }
   json["median_ms"] = Quantile(run.milliseconds, 0.5);
   json["p95_ms"] = Quantile(run.milliseconds, 0.95);
+  if (options.stereo) json["stereo_ms"] = Quantile(run.stereo_milliseconds, 0.5);
   json["frames"] = run.trajectory.size();
   json["lost"] = run.lost;
   json["keyframes"] = run.keyframes;
@@ -160,11 +192,19 @@ nlohmann::ordered_json Report(const Sequence& sequence, const Options& options, 
   return json;
 }
 
+/// Four digits of what is measured; counts whole.
+std::string Text(const nlohmann::ordered_json& value) {
+  if (!value.is_number_float()) return value.dump();
+  std::ostringstream text;
+  text << std::setprecision(4) << value.get<double>();
+  return text.str();
+}
+
 int RunEvaluation(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
   cv::setNumThreads(1);
-  const Sequence sequence = ReadTumSequence(options->sequence);
+  const Sequence sequence = ReadSequence(options->sequence);
   const Run run = FollowSequence(sequence, *options);
   if (!options->out.empty()) WriteTrajectory(options->out, run.trajectory);
   const nlohmann::ordered_json report = Report(sequence, *options, run);
@@ -174,9 +214,10 @@ int RunEvaluation(int argc, char** argv) {
   }
   for (const char* key :
        {"frames", "lost", "keyframes", "ate_rmse_m", "rpe_rmse_m_per_s", "rpe_rmse_deg_per_s",
-        "kitti_translation_percent", "median_ms", "p95_ms"}) {
+        "kitti_translation_percent", "median_ms", "p95_ms", "stereo_ms"}) {
     if (report.contains(key)) {
-      std::cout << std::left << std::setw(28) << std::setfill(' ') << key << report[key] << "\n";
+      std::cout << std::left << std::setw(28) << std::setfill(' ') << key << Text(report[key])
+                << "\n";
     }
   }
   return 0;
