@@ -208,6 +208,17 @@ class StereoTest(unittest.TestCase):
         stamps = [message.header.stamp for message in vehicle.received(DEPTH)]
         self.assertEqual(stamps[1:], [frame[LEFT].header.stamp for frame in self.frames[6:8]])
 
+    def test_when_depth_is_behind_the_oldest_pairs_go_and_are_counted(self):
+        vehicle = self.loaded(stereo_wait_s=10)
+        for frame in self.frames[:9]:
+            answered = len(vehicle.received(IMAGE))
+            vehicle.send(frame, (LEFT,))
+            eventually(lambda: len(vehicle.received(IMAGE)) > answered, "the left image goes on")
+        # One waits for its partner, two wait for that, six had to go; then the newest one's partner comes.
+        vehicle.send(self.frames[8], (RIGHT,))
+        vehicle.wait_for(depth_wanted=9, depth_dropped=6, depth_right_missing=2, depth_published=1)
+        self.assertEqual(vehicle.received(DEPTH)[0].header.stamp, self.frames[8][LEFT].header.stamp)
+
     def test_stamps_that_differ_are_paired_within_the_tolerance_only(self):
         late = copy.deepcopy(self.frames[1])
         late[RIGHT].header.stamp += rospy.Duration(0.004)
