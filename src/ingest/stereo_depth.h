@@ -14,7 +14,7 @@ struct StereoConfig {
   double min_disparity_px = 1;  ///< Farther than this shift says is unknown; camera's pixels.
   int scale = 2;                ///< Matched on images smaller by this: 1, 2 or 4.
   int block_size = 5;           ///< Side of the compared blocks, odd, 1 to 21.
-  int uniqueness_percent = 10;  ///< The best match beats the second by this, 0 to 100.
+  int uniqueness_percent = 40;  ///< The best match beats the second by this, 0 to 100.
   int left_right_px = 1;        ///< Both eyes' matches agree within this, 0 to 100.
   int speckle_pixels = 100;     ///< Smaller islands of depth are taken out; 0: none is.
 };

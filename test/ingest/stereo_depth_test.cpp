@@ -122,7 +122,7 @@ TEST(StereoDepth, OfPlanesIsWithinHalfAPixelOfTheMatchedImages) {
   for (const int scale : {1, 2}) {
     for (const Plane& plane : {kWall, kHouseFront, kRamp}) {
       const Errors errors = ErrorsOn(plane, scale);
-      EXPECT_GT(errors.found_share, 0.9) << plane.normal << ", scale " << scale;
+      EXPECT_GT(errors.found_share, 0.85) << plane.normal << ", scale " << scale;
       EXPECT_LT(errors.median_px, 0.25 * scale) << plane.normal << ", scale " << scale;
       EXPECT_LT(errors.p95_px, 0.5 * scale) << plane.normal << ", scale " << scale;
     }
