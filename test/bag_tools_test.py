@@ -162,6 +162,29 @@ class BagToolsTest(unittest.TestCase):
         self.assertAlmostEqual((images[1].header.stamp - images[0].header.stamp).to_sec(), 0.2)
         self.assertEqual(messages(self.bag, "/ground_truth/pose")[1].pose.position.y, 5)
 
+    def test_kitti_bag_holds_the_right_eye_with_its_baseline(self):
+        for side, eye in enumerate(("image_2", "image_3")):
+            for i in range(2):
+                write_image(self.path("pair", eye, f"{i:06}.png"), 80, 40, 2 * i + side)
+        projections = [f"P{i}: 70 0 40 {shift} 0 70 20 0 0 0 1 0\n" for i, shift in enumerate((0, -14, 7, -28))]
+        write(self.path("pair", "calib.txt"), "".join(projections))
+        result = run("from_kitti", self.path("pair"), self.bag)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        lefts, rights = (messages(self.bag, f"/{eye}/image_raw") for eye in ("camera", "camera_right"))
+        infos = messages(self.bag, "/camera_right/camera_info")
+        for one in (rights, infos):
+            self.assertEqual([(m.header.stamp, m.header.frame_id) for m in one],
+                             [(m.header.stamp, m.header.frame_id) for m in lefts])
+        self.assertNotEqual(rights[0].data, lefts[0].data)
+        self.assertAlmostEqual(infos[0].P[3], -35, msg="from P2 to P3")
+        os.remove(self.bag)
+        projections[3] = projections[3].replace("-28", "28")
+        write(self.path("pair", "calib.txt"), "".join(projections))
+        self.assert_refused(run("from_kitti", self.path("pair"), self.bag), "lines 3 and 4", "calib.txt")
+        write(self.path("pair", "calib.txt"), projections[0])
+        self.assertEqual(run("from_kitti", self.path("pair"), self.bag).returncode, 0)
+        self.assertEqual(messages(self.bag, "/camera_right/image_raw"), [])
+
     def test_real_survey_section_becomes_a_bag(self):
         data = os.environ.get("LIVEMAP_DATA_DIR", os.path.join(
             os.path.dirname(os.path.realpath(__file__)), "..", "..", "shared", "data"))

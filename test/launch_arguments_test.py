@@ -35,7 +35,7 @@ def changed(value):
 class LaunchArguments(unittest.TestCase):
     def test_every_parameter_of_every_node_can_be_set_by_the_argument_of_its_node(self):
         # What an argument of its own sets already is not set twice.
-        own_arguments = {"source", "transport", "uri", "camera_info_url", "model", "database", "drive_id",
+        own_arguments = {"source", "transport", "uri", "camera_info_url", "stereo", "model", "database", "drive_id",
                          "catalogue", "publish_tf", "user", "zone", "host", "port", "password_file",
                          "directory", "hazards", "web_address", "web_port", "tile_url", "tile_attribution"}
         for launch, nodes in NODES.items():
@@ -46,6 +46,15 @@ class LaunchArguments(unittest.TestCase):
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
+
+    def test_with_two_eyes_odometry_listens_to_the_depth_of_camera_ingest(self):
+        wanted = {(): "camera/depth/image_raw", ("stereo:=true",): "camera_rect/depth/image_raw",
+                  ("stereo:=true", "depth:=own/depth"): "own/depth"}
+        for arguments, topic in wanted.items():
+            command = subprocess.run(["/usr/bin/roslaunch", "--args", "/edge_vo",
+                                      str(ROOT / "launch" / "vehicle.launch"), "vo:=true", *arguments],
+                                     check=True, capture_output=True, text=True).stdout
+            self.assertIn(f" camera/depth/image_raw:={topic} ", command)
 
     def test_a_replay_hands_its_arguments_on_to_the_vehicle(self):
         with tempfile.NamedTemporaryFile(suffix=".bag") as bag:

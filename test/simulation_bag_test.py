@@ -62,6 +62,23 @@ class SimulationBagTest(unittest.TestCase):
         self.assertEqual(run(*self.arguments, "--bag", again).returncode, 0)
         self.assertEqual(read(self.bag), read(again))
 
+    def refused(self, *arguments):
+        result = run(*DRIVE, *arguments)
+        self.assertEqual(result.returncode, 2)
+        self.assertEqual(result.stderr.strip().count("\n"), 0, "one sentence, no frame rendered")
+        return result.stderr
+
+    def test_a_drive_that_nobody_would_see_is_refused(self):
+        self.assertIn("nothing would be written: accepted is at least one of --preview", self.refused())
+
+    def test_what_cannot_be_written_at_the_end_is_refused_at_the_start(self):
+        for flag, name in (("--preview", "p.png"), ("--truth-preview", "p.png"), ("--hazards", "h.geojson")):
+            path = self.path(os.path.join("nowhere", name))
+            self.assertIn(f"'{path}' cannot be written", self.refused(flag, path))
+        untouched = self.path("untouched.geojson")
+        self.assertIn("must end in .png or .jpg", self.refused("--hazards", untouched, "--preview", "p.xyz"))
+        self.assertFalse(os.path.exists(untouched))
+
     def test_wheel_twist_comes_at_fifty_hertz_and_agrees_with_the_truth(self):
         twists = messages(self.bag, "/wheel/twist")
         # 3 s of pictures, a second before and one after, both ends counted.

@@ -31,8 +31,8 @@ class EdgePairAlignment : public PairAlignment {
       PointSelection selection = config_.points;
       selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
       const cv::Mat& grey = reference_[level];
-      selector_.Select(grey, depths_[level], extractor_.Extract(grey), cameras_[index], selection,
-                       points_[index]);
+      selector_.Select({grey, depths_[level], exact_}, extractor_.Extract(grey), cameras_[index],
+                       selection, points_[index]);
     }
   }
 
@@ -48,6 +48,7 @@ class EdgePairAlignment : public PairAlignment {
 
  private:
   EdgeOdometry::Config config_;
+  const cv::Mat exact_;  // No uncertainty of the depths.
   EdgeExtractor extractor_;
   PointSelector selector_;
   Aligner aligner_;

@@ -14,11 +14,12 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxTextBytes = 256U << 20U;
 
+using Projection = Eigen::Matrix<double, 3, 4>;
+
 /// The 12 numbers of a row-major 3x4 matrix from parts[first...]; none when one is malformed.
-std::optional<Eigen::Matrix<double, 3, 4>> ParseMatrix(const std::vector<std::string>& parts,
-                                                       std::size_t first) {
+std::optional<Projection> ParseMatrix(const std::vector<std::string>& parts, std::size_t first) {
   if (parts.size() != first + 12) return std::nullopt;
-  Eigen::Matrix<double, 3, 4> matrix;
+  Projection matrix;
   for (int i = 0; i < 12; ++i) {
     const std::optional<double> value = ParseFinite(parts[first + static_cast<std::size_t>(i)]);
     if (!value || std::abs(*value) > 1e9) return std::nullopt;
@@ -27,17 +28,51 @@ std::optional<Eigen::Matrix<double, 3, 4>> ParseMatrix(const std::vector<std::st
   return matrix;
 }
 
-CameraIntrinsics ParseCalibration(const std::string& text, const std::string& name) {
-  const std::vector<std::string> lines = Lines(text);
+/// The projection in a line of calib.txt, line 0 the first.
+Projection ParseProjection(const std::vector<std::string>& lines, std::size_t index,
+                           const std::string& name) {
   const std::vector<std::string> parts =
-      lines.empty() ? std::vector<std::string>() : SplitBlanks(lines[0]);
+      index < lines.size() ? SplitBlanks(lines[index]) : std::vector<std::string>();
   const std::size_t first = !parts.empty() && parts[0].back() == ':' ? 1 : 0;
-  const std::optional<Eigen::Matrix<double, 3, 4>> p = ParseMatrix(parts, first);
+  const std::optional<Projection> p = ParseMatrix(parts, first);
   if (!p || (*p)(0, 0) <= 0 || (*p)(1, 1) <= 0) {
-    throw Error("line 1 of '" + name +
+    throw Error("line " + std::to_string(index + 1) + " of '" + name +
                 "' must be a 3x4 projection of 12 numbers with positive focal lengths");
   }
-  return {(*p)(0, 0), (*p)(1, 1), (*p)(0, 2), (*p)(1, 2), 0, 0};
+  return *p;
+}
+
+/// The folder of the right eye's pictures and which lines of calib.txt are the pair's.
+struct RightEye {
+  fs::path folder;
+  std::size_t left_line = 0;
+};
+
+/// None where the left eye is alone.
+std::optional<RightEye> FindRightEye(const fs::path& left_folder) {
+  const std::string left = left_folder.filename().string();
+  if (left != "image_0" && left != "image_2") return std::nullopt;
+  const fs::path folder = left_folder.parent_path() / (left == "image_0" ? "image_1" : "image_3");
+  if (!fs::is_directory(folder)) return std::nullopt;
+  return RightEye{folder, left == "image_0" ? 0U : 2U};
+}
+
+void ReadRightEye(const RightEye& eye, const std::vector<std::string>& calibration,
+                  const std::string& name, Sequence& sequence) {
+  const Projection left = ParseProjection(calibration, eye.left_line, name);
+  const Projection right = ParseProjection(calibration, eye.left_line + 1, name);
+  // The other numbers are the left eye's, as in every rectified pair.
+  sequence.baseline_m = left(0, 3) / left(0, 0) - right(0, 3) / right(0, 0);
+  if ((left.leftCols<3>() - right.leftCols<3>()).cwiseAbs().maxCoeff() > 0.01 ||
+      !(sequence.baseline_m > 0)) {
+    throw Error("lines " + std::to_string(eye.left_line + 1) + " and " +
+                std::to_string(eye.left_line + 2) + " of '" + name +
+                "' must be projections of a rectified pair, the right one with the baseline");
+  }
+  for (SequenceFrame& frame : sequence.frames) {
+    const fs::path path = eye.folder / fs::path(frame.image_path).filename();
+    if (fs::is_regular_file(path)) frame.right_path = path.string();
+  }
 }
 
 fs::path ImageFolder(const fs::path& root) {
@@ -90,7 +125,7 @@ std::vector<Eigen::Isometry3d> ParseKittiPoses(const std::string& text, const st
   std::vector<Eigen::Isometry3d> poses;
   const std::vector<std::string> lines = Lines(text);
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const std::optional<Eigen::Matrix<double, 3, 4>> matrix = ParseMatrix(SplitBlanks(lines[i]), 0);
+    const std::optional<Projection> matrix = ParseMatrix(SplitBlanks(lines[i]), 0);
     // The public files round: rotations are orthonormal to some 1e-6 only.
     const bool is_rotation =
         matrix &&
@@ -114,11 +149,19 @@ Sequence ReadKittiSequence(const std::string& directory, double rate_hz) {
   if (!fs::is_directory(root)) throw Error("the KITTI folder '" + directory + "' does not exist");
   Sequence sequence;
   const std::string calibration = (root / "calib.txt").string();
-  sequence.intrinsics = ParseCalibration(ReadFile(calibration, kMaxTextBytes), calibration);
-  const std::vector<std::string> paths = ListImages(ImageFolder(root));
+  const std::vector<std::string> projections = Lines(ReadFile(calibration, kMaxTextBytes));
+  const Projection p = ParseProjection(projections, 0, calibration);
+  sequence.intrinsics = {p(0, 0), p(1, 1), p(0, 2), p(1, 2), 0, 0};
+  const fs::path folder = ImageFolder(root);
+  const std::vector<std::string> paths = ListImages(folder);
   const std::vector<std::int64_t> times_ns = FrameTimesNs(root, paths.size(), rate_hz);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     sequence.frames.push_back({times_ns[i], paths[i], 0, ""});
+  }
+  const std::optional<RightEye> right = FindRightEye(folder);
+  // A calibration that stops at the left eye is that of a folder used with one.
+  if (right && projections.size() > right->left_line + 1) {
+    ReadRightEye(*right, projections, calibration, sequence);
   }
   const std::string poses_path = (root / "poses.txt").string();
   if (!fs::exists(poses_path)) return sequence;

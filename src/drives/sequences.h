@@ -21,13 +21,15 @@ struct SequenceFrame {
   std::int64_t stamp_ns = 0;
   std::string image_path;
   std::int64_t depth_stamp_ns = 0;
-  std::string depth_path;  ///< 16-bit PNG, empty without depth.
+  std::string depth_path;    ///< 16-bit PNG, empty without depth.
+  std::string right_path{};  ///< The right eye's picture of the same moment, empty without one.
 };
 
 /// A folder in TUM RGB-D or KITTI odometry layout, paths checked, images not opened yet.
 struct Sequence {
   CameraIntrinsics intrinsics;  ///< Width and height zero: as the images.
   double depth_scale = 1;       ///< Depth units per metre.
+  double baseline_m = 0;  ///< From the left eye to the right one; 0: no second eye, or unknown.
   std::vector<SequenceFrame> frames;
   std::vector<StampedPose> poses;
 };
@@ -38,8 +40,10 @@ std::optional<std::int64_t> ParseStampNs(const std::string& text);
 /// TUM RGB-D layout: associations.txt ("rgb_stamp rgb_path depth_stamp depth_path") or else rgb.txt
 /// and depth.txt ("stamp path", paired by AssociateDepth; rgb.txt alone: no depth), groundtruth.txt
 /// ("stamp tx ty tz qx qy qz qw", camera to world, optional) and camera.yaml (width, height, fx,
-/// fy, cx, cy, depth_scale). `camera_file` is read instead of camera.yaml when it is not empty;
-/// without either the camera is PublishedTumCamera's. Throws Error naming file and line.
+/// fy, cx, cy, depth_scale). Of a rectified stereo pair also rgb_right.txt (as rgb.txt, pictures
+/// with the same stamp belong together) and baseline_m in camera.yaml. `camera_file` is read
+/// instead of camera.yaml when it is not empty; without either the camera is PublishedTumCamera's.
+/// Throws Error naming file and line.
 Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file = "");
 
 /// Stamps of picture and depth that are farther apart do not belong together.
@@ -57,7 +61,9 @@ std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory)
 
 /// KITTI odometry layout: images/ (or image_0, image_2) with numbered pictures, calib.txt ("P0: 12
 /// numbers" or 12 bare numbers per line, the first line counts), poses.txt (3x4 rows, camera to
-/// world, optional), times.txt (seconds, optional: else frames at `rate_hz`). Throws Error.
+/// world, optional), times.txt (seconds, optional: else frames at `rate_hz`). Of a stereo pair also
+/// image_1 beside image_0 with P1 in the second line of calib.txt, or image_3 beside image_2 with
+/// P2 and P3 in the third and fourth, pictures of the same name belonging together. Throws Error.
 Sequence ReadKittiSequence(const std::string& directory, double rate_hz);
 
 /// For the parsers' tests and fuzzers; `name` is for messages.

@@ -62,6 +62,7 @@ void ReadCamera(const std::string& path, Sequence& sequence) {
   sequence.intrinsics.cy = CameraNumber(root, "cy", path);
   sequence.depth_scale =
       root["depth_scale"] ? CameraNumber(root, "depth_scale", path) : kPublishedDepthScale;
+  sequence.baseline_m = root["baseline_m"] ? CameraNumber(root, "baseline_m", path) : 0;
 }
 
 /// The camera as a file states it, or else as published for the folder's name.
@@ -103,6 +104,21 @@ void Anchor(const fs::path& root, std::string& path, const std::string& listed_i
     throw Error("the image '" + whole.string() + "' listed in '" + listed_in + "' is missing");
   }
   path = whole.string();
+}
+
+/// The right eye's picture of each frame that has one.
+void ReadRightEye(const fs::path& root, std::vector<SequenceFrame>& frames) {
+  const std::string list = (root / "rgb_right.txt").string();
+  if (!fs::exists(list)) return;
+  std::vector<SequenceFrame> rights = ParseTumAssociations(ReadFile(list, kMaxTextBytes), list);
+  auto right = rights.begin();
+  for (SequenceFrame& frame : frames) {
+    while (right != rights.end() && right->stamp_ns < frame.stamp_ns) ++right;
+    if (right == rights.end()) return;
+    if (right->stamp_ns != frame.stamp_ns) continue;
+    frame.right_path = right->image_path;
+    Anchor(root, frame.right_path, list);
+  }
 }
 
 /// As numpy.savetxt writes it, a trajectory's stamp may be "1.305031102160407066e+09".
@@ -232,6 +248,7 @@ Sequence ReadTumSequence(const std::string& directory, const std::string& camera
     Anchor(root, frame.image_path, list);
     Anchor(root, frame.depth_path, depth_list);
   }
+  ReadRightEye(root, sequence.frames);
   const std::string truth = (root / "groundtruth.txt").string();
   if (fs::exists(truth)) {
     sequence.poses = ParseTumTrajectory(ReadFile(truth, kMaxTextBytes), truth);

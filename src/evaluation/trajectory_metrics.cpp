@@ -12,8 +12,9 @@
 namespace livemap {
 namespace {
 
-constexpr std::array<double, 8> kSegmentLengthsM = {100, 200, 300, 400, 500, 600, 700, 800};
-constexpr std::size_t kSegmentStep = 10;
+constexpr std::array<double, 8> kKittiLengthsM = {100, 200, 300, 400, 500, 600, 700, 800};
+constexpr std::size_t kKittiStep = 10;
+constexpr std::array<double, 5> kShortLengthsM = {10, 20, 30, 40, 50};
 
 /// The median of sorted values.
 double Median(const std::vector<double>& sorted) {
@@ -181,20 +182,31 @@ RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,
   return CompareMotions(truth, estimate, indices, static_cast<std::int64_t>(delta_frames), options);
 }
 
-std::optional<SegmentErrors> KittiSegmentErrors(const TrajectoryPairs& pairs, double scale) {
+namespace {
+
+/// Of the estimate's motion from one pair to another, against the true one.
+Eigen::Isometry3d MotionError(const TrajectoryPairs& pairs, std::size_t first, std::size_t last,
+                              double scale) {
+  const Eigen::Isometry3d true_motion =
+      pairs.truth[first].world_from_camera.inverse() * pairs.truth[last].world_from_camera;
+  const Eigen::Isometry3d motion =
+      pairs.estimate[first].world_from_camera.inverse() * pairs.estimate[last].world_from_camera;
+  return Scaled(motion, scale).inverse() * true_motion;
+}
+
+/// Segments of the lengths, which ascend, from every `step`th pose.
+template <typename Lengths>
+std::optional<SegmentErrors> MeanSegmentErrors(const TrajectoryPairs& pairs, double scale,
+                                               const Lengths& segment_lengths_m, std::size_t step) {
   const std::vector<double> lengths_m = PathLengths(pairs);
   SegmentErrors sums;
-  for (std::size_t first = 0; first < lengths_m.size(); first += kSegmentStep) {
-    for (const double length_m : kSegmentLengthsM) {
+  for (std::size_t first = 0; first < lengths_m.size(); first += step) {
+    for (const double length_m : segment_lengths_m) {
       const auto end =
           std::upper_bound(lengths_m.begin(), lengths_m.end(), lengths_m[first] + length_m);
       if (end == lengths_m.end()) break;
       const auto last = static_cast<std::size_t>(end - lengths_m.begin());
-      const Eigen::Isometry3d true_motion =
-          pairs.truth[first].world_from_camera.inverse() * pairs.truth[last].world_from_camera;
-      const Eigen::Isometry3d motion = pairs.estimate[first].world_from_camera.inverse() *
-                                       pairs.estimate[last].world_from_camera;
-      const Eigen::Isometry3d error = Scaled(motion, scale).inverse() * true_motion;
+      const Eigen::Isometry3d error = MotionError(pairs, first, last, scale);
       ++sums.n;
       sums.translation_percent += 100 * error.translation().norm() / length_m;
       sums.rotation_rad_per_m += Angle(error) / length_m;
@@ -204,6 +216,16 @@ std::optional<SegmentErrors> KittiSegmentErrors(const TrajectoryPairs& pairs, do
   sums.translation_percent /= static_cast<double>(sums.n);
   sums.rotation_rad_per_m /= static_cast<double>(sums.n);
   return sums;
+}
+
+}  // namespace
+
+std::optional<SegmentErrors> KittiSegmentErrors(const TrajectoryPairs& pairs, double scale) {
+  return MeanSegmentErrors(pairs, scale, kKittiLengthsM, kKittiStep);
+}
+
+std::optional<SegmentErrors> ShortSegmentErrors(const TrajectoryPairs& pairs, double scale) {
+  return MeanSegmentErrors(pairs, scale, kShortLengthsM, 1);
 }
 
 TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
@@ -240,6 +262,11 @@ TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
     figures.rpe_frames_rad = Summarise(over_frames.rotation_rad);
   }
   figures.kitti = KittiSegmentErrors(pairs, alignment.scale);
+  figures.short_segments = ShortSegmentErrors(pairs, alignment.scale);
+  if (figures.length_m > 0) {
+    const Eigen::Isometry3d error = MotionError(pairs, 0, pairs.truth.size() - 1, alignment.scale);
+    figures.end_error_percent = 100 * error.translation().norm() / figures.length_m;
+  }
   return figures;
 }
 

@@ -58,17 +58,20 @@ RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,
                                         const std::vector<StampedPose>& estimate,
                                         std::size_t delta_frames, const RelativeOptions& options);
 
-/// Means over the segments of the KITTI odometry devkit: from every 10th pose the segments of the
-/// true path of 100, 200, ... 800 m, their error relative to that length.
+/// Means over segments of the true path, their error relative to their length.
 struct SegmentErrors {
   std::size_t n = 0;  ///< Segments.
   double translation_percent = 0;
   double rotation_rad_per_m = 0;
 };
 
-/// None when the true path is not longer than 100 m. `scale` is that of the estimate's
-/// translations.
+/// As the KITTI odometry devkit: from every 10th pose the segments of 100, 200, ... 800 m. None
+/// when the true path is not longer than 100 m. `scale` is that of the estimate's translations.
 std::optional<SegmentErrors> KittiSegmentErrors(const TrajectoryPairs& pairs, double scale);
+
+/// The same for drives that are shorter than KITTI's: from every pose the segments of 10, 20, ...
+/// 50 m. None when the true path is not longer than 10 m.
+std::optional<SegmentErrors> ShortSegmentErrors(const TrajectoryPairs& pairs, double scale);
 
 struct TrajectoryOptions {
   AssociationOptions association;
@@ -95,6 +98,9 @@ struct TrajectoryFigures {
   ErrorFigures rpe_frames_m;         ///< m over rpe_delta_frames
   ErrorFigures rpe_frames_rad;       ///< rad over rpe_delta_frames
   std::optional<SegmentErrors> kitti;
+  std::optional<SegmentErrors> short_segments;
+  /// Error of the last pose where the first ones agree, % of the path; none without a path.
+  std::optional<double> end_error_percent;
 };
 
 /// ATE and KITTI's errors are of the associated pairs, RPE of all poses of the estimate that have a

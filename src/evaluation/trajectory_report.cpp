@@ -107,6 +107,12 @@ nlohmann::ordered_json ToJson(const TrajectoryFigures& figures) {
     json["kitti_rotation_deg_per_100m"] =
         figures.kitti->rotation_rad_per_m * kDegreesPerRadian * 100;
   }
+  json["segment_translation_percent"] = nullptr;
+  if (figures.short_segments) {
+    json["segment_translation_percent"] = figures.short_segments->translation_percent;
+  }
+  json["end_error_percent"] = nullptr;
+  if (figures.end_error_percent) json["end_error_percent"] = *figures.end_error_percent;
   return json;
 }
 

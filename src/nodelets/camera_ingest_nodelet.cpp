@@ -13,6 +13,7 @@
 #include "detection/frame_queue.h"
 #include "nodelets/ingest_frames.h"
 #include "nodelets/ingest_reader.h"
+#include "nodelets/ingest_stereo.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/camera_info_conversions.h"
 #include "ros/ingest_parameters.h"
@@ -26,7 +27,8 @@ constexpr double kSayAgainS = 60;
 }  // namespace
 
 /// The vehicle's eyes: takes images from a topic, device, video file or folder, takes the lens
-/// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`.
+/// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`; with
+/// a second eye depth too (IngestStereo).
 ///
 /// Callbacks only enqueue; one worker decodes, rectifies and publishes. When it is behind, the
 /// oldest waiting frame goes: frames_in = published + dropped + bad + waiting, at any moment.
@@ -58,6 +60,9 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     std::unique_ptr<FrameSource> source = OpenSource(config_);
     image_transport::ImageTransport transport(getNodeHandle());
     publisher_ = transport.advertiseCamera("camera_rect/image", 10);
+    if (config_.stereo) {
+      stereo_ = std::make_unique<IngestStereo>(config_, getNodeHandle(), getName());
+    }
     worker_ = std::thread([this] { Work(); });
     if (source) {
       StartReader(std::move(source));
@@ -132,6 +137,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
             calibrations_.Find(frame->header().frame_id, config_.calibration_wait_s);
         const ProcessedFrame result = processor_->Process(*frame, info);
         publisher_.publish(result.image, result.info);
+        if (stereo_) stereo_->Take(result);
       } catch (const std::exception& exception) {
         fault = exception.what();
       }
@@ -196,6 +202,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     status.add("frames_dropped", dropped);
     status.add("frames_bad", bad_ + unread_);
     status.add("rate_hz", rate_hz_);
+    if (stereo_) stereo_->Diagnose(status);
   }
 
   IngestConfig config_;
@@ -203,6 +210,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   std::unique_ptr<FrameQueue<IngestFrame>> queue_;
   std::unique_ptr<FrameProcessor> processor_;  ///< The worker's.
   image_transport::CameraPublisher publisher_;
+  std::unique_ptr<IngestStereo> stereo_;  ///< Null: one eye.
   ros::Subscriber image_subscriber_;
   ros::Subscriber info_subscriber_;
   std::unique_ptr<camera_info_manager::CameraInfoManager> info_manager_;

@@ -1,6 +1,24 @@
 #include "ros/ingest_parameters.h"
 
 namespace livemap {
+namespace {
+
+void ReadStereo(ParameterReader& parameters, IngestConfig& config) {
+  parameters.Read("stereo", config.stereo);
+  parameters.Read("stereo_sync_s", config.stereo_sync_s, {0, 1});
+  parameters.Read("stereo_wait_s", config.stereo_wait_s, {0, 10});
+  StereoConfig& matching = config.matching;
+  parameters.Read("stereo_min_depth_m", matching.min_depth_m, {0.01, 1000});
+  parameters.Read("stereo_min_disparity_px", matching.min_disparity_px, {0.1, 100});
+  parameters.Read("stereo_scale", matching.scale, {1, 4});
+  parameters.Read("stereo_block_size", matching.block_size, {1, 21});
+  parameters.Read("stereo_uniqueness_percent", matching.uniqueness_percent, {0, 100});
+  parameters.Read("stereo_left_right_px", matching.left_right_px, {0, 100});
+  parameters.Read("stereo_speckle_pixels", matching.speckle_pixels, {0, 100000});
+  CheckStereoConfig(matching);
+}
+
+}  // namespace
 
 IngestConfig ReadIngestConfig(ParameterReader& parameters) {
   IngestConfig config;
@@ -28,9 +46,14 @@ IngestConfig ReadIngestConfig(ParameterReader& parameters) {
   parameters.Read("calibration_wait_s", config.calibration_wait_s, {0, 60});
   parameters.Read("max_megapixels", config.max_megapixels, {0.001, 268});
   parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});
+  ReadStereo(parameters, config);
   parameters.RejectUnknown();
 
   if (config.source == IngestSource::kTopic) return config;
+  if (config.stereo) {
+    throw Error("parameter 'stereo' is true with source '" + source +
+                "', a second eye is read from topics only");
+  }
   if (config.uri.empty()) {
     throw Error("parameter 'uri' is empty, with source '" + source + "' it names the " + source);
   }

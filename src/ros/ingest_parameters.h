@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "ingest/stereo_depth.h"
 #include "ros/parameters.h"
 
 namespace livemap {
@@ -27,6 +28,11 @@ struct IngestConfig {
   double calibration_wait_s = 1.0;   ///< How long a frame waits for the first camera_info.
   double max_megapixels = 20;        ///< Larger images are refused before they are decoded.
   double diagnostics_period_s = 1.0;
+
+  bool stereo = false;         ///< Depth from a second eye on camera_right/.
+  double stereo_sync_s = 0;    ///< How far the stamps of a pair may differ.
+  double stereo_wait_s = 0.2;  ///< How long a left image's depth waits for the right one.
+  StereoConfig matching;
 };
 
 /// Reads and checks all of them; throws Error.

@@ -19,10 +19,10 @@ constexpr int kJpegQuality = 90;
 }  // namespace
 
 TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera,
-                     double depth_scale)
+                     double depth_scale, double baseline_m)
     : directory_(directory), depth_scale_(depth_scale) {
   MakeNewFolder(directory, {"rgb", "depth"});
-  WriteCamera(directory + "/camera.yaml", camera, depth_scale);
+  WriteCamera(directory + "/camera.yaml", camera, depth_scale, baseline_m);
   rgb_ = OpenFile(directory + "/rgb.txt");
   depth_ = OpenFile(directory + "/depth.txt");
   associations_ = OpenFile(directory + "/associations.txt");

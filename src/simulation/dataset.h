@@ -23,9 +23,10 @@ constexpr double kTumDepthScale = 5000;
 /// Error names the path.
 class TumWriter {
  public:
-  /// Makes the folder; throws Error when it exists and is not empty.
+  /// Makes the folder; throws Error when it exists and is not empty. `baseline_m` is that of a
+  /// stereo pair, 0: one eye.
   TumWriter(const std::string& directory, const SimulatedCamera& camera,
-            double depth_scale = kTumDepthScale);
+            double depth_scale = kTumDepthScale, double baseline_m = 0);
   /// `right` is the second eye's picture of a stereo pair, for rgb_right/; empty: none.
   void Add(double time_s, const SimulatedFrame& frame, const cv::Mat& right = cv::Mat());
   /// Closes the lists; throws Error when the disk was full.

@@ -16,6 +16,15 @@ std::ofstream OpenFile(const std::string& path) {
   return file;
 }
 
+void CheckWritable(const std::string& path) {
+  std::error_code ignored;
+  const bool was_there = fs::exists(path, ignored);
+  std::ofstream file(path, std::ios::app);
+  if (!file) throw Error("the file '" + path + "' cannot be written");
+  file.close();
+  if (!was_there) fs::remove(path, ignored);
+}
+
 void CloseFile(std::ofstream& file, const std::string& path) {
   file.close();
   if (!file) throw Error("the file '" + path + "' could not be written to its end");
@@ -42,7 +51,8 @@ void WriteImage(const std::string& path, const cv::Mat& image, const std::vector
   }
 }
 
-void WriteCamera(const std::string& path, const SimulatedCamera& camera, double depth_scale) {
+void WriteCamera(const std::string& path, const SimulatedCamera& camera, double depth_scale,
+                 double baseline_m) {
   const CameraIntrinsics& k = camera.intrinsics;
   std::ofstream file = OpenFile(path);
   file.precision(10);
@@ -51,6 +61,7 @@ void WriteCamera(const std::string& path, const SimulatedCamera& camera, double 
   if (camera.k1 != 0 || camera.k2 != 0) {
     file << "k1: " << camera.k1 << "\nk2: " << camera.k2 << "\n";
   }
+  if (baseline_m > 0) file << "baseline_m: " << baseline_m << "\n";
   CloseFile(file, path);
 }
 

@@ -14,6 +14,9 @@ namespace livemap {
 
 /// Throws Error when the file cannot be written.
 std::ofstream OpenFile(const std::string& path);
+/// Throws Error when the file cannot be written; changes nothing. For what is written at the end of
+/// a long run.
+void CheckWritable(const std::string& path);
 /// Throws Error when the disk was full.
 void CloseFile(std::ofstream& file, const std::string& path);
 /// Makes the folder and those `inside` it; throws Error when it exists and is not empty.
@@ -23,8 +26,9 @@ void MakeFolder(const std::string& directory);
 /// `parameters` as cv::imwrite takes them.
 void WriteImage(const std::string& path, const cv::Mat& image, const std::vector<int>& parameters);
 /// Intrinsics and distortion as the reader of drives wants them; `depth_scale` is units per metre
-/// of the depth pictures.
-void WriteCamera(const std::string& path, const SimulatedCamera& camera, double depth_scale);
+/// of the depth pictures, `baseline_m` from the left eye to the right one, 0: there is one eye.
+void WriteCamera(const std::string& path, const SimulatedCamera& camera, double depth_scale,
+                 double baseline_m = 0);
 
 /// `format` is printf's for one double.
 std::string FormatNumber(const char* format, double value);

@@ -1,6 +1,7 @@
-// livemap_evaluate_vo: how well and how fast visual odometry follows an RGB-D sequence.
+// livemap_evaluate_vo: how well and how fast visual odometry follows an RGB-D or stereo sequence.
 
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -9,12 +10,15 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <sstream>
 
 #include "base/error.h"
 #include "drives/sequences.h"
 #include "evaluation/trajectory_report.h"
 #include "tools/command_line.h"
+#include "tools/monocular_method.h"
 #include "tools/sequence_pictures.h"
+#include "tools/stereo_source.h"
 #include "tools/vo_method.h"
 
 namespace livemap {
@@ -26,8 +30,11 @@ struct Options {
   std::string method = "edge";
   std::string out;
   bool json = false;
+  std::optional<StereoConfig> stereo;  ///< None: the sequence's own depth.
   int step = 1;
   EdgeOdometry::Config odometry;
+  bool mono = false;
+  MonocularOptions monocular;
 };
 
 EdgeSource ReadEdgeSource(const CommandLine& line) {
@@ -37,15 +44,40 @@ EdgeSource ReadEdgeSource(const CommandLine& line) {
   throw Error("--edge-source is '" + name + "'; accepted are keyframe, new-image");
 }
 
+std::optional<StereoConfig> ReadStereo(const CommandLine& line) {
+  if (!line.Has("stereo")) {
+    if (line.Has("stereo-scale")) throw Error("--stereo-scale needs --stereo, which it is about");
+    return std::nullopt;
+  }
+  StereoConfig config;
+  config.scale = static_cast<int>(line.Number("stereo-scale", config.scale, 1, 4));
+  return config;
+}
+
+MonocularOptions ReadMonocular(const CommandLine& line) {
+  MonocularOptions options;
+  options.scale_source = ParseScaleSource(line.Text("scale", "speed"));
+  options.speed_sigma_mps = line.Number("speed-sigma", 0, 0, 100);
+  options.camera_height_m = line.Number("camera-height", options.camera_height_m, 0.01, 100);
+  options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
+  options.seed = static_cast<std::uint64_t>(line.Number("seed", 1, 0, 1e9));
+  return options;
+}
+
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_vo [FLAGS] SEQ",
-      "Follows the camera of an RGB-D sequence in TUM layout (associations.txt or rgb.txt with\n"
-      "depth.txt, camera.yaml, groundtruth.txt if there is one) and prints accuracy and time per "
-      "frame. Time is that of\n"
-      "one thread from the decoded colour picture to the pose. docs/evaluation.md defines the\n"
-      "figures.",
+      "Follows the camera of a sequence in TUM layout (associations.txt, or rgb.txt with or "
+      "without\n"
+      "depth.txt; camera.yaml; groundtruth.txt if there is one) or in KITTI's (images, image_0 "
+      "and\n"
+      "image_1, calib.txt, poses.txt) and prints accuracy and time per frame: by its depth, by "
+      "two\n"
+      "eyes (--stereo), or by one (--mono, and always where there is no depth). Time is that of "
+      "one\n"
+      "thread from the decoded colour picture to the pose, that of stereo depth apart.\n"
+      "docs/evaluation.md defines the figures.",
       1,
       {{"json", "", "one line of JSON instead of a table"},
        {"edges", "KIND", "canny, log, sobel or structured, default canny"},
@@ -55,6 +87,15 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"camera", "FILE",
         "the camera, laid out as camera.yaml, default the sequence's own or TUM's"},
        {"step", "N", "use every Nth frame only, default 1"},
+       {"stereo", "", "depth from the left and right pictures, as camera_ingest computes it"},
+       {"stereo-scale", "N", "--stereo matches pictures smaller by 1, 2 (default) or 4"},
+       {"mono", "", "one eye only: depth is not used where there is some"},
+       {"scale", "NAME",
+        "what tells one eye metres: speed (default; that of the true poses) or height"},
+       {"speed-sigma", "M/S", "noise added to the speed, default 0"},
+       {"camera-height", "M", "of --scale height: over the road, default 1.65"},
+       {"camera-pitch", "RAD", "of --scale height: positive looks down, default 0"},
+       {"seed", "N", "of the speed's noise, default 1"},
        {"method", "NAME", "edge (default), or OpenCV's: rgbd, rgbd-icp"},
        {"out", "FILE", "write the trajectory, TUM lines"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
@@ -68,32 +109,68 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.odometry.edges.kind = ParseEdgeKind(line.Text("edges", "canny"));
   options.odometry.edges.structured_model = line.Text("edge-model", "");
   options.odometry.edge_source = ReadEdgeSource(line);
+  options.stereo = ReadStereo(line);
+  options.mono = line.Has("mono");
+  options.monocular = ReadMonocular(line);
   if (line.Has("keyframe-every")) {
     options.odometry.keyframe_every = static_cast<int>(line.Number("keyframe-every", 1, 1, 10000));
   }
   return options;
 }
 
+/// In TUM's layout, or in KITTI's, which has a calib.txt.
+Sequence ReadSequence(const Options& options) {
+  constexpr double kKittiRateHz = 10;
+  const bool kitti = std::filesystem::exists(std::filesystem::path(options.sequence) / "calib.txt");
+  return kitti ? ReadKittiSequence(options.sequence, kKittiRateHz)
+               : ReadTumSequence(options.sequence, options.camera_file);
+}
+
 struct Run {
   std::vector<StampedPose> trajectory;
   std::vector<double> milliseconds;
+  std::vector<double> stereo_milliseconds;
   std::size_t lost = 0;
   std::size_t keyframes = 0;
 };
 
+/// Whether one eye is all there is, or all that was asked for.
+bool IsMonocular(const Sequence& sequence, const Options& options) {
+  if (options.stereo) return false;
+  return options.mono || sequence.frames.front().depth_path.empty();
+}
+
+std::unique_ptr<VoMethod> MethodFor(const Sequence& sequence, const CameraIntrinsics& camera,
+                                    const Options& options) {
+  if (!IsMonocular(sequence, options)) {
+    return MakeVoMethod(options.method, options.odometry, camera);
+  }
+  if (options.method != "edge") {
+    throw Error("--method " + options.method + " needs depth, which '" + options.sequence +
+                "' is followed without");
+  }
+  return MakeMonocularMethod(options.monocular, options.odometry, camera, sequence,
+                             static_cast<std::size_t>(options.step));
+}
+
 Run FollowSequence(const Sequence& sequence, const Options& options) {
   const CameraIntrinsics camera = IntrinsicsOf(sequence);
-  const auto method = MakeVoMethod(options.method, options.odometry, camera);
+  const auto method = MethodFor(sequence, camera, options);
+  const bool has_depth = !IsMonocular(sequence, options) && !options.stereo;
   Run run;
+  std::optional<StereoSource> stereo;
+  if (options.stereo) stereo.emplace(sequence, camera, *options.stereo);
   Progress progress("following", sequence.frames.size());
-  cv::Mat grey;
+  cv::Mat grey, depth;
   for (std::size_t i = 0; i < sequence.frames.size(); i += static_cast<std::size_t>(options.step)) {
     const SequenceFrame& source = sequence.frames[i];
-    if (source.depth_path.empty()) {
-      throw Error("sequence '" + options.sequence + "' has no depth (associations.txt)");
+    if (has_depth && source.depth_path.empty()) {
+      throw Error("'" + source.image_path + "' has no depth, but the pictures before it have");
     }
     const cv::Mat colour = ReadPicture(source.image_path, camera, cv::IMREAD_COLOR);
-    const cv::Mat depth = ReadPicture(source.depth_path, camera, cv::IMREAD_UNCHANGED);
+    if (stereo) depth = stereo->Depth(source, colour);
+    if (has_depth) depth = ReadPicture(source.depth_path, camera, cv::IMREAD_UNCHANGED);
+    if (stereo) run.stereo_milliseconds.push_back(stereo->milliseconds());
     const auto start = std::chrono::steady_clock::now();
     cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
     const VoMethod::Step step = method->Track({source.stamp_ns, grey, depth, sequence.depth_scale});
@@ -136,18 +213,28 @@ nlohmann::ordered_json Report(const Sequence& sequence, const Options& options, 
   }
   json["median_ms"] = Quantile(run.milliseconds, 0.5);
   json["p95_ms"] = Quantile(run.milliseconds, 0.95);
+  if (options.stereo) json["stereo_ms"] = Quantile(run.stereo_milliseconds, 0.5);
   json["frames"] = run.trajectory.size();
   json["lost"] = run.lost;
   json["keyframes"] = run.keyframes;
   json["method"] = options.method;
+  json["depth"] = options.stereo ? "stereo" : IsMonocular(sequence, options) ? "mono" : "images";
   return json;
+}
+
+/// Four digits of what is measured; counts whole.
+std::string Text(const nlohmann::ordered_json& value) {
+  if (!value.is_number_float()) return value.dump();
+  std::ostringstream text;
+  text << std::setprecision(4) << value.get<double>();
+  return text.str();
 }
 
 int RunEvaluation(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
   cv::setNumThreads(1);
-  const Sequence sequence = ReadTumSequence(options->sequence, options->camera_file);
+  const Sequence sequence = ReadSequence(*options);
   const Run run = FollowSequence(sequence, *options);
   if (!options->out.empty()) WriteTrajectory(options->out, run.trajectory);
   const nlohmann::ordered_json report = Report(sequence, *options, run);
@@ -157,9 +244,11 @@ int RunEvaluation(int argc, char** argv) {
   }
   for (const char* key :
        {"frames", "lost", "keyframes", "ate_rmse_m", "rpe_rmse_m_per_s", "rpe_rmse_deg_per_s",
-        "kitti_translation_percent", "median_ms", "p95_ms"}) {
+        "kitti_translation_percent", "segment_translation_percent", "end_error_percent",
+        "median_ms", "p95_ms", "stereo_ms"}) {
     if (report.contains(key)) {
-      std::cout << std::left << std::setw(28) << std::setfill(' ') << key << report[key] << "\n";
+      std::cout << std::left << std::setw(28) << std::setfill(' ') << key << Text(report[key])
+                << "\n";
     }
   }
   return 0;

@@ -35,9 +35,9 @@ std_msgs::Header MakeHeader(const ros::Time& stamp) {
   return header;
 }
 
-sensor_msgs::ImagePtr ReadColour(const SequenceFrame& frame, CameraIntrinsics& intrinsics,
+sensor_msgs::ImagePtr ReadColour(const std::string& path, CameraIntrinsics& intrinsics,
                                  const ros::Time& stamp) {
-  const ImageFile file = ReadImageFile(frame.image_path, intrinsics.width, intrinsics.height);
+  const ImageFile file = ReadImageFile(path, intrinsics.width, intrinsics.height);
   const cv::Mat image = DecodeImage(file.bytes.data(), file.bytes.size(), kMaxPixels);
   intrinsics.width = image.cols;
   intrinsics.height = image.rows;
@@ -59,6 +59,18 @@ sensor_msgs::ImagePtr ReadDepth(const SequenceFrame& frame, const CameraIntrinsi
   metres.setTo(std::numeric_limits<float>::quiet_NaN(), raw == 0);
   return cv_bridge::CvImage(MakeHeader(stamp), sensor_msgs::image_encodings::TYPE_32FC1, metres)
       .toImageMsg();
+}
+
+/// The second eye's picture with the stamp of the first one's.
+void WriteRight(const Sequence& sequence, const SequenceFrame& frame, CameraIntrinsics& intrinsics,
+                const ros::Time& stamp, BagWriter& bag) {
+  if (frame.right_path.empty() || !(sequence.baseline_m > 0)) return;
+  const sensor_msgs::ImagePtr image = ReadColour(frame.right_path, intrinsics, stamp);
+  sensor_msgs::CameraInfo info = PinholeCameraInfo(intrinsics);
+  info.header.stamp = stamp;
+  info.P[3] = -intrinsics.fx * sequence.baseline_m;
+  bag.Write("/camera_right/camera_info", stamp, info);
+  bag.Write("/camera_right/image_raw", stamp, *image);
 }
 
 void WritePose(const StampedPose& pose, const ros::Duration& start, BagWriter& bag) {
@@ -107,11 +119,12 @@ void WriteSequenceBag(const Sequence& sequence, const std::string& path,
     const SequenceFrame& frame = sequence.frames[i];
     write_poses_until(frame.stamp_ns);
     const ros::Time stamp = ToStamp(frame.stamp_ns, start);
-    const sensor_msgs::ImagePtr image = ReadColour(frame, intrinsics, stamp);
+    const sensor_msgs::ImagePtr image = ReadColour(frame.image_path, intrinsics, stamp);
     sensor_msgs::CameraInfo info = PinholeCameraInfo(intrinsics);
     info.header.stamp = stamp;
     bag.Write("/camera/camera_info", stamp, info);
     bag.Write("/camera/image_raw", stamp, *image);
+    WriteRight(sequence, frame, intrinsics, stamp, bag);
     if (!frame.depth_path.empty()) {
       const ros::Time depth_stamp = ToStamp(frame.depth_stamp_ns, start);
       info.header.stamp = depth_stamp;

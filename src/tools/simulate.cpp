@@ -82,6 +82,7 @@ int Run(int argc, char** argv) {
   RefuseRoomFlags(line);
   if (line.Has("change")) return SimulateChange(line);
   RefuseChangeFlags(line);
+  RefuseNoOutput(line);
   const std::uint64_t seed = line.Seed("seed", 1);
   const Condition condition = ReadCondition(line, "condition", "day");
   const DrivingStyle style = ReadStyle(line);
@@ -120,7 +121,7 @@ int Run(int argc, char** argv) {
     outputs.Add(i, time_s, camera.along_m, frame, right);
     progress.At(i + 1);
   }
-  outputs.Finish(line, street, static_cast<double>(frames) / rate_hz);
+  outputs.Finish(street, static_cast<double>(frames) / rate_hz);
   const double took_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::printf("%zu frames, %.1f s of driving, %zu hazards seen, %.1f frames/s\n", frames, seconds,

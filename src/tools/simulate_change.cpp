@@ -13,6 +13,7 @@
 #include "simulation/pass_drive.h"
 #include "simulation/random.h"
 #include "tools/simulation_flags.h"
+#include "tools/simulation_outputs.h"
 #include "tools/simulation_setup.h"
 
 namespace livemap {
@@ -67,10 +68,7 @@ ChangeRun ReadRun(const CommandLine& line) {
   run.options.threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   run.options.smooth_edges = !line.Has("one-ray");
   run.world = ReadSimulatedWorld(line, run.setup);
-  run.preview = line.Text("preview", "");
-  if (!run.preview.empty() && !cv::haveImageWriter(run.preview)) {
-    throw Error("the contact sheet '" + run.preview + "' must end in .png or .jpg");
-  }
+  run.preview = ReadSheetPath(line, "preview");
   return run;
 }
 

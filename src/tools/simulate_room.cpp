@@ -10,6 +10,7 @@
 #include "simulation/dataset.h"
 #include "simulation/patterned_wall.h"
 #include "simulation/room.h"
+#include "tools/simulation_outputs.h"
 #include "tools/simulation_setup.h"
 
 namespace livemap {
@@ -67,6 +68,7 @@ int SimulateRoom(const CommandLine& line) {
   const int rays = line.Has("one-ray") ? 1 : 2;
   const auto threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   const auto frames = static_cast<int>(line.Number("seconds", 5, 0.1, 600) * rate_hz);
+  const std::string preview = ReadSheetPath(line, "preview");
   const SimulationSetup setup = ReadSimulationSetup(line);
   const SimulatedRoom room(line.Seed("seed", 1));
   TumWriter writer(line.Text("tum", ""), setup.camera,
@@ -90,8 +92,8 @@ int SimulateRoom(const CommandLine& line) {
     progress.At(static_cast<std::size_t>(i) + 1);
   }
   writer.Finish();
-  if (line.Has("preview") && !cv::imwrite(line.Text("preview", ""), ContactSheet(pictures, 4))) {
-    throw Error("the contact sheet '" + line.Text("preview", "") + "' cannot be written");
+  if (!preview.empty() && !cv::imwrite(preview, ContactSheet(pictures, 4))) {
+    throw Error("the contact sheet '" + preview + "' cannot be written");
   }
   std::printf("%d frames\n", frames);
   return 0;

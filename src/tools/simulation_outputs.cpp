@@ -27,20 +27,37 @@ void WriteSheet(const std::string& path, const std::vector<cv::Mat>& pictures, i
 
 }  // namespace
 
+void RefuseNoOutput(const CommandLine& line) {
+  std::string accepted;
+  for (const char* flag : {"preview", "truth-preview", "tum", "yolo", "video", "bag", "hazards"}) {
+    if (line.Has(flag)) return;
+    accepted += (accepted.empty() ? "--" : ", --") + std::string(flag);
+  }
+  throw Error("nothing would be written: accepted is at least one of " + accepted +
+              ", --change, --room");
+}
+
+std::string ReadSheetPath(const CommandLine& line, const std::string& flag) {
+  std::string path = line.Text(flag, "");
+  if (!line.Has(flag)) return path;
+  if (!cv::haveImageWriter(path)) {
+    throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
+  }
+  CheckWritable(path);
+  return path;
+}
+
 SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSetup& setup,
                                      double rate_hz, std::size_t frames)
     : setup_(setup),
-      preview_path_(line.Text("preview", "")),
-      truth_path_(line.Text("truth-preview", "")),
+      preview_path_(ReadSheetPath(line, "preview")),
+      truth_path_(ReadSheetPath(line, "truth-preview")),
+      hazards_path_(line.Text("hazards", "")),
       frames_(frames) {
-  for (const std::string& path : {preview_path_, truth_path_}) {
-    if (!path.empty() && !cv::haveImageWriter(path)) {
-      throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
-    }
-  }
+  if (line.Has("hazards")) CheckWritable(hazards_path_);
   if (line.Has("tum")) {
     const double scale = line.Number("depth-scale", kTumDepthScale, 100, 10000);
-    tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera, scale);
+    tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera, scale, setup.baseline_m);
   }
   if (line.Has("yolo")) yolo_ = std::make_unique<YoloWriter>(line.Text("yolo", ""));
   if (!line.Has("video")) return;
@@ -121,18 +138,17 @@ void SimulationOutputs::AddToSheets(const SimulatedFrame& frame,
   }
 }
 
-void SimulationOutputs::Finish(const CommandLine& line, const Street& street, double end_s) {
+void SimulationOutputs::Finish(const Street& street, double end_s) {
   const std::string hazards = HazardsAsGeoJson(street, setup_.datum, frames_seen_, along_m_);
   if (bag_) bag_->Finish(end_s, hazards);
   if (tum_) tum_->Finish();
   if (yolo_) yolo_->Finish();
   if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
   if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
-  if (!line.Has("hazards")) return;
-  const std::string path = line.Text("hazards", "");
-  std::ofstream file = OpenFile(path);
+  if (hazards_path_.empty()) return;
+  std::ofstream file = OpenFile(hazards_path_);
   file << hazards;
-  CloseFile(file, path);
+  CloseFile(file, hazards_path_);
 }
 
 }  // namespace livemap

@@ -14,10 +14,17 @@
 
 namespace livemap {
 
+/// Throws Error when the flags ask for no output at all.
+void RefuseNoOutput(const CommandLine& line);
+/// Reads `flag`, a contact sheet that is written at the end: "" when it is not asked for. Throws
+/// Error when its file cannot be written or is of no known kind.
+std::string ReadSheetPath(const CommandLine& line, const std::string& flag);
+
 /// Everything that a simulated drive writes; what was not asked for stays null.
 class SimulationOutputs {
  public:
-  /// Reads --preview, --truth-preview, --tum, --yolo and --video; throws Error naming the path.
+  /// Reads --preview, --truth-preview, --hazards, --tum, --yolo and --video; throws Error naming
+  /// the path.
   SimulationOutputs(const CommandLine& line, const SimulationSetup& setup, double rate_hz,
                     std::size_t frames);
 
@@ -27,7 +34,7 @@ class SimulationOutputs {
   void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame,
            const cv::Mat& right);
   /// Writes what is written once, --hazards too, and closes every file.
-  void Finish(const CommandLine& line, const Street& street, double end_s);
+  void Finish(const Street& street, double end_s);
 
   /// Hazards that were in view so far.
   std::size_t hazards() const { return frames_seen_.size(); }
@@ -43,6 +50,7 @@ class SimulationOutputs {
   std::unique_ptr<SimulationBag> bag_;
   std::string preview_path_;
   std::string truth_path_;
+  std::string hazards_path_;
   std::size_t frames_;
   std::size_t preview_moments_ = 0;
   std::unique_ptr<TumWriter> tum_;

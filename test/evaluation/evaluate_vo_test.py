@@ -1,11 +1,12 @@
 #!/usr/bin/python3
-"""livemap_evaluate_vo as a person meets it: on a simulated room, and on real sequences where there are any.
+"""livemap_evaluate_vo as a person meets it: on a simulated room and street, and on real sequences where there are any.
 
     evaluate_vo_test.py EVALUATE_VO SIMULATE
 """
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,35 @@ DATA = os.environ.get("LIVEMAP_DATA_DIR", os.path.join(SOURCE, "..", "shared", "
 
 def run(*arguments):
     return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False)
+
+
+def street_with_two_eyes(folder):
+    subprocess.run([SIMULATE, "--tum", folder, "--seed", "5", "--seconds", "1.6", "--rate", "10", "--size", "320x240",
+                    "--one-ray", "--stereo", "0.4"], check=True, capture_output=True, timeout=600)
+
+
+def as_kitti(tum, kitti):
+    """The same drive as KITTI lays it out: numbered pictures of two eyes, projections, poses as matrices."""
+    with open(os.path.join(tum, "camera.yaml"), encoding="ascii") as file:
+        camera = {key: float(value) for key, value in (line.split(":") for line in file)}
+    os.mkdir(kitti)
+    for side, name in (("rgb", "image_0"), ("rgb_right", "image_1")):
+        os.mkdir(os.path.join(kitti, name))
+        for number, picture in enumerate(sorted(os.listdir(os.path.join(tum, side)))):
+            shutil.copy(os.path.join(tum, side, picture), os.path.join(kitti, name, f"{number:06}.png"))
+    with open(os.path.join(kitti, "calib.txt"), "w", encoding="ascii") as file:
+        for name, shift in (("P0", 0), ("P1", -camera["fx"] * camera["baseline_m"])):
+            file.write(f"{name}: {camera['fx']} 0 {camera['cx']} {shift} 0 {camera['fy']} {camera['cy']} 0 0 0 1 0\n")
+    with open(os.path.join(tum, "groundtruth.txt"), encoding="ascii") as truth, \
+            open(os.path.join(kitti, "poses.txt"), "w", encoding="ascii") as file:
+        for line in truth:
+            if line.startswith("#"):
+                continue
+            tx, ty, tz, x, y, z, w = map(float, line.split()[1:])
+            rows = ((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), tx),
+                    (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), ty),
+                    (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), tz))
+            file.write(" ".join(f"{value:.9f}" for row in rows for value in row) + "\n")
 
 
 class EvaluateVoTest(unittest.TestCase):
@@ -94,6 +124,40 @@ class EvaluateVoTest(unittest.TestCase):
             done = subprocess.run([SIMULATE, *wrong.split()], capture_output=True, text=True, timeout=60, check=False)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
             self.assertIn(words, done.stderr)
+    def test_two_eyes_are_followed_in_either_layout_and_their_matching_timed_apart(self):
+        tum, kitti = (os.path.join(self.temporary.name, name) for name in ("street", "street_kitti"))
+        street_with_two_eyes(tum)
+        figures = self.figures(tum, "--stereo")
+        self.assertEqual((figures["frames"], figures["lost"]), (16, 0))
+        self.assertLess(figures["ate_rmse_m"], 0.01 * figures["length_m"])
+        self.assertGreater(figures["stereo_ms"], 0)
+        self.assertNotIn("stereo_ms", self.figures(tum), "with the folder's own depth")
+        full = self.figures(tum, "--stereo", "--stereo-scale", "1")
+        self.assertNotEqual(full["ate_rmse_m"], figures["ate_rmse_m"])
+        self.assertLess(full["ate_rmse_m"], 0.01 * full["length_m"])
+        as_kitti(tum, kitti)
+        same = self.figures(kitti, "--stereo")
+        self.assertEqual(same["frames"], 16)
+        self.assertAlmostEqual(same["ate_rmse_m"], figures["ate_rmse_m"], delta=1e-4)
+
+        self.assertIn("accepted is 1, 2 or 4", self.refused(tum, "--stereo", "--stereo-scale", "3"))
+        self.assertIn("--stereo-scale needs --stereo", self.refused(tum, "--stereo-scale", "2"))
+        os.remove(os.path.join(kitti, "image_1", "000007.png"))
+        self.assertIn("000007.png", self.refused(kitti, "--stereo"))
+        camera = os.path.join(tum, "camera.yaml")
+        with open(camera, encoding="ascii") as file:
+            lines = [line for line in file if "baseline" not in line]
+        with open(camera, "w", encoding="ascii") as file:
+            file.writelines(lines)
+        self.assertIn("baseline_m in camera.yaml", self.refused(tum, "--stereo"))
+        self.assertIn("no right eye", self.refused(self.room, "--stereo"))
+
+    def test_figures_for_a_person_have_four_digits(self):
+        done = run(self.room)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = dict(line.split() for line in done.stdout.splitlines())
+        self.assertEqual(rows["frames"], "30")
+        self.assertRegex(rows["ate_rmse_m"], r"^0\.0*[1-9]\d{0,3}$")
 
     def test_without_truth_its_figures_are_null(self):
         os.rename(os.path.join(self.room, "groundtruth.txt"), os.path.join(self.room, "away"))

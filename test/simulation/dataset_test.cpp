@@ -61,6 +61,8 @@ TEST_F(Dataset, TumFolderIsReadBackByTheReaderOfDrives) {
   ASSERT_EQ(sequence.frames.size(), 2U);
   ASSERT_EQ(sequence.poses.size(), 2U);
   EXPECT_EQ(sequence.depth_scale, 5000);
+  EXPECT_EQ(sequence.baseline_m, 0) << "one eye";
+  EXPECT_TRUE(sequence.frames[0].right_path.empty());
   EXPECT_EQ(sequence.intrinsics.fx, 100);
   EXPECT_EQ(sequence.frames[1].stamp_ns, 100000000);
   EXPECT_TRUE(sequence.poses[0].world_from_camera.isApprox(frame_.world_from_optical, 1e-8));
@@ -71,6 +73,19 @@ TEST_F(Dataset, TumFolderIsReadBackByTheReaderOfDrives) {
   EXPECT_EQ(depth.at<std::uint16_t>(1, 5), 0) << "beyond what 16 bits hold";
   EXPECT_TRUE(std::equal(frame_.bgr.datastart, frame_.bgr.dataend,
                          cv::imread(sequence.frames[0].image_path).datastart));
+}
+
+TEST_F(Dataset, TumFolderOfTwoEyesIsReadBackWithItsBaseline) {
+  TumWriter writer(folder_.string(), camera_, 1000, 0.35);
+  writer.Add(0, frame_, frame_.bgr);
+  writer.Add(0.1, frame_, frame_.bgr);
+  writer.Finish();
+  const Sequence sequence = ReadTumSequence(folder_.string());
+  EXPECT_EQ(sequence.baseline_m, 0.35);
+  ASSERT_EQ(sequence.frames.size(), 2U);
+  EXPECT_EQ(sequence.frames[1].right_path, (folder_ / "rgb_right" / "0.100000.png").string());
+  fs::remove(folder_ / "rgb_right" / "0.100000.png");
+  EXPECT_THROW(ReadTumSequence(folder_.string()), Error) << "a listed picture is missing";
 }
 
 TEST_F(Dataset, CoarserTumDepthReachesFurther) {
