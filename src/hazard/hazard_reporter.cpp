@@ -222,7 +222,8 @@ bool HazardReporter::WaitsForDepth(const WaitingFrame& waiting, double waited_s)
 
 /// Where the sighting's foot stands in base_link; counted where it is not on the road or too far.
 std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& frame,
-                                                       const Sighting& sighting) {
+                                                       const Sighting& sighting,
+                                                       double heading_variance_rad2) {
   const Eigen::Isometry3d& mounting = mountings_.at(frame.frame_id);
   const Box& box = sighting.box;
   std::optional<GroundPoint> ground;
@@ -240,8 +241,13 @@ std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& fram
   }
   if (!ground) {
     ++counters_.not_on_ground;
-  } else if (ground->position_m.norm() > config_.max_range_m ||
-             LargestSigma(ground->covariance_m2) > config_.max_ground_sigma_m) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d swing_m(ground->position_m.y(), -ground->position_m.x());
+  const Eigen::Matrix2d seen_from_vehicle_m2 =
+      ground->covariance_m2 + heading_variance_rad2 * swing_m * swing_m.transpose();
+  if (ground->position_m.norm() > config_.max_range_m ||
+      LargestSigma(seen_from_vehicle_m2) > config_.max_ground_sigma_m) {
     ++counters_.too_far;
     return std::nullopt;
   }
@@ -252,7 +258,8 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose
   const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
   const Eigen::Vector2d pose_in_base_m = fused ? Eigen::Vector2d::Zero() : antenna_m;
   for (const Sighting& sighting : waiting.frame.sightings) {
-    const auto ground = PlaceOnRoad(waiting.frame, sighting);
+    const auto ground =
+        PlaceOnRoad(waiting.frame, sighting, fused ? pose.course_variance_rad2 : 0.0);
     if (!ground) continue;
     waiting.candidates.push_back({sighting, PlaceHazard(pose, pose_in_base_m, *ground)});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);

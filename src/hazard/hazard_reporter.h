@@ -60,7 +60,8 @@ class HazardReporter {
     /// A sighting further away than this waits for a nearer view: its place is too uncertain, m.
     double max_range_m = 30.0;
     /// So does one whose place on the road is less certain than this, seen from the vehicle:
-    /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m.
+    /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m. By
+    /// fused poses the heading's error at that distance counts, too.
     double max_ground_sigma_m = 1.0;
     /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
     double max_wait_s = 5.0;
@@ -179,7 +180,8 @@ class HazardReporter {
   bool WaitsForDepth(const WaitingFrame& waiting, double waited_s) const;
   bool WaitsForPose(const WaitingFrame& waiting, double waited_s) const;
   void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused);
-  std::optional<GroundPoint> PlaceOnRoad(const SightingFrame& frame, const Sighting& sighting);
+  std::optional<GroundPoint> PlaceOnRoad(const SightingFrame& frame, const Sighting& sighting,
+                                         double heading_variance_rad2);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);
   void ApplyNotices();
   void TellStoreError(const StoreError& error);

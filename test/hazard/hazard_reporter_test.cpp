@@ -413,6 +413,22 @@ TEST_F(HazardReporterTest, WaitsForTheFusedPoseAndFallsBackToTheFixesWhenItDoesN
   EXPECT_EQ(counters().placed_by_fusion, 1u);
 }
 
+TEST_F(HazardReporterTest, AFusedHeadingThatIsUncertainWaitsForANearerView) {
+  config_.position_source = PositionSource::kFused;
+  config_.max_ground_sigma_m = 1.0;
+  Restart();
+  for (const double time_s : {3.0, 3.5}) {
+    TrackPose pose = FusedPoseAt(time_s);
+    pose.course_variance_rad2 = 0.08 * 0.08;
+    reporter_->AddPose(StampNs(time_s), pose);
+  }
+  See(3.0, {{"pothole", 0.8F, BoxAt(13.5, 0)}});
+  EXPECT_THAT(TakeDue(), IsEmpty()) << "0.08 rad are 1.1 m there";
+  EXPECT_EQ(counters().too_far, 1u);
+  See(3.5, {{"pothole", 0.8F, BoxAt(5.5, 0)}});
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
 TEST_F(HazardReporterTest, FusedPosesWithoutFixesAreEnough) {
   config_.position_source = PositionSource::kFused;
   Restart();
