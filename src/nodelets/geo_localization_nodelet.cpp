@@ -134,7 +134,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
       return FromRosTime(message->header.stamp) == stamp_ns;
     });
     if (found == waiting_.end()) return nullptr;
-    const nav_msgs::OdometryConstPtr message = *found;
+    nav_msgs::OdometryConstPtr message = *found;
     waiting_.erase(waiting_.begin(), std::next(found));
     return message;
   }
