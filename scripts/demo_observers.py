@@ -105,7 +105,9 @@ class MapClient:
 class VehicleObserver:
     """Counts and clock of the vehicle, read on its ROS master."""
 
-    def __init__(self, master_uri):
+    def __init__(self, master_uri, detects=True):
+        """`detects`: whether a detector runs there; else its answers come from the drive."""
+        self.nodelets = [name for name in COUNTS if detects or name != "hazard_detection"]
         os.environ["ROS_MASTER_URI"] = master_uri
         os.environ["ROS_HOSTNAME"] = "127.0.0.1"
         self.lock = threading.Lock()
@@ -139,6 +141,11 @@ class VehicleObserver:
             wall0, wall1 = self.clock_wall[i - 1], self.clock_wall[i]
             return wall0 + (stamp - sim0) * (wall1 - wall0) / (sim1 - sim0)
 
+    def clock_s(self):
+        """What the replay's clock showed last."""
+        with self.lock:
+            return self.clock_sim[-1] if self.clock_sim else 0.0
+
     def clock_share(self, drive):
         """How much of a drive the replay's clock has shown, 0 to 1."""
         with self.lock:
@@ -146,12 +153,12 @@ class VehicleObserver:
                 return 0.0
             return (self.clock_sim[-1] - drive.start_s) / drive.duration_s
 
-    def wait_until_up(self, timeout_s, nodelets=tuple(COUNTS)):
-        """Until every one of `nodelets` has told its counts."""
+    def wait_until_up(self, timeout_s, nodelets=None):
+        """Until every one of `nodelets` (all that run, unless said) has told its counts."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             with self.lock:
-                missing = [name for name in nodelets if name not in self.values]
+                missing = [name for name in nodelets or self.nodelets if name not in self.values]
             if not missing:
                 return
             time.sleep(0.1)
@@ -178,12 +185,16 @@ class VehicleObserver:
                 "uplink_bytes": self._count("mqtt_bridge", "uplink_bytes"),
             }
 
-    def is_through(self, frames):
+    def is_through(self, drive):
         """Every frame processed or dropped, and every report answered by the zone."""
         counts = self.counts()
-        return (counts["frames_in"] >= frames
-                and counts["frames_processed"] + counts["frames_dropped"] >= frames
-                and counts["detections_taken"] >= counts["detections"]
+        if "hazard_detection" in self.nodelets:
+            detected = (counts["frames_processed"] + counts["frames_dropped"] >= drive.frames
+                        and counts["detections_taken"] >= counts["detections"])
+        else:
+            # A second beyond the end: what waited for a position has been placed.
+            detected = self.clock_s() > drive.start_s + drive.duration_s + 1.0
+        return (counts["frames_in"] >= drive.frames and detected
                 and counts["committed"] + counts["refused"] >= counts["reports_created"]
                 and counts["pending"] == 0)
 
@@ -246,7 +257,9 @@ def compare_with_truth(hazards, truth_file, radius_m=5.0):
     errors = [error for figures in classes.values() for error in figures.pop("errors_m")]
     total = {key: sum(figures[key] for figures in classes.values())
              for key in ("hazards", "found", "missed", "false")}
-    return {**total, "position_error_m_mean": mean(errors), "classes": classes}
+    return {**total, "position_error_m_mean": mean(errors), "position_error_m_median": percentile(errors, 0.5),
+            "position_error_m_p95": percentile(errors, 0.95), "classes": classes,
+            "position_errors_m": sorted(round(error, 2) for error in errors)}
 
 
 def compare_class(truth, hazards, radius_m):
@@ -258,6 +271,14 @@ def compare_class(truth, hazards, radius_m):
     return {"hazards": len(passed), "found": len(errors), "missed": len(passed) - len(errors),
             "false": sum(nearest(h, truth) > radius_m for h in hazards),
             "position_error_m_mean": mean(errors), "errors_m": errors}
+
+
+def percentile(values, share, digits=2):
+    """Nearest-rank percentile; None of no values."""
+    if not values:
+        return None
+    ordered = sorted(values)
+    return round(ordered[max(0, math.ceil(share * len(ordered)) - 1)], digits)
 
 
 def mean(values):

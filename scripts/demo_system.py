@@ -143,12 +143,13 @@ class LiveMapSystem:
             "web_port": self.web_port, "rviz": str(rviz).lower()})
         self.wait_for("the zone's live map", self.map_answers)
 
-    def start_vehicle(self, bag, rate, rviz=False):
+    def start_vehicle(self, bag, rate, rviz=False, **arguments):
+        """`arguments` are more of those of replay.launch."""
         self.launch("vehicle", self.vehicle_port, "replay.launch", {
             "bag": bag, "rate": rate, "paused": "true", "vehicle": self.vehicle,
             "zone": self.zone, "directory": self.directory / "vehicle",
             "broker_port": self.broker_port,
-            "password_file": self.password_file(self.vehicle), "rviz": str(rviz).lower()})
+            "password_file": self.password_file(self.vehicle), "rviz": str(rviz).lower(), **arguments})
 
     def play(self):
         environment = dict(os.environ, ROS_MASTER_URI=self.vehicle_master, ROS_HOSTNAME="127.0.0.1")

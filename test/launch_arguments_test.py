@@ -10,8 +10,9 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NODES = {
-    "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "hazard_detection": "hazard_detection",
-                "hazard_reporting": "hazard_reporting", "mqtt_bridge": "mqtt_bridge_vehicle"},
+    "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "geo_localization": "geo_localization",
+                "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
+                "mqtt_bridge": "mqtt_bridge_vehicle"},
     "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone"},
 }
 
@@ -36,13 +37,13 @@ class LaunchArguments(unittest.TestCase):
     def test_every_parameter_of_every_node_can_be_set_by_the_argument_of_its_node(self):
         # What an argument of its own sets already is not set twice.
         own_arguments = {"source", "transport", "uri", "camera_info_url", "stereo", "model", "database", "drive_id",
-                         "catalogue", "publish_tf", "user", "zone", "host", "port", "password_file",
-                         "directory", "hazards", "web_address", "web_port", "tile_url", "tile_attribution"}
+                         "catalogue", "publish_tf", "position_source", "use_depth", "user", "zone", "host", "port",
+                         "password_file", "directory", "hazards", "web_address", "web_port", "tile_url", "tile_attribution"}
         for launch, nodes in NODES.items():
             for node, file in nodes.items():
                 defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
                 wanted = {key: changed(value) for key, value in defaults.items() if key not in own_arguments}
-                optional = ["vo:=true"] if node == "edge_vo" else []
+                optional = ["vo:=true"] if node in ("edge_vo", "geo_localization") else []
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")

@@ -27,6 +27,8 @@ struct TrackPose {
   double course_rad = 0;                                    ///< Clockwise from true north.
   double course_variance_rad2 = 0;
   double speed_mps = 0;
+  /// Covariance of position and course, m rad, where a track knows it.
+  Eigen::Vector2d position_course = Eigen::Vector2d::Zero();
 };
 
 /// The recent fixes of one vehicle: answers where it was and which way it drove at the moment of an

@@ -17,9 +17,10 @@ PlacedHazard PlaceHazard(const TrackPose& antenna, const Eigen::Vector2d& antenn
 
   PlacedHazard placed;
   placed.position = LocalFrame(antenna.position).ToGeo(from_antenna_m);
-  placed.covariance_m2 = antenna.covariance_m2 +
-                         enu_from_base * ground.covariance_m2 * enu_from_base.transpose() +
-                         antenna.course_variance_rad2 * swing_m * swing_m.transpose();
+  placed.covariance_m2 =
+      antenna.covariance_m2 + enu_from_base * ground.covariance_m2 * enu_from_base.transpose() +
+      antenna.course_variance_rad2 * swing_m * swing_m.transpose() +
+      swing_m * antenna.position_course.transpose() + antenna.position_course * swing_m.transpose();
   return placed;
 }
 

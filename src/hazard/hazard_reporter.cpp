@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kMaxClassNameBytes = 64;
 constexpr std::size_t kMaxEarlyPictures = 8;
+constexpr std::size_t kMaxDepths = 30;  // The detector may be that many frames behind.
 constexpr std::size_t kMaxWaitingNotices = 20000;
 constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
 
@@ -27,6 +28,7 @@ HazardReporter::HazardReporter(const Config& config, const HazardCatalogue& cata
       random_(random),
       map_(config.map, catalogue, now_ns),
       track_(config.track),
+      poses_(config.poses),
       schedule_(config.resend, std::mt19937_64(random_())) {
   config_.projection.max_range_m = kEndlessRangeM;
   for (const auto& pending : map_.Pending()) {
@@ -58,6 +60,11 @@ void HazardReporter::AddFix(const Fix& fix) {
       ++counters_.jumps;
       break;
   }
+}
+
+void HazardReporter::AddPose(std::int64_t stamp_ns, const TrackPose& pose) {
+  ++counters_.poses;
+  if (!poses_.Add(stamp_ns, pose)) ++counters_.invalid_poses;
 }
 
 bool HazardReporter::IsUsable(const Sighting& sighting) {
@@ -107,6 +114,14 @@ void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
   }
   early_pictures_[stamp_ns] = picture;
   if (early_pictures_.size() > kMaxEarlyPictures) early_pictures_.erase(early_pictures_.begin());
+}
+
+void HazardReporter::AddDepth(std::int64_t stamp_ns, const DepthImage& depth) {
+  depths_[stamp_ns] = depth;
+  if (depths_.size() <= kMaxDepths) return;
+  // The oldest, but for those of before a clock that was set back.
+  const bool set_back = depths_.rbegin()->first - stamp_ns > 1'000'000'000;
+  depths_.erase(set_back ? std::prev(depths_.end()) : depths_.begin());
 }
 
 void HazardReporter::AddNotice(const Notice& notice) {
@@ -176,10 +191,14 @@ bool HazardReporter::Place(WaitingFrame& waiting, double waited_s) {
     waiting.placed = true;
     return true;
   }
-  const FixTrack::Lookup lookup = track_.At(waiting.frame.stamp_ns);
+  if (WaitsForPose(waiting, waited_s) || WaitsForDepth(waiting, waited_s)) return false;
+  FixTrack::Lookup lookup;
+  if (config_.position_source == PositionSource::kFused) lookup = poses_.At(waiting.frame.stamp_ns);
+  const bool fused = lookup.answer == FixTrack::Answer::kReady;
+  if (!fused) lookup = track_.At(waiting.frame.stamp_ns);
   if (lookup.answer == FixTrack::Answer::kReady ||
       (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s)) {
-    PlaceSightings(waiting, lookup.pose);
+    PlaceSightings(waiting, lookup.pose, fused);
     return true;
   }
   if (lookup.answer == FixTrack::Answer::kExtrapolated) return false;
@@ -191,23 +210,59 @@ bool HazardReporter::Place(WaitingFrame& waiting, double waited_s) {
   return true;
 }
 
-void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose) {
-  const Eigen::Isometry3d& mounting = mountings_.at(waiting.frame.frame_id);
-  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
-  for (const Sighting& sighting : waiting.frame.sightings) {
+bool HazardReporter::WaitsForPose(const WaitingFrame& waiting, double waited_s) const {
+  return config_.position_source == PositionSource::kFused && waited_s < config_.fused_wait_s &&
+         poses_.At(waiting.frame.stamp_ns).answer == FixTrack::Answer::kWait;
+}
+
+bool HazardReporter::WaitsForDepth(const WaitingFrame& waiting, double waited_s) const {
+  return config_.use_depth && waited_s < config_.depth_wait_s &&
+         depths_.count(waiting.frame.stamp_ns) == 0;
+}
+
+/// Where the sighting's foot stands in base_link; counted where it is not on the road or too far.
+std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& frame,
+                                                       const Sighting& sighting,
+                                                       double heading_variance_rad2) {
+  const Eigen::Isometry3d& mounting = mountings_.at(frame.frame_id);
+  const Box& box = sighting.box;
+  std::optional<GroundPoint> ground;
+  const auto depth = depths_.find(frame.stamp_ns);
+  if (config_.use_depth && depth != depths_.end()) {
+    ground =
+        FootByDepth(depth->second, box, *intrinsics_, mounting, config_.projection, config_.depth);
+    if (ground) ++counters_.distances_by_depth;
+  }
+  if (!ground) {
     // Bottom centre of the box. Box edges count from the first pixel's outer corner, the camera
     // model from its centre.
-    const Eigen::Vector2d foot(0.5 * (sighting.box.x_min + sighting.box.x_max) - 0.5,
-                               sighting.box.y_max - 0.5);
-    const auto ground = ProjectToGround(foot, *intrinsics_, mounting, config_.projection);
-    if (!ground) {
-      ++counters_.not_on_ground;
-    } else if (ground->position_m.norm() > config_.max_range_m ||
-               LargestSigma(ground->covariance_m2) > config_.max_ground_sigma_m) {
-      ++counters_.too_far;
-    } else {
-      waiting.candidates.push_back({sighting, PlaceHazard(pose, antenna_m, *ground)});
-    }
+    const Eigen::Vector2d foot(0.5 * (box.x_min + box.x_max) - 0.5, box.y_max - 0.5);
+    ground = ProjectToGround(foot, *intrinsics_, mounting, config_.projection);
+  }
+  if (!ground) {
+    ++counters_.not_on_ground;
+    return std::nullopt;
+  }
+  const Eigen::Vector2d swing_m(ground->position_m.y(), -ground->position_m.x());
+  const Eigen::Matrix2d seen_from_vehicle_m2 =
+      ground->covariance_m2 + heading_variance_rad2 * swing_m * swing_m.transpose();
+  if (ground->position_m.norm() > config_.max_range_m ||
+      LargestSigma(seen_from_vehicle_m2) > config_.max_ground_sigma_m) {
+    ++counters_.too_far;
+    return std::nullopt;
+  }
+  return ground;
+}
+
+void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused) {
+  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
+  const Eigen::Vector2d pose_in_base_m = fused ? Eigen::Vector2d::Zero() : antenna_m;
+  for (const Sighting& sighting : waiting.frame.sightings) {
+    const auto ground =
+        PlaceOnRoad(waiting.frame, sighting, fused ? pose.course_variance_rad2 : 0.0);
+    if (!ground) continue;
+    waiting.candidates.push_back({sighting, PlaceHazard(pose, pose_in_base_m, *ground)});
+    ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
   waiting.placed = true;
 }

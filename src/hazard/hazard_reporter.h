@@ -12,10 +12,12 @@
 
 #include "geo/ground_projection.h"
 #include "hazard/catalogue.h"
+#include "hazard/depth_foot.h"
 #include "hazard/fix_track.h"
 #include "hazard/hazard_placement.h"
 #include "hazard/local_hazard_map.h"
 #include "hazard/picture.h"
+#include "hazard/pose_track.h"
 #include "hazard/report.h"
 #include "hazard/resend_schedule.h"
 
@@ -37,6 +39,12 @@ struct SightingFrame {
   std::vector<Sighting> sightings;
 };
 
+/// Whose positions count.
+enum class PositionSource {
+  kFixes,  ///< The receiver's fixes; the course is that of their track.
+  kFused,  ///< Poses of fixes fused with odometry; the fixes where those do not come.
+};
+
 /// Turns what the detector sees into reports: places each hazard on the ground, sends nothing for a
 /// known one, keeps the others until the zone has answered (thesis, sections 3.1 and 3.2.2).
 ///
@@ -52,7 +60,8 @@ class HazardReporter {
     /// A sighting further away than this waits for a nearer view: its place is too uncertain, m.
     double max_range_m = 30.0;
     /// So does one whose place on the road is less certain than this, seen from the vehicle:
-    /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m.
+    /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m. By
+    /// fused poses the heading's error at that distance counts, too.
     double max_ground_sigma_m = 1.0;
     /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
     double max_wait_s = 5.0;
@@ -65,6 +74,15 @@ class HazardReporter {
     /// Antenna in base_link: forward and left of its origin, m.
     double antenna_x_m = 0.0;
     double antenna_y_m = 0.0;
+    PositionSource position_source = PositionSource::kFixes;
+    /// A frame waits at most this long for its fused pose; then the fixes count, s.
+    double fused_wait_s = 1.0;
+    PoseTrack::Config poses;
+    /// Distances by depth images, where they know the one of the hazard's foot.
+    bool use_depth = false;
+    /// A frame waits at most this long for its depth image; then the road's plane counts, s.
+    double depth_wait_s = 0.3;
+    DepthNoise depth;
     int jpeg_quality = 80;  ///< 1..100.
     int max_image_bytes = 100000;
     FixTrack::Config track;
@@ -98,6 +116,11 @@ class HazardReporter {
     std::uint64_t no_fixes = 0;       ///< The receiver said that it had none.
     std::uint64_t jumps = 0;          ///< Fixes that need an impossible speed.
     std::uint64_t store_errors = 0;
+    std::uint64_t poses = 0;          ///< Fused poses that came.
+    std::uint64_t invalid_poses = 0;  ///< Not finite or not later than the one before.
+    std::uint64_t placed_by_fusion = 0;
+    std::uint64_t placed_by_fixes = 0;
+    std::uint64_t distances_by_depth = 0;  ///< Sightings; the others' are by the road's plane.
   };
 
   /// `random` makes uuids and jitter; `now_ns` (UTC) names a corrupt database's new name.
@@ -110,7 +133,11 @@ class HazardReporter {
   bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
 
   void AddFix(const Fix& fix);
+  /// Where base_link was then and which way it looked: fixes and odometry fused.
+  void AddPose(std::int64_t stamp_ns, const TrackPose& pose);
   void AddFrame(const SightingFrame& frame, double now_s);
+  /// The depth image of the frame with this stamp, before or after it.
+  void AddDepth(std::int64_t stamp_ns, const DepthImage& depth);
   /// The annotated image of the frame with this stamp, before or after it.
   void AddPicture(std::int64_t stamp_ns, const Picture& picture);
   void AddNotice(const Notice& notice);
@@ -124,6 +151,8 @@ class HazardReporter {
   /// Intrinsics and some camera's mounting are known.
   bool HasCamera() const { return intrinsics_ && !mountings_.empty(); }
   const FixTrack& track() const { return track_; }
+  const PoseTrack& poses() const { return poses_; }
+  const Config& config() const { return config_; }
   const LocalHazardMap& map() const { return map_; }
   const Counters& counters() const { return counters_; }
   std::size_t waiting_frames() const { return waiting_.size(); }
@@ -148,7 +177,11 @@ class HazardReporter {
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
   bool FitsCamera(const SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
-  void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose);
+  bool WaitsForDepth(const WaitingFrame& waiting, double waited_s) const;
+  bool WaitsForPose(const WaitingFrame& waiting, double waited_s) const;
+  void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused);
+  std::optional<GroundPoint> PlaceOnRoad(const SightingFrame& frame, const Sighting& sighting,
+                                         double heading_variance_rad2);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);
   void ApplyNotices();
   void TellStoreError(const StoreError& error);
@@ -158,11 +191,13 @@ class HazardReporter {
   std::mt19937_64 random_;
   LocalHazardMap map_;
   FixTrack track_;
+  PoseTrack poses_;
   ResendSchedule schedule_;
   std::optional<CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<WaitingFrame> waiting_;
   std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
+  std::map<std::int64_t, DepthImage> depths_;       // By stamp.
   std::deque<Notice> notices_;
   std::set<Uuid> unsent_;
   Counters counters_;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "geo/datum.h"
 #include "localization/sliding_window.h"
 #include "localization/stamps.h"
 #include "localization/track_alignment.h"
@@ -27,12 +28,6 @@ bool IsCovariance(const Eigen::Matrix2d& matrix) {
          matrix.trace() <= 2 * kMaxSigmaM * kMaxSigmaM &&
          matrix.determinant() >= -1e-9 * matrix.trace() * matrix.trace() &&
          std::abs(matrix(0, 1) - matrix(1, 0)) <= 1e-6 * matrix.trace();
-}
-
-/// Turn from the map's axes to east and north at a place: meridians converge.
-double Convergence(const LocalFrame& frame, const GeoPoint& at) {
-  const Eigen::Vector2d north = frame.ToEnu(GeodesicDestination(at, 0, 10.0)) - frame.ToEnu(at);
-  return std::atan2(-north.x(), north.y());
 }
 
 double Median(std::vector<double> values) {
@@ -61,16 +56,31 @@ double GeoLocalizer::odometry_scale() const { return 1 + window_->calibration()[
 
 double GeoLocalizer::yaw_bias_rps() const { return window_->calibration()[2]; }
 
+std::size_t GeoLocalizer::window_nodes() const { return window_->nodes(); }
+
+double GeoLocalizer::widening() const { return window_->widening(); }
+
 OdometryTrack::Verdict GeoLocalizer::AddOdometry(
     std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base,
     const std::optional<Eigen::Matrix3d>& increment_covariance) {
+  return Advance(stamp_ns,
+                 [&] { return track_.Add(stamp_ns, odom_from_base, increment_covariance); });
+}
+
+OdometryTrack::Verdict GeoLocalizer::AddLostOdometry(std::int64_t stamp_ns,
+                                                     const Eigen::Isometry3d& odom_from_base) {
+  return Advance(stamp_ns, [&] { return track_.AddLost(stamp_ns, odom_from_base); });
+}
+
+OdometryTrack::Verdict GeoLocalizer::Advance(std::int64_t stamp_ns,
+                                             const std::function<OdometryTrack::Verdict()>& add) {
   using Verdict = OdometryTrack::Verdict;
-  Verdict verdict = track_.Add(stamp_ns, odom_from_base, increment_covariance);
+  Verdict verdict = add();
   if (verdict == Verdict::kOutOfOrder &&
       Seconds(track_.newest_ns() - stamp_ns) > config_.window_s) {
     // The clock was set back (a bag starts again): nothing of before can be compared.
-    Reset();
-    verdict = track_.Add(stamp_ns, odom_from_base, increment_covariance);
+    Forget();
+    verdict = add();
   }
   if (verdict == Verdict::kInvalid) ++counters_.odometry_invalid;
   if (verdict == Verdict::kOutOfOrder) ++counters_.odometry_out_of_order;
@@ -97,7 +107,7 @@ void GeoLocalizer::KeepTrackOfTime(std::int64_t stamp_ns) {
   track_.ForgetBefore(window_->oldest_ns() - Nanoseconds(kStartTrackS));
 }
 
-void GeoLocalizer::Reset() {
+void GeoLocalizer::Forget() {
   track_.Clear();
   window_->Clear();
   waiting_.clear();
@@ -132,6 +142,12 @@ GeoLocalizer::FixVerdict GeoLocalizer::Count(FixVerdict verdict) {
       break;
   }
   return verdict;
+}
+
+/// What the window thought better of.
+void GeoLocalizer::CountSecondThoughts(std::uint64_t reinstated, std::uint64_t refused) {
+  counters_.fixes_used += reinstated - refused;
+  counters_.fixes_refused += refused - reinstated;
 }
 
 GeoLocalizer::FixVerdict GeoLocalizer::AddFix(const PositionFix& fix) {
@@ -179,12 +195,16 @@ std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix
   measurement.place_m = frame_->ToEnu(fix.position);
   // The plane cannot tell the other side of the earth.
   if (GeodesicDistanceM(frame_->datum(), fix.position) > config_.max_range_m) return std::nullopt;
-  const Eigen::Matrix2d turn = Rotation2(Convergence(*frame_, fix.position));
+  const Eigen::Matrix2d turn = Rotation2(MeridianConvergence(*frame_, fix.position));
   covariance_m2 = turn * covariance_m2 * turn.transpose();
-  const double least_variance =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance_m2, Eigen::EigenvaluesOnly)
-          .eigenvalues()
-          .minCoeff();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance_m2);
+  const double believed_m = config_.receiver.least_sigma_m;
+  if (believed_m > 0) {
+    covariance_m2 = axes.eigenvectors() *
+                    axes.eigenvalues().cwiseMax(believed_m * believed_m).asDiagonal() *
+                    axes.eigenvectors().transpose();
+  }
+  const double least_variance = std::max(axes.eigenvalues().minCoeff(), believed_m * believed_m);
   measurement.shared_m = std::min(config_.receiver.shared_sigma_m,
                                   kMaxShare * std::sqrt(std::max(0.0, least_variance)));
   const Eigen::Matrix2d white_m2 =
@@ -242,8 +262,7 @@ GeoLocalizer::FixVerdict GeoLocalizer::Use(const FixMeasurement& fix) {
   window_->AddFix(fix, track_);
   window_->Slide();
   const SlidingWindow::Counts counts = window_->Solve(track_);
-  counters_.fixes_used += counts.reinstated - counts.refused;
-  counters_.fixes_refused += counts.refused - counts.reinstated;
+  CountSecondThoughts(counts.reinstated, counts.refused);
   last_used_ns_ = moment_ns;
   return FixVerdict::kUsed;
 }
@@ -279,7 +298,8 @@ bool GeoLocalizer::TryStart() {
   counters_.fixes_used += agreeing - 1;
   counters_.fixes_refused += kept_.size() - agreeing;
   kept_.clear();
-  window_->Solve(track_);
+  const SlidingWindow::Counts counts = window_->Solve(track_);
+  CountSecondThoughts(counts.reinstated, counts.refused);
   window_->Slide();
   return true;
 }
@@ -304,12 +324,13 @@ std::optional<FusedPose> GeoLocalizer::Fused(std::int64_t stamp_ns) const {
   fused.state = StateAt(stamp_ns);
   fused.map_from_base = {now.node.head<2>(), now.node[2]};
   fused.position = frame_->ToGeo(fused.map_from_base.position_m);
-  const double convergence_rad = Convergence(*frame_, fused.position);
+  const double convergence_rad = MeridianConvergence(*frame_, fused.position);
   const Eigen::Matrix2d turn = Rotation2(-convergence_rad);
   fused.covariance_m2 = turn * now.covariance.topLeftCorner<2, 2>() * turn.transpose();
   constexpr double kQuarterTurn = 1.57079632679489661923;
   fused.heading_rad = WrapAngle(kQuarterTurn - (now.node[2] - convergence_rad));
   fused.heading_variance_rad2 = now.covariance(2, 2);
+  fused.map_covariance = now.covariance.topLeftCorner<3, 3>();
   return fused;
 }
 
@@ -331,7 +352,7 @@ std::optional<FusedPose> GeoLocalizer::PositionOnly(std::int64_t stamp_ns) const
   FusedPose fused;
   fused.map_from_base.position_m = {Median(east_m), Median(north_m)};
   fused.position = frame_->ToGeo(fused.map_from_base.position_m);
-  const double convergence_rad = Convergence(*frame_, fused.position);
+  const double convergence_rad = MeridianConvergence(*frame_, fused.position);
   const Eigen::Matrix2d turn = Rotation2(-convergence_rad);
   const Eigen::Matrix2d white_m2 =
       (newest.root_information.transpose() * newest.root_information).inverse();

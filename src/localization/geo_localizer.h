@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -41,6 +42,8 @@ struct FusedPose {
   double heading_variance_rad2 = std::numeric_limits<double>::infinity();
   /// On the map: metres east and north of the datum, yaw from the map's x axis.
   PlanarPose map_from_base;
+  /// Of map_from_base (x, y, yaw), map axes; not set while uninitialised.
+  Eigen::Matrix3d map_covariance = Eigen::Matrix3d::Zero();
 };
 
 struct LatencyEstimate {
@@ -89,7 +92,12 @@ class GeoLocalizer {
   OdometryTrack::Verdict AddOdometry(
       std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base,
       const std::optional<Eigen::Matrix3d>& increment_covariance = std::nullopt);
+  /// While the odometry is lost: see OdometryTrack::AddLost. Counts as a reset.
+  OdometryTrack::Verdict AddLostOdometry(std::int64_t stamp_ns,
+                                         const Eigen::Isometry3d& odom_from_base);
   FixVerdict AddFix(const PositionFix& fix);
+  /// Forgets everything but the datum: the clock was set back, as by a bag that starts again.
+  void Forget();
 
   /// The vehicle at a moment that the window or the odometry covers; none before the first fix and
   /// for other moments.
@@ -104,9 +112,16 @@ class GeoLocalizer {
   double odometry_scale() const;
   double yaw_bias_rps() const;
   const LocalizerCounters& counters() const { return counters_; }
+  /// Poses in the window.
+  std::size_t window_nodes() const;
+  /// How much wider than stated the fixes scatter, at least 1.
+  double widening() const;
 
  private:
+  OdometryTrack::Verdict Advance(std::int64_t stamp_ns,
+                                 const std::function<OdometryTrack::Verdict()>& add);
   FixVerdict Count(FixVerdict verdict);
+  void CountSecondThoughts(std::uint64_t reinstated, std::uint64_t refused);
   std::optional<FixMeasurement> ToMeasurement(const PositionFix& fix);
   std::int64_t MomentOf(const FixMeasurement& fix) const;
   FixVerdict Process(FixMeasurement fix);
@@ -116,7 +131,6 @@ class GeoLocalizer {
   bool TryStart();
   void ProcessWaiting();
   void KeepTrackOfTime(std::int64_t stamp_ns);
-  void Reset();
   LocalizerState StateAt(std::int64_t stamp_ns) const;
   std::optional<FusedPose> PositionOnly(std::int64_t stamp_ns) const;
 

@@ -47,26 +47,46 @@ Eigen::Matrix3d Diagonal(double way_variance, double yaw_variance) {
 OdometryTrack::OdometryTrack(const OdometryModel& model, double max_extrapolation_s)
     : model_(model), max_extrapolation_s_(max_extrapolation_s) {}
 
-OdometryTrack::Verdict OdometryTrack::Add(
-    std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base,
-    const std::optional<Eigen::Matrix3d>& increment_covariance) {
+/// What keeps a pose from becoming a step of the track; the first pose only starts it.
+std::optional<OdometryTrack::Verdict> OdometryTrack::Refuse(
+    std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base) {
   if (stamp_ns <= 0 || !IsPose(odom_from_base)) return Verdict::kInvalid;
-  if (increment_covariance && !IsCovariance(*increment_covariance)) return Verdict::kInvalid;
-  const PlanarPose raw = ToPlanar(odom_from_base);
   if (samples_.empty()) {
-    newest_raw_ = raw;
+    newest_raw_ = ToPlanar(odom_from_base);
     samples_.push_back({stamp_ns, {}, Eigen::Matrix3d::Zero()});
     return Verdict::kAccepted;
   }
-  const Sample& last = samples_.back();
-  if (stamp_ns <= last.stamp_ns) return Verdict::kOutOfOrder;
-  const double time_s = Seconds(stamp_ns - last.stamp_ns);
+  if (stamp_ns <= newest_ns()) return Verdict::kOutOfOrder;
+  return std::nullopt;
+}
+
+/// The track goes on by its last speed.
+void OdometryTrack::Coast(std::int64_t stamp_ns) {
+  const double time_s = Seconds(stamp_ns - newest_ns());
+  const PlanarPose coast{time_s * speed_mps_, time_s * yaw_rate_rps_};
+  samples_.push_back({stamp_ns, samples_.back().pose * coast, CoastCovariance(time_s)});
+}
+
+OdometryTrack::Verdict OdometryTrack::AddLost(std::int64_t stamp_ns,
+                                              const Eigen::Isometry3d& odom_from_base) {
+  if (const auto refused = Refuse(stamp_ns, odom_from_base)) return *refused;
+  newest_raw_ = ToPlanar(odom_from_base);
+  Coast(stamp_ns);
+  return Verdict::kReset;
+}
+
+OdometryTrack::Verdict OdometryTrack::Add(
+    std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base,
+    const std::optional<Eigen::Matrix3d>& increment_covariance) {
+  if (increment_covariance && !IsCovariance(*increment_covariance)) return Verdict::kInvalid;
+  if (const auto refused = Refuse(stamp_ns, odom_from_base)) return *refused;
+  const PlanarPose raw = ToPlanar(odom_from_base);
+  const double time_s = Seconds(stamp_ns - newest_ns());
   PlanarPose step = newest_raw_.Inverse() * raw;
   step.yaw_rad = WrapAngle(step.yaw_rad);
   newest_raw_ = raw;
   if (IsJump(step, time_s)) {
-    const PlanarPose coast{time_s * speed_mps_, time_s * yaw_rate_rps_};
-    samples_.push_back({stamp_ns, last.pose * coast, CoastCovariance(time_s)});
+    Coast(stamp_ns);
     return Verdict::kReset;
   }
   Eigen::Matrix3d covariance = StepCovariance(step, time_s);
@@ -74,7 +94,7 @@ OdometryTrack::Verdict OdometryTrack::Add(
     covariance = *increment_covariance +
                  Diagonal(kMinWaySigmaM * kMinWaySigmaM, kMinYawSigmaRad * kMinYawSigmaRad);
   }
-  samples_.push_back({stamp_ns, last.pose * step, covariance});
+  samples_.push_back({stamp_ns, samples_.back().pose * step, covariance});
   const double fresh = moving_known_ ? 1 - std::exp(-time_s / kSpeedMemoryS) : 1;
   speed_mps_ += fresh * (step.position_m / time_s - speed_mps_);
   yaw_rate_rps_ += fresh * (step.yaw_rad / time_s - yaw_rate_rps_);

@@ -40,11 +40,14 @@ class OdometryTrack {
   /// vehicle's frame; without one the model's noise is taken.
   Verdict Add(std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base,
               const std::optional<Eigen::Matrix3d>& increment_covariance);
+  /// The odometry is lost: its pose says nothing about the motion since the last one, which is
+  /// bridged as a reset is. The pose counts as where a later Add goes on from.
+  Verdict AddLost(std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base);
 
   bool empty() const { return samples_.empty(); }
   std::int64_t oldest_ns() const { return samples_.front().stamp_ns; }
   std::int64_t newest_ns() const { return samples_.back().stamp_ns; }
-  /// As the odometry gave it.
+  /// As the odometry gave it, also while it was lost.
   const PlanarPose& newest_raw() const { return newest_raw_; }
   /// Whether the track has (or may carry on to) this moment.
   bool Covers(std::int64_t stamp_ns) const;
@@ -68,6 +71,8 @@ class OdometryTrack {
     Eigen::Matrix3d covariance;  // Of the step from the sample before.
   };
 
+  std::optional<Verdict> Refuse(std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base);
+  void Coast(std::int64_t stamp_ns);
   std::size_t After(std::int64_t stamp_ns) const;
   bool IsJump(const PlanarPose& step, double time_s) const;
   Eigen::Matrix3d StepCovariance(const PlanarPose& step, double time_s) const;

@@ -33,6 +33,7 @@ class SlidingWindow {
   SlidingWindow& operator=(const SlidingWindow&) = delete;
 
   bool empty() const { return nodes_.empty(); }
+  std::size_t nodes() const { return nodes_.size(); }
   std::int64_t newest_ns() const { return nodes_.back().stamp_ns; }
   std::int64_t oldest_ns() const { return nodes_.front().stamp_ns; }
   const Calibration& calibration() const { return calibration_; }

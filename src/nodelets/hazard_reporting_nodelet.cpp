@@ -18,12 +18,14 @@
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
 
+#include "geo/datum.h"
 #include "hazard/hazard_reporter.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/camera_info_conversions.h"
 #include "ros/hazard_conversions.h"
 #include "ros/hazard_reporting_parameters.h"
 #include "ros/hazard_view.h"
+#include "ros/localization_conversions.h"
 
 namespace livemap {
 namespace {
@@ -91,6 +93,12 @@ class HazardReportingNodelet : public nodelet::Nodelet {
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
         node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
     };
+    if (IsFused()) {
+      subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
+    }
+    if (config_.reporter.use_depth) {
+      subscribers_.push_back(node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this));
+    }
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node);
     updater_ =
         std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
@@ -103,6 +111,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
                                &Self::OnDiagnosticsTimer, this),
     };
   }
+
+  bool IsFused() const { return config_.reporter.position_source == PositionSource::kFused; }
 
   void OnDetections(const DetectionArray& message) {
     if (!reporter_->HasMounting(message.header.frame_id)) wanted_frame_ = message.header.frame_id;
@@ -129,7 +139,53 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     const auto before_ns = reporter_->track().newest_ns();
     reporter_->AddFix(ToFix(message));
     const auto newest_ns = reporter_->track().newest_ns();
-    if (newest_ns && newest_ns != before_ns) PublishVehicle(*newest_ns);
+    const bool by_fixes = !IsFused() || IsFusionSilent(*reporter_);
+    if (by_fixes && newest_ns && newest_ns != before_ns) ShowFix(*newest_ns);
+    Work();
+  }
+
+  /// A fused pose of base_link in the map frame.
+  void OnPose(const nav_msgs::Odometry& message) {
+    LearnDatum();
+    if (!map_ || message.header.frame_id != config_.map_frame ||
+        message.child_frame_id != config_.base_frame) {
+      NODELET_WARN_THROTTLE(kSayAgainS,
+                            "dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s' and tf "
+                            "from 'earth' to the latter",
+                            message.child_frame_id.c_str(), message.header.frame_id.c_str(),
+                            config_.base_frame.c_str(), config_.map_frame.c_str());
+      return;
+    }
+    const std::int64_t stamp_ns = FromRosTime(message.header.stamp);
+    const TrackPose pose = ToTrackPose(message, *map_);
+    reporter_->AddPose(stamp_ns, pose);
+    if (reporter_->poses().newest_ns() == stamp_ns) {
+      TellPosition(pose, stamp_ns);
+      ShowVehicle(pose, message.header.stamp);
+    }
+    Work();
+  }
+
+  void OnDepth(const sensor_msgs::ImageConstPtr& message) {
+    namespace encodings = sensor_msgs::image_encodings;
+    const std::string& encoding = message->encoding;
+    if (encoding != encodings::TYPE_16UC1 && encoding != encodings::MONO16 &&
+        encoding != encodings::TYPE_32FC1) {
+      NODELET_WARN_THROTTLE(kSayAgainS,
+                            "depth has encoding '%s', accepted are 16UC1 and 32FC1: dropped",
+                            encoding.c_str());
+      return;
+    }
+    try {
+      const auto shared = cv_bridge::toCvShare(message);
+      const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
+      reporter_->AddDepth(FromRosTime(message->header.stamp),
+                          {shared->image, config_.depth_units_per_m, owner});
+    } catch (const cv::Exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "depth image dropped: %s", error.what());
+    } catch (const cv_bridge::Exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "depth image dropped: %s", error.what());
+    }
     Work();
   }
 
@@ -172,6 +228,11 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     if (!reporter_->store_error().empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "%s", reporter_->store_error().c_str());
     }
+    const std::uint64_t by_fixes = reporter_->counters().placed_by_fixes;
+    if (IsFused() && by_fixes > placed_by_fixes_) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "no fused pose of an image: hazards placed by the fixes");
+    }
+    placed_by_fixes_ = by_fixes;
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
     for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
@@ -192,31 +253,52 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
   }
 
-  void PublishVehicle(std::int64_t stamp_ns) {
-    const auto antenna = reporter_->track().Newest();
-    const ros::Time stamp = ToRosTime(stamp_ns);
-    if (!position_stamp_ || stamp < *position_stamp_ ||
-        stamp - *position_stamp_ >= ros::Duration(config_.position_period_s)) {
-      position_stamp_ = stamp;
-      const VehicleState vehicle{"",
-                                 config_.reporter.drive_id,
-                                 antenna->position,
-                                 antenna->course_rad,
-                                 antenna->speed_mps,
-                                 stamp_ns};
-      const double sigma_m = std::sqrt(antenna->covariance_m2.trace() / 2);
-      position_publisher_.publish(ToMessage(vehicle, sigma_m));
+  /// The datum of the map frame is that of its owner, the localisation: tf earth -> map.
+  void LearnDatum() {
+    try {
+      const auto transform =
+          tf_buffer_.lookupTransform("earth", config_.map_frame, ros::Time(0)).transform;
+      if (map_ && earth_from_map_ == transform) return;
+      map_.emplace(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
+      earth_from_map_ = transform;
+      path_.poses.clear();
+    } catch (const tf2::TransformException&) {
+      // Whoever needs the map says that it is missing.
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
-    if (!map_) map_.emplace(antenna->position);
-    const auto base = reporter_->track().At(stamp_ns);
-    if (base.answer == FixTrack::Answer::kReady) ShowVehicle(base.pose, stamp);
   }
 
-  void ShowVehicle(const TrackPose& antenna, const ros::Time& stamp) {
+  /// Where the newest fix is, on vehicle/position and on the map.
+  void ShowFix(std::int64_t stamp_ns) {
+    const auto antenna = reporter_->track().Newest();
+    TellPosition(*antenna, stamp_ns);
+    if (!map_ && !IsFused()) map_.emplace(antenna->position);
+    const auto at_stamp = reporter_->track().At(stamp_ns);
+    if (!map_ || at_stamp.answer != FixTrack::Answer::kReady) return;
     const Eigen::Vector2d antenna_m(config_.reporter.antenna_x_m, config_.reporter.antenna_y_m);
     const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
-    const Eigen::Vector2d base_m = map_->ToEnu(PlaceHazard(antenna, antenna_m, origin).position);
-    const auto pose = VehiclePose(base_m, antenna.course_rad, config_.map_frame, stamp);
+    TrackPose base = at_stamp.pose;
+    base.position = PlaceHazard(base, antenna_m, origin).position;
+    ShowVehicle(base, ToRosTime(stamp_ns));
+  }
+
+  void TellPosition(const TrackPose& pose, std::int64_t stamp_ns) {
+    const ros::Time stamp = ToRosTime(stamp_ns);
+    const bool due = !position_stamp_ || stamp < *position_stamp_ ||
+                     stamp - *position_stamp_ >= ros::Duration(config_.position_period_s);
+    if (!due) return;
+    position_stamp_ = stamp;
+    const VehicleState vehicle{
+        "", config_.reporter.drive_id, pose.position, pose.course_rad, pose.speed_mps, stamp_ns};
+    const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
+    position_publisher_.publish(ToMessage(vehicle, sigma_m));
+  }
+
+  /// base_link on the path, and on tf where no odometry does it.
+  void ShowVehicle(const TrackPose& base, const ros::Time& stamp) {
+    const Eigen::Vector2d base_m = map_->ToEnu(base.position);
+    const auto pose = VehiclePose(base_m, base.course_rad, config_.map_frame, stamp);
     if (config_.publish_tf) {
       geometry_msgs::TransformStamped transform;
       transform.header = pose.header;
@@ -256,6 +338,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   HazardCatalogue catalogue_;
   std::unique_ptr<HazardReporter> reporter_;
   std::optional<LocalFrame> map_;
+  geometry_msgs::Transform earth_from_map_;  // By which map_ was made, if it was.
+  std::uint64_t placed_by_fixes_ = 0;        // When it was last looked at.
   std::optional<ros::Time> position_stamp_;
   std::string wanted_frame_;  // Optical frame whose mounting is not known yet.
   nav_msgs::Path path_;

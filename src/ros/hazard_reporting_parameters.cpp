@@ -1,8 +1,9 @@
 #include "ros/hazard_reporting_parameters.h"
 
-#include <cstdio>
 #include <cstdlib>
 #include <ctime>
+
+#include "ros/datum_parameter.h"
 
 namespace livemap {
 namespace {
@@ -26,21 +27,6 @@ std::string DefaultDatabase() {
   return std::string(home != nullptr ? home : ".") + "/.ros/livemap/local_hazards.sqlite3";
 }
 
-std::optional<GeoPoint> ReadDatum(ParameterReader& parameters) {
-  std::string text;
-  parameters.Read("map_datum", text);
-  if (text.empty()) return std::nullopt;
-  GeoPoint datum;
-  int used = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf%n", &datum.latitude_deg, &datum.longitude_deg, &used) !=
-          2 ||
-      static_cast<std::size_t>(used) != text.size() || !IsValid(datum)) {
-    throw Error("parameter 'map_datum' is '" + text +
-                "', accepted is LATITUDE,LONGITUDE in degrees, or nothing for the first fix");
-  }
-  return datum;
-}
-
 void ReadTrack(ParameterReader& parameters, FixTrack::Config& track) {
   parameters.Read("max_extrapolation_s", track.max_extrapolation_s, {0, 10});
   parameters.Read("max_gap_s", track.max_gap_s, {0.01, 60});
@@ -52,6 +38,21 @@ void ReadTrack(ParameterReader& parameters, FixTrack::Config& track) {
   parameters.Read("acceleration_mps2", track.acceleration_mps2, {0, 20});
   parameters.Read("default_sigma_m", track.default_sigma_m, {0.01, 100});
   parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
+}
+
+void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& config) {
+  HazardReporter::Config& reporter = config.reporter;
+  std::string source = "gps";
+  parameters.ReadChoice("position_source", source, {"gps", "fused"});
+  if (source == "fused") reporter.position_source = PositionSource::kFused;
+  parameters.Read("fused_wait_s", reporter.fused_wait_s, {0, 60});
+  parameters.Read("max_fused_gap_s", reporter.poses.max_gap_s, {0.01, 10});
+  parameters.Read("use_depth", reporter.use_depth);
+  parameters.Read("depth_wait_s", reporter.depth_wait_s, {0, 60});
+  parameters.Read("depth_sigma_share", reporter.depth.sigma_share, {0, 1});
+  parameters.Read("min_depth_m", reporter.depth.min_m, {0.01, 1000});
+  parameters.Read("max_depth_m", reporter.depth.max_m, {0.01, 1000});
+  parameters.Read("depth_units_per_m", config.depth_units_per_m, {1, 1e6});
 }
 
 }  // namespace
@@ -86,14 +87,20 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("pitch_sigma_rad", reporter.projection.pitch_sigma_rad, {0, 0.5});
   parameters.Read("height_sigma_m", reporter.projection.height_sigma_m, {0, 2});
   ReadTrack(parameters, reporter.track);
+  ReadPositionSource(parameters, config);
   parameters.Read("resend_first_s", reporter.resend.first_pause_s, {0.05, 600});
   parameters.Read("resend_longest_s", reporter.resend.longest_pause_s, {0.05, 3600});
   parameters.Read("resend_jitter", reporter.resend.jitter, {0, 0.9});
 
   parameters.Read("base_frame", config.base_frame);
   parameters.Read("map_frame", config.map_frame);
-  config.map_datum = ReadDatum(parameters);
+  config.map_datum = ReadDatum(parameters, "the first fix");
   parameters.Read("publish_tf", config.publish_tf);
+  if (config.publish_tf && reporter.position_source == PositionSource::kFused) {
+    throw Error(
+        "parameter 'publish_tf' is true, accepted is false with position_source fused, "
+        "where tf leads from map_frame to base_frame already");
+  }
   parameters.Read("position_period_s", config.position_period_s, {0.01, 3600});
   parameters.Read("path_spacing_m", config.path_spacing_m, {0.01, 1000});
   parameters.Read("path_max_poses", config.path_max_poses, {1, 1e6});

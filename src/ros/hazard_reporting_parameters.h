@@ -21,6 +21,7 @@ struct HazardReportingConfig {
   double path_spacing_m = 1.0;
   int path_max_poses = 5000;
   int max_markers = 1000;
+  double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
   double diagnostics_period_s = 1.0;
 };
 

@@ -65,6 +65,14 @@ geometry_msgs::PoseStamped VehiclePose(const Eigen::Vector2d& east_north_m, doub
   return pose;
 }
 
+bool IsFusionSilent(const HazardReporter& reporter) {
+  constexpr std::int64_t kSilentNs = 2'000'000'000;
+  if (reporter.config().position_source != PositionSource::kFused) return false;
+  const auto newest_fix_ns = reporter.track().newest_ns();
+  const auto newest_pose_ns = reporter.poses().newest_ns();
+  return newest_fix_ns && (!newest_pose_ns || *newest_fix_ns - *newest_pose_ns > kSilentNs);
+}
+
 void DescribeHazardReporter(const HazardReporter& reporter,
                             diagnostic_updater::DiagnosticStatusWrapper& status) {
   using diagnostic_msgs::DiagnosticStatus;
@@ -76,6 +84,8 @@ void DescribeHazardReporter(const HazardReporter& reporter,
                    "started anew after a corrupt store: " + reporter.map().set_aside());
   } else if (!reporter.track().newest_ns()) {
     status.summary(DiagnosticStatus::WARN, "no fix yet");
+  } else if (IsFusionSilent(reporter)) {
+    status.summary(DiagnosticStatus::WARN, "no fused poses: hazards are placed by the fixes alone");
   } else if (!reporter.HasCamera()) {
     status.summary(DiagnosticStatus::WARN, "no camera_info or no mounting of the camera yet");
   } else {
@@ -107,6 +117,11 @@ void DescribeHazardReporter(const HazardReporter& reporter,
   status.add("no_fixes", counters.no_fixes);
   status.add("jumps", counters.jumps);
   status.add("store_errors", counters.store_errors);
+  status.add("poses", counters.poses);
+  status.add("invalid_poses", counters.invalid_poses);
+  status.add("placed_by_fusion", counters.placed_by_fusion);
+  status.add("placed_by_fixes", counters.placed_by_fixes);
+  status.add("distances_by_depth", counters.distances_by_depth);
 }
 
 }  // namespace livemap

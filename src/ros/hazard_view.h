@@ -26,6 +26,9 @@ visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& ha
 geometry_msgs::PoseStamped VehiclePose(const Eigen::Vector2d& east_north_m, double course_rad,
                                        const std::string& map_frame, const ros::Time& stamp);
 
+/// Fused poses are wanted, and have not come for two seconds while fixes did.
+bool IsFusionSilent(const HazardReporter& reporter);
+
 /// What hazard_reporting did since its start, each counter under its own name; a warning while it
 /// lacks fixes or camera, an error while its store fails.
 void DescribeHazardReporter(const HazardReporter& reporter,

@@ -191,6 +191,22 @@ TEST(GeoLocalizer, BelievesTheScatterMoreThanAReceiverThatStatesTooLittle) {
   EXPECT_LT(outcome.error_m, 2);
 }
 
+TEST(GeoLocalizer, BelievesNoFixToBeBetterThanItMayBe) {
+  // Reflections that last for some seconds, of which the receiver's 0.5 m say nothing.
+  SimulatedDrive drive;
+  drive.fix_error = [](double time_s) {
+    return std::optional<Eigen::Vector2d>(1.5 * Eigen::Vector2d(std::sin(time_s), 0));
+  };
+  LocalizerConfig config = ConfigOf(drive);
+  const Outcome believing = Drive(drive, config);
+  config.receiver.least_sigma_m = 1.5;
+  config.receiver.shared_sigma_m = 1;
+  config.receiver.shared_time_s = 5;
+  const Outcome careful = Drive(drive, config);
+  EXPECT_LT(careful.worst_m, 1.5);
+  EXPECT_GT(careful.last->covariance_m2.trace(), 1.5 * believing.last->covariance_m2.trace());
+}
+
 TEST(GeoLocalizer, OdometryResetKeepsTheMap) {
   SimulatedDrive drive;
   drive.motion = ChangingSpeed;
