@@ -87,7 +87,7 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
   }
 }
 
-/// Residuals of points whose depth is not exact err by that, too: equation (14). They are divided
+/// Residuals of points whose depth is not exact err by that, too: equation (13). They are divided
 /// by how much more, at the motion that the alignment starts with.
 void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
   whitening_.resize(points.inverse_depth_sigma.size());

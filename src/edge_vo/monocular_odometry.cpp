@@ -141,7 +141,7 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
   if (unscaled.state != VoState::kTracking) {
     if (last_.state == VoState::kTracking) lost_since_ns_ = frame.stamp_ns;
     way_m_ = way_s_ = way_units_ = 0;
-    const VoResult held = InMetres(unscaled);
+    VoResult held = InMetres(unscaled);
     if (Seconds(frame.stamp_ns, lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
     return held;
   }

@@ -121,7 +121,7 @@ TEST(MonocularOdometry, InitialisesUntilTheCameraMoves) {
   MonocularOdometry odometry(Slow(), SimulatedCamera().intrinsics);
   for (int i = 0; i < 5; ++i) {
     MonocularFrame frame = Frame(0, 0.0);
-    frame.stamp_ns = i * 100'000'000;
+    frame.stamp_ns = std::int64_t{100'000'000} * i;
     const VoResult result = odometry.Track(frame);
     EXPECT_EQ(result.state, VoState::kInitialising);
     EXPECT_TRUE(result.world_from_camera.isApprox(Eigen::Isometry3d::Identity()));

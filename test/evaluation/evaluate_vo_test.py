@@ -152,6 +152,33 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertIn("baseline_m in camera.yaml", self.refused(tum, "--stereo"))
         self.assertIn("no right eye", self.refused(self.room, "--stereo"))
 
+    def test_one_eye_follows_a_street_in_metres_by_the_speed(self):
+        street, kitti = (os.path.join(self.temporary.name, name) for name in ("one_eye", "one_eye_kitti"))
+        street_with_two_eyes(street)
+        figures = self.figures(street, "--mono")
+        self.assertEqual((figures["frames"], figures["lost"], figures["depth"]), (16, 0, "mono"))
+        self.assertLess(figures["end_error_percent"], 3)
+        noisy = self.figures(street, "--mono", "--speed-sigma", "0.3", "--seed", "4")
+        self.assertNotEqual(noisy["ate_rmse_m"], figures["ate_rmse_m"])
+        as_kitti(street, kitti)
+        alone = self.figures(kitti)
+        self.assertEqual((alone["depth"], alone["lost"]), ("mono", 0), "a drive without depth needs no flag")
+        self.assertLess(alone["end_error_percent"], 3)
+
+        self.assertIn("needs depth", self.refused(kitti, "--method", "rgbd"))
+        self.assertIn("accepted are speed, height", self.refused(kitti, "--scale", "gps"))
+        os.remove(os.path.join(kitti, "poses.txt"))
+        self.assertIn("--scale height", self.refused(kitti))
+
+    def test_one_eye_keeps_the_bar_on_a_real_drive(self):
+        drive = os.path.join(DATA, "mono", "kitti_a")
+        if not os.path.isdir(drive):
+            self.skipTest("skipped, no data")
+        figures = self.figures(drive)
+        self.assertEqual((figures["frames"], figures["lost"]), (51, 0))
+        self.assertLess(figures["segment_translation_percent"], 3)
+        self.assertLess(figures["end_error_percent"], 3)
+
     def test_figures_for_a_person_have_four_digits(self):
         done = run(self.room)
         self.assertEqual(done.returncode, 0, done.stderr)
