@@ -215,8 +215,8 @@ void EdgeOdometry::ReserveBuffers() {
 void EdgeOdometry::ForgetNearOnes() {
   const std::size_t count = keyframes_.size();
   auto leaving = keyframes_.end();
-  if (count >= 2 && MotionFrom(*keyframes_[count - 2], keyframes_[count - 1]->world_from_camera) <
-                        config_.kept_motion) {
+  if (count >= 2 && Motion(*keyframes_[count - 2], keyframes_[count - 2]->world_from_camera,
+                           keyframes_[count - 1]->world_from_camera) < config_.kept_motion) {
     leaving = std::prev(keyframes_.end());
   } else if (count >= static_cast<std::size_t>(std::max(2, config_.keyframes_kept))) {
     leaving = keyframes_.begin();
@@ -350,16 +350,20 @@ bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
   ++frames_since_keyframe_;
   if (keyframe_first_sigma_ == 0) keyframe_first_sigma_ = result.sigma;
   if (config_.keyframe_every > 0 && frames_since_keyframe_ >= config_.keyframe_every) return true;
-  return MotionFrom(*keyframe_, world_from_camera) > config_.keyframe_motion ||
+  const double step = Motion(*keyframe_, last_.world_from_camera, world_from_camera);
+  const double enough = step < config_.keyframe_motion
+                            ? config_.keyframe_motion
+                            : std::min(config_.keyframe_steps * step, config_.keyframe_most_motion);
+  return Motion(*keyframe_, keyframe_->world_from_camera, world_from_camera) > enough ||
          result.Overlap() < config_.keyframe_overlap ||
          result.sigma > config_.keyframe_sigma_ratio * keyframe_first_sigma_;
 }
 
-/// How far the keyframe's points moved over the image on average, if they all were in the middle of
-/// it: share of its width.
-double EdgeOdometry::MotionFrom(const Keyframe& keyframe,
-                                const Eigen::Isometry3d& world_from_camera) const {
-  const Vector6d twist = Se3Log(world_from_camera.inverse() * keyframe.world_from_camera);
+/// How far the keyframe's points move over the image on average between two poses of the camera, if
+/// they all are in the middle of it: share of its width.
+double EdgeOdometry::Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
+                            const Eigen::Isometry3d& world_from_other) const {
+  const Vector6d twist = Se3Log(world_from_other.inverse() * world_from_one);
   return cameras_[0].fx / cameras_[0].width *
          (twist.head<3>().norm() * keyframe.points[0].mean_inverse_depth + twist.tail<3>().norm());
 }

@@ -70,8 +70,12 @@ class EdgeOdometry {
     int keyframe_every = 0;
     /// A new keyframe when less than this share of the points is in view,
     double keyframe_overlap = 0.80;
-    /// or the points moved further than this on average, share of the image's width,
+    /// or the points moved further than this on average, share of the image's width; if they do
     double keyframe_motion = 0.018;
+    /// in a single step already: then further than so many steps, or than this share of the width:
+    /// a keyframe costs more than a frame, and a fast camera would make every frame one,
+    double keyframe_steps = 2.5;
+    double keyframe_most_motion = 0.09;
     /// or the residuals grew by this factor since the keyframe's first frame.
     double keyframe_sigma_ratio = 1.6;
 
@@ -149,7 +153,8 @@ class EdgeOdometry {
   Attempt FindBack();
   bool IsGood(const AlignmentResult& result) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
-  double MotionFrom(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_camera) const;
+  double Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
+                const Eigen::Isometry3d& world_from_other) const;
   void ForgetNearOnes();
   void ReserveBuffers();
   VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);

@@ -30,6 +30,8 @@ void ReadOdometry(ParameterReader& parameters, EdgeOdometry::Config& odometry) {
   parameters.Read("keyframe_every", odometry.keyframe_every, {0, 10000});
   parameters.Read("keyframe_overlap", odometry.keyframe_overlap, {0, 1});
   parameters.Read("keyframe_motion", odometry.keyframe_motion, {0.001, 10});
+  parameters.Read("keyframe_steps", odometry.keyframe_steps, {0, 1000});
+  parameters.Read("keyframe_most_motion", odometry.keyframe_most_motion, {0, 1});
   parameters.Read("keyframe_sigma_ratio", odometry.keyframe_sigma_ratio, {1, 100});
   parameters.Read("keyframes_kept", odometry.keyframes_kept, {2, 100});
   parameters.Read("give_up_s", odometry.give_up_s, {0, 3600});

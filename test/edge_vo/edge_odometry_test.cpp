@@ -116,6 +116,28 @@ TEST(EdgeOdometry, FlickeringLightDoesNotBreakTracking) {
   }
 }
 
+TEST(EdgeOdometry, AFastCameraKeepsItsKeyframeForSomeSteps) {
+  const SyntheticWall wall(kCamera);
+  // 7 px a step, at 2 m: more than keyframe_motion.
+  const auto pose = [](int i) { return Pose(0.05 * i, 0, 0, 0, 0, 0); };
+  const auto count_keyframes = [&](double keyframe_steps) {
+    EdgeOdometry::Config config;
+    config.keyframe_steps = keyframe_steps;
+    EdgeOdometry odometry(config, kCamera);
+    int keyframes = 0;
+    VoResult result;
+    for (int i = 0; i < 13; ++i) {
+      result = odometry.Track(wall.See(Stamp(i), pose(i)));
+      EXPECT_EQ(result.state, VoState::kTracking) << i;
+      keyframes += result.new_keyframe ? 1 : 0;
+    }
+    EXPECT_LT((result.world_from_camera.translation() - pose(12).translation()).norm(), 0.006);
+    return keyframes;
+  };
+  EXPECT_EQ(count_keyframes(0), 12);
+  EXPECT_LE(count_keyframes(2.5), 6);
+}
+
 TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
   const SyntheticWall wall(kCamera);
   EdgeOdometry odometry({}, kCamera);
