@@ -196,7 +196,8 @@ TEST(StereoDepth, IsThatOfRectifiedAndResizedImages) {
   const cv::Mat ideal = Look(Eye(kBaselineM), kWall);
   cv::Mat raw_points(raw.height * raw.width, 1, CV_64FC2);
   for (int i = 0; i < raw_points.rows; ++i) {
-    raw_points.at<cv::Vec2d>(i) = cv::Vec2d(i % raw.width, i / raw.width);
+    const int column = i % raw.width, row = i / raw.width;
+    raw_points.at<cv::Vec2d>(i) = cv::Vec2d(column, row);
   }
   cv::Mat ideal_points;
   cv::undistortPoints(raw_points, ideal_points, raw.k, raw.distortion, raw.r,
