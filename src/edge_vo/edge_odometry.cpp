@@ -405,15 +405,17 @@ VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
   result.twist.reset();
   result.twist_covariance.setZero();
   result.new_keyframe = false;
-  const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
   const double lost_s = Seconds(stamp_ns, tracked_stamp_ns_);
-  // The error grows with the time lost: the variance by the difference of the squares.
-  const double growth = lost_s * lost_s - (lost_s - step_s) * (lost_s - step_s);
-  result.covariance.diagonal().head<3>().array() +=
-      growth * config_.lost_speed_mps * config_.lost_speed_mps;
-  result.covariance.diagonal().tail<3>().array() +=
-      growth * config_.lost_turn_rps * config_.lost_turn_rps;
+  GrowWhileLost(config_, lost_s - Seconds(stamp_ns, *last_stamp_ns_), lost_s, result.covariance);
   return result;
+}
+
+void GrowWhileLost(const EdgeOdometry::Config& config, double from_s, double to_s,
+                   Matrix6d& covariance) {
+  // The error grows with the time lost: the variance by the difference of the squares.
+  const double growth = to_s * to_s - from_s * from_s;
+  covariance.diagonal().head<3>().array() += growth * config.lost_speed_mps * config.lost_speed_mps;
+  covariance.diagonal().tail<3>().array() += growth * config.lost_turn_rps * config.lost_turn_rps;
 }
 
 }  // namespace livemap

@@ -181,4 +181,8 @@ class EdgeOdometry {
   std::int64_t tracked_stamp_ns_ = 0;
 };
 
+/// How the uncertainty of a held pose grows between two times since tracking was lost, s.
+void GrowWhileLost(const EdgeOdometry::Config& config, double from_s, double to_s,
+                   Matrix6d& covariance);
+
 }  // namespace livemap

@@ -97,6 +97,10 @@ void MonocularOdometry::BeginStart(const MonocularFrame& frame) {
 VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   VoResult result = last_;
   result.new_keyframe = false;
+  if (result.state == VoState::kLost) {
+    GrowWhileLost(config_.odometry, Seconds(last_frame_->stamp_ns, lost_since_ns_),
+                  Seconds(frame.stamp_ns, lost_since_ns_), result.covariance);
+  }
   odometry_.Reset();
   odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
   const cv::Mat& smooth = odometry_.images()[0];
@@ -127,6 +131,8 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
     return result;
   }
   started_ = true;
+  start_pose_ = result.world_from_camera;
+  start_covariance_ = result.covariance;
   last_unscaled_ = Eigen::Isometry3d::Identity();
   way_m_ = way_s_ = way_units_ = 0;
   result.world_from_camera = result.world_from_camera * first_from_new;
@@ -202,9 +208,13 @@ VoResult MonocularOdometry::InMetres(const VoResult& unscaled) {
   Vector6d stretch = Vector6d::Ones();
   stretch.head<3>().setConstant(scale);
   result.covariance = stretch.asDiagonal() * unscaled.covariance * stretch.asDiagonal();
+  // What was not known of the pose at the start moves along.
+  const Matrix6d to_now = Se3Adjoint(result.world_from_camera.inverse() * start_pose_);
+  result.covariance += to_now * start_covariance_ * to_now.transpose();
   // A wrong scale moves the camera along the whole way from its start.
   const double log_sigma = scale_.log_sigma().value_or(1.0);
-  const Eigen::Vector3d back = result.world_from_camera.inverse().translation() * log_sigma;
+  const Eigen::Vector3d back =
+      (result.world_from_camera.inverse() * start_pose_).translation() * log_sigma;
   result.covariance.topLeftCorner<3, 3>() += back * back.transpose();
   if (result.twist) {
     *result.twist = stretch.asDiagonal() * *unscaled.twist;

@@ -94,6 +94,8 @@ class MonocularOdometry {
   std::int64_t start_stamp_ns_ = 0;
   std::int64_t lost_since_ns_ = 0;
   std::optional<MonocularFrame> last_frame_;
+  Eigen::Isometry3d start_pose_ = Eigen::Isometry3d::Identity();
+  Matrix6d start_covariance_ = Matrix6d::Zero();
   Eigen::Isometry3d last_unscaled_ = Eigen::Isometry3d::Identity();
   VoResult last_;
 };

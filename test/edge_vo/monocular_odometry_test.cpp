@@ -147,6 +147,7 @@ TEST(MonocularOdometry, HoldsThePoseInTheDarkAndStartsAnewAfterwards) {
   VoResult after;
   for (int i = 13; i < kFrames; ++i) after = odometry.Track(Frame(i));
   EXPECT_EQ(after.state, VoState::kTracking);
+  EXPECT_GT(after.covariance.trace(), dark.covariance.trace()) << "what was unknown stays unknown";
   // What it moved in the dark, and until it could start, is not known.
   EXPECT_GT(after.world_from_camera.translation().norm(),
             before.world_from_camera.translation().norm());
