@@ -48,7 +48,7 @@ class Town {
         side_(static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(hazards))))) {}
 
   GeoPoint Place(double column, double row) const {
-    const double cosine = std::cos(kCorner.latitude_deg * 3.14159265358979 / 180.0);
+    const double cosine = std::cos(kCorner.latitude_deg * kRadiansPerDegree);
     return {kCorner.latitude_deg + row * kSpacingM / kMetresPerDegree,
             kCorner.longitude_deg + column * kSpacingM / (kMetresPerDegree * cosine)};
   }

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/stamps.h"
 #include "localization/planar.h"
-#include "localization/stamps.h"
 
 namespace livemap {
 namespace {

@@ -1,9 +1,9 @@
 #include <vector>
 
+#include "evaluation/quantile.h"
 #include "measurements.h"
 #include "thread_time.h"
 #include "tools/command_line.h"
-#include "tools/sequence_pictures.h"
 
 namespace livemap {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "drives/stamp_pairs.h"
+#include "evaluation/quantile.h"
 #include "evaluation/trajectory_report.h"
 #include "tools/sequence_pictures.h"
 

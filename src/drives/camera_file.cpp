@@ -7,12 +7,12 @@
 
 #include "base/error.h"
 #include "drives/text.h"
+#include "geo/wgs84.h"
 
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxBytes = 1U << 16U;
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
+constexpr std::size_t kMaxCameraFileBytes = 1U << 16U;
 
 double ReadNumber(const YAML::Node& map, const std::string& key, double min, double max,
                   const std::string& name) {
@@ -93,7 +93,7 @@ CameraFile ParseCameraFile(const std::string& yaml, const std::string& name) {
 }
 
 CameraFile ReadCameraFile(const std::string& path) {
-  return ParseCameraFile(ReadFile(path, kMaxBytes), path);
+  return ParseCameraFile(ReadFile(path, kMaxCameraFileBytes), path);
 }
 
 }  // namespace livemap

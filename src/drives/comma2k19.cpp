@@ -13,7 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxTableBytes = 64U << 20U;
 constexpr double kMaxTimeS = 4e9;       // In nanoseconds still far from the end of 64 bits.
 constexpr double kMaxSpeedMps = 150;    // Of a car.
 constexpr double kMinRadiusM = 6.30e6;  // Of places on roads, from the centre of the earth.

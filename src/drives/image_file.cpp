@@ -6,13 +6,13 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxBytes = 64U << 20U;
+constexpr std::size_t kMaxImageFileBytes = 64U << 20U;
 constexpr std::int64_t kMaxPixels = 64'000'000;
 
 }  // namespace
 
 ImageFile ReadImageFile(const std::string& path, int width, int height) {
-  const std::string text = ReadFile(path, kMaxBytes);
+  const std::string text = ReadFile(path, kMaxImageFileBytes);
   ImageFile file;
   file.bytes.assign(text.begin(), text.end());
   try {

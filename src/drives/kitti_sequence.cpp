@@ -12,8 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxTextBytes = 256U << 20U;
-
 using Projection = Eigen::Matrix<double, 3, 4>;
 
 /// The 12 numbers of a row-major 3x4 matrix from parts[first...]; none when one is malformed.

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "geo/wgs84.h"
 
 namespace livemap {
 namespace {
@@ -16,7 +17,6 @@ using nlohmann::json;
 constexpr std::size_t kMaxRouteBytes = 16U << 20U;
 constexpr std::size_t kMaxPoints = 1000000;
 constexpr int kMaxDepth = 32;
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
 double BearingRad(const GeoPoint& from, const GeoPoint& to) {
   double forward_deg = 0;

@@ -12,7 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxTableBytes = 64U << 20U;
 constexpr std::size_t kMaxLabelBytes = 1U << 20U;
 
 bool IsPlainName(const std::string& name) {

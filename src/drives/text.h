@@ -1,10 +1,16 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace livemap {
+
+/// Longer tables of a data set (one line per frame) are refused.
+constexpr std::size_t kMaxTableBytes = 64U << 20U;
+/// Longer lists, poses and trajectories are refused.
+constexpr std::size_t kMaxTextBytes = 256U << 20U;
 
 /// The whole of `text`, surrounding blanks aside, as a finite decimal number; none otherwise. The
 /// point is the decimal mark whatever the locale.

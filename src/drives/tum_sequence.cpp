@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxTextBytes = 256U << 20U;
 constexpr double kPublishedDepthScale = 5000;
 
 [[noreturn]] void RefuseLine(const std::string& name, std::size_t index, const std::string& line,

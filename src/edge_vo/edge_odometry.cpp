@@ -6,24 +6,20 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/stamps.h"
 
 namespace livemap {
 namespace {
 
-constexpr double kSecond = 1e-9;  // Per nanosecond.
 /// A motion is carried on only over a short pause, s.
 constexpr double kMaxPredictionS = 0.5;
 /// Below this reciprocal condition number the information matrix says nothing about some direction.
 constexpr double kLeastCondition = 1e-12;
 /// Light that fades further than this, or grows, between two images is a covered lens.
-constexpr double kLeastGain = 0.3;
+constexpr double kLeastBelievedGain = 0.3;
 
 std::string SizeText(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows);
-}
-
-double Seconds(std::int64_t later_ns, std::int64_t earlier_ns) {
-  return static_cast<double>(later_ns - earlier_ns) * kSecond;
 }
 
 const CameraIntrinsics& Checked(const CameraIntrinsics& camera) {
@@ -124,7 +120,7 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
     if (!attempt.good && last_.state != VoState::kLost) attempt = FindBack();
     result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
     const bool gives_up = result.state == VoState::kLost &&
-                          Seconds(frame.stamp_ns, tracked_stamp_ns_) >= config_.give_up_s;
+                          Seconds(frame.stamp_ns - tracked_stamp_ns_) >= config_.give_up_s;
     result.keyframe_due =
         gives_up || (attempt.good && WantsKeyframe(attempt.fine, result.world_from_camera));
     if (result.keyframe_due) {
@@ -294,7 +290,7 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   // Equation (5.7): the motion goes on as it was; or the camera stands.
   Guesses guesses;
   const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
-  const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
   if (config_.constant_motion && last_.twist && step_s <= kMaxPredictionS) {
     const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
     guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
@@ -342,7 +338,7 @@ bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
          determined.info() == Eigen::Success && determined.rcond() > kLeastCondition &&
          result.visible >= static_cast<std::size_t>(config_.least_points) &&
          result.Overlap() >= config_.least_overlap && result.sigma <= config_.lost_sigma &&
-         result.state.gain > kLeastGain && result.state.gain < 1 / kLeastGain;
+         result.state.gain > kLeastBelievedGain && result.state.gain < 1 / kLeastBelievedGain;
 }
 
 bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
@@ -384,7 +380,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);
   result.covariance = to_new * (keyframe_->covariance + relative) * to_new.transpose();
   result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
-  const double step_s = Seconds(stamp_ns, *last_stamp_ns_);
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
   if (last_.state == VoState::kTracking) {
     result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
     // Both ends err by the alignment with the keyframe.
@@ -405,8 +401,8 @@ VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
   result.twist.reset();
   result.twist_covariance.setZero();
   result.new_keyframe = false;
-  const double lost_s = Seconds(stamp_ns, tracked_stamp_ns_);
-  GrowWhileLost(config_, lost_s - Seconds(stamp_ns, *last_stamp_ns_), lost_s, result.covariance);
+  const double lost_s = Seconds(stamp_ns - tracked_stamp_ns_);
+  GrowWhileLost(config_, lost_s - Seconds(stamp_ns - *last_stamp_ns_), lost_s, result.covariance);
   return result;
 }
 

@@ -7,7 +7,7 @@
 namespace livemap {
 namespace {
 
-constexpr int kBorderPx = 3;
+constexpr int kMapBorderPx = 3;
 
 /// The product of two Gaussians.
 void Fuse(EdgeDepth& edge, float inverse_depth, float variance) {
@@ -39,10 +39,10 @@ void InverseDepthMap::PlaceEdges(const cv::Mat& edges) {
   edges_.clear();
   const int all = cv::countNonZero(edges);
   int seen = 0, taken = 0;
-  for (int v = kBorderPx; v < edges.rows - kBorderPx; ++v) {
+  for (int v = kMapBorderPx; v < edges.rows - kMapBorderPx; ++v) {
     const std::uint8_t* mask = edges.ptr(v);
     int* index = index_.ptr<int>(v);
-    for (int u = kBorderPx; u < edges.cols - kBorderPx; ++u) {
+    for (int u = kMapBorderPx; u < edges.cols - kMapBorderPx; ++u) {
       if (mask[u] == 0) continue;
       const double due = static_cast<double>(++seen) * config_.max_edges / all;
       if (taken >= due && all > config_.max_edges) continue;
@@ -67,8 +67,8 @@ void InverseDepthMap::MoveTo(const cv::Mat& edges, const Eigen::Isometry3d& new_
 /// The edge pixel at, or next to, a place.
 EdgeDepth* InverseDepthMap::NearestEdge(float u, float v) {
   const int column = static_cast<int>(std::lround(u)), row = static_cast<int>(std::lround(v));
-  if (column < kBorderPx || row < kBorderPx || column >= index_.cols - kBorderPx ||
-      row >= index_.rows - kBorderPx) {
+  if (column < kMapBorderPx || row < kMapBorderPx || column >= index_.cols - kMapBorderPx ||
+      row >= index_.rows - kMapBorderPx) {
     return nullptr;
   }
   int nearest = -1;
@@ -161,9 +161,9 @@ void InverseDepthMap::FindNew(EdgeDepth& edge, const EpipolarSearch& search) con
 std::optional<InverseDepthMap::Interval> InverseDepthMap::NeighboursInterval(
     const EdgeDepth& edge) const {
   Interval interval = {std::numeric_limits<float>::infinity(), 0};
-  for (int dy = -kBorderPx; dy <= kBorderPx; ++dy) {
+  for (int dy = -kMapBorderPx; dy <= kMapBorderPx; ++dy) {
     const int* index = index_.ptr<int>(edge.v + dy) + edge.u;
-    for (int dx = -kBorderPx; dx <= kBorderPx; ++dx) {
+    for (int dx = -kMapBorderPx; dx <= kMapBorderPx; ++dx) {
       if (index[dx] < 0) continue;
       const EdgeDepth& other = edges_[static_cast<std::size_t>(index[dx])];
       if (!other.known) continue;

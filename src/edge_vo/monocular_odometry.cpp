@@ -4,21 +4,17 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/stamps.h"
 #include "edge_vo/road_height.h"
 
 namespace livemap {
 namespace {
 
-constexpr double kSecond = 1e-9;  // Per nanosecond.
 /// The shortest way that tells the scale: over less, errors of both sides do not average out, m.
 constexpr double kScaleWayM = 1.0;
 constexpr double kFastestMps = 200;
 /// Of the camera's height: the load, the road's crown.
 constexpr double kHeightSigmaM = 0.05;
-
-double Seconds(std::int64_t later_ns, std::int64_t earlier_ns) {
-  return static_cast<double>(later_ns - earlier_ns) * kSecond;
-}
 
 /// A motion with its translation times `factor`.
 Eigen::Isometry3d Stretched(Eigen::Isometry3d motion, double factor) {
@@ -81,7 +77,7 @@ VoResult MonocularOdometry::Track(const MonocularFrame& frame) {
 /// The way since the last frame, by the mean of the speeds at its ends.
 void MonocularOdometry::AddWay(const MonocularFrame& frame) {
   if (!last_frame_ || !last_frame_->speed_mps || !frame.speed_mps) return;
-  const double step_s = Seconds(frame.stamp_ns, last_frame_->stamp_ns);
+  const double step_s = Seconds(frame.stamp_ns - last_frame_->stamp_ns);
   way_m_ += 0.5 * (*last_frame_->speed_mps + *frame.speed_mps) * step_s;
   way_s_ += step_s;
 }
@@ -98,8 +94,8 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   VoResult result = last_;
   result.new_keyframe = false;
   if (result.state == VoState::kLost) {
-    GrowWhileLost(config_.odometry, Seconds(last_frame_->stamp_ns, lost_since_ns_),
-                  Seconds(frame.stamp_ns, lost_since_ns_), result.covariance);
+    GrowWhileLost(config_.odometry, Seconds(last_frame_->stamp_ns - lost_since_ns_),
+                  Seconds(frame.stamp_ns - lost_since_ns_), result.covariance);
   }
   odometry_.Reset();
   odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
@@ -124,7 +120,7 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   views_.push_back({start_.first().clone(), first_from_new.inverse()});
   map_.Clear();
   LearnDepths(Eigen::Isometry3d::Identity());
-  const double step_s = Seconds(frame.stamp_ns, start_stamp_ns_);
+  const double step_s = Seconds(frame.stamp_ns - start_stamp_ns_);
   if (!odometry_.AddKeyframe(map_.DepthImage(), map_.SigmaImage(),
                              Se3Log(first_from_new) / step_s)) {
     BeginStart(frame);
@@ -148,7 +144,7 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
     if (last_.state == VoState::kTracking) lost_since_ns_ = frame.stamp_ns;
     way_m_ = way_s_ = way_units_ = 0;
     VoResult held = InMetres(unscaled);
-    if (Seconds(frame.stamp_ns, lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
+    if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
     return held;
   }
   MeasureScale(unscaled.world_from_camera);

@@ -69,14 +69,6 @@ constexpr char kThresholdHeader[] = " threshold precision  recall event recall  
 
 }  // namespace
 
-double Quantile(std::vector<double> values, double fraction) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  const double rank = std::ceil(fraction * static_cast<double>(values.size()));
-  const auto index = static_cast<std::size_t>(std::max(rank, 1.0)) - 1;
-  return values[std::min(index, values.size() - 1)];
-}
-
 nlohmann::ordered_json ToJson(const DetectionReport& report) {
   nlohmann::ordered_json json;
   json["frames"] = report.frames;

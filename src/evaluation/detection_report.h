@@ -30,8 +30,4 @@ nlohmann::ordered_json ToJson(const DetectionReport& report);
 /// A table for people.
 std::string ToText(const DetectionReport& report);
 
-/// The value below which `fraction` (0..1) of the values lie, by the nearest rank; 0 without
-/// values.
-double Quantile(std::vector<double> values, double fraction);
-
 }  // namespace livemap

@@ -10,10 +10,11 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/stamps.h"
 #include "drives/seeded_random.h"
 #include "evaluation/detection_report.h"
+#include "evaluation/quantile.h"
 #include "localization/geo_localizer.h"
-#include "localization/stamps.h"
 
 namespace livemap {
 namespace {

@@ -10,13 +10,6 @@
 namespace livemap {
 namespace {
 
-std::vector<std::int64_t> Stamps(const std::vector<StampedPose>& poses, std::int64_t moved_by_ns) {
-  std::vector<std::int64_t> stamps;
-  stamps.reserve(poses.size());
-  for (const StampedPose& pose : poses) stamps.push_back(pose.stamp_ns + moved_by_ns);
-  return stamps;
-}
-
 Eigen::Matrix3Xd Positions(const std::vector<StampedPose>& poses) {
   Eigen::Matrix3Xd positions(3, static_cast<Eigen::Index>(poses.size()));
   Eigen::Index column = 0;
@@ -61,13 +54,21 @@ Alignment AlignAll(const TrajectoryPairs& pairs, bool with_scale) {
 
 }  // namespace
 
+std::vector<std::int64_t> StampsOf(const std::vector<StampedPose>& poses,
+                                   std::int64_t moved_by_ns) {
+  std::vector<std::int64_t> stamps;
+  stamps.reserve(poses.size());
+  for (const StampedPose& pose : poses) stamps.push_back(pose.stamp_ns + moved_by_ns);
+  return stamps;
+}
+
 TrajectoryPairs Associate(const std::vector<StampedPose>& truth,
                           const std::vector<StampedPose>& estimate,
                           const AssociationOptions& options) {
   TrajectoryPairs pairs;
   const std::int64_t offset_ns = std::llround(options.offset_s * 1e9);
   for (const auto& [true_index, index] :
-       PairNearestStamps(Stamps(truth, -offset_ns), Stamps(estimate, 0),
+       PairNearestStamps(StampsOf(truth, -offset_ns), StampsOf(estimate, 0),
                          std::llround(options.max_difference_s * 1e9))) {
     pairs.truth.push_back(truth[true_index]);
     pairs.estimate.push_back(estimate[index]);

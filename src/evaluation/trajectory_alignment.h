@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <vector>
 
 #include "drives/sequences.h"
@@ -20,6 +21,9 @@ struct TrajectoryPairs {
   std::vector<StampedPose> truth;
   std::vector<StampedPose> estimate;  ///< Stamps as in the file, without the offset.
 };
+
+/// The poses' stamps in nanoseconds, each later by `moved_by_ns`.
+std::vector<std::int64_t> StampsOf(const std::vector<StampedPose>& poses, std::int64_t moved_by_ns);
 
 /// PairNearestStamps over the true stamps and the estimate's.
 TrajectoryPairs Associate(const std::vector<StampedPose>& truth,

@@ -22,13 +22,6 @@ double Median(const std::vector<double>& sorted) {
   return sorted.size() % 2 == 1 ? sorted[half] : (sorted[half - 1] + sorted[half]) / 2;
 }
 
-std::vector<std::int64_t> Stamps(const std::vector<StampedPose>& poses, std::int64_t offset_ns) {
-  std::vector<std::int64_t> stamps;
-  stamps.reserve(poses.size());
-  for (const StampedPose& pose : poses) stamps.push_back(pose.stamp_ns + offset_ns);
-  return stamps;
-}
-
 /// The index of the value nearest to `wanted` among ascending values (not empty). The bisection is
 /// that of evaluate_rpe.py, so that of two equally near values the same one is taken.
 std::size_t FindClosest(const std::vector<std::int64_t>& values, std::int64_t wanted) {
@@ -77,8 +70,8 @@ RelativeErrors CompareMotions(const std::vector<StampedPose>& truth,
                               const RelativeOptions& options) {
   RelativeErrors errors;
   if (truth.empty() || estimate.empty()) return errors;
-  const std::vector<std::int64_t> true_stamps = Stamps(truth, 0);
-  const std::vector<std::int64_t> stamps = Stamps(estimate, std::llround(options.offset_s * 1e9));
+  const std::vector<std::int64_t> true_stamps = StampsOf(truth, 0);
+  const std::vector<std::int64_t> stamps = StampsOf(estimate, std::llround(options.offset_s * 1e9));
   const double greatest_ns = GreatestDistanceNs(true_stamps);
   // For each pose of the estimate its true pose, null when that is too far.
   std::vector<const Eigen::Isometry3d*> true_poses;
@@ -171,7 +164,8 @@ std::vector<double> AbsoluteErrors(const TrajectoryPairs& pairs, const Alignment
 RelativeErrors RelativeErrorsOverTime(const std::vector<StampedPose>& truth,
                                       const std::vector<StampedPose>& estimate, double delta_s,
                                       const RelativeOptions& options) {
-  return CompareMotions(truth, estimate, Stamps(estimate, 0), std::llround(delta_s * 1e9), options);
+  return CompareMotions(truth, estimate, StampsOf(estimate, 0), std::llround(delta_s * 1e9),
+                        options);
 }
 
 RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,

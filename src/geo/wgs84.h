@@ -5,6 +5,8 @@
 
 namespace livemap {
 
+constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
+
 /// A position on the WGS84 ellipsoid, degrees, north and east positive.
 struct GeoPoint {
   double latitude_deg = 0;

@@ -6,25 +6,17 @@
 #include <iterator>
 #include <limits>
 
+#include "base/stamps.h"
+#include "geo/fix_covariance.h"
+
 namespace livemap {
 namespace {
 
-constexpr double kSecond = 1e-9;           // Per nanosecond.
-constexpr double kMaxSigmaM = 1000.0;      // A fix less certain than this is none.
 constexpr double kMinSigmaM = 1e-3;        // No receiver is better; keeps covariances invertible.
 constexpr double kStandingMps = 0.3;       // Slower than this the vehicle stands.
 constexpr double kMaxJumpAllowanceM = 30;  // What uncertainty may excuse between two fixes.
 
-double Seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecond; }
-
 double SigmaM(const Eigen::Matrix2d& covariance_m2) { return std::sqrt(covariance_m2.trace() / 2); }
-
-bool IsCovariance(const Eigen::Matrix2d& matrix) {
-  return matrix.allFinite() && matrix(0, 0) >= 0 && matrix(1, 1) >= 0 &&
-         matrix.trace() <= 2 * kMaxSigmaM * kMaxSigmaM &&
-         matrix.determinant() >= -1e-9 * matrix.trace() * matrix.trace() &&
-         std::abs(matrix(0, 1) - matrix(1, 0)) <= 1e-6 * matrix.trace();
-}
 
 }  // namespace
 
@@ -80,7 +72,7 @@ std::optional<FixTrack::Point> FixTrack::ToPoint(const Fix& fix) const {
   Eigen::Matrix2d covariance_m2 =
       Eigen::Matrix2d::Identity() * config_.default_sigma_m * config_.default_sigma_m;
   if (fix.covariance_m2) {
-    if (!IsCovariance(*fix.covariance_m2)) return std::nullopt;
+    if (!IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
     covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   }
   return Point{fix.stamp_ns, fix.position, covariance_m2, std::nullopt};

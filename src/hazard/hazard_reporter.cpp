@@ -7,7 +7,6 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxClassNameBytes = 64;
 constexpr std::size_t kMaxEarlyPictures = 8;
 constexpr std::size_t kMaxDepths = 30;  // The detector may be that many frames behind.
 constexpr std::size_t kMaxWaitingNotices = 20000;

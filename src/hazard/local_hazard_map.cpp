@@ -9,8 +9,6 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxClassNameBytes = 64;
-
 const std::vector<std::string>& Migrations() {
   static const std::vector<std::string> migrations = {
       std::string("CREATE TABLE known("

@@ -5,21 +5,17 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/stamps.h"
+#include "geo/fix_covariance.h"
+
 namespace livemap {
 namespace {
 
-constexpr double kMaxSigmaM = 1000.0;  // A pose less certain than this is none.
-
-double Seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
-
 bool IsUsable(const TrackPose& pose) {
-  const Eigen::Matrix2d& covariance_m2 = pose.covariance_m2;
   return IsValid(pose.position) && std::isfinite(pose.course_rad) &&
-         std::isfinite(pose.speed_mps) && covariance_m2.allFinite() &&
-         pose.position_course.allFinite() && covariance_m2(0, 0) >= 0 && covariance_m2(1, 1) >= 0 &&
-         covariance_m2.trace() <= 2 * kMaxSigmaM * kMaxSigmaM &&
-         covariance_m2.determinant() >= -1e-9 * covariance_m2.trace() * covariance_m2.trace() &&
-         pose.course_variance_rad2 >= 0 && pose.course_variance_rad2 <= 10;
+         std::isfinite(pose.speed_mps) && IsFixCovariance(pose.covariance_m2) &&
+         pose.position_course.allFinite() && pose.course_variance_rad2 >= 0 &&
+         pose.course_variance_rad2 <= 10;
 }
 
 TrackPose Between(const TrackPose& before, const TrackPose& after, double share) {

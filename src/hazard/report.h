@@ -10,6 +10,9 @@
 
 namespace livemap {
 
+/// Class names of detectors and of the zone may be this long.
+constexpr std::size_t kMaxClassNameBytes = 64;
+
 /// A rectangle in an image: edges in pixels, x to the right and y down, (0, 0) the outer corner of
 /// the first pixel, min < max.
 struct Box {

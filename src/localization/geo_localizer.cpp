@@ -6,35 +6,23 @@
 #include <utility>
 #include <vector>
 
+#include "base/stamps.h"
 #include "geo/datum.h"
+#include "geo/fix_covariance.h"
+#include "localization/median.h"
 #include "localization/sliding_window.h"
-#include "localization/stamps.h"
 #include "localization/track_alignment.h"
 
 namespace livemap {
 namespace {
 
-constexpr double kMaxSigmaM = 1000.0;  // A fix less certain than this is none.
-constexpr double kMinSigmaM = 1e-3;    // No receiver is better; keeps covariances invertible.
-constexpr double kMaxShare = 0.8;      // Of a fix's sigma that may be the shared error.
-constexpr double kMaxWaitS = 5.0;      // For odometry.
-constexpr std::size_t kMaxWaiting = 256;
+constexpr double kMinSigmaM = 1e-3;  // No receiver is better; keeps covariances invertible.
+constexpr double kMaxShare = 0.8;    // Of a fix's sigma that may be the shared error.
+constexpr double kMaxWaitS = 5.0;    // For odometry.
+constexpr std::size_t kMaxWaitingFixes = 256;
 constexpr std::size_t kMaxKept = 1024;
 constexpr double kStartTrackS = 3.0;  // Odometry kept beyond the window.
 constexpr double kMedianSpanS = 2.0;  // Position of a standing vehicle: median of these fixes.
-
-bool IsCovariance(const Eigen::Matrix2d& matrix) {
-  return matrix.allFinite() && matrix(0, 0) >= 0 && matrix(1, 1) >= 0 &&
-         matrix.trace() <= 2 * kMaxSigmaM * kMaxSigmaM &&
-         matrix.determinant() >= -1e-9 * matrix.trace() * matrix.trace() &&
-         std::abs(matrix(0, 1) - matrix(1, 0)) <= 1e-6 * matrix.trace();
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 LocalizerConfig Checked(const LocalizerConfig& config) {
   Check(config);
@@ -161,7 +149,7 @@ GeoLocalizer::FixVerdict GeoLocalizer::AddFix(const PositionFix& fix) {
   }
   newest_fix_ns_ = fix.stamp_ns;
   if (!waiting_.empty() || MomentOf(*measurement) > track_.newest_ns()) {
-    if (waiting_.size() >= kMaxWaiting) return Count(FixVerdict::kWithoutOdometry);
+    if (waiting_.size() >= kMaxWaitingFixes) return Count(FixVerdict::kWithoutOdometry);
     waiting_.push_back(*measurement);
     return Count(FixVerdict::kWaiting);
   }
@@ -186,7 +174,7 @@ std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix
       config_.receiver.default_sigma_m * config_.receiver.default_sigma_m;
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity() * default_variance;
   if (fix.covariance_m2) {
-    if (!IsCovariance(*fix.covariance_m2)) return std::nullopt;
+    if (!IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
     covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   }
   if (!frame_) frame_.emplace(fix.position);
@@ -350,7 +338,7 @@ std::optional<FusedPose> GeoLocalizer::PositionOnly(std::int64_t stamp_ns) const
   const double moved_m = (track_.At(stamp_ns).position_m - track_.At(from_ns).position_m).norm();
   const double spread_m = track_.VelocityAt(from_ns).norm() * kMedianSpanS;
   FusedPose fused;
-  fused.map_from_base.position_m = {Median(east_m), Median(north_m)};
+  fused.map_from_base.position_m = {TakeMedian(east_m), TakeMedian(north_m)};
   fused.position = frame_->ToGeo(fused.map_from_base.position_m);
   const double convergence_rad = MeridianConvergence(*frame_, fused.position);
   const Eigen::Matrix2d turn = Rotation2(-convergence_rad);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "localization/stamps.h"
+#include "base/stamps.h"
 
 namespace livemap {
 namespace {

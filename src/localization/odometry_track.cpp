@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "localization/stamps.h"
+#include "base/stamps.h"
 
 namespace livemap {
 namespace {

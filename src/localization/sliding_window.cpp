@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "localization/stamps.h"
+#include "base/stamps.h"
 #include "localization/track_alignment.h"
 
 namespace livemap {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "localization/median.h"
+
 namespace livemap {
 namespace {
 
@@ -26,17 +28,11 @@ PlanarPose ThroughTwo(const TrackPair& a, const TrackPair& b) {
   return pose;
 }
 
-double Median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double MedianDoubt(const std::vector<TrackPair>& pairs, const PlanarPose& pose,
                    std::vector<double>& doubts) {
   doubts.clear();
   for (const TrackPair& pair : pairs) doubts.push_back(Doubt(pair, pose));
-  return Median(doubts);
+  return TakeMedian(doubts);
 }
 
 /// Least squares over the pairs that agree; false when they all lie in one place.
@@ -77,7 +73,7 @@ double Widening(std::vector<double> squared_distances) {
   constexpr double kMedian = 1.386;  // Of chi-square with two degrees of freedom: 2 ln 2.
   constexpr double kMost = 20;
   if (squared_distances.empty()) return 1;
-  return std::clamp(std::sqrt(Median(squared_distances) / kMedian), 1.0, kMost);
+  return std::clamp(std::sqrt(TakeMedian(squared_distances) / kMedian), 1.0, kMost);
 }
 
 std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, double gate,

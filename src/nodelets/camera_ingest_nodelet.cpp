@@ -22,7 +22,6 @@ namespace livemap {
 namespace {
 
 // What goes wrong with frames is said once in this time, and counted always.
-constexpr double kSayAgainS = 60;
 
 }  // namespace
 

@@ -30,7 +30,6 @@
 namespace livemap {
 namespace {
 
-constexpr double kSayAgainS = 60;
 /// A stamp that goes back further than this is a replay that begins again.
 constexpr double kClockSetBackS = 1.0;
 

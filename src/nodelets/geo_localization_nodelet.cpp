@@ -21,10 +21,7 @@
 namespace livemap {
 namespace {
 
-constexpr double kSayAgainS = 60;
 constexpr double kTickS = 0.02;
-
-double SteadyS() { return ros::SteadyTime::now().toSec(); }
 
 }  // namespace
 

@@ -30,12 +30,9 @@
 namespace livemap {
 namespace {
 
-constexpr double kSayAgainS = 60;
-constexpr double kTickS = 0.05;
+constexpr double kSendTickS = 0.05;
 constexpr double kViewPeriodS = 1.0;
 constexpr std::size_t kSendPerTick = 10;
-
-double SteadyS() { return ros::SteadyTime::now().toSec(); }
 
 }  // namespace
 
@@ -105,7 +102,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     updater_->setHardwareID("hazard_reporting");
     updater_->add("hazard reporting", this, &Self::Diagnose);
     timers_ = {
-        node.createSteadyTimer(ros::WallDuration(kTickS), &Self::OnTick, this),
+        node.createSteadyTimer(ros::WallDuration(kSendTickS), &Self::OnTick, this),
         node.createSteadyTimer(ros::WallDuration(kViewPeriodS), &Self::OnViewTimer, this),
         node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
                                &Self::OnDiagnosticsTimer, this),

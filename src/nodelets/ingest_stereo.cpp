@@ -9,12 +9,11 @@
 #include <utility>
 
 #include "base/error.h"
+#include "nodelets/nodelet_support.h"
 #include "ros/camera_info_conversions.h"
 
 namespace livemap {
 namespace {
-
-constexpr double kSayAgainS = 60;
 
 /// All left images that wait may still ask for theirs.
 std::size_t RightsKept(const IngestConfig& config) {

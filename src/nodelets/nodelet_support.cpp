@@ -1,10 +1,13 @@
 #include "nodelets/nodelet_support.h"
 
 #include <ros/console.h>
+#include <ros/time.h>
 
 #include "base/error.h"
 
 namespace livemap {
+
+double SteadyS() { return ros::SteadyTime::now().toSec(); }
 
 void InitializeOrExplain(const std::string& nodelet_name, const std::function<void()>& initialize) {
   try {

@@ -6,15 +6,15 @@
 #include <cmath>
 #include <limits>
 
+#include "base/stamps.h"
 #include "geo/datum.h"
 #include "localization/planar.h"
-#include "localization/stamps.h"
 #include "ros/hazard_conversions.h"
+#include "ros/odometry_conversions.h"
 
 namespace livemap {
 namespace {
 
-constexpr double kUnknownVariance = 1e6;
 constexpr double kLostVariance = 1e5;
 // Of ROS's (x, y, z, roll, pitch, yaw), those of a plane.
 constexpr std::array<std::size_t, 3> kPlanar = {0, 1, 5};

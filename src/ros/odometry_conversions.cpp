@@ -9,8 +9,6 @@
 namespace livemap {
 namespace {
 
-constexpr double kUnknownVariance = 1e6;
-
 /// Row by row, as ROS has covariances.
 void CopyCovariance(const Matrix6d& from, boost::array<double, 36>& to) {
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(to.data()) = from;

@@ -9,6 +9,9 @@
 
 namespace livemap {
 
+/// Variance of what nobody measured, as REP 105's users write it.
+constexpr double kUnknownVariance = 1e6;
+
 /// Where odometry's poses belong to (REP 105).
 struct OdometryFrames {
   std::string odom = "odom";

@@ -13,7 +13,7 @@
 namespace livemap {
 namespace {
 
-enum Stream : std::uint64_t {
+enum BlockStream : std::uint64_t {
   kHouses = 21,
   kCars = 23,
   kTrees = 25,

@@ -17,7 +17,7 @@ struct Station {
   std::array<float, 2 * kColumns - 1> up{};
 };
 
-float Crown(float left) { return -kCrownFall * std::min(std::abs(left), 6.0F); }
+float CrownHeight(float left) { return -kCrownFall * std::min(std::abs(left), 6.0F); }
 
 Station MakeStation(const GroundPlan& plan, float along, bool in_crossing) {
   const float foot =
@@ -36,7 +36,7 @@ Station MakeStation(const GroundPlan& plan, float along, bool in_crossing) {
   for (int column = 0; column < kColumns; ++column) {
     const auto c = static_cast<std::size_t>(column);
     const bool raised = column >= 3 && !in_crossing;
-    float up = Crown(std::min(out[c], foot)) + (raised ? kKerbHeightM : 0);
+    float up = CrownHeight(std::min(out[c], foot)) + (raised ? kKerbHeightM : 0);
     if (column >= 5 && raised) up += 0.03F;
     station.left[kColumns - 1 + c] = out[c];
     station.up[kColumns - 1 + c] = up;
@@ -217,7 +217,7 @@ float GroundHeight(const GroundPlan& plan, float along_m, float left_m) {
   float crossing = 0;
   const float foot = plan.KerbFoot(along_m, &crossing);
   const float away = std::abs(left_m);
-  const float height = Crown(std::min(away, foot));
+  const float height = CrownHeight(std::min(away, foot));
   if (away <= foot) return height;
   return height + kKerbHeightM +
          (away > foot + kKerbWidthM + plan.profile.pavement_width_m ? 0.03F : 0.0F);

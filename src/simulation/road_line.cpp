@@ -7,7 +7,7 @@
 namespace livemap {
 namespace {
 
-constexpr double kStepM = 0.5;
+constexpr double kSampleM = 0.5;
 
 double Smooth(double t) { return t * t * (3 - 2 * t); }
 
@@ -23,11 +23,11 @@ RoadLine::RoadLine(double bearing_deg, const std::vector<RoadPiece>& pieces) {
   for (const RoadPiece& piece : pieces) {
     const double turn = piece.turn_deg * M_PI / 180;
     const double piece_end = piece_start + piece.length_m;
-    for (; static_cast<double>(next) * kStepM <= piece_end; ++next) {
-      const double t = (static_cast<double>(next) * kStepM - piece_start) / piece.length_m;
-      const double middle = std::max(0.0, t - 0.5 * kStepM / piece.length_m);
+    for (; static_cast<double>(next) * kSampleM <= piece_end; ++next) {
+      const double t = (static_cast<double>(next) * kSampleM - piece_start) / piece.length_m;
+      const double middle = std::max(0.0, t - 0.5 * kSampleM / piece.length_m);
       const double heading_between = heading + turn * Smooth(middle);
-      place += kStepM * Eigen::Vector2d(std::cos(heading_between), std::sin(heading_between));
+      place += kSampleM * Eigen::Vector2d(std::cos(heading_between), std::sin(heading_between));
       samples_.push_back(
           {{place.x(), place.y(), height + piece.climb_m * Smooth(t)}, heading + turn * Smooth(t)});
     }
@@ -40,10 +40,10 @@ RoadLine::RoadLine(double bearing_deg, const std::vector<RoadPiece>& pieces) {
 
 RoadLine::Sample RoadLine::Interpolate(double along_m) const {
   const double last = static_cast<double>(samples_.size() - 1);
-  const double index = along_m / kStepM;
+  const double index = along_m / kSampleM;
   if (index <= 0 || index >= last) {
     Sample sample = index <= 0 ? samples_.front() : samples_.back();
-    const double beyond = (index <= 0 ? index : index - last) * kStepM;
+    const double beyond = (index <= 0 ? index : index - last) * kSampleM;
     sample.position +=
         beyond * Eigen::Vector3d(std::cos(sample.heading_rad), std::sin(sample.heading_rad), 0);
     return sample;

@@ -8,8 +8,8 @@ namespace livemap {
 namespace {
 
 constexpr double kFrontHeightM = 10;
-constexpr double kReachM = 20;
-constexpr double kStepM = 5;
+constexpr double kSkylineReachM = 20;
+constexpr double kHillStepM = 5;
 /// House fronts end this far from a side road.
 constexpr double kCornerGapM = 3.4;
 
@@ -47,7 +47,7 @@ StreetSky SkyOver(const Street& street, double along_m, double left_m) {
   const double pavement_m = static_cast<double>(street.profile().half_road_m() + kKerbWidthM) +
                             street.description().pavement_width_m;
   int count = 0;
-  for (double off = -kReachM; off <= kReachM; off += kStepM, ++count) {
+  for (double off = -kSkylineReachM; off <= kSkylineReachM; off += kHillStepM, ++count) {
     const Row row = RowAt(street, along_m + off);
     const double front_m = pavement_m + row.setback_m;
     const double rise_m = kFrontHeightM - kAntennaHeightM;

@@ -8,7 +8,7 @@ namespace livemap {
 namespace {
 
 /// Streams of randomness: one per kind of thing, so that none shifts another.
-enum Stream : std::uint64_t { kHazards = 11, kCrossings = 12, kGroundDetails = 13 };
+enum StreetStream : std::uint64_t { kHazards = 11, kCrossings = 12, kGroundDetails = 13 };
 
 std::uint64_t Item(int index) { return static_cast<std::uint64_t>(index) + 1000; }
 

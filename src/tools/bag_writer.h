@@ -8,6 +8,9 @@
 
 namespace livemap {
 
+/// Frame of the camera's images in our bags (REP 103: z forward, x right, y down).
+constexpr char kOpticalFrame[] = "camera_optical_frame";
+
 /// Writes a bag beside its final name and renames it when it is whole, so that an interrupted run
 /// leaves no half bag under the name that was asked for.
 class BagWriter {

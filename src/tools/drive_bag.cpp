@@ -11,12 +11,11 @@
 
 #include "base/error.h"
 #include "drives/text.h"
+#include "geo/wgs84.h"
+#include "tools/bag_writer.h"
 
 namespace livemap {
 namespace {
-
-constexpr char kOpticalFrame[] = "camera_optical_frame";
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
 geometry_msgs::TransformStamped ToTransform(const Eigen::Isometry3d& pose, const ros::Time& stamp,
                                             const std::string& parent, const std::string& child) {

@@ -10,6 +10,7 @@
 #include "detection/hazard_detector.h"
 #include "evaluation/detection_report.h"
 #include "evaluation/labelled_folder.h"
+#include "evaluation/quantile.h"
 #include "ingest/decode.h"
 #include "tools/command_line.h"
 #include "tools/detection_tool_support.h"

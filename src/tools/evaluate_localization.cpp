@@ -9,12 +9,11 @@
 #include "drives/comma2k19.h"
 #include "drives/text.h"
 #include "evaluation/localization_evaluation.h"
+#include "geo/wgs84.h"
 #include "tools/command_line.h"
 
 namespace livemap {
 namespace {
-
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180;
 
 struct Options {
   std::string folder;

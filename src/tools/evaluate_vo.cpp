@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "drives/sequences.h"
+#include "evaluation/quantile.h"
 #include "evaluation/trajectory_report.h"
 #include "tools/command_line.h"
 #include "tools/monocular_method.h"

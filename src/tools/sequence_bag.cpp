@@ -19,7 +19,6 @@
 namespace livemap {
 namespace {
 
-constexpr char kOpticalFrame[] = "camera_optical_frame";
 constexpr std::int64_t kMaxPixels = 64'000'000;
 
 ros::Time ToStamp(std::int64_t stamp_ns, const ros::Duration& start) {

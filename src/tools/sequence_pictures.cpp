@@ -1,7 +1,5 @@
 #include "tools/sequence_pictures.h"
 
-#include <algorithm>
-#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
 #include "drives/image_file.h"
@@ -19,12 +17,6 @@ CameraIntrinsics IntrinsicsOf(const Sequence& sequence) {
   if (camera.width == 0) camera.width = static_cast<int>(first.header.width);
   if (camera.height == 0) camera.height = static_cast<int>(first.header.height);
   return camera;
-}
-
-double Quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(
-      std::lround(share * static_cast<double>(values.size() - 1)))];
 }
 
 }  // namespace livemap

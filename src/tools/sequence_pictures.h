@@ -2,7 +2,6 @@
 
 #include <opencv2/core.hpp>
 #include <string>
-#include <vector>
 
 #include "drives/sequences.h"
 
@@ -13,8 +12,5 @@ cv::Mat ReadPicture(const std::string& path, const CameraIntrinsics& camera, int
 
 /// The sequence's camera; one without width and height has those of the first picture.
 CameraIntrinsics IntrinsicsOf(const Sequence& sequence);
-
-/// The value that this share (0..1) of `values`, which are not empty, is not above.
-double Quantile(std::vector<double> values, double share);
 
 }  // namespace livemap

@@ -24,7 +24,7 @@ constexpr std::uint64_t kSecondLight = 43;
 constexpr std::uint32_t kSecondNoise = 0x20000000U;
 constexpr double kFirstRateHz = 10;
 constexpr std::size_t kPreviewRows = 6;
-constexpr double kPreviewWidth = 400;
+constexpr double kDiagramWidth = 400;
 
 struct ChangeRun {
   std::uint64_t seed = 1;
@@ -114,7 +114,7 @@ class FirstPass {
 
 void AddToSheet(const PassPicture& first, const PassPicture& second, const cv::Mat& mask,
                 std::vector<cv::Mat>& sheet) {
-  const double scale = kPreviewWidth / second.frame.bgr.cols;
+  const double scale = kDiagramWidth / second.frame.bgr.cols;
   for (const cv::Mat& picture :
        {first.frame.bgr, second.frame.bgr, OverlayChanges(second.frame.bgr, mask)}) {
     cv::Mat small;

@@ -127,7 +127,7 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
   const double max_latitude_difference = radius_m / 110574.0;
   const double poleward_deg =
       std::min(90.0, std::abs(centre.latitude_deg) + max_latitude_difference);
-  const double least_m_per_degree = 111319.0 * std::cos(poleward_deg * 3.14159265358979 / 180.0);
+  const double least_m_per_degree = 111319.0 * std::cos(poleward_deg * kRadiansPerDegree);
   std::vector<std::pair<double, Slot>> found;
   for (Slot slot = 0; slot < hazards_.size(); ++slot) {
     const Hazard& hazard = hazards_[slot];

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -99,8 +100,8 @@ TEST(FootByDepth, CovarianceHoldsTheNoiseOfTheDepth) {
   int count = 0;
   for (int trial = 0; trial < 50; ++trial) {
     DepthImage image = Road();
-    image.depth(cv::Rect(305, static_cast<int>(box.y_min), 30, 60))
-        .forEach<float>([&](float& depth, const int*) { depth = 12.0F + noise(random); });
+    cv::Mat_<float> standing = image.depth(cv::Rect(305, static_cast<int>(box.y_min), 30, 60));
+    std::generate(standing.begin(), standing.end(), [&] { return 12.0F + noise(random); });
     const auto foot = Foot(image, box);
     ASSERT_TRUE(foot);
     const double error_m = foot->position_m.x() - kForwardM - 12;

@@ -7,10 +7,10 @@
 #include <map>
 #include <optional>
 
+#include "base/stamps.h"
 #include "geo/wgs84.h"
 #include "localization/geo_localizer.h"
 #include "localization/planar.h"
-#include "localization/stamps.h"
 
 namespace livemap {
 
