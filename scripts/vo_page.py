@@ -175,7 +175,8 @@ def sources_sentence(sequences):
 
 
 def time_section(sequences):
-    columns = (("canny KF", ("edge",)), ("canny FF", ("edge", "canny", "keyframe", "frame-to-frame")),
+    columns = (("canny KF", ("edge",)), ("canny K5", ("edge", "canny", "keyframe", "every-5")),
+               ("canny FF", ("edge", "canny", "keyframe", "frame-to-frame")),
                ("canny KF, new image's edges", ("edge", "canny", "new-image")), ("log KF", ("edge", "log")),
                ("sobel KF", ("edge", "sobel")), ("RgbdOdometry", ("rgbd",)), ("RgbdICPOdometry", ("rgbd-icp",)))
     rows = []
@@ -217,7 +218,7 @@ def ablation_section(sequences):
     chosen = [s for s in sequences if "ablation" in s]
     text = "## Edge pixels against random pixels\n" + prose("""The thesis's figure 5.6, left: a share of the edge
         pixels against as many pixels drawn from the whole image (those with depth that is not behind an occluding
-        edge). Adaptive keyframes, no constant motion, no limit on the points; mean (least-most) of the runs, each
+        edge). Adaptive keyframes, each frame's alignment begins at the last pose, no limit on the points; mean (least-most) of the runs, each
         with a seed of its own. *Lost* counts frames of all runs. Of the edges 100 % are no draw: their runs are
         one.""") + "\n![Error against the share of edge pixels](odometry_ablation.png)\n"
     for sequence in chosen:
@@ -284,11 +285,13 @@ def head_section(results):
     machine = results["machine"]
     load = statistics.median(sequence["tables"]["load"] for sequence in results["sequences"])
     others = "otherwise quiet" if load < 1.4 else f"shared with other work: load average {load:.1f}"
+    measured = "; measured on " + " at ".join(word for word in (results["date"], results["version"]) if word)
     text = "# Visual odometry: the benchmark\n" + prose(f"""Made by `./livemap bench vo`; do not edit.
-        [../odometry.md](../odometry.md) is about the method and its parameters.""") + prose(
+        [../odometry.md](../odometry.md) is about the method and its parameters, and has the figures of one camera
+        without depth and of stereo; here every sequence has depth.""") + prose(
             f"""Machine: {machine['cores']} cores, {machine['cpu']}, {others}. All methods run on one thread
         (`cv::setNumThreads(1)`) in one process, beside each other, OpenCV's with their default settings; n is the
-        number of frames. Errors are defined in [../evaluation.md](../evaluation.md#trajectories) (SE(3) alignment,
+        number of frames{measured}. Errors are defined in [../evaluation.md](../evaluation.md#trajectories) (SE(3) alignment,
         RPE over 1 s, RMSE).""") + """
 ```
 ./livemap bench vo                                         # this page
@@ -304,8 +307,9 @@ def head_section(results):
 def paths_section(sequences):
     if not vo_plots.with_paths(sequences):
         return ""
-    return ("## Paths\nThe thesis's figure 5.7: truth, LiveMap (canny KF) and RgbdOdometry, moved onto the truth.\n"
-            "\n![Positions over time](odometry_paths.png)\n")
+    return ("## Paths\nThe thesis's figure 5.7: truth, LiveMap (canny KF) and RgbdOdometry, moved onto the truth: the path in "
+            "the plane of its two widest axes, and each pose's error.\n"
+            "\n![Paths and errors over time](odometry_paths.png)\n")
 
 
 def write(results, out):

@@ -1,5 +1,6 @@
 """The plots of visual odometry's page."""
 
+import math
 import statistics
 
 import matplotlib
@@ -79,11 +80,14 @@ def draw_pixels(sequences, path):
             axis.plot([row["points"] / 1000 for row in own], [row["tracked_ms"] for row in own], color=colour,
                       marker=marker, linestyle="", label="edge pixels" if pixels == "edges" else "pixels from anywhere")
         slope, intercept, _ = line_through(rows)
-        ends = [0, max(row["points"] for row in rows)]
-        axis.plot([end / 1000 for end in ends], [intercept + slope * end for end in ends], color="#888888",
-                  linewidth=1, zorder=0, label=f"{intercept:.1f} ms + {1000 * slope:.3f} us per pixel")
+        counts = sorted(row["points"] for row in rows)
+        axis.plot([count / 1000 for count in counts], [intercept + slope * count for count in counts],
+                  color="#888888", linewidth=1, zorder=0,
+                  label=f"{intercept:.1f} ms + {1000 * slope:.3f} us per pixel")
         axis.set(title=sequence["name"], xlabel="pixels of the finest level (thousands)", ylabel="tracked frame (ms)",
-                 ylim=(0, None))
+                 xscale="log", yscale="log")
+        for numbered in (axis.xaxis, axis.yaxis):
+            numbered.set_major_formatter(lambda value, _: f"{value:g}")
         axis.legend()
     save(figure, path)
 
@@ -108,26 +112,31 @@ def draw_basin(sequences, path):
 
 def with_paths(sequences):
     return [s for s in sequences if s["kind"] != "generated" and s["tables"]["paths"] and
-            len(s["tables"]["paths"]["time_s"]) > 20][:4]
+            len(s["tables"]["paths"]["time_s"]) > 20][:5]
 
 
 def draw_paths(sequences, path):
+    """Each sequence's path in the plane where it is widest, and the errors over time."""
     chosen = with_paths(sequences)
     if not chosen:
         return
-    figure, axes = panels((len(chosen) + 1) // 2, 2)
-    for axis, sequence in zip(axes.flat, chosen):
+    figure, axes = panels(len(chosen), 2)
+    for (plan, errors), sequence in zip(axes, chosen):
         paths = sequence["tables"]["paths"]
-        centre = [statistics.mean(values) for values in zip(*paths["truth"])]
-        for method, style, width in (("truth", "--", 1), ("rgbd", "-", 1), ("edge", "-", 2.6)):
-            for index in range(3):
-                axis.plot(paths["time_s"], [at[index] - centre[index] for at in paths[method]], style,
-                          color=COLOURS[method], linewidth=width, zorder=3 if method == "truth" else 2,
-                          label=NAMES.get(method, "truth") if index == 0 else None)
-        axis.set(title=sequence["name"], xlabel="time (s)", ylabel="x, y, z from the mean (m)")
+        truth = list(zip(*paths["truth"]))
+        widest = sorted(sorted(range(3), key=lambda axis: min(truth[axis]) - max(truth[axis]))[:2])
+        for method, style, width in (("rgbd", "-", 1.5), ("edge", "-", 2.6), ("truth", "--", 1.2)):
+            plan.plot(*([at[axis] for at in paths[method]] for axis in widest), style, color=COLOURS[method],
+                      linewidth=width, label=NAMES.get(method, "truth"))
+        plan.set(title=sequence["name"], xlabel=f"{'xyz'[widest[0]]} (m)", ylabel=f"{'xyz'[widest[1]]} (m)")
+        plan.axis("equal")
+        for method in ("rgbd", "edge"):
+            errors.plot(paths["time_s"], [1000 * max(math.dist(at, true), 1e-5)
+                                          for at, true in zip(paths[method], paths["truth"])],
+                        color=COLOURS[method], linewidth=1.5, label=NAMES[method])
+        errors.set(title=sequence["name"], xlabel="time (s)", ylabel="error (mm)", yscale="log")
+        errors.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes[0][0].legend(fontsize="small")
-    for axis in list(axes.flat)[len(chosen):]:
-        axis.remove()
     save(figure, path)
 
 
