@@ -203,10 +203,12 @@ class EdgeVoTest(unittest.TestCase):
     def test_reset_makes_the_next_frame_the_origin(self):
         vehicle = self.loaded()
         self.play(vehicle, self.frames[:12])
+        vehicle.wait_for(frames=12, resets=0)
         reset = rospy.ServiceProxy(f"/{vehicle.name}/edge_vo/reset", Trigger)
         self.assertTrue(reset().success)
         self.play(vehicle, self.frames[12:14])
         numpy.testing.assert_allclose(base_pose(vehicle.poses()[12].pose.pose), numpy.eye(4), atol=1e-9)
+        vehicle.wait_for(resets=1)
 
     def test_a_replay_that_begins_again_starts_anew(self):
         vehicle = self.loaded()

@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import tempfile
 import unittest
+from xml.etree import ElementTree
 
 import yaml
 
@@ -22,6 +23,12 @@ def parameters(launch, *arguments):
     result = subprocess.run(["/usr/bin/roslaunch", "--dump-params", str(ROOT / "launch" / launch), *arguments],
                             check=True, capture_output=True, text=True)
     return yaml.safe_load(result.stdout)
+
+
+def nodes(launch, *arguments):
+    """What roslaunch says about the nodes that it would start."""
+    return subprocess.run(["/usr/bin/roslaunch", "--nodes", str(ROOT / "launch" / launch), *arguments],
+                          capture_output=True, text=True)
 
 
 def changed(value):
@@ -56,6 +63,37 @@ class LaunchArguments(unittest.TestCase):
                                       str(ROOT / "launch" / "vehicle.launch"), "vo:=true", *arguments],
                                      check=True, capture_output=True, text=True).stdout
             self.assertIn(f" camera/depth/image_raw:={topic} ", command)
+
+    def test_positions_by_fusion_are_refused_without_it_and_told_what_they_need(self):
+        refused = nodes("vehicle.launch", "position_source:=fused")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("position_source:=fused needs localize:=true", refused.stderr)
+        for arguments in (("vo:=true",), ("localize:=true",), ("vo:=true", "position_source:=gps")):
+            accepted = nodes("vehicle.launch", *arguments)
+            self.assertEqual(accepted.returncode, 0, accepted.stderr)
+
+    def test_a_nodelet_that_does_not_load_is_tried_again_only_after_a_pause(self):
+        for launch in ("vehicle.launch", "zone.launch"):
+            loaded = [node for node in ElementTree.parse(ROOT / "launch" / launch).iter("node")
+                      if node.get("respawn") == "true" and "Nodelet" in node.get("args", "")]
+            self.assertGreater(len(loaded), 0, launch)
+            for node in loaded:
+                self.assertIn(node.get("respawn_delay"), ("$(arg respawn_delay)", "5"), node.get("name"))
+
+    def test_a_replay_runs_the_detector_unless_told_otherwise_or_the_bags_labels_answer(self):
+        wanted = {(): True, ("use_truth:=true",): False, ("detect:=false",): False,
+                  ("use_truth:=true", "detect:=true"): True}
+        for arguments, runs in wanted.items():
+            started = nodes("replay.launch", "bag:=drive.bag", *arguments)
+            self.assertEqual(started.returncode, 0, started.stderr)
+            self.assertEqual("/hazard_detection" in started.stdout.split(), runs, arguments)
+
+    def test_the_tf_of_a_bag_goes_where_it_is_wanted(self):
+        for arguments, topic in (((), "tf"), (("bag_tf:=ground_truth/tf",), "ground_truth/tf")):
+            command = subprocess.run(["/usr/bin/roslaunch", "--args", "/player",
+                                      str(ROOT / "launch" / "replay.launch"), "bag:=drive.bag", *arguments],
+                                     check=True, capture_output=True, text=True).stdout
+            self.assertIn(f" tf:={topic} ", command)
 
     def test_a_replay_hands_its_arguments_on_to_the_vehicle(self):
         with tempfile.NamedTemporaryFile(suffix=".bag") as bag:

@@ -87,7 +87,7 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
   }
 }
 
-/// Residuals of points whose depth is not exact err by that, too: equation (13). They are divided
+/// Residuals of points whose depth is not exact err by that, too: equation (12). They are divided
 /// by how much more, at the motion that the alignment starts with.
 void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
   whitening_.resize(points.inverse_depth_sigma.size());
@@ -135,7 +135,7 @@ double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
   return sum / static_cast<double>(residuals.count);
 }
 
-/// Equation (8): the Jacobian is the reference's and stays; only the weights change.
+/// Equation (7): the Jacobian is the reference's and stays; only the weights change.
 void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
   const auto k = static_cast<float>(config_.huber_k * sigma);
   normal_.setZero();
@@ -197,7 +197,7 @@ bool Aligner::Solve(double damping, Step& step) const {
   return step.allFinite();
 }
 
-/// Equation (9). The twist was solved for times the gain.
+/// Equation (8). The twist was solved for times the gain.
 AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) const {
   AlignmentState moved = state;
   moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / state.gain);

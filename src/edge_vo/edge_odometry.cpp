@@ -287,7 +287,7 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
 }
 
 EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
-  // Equation (5.7): the motion goes on as it was; or the camera stands.
+  // The thesis's equation 5.7: the motion goes on as it was; or the camera stands.
   Guesses guesses;
   const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);

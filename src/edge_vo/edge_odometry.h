@@ -62,7 +62,7 @@ class EdgeOdometry {
     /// Points per level, finest first.
     std::array<int, kMaxLevels> max_points = {6000, 4000, 2000};
     PointSelection points;  ///< Its max_points is taken from above.
-    /// Each frame starts from the last motion too, equation (5.7), not from the last pose alone.
+    /// Each frame starts from the last motion too (thesis, equation 5.7), not the last pose alone.
     bool constant_motion = true;
     DepthPyramid::Range depth_range;
 

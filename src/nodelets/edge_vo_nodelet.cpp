@@ -149,8 +149,9 @@ class EdgeVoNodelet : public nodelet::Nodelet {
         config_.base_frame, header.frame_id, ros::Time(0), ros::Duration(0));
     frames_.base_from_optical = tf2::transformToEigen(mounting);
     camera_ = camera;
+    const bool first = odometry_ == nullptr;
     odometry_ = std::make_unique<EdgeOdometry>(config_.odometry, camera);
-    StartAnew();
+    if (!first) StartAnew();
   }
 
   RgbdFrame ToFrame(const ImageConstPtr& image, const ImageConstPtr& depth) const {

@@ -172,7 +172,11 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     if (came.fixes == 0) missing_ = "no fixes on " + fix_subscriber_.getTopic();
     if (came.odometry == 0) {
       missing_ += (missing_.empty() ? "" : ", ") + std::string("no odometry on ") +
-                  odometry_subscriber_.getTopic() + " (visual odometry: vo:=true)";
+                  odometry_subscriber_.getTopic();
+      // Visual odometry may be wanted and have failed to load.
+      if (odometry_subscriber_.getNumPublishers() == 0) {
+        missing_ += ", which nobody publishes (edge_vo does, with vo:=true)";
+      }
     }
     if (missing_.empty()) return;
     NODELET_WARN_THROTTLE(kSayAgainS, "for %.1f s %s", config_.silence_warning_s, missing_.c_str());
