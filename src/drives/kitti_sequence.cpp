@@ -144,7 +144,8 @@ std::vector<Eigen::Isometry3d> ParseKittiPoses(const std::string& text, const st
 
 Sequence ReadKittiSequence(const std::string& directory, double rate_hz) {
   const fs::path root(directory);
-  if (!fs::is_directory(root)) throw Error("the KITTI folder '" + directory + "' does not exist");
+  if (!fs::exists(root)) throw Error("the KITTI folder '" + directory + "' does not exist");
+  if (!fs::is_directory(root)) throw Error("'" + directory + "' is no folder");
   Sequence sequence;
   const std::string calibration = (root / "calib.txt").string();
   const std::vector<std::string> projections = Lines(ReadFile(calibration, kMaxTextBytes));

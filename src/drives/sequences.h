@@ -37,14 +37,21 @@ struct Sequence {
 /// A TUM stamp "1305031102.175304" to nanoseconds without losing digits; none when malformed.
 std::optional<std::int64_t> ParseStampNs(const std::string& text);
 
+/// Whether a sequence's depth images are wanted.
+enum class DepthImages {
+  kRead,
+  kIgnored,  ///< Frames are all listed pictures, without depth, which may be missing.
+};
+
 /// TUM RGB-D layout: associations.txt ("rgb_stamp rgb_path depth_stamp depth_path") or else rgb.txt
 /// and depth.txt ("stamp path", paired by AssociateDepth; rgb.txt alone: no depth), groundtruth.txt
 /// ("stamp tx ty tz qx qy qz qw", camera to world, optional) and camera.yaml (width, height, fx,
 /// fy, cx, cy, depth_scale). Of a rectified stereo pair also rgb_right.txt (as rgb.txt, pictures
 /// with the same stamp belong together) and baseline_m in camera.yaml. `camera_file` is read
 /// instead of camera.yaml when it is not empty; without either the camera is PublishedTumCamera's.
-/// Throws Error naming file and line.
-Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file = "");
+/// With DepthImages::kIgnored depth.txt is not opened. Throws Error naming file and line.
+Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file = "",
+                         DepthImages depth_images = DepthImages::kRead);
 
 /// Stamps of picture and depth that are farther apart do not belong together.
 constexpr std::int64_t kMaxDepthDifferenceNs = 20'000'000;

@@ -81,12 +81,12 @@ void FindCamera(const fs::path& root, const std::string& camera_file, Sequence& 
   sequence.depth_scale = kPublishedDepthScale;
 }
 
-/// rgb.txt and, where there is one, depth.txt.
-std::vector<SequenceFrame> ReadLists(const fs::path& root) {
+/// rgb.txt and, where there is one and it is wanted, depth.txt.
+std::vector<SequenceFrame> PairLists(const fs::path& root, DepthImages depth_images) {
   const std::string rgb = (root / "rgb.txt").string();
   const std::string depth = (root / "depth.txt").string();
   std::vector<SequenceFrame> pictures = ParseTumAssociations(ReadFile(rgb, kMaxTextBytes), rgb);
-  if (!fs::exists(depth)) return pictures;
+  if (depth_images == DepthImages::kIgnored || !fs::exists(depth)) return pictures;
   const std::vector<SequenceFrame> depths =
       ParseTumAssociations(ReadFile(depth, kMaxTextBytes), depth);
   std::vector<SequenceFrame> frames = AssociateDepth(pictures, depths);
@@ -94,6 +94,22 @@ std::vector<SequenceFrame> ReadLists(const fs::path& root) {
     throw Error("no picture of '" + rgb + "' is within 0.02 s of a depth image of '" + depth + "'");
   }
   return frames;
+}
+
+/// associations.txt, or else the lists that it is made of.
+std::vector<SequenceFrame> ReadLists(const fs::path& root, DepthImages depth_images) {
+  const std::string both = (root / "associations.txt").string();
+  if (!fs::exists(both)) return PairLists(root, depth_images);
+  std::vector<SequenceFrame> frames = ParseTumAssociations(ReadFile(both, kMaxTextBytes), both);
+  if (depth_images == DepthImages::kIgnored) {
+    for (SequenceFrame& frame : frames) frame.depth_path.clear();
+  }
+  return frames;
+}
+
+void RequireFolder(const fs::path& path) {
+  if (!fs::exists(path)) throw Error("the TUM folder '" + path.string() + "' does not exist");
+  if (!fs::is_directory(path)) throw Error("'" + path.string() + "' is no folder");
 }
 
 void Anchor(const fs::path& root, std::string& path, const std::string& listed_in) {
@@ -233,15 +249,19 @@ std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory)
   return std::nullopt;
 }
 
-Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file) {
+Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file,
+                         DepthImages depth_images) {
   const fs::path root(directory);
-  if (!fs::is_directory(root)) throw Error("the TUM folder '" + directory + "' does not exist");
+  RequireFolder(root);
+  const bool associated = fs::exists(root / "associations.txt");
+  if (!associated && !fs::exists(root / "rgb.txt")) {
+    throw Error("'" + directory +
+                "' is no TUM sequence: it has no associations.txt and no rgb.txt");
+  }
   Sequence sequence;
   FindCamera(root, camera_file, sequence);
-  const bool associated = fs::exists(root / "associations.txt");
+  sequence.frames = ReadLists(root, depth_images);
   const std::string list = (root / (associated ? "associations.txt" : "rgb.txt")).string();
-  sequence.frames =
-      associated ? ParseTumAssociations(ReadFile(list, kMaxTextBytes), list) : ReadLists(root);
   const std::string depth_list = associated ? list : (root / "depth.txt").string();
   for (SequenceFrame& frame : sequence.frames) {
     Anchor(root, frame.image_path, list);

@@ -53,12 +53,15 @@ class MonocularOdometry {
   /// Throws Error naming what is wrong with the intrinsics or the configuration.
   MonocularOdometry(const Config& config, const CameraIntrinsics& intrinsics);
 
-  /// Works off the next frame: poses in metres, from the first frame on. Initialising until the
-  /// camera has moved far enough to see depth. Throws as EdgeOdometry::Track().
+  /// Works off the next frame: poses in metres. Initialising, with a pose that says nothing, until
+  /// the camera has moved far enough to see depth. Throws as EdgeOdometry::Track().
   VoResult Track(const MonocularFrame& frame);
 
   void Reset();
 
+  /// Of the frame that the last two-view start began with. With the first pose: of the frame that
+  /// stands at the origin, which the first frame need not be.
+  std::int64_t start_stamp_ns() const { return start_stamp_ns_; }
   const InverseDepthMap& depths() const { return map_; }
   double metres_per_unit() const { return scale_.metres_per_unit(); }
 

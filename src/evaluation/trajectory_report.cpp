@@ -116,6 +116,12 @@ nlohmann::ordered_json ToJson(const TrajectoryFigures& figures) {
   return json;
 }
 
+nlohmann::ordered_json NullFigures() {
+  nlohmann::ordered_json json = ToJson(TrajectoryFigures{});
+  for (auto& [key, value] : json.items()) value = nullptr;
+  return json;
+}
+
 std::string ToText(const TrajectoryFigures& figures) {
   std::string text = std::to_string(figures.pairs) + " pairs of " +
                      std::to_string(figures.truth_poses) + " true and " +

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -12,6 +13,17 @@
 #include "drives/text.h"
 
 namespace livemap {
+namespace {
+
+[[noreturn]] void RefuseNumber(const std::string& flag, const std::string& text, const char* kind,
+                               double min, double max) {
+  std::ostringstream sentence;
+  sentence << "--" << flag << " is '" << text << "', accepted is " << kind << " from " << min
+           << " to " << max;
+  throw Error(sentence.str());
+}
+
+}  // namespace
 
 CommandLine::CommandLine(std::string usage, std::string about, std::size_t positionals,
                          std::vector<Flag> flags)
@@ -88,12 +100,25 @@ double CommandLine::Number(const std::string& flag, double otherwise, double min
   if (found == values_.end()) return otherwise;
   const std::optional<double> value = ParseFinite(found->second);
   if (!value || *value < min || *value > max) {
-    std::ostringstream sentence;
-    sentence << "--" << flag << " is '" << found->second << "', accepted is a number from " << min
-             << " to " << max;
-    throw Error(sentence.str());
+    RefuseNumber(flag, found->second, "a number", min, max);
   }
   return *value;
+}
+
+int CommandLine::Whole(const std::string& flag, int otherwise, int min, int max) const {
+  const auto found = values_.find(flag);
+  if (found == values_.end()) return otherwise;
+  const std::optional<double> value = ParseFinite(found->second);
+  if (!value || *value < min || *value > max || *value != std::floor(*value)) {
+    RefuseNumber(flag, found->second, "a whole number", min, max);
+  }
+  return static_cast<int>(*value);
+}
+
+void CommandLine::CheckNeeds(const std::vector<FlagNeed>& needs) const {
+  for (const FlagNeed& need : needs) {
+    if (Has(need.flag) && !need.holds) throw Error("--" + need.flag + " needs " + need.need);
+  }
 }
 
 std::uint64_t CommandLine::Seed(const std::string& flag, std::uint64_t otherwise) const {

@@ -15,6 +15,13 @@ struct Flag {
   std::string help;   ///< One line, with unit and default.
 };
 
+/// What a flag tells nothing without.
+struct FlagNeed {
+  std::string flag;    ///< Without the dashes.
+  bool holds = false;  ///< What it needs is so.
+  std::string need;    ///< In words, for the refusal: "--FLAG needs NEED".
+};
+
 /// The arguments of a program. Every mistake is an Error of one sentence.
 class CommandLine {
  public:
@@ -33,7 +40,11 @@ class CommandLine {
   std::string Text(const std::string& flag, const std::string& otherwise) const;
   /// A finite number in [min, max].
   double Number(const std::string& flag, double otherwise, double min, double max) const;
+  /// A whole number in [min, max].
+  int Whole(const std::string& flag, int otherwise, int min, int max) const;
   std::uint64_t Seed(const std::string& flag, std::uint64_t otherwise) const;
+  /// Throws Error about the first of `needs` whose flag is given and which does not hold.
+  void CheckNeeds(const std::vector<FlagNeed>& needs) const;
   const std::string& Positional(std::size_t index) const { return positionals_[index]; }
   const std::vector<std::string>& Positionals() const { return positionals_; }
 

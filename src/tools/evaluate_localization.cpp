@@ -1,11 +1,14 @@
 // livemap_evaluate_localization: how well fixes and odometry are fused, on a recorded drive.
 
+#include <algorithm>
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
+#include "base/stamps.h"
 #include "drives/comma2k19.h"
 #include "drives/text.h"
 #include "evaluation/localization_evaluation.h"
@@ -60,6 +63,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"seed", "N", "of all noise, default 1"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
+  line.CheckNeeds({{"outlier-m", line.Has("outliers"), "--outliers, which says how many"},
+                   {"hide-noise", line.Has("noise-m"), "--noise-m, which it hides"}});
   options.folder = line.Positional(0);
   options.json = line.Has("json");
   LocalizationTrial& trial = options.trial;
@@ -81,10 +86,30 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   return options;
 }
 
+/// A drop-out that takes no fix away would change nothing.
+void CheckDropout(const PositionDrive& drive, const LocalizationTrial& trial) {
+  if (trial.dropout_s <= 0) return;
+  const auto after_s = [&drive](const RecordedFix& fix) {
+    return Seconds(fix.stamp_ns - drive.fixes.front().stamp_ns);
+  };
+  const double end_s = trial.dropout_start_s + trial.dropout_s;
+  const bool takes_one =
+      std::any_of(drive.fixes.begin(), drive.fixes.end(), [&](const RecordedFix& fix) {
+        return after_s(fix) >= trial.dropout_start_s && after_s(fix) < end_s;
+      });
+  if (takes_one) return;
+  std::ostringstream sentence;
+  sentence << "--dropout-s is '" << trial.dropout_start_s << "," << trial.dropout_s
+           << "', in which the drive has no fix: its last one comes " << after_s(drive.fixes.back())
+           << " s after the first";
+  throw Error(sentence.str());
+}
+
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
   const PositionDrive drive = ReadComma2k19(options->folder);
+  CheckDropout(drive, options->trial);
   const LocalizationReport report = EvaluateLocalization(drive, options->config, options->trial);
   std::cout << (options->json ? ToJson(report).dump() + "\n" : ToText(report));
   return 0;

@@ -36,22 +36,20 @@ struct Options {
   EdgeOdometry::Config odometry;
   bool mono = false;
   MonocularOptions monocular;
+  std::string one_eye_flag;  ///< One that was given and is about one eye only, or none.
 };
 
 EdgeSource ReadEdgeSource(const CommandLine& line) {
   const std::string name = line.Text("edge-source", "keyframe");
   if (name == "keyframe") return EdgeSource::kKeyframe;
-  if (name == "new-image") return EdgeSource::kNewImage;
+  if (name == "new-image" || name == "new_image") return EdgeSource::kNewImage;
   throw Error("--edge-source is '" + name + "'; accepted are keyframe, new-image");
 }
 
 std::optional<StereoConfig> ReadStereo(const CommandLine& line) {
-  if (!line.Has("stereo")) {
-    if (line.Has("stereo-scale")) throw Error("--stereo-scale needs --stereo, which it is about");
-    return std::nullopt;
-  }
+  if (!line.Has("stereo")) return std::nullopt;
   StereoConfig config;
-  config.scale = static_cast<int>(line.Number("stereo-scale", config.scale, 1, 4));
+  config.scale = line.Whole("stereo-scale", config.scale, 1, 4);
   return config;
 }
 
@@ -61,8 +59,41 @@ MonocularOptions ReadMonocular(const CommandLine& line) {
   options.speed_sigma_mps = line.Number("speed-sigma", 0, 0, 100);
   options.camera_height_m = line.Number("camera-height", options.camera_height_m, 0.01, 100);
   options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
-  options.seed = static_cast<std::uint64_t>(line.Number("seed", 1, 0, 1e9));
+  options.seed = line.Seed("seed", options.seed);
   return options;
+}
+
+EdgeExtractor::Config ReadEdges(const CommandLine& line) {
+  EdgeExtractor::Config edges;
+  edges.kind = ParseEdgeKind(line.Text("edges", "canny"));
+  edges.structured_model = line.Text("edge-model", "");
+  const bool has_model = std::filesystem::is_regular_file(edges.structured_model);
+  if (line.Has("edge-model") && !has_model) {
+    throw Error("--edge-model is '" + edges.structured_model + "', which is no file");
+  }
+  return edges;
+}
+
+/// Flags that would be passed over, and those that contradict each other, are refused. Whether a
+/// sequence has depth is not known yet.
+void CheckFlags(const CommandLine& line) {
+  const bool ours = line.Text("method", "edge") == "edge";
+  const bool structured = line.Text("edges", "canny") == "structured";
+  const bool height = line.Text("scale", "speed") == "height";
+  const std::string edge_method = "--method edge, which alone has such";
+  line.CheckNeeds({{"edges", ours, edge_method},
+                   {"edge-source", ours, edge_method},
+                   {"keyframe-every", ours, edge_method},
+                   {"edge-model", structured, "--edges structured, which it is for"},
+                   {"mono", !line.Has("stereo"), "--stereo left out: one eye or two"},
+                   {"stereo-scale", line.Has("stereo"), "--stereo, which it is about"},
+                   {"speed-sigma", !height, "--scale speed: the height knows no speed"},
+                   {"seed", line.Has("speed-sigma"), "--speed-sigma, whose noise it is of"},
+                   {"camera-height", height, "--scale height, which it is about"},
+                   {"camera-pitch", height, "--scale height, which it is about"}});
+  if (structured && !line.Has("edge-model")) {
+    throw Error("--edges structured needs --edge-model FILE, OpenCV's model of them");
+  }
 }
 
 /// None when --help was asked for and printed.
@@ -93,44 +124,58 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"mono", "", "one eye only: depth is not used where there is some"},
        {"scale", "NAME",
         "what tells one eye metres: speed (default; that of the true poses) or height"},
-       {"speed-sigma", "M/S", "noise added to the speed, default 0"},
+       {"speed-sigma", "M/S", "of --scale speed: noise added to the speed, default 0"},
        {"camera-height", "M", "of --scale height: over the road, default 1.65"},
        {"camera-pitch", "RAD", "of --scale height: positive looks down, default 0"},
        {"seed", "N", "of the speed's noise, default 1"},
        {"method", "NAME", "edge (default), or OpenCV's: rgbd, rgbd-icp"},
        {"out", "FILE", "write the trajectory, TUM lines"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
+  CheckFlags(line);
   Options options;
   options.sequence = line.Positional(0);
   options.camera_file = line.Text("camera", "");
   options.method = line.Text("method", options.method);
   options.out = line.Text("out", "");
   options.json = line.Has("json");
-  options.step = static_cast<int>(line.Number("step", 1, 1, 1000));
-  options.odometry.edges.kind = ParseEdgeKind(line.Text("edges", "canny"));
-  options.odometry.edges.structured_model = line.Text("edge-model", "");
+  options.step = line.Whole("step", 1, 1, 1000);
+  options.odometry.edges = ReadEdges(line);
   options.odometry.edge_source = ReadEdgeSource(line);
   options.stereo = ReadStereo(line);
   options.mono = line.Has("mono");
   options.monocular = ReadMonocular(line);
-  if (line.Has("keyframe-every")) {
-    options.odometry.keyframe_every = static_cast<int>(line.Number("keyframe-every", 1, 1, 10000));
+  for (const char* flag : {"scale", "speed-sigma"}) {
+    if (line.Has(flag)) options.one_eye_flag = flag;
   }
+  options.odometry.keyframe_every = line.Whole("keyframe-every", 0, 1, 10000);
   return options;
 }
 
 /// In TUM's layout, or in KITTI's, which has a calib.txt.
 Sequence ReadSequence(const Options& options) {
   constexpr double kKittiRateHz = 10;
-  const bool kitti = std::filesystem::exists(std::filesystem::path(options.sequence) / "calib.txt");
-  return kitti ? ReadKittiSequence(options.sequence, kKittiRateHz)
-               : ReadTumSequence(options.sequence, options.camera_file);
+  const std::filesystem::path root(options.sequence);
+  const auto has = [&root](const char* name) { return std::filesystem::exists(root / name); };
+  if (has("calib.txt")) {
+    if (!options.camera_file.empty()) {
+      throw Error("--camera needs TUM's layout, and '" + options.sequence + "' has a calib.txt");
+    }
+    return ReadKittiSequence(options.sequence, kKittiRateHz);
+  }
+  if (std::filesystem::is_directory(root) && !has("rgb.txt") && !has("associations.txt")) {
+    throw Error("'" + options.sequence +
+                "' is no sequence: TUM's have rgb.txt or associations.txt, KITTI's calib.txt");
+  }
+  const bool wants_depth = !options.mono && !options.stereo;
+  return ReadTumSequence(options.sequence, options.camera_file,
+                         wants_depth ? DepthImages::kRead : DepthImages::kIgnored);
 }
 
 struct Run {
-  std::vector<StampedPose> trajectory;
-  std::vector<double> milliseconds;
+  std::vector<StampedPose> trajectory;  ///< Without the frames before the start.
+  std::vector<double> milliseconds;     ///< Of every frame.
   std::vector<double> stereo_milliseconds;
+  std::size_t initialising = 0;
   std::size_t lost = 0;
   std::size_t keyframes = 0;
 };
@@ -141,9 +186,28 @@ bool IsMonocular(const Sequence& sequence, const Options& options) {
   return options.mono || sequence.frames.front().depth_path.empty();
 }
 
+/// The frame's part of the run; poses begin with the frame at the origin.
+void AddStep(const VoMethod::Step& step, std::int64_t stamp_ns, Run& run) {
+  run.lost += step.lost ? 1U : 0U;
+  run.keyframes += step.keyframe ? 1U : 0U;
+  if (step.initialising) {
+    ++run.initialising;
+    return;
+  }
+  if (step.origin_stamp_ns) {
+    --run.initialising;
+    run.trajectory.push_back({*step.origin_stamp_ns, Eigen::Isometry3d::Identity()});
+  }
+  run.trajectory.push_back({stamp_ns, step.world_from_camera});
+}
+
 std::unique_ptr<VoMethod> MethodFor(const Sequence& sequence, const CameraIntrinsics& camera,
                                     const Options& options) {
   if (!IsMonocular(sequence, options)) {
+    if (!options.one_eye_flag.empty()) {
+      throw Error("--" + options.one_eye_flag +
+                  " tells one eye metres: it needs --mono, or a sequence without depth");
+    }
     return MakeVoMethod(options.method, options.odometry, camera);
   }
   if (options.method != "edge") {
@@ -178,12 +242,20 @@ Run FollowSequence(const Sequence& sequence, const Options& options) {
     run.milliseconds.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
             .count());
-    run.trajectory.push_back({source.stamp_ns, step.world_from_camera});
-    run.lost += step.lost ? 1U : 0U;
-    run.keyframes += step.keyframe ? 1U : 0U;
+    AddStep(step, source.stamp_ns, run);
     progress.At(i + 1);
   }
   return run;
+}
+
+/// Before the work, not after it. What the file holds stays until then, and none is left behind.
+void CheckWritable(const std::string& path) {
+  std::error_code ignored;
+  const bool was_there = std::filesystem::exists(path, ignored);
+  if (!std::ofstream(path, std::ios::app)) {
+    throw Error("--out is '" + path + "', which cannot be written");
+  }
+  if (!was_there) std::filesystem::remove(path, ignored);
 }
 
 void WriteTrajectory(const std::string& path, const std::vector<StampedPose>& trajectory) {
@@ -203,19 +275,24 @@ void WriteTrajectory(const std::string& path, const std::vector<StampedPose>& tr
   if (!file) throw Error("the trajectory '" + path + "' cannot be written");
 }
 
+void SayItNeverStarted(const Sequence& sequence, const Options& options, const Run& run) {
+  std::cerr << "livemap_evaluate_vo: visual odometry never started in " << run.milliseconds.size()
+            << " frames: "
+            << (IsMonocular(sequence, options)
+                    ? "one eye must move far enough, in small steps, to see depth"
+                    : "no frame has enough edges with depth")
+            << "; there are no poses, and the errors are null\n";
+}
+
 nlohmann::ordered_json Report(const Sequence& sequence, const Options& options, const Run& run) {
-  nlohmann::ordered_json json;
-  if (sequence.poses.empty()) {
-    for (const char* key : {"ate_rmse_m", "rpe_rmse_m_per_s", "rpe_rmse_deg_per_s"}) {
-      json[key] = nullptr;
-    }
-  } else {
-    json = ToJson(EvaluateTrajectory(sequence.poses, run.trajectory, {}));
-  }
+  const bool has_figures = !sequence.poses.empty() && !run.trajectory.empty();
+  nlohmann::ordered_json json =
+      has_figures ? ToJson(EvaluateTrajectory(sequence.poses, run.trajectory, {})) : NullFigures();
   json["median_ms"] = Quantile(run.milliseconds, 0.5);
   json["p95_ms"] = Quantile(run.milliseconds, 0.95);
   if (options.stereo) json["stereo_ms"] = Quantile(run.stereo_milliseconds, 0.5);
-  json["frames"] = run.trajectory.size();
+  json["frames"] = run.milliseconds.size();
+  json["initialising"] = run.initialising;
   json["lost"] = run.lost;
   json["keyframes"] = run.keyframes;
   json["method"] = options.method;
@@ -231,27 +308,33 @@ std::string Text(const nlohmann::ordered_json& value) {
   return text.str();
 }
 
-int RunEvaluation(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
-  if (!options) return 0;
-  cv::setNumThreads(1);
-  const Sequence sequence = ReadSequence(*options);
-  const Run run = FollowSequence(sequence, *options);
-  if (!options->out.empty()) WriteTrajectory(options->out, run.trajectory);
-  const nlohmann::ordered_json report = Report(sequence, *options, run);
-  if (options->json) {
-    std::cout << report.dump() << "\n";
-    return 0;
-  }
+void Print(const nlohmann::ordered_json& report) {
   for (const char* key :
-       {"frames", "lost", "keyframes", "ate_rmse_m", "rpe_rmse_m_per_s", "rpe_rmse_deg_per_s",
-        "kitti_translation_percent", "segment_translation_percent", "end_error_percent",
-        "median_ms", "p95_ms", "stereo_ms"}) {
+       {"frames", "initialising", "lost", "keyframes", "ate_rmse_m", "rpe_rmse_m_per_s",
+        "rpe_rmse_deg_per_s", "kitti_translation_percent", "segment_translation_percent",
+        "end_error_percent", "median_ms", "p95_ms", "stereo_ms"}) {
     if (report.contains(key)) {
       std::cout << std::left << std::setw(28) << std::setfill(' ') << key << Text(report[key])
                 << "\n";
     }
   }
+}
+
+int RunEvaluation(int argc, char** argv) {
+  const std::optional<Options> options = ParseOptions(argc, argv);
+  if (!options) return 0;
+  cv::setNumThreads(1);
+  const Sequence sequence = ReadSequence(*options);
+  if (!options->out.empty()) CheckWritable(options->out);
+  const Run run = FollowSequence(sequence, *options);
+  if (run.trajectory.empty()) SayItNeverStarted(sequence, *options, run);
+  const nlohmann::ordered_json report = Report(sequence, *options, run);
+  if (options->json) {
+    std::cout << report.dump() << "\n";
+  } else {
+    Print(report);
+  }
+  if (!options->out.empty()) WriteTrajectory(options->out, run.trajectory);
   return 0;
 }
 

@@ -56,12 +56,19 @@ class MonocularMethod : public VoMethod {
     const auto speed = speeds_.find(frame.stamp_ns);
     if (speed != speeds_.end()) seen.speed_mps = speed->second;
     const VoResult result = odometry_.Track(seen);
-    return {result.world_from_camera, result.state == VoState::kLost, result.new_keyframe};
+    Step step{result.world_from_camera, result.state == VoState::kLost, result.new_keyframe,
+              result.state == VoState::kInitialising};
+    if (!step.initialising && !has_started_) {
+      step.origin_stamp_ns = odometry_.start_stamp_ns();
+      has_started_ = true;
+    }
+    return step;
   }
 
  private:
   MonocularOdometry odometry_;
   SpeedByStamp speeds_;
+  bool has_started_ = false;
 };
 
 }  // namespace

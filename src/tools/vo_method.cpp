@@ -12,7 +12,8 @@ class EdgeMethod : public VoMethod {
       : odometry_(config, intrinsics) {}
   Step Track(const RgbdFrame& frame) override {
     const VoResult result = odometry_.Track(frame);
-    return {result.world_from_camera, result.state == VoState::kLost, result.new_keyframe};
+    return {result.world_from_camera, result.state == VoState::kLost, result.new_keyframe,
+            result.state == VoState::kInitialising};
   }
 
  private:

@@ -1,20 +1,25 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "edge_vo/edge_odometry.h"
 
 namespace livemap {
 
-/// One way to follow a camera through an RGB-D sequence.
+/// One way to follow a camera through a sequence.
 class VoMethod {
  public:
   struct Step {
     Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
     bool lost = false;
     bool keyframe = false;
+    bool initialising = false;  ///< It has not started yet: there is no pose.
+    /// With the first pose, where an earlier frame turns out to stand at the origin: its stamp.
+    std::optional<std::int64_t> origin_stamp_ns{};
   };
   virtual ~VoMethod() = default;
   virtual Step Track(const RgbdFrame& frame) = 0;

@@ -110,6 +110,31 @@ TEST_F(TumFolder, WithoutADepthListHasEveryPictureAndNoDepth) {
   EXPECT_EQ(sequence.frames[0].depth_path, "");
 }
 
+TEST_F(TumFolder, WhoseDepthIsIgnoredHasEveryPictureAndNeedsNoDepthImage) {
+  fs::remove_all(folder_ / "depth");
+  const Sequence lists = ReadTumSequence(folder_.string(), "", DepthImages::kIgnored);
+  ASSERT_EQ(lists.frames.size(), 4U);
+  EXPECT_EQ(lists.frames[0].depth_path, "");
+  Write("associations.txt", "1 rgb/1.png 1 depth/1.png\n2 rgb/2.png 2 depth/2.png\n");
+  const Sequence associated = ReadTumSequence(folder_.string(), "", DepthImages::kIgnored);
+  ASSERT_EQ(associated.frames.size(), 2U);
+  EXPECT_EQ(associated.frames[1].depth_path, "");
+  EXPECT_EQ(associated.frames[1].image_path, (folder_ / "rgb/2.png").string());
+  EXPECT_THAT([&] { ReadTumSequence(folder_.string()); },
+              ThrowsMessage<Error>(HasSubstr("associations.txt' is missing")));
+}
+
+TEST_F(TumFolder, WhatIsNoSequenceOrNoFolderIsSaidToBeNone) {
+  EXPECT_THAT([&] { ReadTumSequence((folder_ / "rgb").string()); },
+              ThrowsMessage<Error>(HasSubstr("is no TUM sequence")));
+  EXPECT_THAT([&] { ReadTumSequence((folder_ / "rgb.txt").string()); },
+              ThrowsMessage<Error>(HasSubstr("is no folder")));
+  EXPECT_THAT([&] { ReadKittiSequence((folder_ / "rgb.txt").string(), 10); },
+              ThrowsMessage<Error>(HasSubstr("is no folder")));
+  EXPECT_THAT([&] { ReadTumSequence((folder_ / "nothing").string()); },
+              ThrowsMessage<Error>(HasSubstr("does not exist")));
+}
+
 TEST(StampPairs, TheNearestPairGoesFirstAndEachStampOnce) {
   // 13 is the nearest to 10, but 14 is nearer to it.
   EXPECT_THAT(PairNearestStamps({10, 14}, {13, 30}, 100), ElementsAre(Pair(0, 1), Pair(1, 0)));

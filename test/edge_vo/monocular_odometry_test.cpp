@@ -128,6 +128,24 @@ TEST(MonocularOdometry, InitialisesUntilTheCameraMoves) {
   }
 }
 
+TEST(MonocularOdometry, TellsWhichFrameStandsAtTheOrigin) {
+  MonocularOdometry odometry(Slow(), SimulatedCamera().intrinsics);
+  constexpr int kCovered = 2;
+  int started = 0;
+  VoResult result;
+  for (int i = 0; i < kFrames && result.state != VoState::kTracking; ++i) {
+    MonocularFrame frame = Frame(i);
+    if (i < kCovered) frame.grey = cv::Mat(frame.grey.size(), CV_8UC1, cv::Scalar(0));
+    result = odometry.Track(frame);
+    started = i;
+  }
+  ASSERT_EQ(result.state, VoState::kTracking);
+  ASSERT_GT(started, kCovered);
+  EXPECT_EQ(odometry.start_stamp_ns(), Frame(kCovered).stamp_ns);
+  const double way_m = kSpeedMps * kFrameS * (started - kCovered);
+  EXPECT_NEAR(result.world_from_camera.translation().norm(), way_m, 0.1 * way_m);
+}
+
 TEST(MonocularOdometry, HoldsThePoseInTheDarkAndStartsAnewAfterwards) {
   MonocularOdometry::Config config = Slow();
   config.give_up_s = 0.25;

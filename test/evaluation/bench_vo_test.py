@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -95,6 +96,25 @@ class BenchVoTest(unittest.TestCase):
         after = {file.name: file.stat().st_mtime_ns for file in figures.iterdir()}
         self.assertEqual([name for name in before if after[name] != before[name]], ["room_basin.json"])
 
+    def test_a_quick_page_does_not_replace_the_published_one(self):
+        tree = self.folder / "tree"
+        published = tree / "docs" / "benchmarks" / "odometry.md"
+        published.parent.mkdir(parents=True)
+        published.write_text("published", encoding="utf-8")
+        quick = tree / "build" / "vo_benchmark" / "quick" / "odometry.md"
+        shutil.copytree(self.cache, tree / "build" / "vo_benchmark")
+        done = run(SCRIPT, "--quick", "--resume", "--root", tree, "--programs", PROGRAMS, "--sequence", self.own)
+        self.assertEqual((done.returncode, done.stdout.strip()), (0, str(quick)), done.stderr)
+        self.assertEqual(quick.read_text(encoding="utf-8"), self.page)
+        quick.unlink()
+        again = run(SCRIPT, "--again", self.cache / "quick.json", "--root", tree)
+        self.assertEqual((again.returncode, again.stdout.strip()), (0, str(quick)), again.stderr)
+        self.assertEqual(published.read_text(encoding="utf-8"), "published")
+        by_hand = {**self.results, "quick": False}
+        (self.folder / "whole.json").write_text(json.dumps(by_hand), encoding="utf-8")
+        whole = run(SCRIPT, "--again", self.folder / "whole.json", "--root", tree)
+        self.assertEqual(whole.stdout.strip(), str(published), "a whole run is published")
+
     def test_two_sequences_of_one_name_are_refused(self):
         other = self.folder / "elsewhere" / "room"
         other.mkdir(parents=True)
@@ -144,7 +164,14 @@ class BenchVoTest(unittest.TestCase):
             done = run(SCRIPT, flag, value)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
             self.assertIn(flag, done.stderr)
-        self.assertEqual(run(SCRIPT, "--fast").returncode, 2)
+        for flag in ("--fast", "--qui"):
+            done = run(SCRIPT, flag)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn(flag, done.stderr)
+        empty = self.folder / "empty.json"
+        empty.write_text("{}", encoding="utf-8")
+        done = run(SCRIPT, "--again", empty)
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
         done = run(MEASURE, "speed", self.own)
         self.assertEqual(done.returncode, 2)
         self.assertIn("tables, ablation, pixels, basin", done.stderr)

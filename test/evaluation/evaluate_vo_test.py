@@ -7,10 +7,12 @@
 import json
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 SIMULATE = sys.argv.pop()
 PROGRAM = sys.argv.pop()
@@ -51,6 +53,22 @@ def as_kitti(tum, kitti):
             file.write(" ".join(f"{value:.9f}" for row in rows for value in row) + "\n")
 
 
+def write_blank_png(path, width, height):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = (b"\0" + bytes(3 * width)) * height
+    with open(path, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+                   chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def poses(file):
+    """The lines of a trajectory, split."""
+    with open(file, encoding="ascii") as lines:
+        return [line.split() for line in lines if not line.startswith("#")]
+
+
 class EvaluateVoTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -64,10 +82,13 @@ class EvaluateVoTest(unittest.TestCase):
         cls.temporary.cleanup()
 
     def figures(self, *arguments):
+        return self.figures_and_words(*arguments)[0]
+
+    def figures_and_words(self, *arguments):
         done = run("--json", *arguments)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stdout.count("\n"), 1)
-        return json.loads(done.stdout)
+        return json.loads(done.stdout), done.stderr
 
     def refused(self, *arguments):
         done = run(*arguments)
@@ -77,9 +98,9 @@ class EvaluateVoTest(unittest.TestCase):
 
     def test_a_calm_hand_is_followed_within_millimetres_by_every_kind_of_edges(self):
         for edges in ("canny", "log", "sobel"):
-            for source in ("keyframe", "new-image"):
+            for source in ("keyframe", "new-image" if edges == "log" else "new_image"):
                 figures = self.figures(self.room, "--edges", edges, "--edge-source", source)
-                self.assertEqual((figures["frames"], figures["lost"]), (30, 0), edges)
+                self.assertEqual((figures["frames"], figures["initialising"], figures["lost"]), (30, 0, 0), edges)
                 self.assertLess(figures["ate_rmse_m"], 0.004, f"{edges} {source}")
                 self.assertLess(figures["rpe_rmse_m_per_s"], 0.006, f"{edges} {source}")
 
@@ -97,8 +118,7 @@ class EvaluateVoTest(unittest.TestCase):
     def test_the_trajectory_is_written_with_the_pictures_stamps(self):
         out = os.path.join(self.temporary.name, "out.txt")
         self.figures(self.room, "--out", out)
-        with open(out, encoding="ascii") as file:
-            rows = [line.split() for line in file if not line.startswith("#")]
+        rows = poses(out)
         self.assertEqual(len(rows), 30)
         self.assertEqual(rows[1][0], "0.066667000")
         self.assertEqual([float(value) for value in rows[0][1:]], [0, 0, 0, 0, 0, 0, 1])
@@ -140,6 +160,11 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertEqual(same["frames"], 16)
         self.assertAlmostEqual(same["ate_rmse_m"], figures["ate_rmse_m"], delta=1e-4)
 
+        shutil.rmtree(os.path.join(tum, "depth"))
+        self.assertIn("is missing", self.refused(tum), "the folder's own depth is wanted here")
+        self.assertEqual(self.figures(tum, "--stereo")["ate_rmse_m"], figures["ate_rmse_m"])
+        self.assertEqual(self.figures(tum, "--mono")["depth"], "mono")
+
         self.assertIn("accepted is 1, 2 or 4", self.refused(tum, "--stereo", "--stereo-scale", "3"))
         self.assertIn("--stereo-scale needs --stereo", self.refused(tum, "--stereo-scale", "2"))
         os.remove(os.path.join(kitti, "image_1", "000007.png"))
@@ -165,17 +190,67 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertEqual((alone["depth"], alone["lost"]), ("mono", 0), "a drive without depth needs no flag")
         self.assertLess(alone["end_error_percent"], 3)
 
+        by_height = self.figures(kitti, "--scale", "height", "--camera-height", "1.4", "--camera-pitch", "0.07")
+        self.assertNotEqual(by_height["ate_rmse_m"], alone["ate_rmse_m"])
+
+        self.assertIn("--camera needs TUM's", self.refused(kitti, "--camera", os.path.join(street, "camera.yaml")))
         self.assertIn("needs depth", self.refused(kitti, "--method", "rgbd"))
         self.assertIn("accepted are speed, height", self.refused(kitti, "--scale", "gps"))
         os.remove(os.path.join(kitti, "poses.txt"))
         self.assertIn("--scale height", self.refused(kitti))
+
+    def test_frames_of_one_eye_before_its_start_have_no_pose(self):
+        tum, kitti = (os.path.join(self.temporary.name, name) for name in ("begin", "begin_kitti"))
+        street_with_two_eyes(tum)
+        as_kitti(tum, kitti)
+        out = os.path.join(self.temporary.name, "begin.txt")
+        figures = self.figures(kitti, "--out", out)
+        waiting = figures["initialising"]
+        self.assertGreater(waiting, 0, "frame 1 is too near to frame 0")
+        rows = poses(out)
+        self.assertEqual((figures["frames"], figures["estimate_poses"], len(rows)), (16, 16 - waiting, 16 - waiting))
+        self.assertEqual(rows[0], "0.000000000 0 0 0 0 0 0 1".split(), "the first frame is the origin")
+        self.assertEqual([row[0] for row in rows[1:]], [f"{i / 10:.9f}" for i in range(waiting + 1, 16)])
+        self.assertLess(figures["ate_max_m"], 0.01 * figures["length_m"])
+        self.assertEqual(dict(line.split() for line in run(kitti).stdout.splitlines())["initialising"], str(waiting))
+
+        # The lens is covered at first: the origin is the frame that the start began with.
+        pictures = os.path.join(kitti, "image_0")
+        blank = os.path.join(self.temporary.name, "blank.png")
+        write_blank_png(blank, 320, 240)
+        for number in range(3):
+            shutil.copy(blank, os.path.join(pictures, f"{number:06}.png"))
+        covered = self.figures(kitti, "--out", out)
+        rows = poses(out)
+        self.assertEqual(rows[0], "0.300000000 0 0 0 0 0 0 1".split())
+        self.assertEqual((covered["initialising"], covered["lost"], len(rows)), (3 + waiting, 0, 13 - waiting))
+        self.assertLess(covered["ate_max_m"], 0.01 * figures["length_m"])
+
+    def test_one_eye_that_never_starts_says_so_and_has_no_errors(self):
+        tum, still = (os.path.join(self.temporary.name, name) for name in ("stands", "stands_kitti"))
+        street_with_two_eyes(tum)
+        as_kitti(tum, still)
+        moving = self.figures(still)
+        for number in range(1, 16):
+            shutil.copy(os.path.join(still, "image_0", "000000.png"),
+                        os.path.join(still, "image_0", f"{number:06}.png"))
+        out = os.path.join(self.temporary.name, "still.txt")
+        figures, words = self.figures_and_words(still, "--out", out)
+        self.assertEqual((figures["frames"], figures["initialising"], figures["lost"]), (16, 16, 0))
+        self.assertEqual(list(figures), list(moving))
+        for key in ("ate_rmse_m", "ate_max_m", "segment_translation_percent", "end_error_percent", "pairs"):
+            self.assertIsNone(figures[key], key)
+        self.assertIn("never started in 16 frames", words)
+        self.assertEqual(poses(out), [])
 
     def test_one_eye_keeps_the_bar_on_a_real_drive(self):
         drive = os.path.join(DATA, "mono", "kitti_a")
         if not os.path.isdir(drive):
             self.skipTest("skipped, no data")
         figures = self.figures(drive)
-        self.assertEqual((figures["frames"], figures["lost"]), (51, 0))
+        self.assertEqual((figures["frames"], figures["initialising"], figures["lost"]), (51, 1, 0))
+        self.assertEqual(figures["estimate_poses"], 50)
+        self.assertLess(figures["ate_max_m"], 0.1, "no pose is made up")
         self.assertLess(figures["segment_translation_percent"], 3)
         self.assertLess(figures["end_error_percent"], 3)
 
@@ -187,20 +262,63 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertRegex(rows["ate_rmse_m"], r"^0\.0*[1-9]\d{0,3}$")
 
     def test_without_truth_its_figures_are_null(self):
+        with_truth = self.figures(self.room)
         os.rename(os.path.join(self.room, "groundtruth.txt"), os.path.join(self.room, "away"))
         try:
             figures = self.figures(self.room)
         finally:
             os.rename(os.path.join(self.room, "away"), os.path.join(self.room, "groundtruth.txt"))
-        self.assertIsNone(figures["ate_rmse_m"])
+        self.assertEqual(list(figures), list(with_truth), "no key is left out")
+        for key in list(figures)[:list(figures).index("median_ms")]:
+            self.assertIsNone(figures[key], key)
         self.assertGreater(figures["median_ms"], 0)
+        self.assertEqual((figures["frames"], figures["lost"]), (30, 0))
 
     def test_mistakes_are_refused_in_one_sentence(self):
         self.assertIn("/nowhere", self.refused("/nowhere"))
         self.assertIn("canny, log, sobel", self.refused(self.room, "--edges", "prewitt"))
         self.assertIn("edge, rgbd, rgbd-icp", self.refused(self.room, "--method", "orb"))
         self.assertIn("/no/camera", self.refused(self.room, "--camera", "/no/camera.yaml"))
-        self.assertIn("structured_model", self.refused(self.room, "--edges", "structured"))
+        self.assertIn("--edge-model FILE", self.refused(self.room, "--edges", "structured"))
+        self.assertIn("which is no file",
+                      self.refused(self.room, "--edges", "structured", "--edge-model", "/nowhere/model.yml.gz"))
+        self.assertIn("is no folder", self.refused(os.path.join(self.room, "camera.yaml")))
+        empty = os.path.join(self.temporary.name, "empty")
+        os.mkdir(empty)
+        self.assertIn("is no sequence", self.refused(empty))
+
+    def test_flags_that_would_be_passed_over_are_refused(self):
+        for flags, words in (
+                ("--stereo --mono", "--stereo left out"),
+                ("--scale speed", "--scale tells one eye metres: it needs --mono"),
+                ("--scale height", "--scale tells one eye metres: it needs --mono"),
+                ("--speed-sigma 0.2", "--speed-sigma tells one eye metres: it needs --mono"),
+                ("--mono --camera-height 1.4", "--camera-height needs --scale height"),
+                ("--mono --scale speed --camera-pitch 0.1", "--camera-pitch needs --scale height"),
+                ("--mono --scale height --speed-sigma 0.2", "--speed-sigma needs --scale speed"),
+                ("--mono --seed 4", "--seed needs --speed-sigma"),
+                ("--edge-model somewhere", "--edge-model needs --edges structured"),
+                ("--method rgbd --edges log", "--edges needs --method edge"),
+                ("--method rgbd --keyframe-every 2", "--keyframe-every needs --method edge"),
+                ("--method rgbd-icp --edge-source keyframe", "--edge-source needs --method edge"),
+                ("--keyframe-every 1.5", "accepted is a whole number from 1 to 10000"),
+                ("--step 1.5", "accepted is a whole number from 1 to 1000"),
+                ("--step nan", "accepted is a whole number from 1 to 1000"),
+                ("--stereo --stereo-scale 1.5", "accepted is a whole number from 1 to 4"),
+                ("--mono --speed-sigma 0.1 --seed 1.5", "accepted is a whole number")):
+            with self.subTest(flags):
+                self.assertIn(words, self.refused(self.room, *flags.split()))
+
+    def test_a_trajectory_that_cannot_be_written_is_refused_before_the_work(self):
+        words = self.refused(self.room, "--out", "/nowhere/trajectory.txt")
+        self.assertIn("--out is '/nowhere/trajectory.txt'", words)
+        self.assertNotIn("following", words)
+        kept = os.path.join(self.temporary.name, "kept.txt")
+        with open(kept, "w", encoding="ascii") as file:
+            file.write("an earlier one")
+        self.refused(self.room, "--out", kept, "--method", "rgbd", "--edges", "log")
+        with open(kept, encoding="ascii") as file:
+            self.assertEqual(file.read(), "an earlier one")
 
     def test_real_sequences_are_followed_within_the_bars(self):
         bars = {"seven_scenes_a": (0.024, 0.039), "realsense_sample": (0.030, 0.030)}

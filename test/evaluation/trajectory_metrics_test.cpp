@@ -205,6 +205,15 @@ TEST(TrajectoryFigures, HaveNoKittiErrorsOnAPathOfUpTo100M) {
   EXPECT_FALSE(json.contains("scale"));
 }
 
+TEST(TrajectoryFigures, ThatAreMissingHaveTheSameKeysAndAllNull) {
+  const auto measured = ToJson(EvaluateTrajectory(Drive(20), Drive(20), {}));
+  const auto missing = NullFigures();
+  ASSERT_EQ(missing.size(), measured.size());
+  for (const auto& [key, value] : measured.items()) {
+    EXPECT_TRUE(missing.contains(key) && missing[key].is_null()) << key;
+  }
+}
+
 TEST(TrajectoryFigures, GapsOfTheEstimateAreToldAndOfTheTruthLeftOut) {
   const auto drive = Drive(300);
   auto with_gap = drive;
