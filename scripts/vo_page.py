@@ -254,7 +254,7 @@ def pixels_section(sequences):
                 for row in sequence["pixels"]["rows"]]
         fit = vo_plots.line_through(sequence["pixels"]["rows"])
         text += (f"\n**{sequence['name']}**, {sequence['pixels']['frames']} frames; a line through the tracked times: "
-                 f"{fit[1]:.2f} ms + {1000 * fit[0]:.3f} us per pixel of the finest level (R^2 {fit[2]:.3f}):\n\n" +
+                 f"{fit[1]:.2f} ms + {1000 * fit[0]:.3f} us per pixel of the finest level, all within {fit[2]:.0%}:\n\n" +
                  table(["pixels", "points of the finest level", "tracked (ms)", "keyframe (ms)", "ATE (m)", "lost"],
                        rows))
     return text

@@ -29,14 +29,15 @@ def panels(rows, columns):
 
 
 def line_through(rows):
-    """Slope, intercept and R^2 of the least-squares line through tracked_ms over points."""
+    """Slope and intercept of the line through tracked_ms over points that has the least squares of its relative
+    errors, and the greatest of these."""
     points = [(row["points"], row["tracked_ms"]) for row in rows if row["points"] and row["tracked_ms"]]
-    mean_x, mean_y = (statistics.mean(values) for values in zip(*points))
-    spread_x = sum((x - mean_x) ** 2 for x, _ in points)
-    slope = sum((x - mean_x) * (y - mean_y) for x, y in points) / spread_x
+    weights = [1 / y**2 for _, y in points]
+    mean_x, mean_y = (sum(w * value for w, value in zip(weights, values)) / sum(weights) for values in zip(*points))
+    spread_x = sum(w * (x - mean_x) ** 2 for w, (x, _) in zip(weights, points))
+    slope = sum(w * (x - mean_x) * (y - mean_y) for w, (x, y) in zip(weights, points)) / spread_x
     intercept = mean_y - slope * mean_x
-    rest = sum((y - intercept - slope * x) ** 2 for x, y in points)
-    return slope, intercept, 1 - rest / sum((y - mean_y) ** 2 for _, y in points)
+    return slope, intercept, max(abs((intercept + slope * x) / y - 1) for x, y in points)
 
 
 def scale_errors(axis, most, least):
@@ -83,7 +84,7 @@ def draw_pixels(sequences, path):
         counts = sorted(row["points"] for row in rows)
         axis.plot([count / 1000 for count in counts], [intercept + slope * count for count in counts],
                   color="#888888", linewidth=1, zorder=0,
-                  label=f"{intercept:.1f} ms + {1000 * slope:.3f} us per pixel")
+                  label=f"{intercept:.2f} ms + {1000 * slope:.3f} us per pixel")
         axis.set(title=sequence["name"], xlabel="pixels of the finest level (thousands)", ylabel="tracked frame (ms)",
                  xscale="log", yscale="log")
         for numbered in (axis.xaxis, axis.yaxis):

@@ -69,13 +69,13 @@ class EdgeOdometry {
     /// A keyframe every so many frames; 1 is frame to frame, 0 only by the rules below.
     int keyframe_every = 0;
     /// A new keyframe when less than this share of the points is in view,
-    double keyframe_overlap = 0.80;
+    double keyframe_overlap = 0.6;
     /// or the points moved further than this on average, share of the image's width; if they do
     double keyframe_motion = 0.018;
     /// in a single step already: then further than so many steps, or than this share of the width:
     /// a keyframe costs more than a frame, and a fast camera would make every frame one,
-    double keyframe_steps = 2.5;
-    double keyframe_most_motion = 0.09;
+    double keyframe_steps = 3.5;
+    double keyframe_most_motion = 0.13;
     /// or the residuals grew by this factor since the keyframe's first frame.
     double keyframe_sigma_ratio = 1.6;
 
