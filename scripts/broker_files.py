@@ -1,4 +1,4 @@
-"""What both kinds of broker share, the one with passwords and the one with certificates: names, private files, rights, limits."""
+"""What the broker with passwords and the one with certificates share: names, private files, rights, limits."""
 
 import argparse
 import os
