@@ -173,6 +173,14 @@ class Authority:
         return next((entry for entry in self.register["certificates"]
                      if entry["vehicle"] == vehicle and not entry["revoked"]), None)
 
+    def known(self, vehicle):
+        """Whether the vehicle ever had a certificate."""
+        return any(entry["vehicle"] == vehicle for entry in self.register["certificates"])
+
+    def revoked_vehicles(self):
+        names = {entry["vehicle"] for entry in self.register["certificates"]}
+        return sorted(name for name in names if not self.valid_entry(name))
+
     def enroll(self, vehicle, days):
         """Issues the vehicle's folder and returns its path."""
         folder = self.path("vehicles", vehicle)
@@ -209,21 +217,14 @@ class Authority:
     def write_revoked(self):
         """The list of revoked certificates, crl.pem.
 
-        OpenSSL keeps the older of two lists of the same second, and refuses everybody by a list from the
-        future: so each is dated a second or more after the last, beginning an hour ago.
+        An old list would make the broker refuse everybody; ours never leaves this machine, so it cannot be outdated.
         """
-        number, dated = self.register["list_number"] + 1, now() - BACKDATED
-        if self.register["list_dated"]:
-            last = datetime.datetime.fromisoformat(self.register["list_dated"])
-            dated = max(dated, last + datetime.timedelta(seconds=1))
-        if dated > now():
-            raise Usage(f"the clock says {now()} UTC, which is not after the last list of revoked certificates "
-                        f"({dated}): set the clock and try again")
-        # An old list makes the broker refuse everybody; ours never leaves this machine, so it cannot be outdated.
+        self.register["list_number"] += 1
+        self.save()
         builder = (
             x509.CertificateRevocationListBuilder().issuer_name(self.certificate.subject)
-            .last_update(dated).next_update(self.certificate.not_valid_after)
-            .add_extension(x509.CRLNumber(number), critical=False)
+            .last_update(now() - BACKDATED).next_update(self.certificate.not_valid_after)
+            .add_extension(x509.CRLNumber(self.register["list_number"]), critical=False)
             .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key()),
                            critical=False))
         for entry in self.register["certificates"]:
@@ -231,8 +232,6 @@ class Authority:
                 builder = builder.add_revoked_certificate(
                     x509.RevokedCertificateBuilder().serial_number(int(entry["serial"], 16))
                     .revocation_date(datetime.datetime.fromisoformat(entry["revoked"])).build())
-        self.register.update(list_number=number, list_dated=dated.isoformat())
-        self.save()
         write_private(self.path("crl.pem"), certificate_pem(builder.sign(self.key, hashes.SHA256())))
 
 
@@ -258,8 +257,7 @@ def make_authority(directory, zone):
     os.makedirs(os.path.join(directory, "authority"), mode=0o700, exist_ok=True)
     write_private(os.path.join(directory, "authority", "key.pem"), key_pem(key))
     write_private(os.path.join(directory, "authority", "ca.pem"), certificate_pem(certificate))
-    register = {"format": FORMAT, "zone": zone, "hosts": None, "list_number": 0, "list_dated": None,
-                "certificates": []}
+    register = {"format": FORMAT, "zone": zone, "hosts": None, "list_number": 0, "certificates": []}
     write_private(os.path.join(directory, REGISTER), json.dumps(register, indent=1) + "\n")
 
 

@@ -16,10 +16,15 @@ from zone_authority import certificate_pem, key_pem
 BROKER_TIMEOUT_S = 10
 
 
-def rights(zone):
-    """The same for every vehicle, so that enrolling one changes nothing here. mosquitto warns at start that the last
-    line has no %u: it is meant so."""
+def rights(zone, revoked):
+    """The same for every vehicle, so that enrolling one changes nothing here. mosquitto warns at start that one
+    pattern has no %u: it is meant so.
+
+    Revoked vehicles lose their rights as well: mosquitto looks at a certificate when TLS begins, so a connection that
+    was opened before the revocation can log in after it.
+    """
     prefix = f"livemap/v1/{zone}"
+    denied = [line for vehicle in revoked for line in (f"user {vehicle}", "topic deny #", "")]
     return "\n".join([
         f"user {ZONE_USER}",
         f"topic read {prefix}/vehicle/+/report",
@@ -27,6 +32,7 @@ def rights(zone):
         f"topic write {prefix}/vehicle/+/receipt",
         f"topic write {prefix}/notice",
         "",
+        *denied,
         *vehicle_rights(zone),
         f"pattern read {prefix}/notice",
         "",
@@ -62,13 +68,17 @@ def configuration(directory, address, port, max_message_bytes):
     ]) + "\n"
 
 
+def write_rights(authority):
+    write_private(authority.path("acl"), rights(authority.register["zone"], authority.revoked_vehicles()))
+
+
 def write_configuration(authority, address, port, max_message_bytes):
     """Writes what mosquitto reads and returns the path of its configuration."""
     directory = authority.directory
     authority.register.update(address=address, port=port)
     authority.save()
     os.makedirs(os.path.join(directory, "data"), mode=0o700, exist_ok=True)
-    write_private(os.path.join(directory, "acl"), rights(authority.register["zone"]))
+    write_rights(authority)
     path = os.path.join(directory, "mosquitto.conf")
     write_private(path, configuration(directory, address, port, max_message_bytes))
     return path
@@ -95,6 +105,17 @@ def reload(pid):
                     f"run as its user: kill -HUP {pid}") from error
 
 
+def tell_broker(authority, vehicle):
+    """Makes a running broker know who is revoked, and ends the connection under this vehicle's name; returns the
+    broker's process id, None where none runs."""
+    write_rights(authority)
+    pid = running_broker(authority.directory)
+    if pid:
+        reload(pid)
+        end_session(authority, vehicle)
+    return pid
+
+
 def connect_packet(client_id):
     """MQTT v5 CONNECT: clean start, no session afterwards, keepalive of 60 s."""
     body = b"\0\4MQTT\5\2\0\x3c\0" + len(client_id).to_bytes(2, "big") + client_id.encode("ascii")
@@ -104,7 +125,7 @@ def connect_packet(client_id):
 def end_session(authority, vehicle):
     """Throws a connected vehicle out of the running broker, with all that the broker keeps for it.
 
-    mosquitto checks certificates only when a client connects. But a second login of the same name ends the
+    mosquitto checks certificates only when TLS begins. But a second login of the same name ends the
     first: so the zone logs in once with the vehicle's name, by a certificate that exists for this moment.
     The broker takes this login after it read the new list: it handles the signal before the next connection's data.
     """
@@ -129,5 +150,5 @@ def end_session(authority, vehicle):
                 raise OSError(f"it answered {answer.hex() or 'nothing'}")
             connection.sendall(b"\xe0\0")
     except OSError as error:
-        raise Usage(f"vehicle '{vehicle}' cannot log in any more, but a connection it has now could not be ended "
-                    f"({error}): restart the broker") from error
+        raise Usage(f"the running broker knows of the change, but a connection that vehicle '{vehicle}' has now could "
+                    f"not be ended ({error}): restart the broker") from error

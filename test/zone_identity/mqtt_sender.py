@@ -47,7 +47,8 @@ def tls_context(identity, authority=None, version=ssl.TLSVersion.TLSv1_3, certif
 class Sender:
     """One connection; every method waits for the broker's answer and raises Refused when there is none."""
 
-    def __init__(self, port, context, client_id="", version=5, will=None, resume=None, keep_session=False):
+    def __init__(self, port, context, client_id="", version=5, will=None, resume=None, keep_session=False, wait=None):
+        """`wait` is called between the TLS handshake and the login."""
         self.version, self.packet_id, self.messages = version, 0, collections.deque()
         self.buffer = b""
         plain = socket.create_connection(("127.0.0.1", port), PATIENCE_S)
@@ -55,6 +56,8 @@ class Sender:
             self.connection = plain
             if context:
                 self.connection = context.wrap_socket(plain, server_hostname="127.0.0.1", session=resume)
+            if wait:
+                wait()
             self.acceptance = self.request(0x10, self.connect_body(client_id, will, keep_session), CONNACK)
             if self.acceptance[1]:
                 raise Refused(f"MQTT reason {self.acceptance[1]}")

@@ -228,12 +228,37 @@ class RevocationTest(unittest.TestCase):
         self.assert_revoked("car-1")
         self.assertIn(other.publish(topic("car-2", "report"), b"undisturbed"), ACCEPTED)
 
-    def test_two_revocations_within_a_second_both_hold(self):
+    def test_who_opened_tls_before_its_revocation_and_logs_in_after_it_can_do_nothing(self):
         self.zone.start()
-        self.zone.revoke("car-1")
-        self.zone.revoke("car-2")
-        self.assert_revoked("car-1")
-        self.assert_revoked("car-2")
+        zone = self.zone.connect("zone")
+        self.addCleanup(zone.close)
+        zone.subscribe(topic("+", "report"))
+        sleeper = self.connect("car-1", wait=lambda: self.zone.revoke("car-1"))
+        self.assertEqual(sleeper.publish(topic("car-1", "report"), b"still here"), NOT_AUTHORIZED)
+        for topic_filter in (NOTICE, topic("car-1", "receipt")):
+            sleeper.subscribe(topic_filter)
+            zone.publish(topic_filter, b"not for the revoked")
+        # A message would stand before this answer.
+        sleeper.subscribe(NOTICE)
+        self.assertEqual(list(sleeper.messages), [])
+        self.connect("car-2").publish(topic("car-2", "report"), b"welcome")
+        self.assertEqual(zone.receive(), Message(topic("car-2", "report"), b"welcome"))
+
+    def test_such_a_connection_ends_before_its_name_is_given_to_another(self):
+        self.zone.start()
+        sleeper = self.connect("car-1", wait=lambda: self.zone.revoke("car-1"))
+        self.contexts["car-1"] = tls_context(self.zone.enroll("car-1"))
+        self.assertEqual(sleeper.ended(), "connection closed")
+        self.assertIn(self.connect("car-1").publish(topic("car-1", "report"), b"new"), ACCEPTED)
+
+    def test_revocations_in_quick_succession_all_hold(self):
+        self.zone.start()
+        names = [f"car-{number}" for number in range(10, 16)]
+        self.contexts.update({name: tls_context(self.zone.enroll(name)) for name in names})
+        for name in names:
+            self.zone.revoke(name)
+        for name in names:
+            self.assert_revoked(name)
 
     def test_a_revoked_vehicle_cannot_resume_its_tls_session(self):
         self.zone.start()
