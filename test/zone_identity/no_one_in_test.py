@@ -187,6 +187,13 @@ class NoOneInTest(unittest.TestCase):
         self.assertEqual(car.publish(topic("car-1", "report"), b"small"), 0)
         self.assertEqual(zone.receive().payload, b"small")
 
+    def test_mqtt_3_is_cut_off_without_a_reason_for_an_oversize_packet_or_a_retained_message(self):
+        for payload, retain in ((bytes(MAX_MESSAGE_BYTES + 8192), False), (b"for ever", True)):
+            car = self.connect("car-1", version=4)
+            with self.assertRaises(Refused) as refused:
+                car.publish(topic("car-1", "report"), payload, retain=retain)
+            self.assertNotIn("MQTT reason", str(refused.exception))
+
     def test_a_retained_message_ends_the_connection_with_the_reason(self):
         car = self.connect("car-1")
         with self.assertRaises(Refused) as refused:
