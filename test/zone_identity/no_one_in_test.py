@@ -11,7 +11,7 @@ import unittest
 
 from mqtt_sender import (ACCEPTED, NOT_AUTHORIZED, PACKET_TOO_LARGE, RETAIN_NOT_SUPPORTED, Message, Refused, Sender,
                          Will, tls_context)
-from zone_fixture import NOTICE, Zone, topic
+from zone_fixture import NOTICE, Zone, free_port, livemap_zone, topic
 
 MAX_MESSAGE_BYTES = 1 << 20
 GRANTED_QOS_1 = 1
@@ -313,6 +313,19 @@ class RevocationTest(unittest.TestCase):
         self.zone.succeed("init", self.zone.directory, "--zone", "test", "--port", self.zone.port)
         self.zone.start()
         self.assert_revoked("car-1")
+
+    def test_a_connection_that_could_not_be_ended_is_told_and_ended_by_another_revoke(self):
+        self.zone.start()
+        car = self.connect("car-1")
+        init = ("init", self.zone.directory, "--zone", "test", "--port")
+        self.zone.succeed(*init, free_port())
+        result = livemap_zone("revoke", "car-1", "--dir", self.zone.directory)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("could not be ended", result.stderr)
+        self.assertEqual(car.publish(topic("car-1", "report"), b"still here"), NOT_AUTHORIZED)
+        self.zone.succeed(*init, self.zone.port)
+        self.zone.revoke("car-1")
+        self.assertEqual(car.ended(), "connection closed")
 
     def test_sessions_and_queues_survive_an_orderly_restart(self):
         self.zone.start()
