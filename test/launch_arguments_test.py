@@ -55,6 +55,12 @@ class LaunchArguments(unittest.TestCase):
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
 
+    def test_a_folder_of_certificates_gives_the_bridge_its_three_files_on_both_sides(self):
+        for launch in NODES:
+            dumped = parameters(f"{launch}.launch", "identity:=/etc/livemap/identity")
+            for name, file in (("ca_file", "ca.pem"), ("certificate_file", "certificate.pem"), ("key_file", "key.pem")):
+                self.assertEqual(dumped[f"/mqtt_bridge/{name}"], f"/etc/livemap/identity/{file}")
+
     def test_with_two_eyes_odometry_listens_to_the_depth_of_camera_ingest(self):
         wanted = {(): "camera/depth/image_raw", ("stereo:=true",): "camera_rect/depth/image_raw",
                   ("stereo:=true", "depth:=own/depth"): "own/depth"}

@@ -226,6 +226,9 @@ class MqttBridgeTest(unittest.TestCase):
             ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/HazardNotice",
                           "direction": "sideways", "mqtt_topic": "x"}]}, "accepted is in or out"),
             ({"password_file": "/nowhere", "password_wait_s": 0.0}, "/nowhere"),
+            ({"ca_file": "/nowhere", "certificate_file": "/nowhere"}, "parameter 'key_file' of the bridge is missing"),
+            ({"ca_file": "/nowhere", "certificate_file": "/nowhere", "key_file": "/nowhere"},
+             "MQTT ca_file is '/nowhere', accepted is a PEM file that can be read"),
         ]
         for number, (spoiled, sentence) in enumerate(cases):
             with self.subTest(sentence):

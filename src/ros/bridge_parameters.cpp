@@ -158,6 +158,27 @@ void ReadMqttOptions(ParameterReader& parameters, MqttOptions& mqtt) {
   read_size("max_packet_bytes", mqtt.max_packet_bytes, 1 << 28);
 }
 
+/// The three TLS files, or none of them.
+std::optional<MqttTlsOptions> ReadTlsOptions(ParameterReader& parameters) {
+  MqttTlsOptions tls;
+  const std::pair<const char*, std::string*> files[] = {{"ca_file", &tls.ca_file},
+                                                        {"certificate_file", &tls.certificate_file},
+                                                        {"key_file", &tls.key_file}};
+  bool any = false;
+  for (const auto& [name, path] : files) {
+    parameters.Read(name, *path);
+    any = any || !path->empty();
+  }
+  if (!any) return std::nullopt;
+  for (const auto& [name, path] : files) {
+    if (path->empty()) {
+      throw Error("parameter '" + std::string(name) +
+                  "' of the bridge is missing, ca_file, certificate_file and key_file go together");
+    }
+  }
+  return tls;
+}
+
 }  // namespace
 
 BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
@@ -179,6 +200,7 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
   parameters.Read("password_wait_s", config.password_wait_s, {0, 600});
   parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.1, 60});
   ReadMqttOptions(parameters, config.mqtt);
+  config.mqtt.tls = ReadTlsOptions(parameters);
   config.mqtt.client_id = config.user;
   config.mqtt.user = config.user;
   config.topics = ReadTopics(parameters);

@@ -1,8 +1,10 @@
 #include "transport/mosquitto_handle.h"
 
 #include <mqtt_protocol.h>
+#include <unistd.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <mutex>
 #include <system_error>
 
@@ -29,10 +31,19 @@ void InitializeLibraryOnce() {
   std::call_once(once, [] { mosquitto_lib_init(); });
 }
 
+void CheckTlsOptions(const MqttTlsOptions& tls) {
+  for (const auto& [name, path] : {std::pair{"ca_file", tls.ca_file},
+                                   {"certificate_file", tls.certificate_file},
+                                   {"key_file", tls.key_file}}) {
+    std::error_code ignored;
+    Require(std::filesystem::is_regular_file(path, ignored) && access(path.c_str(), R_OK) == 0,
+            name, path, "a PEM file that can be read");
+  }
+}
+
 void SetTls(mosquitto* handle, const MqttTlsOptions& tls) {
-  const auto path = [](const std::string& text) { return text.empty() ? nullptr : text.c_str(); };
-  RequireSuccess(mosquitto_tls_set(handle, path(tls.ca_file), nullptr, path(tls.certificate_file),
-                                   path(tls.key_file), nullptr),
+  RequireSuccess(mosquitto_tls_set(handle, tls.ca_file.c_str(), nullptr,
+                                   tls.certificate_file.c_str(), tls.key_file.c_str(), nullptr),
                  "cannot use the TLS files '" + tls.ca_file + "', '" + tls.certificate_file +
                      "', '" + tls.key_file + "'");
   constexpr int kVerifyPeer = 1;
@@ -55,6 +66,7 @@ void CheckMqttOptions(const MqttOptions& options) {
           std::to_string(options.max_inflight), "1 to 65535");
   Require(options.max_packet_bytes > 0, "max_packet_bytes",
           std::to_string(options.max_packet_bytes), "above 0");
+  if (options.tls) CheckTlsOptions(*options.tls);
 }
 
 MosquittoHandle MakeMosquittoHandle(const MqttOptions& options, void* user_data) {
@@ -99,6 +111,11 @@ int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::s
 std::string DescribeMosquittoError(int code) {
   if (code == MOSQ_ERR_ERRNO) return std::generic_category().message(errno);
   return mosquitto_strerror(code);
+}
+
+std::string TlsErrorIn(const std::string& log_line) {
+  if (log_line.rfind("OpenSSL Error", 0) != 0) return "";
+  return log_line.substr(log_line.rfind(':') + 1);
 }
 
 std::string DescribeReason(int reason_code) {

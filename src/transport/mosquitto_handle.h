@@ -27,6 +27,10 @@ int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::s
 /// The library's result code in words, with the system's own error where that is the cause.
 std::string DescribeMosquittoError(int code);
 
+/// OpenSSL's words in a line that the library logs, e.g. "sslv3 alert certificate revoked"; empty
+/// when the line is about something else.
+std::string TlsErrorIn(const std::string& log_line);
+
 /// "Not authorized (MQTT reason 135)".
 std::string DescribeReason(int reason_code);
 

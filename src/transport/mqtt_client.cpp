@@ -67,6 +67,8 @@ class MqttClient::Connection {
     mosquitto_publish_v5_callback_set(handle_.get(), &OnPublish);
     mosquitto_subscribe_v5_callback_set(handle_.get(), &OnSubscribe);
     mosquitto_message_v5_callback_set(handle_.get(), &OnMessage);
+    // Only its log tells why a TLS connection was refused.
+    if (options_.tls) mosquitto_log_callback_set(handle_.get(), &OnLog);
     thread_ = std::thread([this] { Run(); });
   }
 
@@ -120,6 +122,7 @@ class MqttClient::Connection {
   /// One connection from the probe to its loss; leaves the cause in loss_reason_.
   void Attempt() {
     loss_reason_.clear();
+    tls_error_.clear();
     // The library's blocking connect cannot be interrupted and waits minutes for a silent host:
     // let it try only what has just answered.
     const TcpProbeResult probe =
@@ -130,7 +133,7 @@ class MqttClient::Connection {
     }
     const int code = ConnectMosquitto(handle_.get(), options_, probe.numeric_address);
     if (code != MOSQ_ERR_SUCCESS) {
-      loss_reason_ = "cannot connect to the broker: " + DescribeMosquittoError(code);
+      loss_reason_ = "cannot connect to the broker: " + DescribeLoss(code);
       return;
     }
     Serve();
@@ -153,7 +156,7 @@ class MqttClient::Connection {
       }
       if (code == MOSQ_ERR_SUCCESS) code = mosquitto_loop_misc(handle_.get());
       if (code != MOSQ_ERR_SUCCESS) {
-        Explain("the connection to the broker was lost: " + DescribeMosquittoError(code));
+        Explain("the connection to the broker was lost: " + DescribeLoss(code));
         return;
       }
     }
@@ -214,6 +217,10 @@ class MqttClient::Connection {
   /// The first cause counts: what follows from it says less.
   void Explain(const std::string& reason) {
     if (loss_reason_.empty()) loss_reason_ = reason;
+  }
+
+  std::string DescribeLoss(int code) const {
+    return tls_error_.empty() ? DescribeMosquittoError(code) : "TLS: " + tls_error_;
   }
 
   void EndConnection() {
@@ -322,6 +329,14 @@ class MqttClient::Connection {
     Guarded(self, [=](Connection& connection) { connection.HandleMessage(*message); });
   }
 
+  static void OnLog(mosquitto*, void* self, int level, const char* line) {
+    if (level != MOSQ_LOG_ERR) return;
+    Guarded(self, [=](Connection& connection) {
+      const std::string words = TlsErrorIn(line);
+      if (!words.empty()) connection.tls_error_ = words;
+    });
+  }
+
   const MqttOptions options_;
   const std::vector<MqttSubscription> subscriptions_;
   const MqttCallbacks callbacks_;
@@ -339,6 +354,7 @@ class MqttClient::Connection {
   std::map<int, MqttPublishOutcome> inflight_;  ///< By packet id.
   bool logged_in_ = false;
   std::string loss_reason_;
+  std::string tls_error_;  ///< Of this attempt, in OpenSSL's words.
 
   std::thread thread_;  // Last: it uses everything above.
 };

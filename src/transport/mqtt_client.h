@@ -13,8 +13,8 @@
 
 namespace livemap {
 
-/// Mutual TLS: the broker must show a certificate that `ca_file` signed, for the name in
-/// MqttOptions::host; the client shows its own. PEM files.
+/// Mutual TLS 1.3: the broker must show a certificate that `ca_file` signed, for the name in
+/// MqttOptions::host; the client shows its own. PEM files, all three required.
 struct MqttTlsOptions {
   std::string ca_file;
   std::string certificate_file;
