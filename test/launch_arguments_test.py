@@ -84,7 +84,7 @@ class LaunchArguments(unittest.TestCase):
                       if node.get("respawn") == "true" and "Nodelet" in node.get("args", "")]
             self.assertGreater(len(loaded), 0, launch)
             for node in loaded:
-                self.assertIn(node.get("respawn_delay"), ("$(arg respawn_delay)", "5"), node.get("name"))
+                self.assertIn(node.get("respawn_delay"), ("$(arg respawn_delay)", "2"), node.get("name"))
 
     def test_a_replay_runs_the_detector_unless_told_otherwise_or_the_bags_labels_answer(self):
         wanted = {(): True, ("use_truth:=true",): False, ("detect:=false",): False,

@@ -4,14 +4,13 @@
 #include <vector>
 
 #include "base/error.h"
+#include "geo/wgs84.h"
 #include "measurements.h"
 #include "pair_alignment.h"
 #include "tools/command_line.h"
 
 namespace livemap {
 namespace {
-
-constexpr double kRadiansPerDegree = M_PI / 180;
 
 /// How wrong the guesses of one row are.
 struct Offset {

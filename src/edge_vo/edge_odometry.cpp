@@ -18,25 +18,6 @@ constexpr double kLeastCondition = 1e-12;
 /// Light that fades further than this, or grows, between two images is a covered lens.
 constexpr double kLeastBelievedGain = 0.3;
 
-std::string SizeText(const cv::Mat& image) {
-  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
-}
-
-const CameraIntrinsics& Checked(const CameraIntrinsics& camera) {
-  const bool finite = std::isfinite(camera.fx) && std::isfinite(camera.fy) &&
-                      std::isfinite(camera.cx) && std::isfinite(camera.cy);
-  if (!finite || camera.fx <= 0 || camera.fy <= 0) {
-    throw Error("the camera has no usable calibration: focal lengths and principal point are fx " +
-                std::to_string(camera.fx) + ", fy " + std::to_string(camera.fy) + ", cx " +
-                std::to_string(camera.cx) + ", cy " + std::to_string(camera.cy));
-  }
-  if (camera.width < 32 || camera.height < 32 || camera.width > 8192 || camera.height > 8192) {
-    throw Error("the camera's image size is " + std::to_string(camera.width) + "x" +
-                std::to_string(camera.height) + "; accepted are 32x32 to 8192x8192");
-  }
-  return camera;
-}
-
 AlignmentConfig RotationOnly(AlignmentConfig config) {
   config.rotation_only = true;
   return config;
@@ -62,7 +43,7 @@ EdgeOdometry::EdgeOdometry(const Config& config, const CameraIntrinsics& intrins
       selector_(config.points.seed),
       aligner_(config.alignment),
       rotation_aligner_(RotationOnly(config.alignment)) {
-  cameras_[0] = Checked(intrinsics);
+  cameras_[0] = CheckedCamera(intrinsics);
   levels_ = CountLevels({intrinsics.width, intrinsics.height});
   for (std::size_t level = 1; level < cameras_.size(); ++level) {
     cameras_[level] = HalvedIntrinsics(cameras_[level - 1]);
@@ -81,26 +62,7 @@ void EdgeOdometry::Reset() {
 }
 
 void EdgeOdometry::Check(const RgbdFrame& frame) const {
-  const cv::Size wanted(cameras_[0].width, cameras_[0].height);
-  if (frame.grey.type() != CV_8UC1 || frame.grey.size() != wanted) {
-    throw Error("an image of " + SizeText(frame.grey) + " came for a camera of " +
-                std::to_string(wanted.width) + "x" + std::to_string(wanted.height) +
-                "; 8-bit grey images of that size are accepted");
-  }
-  if (!frame.depth.empty()) {
-    if (frame.depth.size() != wanted) {
-      throw Error("a depth image of " + SizeText(frame.depth) + " came with an image of " +
-                  SizeText(frame.grey) + "; both must have one size");
-    }
-    if (frame.depth.type() != CV_16UC1 && frame.depth.type() != CV_32FC1) {
-      throw Error("a depth image has OpenCV type " + std::to_string(frame.depth.type()) +
-                  "; accepted are 16UC1 and 32FC1");
-    }
-    if (!(frame.depth_units_per_m > 0) || !std::isfinite(frame.depth_units_per_m)) {
-      throw Error("the depth's units per metre are " + std::to_string(frame.depth_units_per_m) +
-                  "; a positive number is accepted");
-    }
-  }
+  CheckPictures(frame, cameras_[0]);
   if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
     throw Error("a frame's stamp of " + std::to_string(frame.stamp_ns) +
                 " ns is not later than the last one's, " + std::to_string(*last_stamp_ns_) + " ns");

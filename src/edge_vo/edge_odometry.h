@@ -10,16 +10,9 @@
 #include "edge_vo/alignment.h"
 #include "edge_vo/edge_extractor.h"
 #include "edge_vo/keyframe.h"
+#include "edge_vo/rgbd_frame.h"
 
 namespace livemap {
-
-/// One image with its depth.
-struct RgbdFrame {
-  std::int64_t stamp_ns = 0;
-  cv::Mat grey;   ///< CV_8UC1, rectified.
-  cv::Mat depth;  ///< CV_16UC1 in 1/units_per_m or CV_32FC1 in m, registered to `grey`; or empty.
-  double depth_units_per_m = 1000;
-};
 
 /// Whose edges choose the pixels of the keyframe that are aligned.
 enum class EdgeSource {

@@ -19,11 +19,6 @@
 #include "ros/ingest_parameters.h"
 
 namespace livemap {
-namespace {
-
-// What goes wrong with frames is said once in this time, and counted always.
-
-}  // namespace
 
 /// The vehicle's eyes: takes images from a topic, device, video file or folder, takes the lens
 /// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`; with
