@@ -166,6 +166,9 @@ double HazardLife::LogRatio(const LifeClass& entry, EvidenceKind kind, double en
 
 bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const {
   const bool against = SpeaksAgainst(evidence.kind);
+  if (evidence.kind == EvidenceKind::kVanished && IsTold(life.state)) {
+    return HearUnasked(entry, evidence, life);
+  }
   const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
   Voice* voice = PlaceOf(evidence.vehicle, at_s, life);
   if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
@@ -194,6 +197,15 @@ bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeReco
     voice->against = against;
   }
   against ? NoteNo(evidence.stamp_ns, life) : NoteYes(evidence.stamp_ns, life);
+  return true;
+}
+
+bool HazardLife::HearUnasked(const LifeClass& entry, const Evidence& evidence,
+                             LifeRecord& life) const {
+  const double least = LogOdds(config_.sure_above);
+  if (life.log_odds <= least) return false;
+  const double ratio = LogRatio(entry, evidence.kind, 0);
+  life.log_odds = std::max(least, life.log_odds + ratio);
   return true;
 }
 
@@ -268,7 +280,7 @@ std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
   const std::uint32_t opponents = Opponents(life);
   switch (life.state) {
     case HazardState::kCandidate:
-      if (supporters < entry.confirmations && !life.official) return std::nullopt;
+      if (supporters < entry.confirmations + opponents && !life.official) return std::nullopt;
       if (presence < config_.active_above) return std::nullopt;
       return Transition(life, HazardState::kActive, "seen by " + VehiclesText(supporters));
     case HazardState::kActive:

@@ -64,9 +64,11 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// One vehicle is one voice: all that it says together moves the odds by at most ln((1-h)/h) either
 /// way, the second message of a kind adds less than the first, and messages lose nothing by their
 /// order. A voice for the hazard fades with the class's life, as what it said ages. Drivers are
-/// told when `confirmations` distinct vehicles speak for a hazard, or an official. It is gone when
-/// two distinct vehicles speak against it and p is small, or by time alone: one vehicle can neither
-/// confirm nor remove, nor hasten the removal. See docs/life.md.
+/// told when `confirmations` distinct vehicles more speak for a hazard than against it, or an
+/// official. What nobody asked for is chosen by its sender, so change evidence against a told
+/// hazard lowers p to `sure_above` at most: it makes the zone ask, and the answers decide. It is
+/// gone when two distinct vehicles speak against it and p is small, or by time alone: one vehicle
+/// can neither confirm nor remove, nor hasten the removal. See docs/life.md.
 class HazardLife {
  public:
   struct Config {
@@ -75,7 +77,7 @@ class HazardLife {
     double verify_below = 0.7;          ///< An active hazard is verified below this presence...
     double sure_above = 0.85;           ///< ...and active again from this one on.
     double gone_below = 0.1;            ///< Off the map.
-    double surest = 0.98;               ///< Presence never counts as more certain than this.
+    double surest = 0.995;              ///< Presence never counts as more certain than this.
     double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
     double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
     double vanished_false_rate = 0.05;  ///< P(the same | it is there).
@@ -119,6 +121,7 @@ class HazardLife {
   void MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const;
   double LogRatio(const LifeClass& entry, EvidenceKind kind, double ended_since) const;
   bool Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
+  bool HearUnasked(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
   LifeStep Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
   std::optional<LifeTransition> Decide(const LifeClass& entry, const LifeRecord& life) const;
   std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;

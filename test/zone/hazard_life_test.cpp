@@ -125,7 +125,7 @@ TEST_F(HazardLifeTest, OneVehicleMovesTheOddsByABoundedAmountInWhateverOrderItSp
   for (int i = 0; i < 2000; ++i) {
     Say(generator() % 2 == 0 ? EvidenceKind::kAnswerNo : EvidenceKind::kAnswerYes, 9,
         kStart + kSecond + i);
-    Say(generator() % 2 == 0 ? EvidenceKind::kVanished : EvidenceKind::kSighting, 9,
+    Say(generator() % 2 == 0 ? EvidenceKind::kAnswerNo : EvidenceKind::kSighting, 9,
         kStart + 2 * kSecond + i * kSecond / 1000);
     ASSERT_GT(life_.log_odds, before - bound - 0.01);
   }
@@ -165,6 +165,24 @@ TEST_F(HazardLifeTest, SeveralVehiclesThatDenyItRemoveItWithTheReason) {
   ASSERT_TRUE(step.transition);
   EXPECT_THAT(step.transition->reason, HasSubstr("denied by"));
   EXPECT_LE(vehicle, 7u) << "four vehicles are enough";
+}
+
+TEST_F(HazardLifeTest, ADisputedCandidateNeedsOneSupporterMorePerOpponent) {
+  Begin(1);
+  Deny(2, kStart + kSecond);
+  See(3, kStart + 2 * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kCandidate);
+  See(4, kStart + 3 * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kActive);
+}
+
+TEST_F(HazardLifeTest, ChangeEvidenceThatNobodyAskedForTakesNothingOffTheMapHoweverManySendIt) {
+  MakeActive();
+  for (std::uint64_t vehicle = 10; vehicle < 200; ++vehicle) {
+    Say(EvidenceKind::kVanished, vehicle, kStart + static_cast<std::int64_t>(vehicle) * kSecond);
+    ASSERT_EQ(life_.state, HazardState::kActive);
+  }
+  EXPECT_LT(Presence(life_.at_ns), 0.86) << "it is worth a question";
 }
 
 TEST_F(HazardLifeTest, ADenialStartsTheVerificationAndASightingEndsIt) {
@@ -251,7 +269,7 @@ TEST_F(HazardLifeTest, TheOrderInWhichVehiclesWordsArriveDoesNotMatter) {
   const HazardLife rules(config);
   const std::vector<Evidence> words = {
       Word(EvidenceKind::kAnswerNo, 3, kStart), Word(EvidenceKind::kSighting, 4, kStart),
-      Word(EvidenceKind::kVanished, 5, kStart), Word(EvidenceKind::kAnswerYes, 6, kStart),
+      Word(EvidenceKind::kStillThere, 5, kStart), Word(EvidenceKind::kAnswerYes, 6, kStart),
       Word(EvidenceKind::kAnswerNo, 7, kStart)};
   std::vector<std::size_t> order = {0, 1, 2, 3, 4};
   std::optional<double> expected;
