@@ -226,7 +226,7 @@ TEST_F(PollSchedulerTest, KeepsItsByteBudget) {
   config_.bytes_per_hour = 6000;
   Rebuild();
   const LifeRecord life = Active(300, kStart);
-  for (std::uint64_t id = 0; id < 200; ++id) Set(id, life, kStart);
+  for (std::uint64_t id = 0; id < 40; ++id) Set(id, life, kStart);
   for (std::int64_t t = kStart; t < kStart + 10 * kHour; t += 5 * kSecond) {
     for (int v = 0; v < 3; ++v) {
       Approach("v" + std::to_string((t / kSecond) * 3 + v), t);
