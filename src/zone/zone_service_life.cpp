@@ -39,7 +39,7 @@ ZoneService::Implementation::Before ZoneService::Implementation::BeforeOf(Slot s
 
 void ZoneService::Implementation::Learn(const std::string& class_name, const LifeLesson& lesson,
                                         Change& change) {
-  if (lesson.stood_s == 0 && !lesson.ended) return;
+  if (!(lesson.stood_s >= 0) || (lesson.stood_s == 0 && !lesson.ended)) return;
   const auto known = survival_.learned().find(class_name);
   // The first time only: a failed transaction takes back all of them.
   change.learned_before.emplace(class_name,
@@ -105,7 +105,7 @@ bool ZoneService::Implementation::Reject(const Uuid& uuid, const std::string& of
   if (!why.empty() && !IsPrintableText(why, kMaxReasonBytes)) {
     throw Error("the reason is not accepted: it must be printable UTF-8");
   }
-  return Decide(uuid, [&](Slot slot, LifeRecord& life) -> LifeStep {
+  return Decide(uuid, [&](Slot, LifeRecord& life) -> LifeStep {
     if (!IsOnMap(life.state)) return {};
     return life_.Reject(official, why, now_ns_(), life);
   });

@@ -51,6 +51,11 @@ auto Explained(const std::string& doing, const Body& body) -> decltype(body()) {
   }
 }
 
+std::string WhyDamaged(const std::string& path, const std::string& verdict) {
+  return "store: database '" + path + "' is damaged and left alone: " + verdict +
+         "; 'sqlite3 DAMAGED .recover' saves what it holds, see docs/zone.md";
+}
+
 std::string ConnectionText(const std::string& path) {
   if (path.find('"') != std::string::npos) {
     throw StoreError("store: path '" + path + "' holds a quotation mark, which is not accepted");
@@ -143,7 +148,7 @@ void ZoneStore::Implementation::Prepare() {
   session_ << "PRAGMA wal_autocheckpoint=10000", soci::into(pages);
   std::string verdict;
   session_ << "PRAGMA quick_check(1)", soci::into(verdict);
-  if (verdict != "ok") throw StoreError("store: database '" + path_ + "' is damaged: " + verdict);
+  if (verdict != "ok") throw StoreError(WhyDamaged(path_, verdict));
   MigrateZoneStore(session_, path_);
   PrepareReads();
   PrepareWrites();
@@ -232,8 +237,15 @@ void ZoneStore::Implementation::PrepareWrites() {
 }
 
 ZoneStore::ZoneStore(const std::string& path) {
-  Explained("opening '" + path + "'",
-            [&] { implementation_ = std::make_unique<Implementation>(path); });
+  try {
+    implementation_ = std::make_unique<Implementation>(path);
+  } catch (const soci::soci_error& error) {
+    const std::string words = error.get_error_message();
+    const bool damaged = words.find("malformed") != std::string::npos ||
+                         words.find("not a database") != std::string::npos;
+    if (damaged) throw StoreError(WhyDamaged(path, words));
+    throw StoreError("store: opening '" + path + "' failed: " + words);
+  }
 }
 
 ZoneStore::~ZoneStore() = default;
