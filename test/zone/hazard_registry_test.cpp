@@ -238,10 +238,12 @@ TEST_F(RegistryTest, AChangedHazardIsToldAroundItInTheOrderOfAnnouncements) {
 
 TEST_F(RegistryTest, ManyHazardsAreFoundByTheirIdsAndForgottenWithThem) {
   std::vector<Uuid> kept;
-  for (int i = 0; i < 3000; ++i) kept.push_back(registry_.Get(Add(MakeReport({0.001 * i, 1}))).uuid);
+  for (int i = 0; i < 3000; ++i)
+    kept.push_back(registry_.Get(Add(MakeReport({0.001 * i, 1}))).uuid);
   registry_.Begin();
   std::vector<Uuid> lost;
-  for (int i = 0; i < 3000; ++i) lost.push_back(registry_.Get(Add(MakeReport({0.001 * i, 2}))).uuid);
+  for (int i = 0; i < 3000; ++i)
+    lost.push_back(registry_.Get(Add(MakeReport({0.001 * i, 2}))).uuid);
   registry_.Rollback();
   for (std::size_t i = 0; i < kept.size(); ++i) {
     EXPECT_EQ(registry_.Find(kept[i]), static_cast<HazardRegistry::Slot>(i));

@@ -1,3 +1,5 @@
+#include "zone/zone_store.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -9,7 +11,6 @@
 
 #include "base/sqlite.h"
 #include "zone/zone_service.h"
-#include "zone/zone_store.h"
 #include "zone_fixture.h"
 
 namespace livemap {
@@ -21,8 +22,8 @@ class ZoneStoreTest : public ZoneTest {
  protected:
   /// All that can be asked of the zone, as text.
   static std::string Everything(const ZoneService& zone) {
-    std::string text = std::to_string(zone.Sequence()) + " " +
-                       std::to_string(zone.AnnouncedSequence()) + "\n";
+    std::string text =
+        std::to_string(zone.Sequence()) + " " + std::to_string(zone.AnnouncedSequence()) + "\n";
     for (const Hazard& hazard : zone.Query(std::nullopt, 1, 100000)) {
       text += hazard.uuid.ToString() + " " + std::to_string(hazard.sequence) + " " +
               StateName(hazard.state) + " " + std::to_string(hazard.presence) + " " +
@@ -245,7 +246,8 @@ TEST_F(ZoneStoreTest, ACorruptStoreIsLeftAloneAndItsContentRecoverable) {
   EXPECT_EQ(ReadFile(damaged, 100 << 20), content);
 
   // As docs/zone.md says.
-  const std::string recover = "cd '" + directory_ + "/zone' && mv zone.sqlite3 damaged.sqlite3 && " +
+  const std::string recover = "cd '" + directory_ +
+                              "/zone' && mv zone.sqlite3 damaged.sqlite3 && " +
                               "sqlite3 damaged.sqlite3 .recover | sqlite3 zone.sqlite3";
   ASSERT_EQ(std::system(recover.c_str()), 0);
   ZoneService zone(Config(), Clock(), 2);
