@@ -105,6 +105,8 @@ TEST_F(ZoneServiceTest, RestartRestoresExactlyTheSameMap) {
   }
   Zone().HandleBatch(reports);
   Zone().Remove(All()[3].uuid, "repaired");
+  Zone().Reject(All()[4].uuid, "anna", "a shadow");
+  Zone().Confirm(All()[5].uuid, "anna");
   const std::vector<Hazard> before = Zone().Query(std::nullopt, 1, 1000000);
   const std::uint64_t sequence = Zone().Sequence();
   EXPECT_GT(before.size(), 50U);
@@ -153,7 +155,7 @@ TEST_F(ZoneServiceTest, EventsComeAfterTheCommitInOrderOfTheirSequence) {
   EXPECT_EQ(events[2].action, HazardAction::kUpdated);
   EXPECT_EQ(events[2].hazard.sightings, 2U);
   EXPECT_EQ(events[3].action, HazardAction::kRemoved);
-  EXPECT_FALSE(events[3].hazard.active);
+  EXPECT_EQ(events[3].hazard.state, HazardState::kGone);
   Zone().Unsubscribe(id);
   Zone().Handle(MakeReport({3, 3}));
   EXPECT_EQ(events.size(), 4U);
