@@ -95,7 +95,7 @@ Hazard ToHazard(const Row& row) {
   hazard.sequence = static_cast<std::uint64_t>(row.sequence);
   hazard.image_sha256 = row.image_sha256;
   hazard.image_format = row.image_format;
-  hazard.active = row.active != 0;
+  hazard.state = row.active != 0 ? HazardState::kActive : HazardState::kGone;
   return hazard;
 }
 
@@ -296,7 +296,7 @@ void ZoneStore::WriteHazard(const Hazard& hazard) {
     row.sequence = static_cast<long long>(hazard.sequence);
     row.image_sha256 = hazard.image_sha256;
     row.image_format = hazard.image_format;
-    row.active = hazard.active ? 1 : 0;
+    row.active = IsOnMap(hazard.state) ? 1 : 0;
     implementation_->write_hazard_->execute(true);
   });
 }

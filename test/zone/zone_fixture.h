@@ -77,7 +77,8 @@ inline bool SameHazard(const Hazard& a, const Hazard& b) {
          a.first_seen_ns == b.first_seen_ns && a.last_seen_ns == b.last_seen_ns &&
          a.updated_ns == b.updated_ns && a.sequence == b.sequence &&
          a.image_sha256 == b.image_sha256 && a.image_format == b.image_format &&
-         a.active == b.active;
+         a.state == b.state && a.presence == b.presence && a.vehicles == b.vehicles &&
+         a.announced_sequence == b.announced_sequence;
 }
 
 }  // namespace livemap
