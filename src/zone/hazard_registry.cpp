@@ -181,7 +181,8 @@ std::vector<Hazard> HazardRegistry::ChangedAround(const GeoPoint& centre, double
       [](std::uint64_t sequence, const Change& c) { return sequence < c.sequence; });
   for (; change != changes_.end(); ++change) {
     const Hazard& hazard = hazards_[change->slot];
-    if (hazard.sequence != change->sequence || hazard.announced_sequence <= since_sequence) continue;
+    if (hazard.sequence != change->sequence || hazard.announced_sequence <= since_sequence)
+      continue;
     if (since_sequence == 0 && !IsTold(hazard.state)) continue;
     if (GeodesicDistanceM(centre, hazard.position) <= radius_m) result.push_back(hazard);
   }

@@ -40,14 +40,13 @@ class HazardRegistry {
   /// Throws Error when its uuid or sequence is not new.
   void Restore(Hazard hazard);
 
-  /// The nearest hazard of this class that is on the map or rejected within the class's radius (geodesic), the older one
-  /// among equals. `position` must be valid.
+  /// The nearest hazard of this class that is on the map or rejected within the class's radius
+  /// (geodesic), the older one among equals. `position` must be valid.
   std::optional<Slot> FindMatch(const std::string& class_name, const GeoPoint& position) const;
 
   /// Puts a new hazard on the map.
   Slot Add(const Report& report, const PictureName& picture, const Uuid& uuid,
-           std::uint64_t sequence, std::int64_t now_ns,
-           HazardState state = HazardState::kActive);
+           std::uint64_t sequence, std::int64_t now_ns, HazardState state = HazardState::kActive);
   /// Counts the report as a sighting of `slot`; the newer image's picture stays.
   void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
              std::int64_t now_ns);

@@ -88,14 +88,16 @@ Why WhyPositionRefused(const Report& report, const ReportLimits& limits) {
   // Compared with the largest entry, so that the unit does not matter; half a part per million is
   // what single precision on the way leaves.
   const double asymmetry = std::abs(covariance(0, 1) - covariance(1, 0));
-  if (asymmetry > 1e-6 * covariance.cwiseAbs().maxCoeff()) return Malformed("covariance is not symmetric");
+  if (asymmetry > 1e-6 * covariance.cwiseAbs().maxCoeff())
+    return Malformed("covariance is not symmetric");
   const double largest = limits.max_position_sigma_m * limits.max_position_sigma_m;
   if (covariance.cwiseAbs().maxCoeff() > largest) {
     return Malformed("covariance exceeds " + std::to_string(largest) + " m^2");
   }
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(covariance, Eigen::EigenvaluesOnly);
-  if (!(solver.eigenvalues().minCoeff() > 0)) return Malformed("covariance is not positive definite");
+  if (!(solver.eigenvalues().minCoeff() > 0))
+    return Malformed("covariance is not positive definite");
   return std::nullopt;
 }
 
@@ -114,9 +116,9 @@ Why WhyStampRefused(const Report& report, const ReportLimits& limits, std::int64
                        std::to_string(limits.max_future_s) + " s are accepted"};
   }
   if (-ahead_s > limits.max_age_s) {
-    return Refusal{RefusalKind::kTooOld,
-                   "stamp lies " + std::to_string(-ahead_s) + " s in the past, at most " +
-                       std::to_string(limits.max_age_s) + " s are accepted"};
+    return Refusal{RefusalKind::kTooOld, "stamp lies " + std::to_string(-ahead_s) +
+                                             " s in the past, at most " +
+                                             std::to_string(limits.max_age_s) + " s are accepted"};
   }
   return std::nullopt;
 }

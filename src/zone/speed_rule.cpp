@@ -20,8 +20,7 @@ double ImpliedSpeed(const ReportedFix& a, const ReportedFix& b, const SpeedRule&
   return unexplained_m / std::max(0.5, seconds);
 }
 
-std::optional<double> Challenge(VehicleTrack& track, const ReportedFix& fix,
-                                const SpeedRule& rule) {
+std::optional<double> Challenge(ReportTrack& track, const ReportedFix& fix, const SpeedRule& rule) {
   const double speed_mps = track.accepted ? ImpliedSpeed(*track.accepted, fix, rule) : 0.0;
   const bool agrees =
       track.challenger && ImpliedSpeed(*track.challenger, fix, rule) <= rule.max_speed_mps;

@@ -27,7 +27,7 @@ struct ReportedFix {
 ReportedFix FixOf(const Report& report);
 
 /// Where the reports of one vehicle say it was. A small value: copied to try, assigned to keep.
-struct VehicleTrack {
+struct ReportTrack {
   std::optional<ReportedFix> accepted;    ///< The last one that was accepted.
   std::optional<ReportedFix> challenger;  ///< The last one refused since.
   std::uint32_t agreeing = 0;             ///< Refused ones in a row that agree with each other.
@@ -40,6 +40,6 @@ double ImpliedSpeed(const ReportedFix& a, const ReportedFix& b, const SpeedRule&
 
 /// Takes in the next fix of the vehicle. The implied speed when the rule refuses it; none when it
 /// is accepted.
-std::optional<double> Challenge(VehicleTrack& track, const ReportedFix& fix, const SpeedRule& rule);
+std::optional<double> Challenge(ReportTrack& track, const ReportedFix& fix, const SpeedRule& rule);
 
 }  // namespace livemap

@@ -14,6 +14,7 @@
 #include "hazard/report.h"
 #include "zone/hazard.h"
 #include "zone/report_validation.h"
+#include "zone/speed_rule.h"
 
 namespace livemap {
 
@@ -74,10 +75,11 @@ struct ZoneStatistics {
   std::uint64_t store_errors = 0;  ///< Batches and decisions that the store could not keep.
   std::uint64_t vehicle_positions = 0;
   std::uint64_t vehicle_positions_refused = 0;
-  std::uint64_t polls = 0;            ///< Asked.
-  std::uint64_t answers = 0;          ///< Counted.
-  std::uint64_t answers_refused = 0;  ///< Unknown, expired, another's, or from where nobody sees it.
-  std::size_t active_hazards = 0;     ///< On the map: candidate, active or verifying.
+  std::uint64_t polls = 0;    ///< Asked.
+  std::uint64_t answers = 0;  ///< Counted.
+  std::uint64_t answers_refused =
+      0;                           ///< Unknown, expired, another's, or from where nobody sees it.
+  std::size_t active_hazards = 0;  ///< On the map: candidate, active or verifying.
   std::array<std::size_t, kHazardStates> hazards_by_state{};  ///< By HazardState.
   std::uint64_t image_bytes = 0;                              ///< On disk.
 };

@@ -75,7 +75,9 @@ void ZoneService::Implementation::Settle(const Change& change) {
   }
 }
 
-void ZoneService::Implementation::Decide(Slot slot, HazardState state, const std::string& reason) {
+ZoneService::Implementation::Change ZoneService::Implementation::Decide(Slot slot,
+                                                                        HazardState state,
+                                                                        const std::string& reason) {
   Change change = NewChange();
   InTransaction(change, [&] {
     const Hazard before = registry_.Get(slot);
@@ -89,6 +91,7 @@ void ZoneService::Implementation::Decide(Slot slot, HazardState state, const std
     if (leaves) change.pictures.emplace_back(before.image_sha256, "");
     if (comes) change.pictures.emplace_back("", before.image_sha256);
   });
+  return change;
 }
 
 bool ZoneService::Implementation::Reject(const Uuid&, const std::string& official,
@@ -102,7 +105,22 @@ bool ZoneService::Implementation::Confirm(const Uuid&, const std::string& offici
   return false;
 }
 
-bool ZoneService::Implementation::Remove(const Uuid&, const std::string&) { return false; }
+bool ZoneService::Implementation::Remove(const Uuid& uuid, const std::string& reason) {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  Change change;
+  {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    const auto slot = registry_.Find(uuid);
+    if (!slot || !IsOnMap(registry_.Get(*slot).state)) return false;
+    change = Decide(*slot, HazardState::kGone, reason);
+  }
+  Settle(change);
+  return true;
+}
+
+std::vector<StoredEvent> ZoneService::Implementation::Events(const Uuid&, std::size_t) const {
+  return {};
+}
 
 std::vector<PollOrder> ZoneService::Implementation::TakeDuePolls() { return {}; }
 

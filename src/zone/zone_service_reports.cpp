@@ -72,21 +72,20 @@ void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Bat
 std::optional<Refusal> ZoneService::Implementation::WhyNot(const Report& report,
                                                            std::int64_t now_ns, Batch& batch) {
   if (auto why = WhyRefused(report, config_.limits, now_ns)) return why;
-  const auto speed_mps =
-      Challenge(TrackOf(report.vehicle_id, batch), FixOf(report), config_.speed);
+  const auto speed_mps = Challenge(TrackOf(report.vehicle_id, batch), FixOf(report), config_.speed);
   if (!speed_mps) return std::nullopt;
-  return Refusal{RefusalKind::kSpeed,
-                 "position is " + std::to_string(*speed_mps) +
-                     " m/s away from this vehicle's last report, at most " +
-                     std::to_string(config_.speed.max_speed_mps) + " m/s are accepted"};
+  return Refusal{RefusalKind::kSpeed, "position is " + std::to_string(*speed_mps) +
+                                          " m/s away from this vehicle's last report, at most " +
+                                          std::to_string(config_.speed.max_speed_mps) +
+                                          " m/s are accepted"};
 }
 
 /// The batch's own copy, so that a failed commit leaves no trace.
-VehicleTrack& ZoneService::Implementation::TrackOf(const std::string& vehicle_id, Batch& batch) {
+ReportTrack& ZoneService::Implementation::TrackOf(const std::string& vehicle_id, Batch& batch) {
   const auto found = batch.tracks.find(vehicle_id);
   if (found != batch.tracks.end()) return found->second;
   const auto known = tracks_.find(vehicle_id);
-  return batch.tracks.emplace(vehicle_id, known == tracks_.end() ? VehicleTrack{} : known->second)
+  return batch.tracks.emplace(vehicle_id, known == tracks_.end() ? ReportTrack{} : known->second)
       .first->second;
 }
 
@@ -110,8 +109,8 @@ void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Batc
     const auto match = registry_.FindMatch(report.class_name, report.position);
     if (!match && registry_.on_map_count() >= config_.max_hazards) {
       Refuse(report,
-             {RefusalKind::kMapFull, "the zone holds its maximum of " +
-                                         std::to_string(config_.max_hazards) + " hazards"},
+             {RefusalKind::kMapFull,
+              "the zone holds its maximum of " + std::to_string(config_.max_hazards) + " hazards"},
              candidate.index, batch);
       continue;
     }

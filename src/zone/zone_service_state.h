@@ -51,7 +51,7 @@ class ZoneService::Implementation {
   ImageStore images_;
   VehicleTable vehicles_;
   EventStream stream_;
-  std::unordered_map<std::string, VehicleTrack> tracks_;  ///< By vehicle id.
+  std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id.
 
   /// Held exclusively from the first change to the end of its commit, so that no reader ever sees
   /// what is not on disk: guards sequence_, announced_, registry_ and statistics_.
@@ -85,7 +85,7 @@ class ZoneService::Implementation {
     std::vector<std::optional<Receipt>> receipts;  ///< None: not taken now.
     std::vector<Candidate> candidates;
     std::unordered_map<Uuid, Uuid> hazard_of_report;
-    std::unordered_map<std::string, VehicleTrack> tracks;  ///< As they will be.
+    std::unordered_map<std::string, ReportTrack> tracks;  ///< As they will be.
     ZoneStatistics counted;
   };
 
@@ -95,14 +95,14 @@ class ZoneService::Implementation {
   void Triage(const std::vector<Report>& reports, Batch& batch);
   std::optional<Refusal> WhyNot(const Report& report, std::int64_t now_ns, Batch& batch);
   void Refuse(const Report& report, const Refusal& refusal, std::size_t index, Batch& batch);
-  VehicleTrack& TrackOf(const std::string& vehicle_id, Batch& batch);
+  ReportTrack& TrackOf(const std::string& vehicle_id, Batch& batch);
   void Apply(const std::vector<Report>& reports, Batch& batch);
   void Register(const Report& report, const PictureName& picture, std::optional<Slot> match,
                 Batch& batch);
   void Count(const ZoneStatistics& counted);
 
   /// Takes one hazard to `state` in a transaction of its own; the reason is cut to what is kept.
-  void Decide(Slot slot, HazardState state, const std::string& reason);
+  Change Decide(Slot slot, HazardState state, const std::string& reason);
 
   Change NewChange() const;
   /// The event of what just happened to `slot`, whose sequence is the change's.

@@ -60,8 +60,10 @@ const std::array<const char*, 5>& FirstSchema() {
 
 constexpr int kSchemaVersion = 1;
 
+}  // namespace
+
 /// The values of all statements: SOCI binds to places, not to values.
-struct Row {
+struct ZoneStoreRow {
   std::string uuid, hazard_uuid, class_name, vehicle_id, drive_id, image_sha256, image_format;
   std::string reason;
   double confidence = 0, latitude = 0, longitude = 0;
@@ -70,6 +72,10 @@ struct Row {
   long long stamp_ns = 0, received_ns = 0;
   int active = 0, action = 0;
 };
+
+namespace {
+
+using Row = ZoneStoreRow;
 
 Uuid ParseUuid(const std::string& text) {
   const auto uuid = Uuid::Parse(text);
@@ -173,8 +179,9 @@ class ZoneStore::Implementation {
 
 void ZoneStore::Implementation::PrepareStatements() {
   using soci::use;
-  find_report_.emplace((session_.prepare << "SELECT hazard_uuid FROM reports WHERE uuid = :uuid",
-                        use(row_.uuid), soci::into(row_.hazard_uuid)));
+  find_report_.emplace(
+      (session_.prepare << "SELECT hazard_uuid, vehicle_id FROM reports WHERE uuid = :uuid",
+       use(row_.uuid), soci::into(row_.hazard_uuid), soci::into(row_.vehicle_id)));
   write_hazard_.emplace(
       (session_.prepare
            << "INSERT INTO hazards (uuid, class_name, confidence, latitude, longitude, "
@@ -249,17 +256,17 @@ std::uint64_t ZoneStore::LastSequence() {
   });
 }
 
-std::optional<Uuid> ZoneStore::FindReport(const Uuid& report_uuid) {
-  return Explained("looking up a report", [&]() -> std::optional<Uuid> {
+std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_uuid) {
+  return Explained("looking up a report", [&]() -> std::optional<KnownReport> {
     Row& row = implementation_->row_;
     row.uuid = report_uuid.ToString();
     soci::statement& find = *implementation_->find_report_;
     if (!find.execute(true)) return std::nullopt;
-    const Uuid hazard_uuid = ParseUuid(row.hazard_uuid);
+    const KnownReport known{ParseUuid(row.hazard_uuid), row.vehicle_id};
     // Read to the end: an unfinished query would keep its snapshot and with it the whole WAL.
     while (find.fetch()) {
     }
-    return hazard_uuid;
+    return known;
   });
 }
 
