@@ -149,7 +149,9 @@ Why WhyPictureRefused(const Report& report, const ReportLimits& limits) {
                      std::to_string(limits.max_image_bytes) + " are accepted");
   }
   const auto header = ReadImageHeader(report.image.data(), report.image.size());
-  if (!header) return Malformed("picture is no JPEG, PNG or WebP");
+  if (!header || header->format == ImageHeader::Format::kWebp) {
+    return Malformed("picture is no JPEG or PNG");
+  }
   const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
   if (longer_side > limits.max_image_side_px) {
     return Malformed("picture is " + std::to_string(header->width) + " x " +
