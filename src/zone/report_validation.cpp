@@ -142,25 +142,6 @@ Why WhyBoxRefused(const Report& report, const ReportLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyPictureRefused(const Report& report, const ReportLimits& limits) {
-  if (report.image.empty()) return std::nullopt;
-  if (report.image.size() > limits.max_image_bytes) {
-    return Malformed("picture has " + std::to_string(report.image.size()) + " bytes, at most " +
-                     std::to_string(limits.max_image_bytes) + " are accepted");
-  }
-  const auto header = ReadImageHeader(report.image.data(), report.image.size());
-  if (!header || header->format == ImageHeader::Format::kWebp) {
-    return Malformed("picture is no JPEG or PNG");
-  }
-  const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
-  if (longer_side > limits.max_image_side_px) {
-    return Malformed("picture is " + std::to_string(header->width) + " x " +
-                     std::to_string(header->height) + " pixels, at most " +
-                     std::to_string(limits.max_image_side_px) + " per side are accepted");
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 bool IsPrintableText(const std::string& text, std::size_t max_bytes) {
@@ -193,6 +174,30 @@ const char* RefusalName(RefusalKind kind) {
   return "unknown";
 }
 
+std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
+                                         const ReportLimits& limits) {
+  if (image.size() > limits.max_image_bytes) {
+    return Malformed("picture has " + std::to_string(image.size()) + " bytes, at most " +
+                     std::to_string(limits.max_image_bytes) + " are accepted");
+  }
+  const auto header = ReadImageHeader(image.data(), image.size());
+  if (!header || header->format == ImageHeader::Format::kWebp) {
+    return Malformed("picture is no JPEG or PNG");
+  }
+  const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
+  if (longer_side > limits.max_image_side_px) {
+    return Malformed("picture is " + std::to_string(header->width) + " x " +
+                     std::to_string(header->height) + " pixels, at most " +
+                     std::to_string(limits.max_image_side_px) + " per side are accepted");
+  }
+  const std::int64_t pixels = static_cast<std::int64_t>(header->width) * header->height;
+  if (pixels > limits.max_image_pixels) {
+    return Malformed("picture has " + std::to_string(pixels) + " pixels, at most " +
+                     std::to_string(limits.max_image_pixels) + " are accepted");
+  }
+  return std::nullopt;
+}
+
 std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limits,
                                   std::int64_t now_ns) {
   if (report.uuid.IsNil()) return Malformed("report has no uuid");
@@ -208,7 +213,8 @@ std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limi
   if (auto why = WhyPositionRefused(report, limits)) return why;
   if (auto why = WhyStampRefused(report, limits, now_ns)) return why;
   if (auto why = WhyBoxRefused(report, limits)) return why;
-  return WhyPictureRefused(report, limits);
+  if (report.image.empty()) return std::nullopt;
+  return WhyPictureRefused(report.image, limits);
 }
 
 }  // namespace livemap

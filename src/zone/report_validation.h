@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hazard/report.h"
 #include "zone/hazard.h"
@@ -39,12 +40,17 @@ struct ReportLimits {
   double max_age_s = 30.0 * 86400.0;   ///< An image stamp this far behind it: outboxes wait long.
   std::int64_t min_stamp_ns = 946684800'000'000'000;  ///< 2000-01-01: older clocks were never set.
   std::uint32_t max_image_side_px = 16384;            ///< Of the original image and of the picture.
+  std::int64_t max_image_pixels = 20'000'000;         ///< Of the picture: PictureLimits' too.
   std::size_t max_image_bytes = 1 << 20;              ///< Of the picture as a compressed file.
 };
 
 /// Valid UTF-8 without control characters, line separators or invisible and direction-changing
 /// format characters, and neither empty nor longer than `max_bytes`.
 bool IsPrintableText(const std::string& text, std::size_t max_bytes);
+
+/// Why the zone refuses a picture, by its size and header alone.
+std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
+                                         const ReportLimits& limits);
 
 /// Why the zone refuses `report`; none when it is acceptable. Looks at the
 /// picture's header only and decodes nothing. `now_ns` is the zone's clock.
