@@ -30,10 +30,15 @@ TEST(ParseTokenFile, ReadsNamesAndForgetsTokens) {
 }
 
 TEST(ParseTokenFile, NamesTheBadLineAndNeverShowsAToken) {
-  for (const std::string bad :
-       {kToken, "miller short", "miller  " + kToken, "miller " + kToken + " x",
-        "miller " + std::string(300, 'a'), "miller " + kToken + "\xc3\xa4", " " + kToken,
-        std::string("mil\x01ler ") + kToken}) {
+  const std::vector<std::string> refused{kToken,
+                                         "miller short",
+                                         "miller  " + kToken,
+                                         "miller " + kToken + " x",
+                                         "miller " + std::string(300, 'a'),
+                                         "miller " + kToken + "\xc3\xa4",
+                                         " " + kToken,
+                                         std::string("mil\x01ler ") + kToken};
+  for (const std::string& bad : refused) {
     try {
       ParseTokenFile("# comment\n" + bad, "tokens");
       FAIL() << bad << " was accepted";

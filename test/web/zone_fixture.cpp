@@ -31,6 +31,7 @@ ZoneFixture::ZoneFixture() {
   catalogue = HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
   ZoneService::Config config;
   config.speed.max_speed_mps = 1e9;  // Reports of one vehicle lie all over the town.
+  config.allowance.reports_per_hour = 1e9;
   config.directory = folder_.path();
   config.catalogue = catalogue;
   zone = std::make_unique<ZoneService>(
