@@ -201,7 +201,8 @@ class Desktop(OfficialsPage):
         self.browser.execute_script("document.querySelector('#hazard-list button').focus()")
         self.press(Keys.ENTER)
         self.wait(lambda: self.browser.execute_script(
-            "return document.activeElement.dataset.hazard") == hazard, "the popup has no focus")
+            "return document.activeElement.matches(`.popup[data-hazard='${arguments[0]}']`)", hazard),
+            "the popup has no focus")
         for _ in range(8):
             self.press(Keys.TAB)
             if self.browser.execute_script(
