@@ -37,7 +37,7 @@ std::string ParseDecisionBody(Decision decision, const std::string& body) {
     if (!value.is_string()) throw BadRequest("the reason is no text, " + kAccepted);
   }
   if (json.empty() && decision == Decision::kConfirm) return "";
-  const std::string reason = json.value("reason", "");
+  std::string reason = json.value("reason", "");
   if (reason.empty()) throw BadRequest("there is no reason, " + kAccepted);
   if (!IsPrintableText(reason, kMaxDecisionReasonBytes)) {
     throw BadRequest("the reason of " + std::to_string(reason.size()) + " bytes is not accepted, " +
