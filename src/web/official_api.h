@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "web/decision.h"
+#include "web/http_answer.h"
+#include "web/official_gate.h"
+#include "web/options.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+
+/// Officials' decisions about hazards. Thread-safe; store failures come out as exceptions.
+class OfficialApi {
+ public:
+  /// Keeps references. Reads the token file of the options; throws Error when it is not accepted.
+  OfficialApi(const WebOptions& options, ZoneService& zone, const HazardCatalogue& catalogue);
+
+  /// Whether anybody may decide at all.
+  bool is_open() const { return gate_.is_open(); }
+  /// Answers a POST to a decision's address.
+  HttpAnswer Decide(const DecisionTarget& target, const HttpQuestion& question);
+
+ private:
+  std::optional<HttpAnswer> WhyNotAllowed(const HttpQuestion& question, std::string& official);
+
+  const WebOptions& options_;
+  ZoneService& zone_;
+  const HazardCatalogue& catalogue_;
+  OfficialGate gate_;
+};
+
+}  // namespace livemap
