@@ -40,8 +40,10 @@ HazardNotice ToMessage(const HazardEvent& event);
 HazardNotice ToMessage(const Notice& notice);
 Notice FromMessage(const HazardNotice& message);
 
-/// `horizontal_sigma_m` per axis, NaN when unknown.
-VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m);
+/// `horizontal_sigma_m` per axis, NaN when unknown; `map_sequence` up to which the vehicle knows
+/// the zone's announcements.
+VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
+                          std::uint64_t map_sequence);
 VehicleState FromMessage(const VehiclePosition& message);
 
 SightingFrame ToSightingFrame(const DetectionArray& message);

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <livemap/HazardPoll.h>
+#include <livemap/HazardPollAnswer.h>
+
+#include "hazard/report.h"
+
+namespace livemap {
+
+// What crosses between the core and the messages of polls, in both directions. FromMessage throws
+// Error, with one sentence that names the value and what is accepted, for an unknown schema version
+// or enumeration value, nil ids, numbers that are not finite or out of range, and overlong text.
+
+HazardPoll ToMessage(const Poll& poll);
+Poll FromMessage(const HazardPoll& message);
+
+HazardPollAnswer ToMessage(const PollReply& reply);
+PollReply FromMessage(const HazardPollAnswer& message);
+
+}  // namespace livemap
