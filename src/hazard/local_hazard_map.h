@@ -49,7 +49,7 @@ class LocalHazardMap {
   enum class AddResult {
     kAdded,      ///< Durably known and to be sent.
     kDuplicate,  ///< Of a known hazard; nothing is stored.
-    kFull,       ///< Too many unfinished reports; nothing is stored.
+    kFull,       ///< Too many unfinished reports, or bytes of them; nothing is stored.
   };
 
   struct PendingReport {

@@ -39,7 +39,8 @@ PlaceView ViewPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
 
 /// Whether a detection's box can be the thing at the place that `view` shows: the middle of its
 /// bottom edge lies within `gate_sigma` standard deviations of the place's pixel, or its own place
-/// on the road within `radius_m` of `place`.
+/// on the road within `radius_m` of `place`. Never one whose place on the road, seen from the
+/// vehicle, is less certain than half that radius (standard deviation).
 bool IsAtPlace(const Box& box, const GeoPoint& place, const PlaceView& view,
                const PlacedCamera& camera, const GroundProjectionNoise& noise, double gate_sigma,
                double radius_m);

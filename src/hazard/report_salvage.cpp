@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/image_header.h"
 #include "hazard/report_table.h"
 
 namespace livemap {
@@ -113,6 +114,15 @@ bool IsSound(const Report& report) {
          report.class_name.size() <= kMaxClassNameBytes && report.drive_id.size() <= 64;
 }
 
+/// A report counts without its picture; a broken picture would have it refused for good.
+void DropBrokenPicture(Report& report) {
+  const std::uint8_t* data = report.image.data();
+  const auto header = ReadImageHeader(data, report.image.size());
+  if (header && HasImageEnd(data, report.image.size(), header->format)) return;
+  report.image.clear();
+  report.image_format.clear();
+}
+
 Salvage ReadRows(SqliteDatabase& database,
                  const std::function<void(const Report&, bool sent)>& accept) {
   Salvage salvage;
@@ -125,6 +135,7 @@ Salvage ReadRows(SqliteDatabase& database,
     } catch (const StoreError&) {
     }
     if (stored && IsSound(stored->report)) {
+      DropBrokenPicture(stored->report);
       accept(stored->report, stored->sent);
       ++salvage.reports;
     } else if (row <= rows.last_listed) {
