@@ -15,6 +15,9 @@ struct HazardClass {
   double duplicate_radius_m = 5.0;  ///< Same class within this distance is the same hazard.
   int urgency = 2;                  ///< Rank: 1 drivers must know at once, 2 soon, 3 can wait.
   double expected_life_s = 86400;   ///< Prior of how long such a hazard stays.
+  int confirmations = 2;            ///< Distinct vehicles before drivers are told, 1 to 5.
+  double hit_rate = 0.85;           ///< P(a vehicle that looks sees it | it is there), 0.5 to 0.99.
+  double false_rate = 0.03;         ///< P(the same | it is not there), 0.001 to 0.4.
 };
 
 /// The classes of hazards and their properties, read from `config/hazards.yaml`.

@@ -200,7 +200,7 @@ bool ZoneNode::TellJoined() {
     const auto hazard = zone_.Find(to_tell_.front());
     in_line_.erase(to_tell_.front());
     to_tell_.pop_front();
-    if (!hazard || !hazard->active) continue;
+    if (!hazard || !IsTold(hazard->state)) continue;
     notice_publisher_.publish(ToMessage(HazardEvent{HazardAction::kAdded, *hazard}));
     Count([](ZoneCloudletCounters& counters) { ++counters.notices_sent; });
   }

@@ -152,7 +152,7 @@ HttpAnswer Api::OneHazard(const std::string& id) const {
   const auto hazard = zone_.Find(*uuid);
   if (!hazard) return ErrorAnswer(404, "the zone knows no hazard with this id");
   Json feature = HazardFeature(*hazard, catalogue_);
-  feature["properties"]["active"] = hazard->active;
+  feature["properties"]["active"] = IsOnMap(hazard->state);
   return JsonAnswer(feature, "application/geo+json");
 }
 

@@ -82,7 +82,7 @@ const char* ActionName(HazardAction action) {
 }
 
 HazardAction ReplayAction(const Hazard& hazard) {
-  if (!hazard.active) return HazardAction::kRemoved;
+  if (!IsOnMap(hazard.state)) return HazardAction::kRemoved;
   // A hazard's first event leaves it with one sighting; every later event is an update.
   return hazard.sightings <= 1 ? HazardAction::kAdded : HazardAction::kUpdated;
 }

@@ -22,12 +22,29 @@ SpatialGrid& HazardRegistry::GridOf(const std::string& class_name) {
 HazardRegistry::Slot HazardRegistry::Append(Hazard hazard) {
   const auto slot = static_cast<Slot>(hazards_.size());
   slots_.emplace(hazard.uuid, slot);
-  if (hazard.active) {
-    GridOf(hazard.class_name).Insert(hazard.position, slot);
-    ++active_count_;
-  }
   hazards_.push_back(std::move(hazard));
+  PutOnGrid(slot);
   return slot;
+}
+
+/// Counts the hazard in its state, and makes it one that reports may match.
+void HazardRegistry::PutOnGrid(Slot slot) {
+  const Hazard& hazard = hazards_[slot];
+  ++counts_[static_cast<std::size_t>(hazard.state)];
+  if (hazard.state == HazardState::kGone) return;
+  GridOf(hazard.class_name).Insert(hazard.position, slot);
+}
+
+void HazardRegistry::TakeFromGrid(Slot slot) {
+  const Hazard& hazard = hazards_[slot];
+  --counts_[static_cast<std::size_t>(hazard.state)];
+  if (hazard.state == HazardState::kGone) return;
+  GridOf(hazard.class_name).Erase(hazard.position, slot);
+}
+
+std::size_t HazardRegistry::on_map_count() const {
+  return hazards_.size() - counts_[static_cast<std::size_t>(HazardState::kGone)] -
+         counts_[static_cast<std::size_t>(HazardState::kRejected)];
 }
 
 void HazardRegistry::Restore(Hazard hazard) {
@@ -52,8 +69,9 @@ std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string&
 
 HazardRegistry::Slot HazardRegistry::Add(const Report& report, const PictureName& picture,
                                          const Uuid& uuid, std::uint64_t sequence,
-                                         std::int64_t now_ns) {
+                                         std::int64_t now_ns, HazardState state) {
   Hazard hazard;
+  hazard.state = state;
   hazard.uuid = uuid;
   hazard.class_name = report.class_name;
   hazard.confidence = std::min(report.confidence, rule_.max_confidence);
@@ -76,10 +94,9 @@ void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& p
   RememberForUndo(slot);
   Hazard& hazard = hazards_[slot];
   const bool newest = report.stamp_ns >= hazard.last_seen_ns;
-  SpatialGrid& grid = GridOf(hazard.class_name);
-  grid.Erase(hazard.position, slot);
+  TakeFromGrid(slot);
   Fuse(hazard, report, rule_);
-  grid.Insert(hazard.position, slot);
+  PutOnGrid(slot);
   if (!picture.sha256.empty() && (newest || hazard.image_sha256.empty())) {
     hazard.image_sha256 = picture.sha256;
     hazard.image_format = picture.format;
@@ -89,15 +106,21 @@ void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& p
   NoteChange(slot);
 }
 
-void HazardRegistry::Deactivate(Slot slot, std::uint64_t sequence, std::int64_t now_ns) {
+void HazardRegistry::SetState(Slot slot, HazardState state, std::uint64_t sequence,
+                              std::int64_t now_ns) {
   RememberForUndo(slot);
   Hazard& hazard = hazards_[slot];
-  GridOf(hazard.class_name).Erase(hazard.position, slot);
-  --active_count_;
-  hazard.active = false;
+  TakeFromGrid(slot);
+  hazard.state = state;
+  PutOnGrid(slot);
   hazard.updated_ns = now_ns;
   hazard.sequence = sequence;
   NoteChange(slot);
+}
+
+void HazardRegistry::MarkAnnounced(Slot slot) {
+  RememberForUndo(slot);
+  hazards_[slot].announced_sequence = hazards_[slot].sequence;
 }
 
 std::optional<HazardRegistry::Slot> HazardRegistry::Find(const Uuid& uuid) const {
@@ -114,7 +137,7 @@ std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
   for (; change != changes_.end() && result.size() < limit; ++change) {
     const Hazard& hazard = hazards_[change->slot];
     if (hazard.sequence != change->sequence) continue;
-    if (!hazard.active && since_sequence == 0) continue;
+    if (!IsOnMap(hazard.state) && since_sequence == 0) continue;
     if (box && !box->Contains(hazard.position)) continue;
     result.push_back(hazard);
   }
@@ -131,7 +154,7 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
   std::vector<std::pair<double, Slot>> found;
   for (Slot slot = 0; slot < hazards_.size(); ++slot) {
     const Hazard& hazard = hazards_[slot];
-    if (!hazard.active) continue;
+    if (!IsTold(hazard.state)) continue;
     if (std::abs(hazard.position.latitude_deg - centre.latitude_deg) > max_latitude_difference) {
       continue;
     }
@@ -146,6 +169,27 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
   std::vector<Hazard> result;
   result.reserve(count);
   for (std::size_t i = 0; i < count; ++i) result.push_back(hazards_[found[i].second]);
+  return result;
+}
+
+std::vector<Hazard> HazardRegistry::ChangedAround(const GeoPoint& centre, double radius_m,
+                                                  std::uint64_t since_sequence,
+                                                  std::size_t limit) const {
+  std::vector<Hazard> result;
+  auto change = std::upper_bound(
+      changes_.begin(), changes_.end(), since_sequence,
+      [](std::uint64_t sequence, const Change& c) { return sequence < c.sequence; });
+  for (; change != changes_.end(); ++change) {
+    const Hazard& hazard = hazards_[change->slot];
+    if (hazard.sequence != change->sequence || hazard.announced_sequence <= since_sequence)
+      continue;
+    if (since_sequence == 0 && !IsTold(hazard.state)) continue;
+    if (GeodesicDistanceM(centre, hazard.position) <= radius_m) result.push_back(hazard);
+  }
+  std::sort(result.begin(), result.end(), [](const Hazard& a, const Hazard& b) {
+    return a.announced_sequence < b.announced_sequence;
+  });
+  if (result.size() > limit) result.resize(limit);
   return result;
 }
 
@@ -187,22 +231,15 @@ void HazardRegistry::Rollback() {
 }
 
 void HazardRegistry::TakeBack(Undo& undo) {
+  TakeFromGrid(undo.slot);
   Hazard& hazard = hazards_[undo.slot];
-  SpatialGrid& grid = GridOf(hazard.class_name);
-  if (hazard.active) {
-    grid.Erase(hazard.position, undo.slot);
-    --active_count_;
-  }
   if (!undo.before) {
     slots_.erase(hazard.uuid);
     hazards_.pop_back();
     return;
   }
   hazard = std::move(*undo.before);
-  if (hazard.active) {
-    grid.Insert(hazard.position, undo.slot);
-    ++active_count_;
-  }
+  PutOnGrid(undo.slot);
 }
 
 }  // namespace livemap

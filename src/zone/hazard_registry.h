@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -39,29 +40,38 @@ class HazardRegistry {
   /// Throws Error when its uuid or sequence is not new.
   void Restore(Hazard hazard);
 
-  /// The nearest active hazard of this class within the class's radius (geodesic), the older one
-  /// among equals. `position` must be valid.
+  /// The nearest hazard of this class that is on the map or rejected within the class's radius
+  /// (geodesic), the older one among equals. `position` must be valid.
   std::optional<Slot> FindMatch(const std::string& class_name, const GeoPoint& position) const;
 
   /// Puts a new hazard on the map.
   Slot Add(const Report& report, const PictureName& picture, const Uuid& uuid,
-           std::uint64_t sequence, std::int64_t now_ns);
+           std::uint64_t sequence, std::int64_t now_ns, HazardState state = HazardState::kActive);
   /// Counts the report as a sighting of `slot`; the newer image's picture stays.
   void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
              std::int64_t now_ns);
-  /// Takes an active hazard off the map.
-  void Deactivate(Slot slot, std::uint64_t sequence, std::int64_t now_ns);
+  /// Takes a hazard to another state; one that is gone matches no report any more.
+  void SetState(Slot slot, HazardState state, std::uint64_t sequence, std::int64_t now_ns);
+  /// Drivers are told of the hazard as it is now.
+  void MarkAnnounced(Slot slot);
 
   const Hazard& Get(Slot slot) const { return hazards_[slot]; }
   std::optional<Slot> Find(const Uuid& uuid) const;
   std::size_t size() const { return hazards_.size(); }
-  std::size_t active_count() const { return active_count_; }
+  /// How many are in each state, by HazardState.
+  const std::array<std::size_t, kHazardStates>& counts() const { return counts_; }
+  /// On the officials' map.
+  std::size_t on_map_count() const;
 
   /// As ZoneService::Query.
   std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit) const;
   /// As ZoneService::QueryNear.
   std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
+
+  /// As ZoneService::ChangedAround.
+  std::vector<Hazard> ChangedAround(const GeoPoint& centre, double radius_m,
+                                    std::uint64_t since_sequence, std::size_t limit) const;
 
   void Begin();
   void Commit();
@@ -82,6 +92,8 @@ class HazardRegistry {
     SpatialGrid grid;
   };
 
+  void PutOnGrid(Slot slot);
+  void TakeFromGrid(Slot slot);
   SpatialGrid& GridOf(const std::string& class_name);
   Slot Append(Hazard hazard);
   void RememberForUndo(Slot slot);
@@ -94,10 +106,10 @@ class HazardRegistry {
   FusionRule rule_;
   std::deque<Hazard> hazards_;  ///< By slot; a deque, because growth must not move them.
   std::unordered_map<Uuid, Slot> slots_;
-  std::unordered_map<std::string, ClassIndex> classes_;  ///< By name; active hazards only.
+  std::unordered_map<std::string, ClassIndex> classes_;  ///< By name; all but gone hazards.
   /// In ascending order of sequence; an entry is stale once its hazard has a newer sequence.
   std::vector<Change> changes_;
-  std::size_t active_count_ = 0;
+  std::array<std::size_t, kHazardStates> counts_{};
   bool in_transaction_ = false;
   std::size_t changes_at_begin_ = 0;
   std::vector<Undo> undo_;

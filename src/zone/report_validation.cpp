@@ -5,13 +5,16 @@
 #include <array>
 #include <cmath>
 #include <string_view>
+#include <utility>
 
 #include "base/image_header.h"
 
 namespace livemap {
 namespace {
 
-using Refusal = std::optional<std::string>;
+using Why = std::optional<Refusal>;
+
+Refusal Malformed(std::string sentence) { return {RefusalKind::kMalformed, std::move(sentence)}; }
 
 /// Decodes the code point at the front of `text` and removes it; none for invalid UTF-8 (RFC 3629:
 /// overlong forms, surrogates, above U+10FFFF).
@@ -59,11 +62,11 @@ bool IsPrintable(std::uint32_t code_point) {
   });
 }
 
-Refusal WhyTextRefused(const char* name, const std::string& text, const ReportLimits& limits) {
+Why WhyTextRefused(const char* name, const std::string& text, const ReportLimits& limits) {
   if (IsPrintableText(text, limits.max_text_bytes)) return std::nullopt;
-  return std::string(name) + " of " + std::to_string(text.size()) +
-         " bytes is not accepted: it must be printable UTF-8 of 1 to " +
-         std::to_string(limits.max_text_bytes) + " bytes";
+  return Malformed(std::string(name) + " of " + std::to_string(text.size()) +
+                   " bytes is not accepted: it must be printable UTF-8 of 1 to " +
+                   std::to_string(limits.max_text_bytes) + " bytes");
 }
 
 std::string ToText(const GeoPoint& point) {
@@ -71,51 +74,62 @@ std::string ToText(const GeoPoint& point) {
          ")";
 }
 
-Refusal WhyPositionRefused(const Report& report, const ReportLimits& limits) {
+Why WhyPositionRefused(const Report& report, const ReportLimits& limits) {
   if (!IsValid(report.position)) {
-    return "position " + ToText(report.position) + " is no latitude and longitude in degrees";
+    return Malformed("position " + ToText(report.position) +
+                     " is no latitude and longitude in degrees");
   }
   if (limits.zone && !limits.zone->Contains(report.position)) {
-    return "position " + ToText(report.position) + " lies outside the zone";
+    return Refusal{RefusalKind::kOutsideZone,
+                   "position " + ToText(report.position) + " lies outside the zone"};
   }
   const Eigen::Matrix2d& covariance = report.covariance_m2;
-  if (!covariance.allFinite()) return "covariance is not finite";
+  if (!covariance.allFinite()) return Malformed("covariance is not finite");
   // Compared with the largest entry, so that the unit does not matter; half a part per million is
   // what single precision on the way leaves.
   const double asymmetry = std::abs(covariance(0, 1) - covariance(1, 0));
-  if (asymmetry > 1e-6 * covariance.cwiseAbs().maxCoeff()) return "covariance is not symmetric";
+  if (asymmetry > 1e-6 * covariance.cwiseAbs().maxCoeff())
+    return Malformed("covariance is not symmetric");
   const double largest = limits.max_position_sigma_m * limits.max_position_sigma_m;
   if (covariance.cwiseAbs().maxCoeff() > largest) {
-    return "covariance exceeds " + std::to_string(largest) + " m^2";
+    return Malformed("covariance exceeds " + std::to_string(largest) + " m^2");
   }
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(covariance, Eigen::EigenvaluesOnly);
-  if (!(solver.eigenvalues().minCoeff() > 0)) return "covariance is not positive definite";
+  if (!(solver.eigenvalues().minCoeff() > 0))
+    return Malformed("covariance is not positive definite");
   return std::nullopt;
 }
 
-Refusal WhyStampRefused(const Report& report, const ReportLimits& limits, std::int64_t now_ns) {
+Why WhyStampRefused(const Report& report, const ReportLimits& limits, std::int64_t now_ns) {
   if (report.stamp_ns < limits.min_stamp_ns) {
-    return "stamp " + std::to_string(report.stamp_ns) + " ns lies before " +
-           std::to_string(limits.min_stamp_ns) + " ns";
+    return Refusal{RefusalKind::kTooOld, "stamp " + std::to_string(report.stamp_ns) +
+                                             " ns lies before " +
+                                             std::to_string(limits.min_stamp_ns) + " ns"};
   }
   // A difference of two arbitrary 64-bit stamps could overflow; of two non-negative ones it cannot.
   const double ahead_s =
       static_cast<double>(report.stamp_ns - std::max<std::int64_t>(now_ns, 0)) * 1e-9;
   if (ahead_s > limits.max_future_s) {
-    return "stamp lies " + std::to_string(ahead_s) + " s in the future, at most " +
-           std::to_string(limits.max_future_s) + " s are accepted";
+    return Refusal{RefusalKind::kFuture,
+                   "stamp lies " + std::to_string(ahead_s) + " s in the future, at most " +
+                       std::to_string(limits.max_future_s) + " s are accepted"};
+  }
+  if (-ahead_s > limits.max_age_s) {
+    return Refusal{RefusalKind::kTooOld, "stamp lies " + std::to_string(-ahead_s) +
+                                             " s in the past, at most " +
+                                             std::to_string(limits.max_age_s) + " s are accepted"};
   }
   return std::nullopt;
 }
 
-Refusal WhyBoxRefused(const Report& report, const ReportLimits& limits) {
+Why WhyBoxRefused(const Report& report, const ReportLimits& limits) {
   const std::uint32_t side = limits.max_image_side_px;
   if (report.image_width == 0 || report.image_height == 0 || report.image_width > side ||
       report.image_height > side) {
-    return "image size " + std::to_string(report.image_width) + " x " +
-           std::to_string(report.image_height) + " is not within 1 to " + std::to_string(side) +
-           " pixels";
+    return Malformed("image size " + std::to_string(report.image_width) + " x " +
+                     std::to_string(report.image_height) + " is not within 1 to " +
+                     std::to_string(side) + " pixels");
   }
   // A detector's edge may stand on the outer corner of the last pixel, and rounding may push it.
   constexpr float kSlackPx = 1.0F;
@@ -124,23 +138,23 @@ Refusal WhyBoxRefused(const Report& report, const ReportLimits& limits) {
                       box.y_min < box.y_max &&
                       box.x_max <= static_cast<float>(report.image_width) + kSlackPx &&
                       box.y_max <= static_cast<float>(report.image_height) + kSlackPx;
-  if (!inside) return "box is empty or not inside the image";
+  if (!inside) return Malformed("box is empty or not inside the image");
   return std::nullopt;
 }
 
-Refusal WhyPictureRefused(const Report& report, const ReportLimits& limits) {
+Why WhyPictureRefused(const Report& report, const ReportLimits& limits) {
   if (report.image.empty()) return std::nullopt;
   if (report.image.size() > limits.max_image_bytes) {
-    return "picture has " + std::to_string(report.image.size()) + " bytes, at most " +
-           std::to_string(limits.max_image_bytes) + " are accepted";
+    return Malformed("picture has " + std::to_string(report.image.size()) + " bytes, at most " +
+                     std::to_string(limits.max_image_bytes) + " are accepted");
   }
   const auto header = ReadImageHeader(report.image.data(), report.image.size());
-  if (!header) return "picture is no JPEG, PNG or WebP";
+  if (!header) return Malformed("picture is no JPEG, PNG or WebP");
   const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
   if (longer_side > limits.max_image_side_px) {
-    return "picture is " + std::to_string(header->width) + " x " + std::to_string(header->height) +
-           " pixels, at most " + std::to_string(limits.max_image_side_px) +
-           " per side are accepted";
+    return Malformed("picture is " + std::to_string(header->width) + " x " +
+                     std::to_string(header->height) + " pixels, at most " +
+                     std::to_string(limits.max_image_side_px) + " per side are accepted");
   }
   return std::nullopt;
 }
@@ -157,9 +171,29 @@ bool IsPrintableText(const std::string& text, std::size_t max_bytes) {
   return true;
 }
 
-std::optional<std::string> WhyRefused(const Report& report, const ReportLimits& limits,
-                                      std::int64_t now_ns) {
-  if (report.uuid.IsNil()) return "report has no uuid";
+const char* RefusalName(RefusalKind kind) {
+  switch (kind) {
+    case RefusalKind::kMalformed:
+      return "malformed";
+    case RefusalKind::kOutsideZone:
+      return "outside_zone";
+    case RefusalKind::kTooOld:
+      return "too_old";
+    case RefusalKind::kFuture:
+      return "future";
+    case RefusalKind::kReplay:
+      return "replay";
+    case RefusalKind::kSpeed:
+      return "speed";
+    case RefusalKind::kMapFull:
+      return "map_full";
+  }
+  return "unknown";
+}
+
+std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limits,
+                                  std::int64_t now_ns) {
+  if (report.uuid.IsNil()) return Malformed("report has no uuid");
   if (auto why = WhyTextRefused("vehicle_id", report.vehicle_id, limits)) return why;
   if (!report.drive_id.empty()) {
     if (auto why = WhyTextRefused("drive_id", report.drive_id, limits)) return why;
@@ -167,7 +201,7 @@ std::optional<std::string> WhyRefused(const Report& report, const ReportLimits& 
   if (auto why = WhyTextRefused("class name", report.class_name, limits)) return why;
   // Written so that NaN is refused too.
   if (!(report.confidence >= 0.0F && report.confidence <= 1.0F)) {
-    return "confidence " + std::to_string(report.confidence) + " is not within 0 to 1";
+    return Malformed("confidence " + std::to_string(report.confidence) + " is not within 0 to 1");
   }
   if (auto why = WhyPositionRefused(report, limits)) return why;
   if (auto why = WhyStampRefused(report, limits, now_ns)) return why;

@@ -14,6 +14,7 @@
 #include "hazard/report.h"
 #include "zone/hazard.h"
 #include "zone/report_validation.h"
+#include "zone/speed_rule.h"
 
 namespace livemap {
 
@@ -34,16 +35,53 @@ struct ZoneEvent {
   std::optional<VehicleState> vehicle;
 };
 
-/// What became of the reports and vehicle positions since start.
+/// The zone asks one vehicle whether a hazard is still there.
+struct PollOrder {
+  Uuid poll;
+  Uuid hazard;
+  std::string vehicle_id;  ///< Addressee.
+  std::string class_name;
+  GeoPoint position;
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
+  std::int64_t expires_ns = 0;  ///< Zone clock (UTC); later answers do not count.
+  bool picture_wanted = false;
+  std::uint32_t max_picture_bytes = 0;
+};
+
+/// What a vehicle answers.
+struct PollAnswer {
+  enum class Answer { kYes, kNo, kCantSee };
+  Uuid poll;
+  Uuid hazard;
+  std::string vehicle_id;  ///< The proven identity.
+  Answer answer = Answer::kCantSee;
+  std::string reason;     ///< Of "can't see"; printable UTF-8 of at most 64 bytes or empty.
+  double confidence = 0;  ///< 0..1.
+  GeoPoint vehicle_position;
+  std::int64_t stamp_ns = 0;  ///< Of the image, vehicle clock (UTC).
+  std::string image_format;
+  std::vector<std::uint8_t> image;  ///< A compressed file; may be empty.
+};
+
+/// What became of the reports, vehicle positions and polls since start.
 struct ZoneStatistics {
   std::uint64_t added = 0;     ///< Reports that became a new hazard.
   std::uint64_t merged = 0;    ///< Reports counted as a sighting of a known hazard.
   std::uint64_t repeated = 0;  ///< Reports whose uuid was committed before.
-  std::uint64_t refused = 0;
+  std::uint64_t refused = 0;   ///< For good; all kinds together.
+  /// Of those, by RefusalKind.
+  std::array<std::uint64_t, kRefusalKinds> refused_by_kind{};
+  std::uint64_t not_now = 0;  ///< Beyond a vehicle's hourly cap: not answered, sent again later.
+  std::uint64_t store_errors = 0;  ///< Batches and decisions that the store could not keep.
   std::uint64_t vehicle_positions = 0;
   std::uint64_t vehicle_positions_refused = 0;
-  std::size_t active_hazards = 0;
-  std::uint64_t image_bytes = 0;  ///< On disk.
+  std::uint64_t polls = 0;    ///< Asked.
+  std::uint64_t answers = 0;  ///< Counted.
+  std::uint64_t answers_refused =
+      0;                           ///< Unknown, expired, another's, or from where nobody sees it.
+  std::size_t active_hazards = 0;  ///< On the map: candidate, active or verifying.
+  std::array<std::size_t, kHazardStates> hazards_by_state{};  ///< By HazardState.
+  std::uint64_t image_bytes = 0;                              ///< On disk.
 };
 
 /// The zone's state behind one thread-safe door: registry, store, pictures, vehicles, event stream.
@@ -59,8 +97,10 @@ class ZoneService {
     double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
     double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
     std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
-    std::size_t max_hazards = 5000000;  ///< New hazards beyond it are refused.
+    std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
+    std::size_t max_reports_per_hour = 3600;  ///< Of one vehicle; further ones must wait.
     ReportLimits limits;
+    SpeedRule speed;
     HazardCatalogue catalogue;
   };
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
@@ -75,24 +115,54 @@ class ZoneService {
   ZoneService& operator=(const ZoneService&) = delete;
 
   /// Validates, registers or merges, commits; idempotent by uuid. Throws StoreError when the store
-  /// fails: then nothing of the report counts, and the vehicle sends it again.
+  /// fails: then nothing of the report counts, and the vehicle sends it again. Throws Error when
+  /// the vehicle's hourly cap is reached: HandleBatch just leaves such a report unanswered.
   Receipt Handle(const Report& report);
-  /// The same for many in one transaction, in order; one receipt per report. All or nothing when
-  /// the store fails.
+  /// The same for many in one transaction, in order; one receipt per report in the order of the
+  /// reports, but none for a report that is not taken now (see Config::max_reports_per_hour): its
+  /// vehicle sends it again. All or nothing when the store fails.
   std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
 
   /// Hazards whose last event is newer than `since_sequence`, in the order of that sequence, at
-  /// most `limit`. Active ones; removed ones too when `since_sequence` > 0, so that a view catches
-  /// up after a gap.
+  /// most `limit`. Those on the officials' map; gone and rejected ones too when `since_sequence`
+  /// > 0, so that a view catches up after a gap.
   std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit) const;
-  /// Active hazards within `radius_m` of `centre`, nearest first, at most `limit`.
+  /// Hazards that drivers are told of within `radius_m` of `centre`, nearest first, at most
+  /// `limit`.
   std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
-  /// Also a removed one.
+  /// What a vehicle that knows all announcements up to `since_sequence` must hear: hazards within
+  /// `radius_m` of `centre` that were announced since, in the order of their last announcement, at
+  /// most `limit`. Those that drivers are no longer told of too (IsTold(state) is false), unless
+  /// `since_sequence` is 0.
+  std::vector<Hazard> ChangedAround(const GeoPoint& centre, double radius_m,
+                                    std::uint64_t since_sequence, std::size_t limit) const;
+  /// Also one that is gone or rejected.
   std::optional<Hazard> Find(const Uuid& uuid) const;
-  /// Takes an active hazard off the map and commits the event with its reason (at most 200 bytes
-  /// are kept). False when there is no active hazard of that uuid.
-  bool Remove(const Uuid& uuid, const std::string& reason);
+  /// The newest `limit` events of a hazard, oldest of them first; empty for an unknown one. Throws
+  /// StoreError.
+  std::vector<StoredEvent> Events(const Uuid& hazard, std::size_t limit) const;
+
+  /// An official's decisions. Each is committed with its event, whose reason names the official
+  /// (printable UTF-8 of at most 64 bytes) and gives `reason` as far as 200 bytes go. False when no
+  /// hazard of that uuid is on the map (Confirm: or it is rejected, which it revokes). Throw Error
+  /// for an unacceptable name, StoreError when the store fails.
+  bool Reject(const Uuid& hazard, const std::string& official, const std::string& reason);
+  bool Confirm(const Uuid& hazard, const std::string& official);
+  /// Takes a hazard off the map for good. False when none of that uuid is on the map.
+  bool Remove(const Uuid& hazard, const std::string& reason);
+
+  /// Polls to be sent now; each is remembered until it is answered or expires. They are not stored:
+  /// after a restart the zone asks anew.
+  std::vector<PollOrder> TakeDuePolls();
+  /// Counts the answer and commits what follows. False, and counted, when the answer is not
+  /// acceptable: the poll is unknown, expired or another vehicle's, its stamp is off, or that
+  /// vehicle cannot have seen the place by the positions that the zone knows. Throws StoreError:
+  /// then the poll stays open.
+  bool HandleAnswer(const PollAnswer& answer);
+  /// Time passes: commits the transitions that are due. To be called about once a second. Throws
+  /// StoreError: then nothing has changed.
+  void Advance();
 
   /// File of a stored picture; only 64 lower-case hex digits name one.
   std::optional<std::string> ImagePath(const std::string& sha256) const;
@@ -111,6 +181,8 @@ class ZoneService {
 
   /// Of the newest event; 0 when nothing ever happened.
   std::uint64_t Sequence() const;
+  /// Of the newest event that drivers were told; 0 without one.
+  std::uint64_t AnnouncedSequence() const;
   ZoneStatistics Statistics() const;
 
  private:

@@ -60,8 +60,10 @@ const std::array<const char*, 5>& FirstSchema() {
 
 constexpr int kSchemaVersion = 1;
 
+}  // namespace
+
 /// The values of all statements: SOCI binds to places, not to values.
-struct Row {
+struct ZoneStoreRow {
   std::string uuid, hazard_uuid, class_name, vehicle_id, drive_id, image_sha256, image_format;
   std::string reason;
   double confidence = 0, latitude = 0, longitude = 0;
@@ -70,6 +72,10 @@ struct Row {
   long long stamp_ns = 0, received_ns = 0;
   int active = 0, action = 0;
 };
+
+namespace {
+
+using Row = ZoneStoreRow;
 
 Uuid ParseUuid(const std::string& text) {
   const auto uuid = Uuid::Parse(text);
@@ -95,7 +101,7 @@ Hazard ToHazard(const Row& row) {
   hazard.sequence = static_cast<std::uint64_t>(row.sequence);
   hazard.image_sha256 = row.image_sha256;
   hazard.image_format = row.image_format;
-  hazard.active = row.active != 0;
+  hazard.state = row.active != 0 ? HazardState::kActive : HazardState::kGone;
   return hazard;
 }
 
@@ -173,8 +179,9 @@ class ZoneStore::Implementation {
 
 void ZoneStore::Implementation::PrepareStatements() {
   using soci::use;
-  find_report_.emplace((session_.prepare << "SELECT hazard_uuid FROM reports WHERE uuid = :uuid",
-                        use(row_.uuid), soci::into(row_.hazard_uuid)));
+  find_report_.emplace(
+      (session_.prepare << "SELECT hazard_uuid, vehicle_id FROM reports WHERE uuid = :uuid",
+       use(row_.uuid), soci::into(row_.hazard_uuid), soci::into(row_.vehicle_id)));
   write_hazard_.emplace(
       (session_.prepare
            << "INSERT INTO hazards (uuid, class_name, confidence, latitude, longitude, "
@@ -249,17 +256,17 @@ std::uint64_t ZoneStore::LastSequence() {
   });
 }
 
-std::optional<Uuid> ZoneStore::FindReport(const Uuid& report_uuid) {
-  return Explained("looking up a report", [&]() -> std::optional<Uuid> {
+std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_uuid) {
+  return Explained("looking up a report", [&]() -> std::optional<KnownReport> {
     Row& row = implementation_->row_;
     row.uuid = report_uuid.ToString();
     soci::statement& find = *implementation_->find_report_;
     if (!find.execute(true)) return std::nullopt;
-    const Uuid hazard_uuid = ParseUuid(row.hazard_uuid);
+    const KnownReport known{ParseUuid(row.hazard_uuid), row.vehicle_id};
     // Read to the end: an unfinished query would keep its snapshot and with it the whole WAL.
     while (find.fetch()) {
     }
-    return hazard_uuid;
+    return known;
   });
 }
 
@@ -296,7 +303,7 @@ void ZoneStore::WriteHazard(const Hazard& hazard) {
     row.sequence = static_cast<long long>(hazard.sequence);
     row.image_sha256 = hazard.image_sha256;
     row.image_format = hazard.image_format;
-    row.active = hazard.active ? 1 : 0;
+    row.active = IsOnMap(hazard.state) ? 1 : 0;
     implementation_->write_hazard_->execute(true);
   });
 }

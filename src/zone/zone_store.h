@@ -28,8 +28,12 @@ class ZoneStore {
   void LoadHazards(const std::function<void(Hazard)>& take);
   /// Of the newest event; 0 without events.
   std::uint64_t LastSequence();
-  /// The hazard that a committed report became or was merged into.
-  std::optional<Uuid> FindReport(const Uuid& report_uuid);
+  struct KnownReport {
+    Uuid hazard;  ///< What it became or was merged into.
+    std::string vehicle_id;
+  };
+  /// A committed report.
+  std::optional<KnownReport> FindReport(const Uuid& report_uuid);
 
   /// Writes happen between Begin and Commit; Commit returns when they are on disk.
   void Begin();

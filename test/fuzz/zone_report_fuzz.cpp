@@ -34,7 +34,7 @@ void FuzzReport(const std::uint8_t* data, std::size_t size) {
   report.image.assign(data + size / 2, data + size);
   const auto why = WhyRefused(report, ReportLimits(), kNowNs);
   if (why) {
-    Require(!why->empty() && why->size() < 300);
+    Require(!why->sentence.empty() && why->sentence.size() < 300);
     return;
   }
   Require(!report.class_name.empty() && report.class_name.size() <= ReportLimits().max_text_bytes);

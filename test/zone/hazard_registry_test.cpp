@@ -121,14 +121,14 @@ TEST_F(RegistryTest, TheNewestImageGivesThePictureAndStampsSpanAllSightings) {
   EXPECT_EQ(registry_.Get(slot).updated_ns, 4);
 }
 
-TEST_F(RegistryTest, ADeactivatedHazardIsNoMatchAndShowsOnlyToThoseWhoCatchUp) {
+TEST_F(RegistryTest, AHazardThatIsGoneIsNoMatchAndShowsOnlyToThoseWhoCatchUp) {
   const auto slot = Add(MakeReport());
-  registry_.Deactivate(slot, ++sequence_, kNowNs);
+  registry_.SetState(slot, HazardState::kGone, ++sequence_, kNowNs);
   EXPECT_FALSE(registry_.FindMatch("pothole", MakeReport().position));
   EXPECT_TRUE(registry_.Query(std::nullopt, 0, 10).empty());
   ASSERT_EQ(registry_.Query(std::nullopt, 1, 10).size(), 1U);
-  EXPECT_FALSE(registry_.Query(std::nullopt, 1, 10).front().active);
-  EXPECT_EQ(registry_.active_count(), 0U);
+  EXPECT_EQ(registry_.Query(std::nullopt, 1, 10).front().state, HazardState::kGone);
+  EXPECT_EQ(registry_.on_map_count(), 0U);
 }
 
 TEST_F(RegistryTest, QueryAnswersInOrderOfTheLastChangeWithinBoxAndLimit) {
@@ -180,11 +180,11 @@ TEST_F(RegistryTest, RollbackRestoresEverythingSinceBegin) {
   registry_.Merge(kept, MakeReport({1, 1.00001}), {}, 11, kNowNs);
   registry_.Merge(added, MakeReport({3, 3}), {}, 12, kNowNs);
   registry_.Merge(kept, MakeReport({1, 1.00002}), {}, 13, kNowNs);
-  registry_.Deactivate(removed, 14, kNowNs);
+  registry_.SetState(removed, HazardState::kGone, 14, kNowNs);
   registry_.Rollback();
 
   EXPECT_EQ(registry_.size(), 2U);
-  EXPECT_EQ(registry_.active_count(), 2U);
+  EXPECT_EQ(registry_.on_map_count(), 2U);
   EXPECT_FALSE(registry_.Find(added_uuid));
   EXPECT_TRUE(SameHazard(registry_.Get(kept), kept_before));
   EXPECT_TRUE(SameHazard(registry_.Get(removed), removed_before));

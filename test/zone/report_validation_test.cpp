@@ -16,7 +16,8 @@ using testing::HasSubstr;
 std::string Why(const std::function<void(Report&)>& change, const ReportLimits& limits = {}) {
   Report report = MakeReport();
   change(report);
-  return WhyRefused(report, limits, kNowNs).value_or("");
+  const auto refusal = WhyRefused(report, limits, kNowNs);
+  return refusal ? refusal->sentence : "";
 }
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

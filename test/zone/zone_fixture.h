@@ -28,6 +28,8 @@ class ZoneTest : public testing::Test {
   ZoneService::Config Config() const {
     ZoneService::Config config;
     config.directory = directory_ + "/zone";
+    // Reports of one vehicle lie all over the Earth.
+    config.speed.max_speed_mps = 1e9;
     return config;
   }
   std::string DatabasePath() const { return directory_ + "/zone/zone.sqlite3"; }
@@ -65,7 +67,7 @@ inline std::vector<std::uint8_t> MakeJpeg(std::uint16_t width, std::uint16_t hei
   std::vector<std::uint8_t> bytes{
       0xff, 0xd8, 0xff,         0xe0,        0,           4,          0, 0, 0xff, 0xc0, 0,
       11,   8,    high(height), low(height), high(width), low(width), 1, 1, 0x11, 0};
-  bytes.insert(bytes.end(), filler, value);
+  bytes.resize(bytes.size() + filler, value);
   return bytes;
 }
 
@@ -77,7 +79,8 @@ inline bool SameHazard(const Hazard& a, const Hazard& b) {
          a.first_seen_ns == b.first_seen_ns && a.last_seen_ns == b.last_seen_ns &&
          a.updated_ns == b.updated_ns && a.sequence == b.sequence &&
          a.image_sha256 == b.image_sha256 && a.image_format == b.image_format &&
-         a.active == b.active;
+         a.state == b.state && a.presence == b.presence && a.vehicles == b.vehicles &&
+         a.announced_sequence == b.announced_sequence;
 }
 
 }  // namespace livemap

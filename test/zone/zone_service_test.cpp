@@ -153,7 +153,7 @@ TEST_F(ZoneServiceTest, EventsComeAfterTheCommitInOrderOfTheirSequence) {
   EXPECT_EQ(events[2].action, HazardAction::kUpdated);
   EXPECT_EQ(events[2].hazard.sightings, 2U);
   EXPECT_EQ(events[3].action, HazardAction::kRemoved);
-  EXPECT_FALSE(events[3].hazard.active);
+  EXPECT_EQ(events[3].hazard.state, HazardState::kGone);
   Zone().Unsubscribe(id);
   Zone().Handle(MakeReport({3, 3}));
   EXPECT_EQ(events.size(), 4U);

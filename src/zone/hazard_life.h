@@ -1,0 +1,171 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "hazard/catalogue.h"
+#include "zone/hazard_state.h"
+#include "zone/survival_model.h"
+
+namespace livemap {
+
+/// A vehicle in the records of hazards: the first 8 bytes of the SHA-256 of its proven id, the same
+/// after a restart. Never 0.
+std::uint64_t VehicleKey(const std::string& vehicle_id);
+
+/// What one vehicle said of one hazard so far.
+struct Voice {
+  std::uint64_t vehicle = 0;  ///< VehicleKey; 0: nobody.
+  std::uint32_t at_s = 0;     ///< Newest stamp that counted, UTC seconds since 1970.
+  float log_odds = 0;         ///< How much it moves the hazard's log odds: > 0 there, < 0 gone.
+};
+
+/// Vehicles that a hazard remembers; a further one takes the place of the longest silent.
+constexpr std::size_t kMaxVoices = 6;
+
+/// The life of one hazard: plain data, about 150 bytes, changed by HazardLife only. Times are UTC,
+/// ns since 1970.
+struct LifeRecord {
+  HazardState state = HazardState::kCandidate;
+  bool official = false;           ///< Confirmed by an official: needs no further vehicle.
+  std::int64_t since_ns = 0;       ///< In this state since, zone clock.
+  std::int64_t first_seen_ns = 0;  ///< Oldest stamp that spoke for it.
+  std::int64_t last_yes_ns = 0;    ///< Newest stamp that spoke for it.
+  std::int64_t first_no_ns = 0;    ///< Oldest stamp against it after that; 0 without one.
+  std::int64_t at_ns = 0;          ///< The odds are of this moment.
+  float log_odds = 0;              ///< ln(p / (1 - p)) of its being there.
+  float undenied_log_odds = 0;     ///< The same had nobody spoken against it.
+  std::array<Voice, kMaxVoices> voices{};
+};
+
+/// One line of plain numbers with spaces between, at most 400 bytes, to be stored; exact.
+std::string PackLife(const LifeRecord& life);
+/// Inverse of PackLife; none when `text` is anything else.
+std::optional<LifeRecord> UnpackLife(const std::string& text);
+
+/// Vehicles that speak for the hazard, and against it; at most kMaxVoices together. An opponent
+/// counts until two other vehicles have spoken for the hazard after it.
+std::uint32_t Supporters(const LifeRecord& life);
+std::uint32_t Opponents(const LifeRecord& life);
+
+enum class EvidenceKind : std::uint8_t {
+  kSighting,    ///< A report.
+  kAnswerYes,   ///< To a poll, by a vehicle that could see the place.
+  kAnswerNo,    ///< The same.
+  kCantSee,     ///< Counts nothing.
+  kStillThere,  ///< Change detection between drives saw it on both.
+  kVanished,    ///< Change detection saw it on the earlier drive only.
+};
+
+/// What one vehicle says of one hazard.
+struct Evidence {
+  EvidenceKind kind = EvidenceKind::kSighting;
+  std::uint64_t vehicle = 0;  ///< VehicleKey.
+  std::int64_t stamp_ns = 0;  ///< Of the image.
+};
+
+/// What HazardLife knows of a hazard's class; made by LifeClassOf, cheap to copy.
+struct LifeClass {
+  std::uint32_t confirmations = 2;  ///< Distinct vehicles before drivers are told, 1 to kMaxVoices.
+  double hit_rate = 0.85;           ///< P(a vehicle that looks says yes | it is there).
+  double false_rate = 0.03;         ///< P(the same | it is not there).
+  ClassSurvival survival;
+};
+LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival);
+
+/// A step from one state to another.
+struct LifeTransition {
+  std::optional<HazardState> from;  ///< None: the hazard is new.
+  HazardState to = HazardState::kCandidate;
+  std::string reason;  ///< One sentence of at most 200 bytes without full stop.
+};
+
+/// What came of one call.
+struct LifeStep {
+  std::optional<LifeTransition> transition;
+  bool counted = false;  ///< The evidence moved the odds.
+  LifeLesson lesson;     ///< For SurvivalModel::Learn, when the step is committed.
+};
+
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+
+/// The rules by which one hazard lives: candidate, active, verifying, gone, rejected.
+///
+/// The presence probability p is a two-state filter in log odds (as of occupancy grids: Moravec and
+/// Elfes, 1985): between words of vehicles p shrinks by the class's survival, p(t + dt) = p(t)
+/// S(dt), for what has vanished does not come back; a word adds the logarithm of its likelihood
+/// ratio. Rates are of honest vehicles; a share h of hostile ones says what it likes, so the ratio
+/// of a yes is ((1-h) hit + h) / ((1-h) false + h). Evidence older than the odds counts less: the
+/// hazard may have ended since.
+///
+/// One vehicle is one voice: all that it says together moves the odds by at most ln((1-h)/h) either
+/// way, the second message of a kind adds less than the first, and messages lose nothing by their
+/// order. A voice for the hazard fades with the class's life, as what it said ages. Drivers are
+/// told when `confirmations` distinct vehicles speak for a hazard, or an official. It is gone when
+/// two distinct vehicles speak against it and p is small, or by time alone: one vehicle can neither
+/// confirm nor remove, nor hasten the removal. See docs/life.md.
+class HazardLife {
+ public:
+  struct Config {
+    double prior_presence = 0.2;        ///< Before the first vehicle speaks.
+    double active_above = 0.7;          ///< Drivers are told from this presence on.
+    double verify_below = 0.8;          ///< An active hazard is verified below this presence...
+    double sure_above = 0.9;            ///< ...and active again from this one on.
+    double gone_below = 0.1;            ///< Off the map.
+    double surest = 0.98;               ///< Presence never counts as more certain than this.
+    double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
+    double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
+    double vanished_false_rate = 0.05;  ///< P(the same | it is there).
+    std::uint32_t denials = 2;          ///< Distinct vehicles against it before it is gone.
+    double quarantine_s = 86400;        ///< A rejected hazard takes no support for this long.
+    std::uint32_t reopen_vehicles = 2;  ///< Distinct vehicles that reopen it afterwards.
+    double rejected_keep_s =
+        90 * 86400.0;  ///< Without support for this long it is forgotten (gone).
+  };
+
+  HazardLife();
+  /// Throws Error naming the first value that is out of range, and what is accepted.
+  explicit HazardLife(const Config& config);
+
+  /// A new hazard's first report. The transition has no `from`; its `to` is active at once where
+  /// one vehicle confirms the class.
+  LifeStep Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
+                 LifeRecord& life) const;
+  /// A further word. Does nothing to a hazard that is gone. What is due by time is done first, so
+  /// evidence may come after a transition that it would have prevented.
+  LifeStep Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
+                 LifeRecord& life) const;
+  /// Time passes. Cheap; nothing happens before NextChangeNs.
+  LifeStep Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
+  /// An official says that it is there (also revokes a rejection), or that it is not and never was.
+  /// No transition when the state stays; nothing happens to a hazard that is gone.
+  LifeStep Confirm(const LifeClass& entry, const std::string& official, std::int64_t now_ns,
+                   LifeRecord& life) const;
+  LifeStep Reject(const std::string& official, const std::string& reason, std::int64_t now_ns,
+                  LifeRecord& life) const;
+
+  /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
+  double Presence(const LifeClass& entry, const LifeRecord& life, std::int64_t now_ns) const;
+  /// When Advance will do something if nobody speaks before; kNever if it will not. To be asked
+  /// again after every step. While the class is learned this may come early or late; Advance then
+  /// decides by what is known at its own time.
+  std::int64_t NextChangeNs(const LifeClass& entry, const LifeRecord& life) const;
+
+  const Config& config() const { return config_; }
+
+ private:
+  void MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const;
+  double LogRatio(const LifeClass& entry, EvidenceKind kind, double ended_since) const;
+  void Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
+  std::optional<LifeTransition> Decide(const LifeClass& entry, LifeRecord& life) const;
+  std::optional<LifeTransition> DecideRejected(LifeRecord& life) const;
+
+  Config config_;
+  double max_log_odds_;  // Of presence, by `surest`.
+  double max_voice_;     // Of one vehicle, by `hostile_share`.
+};
+
+}  // namespace livemap

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+/// Where a vehicle was, as the zone heard it.
+struct TrackPoint {
+  std::int64_t stamp_ns = 0;  ///< UTC, ns since 1970.
+  GeoPoint position;
+  double course_rad = 0;  ///< Clockwise from true north; NaN when unknown.
+  double speed_mps = 0;
+};
+
+/// What a camera that looks ahead sees.
+struct SightRule {
+  double range_m = 60;           ///< Furthest it recognises a hazard.
+  double half_angle_rad = 0.61;  ///< Of its horizontal view: 35 degrees.
+  double position_slack_m = 15;  ///< Errors of the vehicle's and the hazard's positions together.
+  double window_s = 10;          ///< A stamp may be off by this, and a track may have such gaps.
+};
+
+/// Whether a vehicle of this track (in order of stamps) could see `place` within `window_s` of
+/// `stamp_ns`: somewhere on the track then the place lay within range and within the camera's view.
+/// Between two points at most 2 * window_s apart the vehicle drove straight. False for an empty
+/// track, or one that says nothing of that time.
+bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns, const GeoPoint& place,
+              const SightRule& rule = {});
+
+}  // namespace livemap
