@@ -8,9 +8,9 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxPictureBytes = 32 << 20;
 constexpr std::string_view kImagePrefix = "/images/";
 constexpr std::string_view kHazardPrefix = "/api/v1/hazards/";
+constexpr std::string_view kEventsEnding = "/events";
 constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
 
 /// Only this server's own files run or load; tiles are the one exception, and only as images.
@@ -25,12 +25,25 @@ bool StartsWith(std::string_view text, std::string_view prefix) {
   return text.substr(0, prefix.size()) == prefix;
 }
 
-HttpAnswer JsonAnswer(const Json& json, const char* type = "application/json") {
-  HttpAnswer answer;
-  answer.content_type = type;
-  answer.content = ToText(json);
-  answer.headers.emplace_back("Cache-Control", "no-store");
+bool EndsWith(std::string_view text, std::string_view end) {
+  return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
+}
+
+HttpAnswer PostOnly() {
+  HttpAnswer answer = MakeErrorAnswer(405, "the method is not allowed, accepted is POST");
+  answer.headers.emplace_back("Allow", "POST");
   return answer;
+}
+
+PictureLimits LimitsOf(const WebOptions& options) {
+  PictureLimits limits;
+  limits.longest_side_px = options.picture_side_px;
+  return limits;
+}
+
+/// What a client should do that shows the states that the query asks for.
+HazardAction ActionFor(const Hazard& hazard, const HazardQuery& query) {
+  return query.Selects(hazard.state) ? ReplayAction(hazard) : HazardAction::kRemoved;
 }
 
 /// 304 where the client already has this very content.
@@ -56,19 +69,17 @@ Api::Api(const WebOptions& options, ZoneService& zone, const HazardCatalogue& ca
       zone_(zone),
       catalogue_(catalogue),
       trails_(trails),
+      officials_(options_, zone, catalogue),
+      pictures_(LimitsOf(options), options.picture_cache_bytes),
       page_(options.web_root),
       leaflet_(options.leaflet_root + "/leaflet"),
       page_policy_(PagePolicy(TileSource(options.tile_url))) {}
 
-HttpAnswer Api::Answer(const HttpQuestion& question) const {
+HttpAnswer Api::Answer(const HttpQuestion& question) {
   HttpAnswer answer;
   try {
-    if (question.method != "GET" && question.method != "HEAD") {
-      answer = ErrorAnswer(405, "the method is not allowed, accepted are GET and HEAD");
-      answer.headers.emplace_back("Allow", "GET, HEAD");
-    } else {
-      answer = Route(ParseTarget(question.target), question);
-    }
+    const bool is_read = question.method == "GET" || question.method == "HEAD";
+    answer = is_read ? Route(ParseTarget(question.target), question) : AnswerPost(question);
   } catch (const BadRequest& mistake) {
     answer = ErrorAnswer(400, mistake.what());
   } catch (const std::exception&) {
@@ -88,12 +99,25 @@ HttpAnswer Api::Answer(const HttpQuestion& question) const {
 }
 
 HttpAnswer Api::ErrorAnswer(int status, const std::string& sentence) const {
-  HttpAnswer answer = JsonAnswer({{"error", sentence}});
-  answer.status = status;
+  return MakeErrorAnswer(status, sentence);
+}
+
+/// Any method but GET and HEAD.
+HttpAnswer Api::AnswerPost(const HttpQuestion& question) {
+  const RequestTarget target = ParseTarget(question.target);
+  const auto decision = ParseDecisionTarget(target.path);
+  if (decision && question.method == "POST") {
+    RefuseParameters(target);
+    return officials_.Decide(*decision, question);
+  }
+  const char* accepted = decision ? "POST" : "GET, HEAD";
+  HttpAnswer answer =
+      ErrorAnswer(405, std::string("the method is not allowed, accepted is ") + accepted);
+  answer.headers.emplace_back("Allow", accepted);
   return answer;
 }
 
-HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question) const {
+HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question) {
   const std::string& path = target.path;
   if (StartsWith(path, "/api/")) return RouteApi(target);
   if (StartsWith(path, kImagePrefix)) return Picture(path.substr(kImagePrefix.size()), question);
@@ -115,7 +139,12 @@ HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question)
 HttpAnswer Api::RouteApi(const RequestTarget& target) const {
   const std::string& path = target.path;
   if (path == "/api/v1/hazards") return Hazards(ParseHazardQuery(target));
+  if (StartsWith(path, kHazardPrefix) && EndsWith(path, kEventsEnding)) {
+    const std::size_t id_bytes = path.size() - kHazardPrefix.size() - kEventsEnding.size();
+    return Events(path.substr(kHazardPrefix.size(), id_bytes), ParseEventsQuery(target));
+  }
   RefuseParameters(target);
+  if (ParseDecisionTarget(path)) return PostOnly();
   if (StartsWith(path, kHazardPrefix)) return OneHazard(path.substr(kHazardPrefix.size()));
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
   if (path == "/api/v1/vehicles") return Vehicles();
@@ -132,8 +161,9 @@ HttpAnswer Api::Hazards(const HazardQuery& query) const {
   std::uint64_t newest = 0;
   for (const Hazard& hazard : hazards) {
     newest = std::max(newest, hazard.sequence);
+    if (!query.since && !query.Selects(hazard.state)) continue;
     Json feature = HazardFeature(hazard, catalogue_);
-    if (query.since) feature["properties"]["action"] = ActionName(ReplayAction(hazard));
+    if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
     features.push_back(std::move(feature));
   }
   // The list comes in the order of the sequence, so a cut one is complete up to its last hazard.
@@ -156,6 +186,18 @@ HttpAnswer Api::OneHazard(const std::string& id) const {
   return JsonAnswer(feature, "application/geo+json");
 }
 
+HttpAnswer Api::Events(const std::string& id, std::size_t limit) const {
+  const auto uuid = Uuid::Parse(id);
+  if (!uuid) throw BadRequest("the hazard's id is no UUID");
+  if (!zone_.Find(*uuid)) return ErrorAnswer(404, "the zone knows no hazard with this id");
+  Json events = Json::array();
+  for (const StoredEvent& event : zone_.Events(*uuid, limit)) events.push_back(EventJson(event));
+  Json answer;
+  answer["id"] = uuid->ToString();
+  answer["events"] = std::move(events);
+  return JsonAnswer(answer);
+}
+
 HttpAnswer Api::Vehicles() const {
   Json features = Json::array();
   for (const VehicleState& vehicle : zone_.Vehicles()) {
@@ -173,25 +215,22 @@ HttpAnswer Api::PageConfig() const {
   config["tile_url"] = options_.tile_url.empty() ? Json(nullptr) : Json(options_.tile_url);
   config["tile_attribution"] = options_.tile_attribution;
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
+  config["officials"] = officials_.is_open();
   return JsonAnswer(config);
 }
 
-HttpAnswer Api::Picture(const std::string& sha256, const HttpQuestion& question) const {
+/// A vehicle's file itself never leaves the zone.
+HttpAnswer Api::Picture(const std::string& sha256, const HttpQuestion& question) {
   const auto path = zone_.ImagePath(sha256);
-  if (!path) return ErrorAnswer(404, "the zone has no picture of this name");
+  const ServedPictures::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
+  if (!picture) return ErrorAnswer(404, "the zone has no picture of this name");
   StaticFile file;
-  try {
-    file.content = ReadFile(*path, kMaxPictureBytes);
-  } catch (const Error&) {
-    return ErrorAnswer(404, "the zone has no picture of this name");  // Evicted in between.
-  }
-  const auto type = ImageType(file.content);
-  if (!type) return ErrorAnswer(404, "the zone has no picture of this name");
-  file.content_type = *type;
-  file.etag = '"' + sha256 + '"';
+  file.content.assign(picture->begin(), picture->end());
+  file.content_type = "image/jpeg";
+  file.etag = '"' + sha256 + '-' + std::to_string(options_.picture_side_px) + '"';
   HttpAnswer answer =
       CacheableAnswer(std::move(file), "public, max-age=31536000, immutable", question);
-  // A vehicle sent these bytes: even opened on their own they may do nothing.
+  // Even opened on its own it may do nothing.
   answer.headers.emplace_back("Content-Security-Policy", "default-src 'none'; sandbox");
   return answer;
 }

@@ -16,7 +16,7 @@ struct WebContext {
   const WebOptions& options;
   ZoneService& zone;
   const HazardCatalogue& catalogue;
-  const Api& api;
+  Api& api;
   EventHub& hub;
   std::atomic<std::size_t> connections{0};
 };

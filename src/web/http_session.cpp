@@ -1,5 +1,6 @@
 #include "web/http_session.h"
 
+#include <algorithm>
 #include <boost/asio/dispatch.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
@@ -20,13 +21,14 @@ std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
 }
 
-std::string Field(const http::request<http::empty_body>& request, http::field name) {
+std::string Field(const http::request<http::string_body>& request, http::field name) {
   const auto value = request[name];
   return std::string(value.data(), value.size());
 }
 
 /// HTTP's reason phrases come from Beast; this maps a failed parse to an answer.
 int StatusOfParseError(const beast::error_code& failure) {
+  if (failure == http::error::body_limit) return 413;
   return failure == http::error::header_limit ? 431 : 400;
 }
 
@@ -35,10 +37,22 @@ bool IsParseError(const beast::error_code& failure) {
          failure != http::error::end_of_stream && failure != http::error::partial_message;
 }
 
+/// An IPv4 address; of an IPv6 one the network, of which a single customer has every address.
+std::string ClientOf(const boost::asio::ip::tcp::socket& socket) {
+  beast::error_code failure;
+  const auto endpoint = socket.remote_endpoint(failure);
+  if (failure) return "";
+  if (endpoint.address().is_v4()) return endpoint.address().to_string();
+  auto bytes = endpoint.address().to_v6().to_bytes();
+  if (endpoint.address().to_v6().is_v4_mapped()) return endpoint.address().to_string();
+  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
+  return boost::asio::ip::make_address_v6(bytes).to_string();
+}
+
 }  // namespace
 
 HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, WebContext& context)
-    : stream_(std::move(socket)), slot_(context) {}
+    : stream_(std::move(socket)), slot_(context), client_(ClientOf(stream_.socket())) {}
 
 void HttpSession::Start() {
   boost::asio::dispatch(stream_.get_executor(),
@@ -48,36 +62,58 @@ void HttpSession::Start() {
 void HttpSession::ReadRequest() {
   parser_.emplace();
   parser_->header_limit(kMaxHeaderBytes);
+  parser_->body_limit(kMaxBodyBytes);
   stream_.expires_after(Milliseconds(slot_.context().options.request_timeout_s));
   http::async_read_header(stream_, buffer_, *parser_,
                           [self = shared_from_this()](beast::error_code failure, std::size_t) {
-                            self->OnRequest(failure);
+                            self->OnHeader(failure);
                           });
 }
 
-void HttpSession::OnRequest(beast::error_code failure) {
-  const Api& api = slot_.context().api;
-  if (failure) {
-    if (!IsParseError(failure)) return Close();
-    const int status = StatusOfParseError(failure);
-    return Write(api.ErrorAnswer(status, "the request's header is malformed or too large"), false,
-                 false);
-  }
-  const Request& request = parser_->get();
-  // No request of this server has a body; one that announces it is not read any further.
-  const bool has_body = !parser_->is_done();
-  if (!has_body && UpgradeToStream(request)) return;
+void HttpSession::AnswerUnreadable(beast::error_code failure) {
+  if (!IsParseError(failure)) return Close();
+  const int status = StatusOfParseError(failure);
+  const char* sentence = status == 413 ? "the request's body is too large or not accepted"
+                                       : "the request's header is malformed or too large";
+  Write(slot_.context().api.ErrorAnswer(status, sentence), false, false);
+}
 
+void HttpSession::OnHeader(beast::error_code failure) {
+  if (failure) return AnswerUnreadable(failure);
+  if (parser_->is_done()) {
+    if (!UpgradeToStream(parser_->get())) AnswerRequest();
+    return;
+  }
+  if (parser_->get().method() == http::verb::post) return ReadBody();
+  // A body that is not read would be taken for the next request: the connection ends.
+  const bool head_only = parser_->get().method() == http::verb::head;
+  Write(slot_.context().api.ErrorAnswer(413, "a request with a body is not accepted"), false,
+        head_only);
+}
+
+/// Within the time that the header had, too.
+void HttpSession::ReadBody() {
+  http::async_read(stream_, buffer_, *parser_,
+                   [self = shared_from_this()](beast::error_code failure, std::size_t) {
+                     if (failure) return self->AnswerUnreadable(failure);
+                     self->AnswerRequest();
+                   });
+}
+
+void HttpSession::AnswerRequest() {
+  const Request& request = parser_->get();
   HttpQuestion question;
   question.method = std::string(request.method_string());
   question.target = std::string(request.target());
   question.if_none_match = Field(request, http::field::if_none_match);
-  const bool head_only = question.method == "HEAD";
-  const bool is_read = head_only || question.method == "GET";
-  HttpAnswer answer = has_body && is_read
-                          ? api.ErrorAnswer(413, "a request with a body is not accepted")
-                          : api.Answer(question);
-  Write(std::move(answer), request.keep_alive() && !has_body, head_only);
+  question.authorization = Field(request, http::field::authorization);
+  question.content_type = Field(request, http::field::content_type);
+  question.origin = Field(request, http::field::origin);
+  question.host = Field(request, http::field::host);
+  question.client = client_;
+  question.body = request.body();
+  HttpAnswer answer = slot_.context().api.Answer(question);
+  Write(std::move(answer), request.keep_alive(), question.method == "HEAD");
 }
 
 bool HttpSession::UpgradeToStream(const Request& request) {

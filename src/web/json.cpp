@@ -95,6 +95,9 @@ Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue) {
   properties["label"] = catalogue.Get(hazard.class_name).label;
   properties["confidence"] = Rounded(static_cast<double>(hazard.confidence), 4);
   properties["sightings"] = hazard.sightings;
+  properties["state"] = StateName(hazard.state);
+  properties["presence"] = Rounded(static_cast<double>(hazard.presence), 4);
+  properties["vehicles"] = hazard.vehicles;
   properties["first_seen"] = Rfc3339(hazard.first_seen_ns);
   properties["last_seen"] = Rfc3339(hazard.last_seen_ns);
   properties["updated"] = Rfc3339(hazard.updated_ns);
@@ -102,6 +105,17 @@ Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue) {
   properties["image"] = ImageUrl(hazard);
   properties["sequence"] = hazard.sequence;
   return feature;
+}
+
+Json EventJson(const StoredEvent& event) {
+  Json json;
+  json["sequence"] = event.sequence;
+  json["action"] = ActionName(event.action);
+  json["from"] = event.from ? Json(StateName(*event.from)) : Json(nullptr);
+  json["to"] = StateName(event.to);
+  json["reason"] = event.reason;
+  json["time"] = Rfc3339(event.at_ns);
+  return json;
 }
 
 Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalogue& catalogue) {

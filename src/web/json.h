@@ -31,6 +31,9 @@ HazardAction ReplayAction(const Hazard& hazard);
 /// The hazard as a GeoJSON Feature (RFC 7946, position as [longitude, latitude]).
 Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue);
 
+/// One line of a hazard's history: sequence, action, from, to, reason, time.
+Json EventJson(const StoredEvent& event);
+
 /// The message of the live stream for one hazard event.
 Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalogue& catalogue);
 

@@ -56,6 +56,10 @@ void Validate(const WebOptions& options) {
   if (options.threads < 1 || options.threads > 64) {
     throw Error("threads is " + std::to_string(options.threads) + ", accepted is 1 to 64");
   }
+  if (options.picture_side_px < 16 || options.picture_side_px > 16384) {
+    throw Error("picture_side_px is " + std::to_string(options.picture_side_px) +
+                ", accepted is 16 to 16384");
+  }
   RequirePositive("max_connections", static_cast<double>(options.max_connections));
   RequirePositive("request_timeout_s", options.request_timeout_s);
   RequirePositive("answer_timeout_s", options.answer_timeout_s);

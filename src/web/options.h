@@ -20,6 +20,10 @@ struct WebOptions {
   GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
   std::vector<std::string> allowed_origins;
+  /// Officials and their tokens (web/official_gate.h); empty: nobody may confirm or reject.
+  std::string token_file;
+  int picture_side_px = 1280;                  ///< Longest side of a served picture.
+  std::size_t picture_cache_bytes = 64 << 20;  ///< Served pictures kept in memory.
   int threads = 2;
   std::size_t max_connections = 256;  ///< Further ones are answered 503 and closed.
   double request_timeout_s = 15;      ///< For a request's header, also the idle time between two.

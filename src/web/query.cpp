@@ -107,13 +107,27 @@ std::uint64_t ParseSequence(const std::string& text) {
   return *number;
 }
 
-std::size_t ParseLimit(const std::string& text) {
+std::size_t ParseLimit(const std::string& text, std::size_t most) {
   const auto number = WholeNumber(text);
-  if (!number || *number < 1 || *number > kMaxHazardsPerAnswer) {
+  if (!number || *number < 1 || *number > most) {
     throw BadRequest("limit is " + Quoted(text) + ", accepted is a whole number from 1 to " +
-                     std::to_string(kMaxHazardsPerAnswer));
+                     std::to_string(most));
   }
   return *number;
+}
+
+std::set<HazardState> ParseStates(const std::string& text) {
+  std::set<HazardState> states;
+  Split(text, ',', [&](std::string_view piece) {
+    for (const auto state :
+         {HazardState::kCandidate, HazardState::kActive, HazardState::kVerifying}) {
+      if (piece == StateName(state) && states.insert(state).second) return;
+    }
+    throw BadRequest("state is " + Quoted(text) +
+                     ", accepted are candidate, active and verifying, each once, with commas "
+                     "between");
+  });
+  return states;
 }
 
 void RefuseRepeated(const RequestTarget& target) {
@@ -166,12 +180,24 @@ HazardQuery ParseHazardQuery(const RequestTarget& target) {
     } else if (name == "since") {
       query.since = ParseSequence(value);
     } else if (name == "limit") {
-      query.limit = ParseLimit(value);
+      query.limit = ParseLimit(value, kMaxHazardsPerAnswer);
+    } else if (name == "state") {
+      query.states = ParseStates(value);
     } else {
-      RefuseUnknown(name, "accepted are bbox, since and limit");
+      RefuseUnknown(name, "accepted are bbox, since, limit and state");
     }
   }
   return query;
+}
+
+std::size_t ParseEventsQuery(const RequestTarget& target) {
+  RefuseRepeated(target);
+  std::size_t limit = 100;
+  for (const auto& [name, value] : target.parameters) {
+    if (name != "limit") RefuseUnknown(name, "accepted is limit");
+    limit = ParseLimit(value, kMaxEventsPerAnswer);
+  }
+  return limit;
 }
 
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target) {

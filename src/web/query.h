@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,15 +35,27 @@ struct HazardQuery {
   std::optional<GeoBox> box;           ///< May cross the antimeridian (west > east).
   std::optional<std::uint64_t> since;  ///< Only what changed after this sequence.
   std::size_t limit = 20000;
+  std::set<HazardState> states;  ///< Only these; empty: all that are on the map.
+
+  bool Selects(HazardState state) const {
+    return states.empty() ? IsOnMap(state) : states.count(state) != 0;
+  }
 };
 
 /// The most hazards that one answer may hold.
 constexpr std::size_t kMaxHazardsPerAnswer = 50000;
 
-/// Reads `bbox=minLon,minLat,maxLon,maxLat` (degrees, RFC 7946 section 5), `since` and `limit`.
+/// Reads `bbox=minLon,minLat,maxLon,maxLat` (degrees, RFC 7946 section 5), `since`, `limit` and
+/// `state`, one or more of candidate, active and verifying with commas between.
 /// Throws BadRequest naming the parameter, its value and what is accepted; unknown and repeated
 /// parameters are refused, so that a misspelt filter never answers with everything.
 HazardQuery ParseHazardQuery(const RequestTarget& target);
+
+/// The most events of a hazard that one answer may hold.
+constexpr std::size_t kMaxEventsPerAnswer = 1000;
+
+/// The `limit` parameter of a hazard's history, 100 by default; refuses every other parameter.
+std::size_t ParseEventsQuery(const RequestTarget& target);
 
 /// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);

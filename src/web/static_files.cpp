@@ -65,13 +65,4 @@ std::optional<StaticFile> StaticFiles::Find(std::string_view relative) const {
   }
 }
 
-std::optional<std::string> ImageType(std::string_view content) {
-  using namespace std::string_view_literals;
-  if (content.substr(0, 3) == "\xff\xd8\xff"sv) return "image/jpeg";
-  if (content.substr(0, 8) == "\x89PNG\r\n\x1a\n"sv) return "image/png";
-  const bool riff = content.size() >= 12 && content.substr(0, 4) == "RIFF"sv;
-  if (riff && content.substr(8, 4) == "WEBP"sv) return "image/webp";
-  return std::nullopt;
-}
-
 }  // namespace livemap

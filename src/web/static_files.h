@@ -28,7 +28,4 @@ class StaticFiles {
   std::string root_;
 };
 
-/// The media type of a stored picture by its first bytes; none when it is no JPEG, PNG or WebP.
-std::optional<std::string> ImageType(std::string_view content);
-
 }  // namespace livemap

@@ -24,7 +24,7 @@ namespace livemap {
 class WebSocketSession : public LiveListener,
                          public std::enable_shared_from_this<WebSocketSession> {
  public:
-  using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+  using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// Without `since` the client is told only what happens from now on.
   WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot,

@@ -37,7 +37,6 @@ void CheckHazardQuery(const livemap::RequestTarget& target) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   static const livemap::StaticFiles files(LIVEMAP_SOURCE_DIR "/web/icons");
-  livemap::ImageType(text);
   livemap::IsAllowedOrigin(text, "map.example", {"https://city.example"});
   // The input as a whole, and as what stands behind the address that has parameters.
   for (const std::string& address : {text, "/api/v1/hazards?" + text}) {

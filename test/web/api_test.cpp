@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "base/sha256.h"
 #include "http_client.h"
@@ -52,6 +54,10 @@ TEST_F(ApiTest, AnswersAHazardAsGeoJsonFeature) {
   EXPECT_EQ(properties["label"], "Pothole");
   EXPECT_EQ(properties["confidence"], 0.87);
   EXPECT_EQ(properties["sightings"], 1);
+  EXPECT_EQ(properties["state"], "candidate");
+  EXPECT_EQ(properties["vehicles"], 1);
+  EXPECT_GT(properties["presence"], 0.1);
+  EXPECT_LE(properties["presence"], 1.0);
   EXPECT_EQ(properties["first_seen"], "2026-01-01T00:00:00.250Z");
   EXPECT_EQ(properties["last_seen"], "2026-01-01T00:00:00.250Z");
   EXPECT_EQ(properties["position_sigma_m"], 2.0);
@@ -95,6 +101,25 @@ TEST_F(ApiTest, SinceAnswersOnlyWhatChangedWithItsAction) {
   EXPECT_EQ(Hazards()["features"].size(), 2U);
 }
 
+TEST_F(ApiTest, StateSelectsAndTellsWhatLeavesTheSelection) {
+  const std::string first =
+      fixture_.zone->Handle(fixture_.MakeReport("pothole", kPittsburgh)).hazard_uuid.ToString();
+  fixture_.zone->Handle(fixture_.MakeReport("deer", {40.5, -79.9}));
+  EXPECT_EQ(Hazards("state=candidate")["features"].size(), 1U);
+  EXPECT_EQ(Hazards("state=active,verifying")["features"].size(), 1U);
+  EXPECT_EQ(Hazards("state=candidate,active,verifying")["features"].size(), 2U);
+
+  const std::uint64_t before = fixture_.zone->Sequence();
+  ASSERT_TRUE(fixture_.zone->Confirm(*Uuid::Parse(first), "miller"));
+  const auto left = Hazards("state=candidate&since=" + std::to_string(before))["features"];
+  ASSERT_EQ(left.size(), 1U);
+  EXPECT_EQ(left[0]["properties"]["action"], "removed");
+  EXPECT_EQ(left[0]["properties"]["state"], "active");
+  const auto joined = Hazards("state=active&since=" + std::to_string(before))["features"];
+  ASSERT_EQ(joined.size(), 1U);
+  EXPECT_NE(joined[0]["properties"]["action"], "removed");
+}
+
 TEST_F(ApiTest, LimitCutsAndTheSequenceLeadsToTheRest) {
   fixture_.AddRow("pothole", kPittsburgh, 25);
   nlohmann::json page = Hazards("limit=10");
@@ -110,7 +135,8 @@ TEST_F(ApiTest, LimitCutsAndTheSequenceLeadsToTheRest) {
 }
 
 TEST_F(ApiTest, TellsWhatIsWrongWithAParameter) {
-  for (const char* parameters : {"bbox=1,2,3", "since=x", "limit=0", "colour=red"}) {
+  for (const char* parameters : {"bbox=1,2,3", "since=x", "limit=0", "colour=red",
+                                 "state=", "state=gone", "state=active,active"}) {
     const HttpResult answer = Get(port(), std::string("/api/v1/hazards?") + parameters);
     EXPECT_EQ(answer.status, 400);
     EXPECT_THAT(answer.Json()["error"].get<std::string>(), testing::HasSubstr("accepted"));
@@ -154,8 +180,7 @@ TEST_F(ApiTest, ServesAPictureForEverAndHarmlessly) {
   const std::string url = Hazards()["features"][0]["properties"]["image"];
   const HttpResult picture = Get(port(), url);
   EXPECT_EQ(picture.status, 200);
-  EXPECT_EQ(picture.body, std::string(report.image.begin(), report.image.end()));
-  EXPECT_EQ(picture.Field("Content-Type"), "image/png");
+  EXPECT_EQ(picture.Field("Content-Type"), "image/jpeg");
   EXPECT_THAT(picture.Field("Cache-Control"), testing::HasSubstr("immutable"));
   EXPECT_THAT(picture.Field("Content-Security-Policy"), testing::HasSubstr("sandbox"));
   const HttpResult again = Get(port(), url, {{"If-None-Match", picture.Field("ETag")}});
@@ -166,6 +191,31 @@ TEST_F(ApiTest, ServesAPictureForEverAndHarmlessly) {
     EXPECT_EQ(Get(port(), other).status, 404) << other;
   }
   EXPECT_EQ(Get(port(), "/images/" + std::string(64, 'a')).status, 404);
+}
+
+TEST_F(ApiTest, NoByteOfAVehiclesFileIsServed) {
+  cv::Mat scene(48, 64, CV_8UC3, cv::Scalar(90, 120, 150));
+  Report report = fixture_.MakeReport("pothole", kPittsburgh);
+  report.image_format = "png";  // It is none: nobody believes the name.
+  cv::imencode(".jpg", scene, report.image);
+  const std::string markup = "<script>alert(1)</script>";
+  report.image.insert(report.image.end(), markup.begin(), markup.end());
+  ASSERT_EQ(fixture_.zone->Handle(report).status, Receipt::Status::kCommitted);
+  const HttpResult picture = Get(port(), Hazards()["features"][0]["properties"]["image"]);
+  ASSERT_EQ(picture.status, 200);
+  EXPECT_EQ(picture.body.substr(0, 3), "\xff\xd8\xff");
+  EXPECT_EQ(picture.body.find("script"), std::string::npos);
+  const std::vector<std::uint8_t> bytes(picture.body.begin(), picture.body.end());
+  EXPECT_EQ(cv::imdecode(bytes, cv::IMREAD_COLOR).size(), scene.size());
+}
+
+TEST_F(ApiTest, APictureThatCannotBeDecodedIsNotServed) {
+  Report report = fixture_.MakeReport("pothole", kPittsburgh);
+  report.image_format = "png";
+  report.image = OnePixelPng();
+  report.image.resize(report.image.size() - 20);
+  ASSERT_EQ(fixture_.zone->Handle(report).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(Get(port(), Hazards()["features"][0]["properties"]["image"]).status, 404);
 }
 
 TEST_F(ApiTest, ServesThePageWithHeadersThatForbidForeignScript) {

@@ -124,15 +124,6 @@ TEST(StaticFiles, FindsOnlyFilesOfTheFolder) {
   }
 }
 
-TEST(ImageType, KnowsPicturesByTheirFirstBytes) {
-  EXPECT_EQ(ImageType("\xff\xd8\xff\xe0"), "image/jpeg");
-  EXPECT_EQ(ImageType(std::string("\x89PNG\r\n\x1a\n") + "rest"), "image/png");
-  EXPECT_EQ(ImageType("RIFF....WEBPVP8 "), "image/webp");
-  for (const char* other : {"", "RIFF", "RIFF....WAVE", "<svg onload='alert(1)'>", "<html>"}) {
-    EXPECT_FALSE(ImageType(other)) << other;
-  }
-}
-
 TEST(Validate, NamesTheBadOption) {
   WebOptions options;
   options.web_root = "/nowhere";

@@ -1,10 +1,18 @@
 #include "zone_fixture.h"
 
+#include <sys/stat.h>
+
 #include <chrono>
+#include <fstream>
 
 #include "geo/wgs84.h"
 
 namespace livemap {
+
+TokenFile::TokenFile() {
+  std::ofstream(path()) << official() << " " << token() << "\n";
+  if (chmod(path().c_str(), 0600) != 0) throw Error("chmod failed for '" + path() + "'");
+}
 
 std::vector<std::uint8_t> OnePixelPng() {
   return {0x89, 'P',  'N',  'G',  0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 'I',  'H',

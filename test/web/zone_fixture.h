@@ -30,6 +30,18 @@ class TemporaryFolder {
   std::string path_;
 };
 
+/// A token file that only its owner may read, with one official.
+class TokenFile {
+ public:
+  TokenFile();
+  std::string path() const { return folder_.path() + "/tokens"; }
+  static std::string official() { return "miller"; }
+  static std::string token() { return "correct-horse-battery-staple"; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
 /// A picture of one white pixel.
 std::vector<std::uint8_t> OnePixelPng();
 

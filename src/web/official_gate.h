@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+namespace livemap {
+
+/// An official as the token file names him: only the token's hash is kept.
+struct Official {
+  std::string name;
+  std::string token_sha256;  ///< 64 hex digits.
+};
+
+/// Reads a token file: a line "NAME TOKEN" for each official, empty lines and lines that start with
+/// '#' aside. A name is printable text of at most 64 bytes without blanks; a token is 16 to 256 of
+/// the characters that RFC 6750 allows (letters, digits, -._~+/=). Throws Error naming the line and
+/// what is accepted, and for names or tokens that come twice; never shows a token.
+std::vector<Official> ParseTokenFile(const std::string& text, const std::string& name);
+
+/// Reads the file at `path`. Throws Error as ParseTokenFile, and when the file cannot be read, is
+/// no regular file, or may be read or written by everybody.
+std::vector<Official> ReadTokenFile(const std::string& path);
+
+/// Lets officials in by the bearer token of their request. Wrong tokens are counted against the
+/// client that sends them: after a few, nothing of it is looked at for a while. Thread-safe.
+class OfficialGate {
+ public:
+  enum class Verdict {
+    kAllowed,
+    kClosed,       ///< There are no officials.
+    kNoToken,      ///< None was sent.
+    kWrongToken,   ///< Counted against the client.
+    kTooManyWrong  ///< Not even looked at.
+  };
+  struct Answer {
+    Verdict verdict = Verdict::kClosed;
+    std::string official;  ///< Name, where allowed.
+  };
+
+  /// A client may be wrong so often at once, and again each time so long has passed.
+  static constexpr int kMostWrong = 10;
+  static constexpr double kSecondsPerWrong = 30;
+
+  explicit OfficialGate(std::vector<Official> officials) : officials_(std::move(officials)) {}
+
+  bool is_open() const { return !officials_.empty(); }
+  /// `authorization` is the header's value, `now_s` a clock that never goes back. Takes the same
+  /// time for every token.
+  Answer Check(const std::string& authorization, const std::string& client, double now_s);
+
+ private:
+  /// A leaky bucket: `wrong` shrinks by one in kSecondsPerWrong.
+  struct Mistakes {
+    double wrong = 0;
+    double at_s = 0;
+    std::list<std::string>::iterator age;
+  };
+
+  std::optional<std::string> NameOf(const std::string& token) const;
+  bool MayTry(const std::string& client, double now_s);
+  void CountMistake(const std::string& client, double now_s);
+
+  const std::vector<Official> officials_;
+  std::mutex mutex_;
+  std::unordered_map<std::string, Mistakes> mistakes_;  ///< By client, bounded.
+  std::list<std::string> ages_;  ///< Clients in the order of their last mistake.
+};
+
+}  // namespace livemap

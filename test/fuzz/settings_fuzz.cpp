@@ -1,0 +1,71 @@
+// Files that an operator or researcher writes: the catalogue of hazards, the officials' tokens, label
+// files of data sets. The first byte chooses.
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+
+#include "base/error.h"
+#include "evaluation/labelled_folder.h"
+#include "hazard/catalogue.h"
+#include "web/official_gate.h"
+
+namespace livemap {
+namespace {
+
+void Require(bool holds) {
+  if (!holds) std::abort();
+}
+
+void FuzzCatalogue(const std::string& text) {
+  const HazardCatalogue catalogue = HazardCatalogue::Parse(text, "input");
+  for (const auto& [name, hazard_class] : catalogue.classes()) {
+    Require(!name.empty() && name.size() <= 64);
+    Require(std::isfinite(hazard_class.duplicate_radius_m) && hazard_class.duplicate_radius_m > 0);
+    Require(hazard_class.duplicate_radius_m <= catalogue.MaxDuplicateRadiusM());
+    Require(std::isfinite(hazard_class.expected_life_s) && hazard_class.expected_life_s > 0);
+    Require(hazard_class.colour.size() == 7 && hazard_class.colour[0] == '#');
+  }
+}
+
+void FuzzTokens(const std::string& text) {
+  const auto officials = ParseTokenFile(text, "input");
+  Require(!officials.empty());
+  for (const Official& official : officials) {
+    Require(!official.name.empty() && official.token_sha256.size() == 64);
+  }
+  // The file itself is no token of it.
+  OfficialGate gate(officials);
+  Require(gate.Check("Bearer " + text, "client", 0).verdict != OfficialGate::Verdict::kClosed);
+}
+
+void FuzzLabels(const std::string& text) {
+  for (const auto& label : ParseYoloLabels(text, {"pothole", "deer"}, "input")) {
+    Require(label.box.width >= 0 && label.box.height >= 0);
+    Require(label.box.x >= 0 && label.box.x + label.box.width <= 1 + 1e-9);
+    Require(label.box.y >= 0 && label.box.y + label.box.height <= 1 + 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace livemap
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
+  try {
+    switch (data[0] % 3) {
+      case 0:
+        livemap::FuzzCatalogue(text);
+        break;
+      case 1:
+        livemap::FuzzTokens(text);
+        break;
+      default:
+        livemap::FuzzLabels(text);
+    }
+  } catch (const livemap::Error& error) {
+    livemap::Require(error.what()[0] != '\0');
+  }
+  return 0;
+}
