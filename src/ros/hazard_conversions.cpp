@@ -94,21 +94,22 @@ Receipt FromMessage(const ReportReceipt& message) {
   return receipt;
 }
 
-HazardNotice ToMessage(const HazardEvent& event) {
-  const Hazard& hazard = event.hazard;
-  Notice notice;
-  switch (event.action) {
+namespace {
+
+Notice::Action ToNoticeAction(HazardAction action) {
+  switch (action) {
     case HazardAction::kAdded:
-      notice.action = Notice::Action::kAdded;
-      break;
+      return Notice::Action::kAdded;
     case HazardAction::kUpdated:
-      notice.action = Notice::Action::kUpdated;
-      break;
+      return Notice::Action::kUpdated;
     case HazardAction::kRemoved:
-      notice.action = Notice::Action::kRemoved;
-      break;
+      return Notice::Action::kRemoved;
   }
-  notice.sequence = hazard.sequence;
+  return Notice::Action::kRemoved;
+}
+
+Notice NoticeOf(const Hazard& hazard) {
+  Notice notice;
   notice.hazard_uuid = hazard.uuid;
   notice.stamp_ns = hazard.updated_ns;
   notice.class_name = hazard.class_name;
@@ -118,6 +119,27 @@ HazardNotice ToMessage(const HazardEvent& event) {
   notice.sightings = hazard.sightings;
   notice.first_seen_ns = hazard.first_seen_ns;
   notice.last_seen_ns = hazard.last_seen_ns;
+  return notice;
+}
+
+}  // namespace
+
+HazardNotice ToMessage(const HazardEvent& event) {
+  Notice notice = NoticeOf(event.hazard);
+  // What drivers knew before decides: a candidate that becomes active is new to them.
+  notice.action =
+      ToNoticeAction(DriversAction(event.from, event.hazard.state).value_or(event.action));
+  notice.sequence = event.hazard.sequence;
+  notice.previous_sequence = event.previous_announced;
+  return ToMessage(notice);
+}
+
+HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+                              const std::string& vehicle_id) {
+  Notice notice = NoticeOf(hazard);
+  notice.action = ToNoticeAction(action);
+  notice.sequence = hazard.announced_sequence;
+  notice.vehicle_id = vehicle_id;
   return ToMessage(notice);
 }
 

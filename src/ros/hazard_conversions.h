@@ -35,8 +35,12 @@ Report FromMessage(const HazardReport& message);
 ReportReceipt ToMessage(const Receipt& receipt);
 Receipt FromMessage(const ReportReceipt& message);
 
-/// The notice's stamp is `hazard.updated_ns`, the zone's clock at the event.
+/// To every vehicle: what drivers hear of the event. The notice's stamp is `hazard.updated_ns`, the
+/// zone's clock at the event.
 HazardNotice ToMessage(const HazardEvent& event);
+/// To one vehicle: the hazard as it is now, under the sequence of its last announcement.
+HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+                              const std::string& vehicle_id);
 HazardNotice ToMessage(const Notice& notice);
 Notice FromMessage(const HazardNotice& message);
 

@@ -9,7 +9,7 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxReasonBytes = 300;
+constexpr std::size_t kMaxReasonBytes = 64;
 constexpr std::size_t kMaxNameBytes = 64;
 
 void RequireIds(const Uuid& poll, const Uuid& hazard, const std::string& name) {
@@ -84,6 +84,47 @@ Poll FromMessage(const HazardPoll& message) {
     throw Error("hazard poll expires before it was asked, accepted is a later moment");
   }
   return poll;
+}
+
+HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns) {
+  Poll poll;
+  poll.poll = order.poll;
+  poll.hazard = order.hazard;
+  poll.vehicle_id = order.vehicle_id;
+  poll.stamp_ns = now_ns;
+  poll.expires_ns = order.expires_ns;
+  poll.class_name = order.class_name;
+  poll.position = order.position;
+  poll.covariance_m2 = order.covariance_m2;
+  poll.picture_wanted = order.picture_wanted;
+  poll.max_picture_bytes = order.max_picture_bytes;
+  return ToMessage(poll);
+}
+
+PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
+  const PollReply reply = FromMessage(message);
+  PollAnswer answer;
+  answer.poll = reply.poll;
+  answer.hazard = reply.hazard;
+  answer.vehicle_id = reply.vehicle_id;
+  switch (reply.answer) {
+    case PollReply::Answer::kYes:
+      answer.answer = PollAnswer::Answer::kYes;
+      break;
+    case PollReply::Answer::kNo:
+      answer.answer = PollAnswer::Answer::kNo;
+      break;
+    case PollReply::Answer::kCantSee:
+      answer.answer = PollAnswer::Answer::kCantSee;
+      break;
+  }
+  answer.reason = reply.reason;
+  answer.confidence = static_cast<double>(reply.confidence);
+  answer.vehicle_position = reply.vehicle_position;
+  answer.stamp_ns = reply.stamp_ns;
+  answer.image_format = reply.image_format;
+  answer.image = reply.image;
+  return answer;
 }
 
 HazardPollAnswer ToMessage(const PollReply& reply) {

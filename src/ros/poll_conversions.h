@@ -4,6 +4,7 @@
 #include <livemap/HazardPollAnswer.h>
 
 #include "hazard/report.h"
+#include "zone/zone_service.h"
 
 namespace livemap {
 
@@ -13,6 +14,11 @@ namespace livemap {
 
 HazardPoll ToMessage(const Poll& poll);
 Poll FromMessage(const HazardPoll& message);
+
+/// The zone's order as a poll that is asked at `now_ns`, zone clock.
+HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns);
+/// The reply as the zone takes it; the vehicle_id is the one that the bridge wrote.
+PollAnswer ToPollAnswer(const HazardPollAnswer& message);
 
 HazardPollAnswer ToMessage(const PollReply& reply);
 PollReply FromMessage(const HazardPollAnswer& message);

@@ -63,10 +63,14 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("vehicle_retention_s", zone.vehicle_retention_s, {1, 1e6});
   ReadCount(parameters, "max_vehicles", zone.max_vehicles, {1, 1e6});
   ReadCount(parameters, "max_hazards", zone.max_hazards, {1, 1e8});
+  ReadCount(parameters, "max_reports_per_hour", zone.max_reports_per_hour, {1, 1e9});
+  parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000});
+  parameters.Read("speed_slack_m", zone.speed.slack_m, {0, 100000});
   ReportLimits& limits = zone.limits;
   limits.zone = ReadBounds(parameters);
   parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000});
   parameters.Read("max_future_s", limits.max_future_s, {0, 1e9});
+  parameters.Read("max_age_s", limits.max_age_s, {60, 1e10});
   ReadCount(parameters, "max_image_bytes", limits.max_image_bytes, {0, 64e6});
   ReadCount(parameters, "max_image_side_px", limits.max_image_side_px, {1, 65535});
 }
@@ -86,8 +90,24 @@ void ReadWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("tile_attribution", web.tile_attribution);
   parameters.Read("web_title", web.title);
   parameters.Read("web_threads", web.threads, {1, 64});
+  parameters.Read("web_token_file", web.token_file);
+  parameters.Read("web_picture_side_px", web.picture_side_px, {16, 16384});
+  ReadCount(parameters, "web_picture_cache_bytes", web.picture_cache_bytes, {0, 2e9});
   ReadCount(parameters, "web_max_connections", web.max_connections, {1, 100000});
   if (config.map_datum) web.centre = *config.map_datum;
+}
+
+void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  CatchUpPlanner::Config& catch_up = config.catch_up;
+  parameters.Read("join_radius_m", catch_up.radius_m, {1, 100000});
+  parameters.Read("join_max_hazards", config.join_max_hazards, {1, 100000});
+  parameters.Read("join_gap_s", catch_up.gap_s, {1, 1e6});
+  parameters.Read("catch_up_lag_s", catch_up.lag_s, {0, 3600});
+  parameters.Read("catch_up_retry_s", catch_up.retry_s, {0.1, 3600});
+  parameters.Read("catch_up_longest_retry_s", catch_up.longest_retry_s, {0.1, 3600});
+  catch_up.max_vehicles = config.zone.max_vehicles;
+  parameters.Read("notice_picture_bytes", config.notice_picture_bytes, {0, 60000});
+  parameters.Read("advance_period_s", config.advance_period_s, {0.05, 60});
 }
 
 }  // namespace
@@ -102,9 +122,7 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   parameters.Read("batch_reports", config.batch_reports, {1, 100000});
   parameters.Read("queue_reports", config.queue_reports, {1, 1e7});
   parameters.Read("queue_bytes", config.queue_bytes, {1e6, 1e12});
-  parameters.Read("join_radius_m", config.join_radius_m, {0, 100000});
-  parameters.Read("join_max_hazards", config.join_max_hazards, {0, 100000});
-  parameters.Read("join_gap_s", config.join_gap_s, {1, 1e6});
+  ReadCatchUp(parameters, config);
   parameters.Read("map_frame", config.map_frame);
   config.map_datum = ReadDatum(parameters);
   parameters.Read("marker_period_s", config.marker_period_s, {0.05, 3600});
