@@ -1,6 +1,7 @@
 #include "geo/spatial_grid.h"
 
 #include <GeographicLib/Geocentric.hpp>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -88,6 +89,36 @@ std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centr
   }
   read_waiting();
   return search.nearest;
+}
+
+std::vector<SpatialGrid::Neighbour> SpatialGrid::Within(const GeoPoint& centre,
+                                                        double radius_m) const {
+  std::vector<Neighbour> found;
+  if (!IsValid(centre) || !(radius_m >= 0)) return found;
+  const Search search{centre, ToEarth(centre), radius_m, std::nullopt};
+  const Cell low = CellAt(search.earth_m.array() - search.ChordM());
+  const Cell high = CellAt(search.earth_m.array() + search.ChordM());
+  std::vector<std::uint32_t> hashes;
+  Cell cell;
+  for (cell[0] = low[0]; cell[0] <= high[0]; ++cell[0]) {
+    for (cell[1] = low[1]; cell[1] <= high[1]; ++cell[1]) {
+      for (cell[2] = low[2]; cell[2] <= high[2]; ++cell[2]) hashes.push_back(Hash(cell));
+    }
+  }
+  // Two cells may share a hash: what is found by it must not be found twice.
+  std::sort(hashes.begin(), hashes.end());
+  hashes.erase(std::unique(hashes.begin(), hashes.end()), hashes.end());
+  for (const std::uint32_t hash : hashes) {
+    for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
+      if (slots_[i].hash != hash) continue;
+      const Entry& entry = entries_[slots_[i].entry];
+      if ((entry.earth_m - search.earth_m).squaredNorm() > search.ChordM() * search.ChordM())
+        continue;
+      const double distance_m = GeodesicDistanceM(entry.place, centre);
+      if (distance_m <= radius_m) found.push_back({entry.id, distance_m});
+    }
+  }
+  return found;
 }
 
 void SpatialGrid::ReadCell(std::uint32_t hash, Search& search) const {

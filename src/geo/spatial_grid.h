@@ -38,6 +38,9 @@ class SpatialGrid {
   bool Erase(const GeoPoint& place, std::uint64_t id);
   /// The nearest place within `radius_m` (inclusive) of `centre`, the lowest id among equals.
   std::optional<Neighbour> Nearest(const GeoPoint& centre, double radius_m) const;
+  /// Every place within `radius_m` (inclusive) of `centre`, in no order. Costs one cell of the
+  /// table per cell that the radius touches: for radii of some cells.
+  std::vector<Neighbour> Within(const GeoPoint& centre, double radius_m) const;
 
   std::size_t size() const { return entries_.size(); }
 

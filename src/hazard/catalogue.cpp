@@ -26,6 +26,7 @@ constexpr TextRule kName{1, 40, "abcdefghijklmnopqrstuvwxyz0123456789_", true,
 constexpr TextRule kLabel{1, 60, "<>&\"\n", false, "1 to 60 characters without < > & \""};
 constexpr TextRule kHexColour{7, 7, "#0123456789abcdef", true, "#rrggbb in lower case"};
 constexpr TextRule kUrgency{1, 1, "123", true, "1, 2 or 3"};
+constexpr TextRule kConfirmations{1, 1, "12345", true, "1, 2, 3, 4 or 5"};
 
 bool Obeys(const std::string& text, const TextRule& rule) {
   if (text.size() < rule.min_size || text.size() > rule.max_size) return false;
@@ -47,6 +48,12 @@ class EntryReader {
     if (text == nullptr) return;
     if (!Obeys(*text, rule)) Refuse(key, *text, rule.accepted);
     value = *text;
+  }
+
+  void ReadDigit(const char* key, const TextRule& rule, int& value) {
+    std::string text = std::to_string(value);
+    ReadText(key, rule, text);
+    value = text[0] - '0';
   }
 
   void ReadNumber(const char* key, double min, double max, double& value) {
@@ -107,10 +114,11 @@ void ReadProperties(const YAML::Node& node, const std::string& place, HazardClas
   reader.ReadText("icon", kName, entry.icon);
   reader.ReadText("colour", kHexColour, entry.colour);
   reader.ReadNumber("duplicate_radius_m", 0.1, 1000.0, entry.duplicate_radius_m);
-  std::string urgency = std::to_string(entry.urgency);
-  reader.ReadText("urgency", kUrgency, urgency);
-  entry.urgency = urgency[0] - '0';
+  reader.ReadDigit("urgency", kUrgency, entry.urgency);
   reader.ReadNumber("expected_life_s", 60.0, 1e10, entry.expected_life_s);
+  reader.ReadDigit("confirmations", kConfirmations, entry.confirmations);
+  reader.ReadNumber("hit_rate", 0.5, 0.99, entry.hit_rate);
+  reader.ReadNumber("false_rate", 0.001, 0.4, entry.false_rate);
   reader.RejectUnknown();
 }
 

@@ -15,7 +15,7 @@ Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_
   return solver.eigenvectors() * raised.asDiagonal() * solver.eigenvectors().transpose();
 }
 
-void Fuse(Hazard& hazard, const Report& report, const FusionRule& rule) {
+void Fuse(HazardEstimate& hazard, const Report& report, const FusionRule& rule) {
   const LocalFrame frame(hazard.position);
   const Eigen::Vector2d offset = frame.ToEnu(report.position);
   const Eigen::Matrix2d report_covariance =

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstdint>
+
 #include "hazard/report.h"
-#include "zone/hazard.h"
 
 namespace livemap {
 
@@ -15,6 +17,16 @@ struct FusionRule {
   float max_confidence = 0.99F;
 };
 
+/// What all sightings of one hazard say together.
+struct HazardEstimate {
+  float confidence = 0;  ///< 0..1.
+  std::uint32_t sightings = 1;
+  GeoPoint position;
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
+  std::int64_t first_seen_ns = 0;                               ///< Oldest image stamp.
+  std::int64_t last_seen_ns = 0;                                ///< Newest image stamp.
+};
+
 /// The covariance with its eigenvalues raised to at least `min_sigma_m` squared.
 Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_sigma_m);
 
@@ -26,6 +38,6 @@ Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_
 ///   confidence  noisy-or, 1 - (1 - c1)(1 - c2), capped by the rule, never lowered;
 ///   sightings + 1, first and last seen.
 /// Order matters only through the two floors and the cap.
-void Fuse(Hazard& hazard, const Report& report, const FusionRule& rule);
+void Fuse(HazardEstimate& hazard, const Report& report, const FusionRule& rule);
 
 }  // namespace livemap

@@ -1,55 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
 
 #include "hazard/catalogue.h"
-#include "zone/hazard_state.h"
+#include "zone/life_record.h"
 #include "zone/survival_model.h"
 
 namespace livemap {
-
-/// A vehicle in the records of hazards: the first 8 bytes of the SHA-256 of its proven id, the same
-/// after a restart. Never 0.
-std::uint64_t VehicleKey(const std::string& vehicle_id);
-
-/// What one vehicle said of one hazard so far.
-struct Voice {
-  std::uint64_t vehicle = 0;  ///< VehicleKey; 0: nobody.
-  std::uint32_t at_s = 0;     ///< Newest stamp that counted, UTC seconds since 1970.
-  float log_odds = 0;         ///< How much it moves the hazard's log odds: > 0 there, < 0 gone.
-};
-
-/// Vehicles that a hazard remembers; a further one takes the place of the longest silent.
-constexpr std::size_t kMaxVoices = 6;
-
-/// The life of one hazard: plain data, about 150 bytes, changed by HazardLife only. Times are UTC,
-/// ns since 1970.
-struct LifeRecord {
-  HazardState state = HazardState::kCandidate;
-  bool official = false;           ///< Confirmed by an official: needs no further vehicle.
-  std::int64_t since_ns = 0;       ///< In this state since, zone clock.
-  std::int64_t first_seen_ns = 0;  ///< Oldest stamp that spoke for it.
-  std::int64_t last_yes_ns = 0;    ///< Newest stamp that spoke for it.
-  std::int64_t first_no_ns = 0;    ///< Oldest stamp against it after that; 0 without one.
-  std::int64_t at_ns = 0;          ///< The odds are of this moment.
-  float log_odds = 0;              ///< ln(p / (1 - p)) of its being there.
-  float undenied_log_odds = 0;     ///< The same had nobody spoken against it.
-  std::array<Voice, kMaxVoices> voices{};
-};
-
-/// One line of plain numbers with spaces between, at most 400 bytes, to be stored; exact.
-std::string PackLife(const LifeRecord& life);
-/// Inverse of PackLife; none when `text` is anything else.
-std::optional<LifeRecord> UnpackLife(const std::string& text);
-
-/// Vehicles that speak for the hazard, and against it; at most kMaxVoices together. An opponent
-/// counts until two other vehicles have spoken for the hazard after it.
-std::uint32_t Supporters(const LifeRecord& life);
-std::uint32_t Opponents(const LifeRecord& life);
 
 enum class EvidenceKind : std::uint8_t {
   kSighting,    ///< A report.
@@ -112,8 +72,8 @@ class HazardLife {
   struct Config {
     double prior_presence = 0.2;        ///< Before the first vehicle speaks.
     double active_above = 0.7;          ///< Drivers are told from this presence on.
-    double verify_below = 0.8;          ///< An active hazard is verified below this presence...
-    double sure_above = 0.9;            ///< ...and active again from this one on.
+    double verify_below = 0.7;          ///< An active hazard is verified below this presence...
+    double sure_above = 0.85;           ///< ...and active again from this one on.
     double gone_below = 0.1;            ///< Off the map.
     double surest = 0.98;               ///< Presence never counts as more certain than this.
     double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
@@ -134,8 +94,7 @@ class HazardLife {
   /// one vehicle confirms the class.
   LifeStep Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
                  LifeRecord& life) const;
-  /// A further word. Does nothing to a hazard that is gone. What is due by time is done first, so
-  /// evidence may come after a transition that it would have prevented.
+  /// A further word, in any order of stamps. Does nothing to a hazard that is gone.
   LifeStep Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
                  LifeRecord& life) const;
   /// Time passes. Cheap; nothing happens before NextChangeNs.
@@ -159,9 +118,11 @@ class HazardLife {
  private:
   void MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const;
   double LogRatio(const LifeClass& entry, EvidenceKind kind, double ended_since) const;
-  void Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
-  std::optional<LifeTransition> Decide(const LifeClass& entry, LifeRecord& life) const;
-  std::optional<LifeTransition> DecideRejected(LifeRecord& life) const;
+  bool Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
+  LifeStep Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
+  std::optional<LifeTransition> Decide(const LifeClass& entry, const LifeRecord& life) const;
+  std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;
+  std::optional<LifeTransition> DecideRejected(const LifeRecord& life) const;
 
   Config config_;
   double max_log_odds_;  // Of presence, by `surest`.

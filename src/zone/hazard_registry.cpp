@@ -11,80 +11,96 @@ namespace livemap {
 HazardRegistry::HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule)
     : catalogue_(std::move(catalogue)), hash_seed_(hash_seed), rule_(rule) {}
 
-SpatialGrid& HazardRegistry::GridOf(const std::string& class_name) {
-  const auto found = classes_.find(class_name);
-  if (found != classes_.end()) return found->second.grid;
+std::uint32_t HazardRegistry::ClassOf(const std::string& class_name) {
+  const auto found = class_places_.find(class_name);
+  if (found != class_places_.end()) return found->second;
   const double radius_m = catalogue_.DuplicateRadiusM(class_name);
-  ClassIndex index{radius_m, SpatialGrid::ForRadius(radius_m, hash_seed_)};
-  return classes_.emplace(class_name, std::move(index)).first->second.grid;
+  const auto place = static_cast<std::uint32_t>(classes_.size());
+  classes_.push_back({class_name, radius_m, SpatialGrid::ForRadius(radius_m, hash_seed_)});
+  class_places_.emplace(class_name, place);
+  return place;
 }
 
-HazardRegistry::Slot HazardRegistry::Append(Hazard hazard) {
-  const auto slot = static_cast<Slot>(hazards_.size());
-  slots_.emplace(hazard.uuid, slot);
-  hazards_.push_back(std::move(hazard));
+HazardRegistry::Slot HazardRegistry::Append(const HazardRecord& record) {
+  const auto slot = static_cast<Slot>(records_.size());
+  slots_.Insert(record.uuid, slot);
+  records_.push_back(record);
   PutOnGrid(slot);
   return slot;
 }
 
 /// Counts the hazard in its state, and makes it one that reports may match.
 void HazardRegistry::PutOnGrid(Slot slot) {
-  const Hazard& hazard = hazards_[slot];
-  ++counts_[static_cast<std::size_t>(hazard.state)];
-  if (hazard.state == HazardState::kGone) return;
-  GridOf(hazard.class_name).Insert(hazard.position, slot);
+  const HazardRecord& record = records_[slot];
+  ++counts_[static_cast<std::size_t>(record.life.state)];
+  if (record.life.state == HazardState::kGone) return;
+  classes_[record.hazard_class].grid.Insert(record.estimate.position, slot);
 }
 
 void HazardRegistry::TakeFromGrid(Slot slot) {
-  const Hazard& hazard = hazards_[slot];
-  --counts_[static_cast<std::size_t>(hazard.state)];
-  if (hazard.state == HazardState::kGone) return;
-  GridOf(hazard.class_name).Erase(hazard.position, slot);
+  const HazardRecord& record = records_[slot];
+  --counts_[static_cast<std::size_t>(record.life.state)];
+  if (record.life.state == HazardState::kGone) return;
+  classes_[record.hazard_class].grid.Erase(record.estimate.position, slot);
 }
 
 std::size_t HazardRegistry::on_map_count() const {
-  return hazards_.size() - counts_[static_cast<std::size_t>(HazardState::kGone)] -
+  return records_.size() - counts_[static_cast<std::size_t>(HazardState::kGone)] -
          counts_[static_cast<std::size_t>(HazardState::kRejected)];
 }
 
-void HazardRegistry::Restore(Hazard hazard) {
-  if (slots_.count(hazard.uuid) != 0) {
+void HazardRegistry::Restore(const Hazard& hazard, const LifeRecord& life, std::uint32_t id) {
+  if (Find(hazard.uuid)) {
     throw Error("hazard '" + hazard.uuid.ToString() + "' stands twice in the store");
   }
   if (!changes_.empty() && hazard.sequence <= changes_.back().sequence) {
     throw Error("hazard '" + hazard.uuid.ToString() + "' has sequence " +
                 std::to_string(hazard.sequence) + ", which is not above its predecessor's");
   }
-  const std::uint64_t sequence = hazard.sequence;
-  changes_.push_back({sequence, Append(std::move(hazard))});
+  HazardRecord record;
+  record.uuid = hazard.uuid;
+  record.estimate = {hazard.confidence,    hazard.sightings,     hazard.position,
+                     hazard.covariance_m2, hazard.first_seen_ns, hazard.last_seen_ns};
+  record.sequence = hazard.sequence;
+  record.announced_sequence = hazard.announced_sequence;
+  record.updated_ns = hazard.updated_ns;
+  record.id = id;
+  record.hazard_class = ClassOf(hazard.class_name);
+  record.presence = hazard.presence;
+  record.picture = PackedPicture(hazard.image_sha256, hazard.image_format);
+  record.life = life;
+  last_id_ = std::max(last_id_, id);
+  changes_.push_back({record.sequence, Append(record)});
 }
 
 std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string& class_name,
                                                               const GeoPoint& position) const {
-  const auto found = classes_.find(class_name);
-  if (found == classes_.end()) return std::nullopt;
-  const auto nearest = found->second.grid.Nearest(position, found->second.radius_m);
+  const auto found = class_places_.find(class_name);
+  if (found == class_places_.end()) return std::nullopt;
+  const Class& known = classes_[found->second];
+  const auto nearest = known.grid.Nearest(position, known.radius_m);
   return nearest ? std::optional<Slot>(static_cast<Slot>(nearest->id)) : std::nullopt;
 }
 
 HazardRegistry::Slot HazardRegistry::Add(const Report& report, const PictureName& picture,
                                          const Uuid& uuid, std::uint64_t sequence,
-                                         std::int64_t now_ns, HazardState state) {
-  Hazard hazard;
-  hazard.state = state;
-  hazard.uuid = uuid;
-  hazard.class_name = report.class_name;
-  hazard.confidence = std::min(report.confidence, rule_.max_confidence);
-  hazard.position = report.position;
-  hazard.covariance_m2 = WithLeastSigma(report.covariance_m2, rule_.min_report_sigma_m);
-  hazard.first_seen_ns = report.stamp_ns;
-  hazard.last_seen_ns = report.stamp_ns;
-  hazard.updated_ns = now_ns;
-  hazard.sequence = sequence;
-  hazard.image_sha256 = picture.sha256;
-  hazard.image_format = picture.format;
-  const Slot slot = Append(std::move(hazard));
-  if (in_transaction_) undo_.push_back({slot, std::nullopt});
+                                         std::int64_t now_ns) {
+  slots_.Prefetch(uuid);
+  HazardRecord record;
+  record.uuid = uuid;
+  record.estimate = {std::min(report.confidence, rule_.max_confidence),
+                     1,
+                     report.position,
+                     WithLeastSigma(report.covariance_m2, rule_.min_report_sigma_m),
+                     report.stamp_ns,
+                     report.stamp_ns};
+  record.sequence = sequence;
+  record.updated_ns = now_ns;
+  record.id = ++last_id_;
+  record.hazard_class = ClassOf(report.class_name);
+  record.picture = PackedPicture(picture.sha256, picture.format);
+  const Slot slot = Append(record);
+  if (in_transaction_) undo_.push_back({slot, true, {}});
   NoteChange(slot);
   return slot;
 }
@@ -92,54 +108,93 @@ HazardRegistry::Slot HazardRegistry::Add(const Report& report, const PictureName
 void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& picture,
                            std::uint64_t sequence, std::int64_t now_ns) {
   RememberForUndo(slot);
-  Hazard& hazard = hazards_[slot];
-  const bool newest = report.stamp_ns >= hazard.last_seen_ns;
+  HazardRecord& record = records_[slot];
+  const bool newest = report.stamp_ns >= record.estimate.last_seen_ns;
   TakeFromGrid(slot);
-  Fuse(hazard, report, rule_);
+  Fuse(record.estimate, report, rule_);
   PutOnGrid(slot);
-  if (!picture.sha256.empty() && (newest || hazard.image_sha256.empty())) {
-    hazard.image_sha256 = picture.sha256;
-    hazard.image_format = picture.format;
+  if (!picture.sha256.empty() && (newest || record.picture.empty())) {
+    record.picture = PackedPicture(picture.sha256, picture.format);
   }
-  hazard.updated_ns = now_ns;
-  hazard.sequence = sequence;
+  record.updated_ns = now_ns;
+  record.sequence = sequence;
   NoteChange(slot);
 }
 
-void HazardRegistry::SetState(Slot slot, HazardState state, std::uint64_t sequence,
-                              std::int64_t now_ns) {
+void HazardRegistry::SetLife(Slot slot, const LifeRecord& life, double presence,
+                             std::uint64_t sequence, std::int64_t now_ns) {
   RememberForUndo(slot);
-  Hazard& hazard = hazards_[slot];
-  TakeFromGrid(slot);
-  hazard.state = state;
-  PutOnGrid(slot);
-  hazard.updated_ns = now_ns;
-  hazard.sequence = sequence;
+  HazardRecord& record = records_[slot];
+  const bool on_grid = record.life.state != HazardState::kGone;
+  if (on_grid != (life.state != HazardState::kGone)) {
+    TakeFromGrid(slot);
+    record.life = life;
+    PutOnGrid(slot);
+  } else {
+    --counts_[static_cast<std::size_t>(record.life.state)];
+    ++counts_[static_cast<std::size_t>(life.state)];
+    record.life = life;
+  }
+  record.presence = static_cast<float>(presence);
+  record.updated_ns = now_ns;
+  if (record.sequence == sequence) return;
+  record.sequence = sequence;
   NoteChange(slot);
+}
+
+void HazardRegistry::SetPicture(Slot slot, const PictureName& picture) {
+  RememberForUndo(slot);
+  records_[slot].picture = PackedPicture(picture.sha256, picture.format);
 }
 
 void HazardRegistry::MarkAnnounced(Slot slot) {
   RememberForUndo(slot);
-  hazards_[slot].announced_sequence = hazards_[slot].sequence;
+  records_[slot].announced_sequence = records_[slot].sequence;
+}
+
+Hazard HazardRegistry::Get(Slot slot) const {
+  const HazardRecord& record = records_[slot];
+  Hazard hazard;
+  hazard.uuid = record.uuid;
+  hazard.class_name = ClassName(slot);
+  hazard.confidence = record.estimate.confidence;
+  hazard.position = record.estimate.position;
+  hazard.covariance_m2 = record.estimate.covariance_m2;
+  hazard.sightings = record.estimate.sightings;
+  hazard.first_seen_ns = record.estimate.first_seen_ns;
+  hazard.last_seen_ns = record.estimate.last_seen_ns;
+  hazard.updated_ns = record.updated_ns;
+  hazard.sequence = record.sequence;
+  hazard.image_sha256 = record.picture.Sha256();
+  hazard.image_format = record.picture.Format();
+  hazard.state = record.life.state;
+  hazard.presence = record.presence;
+  hazard.vehicles = Supporters(record.life);
+  hazard.announced_sequence = record.announced_sequence;
+  return hazard;
 }
 
 std::optional<HazardRegistry::Slot> HazardRegistry::Find(const Uuid& uuid) const {
-  const auto found = slots_.find(uuid);
-  return found == slots_.end() ? std::nullopt : std::optional<Slot>(found->second);
+  return slots_.Find(uuid, [this](Slot slot) -> const Uuid& { return records_[slot].uuid; });
+}
+
+std::vector<HazardRegistry::Change>::const_iterator HazardRegistry::ChangesSince(
+    std::uint64_t sequence) const {
+  return std::upper_bound(
+      changes_.begin(), changes_.end(), sequence,
+      [](std::uint64_t since, const Change& change) { return since < change.sequence; });
 }
 
 std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
                                           std::uint64_t since_sequence, std::size_t limit) const {
   std::vector<Hazard> result;
-  auto change = std::upper_bound(
-      changes_.begin(), changes_.end(), since_sequence,
-      [](std::uint64_t sequence, const Change& c) { return sequence < c.sequence; });
+  auto change = ChangesSince(since_sequence);
   for (; change != changes_.end() && result.size() < limit; ++change) {
-    const Hazard& hazard = hazards_[change->slot];
-    if (hazard.sequence != change->sequence) continue;
-    if (!IsOnMap(hazard.state) && since_sequence == 0) continue;
-    if (box && !box->Contains(hazard.position)) continue;
-    result.push_back(hazard);
+    const HazardRecord& record = records_[change->slot];
+    if (record.sequence != change->sequence) continue;
+    if (!IsOnMap(record.life.state) && since_sequence == 0) continue;
+    if (box && !box->Contains(record.estimate.position)) continue;
+    result.push_back(Get(change->slot));
   }
   return result;
 }
@@ -152,60 +207,60 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
       std::min(90.0, std::abs(centre.latitude_deg) + max_latitude_difference);
   const double least_m_per_degree = 111319.0 * std::cos(poleward_deg * kRadiansPerDegree);
   std::vector<std::pair<double, Slot>> found;
-  for (Slot slot = 0; slot < hazards_.size(); ++slot) {
-    const Hazard& hazard = hazards_[slot];
-    if (!IsTold(hazard.state)) continue;
-    if (std::abs(hazard.position.latitude_deg - centre.latitude_deg) > max_latitude_difference) {
-      continue;
-    }
-    double east_deg = std::abs(hazard.position.longitude_deg - centre.longitude_deg);
+  for (Slot slot = 0; slot < records_.size(); ++slot) {
+    if (!IsTold(State(slot))) continue;
+    const GeoPoint& position = records_[slot].estimate.position;
+    if (std::abs(position.latitude_deg - centre.latitude_deg) > max_latitude_difference) continue;
+    double east_deg = std::abs(position.longitude_deg - centre.longitude_deg);
     east_deg = std::min(east_deg, 360.0 - east_deg);
     if (east_deg * least_m_per_degree > radius_m) continue;
-    const double distance_m = GeodesicDistanceM(centre, hazard.position);
+    const double distance_m = GeodesicDistanceM(centre, position);
     if (distance_m <= radius_m) found.emplace_back(distance_m, slot);
   }
   const std::size_t count = std::min(limit, found.size());
   std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count), found.end());
   std::vector<Hazard> result;
   result.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) result.push_back(hazards_[found[i].second]);
+  for (std::size_t i = 0; i < count; ++i) result.push_back(Get(found[i].second));
   return result;
 }
 
 std::vector<Hazard> HazardRegistry::ChangedAround(const GeoPoint& centre, double radius_m,
                                                   std::uint64_t since_sequence,
                                                   std::size_t limit) const {
-  std::vector<Hazard> result;
-  auto change = std::upper_bound(
-      changes_.begin(), changes_.end(), since_sequence,
-      [](std::uint64_t sequence, const Change& c) { return sequence < c.sequence; });
-  for (; change != changes_.end(); ++change) {
-    const Hazard& hazard = hazards_[change->slot];
-    if (hazard.sequence != change->sequence || hazard.announced_sequence <= since_sequence)
-      continue;
-    if (since_sequence == 0 && !IsTold(hazard.state)) continue;
-    if (GeodesicDistanceM(centre, hazard.position) <= radius_m) result.push_back(hazard);
+  std::vector<std::pair<std::uint64_t, Slot>> found;
+  // An announcement is an event: what was announced since has changed since.
+  for (auto change = ChangesSince(since_sequence); change != changes_.end(); ++change) {
+    const HazardRecord& record = records_[change->slot];
+    if (record.sequence != change->sequence) continue;
+    if (record.announced_sequence <= since_sequence) continue;
+    if (since_sequence == 0 && !IsTold(record.life.state)) continue;
+    if (GeodesicDistanceM(centre, record.estimate.position) > radius_m) continue;
+    found.emplace_back(record.announced_sequence, change->slot);
   }
-  std::sort(result.begin(), result.end(), [](const Hazard& a, const Hazard& b) {
-    return a.announced_sequence < b.announced_sequence;
-  });
-  if (result.size() > limit) result.resize(limit);
+  std::sort(found.begin(), found.end());
+  if (found.size() > limit) found.resize(limit);
+  std::vector<Hazard> result;
+  result.reserve(found.size());
+  for (const auto& [sequence, slot] : found) result.push_back(Get(slot));
   return result;
 }
 
 void HazardRegistry::RememberForUndo(Slot slot) {
-  if (in_transaction_) undo_.push_back({slot, hazards_[slot]});
+  // As it was at first: what comes on top of that is taken back with it.
+  if (!in_transaction_ || (!undo_.empty() && undo_.back().slot == slot)) return;
+  undo_.push_back({slot, false, records_[slot]});
 }
 
 void HazardRegistry::NoteChange(Slot slot) {
-  changes_.push_back({hazards_[slot].sequence, slot});
+  changes_.push_back({records_[slot].sequence, slot});
   if (!in_transaction_) CompactChanges();
 }
 
 void HazardRegistry::CompactChanges() {
-  if (changes_.size() < 2 * hazards_.size() + 1024) return;
+  if (changes_.size() < 2 * records_.size() + 1024) return;
   const auto is_stale = [this](const Change& change) {
-    return hazards_[change.slot].sequence != change.sequence;
+    return records_[change.slot].sequence != change.sequence;
   };
   changes_.erase(std::remove_if(changes_.begin(), changes_.end(), is_stale), changes_.end());
 }
@@ -230,15 +285,15 @@ void HazardRegistry::Rollback() {
   in_transaction_ = false;
 }
 
-void HazardRegistry::TakeBack(Undo& undo) {
+void HazardRegistry::TakeBack(const Undo& undo) {
   TakeFromGrid(undo.slot);
-  Hazard& hazard = hazards_[undo.slot];
-  if (!undo.before) {
-    slots_.erase(hazard.uuid);
-    hazards_.pop_back();
+  if (undo.is_new) {
+    slots_.Erase(records_[undo.slot].uuid, undo.slot);
+    records_.pop_back();
+    --last_id_;
     return;
   }
-  hazard = std::move(*undo.before);
+  records_[undo.slot] = undo.before;
   PutOnGrid(undo.slot);
 }
 

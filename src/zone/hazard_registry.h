@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -14,6 +13,8 @@
 #include "hazard/report.h"
 #include "zone/hazard.h"
 #include "zone/hazard_fusion.h"
+#include "zone/hazard_record.h"
+#include "zone/uuid_index.h"
 
 namespace livemap {
 
@@ -36,28 +37,36 @@ class HazardRegistry {
   /// Radii come from the catalogue. `hash_seed`: see SpatialGrid.
   HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule = {});
 
-  /// Takes in a hazard as the store kept it; in ascending order of sequence.
-  /// Throws Error when its uuid or sequence is not new.
-  void Restore(Hazard hazard);
+  /// Takes in a hazard as the store kept it under `id`; in ascending order of sequence. The life's
+  /// state counts, the hazard's presence too. Throws Error when its uuid or sequence is not new.
+  void Restore(const Hazard& hazard, const LifeRecord& life, std::uint32_t id);
 
-  /// The nearest hazard of this class that is on the map or rejected within the class's radius
-  /// (geodesic), the older one among equals. `position` must be valid.
+  /// The nearest hazard of this class that is not gone within the class's radius (geodesic), the
+  /// older one among equals. `position` must be valid.
   std::optional<Slot> FindMatch(const std::string& class_name, const GeoPoint& position) const;
 
-  /// Puts a new hazard on the map.
+  /// Puts in a new hazard; SetLife gives it its life.
   Slot Add(const Report& report, const PictureName& picture, const Uuid& uuid,
-           std::uint64_t sequence, std::int64_t now_ns, HazardState state = HazardState::kActive);
+           std::uint64_t sequence, std::int64_t now_ns);
   /// Counts the report as a sighting of `slot`; the newer image's picture stays.
   void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
              std::int64_t now_ns);
-  /// Takes a hazard to another state; one that is gone matches no report any more.
-  void SetState(Slot slot, HazardState state, std::uint64_t sequence, std::int64_t now_ns);
+  /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
+  void SetLife(Slot slot, const LifeRecord& life, double presence, std::uint64_t sequence,
+               std::int64_t now_ns);
+  /// A newer picture.
+  void SetPicture(Slot slot, const PictureName& picture);
   /// Drivers are told of the hazard as it is now.
   void MarkAnnounced(Slot slot);
 
-  const Hazard& Get(Slot slot) const { return hazards_[slot]; }
+  Hazard Get(Slot slot) const;
+  const HazardRecord& Record(Slot slot) const { return records_[slot]; }
+  const std::string& ClassName(Slot slot) const {
+    return classes_[records_[slot].hazard_class].name;
+  }
+  HazardState State(Slot slot) const { return records_[slot].life.state; }
   std::optional<Slot> Find(const Uuid& uuid) const;
-  std::size_t size() const { return hazards_.size(); }
+  std::size_t size() const { return records_.size(); }
   /// How many are in each state, by HazardState.
   const std::array<std::size_t, kHazardStates>& counts() const { return counts_; }
   /// On the officials' map.
@@ -84,29 +93,33 @@ class HazardRegistry {
   };
   struct Undo {
     Slot slot = 0;
-    std::optional<Hazard> before;  ///< None: the slot was new.
+    bool is_new = false;
+    HazardRecord before;  ///< Unless it is new.
   };
-
-  struct ClassIndex {
+  struct Class {
+    std::string name;
     double radius_m;
-    SpatialGrid grid;
+    SpatialGrid grid;  ///< All that are not gone.
   };
 
+  std::uint32_t ClassOf(const std::string& class_name);
+  Slot Append(const HazardRecord& record);
   void PutOnGrid(Slot slot);
   void TakeFromGrid(Slot slot);
-  SpatialGrid& GridOf(const std::string& class_name);
-  Slot Append(Hazard hazard);
   void RememberForUndo(Slot slot);
   void NoteChange(Slot slot);
   void CompactChanges();
-  void TakeBack(Undo& undo);
+  void TakeBack(const Undo& undo);
+  std::vector<Change>::const_iterator ChangesSince(std::uint64_t sequence) const;
 
   HazardCatalogue catalogue_;
   std::uint64_t hash_seed_;
   FusionRule rule_;
-  std::deque<Hazard> hazards_;  ///< By slot; a deque, because growth must not move them.
-  std::unordered_map<Uuid, Slot> slots_;
-  std::unordered_map<std::string, ClassIndex> classes_;  ///< By name; all but gone hazards.
+  HazardRecords records_;  ///< By slot.
+  UuidIndex slots_;
+  std::vector<Class> classes_;
+  std::unordered_map<std::string, std::uint32_t> class_places_;  ///< By name, in classes_.
+  std::uint32_t last_id_ = 0;
   /// In ascending order of sequence; an entry is stale once its hazard has a newer sequence.
   std::vector<Change> changes_;
   std::array<std::size_t, kHazardStates> counts_{};

@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <optional>
-#include <queue>
+#include <list>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "geo/spatial_grid.h"
@@ -65,7 +65,7 @@ class PollScheduler {
     double corridor_slope = 0.3;   ///< ...which grows by this per metre ahead: roads bend.
     double answer_timeout_s = 60;  ///< A poll is open for this long.
     double same_vehicle_gap_s = 6 * 3600.0;
-    double vehicle_silence_s = 15;  ///< A vehicle not heard of for this long is not asked.
+    double vehicle_silence_s = 15;  ///< A vehicle not heard of for this long is forgotten.
     std::size_t max_open_per_hazard = 1;
     std::size_t max_open_per_vehicle = 4;
     std::size_t max_vehicles = 10000;  ///< The longest silent one goes beyond it.
@@ -95,11 +95,84 @@ class PollScheduler {
   double bytes() const { return bytes_; }
 
  private:
-  struct Target;
-  struct Asked;
-  struct Rider;
+  struct Target {
+    GeoPoint position;
+    ClassSurvival survival;
+    std::int64_t at_ns = 0;  ///< `log_odds` and `debt_s` are of this moment.
+    std::int64_t first_seen_ns = 0;
+    std::int64_t last_yes_ns = 0;
+    std::int64_t picture_ns = 0;
+    double log_odds = 0;
+    double debt_s = 0;  ///< Seconds of wrong map expected since the last word that settled it.
+    std::uint32_t version = 0;  ///< Of its entry in the heap.
+    std::uint16_t open = 0;
+    HazardState state = HazardState::kCandidate;
+    bool waiting = false;  ///< Due, in `waiting_`.
+  };
+  /// The vehicles that lately spoke of a hazard or were asked about it, in a ring.
+  struct Asked {
+    std::array<std::uint64_t, 8> vehicle{};
+    std::array<std::int64_t, 8> at_ns{};
+    std::size_t next = 0;
+  };
+  struct Rider {
+    std::string id;
+    std::uint64_t key = 0;
+    TrackPoint point;
+    std::size_t open = 0;
+    bool moved = false;
+  };
+  using RiderPlace = std::list<Rider>::iterator;
+  struct Due {
+    std::int64_t at_ns;
+    std::uint64_t hazard;
+    std::uint32_t version;
+    friend bool operator<(const Due& a, const Due& b) { return a.at_ns > b.at_ns; }
+  };
+  struct Open {
+    std::uint64_t hazard;
+    std::string vehicle_id;
+    std::int64_t expires_ns;
+    double bytes;
+    bool closed = false;
+  };
+
+  double DebtS(const Target& target, std::int64_t now_ns) const;
+  double PriceS() const;
+  std::int64_t DueNs(const Target& target, double price_s) const;
+  void Refill(std::int64_t now_ns);
+  void Schedule(std::uint64_t hazard, Target& target, std::int64_t now_ns);
+  void ForgetRider(RiderPlace rider);
+  void StopWaiting(std::uint64_t hazard, Target& target);
+  void NoteAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns);
+  bool WasAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t now_ns) const;
+  void ForgetAsked(std::int64_t now_ns);
+  void ExpirePolls(std::int64_t now_ns);
+  void TakeFallenDue(std::int64_t now_ns);
+  void LookAround(std::uint64_t hazard, std::int64_t now_ns, std::vector<PollChoice>& choices);
+  void TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_ns,
+              std::vector<PollChoice>& choices);
+  bool Passes(const TrackPoint& point, const GeoPoint& place) const;
+  void Close(Open& poll);
+  void CompactHeap();
 
   Config config_;
+  std::unordered_map<std::uint64_t, Target> hazards_;
+  std::vector<Due> heap_;                   // Soonest first; entries of an old version are stale.
+  SpatialGrid waiting_;                     // Hazards that are due.
+  std::vector<std::uint64_t> look_around_;  // Due since the last tick, or free to be asked again.
+  std::unordered_map<std::uint64_t, Asked> asked_;
+  std::deque<std::pair<std::int64_t, std::uint64_t>> asked_order_;  // When noted, hazard.
+  std::list<Rider> riders_;                                         // Longest silent first.
+  std::unordered_map<std::string, RiderPlace> riders_by_id_;
+  std::unordered_map<std::uint64_t, RiderPlace> riders_by_key_;
+  SpatialGrid rider_grid_;
+  std::vector<std::uint64_t> moved_;  // Keys of riders heard since the last tick.
+  std::deque<Open> open_;             // In order of expiry.
+  std::size_t open_count_ = 0;
+  double bucket_bytes_ = 0;
+  std::int64_t filled_ns_ = 0;
+  double bytes_ = 0;
 };
 
 }  // namespace livemap

@@ -142,23 +142,6 @@ Why WhyBoxRefused(const Report& report, const ReportLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyPictureRefused(const Report& report, const ReportLimits& limits) {
-  if (report.image.empty()) return std::nullopt;
-  if (report.image.size() > limits.max_image_bytes) {
-    return Malformed("picture has " + std::to_string(report.image.size()) + " bytes, at most " +
-                     std::to_string(limits.max_image_bytes) + " are accepted");
-  }
-  const auto header = ReadImageHeader(report.image.data(), report.image.size());
-  if (!header) return Malformed("picture is no JPEG, PNG or WebP");
-  const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
-  if (longer_side > limits.max_image_side_px) {
-    return Malformed("picture is " + std::to_string(header->width) + " x " +
-                     std::to_string(header->height) + " pixels, at most " +
-                     std::to_string(limits.max_image_side_px) + " per side are accepted");
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 bool IsPrintableText(const std::string& text, std::size_t max_bytes) {
@@ -191,6 +174,23 @@ const char* RefusalName(RefusalKind kind) {
   return "unknown";
 }
 
+std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
+                                         const ReportLimits& limits) {
+  if (image.size() > limits.max_image_bytes) {
+    return Malformed("picture has " + std::to_string(image.size()) + " bytes, at most " +
+                     std::to_string(limits.max_image_bytes) + " are accepted");
+  }
+  const auto header = ReadImageHeader(image.data(), image.size());
+  if (!header) return Malformed("picture is no JPEG, PNG or WebP");
+  const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
+  if (longer_side > limits.max_image_side_px) {
+    return Malformed("picture is " + std::to_string(header->width) + " x " +
+                     std::to_string(header->height) + " pixels, at most " +
+                     std::to_string(limits.max_image_side_px) + " per side are accepted");
+  }
+  return std::nullopt;
+}
+
 std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limits,
                                   std::int64_t now_ns) {
   if (report.uuid.IsNil()) return Malformed("report has no uuid");
@@ -206,7 +206,8 @@ std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limi
   if (auto why = WhyPositionRefused(report, limits)) return why;
   if (auto why = WhyStampRefused(report, limits, now_ns)) return why;
   if (auto why = WhyBoxRefused(report, limits)) return why;
-  return WhyPictureRefused(report, limits);
+  if (report.image.empty()) return std::nullopt;
+  return WhyPictureRefused(report.image, limits);
 }
 
 }  // namespace livemap

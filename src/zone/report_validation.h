@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hazard/report.h"
 #include "zone/hazard.h"
@@ -45,6 +46,10 @@ struct ReportLimits {
 /// Valid UTF-8 without control characters, line separators or invisible and direction-changing
 /// format characters, and neither empty nor longer than `max_bytes`.
 bool IsPrintableText(const std::string& text, std::size_t max_bytes);
+
+/// Why the zone refuses a picture, by its size and header alone.
+std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
+                                         const ReportLimits& limits);
 
 /// Why the zone refuses `report`; none when it is acceptable. Looks at the
 /// picture's header only and decodes nothing. `now_ns` is the zone's clock.

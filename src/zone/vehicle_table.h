@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "zone/vehicle_track.h"
 #include "zone/zone_service.h"
 
 namespace livemap {
@@ -20,12 +22,21 @@ class VehicleTable {
   void Update(const VehicleState& vehicle);
   /// Those heard of within the retention time, by id.
   std::vector<VehicleState> List(std::int64_t now_ns) const;
+  /// Where the vehicle was during the last two minutes, by when the zone heard it, oldest first, at
+  /// most the newest 240 places.
+  std::vector<TrackPoint> Track(const std::string& vehicle_id) const;
 
  private:
+  void MakeRoom(std::int64_t now_ns);
+
   const std::int64_t retention_ns_;
   const std::size_t max_vehicles_;
   mutable std::mutex mutex_;
-  std::map<std::string, VehicleState> vehicles_;
+  struct Vehicle {
+    VehicleState state;
+    std::deque<TrackPoint> track;
+  };
+  std::map<std::string, Vehicle> vehicles_;
 };
 
 }  // namespace livemap

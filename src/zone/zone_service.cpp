@@ -27,18 +27,17 @@ ZoneService::Implementation::Implementation(Config config, Clock now_ns, std::ui
     : config_(std::move(config)),
       now_ns_(std::move(now_ns)),
       directory_(config_.directory),
+      life_(config_.life),
       store_(directory_.path() + "/zone.sqlite3"),
+      survival_(config_.catalogue, config_.survival),
+      allowance_(config_.allowance),
       images_(directory_.path() + "/images", static_cast<std::uint64_t>(config_.image_cap_bytes)),
       vehicles_(config_.vehicle_retention_s, config_.max_vehicles),
       sequence_(store_.LastSequence()),
-      announced_(0),
       generator_(MakeGenerator(uuid_seed, sequence_)),
-      registry_(config_.catalogue, generator_()) {
-  store_.LoadHazards([this](Hazard hazard) {
-    if (IsOnMap(hazard.state)) images_.Retain(hazard.image_sha256);
-    announced_ = std::max(announced_, hazard.announced_sequence);
-    registry_.Restore(std::move(hazard));
-  });
+      registry_(config_.catalogue, generator_()),
+      scheduler_(config_.polls, generator_()) {
+  Load();
 }
 
 std::mt19937_64 ZoneService::Implementation::MakeGenerator(std::uint64_t seed,
@@ -46,6 +45,77 @@ std::mt19937_64 ZoneService::Implementation::MakeGenerator(std::uint64_t seed,
   std::seed_seq sequence_of_seeds{seed & 0xffffffffU, seed >> 32, sequence & 0xffffffffU,
                                   sequence >> 32};
   return std::mt19937_64(sequence_of_seeds);
+}
+
+void ZoneService::Implementation::Load() {
+  store_.LoadLives([this](const std::string& class_name, LearnedLife learned) {
+    survival_.Restore(class_name, learned);
+  });
+  store_.LoadHazards([this](const ZoneStore::HazardRow& row) {
+    const Hazard& hazard = row.hazard;
+    if (IsOnMap(hazard.state)) images_.Retain(hazard.image_sha256);
+    announced_ = std::max(announced_, hazard.announced_sequence);
+    registry_.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));
+  });
+  const std::int64_t now_ns = now_ns_();
+  for (Slot slot = 0; slot < registry_.size(); ++slot) Schedule(slot, now_ns);
+}
+
+ZoneService::Implementation::Change ZoneService::Implementation::NewChange() const {
+  Change change;
+  change.now_ns = now_ns_();
+  change.sequence = sequence_;
+  change.announced = announced_;
+  return change;
+}
+
+/// Once per hazard and class, as they are in the end.
+void ZoneService::Implementation::WriteTouched(Change& change) {
+  std::vector<Slot>& touched = change.touched;
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  for (const Slot slot : touched) {
+    const HazardRecord& record = registry_.Record(slot);
+    store_.WriteHazard({record.id, registry_.Get(slot), record.life});
+  }
+  for (const auto& [class_name, before] : change.learned_before) {
+    store_.WriteLife(class_name, survival_.learned().at(class_name));
+  }
+}
+
+/// What a failed transaction taught.
+void ZoneService::Implementation::Forget(const Change& change) {
+  for (const auto& [class_name, before] : change.learned_before) {
+    survival_.Restore(class_name, before);
+  }
+}
+
+void ZoneService::Implementation::Settle(const Change& change) {
+  for (const auto& [before, after] : change.pictures) {
+    images_.Retain(after);
+    images_.Release(before);
+  }
+  images_.EvictBeyondCap();
+  for (const Slot slot : change.touched) Schedule(slot, change.now_ns);
+  for (const HazardEvent& event : change.events) {
+    ZoneEvent message;
+    message.hazard = event;
+    stream_.Publish(message);
+  }
+}
+
+/// When time changes the hazard next, and when vehicles are to be asked about it.
+void ZoneService::Implementation::Schedule(Slot slot, std::int64_t now_ns) {
+  const HazardRecord& record = registry_.Record(slot);
+  const LifeClass entry = ClassOf(slot);
+  due_.Set(slot, life_.NextChangeNs(entry, record.life));
+  const std::int64_t picture_ns = record.picture.empty() ? 0 : record.estimate.last_seen_ns;
+  const std::lock_guard<std::mutex> lock(polls_mutex_);
+  if (IsOnMap(record.life.state)) {
+    scheduler_.SetHazard(slot, record.estimate.position, entry, record.life, picture_ns, now_ns);
+  } else {
+    scheduler_.RemoveHazard(slot);
+  }
 }
 
 bool ZoneService::Implementation::UpdateVehicle(const VehicleState& told) {
@@ -63,6 +133,11 @@ bool ZoneService::Implementation::UpdateVehicle(const VehicleState& told) {
   }
   ++vehicle_positions_;
   vehicles_.Update(vehicle);
+  {
+    const std::lock_guard<std::mutex> lock(polls_mutex_);
+    scheduler_.SetVehicle(vehicle.vehicle_id, {vehicle.heard_ns, vehicle.position,
+                                               vehicle.course_rad, vehicle.speed_mps});
+  }
   ZoneEvent message;
   message.vehicle = std::move(vehicle);
   stream_.Publish(message);

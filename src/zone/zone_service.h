@@ -13,8 +13,13 @@
 #include "hazard/catalogue.h"
 #include "hazard/report.h"
 #include "zone/hazard.h"
+#include "zone/hazard_life.h"
+#include "zone/poll_scheduler.h"
 #include "zone/report_validation.h"
 #include "zone/speed_rule.h"
+#include "zone/survival_model.h"
+#include "zone/vehicle_allowance.h"
+#include "zone/vehicle_track.h"
 
 namespace livemap {
 
@@ -98,9 +103,13 @@ class ZoneService {
     double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
     std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
     std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
-    std::size_t max_reports_per_hour = 3600;  ///< Of one vehicle; further ones must wait.
     ReportLimits limits;
     SpeedRule speed;
+    VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
+    HazardLife::Config life;
+    SurvivalModel::Config survival;
+    PollScheduler::Config polls;
+    SightRule sight;  ///< Whose answer to a poll counts.
     HazardCatalogue catalogue;
   };
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
@@ -119,7 +128,7 @@ class ZoneService {
   /// the vehicle's hourly cap is reached: HandleBatch just leaves such a report unanswered.
   Receipt Handle(const Report& report);
   /// The same for many in one transaction, in order; one receipt per report in the order of the
-  /// reports, but none for a report that is not taken now (see Config::max_reports_per_hour): its
+  /// reports, but none for a report that is not taken now (see Config::allowance): its
   /// vehicle sends it again. All or nothing when the store fails.
   std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
 

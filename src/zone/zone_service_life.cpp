@@ -1,5 +1,4 @@
-// What happens to hazards besides reports: officials, polls, time. And what every change has in
-// common.
+// One step of a hazard's life, whatever causes it; and what officials and time do.
 #include <algorithm>
 #include <utility>
 
@@ -28,104 +27,161 @@ void CheckOfficial(const std::string& official, std::size_t max_bytes) {
 
 }  // namespace
 
-ZoneService::Implementation::Change ZoneService::Implementation::NewChange() const {
-  Change change;
-  change.sequence = sequence_;
-  change.announced = announced_;
-  return change;
+LifeClass ZoneService::Implementation::ClassOf(Slot slot) const {
+  const std::string& name = registry_.ClassName(slot);
+  return LifeClassOf(config_.catalogue.Get(name), survival_.Of(name));
 }
 
-void ZoneService::Implementation::NoteEvent(Slot slot, HazardAction action,
-                                            std::optional<HazardState> from, std::string reason,
-                                            Change& change) {
+ZoneService::Implementation::Before ZoneService::Implementation::BeforeOf(Slot slot) const {
+  const HazardRecord& record = registry_.Record(slot);
+  return {record.life.state, record.sequence, record.picture};
+}
+
+void ZoneService::Implementation::Learn(const std::string& class_name, const LifeLesson& lesson,
+                                        Change& change) {
+  if (!(lesson.stood_s >= 0) || (lesson.stood_s == 0 && !lesson.ended)) return;
+  const auto known = survival_.learned().find(class_name);
+  // The first time only: a failed transaction takes back all of them.
+  change.learned_before.emplace(class_name,
+                                known == survival_.learned().end() ? LearnedLife{} : known->second);
+  survival_.Learn(class_name, lesson);
+}
+
+std::optional<ZoneService::Implementation::Slot> ZoneService::Implementation::MatchNow(
+    const Report& report, Change& change) {
+  auto match = registry_.FindMatch(report.class_name, report.position);
+  while (match && PassTime(*match, change) && registry_.State(*match) == HazardState::kGone) {
+    match = registry_.FindMatch(report.class_name, report.position);
+  }
+  return match;
+}
+
+bool ZoneService::Implementation::PassTime(Slot slot, Change& change) {
+  LifeRecord life = registry_.Record(slot).life;
+  const LifeStep step = life_.Advance(ClassOf(slot), change.now_ns, life);
+  if (!step.transition) return false;
+  Step(slot, life, step, step.transition->reason, BeforeOf(slot), change);
+  return true;
+}
+
+void ZoneService::Implementation::Step(Slot slot, const LifeRecord& life, const LifeStep& step,
+                                       const std::string& reason, const Before& before,
+                                       Change& change) {
+  Learn(registry_.ClassName(slot), step.lesson, change);
+  registry_.SetLife(slot, life, life_.Presence(ClassOf(slot), life, change.now_ns),
+                    ++change.sequence, change.now_ns);
+  NoteEvent(slot, before, reason, false, change);
+}
+
+void ZoneService::Implementation::NoteEvent(Slot slot, const std::optional<Before>& before,
+                                            std::string reason, bool tells, Change& change) {
+  const HazardState state = registry_.State(slot);
+  const bool was_on_map = before && IsOnMap(before->state);
   HazardEvent event;
-  event.action = action;
-  event.from = from;
+  event.action = !IsOnMap(state) ? HazardAction::kRemoved
+                 : was_on_map    ? HazardAction::kUpdated
+                                 : HazardAction::kAdded;
+  if (before) event.from = before->state;
   event.reason = Shortened(std::move(reason));
   event.previous_announced = change.announced;
-  event.announced = DriversAction(from, registry_.Get(slot).state).has_value();
+  const auto told = DriversAction(event.from, state);
+  event.announced = told && (tells || *told != HazardAction::kUpdated);
   if (event.announced) {
     registry_.MarkAnnounced(slot);
     change.announced = change.sequence;
   }
   event.hazard = registry_.Get(slot);
-  store_.WriteEvent(event, event.reason);
+  store_.WriteEvent(event, registry_.Record(slot).id, before ? before->sequence : 0);
   change.touched.push_back(slot);
+  change.pictures.emplace_back(was_on_map ? before->picture.Sha256() : "",
+                               IsOnMap(state) ? event.hazard.image_sha256 : "");
   change.events.push_back(std::move(event));
 }
 
-/// Once per hazard, as it is in the end.
-void ZoneService::Implementation::WriteTouched(Change& change) {
-  std::vector<Slot>& touched = change.touched;
-  std::sort(touched.begin(), touched.end());
-  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
-  for (const Slot slot : touched) store_.WriteHazard(registry_.Get(slot));
-}
-
-void ZoneService::Implementation::Settle(const Change& change) {
-  for (const auto& [before, after] : change.pictures) {
-    images_.Retain(after);
-    images_.Release(before);
+bool ZoneService::Implementation::Reject(const Uuid& uuid, const std::string& official,
+                                         const std::string& reason) {
+  CheckOfficial(official, config_.limits.max_text_bytes);
+  const std::string why = Shortened(reason);
+  if (!why.empty() && !IsPrintableText(why, kMaxReasonBytes)) {
+    throw Error("the reason is not accepted: it must be printable UTF-8");
   }
-  images_.EvictBeyondCap();
-  for (const HazardEvent& event : change.events) {
-    ZoneEvent message;
-    message.hazard = event;
-    stream_.Publish(message);
-  }
-}
-
-ZoneService::Implementation::Change ZoneService::Implementation::Decide(Slot slot,
-                                                                        HazardState state,
-                                                                        const std::string& reason) {
-  Change change = NewChange();
-  InTransaction(change, [&] {
-    const Hazard before = registry_.Get(slot);
-    registry_.SetState(slot, state, ++change.sequence, now_ns_());
-    const bool leaves = IsOnMap(before.state) && !IsOnMap(state);
-    const bool comes = !IsOnMap(before.state) && IsOnMap(state);
-    const HazardAction action = leaves  ? HazardAction::kRemoved
-                                : comes ? HazardAction::kAdded
-                                        : HazardAction::kUpdated;
-    NoteEvent(slot, action, before.state, reason, change);
-    if (leaves) change.pictures.emplace_back(before.image_sha256, "");
-    if (comes) change.pictures.emplace_back("", before.image_sha256);
+  return Decide(uuid, [&](Slot, LifeRecord& life) -> LifeStep {
+    if (!IsOnMap(life.state)) return {};
+    return life_.Reject(official, why, now_ns_(), life);
   });
-  return change;
 }
 
-bool ZoneService::Implementation::Reject(const Uuid&, const std::string& official,
-                                         const std::string&) {
+bool ZoneService::Implementation::Confirm(const Uuid& uuid, const std::string& official) {
   CheckOfficial(official, config_.limits.max_text_bytes);
-  return false;
-}
-
-bool ZoneService::Implementation::Confirm(const Uuid&, const std::string& official) {
-  CheckOfficial(official, config_.limits.max_text_bytes);
-  return false;
+  return Decide(uuid, [&](Slot slot, LifeRecord& life) -> LifeStep {
+    if (life.state == HazardState::kGone) return {};
+    LifeStep step = life_.Confirm(ClassOf(slot), official, now_ns_(), life);
+    // Confirmed again it stays what it is; that somebody looked is an event all the same.
+    if (!step.transition) {
+      step.transition = LifeTransition{life.state, life.state, "confirmed by " + official};
+    }
+    return step;
+  });
 }
 
 bool ZoneService::Implementation::Remove(const Uuid& uuid, const std::string& reason) {
+  return Decide(uuid, [&](Slot, LifeRecord& life) -> LifeStep {
+    if (!IsOnMap(life.state)) return {};
+    LifeStep step;
+    step.transition = LifeTransition{life.state, HazardState::kGone, Shortened(reason)};
+    life.state = HazardState::kGone;
+    life.since_ns = now_ns_();
+    return step;
+  });
+}
+
+template <typename Decision>
+bool ZoneService::Implementation::Decide(const Uuid& uuid, const Decision& decision) {
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   Change change;
   {
     const std::unique_lock<std::shared_mutex> lock(data_mutex_);
     const auto slot = registry_.Find(uuid);
-    if (!slot || !IsOnMap(registry_.Get(*slot).state)) return false;
-    change = Decide(*slot, HazardState::kGone, reason);
+    if (!slot) return false;
+    LifeRecord life = registry_.Record(*slot).life;
+    const LifeStep step = decision(*slot, life);
+    if (!step.transition) return false;
+    change = NewChange();
+    InTransaction(
+        change, [&] { Step(*slot, life, step, step.transition->reason, BeforeOf(*slot), change); });
   }
   Settle(change);
   return true;
 }
 
-std::vector<StoredEvent> ZoneService::Implementation::Events(const Uuid&, std::size_t) const {
-  return {};
+void ZoneService::Implementation::Advance() {
+  constexpr std::size_t kMostAtOnce = 2000;
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  Change change = NewChange();
+  const std::vector<Slot> due = due_.Take(change.now_ns, kMostAtOnce);
+  if (due.empty()) return;
+  try {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    InTransaction(change, [&] {
+      for (const Slot slot : due) PassTime(slot, change);
+    });
+  } catch (...) {
+    for (const Slot slot : due) due_.Set(slot, change.now_ns);
+    throw;
+  }
+  // A second at least: what is learned may put off what was due.
+  for (const Slot slot : due) {
+    const std::int64_t next_ns = life_.NextChangeNs(ClassOf(slot), registry_.Record(slot).life);
+    due_.Set(slot, std::max(next_ns, change.now_ns + 1'000'000'000));
+  }
+  Settle(change);
 }
 
-std::vector<PollOrder> ZoneService::Implementation::TakeDuePolls() { return {}; }
-
-bool ZoneService::Implementation::HandleAnswer(const PollAnswer&) { return false; }
-
-void ZoneService::Implementation::Advance() {}
+std::vector<StoredEvent> ZoneService::Implementation::Events(const Uuid& uuid, std::size_t limit) {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  const auto slot = registry_.Find(uuid);
+  if (!slot) return {};
+  return store_.LoadEvents(uuid, registry_.Record(*slot).sequence, limit);
+}
 
 }  // namespace livemap

@@ -17,17 +17,17 @@ Receipt Committed(const Report& report, const Uuid& hazard_uuid) {
 std::vector<Receipt> ZoneService::Implementation::HandleBatch(const std::vector<Report>& reports) {
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   Batch batch;
+  batch.change = NewChange();
   batch.receipts.resize(reports.size());
   Triage(reports, batch);
   {
     const std::unique_lock<std::shared_mutex> lock(data_mutex_);
-    batch.change = NewChange();
     if (!batch.candidates.empty()) {
       InTransaction(batch.change, [&] { Apply(reports, batch); });
     }
     Count(batch.counted);
   }
-  for (auto& [vehicle_id, track] : batch.tracks) tracks_[vehicle_id] = track;
+  KeepTracks(batch);
   Settle(batch.change);
   std::vector<Receipt> receipts;
   receipts.reserve(reports.size());
@@ -40,24 +40,9 @@ std::vector<Receipt> ZoneService::Implementation::HandleBatch(const std::vector<
 /// First pass, without the lock: what needs no change, what is refused, pictures to disk. A picture
 /// whose report is never committed is unreferenced and goes first.
 void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Batch& batch) {
-  const std::int64_t now_ns = now_ns_();
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const Report& report = reports[i];
-    // A report that was committed stays committed, whatever the limits are now.
-    const auto known = store_.FindReport(report.uuid);
-    if (known && known->vehicle_id == report.vehicle_id) {
-      batch.receipts[i] = Committed(report, known->hazard);
-      ++batch.counted.repeated;
-      continue;
-    }
-    if (known) {
-      Refuse(report, {RefusalKind::kReplay, "another vehicle's report has this uuid"}, i, batch);
-      continue;
-    }
-    if (const auto why = WhyNot(report, now_ns, batch)) {
-      Refuse(report, *why, i, batch);
-      continue;
-    }
+    if (!Examine(report, i, batch)) continue;
     Candidate candidate{i, {}};
     if (!report.image.empty()) {
       candidate.picture.format =
@@ -69,13 +54,40 @@ void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Bat
   images_.Publish();
 }
 
-std::optional<Refusal> ZoneService::Implementation::WhyNot(const Report& report,
-                                                           std::int64_t now_ns, Batch& batch) {
-  if (auto why = WhyRefused(report, config_.limits, now_ns)) return why;
+/// Whether the report may change the map; the others are counted, and answered unless they are to
+/// be sent again.
+bool ZoneService::Implementation::Examine(const Report& report, std::size_t index, Batch& batch) {
+  // A report that was committed stays committed, whatever the limits are now.
+  const auto known = store_.FindReport(report.uuid);
+  if (known && known->vehicle_id == report.vehicle_id) {
+    batch.receipts[index] = Committed(report, known->hazard);
+    ++batch.counted.repeated;
+    return false;
+  }
+  if (known) {
+    Refuse(report, {RefusalKind::kReplay, "another vehicle's report has this uuid"}, index, batch);
+    return false;
+  }
+  if (const auto why = WhyRefused(report, config_.limits, batch.change.now_ns)) {
+    Refuse(report, *why, index, batch);
+    return false;
+  }
+  if (!allowance_.TakeReport(report.vehicle_id, batch.change.now_ns)) {
+    ++batch.counted.not_now;
+    return false;
+  }
+  if (const auto why = WhyTooFast(report, batch)) {
+    Refuse(report, *why, index, batch);
+    return false;
+  }
+  return true;
+}
+
+std::optional<Refusal> ZoneService::Implementation::WhyTooFast(const Report& report, Batch& batch) {
   const auto speed_mps = Challenge(TrackOf(report.vehicle_id, batch), FixOf(report), config_.speed);
   if (!speed_mps) return std::nullopt;
-  return Refusal{RefusalKind::kSpeed, "position is " + std::to_string(*speed_mps) +
-                                          " m/s away from this vehicle's last report, at most " +
+  return Refusal{RefusalKind::kSpeed, "position is reached from this vehicle's last report at " +
+                                          std::to_string(*speed_mps) + " m/s only, at most " +
                                           std::to_string(config_.speed.max_speed_mps) +
                                           " m/s are accepted"};
 }
@@ -85,8 +97,19 @@ ReportTrack& ZoneService::Implementation::TrackOf(const std::string& vehicle_id,
   const auto found = batch.tracks.find(vehicle_id);
   if (found != batch.tracks.end()) return found->second;
   const auto known = tracks_.find(vehicle_id);
-  return batch.tracks.emplace(vehicle_id, known == tracks_.end() ? ReportTrack{} : known->second)
-      .first->second;
+  ReportTrack track;
+  if (known != tracks_.end()) {
+    track = known->second;
+  } else {
+    track.accepted = store_.FindLastReport(vehicle_id);
+  }
+  return batch.tracks.emplace(vehicle_id, track).first->second;
+}
+
+void ZoneService::Implementation::KeepTracks(const Batch& batch) {
+  // What is forgotten here is read from the store again, but for a vehicle's refused reports.
+  if (tracks_.size() > config_.max_vehicles) tracks_.clear();
+  for (const auto& [vehicle_id, track] : batch.tracks) tracks_[vehicle_id] = track;
 }
 
 void ZoneService::Implementation::Refuse(const Report& report, const Refusal& refusal,
@@ -106,45 +129,65 @@ void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Batc
       ++batch.counted.repeated;
       continue;
     }
-    const auto match = registry_.FindMatch(report.class_name, report.position);
-    if (!match && registry_.on_map_count() >= config_.max_hazards) {
+    auto slot = MatchNow(report, batch.change);
+    if (!slot && registry_.on_map_count() >= config_.max_hazards) {
       Refuse(report,
              {RefusalKind::kMapFull,
               "the zone holds its maximum of " + std::to_string(config_.max_hazards) + " hazards"},
              candidate.index, batch);
       continue;
     }
-    Register(report, candidate.picture, match, batch);
-    const Uuid& hazard = batch.change.events.back().hazard.uuid;
-    batch.hazard_of_report.emplace(report.uuid, hazard);
-    batch.receipts[candidate.index] = Committed(report, hazard);
+    if (slot) {
+      Sight(*slot, report, candidate.picture, batch.change);
+      ++batch.counted.merged;
+    } else {
+      slot = Register(report, candidate.picture, batch.change);
+      ++batch.counted.added;
+    }
+    const HazardRecord& record = registry_.Record(*slot);
+    store_.WriteReport(report, record.id, candidate.picture.sha256, batch.change.now_ns);
+    batch.hazard_of_report.emplace(report.uuid, record.uuid);
+    batch.receipts[candidate.index] = Committed(report, record.uuid);
+  }
+  for (const auto& [vehicle_id, track] : batch.tracks) {
+    if (track.accepted) store_.WriteLastReport(vehicle_id, *track.accepted);
   }
 }
 
-void ZoneService::Implementation::Register(const Report& report, const PictureName& picture,
-                                           std::optional<Slot> match, Batch& batch) {
-  const std::int64_t now_ns = now_ns_();
-  Change& change = batch.change;
-  const std::uint64_t sequence = ++change.sequence;
-  std::string picture_before;
-  Slot slot = 0;
-  if (match) {
-    slot = *match;
-    const HazardState before = registry_.Get(slot).state;
-    picture_before = registry_.Get(slot).image_sha256;
-    registry_.Merge(slot, report, picture, sequence, now_ns);
-    NoteEvent(slot, HazardAction::kUpdated, before, "sighting", change);
-    ++batch.counted.merged;
-  } else {
-    Uuid uuid = Uuid::Random(generator_);
-    while (registry_.Find(uuid)) uuid = Uuid::Random(generator_);
-    slot = registry_.Add(report, picture, uuid, sequence, now_ns);
-    NoteEvent(slot, HazardAction::kAdded, std::nullopt, "report", change);
-    ++batch.counted.added;
+ZoneService::Implementation::Slot ZoneService::Implementation::Register(const Report& report,
+                                                                        const PictureName& picture,
+                                                                        Change& change) {
+  Uuid uuid = Uuid::Random(generator_);
+  while (registry_.Find(uuid)) uuid = Uuid::Random(generator_);
+  const Slot slot = registry_.Add(report, picture, uuid, ++change.sequence, change.now_ns);
+  const LifeClass entry = ClassOf(slot);
+  LifeRecord life;
+  const Evidence evidence{EvidenceKind::kSighting, VehicleKey(report.vehicle_id), report.stamp_ns};
+  const LifeStep step = life_.Begin(entry, evidence, change.now_ns, life);
+  Learn(report.class_name, step.lesson, change);
+  registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
+                    change.now_ns);
+  NoteEvent(slot, std::nullopt, step.transition ? step.transition->reason : "report", true, change);
+  return slot;
+}
+
+void ZoneService::Implementation::Sight(Slot slot, const Report& report, const PictureName& picture,
+                                        Change& change) {
+  const Before before = BeforeOf(slot);
+  registry_.Merge(slot, report, picture, ++change.sequence, change.now_ns);
+  std::string reason = "sighting that counts for no more: too many from this vehicle";
+  if (allowance_.TakeEvidence(report.vehicle_id, change.now_ns)) {
+    const LifeClass entry = ClassOf(slot);
+    LifeRecord life = registry_.Record(slot).life;
+    const Evidence evidence{EvidenceKind::kSighting, VehicleKey(report.vehicle_id),
+                            report.stamp_ns};
+    const LifeStep step = life_.Apply(entry, evidence, change.now_ns, life);
+    Learn(report.class_name, step.lesson, change);
+    registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
+                      change.now_ns);
+    reason = step.transition ? step.transition->reason : "sighting";
   }
-  const Hazard& hazard = change.events.back().hazard;
-  store_.WriteReport(report, hazard.uuid, picture.sha256, now_ns);
-  change.pictures.emplace_back(std::move(picture_before), hazard.image_sha256);
+  NoteEvent(slot, before, std::move(reason), true, change);
 }
 
 void ZoneService::Implementation::Count(const ZoneStatistics& counted) {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <random>
@@ -11,18 +12,19 @@
 #include <utility>
 #include <vector>
 
+#include "zone/due_queue.h"
 #include "zone/event_stream.h"
 #include "zone/hazard_registry.h"
 #include "zone/image_store.h"
 #include "zone/owned_directory.h"
-#include "zone/speed_rule.h"
 #include "zone/vehicle_table.h"
 #include "zone/zone_service.h"
 #include "zone/zone_store.h"
 
 namespace livemap {
 
-/// What stands behind ZoneService; only its own sources include this.
+/// What stands behind ZoneService; only its own sources include this. Locks are taken in the order
+/// writer_mutex_, data_mutex_, polls_mutex_.
 class ZoneService::Implementation {
  public:
   using Slot = HazardRegistry::Slot;
@@ -37,27 +39,39 @@ class ZoneService::Implementation {
   bool HandleAnswer(const PollAnswer& answer);
   void Advance();
   bool UpdateVehicle(const VehicleState& told);
-  std::vector<StoredEvent> Events(const Uuid& uuid, std::size_t limit) const;
+  std::vector<StoredEvent> Events(const Uuid& uuid, std::size_t limit);
   ZoneStatistics Statistics() const;
 
   const Config config_;
   const Clock now_ns_;
   const OwnedDirectory directory_;
+  const HazardLife life_;
 
-  /// One writer at a time: owns store_, generator_, tracks_ and the right to change what
+  /// One writer at a time: owns what follows up to the vehicles, and the right to change what
   /// data_mutex_ guards.
-  mutable std::mutex writer_mutex_;
-  mutable ZoneStore store_;
+  std::mutex writer_mutex_;
+  ZoneStore store_;
+  SurvivalModel survival_;
+  VehicleAllowance allowance_;
+  std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id; the rest is stored.
+  DueQueue due_;
+  struct OpenPoll {
+    Slot slot = 0;
+    std::string vehicle_id;
+    std::int64_t asked_ns = 0;
+    std::int64_t expires_ns = 0;
+  };
+  std::map<Uuid, OpenPoll> open_polls_;
+
   ImageStore images_;
   VehicleTable vehicles_;
   EventStream stream_;
-  std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id.
 
   /// Held exclusively from the first change to the end of its commit, so that no reader ever sees
   /// what is not on disk: guards sequence_, announced_, registry_ and statistics_.
   mutable std::shared_mutex data_mutex_;
   std::uint64_t sequence_;
-  std::uint64_t announced_;
+  std::uint64_t announced_ = 0;
   std::mt19937_64 generator_;
   HazardRegistry registry_;
   ZoneStatistics statistics_;
@@ -65,14 +79,25 @@ class ZoneService::Implementation {
   std::atomic<std::uint64_t> vehicle_positions_refused_{0};
   std::atomic<std::uint64_t> store_errors_{0};
 
+  std::mutex polls_mutex_;
+  PollScheduler scheduler_;
+
  private:
+  /// A hazard before something happens to it.
+  struct Before {
+    HazardState state = HazardState::kCandidate;
+    std::uint64_t sequence = 0;
+    PackedPicture picture;
+  };
   /// What a transaction changes: kept when its commit succeeds, thrown away when it fails.
   struct Change {
+    std::int64_t now_ns = 0;
     std::uint64_t sequence = 0;
     std::uint64_t announced = 0;
     std::vector<HazardEvent> events;
     std::vector<std::pair<std::string, std::string>> pictures;  ///< Before and after.
     std::vector<Slot> touched;                                  ///< Hazards to write; may repeat.
+    std::map<std::string, LearnedLife> learned_before;          ///< By class.
   };
   /// A report that may change the map.
   struct Candidate {
@@ -85,36 +110,62 @@ class ZoneService::Implementation {
     std::vector<std::optional<Receipt>> receipts;  ///< None: not taken now.
     std::vector<Candidate> candidates;
     std::unordered_map<Uuid, Uuid> hazard_of_report;
-    std::unordered_map<std::string, ReportTrack> tracks;  ///< As they will be.
+    std::map<std::string, ReportTrack> tracks;  ///< As they will be.
     ZoneStatistics counted;
   };
 
   /// The same seed gives other ids after a restart: the ids of before are taken.
   static std::mt19937_64 MakeGenerator(std::uint64_t seed, std::uint64_t sequence);
+  void Load();
 
+  // Reports: zone_service_reports.cpp.
   void Triage(const std::vector<Report>& reports, Batch& batch);
-  std::optional<Refusal> WhyNot(const Report& report, std::int64_t now_ns, Batch& batch);
+  bool Examine(const Report& report, std::size_t index, Batch& batch);
+  std::optional<Refusal> WhyTooFast(const Report& report, Batch& batch);
   void Refuse(const Report& report, const Refusal& refusal, std::size_t index, Batch& batch);
   ReportTrack& TrackOf(const std::string& vehicle_id, Batch& batch);
+  void KeepTracks(const Batch& batch);
   void Apply(const std::vector<Report>& reports, Batch& batch);
-  void Register(const Report& report, const PictureName& picture, std::optional<Slot> match,
-                Batch& batch);
+  Slot Register(const Report& report, const PictureName& picture, Change& change);
+  void Sight(Slot slot, const Report& report, const PictureName& picture, Change& change);
   void Count(const ZoneStatistics& counted);
 
-  /// Takes one hazard to `state` in a transaction of its own; the reason is cut to what is kept.
-  Change Decide(Slot slot, HazardState state, const std::string& reason);
+  // One step of a hazard's life, in a running transaction: zone_service_life.cpp.
+  LifeClass ClassOf(Slot slot) const;
+  Before BeforeOf(Slot slot) const;
+  /// The map's hazard that the report is a sighting of, after time has done what is due to it.
+  std::optional<Slot> MatchNow(const Report& report, Change& change);
+  /// Does what time has made due; false when that was nothing.
+  bool PassTime(Slot slot, Change& change);
+  /// `life` is what `step` made of the hazard's life. Gives the event its own sequence.
+  void Step(Slot slot, const LifeRecord& life, const LifeStep& step, const std::string& reason,
+            const Before& before, Change& change);
+  /// The event of what happened to `slot` since `before` (none: it is new); its sequence is the
+  /// change's. `tells`: drivers hear of it even when the state stays.
+  void NoteEvent(Slot slot, const std::optional<Before>& before, std::string reason, bool tells,
+                 Change& change);
+  void Learn(const std::string& class_name, const LifeLesson& lesson, Change& change);
+  /// A decision about one hazard, in a transaction of its own: false when it leads to no
+  /// transition.
+  template <typename Decision>
+  bool Decide(const Uuid& uuid, const Decision& decision);
 
+  // Transactions: zone_service.cpp.
   Change NewChange() const;
-  /// The event of what just happened to `slot`, whose sequence is the change's.
-  void NoteEvent(Slot slot, HazardAction action, std::optional<HazardState> from,
-                 std::string reason, Change& change);
   /// Runs `body` between Begin and Commit of store and registry; when anything throws both are as
-  /// before. The caller holds both locks.
+  /// before. The caller holds writer_mutex_ and, exclusively, data_mutex_.
   template <typename Body>
   void InTransaction(Change& change, const Body& body);
   void WriteTouched(Change& change);
-  /// After the locks of data: pictures' references, subscribers.
+  void Forget(const Change& change);
+  /// After data_mutex_ was released: pictures' references, what is due when, subscribers.
   void Settle(const Change& change);
+  void Schedule(Slot slot, std::int64_t now_ns);
+
+  // Polls: zone_service_polls.cpp.
+  bool IsAcceptable(const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns) const;
+  Change CommitAnswer(const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns);
+  void CountAnswer(bool accepted);
 };
 
 template <typename Body>
@@ -129,6 +180,7 @@ void ZoneService::Implementation::InTransaction(Change& change, const Body& body
     } catch (...) {
       store_.Rollback();
       registry_.Rollback();
+      Forget(change);
       throw;
     }
   } catch (const StoreError&) {

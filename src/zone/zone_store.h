@@ -5,14 +5,21 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hazard/report.h"
 #include "zone/hazard.h"
+#include "zone/hazard_life.h"
+#include "zone/speed_rule.h"
+#include "zone/survival_model.h"
 
 namespace livemap {
 
-/// The zone's database: hazards as they are, every accepted report, every event. SQLite in WAL mode
-/// with synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
+struct PollAnswer;
+
+/// The zone's database: hazards as they are, every accepted report and answer, every event, what
+/// was learned of the classes, and where each vehicle's last report lies. SQLite in WAL mode with
+/// synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
 ///
 /// Every function throws StoreError with the database's own words when it fails.
 class ZoneStore {
@@ -24,8 +31,16 @@ class ZoneStore {
   ZoneStore(const ZoneStore&) = delete;
   ZoneStore& operator=(const ZoneStore&) = delete;
 
-  /// Every hazard, in ascending order of sequence.
-  void LoadHazards(const std::function<void(Hazard)>& take);
+  /// A hazard with its life; `id` numbers the rows, from 1.
+  struct HazardRow {
+    std::uint64_t id = 0;
+    Hazard hazard;
+    LifeRecord life;
+  };
+  /// Every hazard, in ascending order of sequence. One of an older schema gets a life that says
+  /// what that schema knew.
+  void LoadHazards(const std::function<void(HazardRow)>& take);
+  void LoadLives(const std::function<void(const std::string& class_name, LearnedLife)>& take);
   /// Of the newest event; 0 without events.
   std::uint64_t LastSequence();
   struct KnownReport {
@@ -34,6 +49,11 @@ class ZoneStore {
   };
   /// A committed report.
   std::optional<KnownReport> FindReport(const Uuid& report_uuid);
+  /// Where the vehicle's last accepted report lies.
+  std::optional<ReportedFix> FindLastReport(const std::string& vehicle_id);
+  /// The newest `limit` events of a hazard whose newest one is `sequence`, oldest first.
+  std::vector<StoredEvent> LoadEvents(const Uuid& hazard, std::uint64_t sequence,
+                                      std::size_t limit);
 
   /// Writes happen between Begin and Commit; Commit returns when they are on disk.
   void Begin();
@@ -41,11 +61,16 @@ class ZoneStore {
   /// Never throws: after a full disk the database may have rolled back by itself.
   void Rollback() noexcept;
 
-  /// Adds the hazard, or replaces the row of the same uuid.
-  void WriteHazard(const Hazard& hazard);
-  void WriteReport(const Report& report, const Uuid& hazard_uuid, const std::string& image_sha256,
+  /// Adds the hazard, or replaces the row of the same id.
+  void WriteHazard(const HazardRow& row);
+  void WriteReport(const Report& report, std::uint64_t hazard_id, const std::string& image_sha256,
                    std::int64_t received_ns);
-  void WriteEvent(const HazardEvent& event, const std::string& reason);
+  /// `previous_sequence`: of the hazard's event before; 0 without one.
+  void WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
+                  std::uint64_t previous_sequence);
+  void WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id, std::int64_t received_ns);
+  void WriteLife(const std::string& class_name, const LearnedLife& learned);
+  void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
 
   /// The schema that this program writes.
   static int SchemaVersion();

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -61,6 +62,26 @@ TEST_P(SpatialGridAt, FindsWhatBruteForceFindsWhilePlacesComeAndGo) {
       EXPECT_EQ(found->id, expected->id);
       EXPECT_EQ(found->distance_m, expected->distance_m);
     }
+  }
+}
+
+TEST_P(SpatialGridAt, FindsEveryPlaceWithinTheRadiusOnce) {
+  for (const double radius_m : {5.0, 31.0, 100.0}) {
+    SpatialGrid grid(30.0);
+    std::vector<Place> places;
+    for (std::uint64_t id = 0; id < 300; ++id) {
+      places.push_back({Scatter(150.0), id});
+      grid.Insert(places.back().point, id);
+    }
+    const GeoPoint centre = Scatter(160.0);
+    std::vector<std::uint64_t> expected;
+    for (const Place& place : places) {
+      if (GeodesicDistanceM(place.point, centre) <= radius_m) expected.push_back(place.id);
+    }
+    std::vector<std::uint64_t> found;
+    for (const auto& neighbour : grid.Within(centre, radius_m)) found.push_back(neighbour.id);
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, expected);
   }
 }
 

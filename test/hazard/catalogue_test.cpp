@@ -25,6 +25,27 @@ TEST(HazardCatalogue, ShippedFileNamesEveryClassOfTheDesign) {
   EXPECT_LT(catalogue.Get("stopped_accident").urgency, catalogue.Get("pothole").urgency);
 }
 
+TEST(HazardCatalogue, ShippedFileTellsDriversOfDeerAndAccidentsByOneVehicleAndOfTheRestByTwo) {
+  const auto catalogue = HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
+  for (const auto& [name, entry] : catalogue.classes()) {
+    const bool urgent = name == "deer" || name == "stopped_accident";
+    EXPECT_EQ(entry.confirmations, urgent ? 1 : 2) << name;
+    EXPECT_GT(entry.hit_rate, entry.false_rate) << name;
+  }
+  EXPECT_EQ(catalogue.Get("meteorite").confirmations, 2);
+}
+
+TEST(HazardCatalogue, RatesAndConfirmationsOfAClassOverrideTheDefaults) {
+  const auto catalogue = HazardCatalogue::Parse(
+      "defaults: {confirmations: 3, hit_rate: 0.6}\n"
+      "classes: {deer: {confirmations: 1, false_rate: 0.2}}",
+      "test");
+  EXPECT_EQ(catalogue.Get("deer").confirmations, 1);
+  EXPECT_EQ(catalogue.Get("deer").hit_rate, 0.6);
+  EXPECT_EQ(catalogue.Get("deer").false_rate, 0.2);
+  EXPECT_EQ(catalogue.Get("meteorite").confirmations, 3);
+}
+
 TEST(HazardCatalogue, UnknownClassGetsTheDefaultsUnderItsOwnName) {
   const auto catalogue = HazardCatalogue::Parse(
       "defaults: {duplicate_radius_m: 8, urgency: 3}\nclasses: {deer: {label: Deer}}", "test");
@@ -74,6 +95,10 @@ INSTANTIATE_TEST_SUITE_P(
                       BadCatalogue{"classes: {deer: {expected_life_s: .inf}}", "'expected_life_s'"},
                       BadCatalogue{"classes: {deer: {urgency: 1.5}}", "'1.5'"},
                       BadCatalogue{"classes: {deer: {urgency: [1]}}", "'urgency'"},
+                      BadCatalogue{"classes: {deer: {confirmations: 0}}", "'confirmations'"},
+                      BadCatalogue{"classes: {deer: {confirmations: 6}}", "'6'"},
+                      BadCatalogue{"classes: {deer: {hit_rate: 0.4}}", "'hit_rate'"},
+                      BadCatalogue{"classes: {deer: {false_rate: .nan}}", "'false_rate'"},
                       BadCatalogue{"classes: {deer: {colour: red}}", "'red'"},
                       BadCatalogue{"classes: {deer: {icon: ../x}}", "'../x'"},
                       BadCatalogue{"classes: {deer: {label: <b>}}", "'<b>'"}));

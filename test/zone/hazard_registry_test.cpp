@@ -16,7 +16,14 @@ constexpr double kPi = 3.14159265358979323846;
 class RegistryTest : public testing::Test {
  protected:
   HazardRegistry::Slot Add(const Report& report) {
-    return registry_.Add(report, {}, Uuid::Random(generator_), ++sequence_, kNowNs);
+    const auto slot = registry_.Add(report, {}, Uuid::Random(generator_), ++sequence_, kNowNs);
+    SetState(slot, HazardState::kActive);
+    return slot;
+  }
+  void SetState(HazardRegistry::Slot slot, HazardState state) {
+    LifeRecord life = registry_.Record(slot).life;
+    life.state = state;
+    registry_.SetLife(slot, life, 0.5, sequence_, kNowNs);
   }
 
   std::mt19937_64 generator_{3};
@@ -66,7 +73,7 @@ TEST_F(RegistryTest, MergingFusesPositionsByInverseCovariance) {
   const Eigen::Matrix2d covariance = information.inverse();
   const Eigen::Vector2d expected =
       covariance * (sighting.covariance_m2.inverse() * Eigen::Vector2d(1.5, -2.0));
-  const Hazard& hazard = registry_.Get(slot);
+  const Hazard hazard = registry_.Get(slot);
   EXPECT_LT((frame.ToEnu(hazard.position) - expected).norm(), 1e-5);
   EXPECT_LT((hazard.covariance_m2 - covariance).norm(), 1e-9);
   EXPECT_EQ(hazard.sightings, 2U);
@@ -96,7 +103,7 @@ TEST_F(RegistryTest, ManySightingsNeitherFreezeThePositionNorReachCertainty) {
     registry_.Merge(slot, boastful, {}, ++sequence_, kNowNs);
   }
   const FusionRule rule;
-  const Hazard& hazard = registry_.Get(slot);
+  const Hazard hazard = registry_.Get(slot);
   const double least = rule.min_fused_sigma_m * rule.min_fused_sigma_m;
   EXPECT_GE(hazard.covariance_m2(0, 0), least * (1 - 1e-9));
   EXPECT_GE(hazard.covariance_m2(1, 1), least * (1 - 1e-9));
@@ -104,18 +111,21 @@ TEST_F(RegistryTest, ManySightingsNeitherFreezeThePositionNorReachCertainty) {
 }
 
 TEST_F(RegistryTest, TheNewestImageGivesThePictureAndStampsSpanAllSightings) {
+  const std::string a(64, 'a');
+  const std::string b(64, 'b');
+  const std::string c(64, 'c');
   const Report report = MakeReport();
-  const auto slot = registry_.Add(report, {"a", "jpeg"}, Uuid::Random(generator_), ++sequence_, 1);
+  const auto slot = registry_.Add(report, {a, "jpeg"}, Uuid::Random(generator_), ++sequence_, 1);
   Report older = MakeReport();
   older.stamp_ns = report.stamp_ns - 5;
-  registry_.Merge(slot, older, {"b", "png"}, ++sequence_, 2);
-  EXPECT_EQ(registry_.Get(slot).image_sha256, "a");
+  registry_.Merge(slot, older, {b, "png"}, ++sequence_, 2);
+  EXPECT_EQ(registry_.Get(slot).image_sha256, a);
   Report newer = MakeReport();
   newer.stamp_ns = report.stamp_ns + 5;
   registry_.Merge(slot, newer, {}, ++sequence_, 3);
-  EXPECT_EQ(registry_.Get(slot).image_sha256, "a");
-  registry_.Merge(slot, newer, {"c", "png"}, ++sequence_, 4);
-  EXPECT_EQ(registry_.Get(slot).image_sha256, "c");
+  EXPECT_EQ(registry_.Get(slot).image_sha256, a);
+  registry_.Merge(slot, newer, {c, "png"}, ++sequence_, 4);
+  EXPECT_EQ(registry_.Get(slot).image_sha256, c);
   EXPECT_EQ(registry_.Get(slot).first_seen_ns, older.stamp_ns);
   EXPECT_EQ(registry_.Get(slot).last_seen_ns, newer.stamp_ns);
   EXPECT_EQ(registry_.Get(slot).updated_ns, 4);
@@ -123,7 +133,8 @@ TEST_F(RegistryTest, TheNewestImageGivesThePictureAndStampsSpanAllSightings) {
 
 TEST_F(RegistryTest, AHazardThatIsGoneIsNoMatchAndShowsOnlyToThoseWhoCatchUp) {
   const auto slot = Add(MakeReport());
-  registry_.SetState(slot, HazardState::kGone, ++sequence_, kNowNs);
+  ++sequence_;
+  SetState(slot, HazardState::kGone);
   EXPECT_FALSE(registry_.FindMatch("pothole", MakeReport().position));
   EXPECT_TRUE(registry_.Query(std::nullopt, 0, 10).empty());
   ASSERT_EQ(registry_.Query(std::nullopt, 1, 10).size(), 1U);
@@ -180,7 +191,8 @@ TEST_F(RegistryTest, RollbackRestoresEverythingSinceBegin) {
   registry_.Merge(kept, MakeReport({1, 1.00001}), {}, 11, kNowNs);
   registry_.Merge(added, MakeReport({3, 3}), {}, 12, kNowNs);
   registry_.Merge(kept, MakeReport({1, 1.00002}), {}, 13, kNowNs);
-  registry_.SetState(removed, HazardState::kGone, 14, kNowNs);
+  sequence_ = 14;
+  SetState(removed, HazardState::kGone);
   registry_.Rollback();
 
   EXPECT_EQ(registry_.size(), 2U);
@@ -194,15 +206,61 @@ TEST_F(RegistryTest, RollbackRestoresEverythingSinceBegin) {
   EXPECT_EQ(registry_.Query(std::nullopt, 0, 10).size(), 2U);
 }
 
+TEST_F(RegistryTest, AChangedHazardIsToldAroundItInTheOrderOfAnnouncements) {
+  const GeoPoint here{40.44, -79.94};
+  const auto first = Add(MakeReport(here));
+  registry_.MarkAnnounced(first);
+  const auto never = Add(MakeReport(GeodesicDestination(here, 0, 50.0)));
+  const auto far = Add(MakeReport(GeodesicDestination(here, 0, 9000.0)));
+  registry_.MarkAnnounced(far);
+  const auto second = Add(MakeReport(GeodesicDestination(here, 0, 100.0)));
+  registry_.MarkAnnounced(second);
+  // What happens without an announcement does not change the order.
+  registry_.Merge(first, MakeReport(here), {}, ++sequence_, kNowNs);
+  const auto all = registry_.ChangedAround(here, 1000.0, 0, 10);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].uuid, registry_.Get(first).uuid);
+  EXPECT_EQ(all[1].uuid, registry_.Get(second).uuid);
+  ASSERT_EQ(registry_.ChangedAround(here, 1000.0, all[0].announced_sequence, 10).size(), 1U);
+  EXPECT_EQ(registry_.ChangedAround(here, 1000.0, 0, 1).size(), 1U);
+
+  // Taken away from drivers: only those who knew of it hear so.
+  ++sequence_;
+  SetState(first, HazardState::kRejected);
+  registry_.MarkAnnounced(first);
+  EXPECT_EQ(registry_.ChangedAround(here, 1000.0, 0, 10).size(), 1U);
+  const auto since = registry_.ChangedAround(here, 1000.0, all[1].announced_sequence, 10);
+  ASSERT_EQ(since.size(), 1U);
+  EXPECT_EQ(since[0].state, HazardState::kRejected);
+  EXPECT_EQ(registry_.FindMatch("pothole", here), first);
+  EXPECT_EQ(registry_.Get(never).announced_sequence, 0U);
+}
+
+TEST_F(RegistryTest, ManyHazardsAreFoundByTheirIdsAndForgottenWithThem) {
+  std::vector<Uuid> kept;
+  for (int i = 0; i < 3000; ++i)
+    kept.push_back(registry_.Get(Add(MakeReport({0.001 * i, 1}))).uuid);
+  registry_.Begin();
+  std::vector<Uuid> lost;
+  for (int i = 0; i < 3000; ++i)
+    lost.push_back(registry_.Get(Add(MakeReport({0.001 * i, 2}))).uuid);
+  registry_.Rollback();
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    EXPECT_EQ(registry_.Find(kept[i]), static_cast<HazardRegistry::Slot>(i));
+    EXPECT_FALSE(registry_.Find(lost[i]));
+  }
+  EXPECT_EQ(registry_.Record(Add(MakeReport({1, 3}))).id, 3001U);
+}
+
 TEST_F(RegistryTest, RefusesToRestoreTheSameHazardTwice) {
   Hazard hazard;
   hazard.sequence = 1;
-  registry_.Restore(hazard);
+  registry_.Restore(hazard, {}, 1);
   hazard.sequence = 2;
-  EXPECT_THROW(registry_.Restore(hazard), Error);
+  EXPECT_THROW(registry_.Restore(hazard, {}, 1), Error);
   hazard.uuid.bytes[0] = 1;
   hazard.sequence = 1;
-  EXPECT_THROW(registry_.Restore(hazard), Error);
+  EXPECT_THROW(registry_.Restore(hazard, {}, 1), Error);
 }
 
 }  // namespace

@@ -30,7 +30,12 @@ class ZoneTest : public testing::Test {
     config.directory = directory_ + "/zone";
     // Reports of one vehicle lie all over the Earth.
     config.speed.max_speed_mps = 1e9;
+    config.catalogue = OneVehicleSuffices();
     return config;
+  }
+  /// Drivers are told at once: most tests are not about confirmation.
+  static HazardCatalogue OneVehicleSuffices() {
+    return HazardCatalogue::Parse("defaults: {confirmations: 1}\nclasses: {}\n", "test");
   }
   std::string DatabasePath() const { return directory_ + "/zone/zone.sqlite3"; }
   /// A clock that stands still.

@@ -105,6 +105,8 @@ TEST_F(ZoneServiceTest, RestartRestoresExactlyTheSameMap) {
   }
   Zone().HandleBatch(reports);
   Zone().Remove(All()[3].uuid, "repaired");
+  Zone().Reject(All()[4].uuid, "anna", "a shadow");
+  Zone().Confirm(All()[5].uuid, "anna");
   const std::vector<Hazard> before = Zone().Query(std::nullopt, 1, 1000000);
   const std::uint64_t sequence = Zone().Sequence();
   EXPECT_GT(before.size(), 50U);

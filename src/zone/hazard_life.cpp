@@ -1,0 +1,383 @@
+#include "zone/hazard_life.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "base/error.h"
+#include "base/stamps.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxTransitionBytes = 200;
+
+double Probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
+double LogOdds(double probability) { return std::log(probability / (1 - probability)); }
+
+bool SpeaksAgainst(EvidenceKind kind) {
+  return kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
+}
+
+void CheckRange(const char* name, double value, double min, double max) {
+  // Written so that NaN is refused too.
+  if (value >= min && value <= max) return;
+  throw Error(std::string(name) + " is " + std::to_string(value) + ", accepted is " +
+              std::to_string(min) + " to " + std::to_string(max));
+}
+
+std::string VehiclesText(std::uint32_t vehicles) {
+  if (vehicles == 1) return "1 vehicle";
+  return std::to_string(vehicles) + " vehicles";
+}
+
+std::string PresenceText(double log_odds) {
+  char text[40];
+  std::snprintf(text, sizeof text, "presence %.0f %%", 100 * Probability(log_odds));
+  return text;
+}
+
+std::string DurationText(double seconds) {
+  struct Unit {
+    double seconds;
+    const char* name;
+  };
+  constexpr Unit kUnits[] = {{86400, "days"}, {3600, "h"}, {60, "min"}, {1, "s"}};
+  const Unit* unit = kUnits;
+  while (unit->seconds > 1 && seconds < 2 * unit->seconds) ++unit;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.0f %s", seconds / unit->seconds, unit->name);
+  return text;
+}
+
+/// Cut where a character begins.
+std::string AsReason(std::string text) {
+  if (text.size() <= kMaxTransitionBytes) return text;
+  std::size_t size = kMaxTransitionBytes;
+  while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0U) == 0x80U) --size;
+  text.resize(size);
+  return text;
+}
+
+double AgeS(const LifeRecord& life, std::int64_t at_ns) {
+  return Seconds(std::max<std::int64_t>(0, at_ns - life.first_seen_ns));
+}
+
+double Faded(const LifeClass& entry, double log_odds, const LifeRecord& life, double dt_s) {
+  const double standing =
+      Probability(log_odds) * entry.survival.Survival(AgeS(life, life.at_ns), dt_s);
+  return LogOdds(standing);
+}
+
+/// The vehicle's place among the voices: its own, a free one, or that of the longest silent, if it
+/// has been silent since before `at_s`.
+Voice* PlaceOf(std::uint64_t vehicle, std::uint32_t at_s, LifeRecord& life) {
+  Voice* place = nullptr;
+  for (Voice& voice : life.voices) {
+    if (voice.vehicle == vehicle) return &voice;
+    if (place == nullptr || voice.at_s < place->at_s) place = &voice;
+  }
+  if (place->vehicle != 0 && place->at_s >= at_s) return nullptr;
+  *place = Voice{vehicle, 0, 0, false};
+  return place;
+}
+
+LifeTransition Transition(const LifeRecord& life, HazardState to, std::string reason) {
+  return {life.state, to, AsReason(std::move(reason))};
+}
+
+void Enter(HazardState state, std::int64_t now_ns, LifeRecord& life) {
+  life.state = state;
+  life.since_ns = now_ns;
+}
+
+void NoteYes(std::int64_t stamp_ns, LifeRecord& life) {
+  life.first_seen_ns = life.first_seen_ns == 0 ? stamp_ns : std::min(life.first_seen_ns, stamp_ns);
+  life.last_yes_ns = std::max(life.last_yes_ns, stamp_ns);
+  if (life.first_no_ns <= life.last_yes_ns) life.first_no_ns = 0;
+}
+
+void NoteNo(std::int64_t stamp_ns, LifeRecord& life) {
+  if (stamp_ns <= life.last_yes_ns) return;
+  life.first_no_ns = life.first_no_ns == 0 ? stamp_ns : std::min(life.first_no_ns, stamp_ns);
+}
+
+}  // namespace
+
+LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival) {
+  LifeClass result;
+  result.confirmations =
+      static_cast<std::uint32_t>(std::clamp(entry.confirmations, 1, static_cast<int>(kMaxVoices)));
+  result.hit_rate = entry.hit_rate;
+  result.false_rate = entry.false_rate;
+  result.survival = survival;
+  return result;
+}
+
+HazardLife::HazardLife() : HazardLife(Config()) {}
+
+HazardLife::HazardLife(const Config& config) : config_(config) {
+  CheckRange("gone_below", config.gone_below, 0.01, 0.5);
+  CheckRange("surest", config.surest, 0.9, 0.9999);
+  CheckRange("prior_presence", config.prior_presence, 0.01, config.surest);
+  CheckRange("verify_below", config.verify_below, config.gone_below, config.surest);
+  CheckRange("sure_above", config.sure_above, config.verify_below, config.surest);
+  CheckRange("active_above", config.active_above, config.gone_below, config.surest);
+  CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
+  CheckRange("vanished_hit_rate", config.vanished_hit_rate, 0.1, 1);
+  CheckRange("vanished_false_rate", config.vanished_false_rate, 0, config.vanished_hit_rate);
+  CheckRange("denials", config.denials, 2, kMaxVoices - 1);
+  CheckRange("quarantine_s", config.quarantine_s, 0, 1e9);
+  CheckRange("reopen_vehicles", config.reopen_vehicles, 2, kMaxVoices);
+  CheckRange("rejected_keep_s", config.rejected_keep_s, 3600, 1e9);
+  max_log_odds_ = LogOdds(config.surest);
+  max_voice_ = -LogOdds(config.hostile_share);
+}
+
+void HazardLife::MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const {
+  if (to_ns <= life.at_ns) return;
+  if (life.state != HazardState::kRejected) {
+    const double dt_s = Seconds(to_ns - life.at_ns);
+    const auto fade = [&](double log_odds) {
+      return std::max(-max_log_odds_, Faded(entry, log_odds, life, dt_s));
+    };
+    life.log_odds = fade(life.log_odds);
+    life.undenied_log_odds = fade(life.undenied_log_odds);
+  }
+  life.at_ns = to_ns;
+}
+
+double HazardLife::LogRatio(const LifeClass& entry, EvidenceKind kind, double ended_since) const {
+  const bool change = kind == EvidenceKind::kVanished;
+  const bool against = SpeaksAgainst(kind);
+  // P(this word | there) and P(it | not there), of honest vehicles.
+  double there = against ? 1 - entry.hit_rate : entry.hit_rate;
+  double absent = against ? 1 - entry.false_rate : entry.false_rate;
+  if (change) {
+    there = config_.vanished_false_rate;
+    absent = config_.vanished_hit_rate;
+  }
+  // What is not there now may have been there then.
+  absent = ended_since * there + (1 - ended_since) * absent;
+  const double h = config_.hostile_share;
+  const double ratio = std::log(((1 - h) * there + h) / ((1 - h) * absent + h));
+  return std::clamp(ratio, -max_voice_, max_voice_);
+}
+
+bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const {
+  const bool against = SpeaksAgainst(evidence.kind);
+  const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
+  Voice* voice = PlaceOf(evidence.vehicle, at_s, life);
+  if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
+  const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
+  const double ended_since = 1 - entry.survival.Survival(AgeS(life, evidence.stamp_ns), late_s);
+  const double ratio = LogRatio(entry, evidence.kind, ended_since);
+
+  // What the vehicle said for the hazard earlier has faded with the odds.
+  double before = 1e-3 * voice->weight_1000;
+  if (before > 0 && at_s > voice->at_s) {
+    before *= std::exp(-static_cast<double>(at_s - voice->at_s) / entry.survival.MeanLifeS());
+  }
+  // The nearer a voice is to its bound, the less a further word adds; factors commute.
+  const double room = (ratio > 0 ? max_voice_ - before : max_voice_ + before) / max_voice_;
+  double after = before + ratio * std::clamp(room, 0.0, 1.0);
+  // What the odds' own bound cuts off was not said: it must not be taken back later.
+  const double odds = std::clamp(life.log_odds + after - before, -max_log_odds_, max_log_odds_);
+  after = before + odds - life.log_odds;
+  life.log_odds = odds;
+  const double gain = std::max(0.0, after) - std::max(0.0, before);
+  life.undenied_log_odds = std::min(max_log_odds_, life.undenied_log_odds + std::max(0.0, gain));
+
+  voice->weight_1000 = static_cast<std::int16_t>(std::lround(1000 * after));
+  if (at_s >= voice->at_s) {
+    voice->at_s = at_s;
+    voice->against = against;
+  }
+  against ? NoteNo(evidence.stamp_ns, life) : NoteYes(evidence.stamp_ns, life);
+  return true;
+}
+
+LifeStep HazardLife::Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
+                           LifeRecord& life) const {
+  life = LifeRecord();
+  life.since_ns = now_ns;
+  life.at_ns = std::min(sighting.stamp_ns, now_ns);
+  life.first_seen_ns = life.at_ns;
+  life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
+  LifeStep step = Apply(entry, sighting, now_ns, life);
+  if (!step.transition) {
+    step.transition = LifeTransition{std::nullopt, life.state, "first seen by 1 vehicle"};
+  }
+  step.transition->from.reset();
+  return step;
+}
+
+LifeStep HazardLife::Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
+                           LifeRecord& life) const {
+  LifeStep step;
+  if (life.state == HazardState::kGone || evidence.kind == EvidenceKind::kCantSee ||
+      evidence.vehicle == 0) {
+    return step;
+  }
+  Evidence word = evidence;
+  word.stamp_ns = std::min(word.stamp_ns, now_ns);
+  const bool quarantined = life.state == HazardState::kRejected &&
+                           Seconds(word.stamp_ns - life.since_ns) < config_.quarantine_s;
+  if (quarantined) return step;
+  const bool told = IsTold(life.state);
+  const std::int64_t stood_until_ns = life.last_yes_ns;
+  MoveTo(entry, word.stamp_ns, life);
+  const bool counted = Hear(entry, word, life);
+  step = Settle(entry, now_ns, life);
+  step.counted = counted;
+  if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
+  return step;
+}
+
+LifeStep HazardLife::Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const {
+  if (life.state == HazardState::kGone) return {};
+  return Settle(entry, now_ns, life);
+}
+
+LifeStep HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const {
+  MoveTo(entry, now_ns, life);
+  LifeStep step;
+  step.transition = Decide(entry, life);
+  if (!step.transition) return step;
+  const HazardState from = life.state;
+  const HazardState to = step.transition->to;
+  Enter(to, now_ns, life);
+  if (from == HazardState::kCandidate && to == HazardState::kActive) {
+    step.lesson.stood_s = Seconds(life.last_yes_ns - life.first_seen_ns);
+  }
+  // It ended somewhere between the last word for it and the first against it; without such a word
+  // it was only lost from sight.
+  if (IsTold(from) && to == HazardState::kGone && life.first_no_ns > life.last_yes_ns) {
+    step.lesson.stood_s = 0.5 * Seconds(life.first_no_ns - life.last_yes_ns);
+    step.lesson.ended = true;
+  }
+  return step;
+}
+
+std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
+                                                 const LifeRecord& life) const {
+  if (life.state == HazardState::kRejected) return DecideRejected(life);
+  if (auto gone = DecideGone(life)) return gone;
+  const double presence = Probability(life.log_odds);
+  const std::uint32_t supporters = Supporters(life);
+  const std::uint32_t opponents = Opponents(life);
+  switch (life.state) {
+    case HazardState::kCandidate:
+      if (supporters < entry.confirmations && !life.official) return std::nullopt;
+      if (presence < config_.active_above) return std::nullopt;
+      return Transition(life, HazardState::kActive, "seen by " + VehiclesText(supporters));
+    case HazardState::kActive:
+      if (presence >= config_.verify_below) return std::nullopt;
+      return Transition(
+          life, HazardState::kVerifying,
+          PresenceText(life.log_odds) +
+              (opponents > 0
+                   ? ": denied by " + VehiclesText(opponents)
+                   : ": not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns))));
+    case HazardState::kVerifying:
+      if (presence < config_.sure_above) return std::nullopt;
+      return Transition(
+          life, HazardState::kActive,
+          "still there by " + VehiclesText(supporters) + ", " + PresenceText(life.log_odds));
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<LifeTransition> HazardLife::DecideGone(const LifeRecord& life) const {
+  const std::uint32_t opponents = Opponents(life);
+  if (opponents >= config_.denials && Probability(life.log_odds) < config_.gone_below) {
+    return Transition(life, HazardState::kGone,
+                      "denied by " + VehiclesText(opponents) + ", " + PresenceText(life.log_odds));
+  }
+  if (Probability(life.undenied_log_odds) >= config_.gone_below) return std::nullopt;
+  return Transition(life, HazardState::kGone,
+                    "not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns)) + ", " +
+                        PresenceText(life.undenied_log_odds));
+}
+
+std::optional<LifeTransition> HazardLife::DecideRejected(const LifeRecord& life) const {
+  const std::uint32_t supporters = Supporters(life);
+  if (supporters >= config_.reopen_vehicles && Probability(life.log_odds) >= config_.active_above) {
+    return Transition(life, HazardState::kActive,
+                      "seen by " + VehiclesText(supporters) + " after its rejection");
+  }
+  const std::int64_t heard_ns = std::max(life.since_ns, life.last_yes_ns);
+  if (Seconds(life.at_ns - heard_ns) < config_.rejected_keep_s) return std::nullopt;
+  return Transition(life, HazardState::kGone,
+                    "rejected, and not seen for " + DurationText(Seconds(life.at_ns - heard_ns)));
+}
+
+LifeStep HazardLife::Confirm(const LifeClass& entry, const std::string& official,
+                             std::int64_t now_ns, LifeRecord& life) const {
+  LifeStep step;
+  if (life.state == HazardState::kGone) return step;
+  const bool told = IsTold(life.state);
+  MoveTo(entry, now_ns, life);
+  const std::int64_t stood_until_ns = told ? life.last_yes_ns : life.first_seen_ns;
+  for (Voice& voice : life.voices) {
+    if (voice.against) voice = Voice();
+  }
+  NoteYes(now_ns, life);
+  life.official = true;
+  life.log_odds = life.undenied_log_odds = max_log_odds_;
+  step.counted = true;
+  step.lesson.stood_s = Seconds(life.last_yes_ns - stood_until_ns);
+  if (life.state == HazardState::kActive) return step;
+  step.transition = Transition(life, HazardState::kActive, "confirmed by " + official);
+  Enter(HazardState::kActive, now_ns, life);
+  return step;
+}
+
+LifeStep HazardLife::Reject(const std::string& official, const std::string& reason,
+                            std::int64_t now_ns, LifeRecord& life) const {
+  LifeStep step;
+  if (!IsOnMap(life.state)) return step;
+  step.transition = Transition(life, HazardState::kRejected,
+                               "rejected by " + official + (reason.empty() ? "" : ": " + reason));
+  Enter(HazardState::kRejected, now_ns, life);
+  // From here on it must be shown anew that there is something.
+  life.official = false;
+  life.voices = {};
+  life.first_no_ns = 0;
+  life.at_ns = std::max(life.at_ns, now_ns);
+  life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
+  return step;
+}
+
+double HazardLife::Presence(const LifeClass& entry, const LifeRecord& life,
+                            std::int64_t now_ns) const {
+  if (life.state == HazardState::kRejected || now_ns <= life.at_ns) {
+    return Probability(life.log_odds);
+  }
+  return Probability(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
+}
+
+std::int64_t HazardLife::NextChangeNs(const LifeClass& entry, const LifeRecord& life) const {
+  if (life.state == HazardState::kGone) return kNever;
+  if (life.state == HazardState::kRejected) {
+    return std::max(life.since_ns, life.last_yes_ns) + Nanoseconds(config_.rejected_keep_s);
+  }
+  const auto falls_in_s = [&](double log_odds, double below) {
+    const double share = below / Probability(log_odds);
+    return share >= 1 ? 0.0 : entry.survival.TimeTo(share, AgeS(life, life.at_ns));
+  };
+  double soonest_s = falls_in_s(life.undenied_log_odds, config_.gone_below);
+  if (Opponents(life) >= config_.denials) {
+    soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, config_.gone_below));
+  }
+  if (life.state == HazardState::kActive) {
+    soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, config_.verify_below));
+  }
+  // A little later than computed, so that rounding does not make it too early.
+  const double margin_s = 1e-3 + 1e-9 * (entry.survival.scale_s + AgeS(life, life.at_ns));
+  const double limited_s = std::min(soonest_s + margin_s, 1e9);
+  return life.at_ns + Nanoseconds(limited_s);
+}
+
+}  // namespace livemap

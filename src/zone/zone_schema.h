@@ -1,0 +1,16 @@
+#pragma once
+
+#include <soci/soci.h>
+
+#include <string>
+
+namespace livemap {
+
+/// The schema that this program writes.
+constexpr int kZoneSchemaVersion = 2;
+
+/// Brings the database at `path`, which `session` has open, up to date, step by step, each step in
+/// its own transaction. Throws StoreError when it is of a newer schema.
+void MigrateZoneStore(soci::session& session, const std::string& path);
+
+}  // namespace livemap

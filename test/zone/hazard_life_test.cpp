@@ -1,0 +1,462 @@
+#include "zone/hazard_life.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kHour = 3600 * kSecond;
+constexpr std::int64_t kDay = 24 * kHour;
+constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
+
+class HazardLifeTest : public ::testing::Test {
+ protected:
+  HazardLifeTest() { cone_.survival = {5, 4 * 2 * 86400.0}; }
+
+  static Evidence Word(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
+    return {kind, vehicle, at_ns};
+  }
+  LifeStep Begin(std::uint64_t vehicle, std::int64_t at_ns = kStart) {
+    return rules_.Begin(cone_, Word(EvidenceKind::kSighting, vehicle, at_ns), at_ns, life_);
+  }
+  LifeStep Say(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
+    return rules_.Apply(cone_, Word(kind, vehicle, at_ns), at_ns, life_);
+  }
+  LifeStep See(std::uint64_t vehicle, std::int64_t at_ns) {
+    return Say(EvidenceKind::kSighting, vehicle, at_ns);
+  }
+  LifeStep Deny(std::uint64_t vehicle, std::int64_t at_ns) {
+    return Say(EvidenceKind::kAnswerNo, vehicle, at_ns);
+  }
+  /// Told to drivers by vehicles 1 and 2.
+  void MakeActive() {
+    Begin(1);
+    See(2, kStart + kSecond);
+    ASSERT_EQ(life_.state, HazardState::kActive);
+  }
+  double Presence(std::int64_t at_ns) const { return rules_.Presence(cone_, life_, at_ns); }
+
+  HazardLife rules_;
+  LifeClass cone_;
+  LifeRecord life_;
+};
+
+TEST_F(HazardLifeTest, TheFirstReportMakesACandidate) {
+  const LifeStep step = Begin(1);
+  ASSERT_TRUE(step.transition);
+  EXPECT_FALSE(step.transition->from);
+  EXPECT_EQ(step.transition->to, HazardState::kCandidate);
+  EXPECT_EQ(life_.state, HazardState::kCandidate);
+  EXPECT_GT(Presence(kStart), 0.5);
+  EXPECT_LT(Presence(kStart), 0.9);
+}
+
+TEST_F(HazardLifeTest, DriversAreToldWhenASecondVehicleSeesIt) {
+  Begin(1);
+  const LifeStep step = See(2, kStart + kHour);
+  ASSERT_TRUE(step.transition);
+  EXPECT_EQ(step.transition->from, HazardState::kCandidate);
+  EXPECT_EQ(step.transition->to, HazardState::kActive);
+  EXPECT_EQ(step.transition->reason, "seen by 2 vehicles");
+  EXPECT_EQ(Supporters(life_), 2u);
+}
+
+TEST_F(HazardLifeTest, OneVehicleSufficesWhereTheClassSaysSo) {
+  cone_.confirmations = 1;
+  const LifeStep step = Begin(1);
+  ASSERT_TRUE(step.transition);
+  EXPECT_FALSE(step.transition->from);
+  EXPECT_EQ(step.transition->to, HazardState::kActive);
+}
+
+TEST_F(HazardLifeTest, AnOfficialSuffices) {
+  Begin(1);
+  const LifeStep step = rules_.Confirm(cone_, "Ada", kStart + kSecond, life_);
+  ASSERT_TRUE(step.transition);
+  EXPECT_EQ(step.transition->to, HazardState::kActive);
+  EXPECT_EQ(step.transition->reason, "confirmed by Ada");
+  EXPECT_FALSE(rules_.Confirm(cone_, "Ada", kStart + kSecond, life_).transition);
+}
+
+TEST_F(HazardLifeTest, OneVehicleCannotConfirmHoweverMuchItSays) {
+  Begin(1);
+  std::mt19937_64 generator(5);
+  for (int i = 1; i < 5000; ++i) {
+    const auto kind = i % 3 == 0 ? EvidenceKind::kAnswerYes
+                                 : (i % 7 == 0 ? EvidenceKind::kAnswerNo : EvidenceKind::kSighting);
+    Say(kind, 1, kStart + i * static_cast<std::int64_t>(generator() % 100) * kSecond / 100);
+    ASSERT_EQ(life_.state, HazardState::kCandidate) << i;
+  }
+  EXPECT_EQ(Supporters(life_) + Opponents(life_), 1u);
+}
+
+TEST_F(HazardLifeTest, OneVehicleCannotRemoveHoweverMuchItSays) {
+  MakeActive();
+  LifeRecord left_alone = life_;
+  std::mt19937_64 generator(6);
+  std::int64_t now_ns = kStart + kSecond;
+  while (left_alone.state != HazardState::kGone) {
+    now_ns += static_cast<std::int64_t>(generator() % 1800) * kSecond;
+    const auto kind = generator() % 4 == 0 ? EvidenceKind::kVanished : EvidenceKind::kAnswerNo;
+    Say(kind, 9, now_ns);
+    rules_.Advance(cone_, now_ns, left_alone);
+    if (left_alone.state == HazardState::kGone) break;
+    ASSERT_TRUE(IsTold(life_.state)) << "not before time alone would have removed it";
+  }
+}
+
+TEST_F(HazardLifeTest, OneVehicleMovesTheOddsByABoundedAmountInWhateverOrderItSpeaks) {
+  MakeActive();
+  const double bound = std::log(0.95 / 0.05) + 1e-3;
+  std::mt19937_64 generator(7);
+  const double before = life_.log_odds;
+  for (int i = 0; i < 2000; ++i) {
+    Say(generator() % 2 == 0 ? EvidenceKind::kAnswerNo : EvidenceKind::kAnswerYes, 9,
+        kStart + kSecond + i);
+    Say(generator() % 2 == 0 ? EvidenceKind::kVanished : EvidenceKind::kSighting, 9,
+        kStart + 2 * kSecond + i * kSecond / 1000);
+    ASSERT_GT(life_.log_odds, before - bound - 0.01);
+  }
+}
+
+TEST_F(HazardLifeTest, ARepeatedMessageCountsNothing) {
+  MakeActive();
+  EXPECT_TRUE(Deny(9, kStart + kHour).counted);
+  const double before = life_.log_odds;
+  EXPECT_FALSE(Deny(9, kStart + kHour).counted);
+  EXPECT_EQ(life_.log_odds, before);
+}
+
+TEST_F(HazardLifeTest, FurtherWordsOfOneVehicleAddLessAndLess) {
+  MakeActive();
+  double gain = 100;
+  for (int i = 1; i < 4; ++i) {
+    const double before = life_.log_odds;
+    Deny(9, kStart + i * kSecond + kHour);
+    const double step = before - life_.log_odds;
+    EXPECT_GT(step, 0);
+    EXPECT_LT(step, gain);
+    gain = step;
+  }
+}
+
+TEST_F(HazardLifeTest, SeveralVehiclesThatDenyItRemoveItWithTheReason) {
+  MakeActive();
+  LifeStep step = Deny(3, kStart + kHour);
+  EXPECT_TRUE(IsTold(life_.state));
+  std::uint64_t vehicle = 4;
+  while (IsTold(life_.state) && vehicle < 9) {
+    step = Deny(vehicle, kStart + kHour + static_cast<std::int64_t>(vehicle) * kSecond);
+    ++vehicle;
+  }
+  EXPECT_EQ(life_.state, HazardState::kGone);
+  ASSERT_TRUE(step.transition);
+  EXPECT_THAT(step.transition->reason, HasSubstr("denied by"));
+  EXPECT_LE(vehicle, 7u) << "four vehicles are enough";
+}
+
+TEST_F(HazardLifeTest, ADenialStartsTheVerificationAndASightingEndsIt) {
+  MakeActive();
+  Deny(3, kStart + kHour);
+  Deny(4, kStart + kHour + kSecond);
+  EXPECT_EQ(life_.state, HazardState::kVerifying);
+  See(5, kStart + kHour + 2 * kSecond);
+  const LifeStep step = See(6, kStart + kHour + 3 * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kActive);
+  EXPECT_EQ(Opponents(life_), 0u) << "two vehicles have answered the denials";
+  ASSERT_TRUE(step.transition || life_.state == HazardState::kActive);
+}
+
+TEST_F(HazardLifeTest, CantSeeCountsNothing) {
+  MakeActive();
+  const std::string before = PackLife(life_);
+  EXPECT_FALSE(Say(EvidenceKind::kCantSee, 3, kStart + kHour).counted);
+  EXPECT_EQ(PackLife(life_), before);
+}
+
+TEST_F(HazardLifeTest, TimeAloneTakesItThroughVerifyingToGoneWhenSaid) {
+  MakeActive();
+  std::vector<HazardState> states;
+  for (int i = 0; i < 10 && life_.state != HazardState::kGone; ++i) {
+    const std::int64_t change_ns = rules_.NextChangeNs(cone_, life_);
+    LifeRecord earlier = life_;
+    const std::int64_t shortly_before = change_ns - (change_ns - life_.at_ns) / 100 - kSecond;
+    EXPECT_FALSE(rules_.Advance(cone_, shortly_before, earlier).transition);
+    const LifeStep step = rules_.Advance(cone_, change_ns, life_);
+    ASSERT_TRUE(step.transition);
+    states.push_back(step.transition->to);
+  }
+  EXPECT_THAT(states, ::testing::ElementsAre(HazardState::kVerifying, HazardState::kGone));
+  EXPECT_EQ(rules_.NextChangeNs(cone_, life_), kNever);
+}
+
+TEST_F(HazardLifeTest, NextChangeIsKeptWithoutEmptyRoundsForEveryLength) {
+  for (const double life_s : {60.0, 300.0, 86400.0, 5184000.0, 1e9}) {
+    cone_.survival = {5, 4 * life_s};
+    MakeActive();
+    int rounds = 0;
+    while (life_.state != HazardState::kGone && rounds < 100) {
+      rules_.Advance(cone_, rules_.NextChangeNs(cone_, life_), life_);
+      ++rounds;
+    }
+    EXPECT_LE(rounds, 5) << life_s;
+  }
+}
+
+TEST_F(HazardLifeTest, ACandidateThatNobodyElseSeesGoesByTime) {
+  Begin(1);
+  const LifeStep step = rules_.Advance(cone_, rules_.NextChangeNs(cone_, life_), life_);
+  ASSERT_TRUE(step.transition);
+  EXPECT_EQ(step.transition->to, HazardState::kGone);
+  EXPECT_FALSE(step.lesson.ended) << "nobody knows that it was ever there";
+}
+
+TEST_F(HazardLifeTest, PresenceFallsByTheClassesSurvival) {
+  MakeActive();
+  const double before = Presence(life_.at_ns);
+  const double age_s = 1e-9 * static_cast<double>(life_.at_ns - life_.first_seen_ns);
+  EXPECT_NEAR(Presence(life_.at_ns + kDay), before * cone_.survival.Survival(age_s, 86400), 1e-9);
+}
+
+TEST_F(HazardLifeTest, AdvancingOftenGivesWhatAdvancingOnceGives) {
+  MakeActive();
+  LifeRecord once = life_;
+  const std::int64_t end_ns = kStart + 6 * kHour;
+  for (std::int64_t t = kStart + kHour; t <= end_ns; t += kSecond * 7) {
+    rules_.Advance(cone_, t, life_);
+  }
+  rules_.Advance(cone_, end_ns, life_);
+  rules_.Advance(cone_, end_ns, once);
+  EXPECT_NEAR(life_.log_odds, once.log_odds, 1e-6);
+}
+
+TEST_F(HazardLifeTest, TheOrderInWhichVehiclesWordsArriveDoesNotMatter) {
+  // One moment, distinct vehicles, odds short of their bounds.
+  HazardLife::Config config;
+  config.surest = 0.9999;
+  config.gone_below = 0.01;
+  config.denials = 5;
+  const HazardLife rules(config);
+  const std::vector<Evidence> words = {
+      Word(EvidenceKind::kAnswerNo, 3, kStart), Word(EvidenceKind::kSighting, 4, kStart),
+      Word(EvidenceKind::kVanished, 5, kStart), Word(EvidenceKind::kAnswerYes, 6, kStart),
+      Word(EvidenceKind::kAnswerNo, 7, kStart)};
+  std::vector<std::size_t> order = {0, 1, 2, 3, 4};
+  std::optional<double> expected;
+  int orders = 0;
+  do {
+    LifeRecord life;
+    rules.Begin(cone_, Word(EvidenceKind::kSighting, 1, kStart), kStart, life);
+    for (const std::size_t i : order) rules.Apply(cone_, words[i], kStart, life);
+    ASSERT_NE(life.state, HazardState::kGone);
+    ++orders;
+    if (!expected) expected = life.log_odds;
+    EXPECT_NEAR(life.log_odds, *expected, 0.01);
+  } while (std::next_permutation(order.begin(), order.end()));
+  EXPECT_EQ(orders, 120);
+}
+
+TEST_F(HazardLifeTest, ALateWordCountsLessThanAFreshOne) {
+  MakeActive();
+  LifeRecord late = life_;
+  const std::int64_t now_ns = kStart + kDay;
+  rules_.Apply(cone_, Word(EvidenceKind::kAnswerNo, 9, now_ns), now_ns, life_);
+  rules_.Advance(cone_, now_ns, late);
+  const double before = late.log_odds;
+  rules_.Apply(cone_, Word(EvidenceKind::kSighting, 9, kStart - kDay), now_ns, late);
+  EXPECT_GT(late.log_odds, before);
+  EXPECT_LT(late.log_odds, before + 2.2);
+}
+
+TEST_F(HazardLifeTest, AnOlderMessageDoesNotTurnTheNewerWordOfItsVehicle) {
+  MakeActive();
+  Deny(9, kStart + kHour);
+  rules_.Apply(cone_, Word(EvidenceKind::kAnswerYes, 9, kStart + kHour / 2), kStart + 2 * kHour,
+               life_);
+  EXPECT_EQ(Opponents(life_), 1u);
+}
+
+TEST_F(HazardLifeTest, FutureStampsCountAsNow) {
+  Begin(1);
+  rules_.Apply(cone_, Word(EvidenceKind::kSighting, 2, kStart + 300 * kDay), kStart, life_);
+  EXPECT_EQ(life_.at_ns, kStart);
+  EXPECT_EQ(life_.last_yes_ns, kStart);
+}
+
+TEST_F(HazardLifeTest, ARejectedHazardIsOffTheMapAndSightingsDoNotReopenItInQuarantine) {
+  MakeActive();
+  const LifeStep step = rules_.Reject("Ada", "a manhole cover", kStart + kHour, life_);
+  ASSERT_TRUE(step.transition);
+  EXPECT_EQ(step.transition->to, HazardState::kRejected);
+  EXPECT_EQ(step.transition->reason, "rejected by Ada: a manhole cover");
+  for (std::uint64_t vehicle = 10; vehicle < 60; ++vehicle) {
+    See(vehicle, kStart + 2 * kHour + static_cast<std::int64_t>(vehicle) * kSecond);
+  }
+  EXPECT_EQ(life_.state, HazardState::kRejected);
+}
+
+TEST_F(HazardLifeTest, AfterQuarantineTwoFurtherVehiclesReopenARejectedHazardAndOneDoesNot) {
+  MakeActive();
+  rules_.Reject("Ada", "", kStart + kHour, life_);
+  const std::int64_t later = kStart + kHour + kDay + kSecond;
+  for (int i = 0; i < 100; ++i) See(1, later + i * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kRejected);
+  const LifeStep step = See(2, later + kHour);
+  EXPECT_EQ(life_.state, HazardState::kActive);
+  ASSERT_TRUE(step.transition);
+  EXPECT_THAT(step.transition->reason, HasSubstr("after its rejection"));
+}
+
+TEST_F(HazardLifeTest, AnOfficialRevokesARejectionAtOnce) {
+  MakeActive();
+  rules_.Reject("Ada", "", kStart + kHour, life_);
+  rules_.Confirm(cone_, "Bob", kStart + 2 * kHour, life_);
+  EXPECT_EQ(life_.state, HazardState::kActive);
+}
+
+TEST_F(HazardLifeTest, ARejectedHazardIsForgottenAfterItsTime) {
+  MakeActive();
+  rules_.Reject("Ada", "", kStart + kHour, life_);
+  EXPECT_FALSE(rules_.Advance(cone_, kStart + 80 * kDay, life_).transition);
+  rules_.Advance(cone_, rules_.NextChangeNs(cone_, life_), life_);
+  EXPECT_EQ(life_.state, HazardState::kGone);
+}
+
+TEST_F(HazardLifeTest, NothingHappensToWhatIsGone) {
+  Begin(1);
+  rules_.Advance(cone_, kStart + 1000 * kDay, life_);
+  ASSERT_EQ(life_.state, HazardState::kGone);
+  const std::string before = PackLife(life_);
+  See(2, kStart + 1001 * kDay);
+  rules_.Confirm(cone_, "Ada", kStart + 1001 * kDay, life_);
+  rules_.Reject("Ada", "", kStart + 1001 * kDay, life_);
+  rules_.Advance(cone_, kStart + 1002 * kDay, life_);
+  EXPECT_EQ(PackLife(life_), before);
+}
+
+TEST_F(HazardLifeTest, TeachesHowLongItStoodAndThatItEnded) {
+  MakeActive();
+  LifeLesson sum;
+  const auto learn = [&sum](const LifeStep& step) {
+    sum.stood_s += step.lesson.stood_s;
+    sum.ended = sum.ended || step.lesson.ended;
+  };
+  learn(See(3, kStart + 10 * kHour));
+  EXPECT_FALSE(sum.ended);
+  for (std::uint64_t vehicle = 4; IsTold(life_.state); ++vehicle) {
+    learn(Deny(vehicle, kStart + 12 * kHour + static_cast<std::int64_t>(vehicle - 4) * kSecond));
+  }
+  EXPECT_TRUE(sum.ended);
+  // From the second sighting, which told the first second, to the middle of the unseen time.
+  EXPECT_NEAR(sum.stood_s, 11 * 3600 - 1, 1e-6);
+}
+
+TEST_F(HazardLifeTest, PackedAndUnpackedItIsTheSame) {
+  MakeActive();
+  for (std::uint64_t vehicle = 3; vehicle < 8; ++vehicle) {
+    See(VehicleKey("vehicle " + std::to_string(vehicle)),
+        kStart + kHour + static_cast<std::int64_t>(vehicle) * kSecond / 3);
+  }
+  Deny(VehicleKey("x"), kStart + kDay);
+  const std::string packed = PackLife(life_);
+  EXPECT_LE(packed.size(), 500u);
+  const auto unpacked = UnpackLife(packed);
+  ASSERT_TRUE(unpacked);
+  EXPECT_EQ(PackLife(*unpacked), packed);
+  EXPECT_EQ(unpacked->log_odds, life_.log_odds);
+  EXPECT_EQ(rules_.NextChangeNs(cone_, *unpacked), rules_.NextChangeNs(cone_, life_));
+}
+
+TEST_F(HazardLifeTest, WhatIsNoPackedLifeIsRefused) {
+  MakeActive();
+  const std::string packed = PackLife(life_);
+  EXPECT_TRUE(UnpackLife(packed));
+  for (std::size_t size = 0; size < packed.size(); ++size) {
+    const auto cut = UnpackLife(packed.substr(0, size));
+    if (cut) {
+      EXPECT_LT(PackLife(*cut).size(), packed.size());
+    }
+  }
+  EXPECT_FALSE(UnpackLife(packed + " "));
+  EXPECT_FALSE(UnpackLife(packed + " 7"));
+  EXPECT_FALSE(UnpackLife("9" + packed.substr(1))) << "no such state";
+  EXPECT_FALSE(UnpackLife("1 0 1 1 1 0 1 nan 0"));
+  EXPECT_FALSE(UnpackLife("1 0 1 1 1 0 1 1e300 0"));
+  EXPECT_FALSE(UnpackLife("1 0 -1 1 1 0 1 1 0"));
+  EXPECT_FALSE(UnpackLife("1 0 1 1 1 0 1 1 0 5 1 1 0 5 1 1 0")) << "a vehicle twice";
+  EXPECT_FALSE(UnpackLife(std::string(10000, '1')));
+}
+
+TEST_F(HazardLifeTest, TheFilterIsRightAsOftenAsItSays) {
+  // Hazards that live as the class says, and honest vehicles with the class's rates: of all moments
+  // at which it says p, a share p has the hazard there.
+  HazardLife::Config config;
+  config.hostile_share = 0.001;
+  config.surest = 0.999;
+  const HazardLife rules(config);
+  std::mt19937_64 generator(11);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::array<double, 10> there{};
+  std::array<double, 10> said{};
+  std::array<double, 10> moments{};
+  for (int run = 0; run < 4000; ++run) {
+    const double rate = std::gamma_distribution<double>(cone_.survival.shape,
+                                                        1 / cone_.survival.scale_s)(generator);
+    const double end_s = std::exponential_distribution<double>(rate)(generator);
+    LifeRecord life;
+    rules.Begin(cone_, {EvidenceKind::kSighting, 1, kStart}, kStart, life);
+    life.log_odds = life.undenied_log_odds = 6;  // It is known to be there.
+    for (int i = 1; i < 12; ++i) {
+      const double t_s = i * 20000.0;
+      const std::int64_t now_ns = kStart + static_cast<std::int64_t>(t_s * 1e9);
+      const bool standing = t_s < end_s;
+      const double presence = rules.Presence(cone_, life, now_ns);
+      const auto bin = static_cast<std::size_t>(std::min(9.0, presence * 10));
+      said[bin] += presence;
+      there[bin] += standing ? 1 : 0;
+      moments[bin] += 1;
+      const bool yes = uniform(generator) < (standing ? cone_.hit_rate : cone_.false_rate);
+      rules.Apply(cone_,
+                  {yes ? EvidenceKind::kAnswerYes : EvidenceKind::kAnswerNo,
+                   static_cast<std::uint64_t>(i + 1), now_ns},
+                  now_ns, life);
+      if (life.state == HazardState::kGone) break;
+    }
+  }
+  for (std::size_t bin = 0; bin < 10; ++bin) {
+    if (moments[bin] < 500) continue;
+    EXPECT_NEAR(there[bin] / moments[bin], said[bin] / moments[bin], 0.05) << "bin " << bin;
+  }
+}
+
+TEST(HazardLifeConfig, RefusesWhatIsOutOfRangeAndNamesIt) {
+  HazardLife::Config config;
+  config.denials = 1;
+  EXPECT_THAT([&] { HazardLife{config}; }, ThrowsMessage<Error>(HasSubstr("denials")));
+  config = {};
+  config.hostile_share = std::nan("");
+  EXPECT_THAT([&] { HazardLife{config}; }, ThrowsMessage<Error>(HasSubstr("hostile_share")));
+  config = {};
+  config.sure_above = 0.3;
+  EXPECT_THAT([&] { HazardLife{config}; }, ThrowsMessage<Error>(HasSubstr("sure_above")));
+}
+
+TEST(VehicleKeys, AreStableAndNeverNobody) {
+  EXPECT_EQ(VehicleKey("abc"), 0xba7816bf8f01cfeaU) << "FIPS 180-4's example";
+  EXPECT_NE(VehicleKey(""), 0u);
+}
+
+}  // namespace
+}  // namespace livemap
