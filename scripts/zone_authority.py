@@ -38,7 +38,8 @@ def now():
 def require_host(text):
     """A name or address that a certificate can carry."""
     try:
-        return str(ipaddress.ip_address(text))
+        # A scope ("%eth0") means nothing to others, and Python lets any characters be one.
+        return str(ipaddress.ip_address(text.replace("%", "?")))
     except ValueError:
         if not HOST_PATTERN.fullmatch(text):
             raise Usage(f"host {text!r} is not accepted, an IP address or host name is") from None
@@ -275,6 +276,6 @@ def load(directory):
         path = os.path.join(directory, "authority", "ca.pem")
         with open(path, "rb") as file:
             certificate = x509.load_pem_x509_certificate(file.read())
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise Usage(f"'{path}' is damaged, restore it from a backup ({type(error).__name__})") from error
     return register, key, certificate

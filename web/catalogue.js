@@ -27,9 +27,10 @@ export class Catalogue {
     return (this.classes.get(className) ?? this.fallback).colour;
   }
 
-  /** A coloured disc with the class's icon. */
-  badge(className, extraClass = '') {
-    const badge = element('span', { class: `badge ${extraClass}`.trim(), 'aria-hidden': 'true' },
+  /** A coloured disc with the class's icon; hollow for a candidate. */
+  badge(className, state = 'active') {
+    const hollow = state === 'candidate' ? ' hollow' : '';
+    const badge = element('span', { class: `badge${hollow}`, 'aria-hidden': 'true' },
       element('span', { class: `glyph glyph-${this.icon(className)}` }));
     badge.style.setProperty('--colour', this.colour(className));
     badge.style.setProperty('--on-colour', inkOn(this.colour(className)));

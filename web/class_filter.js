@@ -1,6 +1,7 @@
-// Check boxes that show or hide the hazards of a class.
+// Check boxes that show or hide the hazards of a class or in a state.
 
 import { byId, element } from './dom.js';
+import { STATES } from './hazard_state.js';
 
 export class ClassFilter {
   /** `onChange()` is called when the set of hidden classes changed. */
@@ -53,6 +54,34 @@ export class ClassFilter {
       else this.store.hidden.add(className);
     }
     this.onChange();
+  }
+}
+
+/** The three states, always there. */
+export class StateFilter {
+  constructor(store, onChange) {
+    this.store = store;
+    this.counts = new Map();
+    for (const state of STATES) {
+      const box = element('input', { type: 'checkbox', 'data-state': state.name });
+      box.checked = true;
+      box.addEventListener('change', () => {
+        if (box.checked) store.hiddenStates.delete(state.name);
+        else store.hiddenStates.add(state.name);
+        onChange();
+      });
+      const count = element('span', { class: 'count' });
+      this.counts.set(state.name, count);
+      byId('states').append(element('li', {}, element('label',
+        { class: 'chip', title: state.meaning }, box,
+        element('span', { class: 'chip-label' }, state.label), count)));
+    }
+  }
+
+  update() {
+    for (const [name, node] of this.counts) {
+      node.textContent = (this.store.stateCounts.get(name) ?? 0).toLocaleString('en');
+    }
   }
 }
 

@@ -10,8 +10,8 @@ const HazardIcon = L.Icon.extend({
   options: { className: 'pin', iconSize: [34, 42], iconAnchor: [17, 40], popupAnchor: [0, -36] },
 
   createIcon() {
-    const { catalogue, hazardClass } = this.options;
-    const pin = element('div', {}, catalogue.badge(hazardClass));
+    const { catalogue, hazardClass, state } = this.options;
+    const pin = element('div', { 'data-state': state }, catalogue.badge(hazardClass, state));
     pin.style.setProperty('--colour', catalogue.colour(hazardClass));
     this._setIconStyles(pin, 'icon');
     return pin;
@@ -107,16 +107,34 @@ export class HazardLayer {
 
   update(marker, hazard) {
     if (marker.hazard.sequence === hazard.sequence) return;
+    if (marker.hazard.state !== hazard.state) {
+      marker.setIcon(this.icon(hazard.className, hazard.state));
+    }
     marker.hazard = hazard;
-    const popup = marker.getPopup();
-    const focused = popup.getElement()?.contains(document.activeElement);
     const { lat, lng } = marker.getLatLng();
     if (lat !== hazard.latitude || lng !== hazard.longitude) {
       marker.setLatLng([hazard.latitude, hazard.longitude]);
     }
-    if (!marker.isPopupOpen()) return;
+    this.refresh(hazard.id);
+  }
+
+  /** Draws the hazard's popup anew if it is open; what had the focus in it keeps it. */
+  refresh(id) {
+    const marker = this.markers.get(id);
+    if (!marker?.isPopupOpen()) return;
+    const popup = marker.getPopup();
+    const active = document.activeElement;
+    const focused = popup.getElement()?.contains(active);
+    const name = focused ? active.dataset.focus : undefined;
     popup.update();
-    if (focused) popup.getElement().querySelector('.popup').focus({ preventScroll: true });
+    if (focused) this.focusPopup(id, name);
+  }
+
+  /** The control of this name in the hazard's open popup, else the popup itself. */
+  focusPopup(id, name) {
+    const content = this.markers.get(id)?.getPopup().getElement()?.querySelector('.popup');
+    const control = name ? content?.querySelector(`[data-focus="${name}"]`) : null;
+    (control ?? content)?.focus({ preventScroll: true });
   }
 
   remove(hazard) {
@@ -154,7 +172,7 @@ export class HazardLayer {
 
   createMarker(hazard) {
     const marker = L.marker([hazard.latitude, hazard.longitude],
-      { icon: this.icon(hazard.className), riseOnHover: true });
+      { icon: this.icon(hazard.className, hazard.state), riseOnHover: true });
     marker.hazard = hazard;
     marker.bindPopup(() => this.onOpen(marker.hazard),
       { minWidth: 296, maxWidth: 296, autoPanPadding: [16, 16], className: 'hazard-popup' });
@@ -162,11 +180,12 @@ export class HazardLayer {
     return marker;
   }
 
-  icon(className) {
-    let icon = this.icons.get(className);
+  icon(className, state) {
+    const key = `${state} ${className}`;
+    let icon = this.icons.get(key);
     if (!icon) {
-      icon = new HazardIcon({ catalogue: this.catalogue, hazardClass: className });
-      this.icons.set(className, icon);
+      icon = new HazardIcon({ catalogue: this.catalogue, hazardClass: className, state });
+      this.icons.set(key, icon);
     }
     return icon;
   }

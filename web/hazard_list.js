@@ -2,6 +2,7 @@
 
 import { byId, element } from './dom.js';
 import { ago, percent, plural, utcTime } from './format.js';
+import { stateLabel } from './hazard_state.js';
 
 const MAX_ROWS = 200;
 
@@ -66,13 +67,13 @@ export class HazardList {
   add(hazard) {
     const time = element('time');
     const facts = element('span', { class: 'row-facts' });
+    const badge = this.catalogue.badge(hazard.className, hazard.state);
     const button = element('button', {
       type: 'button', tabindex: '-1', 'data-hazard': hazard.id,
       class: this.fresh.has(hazard.id) ? 'row fresh' : 'row',
     },
-    this.catalogue.badge(hazard.className),
-    element('span', { class: 'row-label' }, hazard.label), time, facts);
-    const row = { item: element('li', {}, button), button, time, facts, hazard };
+    badge, element('span', { class: 'row-label' }, hazard.label), time, facts);
+    const row = { item: element('li', {}, button), button, badge, time, facts, hazard };
     this.rows.set(hazard.id, row);
     return row;
   }
@@ -82,8 +83,10 @@ export class HazardList {
     row.time.dateTime = new Date(hazard.updated).toISOString();
     row.time.title = utcTime(hazard.updated);
     setText(row.time, ago(hazard.updated));
+    row.badge.classList.toggle('hollow', hazard.state === 'candidate');
+    const state = hazard.state === 'active' ? '' : `${stateLabel(hazard.state)} \u00b7 `;
     setText(row.facts,
-      `${plural(hazard.sightings, 'sighting')} \u00b7 ${percent(hazard.confidence)}`);
+      `${state}${plural(hazard.sightings, 'sighting')} \u00b7 ${percent(hazard.confidence)}`);
   }
 
   keepOneTabStop() {

@@ -2,6 +2,7 @@
 
 import { element } from './dom.js';
 import { localTime, percent, plural, position, utcTime } from './format.js';
+import { stateLabel, stateMeaning } from './hazard_state.js';
 
 /** Only the server's own pictures: a path of /images with a content hash. */
 function safeImage(url) {
@@ -34,29 +35,38 @@ function row(name, ...content) {
   return [element('dt', {}, name), element('dd', {}, ...content)];
 }
 
-function confidenceBar(share) {
-  const bar = element('span', { class: 'meter', 'aria-hidden': 'true' }, element('span'));
-  bar.firstChild.style.width = `${Math.round(Math.min(Math.max(share, 0), 1) * 100)}%`;
-  return [bar, percent(share)];
+function seen(hazard) {
+  const times = plural(hazard.sightings, 'time');
+  return hazard.sightings > 1 ? `${times} by ${plural(hazard.vehicles, 'vehicle')}` : times;
 }
 
-/** The popup's content as a detached element. */
-export function popupContent(hazard, catalogue) {
+function bar(share) {
+  const meter = element('span', { class: 'meter', 'aria-hidden': 'true' }, element('span'));
+  meter.firstChild.style.width = `${Math.round(Math.min(Math.max(share, 0), 1) * 100)}%`;
+  return [meter, percent(share)];
+}
+
+/** The popup's content as a detached element; `extras` are what people can do with the hazard. */
+export function popupContent(hazard, catalogue, extras) {
   const sigma = hazard.sigma === null ? '' : ` \u00b1 ${hazard.sigma.toFixed(1)} m`;
   const facts = [
     ...row('Position', element('span', { class: 'copyable' },
       position(hazard.latitude, hazard.longitude)), sigma),
     ...row('Last seen', time(hazard.lastSeen)),
     ...(hazard.firstSeen === hazard.lastSeen ? [] : row('First seen', time(hazard.firstSeen))),
-    ...row('Confidence', ...confidenceBar(hazard.confidence)),
-    ...row('Seen', plural(hazard.sightings, 'time')),
+    ...row('Seen', seen(hazard)),
+    ...row('Confidence', ...bar(hazard.confidence)),
+    ...row('Still there', ...bar(hazard.presence)),
   ];
   return element('article', {
     class: 'popup', role: 'dialog', tabindex: '-1', 'aria-label': hazard.label,
     'data-hazard': hazard.id,
   },
   picture(hazard),
-  element('h3', { class: 'popup-title' }, catalogue.badge(hazard.className),
-    element('span', {}, hazard.label)),
-  element('dl', { class: 'facts' }, ...facts));
+  element('h3', { class: 'popup-title' }, catalogue.badge(hazard.className, hazard.state),
+    element('span', { class: 'popup-label' }, hazard.label),
+    element('span', { class: `state state-${hazard.state}`, title: stateMeaning(hazard.state) },
+      stateLabel(hazard.state))),
+  element('dl', { class: 'facts' }, ...facts),
+  ...extras);
 }

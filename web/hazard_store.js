@@ -13,6 +13,9 @@ export function hazardOf(feature) {
     longitude,
     confidence: properties.confidence,
     sightings: properties.sightings,
+    state: String(properties.state),
+    presence: properties.presence,
+    vehicles: properties.vehicles,
     firstSeen: Date.parse(properties.first_seen),
     lastSeen: Date.parse(properties.last_seen),
     updated: Date.parse(properties.updated),
@@ -26,8 +29,10 @@ export class HazardStore {
   constructor() {
     this.hazards = new Map();
     this.hidden = new Set();
-    /** How many hazards there are of each class, hidden ones included. */
+    this.hiddenStates = new Set();
+    /** How many hazards there are of each class and in each state, hidden ones included. */
     this.counts = new Map();
+    this.stateCounts = new Map();
   }
 
   get size() {
@@ -37,6 +42,7 @@ export class HazardStore {
   replaceAll(features) {
     this.hazards.clear();
     this.counts.clear();
+    this.stateCounts.clear();
     for (const feature of features) this.put(hazardOf(feature));
   }
 
@@ -48,7 +54,7 @@ export class HazardStore {
     if (action === 'removed') {
       if (!known) return null;
       this.hazards.delete(hazard.id);
-      this.count(hazard.className, -1);
+      this.count(known, -1);
       return { change: 'gone', hazard: known };
     }
     this.put(hazard);
@@ -56,7 +62,7 @@ export class HazardStore {
   }
 
   isShown(hazard) {
-    return !this.hidden.has(hazard.className);
+    return !this.hidden.has(hazard.className) && !this.hiddenStates.has(hazard.state);
   }
 
   shown() {
@@ -65,13 +71,13 @@ export class HazardStore {
 
   put(hazard) {
     const known = this.hazards.get(hazard.id);
-    if (known) this.count(known.className, -1);
+    if (known) this.count(known, -1);
     this.hazards.set(hazard.id, hazard);
-    this.count(hazard.className, 1);
+    this.count(hazard, 1);
   }
 
-  count(className, change) {
-    const count = (this.counts.get(className) ?? 0) + change;
-    this.counts.set(className, count);
+  count({ className, state }, change) {
+    this.counts.set(className, (this.counts.get(className) ?? 0) + change);
+    this.stateCounts.set(state, (this.stateCounts.get(state) ?? 0) + change);
   }
 }

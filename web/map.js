@@ -1,16 +1,18 @@
 // The live map's page: puts map, panel and live feed together.
 
 import { Catalogue } from './catalogue.js';
-import { ClassFilter } from './class_filter.js';
+import { ClassFilter, StateFilter } from './class_filter.js';
 import { AttributionText, FitControl } from './controls.js';
 import { byId, throttled } from './dom.js';
 import { plural } from './format.js';
 import { Graticule } from './graticule.js';
+import { HazardHistory } from './hazard_history.js';
 import { HazardLayer } from './hazard_layer.js';
 import { HazardList } from './hazard_list.js';
 import { popupContent } from './hazard_popup.js';
 import { HazardStore } from './hazard_store.js';
 import { LiveFeed, getJson } from './live_feed.js';
+import { Officials } from './officials.js';
 import { Sheet } from './sheet.js';
 import { VehicleLayer } from './vehicle_layer.js';
 
@@ -47,9 +49,14 @@ class Page {
     this.map = createMap(config);
     this.vehicles = new VehicleLayer(this.map, !config.tile_url);
     this.layer = new HazardLayer(this.map, this.catalogue,
-      (hazard) => popupContent(hazard, this.catalogue));
+      (hazard) => popupContent(hazard, this.catalogue,
+        [this.history.section(hazard), ...this.officials.buttons(hazard)]));
+    this.history = new HazardHistory((id) => this.layer.refresh(id));
+    this.officials = new Officials(config.officials, (text) => this.say(text),
+      (hazard) => this.layer.focusPopup(hazard.id, this.officials.decision));
     this.list = new HazardList(this.catalogue, (hazard) => this.choose(hazard));
     this.filter = new ClassFilter(this.store, this.catalogue, () => this.showAll());
+    this.states = new StateFilter(this.store, () => this.showAll());
     this.inView = byId('in-view');
     this.updateSoon = throttled(() => this.updatePanel(), 120);
     this.announced = [];
@@ -76,7 +83,7 @@ class Page {
     this.map.on('popupclose', (event) => this.onPopupClose(event.popup));
     this.inView.addEventListener('change', () => this.updatePanel());
     document.addEventListener('keydown', (event) => {
-      if (event.key !== 'Escape') return;
+      if (event.key !== 'Escape' || this.officials.isAsking()) return;
       this.map.closePopup();
       this.sheet.toggle(false);
     });
@@ -111,6 +118,7 @@ class Page {
     const { change, hazard } = result;
     if (change === 'gone') this.layer.remove(hazard);
     else if (this.store.isShown(hazard)) this.layer.put(hazard);
+    else this.layer.remove(hazard);
     if (change === 'new' && this.store.isShown(hazard)) {
       this.layer.highlight(hazard);
       this.list.markFresh(hazard);
@@ -134,6 +142,7 @@ class Page {
       : shown;
     this.list.show(listed, this.store.size);
     this.filter.update();
+    this.states.update();
     this.sheet.say(this.store.size === 0 ? 'No hazards yet' : plural(shown.length, 'hazard'));
   }
 
@@ -182,9 +191,14 @@ class Page {
 
   announce() {
     const [first] = this.announced;
-    byId('announcer').textContent = this.announced.length === 1
-      ? `New hazard: ${first}` : `${this.announced.length} new hazards, the first: ${first}`;
+    this.say(this.announced.length === 1
+      ? `New hazard: ${first}` : `${this.announced.length} new hazards, the first: ${first}`);
     this.announced = [];
+  }
+
+  /** To those who listen instead of looking. */
+  say(text) {
+    byId('announcer').textContent = text;
   }
 }
 

@@ -10,8 +10,9 @@ namespace livemap {
 
 cv::Mat DecodeImage(const std::uint8_t* bytes, std::size_t size, std::int64_t max_pixels) {
   const std::optional<ImageHeader> header = ReadImageHeader(bytes, size);
-  if (!header) {
-    throw Error("the image of " + std::to_string(size) + " bytes is no JPEG, PNG or WebP");
+  // Not WebP: where libwebp takes no interest, OpenCV would hand the bytes to other libraries.
+  if (!header || header->format == ImageHeader::Format::kWebp) {
+    throw Error("the image of " + std::to_string(size) + " bytes is no JPEG or PNG");
   }
   const std::string dimensions =
       std::to_string(header->width) + "x" + std::to_string(header->height);

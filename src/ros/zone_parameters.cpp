@@ -126,10 +126,10 @@ void ReadWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("tile_attribution", web.tile_attribution);
   parameters.Read("web_title", web.title);
   parameters.Read("web_threads", web.threads, {1, 64});
+  ReadCount(parameters, "web_max_connections", web.max_connections, {1, 100000});
   parameters.Read("web_token_file", web.token_file);
   parameters.Read("web_picture_side_px", web.picture_side_px, {16, 16384});
   ReadCount(parameters, "web_picture_cache_bytes", web.picture_cache_bytes, {0, 2e9});
-  ReadCount(parameters, "web_max_connections", web.max_connections, {1, 100000});
   if (config.map_datum) web.centre = *config.map_datum;
 }
 

@@ -3,21 +3,13 @@
 #include <chrono>
 
 #include "web/origin.h"
-#include "zone/report_validation.h"
 
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxReasonBytes = 200;
-constexpr std::string_view kPrefix = "/api/v1/hazards/";
-
 double SteadySeconds() {
   const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
   return std::chrono::duration<double>(since_start).count();
-}
-
-bool EndsWith(std::string_view text, std::string_view end) {
-  return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
 }
 
 /// "application/json", with or without parameters. A page of another origin cannot send it without
@@ -28,39 +20,6 @@ bool IsJsonType(const std::string& content_type) {
 }
 
 }  // namespace
-
-std::optional<DecisionTarget> ParseDecisionTarget(std::string_view path) {
-  if (path.substr(0, kPrefix.size()) != kPrefix) return std::nullopt;
-  path.remove_prefix(kPrefix.size());
-  for (const auto& [ending, decision] :
-       {std::pair<std::string_view, Decision>{"/confirm", Decision::kConfirm},
-        {"/reject", Decision::kReject}}) {
-    if (!EndsWith(path, ending)) continue;
-    return DecisionTarget{decision, std::string(path.substr(0, path.size() - ending.size()))};
-  }
-  return std::nullopt;
-}
-
-std::string ParseDecisionBody(Decision decision, const std::string& body) {
-  static const std::string kAccepted =
-      R"(accepted is {"reason": TEXT} with one line of printable text of 1 to )" +
-      std::to_string(kMaxReasonBytes) + " bytes";
-  if (body.empty() && decision == Decision::kConfirm) return "";
-  const Json json = Json::parse(body, nullptr, false);
-  if (!json.is_object()) throw BadRequest("the body is no JSON object, " + kAccepted);
-  for (const auto& [key, value] : json.items()) {
-    if (key != "reason") throw BadRequest("the body has an unknown key, " + kAccepted);
-    if (!value.is_string()) throw BadRequest("the reason is no text, " + kAccepted);
-  }
-  if (json.empty() && decision == Decision::kConfirm) return "";
-  const std::string reason = json.value("reason", "");
-  if (reason.empty()) throw BadRequest("there is no reason, " + kAccepted);
-  if (!IsPrintableText(reason, kMaxReasonBytes)) {
-    throw BadRequest("the reason of " + std::to_string(reason.size()) + " bytes is not accepted, " +
-                     kAccepted);
-  }
-  return reason;
-}
 
 OfficialApi::OfficialApi(const WebOptions& options, ZoneService& zone,
                          const HazardCatalogue& catalogue)

@@ -40,7 +40,7 @@ struct Hazard {
   std::int64_t updated_ns = 0;     ///< Zone clock at the last event.
   std::uint64_t sequence = 0;      ///< Of its last event.
   std::string image_sha256;        ///< 64 hex digits, or empty without a picture.
-  std::string image_format;        ///< "jpeg", "png" or "webp"; empty without a picture.
+  std::string image_format;        ///< "jpeg" or "png"; empty without a picture.
   HazardState state = HazardState::kActive;
   float presence = 1;          ///< 0..1, probability at `updated_ns` that it is still there.
   std::uint32_t vehicles = 1;  ///< Distinct vehicles that speak for it.

@@ -33,18 +33,19 @@ ImageHeader CheckedHeader(const std::vector<std::uint8_t>& file, const PictureLi
                 std::to_string(limits.max_bytes));
   }
   const std::optional<ImageHeader> header = ReadImageHeader(file.data(), file.size());
-  if (!header) throw Error("the picture is no JPEG, PNG or WebP");
+  // Not WebP: where libwebp takes no interest, OpenCV would hand the bytes to other libraries.
+  if (!header || header->format == ImageHeader::Format::kWebp) {
+    throw Error("the picture is no JPEG or PNG");
+  }
   const std::int64_t pixels = static_cast<std::int64_t>(header->width) * header->height;
   if (pixels > limits.max_pixels) {
     throw Error("the picture says it has " + Dimensions(*header) + ", accepted are " +
                 std::to_string(limits.max_pixels) + " in all");
   }
-  if (!HasImageEnd(file.data(), file.size(), header->format) &&
-      header->format != ImageHeader::Format::kJpeg) {
-    throw Error("the picture of " + Dimensions(*header) + " is cut off");
-  }
   if (header->format == ImageHeader::Format::kJpeg) {
     if (const auto why = WhyNoWholeJpeg(file, kMaxScans)) throw Error("the picture " + *why);
+  } else if (!HasImageEnd(file.data(), file.size(), header->format)) {
+    throw Error("the picture of " + Dimensions(*header) + " is cut off");
   }
   return *header;
 }

@@ -181,12 +181,19 @@ std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
                      std::to_string(limits.max_image_bytes) + " are accepted");
   }
   const auto header = ReadImageHeader(image.data(), image.size());
-  if (!header) return Malformed("picture is no JPEG, PNG or WebP");
+  if (!header || header->format == ImageHeader::Format::kWebp) {
+    return Malformed("picture is no JPEG or PNG");
+  }
   const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
   if (longer_side > limits.max_image_side_px) {
     return Malformed("picture is " + std::to_string(header->width) + " x " +
                      std::to_string(header->height) + " pixels, at most " +
                      std::to_string(limits.max_image_side_px) + " per side are accepted");
+  }
+  const std::int64_t pixels = static_cast<std::int64_t>(header->width) * header->height;
+  if (pixels > limits.max_image_pixels) {
+    return Malformed("picture has " + std::to_string(pixels) + " pixels, at most " +
+                     std::to_string(limits.max_image_pixels) + " are accepted");
   }
   return std::nullopt;
 }

@@ -40,6 +40,7 @@ struct ReportLimits {
   double max_age_s = 30.0 * 86400.0;   ///< An image stamp this far behind it: outboxes wait long.
   std::int64_t min_stamp_ns = 946684800'000'000'000;  ///< 2000-01-01: older clocks were never set.
   std::uint32_t max_image_side_px = 16384;            ///< Of the original image and of the picture.
+  std::int64_t max_image_pixels = 20'000'000;         ///< Of the picture: PictureLimits' too.
   std::size_t max_image_bytes = 1 << 20;              ///< Of the picture as a compressed file.
 };
 

@@ -1,5 +1,5 @@
-// Files that an operator or researcher writes: the catalogue of hazards, the officials' tokens, label
-// files of data sets. The first byte chooses.
+// Files that an operator or researcher writes: the catalogue of hazards, the officials' tokens,
+// label files of data sets. The first byte chooses.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

@@ -4,6 +4,9 @@
 #include <cstdlib>
 #include <string>
 
+#include "base/uuid.h"
+#include "web/decision.h"
+#include "web/official_gate.h"
 #include "web/origin.h"
 #include "web/query.h"
 #include "web/static_files.h"
@@ -26,9 +29,35 @@ void CheckHazardQuery(const livemap::RequestTarget& target) {
     // Refused: what a bad address deserves.
   }
   try {
+    Require(livemap::ParseEventsQuery(target) <= livemap::kMaxEventsPerAnswer);
+  } catch (const livemap::BadRequest&) {
+    // Refused.
+  }
+  try {
     livemap::ParseStreamQuery(target);
   } catch (const livemap::BadRequest&) {
     // Refused.
+  }
+}
+
+/// What comes with a POST: its address, its token, its body.
+void CheckDecision(const std::string& text) {
+  const auto target = livemap::ParseDecisionTarget(text);
+  if (target) {
+    const auto uuid = livemap::Uuid::Parse(target->id);
+    if (uuid) Require(uuid->ToString().size() == target->id.size());
+  }
+  static livemap::OfficialGate gate({{"miller", std::string(64, 'a')}});
+  Require(gate.Check(text, "client", 0).verdict != livemap::OfficialGate::Verdict::kAllowed);
+  for (const auto decision : {livemap::Decision::kConfirm, livemap::Decision::kReject}) {
+    try {
+      const std::string reason = livemap::ParseDecisionBody(decision, text);
+      Require(reason.size() <= livemap::kMaxDecisionReasonBytes);
+      Require(!reason.empty() || decision == livemap::Decision::kConfirm);
+      for (const char c : reason) Require(static_cast<unsigned char>(c) >= 0x20);
+    } catch (const livemap::BadRequest& mistake) {
+      Require(std::string(mistake.what()).find("accepted is") != std::string::npos);
+    }
   }
 }
 
@@ -38,6 +67,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   static const livemap::StaticFiles files(LIVEMAP_SOURCE_DIR "/web/icons");
   livemap::IsAllowedOrigin(text, "map.example", {"https://city.example"});
+  CheckDecision(text);
   // The input as a whole, and as what stands behind the address that has parameters.
   for (const std::string& address : {text, "/api/v1/hazards?" + text}) {
     try {

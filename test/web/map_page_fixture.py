@@ -1,4 +1,4 @@
-"""A zone with its real web server, and the live map's page in real Chromium, for map_page_test.py."""
+"""A zone with its real web server, and the live map's page in real Chromium, for map_page_test.py and map_page_officials_test.py."""
 
 import argparse
 import json
@@ -6,6 +6,7 @@ import math
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -34,7 +35,8 @@ class ZoneProcess:
     def __init__(self):
         self.process = subprocess.Popen([OPTIONS.server], stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
-        self.port = self.read()["port"]
+        started = self.read()
+        self.port, self.token = started["port"], started["token"]
         self.url = f"http://127.0.0.1:{self.port}/"
 
     def read(self):
@@ -48,8 +50,9 @@ class ZoneProcess:
         self.process.stdin.flush()
         return self.read()
 
-    def report(self, class_name, lat, lon, picture=True):
-        answer = self.do("report", **{"class": class_name}, lat=lat, lon=lon, picture=picture)
+    def report(self, class_name, lat, lon, picture=True, vehicle="car-1"):
+        answer = self.do("report", **{"class": class_name}, lat=lat, lon=lon, picture=picture,
+                         vehicle=vehicle)
         assert answer["status"] == "committed", answer
         return answer["id"]
 
@@ -197,3 +200,18 @@ def missing():
         if shutil.which(program) is None:
             return program
     return None
+
+
+def run_tests(description):
+    """The main program of a test of the page: the exit status."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--server", required=True, help="the built map_page_server")
+    parser.add_argument("--screenshots", help="folder for pictures of the page")
+    parser.add_argument("tests", nargs="*", help="e.g. Desktop.test_an_empty_map_says_so")
+    parser.parse_args(namespace=OPTIONS)
+    lacking = missing()
+    if lacking:
+        print(f"skipped: {lacking} is not installed")
+        return 1 if os.environ.get("CI") else 77
+    program = unittest.main(argv=[sys.argv[0], *OPTIONS.tests], exit=False, verbosity=2)
+    return 0 if program.result.wasSuccessful() else 1

@@ -1,9 +1,13 @@
 // A real zone and its real web server for the browser tests and for pictures of the page. It takes
 // one JSON command per line on standard input and answers each with one line of JSON:
 //
-//   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true}   -> {"id", "status",
-//   "reason"}
+//   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
+//                                                                       -> {"id", "status",
+//                                                                       "reason"}
 //   {"do": "remove", "id": UUID}                                        -> {"removed"}
+//   {"do": "confirm", "id": UUID}           as an official              -> {"confirmed"}
+//   {"do": "pass", "seconds": S}            the zone's clock goes on    -> {"passed"}
+//   {"do": "close_decisions"}               the server starts anew without a token file
 //   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
 //   {"do": "vehicle", "id": V, "lat": D, "lon": D, "course": RAD, "speed": MPS} -> {"accepted"}
 //   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
@@ -60,6 +64,7 @@ class Session {
  public:
   Session() {
     options_ = livemap::TestOptions();
+    options_.token_file = tokens_.path();
     Start();
   }
 
@@ -69,6 +74,9 @@ class Session {
     const std::string verb = command.at("do");
     if (verb == "report") return AddReport(command);
     if (verb == "remove") return Remove(command);
+    if (verb == "confirm") return Confirm(command);
+    if (verb == "pass") return Pass(command);
+    if (verb == "close_decisions") return CloseDecisions();
     if (verb == "fill") return Fill(command);
     if (verb == "vehicle") return MoveVehicle(command);
     if (verb == "start") return Start();
@@ -85,11 +93,32 @@ class Session {
     return {{"running", true}};
   }
 
-  void Tick() { fixture_.now_ns = livemap::UtcNowNs(); }
+  void Tick() { fixture_.now_ns = livemap::UtcNowNs() + ahead_ns_; }
+
+  Json Pass(const Json& command) {
+    ahead_ns_ += static_cast<std::int64_t>(command.at("seconds").get<double>() * 1e9);
+    Tick();
+    fixture_.zone->Advance();
+    return {{"passed", true}};
+  }
+
+  Json CloseDecisions() {
+    server_.reset();
+    options_.token_file.clear();
+    return Start();
+  }
+
+  Json Confirm(const Json& command) {
+    Tick();
+    const auto uuid = livemap::Uuid::Parse(command.at("id"));
+    const std::string official = livemap::TokenFile::official();
+    return {{"confirmed", uuid && fixture_.zone->Confirm(*uuid, official)}};
+  }
 
   Json AddReport(const Json& command) {
     Tick();
     auto report = fixture_.MakeReport(command.at("class"), {command.at("lat"), command.at("lon")});
+    report.vehicle_id = command.value("vehicle", report.vehicle_id);
     if (command.value("picture", true)) {
       report.image_format = "jpeg";
       report.image = DrawnPicture(report.class_name);
@@ -145,7 +174,9 @@ class Session {
     return {{"accepted", fixture_.zone->UpdateVehicle(vehicle)}};
   }
 
+  livemap::TokenFile tokens_;
   livemap::ZoneFixture fixture_;
+  std::int64_t ahead_ns_ = 0;  ///< Of the zone's clock before the system's.
   livemap::WebOptions options_;
   std::unique_ptr<livemap::WebServer> server_;
 };
@@ -155,7 +186,8 @@ class Session {
 int main() {
   try {
     Session session;
-    std::cout << Json{{"port", session.port()}} << std::endl;
+    std::cout << Json{{"port", session.port()}, {"token", livemap::TokenFile::token()}}
+              << std::endl;
     std::string line;
     while (std::getline(std::cin, line)) {
       std::cout << session.Do(Json::parse(line)) << std::endl;

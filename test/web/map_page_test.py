@@ -7,14 +7,11 @@ Ends with exit 77, which ctest reads as "skipped", where Chromium, its driver or
 with CI set in the environment that is a failure.
 """
 
-import argparse
 import math
-import os
 import sys
 import time
-import unittest
 
-from map_page_fixture import HOSTILE, LAT, LON, OPTIONS, Keys, MapPage, missing, street
+from map_page_fixture import HOSTILE, LAT, LON, Keys, MapPage, run_tests, street
 
 
 class Desktop(MapPage):
@@ -295,19 +292,5 @@ class Phone(MapPage):
         self.assertEqual(inner, 390)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--server", required=True, help="the built map_page_server")
-    parser.add_argument("--screenshots", help="folder for pictures of the page")
-    parser.add_argument("tests", nargs="*", help="e.g. Desktop.test_an_empty_map_says_so")
-    parser.parse_args(namespace=OPTIONS)
-    lacking = missing()
-    if lacking:
-        print(f"skipped: {lacking} is not installed")
-        return 1 if os.environ.get("CI") else 77
-    program = unittest.main(argv=[sys.argv[0], *OPTIONS.tests], exit=False, verbosity=2)
-    return 0 if program.result.wasSuccessful() else 1
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_tests(__doc__.splitlines()[0]))

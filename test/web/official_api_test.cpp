@@ -149,7 +149,7 @@ TEST_F(OfficialApiTest, SaysWhatIsWrongWithTheBody) {
     EXPECT_EQ(answer.status, 400) << body;
     EXPECT_THAT(answer.Json()["error"].get<std::string>(), HasSubstr("accepted is")) << body;
   }
-  const std::string longest(200, 'x');
+  const std::string longest(120, 'x');
   EXPECT_EQ(Post(id, "reject", R"({"reason": "x)" + longest + "\"}", tokens_.token()).status, 400);
   EXPECT_EQ(Post(id, "reject", std::string(5000, ' '), tokens_.token()).status, 413);
   EXPECT_EQ(

@@ -70,7 +70,7 @@ void StateSize(Bytes& jpeg, int width, int height) {
 
 TEST(RecodePicture, MakesAJpegOfTheSamePixelsOfEveryFormat) {
   const cv::Mat scene = Scene(320, 200);
-  for (const char* extension : {".jpg", ".png", ".webp"}) {
+  for (const char* extension : {".jpg", ".png"}) {
     const cv::Mat seen = Decode(RecodePicture(Encode(extension, scene)));
     ASSERT_EQ(seen.size(), scene.size()) << extension;
     EXPECT_LT(cv::norm(seen, scene, cv::NORM_L1) / static_cast<double>(scene.total() * 3), 3.0)
@@ -156,7 +156,7 @@ TEST(RecodePicture, RefusesTooManyBytes) {
 }
 
 TEST(RecodePicture, RefusesWhatIsCutOffAnywhere) {
-  for (const char* extension : {".jpg", ".png", ".webp"}) {
+  for (const char* extension : {".jpg", ".png"}) {
     const Bytes whole = Encode(extension, Scene(96, 64));
     for (std::size_t size = 0; size + 1 < whole.size(); size += 7) {
       const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
@@ -215,6 +215,14 @@ TEST(RecodePicture, RefusesWhatIsNoPicture) {
         "RIFF\xff\xff\xff\x7fWEBPVP8 ", "\xff\xd8\xff\xd9"}) {
     EXPECT_THROW(RecodePicture(Bytes(text.begin(), text.end())), Error) << text;
   }
+}
+
+/// OpenCV asks one decoder after the other whether it knows the bytes, GDAL's and GDCM's too, which
+/// look for their marks in the middle of a file. JPEG's and PNG's marks at the start keep them out;
+/// a WebP that libwebp does not accept does not.
+TEST(RecodePicture, RefusesWebpSoThatNoOtherDecoderIsAsked) {
+  EXPECT_THAT([] { RecodePicture(Encode(".webp", Scene(64, 48))); },
+              ThrowsMessage<Error>(HasSubstr("is no JPEG or PNG")));
 }
 
 TEST(RecodePicture, RefusesAProgressivePictureOfThousandsOfScans) {

@@ -1,0 +1,306 @@
+#!/usr/bin/python3
+"""Officials at work in real Chromium: states, confirming, rejecting, the history of a hazard.
+
+  map_page_officials_test.py --server PATH_OF_map_page_server [--screenshots DIR]
+
+Skips as map_page_test.py does.
+"""
+
+import sys
+
+from map_page_fixture import (
+    HOSTILE, LAT, LON, Keys, MapPage, run_tests, start_browser, stop_browser, street)
+
+
+class OfficialsPage(MapPage):
+    """What the tests of decisions share."""
+
+    def text(self, selector):
+        return self.find(selector).text
+
+    def state_in_popup(self, hazard, state):
+        self.wait_for_text(f'.popup[data-hazard="{hazard}"] .state', state)
+
+    def pin_state(self, state):
+        return self.count(f'.pin[data-state="{state}"]')
+
+    def ask(self, decision):
+        self.click(f'.popup [data-focus="{decision}"]')
+        self.wait(lambda: self.find("#decision").is_displayed(), "no question is asked")
+
+    def write(self, selector, text):
+        self.wait(lambda: self.find(selector).is_displayed(), f"{selector} is not asked for")
+        field = self.find(selector)
+        field.clear()
+        field.send_keys(text)
+
+    def submit(self):
+        self.click("#decision-submit")
+
+    def wait_closed(self):
+        self.wait(lambda: not self.find("#decision").is_displayed(), "the question stays")
+
+    def reject(self, hazard, reason, token):
+        self.open_popup_of(hazard)
+        self.ask("reject")
+        self.write("#decision-reason", reason)
+        self.write("#decision-token", token)
+        self.submit()
+
+    def assert_quiet_but(self, status):
+        """Chromium logs every answer that is an error: that one was meant."""
+        loud = [entry["message"] for entry in self.browser.get_log("browser")
+                if entry["level"] == "SEVERE" and f"status of {status}" not in entry["message"]]
+        self.assertEqual(loud, [])
+
+
+class Desktop(OfficialsPage):
+    def test_candidates_look_different_and_become_active_before_ones_eyes(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.zone.report("deer", LAT + 0.0006, LON + 0.0006)
+        self.open()
+        self.wait(lambda: self.pin_state("candidate") == 1 and self.pin_state("active") == 1,
+                  "candidate and active look the same")
+        self.assertIn("Unconfirmed", self.text("#hazard-list"))
+        self.open_popup_of(hazard)
+        self.state_in_popup(hazard, "Unconfirmed")
+        self.wait_for_text(".popup", "Still there")
+        self.picture("candidate_popup")
+        self.zone.report("pothole", LAT, LON, vehicle="car-2")
+        self.state_in_popup(hazard, "Active")
+        self.wait_for_text(".popup", "2 times by 2 vehicles")
+        self.wait(lambda: self.pin_state("candidate") == 0 and self.pin_state("active") == 2,
+                  "the marker stays hollow")
+        self.wait(lambda: "Unconfirmed" not in self.text("#hazard-list"), "the list lags behind")
+        self.assert_quiet()
+
+    def test_states_can_be_hidden_and_are_counted(self):
+        self.zone.report("pothole", LAT, LON)
+        deer = self.zone.report("deer", LAT + 0.001, LON)
+        self.open()
+        self.wait_for(".pin", 2)
+        self.assertEqual(self.text("#states li:has([data-state=candidate]) .count"), "1")
+        self.click('#states input[data-state="candidate"]')
+        self.wait(lambda: self.count(".pin") == 1, "candidates are still shown")
+        self.assertEqual(self.count("#hazard-list button"), 1)
+        late = self.zone.report("debris", LAT + 0.002, LON)
+        self.wait(lambda: self.text("#states li:has([data-state=candidate]) .count") == "2",
+                  "a hidden state is not counted")
+        self.assertEqual(self.count(".pin"), 1)
+        self.zone.do("confirm", id=late)
+        self.wait_for(f'#hazard-list button[data-hazard="{late}"]')
+        self.click('#states input[data-state="active"]')
+        self.wait(lambda: self.count(".pin") == 0, "active ones are still shown")
+        self.click('#states input[data-state="active"]')
+        self.wait_for(f'#hazard-list button[data-hazard="{deer}"]')
+        self.assert_quiet()
+
+    def test_rejecting_in_one_browser_takes_the_hazard_away_in_another(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        kept = self.zone.report("debris", LAT + 0.002, LON)
+        other = start_browser(800, 600)
+        self.addCleanup(stop_browser, other)
+        other.get(self.zone.url)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("reject")
+        self.picture("reject")
+        self.write("#decision-reason", "filled yesterday")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_closed()
+        self.wait(lambda: self.count("#hazard-list button") == 1, "it stays in this browser")
+        rows = "return [...document.querySelectorAll('#hazard-list button')]" \
+               ".map((row) => row.dataset.hazard).join()"
+        self.wait(lambda: other.execute_script(rows) == kept, "it stays in the other browser")
+        self.wait(lambda: "Rejected: Pothole" in
+                  self.find("#announcer").get_attribute("textContent"), "nothing is announced")
+        self.assert_quiet()
+
+    def test_the_token_is_asked_for_once_and_forgotten_with_the_tab(self):
+        first = self.zone.report("pothole", LAT, LON)
+        second = self.zone.report("debris", LAT + 0.002, LON)
+        self.open()
+        self.open_popup_of(first)
+        self.ask("confirm")
+        self.assertFalse(self.find("#decision-reason").is_displayed())
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_closed()
+        self.state_in_popup(first, "Active")
+        self.open_popup_of(second)
+        self.ask("confirm")
+        self.assertFalse(self.find("#decision-token").is_displayed())
+        self.submit()
+        self.wait_closed()
+        self.state_in_popup(second, "Active")
+        self.assertEqual(self.browser.execute_script("return localStorage.length"), 0)
+        self.assertEqual(self.browser.execute_script("return document.cookie"), "")
+        self.browser.execute_script("sessionStorage.clear()")
+        self.ask("reject")
+        self.assertTrue(self.find("#decision-token").is_displayed())
+        self.assert_quiet()
+
+    def test_a_wrong_token_says_so_and_can_be_mended(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.reject(hazard, "filled", "no-official-has-this-token")
+        self.wait_for_text("#decision-error", "This token is not known here")
+        self.assertEqual(self.browser.execute_script("return sessionStorage.length"), 0)
+        self.assertEqual(self.browser.execute_script("return document.activeElement.id"),
+                         "decision-token")
+        self.picture("wrong_token")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait(lambda: self.count(".pin") == 0, "the hazard stays")
+        self.assert_quiet_but(401)
+
+    def test_a_reason_is_needed_and_a_decision_can_be_called_off(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("reject")
+        self.submit()
+        self.wait_for_text("#decision-error", "Please say why")
+        self.click("#decision-cancel")
+        self.wait_closed()
+        self.assertEqual(self.count(f'.popup[data-hazard="{hazard}"]'), 1)
+        self.assertEqual(self.count(".pin"), 1)
+        self.assert_quiet()
+
+    def test_a_zone_that_does_not_answer_is_said_so(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("confirm")
+        self.zone.do("stop")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_for_text("#decision-error", "The zone does not answer")
+        self.zone.do("start")
+        self.submit()
+        self.wait_closed()
+        self.state_in_popup(hazard, "Active")
+
+    def test_a_hazard_that_was_rejected_meanwhile_is_said_so(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("reject")
+        self.zone.do("remove", id=hazard)
+        self.write("#decision-reason", "filled")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_for_text("#decision-error", "This hazard is no longer on the map")
+        self.assert_quiet_but(409)
+
+    def test_everything_is_decided_by_keyboard(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.wait_for("#hazard-list button")
+        self.browser.execute_script("document.querySelector('#hazard-list button').focus()")
+        self.press(Keys.ENTER)
+        self.wait(lambda: self.browser.execute_script(
+            "return document.activeElement.dataset.hazard") == hazard, "the popup has no focus")
+        for _ in range(8):
+            self.press(Keys.TAB)
+            if self.browser.execute_script(
+                    "return document.activeElement.dataset.focus") == "reject":
+                break
+        self.press(Keys.ENTER)
+        self.wait(lambda: self.browser.execute_script(
+            "return document.activeElement.id") == "decision-reason", "the reason has no focus")
+        self.press(Keys.ESCAPE)
+        self.wait_closed()
+        self.assertEqual(self.count(".popup"), 1, "Escape closed the popup too")
+        self.wait(lambda: self.browser.execute_script(
+            "return document.activeElement.dataset.focus") == "reject", "the focus is lost")
+        self.press(Keys.ENTER)
+        self.wait(lambda: self.find("#decision").is_displayed(), "no question is asked")
+        self.press("filled", Keys.TAB, self.zone.token, Keys.ENTER)
+        self.wait(lambda: self.count(".pin") == 0, "the hazard stays")
+        self.assert_quiet()
+
+    def test_the_history_tells_what_happened_and_hostile_reasons_stay_text(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.reject(hazard, HOSTILE, self.zone.token)
+        self.wait(lambda: self.count(".pin") == 0, "the hazard stays")
+        self.assertTrue(self.zone.do("confirm", id=hazard)["confirmed"])
+        self.open_popup_of(hazard)
+        self.click(".popup summary")
+        self.wait_for_text(".history-list", HOSTILE, "Rejected", "miller")
+        self.assertEqual(self.count('img[src="x"]'), 0)
+        self.assertGreaterEqual(self.count(".history-list li"), 3)
+        self.assertEqual(self.browser.execute_script(
+            "return document.activeElement.dataset.focus"), "history")
+        self.zone.report("pothole", LAT, LON, vehicle="car-3")
+        self.wait_for_text(".popup", "2 times")
+        self.wait(lambda: self.count(".history-list li") >= 4, "the open history lags behind")
+        self.picture("history")
+        self.assert_quiet()
+
+    def test_without_officials_there_are_no_buttons(self):
+        self.zone.do("close_decisions")
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.assertEqual(self.count(".popup .decide"), 0)
+        self.assertEqual(self.count(".popup .history"), 1)
+
+
+class Phone(OfficialsPage):
+    size = (390, 844)
+
+    def test_a_decision_fits_a_phone(self):
+        road = street()
+        hazard = self.zone.report("pothole", *road[40])
+        self.zone.report("traffic_cone", *road[60])
+        self.zone.report("deer", *road[80])
+        self.zone.report("W" * 64, *road[100])
+        self.open()
+        self.wait_for(".pin", 4)
+        self.picture("phone_states")
+        self.click("#sheet-handle")
+        self.picture("phone_states_list")
+        self.open_popup_of(hazard)
+        self.click(".popup summary")
+        self.wait_for(".history-list li")
+        self.picture("phone_history")
+        self.assert_inside(".leaflet-popup", 52)
+        self.ask("reject")
+        self.wait_for("#decision-token")
+        self.picture("phone_reject")
+        self.assert_inside("#decision", 0)
+        self.assertGreaterEqual(self.find("#decision-submit").size["height"], 40)
+        self.assert_quiet()
+
+    def assert_inside(self, selector, top):
+        box = self.browser.execute_script(
+            "const r = document.querySelector(arguments[0]).getBoundingClientRect();"
+            "return [r.left, r.top, r.right, r.bottom]", selector)
+        self.assertGreaterEqual(box[0], 0)
+        self.assertGreaterEqual(box[1], top)
+        self.assertLessEqual(box[2], 390)
+        self.assertLessEqual(box[3], 844)
+
+
+class DesktopDark(OfficialsPage):
+    dark = True
+
+    def test_decisions_follow_the_dark_scheme(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.zone.report("debris", LAT + 0.0003, LON + 0.0008)
+        self.open()
+        self.open_popup_of(hazard)
+        self.picture("dark_candidate")
+        self.ask("reject")
+        self.picture("dark_reject")
+        self.assertEqual(self.browser.execute_script(
+            "return getComputedStyle(document.querySelector('#decision')).backgroundColor"),
+            "rgb(23, 28, 35)")
+        self.assert_quiet()
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(__doc__.splitlines()[0]))
