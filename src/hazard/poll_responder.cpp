@@ -98,7 +98,7 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
   const bool ready =
       lookup.answer == FixTrack::Answer::kReady ||
       (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s);
-  if (!ready && lookup.answer != FixTrack::Answer::kNever && waited_s < config_.pose_wait_s) {
+  if (!ready && lookup.answer != FixTrack::Answer::kHopeless && waited_s < config_.pose_wait_s) {
     return false;
   }
   if (!ready) {

@@ -214,7 +214,7 @@ TEST_F(PollResponderTest, SaysNothingWithoutAnyPositionAndCannotSeeWithoutThoseO
   poll_.poll = Named(3);
   responder_.Add(poll_, steady_s_);
   Drive(0, 0.05);
-  vehicle_.pose_at = [](std::int64_t) { return FixTrack::Lookup{FixTrack::Answer::kNever, {}}; };
+  vehicle_.pose_at = [](std::int64_t) { return FixTrack::Lookup{FixTrack::Answer::kHopeless, {}}; };
   Drive(2.0, 4.0);
   Expire();
   EXPECT_EQ(OnlyReply().reason, "no position of the vehicle");
