@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "base/error.h"
 
@@ -33,35 +34,65 @@ SpatialGrid::SpatialGrid(double cell_m, std::uint64_t hash_seed)
   }
 }
 
+SpatialGrid::Slot SpatialGrid::SlotOf(const Eigen::Vector3d& earth_m, std::uint32_t entry) const {
+  const Cell cell = CellAt(earth_m);
+  return {Hash(cell), entry, OffsetIn(cell, earth_m)};
+}
+
 void SpatialGrid::Insert(const GeoPoint& place, std::uint64_t id) {
   if (!IsValid(place)) throw Error("a place of a spatial grid is no valid position");
   if (2 * (entries_.size() + 1) > slots_.size()) Grow();
   const Eigen::Vector3d earth_m = ToEarth(place);
-  PutSlot({Hash(CellAt(earth_m)), static_cast<std::uint32_t>(entries_.size())});
+  PutSlot(SlotOf(earth_m, static_cast<std::uint32_t>(entries_.size())));
   entries_.push_back({earth_m, place, id});
+}
+
+/// The slot of what Insert added with exactly these values.
+std::optional<std::size_t> SpatialGrid::FindPlace(const Slot& like, const GeoPoint& place,
+                                                  std::uint64_t id) const {
+  for (std::size_t i = Home(like.hash); slots_[i].entry != kEmpty; i = Next(i)) {
+    if (slots_[i].hash != like.hash || slots_[i].offset != like.offset) continue;
+    const Entry& entry = entries_[slots_[i].entry];
+    if (entry.id == id && entry.place.latitude_deg == place.latitude_deg &&
+        entry.place.longitude_deg == place.longitude_deg) {
+      return i;
+    }
+  }
+  return std::nullopt;
 }
 
 bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
   if (!IsValid(place)) return false;
-  const std::uint32_t hash = Hash(CellAt(ToEarth(place)));
-  for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
-    const std::uint32_t index = slots_[i].entry;
-    if (slots_[i].hash != hash || entries_[index].id != id ||
-        entries_[index].place.latitude_deg != place.latitude_deg ||
-        entries_[index].place.longitude_deg != place.longitude_deg) {
-      continue;
-    }
-    ClearSlot(i);
-    // The last entry fills the hole, so that entries stay dense.
-    const auto last = static_cast<std::uint32_t>(entries_.size() - 1);
-    if (index != last) {
-      slots_[FindSlot(Hash(CellAt(entries_[last].earth_m)), last)].entry = index;
-      entries_[index] = entries_[last];
-    }
-    entries_.pop_back();
-    return true;
+  const auto found = FindPlace(SlotOf(ToEarth(place), kEmpty), place, id);
+  if (!found) return false;
+  const std::uint32_t index = slots_[*found].entry;
+  ClearSlot(*found);
+  // The last entry fills the hole, so that entries stay dense.
+  const auto last = static_cast<std::uint32_t>(entries_.size() - 1);
+  if (index != last) {
+    slots_[FindSlot(Hash(CellAt(entries_[last].earth_m)), last)].entry = index;
+    entries_[index] = entries_[last];
   }
-  return false;
+  entries_.pop_back();
+  return true;
+}
+
+bool SpatialGrid::Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t id) {
+  if (!IsValid(from)) return false;
+  if (!IsValid(to)) throw Error("a place of a spatial grid is no valid position");
+  const auto found = FindPlace(SlotOf(ToEarth(from), kEmpty), from, id);
+  if (!found) return false;
+  const std::uint32_t index = slots_[*found].entry;
+  const Eigen::Vector3d earth_m = ToEarth(to);
+  const Slot slot = SlotOf(earth_m, index);
+  if (slot.hash == slots_[*found].hash) {
+    slots_[*found] = slot;
+  } else {
+    ClearSlot(*found);
+    PutSlot(slot);
+  }
+  entries_[index] = {earth_m, to, id};
+  return true;
 }
 
 std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centre,
@@ -71,18 +102,18 @@ std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centr
   const Cell low = CellAt(search.earth_m.array() - search.ChordM());
   const Cell high = CellAt(search.earth_m.array() + search.ChordM());
   // In a large table every cell is a cache miss: ask for several at once, then read them.
-  std::array<std::uint32_t, 16> waiting;
+  std::array<std::pair<Cell, std::uint32_t>, 16> waiting;
   std::size_t count = 0;
   const auto read_waiting = [&] {
-    for (std::size_t i = 0; i < count; ++i) ReadCell(waiting[i], search);
+    for (std::size_t i = 0; i < count; ++i) ReadCell(waiting[i].first, waiting[i].second, search);
     count = 0;
   };
   Cell cell;
   for (cell[0] = low[0]; cell[0] <= high[0]; ++cell[0]) {
     for (cell[1] = low[1]; cell[1] <= high[1]; ++cell[1]) {
       for (cell[2] = low[2]; cell[2] <= high[2]; ++cell[2]) {
-        waiting[count] = Hash(cell);
-        __builtin_prefetch(&slots_[Home(waiting[count])]);
+        waiting[count] = {cell, Hash(cell)};
+        __builtin_prefetch(&slots_[Home(waiting[count].second)]);
         if (++count == waiting.size()) read_waiting();
       }
     }
@@ -121,10 +152,19 @@ std::vector<SpatialGrid::Neighbour> SpatialGrid::Within(const GeoPoint& centre,
   return found;
 }
 
-void SpatialGrid::ReadCell(std::uint32_t hash, Search& search) const {
+void SpatialGrid::ReadCell(const Cell& cell, std::uint32_t hash, Search& search) const {
+  // In units of an offset, from the corner of the cell. An offset is rounded down by less than one
+  // unit per axis: what lies further than two units beyond the chord cannot be within it.
+  const double unit_m = cell_m_ / 65536.0;
+  const Eigen::Vector3d corner = Eigen::Array3d(cell[0], cell[1], cell[2]) * cell_m_;
+  const Eigen::Vector3f from = ((search.earth_m - corner) / unit_m).cast<float>();
+  const auto reach = static_cast<float>(1.000001 * search.ChordM() / unit_m + 2.1);
   for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
-    if (slots_[i].hash != hash) continue;
-    const Entry& entry = entries_[slots_[i].entry];
+    const Slot& slot = slots_[i];
+    if (slot.hash != hash) continue;
+    const Eigen::Vector3f offset(slot.offset[0], slot.offset[1], slot.offset[2]);
+    if ((offset - from).squaredNorm() > reach * reach) continue;
+    const Entry& entry = entries_[slot.entry];
     if ((entry.earth_m - search.earth_m).squaredNorm() > search.ChordM() * search.ChordM())
       continue;
     const double distance_m = GeodesicDistanceM(entry.place, search.centre);
@@ -135,6 +175,15 @@ void SpatialGrid::ReadCell(std::uint32_t hash, Search& search) const {
       search.nearest = {entry.id, distance_m};
     }
   }
+}
+
+SpatialGrid::Offset SpatialGrid::OffsetIn(const Cell& cell, const Eigen::Vector3d& earth_m) const {
+  Offset offset;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double share = earth_m[static_cast<int>(axis)] / cell_m_ - cell[axis];
+    offset[axis] = static_cast<std::uint16_t>(std::min(std::max(share, 0.0) * 65536.0, 65535.0));
+  }
+  return offset;
 }
 
 SpatialGrid::Cell SpatialGrid::CellAt(const Eigen::Vector3d& earth_m) const {

@@ -36,6 +36,8 @@ class SpatialGrid {
   void Insert(const GeoPoint& place, std::uint64_t id);
   /// Removes what Insert added with exactly these values; false when there is none.
   bool Erase(const GeoPoint& place, std::uint64_t id);
+  /// The same as Erase and Insert, and cheaper over a short way; false when nothing stands there.
+  bool Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t id);
   /// The nearest place within `radius_m` (inclusive) of `centre`, the lowest id among equals.
   std::optional<Neighbour> Nearest(const GeoPoint& centre, double radius_m) const;
   /// Every place within `radius_m` (inclusive) of `centre`, in no order. Costs one cell of the
@@ -50,10 +52,14 @@ class SpatialGrid {
     GeoPoint place;
     std::uint64_t id;
   };
-  // One place of the hash table: the hash of the cell and where its entry stands.
+  // Where in its cell a place lies, in 65536ths of the cell's edge.
+  using Offset = std::array<std::uint16_t, 3>;
+  // One place of the hash table: the hash of the cell, where its entry stands, and roughly where
+  // that lies, so that entries too far away need not be looked at.
   struct Slot {
     std::uint32_t hash = 0;
     std::uint32_t entry = kEmpty;
+    Offset offset{};
   };
   struct Search {
     GeoPoint centre;
@@ -68,7 +74,11 @@ class SpatialGrid {
   using Cell = std::array<std::int32_t, 3>;
   static constexpr std::uint32_t kEmpty = 0xffffffff;
 
-  void ReadCell(std::uint32_t hash, Search& search) const;
+  void ReadCell(const Cell& cell, std::uint32_t hash, Search& search) const;
+  Offset OffsetIn(const Cell& cell, const Eigen::Vector3d& earth_m) const;
+  Slot SlotOf(const Eigen::Vector3d& earth_m, std::uint32_t entry) const;
+  std::optional<std::size_t> FindPlace(const Slot& like, const GeoPoint& place,
+                                       std::uint64_t id) const;
   Cell CellAt(const Eigen::Vector3d& earth_m) const;
   std::uint32_t Hash(const Cell& cell) const;
   std::size_t Next(std::size_t slot) const { return (slot + 1) & (slots_.size() - 1); }

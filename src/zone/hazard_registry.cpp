@@ -110,9 +110,9 @@ void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& p
   RememberForUndo(slot);
   HazardRecord& record = records_[slot];
   const bool newest = report.stamp_ns >= record.estimate.last_seen_ns;
-  TakeFromGrid(slot);
+  const GeoPoint from = record.estimate.position;
   Fuse(record.estimate, report, rule_);
-  PutOnGrid(slot);
+  classes_[record.hazard_class].grid.Move(from, record.estimate.position, slot);
   if (!picture.sha256.empty() && (newest || record.picture.empty())) {
     record.picture = PackedPicture(picture.sha256, picture.format);
   }

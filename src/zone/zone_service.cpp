@@ -69,14 +69,24 @@ ZoneService::Implementation::Change ZoneService::Implementation::NewChange() con
   return change;
 }
 
-/// Once per hazard and class, as they are in the end.
-void ZoneService::Implementation::WriteTouched(Change& change) {
+/// Hazards and classes once, as they are in the end; hazards before what refers to them.
+void ZoneService::Implementation::Write(Change& change) {
   std::vector<Slot>& touched = change.touched;
   std::sort(touched.begin(), touched.end());
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   for (const Slot slot : touched) {
     const HazardRecord& record = registry_.Record(slot);
     store_.WriteHazard({record.id, registry_.Get(slot), record.life});
+  }
+  for (std::size_t i = 0; i < change.events.size(); ++i) {
+    const EventPlace& place = change.places[i];
+    store_.WriteEvent(change.events[i], place.hazard_id, place.previous_sequence);
+  }
+  for (const AcceptedReport& accepted : change.reports) {
+    store_.WriteReport(*accepted.report, accepted.hazard_id, accepted.image_sha256, change.now_ns);
+  }
+  if (change.answer != nullptr) {
+    store_.WriteAnswer(*change.answer, change.answered_id, change.now_ns);
   }
   for (const auto& [class_name, before] : change.learned_before) {
     store_.WriteLife(class_name, survival_.learned().at(class_name));

@@ -91,7 +91,7 @@ void ZoneService::Implementation::NoteEvent(Slot slot, const std::optional<Befor
     change.announced = change.sequence;
   }
   event.hazard = registry_.Get(slot);
-  store_.WriteEvent(event, registry_.Record(slot).id, before ? before->sequence : 0);
+  change.places.push_back({registry_.Record(slot).id, before ? before->sequence : 0});
   change.touched.push_back(slot);
   change.pictures.emplace_back(was_on_map ? before->picture.Sha256() : "",
                                IsOnMap(state) ? event.hazard.image_sha256 : "");

@@ -67,7 +67,7 @@ bool ZoneService::Implementation::HandleAnswer(const PollAnswer& answer) {
     return false;
   }
   const OpenPoll poll = found->second;
-  const Change change = CommitAnswer(answer, poll, now_ns);
+  const Change change = CommitAnswer(answer, poll);
   open_polls_.erase(found);
   CountAnswer(true);
   {
@@ -102,7 +102,7 @@ bool ZoneService::Implementation::IsAcceptable(const PollAnswer& answer, const O
 }
 
 ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
-    const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns) {
+    const PollAnswer& answer, const OpenPoll& poll) {
   PictureName picture;
   if (answer.answer == PollAnswer::Answer::kYes && !answer.image.empty()) {
     picture.format = FormatName(ReadImageHeader(answer.image.data(), answer.image.size())->format);
@@ -113,7 +113,8 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
   Change change = NewChange();
   InTransaction(change, [&] {
     const Slot slot = poll.slot;
-    store_.WriteAnswer(answer, registry_.Record(slot).id, now_ns);
+    change.answer = &answer;
+    change.answered_id = registry_.Record(slot).id;
     PassTime(slot, change);
     LifeRecord life = registry_.Record(slot).life;
     const Evidence evidence{KindOf(answer.answer), VehicleKey(answer.vehicle_id), answer.stamp_ns};

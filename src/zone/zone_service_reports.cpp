@@ -145,7 +145,7 @@ void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Batc
       ++batch.counted.added;
     }
     const HazardRecord& record = registry_.Record(*slot);
-    store_.WriteReport(report, record.id, candidate.picture.sha256, batch.change.now_ns);
+    batch.change.reports.push_back({&report, record.id, candidate.picture.sha256});
     batch.hazard_of_report.emplace(report.uuid, record.uuid);
     batch.receipts[candidate.index] = Committed(report, record.uuid);
   }

@@ -89,15 +89,28 @@ class ZoneService::Implementation {
     std::uint64_t sequence = 0;
     PackedPicture picture;
   };
+  struct EventPlace {
+    std::uint32_t hazard_id = 0;
+    std::uint64_t previous_sequence = 0;  ///< Of the hazard's event before; 0 without one.
+  };
+  struct AcceptedReport {
+    const Report* report = nullptr;
+    std::uint32_t hazard_id = 0;
+    std::string image_sha256;
+  };
   /// What a transaction changes: kept when its commit succeeds, thrown away when it fails.
   struct Change {
     std::int64_t now_ns = 0;
     std::uint64_t sequence = 0;
     std::uint64_t announced = 0;
     std::vector<HazardEvent> events;
+    std::vector<EventPlace> places;                             ///< Of each event.
     std::vector<std::pair<std::string, std::string>> pictures;  ///< Before and after.
     std::vector<Slot> touched;                                  ///< Hazards to write; may repeat.
     std::map<std::string, LearnedLife> learned_before;          ///< By class.
+    std::vector<AcceptedReport> reports;
+    const PollAnswer* answer = nullptr;
+    std::uint32_t answered_id = 0;  ///< Hazard of the answer.
   };
   /// A report that may change the map.
   struct Candidate {
@@ -156,7 +169,8 @@ class ZoneService::Implementation {
   /// before. The caller holds writer_mutex_ and, exclusively, data_mutex_.
   template <typename Body>
   void InTransaction(Change& change, const Body& body);
-  void WriteTouched(Change& change);
+  /// All that changed in memory, to the store.
+  void Write(Change& change);
   void Forget(const Change& change);
   /// After data_mutex_ was released: pictures' references, what is due when, subscribers.
   void Settle(const Change& change);
@@ -164,7 +178,7 @@ class ZoneService::Implementation {
 
   // Polls: zone_service_polls.cpp.
   bool IsAcceptable(const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns) const;
-  Change CommitAnswer(const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns);
+  Change CommitAnswer(const PollAnswer& answer, const OpenPoll& poll);
   void CountAnswer(bool accepted);
 };
 
@@ -175,7 +189,7 @@ void ZoneService::Implementation::InTransaction(Change& change, const Body& body
     registry_.Begin();
     try {
       body();
-      WriteTouched(change);
+      Write(change);
       store_.Commit();
     } catch (...) {
       store_.Rollback();

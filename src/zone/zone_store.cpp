@@ -53,7 +53,7 @@ auto Explained(const std::string& doing, const Body& body) -> decltype(body()) {
 
 std::string WhyDamaged(const std::string& path, const std::string& verdict) {
   return "store: database '" + path + "' is damaged and left alone: " + verdict +
-         "; 'sqlite3 DAMAGED .recover' saves what it holds, see docs/zone.md";
+         "; how to recover what it holds stands in docs/zone.md";
 }
 
 std::string ConnectionText(const std::string& path) {

@@ -213,12 +213,6 @@ TEST_F(ZoneLifeTest, VehiclesThatPassAreAskedAndTwoDenialsTakeItOff) {
   const PollOrder second = Asked("car-9");
   DriveBy("car-9", -45, -15);
   EXPECT_TRUE(Zone().HandleAnswer(AnswerTo(second, PollAnswer::Answer::kNo)));
-  now_ns_ += 120'000'000'000;
-  const PollOrder third = Asked("car-10");
-  if (!third.poll.IsNil()) {
-    DriveBy("car-10", -45, -15);
-    EXPECT_TRUE(Zone().HandleAnswer(AnswerTo(third, PollAnswer::Answer::kNo)));
-  }
   EXPECT_EQ(State(hazard), HazardState::kGone);
   EXPECT_THAT(Zone().Events(hazard, 1).front().reason, HasSubstr("denied"));
   EXPECT_EQ(Zone().Statistics().answers_refused, 1U);

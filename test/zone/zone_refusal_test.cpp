@@ -116,6 +116,7 @@ TEST_F(ZoneRefusalTest, OtherVehiclesHaveTheirOwnPlaces) {
 
 TEST_F(ZoneRefusalTest, OneWrongFixDoesNotShutAnHonestVehicleOut) {
   EXPECT_EQ(Reason(Sample(0, 0)), "");
+  now_ns_ += 7200 * kSecondNs;
   // After a long pause a wild fix looks possible and is taken; then the vehicle is where it was.
   EXPECT_EQ(Reason(Sample(3600, 300000)), "");
   int refused = 0;
