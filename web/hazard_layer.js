@@ -64,8 +64,9 @@ function shortCount(count) {
 }
 
 export class HazardLayer {
-  /** `onOpen(hazard)` answers the popup's content. */
-  constructor(map, catalogue, onOpen) {
+  /** `onOpen(hazard)` answers the popup's content; `coveredHeight` of the map's foot, pixels. */
+  constructor(map, catalogue, onOpen, coveredHeight) {
+    this.coveredHeight = coveredHeight;
     this.map = map;
     this.catalogue = catalogue;
     this.onOpen = onOpen;
@@ -175,7 +176,8 @@ export class HazardLayer {
       { icon: this.icon(hazard.className, hazard.state), riseOnHover: true });
     marker.hazard = hazard;
     marker.bindPopup(() => this.onOpen(marker.hazard),
-      { minWidth: 296, maxWidth: 296, autoPanPadding: [16, 16], className: 'hazard-popup' });
+      { minWidth: 296, maxWidth: 296, className: 'hazard-popup', autoPanPaddingTopLeft: [16, 16],
+        autoPanPaddingBottomRight: [16, 16 + this.coveredHeight] });
     this.markers.set(hazard.id, marker);
     return marker;
   }

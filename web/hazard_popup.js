@@ -49,7 +49,9 @@ function bar(share) {
 /** The popup's content as a detached element; `extras` are what people can do with the hazard. */
 export function popupContent(hazard, catalogue, extras) {
   const sigma = hazard.sigma === null ? '' : ` \u00b1 ${hazard.sigma.toFixed(1)} m`;
+  const state = element('span', { class: `state state-${hazard.state}` }, stateLabel(hazard.state));
   const facts = [
+    ...row('State', state, element('span', { class: 'meaning' }, stateMeaning(hazard.state))),
     ...row('Position', element('span', { class: 'copyable' },
       position(hazard.latitude, hazard.longitude)), sigma),
     ...row('Last seen', time(hazard.lastSeen)),
@@ -64,9 +66,7 @@ export function popupContent(hazard, catalogue, extras) {
   },
   picture(hazard),
   element('h3', { class: 'popup-title' }, catalogue.badge(hazard.className, hazard.state),
-    element('span', { class: 'popup-label' }, hazard.label),
-    element('span', { class: `state state-${hazard.state}`, title: stateMeaning(hazard.state) },
-      stateLabel(hazard.state))),
+    element('span', {}, hazard.label)),
   element('dl', { class: 'facts' }, ...facts),
   ...extras);
 }

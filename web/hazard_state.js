@@ -3,7 +3,7 @@
 export const STATES = [
   { name: 'candidate', label: 'Unconfirmed', meaning: 'Drivers are not told yet' },
   { name: 'active', label: 'Active', meaning: 'Drivers are told' },
-  { name: 'verifying', label: 'Being checked', meaning: 'Drivers are told; passing vehicles are asked' },
+  { name: 'verifying', label: 'Being checked', meaning: 'Passing vehicles are asked' },
 ];
 
 const OFF_MAP = { gone: 'Gone', rejected: 'Rejected' };

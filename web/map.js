@@ -50,7 +50,8 @@ class Page {
     this.vehicles = new VehicleLayer(this.map, !config.tile_url);
     this.layer = new HazardLayer(this.map, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue,
-        [this.history.section(hazard), ...this.officials.buttons(hazard)]));
+        [this.history.section(hazard), ...this.officials.buttons(hazard)]),
+      this.sheet.coveredHeight());
     this.history = new HazardHistory((id) => this.layer.refresh(id));
     this.officials = new Officials(config.officials, (text) => this.say(text),
       (hazard) => this.layer.focusPopup(hazard.id, this.officials.decision));

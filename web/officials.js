@@ -115,31 +115,34 @@ export class Officials {
   }
 
   focusFirst() {
-    const fields = [this.reason, this.token].filter((field) => !field.closest('[hidden]'));
-    (fields.find((field) => field.value === '') ?? fields[0] ?? this.submit).focus();
+    const field = [this.reason, this.token].find((one) => !one.closest('[hidden]'));
+    (field ?? this.submit).focus();
   }
 
   async decide() {
     const { hazard, decision } = this;
     const token = this.token.value.trim() || savedToken();
     const reason = decision === 'reject' ? this.reason.value.trim().replace(/\s+/g, ' ') : '';
-    if (decision === 'reject' && reason === '') return this.refuse('Please say why.');
-    if (token === '') return this.refuse('Please enter your token.');
-    if (/[^\x21-\x7e]/.test(token)) return this.refuse('A token has no blanks or special letters.');
+    if (decision === 'reject' && reason === '') return this.refuse('Please say why.', this.reason);
+    if (token === '') return this.refuse('Please enter your token.', this.token);
+    if (/[^\x21-\x7e]/.test(token)) {
+      return this.refuse('A token has no blanks or special letters.', this.token);
+    }
     this.submit.disabled = true;
     const wrong = await send(hazard, decision, reason, token);
     if (this.hazard !== hazard || !this.dialog.open) return undefined;
     if (wrong !== null) {
       if (wrong.status === 401) saveToken('');
-      return this.refuse(wrong.sentence);
+      return this.refuse(wrong.sentence, wrong.status === 401 ? this.token : this.submit);
     }
     saveToken(token);
     this.dialog.close();
     return this.onDone(`${WORDS[decision].done}: ${hazard.label}`);
   }
 
-  refuse(sentence) {
+  refuse(sentence, field) {
     this.show(sentence, savedToken() === '');
-    this.focusFirst();
+    field.focus();
+    if (field === this.token) field.select();
   }
 }
