@@ -83,7 +83,10 @@ def vehicle_rights(zone):
     vehicle = f"livemap/v1/{zone}/vehicle/%u"
     return [f"pattern write {vehicle}/report",
             f"pattern write {vehicle}/position",
-            f"pattern read {vehicle}/receipt"]
+            f"pattern write {vehicle}/answer",
+            f"pattern read {vehicle}/receipt",
+            f"pattern read {vehicle}/notice",
+            f"pattern read {vehicle}/poll"]
 
 
 def limits(max_message_bytes):

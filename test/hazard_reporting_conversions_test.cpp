@@ -1,10 +1,14 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "ros/hazard_conversions.h"
+#include "ros/poll_conversions.h"
 
 namespace livemap {
 namespace {
@@ -73,13 +77,22 @@ TEST(HazardConversions, ReceiptSurvivesTheWayThroughItsMessage) {
 }
 
 TEST(HazardConversions, EventOfTheZoneBecomesTheNoticeOfTheVehicle) {
-  const std::pair<HazardAction, Notice::Action> actions[] = {
-      {HazardAction::kAdded, Notice::Action::kAdded},
-      {HazardAction::kUpdated, Notice::Action::kUpdated},
-      {HazardAction::kRemoved, Notice::Action::kRemoved}};
-  for (const auto& [action, expected] : actions) {
+  struct Step {
+    std::optional<HazardState> from;
+    HazardState to;
+    Notice::Action expected;
+  };
+  const Step steps[] = {{std::nullopt, HazardState::kActive, Notice::Action::kAdded},
+                        {HazardState::kCandidate, HazardState::kActive, Notice::Action::kAdded},
+                        {HazardState::kActive, HazardState::kVerifying, Notice::Action::kUpdated},
+                        {HazardState::kVerifying, HazardState::kGone, Notice::Action::kRemoved},
+                        {HazardState::kActive, HazardState::kRejected, Notice::Action::kRemoved}};
+  for (const Step& step : steps) {
     HazardEvent event;
-    event.action = action;
+    event.from = step.from;
+    event.hazard.state = step.to;
+    event.announced = true;
+    event.previous_announced = 95;
     event.hazard.uuid = Id(3);
     event.hazard.class_name = "deer";
     event.hazard.confidence = 0.5F;
@@ -91,7 +104,7 @@ TEST(HazardConversions, EventOfTheZoneBecomesTheNoticeOfTheVehicle) {
     event.hazard.updated_ns = kStampNs + 2;
     event.hazard.sequence = 99;
     const Notice notice = FromMessage(ToMessage(event));
-    EXPECT_EQ(notice.action, expected);
+    EXPECT_EQ(notice.action, step.expected);
     EXPECT_EQ(notice.hazard_uuid, Id(3));
     EXPECT_EQ(notice.class_name, "deer");
     EXPECT_EQ(notice.confidence, 0.5F);
@@ -103,6 +116,130 @@ TEST(HazardConversions, EventOfTheZoneBecomesTheNoticeOfTheVehicle) {
     EXPECT_EQ(notice.last_seen_ns, kStampNs + 1);
     EXPECT_EQ(notice.stamp_ns, kStampNs + 2);
     EXPECT_EQ(notice.sequence, 99u);
+    EXPECT_EQ(notice.previous_sequence, 95u);
+    EXPECT_EQ(notice.vehicle_id, "") << "to everybody";
+  }
+}
+
+TEST(HazardConversions, WhatOneVehicleIsToldBearsItsNameAndTheAnnouncementsSequence) {
+  Hazard hazard;
+  hazard.uuid = Id(3);
+  hazard.class_name = "deer";
+  hazard.position = {40, -80};
+  hazard.sequence = 120;
+  hazard.announced_sequence = 99;
+  const Notice notice = FromMessage(ToVehicleMessage(hazard, HazardAction::kRemoved, "car-1"));
+  EXPECT_EQ(notice.action, Notice::Action::kRemoved);
+  EXPECT_EQ(notice.vehicle_id, "car-1");
+  EXPECT_EQ(notice.sequence, 99u);
+  EXPECT_EQ(notice.previous_sequence, 0u);
+}
+
+TEST(HazardConversions, TheEndOfACatchUpSurvivesTheWayThroughItsMessage) {
+  Notice done;
+  done.action = Notice::Action::kCaughtUp;
+  done.sequence = 99;
+  done.previous_sequence = 7;
+  done.vehicle_id = "car-1";
+  done.position = {40, -80};
+  done.radius_m = 5000;
+  done.told = 12;
+  done.image_format = "jpeg";
+  done.image = {1, 2};
+  const Notice back = FromMessage(ToMessage(done));
+  EXPECT_EQ(back.action, Notice::Action::kCaughtUp);
+  EXPECT_EQ(back.sequence, 99u);
+  EXPECT_EQ(back.previous_sequence, 7u);
+  EXPECT_EQ(back.vehicle_id, "car-1");
+  EXPECT_EQ(back.radius_m, 5000);
+  EXPECT_EQ(back.told, 12u);
+  EXPECT_EQ(back.image_format, "jpeg");
+  EXPECT_EQ(back.image, done.image);
+}
+
+Poll MakePoll() {
+  Poll poll;
+  poll.poll = Id(1);
+  poll.hazard = Id(2);
+  poll.vehicle_id = "car-1";
+  poll.stamp_ns = kStampNs;
+  poll.expires_ns = kStampNs + 60'000'000'000;
+  poll.class_name = "deer";
+  poll.position = {40, -80};
+  poll.covariance_m2 << 1, 0.5, 0.5, 2;
+  poll.picture_wanted = true;
+  poll.max_picture_bytes = 5000;
+  return poll;
+}
+
+TEST(PollConversions, PollSurvivesTheWayThroughItsMessage) {
+  const Poll poll = MakePoll();
+  const Poll back = FromMessage(ToMessage(poll));
+  EXPECT_EQ(back.poll, poll.poll);
+  EXPECT_EQ(back.hazard, poll.hazard);
+  EXPECT_EQ(back.vehicle_id, "car-1");
+  EXPECT_EQ(back.stamp_ns, poll.stamp_ns);
+  EXPECT_EQ(back.expires_ns, poll.expires_ns);
+  EXPECT_EQ(back.class_name, "deer");
+  EXPECT_EQ(back.position.longitude_deg, -80);
+  EXPECT_EQ(back.covariance_m2, poll.covariance_m2);
+  EXPECT_TRUE(back.picture_wanted);
+  EXPECT_EQ(back.max_picture_bytes, 5000u);
+}
+
+TEST(PollConversions, PollsThatMakeNoSenseAreRefusedWithTheReason) {
+  const std::pair<std::function<void(HazardPoll&)>, const char*> faults[] = {
+      {[](HazardPoll& poll) { poll.schema_version = 9; }, "version 9"},
+      {[](HazardPoll& poll) { poll.poll_uuid.assign(0); }, "nil poll_uuid"},
+      {[](HazardPoll& poll) { poll.latitude = std::nan(""); }, "position"},
+      {[](HazardPoll& poll) { poll.covariance[0] = -1; }, "covariance"},
+      {[](HazardPoll& poll) { poll.covariance[1] = std::nan(""); }, "covariance"},
+      {[](HazardPoll& poll) { poll.class_name.clear(); }, "class_name"},
+      {[](HazardPoll& poll) { poll.class_name.assign(65, 'x'); }, "65 bytes"},
+      {[](HazardPoll& poll) { poll.expires = poll.stamp; }, "expires before"}};
+  for (const auto& [spoil, words] : faults) {
+    HazardPoll message = ToMessage(MakePoll());
+    spoil(message);
+    EXPECT_THAT([&message] { FromMessage(message); }, ThrowsMessage<Error>(HasSubstr(words)));
+  }
+}
+
+TEST(PollConversions, AnswerReachesTheZoneAsItWasGiven) {
+  PollReply reply;
+  reply.poll = Id(1);
+  reply.hazard = Id(2);
+  reply.vehicle_id = "car-1";
+  reply.drive_id = "drive-1";
+  reply.stamp_ns = kStampNs;
+  reply.answer = PollReply::Answer::kCantSee;
+  reply.reason = "too dark";
+  reply.confidence = 0.25F;
+  reply.vehicle_position = {40, -80};
+  reply.course_rad = std::numeric_limits<double>::quiet_NaN();
+  reply.image_format = "jpeg";
+  reply.image = {1, 2, 3};
+  const PollAnswer answer = ToPollAnswer(ToMessage(reply));
+  EXPECT_EQ(answer.poll, Id(1));
+  EXPECT_EQ(answer.hazard, Id(2));
+  EXPECT_EQ(answer.vehicle_id, "car-1");
+  EXPECT_EQ(answer.answer, PollAnswer::Answer::kCantSee);
+  EXPECT_EQ(answer.reason, "too dark");
+  EXPECT_EQ(answer.confidence, 0.25);
+  EXPECT_EQ(answer.vehicle_position.latitude_deg, 40);
+  EXPECT_EQ(answer.stamp_ns, kStampNs);
+  EXPECT_EQ(answer.image_format, "jpeg");
+  EXPECT_EQ(answer.image, reply.image);
+
+  const std::pair<std::function<void(HazardPollAnswer&)>, const char*> faults[] = {
+      {[](HazardPollAnswer& message) { message.answer = 3; }, "is 3"},
+      {[](HazardPollAnswer& message) { message.confidence = std::nanf(""); }, "confidence"},
+      {[](HazardPollAnswer& message) { message.longitude = 181; }, "position"},
+      {[](HazardPollAnswer& message) { message.reason.assign(65, 'x'); }, "65 bytes"},
+      {[](HazardPollAnswer& message) { message.hazard_uuid.assign(0); }, "nil hazard_uuid"}};
+  for (const auto& [spoil, words] : faults) {
+    HazardPollAnswer message = ToMessage(reply);
+    spoil(message);
+    EXPECT_THAT([&message] { ToPollAnswer(message); }, ThrowsMessage<Error>(HasSubstr(words)));
   }
 }
 
@@ -113,7 +250,8 @@ TEST(HazardConversions, VehiclePositionKeepsThatTheCourseIsUnknown) {
   vehicle.course_rad = std::numeric_limits<double>::quiet_NaN();
   vehicle.speed_mps = 0.25;
   vehicle.stamp_ns = kStampNs;
-  const VehiclePosition message = ToMessage(vehicle, 1.5);
+  const VehiclePosition message = ToMessage(vehicle, 1.5, 42);
+  EXPECT_EQ(message.map_sequence, 42u);
   EXPECT_EQ(message.horizontal_sigma, 1.5F);
   const VehicleState back = FromMessage(message);
   EXPECT_TRUE(std::isnan(back.course_rad));
@@ -127,14 +265,14 @@ TEST(HazardConversions, OtherSchemaVersionsAreRefused) {
   EXPECT_THAT([] { FromMessage(HazardNotice()); }, ThrowsMessage<Error>(HasSubstr("version 0")));
   EXPECT_THAT([] { FromMessage(ReportReceipt()); }, ThrowsMessage<Error>(HasSubstr("version 0")));
   VehiclePosition newer;
-  newer.schema_version = 2;
-  EXPECT_THAT([&] { FromMessage(newer); }, ThrowsMessage<Error>(HasSubstr("version 2")));
+  newer.schema_version = 3;
+  EXPECT_THAT([&] { FromMessage(newer); }, ThrowsMessage<Error>(HasSubstr("version 3")));
 }
 
 TEST(HazardConversions, UnknownActionsAndStatesAreRefused) {
   HazardNotice notice = ToMessage(Notice{});
-  notice.action = 3;
-  EXPECT_THAT([&] { FromMessage(notice); }, ThrowsMessage<Error>(HasSubstr("action 3")));
+  notice.action = 4;
+  EXPECT_THAT([&] { FromMessage(notice); }, ThrowsMessage<Error>(HasSubstr("action 4")));
   ReportReceipt receipt = ToMessage(Receipt{});
   receipt.status = 9;
   EXPECT_THAT([&] { FromMessage(receipt); }, ThrowsMessage<Error>(HasSubstr("status 9")));

@@ -14,8 +14,8 @@ from sensor_msgs.msg import CameraInfo, Image, NavSatFix, NavSatStatus
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from livemap.msg import (Detection, DetectionArray, HazardNotice, HazardReport, ReportReceipt,
-                         VehiclePosition)
+from livemap.msg import (Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
+                         ReportReceipt, VehiclePosition)
 from node_testing import NodeletUnderTest, eventually, parameters_of
 
 LATITUDE, LONGITUDE = 40.4433, -79.9436
@@ -113,9 +113,11 @@ class Vehicle(NodeletUnderTest):
             for topic, message_class, latch in [
                 ("hazard/detections", DetectionArray, False), ("hazard/annotated", Image, False),
                 ("fix", NavSatFix, False), ("camera_rect/camera_info", CameraInfo, True),
-                ("hazard/notice", HazardNotice, False), ("hazard/receipt", ReportReceipt, False)]}
+                ("hazard/notice", HazardNotice, False), ("hazard/receipt", ReportReceipt, False),
+                ("hazard/poll", HazardPoll, False)]}
         for topic, message_class in [("hazard/report", HazardReport), ("vehicle/position", VehiclePosition),
-                                     ("hazard/local_map", MarkerArray), ("path", Path)]:
+                                     ("hazard/local_map", MarkerArray), ("path", Path),
+                                     ("hazard/poll_answer", HazardPollAnswer)]:
             self.subscribe(topic, message_class)
         self.mounting = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self.ends.append(self.mounting)

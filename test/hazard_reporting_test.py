@@ -13,7 +13,7 @@ from sensor_msgs.msg import NavSatStatus
 
 from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, decode,
                                       detection, east_north, fix, on_street, place, stamp)
-from livemap.msg import HazardNotice, HazardReport, ReportReceipt
+from livemap.msg import HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, ReportReceipt
 from node_testing import eventually
 
 
@@ -22,11 +22,20 @@ def receipt(report, status=ReportReceipt.COMMITTED, hazard=9):
                          report_uuid=report.uuid, hazard_uuid=bytes([hazard] * 16))
 
 
-def notice(action, sequence, where):
+def notice(action, sequence, where, hazard=7, **fields):
     latitude, longitude = place(*where)
     return HazardNotice(schema_version=HazardNotice.SCHEMA_VERSION, action=action,
-                        sequence=sequence, hazard_uuid=bytes([7] * 16), class_name="pothole",
-                        confidence=0.5, latitude=latitude, longitude=longitude, sightings=1)
+                        sequence=sequence, hazard_uuid=bytes([hazard] * 16), class_name="pothole",
+                        confidence=0.5, latitude=latitude, longitude=longitude, sightings=1, **fields)
+
+
+def poll(number, where, life_s=60, **fields):
+    """Is the pothole there still? The zone's clock is another one than the drive's."""
+    latitude, longitude = place(*where)
+    return HazardPoll(schema_version=HazardPoll.SCHEMA_VERSION, poll_uuid=bytes([number] * 16),
+                      hazard_uuid=bytes([7] * 16), vehicle_id="car-1", stamp=rospy.Time(50),
+                      expires=rospy.Time(50 + life_s), class_name="pothole", latitude=latitude,
+                      longitude=longitude, covariance=[0.1, 0, 0, 0.1], **fields)
 
 
 class HazardReportingTest(unittest.TestCase):
@@ -100,6 +109,53 @@ class HazardReportingTest(unittest.TestCase):
         vehicle.wait_for(notices=2, known=0)
         vehicle.see(3.1, detection(10.4))
         vehicle.wait_for(reports_created=1)
+
+    def test_a_hazard_removed_while_it_was_off_disappears_with_the_catch_up(self):
+        vehicle = self.driving_vehicle()
+        vehicle.publish("hazard/notice", notice(HazardNotice.ADDED, 1, on_street(3.0, 13.0)))
+        vehicle.wait_for(known=1, map_sequence=1)
+        vehicle.kill()
+        vehicle.start()
+        vehicle.drive(5, 7)
+        eventually(lambda: vehicle.received("vehicle/position")[-1].map_sequence == 1,
+                   "it says from where it needs to be told")
+        vehicle.publish("hazard/notice",
+                        notice(HazardNotice.ADDED, 3, on_street(9.0), hazard=8, previous_sequence=2))
+        vehicle.wait_for(known=2, map_sequence=1)
+        own = {"vehicle_id": "car-1"}
+        vehicle.publish("hazard/notice", notice(HazardNotice.REMOVED, 2, on_street(3.0, 13.0), **own))
+        vehicle.publish("hazard/notice", notice(HazardNotice.CAUGHT_UP, 2, on_street(3.0), hazard=0,
+                                                previous_sequence=1, told=1, radius=5000, **own))
+        vehicle.wait_for(known=1, map_sequence=3)
+
+    def test_answers_a_poll_yes_with_a_picture_when_the_hazard_is_there(self):
+        vehicle = self.driving_vehicle(drive_id="drive-7")
+        vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0), picture_wanted=True, max_picture_bytes=20000))
+        vehicle.wait_for(polls=1)
+        vehicle.see(3.05, detection(11.2))
+        answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
+        self.assertEqual((answer.answer, answer.poll_uuid, answer.hazard_uuid),
+                         (HazardPollAnswer.YES, bytes([1] * 16), bytes([7] * 16)))
+        self.assertEqual((answer.stamp, answer.drive_id, answer.vehicle_id), (stamp(3.05), "drive-7", ""))
+        self.assertLess(math.dist(east_north(answer.latitude, answer.longitude), on_street(3.05)), 0.05)
+        self.assertLessEqual(len(answer.image.data), 20000)
+        self.assertEqual(decode(answer.image).shape, (400, 640, 3))
+
+    def test_answers_a_poll_no_when_nothing_was_there_and_cannot_see_without_images(self):
+        vehicle = self.driving_vehicle(poll_reserve_s=0.5)
+        vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0)))
+        vehicle.wait_for(polls=1)
+        for tenth in range(26, 38):
+            vehicle.see(tenth / 10)
+        answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
+        self.assertEqual((answer.answer, answer.reason), (HazardPollAnswer.NO, ""))
+        self.assertGreater(answer.confidence, 0.9)
+        vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0)))
+        vehicle.publish("hazard/poll", poll(2, on_street(3.0, 12.0), life_s=2))
+        second = eventually(lambda: vehicle.received("hazard/poll_answer")[1:], "another answer")[0]
+        self.assertEqual((second.answer, second.poll_uuid), (HazardPollAnswer.CANT_SEE, bytes([2] * 16)))
+        self.assertEqual(second.reason, "no image")
+        vehicle.wait_for(polls=3, polls_repeated=1, polls_no=1, polls_cant_see=1)
 
     def test_without_a_fix_holds_back_counts_and_invents_nothing(self):
         vehicle = self.make_vehicle(max_wait_s=2.0)

@@ -12,7 +12,8 @@ sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 
 import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from livemap.msg import HazardNotice, HazardReport, ReportReceipt, VehiclePosition  # noqa: E402
+from livemap.msg import (  # noqa: E402
+    HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, ReportReceipt, VehiclePosition)
 from mqtt_bridge_fixture import (  # noqa: E402
     Bridge, Broker, Master, Peer, envelope, eventually, serialise)
 
@@ -21,6 +22,9 @@ ZONE_TOPICS = {
     "sub:/vehicle/position": VehiclePosition,
     "pub:/hazard/receipt": ReportReceipt,
     "pub:/hazard/notice": HazardNotice,
+    "pub:/hazard/vehicle_notice": HazardNotice,
+    "pub:/hazard/poll": HazardPoll,
+    "sub:/hazard/poll_answer": HazardPollAnswer,
     "sub:/diagnostics": DiagnosticArray,
 }
 VEHICLE_TOPICS = {
@@ -30,6 +34,8 @@ VEHICLE_TOPICS = {
     "pub:/vehicle/position": VehiclePosition,
     "sub:/hazard/receipt": ReportReceipt,
     "sub:/hazard/notice": HazardNotice,
+    "sub:/hazard/poll": HazardPoll,
+    "pub:/hazard/poll_answer": HazardPollAnswer,
     "sub:/diagnostics": DiagnosticArray,
 }
 
@@ -122,6 +128,24 @@ class MqttBridgeTest(unittest.TestCase):
         receipts = eventually(lambda: self.vehicle_peer.received("/hazard/receipt"),
                               "the receipt arrives")
         self.assertEqual([r.reason for r in receipts], ["for car-1"])
+
+    def test_polls_and_what_one_vehicle_is_told_reach_that_vehicle_alone(self):
+        for vehicle in ("car-2", "car-1"):
+            self.zone_peer.publish("/hazard/poll", HazardPoll(vehicle_id=vehicle, class_name="for " + vehicle))
+            self.zone_peer.publish("/hazard/vehicle_notice",
+                                   HazardNotice(vehicle_id=vehicle, class_name="for " + vehicle, sequence=70))
+        polls = eventually(lambda: self.vehicle_peer.received("/hazard/poll"), "the poll arrives")
+        self.assertEqual([p.class_name for p in polls], ["for car-1"])
+        own = eventually(lambda: [n for n in self.vehicle_peer.received("/hazard/notice") if n.vehicle_id],
+                         "the notice arrives where all notices do")
+        self.assertEqual([n.class_name for n in own], ["for car-1"])
+
+    def test_zone_receives_a_poll_answer_under_the_identity_of_the_connection(self):
+        sent = HazardPollAnswer(vehicle_id="mayor", drive_id="p", confidence=0.5)
+        sent.image.data = bytes(50000)
+        self.vehicle_peer.publish("/hazard/poll_answer", sent)
+        received = eventually(lambda: self.zone_peer.received("/hazard/poll_answer"), "the answer arrives")[0]
+        self.assertEqual((received.vehicle_id, len(received.image.data)), ("car-1", 50000))
 
     def test_receipt_without_a_possible_addressee_is_refused_and_counted(self):
         before = self.zone_count("receipts_refused")

@@ -15,19 +15,22 @@ import unittest
 import urllib.request
 import uuid
 
+import cv2
+import numpy
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
-from livemap.msg import HazardNotice, HazardReport, ReportReceipt, VehiclePosition
+from livemap.msg import (HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, ReportReceipt,
+                         VehiclePosition)
 from visualization_msgs.msg import Marker, MarkerArray
 
 from node_testing import PATIENCE_S, eventually
 
 
-def make_report(latitude=40.44, longitude=-79.94, class_name="pothole"):
+def make_report(latitude=40.44, longitude=-79.94, class_name="pothole", vehicle_id="car-1"):
     report = HazardReport(schema_version=HazardReport.SCHEMA_VERSION)
     report.uuid = uuid.uuid4().bytes
-    report.vehicle_id = "car-1"
+    report.vehicle_id = vehicle_id
     report.drive_id = "drive-1"
     report.stamp = rospy.Time.from_sec(time.time() - 1)
     report.class_name = class_name
@@ -39,11 +42,11 @@ def make_report(latitude=40.44, longitude=-79.94, class_name="pothole"):
     return report
 
 
-def make_position(vehicle_id, latitude, longitude):
+def make_position(vehicle_id, latitude, longitude, map_sequence=0, course=1.0):
     return VehiclePosition(
         schema_version=VehiclePosition.SCHEMA_VERSION, vehicle_id=vehicle_id, drive_id="drive-1",
         stamp=rospy.Time.from_sec(time.time()), latitude=latitude, longitude=longitude,
-        course=1.0, speed=10.0, horizontal_sigma=2.0)
+        course=course, speed=10.0, horizontal_sigma=2.0, map_sequence=map_sequence)
 
 
 class Inbox:
@@ -73,6 +76,9 @@ class ZoneCloudletTest(unittest.TestCase):
         rospy.init_node("zone_cloudlet_test")
         cls.receipts = Inbox("hazard/receipt", ReportReceipt)
         cls.notices = Inbox("hazard/notice", HazardNotice)
+        cls.own_notices = Inbox("hazard/vehicle_notice", HazardNotice)
+        cls.polls = Inbox("hazard/poll", HazardPoll)
+        cls.answers = rospy.Publisher("hazard/poll_answer", HazardPollAnswer, queue_size=100)
         cls.markers = Inbox("hazard/markers", MarkerArray)
         cls.diagnostics = Inbox("/diagnostics", DiagnosticArray)
         cls.reports = rospy.Publisher("hazard/report", HazardReport, queue_size=1000)
@@ -89,19 +95,23 @@ class ZoneCloudletTest(unittest.TestCase):
 
     def command(self, **parameters):
         values = {"directory": os.path.join(self.directory, "zone"), "web_port": 0,
-                  "marker_period_s": 0.1, "diagnostics_period_s": 0.2, "join_gap_s": 600.0}
+                  "marker_period_s": 0.1, "diagnostics_period_s": 0.2, "join_gap_s": 600.0,
+                  "catch_up_lag_s": 0.2, "catch_up_retry_s": 0.2, "catch_up_longest_retry_s": 0.4}
         values.update(parameters)
         return (["rosrun", "livemap", "zone_cloudlet", "__name:=zone_cloudlet"] +
                 [f"_{name}:={value}" for name, value in values.items()])
 
     def start(self):
-        for inbox in (self.receipts, self.notices, self.markers, self.diagnostics):
+        for inbox in (self.receipts, self.notices, self.own_notices, self.polls, self.markers, self.diagnostics):
             inbox.clear()
         # Of its own process group: rosrun is a shell that does not pass signals on.
         self.process = subprocess.Popen(self.command(), start_new_session=True)
         eventually(lambda: self.reports.get_num_connections() == 1 and
                    self.positions.get_num_connections() == 1 and
                    self.receipts.subscriber.get_num_connections() == 1 and
+                   self.answers.get_num_connections() == 1 and
+                   self.polls.subscriber.get_num_connections() == 1 and
+                   self.own_notices.subscriber.get_num_connections() == 1 and
                    self.notices.subscriber.get_num_connections() == 1, "the zone connects")
 
     def stop(self, signal_number):
@@ -146,10 +156,13 @@ class ZoneCloudletTest(unittest.TestCase):
         self.assertEqual(receipt.vehicle_id, "car-1")
         hazard_id = str(uuid.UUID(bytes=receipt.hazard_uuid))
         self.assertEqual(self.stored(), [(hazard_id, "pothole", 40.44, -79.94, 1)])
+        self.assertEqual(self.notices.all(), [], "one vehicle's word is none for drivers")
+        self.send(make_report(vehicle_id="car-2"))
         notice = eventually(self.notices.all, "a notice")[0]
         self.assertEqual(notice.action, HazardNotice.ADDED)
         self.assertEqual(notice.hazard_uuid, receipt.hazard_uuid)
-        self.assertEqual(notice.sightings, 1)
+        self.assertEqual((notice.previous_sequence, notice.vehicle_id), (0, ""))
+        self.assertEqual(notice.sightings, 2)
         self.assertEqual(notice.first_seen, report.stamp)
         spheres = eventually(
             lambda: [m for a in self.markers.all() for m in a.markers if m.ns == "hazards"],
@@ -170,13 +183,16 @@ class ZoneCloudletTest(unittest.TestCase):
         self.assertEqual(again.status, ReportReceipt.COMMITTED)
         self.assertEqual(again.hazard_uuid, first.hazard_uuid)
         self.assertEqual([row[4] for row in self.stored()], [1])
-        other = self.send(make_report(latitude=40.44001))
-        self.assertEqual(other.hazard_uuid, first.hazard_uuid)
-        self.assertEqual([row[4] for row in self.stored()], [2])
+        for number, vehicle in enumerate(("car-2", "car-3"), start=2):
+            other = self.send(make_report(latitude=40.44001, vehicle_id=vehicle))
+            self.assertEqual(other.hazard_uuid, first.hazard_uuid)
+            self.assertEqual([row[4] for row in self.stored()], [number])
         eventually(lambda: self.count("reports_repeated") == 1, "the repetition is counted")
-        eventually(lambda: self.count("reports_merged") == 1, "the sighting is counted")
+        eventually(lambda: self.count("reports_merged") == 2, "the sightings are counted")
         eventually(lambda: [n.action for n in self.notices.all()] ==
-                   [HazardNotice.ADDED, HazardNotice.UPDATED], "one notice for each change")
+                   [HazardNotice.ADDED, HazardNotice.UPDATED], "drivers are told by the second vehicle")
+        added, updated = self.notices.all()
+        self.assertEqual(updated.previous_sequence, added.sequence, "nothing lies in between")
 
     def test_a_restart_keeps_the_same_hazards_and_knows_the_old_reports(self):
         report = make_report(class_name="<img src=x onerror=alert(1)>")
@@ -188,7 +204,7 @@ class ZoneCloudletTest(unittest.TestCase):
             self.assertEqual(self.stored(), before)
             self.assertEqual(self.send(report).hazard_uuid, first.hazard_uuid)
             self.assertEqual(self.stored(), before)
-            eventually(lambda: self.count("hazards_active") == 2, "both hazards are active")
+            eventually(lambda: self.count("hazards_on_map") == 2, "both hazards are on the map")
 
     def test_hostile_reports_are_refused_with_a_reason_and_leave_nothing(self):
         bad_position = make_report(latitude=float("nan"))
@@ -210,20 +226,80 @@ class ZoneCloudletTest(unittest.TestCase):
         eventually(lambda: self.count("reports_refused") == 4, "refusals are counted")
         eventually(lambda: self.count("reports_malformed") == 1, "the unknown schema is counted")
 
-    def test_a_joining_vehicle_is_told_what_is_around_it_once(self):
-        near = self.send(make_report())
-        self.send(make_report(latitude=41.44))  # 111 km away.
-        eventually(lambda: len(self.notices.all()) == 2, "both are announced")
+    def told(self, vehicle):
+        """What this vehicle alone was told, until the end of a catch-up."""
+        notices = [n for n in self.own_notices.all() if n.vehicle_id == vehicle]
+        return notices if notices and notices[-1].action == HazardNotice.CAUGHT_UP else None
+
+    def report_by_two(self, **place):
+        receipt = self.send(make_report(vehicle_id="car-8", **place))
+        self.send(make_report(vehicle_id="car-9", **place))
+        return receipt
+
+    def test_a_joining_vehicle_alone_is_told_what_is_around_it_once(self):
+        near = self.report_by_two()
+        # 111 km away: other vehicles, for none drives so fast.
+        for vehicle in ("car-6", "car-7"):
+            self.send(make_report(latitude=41.44, vehicle_id=vehicle))
+        announced = eventually(lambda: self.notices.all()[1:], "both are announced")[-1].sequence
         self.notices.clear()
         self.positions.publish(make_position("car-2", 40.45, -79.94))
-        told = eventually(self.notices.all, "the vehicle is told")
-        self.positions.publish(make_position("car-2", 40.4501, -79.94))
-        eventually(lambda: self.count("vehicle_positions") == 2, "both positions arrive")
-        self.assertEqual([(n.action, n.hazard_uuid) for n in self.notices.all()],
-                         [(HazardNotice.ADDED, near.hazard_uuid)])
+        told = eventually(lambda: self.told("car-2"), "the vehicle is told")
+        self.assertEqual([(n.action, n.hazard_uuid) for n in told],
+                         [(HazardNotice.ADDED, near.hazard_uuid), (HazardNotice.CAUGHT_UP, bytes(16))])
         self.assertEqual(told[0].class_name, "pothole")
+        self.assertEqual((told[1].sequence, told[1].previous_sequence, told[1].told), (announced, 0, 1))
+        self.assertEqual(told[1].radius, 5000)
+        self.positions.publish(make_position("car-2", 40.4501, -79.94, map_sequence=announced))
+        eventually(lambda: self.count("vehicle_positions") == 2, "both positions arrive")
+        self.assertEqual(len(self.own_notices.all()), 2)
+        self.assertEqual(self.notices.all(), [], "nobody else hears of it")
         eventually(lambda: [m for a in self.markers.all() for m in a.markers
                             if m.ns == "vehicles" and m.type == Marker.ARROW], "a vehicle marker")
+
+    def test_a_vehicle_that_missed_announcements_is_told_those_alone(self):
+        self.report_by_two()
+        first = eventually(self.notices.all, "it is announced")[0].sequence
+        self.positions.publish(make_position("car-2", 40.44, -79.94))
+        eventually(lambda: self.told("car-2"), "the vehicle is told")
+        self.positions.publish(make_position("car-2", 40.44, -79.94, map_sequence=first))
+        self.own_notices.clear()
+        missed = self.report_by_two(latitude=40.4405)
+        second = eventually(lambda: self.notices.all()[1:], "the second is announced")[0]
+        self.assertEqual(second.previous_sequence, first)
+
+        def still_behind():
+            self.positions.publish(make_position("car-2", 40.44, -79.94, map_sequence=first))
+            return self.told("car-2")
+        told = eventually(still_behind, "it is told what it missed")
+        self.assertEqual([n.hazard_uuid for n in told[:2]], [missed.hazard_uuid, bytes(16)])
+        self.assertEqual((told[1].previous_sequence, told[1].sequence), (first, second.sequence))
+        eventually(lambda: self.count("vehicles_behind") >= 1, "it is counted")
+
+    def test_a_notice_of_a_new_hazard_carries_a_small_picture(self):
+        pixels = numpy.full((480, 640, 3), 120, numpy.uint8)
+        cv2.rectangle(pixels, (10, 20), (110, 90), (0, 0, 255), 3)
+        picture = cv2.imencode(".jpg", pixels)[1].tobytes()
+        for vehicle in ("car-1", "car-2"):
+            report = make_report(vehicle_id=vehicle)
+            report.image.format, report.image.data = "jpeg", picture
+            self.send(report)
+        notice = eventually(self.notices.all, "a notice")[0]
+        self.assertEqual(notice.image.format, "jpeg")
+        self.assertLessEqual(len(notice.image.data), 4096)
+        small = cv2.imdecode(numpy.frombuffer(notice.image.data, numpy.uint8), cv2.IMREAD_COLOR)
+        self.assertLessEqual(small.shape[1], 192)
+
+    def test_an_answer_to_no_poll_is_refused_and_counted(self):
+        answer = HazardPollAnswer(schema_version=HazardPollAnswer.SCHEMA_VERSION, poll_uuid=bytes([1] * 16),
+                                  hazard_uuid=bytes([2] * 16), vehicle_id="car-1", confidence=0.5,
+                                  latitude=40.44, longitude=-79.94)
+        answer.stamp = rospy.Time.from_sec(time.time())
+        self.answers.publish(answer)
+        eventually(lambda: self.count("answers_refused") == 1, "an invented poll is counted")
+        answer.confidence = float("nan")
+        self.answers.publish(answer)
+        eventually(lambda: self.count("answers_refused") == 2, "nonsense is counted, too")
 
     def test_a_position_that_is_none_is_dropped_and_counted(self):
         self.positions.publish(make_position("car-2", float("nan"), 0.0))

@@ -123,7 +123,7 @@ FixTrack::Lookup FixTrack::At(std::int64_t stamp_ns) const {
       points_.begin(), points_.end(), stamp_ns,
       [](const Point& point, std::int64_t moment_ns) { return point.stamp_ns < moment_ns; });
   if (points_.empty()) return {Answer::kWait, {}};
-  if (after == points_.begin() && after->stamp_ns != stamp_ns) return {Answer::kNever, {}};
+  if (after == points_.begin() && after->stamp_ns != stamp_ns) return {Answer::kHopeless, {}};
   // What lies beyond the first later fix stays out, so that the answer does not hang on how late it
   // is asked for: a replay places every hazard where the drive placed it.
   const auto motion = MotionAt(stamp_ns, after == points_.end() ? after : std::next(after));
@@ -142,7 +142,7 @@ FixTrack::Lookup FixTrack::At(std::int64_t stamp_ns) const {
   } else {
     const Point& before = *std::prev(after);
     if (Seconds(after->stamp_ns - before.stamp_ns) > config_.max_gap_s) {
-      return {Answer::kNever, {}};
+      return {Answer::kHopeless, {}};
     }
     lookup = {Answer::kReady, Interpolate(before, *after, stamp_ns)};
   }

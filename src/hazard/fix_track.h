@@ -77,7 +77,7 @@ class FixTrack {
     kReady,
     kExtrapolated,  ///< The pose is there, but a later fix would make it better.
     kWait,          ///< Not known now; a later fix may tell.
-    kNever,         ///< No later fix can tell.
+    kHopeless,      ///< No later fix can tell.
   };
 
   struct Lookup {

@@ -42,6 +42,26 @@ void HazardReporter::SetMounting(const std::string& frame_id,
   mountings_[frame_id] = base_from_optical;
 }
 
+std::optional<Eigen::Isometry3d> HazardReporter::Mounting(const std::string& frame_id) const {
+  const auto found = mountings_.find(frame_id);
+  if (found == mountings_.end()) return std::nullopt;
+  return found->second;
+}
+
+FixTrack::Lookup HazardReporter::BasePoseAt(std::int64_t stamp_ns) const {
+  if (config_.position_source == PositionSource::kFused) {
+    const FixTrack::Lookup fused = poses_.At(stamp_ns);
+    if (fused.answer == FixTrack::Answer::kReady) return fused;
+  }
+  FixTrack::Lookup lookup = track_.At(stamp_ns);
+  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
+  const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const bool known =
+      lookup.answer == FixTrack::Answer::kReady || lookup.answer == FixTrack::Answer::kExtrapolated;
+  if (known) lookup.pose.position = PlaceHazard(lookup.pose, antenna_m, origin).position;
+  return lookup;
+}
+
 void HazardReporter::AddFix(const Fix& fix) {
   ++counters_.fixes;
   switch (track_.Add(fix)) {
@@ -153,8 +173,22 @@ void HazardReporter::ApplyNotices() {
   }
 }
 
+/// Once a minute of the stamps' clock.
+void HazardReporter::ForgetUnannounced(double now_s) {
+  constexpr double kPeriodS = 60.0;
+  if (forgot_s_ && now_s >= *forgot_s_ && now_s - *forgot_s_ < kPeriodS) return;
+  forgot_s_ = now_s;
+  try {
+    counters_.forgotten_unannounced +=
+        map_.ForgetUnannounced(static_cast<std::int64_t>(now_s * 1e9));
+  } catch (const StoreError& error) {
+    TellStoreError(error);
+  }
+}
+
 void HazardReporter::Process(double now_s, double steady_s) {
   ApplyNotices();
+  ForgetUnannounced(now_s);
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
 }
 

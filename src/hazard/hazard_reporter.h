@@ -20,24 +20,9 @@
 #include "hazard/pose_track.h"
 #include "hazard/report.h"
 #include "hazard/resend_schedule.h"
+#include "hazard/sighting.h"
 
 namespace livemap {
-
-/// One thing that the detector saw in an image.
-struct Sighting {
-  std::string class_name;
-  float confidence = 0;
-  Box box;
-};
-
-/// What the detector saw in one image.
-struct SightingFrame {
-  std::int64_t stamp_ns = 0;
-  std::string frame_id;  ///< Optical frame of the image.
-  std::uint32_t image_width = 0;
-  std::uint32_t image_height = 0;
-  std::vector<Sighting> sightings;
-};
 
 /// Whose positions count.
 enum class PositionSource {
@@ -111,6 +96,8 @@ class HazardReporter {
     std::uint64_t refused = 0;    ///< Reports that the zone will never accept.
     std::uint64_t notices = 0;
     std::uint64_t invalid_notices = 0;
+    std::uint64_t forgotten_unannounced =
+        0;  ///< Hazards that the zone took in and never announced.
     std::uint64_t fixes = 0;
     std::uint64_t invalid_fixes = 0;  ///< NaN, out of range, out of order.
     std::uint64_t no_fixes = 0;       ///< The receiver said that it had none.
@@ -148,6 +135,12 @@ class HazardReporter {
   /// At most `limit` reports to send now.
   std::vector<Report> TakeDue(double steady_s, std::size_t limit);
 
+  /// Where base_link was at a moment and which way it looked: by the source that counts, for kFused
+  /// the fixes where the fusion has no word.
+  FixTrack::Lookup BasePoseAt(std::int64_t stamp_ns) const;
+  const std::optional<CameraIntrinsics>& intrinsics() const { return intrinsics_; }
+  std::optional<Eigen::Isometry3d> Mounting(const std::string& frame_id) const;
+
   /// Intrinsics and some camera's mounting are known.
   bool HasCamera() const { return intrinsics_ && !mountings_.empty(); }
   const FixTrack& track() const { return track_; }
@@ -184,6 +177,7 @@ class HazardReporter {
                                          double heading_variance_rad2);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);
   void ApplyNotices();
+  void ForgetUnannounced(double now_s);
   void TellStoreError(const StoreError& error);
 
   Config config_;
@@ -199,6 +193,7 @@ class HazardReporter {
   std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
   std::map<std::int64_t, DepthImage> depths_;       // By stamp.
   std::deque<Notice> notices_;
+  std::optional<double> forgot_s_;  // When ForgetUnannounced last looked.
   std::set<Uuid> unsent_;
   Counters counters_;
   std::string store_error_;

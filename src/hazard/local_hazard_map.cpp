@@ -22,7 +22,12 @@ const std::vector<std::string>& Migrations() {
                   "  news_ns INTEGER NOT NULL"
                   ") WITHOUT ROWID;"
                   "CREATE INDEX known_by_news ON known(news_ns);") +
-      kCreateReportTable};
+          kCreateReportTable,
+      // Removed hazards are remembered, lest an older notice that comes late brings them back.
+      "CREATE TABLE gone(id BLOB PRIMARY KEY, sequence INTEGER NOT NULL) WITHOUT ROWID;"
+      "CREATE INDEX gone_by_sequence ON gone(sequence);"
+      "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
+      "INSERT INTO zone(map_sequence) VALUES(0);"};
   return migrations;
 }
 
@@ -31,14 +36,6 @@ bool TellsCorruption(const StoreError& error) {
   const std::string sentence = error.what();
   return sentence.find("malformed") != std::string::npos ||
          sentence.find("not a database") != std::string::npos;
-}
-
-bool IsUsable(const Notice& notice) {
-  if (notice.hazard_uuid.IsNil()) return false;
-  if (notice.action == Notice::Action::kRemoved) return true;
-  return IsValid(notice.position) && !notice.class_name.empty() &&
-         notice.class_name.size() <= kMaxClassNameBytes && notice.confidence >= 0 &&
-         notice.confidence <= 1;
 }
 
 }  // namespace
@@ -53,6 +50,7 @@ LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& cata
     database_.reset();
     SetAside(now_ns);
     Open();
+    RecoverFromSetAside();
   }
 }
 
@@ -80,6 +78,20 @@ void LocalHazardMap::SetAside(std::int64_t now_ns) {
   set_aside_ = target;
 }
 
+void LocalHazardMap::RecoverFromSetAside() {
+  // So that the first page of the new file is in the file itself.
+  database_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Execute();
+  salvage_ = SalvageReports(set_aside_, config_.path, [this](const Report& report, bool sent) {
+    if (LoadPending(report.uuid)) return;
+    database_->Transaction([&] {
+      InsertReport(*database_, report);
+      if (!filter_.Find(report.class_name, report.position)) InsertKnown(report);
+    });
+    if (sent) MarkSent(report.uuid);
+  });
+  LoadFilter();
+}
+
 void LocalHazardMap::LoadFilter() {
   filter_ = DuplicateFilter(catalogue_);
   SqliteStatement rows = database_->Prepare("SELECT id,class_name,latitude,longitude FROM known");
@@ -87,9 +99,17 @@ void LocalHazardMap::LoadFilter() {
     const GeoPoint position{rows.Real(2), rows.Real(3)};
     if (IsValid(position)) filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), position);
   }
-  SqliteStatement count = database_->Prepare("SELECT count(*) FROM pending");
+  SqliteStatement zone = database_->Prepare("SELECT map_sequence FROM zone");
+  if (zone.Step()) chain_ = AnnouncementChain(static_cast<std::uint64_t>(zone.Int(0)));
+  CountPending();
+}
+
+void LocalHazardMap::CountPending() {
+  SqliteStatement count =
+      database_->Prepare("SELECT count(*),coalesce(sum(length(image)),0) FROM pending");
   count.Step();
   pending_count_ = static_cast<std::size_t>(count.Int(0));
+  pending_bytes_ = static_cast<std::size_t>(count.Int(1)) + pending_count_ * kReportBytes;
 }
 
 std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& class_name,
@@ -99,97 +119,86 @@ std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& cl
 
 LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report) {
   if (filter_.Find(report.class_name, report.position)) return AddResult::kDuplicate;
-  if (pending_count_ >= static_cast<std::size_t>(config_.max_pending)) return AddResult::kFull;
-  std::vector<Uuid> evicted;
+  const std::size_t bytes = report.image.size() + kReportBytes;
+  if (pending_count_ >= static_cast<std::size_t>(config_.max_pending) ||
+      static_cast<double>(pending_bytes_ + bytes) > config_.max_pending_bytes) {
+    return AddResult::kFull;
+  }
+  std::vector<Change> changes = {{report.uuid, true, report.class_name, report.position}};
   database_->Transaction([&] {
-    SqliteStatement known = database_->Prepare(
-        "INSERT INTO known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
-        " VALUES(?,0,?,?,?,?,0,?)");
-    known.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
-        .Bind(2, report.class_name)
-        .Bind(3, static_cast<double>(report.confidence))
-        .Bind(4, report.position.latitude_deg)
-        .Bind(5, report.position.longitude_deg)
-        .Bind(6, report.stamp_ns)
-        .Execute();
+    InsertKnown(report);
     InsertReport(*database_, report);
-    evicted = EvictBeyondLimit();
+    EvictBeyondLimit(changes);
   });
-  filter_.Put(report.uuid, report.class_name, report.position);
-  for (const Uuid& id : evicted) filter_.Remove(id);
+  Show(changes);
   ++pending_count_;
-  ++revision_;
+  pending_bytes_ += bytes;
   return AddResult::kAdded;
 }
 
-std::size_t LocalHazardMap::Apply(const std::vector<Notice>& notices) {
-  std::vector<const Notice*> news;
-  std::vector<Uuid> evicted;
-  std::size_t unusable = 0;
-  database_->Transaction([&] {
-    for (const Notice& notice : notices) {
-      if (!IsUsable(notice)) {
-        ++unusable;
-      } else if (IsNews(notice)) {
-        StoreNotice(notice);
-        news.push_back(&notice);
-      }
-    }
-    evicted = EvictBeyondLimit();
-  });
-  for (const Notice* notice : news) {
-    if (notice->action == Notice::Action::kRemoved) {
-      filter_.Remove(notice->hazard_uuid);
-    } else {
-      filter_.Put(notice->hazard_uuid, notice->class_name, notice->position);
-    }
-  }
-  for (const Uuid& id : evicted) filter_.Remove(id);
-  if (!news.empty()) ++revision_;
-  return unusable;
-}
-
-bool LocalHazardMap::IsNews(const Notice& notice) const {
-  SqliteStatement query = database_->Prepare("SELECT sequence FROM known WHERE id=? AND of_zone=1");
-  query.BindBlob(1, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size());
-  if (!query.Step()) return notice.action != Notice::Action::kRemoved;
-  return static_cast<std::int64_t>(notice.sequence) > query.Int(0);
-}
-
-void LocalHazardMap::StoreNotice(const Notice& notice) {
-  const auto& id = notice.hazard_uuid.bytes;
-  if (notice.action == Notice::Action::kRemoved) {
-    database_->Prepare("DELETE FROM known WHERE id=?").BindBlob(1, id.data(), id.size()).Execute();
-    return;
-  }
-  SqliteStatement upsert = database_->Prepare(
-      "INSERT OR REPLACE INTO"
-      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
-      " VALUES(?,1,?,?,?,?,?,?)");
-  upsert.BindBlob(1, id.data(), id.size())
-      .Bind(2, notice.class_name)
-      .Bind(3, static_cast<double>(notice.confidence))
-      .Bind(4, notice.position.latitude_deg)
-      .Bind(5, notice.position.longitude_deg)
-      .Bind(6, static_cast<std::int64_t>(notice.sequence))
-      .Bind(7, notice.stamp_ns)
+void LocalHazardMap::InsertKnown(const Report& report) {
+  SqliteStatement known = database_->Prepare(
+      "INSERT INTO known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
+      " VALUES(?,0,?,?,?,?,0,?)");
+  known.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
+      .Bind(2, report.class_name)
+      .Bind(3, static_cast<double>(report.confidence))
+      .Bind(4, report.position.latitude_deg)
+      .Bind(5, report.position.longitude_deg)
+      .Bind(6, report.stamp_ns)
       .Execute();
 }
 
-std::vector<Uuid> LocalHazardMap::EvictBeyondLimit() {
+/// The filter learns what a transaction did.
+void LocalHazardMap::Show(const std::vector<Change>& changes) {
+  for (const Change& change : changes) {
+    if (change.known) {
+      filter_.Put(change.id, change.class_name, change.position);
+    } else {
+      filter_.Remove(change.id);
+    }
+  }
+  if (!changes.empty()) ++revision_;
+}
+
+void LocalHazardMap::Forget(const Uuid& id, std::vector<Change>& changes) {
+  database_->Prepare("DELETE FROM known WHERE id=?")
+      .BindBlob(1, id.bytes.data(), id.bytes.size())
+      .Execute();
+  changes.push_back({id, false, "", {}});
+}
+
+void LocalHazardMap::EvictBeyondLimit(std::vector<Change>& changes) {
   SqliteStatement count = database_->Prepare("SELECT count(*) FROM known");
   count.Step();
   const std::int64_t excess = count.Int(0) - config_.max_known;
-  if (excess <= 0) return {};
+  if (excess <= 0) return;
   SqliteStatement oldest = database_->Prepare(
       "SELECT id FROM known WHERE id NOT IN (SELECT uuid FROM pending)"
       " ORDER BY news_ns LIMIT ?");
   oldest.Bind(1, excess);
   std::vector<Uuid> evicted;
   while (oldest.Step()) evicted.push_back(UuidFromBlob(oldest.Blob(0)));
-  SqliteStatement remove = database_->Prepare("DELETE FROM known WHERE id=?");
-  for (const Uuid& id : evicted) remove.BindBlob(1, id.bytes.data(), id.bytes.size()).Execute();
-  return evicted;
+  for (const Uuid& id : evicted) Forget(id, changes);
+}
+
+std::size_t LocalHazardMap::ForgetUnannounced(std::int64_t now_ns) {
+  std::vector<Uuid> passed;
+  SqliteStatement rows =
+      database_->Prepare("SELECT id,class_name,news_ns FROM known WHERE of_zone=1 AND sequence=0");
+  while (rows.Step()) {
+    const double age_s = static_cast<double>(now_ns - rows.Int(2)) * 1e-9;
+    if (age_s > catalogue_.Get(rows.Text(1)).expected_life_s) {
+      passed.push_back(UuidFromBlob(rows.Blob(0)));
+    }
+  }
+  if (passed.empty()) return 0;
+  std::vector<Change> changes;
+  database_->Transaction([&] {
+    for (const Uuid& id : passed) Forget(id, changes);
+  });
+  Show(changes);
+  return passed.size();
 }
 
 bool LocalHazardMap::Apply(const Receipt& receipt) {
@@ -215,6 +224,7 @@ bool LocalHazardMap::Apply(const Receipt& receipt) {
         .Execute();
   });
   --pending_count_;
+  pending_bytes_ -= report->image.size() + kReportBytes;
   if (!renames) return true;
   if (receipt.report_uuid != receipt.hazard_uuid) filter_.Remove(receipt.report_uuid);
   if (!filter_.Knows(receipt.hazard_uuid)) {

@@ -53,10 +53,10 @@ FixTrack::Lookup PoseTrack::At(std::int64_t stamp_ns) const {
       [](const Point& point, std::int64_t moment_ns) { return point.stamp_ns < moment_ns; });
   if (after == points_.end()) return {Answer::kWait, {}};
   if (after->stamp_ns == stamp_ns) return {Answer::kReady, after->pose};
-  if (after == points_.begin()) return {Answer::kNever, {}};
+  if (after == points_.begin()) return {Answer::kHopeless, {}};
   const Point& before = *std::prev(after);
   const double gap_s = Seconds(after->stamp_ns - before.stamp_ns);
-  if (gap_s > config_.max_gap_s) return {Answer::kNever, {}};
+  if (gap_s > config_.max_gap_s) return {Answer::kHopeless, {}};
   return {Answer::kReady,
           Between(before.pose, after->pose, Seconds(stamp_ns - before.stamp_ns) / gap_s)};
 }

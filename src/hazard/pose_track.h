@@ -27,7 +27,7 @@ class PoseTrack {
   /// The pose's position is that of base_link, its course the heading. False when it is refused:
   /// not finite, no position, no covariance, or not newer than the newest.
   bool Add(std::int64_t stamp_ns, const TrackPose& pose);
-  /// kReady, kWait (a later pose may tell) or kNever. Once kReady, poses that come later do not
+  /// kReady, kWait (a later pose may tell) or kHopeless. Once kReady, poses that come later do not
   /// change it.
   FixTrack::Lookup At(std::int64_t stamp_ns) const;
   /// The newest pose's moment; nothing before the first.

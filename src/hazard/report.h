@@ -55,20 +55,59 @@ struct Receipt {
   std::string reason;      ///< One sentence, empty when committed.
 };
 
-/// The zone tells a vehicle what changed on its map (HazardNotice.msg without ROS).
+/// The zone tells vehicles what changed on its map (HazardNotice.msg without ROS).
 struct Notice {
-  enum class Action { kAdded, kUpdated, kRemoved };
+  enum class Action { kAdded, kUpdated, kRemoved, kCaughtUp };
   Action action = Action::kAdded;
   std::uint64_t sequence = 0;  ///< Of the zone's event log, strictly increasing.
-  Uuid hazard_uuid;
+  /// To everybody: of the announcement before; 0: there was none. With kCaughtUp: where the telling
+  /// began, see HazardNotice.msg.
+  std::uint64_t previous_sequence = 0;
+  std::string vehicle_id;     ///< Addressee; empty: everybody.
+  Uuid hazard_uuid;           ///< Nil with kCaughtUp.
   std::int64_t stamp_ns = 0;  ///< When the zone decided, zone clock (UTC).
   std::string class_name;
   float confidence = 0;  ///< 0..1.
-  GeoPoint position;
+  GeoPoint position;     ///< With kCaughtUp: the middle of what was told.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
   std::uint32_t sightings = 0;                              ///< Reports merged so far.
   std::int64_t first_seen_ns = 0;                           ///< Image stamp of the first report.
   std::int64_t last_seen_ns = 0;                            ///< Image stamp of the newest report.
+  double radius_m = 0;                                      ///< kCaughtUp: around `position`.
+  std::uint32_t told = 0;           ///< kCaughtUp: hazards told since the kCaughtUp before.
+  std::string image_format;         ///< "jpeg", or empty when there is no picture.
+  std::vector<std::uint8_t> image;  ///< Small annotated picture; may be empty.
+};
+
+/// The zone asks one vehicle whether a hazard is still there (HazardPoll.msg without ROS).
+struct Poll {
+  Uuid poll;
+  Uuid hazard;                  ///< The zone's id.
+  std::string vehicle_id;       ///< Addressee.
+  std::int64_t stamp_ns = 0;    ///< When the zone asked, zone clock (UTC).
+  std::int64_t expires_ns = 0;  ///< An answer after this counts no more, zone clock.
+  std::string class_name;
+  GeoPoint position;                                        ///< Of the hazard.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
+  bool picture_wanted = false;
+  std::uint32_t max_picture_bytes = 0;
+};
+
+/// What a vehicle saw at a hazard's place (HazardPollAnswer.msg without ROS).
+struct PollReply {
+  enum class Answer { kYes, kNo, kCantSee };
+  Uuid poll;
+  Uuid hazard;
+  std::string vehicle_id;  ///< Empty on the vehicle; the zone's bridge writes the proven identity.
+  std::string drive_id;
+  std::int64_t stamp_ns = 0;  ///< Of the image that decided, vehicle clock (UTC).
+  Answer answer = Answer::kCantSee;
+  std::string reason;         ///< One sentence, why kCantSee; else empty.
+  float confidence = 0;       ///< 0..1, of kYes and kNo.
+  GeoPoint vehicle_position;  ///< At `stamp_ns`.
+  double course_rad = 0;      ///< Clockwise from true north; NaN when standing.
+  std::string image_format;   ///< "jpeg", or empty when there is no picture.
+  std::vector<std::uint8_t> image;
 };
 
 }  // namespace livemap

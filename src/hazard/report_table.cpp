@@ -1,8 +1,37 @@
 #include "hazard/report_table.h"
 
 #include <algorithm>
+#include <string>
 
 namespace livemap {
+namespace {
+
+constexpr char kSelectReport[] =
+    "SELECT drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,latitude,longitude,"
+    "variance_east,covariance_east_north,variance_north,"
+    "image_width,image_height,image_frame_id,image_format,image,uuid,sent FROM pending ";
+
+/// Of a row of kSelectReport.
+Report ReadReport(const SqliteStatement& row) {
+  const auto real = [&row](int column) { return static_cast<float>(row.Real(column)); };
+  Report report;
+  report.drive_id = row.Text(0);
+  report.stamp_ns = row.Int(1);
+  report.class_name = row.Text(2);
+  report.confidence = real(3);
+  report.box = {real(4), real(5), real(6), real(7)};
+  report.position = {row.Real(8), row.Real(9)};
+  report.covariance_m2 << row.Real(10), row.Real(11), row.Real(11), row.Real(12);
+  report.image_width = static_cast<std::uint32_t>(row.Int(13));
+  report.image_height = static_cast<std::uint32_t>(row.Int(14));
+  report.image_frame_id = row.Text(15);
+  report.image_format = row.Text(16);
+  report.image = row.Blob(17);
+  report.uuid = UuidFromBlob(row.Blob(18));
+  return report;
+}
+
+}  // namespace
 
 const char* const kCreateReportTable =
     "CREATE TABLE pending("
@@ -55,28 +84,17 @@ void InsertReport(SqliteDatabase& database, const Report& report) {
 }
 
 std::optional<Report> SelectReport(SqliteDatabase& database, const Uuid& uuid) {
-  SqliteStatement row = database.Prepare(
-      "SELECT drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,latitude,longitude,"
-      "variance_east,covariance_east_north,variance_north,"
-      "image_width,image_height,image_frame_id,image_format,image FROM pending WHERE uuid=?");
+  SqliteStatement row = database.Prepare(std::string(kSelectReport) + "WHERE uuid=?");
   row.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
   if (!row.Step()) return std::nullopt;
-  const auto real = [&row](int column) { return static_cast<float>(row.Real(column)); };
-  Report report;
-  report.uuid = uuid;
-  report.drive_id = row.Text(0);
-  report.stamp_ns = row.Int(1);
-  report.class_name = row.Text(2);
-  report.confidence = real(3);
-  report.box = {real(4), real(5), real(6), real(7)};
-  report.position = {row.Real(8), row.Real(9)};
-  report.covariance_m2 << row.Real(10), row.Real(11), row.Real(11), row.Real(12);
-  report.image_width = static_cast<std::uint32_t>(row.Int(13));
-  report.image_height = static_cast<std::uint32_t>(row.Int(14));
-  report.image_frame_id = row.Text(15);
-  report.image_format = row.Text(16);
-  report.image = row.Blob(17);
-  return report;
+  return ReadReport(row);
+}
+
+std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int64_t row_number) {
+  SqliteStatement row = database.Prepare(std::string(kSelectReport) + "NOT INDEXED WHERE rowid=?");
+  row.Bind(1, row_number);
+  if (!row.Step()) return std::nullopt;
+  return StoredReport{ReadReport(row), row.Int(19) != 0};
 }
 
 }  // namespace livemap

@@ -16,6 +16,14 @@ void InsertReport(SqliteDatabase& database, const Report& report);
 /// Nothing when the table has no such report.
 std::optional<Report> SelectReport(SqliteDatabase& database, const Uuid& uuid);
 
+/// A row of the table.
+struct StoredReport {
+  Report report;
+  bool sent = false;  ///< At least once.
+};
+/// The same by the row's number, past every index: for a table whose indices are damaged.
+std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int64_t row);
+
 /// The nil UUID when the blob has not 16 bytes.
 Uuid UuidFromBlob(const std::vector<std::uint8_t>& blob);
 

@@ -20,12 +20,14 @@
 
 #include "geo/datum.h"
 #include "hazard/hazard_reporter.h"
+#include "hazard/poll_responder.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/camera_info_conversions.h"
 #include "ros/hazard_conversions.h"
 #include "ros/hazard_reporting_parameters.h"
 #include "ros/hazard_view.h"
 #include "ros/localization_conversions.h"
+#include "ros/poll_conversions.h"
 
 namespace livemap {
 namespace {
@@ -56,9 +58,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     MakeDirectoryOf(config_.reporter.map.path);
     reporter_ = std::make_unique<HazardReporter>(config_.reporter, catalogue_,
                                                  EntropySeededGenerator(), now_ns, SteadyS());
+    responder_ = std::make_unique<PollResponder>(config_.polls, catalogue_);
     if (!reporter_->map().set_aside().empty()) {
-      NODELET_ERROR("the local hazard map '%s' was corrupt: moved to '%s', starting an empty one",
-                    config_.reporter.map.path.c_str(), reporter_->map().set_aside().c_str());
+      NODELET_ERROR("%s", DescribeSetAside(config_.reporter.map.path, reporter_->map()).c_str());
     }
     if (config_.map_datum) map_.emplace(*config_.map_datum);
     path_.header.frame_id = config_.map_frame;
@@ -80,6 +82,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     ros::NodeHandle& node = getNodeHandle();
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 100);
     position_publisher_ = node.advertise<VehiclePosition>("vehicle/position", 10);
+    answer_publisher_ = node.advertise<HazardPollAnswer>("hazard/poll_answer", 100);
     marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/local_map", 1);
     path_publisher_ = node.advertise<nav_msgs::Path>("path", 1);
     subscribers_ = {
@@ -89,6 +92,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
         node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
+        node.subscribe("hazard/poll", 100, &Self::OnPoll, this),
     };
     if (IsFused()) {
       subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
@@ -114,7 +118,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   void OnDetections(const DetectionArray& message) {
     if (!reporter_->HasMounting(message.header.frame_id)) wanted_frame_ = message.header.frame_id;
     LearnMounting();
-    reporter_->AddFrame(ToSightingFrame(message), ros::Time::now().toSec());
+    const SightingFrame frame = ToSightingFrame(message);
+    responder_->AddFrame(frame, ros::Time::now().toSec());
+    reporter_->AddFrame(frame, ros::Time::now().toSec());
     Work();
   }
 
@@ -123,7 +129,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
       // Shares the pixels with the detector's message where it is bgr8 already.
       const auto shared = cv_bridge::toCvShare(message, sensor_msgs::image_encodings::BGR8);
       const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
-      reporter_->AddPicture(FromRosTime(message->header.stamp), {shared->image, owner});
+      const Picture picture{shared->image, owner};
+      responder_->AddPicture(FromRosTime(message->header.stamp), picture);
+      reporter_->AddPicture(FromRosTime(message->header.stamp), picture);
     } catch (const cv::Exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "annotated image dropped: %s", error.what());
     } catch (const cv_bridge::Exception& error) {
@@ -215,6 +223,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
   }
 
+  void OnPoll(const HazardPoll& message) {
+    try {
+      responder_->Add(FromMessage(message), SteadyS());
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+    }
+  }
+
   void OnTick(const ros::SteadyTimerEvent&) {
     LearnMounting();
     Work();
@@ -230,10 +246,24 @@ class HazardReportingNodelet : public nodelet::Nodelet {
       NODELET_WARN_THROTTLE(kSayAgainS, "no fused pose of an image: hazards placed by the fixes");
     }
     placed_by_fixes_ = by_fixes;
+    AnswerPolls();
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
     for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
       report_publisher_.publish(ToMessage(report));
+    }
+  }
+
+  void AnswerPolls() {
+    PollResponder::Vehicle vehicle;
+    vehicle.intrinsics = reporter_->intrinsics();
+    vehicle.mounting = [this](const std::string& frame_id) {
+      return reporter_->Mounting(frame_id);
+    };
+    vehicle.pose_at = [this](std::int64_t stamp_ns) { return reporter_->BasePoseAt(stamp_ns); };
+    responder_->Process(ros::Time::now().toSec(), SteadyS(), vehicle);
+    for (const PollReply& reply : responder_->TakeReplies()) {
+      answer_publisher_.publish(ToMessage(reply));
     }
   }
 
@@ -289,7 +319,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     const VehicleState vehicle{
         "", config_.reporter.drive_id, pose.position, pose.course_rad, pose.speed_mps, stamp_ns};
     const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
-    position_publisher_.publish(ToMessage(vehicle, sigma_m));
+    position_publisher_.publish(ToMessage(vehicle, sigma_m, reporter_->map().map_sequence()));
   }
 
   /// base_link on the path, and on tf where no odometry does it.
@@ -329,11 +359,13 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     DescribeHazardReporter(*reporter_, status);
+    DescribePollResponder(*responder_, status);
   }
 
   HazardReportingConfig config_;
   HazardCatalogue catalogue_;
   std::unique_ptr<HazardReporter> reporter_;
+  std::unique_ptr<PollResponder> responder_;
   std::optional<LocalFrame> map_;
   geometry_msgs::Transform earth_from_map_;  // By which map_ was made, if it was.
   std::uint64_t placed_by_fixes_ = 0;        // When it was last looked at.
@@ -344,7 +376,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::Publisher report_publisher_, position_publisher_, marker_publisher_, path_publisher_;
+  ros::Publisher report_publisher_, position_publisher_, answer_publisher_;
+  ros::Publisher marker_publisher_, path_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;
 };

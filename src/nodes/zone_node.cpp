@@ -1,6 +1,7 @@
 #include "nodes/zone_node.h"
 
 #include <livemap/HazardNotice.h>
+#include <livemap/HazardPoll.h>
 #include <livemap/ReportReceipt.h>
 
 #include <chrono>
@@ -8,16 +9,16 @@
 #include <utility>
 
 #include "ros/hazard_conversions.h"
+#include "ros/poll_conversions.h"
 
 namespace livemap {
 namespace {
 
 constexpr double kSayAgainS = 60.0;
 constexpr std::chrono::milliseconds kPatience{500};
-/// Notices for joining vehicles go out in portions, so that those of new hazards are not held up
-/// and nobody's queue overflows.
-constexpr std::size_t kJoinPortion = 200;
-constexpr std::chrono::milliseconds kJoinPause{50};
+/// Between two portions of what a vehicle is told.
+constexpr std::chrono::milliseconds kTellPause{50};
+constexpr std::size_t kMaxAnswers = 10000;
 /// After a failed commit; the vehicles send the reports again anyway.
 constexpr std::chrono::seconds kStorePause{1};
 
@@ -42,10 +43,17 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       zone_(config_.zone, NowNs, EntropySeededGenerator()()),
       queue_(static_cast<std::size_t>(config_.queue_reports),
              static_cast<std::size_t>(config_.queue_bytes)),
+      catch_up_(config_.catch_up),
       updater_(node, private_node) {
   if (config_.map_datum) SetMap(*config_.map_datum);
   receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
-  notice_publisher_ = node.advertise<HazardNotice>("hazard/notice", 20000);
+  poll_publisher_ = node.advertise<HazardPoll>("hazard/poll", 1000);
+  notices_ =
+      std::make_unique<NoticeSender>(zone_, node.advertise<HazardNotice>("hazard/notice", 20000),
+                                     static_cast<std::size_t>(config_.notice_picture_bytes));
+  teller_ = std::make_unique<VehicleTeller>(
+      zone_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000),
+      config_.catch_up.radius_m, static_cast<std::size_t>(config_.join_max_hazards));
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (config_.web) {
     web_ = std::make_unique<WebServer>(config_.web_options, zone_, config_.zone.catalogue);
@@ -63,8 +71,9 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   subscribers_ = {
       node.subscribe("hazard/report", 2000, &ZoneNode::OnReport, this),
       node.subscribe("vehicle/position", 2000, &ZoneNode::OnPosition, this),
+      node.subscribe("hazard/poll_answer", 1000, &ZoneNode::OnAnswer, this),
   };
-  ROS_INFO("zone in '%s': %zu active hazards", config_.zone.directory.c_str(),
+  ROS_INFO("zone in '%s': %zu hazards on the map", config_.zone.directory.c_str(),
            zone_.Statistics().active_hazards);
 }
 
@@ -110,27 +119,39 @@ void ZoneNode::OnReport(const HazardReportConstPtr& message) {
 void ZoneNode::OnPosition(const VehiclePosition& message) {
   try {
     const VehicleState vehicle = FromMessage(message);
-    if (zone_.UpdateVehicle(vehicle)) NoteJoin(vehicle);
+    if (zone_.UpdateVehicle(vehicle)) NoteNews(vehicle, message.map_sequence);
   } catch (const Error& error) {
     Count([](ZoneCloudletCounters& counters) { ++counters.positions_malformed; });
     ROS_WARN_THROTTLE(kSayAgainS, "vehicle position dropped: %s", error.what());
   }
 }
 
-/// A vehicle that is new, or was silent for long, missed notices: the worker tells it.
-void ZoneNode::NoteJoin(const VehicleState& vehicle) {
-  const std::int64_t now_ns = SteadyNs();
-  const auto gap_ns = static_cast<std::int64_t>(config_.join_gap_s * 1e9);
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const auto [entry, is_new] = last_heard_ns_.try_emplace(vehicle.vehicle_id, now_ns);
-  const bool joins = is_new || now_ns - entry->second > gap_ns;
-  entry->second = now_ns;
-  if (!joins) return;
-  for (auto other = last_heard_ns_.begin(); other != last_heard_ns_.end();) {
-    other = now_ns - other->second > gap_ns ? last_heard_ns_.erase(other) : std::next(other);
+void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
+  try {
+    PollAnswer answer = ToPollAnswer(message);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    answers_.push_back(std::move(answer));
+    // The oldest have waited longest: their polls expire first.
+    if (answers_.size() > kMaxAnswers) {
+      answers_.pop_front();
+      ++counters_.answers_dropped;
+    }
+  } catch (const Error& error) {
+    Count([](ZoneCloudletCounters& counters) { ++counters.answers_malformed; });
+    ROS_WARN_THROTTLE(kSayAgainS, "poll answer of '%.64s' dropped: %s", message.vehicle_id.c_str(),
+                      error.what());
   }
-  ++counters_.vehicles_joined;
-  joined_.push_back(vehicle.position);
+}
+
+/// A vehicle that is new, moved far or missed announcements: the worker tells it.
+void ZoneNode::NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence) {
+  const std::uint64_t announced = zone_.AnnouncedSequence();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto order =
+      catch_up_.Update(vehicle.vehicle_id, vehicle.position, map_sequence, announced, SteadyNs());
+  if (!order) return;
+  ++(order->since == 0 ? counters_.vehicles_joined : counters_.vehicles_behind);
+  orders_.push_back(std::move(*order));
 }
 
 void ZoneNode::OnEvent(const ZoneEvent& event) {
@@ -140,17 +161,18 @@ void ZoneNode::OnEvent(const ZoneEvent& event) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!map_) SetMap(place);
     if (event.vehicle) paths_.Add(*event.vehicle);
-    if (event.hazard) ++counters_.notices_sent;
   }
-  if (event.hazard) notice_publisher_.publish(ToMessage(*event.hazard));
+  if (event.hazard && event.hazard->announced) notices_->Push(*event.hazard);
 }
 
 void ZoneNode::WorkUntilClosed() {
   while (true) {
     const bool closing = queue_.closed();
-    const bool telling = TellJoined();
+    const bool telling = TellVehicles();
+    HandleAnswers();
+    LetTimePass();
     const std::vector<Report> reports = queue_.Take(static_cast<std::size_t>(config_.batch_reports),
-                                                    telling ? kJoinPause : kPatience);
+                                                    telling ? kTellPause : kPatience);
     if (!reports.empty()) CommitBatch(reports);
     // Closed before the queue was found empty: nothing can have come since.
     if (closing && reports.empty()) return;
@@ -180,31 +202,50 @@ void ZoneNode::CommitBatch(const std::vector<Report>& reports) {
   }
 }
 
-/// Publishes the next portion of what joining vehicles must know; true while there is more.
-bool ZoneNode::TellJoined() {
-  std::deque<GeoPoint> joined;
+/// Publishes the next portion of what single vehicles must know; true while there is more.
+bool ZoneNode::TellVehicles() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    joined.swap(joined_);
+    for (CatchUpOrder& order : orders_) teller_->Add(std::move(order));
+    orders_.clear();
   }
-  for (const GeoPoint& place : joined) {
-    const auto around = zone_.QueryNear(place, config_.join_radius_m,
-                                        static_cast<std::size_t>(config_.join_max_hazards));
-    for (const Hazard& hazard : around) {
-      // Everybody hears a notice: one suffices for all who join now.
-      if (in_line_.insert(hazard.uuid).second) to_tell_.push_back(hazard.uuid);
+  const auto told = teller_->TellPortion(NowNs());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (told) catch_up_.Told(*told, SteadyNs());
+  counters_.vehicle_notices_sent = teller_->notices();
+  return teller_->busy();
+}
+
+void ZoneNode::HandleAnswers() {
+  std::deque<PollAnswer> answers;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    answers.swap(answers_);
+  }
+  for (const PollAnswer& answer : answers) {
+    try {
+      zone_.HandleAnswer(answer);
+    } catch (const Error& error) {
+      // The poll stays open and is asked again.
+      ROS_ERROR_THROTTLE(kSayAgainS, "an answer of '%.64s' is not counted: %s",
+                         answer.vehicle_id.c_str(), error.what());
     }
   }
-  for (std::size_t i = 0; i < kJoinPortion && !to_tell_.empty(); ++i) {
-    // As it is now: it may have changed, or gone, since it was put into the list.
-    const auto hazard = zone_.Find(to_tell_.front());
-    in_line_.erase(to_tell_.front());
-    to_tell_.pop_front();
-    if (!hazard || !IsTold(hazard->state)) continue;
-    notice_publisher_.publish(ToMessage(HazardEvent{HazardAction::kAdded, *hazard}));
-    Count([](ZoneCloudletCounters& counters) { ++counters.notices_sent; });
+}
+
+/// Transitions that are due, and polls to be asked.
+void ZoneNode::LetTimePass() {
+  const std::int64_t now_ns = SteadyNs();
+  if (now_ns - advanced_ns_ < static_cast<std::int64_t>(config_.advance_period_s * 1e9)) return;
+  advanced_ns_ = now_ns;
+  try {
+    zone_.Advance();
+    for (const PollOrder& order : zone_.TakeDuePolls()) {
+      poll_publisher_.publish(ToMessage(order, NowNs()));
+    }
+  } catch (const Error& error) {
+    ROS_ERROR_THROTTLE(kSayAgainS, "hazards do not age: %s", error.what());
   }
-  return !to_tell_.empty();
 }
 
 void ZoneNode::SetMap(const GeoPoint& datum) {
@@ -251,6 +292,9 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     counters = counters_;
   }
   counters.reports_waiting = queue_.size();
+  counters.notices_sent = notices_->sent();
+  counters.notice_pictures = notices_->pictures();
+  counters.notice_pictures_failed = notices_->pictures_failed();
   DescribeZone(counters, zone_.Statistics(), status);
 }
 

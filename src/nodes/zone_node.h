@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <livemap/HazardPollAnswer.h>
 #include <livemap/HazardReport.h>
 #include <livemap/VehiclePosition.h>
 #include <ros/ros.h>
@@ -15,20 +16,23 @@
 #include <optional>
 #include <string>
 #include <thread>
-#include <unordered_set>
 #include <vector>
 
+#include "nodes/notice_sender.h"
+#include "nodes/vehicle_teller.h"
 #include "ros/zone_conversions.h"
 #include "ros/zone_parameters.h"
 #include "web/server.h"
+#include "zone/catch_up.h"
 #include "zone/report_queue.h"
 #include "zone/zone_service.h"
 
 namespace livemap {
 
-/// The zone cloudlet as a ROS node. The callbacks' thread queues reports and takes positions; one
-/// worker thread commits what is queued in groups, answers with receipts and tells joining vehicles
-/// what is around; events become notices from whichever thread caused them.
+/// The zone cloudlet as a ROS node. The callbacks' thread queues reports and poll answers and takes
+/// positions; one worker thread commits what is queued in groups, answers with receipts, tells
+/// single vehicles what they missed, lets time pass and asks polls; NoticeSender's thread tells
+/// everybody what is announced.
 class ZoneNode {
  public:
   /// Opens the store, starts the web server and subscribes. Throws Error with one sentence.
@@ -41,6 +45,7 @@ class ZoneNode {
  private:
   void OnReport(const HazardReportConstPtr& message);
   void OnPosition(const VehiclePosition& message);
+  void OnAnswer(const HazardPollAnswer& message);
   void OnEvent(const ZoneEvent& event);
   void OnMarkerTimer(const ros::SteadyTimerEvent&);
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&);
@@ -50,8 +55,10 @@ class ZoneNode {
   void SetMap(const GeoPoint& datum);
   void WorkUntilClosed();
   void CommitBatch(const std::vector<Report>& reports);
-  void NoteJoin(const VehicleState& vehicle);
-  bool TellJoined();
+  void NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence);
+  bool TellVehicles();
+  void HandleAnswers();
+  void LetTimePass();
   template <typename Change>
   void Count(const Change& change);
 
@@ -59,18 +66,20 @@ class ZoneNode {
   ZoneService zone_;
   ReportQueue queue_;
 
-  std::mutex mutex_;  ///< Guards the next five.
+  std::mutex mutex_;  ///< Guards the next six.
   ZoneCloudletCounters counters_;
   VehiclePaths paths_;
   std::optional<LocalFrame> map_;
-  std::map<std::string, std::int64_t> last_heard_ns_;  ///< By vehicle, steady clock.
-  std::deque<GeoPoint> joined_;                        ///< Places of vehicles still to be told.
+  CatchUpPlanner catch_up_;
+  std::deque<CatchUpOrder> orders_;  ///< Not yet the worker's.
+  std::deque<PollAnswer> answers_;
 
-  std::deque<Uuid> to_tell_;          ///< The worker's: hazards for vehicles that joined.
-  std::unordered_set<Uuid> in_line_;  ///< The same, to keep each once.
+  std::unique_ptr<VehicleTeller> teller_;  ///< The worker's.
+  std::int64_t advanced_ns_ = 0;           ///< The worker's: when time last passed, steady.
+  std::unique_ptr<NoticeSender> notices_;
   std::atomic<bool> view_changed_{true};
   ros::Publisher receipt_publisher_;
-  ros::Publisher notice_publisher_;
+  ros::Publisher poll_publisher_;
   ros::Publisher marker_publisher_;
   tf2_ros::StaticTransformBroadcaster transform_broadcaster_;
   std::vector<ros::Subscriber> subscribers_;

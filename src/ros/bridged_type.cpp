@@ -1,6 +1,8 @@
 #include "ros/bridged_type.h"
 
 #include <livemap/HazardNotice.h>
+#include <livemap/HazardPoll.h>
+#include <livemap/HazardPollAnswer.h>
 #include <livemap/HazardReport.h>
 #include <livemap/ReportReceipt.h>
 #include <livemap/VehiclePosition.h>
@@ -95,7 +97,9 @@ std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk
 /// A new message type joins the bridge by one line here.
 const std::map<std::string, Factory>& Registry() {
   static const std::map<std::string, Factory> kRegistry = {
-      Entry<HazardNotice>(),
+      Entry<HazardNotice>({"image.data"}),
+      Entry<HazardPoll>(),
+      Entry<HazardPollAnswer>({"image.data"}),
       Entry<HazardReport>({"image.data"}),
       Entry<ReportReceipt>(),
       Entry<VehiclePosition>(),

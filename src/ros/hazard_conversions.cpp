@@ -4,41 +4,9 @@
 #include <limits>
 
 #include "base/error.h"
+#include "ros/message_fields.h"
 
 namespace livemap {
-namespace {
-
-template <typename Message>
-void CheckVersion(const Message& message, const char* name) {
-  if (message.schema_version == Message::SCHEMA_VERSION) return;
-  throw Error(std::string(name) + " has schema version " + std::to_string(message.schema_version) +
-              ", accepted is " + std::to_string(Message::SCHEMA_VERSION));
-}
-
-Uuid ToUuid(const boost::array<std::uint8_t, 16>& bytes) {
-  Uuid uuid;
-  std::copy(bytes.begin(), bytes.end(), uuid.bytes.begin());
-  return uuid;
-}
-
-boost::array<std::uint8_t, 16> ToBytes(const Uuid& uuid) {
-  boost::array<std::uint8_t, 16> bytes;
-  std::copy(uuid.bytes.begin(), uuid.bytes.end(), bytes.begin());
-  return bytes;
-}
-
-// Row-major 2x2, as in HazardReport.msg.
-boost::array<double, 4> ToArray(const Eigen::Matrix2d& matrix) {
-  return {{matrix(0, 0), matrix(0, 1), matrix(1, 0), matrix(1, 1)}};
-}
-
-Eigen::Matrix2d ToMatrix(const boost::array<double, 4>& array) {
-  Eigen::Matrix2d matrix;
-  matrix << array[0], array[1], array[2], array[3];
-  return matrix;
-}
-
-}  // namespace
 
 ros::Time ToRosTime(std::int64_t stamp_ns) {
   constexpr std::int64_t kSecond = 1'000'000'000;
@@ -126,21 +94,22 @@ Receipt FromMessage(const ReportReceipt& message) {
   return receipt;
 }
 
-HazardNotice ToMessage(const HazardEvent& event) {
-  const Hazard& hazard = event.hazard;
-  Notice notice;
-  switch (event.action) {
+namespace {
+
+Notice::Action ToNoticeAction(HazardAction action) {
+  switch (action) {
     case HazardAction::kAdded:
-      notice.action = Notice::Action::kAdded;
-      break;
+      return Notice::Action::kAdded;
     case HazardAction::kUpdated:
-      notice.action = Notice::Action::kUpdated;
-      break;
+      return Notice::Action::kUpdated;
     case HazardAction::kRemoved:
-      notice.action = Notice::Action::kRemoved;
-      break;
+      return Notice::Action::kRemoved;
   }
-  notice.sequence = hazard.sequence;
+  return Notice::Action::kRemoved;
+}
+
+Notice NoticeOf(const Hazard& hazard) {
+  Notice notice;
   notice.hazard_uuid = hazard.uuid;
   notice.stamp_ns = hazard.updated_ns;
   notice.class_name = hazard.class_name;
@@ -150,6 +119,27 @@ HazardNotice ToMessage(const HazardEvent& event) {
   notice.sightings = hazard.sightings;
   notice.first_seen_ns = hazard.first_seen_ns;
   notice.last_seen_ns = hazard.last_seen_ns;
+  return notice;
+}
+
+}  // namespace
+
+HazardNotice ToMessage(const HazardEvent& event) {
+  Notice notice = NoticeOf(event.hazard);
+  // What drivers knew before decides: a candidate that becomes active is new to them.
+  notice.action =
+      ToNoticeAction(DriversAction(event.from, event.hazard.state).value_or(event.action));
+  notice.sequence = event.hazard.sequence;
+  notice.previous_sequence = event.previous_announced;
+  return ToMessage(notice);
+}
+
+HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+                              const std::string& vehicle_id) {
+  Notice notice = NoticeOf(hazard);
+  notice.action = ToNoticeAction(action);
+  notice.sequence = hazard.announced_sequence;
+  notice.vehicle_id = vehicle_id;
   return ToMessage(notice);
 }
 
@@ -166,8 +156,13 @@ HazardNotice ToMessage(const Notice& notice) {
     case Notice::Action::kRemoved:
       message.action = HazardNotice::REMOVED;
       break;
+    case Notice::Action::kCaughtUp:
+      message.action = HazardNotice::CAUGHT_UP;
+      break;
   }
   message.sequence = notice.sequence;
+  message.previous_sequence = notice.previous_sequence;
+  message.vehicle_id = notice.vehicle_id;
   message.hazard_uuid = ToBytes(notice.hazard_uuid);
   message.stamp = ToRosTime(notice.stamp_ns);
   message.class_name = notice.class_name;
@@ -178,6 +173,11 @@ HazardNotice ToMessage(const Notice& notice) {
   message.sightings = notice.sightings;
   message.first_seen = ToRosTime(notice.first_seen_ns);
   message.last_seen = ToRosTime(notice.last_seen_ns);
+  message.radius = static_cast<float>(notice.radius_m);
+  message.told = notice.told;
+  message.image.header.stamp = message.last_seen;
+  message.image.format = notice.image_format;
+  message.image.data = notice.image;
   return message;
 }
 
@@ -194,11 +194,16 @@ Notice FromMessage(const HazardNotice& message) {
     case HazardNotice::REMOVED:
       notice.action = Notice::Action::kRemoved;
       break;
+    case HazardNotice::CAUGHT_UP:
+      notice.action = Notice::Action::kCaughtUp;
+      break;
     default:
       throw Error("hazard notice has action " + std::to_string(message.action) +
-                  ", accepted is 0 (added), 1 (updated) or 2 (removed)");
+                  ", accepted is 0 (added), 1 (updated), 2 (removed) or 3 (caught up)");
   }
   notice.sequence = message.sequence;
+  notice.previous_sequence = message.previous_sequence;
+  notice.vehicle_id = message.vehicle_id;
   notice.hazard_uuid = ToUuid(message.hazard_uuid);
   notice.stamp_ns = FromRosTime(message.stamp);
   notice.class_name = message.class_name;
@@ -208,10 +213,15 @@ Notice FromMessage(const HazardNotice& message) {
   notice.sightings = message.sightings;
   notice.first_seen_ns = FromRosTime(message.first_seen);
   notice.last_seen_ns = FromRosTime(message.last_seen);
+  notice.radius_m = static_cast<double>(message.radius);
+  notice.told = message.told;
+  notice.image_format = message.image.format;
+  notice.image = message.image.data;
   return notice;
 }
 
-VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m) {
+VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
+                          std::uint64_t map_sequence) {
   VehiclePosition message;
   message.schema_version = VehiclePosition::SCHEMA_VERSION;
   message.vehicle_id = vehicle.vehicle_id;
@@ -222,6 +232,7 @@ VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m
   message.course = static_cast<float>(vehicle.course_rad);
   message.speed = static_cast<float>(vehicle.speed_mps);
   message.horizontal_sigma = static_cast<float>(horizontal_sigma_m);
+  message.map_sequence = map_sequence;
   return message;
 }
 

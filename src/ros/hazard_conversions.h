@@ -35,13 +35,19 @@ Report FromMessage(const HazardReport& message);
 ReportReceipt ToMessage(const Receipt& receipt);
 Receipt FromMessage(const ReportReceipt& message);
 
-/// The notice's stamp is `hazard.updated_ns`, the zone's clock at the event.
+/// To every vehicle: what drivers hear of the event. The notice's stamp is `hazard.updated_ns`, the
+/// zone's clock at the event.
 HazardNotice ToMessage(const HazardEvent& event);
+/// To one vehicle: the hazard as it is now, under the sequence of its last announcement.
+HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+                              const std::string& vehicle_id);
 HazardNotice ToMessage(const Notice& notice);
 Notice FromMessage(const HazardNotice& message);
 
-/// `horizontal_sigma_m` per axis, NaN when unknown.
-VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m);
+/// `horizontal_sigma_m` per axis, NaN when unknown; `map_sequence` up to which the vehicle knows
+/// the zone's announcements.
+VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
+                          std::uint64_t map_sequence);
 VehicleState FromMessage(const VehiclePosition& message);
 
 SightingFrame ToSightingFrame(const DetectionArray& message);

@@ -55,6 +55,29 @@ void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& conf
   parameters.Read("depth_units_per_m", config.depth_units_per_m, {1, 1e6});
 }
 
+/// After the reporter's own: what they share is read once.
+void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& config) {
+  PollResponder::Config& polls = config.polls;
+  polls.drive_id = config.reporter.drive_id;
+  polls.min_confidence = config.reporter.min_confidence;
+  polls.bracket_wait_s = config.reporter.bracket_wait_s;
+  polls.picture_wait_s = config.reporter.picture_wait_s;
+  polls.projection.pixel_sigma_px = config.reporter.projection.pixel_sigma_px;
+  polls.projection.pitch_sigma_rad = config.reporter.projection.pitch_sigma_rad;
+  polls.projection.height_sigma_m = config.reporter.projection.height_sigma_m;
+  parameters.Read("max_polls", polls.max_open, {1, 1000});
+  parameters.Read("poll_max_range_m", polls.max_range_m, {1, 200});
+  parameters.Read("poll_margin_share", polls.margin_share, {0, 0.4});
+  parameters.Read("poll_gate_sigma", polls.gate_sigma, {0.1, 20});
+  parameters.Read("poll_no_views", polls.no_views, {1, 1000});
+  parameters.Read("poll_view_spacing_m", polls.view_spacing_m, {0, 100});
+  parameters.Read("poll_dark_luminance", polls.dark_luminance, {0, 255});
+  parameters.Read("poll_miss_share", polls.miss_share, {0, 0.99});
+  parameters.Read("poll_pose_wait_s", polls.pose_wait_s, {0, 60});
+  parameters.Read("poll_reserve_s", polls.reserve_s, {0, 600});
+  parameters.Read("poll_jpeg_quality", polls.jpeg_quality, {1, 100});
+}
+
 }  // namespace
 
 HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns) {
@@ -71,6 +94,7 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   if (reporter.map.path.empty()) reporter.map.path = DefaultDatabase();
   parameters.Read("max_known", reporter.map.max_known, {1, 10e6});
   parameters.Read("max_pending", reporter.map.max_pending, {1, 1e6});
+  parameters.Read("max_pending_bytes", reporter.map.max_pending_bytes, {1e5, 1e12});
 
   parameters.Read("min_confidence", reporter.min_confidence, {0, 1});
   parameters.Read("max_range_m", reporter.max_range_m, {0.1, 1000});
@@ -88,6 +112,7 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("height_sigma_m", reporter.projection.height_sigma_m, {0, 2});
   ReadTrack(parameters, reporter.track);
   ReadPositionSource(parameters, config);
+  ReadPollAnswering(parameters, config);
   parameters.Read("resend_first_s", reporter.resend.first_pause_s, {0.05, 600});
   parameters.Read("resend_longest_s", reporter.resend.longest_pause_s, {0.05, 3600});
   parameters.Read("resend_jitter", reporter.resend.jitter, {0, 0.9});

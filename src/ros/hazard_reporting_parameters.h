@@ -5,6 +5,7 @@
 
 #include "geo/wgs84.h"
 #include "hazard/hazard_reporter.h"
+#include "hazard/poll_responder.h"
 #include "ros/parameters.h"
 
 namespace livemap {
@@ -12,6 +13,7 @@ namespace livemap {
 /// Defaults of the hazard_reporting nodelet; config/hazard_reporting.yaml explains each.
 struct HazardReportingConfig {
   HazardReporter::Config reporter;
+  PollResponder::Config polls;
   std::string catalogue;  ///< Path of hazards.yaml; empty: the package's own.
   std::string base_frame = "base_link";
   std::string map_frame = "map";

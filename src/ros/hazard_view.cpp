@@ -108,6 +108,11 @@ void DescribeHazardReporter(const HazardReporter& reporter,
   status.add("committed", counters.committed);
   status.add("refused", counters.refused);
   status.add("pending", reporter.map().pending_count());
+  status.add("pending_bytes", reporter.map().pending_bytes());
+  status.add("salvaged", reporter.map().salvage().reports);
+  status.add("map_sequence", reporter.map().map_sequence());
+  status.add("notices_missing", reporter.map().has_gap());
+  status.add("forgotten_unannounced", counters.forgotten_unannounced);
   status.add("known", reporter.map().known_count());
   status.add("waiting_frames", reporter.waiting_frames());
   status.add("notices", counters.notices);
@@ -122,6 +127,33 @@ void DescribeHazardReporter(const HazardReporter& reporter,
   status.add("placed_by_fusion", counters.placed_by_fusion);
   status.add("placed_by_fixes", counters.placed_by_fixes);
   status.add("distances_by_depth", counters.distances_by_depth);
+}
+
+void DescribePollResponder(const PollResponder& responder,
+                           diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const PollResponder::Counters& counters = responder.counters();
+  status.add("polls", counters.polls);
+  status.add("polls_open", responder.open());
+  status.add("polls_repeated", counters.repeated);
+  status.add("polls_not_taken", counters.not_taken);
+  status.add("polls_yes", counters.yes);
+  status.add("polls_no", counters.no);
+  status.add("polls_cant_see", counters.cant_see);
+  status.add("polls_unanswered", counters.unanswered);
+  status.add("poll_pictures", counters.pictures);
+  status.add("poll_picture_bytes", counters.picture_bytes);
+}
+
+std::string DescribeSetAside(const std::string& path, const LocalHazardMap& map) {
+  const Salvage& salvage = map.salvage();
+  std::string sentence = "the local hazard map '" + path + "' was corrupt: moved to '" +
+                         map.set_aside() + "', starting anew with ";
+  if (!salvage.error.empty()) return sentence + "none of its reports (" + salvage.error + ")";
+  sentence += std::to_string(salvage.reports) + " of its unfinished reports";
+  if (salvage.unreadable > 0) {
+    sentence += ", " + std::to_string(salvage.unreadable) + " more are not readable";
+  }
+  return sentence;
 }
 
 }  // namespace livemap

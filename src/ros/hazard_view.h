@@ -12,6 +12,7 @@
 #include "hazard/catalogue.h"
 #include "hazard/hazard_reporter.h"
 #include "hazard/local_hazard_map.h"
+#include "hazard/poll_responder.h"
 
 namespace livemap {
 
@@ -33,5 +34,13 @@ bool IsFusionSilent(const HazardReporter& reporter);
 /// lacks fixes or camera, an error while its store fails.
 void DescribeHazardReporter(const HazardReporter& reporter,
                             diagnostic_updater::DiagnosticStatusWrapper& status);
+
+/// What became of the zone's polls, the same way; to be called after DescribeHazardReporter.
+void DescribePollResponder(const PollResponder& responder,
+                           diagnostic_updater::DiagnosticStatusWrapper& status);
+
+/// The sentence about a corrupt store of `path` that was moved away: where to, and what of its
+/// unfinished reports came back.
+std::string DescribeSetAside(const std::string& path, const LocalHazardMap& map);
 
 }  // namespace livemap

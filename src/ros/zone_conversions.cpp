@@ -144,22 +144,39 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
   } else {
     status.summary(DiagnosticStatus::OK, "serving");
   }
-  status.add("hazards_active", statistics.active_hazards);
+  status.add("hazards_on_map", statistics.active_hazards);
+  for (std::size_t i = 0; i < kHazardStates; ++i) {
+    status.add(std::string("hazards_") + StateName(static_cast<HazardState>(i)),
+               statistics.hazards_by_state[i]);
+  }
   status.add("reports_received", counters.reports_received);
   status.add("reports_accepted", statistics.added);
   status.add("reports_merged", statistics.merged);
   status.add("reports_repeated", statistics.repeated);
   status.add("reports_refused", statistics.refused);
+  for (std::size_t i = 0; i < kRefusalKinds; ++i) {
+    status.add(std::string("refused_") + RefusalName(static_cast<RefusalKind>(i)),
+               statistics.refused_by_kind[i]);
+  }
+  status.add("reports_not_now", statistics.not_now);
   status.add("reports_malformed", counters.reports_malformed);
   status.add("reports_not_queued", counters.reports_not_queued);
   status.add("reports_waiting", counters.reports_waiting);
   status.add("commits", counters.commits);
   status.add("store_errors", counters.store_errors);
   status.add("notices_sent", counters.notices_sent);
+  status.add("notice_pictures", counters.notice_pictures);
+  status.add("notice_pictures_failed", counters.notice_pictures_failed);
+  status.add("vehicle_notices_sent", counters.vehicle_notices_sent);
+  status.add("polls", statistics.polls);
+  status.add("answers", statistics.answers);
+  status.add("answers_refused",
+             statistics.answers_refused + counters.answers_malformed + counters.answers_dropped);
   status.add("vehicle_positions", statistics.vehicle_positions);
   status.add("vehicle_positions_refused",
              statistics.vehicle_positions_refused + counters.positions_malformed);
   status.add("vehicles_joined", counters.vehicles_joined);
+  status.add("vehicles_behind", counters.vehicles_behind);
   status.add("image_bytes", statistics.image_bytes);
 }
 

@@ -47,8 +47,14 @@ struct ZoneCloudletCounters {
   std::uint64_t positions_malformed = 0;
   std::uint64_t commits = 0;
   std::uint64_t store_errors = 0;  ///< Batches whose vehicles send them again.
-  std::uint64_t notices_sent = 0;
-  std::uint64_t vehicles_joined = 0;
+  std::uint64_t notices_sent = 0;  ///< To everybody.
+  std::uint64_t notice_pictures = 0;
+  std::uint64_t notice_pictures_failed = 0;
+  std::uint64_t vehicle_notices_sent = 0;  ///< To one vehicle each.
+  std::uint64_t vehicles_joined = 0;       ///< Told all around them.
+  std::uint64_t vehicles_behind = 0;       ///< Told what they missed.
+  std::uint64_t answers_malformed = 0;
+  std::uint64_t answers_dropped = 0;  ///< Too many at the same time.
   std::size_t reports_waiting = 0;
   std::string store_error;  ///< Of the newest batch; empty when it went well.
 };

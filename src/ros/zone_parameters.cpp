@@ -63,12 +63,52 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("vehicle_retention_s", zone.vehicle_retention_s, {1, 1e6});
   ReadCount(parameters, "max_vehicles", zone.max_vehicles, {1, 1e6});
   ReadCount(parameters, "max_hazards", zone.max_hazards, {1, 1e8});
+  parameters.Read("max_reports_per_hour", zone.allowance.reports_per_hour, {1, 1e9});
+  parameters.Read("max_evidence_per_hour", zone.allowance.evidence_per_hour, {1, 1e9});
+  parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000});
+  parameters.Read("speed_slack_m", zone.speed.slack_m, {0, 100000});
   ReportLimits& limits = zone.limits;
   limits.zone = ReadBounds(parameters);
   parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000});
   parameters.Read("max_future_s", limits.max_future_s, {0, 1e9});
+  parameters.Read("max_age_s", limits.max_age_s, {60, 1e10});
   ReadCount(parameters, "max_image_bytes", limits.max_image_bytes, {0, 64e6});
   ReadCount(parameters, "max_image_side_px", limits.max_image_side_px, {1, 65535});
+}
+
+void ReadLife(ParameterReader& parameters, ZoneService::Config& zone) {
+  HazardLife::Config& life = zone.life;
+  parameters.Read("prior_presence", life.prior_presence, {0.01, 0.99});
+  parameters.Read("active_above", life.active_above, {0.01, 0.99});
+  parameters.Read("verify_below", life.verify_below, {0.01, 0.99});
+  parameters.Read("sure_above", life.sure_above, {0.01, 0.99});
+  parameters.Read("gone_below", life.gone_below, {0.001, 0.5});
+  parameters.Read("surest_presence", life.surest, {0.5, 0.9999});
+  parameters.Read("hostile_share", life.hostile_share, {0, 0.5});
+  ReadCount(parameters, "denials", life.denials, {1, 100});
+  parameters.Read("quarantine_s", life.quarantine_s, {0, 1e9});
+  ReadCount(parameters, "reopen_vehicles", life.reopen_vehicles, {1, 100});
+  parameters.Read("rejected_keep_s", life.rejected_keep_s, {1, 1e10});
+  parameters.Read("life_prior_weight", zone.survival.prior_weight, {0.01, 1e6});
+  parameters.Read("life_memory", zone.survival.memory, {1, 1e6});
+}
+
+void ReadPolls(ParameterReader& parameters, ZoneService::Config& zone) {
+  PollScheduler::Config& polls = zone.polls;
+  parameters.Read("poll_price_s", polls.price_s, {0.01, 1e9});
+  parameters.Read("poll_bytes_per_hour", polls.bytes_per_hour, {1, 1e12});
+  parameters.Read("poll_picture_bytes", polls.picture_bytes, {0, 1e6});
+  parameters.Read("poll_picture_share", polls.picture_share, {0, 1});
+  parameters.Read("poll_picture_age_s", polls.picture_age_s, {0, 1e10});
+  parameters.Read("poll_lookahead_s", polls.lookahead_s, {1, 3600});
+  parameters.Read("poll_lookahead_m", polls.lookahead_m, {1, 10000});
+  parameters.Read("poll_timeout_s", polls.answer_timeout_s, {1, 3600});
+  parameters.Read("poll_same_vehicle_gap_s", polls.same_vehicle_gap_s, {0, 1e7});
+  polls.max_vehicles = zone.max_vehicles;
+  parameters.Read("sight_range_m", zone.sight.range_m, {1, 1000});
+  parameters.Read("sight_half_angle_rad", zone.sight.half_angle_rad, {0.01, 3.2});
+  parameters.Read("sight_slack_m", zone.sight.position_slack_m, {0, 1000});
+  parameters.Read("sight_window_s", zone.sight.window_s, {0.1, 600});
 }
 
 void ReadWeb(ParameterReader& parameters, const std::string& package_path,
@@ -93,6 +133,19 @@ void ReadWeb(ParameterReader& parameters, const std::string& package_path,
   if (config.map_datum) web.centre = *config.map_datum;
 }
 
+void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  CatchUpPlanner::Config& catch_up = config.catch_up;
+  parameters.Read("join_radius_m", catch_up.radius_m, {1, 100000});
+  parameters.Read("join_max_hazards", config.join_max_hazards, {1, 100000});
+  parameters.Read("join_gap_s", catch_up.gap_s, {1, 1e6});
+  parameters.Read("catch_up_lag_s", catch_up.lag_s, {0, 3600});
+  parameters.Read("catch_up_retry_s", catch_up.retry_s, {0.1, 3600});
+  parameters.Read("catch_up_longest_retry_s", catch_up.longest_retry_s, {0.1, 3600});
+  catch_up.max_vehicles = config.zone.max_vehicles;
+  parameters.Read("notice_picture_bytes", config.notice_picture_bytes, {0, 60000});
+  parameters.Read("advance_period_s", config.advance_period_s, {0.05, 60});
+}
+
 }  // namespace
 
 ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
@@ -102,12 +155,12 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   if (config.hazards.empty()) config.hazards = package_path + "/config/hazards.yaml";
   config.zone.catalogue = HazardCatalogue::Load(config.hazards);
   ReadZone(parameters, config.zone);
+  ReadLife(parameters, config.zone);
+  ReadPolls(parameters, config.zone);
   parameters.Read("batch_reports", config.batch_reports, {1, 100000});
   parameters.Read("queue_reports", config.queue_reports, {1, 1e7});
   parameters.Read("queue_bytes", config.queue_bytes, {1e6, 1e12});
-  parameters.Read("join_radius_m", config.join_radius_m, {0, 100000});
-  parameters.Read("join_max_hazards", config.join_max_hazards, {0, 100000});
-  parameters.Read("join_gap_s", config.join_gap_s, {1, 1e6});
+  ReadCatchUp(parameters, config);
   parameters.Read("map_frame", config.map_frame);
   config.map_datum = ReadDatum(parameters);
   parameters.Read("marker_period_s", config.marker_period_s, {0.05, 3600});

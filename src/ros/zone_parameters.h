@@ -6,6 +6,7 @@
 
 #include "ros/parameters.h"
 #include "web/options.h"
+#include "zone/catch_up.h"
 #include "zone/zone_service.h"
 
 namespace livemap {
@@ -17,9 +18,10 @@ struct ZoneCloudletConfig {
   int batch_reports = 500;            ///< Most reports of one commit.
   int queue_reports = 20000;          ///< Waiting for a commit; beyond it they are not taken.
   double queue_bytes = 256e6;         ///< The same in bytes of pictures.
-  double join_radius_m = 5000;        ///< What a joining vehicle is told lies within this.
-  int join_max_hazards = 2000;        ///< The nearest ones.
-  double join_gap_s = 60;             ///< Silent for this long: the vehicle joins anew.
+  CatchUpPlanner::Config catch_up;    ///< join_* and catch_up_* of the file.
+  int join_max_hazards = 2000;        ///< What a vehicle is told at once: the nearest ones.
+  int notice_picture_bytes = 4096;    ///< Of the picture in a notice of a new hazard; 0: none.
+  double advance_period_s = 1.0;      ///< Between two looks at what time has changed.
   std::string map_frame = "map";      ///< Of hazard/markers: x east, y north.
   std::optional<GeoPoint> map_datum;  ///< Its origin; none: the first hazard or vehicle.
   double marker_period_s = 0.5;       ///< Between two pictures of the map for rviz.

@@ -79,13 +79,13 @@ TEST(FixTrack, StaleFixIsWaitedFor) {
 
 TEST(FixTrack, MomentBeforeTheFirstFixIsNeverKnown) {
   const FixTrack track = Drive(1.0, 16.0, 1.0, 5.0);
-  EXPECT_EQ(track.At(At(-0.1)).answer, Answer::kNever);
+  EXPECT_EQ(track.At(At(-0.1)).answer, Answer::kHopeless);
 }
 
 TEST(FixTrack, LongGapIsNotInterpolated) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 5.0);
   track.Add(FixAt(9.0, Straight(1.0, 16.0, 9.0)));
-  EXPECT_EQ(track.At(At(7.0)).answer, Answer::kNever);
+  EXPECT_EQ(track.At(At(7.0)).answer, Answer::kHopeless);
 }
 
 TEST(FixTrack, WithoutAnyMotionTheCourseIsUnknown) {
@@ -226,7 +226,7 @@ TEST(FixTrack, JumpThatLastsStartsTheTrackAnew) {
   EXPECT_EQ(track.Add(FixAt(4.0, Straight(1.0, 16.0, 404.0))), Verdict::kJump);
   EXPECT_EQ(track.Add(FixAt(5.0, Straight(1.0, 16.0, 405.0))), Verdict::kJump);
   EXPECT_EQ(track.Add(FixAt(6.0, Straight(1.0, 16.0, 406.0))), Verdict::kRestarted);
-  EXPECT_EQ(track.At(At(3.5)).answer, Answer::kNever) << "nothing is drawn across the jump";
+  EXPECT_EQ(track.At(At(3.5)).answer, Answer::kHopeless) << "nothing is drawn across the jump";
   EXPECT_EQ(track.At(At(5.5)).answer, Answer::kReady);
 }
 

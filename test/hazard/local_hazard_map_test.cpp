@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "known_reports.h"
 #include "temporary_directory.h"
 
 namespace livemap {
@@ -18,50 +19,6 @@ using ::testing::HasSubstr;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 using AddResult = LocalHazardMap::AddResult;
-
-constexpr GeoPoint kStreet{40.4433, -79.9436};
-constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
-
-GeoPoint East(double distance_m) { return GeodesicDestination(kStreet, M_PI / 2, distance_m); }
-
-Uuid Id(int number) {
-  Uuid id;
-  id.bytes[0] = 1;
-  id.bytes[14] = static_cast<std::uint8_t>(number / 256);
-  id.bytes[15] = static_cast<std::uint8_t>(number % 256);
-  return id;
-}
-
-Report MakeReport(int number, const GeoPoint& position, const std::string& name = "pothole") {
-  Report report;
-  report.uuid = Id(number);
-  report.drive_id = "drive-1";
-  report.stamp_ns = kNowNs + number;
-  report.class_name = name;
-  report.confidence = 0.75F;
-  report.box = {1, 2, 30, 40};
-  report.position = position;
-  report.covariance_m2 << 2.0, 0.25, 0.25, 1.5;
-  report.image_width = 640;
-  report.image_height = 400;
-  report.image_frame_id = "camera_optical_frame";
-  report.image_format = "jpeg";
-  report.image = {0xff, 0xd8, 0x00, 0x01};
-  return report;
-}
-
-Notice MakeNotice(Notice::Action action, int hazard, const GeoPoint& position,
-                  std::uint64_t sequence) {
-  Notice notice;
-  notice.action = action;
-  notice.sequence = sequence;
-  notice.hazard_uuid = Id(hazard);
-  notice.stamp_ns = kNowNs + static_cast<std::int64_t>(sequence);
-  notice.class_name = "pothole";
-  notice.confidence = 0.5F;
-  notice.position = position;
-  return notice;
-}
 
 Receipt MakeReceipt(Receipt::Status status, int report, int hazard) {
   Receipt receipt;
@@ -242,8 +199,9 @@ TEST_P(CorruptLocalHazardMap, IsSetAsideWholeAndANewOneStarts) {
   LocalHazardMap map = Open();
   EXPECT_THAT(map.set_aside(), StartsWith(config_.path + ".corrupt-"));
   EXPECT_EQ(std::filesystem::file_size(map.set_aside()), size) << "its content stays recoverable";
-  EXPECT_EQ(map.known_count(), 0u);
-  EXPECT_EQ(map.Add(MakeReport(1, kStreet)), AddResult::kAdded);
+  EXPECT_EQ(map.salvage().reports, map.pending_count());
+  EXPECT_EQ(map.salvage().error, "");
+  EXPECT_EQ(map.Add(MakeReport(999, East(-100))), AddResult::kAdded);
 }
 
 INSTANTIATE_TEST_SUITE_P(DamageAt, CorruptLocalHazardMap, ::testing::Values(0, 4096, 16384));

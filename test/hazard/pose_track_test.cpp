@@ -46,9 +46,9 @@ TEST(PoseTrack, CarriesNothingOnAndBridgesNoGap) {
   track.Add(StampNs(1), PoseAt(1));
   EXPECT_EQ(track.At(StampNs(1)).answer, Answer::kReady);
   EXPECT_EQ(track.At(StampNs(1.01)).answer, Answer::kWait);
-  EXPECT_EQ(track.At(StampNs(0.9)).answer, Answer::kNever);
+  EXPECT_EQ(track.At(StampNs(0.9)).answer, Answer::kHopeless);
   track.Add(StampNs(1.6), PoseAt(1.6));
-  EXPECT_EQ(track.At(StampNs(1.3)).answer, Answer::kNever) << "0.6 s between the poses";
+  EXPECT_EQ(track.At(StampNs(1.3)).answer, Answer::kHopeless) << "0.6 s between the poses";
 }
 
 TEST(PoseTrack, PosesThatComeLaterDoNotChangeAnAnswerThatWasReady) {

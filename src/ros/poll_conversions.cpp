@@ -1,0 +1,203 @@
+#include "ros/poll_conversions.h"
+
+#include <cmath>
+#include <string>
+
+#include "ros/hazard_conversions.h"
+#include "ros/message_fields.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxReasonBytes = 64;
+constexpr std::size_t kMaxNameBytes = 64;
+
+void RequireIds(const Uuid& poll, const Uuid& hazard, const std::string& name) {
+  if (poll.IsNil() || hazard.IsNil()) {
+    throw Error(name + " has a nil " + (poll.IsNil() ? "poll_uuid" : "hazard_uuid") +
+                ", accepted is the uuid of one");
+  }
+}
+
+void RequirePosition(const GeoPoint& position, const std::string& name) {
+  if (IsValid(position)) return;
+  throw Error(name + " has position " + std::to_string(position.latitude_deg) + ", " +
+              std::to_string(position.longitude_deg) + ", accepted are WGS84 degrees");
+}
+
+void RequireShort(const std::string& text, std::size_t limit, const std::string& what) {
+  if (text.size() <= limit) return;
+  throw Error(what + " has " + std::to_string(text.size()) + " bytes, accepted are at most " +
+              std::to_string(limit));
+}
+
+void RequireCovariance(const Eigen::Matrix2d& covariance_m2) {
+  const bool positive = covariance_m2.allFinite() && covariance_m2(0, 0) > 0 &&
+                        covariance_m2(1, 1) > 0 && covariance_m2.determinant() > 0 &&
+                        covariance_m2(0, 1) == covariance_m2(1, 0);
+  if (positive) return;
+  throw Error(
+      "hazard poll has a covariance that is none, accepted is one that is finite, symmetric and "
+      "positive definite");
+}
+
+}  // namespace
+
+HazardPoll ToMessage(const Poll& poll) {
+  HazardPoll message;
+  message.schema_version = HazardPoll::SCHEMA_VERSION;
+  message.poll_uuid = ToBytes(poll.poll);
+  message.hazard_uuid = ToBytes(poll.hazard);
+  message.vehicle_id = poll.vehicle_id;
+  message.stamp = ToRosTime(poll.stamp_ns);
+  message.expires = ToRosTime(poll.expires_ns);
+  message.class_name = poll.class_name;
+  message.latitude = poll.position.latitude_deg;
+  message.longitude = poll.position.longitude_deg;
+  message.covariance = ToArray(poll.covariance_m2);
+  message.picture_wanted = poll.picture_wanted;
+  message.max_picture_bytes = poll.max_picture_bytes;
+  return message;
+}
+
+Poll FromMessage(const HazardPoll& message) {
+  CheckVersion(message, "hazard poll");
+  Poll poll;
+  poll.poll = ToUuid(message.poll_uuid);
+  poll.hazard = ToUuid(message.hazard_uuid);
+  poll.vehicle_id = message.vehicle_id;
+  poll.stamp_ns = FromRosTime(message.stamp);
+  poll.expires_ns = FromRosTime(message.expires);
+  poll.class_name = message.class_name;
+  poll.position = {message.latitude, message.longitude};
+  poll.covariance_m2 = ToMatrix(message.covariance);
+  poll.picture_wanted = message.picture_wanted != 0;
+  poll.max_picture_bytes = message.max_picture_bytes;
+  RequireIds(poll.poll, poll.hazard, "hazard poll");
+  RequirePosition(poll.position, "hazard poll");
+  RequireCovariance(poll.covariance_m2);
+  RequireShort(poll.class_name, kMaxClassNameBytes, "class_name of a hazard poll");
+  if (poll.class_name.empty()) {
+    throw Error("hazard poll has no class_name, accepted is the hazard's class");
+  }
+  if (poll.expires_ns <= poll.stamp_ns) {
+    throw Error("hazard poll expires before it was asked, accepted is a later moment");
+  }
+  return poll;
+}
+
+HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns) {
+  Poll poll;
+  poll.poll = order.poll;
+  poll.hazard = order.hazard;
+  poll.vehicle_id = order.vehicle_id;
+  poll.stamp_ns = now_ns;
+  poll.expires_ns = order.expires_ns;
+  poll.class_name = order.class_name;
+  poll.position = order.position;
+  poll.covariance_m2 = order.covariance_m2;
+  poll.picture_wanted = order.picture_wanted;
+  poll.max_picture_bytes = order.max_picture_bytes;
+  return ToMessage(poll);
+}
+
+PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
+  const PollReply reply = FromMessage(message);
+  PollAnswer answer;
+  answer.poll = reply.poll;
+  answer.hazard = reply.hazard;
+  answer.vehicle_id = reply.vehicle_id;
+  switch (reply.answer) {
+    case PollReply::Answer::kYes:
+      answer.answer = PollAnswer::Answer::kYes;
+      break;
+    case PollReply::Answer::kNo:
+      answer.answer = PollAnswer::Answer::kNo;
+      break;
+    case PollReply::Answer::kCantSee:
+      answer.answer = PollAnswer::Answer::kCantSee;
+      break;
+  }
+  answer.reason = reply.reason;
+  answer.confidence = static_cast<double>(reply.confidence);
+  answer.vehicle_position = reply.vehicle_position;
+  answer.stamp_ns = reply.stamp_ns;
+  answer.image_format = reply.image_format;
+  answer.image = reply.image;
+  return answer;
+}
+
+HazardPollAnswer ToMessage(const PollReply& reply) {
+  HazardPollAnswer message;
+  message.schema_version = HazardPollAnswer::SCHEMA_VERSION;
+  message.poll_uuid = ToBytes(reply.poll);
+  message.hazard_uuid = ToBytes(reply.hazard);
+  message.vehicle_id = reply.vehicle_id;
+  message.drive_id = reply.drive_id;
+  message.stamp = ToRosTime(reply.stamp_ns);
+  switch (reply.answer) {
+    case PollReply::Answer::kYes:
+      message.answer = HazardPollAnswer::YES;
+      break;
+    case PollReply::Answer::kNo:
+      message.answer = HazardPollAnswer::NO;
+      break;
+    case PollReply::Answer::kCantSee:
+      message.answer = HazardPollAnswer::CANT_SEE;
+      break;
+  }
+  message.reason = reply.reason;
+  message.confidence = reply.confidence;
+  message.latitude = reply.vehicle_position.latitude_deg;
+  message.longitude = reply.vehicle_position.longitude_deg;
+  message.course = static_cast<float>(reply.course_rad);
+  message.image.header.stamp = message.stamp;
+  message.image.format = reply.image_format;
+  message.image.data = reply.image;
+  return message;
+}
+
+PollReply FromMessage(const HazardPollAnswer& message) {
+  CheckVersion(message, "poll answer");
+  PollReply reply;
+  switch (message.answer) {
+    case HazardPollAnswer::YES:
+      reply.answer = PollReply::Answer::kYes;
+      break;
+    case HazardPollAnswer::NO:
+      reply.answer = PollReply::Answer::kNo;
+      break;
+    case HazardPollAnswer::CANT_SEE:
+      reply.answer = PollReply::Answer::kCantSee;
+      break;
+    default:
+      throw Error("poll answer is " + std::to_string(message.answer) +
+                  ", accepted is 0 (yes), 1 (no) or 2 (can't see)");
+  }
+  reply.poll = ToUuid(message.poll_uuid);
+  reply.hazard = ToUuid(message.hazard_uuid);
+  reply.vehicle_id = message.vehicle_id;
+  reply.drive_id = message.drive_id;
+  reply.stamp_ns = FromRosTime(message.stamp);
+  reply.reason = message.reason;
+  reply.confidence = message.confidence;
+  reply.vehicle_position = {message.latitude, message.longitude};
+  reply.course_rad = static_cast<double>(message.course);
+  reply.image_format = message.image.format;
+  reply.image = message.image.data;
+  RequireIds(reply.poll, reply.hazard, "poll answer");
+  if (!(reply.confidence >= 0 && reply.confidence <= 1)) {
+    throw Error("poll answer has confidence " + std::to_string(reply.confidence) +
+                ", accepted is 0 to 1");
+  }
+  RequirePosition(reply.vehicle_position, "poll answer");
+  if (std::isinf(reply.course_rad)) {
+    throw Error("poll answer has an infinite course, accepted are radians, or NaN when standing");
+  }
+  RequireShort(reply.reason, kMaxReasonBytes, "reason of a poll answer");
+  RequireShort(reply.drive_id, kMaxNameBytes, "drive_id of a poll answer");
+  RequireShort(reply.image_format, kMaxNameBytes, "image format of a poll answer");
+  return reply;
+}
+
+}  // namespace livemap

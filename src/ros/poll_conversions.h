@@ -1,0 +1,26 @@
+#pragma once
+
+#include <livemap/HazardPoll.h>
+#include <livemap/HazardPollAnswer.h>
+
+#include "hazard/report.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+
+// What crosses between the core and the messages of polls, in both directions. FromMessage throws
+// Error, with one sentence that names the value and what is accepted, for an unknown schema version
+// or enumeration value, nil ids, numbers that are not finite or out of range, and overlong text.
+
+HazardPoll ToMessage(const Poll& poll);
+Poll FromMessage(const HazardPoll& message);
+
+/// The zone's order as a poll that is asked at `now_ns`, zone clock.
+HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns);
+/// The reply as the zone takes it; the vehicle_id is the one that the bridge wrote.
+PollAnswer ToPollAnswer(const HazardPollAnswer& message);
+
+HazardPollAnswer ToMessage(const PollReply& reply);
+PollReply FromMessage(const HazardPollAnswer& message);
+
+}  // namespace livemap

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+/// What one vehicle is to be told.
+struct CatchUpOrder {
+  std::string vehicle_id;
+  GeoPoint centre;  ///< What lies around it.
+  /// What was announced since; 0: all that drivers are told of there now.
+  std::uint64_t since = 0;
+  /// What the vehicle says it knows. More than was ever announced: the zone began anew.
+  std::uint64_t known = 0;
+};
+
+/// Decides which vehicles must be told something by themselves: by their positions and what they
+/// say they know. Knows no store, no threads and no clock.
+///
+/// All that is there: to a vehicle that is new, was silent for long, knows nothing, knows of a zone
+/// of before, or has driven half the radius away from where it was last told. What it missed: to
+/// one that after `lag_s` still does not know what was announced then. What it missed is told
+/// around where it was last told all, so that within half the radius around a vehicle its map is
+/// right.
+class CatchUpPlanner {
+ public:
+  struct Config {
+    double radius_m = 5000;
+    double lag_s = 3;    ///< Announcements are on their way for this long.
+    double retry_s = 5;  ///< After a telling that did not help; doubled each time.
+    double longest_retry_s = 60;
+    double gap_s = 60;                 ///< A vehicle silent for this long is new.
+    std::size_t max_vehicles = 10000;  ///< Beyond it the longest silent one is forgotten.
+  };
+
+  explicit CatchUpPlanner(const Config& config) : config_(config) {}
+
+  /// A vehicle said where it is and up to where it knows the announcements, of which `announced` is
+  /// the newest. What it is to be told now, if anything; then nothing more until Told.
+  std::optional<CatchUpOrder> Update(const std::string& vehicle_id, const GeoPoint& position,
+                                     std::uint64_t map_sequence, std::uint64_t announced,
+                                     std::int64_t now_ns);
+  /// The order of this vehicle is done.
+  void Told(const std::string& vehicle_id, std::int64_t now_ns);
+
+  std::size_t vehicles() const { return vehicles_.size(); }
+
+ private:
+  struct Vehicle {
+    std::int64_t heard_ns = 0;
+    std::optional<GeoPoint> centre;  // Where it was last told all.
+    std::uint64_t target = 0;        // What it should know by target_ns + lag.
+    std::int64_t target_ns = 0;
+    std::int64_t not_before_ns = 0;
+    double retry_s = 0;
+    bool in_progress = false;
+  };
+
+  Vehicle& Heard(const std::string& vehicle_id, std::int64_t now_ns);
+
+  Config config_;
+  std::map<std::string, Vehicle> vehicles_;
+};
+
+}  // namespace livemap
