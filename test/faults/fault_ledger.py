@@ -166,6 +166,10 @@ class Ledger:
         """How many reports each outbox accepted so far."""
         return [count_entered(path) for path in self.outbox_paths]
 
+    def merged(self):
+        """Hazards that both vehicles reported."""
+        return sum(sightings > 1 for sightings in read_map(self.map_path).sightings.values())
+
     def judge(self, outboxes=None, zone_map=None):
         """Of the stores as they are, or of readings made when something was dead (outboxes first, then the map)."""
         outboxes = self.outboxes() if outboxes is None else outboxes

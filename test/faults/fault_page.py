@@ -34,7 +34,7 @@ rounds in which nothing waited have none.
 
 """
 COLUMNS = ("fault", "rounds", "reports", "waited at the fault's end", "lost", "doubled", "unknown", "stuck",
-           "recovery p50, s", "p95, s", "longest, s", "n")
+           "recovery p50, s", "p95, s", "longest, s", "n", "at")
 
 
 def quantile(values, share):
@@ -55,7 +55,7 @@ def row(kind, records):
     sums = [str(sum(record[key] for record in done))
             for key in ("reports", "waiting", "lost", "doubled", "unknown", "stuck")]
     return [KINDS[kind].words, str(len(done)), *sums, quantile(recoveries, 0.5), quantile(recoveries, 0.95),
-            quantile(recoveries, 1), str(len(recoveries))]
+            quantile(recoveries, 1), str(len(recoveries)), ", ".join(sorted({record["commit"] for record in records}))]
 
 
 def table(rows):
@@ -76,15 +76,18 @@ def notes(records_of):
         if felt:
             lines.append(f"{KINDS[kind].words}: in {sum(felt)} of {len(felt)} rounds nothing was accepted any more in the last "
                          "0.8 s before the disk was freed.")
+    counted = [record for records in records_of.values() for record in records if "merged" in record]
+    if counted:
+        lines.append(f"{sum(record['merged'] for record in counted)} hazards were reported by both vehicles, among "
+                     f"{sum(record['reports'] for record in counted)} reports ({len(counted)} rounds, those that counted it).")
     failed = [f"{kind} {record['round']}: {record['failed']}" for kind, records in records_of.items()
               for record in records if "failed" in record]
     if failed:
         lines.append("Rounds that could not be run to their end, not in the table: " + "; ".join(failed) + ".")
     everything = [record for records in records_of.values() for record in records]
     loads = [record["load"] for record in everything if "load" in record]
-    commits = sorted({record["commit"] for record in everything})
     dates = sorted({record["date"] for record in everything})
-    lines.append(f"Measured at {', '.join(commits)}, {' to '.join(sorted({dates[0], dates[-1]}))} (UTC); load of the machine "
+    lines.append(f"Measured on {' to '.join(sorted({dates[0], dates[-1]}))} (UTC); load of the machine "
                  f"{statistics.median(loads):.0f} (median, by its load average), up to {max(loads):.0f}.")
     if any(not record["namespaces"] for record in everything):
         lines.append("Skipped, no network namespaces: loss, full disks; the other partitions by relays.")

@@ -25,7 +25,9 @@ def run_round(world, kind, seed, number):
     world.rest()
     recovery_s, stuck = settle(world.ledger, outage)
     verdicts = outage.verdicts + [world.ledger.judge()]
+    merged_before, world.merged = world.merged, world.ledger.merged()
     return record | outage.notes | {
+        "merged": world.merged - merged_before,
         "reports": sum(world.ledger.entered()) - sum(before), "waiting": len(outage.waiting), "stuck": stuck,
         "lost": count(verdicts, "lost"), "doubled": count(verdicts, "doubled"), "unknown": count(verdicts, "unknown"),
         "recovery_s": recovery_s, "words": [word for verdict in verdicts for word in verdict.words][:20]}

@@ -127,6 +127,7 @@ class World:
         for vehicle in VEHICLES:
             self.processes[f"feeder_{vehicle}"].await_line("connected")
         self.warm_up()
+        self.merged = self.ledger.merged()
 
     def start_journal(self, vehicle):
         with contextlib.suppress(ledger.sqlite3.OperationalError):
