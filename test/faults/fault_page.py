@@ -12,8 +12,9 @@ HEAD = """# Faults: what is lost
 Made by `./livemap bench faults`; do not edit. What is promised, and by what means, is in [../zone.md](../zone.md),
 [../transport.md](../transport.md) and [../vehicle.md](../vehicle.md).
 
-Two vehicles, a broker with certificates and a zone, all real processes launched by their own launch files, on {machine}.
-Each vehicle and zone has a ROS master of its own; between the vehicles' network namespace and the zone's is one wire. A
+Two vehicles, a broker with certificates and a zone, all real processes launched by their own launch files, on
+{machine}. Each vehicle and the zone have a ROS master of their own; between the vehicles' network namespace and the zone's
+is one wire, and one of the vehicles reaches it through a TCP relay. A
 feeder shows both vehicles the same street: 5 images a second with 3 things each, of which each vehicle sees two thirds, so
 that one in three is reported by both and must become one hazard with two sightings. A round: reports flow, at a random
 moment (by seed {seed}, mostly while some report is under way) the fault strikes, reports go on, the fault ends, the
@@ -30,7 +31,9 @@ stores of killed processes are copied and judged as they lie, before anything is
 a row survives a power cut as well rests on SQLite's `synchronous=FULL` and is not tested here.
 
 **Recovery** is the time from the fault's end (for a kill: the restart's begin) until everything is answered that waited then;
-rounds in which nothing waited have none.
+rounds in which nothing waited have none. The rounds follow each other within seconds: a connection that lived less than 5 s
+counts as a failure, so the bridges' pauses grow to their longest, 10 s ([../transport.md](../transport.md#the-bridge)), and
+that is most of the recovery where connections are cut. A single cut is followed by a pause of 0.5 s at most.
 
 """
 COLUMNS = ("fault", "rounds", "reports", "waited at the fault's end", "lost", "doubled", "unknown", "stuck",

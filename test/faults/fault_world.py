@@ -36,7 +36,7 @@ def wait_until(is_so, what, patience_s=START_S):
     while not is_so():
         if time.monotonic() > deadline:
             raise WorldError(f"{what} did not happen within {patience_s} s")
-        time.sleep(0.02)
+        time.sleep(0.05)
 
 
 def zone_settings():

@@ -48,10 +48,10 @@ class FaultsTest(unittest.TestCase):
         self.assert_nothing_is_lost_or_doubled("kill_vehicle", 2)
 
     def test_broker_killed(self):
-        self.assert_nothing_is_lost_or_doubled("kill_broker", 2)
+        self.assert_nothing_is_lost_or_doubled("kill_broker")
 
     def test_zone_killed(self):
-        self.assert_nothing_is_lost_or_doubled("kill_zone", 2)
+        self.assert_nothing_is_lost_or_doubled("kill_zone")
 
     def test_broker_restarted_with_empty_state(self):
         self.assert_nothing_is_lost_or_doubled("empty_broker")
