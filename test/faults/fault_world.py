@@ -42,7 +42,8 @@ def wait_until(is_so, what, patience_s=START_S):
 def zone_settings():
     """The load is far above what one vehicle may do in an hour."""
     known = yaml.safe_load((ROOT / "config/zone_cloudlet.yaml").read_text(encoding="utf-8"))
-    return {"web": False} | {key: 1000000 for key in ("max_reports_per_hour",) if key in known}
+    return {"web": False} | {
+        key: 1000000 for key in ("max_reports_per_hour", "max_evidence_per_hour") if key in known}
 
 
 class Process:
