@@ -164,7 +164,7 @@ def loss(world, rng):
 
 
 def delay(world, rng):
-    """2 s each way, through the relays."""
+    """2 s each way, of what goes through relays."""
     world.tell_relays("delay 2")
     time.sleep(rng.uniform(3, 6))
     world.tell_relays("pass")
@@ -246,7 +246,7 @@ KINDS = {
     "reset": Kind("partition: every packet answered with a TCP reset", reset, False, False),
     "black_hole": Kind("partition: every packet dropped", black_hole, False, False),
     "loss": Kind("30 % of the packets lost, each way", loss, True, False),
-    "delay": Kind("2 s delay, each way", delay, False, False),
+    "delay": Kind("2 s delay, each way, of the vehicle behind the relay", delay, False, False),
     "flaps": Kind("8 cuts in a row", flaps, False, False),
     "full_vehicle": Kind("ENOSPC of the vehicle's store", full_vehicle, True, True),
     "full_zone": Kind("ENOSPC of the zone's store", full_zone, True, True),

@@ -11,6 +11,8 @@ import pathlib
 import shutil
 import signal
 import sqlite3
+import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -19,7 +21,7 @@ import fault_network
 import fault_rounds
 from fault_kinds import KINDS, Outage
 from fault_ledger import Ledger
-from fault_world import VEHICLES, World, wait_until
+from fault_world import ROOT, VEHICLES, World, wait_until
 
 SEED = 1
 
@@ -141,6 +143,16 @@ class FaultsTest(unittest.TestCase):
             with contextlib.closing(sqlite3.connect(source)) as original, contextlib.closing(sqlite3.connect(copy)) as target:
                 original.backup(target)
         return Ledger(paths[:-1], paths[-1])
+
+
+class BenchTest(unittest.TestCase):
+    def test_wrong_arguments_are_one_sentence_and_exit_code_2(self):
+        for flags, words in ((["--rounds", "0"], "--rounds is 0"), (["--only", "rain"], "--only is 'rain'"),
+                             (["--root", "/"], "is no source tree")):
+            done = subprocess.run([sys.executable, ROOT / "scripts/livemap_bench_faults", *flags], capture_output=True,
+                                  text=True, check=False)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (2, "", 1), done.stderr)
+            self.assertIn(words, done.stderr)
 
 
 @contextlib.contextmanager
