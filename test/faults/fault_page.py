@@ -14,10 +14,10 @@ Made by `./livemap bench faults`; do not edit. What is promised, and by what mea
 
 Machine: {machine}. Two vehicles, a broker with certificates and a zone, all real processes
 launched by their own launch files. Each vehicle and the zone have a ROS master of their own; between the vehicles' network
-namespace and the zone's is one wire, and one of the vehicles reaches it through a TCP relay. A feeder shows both vehicles the same street: 5 images a second with 3 things each, of which each vehicle sees two thirds, so
-that one in three is reported by both and must become one hazard with two sightings. A round: reports flow, at a random
-moment (by seed {seed}, mostly while some report is under way) the fault strikes, reports go on, the fault ends, the
-vehicles rest. Then
+namespace and the zone's is one wire, and one of the vehicles reaches it through a TCP relay. A feeder shows both vehicles
+the same street: 5 images a second with 3 things each, of which each vehicle sees two thirds, so that one in three is
+reported by both and must become one hazard with two sightings. A round: reports flow, at a random moment (by seed {seed},
+mostly while some report is under way) the fault strikes, reports go on, the fault ends, the vehicles rest. Then
 
 - **lost**: a report that entered an outbox, does not wait in it and is not in the zone's store;
 - **doubled**: a hazard whose number of sightings is not that of its reports, a thing that became two hazards, a hazard made
@@ -79,8 +79,8 @@ def notes(records_of):
     seconds = [record["seconds"] for record in records_of.get("black_hole", []) if "seconds" in record]
     if seconds:
         longer = sum(value > KEEPALIVE_GIVES_UP_S for value in seconds)
-        lines.append(f"Black holes lasted {min(seconds):.1f} to {max(seconds):.1f} s, {longer} of {len(seconds)} so long that the "
-                     "keepalive gave the connection up.")
+        lines.append(f"Black holes lasted {min(seconds):.1f} to {max(seconds):.1f} s, {longer} of {len(seconds)} longer "
+                     f"than the {KEEPALIVE_GIVES_UP_S} s after which the keepalive gives a connection up.")
     for kind in ("full_vehicle", "full_zone"):
         felt = [record["felt"] for record in records_of.get(kind, []) if "felt" in record]
         if felt:
