@@ -11,6 +11,7 @@ import sys
 import tempfile
 import unittest
 
+import cv2
 import numpy
 import rospy
 import rostest
@@ -36,6 +37,38 @@ def image(number, *blocks):
     message.header.frame_id = "camera_optical_frame"
     message.data = pixels.tobytes()
     return message
+
+
+def street_with_face(number):
+    """A large image of a grey street with a drawn face, and a red block that the model knows; where the face is."""
+    pixels = numpy.random.RandomState(7).normal(120, 6, (240, 320, 3)).clip(0, 255).astype(numpy.uint8)
+    pixels[180:220, 10:50] = RED
+    height, centre = 80, numpy.array((180, 110))
+
+    def part(x, y, width, part_height, colour):
+        middle = centre + numpy.rint(numpy.array((x, y)) * height).astype(int)
+        axes = (max(1, round(width * height)), max(1, round(part_height * height)))
+        cv2.ellipse(pixels, tuple(map(int, middle)), axes, 0, 0, 360, colour, cv2.FILLED, cv2.LINE_AA)
+
+    part(0, -0.15, 0.48, 0.55, (30, 40, 50))
+    part(0, 0, 0.40, 0.52, (140, 170, 215))
+    for side in (-0.17, 0.17):
+        part(side, -0.10, 0.10, 0.05, (90, 110, 150))
+        part(side, -0.10, 0.07, 0.03, (240, 240, 240))
+        part(side, -0.10, 0.03, 0.03, (20, 20, 20))
+        part(side, -0.19, 0.10, 0.03, (30, 40, 60))
+    part(0, 0.08, 0.06, 0.10, (120, 150, 195))
+    part(0, 0.30, 0.15, 0.04, (70, 70, 160))
+    pixels = cv2.GaussianBlur(pixels, (0, 0), 1.0)
+    message = image(number)
+    message.height, message.width = pixels.shape[:2]
+    message.step = 3 * message.width
+    message.data = pixels.tobytes()
+    return message, (slice(85, 140), slice(155, 205))
+
+
+def pixels_of(message):
+    return numpy.frombuffer(message.data, numpy.uint8).reshape(message.height, message.width, 3)
 
 
 class Detector(NodeletUnderTest):
@@ -129,6 +162,33 @@ class HazardDetectionTest(unittest.TestCase):
         detector.publisher.publish(frame)
         pictures = eventually(lambda: detector.received("hazard/annotated"), "a picture")
         self.assertEqual(bytes(pictures[0].data), bytes(frame.data))
+
+    def picture_of_a_face(self, **parameters):
+        """The face in the published picture, and how the camera saw it."""
+        detector = self.loaded_detector(queue_size=100, **parameters)
+        annotated = detector.subscribe("hazard/annotated", Image)
+        eventually(lambda: annotated.get_num_connections() > 0, "the picture's topic")
+        frame, face = street_with_face(0)
+        detector.publisher.publish(frame)
+        picture = eventually(lambda: detector.received("hazard/annotated"), "a picture")[0]
+        detector.wait_for(pictures_withheld=0, frames_annotated=1)
+        return pixels_of(picture)[face], pixels_of(frame)[face]
+
+    def test_a_face_in_the_picture_is_masked(self):
+        masked, seen = self.picture_of_a_face()
+        colours = {tuple(pixel) for pixel in masked.reshape(-1, 3)}
+        self.assertLess(len(colours), 50, "more blocks than a mask leaves")
+        self.assertGreater(len({tuple(pixel) for pixel in seen.reshape(-1, 3)}), 500)
+
+    def test_without_privacy_the_picture_is_what_the_camera_saw(self):
+        picture, seen = self.picture_of_a_face(privacy=False)
+        self.assertTrue(numpy.array_equal(picture, seen))
+
+    def test_without_a_detector_of_faces_the_load_fails_with_one_sentence(self):
+        detector = self.make_detector()
+        loader = detector.load(privacy_cascades="/nowhere")
+        self.assertNotEqual(loader.wait(60), 0)
+        eventually(lambda: "cascade '/nowhere/" in detector.output(), "the sentence")
 
     def test_other_encodings_work_and_unusable_images_are_dropped_and_counted(self):
         detector = self.loaded_detector(queue_size=100)

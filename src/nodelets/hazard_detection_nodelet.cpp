@@ -14,6 +14,7 @@
 
 #include "detection/frame_queue.h"
 #include "detection/hazard_detector.h"
+#include "detection/privacy_mask.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/detection_conversions.h"
 #include "ros/parameters.h"
@@ -26,6 +27,8 @@ struct HazardDetectionConfig {
   int threads = 2;              ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
   int queue_size = 4;           ///< Frames that may wait.
   bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
+  bool privacy = true;          ///< Mask faces and number plates in the picture.
+  PrivacyMask::Config mask;
   double diagnostics_period_s = 1;  ///< s
 };
 
@@ -57,6 +60,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   void Initialize() {
     ReadParameters();
     detector_ = std::make_unique<HazardDetector>(ReadModelManifest(config_.model), config_.threads);
+    if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
     queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
     ros::NodeHandle& node = getNodeHandle();
     detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
@@ -79,6 +83,12 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     parameters.Read("threads", config_.threads, {0, 256});
     parameters.Read("queue_size", config_.queue_size, {1, 1000});
     parameters.Read("annotate_empty", config_.annotate_empty);
+    parameters.Read("privacy", config_.privacy);
+    parameters.Read("privacy_cascades", config_.mask.regions.cascades);
+    parameters.Read("privacy_face_model", config_.mask.regions.face_model);
+    parameters.Read("privacy_min_side_px", config_.mask.regions.min_side_px, {8, 1000});
+    parameters.Read("privacy_grow", config_.mask.grow, {0, 5});
+    parameters.Read("privacy_keep_frames", config_.mask.keep_frames, {0, 1000});
     parameters.Read("diagnostics_period_s", config_.diagnostics_period_s, {0.1, 60});
     parameters.RejectUnknown({"image_transport", "diagnostic_period"});
     if (config_.model.empty()) {
@@ -109,10 +119,9 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     // The picture first: who reports a detection wants it at hand.
     if ((config_.annotate_empty || !found.empty()) &&
         annotated_publisher_.getNumSubscribers() > 0) {
-      annotated_publisher_.publish(ToAnnotatedMessage(bgr->image, found, image->header));
-      const std::lock_guard<std::mutex> lock(figures_mutex_);
-      ++figures_.annotated;
+      PublishPicture(bgr->image, found, image->header);
     }
+    ++frame_;
     detections_publisher_.publish(boost::make_shared<DetectionArray>(
         ToMessage(found, image->header, detector_->manifest().name, bgr->image.size(), ms)));
     queue_->Done();
@@ -120,6 +129,27 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     figures_.detections += found.size();
     ++figures_.processed_in_window;
     figures_.ms_in_window += ms;
+  }
+
+  /// Masked first, so that the drawn boxes stay whole; a picture that cannot be masked stays here.
+  void PublishPicture(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
+                      const std_msgs::Header& header) {
+    cv::Mat picture = bgr;
+    if (mask_) {
+      picture = bgr.clone();
+      try {
+        mask_->Apply(picture, frame_);
+      } catch (const std::exception& error) {
+        NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", error.what());
+        const std::lock_guard<std::mutex> lock(figures_mutex_);
+        ++figures_.withheld;
+        return;
+      }
+    }
+    annotated_publisher_.publish(ToAnnotatedMessage(picture, found, header));
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    ++figures_.annotated;
+    if (mask_) figures_.masked_regions += mask_->Masked().size();
   }
 
   void StartDiagnostics() {
@@ -164,6 +194,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     status.add("frames_waiting", counters.waiting);
     status.add("frames_unusable", figures.bad);
     status.add("frames_annotated", figures.annotated);
+    status.add("pictures_withheld", figures.withheld);
+    status.add("regions_masked", figures.masked_regions);
     status.add("detections", figures.detections);
     status.add("rate_hz", window_s > 0 ? in_window / window_s : 0.0);
     status.add("detection_ms", in_window > 0 ? figures.ms_in_window / in_window : 0.0);
@@ -174,13 +206,18 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   struct Figures {
     std::uint64_t bad = 0;
     std::uint64_t annotated = 0;
+    std::uint64_t withheld = 0;        ///< Pictures that could not be masked.
+    std::uint64_t masked_regions = 0;  ///< Over all pictures.
     std::uint64_t detections = 0;
     std::uint64_t processed_in_window = 0;
     double ms_in_window = 0;
   };
 
   HazardDetectionConfig config_;
-  std::unique_ptr<HazardDetector> detector_;  ///< The worker's.
+  // The worker's:
+  std::unique_ptr<HazardDetector> detector_;
+  std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
+  std::uint64_t frame_ = 0;
   std::unique_ptr<Queue> queue_;
   image_transport::Subscriber subscriber_;
   ros::Publisher detections_publisher_;

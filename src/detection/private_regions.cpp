@@ -1,0 +1,156 @@
+#include "detection/private_regions.h"
+
+#include <array>
+#include <filesystem>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/objdetect.hpp>
+#include <utility>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+// A missed face costs more than a masked bush: few neighbours are asked for. Of 60 drawn plates the
+// cascade finds 52 with two neighbours, 58 with one, and nothing on twelve roads without plates.
+constexpr int kFaceNeighbours = 2;
+constexpr int kPlateNeighbours = 1;
+constexpr double kScaleStep = 1.1;
+constexpr float kLeastFaceScore = 0.5F;
+
+/// Width of a plate that is `side` high, European or American, at least.
+constexpr int kPlateAspect = 2;
+
+class Cascade {
+ public:
+  Cascade(const std::string& folder, const std::string& name, int neighbours)
+      : file_(folder + "/" + name), neighbours_(neighbours) {
+    bool loaded = false;
+    try {
+      loaded = std::filesystem::is_regular_file(file_) && classifier_.load(file_);
+    } catch (const cv::Exception&) {  // What it says about a damaged file is no help to anybody.
+    }
+    if (!loaded) {
+      throw Error("cascade '" + file_ +
+                  "' cannot be loaded, accepted is a Haar cascade as in Debian's opencv-data");
+    }
+  }
+
+  std::vector<cv::Rect> Find(const cv::Mat& grey, cv::Size smallest) {
+    std::vector<cv::Rect> found;
+    classifier_.detectMultiScale(grey, found, kScaleStep, neighbours_, 0, smallest);
+    return found;
+  }
+
+ private:
+  std::string file_;
+  int neighbours_;
+  cv::CascadeClassifier classifier_;
+};
+
+/// Faces by YuNet (Wu et al., "YuNet: a tiny millisecond-level face detector", 2023).
+class YuNet {
+ public:
+  explicit YuNet(const std::string& file) : file_(file) {
+    if (!std::filesystem::is_regular_file(file)) {
+      throw Error("face_model is '" + file + "', which is no file");
+    }
+    try {
+      network_ = cv::FaceDetectorYN::create(file, "", {320, 320}, kLeastFaceScore);
+    } catch (const cv::Exception&) {
+      throw Error("face_model '" + file + "' cannot be loaded, accepted is a YuNet model in ONNX");
+    }
+  }
+
+  std::vector<cv::Rect> Find(const cv::Mat& bgr) {
+    network_->setInputSize(bgr.size());
+    cv::Mat faces;  // A row per face; x, y, width, height first.
+    network_->detect(bgr, faces);
+    std::vector<cv::Rect> found;
+    for (int i = 0; i < faces.rows; ++i) {
+      const float* face = faces.ptr<float>(i);
+      found.emplace_back(cv::Rect2f(face[0], face[1], face[2], face[3]));
+    }
+    return found;
+  }
+
+ private:
+  std::string file_;
+  cv::Ptr<cv::FaceDetectorYN> network_;
+};
+
+class Finder final : public PrivateRegionFinder {
+ public:
+  explicit Finder(const PrivateRegionConfig& config)
+      : min_side_px_(config.min_side_px),
+        plates_{Cascade(config.cascades, "haarcascade_russian_plate_number.xml", kPlateNeighbours),
+                Cascade(config.cascades, "haarcascade_licence_plate_rus_16stages.xml",
+                        kPlateNeighbours)} {
+    if (!config.face_model.empty()) {
+      yunet_ = std::make_unique<YuNet>(config.face_model);
+      return;
+    }
+    frontal_.emplace_back(config.cascades, "haarcascade_frontalface_alt2.xml", kFaceNeighbours);
+    profile_.emplace_back(config.cascades, "haarcascade_profileface.xml", kFaceNeighbours);
+  }
+
+  std::vector<cv::Rect> Find(const cv::Mat& bgr) override {
+    if (bgr.empty() || bgr.type() != CV_8UC3) {
+      throw Error("faces and plates are looked for in images of 8 bit and 3 channels only");
+    }
+    try {
+      return FindAll(bgr);
+    } catch (const cv::Exception& error) {
+      throw Error("looking for faces and plates failed: " + error.err);
+    }
+  }
+
+ private:
+  std::vector<cv::Rect> FindAll(const cv::Mat& bgr) {
+    cv::Mat grey;
+    cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+    std::vector<cv::Rect> all;
+    const cv::Rect image({}, bgr.size());
+    const auto take = [&](const std::vector<cv::Rect>& found) {
+      for (const cv::Rect& region : found) {
+        if (!(region & image).empty()) all.push_back(region & image);
+      }
+    };
+    const cv::Size face(min_side_px_, min_side_px_);
+    for (Cascade& cascade : frontal_) take(cascade.Find(grey, face));
+    FindProfiles(grey, face, take);
+    for (Cascade& cascade : plates_) {
+      take(cascade.Find(grey, {kPlateAspect * min_side_px_, min_side_px_}));
+    }
+    if (yunet_) take(yunet_->Find(bgr));
+    return all;
+  }
+
+  /// The cascade knows faces that look to one side; the mirror image gives the other.
+  template <typename Take>
+  void FindProfiles(const cv::Mat& grey, cv::Size smallest, const Take& take) {
+    if (profile_.empty()) return;
+    cv::Mat mirrored;
+    cv::flip(grey, mirrored, 1);
+    for (Cascade& cascade : profile_) {
+      take(cascade.Find(grey, smallest));
+      std::vector<cv::Rect> found = cascade.Find(mirrored, smallest);
+      for (cv::Rect& region : found) region.x = grey.cols - region.x - region.width;
+      take(found);
+    }
+  }
+
+  int min_side_px_;
+  std::vector<Cascade> frontal_;
+  std::vector<Cascade> profile_;
+  std::array<Cascade, 2> plates_;
+  std::unique_ptr<YuNet> yunet_;
+};
+
+}  // namespace
+
+std::unique_ptr<PrivateRegionFinder> MakePrivateRegionFinder(const PrivateRegionConfig& config) {
+  return std::make_unique<Finder>(config);
+}
+
+}  // namespace livemap
