@@ -8,7 +8,7 @@
 namespace livemap {
 namespace {
 
-constexpr double kHourS = 3600;
+constexpr double kRefillS = 3600;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ bool VehicleAllowance::Take(const std::string& vehicle_id, std::int64_t now_ns,
   if (buckets == nullptr) return false;
   const double elapsed_s = std::max(0.0, Seconds(now_ns - buckets->at_ns));
   const auto refill = [&](double& level, double per_hour) {
-    level = std::min(per_hour, level + elapsed_s / kHourS * per_hour);
+    level = std::min(per_hour, level + elapsed_s / kRefillS * per_hour);
   };
   refill(buckets->reports, config_.reports_per_hour);
   refill(buckets->evidence, config_.evidence_per_hour);
@@ -51,7 +51,7 @@ VehicleAllowance::Buckets* VehicleAllowance::Find(const std::string& vehicle_id,
   if (buckets_.size() >= config_.max_vehicles) {
     const auto silent = buckets_.find(by_use_.front());
     // Its buckets are not surely full: forgetting it would give it more than its cap.
-    if (Seconds(now_ns - silent->second.at_ns) < kHourS) return nullptr;
+    if (Seconds(now_ns - silent->second.at_ns) < kRefillS) return nullptr;
     by_use_.pop_front();
     buckets_.erase(silent);
   }
