@@ -530,8 +530,8 @@ void Study::Finish() {
     figures.untold += noticeable && thing.first_told_s < 0 ? 1 : 0;
     figures.missing_s += thing.missing_s;
   }
-  for (std::size_t i = 0; i < kClasses; ++i) {
-    figures_.classes[kNature[i].name].learned_life_s = survival_.Of(kNature[i].name).MeanLifeS();
+  for (auto& [name, of_class] : figures_.classes) {
+    of_class.learned_life_s = survival_.Of(name).MeanLifeS();
   }
   figures_.polls = polling_.polls();
   figures_.poll_bytes = polling_.bytes();

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kHourS = 3600;
 constexpr double kDayS = 24 * kHourS;
-constexpr std::size_t kJunctions = std::size_t{Town::kSide} * Town::kSide;
+constexpr std::size_t kJunctions = Town::kSide * Town::kSide;
 constexpr double kMetresPerDegree = 111320;
 const GeoPoint kCorner{40.42, -79.98};
 
@@ -25,15 +25,15 @@ double LeisureHour(SeededRandom& random) {
 }  // namespace
 
 Town::Town() : roads_at_(kJunctions) {
-  const auto add = [this](int x, int y, bool north) {
-    const auto from = static_cast<std::size_t>(y * kSide + x);
+  const auto add = [this](std::size_t x, std::size_t y, bool north) {
+    const std::size_t from = y * kSide + x;
     const bool artery = (north ? x : y) % 4 == 0;
     roads_at_[from].push_back(roads_.size());
     roads_at_[north ? from + kSide : from + 1].push_back(roads_.size());
     roads_.push_back({from, north ? from + kSide : from + 1, north, artery});
   };
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
+  for (std::size_t y = 0; y < kSide; ++y) {
+    for (std::size_t x = 0; x < kSide; ++x) {
       if (x + 1 < kSide) add(x, y, false);
       if (y + 1 < kSide) add(x, y, true);
     }
@@ -74,8 +74,10 @@ std::vector<Town::Lane> Town::Route(std::size_t from, std::size_t to) const {
 
 GeoPoint Town::At(std::size_t road, double offset_m) const {
   const Road& r = roads_[road];
-  const double east_m = kBlockM * static_cast<double>(r.from % kSide) + (r.north ? 0 : offset_m);
-  const double north_m = kBlockM * static_cast<double>(r.from / kSide) + (r.north ? offset_m : 0);
+  const std::size_t column = r.from % kSide;
+  const std::size_t row = r.from / kSide;
+  const double east_m = kBlockM * static_cast<double>(column) + (r.north ? 0 : offset_m);
+  const double north_m = kBlockM * static_cast<double>(row) + (r.north ? offset_m : 0);
   return {kCorner.latitude_deg + north_m / kMetresPerDegree,
           kCorner.longitude_deg +
               east_m / (kMetresPerDegree * std::cos(kCorner.latitude_deg * kRadiansPerDegree))};

@@ -11,8 +11,8 @@ namespace livemap {
 /// A town of square blocks: streets between junctions, every fourth one an artery.
 class Town {
  public:
-  static constexpr int kSide = 16;        ///< Junctions per side.
-  static constexpr double kBlockM = 300;  ///< Between junctions.
+  static constexpr std::size_t kSide = 16;  ///< Junctions per side.
+  static constexpr double kBlockM = 300;    ///< Between junctions.
   static constexpr double kArteryMps = 14;
   static constexpr double kStreetMps = 9;
 
