@@ -234,7 +234,7 @@ void SpatialGrid::ClearSlot(std::size_t slot) {
 }
 
 void SpatialGrid::Grow() {
-  std::vector<Slot> old(2 * slots_.size());
+  decltype(slots_) old(2 * slots_.size());
   old.swap(slots_);
   for (const Slot& slot : old) {
     if (slot.entry != kEmpty) PutSlot(slot);

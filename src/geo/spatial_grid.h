@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/huge_pages.h"
 #include "geo/wgs84.h"
 
 namespace livemap {
@@ -90,8 +91,9 @@ class SpatialGrid {
 
   double cell_m_;
   std::uint64_t hash_seed_;
-  std::vector<Slot> slots_;  // Size a power of two, at most half full, linear probing.
-  std::vector<Entry> entries_;
+  std::vector<Slot, HugePageAllocator<Slot>>
+      slots_;  // Size a power of two, at most half full, linear probing.
+  std::vector<Entry, HugePageAllocator<Entry>> entries_;
 };
 
 }  // namespace livemap

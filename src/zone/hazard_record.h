@@ -3,10 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "base/huge_pages.h"
 #include "base/uuid.h"
 #include "zone/hazard_fusion.h"
 #include "zone/hazard_life.h"
@@ -54,15 +54,23 @@ class HazardRecords {
   }
   void push_back(const HazardRecord& record) {
     if (size_ == blocks_.size() * kBlock) {
-      blocks_.push_back(std::make_unique<HazardRecord[]>(kBlock));
+      blocks_.emplace_back();
+      blocks_.back().reserve(kBlock);
     }
-    (*this)[size_++] = record;
+    blocks_[size_ / kBlock].push_back(record);
+    ++size_;
   }
-  void pop_back() { --size_; }
+  void pop_back() {
+    --size_;
+    blocks_[size_ / kBlock].pop_back();
+    if (blocks_.back().empty()) blocks_.pop_back();
+  }
 
  private:
-  static constexpr std::size_t kBlock = 1024;
-  std::vector<std::unique_ptr<HazardRecord[]>> blocks_;
+  /// As many as fit into some huge pages.
+  static constexpr std::size_t kBlock =
+      8 * HugePageAllocator<HazardRecord>::kPageBytes / sizeof(HazardRecord);
+  std::vector<std::vector<HazardRecord, HugePageAllocator<HazardRecord>>> blocks_;
   std::size_t size_ = 0;
 };
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/huge_pages.h"
 #include "base/uuid.h"
 
 namespace livemap {
@@ -72,14 +73,15 @@ class UuidIndex {
     places_[i] = place;
   }
   void Grow() {
-    std::vector<Place> old(2 * places_.size());
+    decltype(places_) old(2 * places_.size());
     old.swap(places_);
     for (const Place& place : old) {
       if (place.number != kEmpty) Put(place);
     }
   }
 
-  std::vector<Place> places_;  ///< A power of two, at most half full, linear probing.
+  std::vector<Place, HugePageAllocator<Place>>
+      places_;  ///< A power of two, at most half full, linear probing.
   std::size_t size_ = 0;
 };
 

@@ -18,6 +18,12 @@ void CheckSettings(const ZoneService::Config& config) {
     throw Error("vehicle_retention_s is " + std::to_string(config.vehicle_retention_s) +
                 ", accepted is above 0 to 1e6");
   }
+  const SpeedRule& speed = config.speed;
+  if (!(speed.max_speed_mps > 0 && speed.max_speed_mps <= 1e9 && speed.slack_m >= 0)) {
+    throw Error("max_speed_mps is " + std::to_string(speed.max_speed_mps) + " and speed_slack_m " +
+                std::to_string(speed.slack_m) + ", accepted are above 0 and at least 0");
+  }
+  if (speed.recovery_reports < 2) throw Error("recovery_reports must be at least 2");
   if (config.max_vehicles == 0) throw Error("max_vehicles is 0, accepted is at least 1");
 }
 

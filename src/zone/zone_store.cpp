@@ -9,7 +9,7 @@
 
 #include "base/sqlite.h"
 #include "zone/zone_schema.h"
-#include "zone/zone_service.h"
+#include "zone/zone_store_state.h"
 
 namespace livemap {
 namespace {
@@ -41,16 +41,6 @@ LifeRecord LifeOf(const Hazard& hazard) {
   return life;
 }
 
-/// Runs `body` and turns the library's exceptions into the project's.
-template <typename Body>
-auto Explained(const std::string& doing, const Body& body) -> decltype(body()) {
-  try {
-    return body();
-  } catch (const soci::soci_error& error) {
-    throw StoreError("store: " + doing + " failed: " + error.get_error_message());
-  }
-}
-
 std::string WhyDamaged(const std::string& path, const std::string& verdict) {
   return "store: database '" + path + "' is damaged and left alone: " + verdict +
          "; how to recover what it holds stands in docs/zone.md";
@@ -65,44 +55,10 @@ std::string ConnectionText(const std::string& path) {
 
 }  // namespace
 
-class ZoneStore::Implementation {
- public:
-  explicit Implementation(const std::string& path)
-      : path_(path), session_(soci::sqlite3, ConnectionText(path)) {
-    Prepare();
-  }
-
-  void Prepare();
-  void PrepareReads();
-  void PrepareWrites();
-
-  /// The values of all statements: SOCI binds to places, not to values.
-  struct Row {
-    std::string uuid, class_name, vehicle_id, drive_id, image_sha256, image_format, reason, life;
-    double confidence = 0, latitude = 0, longitude = 0, presence = 0, sigma_m = 0;
-    double covariance_ee = 0, covariance_en = 0, covariance_nn = 0, ended = 0, stood_s = 0;
-    long long id = 0, sightings = 0, first_seen_ns = 0, last_seen_ns = 0, updated_ns = 0;
-    long long sequence = 0, announced_sequence = 0, previous_sequence = 0;
-    long long stamp_ns = 0, received_ns = 0;
-    int state = 0, vehicles = 0, action = 0, from_state = 0, announced = 0, answer = 0;
-    soci::indicator has_from = soci::i_ok;
-  };
-  static HazardRow ToHazard(const Row& row);
-
-  /// Declared before the statements, which must go first.
-  std::string path_;
-  soci::session session_;
-  Row row_;
-  std::optional<soci::statement> find_report_;
-  std::optional<soci::statement> find_last_report_;
-  std::optional<soci::statement> find_event_;
-  std::optional<soci::statement> write_hazard_;
-  std::optional<soci::statement> write_report_;
-  std::optional<soci::statement> write_event_;
-  std::optional<soci::statement> write_answer_;
-  std::optional<soci::statement> write_life_;
-  std::optional<soci::statement> write_last_report_;
-};
+ZoneStore::Implementation::Implementation(const std::string& path)
+    : path_(path), session_(soci::sqlite3, ConnectionText(path)) {
+  Prepare();
+}
 
 ZoneStore::HazardRow ZoneStore::Implementation::ToHazard(const Row& row) {
   HazardRow result;
@@ -173,69 +129,6 @@ void ZoneStore::Implementation::PrepareReads() {
                        into(row_.reason), into(row_.updated_ns)));
 }
 
-void ZoneStore::Implementation::PrepareWrites() {
-  using soci::use;
-  write_hazard_.emplace(
-      (session_.prepare
-           << "INSERT INTO hazards (id, uuid, class_name, confidence, latitude, longitude, "
-              "covariance_ee, covariance_en, covariance_nn, sightings, first_seen_ns, "
-              "last_seen_ns, updated_ns, sequence, announced_sequence, image_sha256, "
-              "image_format, state, presence, vehicles, life) VALUES (:i, :u, :c, :co, :la, :lo, "
-              ":ee, :en, :nn, :si, :fi, :ls, :up, :se, :an, :is, :im, :st, :pr, :ve, :li) "
-              "ON CONFLICT (id) DO UPDATE SET confidence = excluded.confidence, "
-              "latitude = excluded.latitude, longitude = excluded.longitude, "
-              "covariance_ee = excluded.covariance_ee, covariance_en = excluded.covariance_en, "
-              "covariance_nn = excluded.covariance_nn, sightings = excluded.sightings, "
-              "first_seen_ns = excluded.first_seen_ns, last_seen_ns = excluded.last_seen_ns, "
-              "updated_ns = excluded.updated_ns, sequence = excluded.sequence, "
-              "announced_sequence = excluded.announced_sequence, "
-              "image_sha256 = excluded.image_sha256, image_format = excluded.image_format, "
-              "state = excluded.state, presence = excluded.presence, "
-              "vehicles = excluded.vehicles, life = excluded.life",
-       use(row_.id), use(row_.uuid), use(row_.class_name), use(row_.confidence), use(row_.latitude),
-       use(row_.longitude), use(row_.covariance_ee), use(row_.covariance_en),
-       use(row_.covariance_nn), use(row_.sightings), use(row_.first_seen_ns),
-       use(row_.last_seen_ns), use(row_.updated_ns), use(row_.sequence),
-       use(row_.announced_sequence), use(row_.image_sha256), use(row_.image_format),
-       use(row_.state), use(row_.presence), use(row_.vehicles), use(row_.life)));
-  write_report_.emplace(
-      (session_.prepare
-           << "INSERT INTO reports (uuid, hazard_id, vehicle_id, drive_id, stamp_ns, "
-              "received_ns, confidence, latitude, longitude, covariance_ee, covariance_en, "
-              "covariance_nn, image_sha256) VALUES "
-              "(:u, :h, :v, :d, :st, :re, :co, :la, :lo, :ee, :en, :nn, :im)",
-       use(row_.uuid), use(row_.id), use(row_.vehicle_id), use(row_.drive_id), use(row_.stamp_ns),
-       use(row_.received_ns), use(row_.confidence), use(row_.latitude), use(row_.longitude),
-       use(row_.covariance_ee), use(row_.covariance_en), use(row_.covariance_nn),
-       use(row_.image_sha256)));
-  write_event_.emplace((session_.prepare
-                            << "INSERT INTO events (sequence, hazard_id, previous_sequence, "
-                               "action, from_state, to_state, announced, reason, at_ns) "
-                               "VALUES (:s, :h, :p, :a, :f, :t, :an, :r, :at)",
-                        use(row_.sequence), use(row_.id), use(row_.previous_sequence),
-                        use(row_.action), use(row_.from_state, row_.has_from), use(row_.state),
-                        use(row_.announced), use(row_.reason), use(row_.updated_ns)));
-  write_answer_.emplace(
-      (session_.prepare
-           << "INSERT INTO answers (poll_uuid, hazard_id, vehicle_id, answer, reason, confidence, "
-              "stamp_ns, received_ns) VALUES (:u, :h, :v, :a, :r, :c, :st, :re)",
-       use(row_.uuid), use(row_.id), use(row_.vehicle_id), use(row_.answer), use(row_.reason),
-       use(row_.confidence), use(row_.stamp_ns), use(row_.received_ns)));
-  write_life_.emplace((session_.prepare
-                           << "INSERT INTO lives (class_name, ended, stood_s) VALUES (:c, :e, :s) "
-                              "ON CONFLICT (class_name) DO UPDATE SET ended = excluded.ended, "
-                              "stood_s = excluded.stood_s",
-                       use(row_.class_name), use(row_.ended), use(row_.stood_s)));
-  write_last_report_.emplace(
-      (session_.prepare
-           << "INSERT INTO last_reports (vehicle_id, stamp_ns, latitude, longitude, sigma_m) "
-              "VALUES (:v, :st, :la, :lo, :si) ON CONFLICT (vehicle_id) DO UPDATE SET "
-              "stamp_ns = excluded.stamp_ns, latitude = excluded.latitude, "
-              "longitude = excluded.longitude, sigma_m = excluded.sigma_m",
-       use(row_.vehicle_id), use(row_.stamp_ns), use(row_.latitude), use(row_.longitude),
-       use(row_.sigma_m)));
-}
-
 ZoneStore::ZoneStore(const std::string& path) {
   try {
     implementation_ = std::make_unique<Implementation>(path);
@@ -253,7 +146,7 @@ ZoneStore::~ZoneStore() = default;
 int ZoneStore::SchemaVersion() { return kZoneSchemaVersion; }
 
 void ZoneStore::LoadHazards(const std::function<void(HazardRow)>& take) {
-  Explained("loading hazards", [&] {
+  ExplainStore("loading hazards", [&] {
     using soci::into;
     Implementation::Row row;
     soci::statement query =
@@ -274,7 +167,7 @@ void ZoneStore::LoadHazards(const std::function<void(HazardRow)>& take) {
 }
 
 void ZoneStore::LoadLives(const std::function<void(const std::string&, LearnedLife)>& take) {
-  Explained("loading what was learned of classes", [&] {
+  ExplainStore("loading what was learned of classes", [&] {
     Implementation::Row row;
     soci::statement query =
         (implementation_->session_.prepare << "SELECT class_name, ended, stood_s FROM lives",
@@ -285,7 +178,7 @@ void ZoneStore::LoadLives(const std::function<void(const std::string&, LearnedLi
 }
 
 std::uint64_t ZoneStore::LastSequence() {
-  return Explained("reading the newest sequence", [&] {
+  return ExplainStore("reading the newest sequence", [&] {
     long long sequence = 0;
     implementation_->session_ << "SELECT coalesce(max(sequence), 0) FROM events",
         soci::into(sequence);
@@ -307,7 +200,7 @@ bool FetchOne(soci::statement& statement) {
 }  // namespace
 
 std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_uuid) {
-  return Explained("looking up a report", [&]() -> std::optional<KnownReport> {
+  return ExplainStore("looking up a report", [&]() -> std::optional<KnownReport> {
     Implementation::Row& row = implementation_->row_;
     row.reason = report_uuid.ToString();
     if (!FetchOne(*implementation_->find_report_)) return std::nullopt;
@@ -316,7 +209,7 @@ std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_u
 }
 
 std::optional<ReportedFix> ZoneStore::FindLastReport(const std::string& vehicle_id) {
-  return Explained("looking up a vehicle", [&]() -> std::optional<ReportedFix> {
+  return ExplainStore("looking up a vehicle", [&]() -> std::optional<ReportedFix> {
     Implementation::Row& row = implementation_->row_;
     row.vehicle_id = vehicle_id;
     if (!FetchOne(*implementation_->find_last_report_)) return std::nullopt;
@@ -326,7 +219,7 @@ std::optional<ReportedFix> ZoneStore::FindLastReport(const std::string& vehicle_
 
 std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t sequence,
                                                std::size_t limit) {
-  return Explained("reading events", [&] {
+  return ExplainStore("reading events", [&] {
     Implementation::Row& row = implementation_->row_;
     std::vector<StoredEvent> events;
     while (sequence != 0 && events.size() < limit) {
@@ -348,127 +241,6 @@ std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t
     }
     std::reverse(events.begin(), events.end());
     return events;
-  });
-}
-
-void ZoneStore::Begin() {
-  Explained("beginning a transaction", [&] { implementation_->session_ << "BEGIN IMMEDIATE"; });
-}
-
-void ZoneStore::Commit() {
-  Explained("committing", [&] { implementation_->session_ << "COMMIT"; });
-}
-
-void ZoneStore::Rollback() noexcept {
-  try {
-    implementation_->session_ << "ROLLBACK";
-  } catch (const std::exception&) {  // See the header.
-  }
-}
-
-void ZoneStore::WriteHazard(const HazardRow& written) {
-  Explained("writing a hazard", [&] {
-    Implementation::Row& row = implementation_->row_;
-    const Hazard& hazard = written.hazard;
-    row.id = static_cast<long long>(written.id);
-    row.uuid = hazard.uuid.ToString();
-    row.class_name = hazard.class_name;
-    row.confidence = static_cast<double>(hazard.confidence);
-    row.latitude = hazard.position.latitude_deg;
-    row.longitude = hazard.position.longitude_deg;
-    row.covariance_ee = hazard.covariance_m2(0, 0);
-    row.covariance_en = hazard.covariance_m2(0, 1);
-    row.covariance_nn = hazard.covariance_m2(1, 1);
-    row.sightings = hazard.sightings;
-    row.first_seen_ns = hazard.first_seen_ns;
-    row.last_seen_ns = hazard.last_seen_ns;
-    row.updated_ns = hazard.updated_ns;
-    row.sequence = static_cast<long long>(hazard.sequence);
-    row.announced_sequence = static_cast<long long>(hazard.announced_sequence);
-    row.image_sha256 = hazard.image_sha256;
-    row.image_format = hazard.image_format;
-    row.state = static_cast<int>(hazard.state);
-    row.presence = static_cast<double>(hazard.presence);
-    row.vehicles = static_cast<int>(hazard.vehicles);
-    row.life = PackLife(written.life);
-    implementation_->write_hazard_->execute(true);
-  });
-}
-
-void ZoneStore::WriteReport(const Report& report, std::uint64_t hazard_id,
-                            const std::string& image_sha256, std::int64_t received_ns) {
-  Explained("writing a report", [&] {
-    Implementation::Row& row = implementation_->row_;
-    row.uuid = report.uuid.ToString();
-    row.id = static_cast<long long>(hazard_id);
-    row.vehicle_id = report.vehicle_id;
-    row.drive_id = report.drive_id;
-    row.stamp_ns = report.stamp_ns;
-    row.received_ns = received_ns;
-    row.confidence = static_cast<double>(report.confidence);
-    row.latitude = report.position.latitude_deg;
-    row.longitude = report.position.longitude_deg;
-    row.covariance_ee = report.covariance_m2(0, 0);
-    row.covariance_en = report.covariance_m2(0, 1);
-    row.covariance_nn = report.covariance_m2(1, 1);
-    row.image_sha256 = image_sha256;
-    implementation_->write_report_->execute(true);
-  });
-}
-
-void ZoneStore::WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
-                           std::uint64_t previous_sequence) {
-  Explained("writing an event", [&] {
-    Implementation::Row& row = implementation_->row_;
-    row.sequence = static_cast<long long>(event.hazard.sequence);
-    row.id = static_cast<long long>(hazard_id);
-    row.previous_sequence = static_cast<long long>(previous_sequence);
-    row.action = static_cast<int>(event.action);
-    row.has_from = event.from ? soci::i_ok : soci::i_null;
-    row.from_state = event.from ? static_cast<int>(*event.from) : 0;
-    row.state = static_cast<int>(event.hazard.state);
-    row.announced = event.announced ? 1 : 0;
-    row.reason = event.reason;
-    row.updated_ns = event.hazard.updated_ns;
-    implementation_->write_event_->execute(true);
-  });
-}
-
-void ZoneStore::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
-                            std::int64_t received_ns) {
-  Explained("writing an answer", [&] {
-    Implementation::Row& row = implementation_->row_;
-    row.uuid = answer.poll.ToString();
-    row.id = static_cast<long long>(hazard_id);
-    row.vehicle_id = answer.vehicle_id;
-    row.answer = static_cast<int>(answer.answer);
-    row.reason = answer.reason;
-    row.confidence = answer.confidence;
-    row.stamp_ns = answer.stamp_ns;
-    row.received_ns = received_ns;
-    implementation_->write_answer_->execute(true);
-  });
-}
-
-void ZoneStore::WriteLife(const std::string& class_name, const LearnedLife& learned) {
-  Explained("writing what was learned of a class", [&] {
-    Implementation::Row& row = implementation_->row_;
-    row.class_name = class_name;
-    row.ended = learned.ended;
-    row.stood_s = learned.stood_s;
-    implementation_->write_life_->execute(true);
-  });
-}
-
-void ZoneStore::WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix) {
-  Explained("writing a vehicle's last report", [&] {
-    Implementation::Row& row = implementation_->row_;
-    row.vehicle_id = vehicle_id;
-    row.stamp_ns = fix.stamp_ns;
-    row.latitude = fix.position.latitude_deg;
-    row.longitude = fix.position.longitude_deg;
-    row.sigma_m = fix.sigma_m;
-    implementation_->write_last_report_->execute(true);
   });
 }
 

@@ -53,6 +53,14 @@ TEST_P(SpatialGridAt, FindsWhatBruteForceFindsWhilePlacesComeAndGo) {
         places.push_back({Scatter(150.0), round});
         grid.Insert(places.back().point, round);
       }
+      if (round % 2 == 0) {
+        // A long way, or a short one within the cell.
+        Place& moved = places[random_() % places.size()];
+        const GeoPoint to =
+            round % 4 == 0 ? Scatter(150.0) : GeodesicDestination(moved.point, 1, 1);
+        ASSERT_TRUE(grid.Move(moved.point, to, moved.id));
+        moved.point = to;
+      }
       ASSERT_EQ(grid.size(), places.size());
       const GeoPoint centre = Scatter(160.0);
       const auto expected = NearestByBruteForce(places, centre, radius_m);
@@ -150,6 +158,7 @@ TEST(SpatialGrid, ErasingWhatIsNotThereChangesNothing) {
   grid.Insert({10, 20}, 1);
   EXPECT_FALSE(grid.Erase({10, 20}, 2));
   EXPECT_FALSE(grid.Erase({10, 21}, 1));
+  EXPECT_FALSE(grid.Move({10, 21}, {10, 20}, 1));
   EXPECT_FALSE(grid.Erase({std::nan(""), 20}, 1));
   EXPECT_EQ(grid.size(), 1u);
 }

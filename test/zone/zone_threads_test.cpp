@@ -67,5 +67,88 @@ TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
   EXPECT_EQ(zone.Query(std::nullopt, 0, 1000).size(), 40U);
 }
 
+/// Comes from the south towards `place` and passes it.
+void PassBy(ZoneService& zone, const std::string& vehicle, const GeoPoint& place,
+            std::atomic<std::int64_t>& now_ns) {
+  for (int metres = -200; metres <= -15; metres += 15) {
+    now_ns += 1'000'000'000;
+    const GeoPoint at{place.latitude_deg + metres / 111000.0, place.longitude_deg};
+    zone.UpdateVehicle({vehicle, "", at, 0.0, 15.0, now_ns});
+  }
+}
+
+TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnEvent) {
+  std::atomic<std::int64_t> now_ns{kNowNs};
+  ZoneService zone(
+      Config(), [&] { return now_ns.load(); }, 1);
+  std::vector<HazardEvent> events;
+  const int id = zone.Subscribe([&](const ZoneEvent& event) {
+    if (event.hazard) events.push_back(*event.hazard);
+  });
+  const auto place = [](int i) { return GeoPoint{40 + 0.01 * i, 8}; };
+  std::vector<Report> first;
+  for (int i = 0; i < 20; ++i) first.push_back(MakeReport(place(i)));
+  zone.HandleBatch(first);
+  now_ns += 12 * 3600'000'000'000;
+
+  std::atomic<int> working{3};
+  std::thread reporter([&] {
+    for (int i = 0; i < 100; ++i) {
+      Report report = MakeReport(place(i % 20));
+      report.vehicle_id = "car-" + std::to_string(i);
+      report.stamp_ns = now_ns;
+      zone.Handle(report);
+    }
+    --working;
+  });
+  std::thread official([&] {
+    for (int i = 0; i < 40; ++i) {
+      for (const Hazard& hazard : zone.Query(std::nullopt, 0, 5)) {
+        if (i % 2 == 0) zone.Reject(hazard.uuid, "Anna", "");
+        zone.Confirm(hazard.uuid, "Anna");
+        EXPECT_FALSE(zone.Events(hazard.uuid, 10).empty());
+      }
+      zone.ChangedAround(place(3), 5000, zone.AnnouncedSequence() / 2, 100);
+    }
+    --working;
+  });
+  std::atomic<std::uint64_t> accepted{0};
+  std::thread passer([&] {
+    for (int i = 0; i < 20; ++i) {
+      PassBy(zone, "poll-" + std::to_string(i), place(i), now_ns);
+      for (const PollOrder& order : zone.TakeDuePolls()) {
+        PollAnswer answer;
+        answer.poll = order.poll;
+        answer.hazard = order.hazard;
+        answer.vehicle_id = order.vehicle_id;
+        answer.answer = PollAnswer::Answer::kNo;
+        answer.stamp_ns = now_ns;
+        if (zone.HandleAnswer(answer)) ++accepted;
+      }
+    }
+    --working;
+  });
+  std::thread clock([&] {
+    while (working > 0) {
+      zone.Advance();
+      zone.Statistics();
+      std::this_thread::yield();
+    }
+  });
+  for (std::thread* thread : {&reporter, &official, &passer, &clock}) thread->join();
+  zone.Unsubscribe(id);
+
+  ASSERT_EQ(events.size(), zone.Sequence());
+  std::uint64_t announced = 0;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    EXPECT_EQ(events[i].hazard.sequence, i + 1);
+    EXPECT_EQ(events[i].previous_announced, announced);
+    if (events[i].announced) announced = i + 1;
+  }
+  EXPECT_EQ(zone.AnnouncedSequence(), announced);
+  EXPECT_EQ(zone.Statistics().answers, accepted);
+  EXPECT_EQ(zone.Statistics().added + zone.Statistics().merged, 120U);
+}
+
 }  // namespace
 }  // namespace livemap
