@@ -7,6 +7,7 @@ rounds; only the victim of a round dies.
 import contextlib
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -88,10 +89,18 @@ class World:
     def __enter__(self):
         try:
             self.start()
-        except BaseException:
+        except BaseException as error:
             self.__exit__()
+            if isinstance(error, WorldError):
+                raise WorldError(f"{error}; {self.complaints()}") from error
             raise
         return self
+
+    def complaints(self):
+        """The first of each process, without colours: folders of tests go."""
+        first = [f"{log.name}: {lines[0].strip()}" for log in sorted(self.directory.glob("*.log"))
+                if (lines := re.findall(r".*(?:FATAL|ERROR).*", log.read_text(encoding="utf-8", errors="replace")))]
+        return re.sub(r"\x1b\[[0-9;]*m", "", "; ".join(first)) or "nothing complained"
 
     def __exit__(self, *_):
         for process in self.processes.values():
