@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -10,8 +11,9 @@
 namespace livemap {
 
 /// Says which unfinished reports are to be sent now: each at once, then again after a pause that
-/// doubles, with jitter so that vehicles which lost the same link do not return in step. Urgent
-/// classes go first, then older reports. Times are steady seconds from any origin.
+/// doubles, with jitter so that vehicles which lost the same link do not return in step. The first
+/// answer after a silence shows that the way to the zone is open again: then the long pauses end
+/// for all. Urgent classes go first, then older reports. Times are steady seconds from any origin.
 class ResendSchedule {
  public:
   struct Config {
@@ -24,7 +26,7 @@ class ResendSchedule {
 
   /// A report to send from `now_s` on. `urgency` as in HazardClass; `created_ns` orders equals.
   void Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s);
-  /// The report is finished; unknown ones are ignored.
+  /// The report is finished: the zone answered. Unknown ones are ignored.
   void Remove(const Uuid& report);
   /// At most `limit` reports whose time has come, in the order to send them; plans their next time.
   std::vector<Uuid> TakeDue(double now_s, std::size_t limit);
@@ -37,9 +39,14 @@ class ResendSchedule {
     std::int64_t created_ns;
     double due_s;
     double pause_s;
+    double sent_s;  ///< Last, if it was.
   };
 
+  void NoteAnswer(double now_s);
+
   Config config_;
+  bool answered_ = false;                ///< Since the last TakeDue.
+  std::optional<double> last_answer_s_;  ///< Or the first report's time, while there is none.
   std::mt19937_64 random_;
   std::map<Uuid, Entry> entries_;
 };

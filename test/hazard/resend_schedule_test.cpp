@@ -8,9 +8,9 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-Uuid Id(std::uint8_t number) {
+Uuid Id(int number) {
   Uuid id;
-  id.bytes[15] = number;
+  id.bytes[15] = static_cast<std::uint8_t>(number);
   return id;
 }
 
@@ -66,6 +66,45 @@ TEST(ResendSchedule, FinishedReportIsNotSentAgain) {
   schedule.Remove(Id(2));
   EXPECT_THAT(schedule.TakeDue(100.0, 10), IsEmpty());
   EXPECT_EQ(schedule.size(), 0u);
+}
+
+std::vector<Uuid> SendUntil(ResendSchedule& schedule, double from_s, double to_s) {
+  std::vector<Uuid> sent;
+  for (double now_s = from_s; now_s <= to_s; now_s += 0.125) {
+    for (const Uuid& id : schedule.TakeDue(now_s, 10)) sent.push_back(id);
+  }
+  return sent;
+}
+
+TEST(ResendSchedule, FirstAnswerAfterASilenceEndsTheLongPausesOfAll) {
+  ResendSchedule schedule = WithoutJitter();
+  for (const int id : {1, 2, 3}) schedule.Add(Id(id), 2, id, 0.0);
+  SendUntil(schedule, 0.0, 16.0);  // Sent at 0, 1, 3, 7, 15 s; due again at 31 s.
+  schedule.Remove(Id(1));
+  EXPECT_THAT(schedule.TakeDue(16.125, 10), ElementsAre(Id(2), Id(3)));
+  EXPECT_THAT(SendUntil(schedule, 16.25, 17.0), IsEmpty());
+  EXPECT_THAT(SendUntil(schedule, 17.125, 17.125), ElementsAre(Id(2), Id(3)));
+}
+
+TEST(ResendSchedule, AnswersThatFollowEachOtherLeaveThePausesAlone) {
+  ResendSchedule schedule = WithoutJitter();
+  for (const int id : {1, 2, 3, 4}) schedule.Add(Id(id), 2, id, 0.0);
+  SendUntil(schedule, 0.0, 0.0);
+  schedule.Remove(Id(1));
+  SendUntil(schedule, 0.125, 1.5);  // All again at 1 s, then at 3 s.
+  schedule.Remove(Id(2));
+  EXPECT_THAT(SendUntil(schedule, 1.625, 2.875), IsEmpty());
+  EXPECT_THAT(SendUntil(schedule, 3.0, 3.0), ElementsAre(Id(3), Id(4)));
+}
+
+TEST(ResendSchedule, WhatWasSentAMomentAgoIsNotSentAtOnceAgainByAnAnswer) {
+  ResendSchedule schedule = WithoutJitter();
+  schedule.Add(Id(1), 2, 1, 0.0);
+  schedule.Add(Id(2), 2, 2, 0.0);
+  SendUntil(schedule, 0.0, 7.0);  // Due again at 15 s.
+  schedule.Remove(Id(1));
+  EXPECT_THAT(SendUntil(schedule, 7.125, 7.875), IsEmpty());
+  EXPECT_THAT(SendUntil(schedule, 8.0, 8.0), ElementsAre(Id(2)));
 }
 
 }  // namespace
