@@ -81,6 +81,9 @@ def read_bag(path):
 class LiveMapSystem:
     """Broker, zone and vehicle as child processes; leaving the `with` block stops them."""
 
+    # Of zone_cloudlet: the drives that are played here were driven long ago.
+    zone_parameters = "{replay: true}"
+
     def __init__(self, directory, zone, vehicle, web_port=0):
         self.directory = pathlib.Path(directory)
         self.zone, self.vehicle = zone, vehicle
@@ -140,7 +143,7 @@ class LiveMapSystem:
         self.launch("zone", self.zone_port, "zone.launch", {
             "zone": self.zone, "directory": self.directory / "zone",
             "broker_port": self.broker_port, "password_file": self.password_file("zone"),
-            "web_port": self.web_port, "rviz": str(rviz).lower()})
+            "web_port": self.web_port, "rviz": str(rviz).lower(), "zone_cloudlet": self.zone_parameters})
         self.wait_for("the zone's live map", self.map_answers)
 
     def start_vehicle(self, bag, rate, rviz=False, **arguments):

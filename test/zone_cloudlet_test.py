@@ -197,7 +197,7 @@ class ZoneCloudletTest(unittest.TestCase):
     def test_a_restart_keeps_the_same_hazards_and_knows_the_old_reports(self):
         report = make_report(class_name="<img src=x onerror=alert(1)>")
         first = self.send(report)
-        self.send(make_report(latitude=40.45))
+        self.send(make_report(latitude=40.45, vehicle_id="car-2"))
         before = self.stored()
         for signal_number in (signal.SIGINT, signal.SIGKILL):
             self.restart(signal_number)

@@ -108,6 +108,8 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
   newest_base_ = lookup.pose;
   newest_ns_ = frame.stamp_ns;
   const auto mounting = vehicle.mounting(frame.frame_id);
+  // At a start the camera's calibration and mounting may come after its first image.
+  if ((!vehicle.intrinsics || !mounting) && waited_s < config_.pose_wait_s) return false;
   const bool fits = vehicle.intrinsics && mounting &&
                     static_cast<std::uint32_t>(vehicle.intrinsics->width) == frame.image_width &&
                     static_cast<std::uint32_t>(vehicle.intrinsics->height) == frame.image_height;

@@ -42,7 +42,7 @@ class PollResponder {
     double dark_luminance = 20;   ///< 0..255: mean of the image below which nothing counts.
     double miss_share = 0.4;      ///< Share of clear views in which a detector misses a hazard.
     double min_confidence = 0;    ///< 0..1, of a match.
-    double pose_wait_s = 3;       ///< A frame waits at most this long for its pose.
+    double pose_wait_s = 3;       ///< A frame waits at most this long for pose and camera.
     double bracket_wait_s = 0.3;  ///< As in HazardReporter.
     double picture_wait_s = 0.5;  ///< A yes waits at most this long for its picture.
     int jpeg_quality = 70;        ///< 1..100.

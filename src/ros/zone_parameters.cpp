@@ -72,6 +72,7 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000});
   parameters.Read("max_future_s", limits.max_future_s, {0, 1e9});
   parameters.Read("max_age_s", limits.max_age_s, {60, 1e10});
+  parameters.Read("replay", zone.replay);
   ReadCount(parameters, "max_image_bytes", limits.max_image_bytes, {0, 64e6});
   ReadCount(parameters, "max_image_side_px", limits.max_image_side_px, {1, 65535});
 }

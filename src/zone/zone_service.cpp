@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "zone/zone_service_state.h"
@@ -174,6 +175,7 @@ ZoneStatistics ZoneService::Implementation::Statistics() const {
 
 ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed) {
   CheckSettings(config);
+  if (config.replay) config.limits.max_age_s = std::numeric_limits<double>::infinity();
   implementation_ =
       std::make_unique<Implementation>(std::move(config), std::move(now_ns), uuid_seed);
 }

@@ -110,6 +110,9 @@ class ZoneService {
     SurvivalModel::Config survival;
     PollScheduler::Config polls;
     SightRule sight;  ///< Whose answer to a poll counts.
+    /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
+    /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
+    bool replay = false;
     HazardCatalogue catalogue;
   };
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.

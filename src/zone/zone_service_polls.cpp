@@ -88,16 +88,15 @@ bool ZoneService::Implementation::IsAcceptable(const PollAnswer& answer, const O
   if (now_ns > poll.expires_ns) return false;
   // Of an image taken since the poll, by a clock that is nearly right.
   const auto window_ns = static_cast<std::int64_t>(config_.sight.window_s * 1e9);
-  if (answer.stamp_ns < poll.asked_ns - window_ns || answer.stamp_ns > now_ns + window_ns) {
-    return false;
-  }
+  const std::int64_t seen_ns = SeenNs(answer.stamp_ns, now_ns);
+  if (seen_ns < poll.asked_ns - window_ns || seen_ns > now_ns + window_ns) return false;
   if (!answer.reason.empty() && !IsPrintableText(answer.reason, config_.limits.max_text_bytes)) {
     return false;
   }
   if (!(answer.confidence >= 0 && answer.confidence <= 1)) return false;
   if (!answer.image.empty() && WhyPictureRefused(answer.image, config_.limits)) return false;
   if (answer.answer == PollAnswer::Answer::kCantSee) return true;
-  return CouldSee(vehicles_.Track(answer.vehicle_id), answer.stamp_ns, record.estimate.position,
+  return CouldSee(vehicles_.Track(answer.vehicle_id), seen_ns, record.estimate.position,
                   config_.sight);
 }
 
@@ -117,7 +116,8 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
     change.answered_id = registry_.Record(slot).id;
     PassTime(slot, change);
     LifeRecord life = registry_.Record(slot).life;
-    const Evidence evidence{KindOf(answer.answer), VehicleKey(answer.vehicle_id), answer.stamp_ns};
+    const Evidence evidence{KindOf(answer.answer), VehicleKey(answer.vehicle_id),
+                            SeenNs(answer.stamp_ns, change.now_ns)};
     const LifeStep step = life_.Apply(ClassOf(slot), evidence, change.now_ns, life);
     if (!step.counted && !step.transition) return;
     const Before before = BeforeOf(slot);

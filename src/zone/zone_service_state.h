@@ -165,6 +165,10 @@ class ZoneService::Implementation {
 
   // Transactions: zone_service.cpp.
   Change NewChange() const;
+  /// When something was seen, by an image's stamp; see Config::replay.
+  std::int64_t SeenNs(std::int64_t stamp_ns, std::int64_t now_ns) const {
+    return config_.replay ? now_ns : stamp_ns;
+  }
   /// Runs `body` between Begin and Commit of store and registry; when anything throws both are as
   /// before. The caller holds writer_mutex_ and, exclusively, data_mutex_.
   template <typename Body>

@@ -70,6 +70,21 @@ TEST_F(ZoneRefusalTest, AReportFromAnOutboxMayBeOldButNotOlderThanTheLimit) {
   EXPECT_EQ(Refused(RefusalKind::kTooOld), 1U);
 }
 
+TEST_F(ZoneRefusalTest, AReplayedDriveCountsAsOfItsArrivalHoweverOldItIs) {
+  ZoneService::Config config = Strict();
+  config.replay = true;
+  ZoneService zone(config, Clock(), 1);
+  Report report = MakeReport();
+  report.stamp_ns = kNowNs - 3 * 365 * 86400 * kSecondNs;
+  const Receipt receipt = zone.Handle(report);
+  EXPECT_EQ(receipt.reason, "");
+  zone.Advance();
+  const auto hazard = zone.Find(receipt.hazard_uuid);
+  ASSERT_TRUE(hazard);
+  EXPECT_EQ(hazard->state, HazardState::kCandidate) << "gone, as if unseen for three years";
+  EXPECT_EQ(hazard->last_seen_ns, report.stamp_ns) << "the drive's own time is shown";
+}
+
 TEST_F(ZoneRefusalTest, AStampOfTheFutureIsRefusedAndCounted) {
   Report report = MakeReport();
   report.stamp_ns = kNowNs + 400 * kSecondNs;
