@@ -87,8 +87,8 @@ def read_map(path):
     database = open_for_reading(path)
     try:
         database.execute("BEGIN")
-        reports = {uuid.UUID(row[0]): row[1] for row in database.execute("SELECT uuid, hazard_uuid FROM reports")}
-        sightings = dict(database.execute("SELECT uuid, sightings FROM hazards"))
+        reports = {uuid.UUID(row[0]): row[1] for row in database.execute("SELECT uuid, hazard_id FROM reports")}
+        sightings = dict(database.execute("SELECT id, sightings FROM hazards"))
         return Map(reports, sightings)
     finally:
         database.close()

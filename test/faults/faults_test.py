@@ -104,29 +104,29 @@ class FaultsTest(unittest.TestCase):
 
     def test_a_report_gone_from_the_zone_is_lost(self):
         copies = self.copies()
-        uuid, hazard = change(copies.map_path, "SELECT uuid, hazard_uuid FROM reports LIMIT 1")[0]
+        uuid, hazard = change(copies.map_path, "SELECT uuid, hazard_id FROM reports LIMIT 1")[0]
         change(copies.map_path, "DELETE FROM reports WHERE uuid = ?", uuid)
         self.assertEqual(copies.judge().lost, [uuid])
         self.assertEqual(copies.judge().doubled, [hazard], "it has fewer reports than sightings")
 
     def test_a_report_counted_twice_is_doubled(self):
         copies = self.copies()
-        hazard = change(copies.map_path, "SELECT uuid FROM hazards LIMIT 1")[0][0]
-        change(copies.map_path, "UPDATE hazards SET sightings = sightings + 1 WHERE uuid = ?", hazard)
+        hazard = change(copies.map_path, "SELECT id FROM hazards LIMIT 1")[0][0]
+        change(copies.map_path, "UPDATE hazards SET sightings = sightings + 1 WHERE id = ?", hazard)
         self.assertEqual(copies.judge().doubled, [hazard])
 
     def test_a_thing_that_became_two_hazards_is_doubled(self):
-        twice = "SELECT max(uuid), hazard_uuid FROM reports GROUP BY hazard_uuid HAVING count(*) = 2 LIMIT 1"
+        twice = "SELECT max(uuid), hazard_id FROM reports GROUP BY hazard_id HAVING count(*) = 2 LIMIT 1"
         self.world.feed()
         wait_until(lambda: change(self.world.ledger.map_path, twice), "a hazard that both vehicles reported")
         self.world.rest()
         copies = self.copies()
         uuid, hazard = change(copies.map_path, twice)[0]
         columns = [row[1] for row in change(copies.map_path, "PRAGMA table_info(hazards)")]
-        values = ", ".join({"uuid": "'twin'", "sightings": "1", "sequence": "-1"}.get(name, name) for name in columns)
-        change(copies.map_path, f"INSERT INTO hazards SELECT {values} FROM hazards WHERE uuid = ?", hazard)
-        change(copies.map_path, "UPDATE reports SET hazard_uuid = 'twin' WHERE uuid = ?", uuid)
-        change(copies.map_path, "UPDATE hazards SET sightings = 1 WHERE uuid = ?", hazard)
+        values = ", ".join({"id": "-1", "uuid": "'twin'", "sightings": "1", "sequence": "-1"}.get(name, name) for name in columns)
+        change(copies.map_path, f"INSERT INTO hazards SELECT {values} FROM hazards WHERE id = ?", hazard)
+        change(copies.map_path, "UPDATE reports SET hazard_id = -1 WHERE uuid = ?", uuid)
+        change(copies.map_path, "UPDATE hazards SET sightings = 1 WHERE id = ?", hazard)
         self.assertEqual(len(copies.judge().doubled), 1)
 
     def test_a_report_that_no_outbox_had_is_unknown(self):
