@@ -42,7 +42,6 @@ def image(number, *blocks):
 def street_with_face(number):
     """A large image of a grey street with a drawn face, and a red block that the model knows; where the face is."""
     pixels = numpy.random.RandomState(7).normal(120, 6, (240, 320, 3)).clip(0, 255).astype(numpy.uint8)
-    pixels[180:220, 10:50] = RED
     height, centre = 80, numpy.array((180, 110))
 
     def part(x, y, width, part_height, colour):
@@ -59,7 +58,9 @@ def street_with_face(number):
         part(side, -0.19, 0.10, 0.03, (30, 40, 60))
     part(0, 0.08, 0.06, 0.10, (120, 150, 195))
     part(0, 0.30, 0.15, 0.04, (70, 70, 160))
-    pixels = cv2.GaussianBlur(pixels, (0, 0), 1.0)
+    # Without colour: the model would take skin for red.
+    pixels = cv2.merge([cv2.cvtColor(cv2.GaussianBlur(pixels, (0, 0), 1.0), cv2.COLOR_BGR2GRAY)] * 3)
+    pixels[180:220, 10:50] = RED
     message = image(number)
     message.height, message.width = pixels.shape[:2]
     message.step = 3 * message.width
@@ -178,7 +179,7 @@ class HazardDetectionTest(unittest.TestCase):
         masked, seen = self.picture_of_a_face()
         colours = {tuple(pixel) for pixel in masked.reshape(-1, 3)}
         self.assertLess(len(colours), 50, "more blocks than a mask leaves")
-        self.assertGreater(len({tuple(pixel) for pixel in seen.reshape(-1, 3)}), 500)
+        self.assertGreater(len({tuple(pixel) for pixel in seen.reshape(-1, 3)}), 100)
 
     def test_without_privacy_the_picture_is_what_the_camera_saw(self):
         picture, seen = self.picture_of_a_face(privacy=False)
