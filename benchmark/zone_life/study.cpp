@@ -17,7 +17,6 @@
 namespace livemap {
 namespace {
 
-constexpr double kDayS = 86400;
 constexpr std::int64_t kEpochNs = 1'700'000'000LL * 1'000'000'000;
 constexpr double kApproachS = 8;         // Before the passage a vehicle is near enough to be asked.
 constexpr double kCantSee = 0.1;         // Polls that meet an occluded or blinded camera.

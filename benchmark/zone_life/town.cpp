@@ -8,7 +8,6 @@ namespace livemap {
 namespace {
 
 constexpr double kHourS = 3600;
-constexpr double kDayS = 24 * kHourS;
 constexpr std::size_t kJunctions = Town::kSide * Town::kSide;
 constexpr double kMetresPerDegree = 111320;
 const GeoPoint kCorner{40.42, -79.98};

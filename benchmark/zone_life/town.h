@@ -8,6 +8,8 @@
 
 namespace livemap {
 
+constexpr double kDayS = 86400;
+
 /// A town of square blocks: streets between junctions, every fourth one an artery.
 class Town {
  public:

@@ -50,7 +50,7 @@ std::optional<Eigen::Isometry3d> HazardReporter::Mounting(const std::string& fra
 
 FixTrack::Lookup HazardReporter::BasePoseAt(std::int64_t stamp_ns) const {
   if (config_.position_source == PositionSource::kFused) {
-    const FixTrack::Lookup fused = poses_.At(stamp_ns);
+    FixTrack::Lookup fused = poses_.At(stamp_ns);
     if (fused.answer == FixTrack::Answer::kReady) return fused;
   }
   FixTrack::Lookup lookup = track_.At(stamp_ns);

@@ -22,9 +22,9 @@ std::vector<std::uint8_t> ReadWholeFile(const std::string& path) {
 
 }  // namespace
 
-NoticeSender::NoticeSender(const ZoneService& zone, ros::Publisher publisher,
+NoticeSender::NoticeSender(const ZoneService& zone, const ros::Publisher& publisher,
                            std::size_t picture_bytes)
-    : zone_(zone), publisher_(std::move(publisher)), picture_bytes_(picture_bytes) {
+    : zone_(zone), publisher_(publisher), picture_bytes_(picture_bytes) {
   thread_ = std::thread([this] { Work(); });
 }
 

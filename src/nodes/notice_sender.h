@@ -18,7 +18,7 @@ namespace livemap {
 class NoticeSender {
  public:
   /// `picture_bytes` of a notice's picture at most; 0: none.
-  NoticeSender(const ZoneService& zone, ros::Publisher publisher, std::size_t picture_bytes);
+  NoticeSender(const ZoneService& zone, const ros::Publisher& publisher, std::size_t picture_bytes);
   /// Sends what waits and stops.
   ~NoticeSender();
   NoticeSender(const NoticeSender&) = delete;

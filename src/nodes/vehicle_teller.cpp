@@ -12,12 +12,9 @@ constexpr std::size_t kPortion = 200;
 
 }  // namespace
 
-VehicleTeller::VehicleTeller(const ZoneService& zone, ros::Publisher publisher, double radius_m,
-                             std::size_t max_hazards)
-    : zone_(zone),
-      publisher_(std::move(publisher)),
-      radius_m_(radius_m),
-      max_hazards_(max_hazards) {}
+VehicleTeller::VehicleTeller(const ZoneService& zone, const ros::Publisher& publisher,
+                             double radius_m, std::size_t max_hazards)
+    : zone_(zone), publisher_(publisher), radius_m_(radius_m), max_hazards_(max_hazards) {}
 
 /// All that drivers are told of around the place: the nearest, and the radius that those fill.
 void VehicleTeller::CollectAll(Telling& telling) const {

@@ -16,7 +16,7 @@ namespace livemap {
 /// hazards are not held up and nobody's queue overflows. Not thread-safe.
 class VehicleTeller {
  public:
-  VehicleTeller(const ZoneService& zone, ros::Publisher publisher, double radius_m,
+  VehicleTeller(const ZoneService& zone, const ros::Publisher& publisher, double radius_m,
                 std::size_t max_hazards);
 
   void Add(CatchUpOrder order) { orders_.push_back(std::move(order)); }
