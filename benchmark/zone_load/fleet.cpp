@@ -80,6 +80,7 @@ Fleet::Fleet(const Config& config)
     Vehicle& vehicle = *vehicles_.back();
     vehicle.id = "car-" + std::to_string(i);
     vehicle.random.seed(std::random_device{}());
+    vehicle.next_step = config_.first_step;
     vehicle.client = Connect(vehicle.id, base + "/vehicle/" + vehicle.id + "/receipt",
                              [this, i](const MqttMessage& message) { OnReceipt(i, message); });
   }
@@ -145,6 +146,7 @@ void Fleet::Send(Vehicle& vehicle, std::uint32_t index, const Uuid& uuid, std::u
 
 void Fleet::OnReceipt(std::uint32_t index, const MqttMessage& message) {
   const Receipt receipt = FromMessage(Open<ReportReceipt>(message));
+  answered_ = true;
   Vehicle& vehicle = *vehicles_[index];
   {
     const std::lock_guard<std::mutex> lock(vehicle.mutex);
@@ -186,22 +188,34 @@ void Fleet::Pace(Clock::time_point until) {
       ++result_.behind;
     }
     if (now >= next_look) {
-      ResendOverdue();
+      ResendOverdue(kPatience);
       next_look = now + std::chrono::seconds(1);
     }
     std::this_thread::sleep_for(kPaceStep);
   }
 }
 
-void Fleet::ResendOverdue() {
+/// The zone's bridge may come after its map page: what is sent before goes nowhere.
+void Fleet::WaitForZone() {
+  const auto deadline = Clock::now() + kPatience;
+  SendNext(0);
+  while (!answered_) {
+    if (Clock::now() > deadline) throw Error("the zone does not answer");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    ResendOverdue({});
+  }
+}
+
+void Fleet::ResendOverdue(Clock::duration patience) {
   const auto now = Clock::now();
   for (std::uint32_t i = 0; i < config_.vehicles; ++i) {
     Vehicle& vehicle = *vehicles_[i];
     const std::lock_guard<std::mutex> lock(vehicle.mutex);
     for (auto& [uuid, waiting] : vehicle.waiting) {
-      if (now - waiting.last_sent < kPatience) continue;
+      if (now - waiting.last_sent < patience) continue;
       waiting.last_sent = now;
       Send(vehicle, i, uuid, waiting.step);
+      if (!counting_) continue;
       const std::lock_guard<std::mutex> result_lock(result_mutex_);
       ++result_.resent;
     }
@@ -212,6 +226,7 @@ Fleet::Result Fleet::Run(double warm_up_s, double seconds) {
   const auto as_duration = [](double s) {
     return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
   };
+  WaitForZone();
   if (config_.rate == 0) {
     for (std::uint32_t i = 0; i < config_.vehicles; ++i) {
       while (SendNext(i)) {
@@ -223,6 +238,11 @@ Fleet::Result Fleet::Run(double warm_up_s, double seconds) {
   const auto start = Clock::now();
   Pace(start + as_duration(seconds));
   counting_ = false;
+  sending_ = false;
+  for (const auto& vehicle : vehicles_) {
+    const std::lock_guard<std::mutex> vehicle_lock(vehicle->mutex);
+    result_.next_step = std::max(result_.next_step, (vehicle->next_step + 1) / 2 * 2);
+  }
   const std::lock_guard<std::mutex> lock(result_mutex_);
   result_.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   return std::move(result_);

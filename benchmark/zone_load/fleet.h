@@ -29,11 +29,13 @@ class Fleet {
     std::uint32_t vehicles = 20;
     /// Reports per second of all together; 0: as fast as the zone answers.
     double rate = 0;
-    std::uint32_t window = 50;  ///< Reports of one vehicle that may wait for their receipts.
+    std::uint32_t window = 50;     ///< Reports of one vehicle that may wait for their receipts.
+    std::uint32_t first_step = 0;  ///< Where on its street every vehicle begins; even.
   };
   struct Result {
     double seconds = 0;
-    std::uint64_t sent = 0;  ///< First sendings, without resends.
+    std::uint32_t next_step = 0;  ///< From here on nothing was reported; even.
+    std::uint64_t sent = 0;       ///< First sendings, without resends.
     std::uint64_t committed = 0;
     std::uint64_t refused = 0;
     std::uint64_t resent = 0;        ///< No receipt within kPatience.
@@ -73,7 +75,8 @@ class Fleet {
   void OnReceipt(std::uint32_t index, const MqttMessage& message);
   void OnNotice(const MqttMessage& message);
   void Pace(Clock::time_point until);
-  void ResendOverdue();
+  void WaitForZone();
+  void ResendOverdue(Clock::duration patience);
 
   const Config config_;
   const ReportStreet street_;
@@ -81,6 +84,7 @@ class Fleet {
   std::unique_ptr<MqttClient> listener_;
   std::atomic<bool> sending_{true};
   std::atomic<bool> counting_{false};
+  std::atomic<bool> answered_{false};  ///< At least one report.
 
   std::mutex result_mutex_;  ///< Guards the next two.
   Result result_;

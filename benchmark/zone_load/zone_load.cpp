@@ -35,8 +35,9 @@ void PrintJson(const Fleet::Config& config, Fleet::Result result) {
               static_cast<unsigned long long>(result.behind));
   PrintQuantiles("receipt", result.receipt_ms);
   const std::size_t notices = result.notice_ms.size();
+  const std::uint32_t next_step = result.next_step;
   PrintQuantiles("notice", std::move(result.notice_ms));
-  std::printf("\"notices\":%zu}\n", notices);
+  std::printf("\"notices\":%zu,\"next_step\":%u}\n", notices, next_step);
 }
 
 int Run(int argc, char** argv) {
@@ -51,6 +52,7 @@ int Run(int argc, char** argv) {
        {"vehicles", "N", "vehicles that report (20)"},
        {"rate", "R", "reports per second of all; 0: as fast as they are answered (0)"},
        {"window", "N", "reports of one vehicle waiting for a receipt (50)"},
+       {"first-step", "N", "begin where an earlier run's next_step was (0)"},
        {"warm-up", "SECONDS", "not counted (2)"},
        {"seconds", "SECONDS", "counted (10)"}});
   if (!line.Parse(argc, argv)) return 0;
@@ -63,6 +65,7 @@ int Run(int argc, char** argv) {
   config.port = line.Whole("port", 1883, 1, 65535);
   config.vehicles = static_cast<std::uint32_t>(line.Whole("vehicles", 20, 1, 1000));
   config.window = static_cast<std::uint32_t>(line.Whole("window", 50, 1, 10000));
+  config.first_step = static_cast<std::uint32_t>(line.Whole("first-step", 0, 0, 10000000));
   config.rate = line.Number("rate", 0, 0, 1e6);
   const double warm_up_s = line.Number("warm-up", 2, 0, 600);
   const double seconds = line.Number("seconds", 10, 0.1, 600);
