@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
+#include <utility>
 
 #include "driving_reporter.h"
 
@@ -132,6 +133,18 @@ TEST_F(PollResponderTest, SaysNoWhenThePlaceWasWellInViewSeveralTimesAndNothingW
   EXPECT_THAT(reply.image, IsEmpty()) << "none was wanted";
   const double distance_m = GeodesicDistanceM(reply.vehicle_position, poll_.position);
   EXPECT_LT(distance_m, 14) << "the nearest view speaks";
+}
+
+TEST_F(PollResponderTest, AnImageWaitsUntilTheCameraIsKnown) {
+  const auto intrinsics = std::exchange(vehicle_.intrinsics, std::nullopt);
+  responder_.Add(poll_, steady_s_);
+  Drive(2.7, 2.75, [](double time_s) {
+    return std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+  });
+  EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
+  vehicle_.intrinsics = intrinsics;
+  responder_.Process(2.8, steady_s_, vehicle_);
+  EXPECT_EQ(OnlyReply().answer, Answer::kYes);
 }
 
 TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
