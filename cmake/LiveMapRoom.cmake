@@ -1,3 +1,11 @@
+# livemap_compile_together(TARGET...): with LIVEMAP_UNITY the sources of a target are compiled as a few,
+# since their headers cost more than they do. Names in anonymous namespaces have to differ then.
+function(livemap_compile_together)
+  if(LIVEMAP_UNITY)
+    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+  endif()
+endfunction()
+
 # livemap_room(NAME SOURCES a.cpp ... DEPENDS target ... [SYSTEM_INCLUDES dir ...])
 #
 # One ROS-free room of the house: the static library livemap_NAME from src/NAME, its headers included
@@ -8,9 +16,7 @@ function(livemap_room name)
   target_include_directories(livemap_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
   target_include_directories(livemap_${name} SYSTEM PUBLIC ${ROOM_SYSTEM_INCLUDES})
   target_link_libraries(livemap_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE livemap_options)
-  if(LIVEMAP_UNITY)
-    set_target_properties(livemap_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
-  endif()
+  livemap_compile_together(livemap_${name})
 endfunction()
 
 # livemap_gtest(NAME SOURCES a_test.cpp ... DEPENDS target ...)
