@@ -95,7 +95,7 @@ def calibrate(arguments: argparse.Namespace) -> dict:
     names = [f"changed_at_fpr_{rate:.2f}" for rate in FALSE_POSITIVE_RATES]
     if arguments.validation is None:
         return {"changed": UNCALIBRATED_THRESHOLD, **{name: UNCALIBRATED_THRESHOLD for name in names}}
-    source = read_source(arguments.validation, arguments.data, arguments.validation / "registration.npz", True)
+    source = read_source(arguments.validation, arguments.data, arguments.validation / "registration.npz", True, arguments.registered)
     pairs = registered_pairs(source.pairs) + photo_pairs(source, VALIDATION_PHOTOS, 1)
     if not any(pair.part == "changes" for pair in pairs):
         raise ExportError(f"No pair with changes below {arguments.validation} could be registered.")
@@ -132,6 +132,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--name", default="change-small", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--validation", type=Path, help="held-out pairs (training/simulate_change.py --plain)")
+    parser.add_argument("--registered", action="store_true", help="the pictures of all pairs lie upon each other already")
     parser.add_argument("--data", type=Path, help="folder of the data sets: held-out photos to paste objects into")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)

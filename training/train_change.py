@@ -136,6 +136,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Train the change network.")
     parser.add_argument("--pairs", type=Path, default=Path("build/training/change"), help="pairs as VL-CMU-CD lays them out")
     parser.add_argument("--validation", type=Path, help="held-out pairs, laid out alike")
+    parser.add_argument("--registered", action="store_true", help="the pictures of all pairs lie upon each other already")
     parser.add_argument("--data", type=Path, help="folder of the data sets: photos to paste objects into")
     parser.add_argument("--out", type=Path, default=Path("build/training/change_small"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
@@ -170,15 +171,15 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
     return Settings(**{name: value for name, value in vars(arguments).items() if name in known})
 
 
-def read_source(pairs: Path, photos: Optional[Path], cache: Path, validation: bool) -> Source:
+def read_source(pairs: Path, photos: Optional[Path], cache: Path, validation: bool, registered: bool = False) -> Source:
     """Everything that samples are drawn from, of the training or of the validation side."""
-    source = Source(data.read_pairs(pairs, cache), data.read_scenes(pairs))
+    source = Source(data.read_pairs(pairs, cache, registered), data.read_scenes(pairs))
     if photos is not None:
         source.photos = data.read_photos(photos, validation)
         source.cut_outs = objects.read_cut_outs(photos, source.scenes, validation)
     print(
         f"{'validation' if validation else 'training'}: {len(source.pairs)} pairs, of which "
-        f"{sum(pair.homography is not None for pair in source.pairs)} match by features, {len(source.scenes)} scenes, "
+        f"{sum(pair.homography is not None for pair in source.pairs)} are registered, {len(source.scenes)} scenes, "
         f"{sum(map(len, source.photos.values()))} photos, {sum(map(len, source.cut_outs.values()))} objects to paste", flush=True,
     )
     return source
@@ -204,14 +205,15 @@ def run(arguments: argparse.Namespace) -> None:
         if not arguments.start_from.is_file():
             raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
         trainer.start_from(torch.load(arguments.start_from, map_location=device))
-    source = read_source(arguments.pairs, arguments.data, arguments.out / "registration.npz", False)
+    source = read_source(arguments.pairs, arguments.data, arguments.out / "registration.npz", False, arguments.registered)
     if settings.pretrain and not source.scenes:
         raise UsageError(f"--pretrain: below {arguments.pairs} there are no scenes of training/simulate_change.py; set it to 0.")
     if not source.registered and not source.photos:
         raise UsageError(f"No pair below {arguments.pairs} could be registered, and there are no photos.")
     held_out: List[RegisteredPair] = []
     if arguments.validation:
-        validation = read_source(arguments.validation, arguments.data, arguments.out / "registration_validation.npz", True)
+        cache = arguments.out / "registration_validation.npz"
+        validation = read_source(arguments.validation, arguments.data, cache, True, arguments.registered)
         held_out = registered_pairs(validation.pairs) + photo_pairs(validation, VALIDATION_PHOTOS, settings.seed)
     arguments.out.mkdir(parents=True, exist_ok=True)
 

@@ -15,7 +15,7 @@ import yaml
 from detector.data import VALIDATION_SECTIONS, DataError
 
 from . import registration
-from .classes import CLASSES
+from .classes import CLASSES, NO_CHANGE
 from .inference import INPUT_HEIGHT, INPUT_WIDTH, letterbox
 
 IGNORED = 255
@@ -25,7 +25,10 @@ COLOURS = (
     (255, 255, 255), (136, 0, 21), (237, 28, 36), (255, 127, 39), (34, 177, 76), (0, 162, 232), (63, 72, 204), (163, 73, 164),
     (255, 174, 201), (181, 230, 29),
 )
-"""RGB of the classes in the published ground truth; any other colour is ignored."""
+"""RGB of the classes in the published ground truth; any other colour but the next is ignored."""
+
+MISCELLANEOUS = (255, 242, 0)
+"""A colour for a class that the thesis (section 4.4.1) counts as rubbish."""
 
 PLANE_DEPTHS_M = (9.0, 14.0, 25.0)
 """Walls onto which a pair of known poses is registered where features do not match."""
@@ -67,18 +70,21 @@ def read_image(path: Path) -> np.ndarray:
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """A ground truth, of indices (one channel) or in the published colours (three), to H x W uint8."""
+    """A ground truth, of indices (one channel) or in the published colours (three or four), to H x W uint8."""
     stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if stored is None:
         raise DataError(f"Cannot read the mask {path}.")
     if stored.ndim == 2:
         if (stored[stored != IGNORED] >= len(CLASSES)).any():
             raise DataError(f"The mask {path} has a value that is neither a class (0 to {len(CLASSES) - 1}) nor {IGNORED}.")
+        if IGNORED in stored and set(np.unique(stored)) <= {NO_CHANGE, IGNORED}:
+            raise DataError(f"The mask {path} says change or not (0 and 255 alone); training needs classes.")
         return stored.astype(np.uint8)
     rgb = stored[..., 2::-1].astype(np.int32)
     codes = (rgb[..., 0] << 16) + (rgb[..., 1] << 8) + rgb[..., 2]
     mask = np.full(codes.shape, IGNORED, np.uint8)
-    for index, (red, green, blue) in enumerate(COLOURS):
+    known = list(enumerate(COLOURS)) + [(CLASSES.index("rubbish"), MISCELLANEOUS)]
+    for index, (red, green, blue) in known:
         mask[codes == (red << 16) + (green << 8) + blue] = index
     return mask
 
@@ -141,8 +147,11 @@ def read_pair(truth: Path, poses: Dict[str, np.ndarray], intrinsics: Optional[np
     return Pair(first, second, fit_mask(read_mask(truth)), None, fallbacks, str(truth))
 
 
-def read_pairs(root: Path, cache: Optional[Path] = None) -> List[Pair]:
-    """All pairs below a folder, registered; `cache` keeps the registrations, which take longer than the reading."""
+def read_pairs(root: Path, cache: Optional[Path] = None, registered: bool = False) -> List[Pair]:
+    """All pairs below a folder, registered; `cache` keeps the registrations, which take longer than the reading.
+
+    With `registered` the pictures of a pair lie upon each other already.
+    """
     known: Dict[str, np.ndarray] = {}
     if cache is not None and cache.is_file():
         with np.load(cache) as stored:
@@ -154,13 +163,15 @@ def read_pairs(root: Path, cache: Optional[Path] = None) -> List[Pair]:
         if data_set not in data_sets:
             data_sets[data_set] = read_poses(data_set), read_intrinsics(data_set)
         pair = read_pair(path, *data_sets[data_set])
-        key = str(path.relative_to(root))
-        if key not in known:
-            found, fresh = registration.by_features(pair.first, pair.second), True
-            known[key] = np.zeros((0, 3)) if found is None else found
-        pair.homography = known[key] if len(known[key]) else None
-        pair.name = key
+        pair.name = str(path.relative_to(root))
         pairs.append(pair)
+        if registered:
+            pair.homography = np.eye(3)
+            continue
+        if pair.name not in known:
+            found, fresh = registration.by_features(pair.first, pair.second), True
+            known[pair.name] = np.zeros((0, 3)) if found is None else found
+        pair.homography = known[pair.name] if len(known[pair.name]) else None
     if cache is not None and fresh:
         cache.parent.mkdir(parents=True, exist_ok=True)
         np.savez(cache, **known)

@@ -64,6 +64,17 @@ class Reading(unittest.TestCase):
         with self.assertRaisesRegex(data.DataError, "neither a class"):
             data.read_mask(path)
 
+    def test_miscellaneous_is_rubbish(self):
+        path = self.root / "gt00.png"
+        cv2.imwrite(str(path), np.full((4, 4, 3), (0, 242, 255), np.uint8))
+        self.assertTrue((data.read_mask(path) == CLASSES.index("rubbish")).all())
+
+    def test_a_mask_that_says_change_or_not_is_refused(self):
+        path = self.root / "gt00.png"
+        cv2.imwrite(str(path), np.array([[0, 255]], np.uint8))
+        with self.assertRaisesRegex(data.DataError, "needs classes"):
+            data.read_mask(path)
+
     def test_what_stands_in_a_street_is_known_from_none_and_all(self):
         scenes = data.read_scenes(write_streets(self.root))
         self.assertEqual(len(scenes), 2)
@@ -77,6 +88,11 @@ class Reading(unittest.TestCase):
         again = data.read_pairs(self.root / "pairs", cache)
         self.assertTrue(cache.is_file())
         np.testing.assert_array_equal(pairs[0].homography, again[0].homography)
+
+    def test_pairs_that_are_registered_already_stay_as_they_are(self):
+        write_streets(self.root / "pairs")
+        for pair in data.read_pairs(self.root / "pairs", registered=True):
+            np.testing.assert_array_equal(pair.homography, np.eye(3))
 
     def test_an_empty_folder_is_refused(self):
         with self.assertRaisesRegex(data.DataError, "No pair"):

@@ -9,6 +9,7 @@ import onnx
 import torch
 
 import export_change
+import predict_change
 import simulate_change
 import train_change
 from change import data, onnx_model
@@ -16,7 +17,7 @@ from change.manifest import read_manifest
 from change.network import ChangeNetwork, ThesisNetwork
 from detector.manifest import ManifestError
 
-from .synthetic_change import write_photos, write_streets
+from .synthetic_change import street, write_pair, write_photos, write_streets
 from .test_programs import quietly
 
 SIMULATOR = Path(__file__).resolve().parents[2] / "install/lib/livemap/livemap_simulate"
@@ -99,11 +100,33 @@ class ChangePrograms(unittest.TestCase):
         np.testing.assert_allclose(found, expected, atol=1e-3)
         np.testing.assert_allclose(onnx_model.run_parts(encoder, head, first, second, validity), expected, atol=1e-3)
         self.assertTrue((found[0, 0, 100:, 200:] == 1).all())
+        self.check_predictions(models / "tiny.yaml", checkpoint)
         for part in onnx_model.PARTS:
             self.assertLess(manifest.files[part].stat().st_size, 10_000_000)
         manifest.files["head"].write_bytes(b"something else")
         with self.assertRaisesRegex(ManifestError, "SHA-256"):
             read_manifest(models / "tiny.yaml")
+
+    def check_predictions(self, manifest, checkpoint):
+        """OpenCV and torch write the same for the evaluation, and what cannot be registered is no change."""
+        pairs = self.root / "to_predict"
+        first, second, mask = street(4, False, True)
+        write_pair(pairs, 0, first, second, mask)
+        write_pair(pairs, 1, np.full_like(first, 90), second, mask)
+        for name, model in (("opencv", ("--manifest", manifest)), ("torch", ("--checkpoint", checkpoint))):
+            arguments = (*model, "--pairs", pairs, "--out", self.root / name, "--threads", 1)
+            self.assertEqual(quietly(predict_change, *arguments), (0, ""))
+        for order in ("forward", "reversed"):
+            found = np.load(self.root / "opencv" / order / "000" / "00.npy")
+            self.assertEqual((found.shape, found.dtype), ((10, 256, 320), np.float32))
+            np.testing.assert_allclose(found, np.load(self.root / "torch" / order / "000" / "00.npy"), atol=1e-3)
+            self.assertTrue((np.load(self.root / "opencv" / order / "000" / "01.npy")[0] == 1).all())
+
+    def test_predictions_have_the_size_of_the_pictures(self):
+        ramp = np.tile(np.linspace(0, 1, 320, dtype=np.float32), (10, 256, 1))
+        enlarged = predict_change.enlarge(ramp, 640, 480)
+        self.assertEqual(enlarged.shape, (10, 480, 640))
+        np.testing.assert_allclose(enlarged[0, 470, [0, 639]], [0, 1], atol=2e-3)
 
     def test_the_thesis_network_trains_and_is_exported_too(self):
         original = train_change.ARCHITECTURES["thesis"]
@@ -147,6 +170,8 @@ class ChangePrograms(unittest.TestCase):
             (train_change, ("--frobnicate",)),
             (export_change, ("--checkpoint", nowhere, "--out", self.root)),
             (export_change, ("--out", nowhere)),
+            (predict_change, ("--pairs", self.pairs, "--out", self.root / "new")),
+            (predict_change, ("--pairs", self.pairs, "--out", self.root / "new", "--manifest", nowhere)),
             (simulate_change, ("--program", nowhere, "--out", self.root / "new")),
         ]
         for program, arguments in cases:
