@@ -15,20 +15,11 @@ import yaml
 from detector.data import VALIDATION_SECTIONS, DataError
 
 from . import registration
-from .classes import CLASSES, NO_CHANGE
+from .classes import CLASSES, COLOURS, MISCELLANEOUS, NO_CHANGE
 from .inference import INPUT_HEIGHT, INPUT_WIDTH, letterbox
 
 IGNORED = 255
 """In a mask: neither changed nor unchanged."""
-
-COLOURS = (
-    (255, 255, 255), (136, 0, 21), (237, 28, 36), (255, 127, 39), (34, 177, 76), (0, 162, 232), (63, 72, 204), (163, 73, 164),
-    (255, 174, 201), (181, 230, 29),
-)
-"""RGB of the classes in the published ground truth; any other colour but the next is ignored."""
-
-MISCELLANEOUS = (255, 242, 0)
-"""A colour for a class that the thesis (section 4.4.1) counts as rubbish."""
 
 PLANE_DEPTHS_M = (9.0, 14.0, 25.0)
 """Walls onto which a pair of known poses is registered where features do not match."""

@@ -6,8 +6,7 @@ from typing import Tuple
 import cv2
 import numpy as np
 
-from change.classes import CLASSES
-from change.data import COLOURS
+from change.classes import CLASSES, COLOURS
 
 from .synthetic import write_data
 

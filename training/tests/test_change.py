@@ -12,7 +12,7 @@ from torch import nn
 
 from change import data, registration
 from change.augment import Augmenter, Recipe, Sample, Source
-from change.classes import CLASSES
+from change.classes import CLASSES, COLOURS
 from change.data import IGNORED, Pair
 from change.inference import fill_invalid
 from change.loss import change_loss, class_weights
@@ -44,7 +44,7 @@ class Reading(unittest.TestCase):
         found = [described.findall(path.read_text()) for path in sorted(SOURCES.glob("*/change*.cpp"))]
         rows = next(rows for rows in found if rows)
         self.assertEqual(tuple(row[0] for row in rows), CLASSES)
-        self.assertEqual(tuple(tuple(map(int, row[1:])) for row in rows), data.COLOURS)
+        self.assertEqual(tuple(tuple(map(int, row[1:])) for row in rows), COLOURS)
 
     def test_masks_of_indices_and_of_published_colours_mean_the_same(self):
         first, second, mask = street(1, False, True)
