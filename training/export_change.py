@@ -95,7 +95,8 @@ def calibrate(arguments: argparse.Namespace) -> dict:
     names = [f"changed_at_fpr_{rate:.2f}" for rate in FALSE_POSITIVE_RATES]
     if arguments.validation is None:
         return {"changed": UNCALIBRATED_THRESHOLD, **{name: UNCALIBRATED_THRESHOLD for name in names}}
-    source = read_source(arguments.validation, arguments.data, arguments.validation / "registration.npz", True, arguments.registered)
+    cache = arguments.checkpoint.parent / "registration_validation.npz"
+    source = read_source(arguments.validation, arguments.data, cache, True, arguments.registered)
     pairs = registered_pairs(source.pairs) + photo_pairs(source, VALIDATION_PHOTOS, 1)
     if not any(pair.part == "changes" for pair in pairs):
         raise ExportError(f"No pair with changes below {arguments.validation} could be registered.")

@@ -4,6 +4,9 @@ Pictures are kept decoded, in the size of the network's input (pairs, about 0.6 
 """
 
 import csv
+import hashlib
+import os
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List, Optional
@@ -138,16 +141,42 @@ def read_pair(truth: Path, poses: Dict[str, np.ndarray], intrinsics: Optional[np
     return Pair(first, second, fit_mask(read_mask(truth)), None, fallbacks, str(truth))
 
 
+class Registrations:
+    """Homographies of pairs by what their pictures show, kept in a file because they take longer than reading."""
+
+    def __init__(self, path: Optional[Path]):
+        self.path, self.known, self.fresh = path, {}, False
+        if path is not None and path.is_file():
+            try:
+                with np.load(path) as stored:
+                    self.known = {name: stored[name] for name in stored.files}
+            except (OSError, ValueError, zipfile.BadZipFile) as error:
+                raise DataError(f"Cannot read the kept registrations {path}: {error}; delete it.") from error
+
+    def of(self, first: np.ndarray, second: np.ndarray) -> Optional[np.ndarray]:
+        """As registration.by_features; each pair is registered once."""
+        key = hashlib.blake2b(first.tobytes() + second.tobytes(), digest_size=16).hexdigest()
+        if key not in self.known:
+            found, self.fresh = registration.by_features(first, second), True
+            self.known[key] = np.zeros((0, 3)) if found is None else found
+        return self.known[key] if len(self.known[key]) else None
+
+    def keep(self) -> None:
+        """Write what is new; a kill at any moment leaves the old file or the new one."""
+        if self.path is None or not self.fresh:
+            return
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = self.path.with_suffix(".tmp.npz")
+        np.savez(temporary, **self.known)
+        os.replace(temporary, self.path)
+
+
 def read_pairs(root: Path, cache: Optional[Path] = None, registered: bool = False) -> List[Pair]:
-    """All pairs below a folder, registered; `cache` keeps the registrations, which take longer than the reading.
+    """All pairs below a folder, registered; `cache` is where Registrations are kept.
 
     With `registered` the pictures of a pair lie upon each other already.
     """
-    known: Dict[str, np.ndarray] = {}
-    if cache is not None and cache.is_file():
-        with np.load(cache) as stored:
-            known = {name: stored[name] for name in stored.files}
-    pairs, data_sets, fresh = [], {}, False
+    pairs, data_sets, registrations = [], {}, Registrations(cache)
     for path in pair_paths(root):
         # NNN/GT/gtII.png, in a simulated data set below raw/.
         data_set = path.parents[3]
@@ -155,17 +184,9 @@ def read_pairs(root: Path, cache: Optional[Path] = None, registered: bool = Fals
             data_sets[data_set] = read_poses(data_set), read_intrinsics(data_set)
         pair = read_pair(path, *data_sets[data_set])
         pair.name = str(path.relative_to(root))
+        pair.homography = np.eye(3) if registered else registrations.of(pair.first, pair.second)
         pairs.append(pair)
-        if registered:
-            pair.homography = np.eye(3)
-            continue
-        if pair.name not in known:
-            found, fresh = registration.by_features(pair.first, pair.second), True
-            known[pair.name] = np.zeros((0, 3)) if found is None else found
-        pair.homography = known[pair.name] if len(known[pair.name]) else None
-    if cache is not None and fresh:
-        cache.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(cache, **known)
+    registrations.keep()
     return pairs
 
 
