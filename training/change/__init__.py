@@ -1,0 +1,1 @@
+"""Training of LiveMap's change detection."""

@@ -1,0 +1,265 @@
+"""The networks: one encoder for both pictures, two decoders with weights of their own, final convolutions.
+
+The structure is the thesis's (section 4.4, figure 4.3). `ChangeNetwork` at `Widths()` is change-small: separable
+convolutions and one thing the thesis does not have, namely that a decoder's skip connections bring beside its own
+picture's features how far they are from the other's. `ThesisNetwork` is the original, shaped like VGG-16.
+
+Which pixels the warp could fill does not go into the encoder: its features depend on one picture alone and can be
+kept. It decides at the very end, where a pixel outside of the warp is told to be no change (`Network.probabilities`).
+"""
+
+from dataclasses import dataclass
+from typing import List, Tuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from .classes import CLASSES, NO_CHANGE
+
+STRIDE = 32
+"""Height and width of an input are multiples of this."""
+
+CERTAINTY = 8192.0
+"""Logits by which every change falls behind no change where a pixel is not valid (a power of two: exact in bf16)."""
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Channels of change-small's parts."""
+
+    encoder: Tuple[int, ...] = (16, 48, 96, 192, 256)  # at strides 2, 4, 8, 16, 32
+    blocks: Tuple[int, ...] = (1, 2, 3, 3, 2)  # separable convolutions at each stride
+    decoder: Tuple[int, ...] = (24, 40, 72, 128)  # at strides 2, 4, 8, 16
+    final: int = 32
+
+
+class ConvBlock(nn.Sequential):
+    """Convolution, batch normalisation, ReLU."""
+
+    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1, groups: int = 1):
+        super().__init__(
+            nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, groups=groups, bias=False),
+            nn.BatchNorm2d(channels_out, momentum=0.03),
+            nn.ReLU(inplace=True),
+        )
+
+
+class SeparableBlock(nn.Module):
+    """A 3x3 convolution per channel, then a 1x1 convolution across channels; added to its input where shapes agree."""
+
+    def __init__(self, channels_in: int, channels_out: int, stride: int = 1):
+        super().__init__()
+        self.spatial = ConvBlock(channels_in, channels_in, 3, stride, groups=channels_in)
+        self.mixing = ConvBlock(channels_in, channels_out, 1)
+        self.residual = stride == 1 and channels_in == channels_out
+
+    def forward(self, features: Tensor) -> Tensor:
+        mixed = self.mixing(self.spatial(features))
+        return features + mixed if self.residual else mixed
+
+
+class Encoder(nn.Module):
+    """A picture to features at strides 2, 4, 8, 16 and 32."""
+
+    def __init__(self, widths: Widths):
+        super().__init__()
+        stages, channels = [], 3
+        for index, (width, blocks) in enumerate(zip(widths.encoder, widths.blocks)):
+            enter = ConvBlock(channels, width, stride=2) if index == 0 else SeparableBlock(channels, width, stride=2)
+            stages.append(nn.Sequential(enter, *(SeparableBlock(width, width) for _ in range(blocks))))
+            channels = width
+        self.stages = nn.ModuleList(stages)
+
+    def forward(self, images: Tensor) -> List[Tensor]:
+        levels = []
+        for stage in self.stages:
+            images = stage(images)
+            levels.append(images)
+        return levels
+
+
+def enlarge(features: Tensor) -> Tensor:
+    """Nearest-neighbour upsampling by 2."""
+    return F.interpolate(features, scale_factor=2, mode="nearest")
+
+
+class Decoder(nn.Module):
+    """One picture's features, and how far they are from the other's, back to stride 2."""
+
+    def __init__(self, widths: Widths):
+        super().__init__()
+        encoder, decoder = widths.encoder, widths.decoder
+        self.enter = ConvBlock(2 * encoder[-1], decoder[-1], 1)
+        joins, blocks = [], []
+        for index in reversed(range(len(decoder))):
+            here, below = decoder[index], decoder[max(index - 1, 0)]
+            joins.append(ConvBlock(here + 2 * encoder[index], here, 1))
+            blocks.append(SeparableBlock(here, below))  # narrowed before it is enlarged: four times fewer cells
+        self.joins, self.blocks = nn.ModuleList(joins), nn.ModuleList(blocks)
+
+    def forward(self, own: List[Tensor], apart: List[Tensor]) -> Tensor:
+        features = self.enter(torch.cat([own[-1], apart[-1]], dim=1))
+        for step, (join, block) in enumerate(zip(self.joins, self.blocks)):
+            level = len(self.joins) - 1 - step
+            features = block(join(torch.cat([enlarge(features), own[level], apart[level]], dim=1)))
+        return features
+
+
+class Network(nn.Module):
+    """What both networks have in common. Pictures are B x 3 x H x W, normalised RGB, registered onto each other."""
+
+    encoder: nn.Module
+    first: nn.Module
+    second: nn.Module
+    logits_stride: int
+    """Pixels of the input per cell of the logits: 1 or 2."""
+
+    def encode(self, images: Tensor) -> List[Tensor]:
+        """Features of pictures, each of one picture alone, finest first."""
+        return self.encoder(images)
+
+    def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
+        """Logits (B x 10 x H / logits_stride x W / logits_stride) of pairs whose features are given."""
+        raise NotImplementedError
+
+    def forward(self, first: Tensor, second: Tensor) -> Tensor:
+        """Logits of pairs of pictures, as compare's: what training sees."""
+        # One batch for both, so that batch normalisation measures both pictures together.
+        levels = self.encode(torch.cat([first, second]))
+        count = len(first)
+        return self.compare([level[:count] for level in levels], [level[count:] for level in levels])
+
+    def probabilities(self, first: List[Tensor], second: List[Tensor], validity: Tensor) -> Tensor:
+        """Probabilities (B x 10 x H x W) from features and validity (B x 1 x H x W: 1, or 0 where the warp had nothing).
+
+        Softmax is taken in the logits' cells and then enlarged, which costs a quarter. A cell that has a share in
+        an invalid pixel's result is no change, so that every invalid pixel is, and up to two pixels beside it.
+        """
+        logits = self.compare(first, second)
+        invalid = 1 - validity
+        if self.logits_stride == 2:
+            invalid = F.max_pool2d(invalid, 4, stride=2, padding=1)
+        found = torch.softmax(logits + self.penalty(invalid), dim=1)
+        if self.logits_stride == 1:
+            return found
+        return F.interpolate(found, scale_factor=self.logits_stride, mode="bilinear", align_corners=False)
+
+    def classify(self, images: Tensor) -> Tensor:
+        """Logits of the class of each pixel's object, as coarse as compare's: what pretraining trains.
+
+        It is change detection against nothing at all: the second decoder is told that all it sees is new.
+        """
+        raise NotImplementedError
+
+    def begin_changes(self) -> None:
+        """After pretraining: the first decoder begins with what the second has learnt."""
+        self.first.load_state_dict(self.second.state_dict())
+
+    def detect(self, first: Tensor, second: Tensor, validity: Tensor) -> Tensor:
+        """Probabilities of pairs of pictures."""
+        return self.probabilities(self.encode(first), self.encode(second), validity)
+
+
+def invalidity_penalty() -> nn.Conv2d:
+    """1 where a pixel is not valid to what its logits lose there: nothing for no change, CERTAINTY for every change."""
+    penalty = nn.Conv2d(1, len(CLASSES), 1, bias=False).requires_grad_(False)
+    with torch.no_grad():
+        penalty.weight.fill_(-CERTAINTY)[NO_CHANGE] = 0
+    return penalty
+
+
+class ChangeNetwork(Network):
+    """change-small at the default widths."""
+
+    logits_stride = 2
+
+    def __init__(self, widths: Widths = Widths()):
+        super().__init__()
+        self.encoder = Encoder(widths)
+        self.first, self.second = Decoder(widths), Decoder(widths)
+        self.final = nn.Sequential(
+            ConvBlock(2 * widths.decoder[0], widths.final, 1),
+            SeparableBlock(widths.final, widths.final),
+            nn.Conv2d(widths.final, len(CLASSES), 1),
+        )
+        self.penalty = invalidity_penalty()
+        self.objects = nn.Conv2d(widths.decoder[0], len(CLASSES), 1)  # in pretraining only
+
+    def classify(self, images: Tensor) -> Tensor:
+        levels = self.encode(images)
+        return self.objects(self.second(levels, levels))
+
+    def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
+        apart = [torch.abs(one - other) for one, other in zip(first, second)]
+        return self.final(torch.cat([self.first(first, apart), self.second(second, apart)], dim=1))
+
+
+def convolutions(channels_in: int, channels_out: int, count: int) -> nn.Sequential:
+    """`count` 3x3 convolutions with normalisation and ReLU."""
+    widths = [channels_in] + [channels_out] * count
+    return nn.Sequential(*(ConvBlock(before, after) for before, after in zip(widths, widths[1:])))
+
+
+class ThesisEncoder(nn.Module):
+    """VGG-16's convolutions, then three more; each block's features as they are before its pooling (strides 1 to 16)."""
+
+    def __init__(self, base: int):
+        super().__init__()
+        widths = [base, 2 * base, 4 * base, 8 * base, 8 * base]
+        self.blocks = nn.ModuleList(
+            convolutions(before, after, count) for before, after, count in zip([3] + widths, widths, (2, 2, 3, 3, 3))
+        )
+        self.deepest = convolutions(widths[-1], widths[-1], 3)
+
+    def forward(self, images: Tensor) -> List[Tensor]:
+        levels = []
+        for block in self.blocks:
+            levels.append(block(images))
+            images = F.max_pool2d(levels[-1], 2)
+        return levels + [self.deepest(images)]
+
+
+class ThesisDecoder(nn.Module):
+    """Symmetric to VGG-16: per block one transposed convolution, the skip connection, three convolutions."""
+
+    def __init__(self, base: int):
+        super().__init__()
+        widths = [8 * base, 8 * base, 8 * base, 4 * base, 2 * base, base]
+        self.ups = nn.ModuleList(nn.ConvTranspose2d(above, here, 2, 2) for above, here in zip(widths, widths[1:]))
+        self.blocks = nn.ModuleList(convolutions(2 * here, here, 3) for here in widths[1:])
+
+    def forward(self, levels: List[Tensor]) -> Tensor:
+        features = levels[-1]
+        for up, block, skip in zip(self.ups, self.blocks, reversed(levels[:-1])):
+            features = block(torch.cat([up(features), skip], dim=1))
+        return features
+
+
+class ThesisNetwork(Network):
+    """The thesis's network: 64 channels in the first block, as VGG-16 has; a smaller `base` only serves tests.
+
+    Batch normalisation is ours: the thesis began with ImageNet's weights, which this can do without.
+    """
+
+    logits_stride = 1
+
+    def __init__(self, base: int = 64):
+        super().__init__()
+        self.encoder = ThesisEncoder(base)
+        self.first, self.second = ThesisDecoder(base), ThesisDecoder(base)
+        self.final = nn.Sequential(
+            ConvBlock(2 * base, base), ConvBlock(base, base), nn.Conv2d(base, len(CLASSES), 3, padding=1)
+        )
+        self.penalty = invalidity_penalty()
+        self.objects = nn.Conv2d(base, len(CLASSES), 1)  # in pretraining only
+
+    def classify(self, images: Tensor) -> Tensor:
+        return self.objects(self.second(self.encode(images)))
+
+    def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
+        return self.final(torch.cat([self.first(first), self.second(second)], dim=1))
+
+
+ARCHITECTURES = {"change-small": ChangeNetwork, "thesis": ThesisNetwork}
+"""By the name that --architecture takes."""
