@@ -108,8 +108,21 @@ def export_torch(weights: Path, path: Path) -> OnnxNetwork:
         frozen = torch.jit.freeze(traced.eval())
     buffer = io.BytesIO()
     torch.jit.save(frozen, buffer)
-    path.write_bytes(buffer.getvalue())
+    path.write_bytes(without_sources(buffer.getvalue()))
     return network
+
+
+def without_sources(archive: bytes) -> bytes:
+    """A TorchScript file without its records of who called whom, which name paths of the machine that made it."""
+    reader, kept = torch._C.PyTorchFileReader(io.BytesIO(archive)), io.BytesIO()
+    writer = torch._C.PyTorchFileWriter(kept)
+    for name in reader.get_all_records():
+        # The writer adds the version itself.
+        if not name.endswith(".debug_pkl") and name != "version":
+            record = reader.get_record(name)
+            writer.write_record(name, record, len(record))
+    writer.write_end_of_file()
+    return kept.getvalue()
 
 
 def torch_outputs(path: Path, images: np.ndarray) -> np.ndarray:
