@@ -179,7 +179,7 @@ def boil_down(run, figures):
         told["processed"] = len(of_kind(figures["zone"], "detections", "hazard/detections"))
     if drive["folder"]:
         stamps, boxes = read_truth(drive["bag"])
-        told["found"] = found_events(figures, small, (stamps, read_chainage(drive["folder"]), boxes), "pothole")
+        told["found"] = found_events(figures, small, (stamps, boxes, read_chainage(drive["folder"])), "pothole")
     else:
         truth = demo_observers.compare_with_truth(figures["stored"], drive["truth"])
         told["found"] = {"events": truth["hazards"], "found": truth["found"], "false": truth["false"], "km": None}
