@@ -204,6 +204,19 @@ def engines_section(results):
     return text
 
 
+def starved(results):
+    """A warning where frames were dropped: then rates, latencies and recall are the machine's and not the detector's."""
+    runs = [run for run in results["runs"] if run["profile"] == "big"]
+    dropped, frames = sum(run["dropped"] for run in runs), sum(run["frames"] for run in runs)
+    if dropped <= 0.05 * frames:
+        return ""
+    return prose(f"""**The machine starved in this run.** {dropped} of the {frames} frames that the BVC got over all its runs were
+        dropped because the detector was behind, and those that were not waited seconds in its queue. Its event
+        recall, its frames/s and its latencies are no figures of the system on a machine of its own, and differences
+        between the radii are chance; what holds is that every part ran, the link's round trip, sizes of reports, and
+        the ratios between engines.""")
+
+
 def write(results, out):
     out.mkdir(parents=True, exist_ok=True)
     machine = results["machine"]
@@ -220,6 +233,7 @@ def write(results, out):
         bags by `launch/replay.launch`; GPS fixes are simulated along the road.""")
     if results["quick"]:
         text += prose("""**The quick form**: one drive and three radii. Its figures have few events; the whole run's have more.""")
+    text += starved(results)
     if incomplete:
         text += prose(f"""Not everything came through in {len(incomplete)} of {len(results['runs'])} runs within a minute of the
             drive's end: {', '.join(sorted({f"{run['name']} {run['profile']} {run['radius']} m" for run in incomplete}))}.""")
