@@ -1,21 +1,27 @@
-// How fast frames become detections: the whole detector with a model, and decoding with suppression
-// alone at several numbers of candidates.
+// How fast frames become detections: the whole detector with a model, pools of both engines, and
+// decoding with suppression alone at several numbers of candidates.
 //
 //     livemap_detector_benchmark [--benchmark_filter=REGEX] [Google Benchmark's flags]
 //
 // LIVEMAP_MODEL names another manifest than models/hazards-first.yaml, LIVEMAP_THREADS the threads
-// of OpenCV (default: all cores).
+// of the engine (default: all cores), LIVEMAP_ENGINE the engine (default: the manifest's).
 #include <benchmark/benchmark.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <random>
 #include <string>
+#include <thread>
 
 #include "base/error.h"
 #include "detection/annotation.h"
+#include "detection/detector_pool.h"
 #include "detection/hazard_detector.h"
 #include "detection/yolox_decoder.h"
 #include "run_benchmarks.h"
@@ -33,6 +39,20 @@ int Threads() {
   const char* threads = std::getenv("LIVEMAP_THREADS");
   if (threads == nullptr) return 0;
   return static_cast<int>(std::clamp(std::strtol(threads, nullptr, 10), 0L, 256L));
+}
+
+std::optional<EngineKind> Engine() {
+  const char* engine = std::getenv("LIVEMAP_ENGINE");
+  return ParseEngineChoice(engine != nullptr ? engine : "auto", "LIVEMAP_ENGINE");
+}
+
+/// Memory of this process that is in RAM, MiB.
+double ResidentMib() {
+  std::ifstream file("/proc/self/statm");
+  double size = 0;
+  double resident = 0;
+  file >> size >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1024 * 1024);
 }
 
 /// A frame of noise: what a convolution costs does not depend on the picture.
@@ -77,12 +97,11 @@ ModelManifest CandidateManifest() {
 
 void BM_FrameToDetections(benchmark::State& state) {
   try {
-    HazardDetector detector(ReadModelManifest(ModelPath()), Threads());
+    HazardDetector detector(ReadModelManifest(ModelPath()), Threads(), Engine());
     const cv::Mat frame =
         NoiseFrame(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
     for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(detector.Detect(frame));
-    state.SetLabel(detector.manifest().name + ", " + std::to_string(cv::getNumThreads()) +
-                   " threads");
+    state.SetLabel(detector.manifest().name + ", " + NameOf(detector.Engine()));
     state.SetItemsProcessed(state.iterations());
   } catch (const Error& error) {
     state.SkipWithError(error.what());
@@ -94,6 +113,84 @@ BENCHMARK(BM_FrameToDetections)
     ->Args({1920, 1080})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
+
+/// Frames of 640 x 400 through a pool: engine (0 OpenCV, 1 torch), number of engines, threads each.
+void BM_Pool(benchmark::State& state) {
+  const EngineKind kind = state.range(0) == 0 ? EngineKind::kOpenCv : EngineKind::kTorch;
+  const auto threads = static_cast<int>(state.range(2));
+  constexpr int kFrames = 16;
+  try {
+    const ModelManifest manifest = ReadModelManifest(ModelPath());
+    const double before_mib = ResidentMib();
+    using Pool = DetectorPool<cv::Mat, std::vector<HazardDetection>>;
+    std::vector<Pool::Engine> engines;
+    for (int i = 0; i < state.range(1); ++i) {
+      const auto detector = std::make_shared<HazardDetector>(manifest, threads, kind);
+      engines.emplace_back([detector](const cv::Mat& frame) { return detector->Detect(frame); });
+    }
+    Pool pool(std::move(engines), kFrames, [](const Pool::Outcome&) {});
+    const cv::Mat frame = NoiseFrame(640, 400);
+    for ([[maybe_unused]] auto _ : state) {
+      for (int i = 0; i < kFrames; ++i) pool.Push(frame);
+      while (pool.counters().waiting > 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+    if (pool.counters().dropped > 0) throw Error("the pool dropped frames");
+    state.counters["pool_mib"] = ResidentMib() - before_mib;
+    state.SetItemsProcessed(state.iterations() * kFrames);
+    state.SetLabel(NameOf(kind));
+  } catch (const Error& error) {
+    state.SkipWithError(error.what());
+  }
+}
+BENCHMARK(BM_Pool)
+    ->ArgNames({"torch", "engines", "threads"})
+    ->ArgsProduct({{0, 1}, {1, 2}, {1, 2}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+/// Boxes of one class all over an image.
+std::vector<HazardDetection> Candidates(int count) {
+  std::mt19937 generator(1);
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::vector<HazardDetection> candidates;
+  for (int i = 0; i < count; ++i) {
+    candidates.push_back({"pothole",
+                          0,
+                          unit(generator),
+                          {600 * unit(generator), 370 * unit(generator), 10 + 30 * unit(generator),
+                           5 + 20 * unit(generator)}});
+  }
+  return candidates;
+}
+
+void BM_Suppress(benchmark::State& state) {
+  const std::vector<HazardDetection> candidates = Candidates(static_cast<int>(state.range(0)));
+  for ([[maybe_unused]] auto _ : state) {
+    benchmark::DoNotOptimize(SuppressOverlaps(candidates, 0.5F));
+  }
+}
+BENCHMARK(BM_Suppress)->Arg(100)->Arg(1000)->Arg(3000)->Unit(benchmark::kMicrosecond);
+
+/// What suppression costs when every candidate is compared with every kept one.
+void BM_SuppressAllWithAll(benchmark::State& state) {
+  const std::vector<HazardDetection> candidates = Candidates(static_cast<int>(state.range(0)));
+  for ([[maybe_unused]] auto _ : state) {
+    std::vector<HazardDetection> sorted = candidates;
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
+    std::vector<HazardDetection> kept;
+    for (HazardDetection& candidate : sorted) {
+      const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const auto& better) {
+        return IntersectionOverUnion(better.box, candidate.box) > 0.5F;
+      });
+      if (!overlaps) kept.push_back(std::move(candidate));
+    }
+    benchmark::DoNotOptimize(kept.data());
+  }
+}
+BENCHMARK(BM_SuppressAllWithAll)->Arg(100)->Arg(1000)->Arg(3000)->Unit(benchmark::kMicrosecond);
 
 void BM_DecodeAndSuppress(benchmark::State& state) {
   const ModelManifest manifest = CandidateManifest();

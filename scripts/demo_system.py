@@ -83,6 +83,8 @@ class LiveMapSystem:
 
     # Of zone_cloudlet: the drives that are played here were driven long ago.
     zone_parameters = "{replay: true}"
+    # More arguments of zone.launch.
+    zone_arguments = {}
 
     def __init__(self, directory, zone, vehicle, web_port=0):
         self.directory = pathlib.Path(directory)
@@ -143,7 +145,8 @@ class LiveMapSystem:
         self.launch("zone", self.zone_port, "zone.launch", {
             "zone": self.zone, "directory": self.directory / "zone",
             "broker_port": self.broker_port, "password_file": self.password_file("zone"),
-            "web_port": self.web_port, "rviz": str(rviz).lower(), "zone_cloudlet": self.zone_parameters})
+            "web_port": self.web_port, "rviz": str(rviz).lower(), "zone_cloudlet": self.zone_parameters,
+            **self.zone_arguments})
         self.wait_for("the zone's live map", self.map_answers)
 
     def start_vehicle(self, bag, rate, rviz=False, **arguments):

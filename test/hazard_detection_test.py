@@ -229,6 +229,44 @@ class HazardDetectionTest(unittest.TestCase):
         self.assertEqual(stamps, sorted(set(stamps)), "each frame once, in order")
         self.assertEqual(stamps[-1], rospy.Time(1600000000, 1000 * (BURST - 1)), "the newest stays")
 
+    def test_stamps_stay_in_order_under_an_uneven_worker_pool(self):
+        detector = self.loaded_detector(queue_size=100, engines=3, threads=1)
+        # Every fourth image has a thousand times the pixels, whose colours must be swapped too.
+        large = numpy.zeros((1500, 2000, 3), numpy.uint8)
+        large[:, :1000] = (255, 0, 0)
+        large = large.tobytes()
+        frames = []
+        for number in range(48):
+            frame = image(number, (16, 8, RED))
+            if number % 4 == 0:
+                frame.width, frame.height, frame.step, frame.encoding = 2000, 1500, 6000, "rgb8"
+                frame.data = large
+            frames.append(frame)
+        unusable = frames[5]
+        unusable.encoding = "no encoding"
+        for frame in frames:
+            detector.publisher.publish(frame)
+        detector.wait_for(frames_in=48, frames_processed=47, frames_dropped=1, frames_waiting=0, engines=3)
+        answers = eventually(lambda: len(detector.answers()) >= 47 and detector.answers(), "47 answers")
+        self.assertEqual([answer.header.stamp for answer in answers],
+                         [frame.header.stamp for frame in frames if frame is not unusable])
+        times = [answer.inference_ms for answer in answers]
+        self.assertGreater(max(times), 2 * min(times), "the engines' work was even")
+
+    def test_both_engines_find_the_same(self):
+        found = {}
+        for engine in ("opencv", "torch"):
+            detector = self.loaded_detector(queue_size=100, engine=engine)
+            detector.publisher.publish(image(0, (16, 8, RED), (40, 32, GREEN)))
+            answer = eventually(detector.answers, "an answer")[0]
+            detector.wait_for(engine=engine)
+            found[engine] = [(each.class_name, each.confidence, each.x_min, each.y_min, each.x_max, each.y_max)
+                             for each in answer.detections]
+        self.assertEqual(len(found["opencv"]), 2)
+        for one, other in zip(found["opencv"], found["torch"]):
+            self.assertEqual(one[0], other[0])
+            numpy.testing.assert_allclose(one[1:], other[1:], atol=1e-3)
+
     def test_a_bad_manifest_fails_the_load_with_one_sentence_and_the_manager_lives(self):
         detector = self.make_detector()
         with open(TINY_MODEL, encoding="utf-8") as file:
@@ -248,7 +286,9 @@ class HazardDetectionTest(unittest.TestCase):
             self.assertEqual(len(said), 1, detector.output())
         for parameters, expected in [({"model": ""}, "is empty, accepted is the path"),
                                      ({"queue_sise": 3}, "unknown parameter"),
-                                     ({"queue_size": 0}, "a whole number from 1")]:
+                                     ({"queue_size": 0}, "a whole number from 1"),
+                                     ({"engines": 0}, "a whole number from 1"),
+                                     ({"engine": "abacus"}, "accepted are auto, opencv and torch")]:
             self.assertNotEqual(detector.load(**parameters).wait(60), 0)
             self.assertIn(expected, detector.output())
         self.assertIsNone(detector.manager.poll(), detector.output())

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Export a checkpoint as ONNX with its manifest and golden outputs.
+"""Export a checkpoint as ONNX and TorchScript with its manifest and golden outputs.
 
     training/export_detector.py --checkpoint build/training/hazards/last.pt --name hazards-first --data ../shared/data
 
@@ -25,6 +25,7 @@ from detector.manifest import write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import Detector
 from detector.validation import detect_simulated, validate
+from export_torch import ExportError, add_torch_file
 
 TOLERANCE = 1e-3
 """Largest difference between OpenCV and torch, in raw units, that an export may have."""
@@ -38,10 +39,6 @@ UNCALIBRATED_THRESHOLD = 0.5
 """Of a class without pictures to calibrate it on."""
 
 DEFAULT_CHECKPOINT = Path("build/training/hazards/last.pt")
-
-
-class ExportError(Exception):
-    """Nothing usable was exported; the text is one sentence for the user."""
 
 
 def load_averaged(checkpoints: List[Path]) -> Detector:
@@ -113,7 +110,9 @@ def run(arguments: argparse.Namespace) -> None:
     found = validate(runner, drives, cones)
     thresholds["pothole"] = found.best_drive_figures().threshold
     thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
-    write_manifest(arguments.out / f"{arguments.name}.yaml", weights, thresholds)
+    manifest = arguments.out / f"{arguments.name}.yaml"
+    write_manifest(manifest, weights, thresholds)
+    add_torch_file(manifest)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 
 

@@ -6,8 +6,9 @@
 
 namespace livemap {
 
-HazardDetector::HazardDetector(const ModelManifest& manifest, int threads)
-    : HazardDetector(manifest, MakeInferenceEngine(manifest, threads)) {}
+HazardDetector::HazardDetector(const ModelManifest& manifest, int threads,
+                               std::optional<EngineKind> engine)
+    : HazardDetector(manifest, MakeInferenceEngine(manifest, threads, engine)) {}
 
 HazardDetector::HazardDetector(const ModelManifest& manifest,
                                std::unique_ptr<InferenceEngine> engine)

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "detection/detection.h"
@@ -15,9 +16,10 @@ namespace livemap {
 /// thread-safe: one detector per thread.
 class HazardDetector {
  public:
-  /// Loads the model; throws Error when it is not what the manifest says. `threads` as in
-  /// MakeInferenceEngine.
-  explicit HazardDetector(const ModelManifest& manifest, int threads = 0);
+  /// Loads the model; throws Error when it is not what the manifest says. `threads` and `engine` as
+  /// in MakeInferenceEngine.
+  explicit HazardDetector(const ModelManifest& manifest, int threads = 0,
+                          std::optional<EngineKind> engine = {});
   /// With another engine, which must have been made for the same manifest.
   HazardDetector(const ModelManifest& manifest, std::unique_ptr<InferenceEngine> engine);
 
@@ -26,6 +28,8 @@ class HazardDetector {
   std::vector<HazardDetection> Detect(const cv::Mat& bgr);
 
   const ModelManifest& manifest() const { return manifest_; }
+  /// The library that runs it.
+  EngineKind Engine() const { return engine_->Kind(); }
 
  private:
   ModelManifest manifest_;

@@ -3,10 +3,23 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
+#include <utility>
 
 #include "base/error.h"
 
 namespace livemap {
+double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
+  const double width =
+      std::min(double{a.x} + a.width, double{b.x} + b.width) - std::max(double{a.x}, double{b.x});
+  const double height =
+      std::min(double{a.y} + a.height, double{b.y} + b.height) - std::max(double{a.y}, double{b.y});
+  if (width <= 0 || height <= 0) return 0;
+  const double intersection = width * height;
+  const double together = double{a.width} * a.height + double{b.width} * b.height - intersection;
+  return together > 0 ? intersection / together : 0;
+}
+
 namespace {
 
 /// exp() of more than this is wider than any image; the limit keeps the arithmetic finite.
@@ -52,9 +65,71 @@ void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest, do
   }
 }
 
-bool MoreConfident(const HazardDetection& a, const HazardDetection& b) {
-  return a.confidence > b.confidence;
-}
+/// The boxes of one class that suppression has kept so far, in a grid by their centres.
+///
+/// Two boxes whose IoU is above t are alike: each side of one is at least t times that of the
+/// other, and from a box of width w the other's centre is at most w * max(1 - t, (1 / t - 1) / 2)
+/// away, likewise in height. So only the cells that near are looked at, and thousands of candidates
+/// cost not much more than sorting them.
+class KeptBoxes {
+ public:
+  KeptBoxes(const std::vector<HazardDetection>& all, const std::vector<std::size_t>& mine,
+            float iou_limit)
+      : iou_limit_(iou_limit),
+        reach_(std::max(1.0 - iou_limit, (1.0 / std::max(double{iou_limit}, 1e-9) - 1) / 2)) {
+    for (const std::size_t index : mine) {
+      const cv::Rect2f& box = all[index].box;
+      width_ = std::max(width_, double{box.x} + box.width);
+      height_ = std::max(height_, double{box.y} + box.height);
+    }
+    // About one candidate per cell; a few are compared as fast without cells.
+    side_ = static_cast<int>(std::clamp(std::sqrt(static_cast<double>(mine.size())), 1.0, 64.0));
+    first_.assign(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_), kNone);
+  }
+
+  bool KeepUnlessOverlapped(const cv::Rect2f& box) {
+    const double x = double{box.x} + 0.5 * double{box.width};
+    const double y = double{box.y} + 0.5 * double{box.height};
+    // A little more than the reach: the bound is exact, the floats of a box are not.
+    const double reach_x = 1.001 * reach_ * double{box.width} + 0.01;
+    const double reach_y = 1.001 * reach_ * double{box.height} + 0.01;
+    const int last_column = Cell(x + reach_x, width_);
+    const int last_row = Cell(y + reach_y, height_);
+    for (int row = Cell(y - reach_y, height_); row <= last_row; ++row) {
+      for (int column = Cell(x - reach_x, width_); column <= last_column; ++column) {
+        for (std::size_t i = first_[Index(column, row)]; i != kNone; i = next_[i]) {
+          if (IntersectionOverUnion(boxes_[i], box) > iou_limit_) return false;
+        }
+      }
+    }
+    std::size_t& first = first_[Index(Cell(x, width_), Cell(y, height_))];
+    boxes_.push_back(box);
+    next_.push_back(first);
+    first = boxes_.size() - 1;
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+  int Cell(double position, double extent) const {
+    if (!(extent > 0)) return 0;
+    return static_cast<int>(std::clamp(position / extent * side_, 0.0, side_ - 1.0));
+  }
+  std::size_t Index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(side_) +
+           static_cast<std::size_t>(column);
+  }
+
+  float iou_limit_;
+  double reach_;  ///< Sides of a box that the centre of one alike may be away.
+  double width_ = 0;
+  double height_ = 0;
+  int side_ = 1;                    ///< Cells in each direction.
+  std::vector<std::size_t> first_;  ///< By cell: the box kept last.
+  std::vector<std::size_t> next_;   ///< By box: the one kept before it in its cell.
+  std::vector<cv::Rect2f> boxes_;
+};
 
 void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
   const int columns = 5 + static_cast<int>(manifest.classes.size());
@@ -71,33 +146,31 @@ void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
 
 }  // namespace
 
-double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
-  const double width =
-      std::min(double{a.x} + a.width, double{b.x} + b.width) - std::max(double{a.x}, double{b.x});
-  const double height =
-      std::min(double{a.y} + a.height, double{b.y} + b.height) - std::max(double{a.y}, double{b.y});
-  if (width <= 0 || height <= 0) return 0;
-  const double intersection = width * height;
-  const double together = double{a.width} * a.height + double{b.width} * b.height - intersection;
-  return together > 0 ? intersection / together : 0;
-}
-
 std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candidates,
                                               float iou_limit) {
-  // Stable, so that equal confidences keep the order of the cells and a run can be repeated.
-  std::stable_sort(candidates.begin(), candidates.end(), MoreConfident);
-  std::vector<std::size_t> looked_at;  // by class
+  // Indices, as a detection holds a text. Stable, so that equal confidences keep the order of the
+  // cells and a run can be repeated.
+  std::vector<std::size_t> order(candidates.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return candidates[a].confidence > candidates[b].confidence;
+  });
+  std::vector<std::vector<std::size_t>> by_class;
+  for (const std::size_t candidate : order) {
+    const auto index = static_cast<std::size_t>(candidates[candidate].class_index);
+    if (by_class.size() <= index) by_class.resize(index + 1);
+    if (by_class[index].size() < kMostCandidates) by_class[index].push_back(candidate);
+  }
+  std::vector<bool> keep(candidates.size(), false);
+  for (const std::vector<std::size_t>& of_class : by_class) {
+    KeptBoxes kept(candidates, of_class, iou_limit);
+    for (const std::size_t candidate : of_class) {
+      keep[candidate] = kept.KeepUnlessOverlapped(candidates[candidate].box);
+    }
+  }
   std::vector<HazardDetection> kept;
-  for (HazardDetection& candidate : candidates) {
-    const auto index = static_cast<std::size_t>(candidate.class_index);
-    if (looked_at.size() <= index) looked_at.resize(index + 1, 0);
-    if (looked_at[index] == kMostCandidates) continue;
-    ++looked_at[index];
-    const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const HazardDetection& better) {
-      return better.class_index == candidate.class_index &&
-             IntersectionOverUnion(better.box, candidate.box) > iou_limit;
-    });
-    if (!overlaps) kept.push_back(std::move(candidate));
+  for (const std::size_t candidate : order) {
+    if (keep[candidate]) kept.push_back(std::move(candidates[candidate]));
   }
   return kept;
 }

@@ -22,8 +22,8 @@ std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const Model
 
 /// Greedy non-maximum suppression within each class: going down in confidence, a box that overlaps
 /// a kept one of its class by more than `iou_limit` goes. At most `kMostCandidates` of each class,
-/// the most confident, are looked at, which bounds the time that a wild output can cost. Returns
-/// the kept detections, descending confidence.
+/// the most confident, are looked at, which bounds the time that a wild output can cost; boxes are
+/// compared with near ones only. Returns the kept detections, descending confidence.
 std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candidates,
                                               float iou_limit);
 constexpr std::size_t kMostCandidates = 3000;

@@ -32,17 +32,21 @@ std::string Shown(const YAML::Node& node) {
 /// One map of the manifest, read key by key.
 class Section {
  public:
-  /// Refuses keys that are not in `keys`, that are repeated or missing.
+  /// Refuses keys that are not in `keys` or `optional`, that are repeated, and missing `keys`.
   Section(const YAML::Node& node, std::string origin, std::string path,
-          const std::vector<std::string>& keys)
+          const std::vector<std::string>& keys, const std::vector<std::string>& optional = {})
       : node_(node), origin_(std::move(origin)), path_(std::move(path)) {
     if (!node.IsMap()) Refuse(path_.empty() ? "the file" : path_, node, "a map");
     std::set<std::string> seen;
     for (const auto& entry : node) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      const auto has = [&key](const std::vector<std::string>& list) {
+        return std::find(list.begin(), list.end(), key) != list.end();
+      };
+      if (!has(keys) && !has(optional)) {
         throw Error("model manifest '" + origin_ + "': unknown key " + Shown(entry.first) +
-                    Where() + ", accepted are: " + Join(keys));
+                    Where() + ", accepted are: " + Join(keys) +
+                    (optional.empty() ? "" : ", " + Join(optional)));
       }
       if (!seen.insert(key).second) {
         throw Error("model manifest '" + origin_ + "': key '" + key + "'" + Where() +
@@ -60,6 +64,8 @@ class Section {
   Section Sub(const std::string& key, const std::vector<std::string>& keys) const {
     return {node_[key], origin_, Path(key), keys};
   }
+
+  bool Has(const std::string& key) const { return node_[key].IsDefined(); }
 
   std::string Text(const std::string& key) const { return TextOf(node_[key], Path(key)); }
 
@@ -139,14 +145,39 @@ class Section {
   std::string path_;
 };
 
+std::string HashOf(const Section& root, const std::string& key) {
+  const std::string hash = root.Text(key);
+  if (hash.size() != 64 || hash.find_first_not_of("0123456789abcdef") != std::string::npos) {
+    root.Refuse(key, root.node()[key], "64 lower-case hexadecimal digits");
+  }
+  return hash;
+}
+
+void ReadFiles(const Section& root, const std::filesystem::path& directory,
+               ModelManifest& manifest) {
+  manifest.file = (directory / root.Text("file")).string();
+  manifest.sha256 = HashOf(root, "sha256");
+  if (root.Has("torch_file") != root.Has("torch_sha256")) {
+    const std::string missing = root.Has("torch_file") ? "torch_sha256" : "torch_file";
+    root.Refuse(missing, root.node()[missing], "both torch_file and torch_sha256 or none of them");
+  }
+  if (root.Has("torch_file")) {
+    manifest.torch_file = (directory / root.Text("torch_file")).string();
+    manifest.torch_sha256 = HashOf(root, "torch_sha256");
+  }
+  if (!root.Has("engine")) return;
+  const std::string engine = root.Text("engine");
+  if (engine != "opencv" && engine != "torch") {
+    root.Refuse("engine", root.node()["engine"], "opencv or torch");
+  }
+  manifest.engine = engine == "torch" ? EngineKind::kTorch : EngineKind::kOpenCv;
+  if (manifest.engine == EngineKind::kTorch && manifest.torch_file.empty()) {
+    root.Refuse("engine", root.node()["engine"], "opencv where no torch_file is given");
+  }
+}
+
 void ReadNames(const Section& root, ModelManifest& manifest) {
   manifest.name = root.Text("name");
-  manifest.sha256 = root.Text("sha256");
-  const bool is_hash = manifest.sha256.size() == 64 &&
-                       manifest.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
-  if (!is_hash) {
-    root.Refuse("sha256", root.node()["sha256"], "64 lower-case hexadecimal digits");
-  }
   manifest.classes = root.List(
       "classes", 1, kMostClasses,
       [&](const YAML::Node& node, const std::string& path) { return root.TextOf(node, path); });
@@ -208,6 +239,17 @@ void ReadHead(const Section& root, ModelManifest& manifest) {
   manifest.nms_iou = root.Number("nms_iou", 0.0, 1.0);
 }
 
+std::string ReadChecked(const ModelManifest& manifest, const std::string& file,
+                        const std::string& sha256) {
+  std::string bytes = ReadFile(file, kMostModelBytes);
+  const std::string found = Sha256Hex(bytes);
+  if (found != sha256) {
+    throw Error("model file '" + file + "' has SHA-256 " + found + ", the manifest of '" +
+                manifest.name + "' accepts " + sha256);
+  }
+  return bytes;
+}
+
 }  // namespace
 
 int ModelManifest::AnchorCount() const {
@@ -227,10 +269,11 @@ ModelManifest ParseModelManifest(const std::string& yaml, const std::string& ori
   try {
     const Section root(YAML::Load(yaml), origin, "",
                        {"name", "file", "sha256", "classes", "input", "normalisation", "head",
-                        "thresholds", "nms_iou"});
+                        "thresholds", "nms_iou"},
+                       {"engine", "torch_file", "torch_sha256"});
     ModelManifest manifest;
     ReadNames(root, manifest);
-    manifest.file = (std::filesystem::path(directory) / root.Text("file")).string();
+    ReadFiles(root, directory, manifest);
     ReadInput(root, manifest);
     ReadHead(root, manifest);
     return manifest;
@@ -245,13 +288,16 @@ ModelManifest ReadModelManifest(const std::string& path) {
 }
 
 std::string ReadModelFile(const ModelManifest& manifest) {
-  std::string bytes = ReadFile(manifest.file, kMostModelBytes);
-  const std::string found = Sha256Hex(bytes);
-  if (found != manifest.sha256) {
-    throw Error("model file '" + manifest.file + "' has SHA-256 " + found + ", the manifest of '" +
-                manifest.name + "' accepts " + manifest.sha256);
+  return ReadChecked(manifest, manifest.file, manifest.sha256);
+}
+
+std::string ReadTorchFile(const ModelManifest& manifest) {
+  if (manifest.torch_file.empty()) {
+    throw Error("the torch engine was asked for model '" + manifest.name +
+                "', whose manifest has no torch_file: accepted is opencv, or "
+                "training/export_torch.py adds one");
   }
-  return bytes;
+  return ReadChecked(manifest, manifest.torch_file, manifest.torch_sha256);
 }
 
 }  // namespace livemap

@@ -9,13 +9,19 @@ namespace livemap {
 /// Order of the three channels in which a network wants an image.
 enum class ChannelOrder { kRgb, kBgr };
 
+/// The library that runs a network.
+enum class EngineKind { kOpenCv, kTorch };
+
 /// Everything that must be known about a model to run it: the content of models/NAME.yaml, checked.
 /// models/README.md describes the file key by key.
 struct ModelManifest {
-  std::string name;                  ///< Goes into DetectionArray.model.
-  std::string file;                  ///< Path of the ONNX file.
-  std::string sha256;                ///< Of that file, 64 lower-case hexadecimal digits.
-  std::vector<std::string> classes;  ///< By class index; names as in config/hazards.yaml.
+  std::string name;                         ///< Goes into DetectionArray.model.
+  std::string file;                         ///< Path of the ONNX file.
+  std::string sha256;                       ///< Of that file, 64 lower-case hexadecimal digits.
+  std::string torch_file;                   ///< Path of the TorchScript file; empty: there is none.
+  std::string torch_sha256;                 ///< Of that file; empty where there is none.
+  EngineKind engine = EngineKind::kOpenCv;  ///< What runs it unless a parameter says otherwise.
+  std::vector<std::string> classes;         ///< By class index; names as in config/hazards.yaml.
 
   /// The network's input tensor `images`: 1 x 3 x height x width, float32. An image is scaled to
   /// fit and padded on the right and at the bottom with `pad_value` (letterbox).
@@ -47,17 +53,22 @@ struct ModelManifest {
   int AnchorCount() const;
 };
 
-/// Reads and checks a manifest file; `file` is resolved against the manifest's folder. The model
-/// itself is not touched. Throws Error naming the file, the key, its value and what is accepted;
-/// unknown, missing and repeated keys are errors too.
+/// Reads and checks a manifest file; its files are resolved against the manifest's folder. The
+/// model itself is not touched. Throws Error naming the file, the key, its value and what is
+/// accepted; unknown, missing and repeated keys are errors too; engine, torch_file and torch_sha256
+/// may be left out.
 ModelManifest ReadModelManifest(const std::string& path);
 
-/// The same from text; `origin` names it in errors and `directory` is what `file` is relative to.
+/// The same from text; `origin` names it in errors and `directory` is what its files are relative
+/// to.
 ModelManifest ParseModelManifest(const std::string& yaml, const std::string& origin,
                                  const std::string& directory);
 
 /// The bytes of the model file, whose SHA-256 is the manifest's: what is checked is what is loaded.
 /// Throws Error when the file is missing, too large (256 MiB) or another one.
 std::string ReadModelFile(const ModelManifest& manifest);
+
+/// The same for the TorchScript file and its hash. Throws Error also when the manifest names none.
+std::string ReadTorchFile(const ModelManifest& manifest);
 
 }  // namespace livemap

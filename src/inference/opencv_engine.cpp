@@ -3,26 +3,13 @@
 #include <string>
 
 #include "base/error.h"
-#include "inference/inference_engine.h"
+#include "inference/engines.h"
 #include "inference/onnx_inputs.h"
 
 namespace livemap {
 namespace {
 
 constexpr char kInputName[] = "images";
-
-template <typename Sizes>
-std::string ShapeText(const Sizes& sizes) {
-  std::string text;
-  for (const auto size : sizes) {
-    text += (text.empty() ? "" : " x ") + (size < 0 ? "?" : std::to_string(size));
-  }
-  return text.empty() ? "no dimensions" : text;
-}
-
-std::vector<std::int64_t> ShapeOf(const cv::Mat& tensor) {
-  return {tensor.size.p, tensor.size.p + tensor.dims};
-}
 
 /// OpenCV's messages run over several lines; errors here are one sentence.
 std::string OneLine(std::string text) {
@@ -45,7 +32,8 @@ class OpenCvEngine final : public InferenceEngine {
                   "' cannot be loaded, accepted is an ONNX file of layers that OpenCV knows (" +
                   OneLine(error.err) + ")");
     }
-    CheckOutput(manifest);
+    CheckOutputName(manifest);
+    CheckOutput(*this, manifest, file_);
   }
 
   cv::Mat Run(const cv::Mat& images) override {
@@ -57,6 +45,8 @@ class OpenCvEngine final : public InferenceEngine {
                   ShapeText(ShapeOf(images)) + " (" + OneLine(error.err) + ")");
     }
   }
+
+  EngineKind Kind() const override { return EngineKind::kOpenCv; }
 
  private:
   void CheckInput(const std::string& bytes, const ModelManifest& manifest) const {
@@ -73,29 +63,19 @@ class OpenCvEngine final : public InferenceEngine {
       throw Error("model file '" + file_ + "' declares " + std::to_string(inputs.size()) +
                   " inputs of other names, accepted is one named '" + kInputName + "'");
     }
-    const std::vector<std::int64_t> shape = {1, 3, manifest.input.height, manifest.input.width};
+    const std::vector<std::int64_t> shape = InputShape(manifest);
     if (images->shape != shape) {
       throw Error("model file '" + file_ + "' takes images of " + ShapeText(images->shape) +
                   ", its manifest accepts " + ShapeText(shape));
     }
   }
 
-  /// Runs the network once, which also makes the first frame as fast as the others.
-  void CheckOutput(const ModelManifest& manifest) {
+  void CheckOutputName(const ModelManifest& manifest) const {
     const std::vector<std::string> outputs = network_.getUnconnectedOutLayersNames();
     if (outputs.size() != 1 || outputs[0] != manifest.head.output) {
       throw Error("model file '" + file_ + "' has " + std::to_string(outputs.size()) +
                   " outputs, the first named '" + (outputs.empty() ? "" : outputs[0]) +
                   "', its manifest accepts one named '" + manifest.head.output + "'");
-    }
-    const int images_shape[] = {1, 3, manifest.input.height, manifest.input.width};
-    const cv::Mat output = Run(cv::Mat(4, images_shape, CV_32F, cv::Scalar(0)));
-    const std::vector<std::int64_t> shape = {
-        1, manifest.AnchorCount(), 5 + static_cast<std::int64_t>(manifest.classes.size())};
-    if (output.type() != CV_32F || ShapeOf(output) != shape) {
-      throw Error("model file '" + file_ + "' answers with a tensor of " +
-                  ShapeText(ShapeOf(output)) + ", its manifest of " +
-                  std::to_string(manifest.classes.size()) + " classes accepts " + ShapeText(shape));
     }
   }
 
@@ -105,7 +85,7 @@ class OpenCvEngine final : public InferenceEngine {
 
 }  // namespace
 
-std::unique_ptr<InferenceEngine> MakeInferenceEngine(const ModelManifest& manifest, int threads) {
+std::unique_ptr<InferenceEngine> MakeOpenCvEngine(const ModelManifest& manifest, int threads) {
   if (threads > 0) cv::setNumThreads(threads);
   return std::make_unique<OpenCvEngine>(manifest);
 }

@@ -10,9 +10,8 @@
 #include <memory>
 #include <mutex>
 #include <pluginlib/class_list_macros.hpp>
-#include <thread>
 
-#include "detection/frame_queue.h"
+#include "detection/detector_pool.h"
 #include "detection/hazard_detector.h"
 #include "detection/privacy_mask.h"
 #include "nodelets/nodelet_support.h"
@@ -24,7 +23,9 @@ namespace livemap {
 /// Parameters of the hazard_detection nodelet; config/hazard_detection.yaml explains them.
 struct HazardDetectionConfig {
   std::string model;            ///< Path of the manifest; must be given.
-  int threads = 2;              ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
+  std::string engine = "auto";  ///< auto (the manifest's choice), opencv or torch.
+  int engines = 1;              ///< Networks that work side by side on frames in turn.
+  int threads = 2;              ///< Of each engine; OpenCV's are one pool; 0 = all cores.
   int queue_size = 4;           ///< Frames that may wait.
   bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
   bool privacy = true;          ///< Mask faces and number plates in the picture.
@@ -39,19 +40,25 @@ struct HazardDetectionConfig {
 /// The subscriber's callback only puts the pointer of the image into a queue, so ROS's own
 /// queue, which would lose frames without a word, never fills: it has no bound. The bound is
 /// queue_size, where the oldest frame goes and is counted: frames_in = frames_processed +
-/// frames_dropped + frames_waiting, at any moment. One worker thread takes from the queue.
+/// frames_dropped + frames_waiting, at any moment. The engines of a pool take from the queue, and
+/// HandOn gets their results in the order of the frames, on a thread of its own.
 class HazardDetectionNodelet : public nodelet::Nodelet {
  public:
   ~HazardDetectionNodelet() override {
     diagnostics_timer_.stop();
     subscriber_.shutdown();
-    if (queue_) queue_->Close();
-    if (worker_.joinable()) worker_.join();
+    if (pool_) pool_->Close();
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  using Queue = FrameQueue<sensor_msgs::ImageConstPtr>;
+  /// What an engine makes of an image.
+  struct Seen {
+    cv_bridge::CvImageConstPtr bgr;
+    std::vector<HazardDetection> found;
+    double ms = 0;  ///< conversion and detection
+  };
+  using Pool = DetectorPool<sensor_msgs::ImageConstPtr, Seen>;
 
   void onInit() override {
     InitializeOrExplain(getName(), [this] { Initialize(); });
@@ -59,27 +66,33 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   void Initialize() {
     ReadParameters();
-    detector_ = std::make_unique<HazardDetector>(ReadModelManifest(config_.model), config_.threads);
+    const ModelManifest manifest = ReadModelManifest(config_.model);
+    const std::optional<EngineKind> engine = ParseEngineChoice(
+        config_.engine, "parameter '" + getPrivateNodeHandle().resolveName("engine") + "'");
+    for (int i = 0; i < config_.engines; ++i) {
+      detectors_.push_back(std::make_unique<HazardDetector>(manifest, config_.threads, engine));
+    }
     if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
-    queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
     ros::NodeHandle& node = getNodeHandle();
     detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
     image_transport::ImageTransport transport(node);
     annotated_publisher_ = transport.advertise("hazard/annotated", 10);
+    StartPool();
     StartDiagnostics();
-    worker_ = std::thread([this] { Work(); });
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
                                                 getPrivateNodeHandle());
     subscriber_ = transport.subscribe(
         "camera_rect/image", 0,
         boost::function<void(const sensor_msgs::ImageConstPtr&)>(
-            [this](const sensor_msgs::ImageConstPtr& image) { queue_->Push(image); }),
+            [this](const sensor_msgs::ImageConstPtr& image) { pool_->Push(image); }),
         ros::VoidPtr(), hints);
   }
 
   void ReadParameters() {
     ParameterReader parameters(getPrivateNodeHandle());
     parameters.Read("model", config_.model);
+    parameters.Read("engine", config_.engine);
+    parameters.Read("engines", config_.engines, {1, 64});
     parameters.Read("threads", config_.threads, {0, 256});
     parameters.Read("queue_size", config_.queue_size, {1, 1000});
     parameters.Read("annotate_empty", config_.annotate_empty);
@@ -97,38 +110,50 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     }
   }
 
-  void Work() {
-    while (const std::optional<sensor_msgs::ImageConstPtr> image = queue_->Pop()) {
-      try {
-        Process(*image);
-      } catch (const std::exception& error) {
-        queue_->Unusable();
-        const std::lock_guard<std::mutex> lock(figures_mutex_);
-        ++figures_.bad;
-        NODELET_ERROR_THROTTLE(60, "dropped an image of %s: %s", subscriber_.getTopic().c_str(),
-                               error.what());
-      }
+  void StartPool() {
+    std::vector<Pool::Engine> engines;
+    for (const std::unique_ptr<HazardDetector>& detector : detectors_) {
+      engines.emplace_back([&detector](const sensor_msgs::ImageConstPtr& image) {
+        const Clock::time_point start = Clock::now();
+        Seen seen;
+        seen.bgr = cv_bridge::toCvShare(image, "bgr8");
+        seen.found = detector->Detect(seen.bgr->image);
+        seen.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        return seen;
+      });
     }
+    pool_ = std::make_unique<Pool>(std::move(engines), static_cast<std::size_t>(config_.queue_size),
+                                   [this](const Pool::Outcome& outcome) {
+                                     if (outcome.result) {
+                                       HandOn(*outcome.result, outcome.item->header);
+                                     } else {
+                                       Drop(outcome.error);
+                                     }
+                                   });
   }
 
-  void Process(const sensor_msgs::ImageConstPtr& image) {
-    const Clock::time_point start = Clock::now();
-    const cv_bridge::CvImageConstPtr bgr = cv_bridge::toCvShare(image, "bgr8");
-    const std::vector<HazardDetection> found = detector_->Detect(bgr->image);
-    const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  void Drop(const std::string& error) {
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    ++figures_.bad;
+    NODELET_ERROR_THROTTLE(60, "dropped an image of %s: %s", subscriber_.getTopic().c_str(),
+                           error.c_str());
+  }
+
+  /// Called image after image in the order in which they came.
+  void HandOn(const Seen& seen, const std_msgs::Header& header) {
+    const cv::Mat& bgr = seen.bgr->image;
     // The picture first: who reports a detection wants it at hand.
-    if ((config_.annotate_empty || !found.empty()) &&
+    if ((config_.annotate_empty || !seen.found.empty()) &&
         annotated_publisher_.getNumSubscribers() > 0) {
-      PublishPicture(bgr->image, found, image->header);
+      PublishPicture(bgr, seen.found, header);
     }
     ++frame_;
     detections_publisher_.publish(boost::make_shared<DetectionArray>(
-        ToMessage(found, image->header, detector_->manifest().name, bgr->image.size(), ms)));
-    queue_->Done();
+        ToMessage(seen.found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
     const std::lock_guard<std::mutex> lock(figures_mutex_);
-    figures_.detections += found.size();
+    figures_.detections += seen.found.size();
     ++figures_.processed_in_window;
-    figures_.ms_in_window += ms;
+    figures_.ms_in_window += seen.ms;
   }
 
   /// Masked first, so that the drawn boxes stay whole; a picture that cannot be masked stays here.
@@ -172,7 +197,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       figures_.processed_in_window = 0;
       figures_.ms_in_window = 0;
     }
-    const Queue::Counters counters = queue_->counters();
+    const Pool::Counters counters = pool_->counters();
     const Clock::time_point now = Clock::now();
     const double window_s = std::chrono::duration<double>(now - window_start_).count();
     window_start_ = now;
@@ -199,7 +224,9 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     status.add("detections", figures.detections);
     status.add("rate_hz", window_s > 0 ? in_window / window_s : 0.0);
     status.add("detection_ms", in_window > 0 ? figures.ms_in_window / in_window : 0.0);
-    status.add("model", detector_->manifest().name);
+    status.add("model", detectors_.front()->manifest().name);
+    status.add("engine", NameOf(detectors_.front()->Engine()));
+    status.add("engines", detectors_.size());
   }
 
   /// What the queue does not count.
@@ -214,15 +241,13 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   };
 
   HazardDetectionConfig config_;
-  // The worker's:
-  std::unique_ptr<HazardDetector> detector_;
+  std::vector<std::unique_ptr<HazardDetector>> detectors_;  ///< Each its engine's thread's own.
+  // HandOn's:
   std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
   std::uint64_t frame_ = 0;
-  std::unique_ptr<Queue> queue_;
   image_transport::Subscriber subscriber_;
   ros::Publisher detections_publisher_;
   image_transport::Publisher annotated_publisher_;
-  std::thread worker_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;
   // The diagnostics timer's own:
@@ -232,6 +257,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   std::mutex figures_mutex_;
   Figures figures_;
+  std::unique_ptr<Pool> pool_;  ///< Last: its threads use the rest.
 };
 
 }  // namespace livemap

@@ -21,6 +21,7 @@ struct Options {
   std::string draw;
   std::optional<double> threshold;
   int threads = 0;
+  std::optional<EngineKind> engine;
 };
 
 /// None when --help was asked for and printed.
@@ -34,7 +35,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       {{"model", "FILE", "manifest of the model, default models/hazards-first.yaml"},
        {"threshold", "X", "least confidence, instead of the manifest's"},
        {"draw", "FILE", "write the image with what was found drawn in (.jpg or .png; one IMAGE)"},
-       {"threads", "N", "threads of OpenCV, default all cores"}});
+       {"engine", "NAME", "auto (what the manifest says, default), opencv or torch"},
+       {"threads", "N", "threads of the engine, default all cores"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
   options.images = line.Positionals();
@@ -42,6 +44,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (options.model.empty()) options.model = DefaultModelPath();
   options.draw = line.Text("draw", "");
   if (line.Has("threshold")) options.threshold = line.Number("threshold", 0, 0.001, 0.999);
+  options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
   options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
   if (!options.draw.empty() && options.images.size() != 1) {
     throw Error("--draw is given with " + std::to_string(options.images.size()) +
@@ -84,7 +87,7 @@ int Run(int argc, char** argv) {
     std::fill(manifest.thresholds.begin(), manifest.thresholds.end(),
               static_cast<float>(*options->threshold));
   }
-  HazardDetector detector(manifest, options->threads);
+  HazardDetector detector(manifest, options->threads, options->engine);
   for (const std::string& path : options->images) {
     const cv::Mat image = ReadImage(path);
     const std::vector<HazardDetection> found = detector.Detect(image);

@@ -25,6 +25,7 @@ struct Options {
   bool sweep = false;
   double lowest_score = 0.01;
   int threads = 0;
+  std::optional<EngineKind> engine;
   LabelledFolderOptions labels;
 };
 
@@ -43,7 +44,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"label-classes", "A,B", "names of the label files' classes 0, 1, ..., default classes.txt"},
        {"sweep", "", "figures at thresholds from 0.05 to 0.95 too"},
        {"lowest-score", "X", "least score that the average precision counts, default 0.01"},
-       {"threads", "N", "threads of OpenCV, default all cores"}});
+       {"engine", "NAME", "auto (what the manifest says, default), opencv or torch"},
+       {"threads", "N", "threads of the engine, default all cores"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
   options.folders = line.Positionals();
@@ -52,6 +54,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.json = line.Has("json");
   options.sweep = line.Has("sweep");
   options.lowest_score = line.Number("lowest-score", options.lowest_score, 0.001, 0.999);
+  options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
   options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
   options.labels.split = line.Text("split", "");
   options.labels.label_classes = SplitNames("--label-classes", line.Text("label-classes", ""));
@@ -73,7 +76,7 @@ class Evaluation {
     for (float& threshold : everything.thresholds) {
       threshold = std::min(threshold, static_cast<float>(options.lowest_score));
     }
-    detector_ = std::make_unique<HazardDetector>(everything, options.threads);
+    detector_ = std::make_unique<HazardDetector>(everything, options.threads, options.engine);
   }
 
   void Run(const std::vector<LabelledFolder>& folders) {

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "base/error.h"
 #include "detection/synthetic_head.h"
@@ -148,6 +150,58 @@ TEST(Suppression, OnlyTheMostConfidentCandidatesAreLookedAt) {
   const std::vector<HazardDetection> kept = SuppressOverlaps(candidates, 0.5F);
   ASSERT_EQ(kept.size(), kMostCandidates);
   EXPECT_FLOAT_EQ(kept.front().box.x, 20.0F * (kMostCandidates + 9));
+}
+
+/// Suppression as it is defined, every candidate against every kept one.
+std::vector<HazardDetection> SuppressedByTheBook(std::vector<HazardDetection> candidates,
+                                                 float iou_limit) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
+  std::vector<HazardDetection> kept;
+  for (const HazardDetection& candidate : candidates) {
+    if (std::none_of(kept.begin(), kept.end(), [&](const HazardDetection& better) {
+          return better.class_index == candidate.class_index &&
+                 IntersectionOverUnion(better.box, candidate.box) > iou_limit;
+        })) {
+      kept.push_back(candidate);
+    }
+  }
+  return kept;
+}
+
+/// Boxes of many sizes, bunched and spread, cut to 640 x 400 as a decoder cuts them.
+std::vector<HazardDetection> RandomCandidates(std::mt19937& random, int count) {
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::vector<HazardDetection> candidates;
+  for (int i = 0; i < count; ++i) {
+    const float around = unit(random) < 0.5F ? 30.0F : 640.0F;
+    const float width = std::exp(6 * unit(random));
+    const float height = unit(random) < 0.5F ? width : std::exp(6 * unit(random));
+    cv::Rect2f box(200 + around * (unit(random) - 0.5F), 150 + around * (unit(random) - 0.5F),
+                   width, height);
+    box &= cv::Rect2f(0, 0, 640, 400);
+    // Few levels of confidence, so that there are equal ones.
+    const float confidence = std::floor(50 * unit(random)) / 50;
+    if (!box.empty()) candidates.push_back(Candidate(unit(random) < 0.7F ? 0 : 1, confidence, box));
+  }
+  return candidates;
+}
+
+TEST(Suppression, KeepsWhatComparingAllWithAllKeeps) {
+  std::mt19937 random(1);
+  for (const float limit : {0.0F, 0.1F, 0.3F, 0.5F, 0.65F, 0.9F, 1.0F}) {
+    for (const int count : {0, 1, 7, 100, 1500}) {
+      const std::vector<HazardDetection> candidates = RandomCandidates(random, count);
+      const std::vector<HazardDetection> expected = SuppressedByTheBook(candidates, limit);
+      const std::vector<HazardDetection> kept = SuppressOverlaps(candidates, limit);
+      ASSERT_EQ(kept.size(), expected.size()) << count << " candidates at " << limit;
+      for (std::size_t i = 0; i < kept.size(); ++i) {
+        EXPECT_EQ(kept[i].box, expected[i].box);
+        EXPECT_EQ(kept[i].class_index, expected[i].class_index);
+        EXPECT_EQ(kept[i].confidence, expected[i].confidence);
+      }
+    }
+  }
 }
 
 TEST(IntersectionOverUnion, OfKnownBoxes) {

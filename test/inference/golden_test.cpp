@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "inference/inference_engine.h"
@@ -46,14 +47,22 @@ cv::Mat FormulaImage(const ModelManifest& manifest) {
   return images;
 }
 
-class GoldenTest : public ::testing::TestWithParam<std::string> {};
+using Parameters = std::tuple<std::string, EngineKind>;
+class GoldenTest : public ::testing::TestWithParam<Parameters> {};
 
 TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
+  const auto& [path, kind] = GetParam();
   const std::string golden_path =
-      GetParam().substr(0, GetParam().size() - std::string("yaml").size()) + "golden.yaml";
+      path.substr(0, path.size() - std::string("yaml").size()) + "golden.yaml";
   const YAML::Node golden = YAML::LoadFile(golden_path);
-  const ModelManifest manifest = ReadModelManifest(GetParam());
-  const cv::Mat output = MakeInferenceEngine(manifest, 0)->Run(FormulaImage(manifest));
+  const ModelManifest manifest = ReadModelManifest(path);
+  if (kind == EngineKind::kTorch && !HasTorchEngine()) GTEST_SKIP() << "skipped, no libtorch";
+  if (kind == EngineKind::kTorch && manifest.torch_file.empty()) {
+    GTEST_SKIP() << "skipped, '" << path << "' has no torch_file";
+  }
+  const std::unique_ptr<InferenceEngine> engine = MakeInferenceEngine(manifest, 0, kind);
+  ASSERT_EQ(engine->Kind(), kind);
+  const cv::Mat output = engine->Run(FormulaImage(manifest));
   const auto tolerance = golden["tolerance"].as<double>();
   ASSERT_LE(tolerance, 1e-3);
   ASSERT_GT(golden["rows"].size(), 0U);
@@ -69,15 +78,20 @@ TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
   }
 }
 
-std::string NameOf(const ::testing::TestParamInfo<std::string>& manifest) {
-  std::string name = std::filesystem::path(manifest.param).stem().string();
+std::string NameOfModel(const ::testing::TestParamInfo<Parameters>& parameters) {
+  std::string name = std::filesystem::path(std::get<0>(parameters.param)).stem().string() + "_" +
+                     NameOf(std::get<1>(parameters.param));
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
   }
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest, ::testing::ValuesIn(ShippedManifests()), NameOf);
+INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest,
+                         ::testing::Combine(::testing::ValuesIn(ShippedManifests()),
+                                            ::testing::Values(EngineKind::kOpenCv,
+                                                              EngineKind::kTorch)),
+                         NameOfModel);
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenTest);
 
 }  // namespace

@@ -2,6 +2,7 @@
 """Writes tiny.onnx and tiny.yaml: a model whose answer is a known function of the image.
 
     test/inference/make_tiny_model.py [FOLDER]
+    training/export_torch.py test/inference/tiny.yaml      (adds tiny.pt)
 
 It "detects" coloured blocks: a cell of 8x8 (or 16x16) pixels that is red is a pothole, one that is
 green a traffic cone. With r, g the cell's mean red and green (0..1):

@@ -61,6 +61,33 @@ TEST(ModelManifest, EveryValueIsRead) {
   EXPECT_THAT(manifest.thresholds, ElementsAre(0.6F, 0.7F)) << "by class index, not by file order";
   EXPECT_EQ(manifest.nms_iou, 0.5F);
   EXPECT_EQ(manifest.AnchorCount(), 8 * 6 + 4 * 3);
+  EXPECT_EQ(manifest.engine, EngineKind::kOpenCv);
+  EXPECT_EQ(manifest.torch_file, "");
+}
+
+const std::string kTorchKeys =
+    "torch_file: n.pt\ntorch_sha256: " + std::string(64, 'b') + "\nengine: torch\n";
+
+TEST(ModelManifest, TheTorchFileAndTheChoiceOfAnEngineAreRead) {
+  const ModelManifest manifest = ParseModelManifest(kGood + kTorchKeys, "x.yaml", "models");
+  EXPECT_EQ(manifest.torch_file, "models/n.pt");
+  EXPECT_EQ(manifest.torch_sha256, std::string(64, 'b'));
+  EXPECT_EQ(manifest.engine, EngineKind::kTorch);
+  EXPECT_EQ(ParseModelManifest(kGood + "engine: opencv\n", "x.yaml", "models").engine,
+            EngineKind::kOpenCv);
+}
+
+TEST(ModelManifest, AHalfOrWrongChoiceOfAnEngineIsRefused) {
+  EXPECT_THAT(ErrorOf(kGood + "torch_file: n.pt\n"),
+              AllOf(HasSubstr("torch_sha256 is missing"), HasSubstr("both torch_file and")));
+  EXPECT_THAT(ErrorOf(kGood + "torch_sha256: " + std::string(64, 'b') + "\n"),
+              HasSubstr("torch_file is missing"));
+  EXPECT_THAT(ErrorOf(kGood + "torch_file: n.pt\ntorch_sha256: b\n"),
+              AllOf(HasSubstr("torch_sha256 is 'b'"), HasSubstr("64 lower-case")));
+  EXPECT_THAT(ErrorOf(kGood + "engine: abacus\n"),
+              AllOf(HasSubstr("engine is 'abacus'"), HasSubstr("opencv or torch")));
+  EXPECT_THAT(ErrorOf(kGood + "engine: torch\n"),
+              AllOf(HasSubstr("engine is 'torch'"), HasSubstr("no torch_file")));
 }
 
 struct BadManifest {
@@ -151,6 +178,15 @@ TEST(ModelFile, AMissingFileIsNamed) {
   ModelManifest manifest = ReadModelManifest(kTinyManifest);
   manifest.file = "/nowhere/m.onnx";
   EXPECT_THROW(ReadModelFile(manifest), Error);
+}
+
+TEST(TorchFile, IsReadWhenItsHashIsTheManifestsAndRefusedWhereThereIsNone) {
+  ModelManifest manifest = ReadModelManifest(kTinyManifest);
+  EXPECT_EQ(ReadTorchFile(manifest).size(), std::filesystem::file_size(manifest.torch_file));
+  std::swap(manifest.torch_sha256, manifest.sha256);
+  EXPECT_THROW(ReadTorchFile(manifest), Error);
+  manifest.torch_file.clear();
+  EXPECT_THROW(ReadTorchFile(manifest), Error);
 }
 
 }  // namespace

@@ -7,12 +7,15 @@ import unittest
 from pathlib import Path
 
 import torch
+import yaml
 
 import convert_backbone
 import evaluate_detector
 import export_detector
+import export_torch
 import train_detector
 from detector import CLASSES, onnx_model, pretrained
+from detector.manifest import sha256_of
 from detector.network import Backbone, Detector, Widths
 
 from .synthetic import write_data
@@ -117,10 +120,29 @@ class Programs(unittest.TestCase):
         self.assertEqual(exported, (0, ""))
         arguments = ("--manifest", models / "tiny.yaml", "--data", self.data)
         self.assertEqual(quietly(evaluate_detector, *arguments), (0, ""))
+        manifest = yaml.safe_load((models / "tiny.yaml").read_text())
+        self.assertEqual((manifest["torch_file"], manifest["torch_sha256"]), ("tiny.pt", sha256_of(models / "tiny.pt")))
         (models / "tiny.onnx").write_bytes(b"something else")
+        self.assertIn("SHA-256", quietly(export_torch, models / "tiny.yaml")[1])
         status, errors = quietly(evaluate_detector, *arguments)
         self.assertEqual(status, 2)
         self.assertIn("SHA-256", errors)
+
+    def test_a_torch_file_is_entered_once_and_leaves_the_rest_of_the_manifest(self):
+        source = Path(__file__).resolve().parents[2] / "test" / "inference"
+        models = self.root / "tiny"
+        models.mkdir()
+        (models / "tiny.onnx").write_bytes((source / "tiny.onnx").read_bytes())
+        text = (source / "tiny.yaml").read_text()
+        (models / "tiny.yaml").write_text("# A comment.\n" + text)
+        for _ in range(2):
+            self.assertEqual(quietly(export_torch, models / "tiny.yaml"), (0, ""))
+            lines = (models / "tiny.yaml").read_text().splitlines()
+            entered = f"torch_sha256: {sha256_of(models / 'tiny.pt')}"
+            self.assertEqual([line for line in lines if line != entered],
+                             ["# A comment.", *(line for line in text.splitlines() if "torch_sha256" not in line)])
+            self.assertEqual(lines.count(entered), 1)
+        self.assertNotIn(str(source.parents[1]).encode(), (models / "tiny.pt").read_bytes(), "a path of this machine")
 
     def test_objectness_is_one(self):
         exportable = onnx_model.ExportableDetector(Detector(2))
@@ -142,6 +164,7 @@ class Programs(unittest.TestCase):
             (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
             (export_detector, ("--out", nowhere)),
             (evaluate_detector, ("--manifest", nowhere)),
+            (export_torch, (nowhere,)),
         ]
         for program, arguments in cases:
             status, errors = quietly(program, *arguments)
