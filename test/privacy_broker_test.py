@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """What of a passer-by and a parked car reaches the wire: the vehicle drives past, and the test reads the broker.
 
-hazard_detection with the tiny model, hazard_reporting and mqtt_bridge in one manager, a real mosquitto, and a subscriber to
-every topic that looks for JPEG files in whatever bytes come and for the face and the plate in each of them.
+hazard_detection with the tiny model, hazard_reporting and mqtt_bridge in one manager, a real mosquitto, and a
+subscriber to every topic that looks for JPEG files in whatever bytes come and for the face and the plate in each.
 """
 
 import os
@@ -36,8 +36,8 @@ SEEN = 0.8
 
 
 def grey_scene():
-    """A street with a face and a number plate; a red block, which the model takes for a pothole, beside them: the picture of
-    the hazard and its surroundings cuts through the face."""
+    """A street with a face and a number plate; a red block, which the model takes for a pothole, beside them: the picture
+    of the hazard and its surroundings cuts through the face."""
     pixels = numpy.random.RandomState(7).normal(120, 6, (HEIGHT, WIDTH, 3)).clip(0, 255).astype(numpy.uint8)
     height, centre = 80, numpy.array((180, 110))
 
@@ -152,10 +152,11 @@ class PassingVehicle(NodeletUnderTest):
                  {"zone": "test", "port": broker.port, "user": "car-1",
                   "password_file": broker.password_file("car-1")})]:
             name_in_config = "mqtt_bridge_vehicle" if node == "mqtt_bridge" else node
-            rospy.set_param(f"/{name}/{node}", {**parameters_of(name_in_config), "diagnostics_period_s": 0.2, **parameters})
+            rospy.set_param(f"/{name}/{node}",
+                            {**parameters_of(name_in_config), "diagnostics_period_s": 0.2, **parameters})
             self.start_nodelet(node, "load", "livemap/" + kind, "manager")
-        eventually(lambda: all(end.get_num_connections() > 0
-                               for end in (self.images, self.info, self.fixes, self.polls, self.detections)), "it listens")
+        ends = (self.images, self.info, self.fixes, self.polls, self.detections)
+        eventually(lambda: all(end.get_num_connections() > 0 for end in ends), "it listens")
         self._mount_camera()
         self.time_s = 3.0
         for tenth in range(30):
@@ -206,7 +207,7 @@ class PrivacyBrokerTest(unittest.TestCase):
                 return [report for report in wire.of("report", HazardReport) if report.image.data]
             report = eventually(reported, "a report with a picture on the wire")[0]
             self.assertLessEqual(len(report.image.data), 12000)
-            poll = HazardPoll(schema_version=HazardPoll.SCHEMA_VERSION, poll_uuid=os.urandom(16), hazard_uuid=os.urandom(16),
+            poll = HazardPoll(schema_version=HazardPoll.SCHEMA_VERSION, hazard_uuid=os.urandom(16),
                               vehicle_id="car-1", stamp=rospy.Time(50), expires=rospy.Time(170), class_name="pothole",
                               covariance=[25, 0, 0, 25], picture_wanted=True, max_picture_bytes=200000)
 
