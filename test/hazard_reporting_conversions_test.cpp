@@ -40,6 +40,7 @@ TEST(HazardConversions, ReportSurvivesTheWayThroughItsMessage) {
   report.image_frame_id = "camera";
   report.image_format = "jpeg";
   report.image = {1, 2, 3};
+  report.shown = {10, 20, 240, 160};
   const HazardReport message = ToMessage(report);
   EXPECT_EQ(message.image.header.stamp, message.stamp) << "the image's stamp is the report's";
   EXPECT_EQ(message.covariance[1], 0.25) << "row-major";
@@ -62,6 +63,34 @@ TEST(HazardConversions, ReportSurvivesTheWayThroughItsMessage) {
   EXPECT_EQ(back.image_frame_id, "camera");
   EXPECT_EQ(back.image_format, "jpeg");
   EXPECT_EQ(back.image, report.image);
+  EXPECT_EQ(back.shown.x, 10u);
+  EXPECT_EQ(back.shown.y, 20u);
+  EXPECT_EQ(back.shown.width, 240u);
+  EXPECT_EQ(back.shown.height, 160u);
+}
+
+TEST(HazardConversions, AReportOfVersion1ShowsTheWholeImage) {
+  HazardReport message = ToMessage(Report{});
+  message.schema_version = 1;
+  message.shown_width = message.shown_height = 100;
+  EXPECT_TRUE(FromMessage(message).shown.IsWholeImage());
+  for (const std::uint16_t unknown : {0, 3}) {
+    message.schema_version = unknown;
+    EXPECT_THAT([&] { FromMessage(message); },
+                ThrowsMessage<Error>(HasSubstr("accepted is 1 to 2")));
+  }
+}
+
+TEST(HazardConversions, TheLinkIsWhatItsMessageSaysAndNothingElse) {
+  LinkState message;
+  const LinkCost costs[] = {LinkCost::kUnknown, LinkCost::kCheap, LinkCost::kMetered,
+                            LinkCost::kNone};
+  for (std::uint8_t state = 0; state < 4; ++state) {
+    message.state = state;
+    EXPECT_EQ(FromMessage(message), costs[state]);
+  }
+  message.state = 4;
+  EXPECT_THAT([&] { FromMessage(message); }, ThrowsMessage<Error>(HasSubstr("link state is 4")));
 }
 
 TEST(HazardConversions, ReceiptSurvivesTheWayThroughItsMessage) {
@@ -167,7 +196,7 @@ Poll MakePoll() {
   poll.class_name = "deer";
   poll.position = {40, -80};
   poll.covariance_m2 << 1, 0.5, 0.5, 2;
-  poll.picture_wanted = true;
+  poll.picture = PollPicture::kCrop;
   poll.max_picture_bytes = 5000;
   return poll;
 }
@@ -183,13 +212,30 @@ TEST(PollConversions, PollSurvivesTheWayThroughItsMessage) {
   EXPECT_EQ(back.class_name, "deer");
   EXPECT_EQ(back.position.longitude_deg, -80);
   EXPECT_EQ(back.covariance_m2, poll.covariance_m2);
-  EXPECT_TRUE(back.picture_wanted);
+  EXPECT_EQ(back.picture, PollPicture::kCrop);
   EXPECT_EQ(back.max_picture_bytes, 5000u);
+}
+
+TEST(PollConversions, APollOfVersion1WantsTheWholeFrameOrNone) {
+  HazardPoll message = ToMessage(MakePoll());
+  message.schema_version = 1;
+  message.picture_kind = 0;  // As the bridge fills it in.
+  EXPECT_EQ(FromMessage(message).picture, PollPicture::kFullFrame);
+  message.picture_wanted = 0;
+  EXPECT_EQ(FromMessage(message).picture, PollPicture::kNone);
+  for (const PollPicture picture :
+       {PollPicture::kNone, PollPicture::kCrop, PollPicture::kFullFrame}) {
+    Poll poll = MakePoll();
+    poll.picture = picture;
+    EXPECT_EQ(FromMessage(ToMessage(poll)).picture, picture);
+  }
 }
 
 TEST(PollConversions, PollsThatMakeNoSenseAreRefusedWithTheReason) {
   const std::pair<std::function<void(HazardPoll&)>, const char*> faults[] = {
       {[](HazardPoll& poll) { poll.schema_version = 9; }, "version 9"},
+      {[](HazardPoll& poll) { poll.schema_version = 0; }, "accepted is 1 to 2"},
+      {[](HazardPoll& poll) { poll.picture_kind = 2; }, "wants picture 2"},
       {[](HazardPoll& poll) { poll.poll_uuid.assign(0); }, "nil poll_uuid"},
       {[](HazardPoll& poll) { poll.latitude = std::nan(""); }, "position"},
       {[](HazardPoll& poll) { poll.covariance[0] = -1; }, "covariance"},

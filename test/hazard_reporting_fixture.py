@@ -15,7 +15,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from livemap.msg import (Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
-                         ReportReceipt, VehiclePosition)
+                         LinkState, PictureRequest, ReportReceipt, VehiclePosition)
 from node_testing import NodeletUnderTest, eventually, parameters_of
 
 LATITUDE, LONGITUDE = 40.4433, -79.9436
@@ -111,16 +111,37 @@ class Vehicle(NodeletUnderTest):
         self.publishers = {
             topic: self.advertise(topic, message_class, latch=latch)
             for topic, message_class, latch in [
-                ("hazard/detections", DetectionArray, False), ("hazard/annotated", Image, False),
+                ("hazard/detections", DetectionArray, False), *self.sources(),
                 ("fix", NavSatFix, False), ("camera_rect/camera_info", CameraInfo, True),
                 ("hazard/notice", HazardNotice, False), ("hazard/receipt", ReportReceipt, False),
-                ("hazard/poll", HazardPoll, False)]}
+                ("hazard/poll", HazardPoll, False), ("link_state", LinkState, True)]}
         for topic, message_class in [("hazard/report", HazardReport), ("vehicle/position", VehiclePosition),
                                      ("hazard/local_map", MarkerArray), ("path", Path),
-                                     ("hazard/poll_answer", HazardPollAnswer)]:
+                                     ("hazard/poll_answer", HazardPollAnswer),
+                                     ("hazard/picture_request", PictureRequest)]:
             self.subscribe(topic, message_class)
         self.mounting = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self.ends.append(self.mounting)
+
+    def uses_events(self):
+        return self.parameters.get("use_events", True)
+
+    def sources(self):
+        """Where sightings and their pictures come from."""
+        if self.uses_events():
+            return [("hazard/events", DetectionArray, False), ("hazard/picture", Image, False)]
+        return [("hazard/annotated", Image, False)]
+
+    def answer_picture_requests(self, draw=None):
+        """The detector's side: the picture of the image that is asked for."""
+        def answer(request):
+            picture = (draw or annotated)((request.stamp - stamp(0)).to_sec())
+            picture.header.stamp = request.stamp
+            self.publish("hazard/picture", picture)
+        self.ends.append(rospy.Subscriber(f"/{self.name}/hazard/picture_request", PictureRequest, answer))
+
+    def link(self, state):
+        self.publish("link_state", LinkState(state=state))
 
     def reports(self):
         return self.received("hazard/report")
@@ -164,5 +185,9 @@ class Vehicle(NodeletUnderTest):
             self.publish("fix", fix(tenth / 10))
 
     def see(self, time_s, *found):
-        self.publish("hazard/annotated", annotated(time_s))
+        """As the detector says it, and the tracker: the objects at their best view."""
+        if not self.uses_events():
+            self.publish("hazard/annotated", annotated(time_s))
         self.publish("hazard/detections", detections(time_s, *found))
+        if self.uses_events() and found:
+            self.publish("hazard/events", detections(time_s, *found))

@@ -4,16 +4,17 @@
 import glob
 import math
 import sys
+import time
 import unittest
 
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import NavSatStatus
+from sensor_msgs.msg import Image, NavSatStatus
 
-from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, decode,
-                                      detection, east_north, fix, on_street, place, stamp)
-from livemap.msg import HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, ReportReceipt
+from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, annotated, decode,
+                                      detection, detections, east_north, fix, on_street, place, stamp)
+from livemap.msg import HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, LinkState, ReportReceipt
 from node_testing import eventually
 
 
@@ -49,6 +50,7 @@ class HazardReportingTest(unittest.TestCase):
 
     def driving_vehicle(self, **parameters):
         vehicle = self.make_vehicle(**parameters)
+        vehicle.answer_picture_requests()
         vehicle.start()
         vehicle.mount_camera()
         vehicle.drive(0, 4)
@@ -66,9 +68,89 @@ class HazardReportingTest(unittest.TestCase):
         self.assertEqual(report.stamp, stamp(3.05))
         self.assertEqual(report.image.header.stamp, report.stamp)
         self.assertEqual(report.image.header.frame_id, OPTICAL)
-        self.assertEqual(decode(report.image).shape, (400, 640, 3))
         self.assertEqual((report.image_width, report.image_height), (640, 400))
+        # What it shows: the hazard and its surroundings, in few bytes.
+        self.assertEqual(decode(report.image).shape, (160, 240, 3))
+        self.assertEqual((report.shown_width, report.shown_height), (240, 160))
+        self.assertTrue(report.shown_x <= report.x_min and report.x_max <= report.shown_x + 240)
+        self.assertTrue(report.shown_y <= report.y_min and report.y_max <= report.shown_y + 160)
+        self.assertLessEqual(len(report.image.data), 12000)
         self.assertGreater(report.covariance[0] * report.covariance[3], report.covariance[1] ** 2)
+
+    def test_asks_for_a_picture_only_when_a_sighting_is_news(self):
+        vehicle = self.driving_vehicle()
+        vehicle.see(3.0)
+        vehicle.see(3.1, detection(12.0))
+        vehicle.see(3.2, detection(10.4))
+        vehicle.publish("hazard/detections", detections(3.3, detection(9.0, 3.0, "debris")))
+        vehicle.wait_for(reports_created=1, duplicates_suppressed=1, pictures_requested=1, reports_without_picture=0)
+        self.assertEqual([request.stamp for request in vehicle.received("hazard/picture_request")], [stamp(3.1)])
+        self.assertEqual([report.class_name for report in vehicle.reports()], ["pothole"])
+
+    def test_a_picture_that_does_not_come_is_waited_for_and_then_missing(self):
+        vehicle = self.make_vehicle(picture_wait_s=0.3)
+        vehicle.start()
+        vehicle.mount_camera()
+        vehicle.drive(0, 4)
+        vehicle.see(3.1, detection(12.0))
+        report = eventually(vehicle.reports, "a report")[0]
+        self.assertEqual((report.image.format, len(report.image.data)), ("", 0))
+        vehicle.wait_for(reports_without_picture=1, pictures_requested=1)
+
+    def test_without_events_every_detection_counts_with_the_annotated_image(self):
+        vehicle = self.driving_vehicle(use_events=False, picture_context=0.0, max_image_bytes=100000)
+        vehicle.see(3.1, detection(12.0))
+        report = eventually(vehicle.reports, "a report")[0]
+        self.assertEqual(decode(report.image).shape, (400, 640, 3))
+        self.assertEqual((report.shown_x, report.shown_y, report.shown_width, report.shown_height), (0, 0, 640, 400))
+        self.assertEqual(vehicle.received("hazard/picture_request"), [])
+
+    def deferring_vehicle(self, **parameters):
+        """On a link that costs, with a report of rank 3 that waits."""
+        vehicle = self.make_vehicle(resend_first_s=0.2, resend_longest_s=0.4, **parameters)
+        vehicle.answer_picture_requests()
+        vehicle.link(LinkState.METERED)
+        vehicle.start()
+        vehicle.wait_for(link="metered")
+        vehicle.mount_camera()
+        vehicle.drive(0, 4)
+        vehicle.see(3.1, detection(12.0), detection(12.0, 2.0, "debris"))
+        vehicle.wait_for(reports_created=2, pending=2, held=1)
+        return vehicle
+
+    def test_a_deferred_report_survives_kill_nine_and_goes_once_when_the_link_is_cheap(self):
+        vehicle = self.deferring_vehicle()
+        urgent = eventually(vehicle.reports, "what is urgent goes at once")[0]
+        self.assertEqual(urgent.class_name, "debris")
+        vehicle.publish("hazard/receipt", receipt(urgent))
+        vehicle.wait_for(pending=1, held=1)
+        vehicle.kill()
+        vehicle.start()
+        vehicle.wait_for(pending=1, held=1, reports_sent=0)
+        rospy.sleep(1.0)
+        self.assertEqual({report.class_name for report in vehicle.reports()}, {"debris"})
+        vehicle.link(LinkState.CHEAP)
+        deferred = eventually(lambda: [report for report in vehicle.reports() if report.class_name == "pothole"],
+                              "it goes")[0]
+        self.assertEqual(deferred.stamp, stamp(3.1))
+        self.assertEqual(decode(deferred.image).shape, (160, 240, 3))
+        vehicle.publish("hazard/receipt", receipt(deferred, hazard=8))
+        vehicle.wait_for(pending=0, held=0, committed=1, reports_sent=1)
+        count = len(vehicle.reports())
+        rospy.sleep(1.0)
+        self.assertEqual(len(vehicle.reports()), count, "a finished report is not sent again")
+        self.assertEqual(len({bytes(report.uuid) for report in vehicle.reports()}), 2)
+
+    def test_a_deferred_report_goes_at_its_limit_also_when_the_vehicle_was_off_meanwhile(self):
+        began = time.time()
+        vehicle = self.deferring_vehicle(hold_later_s=25.0)
+        vehicle.kill()
+        vehicle.start()
+        deferred = eventually(lambda: [report for report in vehicle.reports() if report.class_name == "pothole"],
+                              "it goes")
+        self.assertGreater(time.time() - began, 25.0)
+        vehicle.wait_for(held=0, link="metered")
+        self.assertEqual(len({bytes(report.uuid) for report in deferred}), 1)
 
     def test_tells_where_the_vehicle_is_once_a_second_and_shows_it(self):
         vehicle = self.driving_vehicle()
@@ -140,6 +222,37 @@ class HazardReportingTest(unittest.TestCase):
         self.assertLess(math.dist(east_north(answer.latitude, answer.longitude), on_street(3.05)), 0.05)
         self.assertLessEqual(len(answer.image.data), 20000)
         self.assertEqual(decode(answer.image).shape, (400, 640, 3))
+
+    def test_a_poll_may_want_only_the_place_and_its_surroundings(self):
+        vehicle = self.driving_vehicle()
+        vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0), picture_wanted=True, max_picture_bytes=20000,
+                                            picture_kind=HazardPoll.CROP))
+        vehicle.wait_for(polls=1)
+        vehicle.see(3.05, detection(11.2))
+        answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
+        self.assertLessEqual(len(answer.image.data), 12000)
+        self.assertEqual(decode(answer.image).shape, (160, 240, 3))
+
+    def test_looks_at_the_cameras_images_only_while_a_poll_is_open_and_says_when_it_is_too_dark(self):
+        vehicle = self.make_vehicle(poll_reserve_s=0.5)
+        images = vehicle.advertise("camera_rect/image", Image)
+        vehicle.answer_picture_requests()
+        vehicle.start()
+        vehicle.mount_camera()
+        vehicle.drive(0, 4)
+        vehicle.wait_for(polls=0)
+        self.assertEqual(images.get_num_connections(), 0)
+        vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0), life_s=12))
+        eventually(lambda: images.get_num_connections() == 1, "it looks")
+        for tenth in range(26, 38):
+            night = annotated(tenth / 10)
+            night.data = bytes(len(night.data))
+            images.publish(night)
+            rospy.sleep(0.2)
+            vehicle.see(tenth / 10)
+        answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
+        self.assertEqual((answer.answer, answer.reason), (HazardPollAnswer.CANT_SEE, "too dark"))
+        eventually(lambda: images.get_num_connections() == 0, "it looks no more")
 
     def test_answers_a_poll_no_when_nothing_was_there_and_cannot_see_without_images(self):
         vehicle = self.driving_vehicle(poll_reserve_s=0.5)

@@ -47,7 +47,7 @@ class Vehicle(NodeletUnderTest):
                                  "map_datum": f"{DATUM[0]},{DATUM[1]}"},
             "hazard_reporting": {"position_source": "fused", "use_depth": True, "fused_wait_s": 5.0,
                                  "depth_wait_s": 5.0, "database": os.path.join(directory, name + ".sqlite3"),
-                                 "picture_wait_s": 0.0, **reporting}}
+                                 "picture_wait_s": 0.0, "use_events": False, **reporting}}
         self.start_nodelet("manager", "manager")
         for node, kind in NODELETS.items():
             rospy.set_param(f"/{name}/{node}", {**parameters_of(node), "diagnostics_period_s": 0.2,

@@ -3,13 +3,14 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "base/stamps.h"
 
 namespace livemap {
 namespace {
 
 constexpr std::size_t kMaxEarlyPictures = 8;
-constexpr std::size_t kMaxDepths = 30;  // The detector may be that many frames behind.
-constexpr std::size_t kMaxWaitingNotices = 20000;
 constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
 
 /// Standard deviation along the worst axis.
@@ -28,11 +29,19 @@ HazardReporter::HazardReporter(const Config& config, const HazardCatalogue& cata
       map_(config.map, catalogue, now_ns),
       track_(config.track),
       poses_(config.poses),
-      schedule_(config.resend, std::mt19937_64(random_())) {
+      schedule_(config.resend, std::mt19937_64(random_())),
+      start_ns_(now_ns),
+      start_steady_s_(steady_s) {
   config_.projection.max_range_m = kEndlessRangeM;
   for (const auto& pending : map_.Pending()) {
-    schedule_.Add(pending.uuid, catalogue_.Get(pending.class_name).urgency, pending.created_ns,
-                  steady_s);
+    const int urgency = catalogue_.Get(pending.class_name).urgency;
+    // Never longer than from now on: the clock may have been set since.
+    const double left_s =
+        pending.hold_until_ns <= 0
+            ? 0.0
+            : std::clamp(Seconds(pending.hold_until_ns - now_ns), 0.0, HoldS(urgency));
+    held_at_start_ = held_at_start_ || (left_s > 0 && !pending.sent);
+    schedule_.Add(pending.uuid, urgency, pending.created_ns, steady_s, steady_s + left_s);
     if (!pending.sent) unsent_.insert(pending.uuid);
   }
 }
@@ -137,53 +146,10 @@ void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
 
 void HazardReporter::AddDepth(std::int64_t stamp_ns, const DepthImage& depth) {
   depths_[stamp_ns] = depth;
-  if (depths_.size() <= kMaxDepths) return;
+  if (depths_.size() <= static_cast<std::size_t>(config_.depth_images)) return;
   // The oldest, but for those of before a clock that was set back.
   const bool set_back = depths_.rbegin()->first - stamp_ns > 1'000'000'000;
   depths_.erase(set_back ? std::prev(depths_.end()) : depths_.begin());
-}
-
-void HazardReporter::AddNotice(const Notice& notice) {
-  ++counters_.notices;
-  notices_.push_back(notice);
-  if (notices_.size() > kMaxWaitingNotices) notices_.pop_front();
-}
-
-void HazardReporter::AddReceipt(const Receipt& receipt) {
-  try {
-    if (!map_.Apply(receipt)) return;
-  } catch (const StoreError& error) {
-    // The report stays unfinished and is sent again; so the zone answers again.
-    TellStoreError(error);
-    return;
-  }
-  schedule_.Remove(receipt.report_uuid);
-  unsent_.erase(receipt.report_uuid);
-  ++(receipt.status == Receipt::Status::kCommitted ? counters_.committed : counters_.refused);
-}
-
-void HazardReporter::ApplyNotices() {
-  if (notices_.empty()) return;
-  try {
-    counters_.invalid_notices += map_.Apply({notices_.begin(), notices_.end()});
-    notices_.clear();
-    store_error_.clear();
-  } catch (const StoreError& error) {
-    TellStoreError(error);  // They stay and are tried again.
-  }
-}
-
-/// Once a minute of the stamps' clock.
-void HazardReporter::ForgetUnannounced(double now_s) {
-  constexpr double kPeriodS = 60.0;
-  if (forgot_s_ && now_s >= *forgot_s_ && now_s - *forgot_s_ < kPeriodS) return;
-  forgot_s_ = now_s;
-  try {
-    counters_.forgotten_unannounced +=
-        map_.ForgetUnannounced(static_cast<std::int64_t>(now_s * 1e9));
-  } catch (const StoreError& error) {
-    TellStoreError(error);
-  }
 }
 
 void HazardReporter::Process(double now_s, double steady_s) {
@@ -202,9 +168,25 @@ bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_
       waiting.candidates.begin(), waiting.candidates.end(), [this](const Candidate& candidate) {
         return !map_.Find(candidate.sighting.class_name, candidate.place.position);
       });
-  if (news && waiting.picture.bgr.empty() && waited_s < config_.picture_wait_s) return false;
+  if (news && WaitsForPicture(waiting, now_s)) return false;
   ReportCandidates(waiting, steady_s);
   return true;
+}
+
+/// Asks for the picture when it begins to be missed.
+bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
+  if (!waiting.picture.bgr.empty()) return false;
+  if (!waiting.asked_s) {
+    waiting.asked_s = now_s;
+    ++counters_.pictures_requested;
+    if (config_.pictures_on_demand) picture_requests_.push_back(waiting.frame.stamp_ns);
+  }
+  waiting.asked_s = std::min(*waiting.asked_s, now_s);  // The clock was set back.
+  return now_s - *waiting.asked_s < config_.picture_wait_s;
+}
+
+std::vector<std::int64_t> HazardReporter::TakePictureRequests() {
+  return std::exchange(picture_requests_, {});
 }
 
 bool HazardReporter::FitsCamera(const SightingFrame& frame) const {
@@ -298,75 +280,6 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
   waiting.placed = true;
-}
-
-void HazardReporter::ReportCandidates(const WaitingFrame& waiting, double steady_s) {
-  std::optional<std::vector<std::uint8_t>> jpeg;  // Encoded once, when first needed.
-  for (const Candidate& candidate : waiting.candidates) {
-    if (map_.Find(candidate.sighting.class_name, candidate.place.position)) {
-      ++counters_.duplicates_suppressed;
-      continue;
-    }
-    if (!jpeg) {
-      jpeg = EncodeJpeg(waiting.picture, config_.jpeg_quality,
-                        static_cast<std::size_t>(config_.max_image_bytes));
-    }
-    Report report;
-    report.uuid = Uuid::Random(random_);
-    report.drive_id = config_.drive_id;
-    report.stamp_ns = waiting.frame.stamp_ns;
-    report.class_name = candidate.sighting.class_name;
-    report.confidence = candidate.sighting.confidence;
-    report.box = candidate.sighting.box;
-    report.position = candidate.place.position;
-    report.covariance_m2 = candidate.place.covariance_m2;
-    report.image_width = waiting.frame.image_width;
-    report.image_height = waiting.frame.image_height;
-    report.image_frame_id = waiting.frame.frame_id;
-    report.image_format = jpeg->empty() ? "" : "jpeg";
-    report.image = *jpeg;
-    try {
-      if (map_.Add(report) == LocalHazardMap::AddResult::kFull) {
-        ++counters_.refused_map_full;
-        continue;
-      }
-      store_error_.clear();
-    } catch (const StoreError& error) {
-      TellStoreError(error);  // Not known either: the next sight of it tries again.
-      continue;
-    }
-    ++counters_.reports_created;
-    if (jpeg->empty()) ++counters_.reports_without_picture;
-    unsent_.insert(report.uuid);
-    schedule_.Add(report.uuid, catalogue_.Get(report.class_name).urgency, report.stamp_ns,
-                  steady_s);
-  }
-}
-
-std::vector<Report> HazardReporter::TakeDue(double steady_s, std::size_t limit) {
-  std::vector<Report> reports;
-  try {
-    for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
-      auto report = map_.LoadPending(uuid);
-      if (!report) continue;
-      if (unsent_.count(uuid) != 0) {
-        map_.MarkSent(uuid);
-        unsent_.erase(uuid);
-        ++counters_.reports_sent;
-      } else {
-        ++counters_.resends;
-      }
-      reports.push_back(std::move(*report));
-    }
-  } catch (const StoreError& error) {
-    TellStoreError(error);
-  }
-  return reports;
-}
-
-void HazardReporter::TellStoreError(const StoreError& error) {
-  ++counters_.store_errors;
-  store_error_ = error.what();
 }
 
 }  // namespace livemap

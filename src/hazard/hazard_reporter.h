@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -30,6 +31,9 @@ enum class PositionSource {
   kFused,  ///< Poses of fixes fused with odometry; the fixes where those do not come.
 };
 
+/// What the vehicle's way to the zone costs now (LinkState.msg).
+enum class LinkCost { kUnknown, kCheap, kMetered, kNone };
+
 /// Turns what the detector sees into reports: places each hazard on the ground, sends nothing for a
 /// known one, keeps the others until the zone has answered (thesis, sections 3.1 and 3.2.2).
 ///
@@ -52,8 +56,11 @@ class HazardReporter {
     double max_wait_s = 5.0;
     /// A frame whose position can only be carried on waits this long for a fix after it, s.
     double bracket_wait_s = 0.3;
-    /// A frame with something to report waits this long for its picture, s.
+    /// A frame with something to report waits this long for its picture, from when it is known to
+    /// need one, s.
     double picture_wait_s = 0.5;
+    /// Pictures come when they are asked for (TakePictureRequests); false: by themselves.
+    bool pictures_on_demand = true;
     /// Frames that wait at the same time; beyond it the oldest is dropped.
     int max_waiting_frames = 50;
     /// Antenna in base_link: forward and left of its origin, m.
@@ -68,8 +75,16 @@ class HazardReporter {
     /// A frame waits at most this long for its depth image; then the road's plane counts, s.
     double depth_wait_s = 0.3;
     DepthNoise depth;
-    int jpeg_quality = 80;  ///< 1..100.
-    int max_image_bytes = 100000;
+    int depth_images = 60;  ///< So many are kept: detections come late, events later.
+    CropConfig picture;
+    /// How long a report of each rank of urgency may wait for a cheap link, s; rank 1 first. Below
+    /// the age at which the zone refuses reports.
+    std::array<double, 3> hold_s{0, 300, 21600};
+    /// Whether a link of which nothing is known counts as cheap: nothing is held then.
+    bool unknown_link_is_cheap = true;
+    /// Where held reports lie in the outbox at the start, so long nothing is known as metered, s:
+    /// the word about the link may come after us.
+    double link_wait_s = 5;
     FixTrack::Config track;
     GroundProjectionNoise projection;
     ResendSchedule::Config resend;
@@ -89,8 +104,10 @@ class HazardReporter {
     std::uint64_t duplicates_suppressed = 0;
     std::uint64_t reports_created = 0;
     std::uint64_t reports_without_picture = 0;
-    std::uint64_t refused_map_full = 0;  ///< Too many unfinished reports.
-    std::uint64_t reports_sent = 0;      ///< Distinct reports, at their first sending.
+    std::uint64_t pictures_requested = 0;  ///< Images whose picture was asked for.
+    std::uint64_t pictures_illegible = 0;  ///< Reports whose bytes did not suffice: CropPicture.
+    std::uint64_t refused_map_full = 0;    ///< Too many unfinished reports.
+    std::uint64_t reports_sent = 0;        ///< Distinct reports, at their first sending.
     std::uint64_t resends = 0;
     std::uint64_t committed = 0;  ///< Reports that the zone stored.
     std::uint64_t refused = 0;    ///< Reports that the zone will never accept.
@@ -127,6 +144,9 @@ class HazardReporter {
   void AddDepth(std::int64_t stamp_ns, const DepthImage& depth);
   /// The annotated image of the frame with this stamp, before or after it.
   void AddPicture(std::int64_t stamp_ns, const Picture& picture);
+  /// Stamps of the images whose pictures are wanted now, each once.
+  std::vector<std::int64_t> TakePictureRequests();
+  void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const Notice& notice);
   void AddReceipt(const Receipt& receipt);
 
@@ -149,6 +169,11 @@ class HazardReporter {
   const LocalHazardMap& map() const { return map_; }
   const Counters& counters() const { return counters_; }
   std::size_t waiting_frames() const { return waiting_.size(); }
+  LinkCost link() const { return link_; }
+  /// Reports that wait for a cheap link.
+  std::size_t HeldReports(double steady_s) const {
+    return IsCheap(steady_s) ? 0 : schedule_.Held(steady_s);
+  }
   /// The store's last complaint; empty while it works.
   const std::string& store_error() const { return store_error_; }
 
@@ -162,6 +187,7 @@ class HazardReporter {
     double arrival_s;
     bool held_back = false;
     bool placed = false;
+    std::optional<double> asked_s;      // When its picture began to be missed.
     std::vector<Candidate> candidates;  // Once placed.
     Picture picture;
   };
@@ -175,7 +201,13 @@ class HazardReporter {
   void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused);
   std::optional<GroundPoint> PlaceOnRoad(const SightingFrame& frame, const Sighting& sighting,
                                          double heading_variance_rad2);
+  bool WaitsForPicture(WaitingFrame& waiting, double now_s);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);
+  Report MakeReport(const WaitingFrame& waiting, const Candidate& candidate);
+  void AttachPicture(const WaitingFrame& waiting, Report& report);
+  double HoldS(int urgency) const;
+  bool IsCheap(double steady_s) const;
+  std::int64_t UtcNs(double steady_s) const;
   void ApplyNotices();
   void ForgetUnannounced(double now_s);
   void TellStoreError(const StoreError& error);
@@ -192,6 +224,11 @@ class HazardReporter {
   std::deque<WaitingFrame> waiting_;
   std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
   std::map<std::int64_t, DepthImage> depths_;       // By stamp.
+  std::vector<std::int64_t> picture_requests_;
+  LinkCost link_ = LinkCost::kUnknown;
+  bool held_at_start_ = false;
+  std::int64_t start_ns_;  // UTC at the start...
+  double start_steady_s_;  // ...and the steady clock then.
   std::deque<Notice> notices_;
   std::optional<double> forgot_s_;  // When ForgetUnannounced last looked.
   std::set<Uuid> unsent_;

@@ -27,7 +27,8 @@ const std::vector<std::string>& Migrations() {
       "CREATE TABLE gone(id BLOB PRIMARY KEY, sequence INTEGER NOT NULL) WITHOUT ROWID;"
       "CREATE INDEX gone_by_sequence ON gone(sequence);"
       "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
-      "INSERT INTO zone(map_sequence) VALUES(0);"};
+      "INSERT INTO zone(map_sequence) VALUES(0);",
+      kAddShownRegionAndHold};
   return migrations;
 }
 
@@ -81,13 +82,14 @@ void LocalHazardMap::SetAside(std::int64_t now_ns) {
 void LocalHazardMap::RecoverFromSetAside() {
   // So that the first page of the new file is in the file itself.
   database_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Execute();
-  salvage_ = SalvageReports(set_aside_, config_.path, [this](const Report& report, bool sent) {
+  salvage_ = SalvageReports(set_aside_, config_.path, [this](const StoredReport& stored) {
+    const Report& report = stored.report;
     if (LoadPending(report.uuid)) return;
     database_->Transaction([&] {
-      InsertReport(*database_, report);
+      InsertReport(*database_, report, stored.hold_until_ns);
       if (!filter_.Find(report.class_name, report.position)) InsertKnown(report);
     });
-    if (sent) MarkSent(report.uuid);
+    if (stored.sent) MarkSent(report.uuid);
   });
   LoadFilter();
 }
@@ -117,7 +119,7 @@ std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& cl
   return filter_.Find(class_name, position);
 }
 
-LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report) {
+LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report, std::int64_t hold_until_ns) {
   if (filter_.Find(report.class_name, report.position)) return AddResult::kDuplicate;
   const std::size_t bytes = report.image.size() + kReportBytes;
   if (pending_count_ >= static_cast<std::size_t>(config_.max_pending) ||
@@ -127,7 +129,7 @@ LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report) {
   std::vector<Change> changes = {{report.uuid, true, report.class_name, report.position}};
   database_->Transaction([&] {
     InsertKnown(report);
-    InsertReport(*database_, report);
+    InsertReport(*database_, report, hold_until_ns);
     EvictBeyondLimit(changes);
   });
   Show(changes);
@@ -236,10 +238,11 @@ bool LocalHazardMap::Apply(const Receipt& receipt) {
 
 std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
   SqliteStatement rows = database_->Prepare(
-      "SELECT uuid,class_name,stamp_ns,sent FROM pending ORDER BY stamp_ns,uuid");
+      "SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending ORDER BY stamp_ns,uuid");
   std::vector<PendingReport> pending;
   while (rows.Step()) {
-    pending.push_back({UuidFromBlob(rows.Blob(0)), rows.Text(1), rows.Int(2), rows.Int(3) != 0});
+    pending.push_back(
+        {UuidFromBlob(rows.Blob(0)), rows.Text(1), rows.Int(2), rows.Int(3) != 0, rows.Int(4)});
   }
   return pending;
 }

@@ -55,8 +55,9 @@ class LocalHazardMap {
   struct PendingReport {
     Uuid uuid;
     std::string class_name;
-    std::int64_t created_ns = 0;  ///< The report's stamp.
-    bool sent = false;            ///< At least once.
+    std::int64_t created_ns = 0;     ///< The report's stamp.
+    bool sent = false;               ///< At least once.
+    std::int64_t hold_until_ns = 0;  ///< As for Add.
   };
 
   /// Opens or creates the database. A corrupt file is renamed to `<path>.corrupt-<now_ns>` with
@@ -72,7 +73,9 @@ class LocalHazardMap {
   /// The known hazard that a sighting duplicates.
   std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
                                              const GeoPoint& position) const;
-  AddResult Add(const Report& report);
+  /// `hold_until_ns` is kept with it, for whoever sends it: UTC by the vehicle's clock, until which
+  /// it may wait for a cheap link; 0: not at all.
+  AddResult Add(const Report& report, std::int64_t hold_until_ns = 0);
 
   /// Takes in what the zone announced, in one transaction. Returns how many were unusable (nil id,
   /// impossible position, overlong class name) and left out. A kCaughtUp takes away what the zone

@@ -13,16 +13,27 @@ constexpr std::size_t kMaxAnsweredKept = 1000;
 constexpr std::size_t kMaxPollFrames = 50;
 constexpr std::size_t kMaxPollPictures = 24;  // Full images: about a second of them.
 constexpr int kLuminanceGridPx = 64;
+constexpr double kLeastPlacePx = 32;
 
-/// Mean brightness, 0 to 255, of a coarse grid of the image's pixels.
-double MeanLuminance(const cv::Mat& bgr) {
-  cv::Mat grid;
-  cv::resize(bgr, grid, cv::Size(kLuminanceGridPx, kLuminanceGridPx), 0, 0, cv::INTER_NEAREST);
-  cv::cvtColor(grid, grid, cv::COLOR_BGR2GRAY);
-  return cv::mean(grid)[0];
+/// Where a place lies in an image: two standard deviations around its pixel.
+Box BoxOf(const PlaceView& view) {
+  const auto half = [&view](int axis) {
+    return static_cast<float>(
+        std::max(kLeastPlacePx / 2, 2 * std::sqrt(view.covariance_px2(axis, axis))));
+  };
+  const auto u = static_cast<float>(view.pixel.x());
+  const auto v = static_cast<float>(view.pixel.y());
+  return {u - half(0), v - half(1), u + half(0), v + half(1)};
 }
 
 }  // namespace
+
+double PollResponder::MeanLuminance(const cv::Mat& image) {
+  cv::Mat grid;
+  cv::resize(image, grid, cv::Size(kLuminanceGridPx, kLuminanceGridPx), 0, 0, cv::INTER_NEAREST);
+  if (grid.channels() == 3) cv::cvtColor(grid, grid, cv::COLOR_BGR2GRAY);
+  return cv::mean(grid)[0];
+}
 
 void PollResponder::Add(const Poll& poll, double steady_s) {
   ++counters_.polls;
@@ -54,18 +65,27 @@ void PollResponder::AddFrame(const SightingFrame& frame, double now_s) {
 
 void PollResponder::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
   if (open_.empty() || picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return;
-  luminances_[stamp_ns] = MeanLuminance(picture.bgr);
-  if (luminances_.size() > 2 * kMaxPollFrames) luminances_.erase(luminances_.begin());
+  AddLuminance(stamp_ns, MeanLuminance(picture.bgr));
   pictures_[stamp_ns] = picture;
   // The oldest that speaks for no answer goes.
   for (auto old = pictures_.begin();
        pictures_.size() > kMaxPollPictures && old != pictures_.end();) {
     const std::int64_t old_ns = old->first;
     const bool wanted = std::any_of(open_.begin(), open_.end(), [old_ns](const OpenPoll& open) {
-      return open.poll.picture_wanted && open.view_ns == old_ns;
+      return open.poll.picture != PollPicture::kNone && open.view_ns == old_ns;
     });
     old = wanted ? std::next(old) : pictures_.erase(old);
   }
+}
+
+void PollResponder::AddLuminance(std::int64_t stamp_ns, double luminance) {
+  if (open_.empty()) return;
+  luminances_[stamp_ns] = luminance;
+  if (luminances_.size() > 2 * kMaxPollFrames) luminances_.erase(luminances_.begin());
+}
+
+std::vector<std::int64_t> PollResponder::TakePictureRequests() {
+  return std::exchange(picture_requests_, {});
 }
 
 void PollResponder::Process(double now_s, double steady_s, const Vehicle& vehicle) {
@@ -134,6 +154,7 @@ void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const Place
     open.match_confidence = match->confidence;
     open.view_ns = frame.stamp_ns;
     open.view_base = camera.base;
+    open.view_box = match->box;
     return;
   }
   const auto trouble = WhyNotClear(view, frame, vehicle);
@@ -191,16 +212,24 @@ void PollResponder::CountView(OpenPoll& open, const SightingFrame& frame, const 
     open.view_ns = frame.stamp_ns;
     open.view_distance_m = view.distance_m;
     open.view_base = base;
+    open.view_box = BoxOf(view);
   }
   open.last_view = base.position;
   ++open.clear_views;
 }
 
-bool PollResponder::IsReady(const OpenPoll& open, double steady_s) const {
-  if (steady_s >= open.deadline_s) return true;
-  if (!open.matched_s) return false;
-  return !open.poll.picture_wanted || pictures_.count(open.view_ns) != 0 ||
-         steady_s - *open.matched_s >= config_.picture_wait_s;
+/// Asks for the picture when the answer stands and it is missed.
+bool PollResponder::IsReady(OpenPoll& open, double steady_s) {
+  if (!open.matched_s && steady_s < open.deadline_s) return false;
+  const bool decided = open.matched_s || open.clear_views >= config_.no_views;
+  if (!decided || open.poll.picture == PollPicture::kNone || pictures_.count(open.view_ns) != 0) {
+    return true;
+  }
+  if (!open.asked_s) {
+    open.asked_s = steady_s;
+    picture_requests_.push_back(open.view_ns);
+  }
+  return steady_s - *open.asked_s >= config_.picture_wait_s;
 }
 
 void PollResponder::Answer(const OpenPoll& open) {
@@ -239,8 +268,16 @@ void PollResponder::Answer(const OpenPoll& open) {
 
 void PollResponder::AttachPicture(const OpenPoll& open, PollReply& reply) {
   const auto picture = pictures_.find(open.view_ns);
-  if (!open.poll.picture_wanted || picture == pictures_.end()) return;
-  reply.image = EncodeJpeg(picture->second, config_.jpeg_quality, open.poll.max_picture_bytes);
+  if (open.poll.picture == PollPicture::kNone || picture == pictures_.end()) return;
+  const std::size_t max_bytes = open.poll.max_picture_bytes;
+  if (open.poll.picture == PollPicture::kCrop) {
+    CropConfig crop = config_.crop;
+    crop.quality = config_.jpeg_quality;
+    crop.max_bytes = std::min(crop.max_bytes, max_bytes);
+    reply.image = CropPicture(picture->second, open.view_box, crop).jpeg;
+  } else {
+    reply.image = EncodeJpeg(picture->second, config_.jpeg_quality, max_bytes);
+  }
   if (reply.image.empty()) return;
   reply.image_format = "jpeg";
   ++counters_.pictures;

@@ -24,6 +24,9 @@ namespace livemap {
 /// with the reason that kept most images from counting. A yes goes out at once; a no when the place
 /// has left the view, so that the nearest images count, too; the rest when the poll's time is over.
 ///
+/// Pictures are asked for when an answer needs one, see TakePictureRequests; those that come by
+/// themselves are taken, too.
+///
 /// Two clocks as in HazardReporter: `now_s` is that of the stamps, `steady_s` never pauses. How
 /// long a poll lives is what the zone wrote, counted from its arrival on the steady clock: the
 /// vehicle's and the zone's clocks need not agree. Not thread-safe.
@@ -44,8 +47,9 @@ class PollResponder {
     double min_confidence = 0;    ///< 0..1, of a match.
     double pose_wait_s = 3;       ///< A frame waits at most this long for pose and camera.
     double bracket_wait_s = 0.3;  ///< As in HazardReporter.
-    double picture_wait_s = 0.5;  ///< A yes waits at most this long for its picture.
+    double picture_wait_s = 0.5;  ///< A yes or no waits at most this long for its picture.
     int jpeg_quality = 70;        ///< 1..100.
+    CropConfig crop;  ///< Of a picture that shows a part; its own quality does not count.
     GroundProjectionNoise projection;
   };
 
@@ -83,10 +87,17 @@ class PollResponder {
   void AddFrame(const SightingFrame& frame, double now_s);
   /// The annotated image of that stamp, before or after its frame.
   void AddPicture(std::int64_t stamp_ns, const Picture& picture);
+  /// How bright the image of that stamp is: its mean, 0..255. Best before its frame.
+  void AddLuminance(std::int64_t stamp_ns, double luminance);
+  /// Stamps of the images whose pictures are wanted now, each once.
+  std::vector<std::int64_t> TakePictureRequests();
 
   /// Works off waiting frames and expired polls. Answers are ready for TakeReplies.
   void Process(double now_s, double steady_s, const Vehicle& vehicle);
   std::vector<PollReply> TakeReplies();
+
+  /// Mean brightness, 0 to 255, of a coarse grid of the pixels of an 8-bit grey or colour image.
+  static double MeanLuminance(const cv::Mat& image);
 
   std::size_t open() const { return open_.size(); }
   const Counters& counters() const { return counters_; }
@@ -103,9 +114,11 @@ class PollResponder {
     std::optional<GeoPoint> last_view;
     std::int64_t view_ns = 0;  // The image that speaks for the answer, and what it showed.
     double view_distance_m = 0;
+    Box view_box;  // The match's, or where the place is in that image.
     TrackPose view_base;
     float match_confidence = 0;
     std::optional<double> matched_s;  // Steady; it only waits for the picture.
+    std::optional<double> asked_s;    // Steady; when its picture began to be missed.
   };
   struct WaitingFrame {
     SightingFrame frame;
@@ -121,7 +134,7 @@ class PollResponder {
                         const PlacedCamera& camera) const;
   void CountView(OpenPoll& open, const SightingFrame& frame, const PlaceView& view,
                  const TrackPose& base);
-  bool IsReady(const OpenPoll& open, double steady_s) const;
+  bool IsReady(OpenPoll& open, double steady_s);
   void Answer(const OpenPoll& open);
   void AttachPicture(const OpenPoll& open, PollReply& reply);
   static std::string ReasonOf(const OpenPoll& open);
@@ -133,6 +146,7 @@ class PollResponder {
   std::deque<WaitingFrame> waiting_;
   std::map<std::int64_t, Picture> pictures_;  // The newest, and those that an open poll may need.
   std::map<std::int64_t, double> luminances_;
+  std::vector<std::int64_t> picture_requests_;
   std::vector<PollReply> replies_;
   std::optional<TrackPose> newest_base_;
   std::int64_t newest_ns_ = 0;

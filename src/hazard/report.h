@@ -22,6 +22,16 @@ struct Box {
   float y_max = 0;
 };
 
+/// A part of an image in whole pixels. Without width or height it stands for the whole image.
+struct PixelRegion {
+  std::uint32_t x = 0;  ///< Left edge.
+  std::uint32_t y = 0;  ///< Upper edge.
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+
+  bool IsWholeImage() const { return width == 0 && height == 0; }
+};
+
 /// One hazard that one vehicle asks the zone to put on the map (HazardReport.msg without ROS).
 /// Everything that handles reports is idempotent by `uuid`.
 struct Report {
@@ -40,6 +50,7 @@ struct Report {
   std::string image_frame_id;       ///< Optical frame of the original image.
   std::string image_format;         ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;  ///< Annotated picture as a compressed file; may be empty.
+  PixelRegion shown;                ///< What of the original image the picture shows.
 };
 
 /// The zone's answer to one report.
@@ -79,6 +90,13 @@ struct Notice {
   std::vector<std::uint8_t> image;  ///< Small annotated picture; may be empty.
 };
 
+/// What picture an answer to a poll shall bring.
+enum class PollPicture {
+  kNone,
+  kCrop,       ///< The hazard's place and its surroundings, as in a report.
+  kFullFrame,  ///< The whole image that decided.
+};
+
 /// The zone asks one vehicle whether a hazard is still there (HazardPoll.msg without ROS).
 struct Poll {
   Uuid poll;
@@ -89,7 +107,7 @@ struct Poll {
   std::string class_name;
   GeoPoint position;                                        ///< Of the hazard.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
-  bool picture_wanted = false;
+  PollPicture picture = PollPicture::kNone;
   std::uint32_t max_picture_bytes = 0;
 };
 

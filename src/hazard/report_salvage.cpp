@@ -123,8 +123,7 @@ void DropBrokenPicture(Report& report) {
   report.image_format.clear();
 }
 
-Salvage ReadRows(SqliteDatabase& database,
-                 const std::function<void(const Report&, bool sent)>& accept) {
+Salvage ReadRows(SqliteDatabase& database, const std::function<void(const StoredReport&)>& accept) {
   Salvage salvage;
   const Rows rows = CandidateRows(database);
   for (const std::int64_t row : rows.numbers) {
@@ -136,7 +135,7 @@ Salvage ReadRows(SqliteDatabase& database,
     }
     if (stored && IsSound(stored->report)) {
       DropBrokenPicture(stored->report);
-      accept(stored->report, stored->sent);
+      accept(*stored);
       ++salvage.reports;
     } else if (row <= rows.last_listed) {
       ++salvage.unreadable;
@@ -148,13 +147,18 @@ Salvage ReadRows(SqliteDatabase& database,
 std::unique_ptr<SqliteDatabase> OpenCopy(const WorkingCopy& copy) {
   auto database = std::make_unique<SqliteDatabase>(copy.path(), /*durable=*/false);
   database->Prepare("SELECT rowid FROM pending WHERE rowid=0").Reset();
+  try {
+    database->Prepare("SELECT hold_until_ns FROM pending WHERE rowid=0").Reset();
+  } catch (const StoreError&) {
+    database->Execute(kAddShownRegionAndHold);  // Of an older LiveMap.
+  }
   return database;
 }
 
 }  // namespace
 
 Salvage SalvageReports(const std::string& path, const std::string& fresh,
-                       const std::function<void(const Report&, bool sent)>& accept) {
+                       const std::function<void(const StoredReport&)>& accept) {
   std::optional<WorkingCopy> copy;
   std::unique_ptr<SqliteDatabase> database;
   try {

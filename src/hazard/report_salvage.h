@@ -6,6 +6,7 @@
 
 #include "base/sqlite.h"
 #include "hazard/report.h"
+#include "hazard/report_table.h"
 
 namespace livemap {
 
@@ -18,11 +19,10 @@ struct Salvage {
 };
 
 /// Reads the unfinished reports of the damaged store `path` row by row, from both ends and around
-/// what is damaged, and hands each sound one to `accept` with whether it was sent before. `path`
-/// and its log stay as they are: the work is done on a copy beside it. `fresh` is a sound store of
-/// the same schema, checkpointed: its first page stands in when that of the copy is destroyed.
-/// Throws only what `accept` throws.
+/// what is damaged, and hands each sound one to `accept`. `path` and its log stay as they are: the
+/// work is done on a copy beside it. `fresh` is a sound store of the same schema, checkpointed: its
+/// first page stands in when that of the copy is destroyed. Throws only what `accept` throws.
 Salvage SalvageReports(const std::string& path, const std::string& fresh,
-                       const std::function<void(const Report&, bool sent)>& accept);
+                       const std::function<void(const StoredReport&)>& accept);
 
 }  // namespace livemap

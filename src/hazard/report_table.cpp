@@ -9,7 +9,8 @@ namespace {
 constexpr char kSelectReport[] =
     "SELECT drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,latitude,longitude,"
     "variance_east,covariance_east_north,variance_north,"
-    "image_width,image_height,image_frame_id,image_format,image,uuid,sent FROM pending ";
+    "image_width,image_height,image_frame_id,image_format,image,uuid,sent,"
+    "shown_x,shown_y,shown_width,shown_height,hold_until_ns FROM pending ";
 
 /// Of a row of kSelectReport.
 Report ReadReport(const SqliteStatement& row) {
@@ -28,6 +29,8 @@ Report ReadReport(const SqliteStatement& row) {
   report.image_format = row.Text(16);
   report.image = row.Blob(17);
   report.uuid = UuidFromBlob(row.Blob(18));
+  const auto pixels = [&row](int column) { return static_cast<std::uint32_t>(row.Int(column)); };
+  report.shown = {pixels(20), pixels(21), pixels(22), pixels(23)};
   return report;
 }
 
@@ -49,18 +52,26 @@ const char* const kCreateReportTable =
     "  image_frame_id TEXT NOT NULL, image_format TEXT NOT NULL,"
     "  image BLOB NOT NULL);";
 
+const char* const kAddShownRegionAndHold =
+    "ALTER TABLE pending ADD COLUMN shown_x INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE pending ADD COLUMN shown_y INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE pending ADD COLUMN shown_width INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE pending ADD COLUMN shown_height INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE pending ADD COLUMN hold_until_ns INTEGER NOT NULL DEFAULT 0;";
+
 Uuid UuidFromBlob(const std::vector<std::uint8_t>& blob) {
   Uuid uuid;
   if (blob.size() == uuid.bytes.size()) std::copy(blob.begin(), blob.end(), uuid.bytes.begin());
   return uuid;
 }
 
-void InsertReport(SqliteDatabase& database, const Report& report) {
+void InsertReport(SqliteDatabase& database, const Report& report, std::int64_t hold_until_ns) {
   SqliteStatement insert = database.Prepare(
       "INSERT INTO pending(uuid,drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,"
       "latitude,longitude,variance_east,covariance_east_north,variance_north,"
-      "image_width,image_height,image_frame_id,image_format,image)"
-      " VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+      "image_width,image_height,image_frame_id,image_format,image,"
+      "shown_x,shown_y,shown_width,shown_height,hold_until_ns)"
+      " VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   insert.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
       .Bind(2, report.drive_id)
       .Bind(3, report.stamp_ns)
@@ -80,6 +91,11 @@ void InsertReport(SqliteDatabase& database, const Report& report) {
       .Bind(17, report.image_frame_id)
       .Bind(18, report.image_format)
       .BindBlob(19, report.image.data(), report.image.size())
+      .Bind(20, static_cast<std::int64_t>(report.shown.x))
+      .Bind(21, static_cast<std::int64_t>(report.shown.y))
+      .Bind(22, static_cast<std::int64_t>(report.shown.width))
+      .Bind(23, static_cast<std::int64_t>(report.shown.height))
+      .Bind(24, hold_until_ns)
       .Execute();
 }
 
@@ -94,7 +110,7 @@ std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int
   SqliteStatement row = database.Prepare(std::string(kSelectReport) + "NOT INDEXED WHERE rowid=?");
   row.Bind(1, row_number);
   if (!row.Step()) return std::nullopt;
-  return StoredReport{ReadReport(row), row.Int(19) != 0};
+  return StoredReport{ReadReport(row), row.Int(19) != 0, row.Int(24)};
 }
 
 }  // namespace livemap

@@ -14,9 +14,16 @@ constexpr double kSilencePauses = 2;
 ResendSchedule::ResendSchedule(const Config& config, std::mt19937_64 random)
     : config_(config), random_(random) {}
 
-void ResendSchedule::Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s) {
+void ResendSchedule::Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s,
+                         double hold_until_s) {
   if (!last_answer_s_) last_answer_s_ = now_s;
-  entries_[report] = {urgency, created_ns, now_s, config_.first_pause_s, now_s};
+  entries_[report] = {urgency, created_ns, now_s, config_.first_pause_s, now_s, hold_until_s};
+}
+
+std::size_t ResendSchedule::Held(double now_s) const {
+  return static_cast<std::size_t>(
+      std::count_if(entries_.begin(), entries_.end(),
+                    [now_s](const auto& entry) { return now_s < entry.second.hold_until_s; }));
 }
 
 void ResendSchedule::Remove(const Uuid& report) {
@@ -39,7 +46,8 @@ std::vector<Uuid> ResendSchedule::TakeDue(double now_s, std::size_t limit) {
   if (answered_) NoteAnswer(now_s);
   std::vector<std::map<Uuid, Entry>::iterator> due;
   for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
-    if (entry->second.due_s <= now_s) due.push_back(entry);
+    const bool held = !cheap_ && now_s < entry->second.hold_until_s;
+    if (entry->second.due_s <= now_s && !held) due.push_back(entry);
   }
   std::sort(due.begin(), due.end(), [](const auto& a, const auto& b) {
     return std::tie(a->second.urgency, a->second.created_ns, a->first) <

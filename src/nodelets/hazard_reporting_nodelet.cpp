@@ -1,6 +1,7 @@
 #include <cv_bridge/cv_bridge.h>
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <nav_msgs/Path.h>
+#include <livemap/PictureRequest.h>
+#include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
 #include <ros/package.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -8,20 +9,18 @@
 #include <sensor_msgs/image_encodings.h>
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
 
-#include "geo/datum.h"
 #include "hazard/hazard_reporter.h"
 #include "hazard/poll_responder.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/vehicle_view.h"
 #include "ros/camera_info_conversions.h"
 #include "ros/hazard_conversions.h"
 #include "ros/hazard_reporting_parameters.h"
@@ -62,8 +61,6 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     if (!reporter_->map().set_aside().empty()) {
       NODELET_ERROR("%s", DescribeSetAside(config_.reporter.map.path, reporter_->map()).c_str());
     }
-    if (config_.map_datum) map_.emplace(*config_.map_datum);
-    path_.header.frame_id = config_.map_frame;
     Connect();
   }
 
@@ -81,19 +78,26 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     using Self = HazardReportingNodelet;
     ros::NodeHandle& node = getNodeHandle();
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 100);
-    position_publisher_ = node.advertise<VehiclePosition>("vehicle/position", 10);
     answer_publisher_ = node.advertise<HazardPollAnswer>("hazard/poll_answer", 100);
-    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/local_map", 1);
-    path_publisher_ = node.advertise<nav_msgs::Path>("path", 1);
+    request_publisher_ = node.advertise<PictureRequest>("hazard/picture_request", 100);
+    view_ = std::make_unique<VehicleView>(config_, *reporter_, catalogue_, node);
     subscribers_ = {
         node.subscribe("hazard/detections", 100, &Self::OnDetections, this),
-        node.subscribe("hazard/annotated", 10, &Self::OnAnnotated, this),
+        node.subscribe("link_state", 1, &Self::OnLink, this),
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
         node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
         node.subscribe("hazard/poll", 100, &Self::OnPoll, this),
     };
+    // Whoever listens to hazard/annotated has every frame drawn and masked: not where pictures come
+    // on demand.
+    if (config_.use_events) {
+      subscribers_.push_back(node.subscribe("hazard/events", 100, &Self::OnEvents, this));
+      subscribers_.push_back(node.subscribe("hazard/picture", 10, &Self::OnPicture, this));
+    } else {
+      subscribers_.push_back(node.subscribe("hazard/annotated", 10, &Self::OnPicture, this));
+    }
     if (IsFused()) {
       subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
     }
@@ -116,15 +120,21 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   bool IsFused() const { return config_.reporter.position_source == PositionSource::kFused; }
 
   void OnDetections(const DetectionArray& message) {
-    if (!reporter_->HasMounting(message.header.frame_id)) wanted_frame_ = message.header.frame_id;
-    LearnMounting();
+    WantMounting(message.header.frame_id);
     const SightingFrame frame = ToSightingFrame(message);
     responder_->AddFrame(frame, ros::Time::now().toSec());
-    reporter_->AddFrame(frame, ros::Time::now().toSec());
+    if (!config_.use_events) reporter_->AddFrame(frame, ros::Time::now().toSec());
     Work();
   }
 
-  void OnAnnotated(const sensor_msgs::ImageConstPtr& message) {
+  /// Objects that the tracker is sure of, at their best view.
+  void OnEvents(const DetectionArray& message) {
+    WantMounting(message.header.frame_id);
+    reporter_->AddFrame(ToSightingFrame(message), ros::Time::now().toSec());
+    Work();
+  }
+
+  void OnPicture(const sensor_msgs::ImageConstPtr& message) {
     try {
       // Shares the pixels with the detector's message where it is bgr8 already.
       const auto shared = cv_bridge::toCvShare(message, sensor_msgs::image_encodings::BGR8);
@@ -133,9 +143,31 @@ class HazardReportingNodelet : public nodelet::Nodelet {
       responder_->AddPicture(FromRosTime(message->header.stamp), picture);
       reporter_->AddPicture(FromRosTime(message->header.stamp), picture);
     } catch (const cv::Exception& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "annotated image dropped: %s", error.what());
+      NODELET_WARN_THROTTLE(kSayAgainS, "picture dropped: %s", error.what());
     } catch (const cv_bridge::Exception& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "annotated image dropped: %s", error.what());
+      NODELET_WARN_THROTTLE(kSayAgainS, "picture dropped: %s", error.what());
+    }
+    Work();
+  }
+
+  /// Only while a poll is open, and only for its brightness.
+  void OnImage(const sensor_msgs::ImageConstPtr& message) {
+    try {
+      const auto grey = cv_bridge::toCvShare(message, sensor_msgs::image_encodings::MONO8);
+      responder_->AddLuminance(FromRosTime(message->header.stamp),
+                               PollResponder::MeanLuminance(grey->image));
+    } catch (const cv::Exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "image not looked at: %s", error.what());
+    } catch (const cv_bridge::Exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "image not looked at: %s", error.what());
+    }
+  }
+
+  void OnLink(const LinkState& message) {
+    try {
+      reporter_->SetLink(FromMessage(message));
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
     Work();
   }
@@ -145,14 +177,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     reporter_->AddFix(ToFix(message));
     const auto newest_ns = reporter_->track().newest_ns();
     const bool by_fixes = !IsFused() || IsFusionSilent(*reporter_);
-    if (by_fixes && newest_ns && newest_ns != before_ns) ShowFix(*newest_ns);
+    if (by_fixes && newest_ns && newest_ns != before_ns) view_->ShowFix(*newest_ns);
     Work();
   }
 
   /// A fused pose of base_link in the map frame.
   void OnPose(const nav_msgs::Odometry& message) {
-    LearnDatum();
-    if (!map_ || message.header.frame_id != config_.map_frame ||
+    view_->LearnDatum(tf_buffer_);
+    if (!view_->map() || message.header.frame_id != config_.map_frame ||
         message.child_frame_id != config_.base_frame) {
       NODELET_WARN_THROTTLE(kSayAgainS,
                             "dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s' and tf "
@@ -162,12 +194,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
       return;
     }
     const std::int64_t stamp_ns = FromRosTime(message.header.stamp);
-    const TrackPose pose = ToTrackPose(message, *map_);
+    const TrackPose pose = ToTrackPose(message, *view_->map());
     reporter_->AddPose(stamp_ns, pose);
-    if (reporter_->poses().newest_ns() == stamp_ns) {
-      TellPosition(pose, stamp_ns);
-      ShowVehicle(pose, message.header.stamp);
-    }
+    if (reporter_->poses().newest_ns() == stamp_ns) view_->ShowPose(pose, message.header.stamp);
     Work();
   }
 
@@ -226,6 +255,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   void OnPoll(const HazardPoll& message) {
     try {
       responder_->Add(FromMessage(message), SteadyS());
+      WatchImages();
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
@@ -247,6 +277,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
     placed_by_fixes_ = by_fixes;
     AnswerPolls();
+    for (const std::int64_t stamp_ns : reporter_->TakePictureRequests()) RequestPicture(stamp_ns);
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
     for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
@@ -265,6 +296,28 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     for (const PollReply& reply : responder_->TakeReplies()) {
       answer_publisher_.publish(ToMessage(reply));
     }
+    for (const std::int64_t stamp_ns : responder_->TakePictureRequests()) RequestPicture(stamp_ns);
+    WatchImages();
+  }
+
+  void RequestPicture(std::int64_t stamp_ns) {
+    PictureRequest request;
+    request.stamp = ToRosTime(stamp_ns);
+    request_publisher_.publish(request);
+  }
+
+  /// Listens to the camera's images while a poll is open.
+  void WatchImages() {
+    const bool wanted = config_.use_events && responder_->open() > 0;
+    if (wanted == static_cast<bool>(images_)) return;
+    images_ = wanted ? getNodeHandle().subscribe("camera_rect/image", 2,
+                                                 &HazardReportingNodelet::OnImage, this)
+                     : ros::Subscriber();
+  }
+
+  void WantMounting(const std::string& frame_id) {
+    if (!reporter_->HasMounting(frame_id)) wanted_frame_ = frame_id;
+    LearnMounting();
   }
 
   /// The mounting does not change: looked up until it is known, then kept.
@@ -280,85 +333,13 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
   }
 
-  /// The datum of the map frame is that of its owner, the localisation: tf earth -> map.
-  void LearnDatum() {
-    try {
-      const auto transform =
-          tf_buffer_.lookupTransform("earth", config_.map_frame, ros::Time(0)).transform;
-      if (map_ && earth_from_map_ == transform) return;
-      map_.emplace(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
-      earth_from_map_ = transform;
-      path_.poses.clear();
-    } catch (const tf2::TransformException&) {
-      // Whoever needs the map says that it is missing.
-    } catch (const Error& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
-    }
-  }
-
-  /// Where the newest fix is, on vehicle/position and on the map.
-  void ShowFix(std::int64_t stamp_ns) {
-    const auto antenna = reporter_->track().Newest();
-    TellPosition(*antenna, stamp_ns);
-    if (!map_ && !IsFused()) map_.emplace(antenna->position);
-    const auto at_stamp = reporter_->track().At(stamp_ns);
-    if (!map_ || at_stamp.answer != FixTrack::Answer::kReady) return;
-    const Eigen::Vector2d antenna_m(config_.reporter.antenna_x_m, config_.reporter.antenna_y_m);
-    const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
-    TrackPose base = at_stamp.pose;
-    base.position = PlaceHazard(base, antenna_m, origin).position;
-    ShowVehicle(base, ToRosTime(stamp_ns));
-  }
-
-  void TellPosition(const TrackPose& pose, std::int64_t stamp_ns) {
-    const ros::Time stamp = ToRosTime(stamp_ns);
-    const bool due = !position_stamp_ || stamp < *position_stamp_ ||
-                     stamp - *position_stamp_ >= ros::Duration(config_.position_period_s);
-    if (!due) return;
-    position_stamp_ = stamp;
-    const VehicleState vehicle{
-        "", config_.reporter.drive_id, pose.position, pose.course_rad, pose.speed_mps, stamp_ns};
-    const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
-    position_publisher_.publish(ToMessage(vehicle, sigma_m, reporter_->map().map_sequence()));
-  }
-
-  /// base_link on the path, and on tf where no odometry does it.
-  void ShowVehicle(const TrackPose& base, const ros::Time& stamp) {
-    const Eigen::Vector2d base_m = map_->ToEnu(base.position);
-    const auto pose = VehiclePose(base_m, base.course_rad, config_.map_frame, stamp);
-    if (config_.publish_tf) {
-      geometry_msgs::TransformStamped transform;
-      transform.header = pose.header;
-      transform.child_frame_id = config_.base_frame;
-      transform.transform.translation.x = base_m.x();
-      transform.transform.translation.y = base_m.y();
-      transform.transform.rotation = pose.pose.orientation;
-      tf_broadcaster_.sendTransform(transform);
-    }
-    if (!path_.poses.empty()) {
-      const auto& last = path_.poses.back().pose.position;
-      if (std::hypot(base_m.x() - last.x, base_m.y() - last.y) < config_.path_spacing_m) return;
-    }
-    path_.header.stamp = stamp;
-    path_.poses.push_back(pose);
-    if (path_.poses.size() > static_cast<std::size_t>(config_.path_max_poses)) {
-      path_.poses.erase(path_.poses.begin());
-    }
-  }
-
-  void OnViewTimer(const ros::SteadyTimerEvent&) {
-    if (path_publisher_.getNumSubscribers() > 0) path_publisher_.publish(path_);
-    if (marker_publisher_.getNumSubscribers() == 0 || !map_) return;
-    const auto known = reporter_->map().Known(static_cast<std::size_t>(config_.max_markers));
-    marker_publisher_.publish(
-        HazardMarkers(known, catalogue_, *map_, config_.map_frame, ros::Time::now()));
-  }
+  void OnViewTimer(const ros::SteadyTimerEvent&) { view_->Publish(); }
 
   // Not the updater's own timer: that one follows the simulated clock.
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    DescribeHazardReporter(*reporter_, status);
+    DescribeHazardReporter(*reporter_, SteadyS(), status);
     DescribePollResponder(*responder_, status);
   }
 
@@ -366,18 +347,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   HazardCatalogue catalogue_;
   std::unique_ptr<HazardReporter> reporter_;
   std::unique_ptr<PollResponder> responder_;
-  std::optional<LocalFrame> map_;
-  geometry_msgs::Transform earth_from_map_;  // By which map_ was made, if it was.
-  std::uint64_t placed_by_fixes_ = 0;        // When it was last looked at.
-  std::optional<ros::Time> position_stamp_;
-  std::string wanted_frame_;  // Optical frame whose mounting is not known yet.
-  nav_msgs::Path path_;
+  std::unique_ptr<VehicleView> view_;
+  std::uint64_t placed_by_fixes_ = 0;  // When it was last looked at.
+  std::string wanted_frame_;           // Optical frame whose mounting is not known yet.
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
-  tf2_ros::TransformBroadcaster tf_broadcaster_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::Publisher report_publisher_, position_publisher_, answer_publisher_;
-  ros::Publisher marker_publisher_, path_publisher_;
+  ros::Publisher report_publisher_, answer_publisher_, request_publisher_;
+  ros::Subscriber images_;  // While a poll is open.
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;
 };

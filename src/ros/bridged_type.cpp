@@ -33,10 +33,11 @@ Md5 RequireMd5(const std::string& name, const std::string& text) {
 template <typename Message>
 class TypedBridge : public BridgedType {
  public:
-  TypedBridge(std::size_t max_bytes, const LayoutLimits& limits)
+  TypedBridge(std::size_t max_bytes, const LayoutLimits& limits,
+              const std::vector<EarlierDefinition>& earlier)
       : BridgedType(ros::message_traits::datatype<Message>(),
                     ros::message_traits::md5sum<Message>(),
-                    ros::message_traits::definition<Message>(), max_bytes, limits) {}
+                    ros::message_traits::definition<Message>(), max_bytes, limits, earlier) {}
 
   bool has_vehicle_id() const override { return HasVehicleId<Message>::value; }
 
@@ -86,21 +87,23 @@ using Factory = std::function<std::unique_ptr<BridgedType>(std::size_t max_bytes
 
 /// `bulk_fields` may fill a message to its own limit; all other strings and arrays are short.
 template <typename Message>
-std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk_fields = {}) {
-  return {ros::message_traits::datatype<Message>(), [bulk_fields](std::size_t max_bytes) {
+std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk_fields = {},
+                                            const std::vector<EarlierDefinition>& earlier = {}) {
+  return {ros::message_traits::datatype<Message>(), [bulk_fields, earlier](std::size_t max_bytes) {
             LayoutLimits limits;
             for (const std::string& field : bulk_fields) limits.fields[field] = max_bytes;
-            return std::make_unique<TypedBridge<Message>>(max_bytes, limits);
+            return std::make_unique<TypedBridge<Message>>(max_bytes, limits, earlier);
           }};
 }
 
-/// A new message type joins the bridge by one line here.
+/// A new message type joins the bridge by one line here. The earlier definitions are version 1 of
+/// theirs, which did not say what a picture shows.
 const std::map<std::string, Factory>& Registry() {
   static const std::map<std::string, Factory> kRegistry = {
       Entry<HazardNotice>({"image.data"}),
-      Entry<HazardPoll>(),
+      Entry<HazardPoll>({}, {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
       Entry<HazardPollAnswer>({"image.data"}),
-      Entry<HazardReport>({"image.data"}),
+      Entry<HazardReport>({"image.data"}, {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
       Entry<ReportReceipt>(),
       Entry<VehiclePosition>(),
   };
@@ -110,11 +113,25 @@ const std::map<std::string, Factory>& Registry() {
 }  // namespace
 
 BridgedType::BridgedType(std::string name, const std::string& md5, const std::string& definition,
-                         std::size_t max_bytes, const LayoutLimits& limits)
+                         std::size_t max_bytes, const LayoutLimits& limits,
+                         const std::vector<EarlierDefinition>& earlier)
     : name_(std::move(name)),
       md5_(RequireMd5(name_, md5)),
       max_bytes_(max_bytes),
-      layout_(name_, definition, limits) {}
+      layout_(name_, definition, limits) {
+  for (const EarlierDefinition& definition_before : earlier) {
+    earlier_.emplace_back(RequireMd5(name_, definition_before.md5), definition_before.added_bytes);
+  }
+}
+
+/// Bytes that the present definition has more than the one of that MD5; none: it is not known.
+std::optional<std::size_t> BridgedType::AddedSince(const Md5& md5) const {
+  if (md5 == md5_) return 0;
+  for (const auto& [earlier, added_bytes] : earlier_) {
+    if (earlier == md5) return added_bytes;
+  }
+  return std::nullopt;
+}
 
 std::optional<std::string> BridgedType::Check(ByteView serialised) const {
   return layout_.Check(serialised);
@@ -133,12 +150,19 @@ std::optional<std::string> BridgedType::PublishChecked(
     return "the message is of type '" + std::string(decoded.envelope->type) + "', accepted is '" +
            name_ + "'";
   }
-  if (decoded.envelope->md5 != md5_) {
-    return "the sender knows another definition of '" + name_ + "' (different MD5)";
+  const std::optional<std::size_t> added = AddedSince(decoded.envelope->md5);
+  if (!added) return "the sender knows another definition of '" + name_ + "' (different MD5)";
+  ByteView payload = decoded.envelope->payload;
+  std::vector<std::uint8_t> whole;
+  if (*added > 0) {
+    whole.reserve(payload.size + *added);
+    whole.assign(payload.data, payload.data + payload.size);
+    whole.resize(payload.size + *added, 0);
+    payload = {whole.data(), whole.size()};
   }
-  std::optional<std::string> fault = layout_.Check(decoded.envelope->payload);
+  std::optional<std::string> fault = layout_.Check(payload);
   if (fault) return fault;
-  Publish(publisher, decoded.envelope->payload, vehicle_id);
+  Publish(publisher, payload, vehicle_id);
   return std::nullopt;
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "transport/envelope.h"
@@ -20,6 +21,13 @@ struct OutgoingBridgeMessage {
   std::string vehicle_id;  ///< The message's own field; empty where the type has none.
   /// Why every receiver would refuse the message (a field over its limit); it has no envelope then.
   std::optional<std::string> fault;
+};
+
+/// An older definition of a message that is still accepted: the present one without its last
+/// fields. Those are filled with zeros, `schema_version` stays the sender's.
+struct EarlierDefinition {
+  std::string md5;              ///< 32 hex digits, as ROS computes it.
+  std::size_t added_bytes = 0;  ///< That the fields added since take, all of them of fixed size.
 };
 
 /// One message type that the MQTT bridge can carry in both directions.
@@ -47,7 +55,8 @@ class BridgedType {
 
  protected:
   BridgedType(std::string name, const std::string& md5, const std::string& definition,
-              std::size_t max_bytes, const LayoutLimits& limits);
+              std::size_t max_bytes, const LayoutLimits& limits,
+              const std::vector<EarlierDefinition>& earlier);
 
   std::optional<std::string> Check(ByteView serialised) const;
   std::vector<std::uint8_t> Enclose(const std::vector<std::uint8_t>& serialised) const;
@@ -57,8 +66,11 @@ class BridgedType {
   virtual void Publish(const ros::Publisher& publisher, ByteView serialised,
                        const std::optional<std::string>& vehicle_id) const = 0;
 
+  std::optional<std::size_t> AddedSince(const Md5& md5) const;
+
   std::string name_;
   Md5 md5_;
+  std::vector<std::pair<Md5, std::size_t>> earlier_;  // And what was added since, bytes.
   std::size_t max_bytes_;
   MessageLayout layout_;
 };

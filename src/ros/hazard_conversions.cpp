@@ -38,11 +38,16 @@ HazardReport ToMessage(const Report& report) {
   message.image.header.frame_id = report.image_frame_id;
   message.image.format = report.image_format;
   message.image.data = report.image;
+  message.shown_x = report.shown.x;
+  message.shown_y = report.shown.y;
+  message.shown_width = report.shown.width;
+  message.shown_height = report.shown.height;
   return message;
 }
 
 Report FromMessage(const HazardReport& message) {
-  CheckVersion(message, "hazard report");
+  constexpr std::uint16_t kWholeImages = 1;  // Has no region: its pictures show the whole image.
+  CheckVersion(message, "hazard report", kWholeImages);
   Report report;
   report.uuid = ToUuid(message.uuid);
   report.vehicle_id = message.vehicle_id;
@@ -58,6 +63,9 @@ Report FromMessage(const HazardReport& message) {
   report.image_frame_id = message.image.header.frame_id;
   report.image_format = message.image.format;
   report.image = message.image.data;
+  if (message.schema_version != kWholeImages) {
+    report.shown = {message.shown_x, message.shown_y, message.shown_width, message.shown_height};
+  }
   return report;
 }
 
@@ -246,6 +254,22 @@ VehicleState FromMessage(const VehiclePosition& message) {
   vehicle.speed_mps = static_cast<double>(message.speed);
   vehicle.stamp_ns = FromRosTime(message.stamp);
   return vehicle;
+}
+
+LinkCost FromMessage(const LinkState& message) {
+  switch (message.state) {
+    case LinkState::UNKNOWN:
+      return LinkCost::kUnknown;
+    case LinkState::CHEAP:
+      return LinkCost::kCheap;
+    case LinkState::METERED:
+      return LinkCost::kMetered;
+    case LinkState::NONE:
+      return LinkCost::kNone;
+    default:
+      throw Error("link state is " + std::to_string(message.state) +
+                  ", accepted is 0 (unknown), 1 (cheap), 2 (metered) or 3 (none)");
+  }
 }
 
 SightingFrame ToSightingFrame(const DetectionArray& message) {

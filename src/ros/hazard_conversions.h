@@ -3,6 +3,7 @@
 #include <livemap/DetectionArray.h>
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardReport.h>
+#include <livemap/LinkState.h>
 #include <livemap/ReportReceipt.h>
 #include <livemap/VehiclePosition.h>
 #include <ros/time.h>
@@ -49,6 +50,8 @@ Notice FromMessage(const HazardNotice& message);
 VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
                           std::uint64_t map_sequence);
 VehicleState FromMessage(const VehiclePosition& message);
+
+LinkCost FromMessage(const LinkState& message);
 
 SightingFrame ToSightingFrame(const DetectionArray& message);
 Fix ToFix(const sensor_msgs::NavSatFix& message);

@@ -40,6 +40,18 @@ void ReadTrack(ParameterReader& parameters, FixTrack::Config& track) {
   parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
 }
 
+void ReadUrgency(ParameterReader& parameters, HazardReporter::Config& reporter) {
+  // Below the 30 days after which the zone refuses a report, with some to spare for the way.
+  constexpr double kLongestHoldS = 20 * 86400.0;
+  parameters.Read("hold_urgent_s", reporter.hold_s[0], {0, kLongestHoldS});
+  parameters.Read("hold_soon_s", reporter.hold_s[1], {0, kLongestHoldS});
+  parameters.Read("hold_later_s", reporter.hold_s[2], {0, kLongestHoldS});
+  std::string unknown = "cheap";
+  parameters.ReadChoice("unknown_link", unknown, {"cheap", "metered"});
+  reporter.unknown_link_is_cheap = unknown == "cheap";
+  parameters.Read("link_wait_s", reporter.link_wait_s, {0, 600});
+}
+
 void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& config) {
   HazardReporter::Config& reporter = config.reporter;
   std::string source = "gps";
@@ -49,6 +61,7 @@ void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& conf
   parameters.Read("max_fused_gap_s", reporter.poses.max_gap_s, {0.01, 10});
   parameters.Read("use_depth", reporter.use_depth);
   parameters.Read("depth_wait_s", reporter.depth_wait_s, {0, 60});
+  parameters.Read("depth_images", reporter.depth_images, {1, 10000});
   parameters.Read("depth_sigma_share", reporter.depth.sigma_share, {0, 1});
   parameters.Read("min_depth_m", reporter.depth.min_m, {0.01, 1000});
   parameters.Read("max_depth_m", reporter.depth.max_m, {0.01, 1000});
@@ -62,6 +75,7 @@ void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& confi
   polls.min_confidence = config.reporter.min_confidence;
   polls.bracket_wait_s = config.reporter.bracket_wait_s;
   polls.picture_wait_s = config.reporter.picture_wait_s;
+  polls.crop = config.reporter.picture;
   polls.projection.pixel_sigma_px = config.reporter.projection.pixel_sigma_px;
   polls.projection.pitch_sigma_rad = config.reporter.projection.pitch_sigma_rad;
   polls.projection.height_sigma_m = config.reporter.projection.height_sigma_m;
@@ -105,12 +119,20 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("max_waiting_frames", reporter.max_waiting_frames, {1, 10000});
   parameters.Read("antenna_x_m", reporter.antenna_x_m, {-50, 50});
   parameters.Read("antenna_y_m", reporter.antenna_y_m, {-50, 50});
-  parameters.Read("jpeg_quality", reporter.jpeg_quality, {1, 100});
-  parameters.Read("max_image_bytes", reporter.max_image_bytes, {0, 10e6});
+  parameters.Read("use_events", config.use_events);
+  reporter.pictures_on_demand = config.use_events;
+  parameters.Read("memory_s", reporter.track.keep_s, {5, 600});
+  reporter.poses.keep_s = reporter.track.keep_s;
+  parameters.Read("jpeg_quality", reporter.picture.quality, {1, 100});
+  int max_image_bytes = static_cast<int>(reporter.picture.max_bytes);
+  parameters.Read("max_image_bytes", max_image_bytes, {0, 10e6});
+  reporter.picture.max_bytes = static_cast<std::size_t>(max_image_bytes);
+  parameters.Read("picture_context", reporter.picture.context, {0, 100});
   parameters.Read("pixel_sigma_px", reporter.projection.pixel_sigma_px, {0, 100});
   parameters.Read("pitch_sigma_rad", reporter.projection.pitch_sigma_rad, {0, 0.5});
   parameters.Read("height_sigma_m", reporter.projection.height_sigma_m, {0, 2});
   ReadTrack(parameters, reporter.track);
+  ReadUrgency(parameters, reporter);
   ReadPositionSource(parameters, config);
   ReadPollAnswering(parameters, config);
   parameters.Read("resend_first_s", reporter.resend.first_pause_s, {0.05, 600});

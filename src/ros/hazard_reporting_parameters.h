@@ -14,7 +14,8 @@ namespace livemap {
 struct HazardReportingConfig {
   HazardReporter::Config reporter;
   PollResponder::Config polls;
-  std::string catalogue;  ///< Path of hazards.yaml; empty: the package's own.
+  std::string catalogue;   ///< Path of hazards.yaml; empty: the package's own.
+  bool use_events = true;  ///< Sightings of hazard/events; false: of hazard/detections.
   std::string base_frame = "base_link";
   std::string map_frame = "map";
   std::optional<GeoPoint> map_datum;  ///< Of the map frame; nothing: the first fix.

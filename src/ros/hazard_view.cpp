@@ -12,6 +12,20 @@ constexpr double kHeightM = 0.4;
 constexpr double kTextM = 1.2;
 constexpr float kOwnAlpha = 0.7F;
 
+const char* LinkName(LinkCost link) {
+  switch (link) {
+    case LinkCost::kCheap:
+      return "cheap";
+    case LinkCost::kMetered:
+      return "metered";
+    case LinkCost::kNone:
+      return "none";
+    case LinkCost::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
 }  // namespace
 
 visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& hazards,
@@ -73,7 +87,7 @@ bool IsFusionSilent(const HazardReporter& reporter) {
   return newest_fix_ns && (!newest_pose_ns || *newest_fix_ns - *newest_pose_ns > kSilentNs);
 }
 
-void DescribeHazardReporter(const HazardReporter& reporter,
+void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
                             diagnostic_updater::DiagnosticStatusWrapper& status) {
   using diagnostic_msgs::DiagnosticStatus;
   const HazardReporter::Counters& counters = reporter.counters();
@@ -102,6 +116,10 @@ void DescribeHazardReporter(const HazardReporter& reporter,
   status.add("duplicates_suppressed", counters.duplicates_suppressed);
   status.add("reports_created", counters.reports_created);
   status.add("reports_without_picture", counters.reports_without_picture);
+  status.add("pictures_requested", counters.pictures_requested);
+  status.add("pictures_illegible", counters.pictures_illegible);
+  status.add("link", LinkName(reporter.link()));
+  status.add("held", reporter.HeldReports(steady_s));
   status.add("refused_map_full", counters.refused_map_full);
   status.add("reports_sent", counters.reports_sent);
   status.add("resends", counters.resends);

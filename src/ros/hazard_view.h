@@ -32,7 +32,7 @@ bool IsFusionSilent(const HazardReporter& reporter);
 
 /// What hazard_reporting did since its start, each counter under its own name; a warning while it
 /// lacks fixes or camera, an error while its store fails.
-void DescribeHazardReporter(const HazardReporter& reporter,
+void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
                             diagnostic_updater::DiagnosticStatusWrapper& status);
 
 /// What became of the zone's polls, the same way; to be called after DescribeHazardReporter.

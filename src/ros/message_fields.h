@@ -13,12 +13,16 @@ namespace livemap {
 
 // Fields that several messages share. Private to the conversions of this room.
 
-/// Throws Error unless the message has the schema version that this program knows.
+/// Throws Error unless the message has a schema version that this program knows: its own, or one
+/// from `oldest` on.
 template <typename Message>
-void CheckVersion(const Message& message, const char* name) {
-  if (message.schema_version == Message::SCHEMA_VERSION) return;
+void CheckVersion(const Message& message, const char* name,
+                  std::uint16_t oldest = Message::SCHEMA_VERSION) {
+  constexpr std::uint16_t newest = Message::SCHEMA_VERSION;
+  if (message.schema_version >= oldest && message.schema_version <= newest) return;
+  const std::string first = oldest < newest ? std::to_string(oldest) + " to " : "";
   throw Error(std::string(name) + " has schema version " + std::to_string(message.schema_version) +
-              ", accepted is " + std::to_string(Message::SCHEMA_VERSION));
+              ", accepted is " + first + std::to_string(newest));
 }
 
 inline Uuid ToUuid(const boost::array<std::uint8_t, 16>& bytes) {

@@ -41,6 +41,16 @@ void RequireCovariance(const Eigen::Matrix2d& covariance_m2) {
       "positive definite");
 }
 
+/// A message of version 1 has 0 there: a whole frame.
+PollPicture PictureOf(const HazardPoll& message) {
+  if (message.picture_kind != HazardPoll::WHOLE_FRAME && message.picture_kind != HazardPoll::CROP) {
+    throw Error("hazard poll wants picture " + std::to_string(message.picture_kind) +
+                ", accepted is 0 (whole frame) or 1 (crop)");
+  }
+  if (message.picture_wanted == 0) return PollPicture::kNone;
+  return message.picture_kind == HazardPoll::CROP ? PollPicture::kCrop : PollPicture::kFullFrame;
+}
+
 }  // namespace
 
 HazardPoll ToMessage(const Poll& poll) {
@@ -55,13 +65,16 @@ HazardPoll ToMessage(const Poll& poll) {
   message.latitude = poll.position.latitude_deg;
   message.longitude = poll.position.longitude_deg;
   message.covariance = ToArray(poll.covariance_m2);
-  message.picture_wanted = poll.picture_wanted;
+  message.picture_wanted = poll.picture != PollPicture::kNone;
+  message.picture_kind =
+      poll.picture == PollPicture::kCrop ? HazardPoll::CROP : HazardPoll::WHOLE_FRAME;
   message.max_picture_bytes = poll.max_picture_bytes;
   return message;
 }
 
 Poll FromMessage(const HazardPoll& message) {
-  CheckVersion(message, "hazard poll");
+  constexpr std::uint16_t kWholeFrames = 1;  // Knew no other pictures.
+  CheckVersion(message, "hazard poll", kWholeFrames);
   Poll poll;
   poll.poll = ToUuid(message.poll_uuid);
   poll.hazard = ToUuid(message.hazard_uuid);
@@ -71,7 +84,7 @@ Poll FromMessage(const HazardPoll& message) {
   poll.class_name = message.class_name;
   poll.position = {message.latitude, message.longitude};
   poll.covariance_m2 = ToMatrix(message.covariance);
-  poll.picture_wanted = message.picture_wanted != 0;
+  poll.picture = PictureOf(message);
   poll.max_picture_bytes = message.max_picture_bytes;
   RequireIds(poll.poll, poll.hazard, "hazard poll");
   RequirePosition(poll.position, "hazard poll");
@@ -96,7 +109,7 @@ HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns) {
   poll.class_name = order.class_name;
   poll.position = order.position;
   poll.covariance_m2 = order.covariance_m2;
-  poll.picture_wanted = order.picture_wanted;
+  poll.picture = order.picture;
   poll.max_picture_bytes = order.max_picture_bytes;
   return ToMessage(poll);
 }

@@ -99,6 +99,9 @@ void ReadPolls(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("poll_price_s", polls.price_s, {0.01, 1e9});
   parameters.Read("poll_bytes_per_hour", polls.bytes_per_hour, {1, 1e12});
   parameters.Read("poll_picture_bytes", polls.picture_bytes, {0, 1e6});
+  std::string picture = "crop";
+  parameters.ReadChoice("poll_picture", picture, {"crop", "full_frame"});
+  zone.poll_picture = picture == "crop" ? PollPicture::kCrop : PollPicture::kFullFrame;
   parameters.Read("poll_picture_share", polls.picture_share, {0, 1});
   parameters.Read("poll_picture_age_s", polls.picture_age_s, {0, 1e10});
   parameters.Read("poll_lookahead_s", polls.lookahead_s, {1, 3600});

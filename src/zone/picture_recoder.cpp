@@ -119,19 +119,22 @@ cv::Rect View(const cv::Rect2d& box, const cv::Size& image) {
           start(box.y + box.height / 2, size.height, image.height), size.width, size.height};
 }
 
-/// The box in pixels of a copy of the image.
-cv::Rect2d ScaledBox(const Box& box, std::uint32_t image_width, std::uint32_t image_height,
-                     const cv::Size& copy) {
-  const double width = image_width;
-  const double height = image_height;
+/// The box in pixels of a copy of the region that the picture shows.
+cv::Rect2d ScaledBox(const Box& box, const PixelRegion& shown, const cv::Size& copy) {
+  const double width = shown.width;
+  const double height = shown.height;
+  const double left = box.x_min - 1.0 * shown.x;
+  const double top = box.y_min - 1.0 * shown.y;
+  const double right = box.x_max - 1.0 * shown.x;
+  const double bottom = box.y_max - 1.0 * shown.y;
   // Written so that NaN is refused too.
-  const bool has_place = box.x_max > box.x_min && box.y_max > box.y_min && box.x_max > 0 &&
-                         box.y_max > 0 && box.x_min < width && box.y_min < height;
-  if (!has_place) throw Error("the box is empty or lies outside the image");
-  const double x_min = std::max(0.0, static_cast<double>(box.x_min)) * copy.width / width;
-  const double y_min = std::max(0.0, static_cast<double>(box.y_min)) * copy.height / height;
-  const double x_max = std::min(width, static_cast<double>(box.x_max)) * copy.width / width;
-  const double y_max = std::min(height, static_cast<double>(box.y_max)) * copy.height / height;
+  const bool has_place =
+      right > left && bottom > top && right > 0 && bottom > 0 && left < width && top < height;
+  if (!has_place) throw Error("the box is empty or lies outside what the picture shows");
+  const double x_min = std::max(0.0, left) * copy.width / width;
+  const double y_min = std::max(0.0, top) * copy.height / height;
+  const double x_max = std::min(width, right) * copy.width / width;
+  const double y_max = std::min(height, bottom) * copy.height / height;
   return {x_min, y_min, x_max - x_min, y_max - y_min};
 }
 
@@ -233,16 +236,15 @@ std::vector<std::uint8_t> RecodePicture(const std::vector<std::uint8_t>& file,
 }
 
 std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file, const Box& box,
-                                       std::uint32_t image_width, std::uint32_t image_height,
-                                       const SmallPictureLimits& limits) {
+                                       const PixelRegion& shown, const SmallPictureLimits& limits) {
   const ImageHeader header = CheckedHeader(file, limits.picture);
   const cv::Size whole(header.width, header.height);
   // As many pixels as the view needs, however small the box is in the image.
-  const double view_width = View(ScaledBox(box, image_width, image_height, whole), whole).width;
+  const double view_width = View(ScaledBox(box, shown, whole), whole).width;
   const double longest = std::max(whole.width, whole.height);
   const double wanted_px = std::min(longest, longest * limits.width_px / view_width);
   const cv::Mat image = DecodePixels(file, header, std::max(1, static_cast<int>(wanted_px)));
-  const cv::Rect2d place = ScaledBox(box, image_width, image_height, image.size());
+  const cv::Rect2d place = ScaledBox(box, shown, image.size());
   const cv::Rect view = View(place, image.size());
   const cv::Size size = ThumbnailSize(view.size(), limits.width_px);
   cv::Mat thumbnail = Shrunk(image(view), size);

@@ -36,12 +36,12 @@ struct SmallPictureLimits {
 };
 
 /// The surroundings of `box` as a JPEG of at most `max_bytes`, with the box drawn on it in its
-/// place. `box` is in pixels of the original image of `image_width` x `image_height`, of which
-/// `file` may be a smaller copy. The view is 2.5 times as wide as the box, within the image. Empty
+/// place. `box` is in pixels of the original image, of which `file` shows the region `shown`,
+/// perhaps by fewer pixels. The view is 2.5 times as wide as the box, within the picture. Empty
 /// when not even the smallest thumbnail keeps to the budget. Throws Error as RecodePicture does,
-/// and for a box that lies outside the image or is empty.
+/// and for a box that lies outside the region or is empty.
 std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file, const Box& box,
-                                       std::uint32_t image_width, std::uint32_t image_height,
+                                       const PixelRegion& shown,
                                        const SmallPictureLimits& limits = {});
 
 /// The whole picture as a thumbnail, where no box is known: pictures of vehicles are annotated.

@@ -139,7 +139,13 @@ Why WhyBoxRefused(const Report& report, const ReportLimits& limits) {
                       box.x_max <= static_cast<float>(report.image_width) + kSlackPx &&
                       box.y_max <= static_cast<float>(report.image_height) + kSlackPx;
   if (!inside) return Malformed("box is empty or not inside the image");
-  return std::nullopt;
+  const PixelRegion& shown = report.shown;
+  const bool shows_part = shown.width > 0 && shown.height > 0 && shown.x < report.image_width &&
+                          shown.y < report.image_height &&
+                          shown.width <= report.image_width - shown.x &&
+                          shown.height <= report.image_height - shown.y;
+  if (shows_part || (shown.IsWholeImage() && shown.x == 0 && shown.y == 0)) return std::nullopt;
+  return Malformed("picture shows a region that is empty or not inside the image");
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ struct PollOrder {
   GeoPoint position;
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
   std::int64_t expires_ns = 0;  ///< Zone clock (UTC); later answers do not count.
-  bool picture_wanted = false;
+  PollPicture picture = PollPicture::kNone;
   std::uint32_t max_picture_bytes = 0;
 };
 
@@ -103,6 +103,7 @@ class ZoneService {
     double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
     std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
     std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
+    PollPicture poll_picture = PollPicture::kCrop;  ///< What polls ask for, where they want one.
     ReportLimits limits;
     SpeedRule speed;
     VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.

@@ -46,7 +46,7 @@ std::vector<PollOrder> ZoneService::Implementation::TakeDuePolls() {
     order.position = record.estimate.position;
     order.covariance_m2 = record.estimate.covariance_m2;
     order.expires_ns = choice.expires_ns;
-    order.picture_wanted = choice.picture_wanted;
+    order.picture = choice.picture_wanted ? config_.poll_picture : PollPicture::kNone;
     order.max_picture_bytes =
         choice.picture_wanted ? static_cast<std::uint32_t>(config_.polls.picture_bytes) : 0;
     open_polls_[order.poll] = {slot, order.vehicle_id, now_ns, order.expires_ns};

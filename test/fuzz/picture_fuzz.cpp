@@ -42,7 +42,8 @@ void FuzzThumbnail(const std::vector<std::uint8_t>& file, std::uint8_t x, std::u
   limits.picture = Limits();
   limits.max_bytes = kSmallBytes;
   const Box box{x * 1.0F - 20, y * 1.0F - 20, x * 1.0F, y * 2.0F};
-  const std::vector<std::uint8_t> small = SmallPicture(file, box, 200, 150, limits);
+  const std::vector<std::uint8_t> small =
+      SmallPicture(file, box, {x % 7U, y % 5U, 200, 150}, limits);
   Require(small.size() <= kSmallBytes);
   if (!small.empty()) CheckServed(small, limits.width_px);
 }

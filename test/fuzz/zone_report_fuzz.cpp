@@ -20,6 +20,29 @@ void FuzzPicture(const std::uint8_t* data, std::size_t size) {
   if (header) Require(header->width > 0 && header->height > 0);
 }
 
+/// What a picture shows must lie within the image: edges and sides of 16 bits each.
+void FuzzRegion(const std::uint8_t* data, std::size_t size) {
+  if (size < 8) return;
+  const auto number = [data](std::size_t i) {
+    const std::uint32_t small = data[2 * i] | static_cast<std::uint32_t>(data[2 * i + 1]) << 8;
+    return small < 0xfff0 ? small : 0xffff0000 | small;  // And what overflows when added up.
+  };
+  Report report;
+  report.uuid.bytes[0] = 1;
+  report.vehicle_id = "car-1";
+  report.class_name = "pothole";
+  report.stamp_ns = kNowNs;
+  report.box = {1, 1, 2, 2};
+  report.covariance_m2 = Eigen::Matrix2d::Identity();
+  report.image_width = report.image_height = 1000;
+  report.shown = {number(0), number(1), number(2), number(3)};
+  if (WhyRefused(report, ReportLimits(), kNowNs) || report.shown.IsWholeImage()) return;
+  const PixelRegion& shown = report.shown;
+  Require(shown.width > 0 && shown.height > 0);
+  Require(std::uint64_t{shown.x} + shown.width <= 1000);
+  Require(std::uint64_t{shown.y} + shown.height <= 1000);
+}
+
 /// The class name is the first half, the picture the second.
 void FuzzReport(const std::uint8_t* data, std::size_t size) {
   Report report;
@@ -47,5 +70,6 @@ void FuzzReport(const std::uint8_t* data, std::size_t size) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   livemap::FuzzPicture(data, size);
   livemap::FuzzReport(data, size);
+  livemap::FuzzRegion(data, size);
   return 0;
 }

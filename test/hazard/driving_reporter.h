@@ -70,10 +70,11 @@ class HazardReporterTest : public ::testing::Test {
     Restart();
   }
 
-  void Restart() {
+  /// After `utc_s` on the vehicle's clock since the first start.
+  void Restart(double utc_s = 0) {
     reporter_.reset();
-    reporter_ = std::make_unique<HazardReporter>(config_, HazardCatalogue(),
-                                                 std::mt19937_64(seed_++), kEpochNs, steady_s_);
+    reporter_ = std::make_unique<HazardReporter>(config_, catalogue_, std::mt19937_64(seed_++),
+                                                 StampNs(utc_s), steady_s_);
     reporter_->SetIntrinsics(Intrinsics());
     reporter_->SetMounting(kOptical, Mounting());
   }
@@ -97,6 +98,7 @@ class HazardReporterTest : public ::testing::Test {
 
   TemporaryDirectory directory_;
   HazardReporter::Config config_;
+  HazardCatalogue catalogue_;
   std::uint64_t seed_ = 1;
   double steady_s_ = 500;
   std::unique_ptr<HazardReporter> reporter_;

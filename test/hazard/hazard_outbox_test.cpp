@@ -10,8 +10,11 @@
 namespace livemap {
 namespace {
 
+using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using ::testing::UnorderedElementsAre;
 
 TEST_F(HazardReporterTest, ReportIsSentAgainUntilTheReceiptAlsoAfterARestart) {
   DriveFixes(0, 4);
@@ -88,6 +91,90 @@ TEST_F(HazardReporterTest, AfterARestartUrgentReportsGoFirstAndThenTheOldest) {
     order.push_back(due[0].uuid.bytes[15]);
   }
   EXPECT_EQ(order, (std::vector<int>{4, 6, 3, 5, 1, 2}));
+}
+
+/// Ranks as in config/hazards.yaml, on a link that costs.
+class HeldReportTest : public HazardReporterTest {
+ protected:
+  HeldReportTest() {
+    catalogue_ = HazardCatalogue::Parse(
+        "classes:\n  deer: {urgency: 1}\n  cone: {urgency: 2}\n  pothole: {urgency: 3}\n", "test");
+    Restart();
+    reporter_->SetLink(LinkCost::kMetered);
+    DriveFixes(0, 4);
+  }
+  std::vector<std::string> Sent() {
+    std::vector<std::string> classes;
+    for (const Report& report : TakeDue()) classes.push_back(report.class_name);
+    return classes;
+  }
+};
+
+TEST_F(HeldReportTest, OnADearLinkOnlyUrgentReportsGoAtOnceOthersAtTheirLimit) {
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)},
+            {"deer", 0.8F, BoxAt(12, 1)},
+            {"cone", 0.8F, BoxAt(12, -1)}});
+  EXPECT_THAT(Sent(), ElementsAre("deer"));
+  EXPECT_EQ(reporter_->HeldReports(steady_s_), 2u);
+  steady_s_ += config_.hold_s[1];
+  EXPECT_THAT(Sent(), UnorderedElementsAre("deer", "cone"));
+  EXPECT_EQ(reporter_->HeldReports(steady_s_), 1u);
+  steady_s_ += config_.hold_s[2] - config_.hold_s[1];
+  EXPECT_THAT(Sent(), Contains("pothole"));
+}
+
+TEST_F(HeldReportTest, ACheapLinkLetsAllGoUrgentFirst) {
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}, {"cone", 0.8F, BoxAt(12, -1)}});
+  EXPECT_THAT(Sent(), IsEmpty());
+  reporter_->SetLink(LinkCost::kNone);
+  EXPECT_THAT(Sent(), IsEmpty());
+  reporter_->SetLink(LinkCost::kCheap);
+  EXPECT_THAT(Sent(), ElementsAre("cone", "pothole"));
+}
+
+TEST_F(HeldReportTest, ALinkOfWhichNobodySpeaksHoldsNothingUnlessItIsSaid) {
+  reporter_->SetLink(LinkCost::kUnknown);
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  EXPECT_THAT(Sent(), ElementsAre("pothole"));
+  config_.unknown_link_is_cheap = false;
+  config_.map.path += ".other";
+  Restart();
+  DriveFixes(0, 4);
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  EXPECT_THAT(Sent(), IsEmpty());
+}
+
+TEST_F(HeldReportTest, ItsLimitSurvivesARestartAndCountsTheTimeInBetween) {
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  steady_s_ = 7;  // Another boot: the steady clock begins anew.
+  const double away_s = 5000;
+  Restart(away_s);
+  EXPECT_THAT(Sent(), IsEmpty()) << "the word about the link may come yet";
+  reporter_->SetLink(LinkCost::kMetered);
+  steady_s_ += config_.hold_s[2] - away_s - 1;
+  EXPECT_THAT(Sent(), IsEmpty());
+  steady_s_ += 1.001;
+  EXPECT_THAT(Sent(), ElementsAre("pothole"));
+  EXPECT_EQ(counters().reports_sent, 1u);
+}
+
+TEST_F(HeldReportTest, AfterARestartWithoutAWordAboutTheLinkItGoesWhenThatHadTimeToCome) {
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  Restart(60);
+  steady_s_ += config_.link_wait_s - 0.1;
+  EXPECT_THAT(Sent(), IsEmpty());
+  steady_s_ += 0.2;
+  EXPECT_THAT(Sent(), ElementsAre("pothole"));
+}
+
+TEST_F(HeldReportTest, AClockThatWasSetBackHoldsItNoLongerThanFromTheStart) {
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  Restart(-10 * 365 * 86400.0);
+  reporter_->SetLink(LinkCost::kMetered);
+  steady_s_ += config_.hold_s[2] - 1;
+  EXPECT_THAT(Sent(), IsEmpty());
+  steady_s_ += 1.001;
+  EXPECT_THAT(Sent(), ElementsAre("pothole"));
 }
 
 TEST_F(HazardReporterTest, AHazardThatTheZoneNeverAnnouncedIsReportedAnewAfterItsClasssLife) {

@@ -9,6 +9,7 @@
 namespace livemap {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
@@ -31,7 +32,12 @@ TEST_F(HazardReporterTest, PlacesTheHazardItselfToTheCentimetre) {
   EXPECT_GT(report.covariance_m2.determinant(), 0);
   const cv::Mat picture = cv::imdecode(report.image, cv::IMREAD_COLOR);
   EXPECT_EQ(report.image_format, "jpeg");
-  EXPECT_EQ(picture.size(), cv::Size(640, 400));
+  // The hazard and its surroundings, of which 240 pixels of the image's are the least.
+  EXPECT_EQ(picture.size(), cv::Size(240, 160));
+  EXPECT_EQ(report.shown.width, 240u);
+  EXPECT_LE(report.shown.x, report.box.x_min);
+  EXPECT_GE(report.shown.x + report.shown.width, report.box.x_max);
+  EXPECT_LE(report.image.size(), 12000u);
 }
 
 TEST_F(HazardReporterTest, HazardInSuccessiveFramesIsReportedOnce) {
@@ -150,6 +156,7 @@ TEST_F(HazardReporterTest, WaitsShortlyForAFixAfterTheImageThenCarriesThePositio
 TEST_F(HazardReporterTest, WaitsForThePictureThenGoesWithout) {
   DriveFixes(0, 4);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Process(3.0, steady_s_);
   reporter_->Process(3.4, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
   reporter_->Process(3.51, steady_s_);
@@ -158,6 +165,55 @@ TEST_F(HazardReporterTest, WaitsForThePictureThenGoesWithout) {
   EXPECT_THAT(reports[0].image, IsEmpty());
   EXPECT_EQ(reports[0].image_format, "");
   EXPECT_EQ(counters().reports_without_picture, 1u);
+}
+
+TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
+  DriveFixes(0, 4);
+  const auto look = [this](double seconds, const Box& box) {
+    reporter_->AddFrame(FrameAt(seconds, {{"pothole", 0.8F, box}}), seconds);
+    reporter_->Process(seconds, steady_s_);
+  };
+  look(3.0, BoxAt(12, 0));
+  EXPECT_THAT(reporter_->TakePictureRequests(), ElementsAre(StampNs(3.0)));
+  reporter_->Process(3.1, steady_s_);
+  EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
+  reporter_->AddPicture(StampNs(3.0), GreyPicture());
+  look(3.2, BoxAt(8.8, 0));         // The same hazard, nearer.
+  look(3.3, {300, 100, 320, 150});  // Not on the road.
+  EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
+  EXPECT_EQ(counters().pictures_requested, 1u);
+  EXPECT_FALSE(TakeDue().at(0).image.empty());
+}
+
+TEST_F(HazardReporterTest, AFrameThatWaitedForItsPositionStillWaitsForItsPicture) {
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Process(5.0, steady_s_);
+  DriveFixes(0, 4);
+  reporter_->Process(5.0, steady_s_);
+  EXPECT_THAT(TakeDue(), IsEmpty());
+  EXPECT_THAT(reporter_->TakePictureRequests(), SizeIs(1));
+  reporter_->AddPicture(StampNs(3.0), GreyPicture());
+  reporter_->Process(5.2, steady_s_);
+  EXPECT_FALSE(TakeDue().at(0).image.empty());
+}
+
+TEST_F(HazardReporterTest, AnEventOfSecondsAgoIsPlacedWhereTheVehicleWasThen) {
+  DriveFixes(0, 28);
+  See(2.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  const GeoPoint expected = GeodesicDestination(VehicleAt(2.0), kBearingRad, 12);
+  EXPECT_LT(GeodesicDistanceM(reports[0].position, expected), 0.02);
+}
+
+TEST_F(HazardReporterTest, APictureOfAnotherSizeThanTheImageIsShownWhole) {
+  DriveFixes(0, 4);
+  reporter_->AddPicture(StampNs(3.0), {cv::Mat(64, 96, CV_8UC3, cv::Scalar(9, 9, 9)), nullptr});
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Process(3.0, steady_s_);
+  const Report report = TakeDue().at(0);
+  EXPECT_TRUE(report.shown.IsWholeImage());
+  EXPECT_EQ(cv::imdecode(report.image, cv::IMREAD_COLOR).size(), cv::Size(96, 64));
 }
 
 TEST_F(HazardReporterTest, PictureMayComeBeforeItsFrame) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "base/sqlite.h"
 #include "hazard/report.h"
 
 namespace livemap {
@@ -55,6 +56,17 @@ inline Notice MakeNotice(Notice::Action action, int hazard, const GeoPoint& posi
   notice.confidence = 0.5F;
   notice.position = position;
   return notice;
+}
+
+/// Gives an outbox the shape that it had before pictures showed a part of the image and reports
+/// were held.
+inline void MakeOlder(const std::string& path) {
+  SqliteDatabase database(path, /*durable=*/true);
+  for (const char* column :
+       {"shown_x", "shown_y", "shown_width", "shown_height", "hold_until_ns"}) {
+    database.Execute(std::string("ALTER TABLE pending DROP COLUMN ") + column);
+  }
+  database.Execute("PRAGMA user_version=2");
 }
 
 }  // namespace livemap

@@ -211,6 +211,37 @@ TEST_F(LocalHazardMapTest, SoundDatabaseIsNotSetAside) {
   EXPECT_EQ(Open().set_aside(), "");
 }
 
+TEST_F(LocalHazardMapTest, ReportsThatAnOlderProgramLeftAreStillThereAndShowTheWholeImage) {
+  {
+    LocalHazardMap map = Open();
+    map.Add(MakeReport(1, East(10)));
+    map.Add(MakeReport(2, East(30)));
+    map.MarkSent(Id(2));
+  }
+  MakeOlder(config_.path);
+  LocalHazardMap map = Open();
+  EXPECT_EQ(map.set_aside(), "");
+  ASSERT_EQ(map.pending_count(), 2u);
+  for (const auto& pending : map.Pending()) EXPECT_EQ(pending.hold_until_ns, 0);
+  const auto report = map.LoadPending(Id(1));
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->image, MakeReport(1, East(10)).image);
+  EXPECT_TRUE(report->shown.IsWholeImage());
+}
+
+TEST_F(LocalHazardMapTest, RegionAndHoldSurviveARestart) {
+  Report report = MakeReport(1, East(10));
+  report.shown = {10, 20, 240, 160};
+  Open().Add(report, 12345);
+  LocalHazardMap map = Open();
+  EXPECT_EQ(map.Pending().at(0).hold_until_ns, 12345);
+  const PixelRegion shown = map.LoadPending(Id(1))->shown;
+  EXPECT_EQ(shown.x, 10u);
+  EXPECT_EQ(shown.y, 20u);
+  EXPECT_EQ(shown.width, 240u);
+  EXPECT_EQ(shown.height, 160u);
+}
+
 TEST_F(LocalHazardMapTest, DatabaseOfANewerProgramIsRefusedAndLeftAlone) {
   { LocalHazardMap map = Open(); }
   SqliteDatabase(config_.path, true).Execute("PRAGMA user_version=99");

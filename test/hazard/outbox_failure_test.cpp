@@ -167,6 +167,7 @@ struct Damage {
   double from_share;       ///< Of the file.
   std::size_t bytes;       ///< Overwritten; 0: the file ends there.
   std::size_t least_left;  ///< Reports of 200 that must come back.
+  bool older = false;      ///< The file is of an older LiveMap.
 };
 
 class DamagedOutbox : public ::testing::TestWithParam<Damage> {};
@@ -187,6 +188,7 @@ TEST_P(DamagedOutbox, StartsAnewWithTheReportsThatCanStillBeRead) {
       if (i < 100) map.MarkSent(report.uuid);
     }
   }
+  if (GetParam().older) MakeOlder(path);
   const auto size = static_cast<double>(std::filesystem::file_size(path));
   const auto from = static_cast<std::streamoff>(GetParam().from_share * size);
   if (GetParam().bytes == 0) {
@@ -222,7 +224,9 @@ INSTANTIATE_TEST_SUITE_P(Places, DamagedOutbox,
                                            Damage{"header", 0, 100, 200},
                                            Damage{"one_page_in_the_middle", 0.5, 4096, 190},
                                            Damage{"many_pages_in_the_middle", 0.5, 40960, 100},
-                                           Damage{"cut_off_at_two_thirds", 0.67, 0, 80}),
+                                           Damage{"cut_off_at_two_thirds", 0.67, 0, 80},
+                                           Damage{"older_header", 0, 100, 200, true},
+                                           Damage{"older_middle", 0.5, 4096, 190, true}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -103,7 +103,7 @@ class PollResponderTest : public ::testing::Test {
 };
 
 TEST_F(PollResponderTest, SaysYesAtOnceWhenTheDetectorSeesTheHazardAtItsPlace) {
-  poll_.picture_wanted = true;
+  poll_.picture = PollPicture::kFullFrame;
   poll_.max_picture_bytes = 30000;
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 2.8, [](double time_s) {
@@ -276,7 +276,7 @@ TEST_F(PollResponderTest, APollThatIsOverOrNeverEndsDoesNotStay) {
 
 TEST_F(PollResponderTest, AYesGoesWithoutThePictureThatDoesNotCome) {
   luminance_.reset();
-  poll_.picture_wanted = true;
+  poll_.picture = PollPicture::kFullFrame;
   poll_.max_picture_bytes = 30000;
   responder_.Add(poll_, steady_s_);
   const auto seen = [](double time_s) {
@@ -287,6 +287,47 @@ TEST_F(PollResponderTest, AYesGoesWithoutThePictureThatDoesNotCome) {
   steady_s_ += responder_.config().picture_wait_s;
   responder_.Process(2.8, steady_s_, vehicle_);
   EXPECT_THAT(OnlyReply().image, IsEmpty());
+}
+
+TEST_F(PollResponderTest, TheCropShowsThePlaceWithinTheSmallerOfBothBudgets) {
+  poll_.picture = PollPicture::kCrop;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  Drive(2.7, 2.75, [](double time_s) {
+    return std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+  });
+  const PollReply reply = OnlyReply();
+  EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(240, 160));
+  EXPECT_LE(reply.image.size(), responder_.config().crop.max_bytes);
+}
+
+TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
+  luminance_.reset();
+  poll_.picture = PollPicture::kCrop;
+  poll_.max_picture_bytes = 12000;
+  responder_.Add(poll_, steady_s_);
+  Drive(2.0, 4.0);
+  const auto wanted = responder_.TakePictureRequests();
+  ASSERT_THAT(wanted, SizeIs(1)) << "once, though several views counted";
+  responder_.AddPicture(wanted[0], Lit(100));
+  responder_.Process(4.1, steady_s_, vehicle_);
+  const PollReply reply = OnlyReply();
+  EXPECT_EQ(reply.answer, Answer::kNo);
+  EXPECT_EQ(reply.stamp_ns, wanted[0]);
+  const cv::Size shown = cv::imdecode(reply.image, cv::IMREAD_COLOR).size();
+  EXPECT_GE(shown.width, 240);
+  EXPECT_LT(shown.width, 640) << "not the whole image";
+}
+
+TEST_F(PollResponderTest, BrightnessAloneTellsThatItIsTooDark) {
+  luminance_.reset();
+  responder_.Add(poll_, steady_s_);
+  for (double time_s = 2.0; time_s <= 4.0; time_s += 0.1) {
+    responder_.AddLuminance(StampNs(time_s), 5);
+    Drive(time_s, time_s + 0.05);
+  }
+  Expire();
+  EXPECT_EQ(OnlyReply().reason, "too dark");
 }
 
 TEST_F(PollResponderTest, FramesOfAnotherCameraOrSizeAreNoViews) {

@@ -107,5 +107,24 @@ TEST(ResendSchedule, WhatWasSentAMomentAgoIsNotSentAtOnceAgainByAnAnswer) {
   EXPECT_THAT(SendUntil(schedule, 8.0, 8.0), ElementsAre(Id(2)));
 }
 
+TEST(ResendSchedule, AHeldReportWaitsForACheapLinkOrTheEndOfItsTime) {
+  ResendSchedule schedule = WithoutJitter();
+  schedule.SetCheapLink(false);
+  schedule.Add(Id(1), 3, 1, 0.0, 100.0);
+  schedule.Add(Id(2), 3, 2, 0.0, 200.0);
+  schedule.Add(Id(3), 1, 3, 0.0);
+  EXPECT_THAT(schedule.TakeDue(0.0, 10), ElementsAre(Id(3)));
+  schedule.Remove(Id(3));
+  EXPECT_EQ(schedule.Held(0.0), 2u);
+  EXPECT_THAT(SendUntil(schedule, 0.125, 99.875), IsEmpty());
+  EXPECT_THAT(schedule.TakeDue(100.0, 10), ElementsAre(Id(1)));
+  schedule.Remove(Id(1));
+  schedule.SetCheapLink(true);
+  EXPECT_THAT(schedule.TakeDue(101.0, 10), ElementsAre(Id(2)));
+  schedule.SetCheapLink(false);
+  EXPECT_THAT(SendUntil(schedule, 101.0, 199.0), IsEmpty()) << "the link is dear again";
+  EXPECT_THAT(schedule.TakeDue(200.0, 10), ElementsAre(Id(2)));
+}
+
 }  // namespace
 }  // namespace livemap

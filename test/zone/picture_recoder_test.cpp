@@ -268,7 +268,7 @@ TEST_F(SmallPictureTest, KeepsToTheBudgetWithTheBoxInView) {
     for (const std::size_t budget : {1500U, 4096U, 12000U}) {
       SmallPictureLimits limits;
       limits.max_bytes = budget;
-      const Bytes file = SmallPicture(Encode(".jpg", image), box, 1280, 720, limits);
+      const Bytes file = SmallPicture(Encode(".jpg", image), box, {0, 0, 1280, 720}, limits);
       ASSERT_FALSE(file.empty()) << budget;
       EXPECT_LE(file.size(), budget);
       EXPECT_EQ(file[0], 0xff);
@@ -278,7 +278,8 @@ TEST_F(SmallPictureTest, KeepsToTheBudgetWithTheBoxInView) {
 
 TEST_F(SmallPictureTest, TheBoxIsDrawnWhereTheHazardIs) {
   const Box box{600, 400, 700, 460};
-  const cv::Mat seen = Decode(SmallPicture(Encode(".jpg", Scene(1280, 720)), box, 1280, 720));
+  const cv::Mat seen =
+      Decode(SmallPicture(Encode(".jpg", Scene(1280, 720)), box, {0, 0, 1280, 720}));
   ASSERT_EQ(seen.size(), cv::Size(192, 128));
   const cv::Rect frame = FrameOf(seen);
   // The view is 250 pixels wide, the box 100 of them and in its middle.
@@ -290,17 +291,37 @@ TEST_F(SmallPictureTest, TheBoxIsDrawnWhereTheHazardIs) {
 
 TEST_F(SmallPictureTest, TheBoxIsOfTheOriginalAlsoWhereThePictureIsASmallerCopy) {
   const Box box{1800, 1200, 2100, 1380};
-  const cv::Mat seen = Decode(SmallPicture(Encode(".png", Scene(1280, 720)), box, 3840, 2160));
+  const cv::Mat seen =
+      Decode(SmallPicture(Encode(".png", Scene(1280, 720)), box, {0, 0, 3840, 2160}));
   const cv::Rect frame = FrameOf(seen);
   EXPECT_NEAR(frame.width, 77, 6);
   EXPECT_NEAR(frame.x + frame.width / 2.0, 96, 4);
+}
+
+TEST_F(SmallPictureTest, TheBoxIsOfTheOriginalAlsoWhereThePictureShowsAPartOfIt) {
+  // 640 x 360 pixels of the original by as many, and by half of them.
+  const cv::Rect part(500, 250, 640, 360);
+  const Box box{600, 400, 700, 460};
+  for (const int divisor : {1, 2}) {
+    cv::Mat picture;
+    cv::resize(Scene(1280, 720)(part), picture, part.size() / divisor, 0, 0, cv::INTER_AREA);
+    const PixelRegion shown{500, 250, 640, 360};
+    const cv::Mat seen = Decode(SmallPicture(Encode(".png", picture), box, shown));
+    // In the part the box lies at 100..200, and the view 25..275: in the middle. Taken for a box of
+    // the whole image it would stand at the right edge.
+    const cv::Rect frame = FrameOf(seen);
+    EXPECT_NEAR(1.0 * frame.width / frame.height, 100.0 / 60, 0.25) << divisor;
+    EXPECT_NEAR(frame.x + frame.width / 2.0, seen.cols * 0.5, 6) << divisor;
+  }
+  EXPECT_THROW(SmallPicture(Encode(".png", Scene(64, 36)), {10, 10, 40, 40}, {500, 250, 640, 360}),
+               Error);
 }
 
 TEST_F(SmallPictureTest, ABoxInTheCornerOrAsLargeAsTheImageIsStillSeen) {
   const Bytes file = Encode(".jpg", Scene(640, 480));
   for (const Box& box : {Box{0, 0, 30, 20}, Box{610, 460, 641, 481}, Box{-1, -1, 641, 481},
                          Box{5, 5, 6, 6}, Box{300, 0, 340, 480}, Box{0, 200, 640, 260}}) {
-    const Bytes small = SmallPicture(file, box, 640, 480);
+    const Bytes small = SmallPicture(file, box, {0, 0, 640, 480});
     ASSERT_FALSE(small.empty());
     const cv::Mat seen = Decode(small);
     EXPECT_LE(seen.cols, 192);
@@ -314,17 +335,17 @@ TEST_F(SmallPictureTest, RefusesBoxesOutsideAndWhatNoPictureIs) {
   const float nan = std::nanf("");
   for (const Box& box : {Box{70, 10, 90, 20}, Box{10, 10, 10, 20}, Box{nan, 0, 10, 10},
                          Box{0, 0, nan, 10}, Box{-9, -9, -1, -1}}) {
-    EXPECT_THROW(SmallPicture(file, box, 64, 48), Error);
+    EXPECT_THROW(SmallPicture(file, box, {0, 0, 64, 48}), Error);
   }
-  EXPECT_THROW(SmallPicture({1, 2, 3}, {0, 0, 5, 5}, 64, 48), Error);
-  EXPECT_THROW(SmallPicture(file, {0, 0, 5, 5}, 0, 0), Error);
+  EXPECT_THROW(SmallPicture({1, 2, 3}, {0, 0, 5, 5}, {0, 0, 64, 48}), Error);
+  EXPECT_THROW(SmallPicture(file, {0, 0, 5, 5}, {0, 0, 0, 0}), Error);
 }
 
 TEST_F(SmallPictureTest, IsEmptyWhereTheBudgetLeavesNothingToSee) {
   SmallPictureLimits limits;
   limits.max_bytes = 50;
-  EXPECT_TRUE(
-      SmallPicture(Encode(".jpg", Scene(64, 48)), {10, 10, 40, 40}, 64, 48, limits).empty());
+  EXPECT_TRUE(SmallPicture(Encode(".jpg", Scene(64, 48)), {10, 10, 40, 40}, {0, 0, 64, 48}, limits)
+                  .empty());
 }
 
 TEST_F(SmallPictureTest, WithoutABoxItShowsTheWholePicture) {

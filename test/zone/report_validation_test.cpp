@@ -120,6 +120,20 @@ TEST(ReportValidation, RefusesBoxesThatAreEmptyOrOutsideTheImage) {
   EXPECT_EQ(Why([](Report& r) { r.box = {0, 0, 640, 480}; }), "");
 }
 
+TEST(ReportValidation, RefusesShownRegionsThatAreEmptyOrNotWithinTheImage) {
+  constexpr std::uint32_t kMost = std::numeric_limits<std::uint32_t>::max();
+  for (const PixelRegion& good : {PixelRegion{}, PixelRegion{0, 0, 640, 480},
+                                  PixelRegion{639, 479, 1, 1}, PixelRegion{100, 50, 240, 160}}) {
+    EXPECT_EQ(Why([&](Report& r) { r.shown = good; }), "");
+  }
+  for (const PixelRegion& bad :
+       {PixelRegion{1, 0, 0, 0}, PixelRegion{0, 0, 10, 0}, PixelRegion{0, 0, 641, 480},
+        PixelRegion{1, 0, 640, 480}, PixelRegion{640, 0, 1, 1}, PixelRegion{2, 2, kMost, kMost},
+        PixelRegion{kMost, kMost, 2, 2}}) {
+    EXPECT_THAT(Why([&](Report& r) { r.shown = bad; }), HasSubstr("region")) << bad.x;
+  }
+}
+
 TEST(ReportValidation, RefusesPicturesThatAreLargeForeignOrHuge) {
   ReportLimits limits;
   limits.max_image_bytes = 1000;
