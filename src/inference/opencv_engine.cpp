@@ -90,8 +90,7 @@ class OpenCvEngine final : public InferenceEngine {
     }
     const int images_shape[] = {1, 3, manifest.input.height, manifest.input.width};
     const cv::Mat output = Run(cv::Mat(4, images_shape, CV_32F, cv::Scalar(0)));
-    const std::vector<std::int64_t> shape = {
-        1, manifest.AnchorCount(), 5 + static_cast<std::int64_t>(manifest.classes.size())};
+    const std::vector<std::int64_t> shape = manifest.OutputShape();
     if (output.type() != CV_32F || ShapeOf(output) != shape) {
       throw Error("model file '" + file_ + "' answers with a tensor of " +
                   ShapeText(ShapeOf(output)) + ", its manifest of " +

@@ -1,5 +1,6 @@
 #include "ros/bridged_type.h"
 
+#include <livemap/CandidateFrame.h>
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardPoll.h>
 #include <livemap/HazardPollAnswer.h>
@@ -97,6 +98,7 @@ std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk
 /// A new message type joins the bridge by one line here.
 const std::map<std::string, Factory>& Registry() {
   static const std::map<std::string, Factory> kRegistry = {
+      Entry<CandidateFrame>({"image.data"}),
       Entry<HazardNotice>({"image.data"}),
       Entry<HazardPoll>(),
       Entry<HazardPollAnswer>({"image.data"}),
