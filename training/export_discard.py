@@ -126,6 +126,8 @@ def run(arguments: argparse.Namespace) -> None:
         name: score_drive(drive, scorer)
         for name, drive in labels.read_sections(arguments.data, lambda name: name in labels.CALIBRATION_SECTIONS).items()
     }
+    if not any(drive.hazards.any() for drive in calibration.values()):
+        raise ExportError(f"No frame with a hazard in the sections {', '.join(labels.CALIBRATION_SECTIONS)} below {arguments.data}.")
     thresholds = [threshold_for_recall(calibration, RECALL)]
     simulated = score_simulated(arguments.simulated, scorer) if arguments.simulated else {}
     if simulated:

@@ -45,10 +45,8 @@ def event_scores(drive: ScoredDrive) -> List[float]:
 
 
 def threshold_for_recall(drives: Dict[str, ScoredDrive], recall: float) -> float:
-    """The highest threshold, in thousandths, that sends at least `recall` of the frames with hazards; at least 0.001."""
+    """The highest threshold, in thousandths, that sends at least `recall` of the frames with hazards (there are some); at least 0.001."""
     scores = np.sort(np.concatenate([drive.scores[drive.hazards] for drive in drives.values()]))
-    if not len(scores):
-        return 0.5
     lowest = scores[int(np.floor((1 - recall) * len(scores) + 1e-9))]
     return float(np.clip(np.floor(lowest * 1000) / 1000, 0.001, 0.999))
 
