@@ -98,19 +98,16 @@ std::optional<Candidate> CandidateSender::Encoded(const Waiting& waiting,
                                                   const BasePoseSource::Lookup& lookup,
                                                   const Encode& encode) {
   Refill(waiting.stamp_ns);
-  if (budget_bytes_ <= 0) {  // Not worth the work of masking.
+  if (budget_bytes_ < config_.min_image_bytes) {
     ++counters_.over_budget;
     return std::nullopt;
   }
+  const double most = std::min(budget_bytes_, static_cast<double>(config_.max_image_bytes));
   Candidate frame;
-  frame.image = encode(waiting.picture);
+  frame.image = encode(waiting.picture, static_cast<std::size_t>(most));
   const auto header = ReadImageHeader(frame.image.data(), frame.image.size());
   if (!header || header->format != ImageHeader::Format::kJpeg) {
     ++counters_.withheld;
-    return std::nullopt;
-  }
-  if (static_cast<double>(frame.image.size()) > budget_bytes_) {
-    ++counters_.over_budget;
     return std::nullopt;
   }
   budget_bytes_ -= static_cast<double>(frame.image.size());

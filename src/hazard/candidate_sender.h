@@ -28,7 +28,12 @@ class CandidateSender {
     double min_spacing_m = 3.0;
     double max_bytes_per_s = 60000;  ///< Of pictures, in the long run.
     double burst_s = 10.0;           ///< Unused budget of this long may be spent at once, s.
-    int max_waiting_frames = 16;     ///< Frames that wait for their pose; then the oldest goes.
+    /// Of one picture: what the budget leaves, but at most this, bytes. So pictures are good on a
+    /// calm road and smaller, rather than fewer, where much is worth sending.
+    int max_image_bytes = 40000;
+    /// A frame for which the budget leaves less than this is dropped, bytes.
+    int min_image_bytes = 12000;
+    int max_waiting_frames = 16;  ///< Frames that wait for their pose; then the oldest goes.
     BasePoseSource::Config pose;
   };
 
@@ -49,8 +54,10 @@ class CandidateSender {
     std::uint64_t withheld = 0;     ///< Could not be masked or encoded.
   };
 
-  /// Makes the file that leaves the car: masked, a JPEG; empty when it must not or cannot leave.
-  using Encode = std::function<std::vector<std::uint8_t>(const Picture& picture)>;
+  /// Makes the file that leaves the car: masked, a JPEG of at most `max_bytes`; empty when it must
+  /// not or cannot leave.
+  using Encode =
+      std::function<std::vector<std::uint8_t>(const Picture& picture, std::size_t max_bytes)>;
 
   explicit CandidateSender(const Config& config);
 

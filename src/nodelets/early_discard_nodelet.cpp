@@ -193,14 +193,16 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     // Without a listener a frame would be spent, not sent.
     if (publisher_.getNumSubscribers() == 0) return;
-    const auto encode = [this](const Picture& picture) { return MaskedJpeg(picture); };
+    const auto encode = [this](const Picture& picture, std::size_t max_bytes) {
+      return MaskedJpeg(picture, max_bytes);
+    };
     for (const Candidate& candidate : sender_->TakeReady(ros::Time::now().toSec(), encode)) {
       publisher_.publish(boost::make_shared<CandidateFrame>(ToMessage(candidate)));
     }
   }
 
   /// What leaves the car; empty when it cannot be masked: it fails closed.
-  std::vector<std::uint8_t> MaskedJpeg(const Picture& picture) {
+  std::vector<std::uint8_t> MaskedJpeg(const Picture& picture, std::size_t max_bytes) {
     Picture masked = picture;
     if (mask_) {
       masked.bgr = picture.bgr.clone();
@@ -212,8 +214,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
       }
       masked_regions_ += mask_->Masked().size();
     }
-    return EncodeJpeg(masked, config_.jpeg_quality,
-                      static_cast<std::size_t>(config_.max_image_bytes));
+    return EncodeJpeg(masked, config_.jpeg_quality, max_bytes);
   }
 
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }

@@ -10,6 +10,8 @@ void ReadSender(ParameterReader& parameters, CandidateSender::Config& sender) {
   parameters.Read("min_spacing_m", sender.min_spacing_m, {0, 1000});
   parameters.Read("max_bytes_per_s", sender.max_bytes_per_s, {1000, 10e6});
   parameters.Read("burst_s", sender.burst_s, {1, 600});
+  parameters.Read("max_image_bytes", sender.max_image_bytes, {1000, 1e6});
+  parameters.Read("min_image_bytes", sender.min_image_bytes, {1, 1e6});
   parameters.Read("max_waiting_frames", sender.max_waiting_frames, {1, 1000});
   BasePoseSource::Config& pose = sender.pose;
   std::string source = "gps";
@@ -38,7 +40,6 @@ EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int6
   config.sender.drive_id = ReadDriveId(parameters, now_ns);
   ReadSender(parameters, config.sender);
   parameters.Read("jpeg_quality", config.jpeg_quality, {1, 100});
-  parameters.Read("max_image_bytes", config.max_image_bytes, {1000, 1e6});
   parameters.Read("privacy", config.privacy);
   parameters.Read("privacy_cascades", config.mask.regions.cascades);
   parameters.Read("privacy_face_model", config.mask.regions.face_model);

@@ -17,9 +17,8 @@ struct EarlyDiscardConfig {
   int threads = 1;        ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
   int queue_size = 2;     ///< Frames that may wait for the classifier.
   CandidateSender::Config sender;
-  int jpeg_quality = 75;        ///< 1..100; lowered to meet max_image_bytes.
-  int max_image_bytes = 40000;  ///< Of a picture.
-  bool privacy = true;          ///< Mask faces and number plates.
+  int jpeg_quality = 75;  ///< 1..100; lowered where the bytes do not suffice.
+  bool privacy = true;    ///< Mask faces and number plates.
   PrivacyMask::Config mask;
   std::string base_frame = "base_link";
   std::string map_frame = "map";  ///< Of fused poses.

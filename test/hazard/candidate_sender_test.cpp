@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "driving_reporter.h"
 
@@ -13,8 +13,8 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-std::vector<std::uint8_t> PlainJpeg(const Picture& picture) {
-  return EncodeJpeg(picture, 80, 100000);
+std::vector<std::uint8_t> PlainJpeg(const Picture& picture, std::size_t max_bytes) {
+  return EncodeJpeg(picture, 80, max_bytes);
 }
 
 /// A small vehicle that drives straight on.
@@ -101,7 +101,7 @@ TEST_F(CandidateSenderTest, ABagThatBeginsAnewIsSeenFromItsFirstFrame) {
 
 TEST_F(CandidateSenderTest, AStandingVehicleSendsOnce) {
   DriveFixes(0, 2);
-  for (int i = 1; i <= 100; ++i) {  // It stands where it was after two seconds.
+  for (int i = 1; i <= 150; ++i) {  // It stands where it was after two seconds.
     const double time_s = 2 + 0.2 * i;
     Fix fix = FixAt(2);
     fix.stamp_ns = StampNs(time_s);
@@ -163,7 +163,7 @@ TEST_F(CandidateSenderTest, FusedPosesCountWhereTheyAreAndFixesElsewhere) {
 TEST_F(CandidateSenderTest, WhatCannotBeMaskedDoesNotLeave) {
   DriveFixes(0, 4);
   sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyPicture(), 3);
-  const auto refuse = [](const Picture&) { return std::vector<std::uint8_t>(); };
+  const auto refuse = [](const Picture&, std::size_t) { return std::vector<std::uint8_t>(); };
   EXPECT_THAT(sender_->TakeReady(3, refuse), IsEmpty());
   EXPECT_EQ(counters().withheld, 1U);
   EXPECT_EQ(counters().sent, 0U);
@@ -171,30 +171,38 @@ TEST_F(CandidateSenderTest, WhatCannotBeMaskedDoesNotLeave) {
 
 TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
   config_.max_bytes_per_s = 5000;
-  config_.burst_s = 1;
+  config_.burst_s = 2;
   config_.min_spacing_m = 0;
+  config_.min_image_bytes = 2000;
+  config_.max_image_bytes = 8000;
   Restart();
   DriveFixes(0, 60);
-  const auto big = [](const Picture& picture) {
-    std::vector<std::uint8_t> jpeg = PlainJpeg(picture);
-    jpeg.resize(4000);
+  std::size_t largest = 0;
+  std::size_t smallest = 100000;
+  const auto all_that_is_left = [&](const Picture& picture, std::size_t max_bytes) {
+    std::vector<std::uint8_t> jpeg = PlainJpeg(picture, 100000);
+    jpeg.resize(max_bytes);
+    largest = std::max(largest, max_bytes);
+    smallest = std::min(smallest, max_bytes);
     return jpeg;
   };
   for (int i = 3; i < 170; ++i) {
     sender_->AddJudged(StampNs(0.33 * i), kOptical, 0.8F, true, GreyPicture(), 0.33 * i);
-    sender_->TakeReady(0.33 * i, big);
+    sender_->TakeReady(0.33 * i, all_that_is_left);
   }
   const double seconds = 0.33 * 167;
-  EXPECT_LE(static_cast<double>(counters().sent_bytes), 5000 * (seconds + 1));
+  EXPECT_LE(static_cast<double>(counters().sent_bytes), 5000 * (seconds + 2));
   EXPECT_GE(static_cast<double>(counters().sent_bytes), 0.8 * 5000 * seconds);
   EXPECT_GT(counters().over_budget, 0U);
+  EXPECT_EQ(largest, 8000U) << "as long as there is plenty";
+  EXPECT_GE(smallest, 2000U);
 }
 
 TEST_F(CandidateSenderTest, APictureThatWasShrunkHasTheIntrinsicsOfItsOwnSize) {
   DriveFixes(0, 4);
   sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyPicture(), 3);
-  const auto half = [](const Picture&) {
-    return PlainJpeg({cv::Mat(200, 320, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr});
+  const auto half = [](const Picture&, std::size_t max_bytes) {
+    return PlainJpeg({cv::Mat(200, 320, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr}, max_bytes);
   };
   const auto sent = sender_->TakeReady(3, half);
   ASSERT_THAT(sent, SizeIs(1));
