@@ -176,7 +176,6 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
   config_.min_image_bytes = 2000;
   config_.max_image_bytes = 8000;
   Restart();
-  DriveFixes(0, 60);
   std::size_t largest = 0;
   std::size_t smallest = 100000;
   const auto all_that_is_left = [&](const Picture& picture, std::size_t max_bytes) {
@@ -186,7 +185,9 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
     smallest = std::min(smallest, max_bytes);
     return jpeg;
   };
+  DriveFixes(0, 0.6);
   for (int i = 3; i < 170; ++i) {
+    DriveFixes(0.33 * i, 0.33 * i + 0.1);
     sender_->AddJudged(StampNs(0.33 * i), kOptical, 0.8F, true, GreyPicture(), 0.33 * i);
     sender_->TakeReady(0.33 * i, all_that_is_left);
   }
