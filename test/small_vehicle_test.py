@@ -228,6 +228,8 @@ class SmallVehicleTest(unittest.TestCase):
 
     def test_6_a_frame_that_comes_twice_is_one_report(self):
         again = self.frames[0]
+        eventually(lambda: (self.status.get("frames_detected"), self.status.get("reports")) ==
+                   (str(len(self.frames)), str(len(self.reports))), "all that came before is reported")
         reports = len(self.reports)
         repeated = int(self.status["frames_repeated"])
         self.publish(VEHICLE, again)
