@@ -84,6 +84,7 @@ def vehicle_rights(zone):
     return [f"pattern write {vehicle}/report",
             f"pattern write {vehicle}/position",
             f"pattern write {vehicle}/answer",
+            f"pattern write {vehicle}/candidate",
             f"pattern read {vehicle}/receipt",
             f"pattern read {vehicle}/notice",
             f"pattern read {vehicle}/poll"]

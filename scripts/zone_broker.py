@@ -30,6 +30,7 @@ def rights(zone, revoked):
         f"topic read {prefix}/vehicle/+/report",
         f"topic read {prefix}/vehicle/+/position",
         f"topic read {prefix}/vehicle/+/answer",
+        f"topic read {prefix}/vehicle/+/candidate",
         f"topic write {prefix}/vehicle/+/receipt",
         f"topic write {prefix}/vehicle/+/notice",
         f"topic write {prefix}/vehicle/+/poll",

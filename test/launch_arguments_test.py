@@ -13,8 +13,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 NODES = {
     "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "geo_localization": "geo_localization",
                 "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
-                "mqtt_bridge": "mqtt_bridge_vehicle"},
-    "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone"},
+                "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard"},
+    "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone", "candidate_intake": "candidate_intake",
+             "hazard_detection": "hazard_detection"},
 }
 
 
@@ -51,10 +52,27 @@ class LaunchArguments(unittest.TestCase):
             for node, file in nodes.items():
                 defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
                 wanted = {key: changed(value) for key, value in defaults.items() if key not in own_arguments}
-                optional = ["vo:=true"] if node in ("edge_vo", "geo_localization") else []
+                optional = {"edge_vo": ["vo:=true"], "geo_localization": ["vo:=true"], "early_discard": ["profile:=small"]}.get(node, [])
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
+
+    def test_a_small_vehicle_discards_early_and_has_no_detector(self):
+        big, small = nodes("vehicle.launch").stdout, nodes("vehicle.launch", "profile:=small").stdout
+        self.assertIn("/hazard_detection", big)
+        self.assertNotIn("/early_discard", big)
+        self.assertNotIn("/hazard_detection", small)
+        self.assertIn("/early_discard", small)
+        self.assertIn("/hazard_reporting", small)
+        refused = nodes("vehicle.launch", "profile:=tiny")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("profile:=tiny is neither big nor small", refused.stderr)
+
+    def test_a_zone_detects_for_small_vehicles_unless_told_not_to(self):
+        self.assertIn("/candidate_intake", nodes("zone.launch").stdout)
+        without = nodes("zone.launch", "detect_for_small:=false").stdout
+        self.assertNotIn("/candidate_intake", without)
+        self.assertNotIn("/hazard_detection", without)
 
     def test_a_folder_of_certificates_gives_the_bridge_its_three_files_on_both_sides(self):
         for launch in NODES:

@@ -82,6 +82,7 @@ def render(program: str, out: Path, seed: int, frames: int, rate_hz: float) -> N
         world_file.write_text(yaml.safe_dump(country_road(rng, frames / rate_hz * SPEED_MPS * 1.1 + 200), sort_keys=False))
         command += ["--world", str(world_file)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    camera_file.rename(unfinished / "drive" / camera_file.name)
     (unfinished / "drive").rename(folder)
     shutil.rmtree(unfinished)
 

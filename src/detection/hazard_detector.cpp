@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "base/error.h"
 #include "detection/yolox_decoder.h"
 
 namespace livemap {
@@ -12,7 +13,12 @@ HazardDetector::HazardDetector(const ModelManifest& manifest, int threads,
 
 HazardDetector::HazardDetector(const ModelManifest& manifest,
                                std::unique_ptr<InferenceEngine> engine)
-    : manifest_(manifest), engine_(std::move(engine)), letterbox_(manifest) {}
+    : manifest_(manifest), engine_(std::move(engine)), letterbox_(manifest) {
+  if (manifest_.head.type != HeadType::kYolox) {
+    throw Error("model '" + manifest_.name +
+                "' has a head of type 'score', a detector needs one of type 'yolox'");
+  }
+}
 
 std::vector<HazardDetection> HazardDetector::Detect(const cv::Mat& bgr) {
   const cv::Mat& input = letterbox_.Fill(bgr);

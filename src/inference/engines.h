@@ -19,9 +19,8 @@ std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, 
 std::string ShapeText(const std::vector<std::int64_t>& sizes);
 std::vector<std::int64_t> ShapeOf(const cv::Mat& tensor);
 
-/// The shape of the input and of the output that the manifest promises.
+/// The shape of the input that the manifest promises.
 std::vector<std::int64_t> InputShape(const ModelManifest& manifest);
-std::vector<std::int64_t> OutputShape(const ModelManifest& manifest);
 
 /// Runs the engine once, which also makes the first frame as fast as the others, and throws Error
 /// when the output is not the manifest's. `file` is the model's, for the error.

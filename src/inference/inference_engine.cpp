@@ -21,16 +21,12 @@ std::vector<std::int64_t> InputShape(const ModelManifest& manifest) {
   return {1, 3, manifest.input.height, manifest.input.width};
 }
 
-std::vector<std::int64_t> OutputShape(const ModelManifest& manifest) {
-  return {1, manifest.AnchorCount(), 5 + static_cast<std::int64_t>(manifest.classes.size())};
-}
-
 std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 void CheckOutput(InferenceEngine& engine, const ModelManifest& manifest, const std::string& file) {
   const int shape[] = {1, 3, manifest.input.height, manifest.input.width};
   const cv::Mat output = engine.Run(cv::Mat(4, shape, CV_32F, cv::Scalar(0)));
-  const std::vector<std::int64_t> promised = OutputShape(manifest);
+  const std::vector<std::int64_t> promised = manifest.OutputShape();
   if (output.type() != CV_32F || ShapeOf(output) != promised) {
     throw Error("model file '" + file + "' answers with a tensor of " + ShapeText(ShapeOf(output)) +
                 ", its manifest of " + std::to_string(manifest.classes.size()) +

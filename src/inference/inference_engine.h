@@ -15,7 +15,7 @@ class InferenceEngine {
   virtual ~InferenceEngine() = default;
 
   /// `images`: continuous float32 of 1 x 3 x H x W as the manifest says. Returns continuous float32
-  /// of 1 x N x (5 + classes), valid until the next call. Throws Error when the library fails.
+  /// of the manifest's OutputShape, valid until the next call. Throws Error when the library fails.
   virtual cv::Mat Run(const cv::Mat& images) = 0;
 
   /// The library that runs it: kOpenCv or kTorch.

@@ -216,10 +216,31 @@ void ReadInput(const Section& root, ModelManifest& manifest) {
   manifest.normalisation.std = read_three("std", 1e-3);
 }
 
-void ReadHead(const Section& root, ModelManifest& manifest) {
+/// Which keys are needed depends on the head, so its type is looked at before they are checked.
+HeadType HeadTypeOf(const YAML::Node& file) {
+  if (!file.IsMap() || !file["head"].IsDefined() || !file["head"].IsMap()) return HeadType::kYolox;
+  const YAML::Node type = file["head"]["type"];
+  const bool is_score = type.IsDefined() && type.IsScalar() && type.Scalar() == "score";
+  return is_score ? HeadType::kScore : HeadType::kYolox;
+}
+
+void ReadThresholds(const Section& root, ModelManifest& manifest) {
+  const Section thresholds = root.Sub("thresholds", manifest.classes);
+  for (const std::string& name : manifest.classes) {
+    manifest.thresholds.push_back(thresholds.Number(name, 0.001, 0.999));
+  }
+}
+
+void ReadScoreHead(const Section& root, ModelManifest& manifest) {
+  const Section head = root.Sub("head", {"type", "output"});
+  manifest.head.type = HeadType::kScore;
+  manifest.head.output = head.Text("output");
+}
+
+void ReadYoloxHead(const Section& root, ModelManifest& manifest) {
   const Section head = root.Sub("head", {"type", "strides", "output"});
   if (head.Text("type") != "yolox") {
-    head.Refuse("head.type", head.node()["type"], "yolox");
+    head.Refuse("head.type", head.node()["type"], "yolox or score");
   }
   manifest.head.output = head.Text("output");
   manifest.head.strides =
@@ -232,10 +253,6 @@ void ReadHead(const Section& root, ModelManifest& manifest) {
         }
         return stride;
       });
-  const Section thresholds = root.Sub("thresholds", manifest.classes);
-  for (const std::string& name : manifest.classes) {
-    manifest.thresholds.push_back(thresholds.Number(name, 0.001, 0.999));
-  }
   manifest.nms_iou = root.Number("nms_iou", 0.0, 1.0);
 }
 
@@ -260,6 +277,12 @@ int ModelManifest::AnchorCount() const {
   return count;
 }
 
+std::vector<std::int64_t> ModelManifest::OutputShape() const {
+  const auto class_count = static_cast<std::int64_t>(classes.size());
+  if (head.type == HeadType::kScore) return {1, class_count};
+  return {1, AnchorCount(), 5 + class_count};
+}
+
 ModelManifest ParseModelManifest(const std::string& yaml, const std::string& origin,
                                  const std::string& directory) {
   if (yaml.size() > kMostManifestBytes) {
@@ -267,15 +290,18 @@ ModelManifest ParseModelManifest(const std::string& yaml, const std::string& ori
                 " bytes, at most " + std::to_string(kMostManifestBytes) + " are accepted");
   }
   try {
-    const Section root(YAML::Load(yaml), origin, "",
-                       {"name", "file", "sha256", "classes", "input", "normalisation", "head",
-                        "thresholds", "nms_iou"},
-                       {"engine", "torch_file", "torch_sha256"});
+    const YAML::Node file = YAML::Load(yaml);
+    const HeadType head = HeadTypeOf(file);
+    std::vector<std::string> keys = {"name",  "file",          "sha256", "classes",
+                                     "input", "normalisation", "head",   "thresholds"};
+    if (head == HeadType::kYolox) keys.emplace_back("nms_iou");
+    const Section root(file, origin, "", keys, {"engine", "torch_file", "torch_sha256"});
     ModelManifest manifest;
     ReadNames(root, manifest);
     ReadFiles(root, directory, manifest);
     ReadInput(root, manifest);
-    ReadHead(root, manifest);
+    head == HeadType::kScore ? ReadScoreHead(root, manifest) : ReadYoloxHead(root, manifest);
+    ReadThresholds(root, manifest);
     return manifest;
   } catch (const YAML::Exception& error) {
     throw Error("model manifest '" + origin + "' is no valid YAML: " + error.what());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,11 @@ enum class ChannelOrder { kRgb, kBgr };
 
 /// The library that runs a network.
 enum class EngineKind { kOpenCv, kTorch };
+/// What a network's answer is.
+enum class HeadType {
+  kYolox,  ///< Boxes with a score per class.
+  kScore,  ///< One score per class for the whole image.
+};
 
 /// Everything that must be known about a model to run it: the content of models/NAME.yaml, checked.
 /// models/README.md describes the file key by key.
@@ -38,19 +44,22 @@ struct ModelManifest {
     std::array<float, 3> std{};
   } normalisation;
 
-  /// YOLOX head (Ge et al. 2021): one output 1 x N x (5 + classes), rows (tx, ty, tw, th,
-  /// objectness, class scores) of all grid cells, level by level in the order of `strides`, rows of
-  /// cells first.
+  /// kYolox (Ge et al. 2021): one output 1 x N x (5 + classes), rows (tx, ty, tw, th, objectness,
+  /// class scores) of all grid cells, level by level in the order of `strides`, rows of cells
+  /// first. kScore: one output 1 x classes, scores of the whole image, without strides.
   struct Head {
+    HeadType type = HeadType::kYolox;
     std::vector<int> strides;  ///< px of the input per cell
     std::string output;        ///< name of the output tensor
   } head;
 
   std::vector<float> thresholds;  ///< Least confidence that is reported, by class index, (0, 1).
-  float nms_iou = 0.5F;           ///< Of two boxes of a class overlapping more, the weaker goes.
+  float nms_iou = 0.5F;  ///< kYolox: of two boxes of a class overlapping more, the weaker goes.
 
   /// Rows of the output tensor: the cells of all levels.
   int AnchorCount() const;
+  /// Of the output tensor, by the type of the head.
+  std::vector<std::int64_t> OutputShape() const;
 };
 
 /// Reads and checks a manifest file; its files are resolved against the manifest's folder. The

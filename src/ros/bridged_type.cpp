@@ -1,5 +1,6 @@
 #include "ros/bridged_type.h"
 
+#include <livemap/CandidateFrame.h>
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardPoll.h>
 #include <livemap/HazardPollAnswer.h>
@@ -100,6 +101,7 @@ std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk
 /// theirs, which did not say what a picture shows.
 const std::map<std::string, Factory>& Registry() {
   static const std::map<std::string, Factory> kRegistry = {
+      Entry<CandidateFrame>({"image.data"}),
       Entry<HazardNotice>({"image.data"}),
       Entry<HazardPoll>({}, {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
       Entry<HazardPollAnswer>({"image.data"}),

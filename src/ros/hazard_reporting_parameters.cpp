@@ -1,22 +1,12 @@
 #include "ros/hazard_reporting_parameters.h"
 
 #include <cstdlib>
-#include <ctime>
 
 #include "ros/datum_parameter.h"
+#include "ros/vehicle_parameters.h"
 
 namespace livemap {
 namespace {
-
-/// "drive-20260131T235959Z".
-std::string DriveName(std::int64_t now_ns) {
-  const auto seconds = static_cast<std::time_t>(now_ns / 1'000'000'000);
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[40];
-  std::strftime(text, sizeof(text), "drive-%Y%m%dT%H%M%SZ", &utc);
-  return text;
-}
 
 /// Where ROS keeps a user's files.
 std::string DefaultDatabase() {
@@ -25,19 +15,6 @@ std::string DefaultDatabase() {
   }
   const char* home = std::getenv("HOME");
   return std::string(home != nullptr ? home : ".") + "/.ros/livemap/local_hazards.sqlite3";
-}
-
-void ReadTrack(ParameterReader& parameters, FixTrack::Config& track) {
-  parameters.Read("max_extrapolation_s", track.max_extrapolation_s, {0, 10});
-  parameters.Read("max_gap_s", track.max_gap_s, {0.01, 60});
-  parameters.Read("min_baseline_m", track.min_baseline_m, {0.01, 100});
-  parameters.Read("course_window_s", track.course_window_s, {0.1, 20});
-  parameters.Read("course_noise_m", track.course_noise_m, {0.001, 100});
-  parameters.Read("turn_rate_rps", track.turn_rate_rps, {0, 3});
-  parameters.Read("max_course_sigma_rad", track.max_course_sigma_rad, {0.001, 3});
-  parameters.Read("acceleration_mps2", track.acceleration_mps2, {0, 20});
-  parameters.Read("default_sigma_m", track.default_sigma_m, {0.01, 100});
-  parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
 }
 
 void ReadUrgency(ParameterReader& parameters, HazardReporter::Config& reporter) {
@@ -97,12 +74,7 @@ void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& confi
 HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns) {
   HazardReportingConfig config;
   HazardReporter::Config& reporter = config.reporter;
-  parameters.Read("drive_id", reporter.drive_id);
-  if (reporter.drive_id.empty()) reporter.drive_id = DriveName(now_ns);
-  if (reporter.drive_id.size() > 64) {
-    throw Error("parameter 'drive_id' has " + std::to_string(reporter.drive_id.size()) +
-                " bytes, accepted are at most 64");
-  }
+  reporter.drive_id = ReadDriveId(parameters, now_ns);
   parameters.Read("catalogue", config.catalogue);
   parameters.Read("database", reporter.map.path);
   if (reporter.map.path.empty()) reporter.map.path = DefaultDatabase();
@@ -133,6 +105,7 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("height_sigma_m", reporter.projection.height_sigma_m, {0, 2});
   ReadTrack(parameters, reporter.track);
   ReadUrgency(parameters, reporter);
+  ReadFixTrack(parameters, reporter.track);
   ReadPositionSource(parameters, config);
   ReadPollAnswering(parameters, config);
   parameters.Read("resend_first_s", reporter.resend.first_pause_s, {0.05, 600});

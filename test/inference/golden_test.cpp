@@ -66,13 +66,17 @@ TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
   const auto tolerance = golden["tolerance"].as<double>();
   ASSERT_LE(tolerance, 1e-3);
   ASSERT_GT(golden["rows"].size(), 0U);
+  // A head of scores has one row.
+  const int columns = output.size[output.dims - 1];
+  const int rows = static_cast<int>(output.total()) / columns;
   for (const YAML::Node& row : golden["rows"]) {
     const int index = row["index"].as<int>();
     const auto values = row["values"].as<std::vector<double>>();
-    ASSERT_TRUE(index >= 0 && index < output.size[1]) << index;
-    ASSERT_EQ(values.size(), static_cast<std::size_t>(output.size[2]));
+    ASSERT_TRUE(index >= 0 && index < rows) << index;
+    ASSERT_EQ(values.size(), static_cast<std::size_t>(columns));
     for (std::size_t column = 0; column < values.size(); ++column) {
-      EXPECT_NEAR(output.ptr<float>(0, index)[column], values[column], tolerance)
+      EXPECT_NEAR(output.ptr<float>()[index * columns + static_cast<int>(column)], values[column],
+                  tolerance)
           << "row " << index << ", column " << column;
     }
   }

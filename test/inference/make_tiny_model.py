@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Writes tiny.onnx and tiny.yaml: a model whose answer is a known function of the image.
+"""Writes tiny.onnx and tiny.yaml, tiny_score.onnx and tiny_score.yaml: models whose answers are known functions of the image.
 
     test/inference/make_tiny_model.py [FOLDER]
     training/export_torch.py test/inference/tiny.yaml      (adds tiny.pt)
@@ -11,6 +11,8 @@ green a traffic cone. With r, g the cell's mean red and green (0..1):
     tx = ty = 0.5    tw = ln 2 * r    th = 0
 
 so that a full red cell's box is two cells wide and one cell high around the cell's centre.
+
+tiny_score judges the whole image: the highest of sigmoid(20 (r - g) - 10) over all cells of 8x8 pixels.
 """
 
 import hashlib
@@ -52,8 +54,36 @@ def level(stride):
     return nodes, constants
 
 
+def checked(graph):
+    """The model of a graph, as OpenCV 4.6 reads it."""
+    model = helper.make_model(graph, producer_name="livemap", opset_imports=[helper.make_opsetid("", 11)])
+    model.ir_version = 6
+    onnx.checker.check_model(model)
+    return model
+
+
+def make_score_model():
+    """The network that judges whole images."""
+    constants = {
+        "weights": np.array([20, -20, 0], np.float32).reshape(1, 3, 1, 1), "bias": np.array([-10], np.float32),
+    }
+    nodes = [
+        helper.make_node("AveragePool", ["images"], ["means"], kernel_shape=[8, 8], strides=[8, 8]),
+        helper.make_node("Conv", ["means", "weights", "bias"], ["logits"], kernel_shape=[1, 1]),
+        helper.make_node("MaxPool", ["logits"], ["highest"], kernel_shape=[HEIGHT // 8, WIDTH // 8]),
+        helper.make_node("Flatten", ["highest"], ["flat"], axis=1),
+        helper.make_node("Sigmoid", ["flat"], ["score"]),
+    ]
+    return checked(helper.make_graph(
+        nodes, "tiny_score",
+        [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, HEIGHT, WIDTH])],
+        [helper.make_tensor_value_info("score", TensorProto.FLOAT, [1, 1])],
+        [numpy_helper.from_array(array, name) for name, array in constants.items()],
+    ))
+
+
 def make_model():
-    """The whole network."""
+    """The network that detects."""
     nodes, constants = [], {}
     for stride in STRIDES:
         level_nodes, level_constants = level(stride)
@@ -67,14 +97,11 @@ def make_model():
         [helper.make_tensor_value_info("predictions", TensorProto.FLOAT, [1, rows, 7])],
         [numpy_helper.from_array(array, name) for name, array in constants.items()],
     )
-    model = helper.make_model(graph, producer_name="livemap", opset_imports=[helper.make_opsetid("", 11)])
-    model.ir_version = 6
-    onnx.checker.check_model(model)
-    return model
+    return checked(graph)
 
 
 def main():
-    """Writes both files."""
+    """Writes all files."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     model = make_model().SerializeToString()
     (folder / "tiny.onnx").write_bytes(model)
@@ -89,6 +116,19 @@ normalisation: {{mean: [0, 0, 0], std: [255, 255, 255]}}
 head: {{type: yolox, strides: [{", ".join(map(str, STRIDES))}], output: predictions}}
 thresholds: {{pothole: 0.6, traffic_cone: 0.7}}
 nms_iou: 0.5
+""")
+    model = make_score_model().SerializeToString()
+    (folder / "tiny_score.onnx").write_bytes(model)
+    (folder / "tiny_score.yaml").write_text(f"""\
+# Written by test/inference/make_tiny_model.py, which says what this model does.
+name: tiny_score
+file: tiny_score.onnx
+sha256: {hashlib.sha256(model).hexdigest()}
+classes: [hazard]
+input: {{width: {WIDTH}, height: {HEIGHT}, channels: rgb, resize: letterbox, pad_value: 0}}
+normalisation: {{mean: [0, 0, 0], std: [255, 255, 255]}}
+head: {{type: score, output: score}}
+thresholds: {{hazard: 0.4}}
 """)
 
 

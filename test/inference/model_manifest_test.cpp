@@ -126,7 +126,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadManifest{"mean: [1, 2, 3]", "mean: [1, 2]", "normalisation.mean", "a list of 3"},
         BadManifest{"std: [4, 5, 6]", "std: [4, 0, 6]", "normalisation.std[1] is '0'", "0.001"},
         BadManifest{"std: [4, 5, 6]", "std: [4, .inf, 6]", "normalisation.std[1]", "a number"},
-        BadManifest{"type: yolox", "type: yolov8", "head.type is 'yolov8'", "yolox"},
+        BadManifest{"type: yolox", "type: yolov8", "head.type is 'yolov8'", "yolox or score"},
+        BadManifest{"type: yolox", "type: score", "unknown key 'nms_iou'", "thresholds"},
         BadManifest{"strides: [8, 16]", "strides: [8, 0]", "head.strides[1]", "whole number"},
         BadManifest{"pothole: 0.6", "pothole: .nan", "thresholds.pothole is '.nan'", "a number"},
         BadManifest{"pothole: 0.6", "pothole: 1.5", "thresholds.pothole is '1.5'", "0.999"},
@@ -135,6 +136,28 @@ INSTANTIATE_TEST_SUITE_P(
                     "accepted are"},
         BadManifest{"nms_iou: 0.5", "nms_iou: .nan", "nms_iou", "from 0 to 1"},
         BadManifest{"nms_iou: 0.5", "nms_iou: [", "x.yaml", "no valid YAML"}));
+
+TEST(ModelManifest, AHeadOfScoresHasNeitherStridesNorSuppression) {
+  const std::string no_nms = Replaced("nms_iou: 0.5\n", "");
+  std::string text = no_nms;
+  const std::string yolox = "{type: yolox, strides: [8, 16], output: predictions}";
+  const std::size_t at = text.find(yolox);
+  text.replace(at, yolox.size(), "{type: score, output: score}");
+  const ModelManifest manifest = ParseModelManifest(text, "x.yaml", "models");
+  EXPECT_EQ(manifest.head.type, HeadType::kScore);
+  EXPECT_EQ(manifest.head.output, "score");
+  EXPECT_TRUE(manifest.head.strides.empty());
+  EXPECT_THAT(manifest.thresholds, ElementsAre(0.6F, 0.7F));
+  EXPECT_THAT(manifest.OutputShape(), ElementsAre(1, 2));
+  text.replace(at, 12, "{type: score, strides: [8]");
+  EXPECT_THAT(ErrorOf(text), HasSubstr("unknown key 'strides' in 'head'"));
+  EXPECT_THAT(ErrorOf(no_nms), HasSubstr("'nms_iou' is missing"));
+}
+
+TEST(ModelManifest, TheOutputOfABoxHeadHasARowPerCell) {
+  EXPECT_THAT(ParseModelManifest(kGood, "x.yaml", "models").OutputShape(),
+              ElementsAre(1, 8 * 6 + 4 * 3, 7));
+}
 
 TEST(ModelManifest, AFileThatIsNoMapIsRefused) {
   EXPECT_THAT(ErrorOf(""), HasSubstr("accepted is a map"));

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "hazard/fix_track.h"
+#include "ros/parameters.h"
+
+namespace livemap {
+
+// Parameters that several of the vehicle's nodelets have, under the same names.
+
+/// `drive_id`; where none is given, one made of `now_ns` (UTC). Throws Error when it is too long.
+std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns);
+
+/// How position and course are made of the fixes.
+void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track);
+
+}  // namespace livemap

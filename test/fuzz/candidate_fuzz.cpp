@@ -1,0 +1,124 @@
+// Whatever a small vehicle puts into a candidate frame, and whatever a detector says about it: up
+// to the reports.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "zone/candidate_intake.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+
+void Require(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// The bytes as they come; zeros when they end.
+class Bytes {
+ public:
+  Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
+
+  template <typename Value>
+  Value Take() {
+    Value value{};
+    const std::size_t count = std::min(sizeof(value), size_);
+    if (count > 0) std::memcpy(&value, data_, count);
+    data_ += count;
+    size_ -= count;
+    return value;
+  }
+
+  std::string TakeText(std::size_t most) {
+    const std::size_t count = std::min({most, size_, std::size_t{Take<std::uint8_t>()}});
+    const std::size_t left = std::min(count, size_);
+    std::string text(data_, data_ + left);
+    data_ += left;
+    size_ -= left;
+    return text;
+  }
+
+  std::vector<std::uint8_t> Rest() const { return {data_, data_ + size_}; }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t size_;
+};
+
+/// Numbers in the order of the message; an honest one where the first byte's bit is not set, so
+/// that the rest is reached.
+Candidate Read(Bytes& bytes) {
+  const auto broken = bytes.Take<std::uint8_t>();
+  Candidate candidate;
+  candidate.vehicle_id = (broken & 1U) != 0 ? bytes.TakeText(80) : "car-1";
+  candidate.drive_id = bytes.TakeText(80);
+  candidate.image_frame_id = bytes.TakeText(80);
+  candidate.stamp_ns = (broken & 2U) != 0 ? bytes.Take<std::int64_t>() : kNowNs;
+  candidate.score = (broken & 2U) != 0 ? bytes.Take<float>() : 0.5F;
+  candidate.base.position = {40, -80};
+  candidate.base.covariance_m2.setIdentity();
+  candidate.base.course_variance_rad2 = 1e-4;
+  if ((broken & 4U) != 0) {
+    candidate.base.position = {bytes.Take<double>(), bytes.Take<double>()};
+    for (int i = 0; i < 4; ++i) candidate.base.covariance_m2(i / 2, i % 2) = bytes.Take<double>();
+    candidate.base.course_rad = bytes.Take<double>();
+    candidate.base.course_variance_rad2 = bytes.Take<double>();
+    candidate.base.position_course = {bytes.Take<double>(), bytes.Take<double>()};
+  }
+  candidate.intrinsics = {
+      500, 500, 319.5, 199.5, bytes.Take<std::int16_t>(), bytes.Take<std::int16_t>()};
+  candidate.base_from_optical.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  candidate.base_from_optical.translation() << 1.5, 0, 1.6;
+  if ((broken & 8U) != 0) {
+    candidate.intrinsics.fx = bytes.Take<double>();
+    candidate.intrinsics.fy = bytes.Take<double>();
+    candidate.intrinsics.cx = bytes.Take<double>();
+    candidate.intrinsics.cy = bytes.Take<double>();
+    for (int i = 0; i < 12; ++i) {
+      candidate.base_from_optical.matrix()(i / 4, i % 4) = bytes.Take<double>();
+    }
+  }
+  return candidate;
+}
+
+void FuzzCandidate(const std::uint8_t* data, std::size_t size) {
+  Bytes bytes(data, size);
+  Candidate candidate = Read(bytes);
+  Sighting sighting;
+  sighting.class_name = bytes.TakeText(80);
+  sighting.confidence = bytes.Take<float>();
+  sighting.box = {bytes.Take<float>(), bytes.Take<float>(), bytes.Take<float>(),
+                  bytes.Take<float>()};
+  candidate.image = bytes.Rest();
+  CandidateIntake intake{CandidateIntake::Config()};
+  const std::string why = intake.Add(candidate, kNowNs);
+  const CandidateIntake::Job* job = intake.Next(kNowNs, 0);
+  Require(why.empty() == (job != nullptr));
+  Require(why.size() < 400);
+  if (job == nullptr) return;
+  Require(std::isfinite(candidate.base.course_rad) && candidate.base.covariance_m2.allFinite());
+  Require(candidate.intrinsics.width > 0 && candidate.intrinsics.height > 0);
+  const std::int64_t stamp_ns = job->internal_ns;
+  SightingFrame answer;
+  answer.stamp_ns = stamp_ns;
+  answer.sightings = {sighting};
+  for (const Report& report : intake.Finish(stamp_ns, answer)) {
+    Require(!report.uuid.IsNil() && report.vehicle_id == candidate.vehicle_id);
+    Require(std::isfinite(report.position.latitude_deg));
+    Require(std::isfinite(report.position.longitude_deg));
+    Require(report.covariance_m2.allFinite());
+  }
+  Require(intake.in_flight() == 0 && intake.waiting() == 0);
+}
+
+}  // namespace
+}  // namespace livemap
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  livemap::FuzzCandidate(data, size);
+  return 0;
+}

@@ -1,0 +1,80 @@
+"""What a classifier's scores are worth: recall of frames and of events, precision, share of frames that are sent."""
+
+from dataclasses import dataclass
+from typing import Dict, List
+
+import numpy as np
+
+from detector.data import DriveFrame
+from detector.metrics import NEAR_M
+
+from .labels import holds_hazard
+
+
+@dataclass
+class ScoredDrive:
+    """The frames of one drive in their order."""
+
+    scores: np.ndarray  # N, 0..1
+    hazards: np.ndarray  # N, bool: worth sending
+    chainage_m: np.ndarray  # N
+
+
+def score_drive(frames: List[DriveFrame], score) -> ScoredDrive:
+    """Scores of a drive's frames by `score(image)`."""
+    return ScoredDrive(
+        np.array([score(frame.picture.image) for frame in frames]),
+        np.array([holds_hazard(frame.picture) for frame in frames]),
+        np.array([frame.chainage_m for frame in frames]),
+    )
+
+
+def event_scores(drive: ScoredDrive) -> List[float]:
+    """Per event (a run of frames with hazards at most NEAR_M apart) the best score of its frames."""
+    best: List[float] = []
+    last_m = -np.inf
+    for score, hazard, at_m in zip(drive.scores, drive.hazards, drive.chainage_m):
+        if not hazard:
+            continue
+        if at_m - last_m <= NEAR_M:
+            best[-1] = max(best[-1], float(score))
+        else:
+            best.append(float(score))
+        last_m = at_m
+    return best
+
+
+def threshold_for_recall(drives: Dict[str, ScoredDrive], recall: float) -> float:
+    """The highest threshold, in thousandths, that sends at least `recall` of the frames with hazards (there are some); at least 0.001."""
+    scores = np.sort(np.concatenate([drive.scores[drive.hazards] for drive in drives.values()]))
+    lowest = scores[int(np.floor((1 - recall) * len(scores) + 1e-9))]
+    return float(np.clip(np.floor(lowest * 1000) / 1000, 0.001, 0.999))
+
+
+@dataclass
+class Figures:
+    """At one threshold, over all drives."""
+
+    frames: int
+    hazard_frames: int
+    recall: float
+    precision: float
+    share_sent: float
+    events: int
+    event_recall: float
+    ranking: float  # Probability that a frame with a hazard scores above one without (AUC).
+
+
+def figures(drives: Dict[str, ScoredDrive], threshold: float) -> Figures:
+    """Figures at a threshold."""
+    scores = np.concatenate([drive.scores for drive in drives.values()])
+    hazards = np.concatenate([drive.hazards for drive in drives.values()])
+    events = np.array([score for drive in drives.values() for score in event_scores(drive)])
+    sent = scores >= threshold
+    calm, worth = scores[~hazards], scores[hazards]
+    above = (worth[:, None] > calm[None]).mean() + 0.5 * (worth[:, None] == calm[None]).mean() if len(calm) and len(worth) else 0
+    return Figures(
+        len(scores), int(hazards.sum()), float(sent[hazards].mean()) if hazards.any() else 0.0,
+        float(hazards[sent].mean()) if sent.any() else 0.0, float(sent.mean()), len(events),
+        float((events >= threshold).mean()) if len(events) else 0.0, float(above),
+    )

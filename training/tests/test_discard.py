@@ -1,0 +1,190 @@
+"""The send / don't-send classifier: its rule, its loss, its figures, and the command lines on a generated data set."""
+
+import contextlib
+import io
+import shutil
+import tempfile
+import unittest
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+import yaml
+
+import export_discard
+import train_discard
+from detector import CLASSES, onnx_model
+from detector.data import Picture
+from detector.loss import Target
+from early_discard import INPUT_HEIGHT, INPUT_WIDTH, figures, labels, loss, network
+
+from .synthetic import TRAINING_SECTION, write_data
+from .test_programs import scattered_detector
+
+LEVEL = labels.Camera(500, 500, 319.5, 199.5, 1.6, 0, 0, 0)
+"""A camera that looks straight ahead, 1.6 m above the road."""
+
+
+def box_with_foot(u, v):
+    return np.array([[u - 10, v - 20, u + 10, v]], np.float32)
+
+
+class Rule(unittest.TestCase):
+    def test_a_foot_lies_where_its_ray_meets_the_road(self):
+        for distance in (5.0, 12.0, 29.0):
+            row = 200 + 500 * 1.6 / distance
+            self.assertAlmostEqual(float(labels.ground_distances_m(LEVEL, box_with_foot(320, row))[0]), distance, places=4)
+        self.assertEqual(labels.ground_distances_m(LEVEL, box_with_foot(320, 150))[0], np.inf)
+
+    def test_a_camera_that_looks_down_sees_a_row_nearer(self):
+        down = labels.Camera(500, 500, 319.5, 199.5, 1.6, 0, 10, 0)
+        self.assertAlmostEqual(float(labels.ground_distances_m(down, box_with_foot(320, 200))[0]), 1.6 / np.tan(np.radians(10)), places=4)
+
+    def test_what_is_too_far_to_be_reported_is_no_reason_to_send(self):
+        image = np.zeros((400, 640, 3), np.uint8)
+        near, far = box_with_foot(320, 300), box_with_foot(320, 200 + 500 * 1.6 / 31)
+        picture = Picture(image, np.vstack([near, far]), np.array([0, 1]), [0])
+        classes = labels.prepared(picture, LEVEL).classes
+        self.assertEqual(classes.tolist(), [labels.REPORTABLE, labels.FAR])
+        self.assertTrue(labels.holds_hazard(labels.prepared(picture, LEVEL)))
+        only_far = Picture(image, far, np.array([1]), [0])
+        self.assertFalse(labels.holds_hazard(labels.prepared(only_far, LEVEL)))
+
+    def test_in_a_photo_the_height_of_a_box_decides(self):
+        photo = Picture(np.zeros((400, 400, 3), np.uint8), np.array([[0, 0, 9, 11], [0, 0, 9, 9]], np.float32), np.array([1, 1]), [1])
+        self.assertEqual(labels.is_reportable(photo, None).tolist(), [True, False])
+
+
+def target(boxes, classes, ignored=()):
+    return Target(
+        torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4), torch.tensor(classes, dtype=torch.int64),
+        torch.tensor(ignored, dtype=torch.float32).reshape(-1, 4), torch.ones(len(CLASSES)),
+    )
+
+
+class Loss(unittest.TestCase):
+    def test_cells_of_a_box_are_hazards_its_rim_and_far_ones_unknown(self):
+        cells = loss.cell_targets([target([[32, 32, 64, 48], [160, 32, 176, 48]], [labels.REPORTABLE, labels.FAR])], 26, 40)[0]
+        self.assertTrue((cells[4:6, 4:8] == loss.HAZARD).all())
+        self.assertEqual(float(cells[3, 4]), loss.UNKNOWN)
+        self.assertTrue((cells[4:6, 20:22] == loss.UNKNOWN).all())
+        self.assertEqual(float(cells[20, 20]), loss.CALM)
+        self.assertEqual(int((cells == loss.HAZARD).sum()), 8)
+
+    def test_the_smallest_box_has_a_cell(self):
+        cells = loss.cell_targets([target([[33, 33, 35, 34]], [labels.REPORTABLE])], 26, 40)[0]
+        self.assertEqual(int((cells == loss.HAZARD).sum()), 1)
+
+    def test_being_right_costs_less_than_being_wrong(self):
+        targets = [target([[32, 32, 64, 48]], [labels.REPORTABLE]), target([], [])]
+        right = torch.full((2, 1, 26, 40), -6.0)
+        wrong = torch.full((2, 1, 26, 40), -6.0)
+        right[0, 0, 4:6, 4:8] = 6
+        wrong[1, 0, 4:6, 4:8] = 6
+        for one, other in zip(loss.losses(right, targets), loss.losses(wrong, targets)):
+            self.assertLess(float(one), float(other))
+
+
+class Figures(unittest.TestCase):
+    drive = figures.ScoredDrive(
+        np.array([0.9, 0.2, 0.1, 0.6, 0.3]), np.array([True, True, False, True, False]), np.array([0.0, 10.0, 20.0, 40.0, 50.0])
+    )
+
+    def test_an_event_is_recalled_by_its_best_frame(self):
+        self.assertEqual(figures.event_scores(self.drive), [0.9, 0.6])
+
+    def test_at_a_threshold(self):
+        found = figures.figures({"a": self.drive}, 0.3)
+        self.assertAlmostEqual(found.recall, 2 / 3)
+        self.assertAlmostEqual(found.precision, 2 / 3)
+        self.assertAlmostEqual(found.share_sent, 0.6)
+        self.assertEqual((found.event_recall, found.events), (1.0, 2))
+        self.assertAlmostEqual(found.ranking, 5 / 6)
+
+    def test_the_threshold_keeps_the_recall(self):
+        many = figures.ScoredDrive(np.arange(1, 11) / 20, np.ones(10, bool), np.arange(10.0))
+        threshold = figures.threshold_for_recall({"a": many}, 0.9)
+        self.assertAlmostEqual(threshold, 0.1)
+        self.assertAlmostEqual(figures.figures({"a": many}, threshold).recall, 0.9)
+
+
+def quietly(program, *arguments):
+    errors = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(errors):
+        status = program.main([str(argument) for argument in arguments])
+    return status, errors.getvalue()
+
+
+class Programs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = Path(cls.folder.name)
+        cls.data = write_data(cls.root / "data")
+        sections = cls.data / "road_survey"
+        shutil.copytree(sections / TRAINING_SECTION, sections / labels.CALIBRATION_SECTIONS[0])
+        cls.detector = cls.root / "detector.onnx"
+        cls.threads = torch.get_num_threads()
+        onnx_model.export(scattered_detector(), cls.detector, 640, 400)
+
+    @classmethod
+    def tearDownClass(cls):
+        torch.set_num_threads(cls.threads)
+        cls.folder.cleanup()
+
+    def train(self, out, *more):
+        return quietly(
+            train_discard, "--data", self.data, "--out", self.root / out, "--detector", self.detector, "--epochs", 3, "--samples", 4,
+            "--batch", 2, *more,
+        )
+
+    def test_a_stopped_run_continues_as_if_it_had_not_and_its_export_is_the_same_in_opencv(self):
+        self.assertEqual(self.train("whole"), (0, ""))
+        save = train_discard.save_atomically
+
+        def stop_after_second(content, path):
+            save(content, path)
+            if content["epoch"] == 2:
+                raise KeyboardInterrupt
+
+        train_discard.save_atomically = stop_after_second
+        try:
+            with self.assertRaises(KeyboardInterrupt):
+                self.train("stopped")
+        finally:
+            train_discard.save_atomically = save
+        self.assertEqual(self.train("stopped", "--resume"), (0, ""))
+        whole, continued = (torch.load(self.root / name / "last.pt")["average"] for name in ("whole", "stopped"))
+        for name, tensor in whole.items():
+            torch.testing.assert_close(continued[name], tensor, rtol=0, atol=0, msg=name)
+        models = self.root / "models"
+        models.mkdir()
+        exported = quietly(export_discard, "--training", self.root / "whole", "--data", self.data, "--out", models)
+        self.assertEqual(exported, (0, ""))
+        manifest = yaml.safe_load((models / "early-discard.yaml").read_text())
+        self.assertEqual(manifest["head"], {"type": "score", "output": "score"})
+        found = cv2.dnn.readNetFromONNX(str(models / "early-discard.onnx"))
+        found.setInput(np.zeros((1, 3, INPUT_HEIGHT, INPUT_WIDTH), np.float32))
+        self.assertEqual(found.forward().shape, (1, 1))
+
+    def test_it_is_small(self):
+        self.assertLess(sum(parameter.numel() for parameter in network.Head().parameters()) + 155616, 500000)
+
+    def test_refusals_are_one_sentence_and_status_2(self):
+        nowhere = self.root / "nowhere"
+        for program, arguments in (
+            (train_discard, ("--data", nowhere, "--out", self.root / "new")),
+            (train_discard, ("--epochs", 0)),
+            (train_discard, ("--batch", 1)),
+            (train_discard, ("--data", self.data, "--out", self.root / "new", "--detector", nowhere)),
+            (export_discard, ("--training", nowhere, "--data", self.data, "--out", self.root)),
+            (export_discard, ("--out", nowhere)),
+        ):
+            status, errors = quietly(program, *arguments)
+            self.assertEqual(status, 2, arguments)
+            self.assertEqual(len(errors.strip().splitlines()), 1, errors)
+
+
+if __name__ == "__main__":
+    unittest.main()
