@@ -18,9 +18,7 @@ Eigen::Matrix2d PlanarTurn(const Eigen::Isometry3d& pose) {
   return turn;
 }
 
-Eigen::Vector2d PlanarPlace(const Eigen::Isometry3d& pose) {
-  return pose.translation().head<2>();
-}
+Eigen::Vector2d PlanarPlace(const Eigen::Isometry3d& pose) { return pose.translation().head<2>(); }
 
 }  // namespace
 
@@ -110,8 +108,8 @@ bool ChangeTracker::ShouldShow(const Track& track, const ChangeFrame& frame) con
   const Eigen::Vector2d ahead_m = PlanarTurn(frame.map_from_base).transpose() *
                                   (track.event.position_m - PlanarPlace(frame.map_from_base));
   if (ahead_m.norm() > config_.most_range_m) return false;
-  const Eigen::Vector3d point = frame.base_from_optical.inverse() *
-                                Eigen::Vector3d(ahead_m.x(), ahead_m.y(), 0);
+  const Eigen::Vector3d point =
+      frame.base_from_optical.inverse() * Eigen::Vector3d(ahead_m.x(), ahead_m.y(), 0);
   if (point.z() < 1) return false;
   const double column = frame.camera.fx * point.x() / point.z() + frame.camera.cx;
   const double row = frame.camera.fy * point.y() / point.z() + frame.camera.cy;
@@ -132,8 +130,7 @@ void ChangeTracker::Forget(const ChangeFrame& frame) {
   const Eigen::Vector2d here_m = PlanarPlace(frame.map_from_base);
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
                                [&](const Track& track) {
-                                 return (track.event.position_m - here_m).norm() >
-                                        config_.forget_m;
+                                 return (track.event.position_m - here_m).norm() > config_.forget_m;
                                }),
                 tracks_.end());
   while (tracks_.size() > config_.most_tracks) {

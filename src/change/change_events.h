@@ -18,16 +18,16 @@ enum class ChangeDirection { kUnknown, kAppeared, kVanished };
 /// A connected piece of one picture that changed.
 struct ChangeRegion {
   ChangeClass change_class = ChangeClass::kNoChange;
-  cv::Rect box;          ///< Pixels.
+  cv::Rect box;  ///< Pixels.
   int pixels = 0;
-  double confidence = 0; ///< Mean probability that its pixels changed, 0 to 1.
+  double confidence = 0;  ///< Mean probability that its pixels changed, 0 to 1.
   ChangeDirection direction = ChangeDirection::kUnknown;
 };
 
 /// What counts as a region.
 struct ChangeRegionOptions {
-  int least_pixels = 60;         ///< Smaller pieces are noise; of a picture 320 wide.
-  double least_confidence = 0.5; ///< Pixels below it do not belong to any.
+  int least_pixels = 60;          ///< Smaller pieces are noise; of a picture 320 wide.
+  double least_confidence = 0.5;  ///< Pixels below it do not belong to any.
 };
 
 /// Connected regions of change, the largest first: pixels whose most likely class is a change and
@@ -45,7 +45,7 @@ struct ChangeEvent {
   std::uint64_t id = 0;  ///< Rising from 1; of one tracker.
   ChangeClass change_class = ChangeClass::kNoChange;
   ChangeDirection direction = ChangeDirection::kUnknown;
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();      ///< Map frame: east, north.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Map frame: east, north.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
   double confidence = 0;  ///< Mean of its regions' times the share of pictures that show it.
   int seen = 0;           ///< Pictures that show it.
@@ -78,8 +78,8 @@ class ChangeTracker {
     double process_sigma_m = 0.5;  ///< Added to each sight's position: pose and foot are not exact.
     double most_range_m = 40;      ///< Further away nothing is placed or missed.
     double least_direction_share = 0.6;  ///< Of the sights that know a direction.
-    double forget_m = 60;          ///< Behind the vehicle by this, an object is closed.
-    std::size_t most_tracks = 256; ///< The least seen, longest unseen goes first.
+    double forget_m = 60;                ///< Behind the vehicle by this, an object is closed.
+    std::size_t most_tracks = 256;       ///< The least seen, longest unseen goes first.
     GroundProjectionNoise ground;
   };
 

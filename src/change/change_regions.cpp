@@ -36,8 +36,7 @@ ChangeDirection DirectionOf(const cv::Mat& region, const cv::Mat& before_edges,
   cv::Mat outline;
   cv::morphologyEx(region, outline, cv::MORPH_GRADIENT,
                    cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3)));
-  const double before =
-      OutlineStrength(before_edges, outline, cv::mean(before_edges)[0]);
+  const double before = OutlineStrength(before_edges, outline, cv::mean(before_edges)[0]);
   const double after = OutlineStrength(after_edges, outline, cv::mean(after_edges)[0]);
   if (after > kClearlyStronger * before) return ChangeDirection::kAppeared;
   if (before > kClearlyStronger * after) return ChangeDirection::kVanished;
@@ -93,9 +92,9 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
     region.direction = DirectionOf(pixels, before_edges, after_edges);
     regions.push_back(region);
   }
-  std::stable_sort(regions.begin(), regions.end(), [](const ChangeRegion& a, const ChangeRegion& b) {
-    return a.pixels > b.pixels;
-  });
+  std::stable_sort(
+      regions.begin(), regions.end(),
+      [](const ChangeRegion& a, const ChangeRegion& b) { return a.pixels > b.pixels; });
   return regions;
 }
 

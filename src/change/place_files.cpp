@@ -148,7 +148,8 @@ std::vector<std::string> PlaceFiles::List() const {
   std::vector<std::string> names;
   ForEachFile(directory_ + "/frames", [&](const fs::path& path) {
     const std::string name = path.stem().string();
-    if (path.extension() == kSuffix && IsHash(name)) names.push_back(name);
+    // What lies elsewhere is not ours.
+    if (IsHash(name) && path == Path(name)) names.push_back(name);
   });
   std::sort(names.begin(), names.end());
   return names;

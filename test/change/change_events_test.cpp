@@ -16,11 +16,11 @@ constexpr int kHeight = 256;
 ChangeFrame FrameAt(double along_m, std::int64_t stamp_s) {
   ChangeFrame frame;
   frame.stamp_ns = stamp_s * 1000000000LL;
-  frame.map_from_base.translation() = {along_m, 0, 0};
+  frame.map_from_base.translation() = Eigen::Vector3d(along_m, 0, 0);
   Eigen::Matrix3d optical;
   optical << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   frame.base_from_optical.linear() = optical;
-  frame.base_from_optical.translation() = {0, 0, 1.4};
+  frame.base_from_optical.translation() = Eigen::Vector3d(0, 0, 1.4);
   frame.camera = {260, 260, 159.5, 127.5, kWidth, kHeight};
   frame.valid = cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(255));
   return frame;
@@ -109,9 +109,9 @@ TEST(ChangeTracker, KeepsNeighboursApartAndGivesTheClassThatMostSay) {
   ChangeTracker tracker{ChangeTracker::Config()};
   for (int i = 0; i < 5; ++i) {
     const ChangeFrame frame = FrameAt(i, i + 1);
-    tracker.Add(frame, {SeenAt(frame, 15, 2.5),
-                        SeenAt(frame, 15, -2.5, i == 1 ? ChangeClass::kBin
-                                                       : ChangeClass::kTrafficCone)});
+    tracker.Add(frame,
+                {SeenAt(frame, 15, 2.5),
+                 SeenAt(frame, 15, -2.5, i == 1 ? ChangeClass::kBin : ChangeClass::kTrafficCone)});
   }
   const auto events = tracker.Confirmed();
   ASSERT_EQ(events.size(), 2U);

@@ -159,11 +159,21 @@ TEST(PooledChangeScores, RefusesAMaskOfAnotherSize) {
 
 TEST(CommunityChangeScores, TakesTheMeanOverPairsAndThePool) {
   CommunityChangeScores community;
-  // Left half changed. Found whole; found by half of it, in the upper half.
-  const cv::Mat truth = Mask(2, {3, 0, 3, 0});
-  community.Add("whole", Scores(2, 2, {1, 0, 1, 0}), truth);
-  community.Add("half", Scores(2, 2, {1, 0, 0, 0}), truth);
-  community.Add("nothing there, nothing said", Scores(2, 2, {0, 0, 0, 0}), Mask(2, {0, 0, 0, 0}));
+  // The left half changed. Found whole; found in its upper half.
+  const cv::Rect left(0, 0, 64, 128);
+  const cv::Rect upper_left(0, 0, 64, 64);
+  cv::Mat truth = cv::Mat::zeros(128, 128, CV_8UC1);
+  truth(left).setTo(3);
+  const auto found = [](const cv::Rect& where) {
+    cv::Mat change = cv::Mat::zeros(128, 128, CV_32FC1);
+    change(where).setTo(1);
+    ChangeProbabilities probabilities;
+    probabilities.of_class = {1 - change, change};
+    return probabilities;
+  };
+  community.Add("whole", found(left), truth);
+  community.Add("half", found(upper_left), truth);
+  community.Add("nothing there, nothing said", found({}), cv::Mat::zeros(128, 128, CV_8UC1));
   ASSERT_EQ(community.pairs().size(), 3U);
   const BinaryCounts& whole = community.pairs()[0].second;
   EXPECT_EQ(whole.true_positive, 512U * 256U);

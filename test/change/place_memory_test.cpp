@@ -65,7 +65,7 @@ TEST_F(PlaceMemoryTest, FindsTheNearestThatLookTheSameWay) {
   const auto found = memory.Nearest({kHere, 1.0, "today"});
   EXPECT_THAT(Ids(found), testing::ElementsAre(*near, *further));
   EXPECT_NEAR(found[0].distance_m, 1, 1e-6);
-  EXPECT_NEAR(found[1].heading_difference_rad, 0.4, 1e-9);
+  EXPECT_NEAR(found[1].heading_difference_rad, 0.4, 1e-6);
   EXPECT_EQ(Ids(memory.Nearest({kHere, 1.0, ""}))[0], *own);
   EXPECT_TRUE(memory.Nearest({{95, 0}, 1.0, ""}).empty());
   EXPECT_TRUE(memory.Nearest({kHere, std::nan(""), ""}).empty());
@@ -224,7 +224,9 @@ TEST_F(PlaceMemoryTest, NoRowIsWithoutItsFileNorFileWithoutRow) {
   const std::vector<std::string> files = Files();
   ASSERT_EQ(files.size(), 5U);
   fs::remove(files[1]);
-  fs::copy_file(files[0], Config().directory + "/frames/ab" + std::string(62, '0') + ".jpg");
+  const std::string orphan(64, '0');
+  fs::create_directories(Config().directory + "/frames/00");
+  fs::copy_file(files[0], Config().directory + "/frames/00/" + orphan + ".jpg");
   std::ofstream(files[2] + ".tmp") << "half";
   PlaceMemory memory(Config(), 2);
   EXPECT_EQ(memory.size(), 4U);

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <limits>
+#include <cmath>
 
 #include "base/error.h"
 #include "place_fixture.h"
@@ -65,17 +65,17 @@ TEST(PlaceRecord, NoByteChangedAtRandomBreaksTheReader) {
 
 TEST(PlaceRecord, FieldsThatCannotBeAreNamed) {
   using testing::HasSubstr;
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(WhyNotWritten([](PlaceRecord&) {}), "");
   EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.drive_id = ""; }), HasSubstr("drive id"));
   EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.drive_id = std::string(65, 'x'); }),
               HasSubstr("65 bytes"));
   EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.position.latitude_deg = 91; }),
               HasSubstr("position"));
-  EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.position.longitude_deg = kNan; }),
+  EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.position.longitude_deg = std::nan(""); }),
               HasSubstr("position"));
   EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.heading_rad = 7; }), HasSubstr("heading_rad"));
-  EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.heading_rad = kNan; }), HasSubstr("heading_rad"));
+  EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.heading_rad = std::nan(""); }),
+              HasSubstr("heading_rad"));
   EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.position_sigma_m = -1; }),
               HasSubstr("position_sigma_m"));
   EXPECT_THAT(WhyNotWritten([](auto& r) { r.frame.stamp_ns = 0; }), HasSubstr("stamp_ns"));

@@ -121,7 +121,8 @@ TEST(RegistrationByHomography, FindsAKnownHomographyToATenthOfAPixel) {
   const Registration registration =
       RegisterByHomography(View(image), View(warped), RegistrationOptions(), 1);
   ASSERT_TRUE(registration.accepted()) << registration.why;
-  for (const cv::Vec3d corner : {cv::Vec3d(60, 60, 1), {450, 60, 1}, {60, 320, 1}, {450, 320, 1}}) {
+  for (const cv::Vec3d& corner :
+       {cv::Vec3d(60, 60, 1), {450, 60, 1}, {60, 320, 1}, {450, 320, 1}}) {
     const cv::Vec3d expected = truth * corner;
     const cv::Vec3d found = registration.after_from_before * corner;
     EXPECT_NEAR(found[0] / found[2], expected[0] / expected[2], 0.1);
