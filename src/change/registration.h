@@ -15,15 +15,15 @@ namespace livemap {
 /// widths they are scaled.
 struct RegistrationOptions {
   double ratio = 0.8;                ///< Of the ratio test between features.
-  double inlier_px = 3.0;            ///< A match agrees when it lies nearer than this to its place.
+  double inlier_px = 6.0;            ///< A match agrees when it lies nearer than this to its place.
   int most_tries = 2000;             ///< Of RANSAC; fewer when the agreement is good.
   int least_features = 40;           ///< In each picture; fewer: no texture.
-  int least_matches = 20;            ///< That pass the ratio test.
-  int least_inliers = 16;            ///< Matches that agree.
+  int least_matches = 15;            ///< That pass the ratio test.
+  int least_inliers = 10;            ///< Matches that agree.
   double least_inlier_share = 0.25;  ///< Of the matches.
   double least_spread = 0.04;        ///< Area of the agreeing matches' hull, share of the picture.
   double least_overlap = 0.5;        ///< Share of the later picture that the earlier one covers.
-  double most_error_px = 2.0;        ///< Root mean square of the agreeing matches.
+  double most_error_px = 4.0;        ///< Root mean square of the agreeing matches.
   double most_scale = 1.6;        ///< Local magnification, or its inverse, anywhere in the picture.
   double most_shear = 1.8;        ///< Ratio of the greatest to the least local magnification.
   double most_turn_deg = 15;      ///< In the picture: vehicles stand upright.
