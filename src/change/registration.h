@@ -21,7 +21,7 @@ struct RegistrationOptions {
   int least_matches = 15;            ///< That pass the ratio test.
   int least_inliers = 10;            ///< Matches that agree.
   double least_inlier_share = 0.25;  ///< Of the matches.
-  double least_spread = 0.04;        ///< Area of the agreeing matches' hull, share of the picture.
+  double least_spread = 0.1;         ///< Area of the agreeing matches' hull, share of the picture.
   double least_overlap = 0.5;        ///< Share of the later picture that the earlier one covers.
   double most_error_px = 4.0;        ///< Root mean square of the agreeing matches.
   double most_scale = 1.6;        ///< Local magnification, or its inverse, anywhere in the picture.
