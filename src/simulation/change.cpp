@@ -1,7 +1,5 @@
 #include "simulation/change.h"
 
-#include <array>
-
 #include "simulation/random.h"
 
 namespace livemap {
@@ -13,31 +11,7 @@ constexpr std::uint32_t kSuccessorSerial = 1U << 25U;
 constexpr double kAppearingShare = 0.4;
 constexpr double kVanishingShare = 0.4;
 
-struct Description {
-  const char* name;
-  cv::Vec3b rgb;
-};
-
-const std::array<Description, kChangeClasses> kDescriptions = {{{"no_change", {255, 255, 255}},
-                                                                {"barrier", {136, 0, 21}},
-                                                                {"bin", {237, 28, 36}},
-                                                                {"construction", {255, 127, 39}},
-                                                                {"other_objects", {34, 177, 76}},
-                                                                {"person_cycle", {0, 162, 232}},
-                                                                {"rubbish", {63, 72, 204}},
-                                                                {"sign", {163, 73, 164}},
-                                                                {"traffic_cone", {255, 174, 201}},
-                                                                {"vehicle", {181, 230, 29}}}};
-
 }  // namespace
-
-const char* ChangeClassName(ChangeClass change_class) {
-  return kDescriptions[static_cast<std::size_t>(change_class)].name;
-}
-
-cv::Vec3b ChangeClassColour(ChangeClass change_class) {
-  return kDescriptions[static_cast<std::size_t>(change_class)].rgb;
-}
 
 ChangeClass ChangeClassOf(ObjectClass object_class) {
   switch (object_class) {

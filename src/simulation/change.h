@@ -1,32 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <opencv2/core.hpp>
 
+#include "base/change_class.h"
 #include "simulation/object_class.h"
 
 namespace livemap {
 
-/// What changed between two drives down one street, the ten classes of VL-CMU-CD. The values are
-/// those of the mask.
-enum class ChangeClass : std::uint8_t {
-  kNoChange = 0,
-  kBarrier,
-  kBin,
-  kConstruction,
-  kOtherObjects,
-  kPersonCycle,
-  kRubbish,
-  kSign,
-  kTrafficCone,
-  kVehicle,
-};
-constexpr int kChangeClasses = 10;
-
-/// "no_change", "barrier", ..., "vehicle".
-const char* ChangeClassName(ChangeClass change_class);
-/// RGB as the published ground truth paints it, white for no change.
-cv::Vec3b ChangeClassColour(ChangeClass change_class);
 /// kNoChange for what has no class of change: the ground and its potholes, houses, trees, poles.
 ChangeClass ChangeClassOf(ObjectClass object_class);
 

@@ -15,7 +15,7 @@ void WritePng(const std::string& path, const cv::Mat& image) {
 }
 
 cv::Vec3b Bgr(ChangeClass change_class) {
-  const cv::Vec3b rgb = ChangeClassColour(change_class);
+  const auto rgb = ChangeClassColour(change_class);
   return {rgb[2], rgb[1], rgb[0]};
 }
 

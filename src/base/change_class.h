@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace livemap {
+
+/// What changed between two drives down one street, the ten classes of VL-CMU-CD. The values are
+/// those of the masks and the order is that of the channels of a prediction.
+enum class ChangeClass : std::uint8_t {
+  kNoChange = 0,
+  kBarrier,
+  kBin,
+  kConstruction,
+  kOtherObjects,
+  kPersonCycle,
+  kRubbish,
+  kSign,
+  kTrafficCone,
+  kVehicle,
+};
+constexpr int kChangeClasses = 10;
+
+/// "no_change", "barrier", ..., "vehicle".
+const char* ChangeClassName(ChangeClass change_class);
+/// Red, green, blue as the published ground truth paints it, white for no change.
+std::array<std::uint8_t, 3> ChangeClassColour(ChangeClass change_class);
+
+}  // namespace livemap

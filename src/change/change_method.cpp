@@ -1,0 +1,42 @@
+#include "change/change_method.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+
+namespace livemap {
+
+ChangeProbabilities NothingChanged(cv::Size size, bool tells_classes) {
+  ChangeProbabilities probabilities;
+  for (int i = 0; i < (tells_classes ? kChangeClasses : 2); ++i) {
+    probabilities.of_class.emplace_back(size, CV_32FC1, cv::Scalar(i == 0 ? 1 : 0));
+  }
+  return probabilities;
+}
+
+ChangeProbabilities ChangeMethod::Run(const AlignedPair& pair) {
+  const cv::Size size = pair.after.size();
+  if (pair.after.empty() || pair.after.type() != CV_8UC3 || pair.before.type() != CV_8UC3 ||
+      pair.valid.type() != CV_8UC1 || pair.before.size() != size || pair.valid.size() != size) {
+    throw Error("a pair for change detection has pictures of " + std::to_string(pair.before.cols) +
+                "x" + std::to_string(pair.before.rows) + " and " + std::to_string(size.width) +
+                "x" + std::to_string(size.height) +
+                ", accepted are two 8-bit colour pictures of one size with their mask");
+  }
+  ChangeProbabilities probabilities = Infer(pair);
+  const cv::Mat unknown = pair.valid == 0;
+  for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
+    probabilities.of_class[i].setTo(i == 0 ? 1 : 0, unknown);
+  }
+  return probabilities;
+}
+
+std::vector<std::string> ChangeMethodNames() { return {"dense-sift", "daisy"}; }
+
+std::unique_ptr<ChangeMethod> MakeChangeMethod(const std::string& name) {
+  if (name == "dense-sift") return MakeDenseSiftDifference();
+  if (name == "daisy") return MakeDaisyDifference();
+  throw Error("method '" + name + "' is unknown, accepted are dense-sift and daisy");
+}
+
+}  // namespace livemap

@@ -1,0 +1,101 @@
+// Connected regions of change, and which of two pictures has what changed.
+#include <algorithm>
+#include <array>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+#include "change/change_events.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kReferenceWidth = 320;
+constexpr double kClearlyStronger = 1.2;
+
+/// Strength of grey edges, CV_32FC1.
+cv::Mat EdgeStrength(const cv::Mat& bgr) {
+  cv::Mat grey;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  cv::GaussianBlur(grey, grey, cv::Size(), 0.8);
+  cv::Mat dx;
+  cv::Mat dy;
+  cv::Sobel(grey, dx, CV_32FC1, 1, 0);
+  cv::Sobel(grey, dy, CV_32FC1, 0, 1);
+  cv::Mat strength;
+  cv::magnitude(dx, dy, strength);
+  return strength;
+}
+
+/// Along a region's outline, as a share of the picture's mean edge: light and exposure differ.
+double OutlineStrength(const cv::Mat& edges, const cv::Mat& outline, double mean_edge) {
+  return cv::mean(edges, outline)[0] / std::max(mean_edge, 1e-6);
+}
+
+ChangeDirection DirectionOf(const cv::Mat& region, const cv::Mat& before_edges,
+                            const cv::Mat& after_edges) {
+  cv::Mat outline;
+  cv::morphologyEx(region, outline, cv::MORPH_GRADIENT,
+                   cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3)));
+  const double before = OutlineStrength(before_edges, outline, cv::mean(before_edges)[0]);
+  const double after = OutlineStrength(after_edges, outline, cv::mean(after_edges)[0]);
+  if (after > kClearlyStronger * before) return ChangeDirection::kAppeared;
+  if (before > kClearlyStronger * after) return ChangeDirection::kVanished;
+  return ChangeDirection::kUnknown;
+}
+
+ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
+  std::array<int, kChangeClasses> counts{};
+  for (int row = 0; row < region.rows; ++row) {
+    for (int column = 0; column < region.cols; ++column) {
+      if (region.at<std::uint8_t>(row, column) == 0) continue;
+      ++counts[classes.at<std::uint8_t>(row, column)];
+    }
+  }
+  const auto most = std::max_element(counts.begin() + 1, counts.end());
+  return static_cast<ChangeClass>(most - counts.begin());
+}
+
+}  // namespace
+
+std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabilities,
+                                            const cv::Mat& before, const cv::Mat& after,
+                                            const ChangeRegionOptions& options) {
+  if (!probabilities.tells_classes() || before.type() != CV_8UC3 || after.type() != CV_8UC3 ||
+      before.size() != after.size() || probabilities.of_class[0].size() != after.size()) {
+    throw Error(
+        "regions of change want ten classes and two colour pictures, all of one size, not " +
+        std::to_string(probabilities.of_class.size()) + " classes with pictures of " +
+        std::to_string(before.cols) + "x" + std::to_string(before.rows) + " and " +
+        std::to_string(after.cols) + "x" + std::to_string(after.rows));
+  }
+  const cv::Mat classes = MostLikely(probabilities);
+  cv::Mat score;
+  cv::subtract(1.0, probabilities.of_class[0], score);
+  const cv::Mat changed = (classes > 0) & (score >= options.least_confidence);
+  cv::Mat labels;
+  cv::Mat stats;
+  cv::Mat centres;
+  const int count = cv::connectedComponentsWithStats(changed, labels, stats, centres, 8, CV_32S);
+  const double scale = after.cols / kReferenceWidth;
+  const cv::Mat before_edges = EdgeStrength(before);
+  const cv::Mat after_edges = EdgeStrength(after);
+  std::vector<ChangeRegion> regions;
+  for (int i = 1; i < count; ++i) {
+    ChangeRegion region;
+    region.pixels = stats.at<int>(i, cv::CC_STAT_AREA);
+    if (region.pixels < options.least_pixels * scale * scale) continue;
+    region.box = {stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
+                  stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT)};
+    const cv::Mat pixels = labels == i;
+    region.confidence = cv::mean(score, pixels)[0];
+    region.change_class = MostFrequent(classes, pixels);
+    region.direction = DirectionOf(pixels, before_edges, after_edges);
+    regions.push_back(region);
+  }
+  std::stable_sort(
+      regions.begin(), regions.end(),
+      [](const ChangeRegion& a, const ChangeRegion& b) { return a.pixels > b.pixels; });
+  return regions;
+}
+
+}  // namespace livemap

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "change/change_metrics.h"
+
+namespace livemap {
+
+/// Figures of one order of the two pictures.
+struct ChangeFigures {
+  PooledChangeScores pooled;
+  CommunityChangeScores community;
+};
+
+/// The result of `livemap evaluate change`.
+struct ChangeReport {
+  std::string method;                 ///< Its name, or the folder of predictions.
+  std::string registration;           ///< "none" or "homography".
+  std::size_t refused = 0;            ///< Pairs that could not be registered: no change is said.
+  std::vector<std::string> refusals;  ///< "NAME: why", in order.
+  std::size_t unknown_colour_pixels = 0;
+  double method_ms_p50 = 0;        ///< Wall time of the method alone, ms; 0 for predictions.
+  double registration_ms_p50 = 0;  ///< Of features, matches, homography and warp.
+  ChangeFigures forward;
+  bool has_reversed = false;
+  ChangeFigures reversed;  ///< The two aligned pictures swapped.
+};
+
+/// docs/change.md names the keys; figures that are not defined are null. With `curve_points` above
+/// 0 the curves of Figures 4.4 to 4.6 too.
+nlohmann::ordered_json ToJson(const ChangeReport& report, std::size_t curve_points);
+
+/// A table for people.
+std::string ToText(const ChangeReport& report);
+
+}  // namespace livemap

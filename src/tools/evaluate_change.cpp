@@ -1,0 +1,194 @@
+// livemap_evaluate_change: how well a method sees what changed, on pairs with the truth.
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "base/error.h"
+#include "change/change_method.h"
+#include "change/change_pairs.h"
+#include "change/change_predictions.h"
+#include "change/change_report.h"
+#include "change/registration.h"
+#include "tools/command_line.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kCurvePoints = 400;
+
+struct Options {
+  std::string directory;
+  std::string method;
+  std::string predictions;
+  std::string reversed_predictions;
+  std::string write;
+  std::uint64_t seed = 1;
+  bool homography = false;
+  bool json = false;
+  bool curves = false;
+};
+
+/// None when --help was asked for and printed.
+std::optional<Options> ParseOptions(int argc, char** argv) {
+  CommandLine line(
+      "livemap_evaluate_change [FLAGS] DIR",
+      "Compares what a method says about pairs of pictures with the truth. DIR has VL-CMU-CD's\n"
+      "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it) or t0/, t1/, "
+      "mask/.\n"
+      "The method is a classical one (--method), or a folder of predictions (--predictions: "
+      "NAME.npy\n"
+      "or NAME.png per pair). docs/change.md defines the figures and the files.",
+      1,
+      {{"json", "", "one line of JSON instead of a table"},
+       {"method", "NAME", "dense-sift or daisy (dense-sift)"},
+       {"predictions", "DIR", "read predictions instead of running a method"},
+       {"reversed-predictions", "DIR", "the same for the pairs with their pictures swapped"},
+       {"register", "HOW", "none or homography: of the earlier picture, for a method (none)"},
+       {"seed", "N", "of the registration's draws (1)"},
+       {"curves", "", "with --json: curves, figures per pair, refusals"},
+       {"write", "DIR", "the method's scores (NAME.png) and classes (NAME_class.png)"}});
+  if (!line.Parse(argc, argv)) return std::nullopt;
+  line.CheckNeeds({{"curves", line.Has("json"), "--json"},
+                   {"reversed-predictions", line.Has("predictions"), "--predictions"},
+                   {"method", !line.Has("predictions"), "to go without --predictions"},
+                   {"register", !line.Has("predictions"), "to go without --predictions"}});
+  Options options;
+  options.directory = line.Positional(0);
+  options.method = line.Text("method", "dense-sift");
+  options.predictions = line.Text("predictions", "");
+  options.reversed_predictions = line.Text("reversed-predictions", "");
+  options.write = line.Text("write", "");
+  options.seed = line.Seed("seed", 1);
+  const std::string how = line.Text("register", "none");
+  if (how != "none" && how != "homography") {
+    throw Error("--register is '" + how + "', accepted are none and homography");
+  }
+  options.homography = how == "homography";
+  options.json = line.Has("json");
+  options.curves = line.Has("curves");
+  return options;
+}
+
+double MillisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+class Evaluation {
+ public:
+  explicit Evaluation(const Options& options) : options_(options) {
+    report_.registration = options.homography ? "homography" : "none";
+    report_.method = options.predictions;
+    report_.has_reversed = !options.reversed_predictions.empty();
+    if (!options.predictions.empty()) return;
+    method_ = MakeChangeMethod(options.method);
+    report_.method = options.method;
+    report_.has_reversed = true;
+  }
+
+  void Add(const ChangePairFiles& files) {
+    const ChangePair pair = LoadChangePair(files);
+    report_.unknown_colour_pixels += pair.unknown_colour_pixels;
+    const ChangeProbabilities forward = Forward(files, pair);
+    Count(files.name, forward, pair, report_.forward);
+    if (report_.has_reversed) Count(files.name, Reversed(files, pair), pair, report_.reversed);
+    if (options_.write.empty()) return;
+    WriteScorePicture(options_.write + "/" + files.name + ".png", forward);
+    WriteClassPicture(options_.write + "/" + files.name + "_class.png", MostLikely(forward));
+  }
+
+  ChangeReport Report() {
+    report_.method_ms_p50 = Median(method_ms_);
+    report_.registration_ms_p50 = Median(registration_ms_);
+    return report_;
+  }
+
+ private:
+  static void Count(const std::string& name, const ChangeProbabilities& probabilities,
+                    const ChangePair& pair, ChangeFigures& figures) {
+    figures.pooled.Add(probabilities, pair.truth, pair.with_classes);
+    figures.community.Add(name, probabilities, pair.truth);
+  }
+
+  ChangeProbabilities Forward(const ChangePairFiles& files, const ChangePair& pair) {
+    if (method_ == nullptr) {
+      return ReadPrediction(options_.predictions, files.name, pair.truth.size());
+    }
+    aligned_ = Align(files, pair);
+    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
+    const auto start = std::chrono::steady_clock::now();
+    ChangeProbabilities probabilities = method_->Run(*aligned_);
+    method_ms_.push_back(MillisecondsSince(start));
+    return probabilities;
+  }
+
+  /// After Forward of the same pair: the view stays that of the later picture, whose mask the truth
+  /// is.
+  ChangeProbabilities Reversed(const ChangePairFiles& files, const ChangePair& pair) {
+    if (method_ == nullptr) {
+      return ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
+    }
+    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
+    return method_->Run({aligned_->after, aligned_->before, aligned_->valid});
+  }
+
+  std::optional<AlignedPair> Align(const ChangePairFiles& files, const ChangePair& pair) {
+    if (!options_.homography) {
+      return AlignedPair{pair.before, pair.after,
+                         cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255))};
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const FeaturedView before{pair.before.size(), ExtractFeatures(pair.before)};
+    const FeaturedView after{pair.after.size(), ExtractFeatures(pair.after)};
+    const Registration registration =
+        RegisterByHomography(before, after, RegistrationOptions(), options_.seed);
+    if (!registration.accepted()) {
+      ++report_.refused;
+      report_.refusals.push_back(files.name + ": " + registration.why);
+      return std::nullopt;
+    }
+    const WarpedPicture warped = WarpByHomography(pair.before, registration.after_from_before);
+    registration_ms_.push_back(MillisecondsSince(start));
+    return AlignedPair{warped.picture, pair.after, warped.valid};
+  }
+
+  const Options& options_;
+  std::unique_ptr<ChangeMethod> method_;
+  std::optional<AlignedPair> aligned_;
+  std::vector<double> method_ms_;
+  std::vector<double> registration_ms_;
+  ChangeReport report_;
+};
+
+int Run(int argc, char** argv) {
+  const std::optional<Options> options = ParseOptions(argc, argv);
+  if (!options) return 0;
+  const std::vector<ChangePairFiles> pairs = FindChangePairs(options->directory);
+  Evaluation evaluation(*options);
+  Progress progress("comparing", pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    evaluation.Add(pairs[i]);
+    progress.At(i + 1);
+  }
+  const ChangeReport report = evaluation.Report();
+  std::cout << (options->json ? ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"
+                              : ToText(report));
+  return 0;
+}
+
+}  // namespace
+}  // namespace livemap
+
+int main(int argc, char** argv) {
+  return livemap::RunProgram("livemap_evaluate_change", argc, argv, livemap::Run);
+}

@@ -1,0 +1,202 @@
+#include "change/change_events.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr int kWidth = 320;
+constexpr int kHeight = 256;
+
+/// A camera 1.4 m above the road that looks ahead.
+ChangeFrame FrameAt(double along_m, std::int64_t stamp_s) {
+  ChangeFrame frame;
+  frame.stamp_ns = stamp_s * 1000000000LL;
+  frame.map_from_base.translation() = Eigen::Vector3d(along_m, 0, 0);
+  Eigen::Matrix3d optical;
+  optical << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  frame.base_from_optical.linear() = optical;
+  frame.base_from_optical.translation() = Eigen::Vector3d(0, 0, 1.4);
+  frame.camera = {260, 260, 159.5, 127.5, kWidth, kHeight};
+  frame.valid = cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(255));
+  return frame;
+}
+
+/// What the camera sees of a thing half a metre wide and a metre high on the road.
+ChangeRegion SeenAt(const ChangeFrame& frame, double along_m, double left_m,
+                    ChangeClass change_class = ChangeClass::kSign) {
+  const double z = along_m - frame.map_from_base.translation().x();
+  const double f = frame.camera.fx;
+  const int column = static_cast<int>(std::lround(frame.camera.cx - f * left_m / z));
+  const int foot = static_cast<int>(std::lround(frame.camera.cy + f * 1.4 / z));
+  const int width = static_cast<int>(f * 0.5 / z);
+  const int height = static_cast<int>(f / z);
+  ChangeRegion region;
+  region.change_class = change_class;
+  region.box = {column - width / 2, foot - height + 1, width, height};
+  region.pixels = region.box.area();
+  region.confidence = 0.8;
+  region.direction = ChangeDirection::kVanished;
+  return region;
+}
+
+TEST(ChangeTracker, ConfirmsWhatSeveralPicturesShowWhereItStands) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  std::vector<ChangeEvent> confirmed;
+  for (int i = 0; i < 6; ++i) {
+    const ChangeFrame frame = FrameAt(2.0 * i, i + 1);
+    const auto events = tracker.Add(frame, {SeenAt(frame, 22, -2)});
+    EXPECT_EQ(events.size(), i == 2 ? 1U : 0U) << i;
+    confirmed.insert(confirmed.end(), events.begin(), events.end());
+  }
+  ASSERT_EQ(confirmed.size(), 1U);
+  EXPECT_EQ(confirmed[0].change_class, ChangeClass::kSign);
+  EXPECT_EQ(confirmed[0].direction, ChangeDirection::kVanished);
+  const auto now = tracker.Confirmed();
+  ASSERT_EQ(now.size(), 1U);
+  EXPECT_EQ(now[0].seen, 6);
+  EXPECT_EQ(now[0].missed, 0);
+  EXPECT_NEAR(now[0].confidence, 0.8, 1e-9);
+  EXPECT_NEAR(now[0].position_m.x(), 22, 0.7);
+  EXPECT_NEAR(now[0].position_m.y(), -2, 0.3);
+  EXPECT_LT(now[0].covariance_m2.trace(), confirmed[0].covariance_m2.trace());
+}
+
+TEST(ChangeTracker, SaysNothingFromOnePictureNorFromOnePlace) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  for (int i = 0; i < 20; ++i) {
+    // Standing: twenty pictures are as good as one.
+    const ChangeFrame frame = FrameAt(0, i + 1);
+    EXPECT_TRUE(tracker.Add(frame, {SeenAt(frame, 15, 1)}).empty());
+  }
+  EXPECT_EQ(tracker.tracks(), 1U);
+  ChangeTracker::Config hasty;
+  hasty.least_seen = 1;
+  EXPECT_THROW(ChangeTracker{hasty}, Error);
+}
+
+TEST(ChangeTracker, WhatMostPicturesDoNotShowIsNotConfirmed) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  for (int i = 0; i < 12; ++i) {
+    const ChangeFrame frame = FrameAt(i, i + 1);
+    std::vector<ChangeRegion> regions;
+    if (i % 4 == 0) regions.push_back(SeenAt(frame, 25, 1));
+    EXPECT_TRUE(tracker.Add(frame, regions).empty()) << i;
+  }
+}
+
+TEST(ChangeTracker, AMissDoesNotCountWhereNothingCouldBeSeen) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  std::size_t confirmed = 0;
+  for (int i = 0; i < 12; ++i) {
+    ChangeFrame frame = FrameAt(i, i + 1);
+    std::vector<ChangeRegion> regions;
+    if (i % 4 == 0) {
+      regions.push_back(SeenAt(frame, 25, 1));
+    } else {
+      frame.valid.setTo(0);
+    }
+    confirmed += tracker.Add(frame, regions).size();
+  }
+  EXPECT_EQ(confirmed, 1U);
+}
+
+TEST(ChangeTracker, KeepsNeighboursApartAndGivesTheClassThatMostSay) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  for (int i = 0; i < 5; ++i) {
+    const ChangeFrame frame = FrameAt(i, i + 1);
+    tracker.Add(frame,
+                {SeenAt(frame, 15, 2.5),
+                 SeenAt(frame, 15, -2.5, i == 1 ? ChangeClass::kBin : ChangeClass::kTrafficCone)});
+  }
+  const auto events = tracker.Confirmed();
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].change_class, ChangeClass::kSign);
+  EXPECT_EQ(events[1].change_class, ChangeClass::kTrafficCone);
+  EXPECT_GT(events[0].position_m.y(), 2);
+  EXPECT_LT(events[1].position_m.y(), -2);
+}
+
+TEST(ChangeTracker, IgnoresOldPicturesAndWhatHasNoFootOnTheRoad) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  const ChangeFrame frame = FrameAt(0, 10);
+  ChangeRegion cut = SeenAt(frame, 15, 0);
+  cut.box.height = kHeight - cut.box.y;
+  ChangeRegion sky = SeenAt(frame, 15, 0);
+  sky.box = {100, 10, 20, 30};
+  tracker.Add(frame, {cut, sky});
+  EXPECT_EQ(tracker.tracks(), 0U);
+  const ChangeFrame older = FrameAt(0, 9);
+  tracker.Add(older, {SeenAt(older, 15, 0)});
+  EXPECT_EQ(tracker.tracks(), 0U);
+}
+
+TEST(ChangeTracker, ForgetsWhatLiesFarBehindAndStaysSmall) {
+  ChangeTracker::Config config;
+  config.most_tracks = 3;
+  ChangeTracker tracker(config);
+  const ChangeFrame frame = FrameAt(0, 1);
+  tracker.Add(frame, {SeenAt(frame, 12, 3), SeenAt(frame, 12, -3), SeenAt(frame, 20, 3),
+                      SeenAt(frame, 20, -3), SeenAt(frame, 28, 3)});
+  EXPECT_EQ(tracker.tracks(), 3U);
+  tracker.Add(FrameAt(200, 2), {});
+  EXPECT_EQ(tracker.tracks(), 0U);
+}
+
+/// Ten classes: no change but for `change_class` with probability 0.9 in a rectangle.
+ChangeProbabilities OneRegion(const cv::Rect& box, ChangeClass change_class) {
+  ChangeProbabilities probabilities;
+  for (int i = 0; i < kChangeClasses; ++i) {
+    probabilities.of_class.emplace_back(kHeight, kWidth, CV_32FC1, cv::Scalar(i == 0 ? 1 : 0));
+  }
+  probabilities.of_class[0](box).setTo(0.1);
+  probabilities.of_class[static_cast<std::size_t>(change_class)](box).setTo(0.9);
+  return probabilities;
+}
+
+cv::Mat Background() {
+  cv::Mat image(kHeight, kWidth, CV_8UC3);
+  cv::RNG random(3);
+  random.fill(image, cv::RNG::NORMAL, cv::Scalar::all(120), cv::Scalar::all(6));
+  return image;
+}
+
+TEST(FindChangeRegions, SayWhereWhatAndWhichPictureHasIt) {
+  const cv::Rect box(100, 80, 30, 50);
+  const cv::Mat without = Background();
+  cv::Mat with = Background();
+  with(box).setTo(cv::Scalar(30, 60, 220));
+  const auto probabilities = OneRegion(box, ChangeClass::kBarrier);
+  const auto appeared = FindChangeRegions(probabilities, without, with);
+  ASSERT_EQ(appeared.size(), 1U);
+  EXPECT_EQ(appeared[0].box, box);
+  EXPECT_EQ(appeared[0].pixels, box.area());
+  EXPECT_EQ(appeared[0].change_class, ChangeClass::kBarrier);
+  EXPECT_NEAR(appeared[0].confidence, 0.9, 1e-5);
+  EXPECT_EQ(appeared[0].direction, ChangeDirection::kAppeared);
+  EXPECT_EQ(FindChangeRegions(probabilities, with, without)[0].direction,
+            ChangeDirection::kVanished);
+  EXPECT_EQ(FindChangeRegions(probabilities, without, without)[0].direction,
+            ChangeDirection::kUnknown);
+}
+
+TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
+  const cv::Mat image = Background();
+  EXPECT_TRUE(
+      FindChangeRegions(OneRegion({10, 10, 7, 8}, ChangeClass::kBin), image, image).empty());
+  ChangeRegionOptions strict;
+  strict.least_confidence = 0.95;
+  EXPECT_TRUE(
+      FindChangeRegions(OneRegion({10, 10, 50, 50}, ChangeClass::kBin), image, image, strict)
+          .empty());
+  EXPECT_THROW(FindChangeRegions(OneRegion({10, 10, 50, 50}, ChangeClass::kBin), image,
+                                 cv::Mat(10, 10, CV_8UC3)),
+               Error);
+}
+
+}  // namespace
+}  // namespace livemap
