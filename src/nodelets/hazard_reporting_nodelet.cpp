@@ -62,6 +62,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     if (!reporter_->map().set_aside().empty()) {
       NODELET_ERROR("%s", DescribeSetAside(config_.reporter.map.path, reporter_->map()).c_str());
     }
+    if (reporter_->map().broken_rows().count() > 0) {
+      NODELET_ERROR("%s", DescribeBrokenRows(config_.reporter.map.path, reporter_->map()).c_str());
+    }
     if (config_.map_datum) map_.emplace(*config_.map_datum);
     path_.header.frame_id = config_.map_frame;
     Connect();
