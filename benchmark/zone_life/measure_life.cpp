@@ -34,11 +34,15 @@ void Print(const StudyConfig& config, const StudyFigures& figures) {
   std::printf(
       "{\"seed\": %llu, \"days\": %.0f, \"all_days\": %d, \"vehicles\": %zu, "
       "\"polls\": %llu, \"poll_bytes\": %.0f, \"traversals\": %llu, "
-      "\"over_allowance\": %llu, \"classes\": {\n",
+      "\"over_allowance\": %llu, \"hostile\": %llu, \"hostile_suspects\": %llu, "
+      "\"honest_suspects\": %llu, \"classes\": {\n",
       static_cast<unsigned long long>(config.seed), figures.measured_days, config.days,
       config.vehicles, static_cast<unsigned long long>(figures.polls), figures.poll_bytes,
       static_cast<unsigned long long>(figures.traversals),
-      static_cast<unsigned long long>(figures.refused_by_allowance));
+      static_cast<unsigned long long>(figures.refused_by_allowance),
+      static_cast<unsigned long long>(figures.hostile),
+      static_cast<unsigned long long>(figures.hostile_suspects),
+      static_cast<unsigned long long>(figures.honest_suspects));
   std::size_t left = figures.classes.size();
   for (const auto& [name, of_class] : figures.classes) PrintClass(name, of_class, --left == 0);
   std::printf("}}\n");
@@ -66,7 +70,9 @@ int Run(int argc, char** argv) {
                     {"value", "X", "price or interval in seconds, or share of a life (120)"},
                     {"bytes-per-hour", "BYTES", "budget of polls by worth (1e9)"},
                     {"hostile", "SHARE", "of the vehicles, 0 to 1 (0)"},
-                    {"telling", "RULE", "life or count (life)"}});
+                    {"telling", "RULE",
+                     "life, alike (as life, but every vehicle is believed alike) or "
+                     "count (life)"}});
   if (!line.Parse(argc, argv)) return 0;
   StudyConfig config;
   config.seed = line.Seed("seed", 1);
@@ -77,10 +83,11 @@ int Run(int argc, char** argv) {
   config.polling.bytes_per_hour = line.Number("bytes-per-hour", 1e9, 1, 1e12);
   config.hostile_share = line.Number("hostile", 0, 0, 1);
   const std::string telling = line.Text("telling", "life");
-  if (telling != "life" && telling != "count") {
-    throw Error("--telling is '" + telling + "', accepted are: life, count");
+  if (telling != "life" && telling != "alike" && telling != "count") {
+    throw Error("--telling is '" + telling + "', accepted are: life, alike, count");
   }
-  config.telling = telling == "life" ? TellingRule::kLife : TellingRule::kCount;
+  config.telling = telling == "count" ? TellingRule::kCount : TellingRule::kLife;
+  config.trust = telling == "life";
   Print(config, RunStudy(config, HazardCatalogue::Load(line.Positional(0))));
   return 0;
 }

@@ -23,6 +23,7 @@ struct StudyConfig {
   std::size_t vehicles = 400;
   double hostile_share = 0;
   TellingRule telling = TellingRule::kLife;
+  bool trust = true;  ///< kLife: learns whom to believe.
   PollingRule polling;
 };
 
@@ -49,6 +50,9 @@ struct StudyFigures {
   double measured_days = 0;
   std::uint64_t traversals = 0;
   std::uint64_t refused_by_allowance = 0;
+  std::uint64_t honest_suspects = 0;   ///< Honest vehicles that in the end do not count as one...
+  std::uint64_t hostile_suspects = 0;  ///< ...and hostile ones.
+  std::uint64_t hostile = 0;           ///< Of all.
 };
 
 /// Simulates the weeks. `catalogue`: config/hazards.yaml.

@@ -63,6 +63,7 @@ void LocalHazardMap::Open() {
   }
   check.Reset();
   database_->Migrate(Migrations());
+  broken_rows_ = MendRows(*database_);
   LoadFilter();
 }
 
@@ -98,8 +99,7 @@ void LocalHazardMap::LoadFilter() {
   filter_ = DuplicateFilter(catalogue_);
   SqliteStatement rows = database_->Prepare("SELECT id,class_name,latitude,longitude FROM known");
   while (rows.Step()) {
-    const GeoPoint position{rows.Real(2), rows.Real(3)};
-    if (IsValid(position)) filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), position);
+    filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), {rows.Real(2), rows.Real(3)});
   }
   SqliteStatement zone = database_->Prepare("SELECT map_sequence FROM zone");
   if (zone.Step()) chain_ = AnnouncementChain(static_cast<std::uint64_t>(zone.Int(0)));
@@ -107,11 +107,15 @@ void LocalHazardMap::LoadFilter() {
 }
 
 void LocalHazardMap::CountPending() {
-  SqliteStatement count =
-      database_->Prepare("SELECT count(*),coalesce(sum(length(image)),0) FROM pending");
-  count.Step();
-  pending_count_ = static_cast<std::size_t>(count.Int(0));
-  pending_bytes_ = static_cast<std::size_t>(count.Int(1)) + pending_count_ * kReportBytes;
+  SqliteStatement sizes = database_->Prepare(
+      std::string("SELECT uuid,length(CAST(image AS BLOB)) FROM pending WHERE ") +
+      kFetchableReport);
+  pending_count_ = pending_bytes_ = 0;
+  while (sizes.Step()) {
+    if (broken_rows_.unsendable.count(UuidFromBlob(sizes.Blob(0))) != 0) continue;
+    ++pending_count_;
+    pending_bytes_ += static_cast<std::size_t>(sizes.Int(1)) + kReportBytes;
+  }
 }
 
 std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& class_name,
@@ -176,7 +180,7 @@ void LocalHazardMap::EvictBeyondLimit(std::vector<Change>& changes) {
   const std::int64_t excess = count.Int(0) - config_.max_known;
   if (excess <= 0) return;
   SqliteStatement oldest = database_->Prepare(
-      "SELECT id FROM known WHERE id NOT IN (SELECT uuid FROM pending)"
+      "SELECT id FROM known WHERE id NOT IN (SELECT uuid FROM pending WHERE uuid IS NOT NULL)"
       " ORDER BY news_ns LIMIT ?");
   oldest.Bind(1, excess);
   std::vector<Uuid> evicted;
@@ -237,17 +241,25 @@ bool LocalHazardMap::Apply(const Receipt& receipt) {
 }
 
 std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
-  SqliteStatement rows = database_->Prepare(
-      "SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending ORDER BY stamp_ns,uuid");
+  SqliteStatement rows =
+      database_->Prepare(std::string("SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending WHERE ") +
+                         kFetchableReport + " ORDER BY stamp_ns,uuid");
   std::vector<PendingReport> pending;
   while (rows.Step()) {
-    pending.push_back(
-        {UuidFromBlob(rows.Blob(0)), rows.Text(1), rows.Int(2), rows.Int(3) != 0, rows.Int(4)});
+    const Uuid uuid = UuidFromBlob(rows.Blob(0));
+    if (broken_rows_.unsendable.count(uuid) != 0) continue;
+    pending.push_back({uuid, rows.Text(1), rows.Int(2), rows.Int(3) != 0, rows.Int(4)});
   }
   return pending;
 }
 
 std::optional<Report> LocalHazardMap::LoadPending(const Uuid& uuid) const {
+  if (broken_rows_.unsendable.count(uuid) != 0) return std::nullopt;
+  SqliteStatement row =
+      database_->Prepare(std::string("SELECT 1 FROM pending WHERE uuid=? AND ") + kFetchableReport);
+  row.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
+  if (!row.Step()) return std::nullopt;
+  row.Reset();
   return SelectReport(*database_, uuid);
 }
 

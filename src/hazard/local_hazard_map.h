@@ -14,6 +14,7 @@
 #include "hazard/duplicate_filter.h"
 #include "hazard/report.h"
 #include "hazard/report_salvage.h"
+#include "hazard/sound_rows.h"
 
 namespace livemap {
 
@@ -62,13 +63,16 @@ class LocalHazardMap {
 
   /// Opens or creates the database. A corrupt file is renamed to `<path>.corrupt-<now_ns>` with
   /// its companions and a new one started, with those of its reports that can still be read: see
-  /// set_aside() and salvage(). Throws Error for every other failure.
+  /// set_aside() and salvage(). In a sound file rows of impossible values count for nothing: see
+  /// broken_rows(). Throws Error for every other failure.
   LocalHazardMap(const Config& config, const HazardCatalogue& catalogue, std::int64_t now_ns);
 
   /// Where a corrupt database was moved; empty when the file was sound.
   const std::string& set_aside() const { return set_aside_; }
   /// What became of the reports in it.
   const Salvage& salvage() const { return salvage_; }
+  /// What was found that the program cannot have written.
+  const BrokenRows& broken_rows() const { return broken_rows_; }
 
   /// The known hazard that a sighting duplicates.
   std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
@@ -137,6 +141,7 @@ class LocalHazardMap {
   HazardCatalogue catalogue_;
   std::string set_aside_;
   Salvage salvage_;
+  BrokenRows broken_rows_;
   std::unique_ptr<SqliteDatabase> database_;
   DuplicateFilter filter_;
   AnnouncementChain chain_;

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "base/image_header.h"
 #include "hazard/report_table.h"
+#include "hazard/sound_rows.h"
 
 namespace livemap {
 namespace {
@@ -103,24 +103,6 @@ Rows CandidateRows(SqliteDatabase& database) {
   numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
   if (!from_end.empty()) rows.last_listed = std::max(rows.last_listed, from_end.front());
   return rows;
-}
-
-/// What a damaged page may turn into must not become a report.
-bool IsSound(const Report& report) {
-  const Box& box = report.box;
-  return !report.uuid.IsNil() && IsValid(report.position) && report.covariance_m2.allFinite() &&
-         report.confidence >= 0 && report.confidence <= 1 && box.x_min < box.x_max &&
-         box.y_min < box.y_max && !report.class_name.empty() &&
-         report.class_name.size() <= kMaxClassNameBytes && report.drive_id.size() <= 64;
-}
-
-/// A report counts without its picture; a broken picture would have it refused for good.
-void DropBrokenPicture(Report& report) {
-  const std::uint8_t* data = report.image.data();
-  const auto header = ReadImageHeader(data, report.image.size());
-  if (header && HasImageEnd(data, report.image.size(), header->format)) return;
-  report.image.clear();
-  report.image_format.clear();
 }
 
 Salvage ReadRows(SqliteDatabase& database, const std::function<void(const StoredReport&)>& accept) {

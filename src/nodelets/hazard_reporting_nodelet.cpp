@@ -61,6 +61,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     if (!reporter_->map().set_aside().empty()) {
       NODELET_ERROR("%s", DescribeSetAside(config_.reporter.map.path, reporter_->map()).c_str());
     }
+    if (reporter_->map().broken_rows().count() > 0) {
+      NODELET_ERROR("%s", DescribeBrokenRows(config_.reporter.map.path, reporter_->map()).c_str());
+    }
     Connect();
   }
 

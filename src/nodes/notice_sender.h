@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "nodes/notice_pictures.h"
 #include "zone/zone_service.h"
 
 namespace livemap {
@@ -17,8 +18,8 @@ namespace livemap {
 /// a new hazard takes milliseconds, in the order of the announcements.
 class NoticeSender {
  public:
-  /// `picture_bytes` of a notice's picture at most; 0: none.
-  NoticeSender(const ZoneService& zone, const ros::Publisher& publisher, std::size_t picture_bytes);
+  /// `pictures` outlives it.
+  NoticeSender(NoticePictures& pictures, const ros::Publisher& publisher);
   /// Sends what waits and stops.
   ~NoticeSender();
   NoticeSender(const NoticeSender&) = delete;
@@ -28,18 +29,15 @@ class NoticeSender {
 
   std::uint64_t sent() const { return sent_; }
   std::uint64_t pictures() const { return pictures_; }
-  std::uint64_t pictures_failed() const { return pictures_failed_; }
 
  private:
   void Work();
   void Send(const HazardEvent& event, bool with_picture);
 
-  const ZoneService& zone_;
+  NoticePictures& all_pictures_;
   const ros::Publisher publisher_;
-  const std::size_t picture_bytes_;
   std::atomic<std::uint64_t> sent_{0};
   std::atomic<std::uint64_t> pictures_{0};
-  std::atomic<std::uint64_t> pictures_failed_{0};
   std::mutex mutex_;  ///< Guards the next two.
   std::deque<HazardEvent> events_;
   bool closing_ = false;

@@ -44,16 +44,19 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       queue_(static_cast<std::size_t>(config_.queue_reports),
              static_cast<std::size_t>(config_.queue_bytes)),
       catch_up_(config_.catch_up),
+      pictures_(zone_, static_cast<std::size_t>(config_.notice_picture_bytes)),
       updater_(node, private_node) {
   if (config_.map_datum) SetMap(*config_.map_datum);
   receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
   poll_publisher_ = node.advertise<HazardPoll>("hazard/poll", 1000);
-  notices_ =
-      std::make_unique<NoticeSender>(zone_, node.advertise<HazardNotice>("hazard/notice", 20000),
-                                     static_cast<std::size_t>(config_.notice_picture_bytes));
+  notices_ = std::make_unique<NoticeSender>(pictures_,
+                                            node.advertise<HazardNotice>("hazard/notice", 20000));
+  VehicleTeller::Config telling;
+  telling.radius_m = config_.catch_up.radius_m;
+  telling.max_hazards = static_cast<std::size_t>(config_.join_max_hazards);
+  telling.picture_bytes = static_cast<std::size_t>(config_.join_picture_bytes);
   teller_ = std::make_unique<VehicleTeller>(
-      zone_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000),
-      config_.catch_up.radius_m, static_cast<std::size_t>(config_.join_max_hazards));
+      zone_, pictures_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000), telling);
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (config_.web) {
     web_ = std::make_unique<WebServer>(config_.web_options, zone_, config_.zone.catalogue);
@@ -75,6 +78,13 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   };
   ROS_INFO("zone in '%s': %zu hazards on the map", config_.zone.directory.c_str(),
            zone_.Statistics().active_hazards);
+  const StoreDamage damage = zone_.Statistics().store_damage;
+  if (damage.rows > 0) {
+    ROS_ERROR(
+        "the store in '%s' holds %zu rows that this program did not write; they are left "
+        "there and do not count. The first: %s",
+        config_.zone.directory.c_str(), damage.rows, damage.first.c_str());
+  }
 }
 
 ZoneNode::~ZoneNode() {
@@ -294,7 +304,7 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   counters.reports_waiting = queue_.size();
   counters.notices_sent = notices_->sent();
   counters.notice_pictures = notices_->pictures();
-  counters.notice_pictures_failed = notices_->pictures_failed();
+  counters.notice_pictures_failed = pictures_.failed();
   DescribeZone(counters, zone_.Statistics(), status);
 }
 

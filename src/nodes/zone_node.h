@@ -74,6 +74,7 @@ class ZoneNode {
   std::deque<CatchUpOrder> orders_;  ///< Not yet the worker's.
   std::deque<PollAnswer> answers_;
 
+  NoticePictures pictures_;
   std::unique_ptr<VehicleTeller> teller_;  ///< The worker's.
   std::int64_t advanced_ns_ = 0;           ///< The worker's: when time last passed, steady.
   std::unique_ptr<NoticeSender> notices_;

@@ -96,6 +96,8 @@ void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
   } else if (!reporter.map().set_aside().empty()) {
     status.summary(DiagnosticStatus::WARN,
                    "started anew after a corrupt store: " + reporter.map().set_aside());
+  } else if (reporter.map().broken_rows().count() > 0) {
+    status.summary(DiagnosticStatus::WARN, "the store holds rows of impossible values");
   } else if (!reporter.track().newest_ns()) {
     status.summary(DiagnosticStatus::WARN, "no fix yet");
   } else if (IsFusionSilent(reporter)) {
@@ -128,6 +130,7 @@ void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
   status.add("pending", reporter.map().pending_count());
   status.add("pending_bytes", reporter.map().pending_bytes());
   status.add("salvaged", reporter.map().salvage().reports);
+  status.add("broken_rows", reporter.map().broken_rows().count());
   status.add("map_sequence", reporter.map().map_sequence());
   status.add("notices_missing", reporter.map().has_gap());
   status.add("forgotten_unannounced", counters.forgotten_unannounced);
@@ -160,6 +163,14 @@ void DescribePollResponder(const PollResponder& responder,
   status.add("polls_unanswered", counters.unanswered);
   status.add("poll_pictures", counters.pictures);
   status.add("poll_picture_bytes", counters.picture_bytes);
+}
+
+std::string DescribeBrokenRows(const std::string& path, const LocalHazardMap& map) {
+  const BrokenRows& broken = map.broken_rows();
+  return "the local hazard map '" + path +
+         "' holds values that this program did not write: " + std::to_string(broken.known) +
+         " rows of what the zone told are taken out, " + std::to_string(broken.reports) +
+         " unfinished reports are left there and not sent";
 }
 
 std::string DescribeSetAside(const std::string& path, const LocalHazardMap& map) {

@@ -39,6 +39,8 @@ void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
 void DescribePollResponder(const PollResponder& responder,
                            diagnostic_updater::DiagnosticStatusWrapper& status);
 
+/// The sentence about rows of a sound store of `path` that hold impossible values.
+std::string DescribeBrokenRows(const std::string& path, const LocalHazardMap& map);
 /// The sentence about a corrupt store of `path` that was moved away: where to, and what of its
 /// unfinished reports came back.
 std::string DescribeSetAside(const std::string& path, const LocalHazardMap& map);

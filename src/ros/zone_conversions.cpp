@@ -139,6 +139,8 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
   using diagnostic_msgs::DiagnosticStatus;
   if (!counters.store_error.empty()) {
     status.summary(DiagnosticStatus::ERROR, counters.store_error);
+  } else if (statistics.store_damage.rows > 0) {
+    status.summary(DiagnosticStatus::WARN, "the store holds rows of impossible values");
   } else if (statistics.active_hazards == 0) {
     status.summary(DiagnosticStatus::OK, "no hazard yet");
   } else {
@@ -149,6 +151,8 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
     status.add(std::string("hazards_") + StateName(static_cast<HazardState>(i)),
                statistics.hazards_by_state[i]);
   }
+  status.add("store_rows_broken", statistics.store_damage.rows);
+  status.add("vehicles_suspect", statistics.suspect_vehicles);
   status.add("reports_received", counters.reports_received);
   status.add("reports_accepted", statistics.added);
   status.add("reports_merged", statistics.merged);

@@ -65,8 +65,10 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   ReadCount(parameters, "max_hazards", zone.max_hazards, {1, 1e8});
   parameters.Read("max_reports_per_hour", zone.allowance.reports_per_hour, {1, 1e9});
   parameters.Read("max_evidence_per_hour", zone.allowance.evidence_per_hour, {1, 1e9});
+  ReadCount(parameters, "max_reporting_vehicles", zone.allowance.max_vehicles, {1, 1e7});
   parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000});
   parameters.Read("speed_slack_m", zone.speed.slack_m, {0, 100000});
+  ReadCount(parameters, "speed_recovery_reports", zone.speed.recovery_reports, {2, 1000});
   ReportLimits& limits = zone.limits;
   limits.zone = ReadBounds(parameters);
   parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000});
@@ -86,6 +88,10 @@ void ReadLife(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("gone_below", life.gone_below, {0.001, 0.5});
   parameters.Read("surest_presence", life.surest, {0.5, 0.9999});
   parameters.Read("hostile_share", life.hostile_share, {0, 0.5});
+  parameters.Read("suspect_above", life.suspect_above, {0.01, 1});
+  parameters.Read("trust_memory_s", zone.trust.memory_s, {60, 1e10});
+  zone.trust.hostile_share = life.hostile_share;
+  zone.trust.max_vehicles = zone.allowance.max_vehicles;
   ReadCount(parameters, "denials", life.denials, {1, 100});
   parameters.Read("quarantine_s", life.quarantine_s, {0, 1e9});
   ReadCount(parameters, "reopen_vehicles", life.reopen_vehicles, {1, 100});
@@ -141,6 +147,7 @@ void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
   CatchUpPlanner::Config& catch_up = config.catch_up;
   parameters.Read("join_radius_m", catch_up.radius_m, {1, 100000});
   parameters.Read("join_max_hazards", config.join_max_hazards, {1, 100000});
+  parameters.Read("join_picture_bytes", config.join_picture_bytes, {0, 1e8});
   parameters.Read("join_gap_s", catch_up.gap_s, {1, 1e6});
   parameters.Read("catch_up_lag_s", catch_up.lag_s, {0, 3600});
   parameters.Read("catch_up_retry_s", catch_up.retry_s, {0.1, 3600});

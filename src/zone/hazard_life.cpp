@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
-#include "base/error.h"
 #include "base/stamps.h"
 
 namespace livemap {
@@ -17,13 +17,6 @@ double LogOdds(double probability) { return std::log(probability / (1 - probabil
 
 bool SpeaksAgainst(EvidenceKind kind) {
   return kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
-}
-
-void CheckRange(const char* name, double value, double min, double max) {
-  // Written so that NaN is refused too.
-  if (value >= min && value <= max) return;
-  throw Error(std::string(name) + " is " + std::to_string(value) + ", accepted is " +
-              std::to_string(min) + " to " + std::to_string(max));
 }
 
 std::string VehiclesText(std::uint32_t vehicles) {
@@ -70,15 +63,18 @@ double Faded(const LifeClass& entry, double log_odds, const LifeRecord& life, do
 }
 
 /// The vehicle's place among the voices: its own, a free one, or that of the longest silent, if it
-/// has been silent since before `at_s`.
-Voice* PlaceOf(std::uint64_t vehicle, std::uint32_t at_s, LifeRecord& life) {
+/// has been silent since before `at_s`. One that does not count goes before one that does, and
+/// drives none away that does.
+Voice* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s, LifeRecord& life) {
+  const auto keeps = [](const Voice& voice) { return std::make_pair(voice.Counts(), voice.at_s); };
   Voice* place = nullptr;
   for (Voice& voice : life.voices) {
     if (voice.vehicle == vehicle) return &voice;
-    if (place == nullptr || voice.at_s < place->at_s) place = &voice;
+    if (place == nullptr || keeps(voice) < keeps(*place)) place = &voice;
   }
-  if (place->vehicle != 0 && place->at_s >= at_s) return nullptr;
-  *place = Voice{vehicle, 0, 0, false};
+  if (place->Counts() && (suspect || place->at_s >= at_s)) return nullptr;
+  if (place->vehicle != 0 && suspect && place->at_s >= at_s) return nullptr;
+  *place = Voice{vehicle, 0, 0, false, suspect};
   return place;
 }
 
@@ -114,26 +110,6 @@ LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival) {
   return result;
 }
 
-HazardLife::HazardLife() : HazardLife(Config()) {}
-
-HazardLife::HazardLife(const Config& config) : config_(config) {
-  CheckRange("gone_below", config.gone_below, 0.01, 0.5);
-  CheckRange("surest", config.surest, 0.9, 0.9999);
-  CheckRange("prior_presence", config.prior_presence, 0.01, config.surest);
-  CheckRange("verify_below", config.verify_below, config.gone_below, config.surest);
-  CheckRange("sure_above", config.sure_above, config.verify_below, config.surest);
-  CheckRange("active_above", config.active_above, config.gone_below, config.surest);
-  CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
-  CheckRange("vanished_hit_rate", config.vanished_hit_rate, 0.1, 1);
-  CheckRange("vanished_false_rate", config.vanished_false_rate, 0, config.vanished_hit_rate);
-  CheckRange("denials", config.denials, 2, kMaxVoices - 1);
-  CheckRange("quarantine_s", config.quarantine_s, 0, 1e9);
-  CheckRange("reopen_vehicles", config.reopen_vehicles, 2, kMaxVoices);
-  CheckRange("rejected_keep_s", config.rejected_keep_s, 3600, 1e9);
-  max_log_odds_ = LogOdds(config.surest);
-  max_voice_ = -LogOdds(config.hostile_share);
-}
-
 void HazardLife::MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const {
   if (to_ns <= life.at_ns) return;
   if (life.state != HazardState::kRejected) {
@@ -147,7 +123,9 @@ void HazardLife::MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& 
   life.at_ns = to_ns;
 }
 
-double HazardLife::LogRatio(const LifeClass& entry, EvidenceKind kind, double ended_since) const {
+double HazardLife::LogRatio(const LifeClass& entry, const Evidence& evidence,
+                            double ended_since) const {
+  const EvidenceKind kind = evidence.kind;
   const bool change = kind == EvidenceKind::kVanished;
   const bool against = SpeaksAgainst(kind);
   // P(this word | there) and P(it | not there), of honest vehicles.
@@ -159,9 +137,16 @@ double HazardLife::LogRatio(const LifeClass& entry, EvidenceKind kind, double en
   }
   // What is not there now may have been there then.
   absent = ended_since * there + (1 - ended_since) * absent;
-  const double h = config_.hostile_share;
+  const double h = std::clamp(evidence.hostile, config_.hostile_share, 1.0);
   const double ratio = std::log(((1 - h) * there + h) / ((1 - h) * absent + h));
-  return std::clamp(ratio, -max_voice_, max_voice_);
+  const double bound = MaxVoice(evidence);
+  return std::clamp(ratio, -bound, bound);
+}
+
+/// Half hostile is worth nothing; who is more so must not be believed the other way round.
+double HazardLife::MaxVoice(const Evidence& evidence) const {
+  if (!(evidence.hostile > config_.hostile_share)) return max_voice_;
+  return std::max(0.0, -LogOdds(std::min(evidence.hostile, 0.5)));
 }
 
 bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const {
@@ -170,11 +155,12 @@ bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeReco
     return HearUnasked(entry, evidence, life);
   }
   const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
-  Voice* voice = PlaceOf(evidence.vehicle, at_s, life);
+  const bool suspect = evidence.hostile >= config_.suspect_above;
+  Voice* voice = PlaceOf(evidence.vehicle, suspect, at_s, life);
   if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
   const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
   const double ended_since = 1 - entry.survival.Survival(AgeS(life, evidence.stamp_ns), late_s);
-  const double ratio = LogRatio(entry, evidence.kind, ended_since);
+  const double ratio = LogRatio(entry, evidence, ended_since);
 
   // What the vehicle said for the hazard earlier has faded with the odds.
   double before = 1e-3 * voice->weight_1000;
@@ -182,8 +168,9 @@ bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeReco
     before *= std::exp(-static_cast<double>(at_s - voice->at_s) / entry.survival.MeanLifeS());
   }
   // The nearer a voice is to its bound, the less a further word adds; factors commute.
-  const double room = (ratio > 0 ? max_voice_ - before : max_voice_ + before) / max_voice_;
-  double after = before + ratio * std::clamp(room, 0.0, 1.0);
+  const double bound = MaxVoice(evidence);
+  const double room = ratio > 0 ? bound - before : bound + before;
+  double after = before + ratio * (bound > 0 ? std::clamp(room / bound, 0.0, 1.0) : 0.0);
   // What the odds' own bound cuts off was not said: it must not be taken back later.
   const double odds = std::clamp(life.log_odds + after - before, -max_log_odds_, max_log_odds_);
   after = before + odds - life.log_odds;
@@ -195,7 +182,10 @@ bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeReco
   if (at_s >= voice->at_s) {
     voice->at_s = at_s;
     voice->against = against;
+    voice->suspect = suspect;
+    life.SetJudged(static_cast<std::size_t>(voice - life.voices.data()), false);
   }
+  if (suspect) return true;
   against ? NoteNo(evidence.stamp_ns, life) : NoteYes(evidence.stamp_ns, life);
   return true;
 }
@@ -204,7 +194,7 @@ bool HazardLife::HearUnasked(const LifeClass& entry, const Evidence& evidence,
                              LifeRecord& life) const {
   const double least = LogOdds(config_.sure_above);
   if (life.log_odds <= least) return false;
-  const double ratio = LogRatio(entry, evidence.kind, 0);
+  const double ratio = LogRatio(entry, evidence, 0);
   life.log_odds = std::max(least, life.log_odds + ratio);
   return true;
 }
@@ -214,7 +204,7 @@ LifeStep HazardLife::Begin(const LifeClass& entry, const Evidence& sighting, std
   life = LifeRecord();
   life.since_ns = now_ns;
   life.at_ns = std::min(sighting.stamp_ns, now_ns);
-  life.first_seen_ns = life.at_ns;
+  life.first_seen_ns = life.last_yes_ns = life.at_ns;
   life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
   LifeStep step = Apply(entry, sighting, now_ns, life);
   if (!step.transition) {
@@ -239,23 +229,27 @@ LifeStep HazardLife::Apply(const LifeClass& entry, const Evidence& evidence, std
   const bool told = IsTold(life.state);
   const std::int64_t stood_until_ns = life.last_yes_ns;
   MoveTo(entry, word.stamp_ns, life);
-  const bool counted = Hear(entry, word, life);
-  step = Settle(entry, now_ns, life);
-  step.counted = counted;
+  step.counted = Hear(entry, word, life);
+  if (step.counted && !SpeaksAgainst(word.kind)) JudgeSeen(entry, word, life, step);
+  Settle(entry, now_ns, life, step);
   if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
   return step;
 }
 
 LifeStep HazardLife::Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const {
-  if (life.state == HazardState::kGone) return {};
-  return Settle(entry, now_ns, life);
+  LifeStep step;
+  if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
+  return step;
 }
 
-LifeStep HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const {
+void HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life,
+                        LifeStep& step) const {
   MoveTo(entry, now_ns, life);
-  LifeStep step;
   step.transition = Decide(entry, life);
-  if (!step.transition) return step;
+  if (!step.transition) return;
+  if (life.state != HazardState::kRejected && IsDeniedAway(life)) {
+    JudgeDeniedAway(entry, life, step);
+  }
   const HazardState from = life.state;
   const HazardState to = step.transition->to;
   Enter(to, now_ns, life);
@@ -268,7 +262,6 @@ LifeStep HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRec
     step.lesson.stood_s = 0.5 * Seconds(life.first_no_ns - life.last_yes_ns);
     step.lesson.ended = true;
   }
-  return step;
 }
 
 std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
@@ -301,11 +294,15 @@ std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
   }
 }
 
+bool HazardLife::IsDeniedAway(const LifeRecord& life) const {
+  return Opponents(life) >= config_.denials && Probability(life.log_odds) < config_.gone_below;
+}
+
 std::optional<LifeTransition> HazardLife::DecideGone(const LifeRecord& life) const {
-  const std::uint32_t opponents = Opponents(life);
-  if (opponents >= config_.denials && Probability(life.log_odds) < config_.gone_below) {
-    return Transition(life, HazardState::kGone,
-                      "denied by " + VehiclesText(opponents) + ", " + PresenceText(life.log_odds));
+  if (IsDeniedAway(life)) {
+    return Transition(
+        life, HazardState::kGone,
+        "denied by " + VehiclesText(Opponents(life)) + ", " + PresenceText(life.log_odds));
   }
   if (Probability(life.undenied_log_odds) >= config_.gone_below) return std::nullopt;
   return Transition(life, HazardState::kGone,
@@ -332,6 +329,7 @@ LifeStep HazardLife::Confirm(const LifeClass& entry, const std::string& official
   const bool told = IsTold(life.state);
   MoveTo(entry, now_ns, life);
   const std::int64_t stood_until_ns = told ? life.last_yes_ns : life.first_seen_ns;
+  JudgeOfficially(entry, true, life, step);
   for (Voice& voice : life.voices) {
     if (voice.against) voice = Voice();
   }
@@ -346,16 +344,19 @@ LifeStep HazardLife::Confirm(const LifeClass& entry, const std::string& official
   return step;
 }
 
-LifeStep HazardLife::Reject(const std::string& official, const std::string& reason,
-                            std::int64_t now_ns, LifeRecord& life) const {
+LifeStep HazardLife::Reject(const LifeClass& entry, const std::string& official,
+                            const std::string& reason, std::int64_t now_ns,
+                            LifeRecord& life) const {
   LifeStep step;
   if (!IsOnMap(life.state)) return step;
+  JudgeOfficially(entry, false, life, step);
   step.transition = Transition(life, HazardState::kRejected,
                                "rejected by " + official + (reason.empty() ? "" : ": " + reason));
   Enter(HazardState::kRejected, now_ns, life);
   // From here on it must be shown anew that there is something.
   life.official = false;
   life.voices = {};
+  life.judged = 0;
   life.first_no_ns = 0;
   life.at_ns = std::max(life.at_ns, now_ns);
   life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);

@@ -4,10 +4,12 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hazard/catalogue.h"
 #include "zone/life_record.h"
 #include "zone/survival_model.h"
+#include "zone/vehicle_trust.h"
 
 namespace livemap {
 
@@ -25,6 +27,8 @@ struct Evidence {
   EvidenceKind kind = EvidenceKind::kSighting;
   std::uint64_t vehicle = 0;  ///< VehicleKey.
   std::int64_t stamp_ns = 0;  ///< Of the image.
+  /// P(its vehicle says what it likes), of VehicleTrust; `hostile_share` at least.
+  double hostile = 0;
 };
 
 /// What HazardLife knows of a hazard's class; made by LifeClassOf, cheap to copy.
@@ -46,8 +50,9 @@ struct LifeTransition {
 /// What came of one call.
 struct LifeStep {
   std::optional<LifeTransition> transition;
-  bool counted = false;  ///< The evidence moved the odds.
-  LifeLesson lesson;     ///< For SurvivalModel::Learn, when the step is committed.
+  bool counted = false;           ///< The evidence moved the odds.
+  LifeLesson lesson;              ///< For SurvivalModel::Learn, when the step is committed.
+  std::vector<Verdict> verdicts;  ///< For VehicleTrust::Judge, likewise.
 };
 
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
@@ -69,6 +74,14 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// hazard lowers p to `sure_above` at most: it makes the zone ask, and the answers decide. It is
 /// gone when two distinct vehicles speak against it and p is small, or by time alone: one vehicle
 /// can neither confirm nor remove, nor hasten the removal. See docs/life.md.
+///
+/// How far a vehicle is believed comes with its word (Evidence::hostile): h is the vehicle's own
+/// where it is above the share, so its voice has a lower bound, and from `suspect_above` on it
+/// counts as no vehicle. What becomes of words teaches that in turn, by verdicts, one per word. A
+/// hazard that another vehicle sees when the others make it sure bears out every voice for it and
+/// contradicts every voice against it: what is gone does not come back. One that is denied away
+/// bears out its opponents, and contradicts its supporters as far as it is likely that they saw
+/// nothing, rather than something that ended since. An official's word settles all.
 class HazardLife {
  public:
   struct Config {
@@ -81,6 +94,9 @@ class HazardLife {
     double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
     double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
     double vanished_false_rate = 0.05;  ///< P(the same | it is there).
+    double suspect_above = 0.5;         ///< A vehicle this likely hostile is not counted as one.
+    double most_against = 1;            ///< No one verdict weighs more, log odds; an official's
+    double official_weight = 2;         ///< ...weighs this many times as much as a vehicle's.
     std::uint32_t denials = 2;          ///< Distinct vehicles against it before it is gone.
     double quarantine_s = 86400;        ///< A rejected hazard takes no support for this long.
     std::uint32_t reopen_vehicles = 2;  ///< Distinct vehicles that reopen it afterwards.
@@ -105,8 +121,8 @@ class HazardLife {
   /// No transition when the state stays; nothing happens to a hazard that is gone.
   LifeStep Confirm(const LifeClass& entry, const std::string& official, std::int64_t now_ns,
                    LifeRecord& life) const;
-  LifeStep Reject(const std::string& official, const std::string& reason, std::int64_t now_ns,
-                  LifeRecord& life) const;
+  LifeStep Reject(const LifeClass& entry, const std::string& official, const std::string& reason,
+                  std::int64_t now_ns, LifeRecord& life) const;
 
   /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
   double Presence(const LifeClass& entry, const LifeRecord& life, std::int64_t now_ns) const;
@@ -119,13 +135,24 @@ class HazardLife {
 
  private:
   void MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const;
-  double LogRatio(const LifeClass& entry, EvidenceKind kind, double ended_since) const;
+  double LogRatio(const LifeClass& entry, const Evidence& evidence, double ended_since) const;
   bool Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
   bool HearUnasked(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
-  LifeStep Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
+  double MaxVoice(const Evidence& evidence) const;
+  void Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life, LifeStep& step) const;
   std::optional<LifeTransition> Decide(const LifeClass& entry, const LifeRecord& life) const;
+  bool IsDeniedAway(const LifeRecord& life) const;
   std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;
   std::optional<LifeTransition> DecideRejected(const LifeRecord& life) const;
+
+  // Verdicts: hazard_verdicts.cpp.
+  double WrongYes(const LifeClass& entry) const;
+  double WrongNo(const LifeClass& entry) const;
+  void JudgeSeen(const LifeClass& entry, const Evidence& seen, LifeRecord& life,
+                 LifeStep& step) const;
+  void JudgeDeniedAway(const LifeClass& entry, const LifeRecord& life, LifeStep& step) const;
+  void JudgeOfficially(const LifeClass& entry, bool there, const LifeRecord& life,
+                       LifeStep& step) const;
 
   Config config_;
   double max_log_odds_;  // Of presence, by `surest`.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -40,6 +41,8 @@ class HazardRegistry {
   /// Takes in a hazard as the store kept it under `id`; in ascending order of sequence. The life's
   /// state counts, the hazard's presence too. Throws Error when its uuid or sequence is not new.
   void Restore(const Hazard& hazard, const LifeRecord& life, std::uint32_t id);
+  /// New hazards get ids above `id`: the store has rows up to there.
+  void SkipIdsTo(std::uint32_t id) { last_id_ = std::max(last_id_, id); }
 
   /// The nearest hazard of this class that is not gone within the class's radius (geodesic), the
   /// older one among equals. `position` must be valid.

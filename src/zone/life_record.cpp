@@ -3,70 +3,45 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <string_view>
 
+#include "base/number_line.h"
 #include "base/sha256.h"
+#include "base/stamp_range.h"
 
 namespace livemap {
 namespace {
 
 constexpr std::size_t kMaxPackedBytes = 500;
 constexpr std::uint32_t kAnswersToOpponent = 2;
-
-template <typename Number>
-void AppendNumber(std::string& line, Number number) {
-  char digits[32];
-  const auto end = std::to_chars(std::begin(digits), std::end(digits), number).ptr;
-  if (!line.empty()) line.push_back(' ');
-  line.append(digits, end);
-}
-
-/// Reads what AppendNumber wrote; once something is wrong it stays so.
-class NumberReader {
- public:
-  explicit NumberReader(std::string_view line) : rest_(line) {}
-
-  template <typename Number>
-  void Read(Number& number) {
-    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), number);
-    if (error != std::errc()) return Fail();
-    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
-    if (rest_.empty()) return;
-    if (rest_.front() != ' ' || rest_.size() == 1) return Fail();
-    rest_.remove_prefix(1);
-  }
-
-  bool good() const { return good_; }
-  bool done() const { return rest_.empty(); }
-
- private:
-  void Fail() {
-    good_ = false;
-    rest_ = {};
-  }
-
-  std::string_view rest_;
-  bool good_ = true;
-};
+constexpr double kMaxLogOdds = 20;  // As sure as nobody is; what a double can still turn back.
+constexpr int kMaxWeight1000 = 10000;
+// The last number of a packed voice.
+constexpr unsigned kAgainst = 1;
+constexpr unsigned kJudged = 2;
+constexpr unsigned kSuspect = 4;
 
 bool IsSound(const LifeRecord& life) {
-  const auto is_time = [](std::int64_t ns) { return ns >= 0; };
-  return is_time(life.since_ns) && is_time(life.first_seen_ns) && is_time(life.last_yes_ns) &&
-         is_time(life.first_no_ns) && is_time(life.at_ns) && std::abs(life.log_odds) <= 100 &&
-         std::abs(life.undenied_log_odds) <= 100;
+  return IsStamp(life.since_ns) && IsStamp(life.first_seen_ns) && IsStamp(life.last_yes_ns) &&
+         IsStamp(life.first_no_ns) && IsStamp(life.at_ns) &&
+         std::abs(life.log_odds) <= kMaxLogOdds && std::abs(life.undenied_log_odds) <= kMaxLogOdds;
 }
 
 bool ReadVoices(NumberReader& reader, LifeRecord& life) {
   for (std::size_t i = 0; !reader.done(); ++i) {
     if (i == kMaxVoices) return false;
     Voice& voice = life.voices[i];
-    unsigned against = 2;
+    unsigned flags = ~0U;
     reader.Read(voice.vehicle);
     reader.Read(voice.at_s);
     reader.Read(voice.weight_1000);
-    reader.Read(against);
-    voice.against = against == 1;
-    if (!reader.good() || against > 1 || voice.vehicle == 0) return false;
+    reader.Read(flags);
+    if (!reader.good() || flags > (kAgainst | kJudged | kSuspect) || voice.vehicle == 0) {
+      return false;
+    }
+    if (std::abs(int{voice.weight_1000}) > kMaxWeight1000) return false;
+    voice.against = (flags & kAgainst) != 0;
+    voice.suspect = (flags & kSuspect) != 0;
+    life.SetJudged(i, (flags & kJudged) != 0);
     for (std::size_t j = 0; j < i; ++j) {
       if (life.voices[j].vehicle == voice.vehicle) return false;
     }
@@ -93,12 +68,14 @@ std::string PackLife(const LifeRecord& life) {
   }
   AppendNumber(line, life.log_odds);
   AppendNumber(line, life.undenied_log_odds);
-  for (const Voice& voice : life.voices) {
+  for (std::size_t i = 0; i < kMaxVoices; ++i) {
+    const Voice& voice = life.voices[i];
     if (voice.vehicle == 0) continue;
     AppendNumber(line, voice.vehicle);
     AppendNumber(line, voice.at_s);
     AppendNumber(line, voice.weight_1000);
-    AppendNumber(line, voice.against ? 1U : 0U);
+    AppendNumber(line, (voice.against ? kAgainst : 0) | (life.IsJudged(i) ? kJudged : 0) |
+                           (voice.suspect ? kSuspect : 0));
   }
   return line;
 }
@@ -127,16 +104,16 @@ std::optional<LifeRecord> UnpackLife(const std::string& text) {
 std::uint32_t Supporters(const LifeRecord& life) {
   return static_cast<std::uint32_t>(
       std::count_if(life.voices.begin(), life.voices.end(),
-                    [](const Voice& voice) { return voice.vehicle != 0 && !voice.against; }));
+                    [](const Voice& voice) { return voice.Counts() && !voice.against; }));
 }
 
 std::uint32_t Opponents(const LifeRecord& life) {
   std::uint32_t opponents = 0;
   for (const Voice& voice : life.voices) {
-    if (voice.vehicle == 0 || !voice.against) continue;
+    if (!voice.Counts() || !voice.against) continue;
     const auto answers =
         std::count_if(life.voices.begin(), life.voices.end(), [&voice](const Voice& other) {
-          return other.vehicle != 0 && !other.against && other.at_s > voice.at_s;
+          return other.Counts() && !other.against && other.at_s > voice.at_s;
         });
     if (answers < kAnswersToOpponent) ++opponents;
   }

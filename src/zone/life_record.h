@@ -21,6 +21,10 @@ struct Voice {
   /// How much the vehicle moves the hazard's log odds, thousandths; > 0 towards there.
   std::int16_t weight_1000 = 0;
   bool against = false;  ///< Its newest word was that the hazard is not there.
+  /// When it said so the zone did not believe the vehicle enough to count it as one.
+  bool suspect = false;
+
+  bool Counts() const { return vehicle != 0 && !suspect; }
 };
 
 /// Vehicles that a hazard remembers; a further one takes the place of the longest silent.
@@ -31,6 +35,7 @@ constexpr std::size_t kMaxVoices = 6;
 struct LifeRecord {
   HazardState state = HazardState::kCandidate;
   bool official = false;           ///< Confirmed by an official: needs no further vehicle.
+  std::uint8_t judged = 0;         ///< Bit i: the newest word of voice i had its verdict.
   std::int64_t since_ns = 0;       ///< In this state since, zone clock.
   std::int64_t first_seen_ns = 0;  ///< Oldest stamp that spoke for it.
   std::int64_t last_yes_ns = 0;    ///< Newest stamp that spoke for it.
@@ -39,6 +44,12 @@ struct LifeRecord {
   double log_odds = 0;             ///< ln(p / (1 - p)) of its being there.
   double undenied_log_odds = 0;    ///< The same had nobody spoken against it.
   std::array<Voice, kMaxVoices> voices{};
+
+  bool IsJudged(std::size_t voice) const { return (judged >> voice & 1U) != 0; }
+  void SetJudged(std::size_t voice, bool is_judged) {
+    const unsigned bit = 1U << voice;
+    judged = static_cast<std::uint8_t>(is_judged ? judged | bit : judged & ~bit);
+  }
 };
 
 /// One line of plain numbers with spaces between, at most 500 bytes, to be stored; exact.
@@ -46,10 +57,10 @@ std::string PackLife(const LifeRecord& life);
 /// Inverse of PackLife; none when `text` is anything else.
 std::optional<LifeRecord> UnpackLife(const std::string& text);
 
-/// Vehicles whose newest word is for the hazard; at most kMaxVoices.
+/// Vehicles that count whose newest word is for the hazard; at most kMaxVoices.
 std::uint32_t Supporters(const LifeRecord& life);
-/// Vehicles whose newest word is against it, and has not been answered by two others since, that
-/// spoke for it.
+/// Vehicles that count whose newest word is against it, and has not been answered by two others
+/// since, that spoke for it.
 std::uint32_t Opponents(const LifeRecord& life);
 
 }  // namespace livemap

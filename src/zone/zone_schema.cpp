@@ -160,6 +160,18 @@ const Statements& ToVersion2() {
   return kStatements;
 }
 
+/// What is held against vehicles, by VehicleKey as a signed number.
+const Statements& ToVersion3() {
+  static const Statements kStatements{
+      R"(CREATE TABLE trust (
+           vehicle_key BIGINT PRIMARY KEY,
+           suspicion DOUBLE PRECISION NOT NULL,
+           at_ns BIGINT NOT NULL,
+           vouchers TEXT NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (3)"};
+  return kStatements;
+}
+
 int Version(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -176,7 +188,12 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
                      std::to_string(version) + ", this program knows versions up to " +
                      std::to_string(kZoneSchemaVersion));
   }
-  const std::array<const Statements*, kZoneSchemaVersion> steps{&ToVersion1(), &ToVersion2()};
+  if (version < 0) {
+    throw StoreError("store: database '" + path + "' has schema version " +
+                     std::to_string(version) + ", which no program wrote");
+  }
+  const std::array<const Statements*, kZoneSchemaVersion> steps{&ToVersion1(), &ToVersion2(),
+                                                                &ToVersion3()};
   for (int step = version; step < kZoneSchemaVersion; ++step) {
     soci::transaction transaction(session);
     for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;

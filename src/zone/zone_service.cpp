@@ -24,7 +24,10 @@ void CheckSettings(const ZoneService::Config& config) {
     throw Error("max_speed_mps is " + std::to_string(speed.max_speed_mps) + " and speed_slack_m " +
                 std::to_string(speed.slack_m) + ", accepted are above 0 and at least 0");
   }
-  if (speed.recovery_reports < 2) throw Error("recovery_reports must be at least 2");
+  if (speed.recovery_reports < 2) {
+    throw Error("recovery_reports is " + std::to_string(speed.recovery_reports) +
+                ", accepted is at least 2");
+  }
   if (config.max_vehicles == 0) throw Error("max_vehicles is 0, accepted is at least 1");
 }
 
@@ -37,6 +40,7 @@ ZoneService::Implementation::Implementation(Config config, Clock now_ns, std::ui
       life_(config_.life),
       store_(directory_.path() + "/zone.sqlite3"),
       survival_(config_.catalogue, config_.survival),
+      trust_(config_.trust),
       allowance_(config_.allowance),
       images_(directory_.path() + "/images", static_cast<std::uint64_t>(config_.image_cap_bytes)),
       vehicles_(config_.vehicle_retention_s, config_.max_vehicles),
@@ -55,15 +59,21 @@ std::mt19937_64 ZoneService::Implementation::MakeGenerator(std::uint64_t seed,
 }
 
 void ZoneService::Implementation::Load() {
-  store_.LoadLives([this](const std::string& class_name, LearnedLife learned) {
+  StoreDamage& damage = statistics_.store_damage;
+  damage += store_.LoadLives([this](const std::string& class_name, LearnedLife learned) {
     survival_.Restore(class_name, learned);
   });
-  store_.LoadHazards([this](const ZoneStore::HazardRow& row) {
+  damage += store_.LoadTrust([this](std::uint64_t vehicle, const TrustRecord& record) {
+    if (!trust_.Restore(vehicle, record)) throw Error("a vehicle's trust is no such record");
+  });
+  damage += store_.LoadHazards([this](const ZoneStore::HazardRow& row) {
     const Hazard& hazard = row.hazard;
+    registry_.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));
     if (IsOnMap(hazard.state)) images_.Retain(hazard.image_sha256);
     announced_ = std::max(announced_, hazard.announced_sequence);
-    registry_.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));
+    sequence_ = std::max(sequence_, hazard.sequence);
   });
+  registry_.SkipIdsTo(static_cast<std::uint32_t>(store_.LastHazardId()));
   const std::int64_t now_ns = now_ns_();
   for (Slot slot = 0; slot < registry_.size(); ++slot) Schedule(slot, now_ns);
 }
@@ -98,6 +108,9 @@ void ZoneService::Implementation::Write(Change& change) {
   for (const auto& [class_name, before] : change.learned_before) {
     store_.WriteLife(class_name, survival_.learned().at(class_name));
   }
+  for (const auto& [vehicle, before] : change.trust_before) {
+    store_.WriteTrust(vehicle, trust_.Get(vehicle));
+  }
 }
 
 /// What a failed transaction taught.
@@ -105,6 +118,7 @@ void ZoneService::Implementation::Forget(const Change& change) {
   for (const auto& [class_name, before] : change.learned_before) {
     survival_.Restore(class_name, before);
   }
+  for (const auto& [vehicle, before] : change.trust_before) trust_.Restore(vehicle, before);
 }
 
 void ZoneService::Implementation::Settle(const Change& change) {
@@ -170,11 +184,13 @@ ZoneStatistics ZoneService::Implementation::Statistics() const {
   statistics.active_hazards = registry_.on_map_count();
   statistics.hazards_by_state = registry_.counts();
   statistics.image_bytes = images_.total_bytes();
+  statistics.suspect_vehicles = trust_.Count(config_.life.suspect_above, now_ns_());
   return statistics;
 }
 
 ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed) {
   CheckSettings(config);
+  config.trust.hostile_share = config.life.hostile_share;
   if (config.replay) config.limits.max_age_s = std::numeric_limits<double>::infinity();
   implementation_ =
       std::make_unique<Implementation>(std::move(config), std::move(now_ns), uuid_seed);

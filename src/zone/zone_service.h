@@ -17,9 +17,11 @@
 #include "zone/poll_scheduler.h"
 #include "zone/report_validation.h"
 #include "zone/speed_rule.h"
+#include "zone/store_damage.h"
 #include "zone/survival_model.h"
 #include "zone/vehicle_allowance.h"
 #include "zone/vehicle_track.h"
+#include "zone/vehicle_trust.h"
 
 namespace livemap {
 
@@ -87,6 +89,8 @@ struct ZoneStatistics {
   std::size_t active_hazards = 0;  ///< On the map: candidate, active or verifying.
   std::array<std::size_t, kHazardStates> hazards_by_state{};  ///< By HazardState.
   std::uint64_t image_bytes = 0;                              ///< On disk.
+  std::size_t suspect_vehicles = 0;  ///< Too often contradicted: they do not count as vehicles.
+  StoreDamage store_damage;          ///< What was found broken in the store at start.
 };
 
 /// The zone's state behind one thread-safe door: registry, store, pictures, vehicles, event stream.
@@ -109,6 +113,7 @@ class ZoneService {
     VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
     HazardLife::Config life;
     SurvivalModel::Config survival;
+    VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
     PollScheduler::Config polls;
     SightRule sight;  ///< Whose answer to a poll counts.
     /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
@@ -119,7 +124,8 @@ class ZoneService {
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
   using Subscriber = std::function<void(const ZoneEvent&)>;
 
-  /// Opens or makes the store and loads it. `uuid_seed` seeds the ids of new hazards: a test gives
+  /// Opens or makes the store and loads it; rows of impossible values are left out, left alone and
+  /// counted. `uuid_seed` seeds the ids of new hazards: a test gives
   /// a number, a node gives entropy. Throws Error for a bad setting, StoreError for a store that
   /// cannot be used: not writable, corrupt, or of a newer schema.
   ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed);

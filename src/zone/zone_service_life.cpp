@@ -47,6 +47,21 @@ void ZoneService::Implementation::Learn(const std::string& class_name, const Lif
   survival_.Learn(class_name, lesson);
 }
 
+Evidence ZoneService::Implementation::EvidenceOf(EvidenceKind kind, const std::string& vehicle_id,
+                                                 std::int64_t stamp_ns, std::int64_t now_ns) const {
+  Evidence evidence{kind, VehicleKey(vehicle_id), SeenNs(stamp_ns, now_ns)};
+  evidence.hostile = trust_.Hostile(evidence.vehicle, now_ns);
+  return evidence;
+}
+
+void ZoneService::Implementation::Judge(const LifeStep& step, Change& change) {
+  for (const Verdict& verdict : step.verdicts) {
+    // The first time only: a failed transaction takes back all of them.
+    change.trust_before.emplace(verdict.vehicle, trust_.Get(verdict.vehicle));
+    trust_.Judge(verdict, change.now_ns);
+  }
+}
+
 std::optional<ZoneService::Implementation::Slot> ZoneService::Implementation::MatchNow(
     const Report& report, Change& change) {
   auto match = registry_.FindMatch(report.class_name, report.position);
@@ -68,6 +83,7 @@ void ZoneService::Implementation::Step(Slot slot, const LifeRecord& life, const 
                                        const std::string& reason, const Before& before,
                                        Change& change) {
   Learn(registry_.ClassName(slot), step.lesson, change);
+  Judge(step, change);
   registry_.SetLife(slot, life, life_.Presence(ClassOf(slot), life, change.now_ns),
                     ++change.sequence, change.now_ns);
   NoteEvent(slot, before, reason, false, change);
@@ -105,9 +121,9 @@ bool ZoneService::Implementation::Reject(const Uuid& uuid, const std::string& of
   if (!why.empty() && !IsPrintableText(why, kMaxReasonBytes)) {
     throw Error("the reason is not accepted: it must be printable UTF-8");
   }
-  return Decide(uuid, [&](Slot, LifeRecord& life) -> LifeStep {
+  return Decide(uuid, [&](Slot slot, LifeRecord& life) -> LifeStep {
     if (!IsOnMap(life.state)) return {};
-    return life_.Reject(official, why, now_ns_(), life);
+    return life_.Reject(ClassOf(slot), official, why, now_ns_(), life);
   });
 }
 

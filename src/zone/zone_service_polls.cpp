@@ -116,8 +116,8 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
     change.answered_id = registry_.Record(slot).id;
     PassTime(slot, change);
     LifeRecord life = registry_.Record(slot).life;
-    const Evidence evidence{KindOf(answer.answer), VehicleKey(answer.vehicle_id),
-                            SeenNs(answer.stamp_ns, change.now_ns)};
+    const Evidence evidence =
+        EvidenceOf(KindOf(answer.answer), answer.vehicle_id, answer.stamp_ns, change.now_ns);
     const LifeStep step = life_.Apply(ClassOf(slot), evidence, change.now_ns, life);
     if (!step.counted && !step.transition) return;
     const Before before = BeforeOf(slot);

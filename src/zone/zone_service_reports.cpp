@@ -162,10 +162,11 @@ ZoneService::Implementation::Slot ZoneService::Implementation::Register(const Re
   const Slot slot = registry_.Add(report, picture, uuid, ++change.sequence, change.now_ns);
   const LifeClass entry = ClassOf(slot);
   LifeRecord life;
-  const Evidence evidence{EvidenceKind::kSighting, VehicleKey(report.vehicle_id),
-                          SeenNs(report.stamp_ns, change.now_ns)};
+  const Evidence evidence =
+      EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, change.now_ns);
   const LifeStep step = life_.Begin(entry, evidence, change.now_ns, life);
   Learn(report.class_name, step.lesson, change);
+  Judge(step, change);
   registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
                     change.now_ns);
   NoteEvent(slot, std::nullopt, step.transition ? step.transition->reason : "report", true, change);
@@ -180,10 +181,11 @@ void ZoneService::Implementation::Sight(Slot slot, const Report& report, const P
   if (allowance_.TakeEvidence(report.vehicle_id, change.now_ns)) {
     const LifeClass entry = ClassOf(slot);
     LifeRecord life = registry_.Record(slot).life;
-    const Evidence evidence{EvidenceKind::kSighting, VehicleKey(report.vehicle_id),
-                            SeenNs(report.stamp_ns, change.now_ns)};
+    const Evidence evidence =
+        EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, change.now_ns);
     const LifeStep step = life_.Apply(entry, evidence, change.now_ns, life);
     Learn(report.class_name, step.lesson, change);
+    Judge(step, change);
     registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
                       change.now_ns);
     reason = step.transition ? step.transition->reason : "sighting";

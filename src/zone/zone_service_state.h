@@ -52,6 +52,7 @@ class ZoneService::Implementation {
   std::mutex writer_mutex_;
   ZoneStore store_;
   SurvivalModel survival_;
+  VehicleTrust trust_;
   VehicleAllowance allowance_;
   std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id; the rest is stored.
   DueQueue due_;
@@ -108,6 +109,7 @@ class ZoneService::Implementation {
     std::vector<std::pair<std::string, std::string>> pictures;  ///< Before and after.
     std::vector<Slot> touched;                                  ///< Hazards to write; may repeat.
     std::map<std::string, LearnedLife> learned_before;          ///< By class.
+    std::map<std::uint64_t, TrustRecord> trust_before;          ///< By vehicle.
     std::vector<AcceptedReport> reports;
     const PollAnswer* answer = nullptr;
     std::uint32_t answered_id = 0;  ///< Hazard of the answer.
@@ -158,6 +160,11 @@ class ZoneService::Implementation {
   void NoteEvent(Slot slot, const std::optional<Before>& before, std::string reason, bool tells,
                  Change& change);
   void Learn(const std::string& class_name, const LifeLesson& lesson, Change& change);
+  /// What the step teaches of vehicles.
+  void Judge(const LifeStep& step, Change& change);
+  /// What a vehicle says of a hazard, with how far it is believed.
+  Evidence EvidenceOf(EvidenceKind kind, const std::string& vehicle_id, std::int64_t stamp_ns,
+                      std::int64_t now_ns) const;
   /// A decision about one hazard, in a transaction of its own: false when it leads to no
   /// transition.
   template <typename Decision>

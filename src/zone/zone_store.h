@@ -11,15 +11,17 @@
 #include "zone/hazard.h"
 #include "zone/hazard_life.h"
 #include "zone/speed_rule.h"
+#include "zone/store_damage.h"
 #include "zone/survival_model.h"
+#include "zone/vehicle_trust.h"
 
 namespace livemap {
 
 struct PollAnswer;
 
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
-/// was learned of the classes, and where each vehicle's last report lies. SQLite in WAL mode with
-/// synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
+/// was learned of classes and of vehicles, and where each vehicle's last report lies. SQLite in WAL
+/// mode with synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
 ///
 /// Every function throws StoreError with the database's own words when it fails.
 class ZoneStore {
@@ -38,20 +40,26 @@ class ZoneStore {
     LifeRecord life;
   };
   /// Every hazard, in ascending order of sequence. One of an older schema gets a life that says
-  /// what that schema knew.
-  void LoadHazards(const std::function<void(HazardRow)>& take);
-  void LoadLives(const std::function<void(const std::string& class_name, LearnedLife)>& take);
+  /// what that schema knew. What the three Load functions give to `take` is sound; a row that the
+  /// program cannot have written, or for which `take` throws Error, is left out and told.
+  StoreDamage LoadHazards(const std::function<void(HazardRow)>& take);
+  StoreDamage LoadLives(const std::function<void(const std::string&, LearnedLife)>& take);
+  StoreDamage LoadTrust(const std::function<void(std::uint64_t, const TrustRecord&)>& take);
+  /// The greatest id that a row of a hazard has, sound or not; 0 without rows. What lies beyond the
+  /// ids that hazards can have is passed over.
+  std::uint64_t LastHazardId();
   /// Of the newest event; 0 without events.
   std::uint64_t LastSequence();
   struct KnownReport {
-    Uuid hazard;  ///< What it became or was merged into.
+    Uuid hazard;  ///< What it became or was merged into; nil when its hazard's row is broken.
     std::string vehicle_id;
   };
   /// A committed report.
   std::optional<KnownReport> FindReport(const Uuid& report_uuid);
-  /// Where the vehicle's last accepted report lies.
+  /// Where the vehicle's last accepted report lies; none too where the row is broken.
   std::optional<ReportedFix> FindLastReport(const std::string& vehicle_id);
-  /// The newest `limit` events of a hazard whose newest one is `sequence`, oldest first.
+  /// The newest `limit` events of a hazard whose newest one is `sequence`, oldest first; broken
+  /// rows are left out.
   std::vector<StoredEvent> LoadEvents(const Uuid& hazard, std::uint64_t sequence,
                                       std::size_t limit);
 
@@ -70,6 +78,7 @@ class ZoneStore {
                   std::uint64_t previous_sequence);
   void WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id, std::int64_t received_ns);
   void WriteLife(const std::string& class_name, const LearnedLife& learned);
+  void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
   void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
 
   /// The schema that this program writes.

@@ -2,8 +2,11 @@
 
 #include <soci/soci.h>
 
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/sqlite.h"
 #include "zone/zone_store.h"
@@ -21,16 +24,24 @@ class ZoneStore::Implementation {
 
   /// The values of all statements: SOCI binds to places, not to values.
   struct Row {
-    std::string uuid, class_name, vehicle_id, drive_id, image_sha256, image_format, reason, life;
+    std::string uuid, class_name, vehicle_id, drive_id, image_sha256, image_format, reason, life,
+        vouchers;
     double confidence = 0, latitude = 0, longitude = 0, presence = 0, sigma_m = 0;
-    double covariance_ee = 0, covariance_en = 0, covariance_nn = 0, ended = 0, stood_s = 0;
+    double covariance_ee = 0, covariance_en = 0, covariance_nn = 0, ended = 0, stood_s = 0,
+           suspicion = 0;
     long long id = 0, sightings = 0, first_seen_ns = 0, last_seen_ns = 0, updated_ns = 0;
     long long sequence = 0, announced_sequence = 0, previous_sequence = 0;
-    long long stamp_ns = 0, received_ns = 0;
+    long long stamp_ns = 0, received_ns = 0, vehicle_key = 0;
     int state = 0, vehicles = 0, action = 0, from_state = 0, announced = 0, answer = 0;
     soci::indicator has_from = soci::i_ok;
   };
+  /// Throws Error for a row of impossible values.
   static HazardRow ToHazard(const Row& row);
+  std::map<long long, std::vector<Voice>> VoicesOfReports();
+  /// Calls `take_row` for every row of a prepared query; what it throws as Error is told. The
+  /// query finds those rows of `table` only whose values are of the right type and size.
+  StoreDamage LoadRows(const std::string& table, soci::statement& query,
+                       const std::function<void()>& take_row);
 
   /// Declared before the statements, which must go first.
   std::string path_;
@@ -44,6 +55,7 @@ class ZoneStore::Implementation {
   std::optional<soci::statement> write_event_;
   std::optional<soci::statement> write_answer_;
   std::optional<soci::statement> write_life_;
+  std::optional<soci::statement> write_trust_;
   std::optional<soci::statement> write_last_report_;
 };
 

@@ -59,6 +59,12 @@ void ZoneStore::Implementation::PrepareWrites() {
                               "ON CONFLICT (class_name) DO UPDATE SET ended = excluded.ended, "
                               "stood_s = excluded.stood_s",
                        use(row_.class_name), use(row_.ended), use(row_.stood_s)));
+  write_trust_.emplace(
+      (session_.prepare
+           << "INSERT INTO trust (vehicle_key, suspicion, at_ns, vouchers) VALUES (:k, :s, :a, :v) "
+              "ON CONFLICT (vehicle_key) DO UPDATE SET suspicion = excluded.suspicion, "
+              "at_ns = excluded.at_ns, vouchers = excluded.vouchers",
+       use(row_.vehicle_key), use(row_.suspicion), use(row_.updated_ns), use(row_.vouchers)));
   write_last_report_.emplace(
       (session_.prepare
            << "INSERT INTO last_reports (vehicle_id, stamp_ns, latitude, longitude, sigma_m) "
@@ -175,6 +181,18 @@ void ZoneStore::WriteLife(const std::string& class_name, const LearnedLife& lear
     row.ended = learned.ended;
     row.stood_s = learned.stood_s;
     implementation_->write_life_->execute(true);
+  });
+}
+
+void ZoneStore::WriteTrust(std::uint64_t vehicle, const TrustRecord& record) {
+  ExplainStore("writing what is held against a vehicle", [&] {
+    Implementation::Row& row = implementation_->row_;
+    // The same bits: databases have no unsigned numbers.
+    row.vehicle_key = static_cast<long long>(vehicle);
+    row.suspicion = record.suspicion;
+    row.updated_ns = record.at_ns;
+    row.vouchers = PackVouchers(record);
+    implementation_->write_trust_->execute(true);
   });
 }
 

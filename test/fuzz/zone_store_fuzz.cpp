@@ -1,0 +1,151 @@
+// A sound database of a zone into which something else than the program wrote: what is loaded keeps
+// the promises of zone/hazard.h, the sound hazard beside it stays, and the zone goes on.
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+
+#include "store_script.h"
+#include "zone/report_validation.h"
+#include "zone/zone_service.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+
+void Require(bool holds) {
+  if (!holds) std::abort();
+}
+
+Report MakeReport(std::uint8_t number, const std::string& vehicle, double latitude_deg) {
+  Report report;
+  report.uuid.bytes[0] = number;
+  report.uuid.bytes[15] = 1;
+  report.vehicle_id = vehicle;
+  report.drive_id = "drive";
+  report.stamp_ns = kNowNs - 1'000'000'000;
+  report.class_name = number % 2 == 0 ? "pothole" : "cone";
+  report.confidence = 0.5F;
+  report.box = {1, 1, 2, 2};
+  report.position = {latitude_deg, 8};
+  report.covariance_m2 = Eigen::Matrix2d::Identity();
+  report.image_width = report.image_height = 10;
+  return report;
+}
+
+ZoneService::Config ConfigOf(const std::string& directory) {
+  ZoneService::Config config;
+  config.directory = directory;
+  config.speed.max_speed_mps = 1e9;
+  return config;
+}
+
+std::int64_t Now() { return kNowNs; }
+
+/// A database as the program writes it, made once; its first hazard is spared.
+struct Template {
+  Template() {
+    const std::string made = folder + "/made";
+    {
+      ZoneService zone(ConfigOf(made), Now, 1);
+      for (std::uint8_t i = 2; i < 6; ++i) {
+        zone.Handle(MakeReport(i, "car-1", 40 + i));
+        Report second = MakeReport(static_cast<std::uint8_t>(i + 100), "car-2", 40 + i);
+        zone.Handle(second);
+      }
+      spared = zone.Query(std::nullopt, 0, 1).at(0);
+      const auto all = zone.Query(std::nullopt, 0, 10);
+      zone.Reject(all.at(2).uuid, "Anna", "a shadow");
+      zone.Confirm(all.at(3).uuid, "Anna");
+    }
+    database = ReadFile(made + "/zone.sqlite3", 100 << 20);
+    SqliteDatabase open(made + "/zone.sqlite3", false);
+    tables = {ReadFuzzTable(open, "hazards", "id", "1"),
+              ReadFuzzTable(open, "events", "sequence"),
+              ReadFuzzTable(open, "reports", "uuid"),
+              ReadFuzzTable(open, "lives", "class_name"),
+              ReadFuzzTable(open, "trust", "vehicle_key"),
+              ReadFuzzTable(open, "last_reports", "vehicle_id"),
+              ReadFuzzTable(open, "livemap_schema", "version")};
+  }
+  ~Template() { std::filesystem::remove_all(folder); }
+
+  const std::string folder = FuzzFolder("zone_store_fuzz");
+  Hazard spared;
+  std::string database;
+  std::vector<FuzzTable> tables;
+};
+
+void RequireSound(const Hazard& hazard) {
+  Require(!hazard.uuid.IsNil() && IsPrintableText(hazard.class_name, 64));
+  Require(hazard.confidence >= 0 && hazard.confidence <= 1);
+  Require(hazard.presence >= 0 && hazard.presence <= 1);
+  Require(IsValid(hazard.position) && hazard.covariance_m2.allFinite());
+  Require(hazard.covariance_m2.determinant() > 0 && hazard.covariance_m2(0, 0) > 0);
+  Require(hazard.first_seen_ns >= 0 && hazard.first_seen_ns <= hazard.last_seen_ns);
+  Require(hazard.sequence > 0 && hazard.announced_sequence <= hazard.sequence);
+  Require(hazard.image_sha256.empty() || hazard.image_sha256.size() == 64);
+  Require(hazard.sightings > 0 && hazard.vehicles <= kMaxVoices);
+}
+
+void RequireWorking(ZoneService& zone, const Template& made) {
+  const auto spared = zone.Find(made.spared.uuid);
+  Require(spared && spared->position.latitude_deg == made.spared.position.latitude_deg);
+  Require(spared->sightings >= made.spared.sightings && spared->state == made.spared.state);
+  for (const Hazard& hazard : zone.Query(std::nullopt, 1, 1000)) {
+    RequireSound(hazard);
+    for (const StoredEvent& event : zone.Events(hazard.uuid, 100)) {
+      Require(event.reason.size() <= 200 && event.at_ns >= 0);
+    }
+  }
+  for (const Hazard& hazard : zone.QueryNear({42, 8}, 1e6, 100)) RequireSound(hazard);
+  // What was committed is committed still, and what is new is taken.
+  Require(zone.Handle(MakeReport(3, "car-1", 43)).status == Receipt::Status::kCommitted ||
+          zone.Statistics().refused > 0);
+  zone.UpdateVehicle({"car-3", "", {42, 8}, 0, 10, kNowNs, 0});
+  zone.TakeDuePolls();
+  zone.Advance();
+}
+
+void FuzzStore(const std::uint8_t* data, std::size_t size) {
+  static const Template made;
+  const std::string directory = made.folder + "/run";
+  std::filesystem::remove_all(directory);
+  std::filesystem::create_directories(directory);
+  const std::string path = directory + "/zone.sqlite3";
+  FILE* file = std::fopen(path.c_str(), "wb");
+  Require(file != nullptr);
+  Require(std::fwrite(made.database.data(), 1, made.database.size(), file) == made.database.size());
+  std::fclose(file);
+  {
+    SqliteDatabase database(path, false);
+    FuzzBytes bytes(data, size);
+    RunStoreScript(database, made.tables, bytes);
+  }
+  try {
+    ZoneService zone(ConfigOf(directory), Now, 2);
+    RequireWorking(zone, made);
+    const Receipt receipt = zone.Handle(MakeReport(200, "car-9", 60));
+    Require(receipt.status == Receipt::Status::kCommitted);
+  } catch (const StoreError& error) {
+    // Another schema's version; everything else must have been passed over.
+    const std::string why = error.what();
+    // With the number of another version its steps are tried, and refused as a whole.
+    Require(why.find("schema version") != std::string::npos ||
+            why.find("opening '") != std::string::npos);
+    return;
+  }
+  ZoneService zone(ConfigOf(directory), Now, 3);
+  RequireWorking(zone, made);
+}
+
+}  // namespace
+}  // namespace livemap
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  livemap::FuzzStore(data, size);
+  return 0;
+}
