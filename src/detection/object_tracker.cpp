@@ -34,8 +34,8 @@ std::optional<SeenPoint> Look(const Eigen::Vector3d& in_base, const CameraMotion
   // Written so that NaN is refused too.
   if (!(p.z() >= kNearestM)) return std::nullopt;
   const CameraIntrinsics& camera = motion.intrinsics;
-  return SeenPoint{
-      {camera.fx * p.x() / p.z() + camera.cx, camera.fy * p.y() / p.z() + camera.cy}, p.z()};
+  return SeenPoint{{camera.fx * p.x() / p.z() + camera.cx, camera.fy * p.y() / p.z() + camera.cy},
+                   p.z()};
 }
 
 std::optional<Eigen::Vector3d> OnRoad(const Eigen::Vector2d& pixel, const CameraMotion& motion) {
@@ -91,8 +91,8 @@ std::vector<HazardEvent> ObjectTracker::Add(const TrackerFrame& frame) {
       ++counters_.refused;
       continue;
     }
-    const double share = double{found.confidence} /
-                         double{thresholds_[static_cast<std::size_t>(found.class_index)]};
+    const double share =
+        double{found.confidence} / double{thresholds_[static_cast<std::size_t>(found.class_index)]};
     if (share < config_.low_share) continue;
     (share >= 1 ? strong : weak).push_back(found);
   }
@@ -191,7 +191,8 @@ std::optional<ObjectTracker::Expected> ObjectTracker::ExpectByMotion(
 
   const auto square = [](double value) { return value * value; };
   const double placed = square(config_.pixel_sigma_px) * (1 + square(growth));
-  const double pitch = square(config_.pitch_sigma_rad * motion.intrinsics.fy) * (1 + square(growth));
+  const double pitch =
+      square(config_.pitch_sigma_rad * motion.intrinsics.fy) * (1 + square(growth));
   const Eigen::Vector2d per_m = (probe->pixel - now->pixel) / kProbeM;
   const double way_sigma = config_.motion_sigma_m + config_.motion_sigma_share * expected.way_m;
   expected.covariance_px2 = square(way_sigma) * per_m * per_m.transpose();
@@ -294,8 +295,8 @@ void ObjectTracker::Begin(const HazardDetection& found, const TrackerFrame& fram
 
 double ObjectTracker::Quality(const HazardDetection& found, const TrackerFrame& frame) const {
   double quality = double{found.confidence};
-  quality *= std::min(
-      1.0, double{std::min(found.box.width, found.box.height)} / config_.good_side_px);
+  quality *=
+      std::min(1.0, double{std::min(found.box.width, found.box.height)} / config_.good_side_px);
   if (Touches(found.box, frame.image_size)) quality *= config_.cut_share;
   if (frame.motion) {
     if (const auto place = OnRoad(FootOf(found.box), *frame.motion)) {
@@ -307,8 +308,7 @@ double ObjectTracker::Quality(const HazardDetection& found, const TrackerFrame& 
 
 double ObjectTracker::Evidence(const Track& track) const {
   const double confidence =
-      track.best_confidence +
-      config_.repeat_gain * (track.sum_confidence - track.best_confidence);
+      track.best_confidence + config_.repeat_gain * (track.sum_confidence - track.best_confidence);
   return confidence / double{thresholds_[static_cast<std::size_t>(track.last.class_index)]};
 }
 
@@ -320,8 +320,7 @@ double ObjectTracker::MaxDelayS(const std::string& class_name) const {
 bool ObjectTracker::IsDue(Track& track, bool seen, bool gone, std::int64_t now_ns) const {
   if (track.reported || !track.sure_ns) return false;
   const bool past_best = seen && track.quality < config_.past_best_share * track.best_quality;
-  return gone || past_best ||
-         Seconds(*track.sure_ns, now_ns) >= MaxDelayS(track.last.class_name);
+  return gone || past_best || Seconds(*track.sure_ns, now_ns) >= MaxDelayS(track.last.class_name);
 }
 
 HazardEvent ObjectTracker::Report(Track& track) {

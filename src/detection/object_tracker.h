@@ -40,8 +40,8 @@ struct HazardEvent {
   int sights = 0;             ///< Images in which it was recognised so far.
 };
 
-/// Follows objects from image to image, and reports each once, when it is sure and at its best view.
-/// Not thread-safe.
+/// Follows objects from image to image, and reports each once, when it is sure and at its best
+/// view. Not thread-safe.
 ///
 /// Association goes in two rounds as in ByteTrack (Zhang et al. 2022): detections above their
 /// class's threshold first, what is below it then to the tracks that are left. Within a round the
@@ -65,10 +65,10 @@ class ObjectTracker {
     /// How well a box's foot is placed, standard deviation: px, and share of the box's side.
     double pixel_sigma_px = 4.0;
     double side_sigma = 0.15;
-    double pitch_sigma_rad = 0.005;  ///< Of the camera's pitch from image to image.
-    double motion_sigma_m = 0.5;     ///< Of the way between two images,
+    double pitch_sigma_rad = 0.005;    ///< Of the camera's pitch from image to image.
+    double motion_sigma_m = 0.5;       ///< Of the way between two images,
     double motion_sigma_share = 0.08;  ///< and as a share of it.
-    double size_sigma = 0.5;  ///< Of the logarithms of width and height.
+    double size_sigma = 0.5;           ///< Of the logarithms of width and height.
     /// Without motion: how far a box may leave its expected place, share of its side per image.
     double drift_sigma = 0.5;
     /// A track that was not seen for this time or this way ends, s and m.
@@ -92,9 +92,9 @@ class ObjectTracker {
 
   struct Counters {
     std::uint64_t frames = 0;
-    std::uint64_t refused = 0;  ///< Boxes that are none: NaN, empty, no class of the model.
-    std::uint64_t resets = 0;   ///< Stamps that went back.
-    std::uint64_t tracks = 0;   ///< Begun.
+    std::uint64_t refused = 0;    ///< Boxes that are none: NaN, empty, no class of the model.
+    std::uint64_t resets = 0;     ///< Stamps that went back.
+    std::uint64_t tracks = 0;     ///< Begun.
     std::uint64_t forgotten = 0;  ///< Because of max_tracks.
     std::uint64_t events = 0;
   };
@@ -156,8 +156,8 @@ class ObjectTracker {
   bool IsDue(Track& track, bool seen, bool gone, std::int64_t now_ns) const;
   HazardEvent Report(Track& track);
 
-  const Config config_;
-  const std::vector<float> thresholds_;
+  Config config_;
+  std::vector<float> thresholds_;
   std::vector<Track> tracks_;
   std::optional<std::int64_t> newest_ns_;
   Counters counters_;
