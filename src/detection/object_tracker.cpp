@@ -295,8 +295,8 @@ void ObjectTracker::Begin(const HazardDetection& found, const TrackerFrame& fram
 
 double ObjectTracker::Quality(const HazardDetection& found, const TrackerFrame& frame) const {
   double quality = double{found.confidence};
-  quality *=
-      std::min(1.0, double{std::min(found.box.width, found.box.height)} / config_.good_side_px);
+  const double side_px = std::sqrt(double{found.box.width} * double{found.box.height});
+  quality *= std::min(1.0, side_px / config_.good_side_px);
   if (Touches(found.box, frame.image_size)) quality *= config_.cut_share;
   if (frame.motion) {
     if (const auto place = OnRoad(FootOf(found.box), *frame.motion)) {

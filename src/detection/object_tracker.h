@@ -82,7 +82,7 @@ class ObjectTracker {
     double past_best_share = 0.8;
     /// Views nearer than this are equally good; farther ones lose, m.
     double good_range_m = 15.0;
-    /// Boxes whose shorter side is at least this are equally good, px.
+    /// Boxes whose mean side (root of the area) is at least this are equally good, px.
     double good_side_px = 16.0;
     /// A view that the image's edge cuts counts this much.
     double cut_share = 0.5;

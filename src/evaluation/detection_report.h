@@ -15,7 +15,7 @@ struct ClassReport {
   std::vector<ClassFigures> sweep;  ///< Empty unless asked for.
   /// The tracker's events instead of single detections, by how sure it must be (`threshold`, a
   /// multiple of the class's). Empty unless asked for.
-  std::vector<ClassFigures> tracking;
+  std::vector<ClassFigures> tracking = {};
 };
 
 /// The result of `livemap evaluate detection`.
