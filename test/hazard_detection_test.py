@@ -18,7 +18,7 @@ import rostest
 import yaml
 from sensor_msgs.msg import Image
 
-from livemap.msg import DetectionArray
+from livemap.msg import DetectionArray, PictureRequest
 from node_testing import SOURCE_DIRECTORY, NodeletUnderTest, eventually, parameters_of
 
 TINY_MODEL = os.path.join(SOURCE_DIRECTORY, "test", "inference", "tiny.yaml")
@@ -266,6 +266,46 @@ class HazardDetectionTest(unittest.TestCase):
         for one, other in zip(found["opencv"], found["torch"]):
             self.assertEqual(one[0], other[0])
             numpy.testing.assert_allclose(one[1:], other[1:], atol=1e-3)
+
+    def test_an_object_in_many_images_is_one_event_with_the_stamp_of_its_best_view(self):
+        detector = self.loaded_detector(queue_size=100, track_max_delay_s=0.3)
+        events = detector.subscribe("hazard/events", DetectionArray)
+        eventually(lambda: events.get_num_connections() > 0, "the events' topic")
+        for number in range(8):
+            frame = image(number, (16, 8, RED))
+            frame.header.stamp = rospy.Time(1600000000 + number // 10, 100000000 * (number % 10))
+            detector.publisher.publish(frame)
+        detector.wait_for(frames_processed=8, events=1, tracks=1)
+        event = eventually(lambda: detector.received("hazard/events"), "an event")[0]
+        self.assertEqual(len(detector.received("hazard/events")), 1)
+        self.assertEqual([found.class_name for found in event.detections], ["pothole"])
+        # All views are equally good: the first one is the best.
+        self.assertEqual(event.header.stamp, rospy.Time(1600000000))
+        self.assertEqual((event.header.frame_id, event.image_width), ("camera_optical_frame", WIDTH))
+        self.assertEqual(len(detector.answers()), 8)
+
+    def test_without_tracking_nothing_speaks_on_the_events_topic(self):
+        detector = self.loaded_detector(queue_size=100, tracking=False)
+        events = detector.subscribe("hazard/events", DetectionArray)
+        detector.publisher.publish(image(0, (16, 8, RED)))
+        detector.wait_for(frames_processed=1, detections=1)
+        self.assertEqual(events.get_num_connections(), 0)
+
+    def test_a_picture_on_demand_is_masked_and_one_of_an_unknown_image_is_counted(self):
+        detector = self.loaded_detector(queue_size=100)
+        requests = detector.advertise("hazard/picture_request", PictureRequest, queue_size=10)
+        pictures = detector.subscribe("hazard/picture", Image)
+        eventually(lambda: pictures.get_num_connections() > 0 and requests.get_num_connections() > 0, "the topics")
+        frame, face = street_with_face(1)
+        detector.publisher.publish(frame)
+        detector.wait_for(frames_processed=1)
+        requests.publish(PictureRequest(stamp=rospy.Time(1, 5)))
+        requests.publish(PictureRequest(stamp=frame.header.stamp))
+        detector.wait_for(pictures_sent=1, pictures_unknown=1, pictures_withheld=0)
+        picture = eventually(lambda: detector.received("hazard/picture"), "a picture")[0]
+        self.assertEqual(picture.header.stamp, frame.header.stamp)
+        colours = {tuple(pixel) for pixel in pixels_of(picture)[face].reshape(-1, 3)}
+        self.assertLess(len(colours), 50, "more blocks than a mask leaves")
 
     def test_a_bad_manifest_fails_the_load_with_one_sentence_and_the_manager_lives(self):
         detector = self.make_detector()

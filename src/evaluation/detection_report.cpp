@@ -42,6 +42,15 @@ nlohmann::ordered_json ClassJson(const ClassReport& report) {
     AddThresholdFigures(at, entry);
     json["sweep"].push_back(entry);
   }
+  for (const ClassFigures& at : report.tracking) {
+    json["tracking"].push_back({{"sure", std::round(at.threshold * 1e6) / 1e6},
+                                {"events", at.events},
+                                {"event_recall", OrNull(at.event_recall)},
+                                {"event_recall_iou30", OrNull(at.event_recall_iou30)},
+                                {"false_per_km", OrNull(at.false_per_km)},
+                                {"false_reports", at.false_reports},
+                                {"false_detections", at.false_detections}});
+  }
   return json;
 }
 
@@ -100,6 +109,14 @@ std::string ToText(const DetectionReport& report) {
     if (entry.sweep.empty()) continue;
     text += "\n" + entry.class_name + "\n" + kThresholdHeader + "\n";
     for (const ClassFigures& at : entry.sweep) text += ThresholdColumns(at) + "\n";
+  }
+  for (const ClassReport& entry : report.classes) {
+    if (entry.tracking.empty()) continue;
+    text += "\n" + entry.class_name + ", tracked\n      sure event recall  IoU .3  false/km\n";
+    for (const ClassFigures& at : entry.tracking) {
+      text += Number(at.threshold, 10, 2) + Number(at.event_recall, 13, 3) +
+              Number(at.event_recall_iou30, 8, 3) + Number(at.false_per_km, 10, 2) + "\n";
+    }
   }
   return text;
 }

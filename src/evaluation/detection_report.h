@@ -13,6 +13,9 @@ struct ClassReport {
   std::string class_name;
   ClassFigures figures;
   std::vector<ClassFigures> sweep;  ///< Empty unless asked for.
+  /// The tracker's events instead of single detections, by how sure it must be (`threshold`, a
+  /// multiple of the class's). Empty unless asked for.
+  std::vector<ClassFigures> tracking = {};
 };
 
 /// The result of `livemap evaluate detection`.

@@ -150,15 +150,18 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   /// The picture that a big vehicle would have sent: with all boxes of the frame.
   void AddPicture(const sensor_msgs::Image& image, const std::vector<HazardDetection>& detections,
                   std::vector<Report>& reports) {
-    const cv::Mat bgr = cv_bridge::toCvCopy(image, sensor_msgs::image_encodings::BGR8)->image;
-    Picture picture{bgr, nullptr};
-    AnnotateImage(picture.bgr, detections);
-    const auto jpeg = EncodeJpeg(picture, config_.jpeg_quality,
-                                 static_cast<std::size_t>(config_.max_image_bytes));
-    if (jpeg.empty()) return;
+    cv::Mat bgr = cv_bridge::toCvCopy(image, sensor_msgs::image_encodings::BGR8)->image;
+    const Picture picture{bgr, nullptr};
+    AnnotateImage(bgr, detections);
+    CropConfig crop;
+    crop.max_bytes = static_cast<std::size_t>(config_.max_image_bytes);
+    crop.quality = config_.jpeg_quality;
     for (Report& report : reports) {
+      CroppedPicture cropped = CropPicture(picture, report.box, crop);
+      if (cropped.jpeg.empty()) continue;
       report.image_format = "jpeg";
-      report.image = jpeg;
+      report.image = std::move(cropped.jpeg);
+      report.shown = cropped.shown;
     }
   }
 

@@ -2,8 +2,10 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <image_transport/image_transport.h>
 #include <livemap/DetectionArray.h>
+#include <livemap/PictureRequest.h>
 #include <nodelet/nodelet.h>
 
+#include <algorithm>
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
@@ -14,7 +16,9 @@
 #include "detection/detector_pool.h"
 #include "detection/hazard_detector.h"
 #include "detection/privacy_mask.h"
+#include "nodelets/hazard_tracking.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/recent_pictures.h"
 #include "ros/detection_conversions.h"
 #include "ros/parameters.h"
 
@@ -30,12 +34,16 @@ struct HazardDetectionConfig {
   bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
   bool privacy = true;          ///< Mask faces and number plates in the picture.
   PrivacyMask::Config mask;
+  HazardTrackingConfig tracking;
+  int picture_frames = 64;          ///< Images with detections that may be asked for.
   double diagnostics_period_s = 1;  ///< s
 };
 
 /// Detects hazards in the rectified images of the vehicle: exactly one `hazard/detections` with the
 /// image's stamp for each processed frame, also when it is empty, and `hazard/annotated` when
-/// somebody listens.
+/// somebody listens. With tracking also `hazard/events`, each object once at its best view, and the
+/// picture of an image of the last moments as `hazard/picture` to who asks for it by
+/// `hazard/picture_request`.
 ///
 /// The subscriber's callback only puts the pointer of the image into a queue, so ROS's own
 /// queue, which would lose frames without a word, never fills: it has no bound. The bound is
@@ -47,6 +55,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   ~HazardDetectionNodelet() override {
     diagnostics_timer_.stop();
     subscriber_.shutdown();
+    request_subscriber_.shutdown();
     if (pool_) pool_->Close();
   }
 
@@ -58,6 +67,13 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     std::vector<HazardDetection> found;
     double ms = 0;  ///< conversion and detection
   };
+  /// An image that may be asked for.
+  struct Kept {
+    cv_bridge::CvImageConstPtr bgr;
+    std::vector<HazardDetection> found;
+    std_msgs::Header header;
+  };
+  using Recent = RecentPictures<Kept>;
   using Pool = DetectorPool<sensor_msgs::ImageConstPtr, Seen>;
 
   void onInit() override {
@@ -69,14 +85,29 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     const ModelManifest manifest = ReadModelManifest(config_.model);
     const std::optional<EngineKind> engine = ParseEngineChoice(
         config_.engine, "parameter '" + getPrivateNodeHandle().resolveName("engine") + "'");
+    thresholds_ = manifest.thresholds;
+    ModelManifest lowered = manifest;
+    if (config_.tracking.tracking) {
+      const auto share = static_cast<float>(config_.tracking.tracker.low_share);
+      for (float& threshold : lowered.thresholds) threshold *= share;
+    }
     for (int i = 0; i < config_.engines; ++i) {
-      detectors_.push_back(std::make_unique<HazardDetector>(manifest, config_.threads, engine));
+      detectors_.push_back(std::make_unique<HazardDetector>(lowered, config_.threads, engine));
     }
     if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
     ros::NodeHandle& node = getNodeHandle();
     detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
     image_transport::ImageTransport transport(node);
     annotated_publisher_ = transport.advertise("hazard/annotated", 10);
+    picture_publisher_ = node.advertise<sensor_msgs::Image>("hazard/picture", 10);
+    recent_ = std::make_unique<Recent>(static_cast<std::size_t>(config_.picture_frames));
+    if (config_.tracking.tracking) {
+      events_publisher_ = node.advertise<DetectionArray>("hazard/events", 100);
+      tracking_ = std::make_unique<HazardTracking>(config_.tracking, manifest, node);
+    }
+    request_subscriber_ = node.subscribe<PictureRequest>(
+        "hazard/picture_request", 100,
+        [this](const PictureRequest::ConstPtr& request) { AnswerPicture(request->stamp); });
     StartPool();
     StartDiagnostics();
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
@@ -102,6 +133,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     parameters.Read("privacy_min_side_px", config_.mask.regions.min_side_px, {8, 1000});
     parameters.Read("privacy_grow", config_.mask.grow, {0, 5});
     parameters.Read("privacy_keep_frames", config_.mask.keep_frames, {0, 1000});
+    config_.tracking = ReadHazardTrackingConfig(parameters);
+    parameters.Read("picture_frames", config_.picture_frames, {1, 1000});
     parameters.Read("diagnostics_period_s", config_.diagnostics_period_s, {0.1, 60});
     parameters.RejectUnknown({"image_transport", "diagnostic_period"});
     if (config_.model.empty()) {
@@ -141,24 +174,77 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   /// Called image after image in the order in which they came.
   void HandOn(const Seen& seen, const std_msgs::Header& header) {
+    const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
     const cv::Mat& bgr = seen.bgr->image;
+    std::vector<HazardDetection> found = seen.found;
+    found.erase(std::remove_if(found.begin(), found.end(),
+                               [this](const HazardDetection& each) { return IsWeak(each); }),
+                found.end());
     // The picture first: who reports a detection wants it at hand.
-    if ((config_.annotate_empty || !seen.found.empty()) &&
+    if ((config_.annotate_empty || !found.empty()) &&
         annotated_publisher_.getNumSubscribers() > 0) {
-      PublishPicture(bgr, seen.found, header);
+      if (const auto picture = Drawn(bgr, found, header)) {
+        annotated_publisher_.publish(picture);
+        CountPicture();
+      }
     }
     ++frame_;
     detections_publisher_.publish(boost::make_shared<DetectionArray>(
-        ToMessage(seen.found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
+        ToMessage(found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
+    Track(seen, header);
     const std::lock_guard<std::mutex> lock(figures_mutex_);
-    figures_.detections += seen.found.size();
+    figures_.detections += found.size();
     ++figures_.processed_in_window;
     figures_.ms_in_window += seen.ms;
   }
 
-  /// Masked first, so that the drawn boxes stay whole; a picture that cannot be masked stays here.
-  void PublishPicture(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
-                      const std_msgs::Header& header) {
+  /// Below the model's threshold: for the tracker alone.
+  bool IsWeak(const HazardDetection& found) const {
+    return found.confidence < thresholds_[static_cast<std::size_t>(found.class_index)];
+  }
+
+  /// The image is kept before its events go out: who gets one may ask at once.
+  void Track(const Seen& seen, const std_msgs::Header& header) {
+    std::vector<DetectionArray> events;
+    std::vector<std::int64_t> wanted;
+    if (tracking_) {
+      events = tracking_->Add(seen.found, header, seen.bgr->image.size());
+      wanted = tracking_->WantedPictures();
+    }
+    if (!seen.found.empty()) {
+      recent_->Add(static_cast<std::int64_t>(header.stamp.toNSec()), {seen.bgr, seen.found, header},
+                   wanted);
+    }
+    for (const DetectionArray& event : events) events_publisher_.publish(event);
+  }
+
+  void AnswerPicture(const ros::Time& stamp) {
+    const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
+    const auto kept = recent_->Find(static_cast<std::int64_t>(stamp.toNSec()));
+    if (!kept) {
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      ++figures_.unknown_requests;
+      return;
+    }
+    std::vector<HazardDetection> shown;
+    if (tracking_) shown = tracking_->ReportedIn(static_cast<std::int64_t>(stamp.toNSec()));
+    shown.erase(std::remove_if(shown.begin(), shown.end(),
+                               [this](const HazardDetection& each) { return !IsWeak(each); }),
+                shown.end());
+    for (const HazardDetection& each : kept->found) {
+      if (!IsWeak(each)) shown.push_back(each);
+    }
+    if (const auto picture = Drawn(kept->bgr->image, shown, kept->header)) {
+      picture_publisher_.publish(picture);
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      ++figures_.sent_pictures;
+    }
+  }
+
+  /// Masked first, so that the drawn boxes stay whole; a picture that cannot be masked stays here:
+  /// none.
+  sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
+                              const std_msgs::Header& header) {
     cv::Mat picture = bgr;
     if (mask_) {
       picture = bgr.clone();
@@ -168,13 +254,19 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
         NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", error.what());
         const std::lock_guard<std::mutex> lock(figures_mutex_);
         ++figures_.withheld;
-        return;
+        return nullptr;
       }
     }
-    annotated_publisher_.publish(ToAnnotatedMessage(picture, found, header));
+    if (mask_) {
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      figures_.masked_regions += mask_->Masked().size();
+    }
+    return ToAnnotatedMessage(picture, found, header);
+  }
+
+  void CountPicture() {
     const std::lock_guard<std::mutex> lock(figures_mutex_);
     ++figures_.annotated;
-    if (mask_) figures_.masked_regions += mask_->Masked().size();
   }
 
   void StartDiagnostics() {
@@ -222,11 +314,25 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     status.add("pictures_withheld", figures.withheld);
     status.add("regions_masked", figures.masked_regions);
     status.add("detections", figures.detections);
+    status.add("pictures_sent", figures.sent_pictures);
+    status.add("pictures_unknown", figures.unknown_requests);
+    if (tracking_) DiagnoseTracking(status);
     status.add("rate_hz", window_s > 0 ? in_window / window_s : 0.0);
     status.add("detection_ms", in_window > 0 ? figures.ms_in_window / in_window : 0.0);
     status.add("model", detectors_.front()->manifest().name);
     status.add("engine", NameOf(detectors_.front()->Engine()));
     status.add("engines", detectors_.size());
+  }
+
+  void DiagnoseTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const std::lock_guard<std::mutex> lock(pictures_mutex_);
+    const ObjectTracker::Counters& counters = tracking_->counters();
+    status.add("events", counters.events);
+    status.add("tracks", counters.tracks);
+    status.add("tracks_forgotten", counters.forgotten);
+    status.add("tracker_resets", counters.resets);
+    status.add("boxes_refused", counters.refused);
+    status.add("frames_with_motion", tracking_->frames_with_motion());
   }
 
   /// What the queue does not count.
@@ -236,17 +342,26 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     std::uint64_t withheld = 0;        ///< Pictures that could not be masked.
     std::uint64_t masked_regions = 0;  ///< Over all pictures.
     std::uint64_t detections = 0;
+    std::uint64_t sent_pictures = 0;     ///< On request.
+    std::uint64_t unknown_requests = 0;  ///< For images that are not kept any more.
     std::uint64_t processed_in_window = 0;
     double ms_in_window = 0;
   };
 
   HazardDetectionConfig config_;
   std::vector<std::unique_ptr<HazardDetector>> detectors_;  ///< Each its engine's thread's own.
-  // HandOn's:
+  std::vector<float> thresholds_;                           ///< The model's, by class index.
+  // HandOn's and AnswerPicture's:
+  std::mutex pictures_mutex_;                 ///< Taken before figures_mutex_.
+  std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
+  std::unique_ptr<Recent> recent_;
   std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
   std::uint64_t frame_ = 0;
   image_transport::Subscriber subscriber_;
+  ros::Subscriber request_subscriber_;
   ros::Publisher detections_publisher_;
+  ros::Publisher events_publisher_;
+  ros::Publisher picture_publisher_;
   image_transport::Publisher annotated_publisher_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;

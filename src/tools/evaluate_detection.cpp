@@ -11,6 +11,7 @@
 #include "evaluation/detection_report.h"
 #include "evaluation/labelled_folder.h"
 #include "evaluation/quantile.h"
+#include "evaluation/tracking_evaluation.h"
 #include "ingest/decode.h"
 #include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
@@ -23,6 +24,9 @@ struct Options {
   std::string model;
   bool json = false;
   bool sweep = false;
+  bool tracking = false;
+  TrackedDriveOptions tracked;
+  ObjectTracker::Config tracker;
   double lowest_score = 0.01;
   int threads = 0;
   std::optional<EngineKind> engine;
@@ -43,6 +47,12 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"split", "NAME", "part of a DIR whose images/ and labels/ are divided, e.g. val"},
        {"label-classes", "A,B", "names of the label files' classes 0, 1, ..., default classes.txt"},
        {"sweep", "", "figures at thresholds from 0.05 to 0.95 too"},
+       {"tracking", "", "drives: the tracker's events at several degrees of certainty too"},
+       {"camera", "FILE",
+        "with --tracking: camera of the drives (config/cameras), default none:\n"
+        "boxes are then followed by their motion in the image"},
+       {"repeat-gain", "X", "with --tracking: share of repeated sights, default 0.15"},
+       {"low-share", "X", "with --tracking: least share of the threshold, default 0.5"},
        {"lowest-score", "X", "least score that the average precision counts, default 0.01"},
        {"engine", "NAME", "auto (what the manifest says, default), opencv or torch"},
        {"threads", "N", "threads of the engine, default all cores"}});
@@ -53,6 +63,11 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (options.model.empty()) options.model = DefaultModelPath();
   options.json = line.Has("json");
   options.sweep = line.Has("sweep");
+  options.tracking = line.Has("tracking");
+  const std::string camera = line.Text("camera", "");
+  if (!camera.empty()) options.tracked.camera = ReadCameraFile(camera);
+  options.tracker.repeat_gain = line.Number("repeat-gain", options.tracker.repeat_gain, 0, 1);
+  options.tracker.low_share = line.Number("low-share", options.tracker.low_share, 0.01, 1);
   options.lowest_score = line.Number("lowest-score", options.lowest_score, 0.001, 0.999);
   options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
   options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
@@ -104,14 +119,32 @@ class Evaluation {
         for (int step = 1; step < 20; ++step) thresholds.push_back(0.05 * step);
         entry.sweep = SweepThresholds(drives, photos, thresholds);
       }
+      if (options_.tracking) AddTracking(drives, entry);
       report.classes.push_back(std::move(entry));
     }
     return report;
   }
 
  private:
+  /// What the tracker reports on the class's drives, at several degrees of certainty.
+  void AddTracking(const std::vector<ScoredDrive>& drives, ClassReport& entry) const {
+    const std::vector<std::size_t>& recordings = drive_recordings_.at(entry.class_name);
+    for (int step = 5; step <= 30; ++step) {
+      ObjectTracker::Config config = options_.tracker;
+      config.sure = 0.1 * step;
+      std::vector<ScoredDrive> events;
+      for (std::size_t i = 0; i < drives.size(); ++i) {
+        events.push_back(EventsOfDrive(drives[i], recordings_[recordings[i]], entry.class_name,
+                                       ObjectTracker(config, thresholds_)));
+      }
+      entry.tracking.push_back(SweepThresholds(events, {}, {0.0}).front());
+      entry.tracking.back().threshold = config.sure;
+    }
+  }
+
   void RunFolder(const LabelledFolder& folder, Progress& progress) {
     std::map<std::string, std::vector<ScoredFrame>> scored;
+    std::vector<TrackerFrame> recording;
     for (const LabelledFrame& frame : folder.frames) {
       const cv::Mat image = ReadImage(frame.image_path);
       const auto start = std::chrono::steady_clock::now();
@@ -123,16 +156,23 @@ class Evaluation {
       for (const std::string& name : folder.classes) {
         scored[name].push_back(Score(frame, found, image.size(), name));
       }
+      if (options_.tracking && folder.is_drive) {
+        const std::int64_t last_ns = recording.empty() ? 0 : recording.back().stamp_ns;
+        recording.push_back(
+            ToTrackerFrame(found, image.size(), frame.chainage_m, last_ns, options_.tracked));
+      }
       progress.At(milliseconds_.size());
     }
     for (auto& [name, frames] : scored) {
       ClassFrames& all = by_class_[name];
       if (folder.is_drive) {
         all.drives.push_back(std::move(frames));
+        drive_recordings_[name].push_back(recordings_.size());
       } else {
         all.photos.insert(all.photos.end(), frames.begin(), frames.end());
       }
     }
+    recordings_.push_back(std::move(recording));
   }
 
   static ScoredFrame Score(const LabelledFrame& frame, const std::vector<HazardDetection>& found,
@@ -157,6 +197,8 @@ class Evaluation {
   std::unique_ptr<HazardDetector> detector_;
   std::map<std::string, ClassFrames> by_class_;
   std::vector<double> milliseconds_;
+  std::vector<std::vector<TrackerFrame>> recordings_;  ///< By folder; with --tracking.
+  std::map<std::string, std::vector<std::size_t>> drive_recordings_;  ///< By class, as its drives.
 };
 
 /// All folders, read before the long work, so that a mistake in the last one shows at once.
