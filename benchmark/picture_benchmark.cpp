@@ -44,7 +44,7 @@ void Thumbnail(benchmark::State& state) {
   const auto x = static_cast<float>(width);
   const auto y = static_cast<float>(height);
   const Box box{x * 0.4F, y * 0.5F, x * 0.55F, y * 0.65F};
-  for (auto _ : state) benchmark::DoNotOptimize(SmallPicture(file, box, width, height));
+  for (auto _ : state) benchmark::DoNotOptimize(SmallPicture(file, box, {0, 0, width, height}));
 }
 
 void Sizes(benchmark::internal::Benchmark* benchmark) {

@@ -76,7 +76,7 @@ ObjectTracker::ObjectTracker(const Config& config, std::vector<float> thresholds
   Check("max_tracks", config_.max_tracks, 1, 10000);
 }
 
-std::vector<HazardEvent> ObjectTracker::Add(const TrackerFrame& frame) {
+std::vector<ObjectEvent> ObjectTracker::Add(const TrackerFrame& frame) {
   ++counters_.frames;
   if (newest_ns_ && frame.stamp_ns <= *newest_ns_) {
     tracks_.clear();
@@ -103,7 +103,7 @@ std::vector<HazardEvent> ObjectTracker::Add(const TrackerFrame& frame) {
   Associate(frame, expected, strong, seen);
   Associate(frame, expected, weak, seen);
 
-  std::vector<HazardEvent> events;
+  std::vector<ObjectEvent> events;
   std::vector<Track> living;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     Track& track = tracks_[i];
@@ -129,8 +129,8 @@ std::vector<HazardEvent> ObjectTracker::Add(const TrackerFrame& frame) {
   return events;
 }
 
-std::vector<HazardEvent> ObjectTracker::Finish() {
-  std::vector<HazardEvent> events;
+std::vector<ObjectEvent> ObjectTracker::Finish() {
+  std::vector<ObjectEvent> events;
   for (Track& track : tracks_) {
     if (IsDue(track, false, true, track.last_ns)) events.push_back(Report(track));
   }
@@ -323,10 +323,10 @@ bool ObjectTracker::IsDue(Track& track, bool seen, bool gone, std::int64_t now_n
   return gone || past_best || Seconds(*track.sure_ns, now_ns) >= MaxDelayS(track.last.class_name);
 }
 
-HazardEvent ObjectTracker::Report(Track& track) {
+ObjectEvent ObjectTracker::Report(Track& track) {
   track.reported = true;
   ++counters_.events;
-  HazardEvent event = track.best;
+  ObjectEvent event = track.best;
   event.evidence = Evidence(track);
   event.sights = track.sights;
   return event;

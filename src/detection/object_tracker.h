@@ -32,7 +32,7 @@ struct TrackerFrame {
 };
 
 /// One object, reported once.
-struct HazardEvent {
+struct ObjectEvent {
   std::int64_t stamp_ns = 0;  ///< Of the image with its best view.
   cv::Size image_size;
   HazardDetection detection;  ///< There.
@@ -104,9 +104,9 @@ class ObjectTracker {
 
   /// The objects that are to be reported now. A stamp that is not newer than the last begins
   /// anew: living tracks are dropped, without events.
-  std::vector<HazardEvent> Add(const TrackerFrame& frame);
+  std::vector<ObjectEvent> Add(const TrackerFrame& frame);
   /// The end of the drive: what is sure and not reported yet.
-  std::vector<HazardEvent> Finish();
+  std::vector<ObjectEvent> Finish();
 
   /// Stamps of the best views of tracks that were not reported yet, which may be asked for.
   std::vector<std::int64_t> BestViews() const;
@@ -123,7 +123,7 @@ class ObjectTracker {
     double best_confidence = 0;
     double sum_confidence = 0;
     int sights = 0;
-    HazardEvent best;
+    ObjectEvent best;
     double best_quality = 0;
     double quality = 0;  ///< Of the newest view.
     std::optional<std::int64_t> sure_ns;
@@ -154,7 +154,7 @@ class ObjectTracker {
   double Evidence(const Track& track) const;
   double MaxDelayS(const std::string& class_name) const;
   bool IsDue(Track& track, bool seen, bool gone, std::int64_t now_ns) const;
-  HazardEvent Report(Track& track);
+  ObjectEvent Report(Track& track);
 
   Config config_;
   std::vector<float> thresholds_;

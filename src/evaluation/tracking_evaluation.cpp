@@ -34,8 +34,8 @@ ScoredDrive EventsOfDrive(const ScoredDrive& labelled, const std::vector<Tracker
     drive[i].detections.clear();
     by_stamp[frames[i].stamp_ns] = i;
   }
-  const auto keep = [&](const std::vector<HazardEvent>& events) {
-    for (const HazardEvent& event : events) {
+  const auto keep = [&](const std::vector<ObjectEvent>& events) {
+    for (const ObjectEvent& event : events) {
       if (event.detection.class_name != class_name) continue;
       drive[by_stamp.at(event.stamp_ns)].detections.push_back(
           {event.detection.box, static_cast<float>(event.evidence)});

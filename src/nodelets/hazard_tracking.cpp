@@ -79,14 +79,14 @@ std::vector<DetectionArray> HazardTracking::Add(const std::vector<HazardDetectio
   frame.motion = MotionAt(header);
   if (frame.motion) ++frames_with_motion_;
 
-  std::map<std::int64_t, std::vector<HazardEvent>> by_view;
-  for (const HazardEvent& event : tracker_.Add(frame)) by_view[event.stamp_ns].push_back(event);
+  std::map<std::int64_t, std::vector<ObjectEvent>> by_view;
+  for (const ObjectEvent& event : tracker_.Add(frame)) by_view[event.stamp_ns].push_back(event);
   std::vector<DetectionArray> messages;
   for (const auto& [stamp_ns, events] : by_view) {
     std_msgs::Header view = header;
     view.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns));
     std::vector<HazardDetection> detections;
-    for (const HazardEvent& event : events) detections.push_back(event.detection);
+    for (const ObjectEvent& event : events) detections.push_back(event.detection);
     std::stable_sort(detections.begin(), detections.end(),
                      [](const HazardDetection& a, const HazardDetection& b) {
                        return a.confidence > b.confidence;
@@ -100,13 +100,13 @@ std::vector<DetectionArray> HazardTracking::Add(const std::vector<HazardDetectio
 
 std::vector<std::int64_t> HazardTracking::WantedPictures() const {
   std::vector<std::int64_t> wanted = tracker_.BestViews();
-  for (const HazardEvent& event : reported_) wanted.push_back(event.stamp_ns);
+  for (const ObjectEvent& event : reported_) wanted.push_back(event.stamp_ns);
   return wanted;
 }
 
 std::vector<HazardDetection> HazardTracking::ReportedIn(std::int64_t stamp_ns) const {
   std::vector<HazardDetection> detections;
-  for (const HazardEvent& event : reported_) {
+  for (const ObjectEvent& event : reported_) {
     if (event.stamp_ns == stamp_ns) detections.push_back(event.detection);
   }
   return detections;

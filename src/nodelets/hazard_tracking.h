@@ -56,7 +56,7 @@ class HazardTracking {
   const HazardTrackingConfig config_;
   const std::string model_;
   ObjectTracker tracker_;
-  std::deque<HazardEvent> reported_;  ///< The last ones.
+  std::deque<ObjectEvent> reported_;  ///< The last ones.
   std::uint64_t frames_with_motion_ = 0;
   tf2_ros::Buffer buffer_;
   tf2_ros::TransformListener listener_;

@@ -103,7 +103,6 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("pixel_sigma_px", reporter.projection.pixel_sigma_px, {0, 100});
   parameters.Read("pitch_sigma_rad", reporter.projection.pitch_sigma_rad, {0, 0.5});
   parameters.Read("height_sigma_m", reporter.projection.height_sigma_m, {0, 2});
-  ReadTrack(parameters, reporter.track);
   ReadUrgency(parameters, reporter);
   ReadFixTrack(parameters, reporter.track);
   ReadPositionSource(parameters, config);

@@ -134,21 +134,21 @@ const char* LocalizerStateName(LocalizerState state) {
 }
 
 const char* RefusalReason(GeoLocalizer::FixVerdict verdict) {
-  using Verdict = GeoLocalizer::FixVerdict;
+  using FixVerdict = GeoLocalizer::FixVerdict;
   switch (verdict) {
-    case Verdict::kRefused:
+    case FixVerdict::kRefused:
       return "it is too far from where odometry and the other fixes foretell it";
-    case Verdict::kAbsent:
+    case FixVerdict::kAbsent:
       return "the receiver says that it has no fix";
-    case Verdict::kInvalid:
+    case FixVerdict::kInvalid:
       return "its stamp, position or covariance cannot be, or it is too far from the datum";
-    case Verdict::kOutOfOrder:
+    case FixVerdict::kOutOfOrder:
       return "its stamp is not later than the one before, or older than the window";
-    case Verdict::kWithoutOdometry:
+    case FixVerdict::kWithoutOdometry:
       return "there is no odometry of its moment";
-    case Verdict::kUsed:
-    case Verdict::kKept:
-    case Verdict::kWaiting:
+    case FixVerdict::kUsed:
+    case FixVerdict::kKept:
+    case FixVerdict::kWaiting:
       break;
   }
   return nullptr;

@@ -22,6 +22,7 @@ class OneAnswer final : public InferenceEngine {
  public:
   explicit OneAnswer(float answer) : answer_(1, 1, answer) {}
   cv::Mat Run(const cv::Mat&) override { return answer_; }
+  EngineKind Kind() const override { return EngineKind::kOpenCv; }
 
  private:
   cv::Mat_<float> answer_;

@@ -61,7 +61,7 @@ class ObjectTrackerTest : public ::testing::Test {
 
   ObjectTracker tracker_{ObjectTracker::Config(), {0.4F, 0.2F}};
   std::int64_t now_ns_ = 0;
-  std::vector<HazardEvent> events_;
+  std::vector<ObjectEvent> events_;
 };
 
 TEST_F(ObjectTrackerTest, AnObjectThatComesNearerIsOneEventAtItsBestView) {
