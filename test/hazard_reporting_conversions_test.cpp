@@ -74,7 +74,7 @@ TEST(HazardConversions, AReportOfVersion1ShowsTheWholeImage) {
   message.schema_version = 1;
   message.shown_width = message.shown_height = 100;
   EXPECT_TRUE(FromMessage(message).shown.IsWholeImage());
-  for (const std::uint16_t unknown : {0, 3}) {
+  for (const std::uint16_t unknown : {std::uint16_t{0}, std::uint16_t{3}}) {
     message.schema_version = unknown;
     EXPECT_THAT([&] { FromMessage(message); },
                 ThrowsMessage<Error>(HasSubstr("accepted is 1 to 2")));
