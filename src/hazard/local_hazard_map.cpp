@@ -241,9 +241,9 @@ bool LocalHazardMap::Apply(const Receipt& receipt) {
 }
 
 std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
-  SqliteStatement rows =
-      database_->Prepare(std::string("SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending WHERE ") +
-                         kFetchableReport + " ORDER BY stamp_ns,uuid");
+  SqliteStatement rows = database_->Prepare(
+      std::string("SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending WHERE ") +
+      kFetchableReport + " ORDER BY stamp_ns,uuid");
   std::vector<PendingReport> pending;
   while (rows.Step()) {
     const Uuid uuid = UuidFromBlob(rows.Blob(0));
