@@ -156,31 +156,44 @@ void HazardReporter::Process(double now_s, double steady_s) {
   ApplyNotices();
   ForgetUnannounced(now_s);
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
+  // All of them, so that none waits for its picture only after the one before it has waited.
+  for (WaitingFrame& waiting : waiting_) {
+    if (IsPlaced(waiting, now_s) && HasNews(waiting)) AskForPicture(waiting, now_s);
+  }
+}
+
+bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {
+  // A clock that was set back must not make a frame wait for ever.
+  waiting.arrival_s = std::min(waiting.arrival_s, now_s);
+  return waiting.placed || Place(waiting, now_s - waiting.arrival_s);
+}
+
+bool HazardReporter::HasNews(const WaitingFrame& waiting) const {
+  return std::any_of(waiting.candidates.begin(), waiting.candidates.end(),
+                     [this](const Candidate& candidate) {
+                       return !map_.Find(candidate.sighting.class_name, candidate.place.position);
+                     });
 }
 
 /// True when the frame is done, whatever became of it.
 bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_s) {
-  // A clock that was set back must not make a frame wait for ever.
-  waiting.arrival_s = std::min(waiting.arrival_s, now_s);
-  const double waited_s = now_s - waiting.arrival_s;
-  if (!waiting.placed && !Place(waiting, waited_s)) return false;
-  const bool news = std::any_of(
-      waiting.candidates.begin(), waiting.candidates.end(), [this](const Candidate& candidate) {
-        return !map_.Find(candidate.sighting.class_name, candidate.place.position);
-      });
-  if (news && WaitsForPicture(waiting, now_s)) return false;
+  if (!IsPlaced(waiting, now_s)) return false;
+  if (HasNews(waiting) && WaitsForPicture(waiting, now_s)) return false;
   ReportCandidates(waiting, steady_s);
   return true;
 }
 
-/// Asks for the picture when it begins to be missed.
+void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
+  if (waiting.asked_s || !waiting.picture.bgr.empty()) return;
+  // A picture that comes unasked is on its way since the frame came.
+  waiting.asked_s = config_.pictures_on_demand ? now_s : waiting.arrival_s;
+  ++counters_.pictures_requested;
+  if (config_.pictures_on_demand) picture_requests_.push_back(waiting.frame.stamp_ns);
+}
+
 bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
   if (!waiting.picture.bgr.empty()) return false;
-  if (!waiting.asked_s) {
-    waiting.asked_s = now_s;
-    ++counters_.pictures_requested;
-    if (config_.pictures_on_demand) picture_requests_.push_back(waiting.frame.stamp_ns);
-  }
+  AskForPicture(waiting, now_s);
   waiting.asked_s = std::min(*waiting.asked_s, now_s);  // The clock was set back.
   return now_s - *waiting.asked_s < config_.picture_wait_s;
 }

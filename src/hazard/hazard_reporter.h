@@ -193,6 +193,9 @@ class HazardReporter {
   };
 
   bool IsUsable(const Sighting& sighting);
+  bool IsPlaced(WaitingFrame& waiting, double now_s);
+  bool HasNews(const WaitingFrame& waiting) const;
+  void AskForPicture(WaitingFrame& waiting, double now_s);
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
   bool FitsCamera(const SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);

@@ -185,6 +185,18 @@ TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
   EXPECT_FALSE(TakeDue().at(0).image.empty());
 }
 
+TEST_F(HazardReporterTest, FramesWaitForTheirPicturesSideBySide) {
+  DriveFixes(0, 4);
+  for (const double seconds : {2.0, 2.1, 2.2}) {
+    const double range_m = 5 + 100 * (seconds - 2);  // Three places.
+    reporter_->AddFrame(FrameAt(seconds, {{"pothole", 0.8F, BoxAt(range_m, 0)}}), 3.0);
+  }
+  reporter_->Process(3.0, steady_s_);
+  EXPECT_THAT(reporter_->TakePictureRequests(), SizeIs(3));
+  reporter_->Process(3.0 + config_.picture_wait_s, steady_s_);
+  EXPECT_THAT(TakeDue(), SizeIs(3));
+}
+
 TEST_F(HazardReporterTest, AFrameThatWaitedForItsPositionStillWaitsForItsPicture) {
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(5.0, steady_s_);
