@@ -157,9 +157,28 @@ void HazardReporter::Process(double now_s, double steady_s) {
   ForgetUnannounced(now_s);
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
   // All of them, so that none waits for its picture only after the one before it has waited.
-  for (WaitingFrame& waiting : waiting_) {
-    if (IsPlaced(waiting, now_s) && HasNews(waiting)) AskForPicture(waiting, now_s);
+  for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
+    if (IsPlaced(*waiting, now_s) && HasNews(*waiting) && !IsForetold(waiting)) {
+      AskForPicture(*waiting, now_s);
+    }
   }
+}
+
+/// Whether the frames before it will have reported all that it shows.
+bool HazardReporter::IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const {
+  const auto is_same = [this](const Candidate& one, const Candidate& other) {
+    const std::string& name = one.sighting.class_name;
+    return name == other.sighting.class_name &&
+           GeodesicDistanceM(one.place.position, other.place.position) <=
+               catalogue_.Get(name).duplicate_radius_m;
+  };
+  const auto will_be_known = [&](const Candidate& candidate) {
+    return std::any_of(waiting_.begin(), waiting, [&](const WaitingFrame& earlier) {
+      return std::any_of(earlier.candidates.begin(), earlier.candidates.end(),
+                         [&](const Candidate& other) { return is_same(candidate, other); });
+    });
+  };
+  return std::all_of(waiting->candidates.begin(), waiting->candidates.end(), will_be_known);
 }
 
 bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {

@@ -195,6 +195,7 @@ class HazardReporter {
   bool IsUsable(const Sighting& sighting);
   bool IsPlaced(WaitingFrame& waiting, double now_s);
   bool HasNews(const WaitingFrame& waiting) const;
+  bool IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const;
   void AskForPicture(WaitingFrame& waiting, double now_s);
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
   bool FitsCamera(const SightingFrame& frame) const;

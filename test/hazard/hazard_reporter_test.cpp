@@ -193,6 +193,10 @@ TEST_F(HazardReporterTest, FramesWaitForTheirPicturesSideBySide) {
   }
   reporter_->Process(3.0, steady_s_);
   EXPECT_THAT(reporter_->TakePictureRequests(), SizeIs(3));
+  // The third place once more: no second picture of it.
+  reporter_->AddFrame(FrameAt(2.2, {{"pothole", 0.7F, BoxAt(25, 0)}}), 3.0);
+  reporter_->Process(3.0, steady_s_);
+  EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
   reporter_->Process(3.0 + config_.picture_wait_s, steady_s_);
   EXPECT_THAT(TakeDue(), SizeIs(3));
 }
