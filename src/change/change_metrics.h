@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
@@ -75,7 +76,7 @@ class ScoreHistogram {
 
   /// `score` within [0, 1].
   void Add(float score, bool positive) {
-    const auto bin = static_cast<std::size_t>(score * static_cast<float>(kBins - 1) + 0.5F);
+    const auto bin = static_cast<std::size_t>(std::lround(score * static_cast<float>(kBins - 1)));
     ++(positive ? positives_ : negatives_)[bin];
   }
   std::uint64_t positives() const;

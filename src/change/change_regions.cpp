@@ -9,7 +9,7 @@
 namespace livemap {
 namespace {
 
-constexpr double kReferenceWidth = 320;
+constexpr double kRegionReferenceWidth = 320;
 constexpr double kClearlyStronger = 1.2;
 
 /// Strength of grey edges, CV_32FC1.
@@ -76,7 +76,7 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
   cv::Mat stats;
   cv::Mat centres;
   const int count = cv::connectedComponentsWithStats(changed, labels, stats, centres, 8, CV_32S);
-  const double scale = after.cols / kReferenceWidth;
+  const double scale = after.cols / kRegionReferenceWidth;
   const cv::Mat before_edges = EdgeStrength(before);
   const cv::Mat after_edges = EdgeStrength(after);
   std::vector<ChangeRegion> regions;

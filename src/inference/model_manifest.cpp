@@ -146,7 +146,7 @@ class Section {
 };
 
 std::string HashOf(const Section& root, const std::string& key) {
-  const std::string hash = root.Text(key);
+  std::string hash = root.Text(key);
   if (hash.size() != 64 || hash.find_first_not_of("0123456789abcdef") != std::string::npos) {
     root.Refuse(key, root.node()[key], "64 lower-case hexadecimal digits");
   }

@@ -156,7 +156,7 @@ std::optional<GroundPoint> CandidateIntake::PlaceOnRoad(const Candidate& frame,
   // from its centre.
   const Eigen::Vector2d foot(0.5 * (static_cast<double>(box.x_min) + box.x_max) - 0.5,
                              static_cast<double>(box.y_max) - 0.5);
-  const auto ground = ProjectToGround(foot, frame.intrinsics, frame.base_from_optical, noise);
+  auto ground = ProjectToGround(foot, frame.intrinsics, frame.base_from_optical, noise);
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
