@@ -206,10 +206,12 @@ double PlaceQuality(const PlaceFrame& frame, const ImageFeatures& features) {
   constexpr double kHalfAtSigmaM = 3;
   std::set<int> covered;
   for (const cv::Point2f& point : features.points) {
-    const int column =
-        static_cast<int>(point.x * kColumns / static_cast<float>(frame.camera.width));
-    const int row = static_cast<int>(point.y * kRows / static_cast<float>(frame.camera.height));
-    covered.insert(std::clamp(row, 0, kRows - 1) * kColumns + std::clamp(column, 0, kColumns - 1));
+    // Clamped before it is an integer: a damaged file has points anywhere.
+    const float column = std::clamp(point.x * kColumns / static_cast<float>(frame.camera.width),
+                                    0.0F, kColumns - 1.0F);
+    const float row =
+        std::clamp(point.y * kRows / static_cast<float>(frame.camera.height), 0.0F, kRows - 1.0F);
+    covered.insert(static_cast<int>(row) * kColumns + static_cast<int>(column));
   }
   const double share = static_cast<double>(covered.size()) / (kColumns * kRows);
   return share / (1 + frame.position_sigma_m / kHalfAtSigmaM);

@@ -33,11 +33,11 @@ Report SharedParts(const Candidate& frame) {
 
 Why WhyPoseRefused(const TrackPose& base, const CandidateLimits& limits) {
   if (!(std::abs(base.course_rad) <= 4 * M_PI)) {
-    return Unusable("course " + std::to_string(base.course_rad) + " rad is not within +-4 pi");
+    return Unusable("course " + NumberText(base.course_rad) + " rad is not within +-4 pi");
   }
   const double most = limits.max_course_sigma_rad * limits.max_course_sigma_rad;
   if (!(base.course_variance_rad2 >= 0 && base.course_variance_rad2 <= most)) {
-    return Unusable("variance of the course " + std::to_string(base.course_variance_rad2) +
+    return Unusable("variance of the course " + NumberText(base.course_variance_rad2) +
                     " rad^2 is not within 0 to " + std::to_string(most));
   }
   // A correlation beyond 1 per axis belongs to no covariance; a thousandth is rounding's.
@@ -55,8 +55,8 @@ Why WhyCameraRefused(const Candidate& frame, const CandidateLimits& limits) {
   const CameraIntrinsics& camera = frame.intrinsics;
   const auto is_focal_length = [](double f) { return f >= 1 && f <= 1e5; };
   if (!is_focal_length(camera.fx) || !is_focal_length(camera.fy)) {
-    return Unusable("focal lengths " + std::to_string(camera.fx) + " and " +
-                    std::to_string(camera.fy) + " are not within 1 to 100000 pixels");
+    return Unusable("focal lengths " + NumberText(camera.fx) + " and " + NumberText(camera.fy) +
+                    " are not within 1 to 100000 pixels");
   }
   const auto is_near = [](double c, int side) { return c >= -2.0 * side && c <= 3.0 * side; };
   if (!is_near(camera.cx, camera.width) || !is_near(camera.cy, camera.height)) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <string_view>
 #include <utility>
 
@@ -70,8 +71,7 @@ Why WhyTextRefused(const char* name, const std::string& text, const ReportLimits
 }
 
 std::string ToText(const GeoPoint& point) {
-  return "(" + std::to_string(point.latitude_deg) + ", " + std::to_string(point.longitude_deg) +
-         ")";
+  return "(" + NumberText(point.latitude_deg) + ", " + NumberText(point.longitude_deg) + ")";
 }
 
 Why WhyPositionRefused(const Report& report, const ReportLimits& limits) {
@@ -221,6 +221,14 @@ std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limi
   if (auto why = WhyBoxRefused(report, limits)) return why;
   if (report.image.empty()) return std::nullopt;
   return WhyPictureRefused(report.image, limits);
+}
+
+std::string NumberText(double number) {
+  constexpr double kManyDigits = 1e12;
+  if (!(std::abs(number) >= kManyDigits)) return std::to_string(number);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6e", number);
+  return text;
 }
 
 }  // namespace livemap

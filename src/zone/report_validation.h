@@ -57,4 +57,7 @@ std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
 std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limits,
                                   std::int64_t now_ns);
 
+/// A number for a sentence that its sender reads: std::to_string writes 1e300 in 300 digits.
+std::string NumberText(double number);
+
 }  // namespace livemap
