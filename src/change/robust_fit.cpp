@@ -1,5 +1,6 @@
 #include "change/robust_fit.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,7 +17,9 @@ namespace {
 
 constexpr std::size_t kSample = 4;
 constexpr double kConfidence = 0.999;
-constexpr int kRefinements = 3;
+constexpr int kRefinements = 10;
+constexpr double kMedianToSigma = 1.4826;
+constexpr double kLeastScalePx = 0.05;
 constexpr double kFar = 1e9;  // Squared pixels: agrees with nothing.
 
 using Sample = std::array<std::size_t, kSample>;
@@ -45,13 +48,16 @@ int TriesWanted(std::size_t inliers, std::size_t count, int most) {
 /// `errors`: squared pixels.
 RobustFit Agreeing(const std::vector<double>& errors, double inlier_px) {
   RobustFit fit;
+  const double most = inlier_px * inlier_px;
   double sum = 0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (errors[i] > inlier_px * inlier_px) continue;
+    if (errors[i] > most) continue;
     fit.inliers.push_back(i);
     sum += errors[i];
   }
-  if (!fit.inliers.empty()) fit.error_px = std::sqrt(sum / static_cast<double>(fit.inliers.size()));
+  const auto inliers = static_cast<double>(fit.inliers.size());
+  if (inliers > 0) fit.error_px = std::sqrt(sum / inliers);
+  fit.cost = sum + most * (static_cast<double>(errors.size()) - inliers);
   return fit;
 }
 
@@ -101,19 +107,54 @@ cv::Matx33d HomographyOf(const Sample& sample, const std::vector<cv::Point2d>& b
   return cv::getPerspectiveTransform(from.data(), to.data());
 }
 
-/// Least squares over the inliers, as long as it brings more of them.
+/// One step of Gauss and Newton on the eight numbers of a homography, each match weighted by
+/// Cauchy's 1 / (1 + error^2 / scale^2): the inliers' own outliers must not pull it.
+cv::Matx33d StepHomography(const cv::Matx33d& h, const std::vector<cv::Point2d>& before,
+                           const std::vector<cv::Point2d>& after,
+                           const std::vector<std::size_t>& inliers, double scale_px) {
+  Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
+  Eigen::Matrix<double, 8, 1> right = Eigen::Matrix<double, 8, 1>::Zero();
+  for (const std::size_t i : inliers) {
+    const cv::Vec3d place = h * cv::Vec3d(before[i].x, before[i].y, 1);
+    const double u = place[0] / place[2];
+    const double v = place[1] / place[2];
+    const Eigen::Vector2d residual(after[i].x - u, after[i].y - v);
+    const double x = before[i].x / place[2];
+    const double y = before[i].y / place[2];
+    const double one = 1 / place[2];
+    Eigen::Matrix<double, 2, 8> jacobian;
+    jacobian << x, y, one, 0, 0, 0, -u * x, -u * y, 0, 0, 0, x, y, one, -v * x, -v * y;
+    const double weight = 1 / (1 + residual.squaredNorm() / (scale_px * scale_px));
+    normal += weight * jacobian.transpose() * jacobian;
+    right += weight * jacobian.transpose() * residual;
+  }
+  // A column is as large as its unit makes it; without that the solution loses its digits.
+  const Eigen::Matrix<double, 8, 1> unit = normal.diagonal().cwiseSqrt().cwiseMax(1e-12);
+  normal = unit.cwiseInverse().asDiagonal() * normal * unit.cwiseInverse().asDiagonal();
+  const Eigen::Matrix<double, 8, 1> step =
+      normal.ldlt().solve(right.cwiseQuotient(unit)).cwiseQuotient(unit);
+  if (!step.allFinite()) return h;
+  cv::Matx33d stepped = h;
+  for (int i = 0; i < 8; ++i) stepped.val[i] += step[i];
+  return stepped;
+}
+
+/// The inliers' own scale: what half of them keep to, as a standard deviation.
+double ScaleOf(const std::vector<double>& errors, const std::vector<std::size_t>& inliers) {
+  std::vector<double> kept;
+  for (const std::size_t i : inliers) kept.push_back(errors[i]);
+  const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 2);
+  std::nth_element(kept.begin(), middle, kept.end());
+  return std::max(kMedianToSigma * std::sqrt(*middle), kLeastScalePx);
+}
+
+/// Fits the inliers and takes in what then agrees, as long as none is lost.
 void RefineHomography(const std::vector<cv::Point2d>& before, const std::vector<cv::Point2d>& after,
                       double inlier_px, HomographyFit& best) {
   for (int i = 0; i < kRefinements && best.fit.inliers.size() > kSample; ++i) {
-    std::vector<cv::Point2d> from;
-    std::vector<cv::Point2d> to;
-    for (const std::size_t index : best.fit.inliers) {
-      from.push_back(before[index]);
-      to.push_back(after[index]);
-    }
-    const cv::Mat h = cv::findHomography(from, to, 0);
-    if (h.empty()) return;
-    const cv::Matx33d refined(h);
+    const cv::Matx33d h = best.after_from_before * (1 / best.after_from_before(2, 2));
+    const double scale_px = ScaleOf(HomographyErrors(h, before, after), best.fit.inliers);
+    const cv::Matx33d refined = StepHomography(h, before, after, best.fit.inliers, scale_px);
     const RobustFit fit = Agreeing(HomographyErrors(refined, before, after), inlier_px);
     if (fit.inliers.size() < best.fit.inliers.size()) return;
     best = {fit, refined};
@@ -184,11 +225,12 @@ HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
     const cv::Matx33d h = HomographyOf(DrawSample(before.size(), random), before, after);
     if (h(2, 2) == 0) continue;
     const RobustFit fit = Agreeing(HomographyErrors(h, before, after), inlier_px);
-    if (fit.inliers.size() <= best.fit.inliers.size()) continue;
+    if (fit.inliers.size() < kSample || fit.cost >= best.fit.cost) continue;
     best = {fit, h};
-    wanted = TriesWanted(fit.inliers.size(), before.size(), most_tries);
+    // A sample of four carries their noise; refined it also finds the inliers it missed.
+    RefineHomography(before, after, inlier_px, best);
+    wanted = TriesWanted(best.fit.inliers.size(), before.size(), most_tries);
   }
-  RefineHomography(before, after, inlier_px, best);
   return best;
 }
 
@@ -206,7 +248,7 @@ PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Po
     if (!tried.found) continue;
     const Eigen::Isometry3d transform = PoseOf(tried.rotation, tried.translation);
     const RobustFit fit = Agreeing(PoseErrors(transform, places, seen, camera), inlier_px);
-    if (fit.inliers.size() <= best.fit.inliers.size()) continue;
+    if (fit.inliers.size() < kSample || fit.cost >= best.fit.cost) continue;
     best = {fit, transform};
     pose = tried;
     wanted = TriesWanted(fit.inliers.size(), places.size(), most_tries);

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -14,6 +15,9 @@ namespace livemap {
 struct RobustFit {
   std::vector<std::size_t> inliers;  ///< Indices, rising.
   double error_px = 0;               ///< Their root mean square.
+  /// Of all points, squared pixels: the squared error, and no more than at the limit (MSAC: Torr,
+  /// Zisserman, CVIU 78(1), 2000). Counting alone prefers a loose fit of a few more.
+  double cost = std::numeric_limits<double>::infinity();
 };
 
 struct HomographyFit {
@@ -21,7 +25,8 @@ struct HomographyFit {
   cv::Matx33d after_from_before = cv::Matx33d::eye();
 };
 
-/// RANSAC over four matches, then least squares over those that agree within `inlier_px`. The same
+/// RANSAC over four matches, the best by their cost; each best one is refined over those that agree
+/// within `inlier_px`, weighted by Cauchy's function (Chum, Matas, Kittler, DAGM 2003). The same
 /// `seed` gives the same result. Without any agreement there are no inliers. Source: M. A.
 /// Fischler, R. C. Bolles, "Random Sample Consensus", CACM 24(6), 1981.
 HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
