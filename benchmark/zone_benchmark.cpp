@@ -1,4 +1,5 @@
-// How fast the zone registers reports: in memory at 1e3 to 1e6 known hazards, and with its store.
+// How fast the zone registers reports: in memory at 1e3 to 1e6 known hazards, what polls cost, and
+// with its store.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "poll_scheduler_cost.h"
 #include "zone/hazard_registry.h"
 #include "zone/zone_service.h"
 
@@ -23,7 +25,8 @@ constexpr char kUsage[] =
     "usage: livemap_zone_benchmark [--max-hazards N] [--store-seconds S] [--help]\n"
     "\n"
     "Prints the cost of one registration in memory at 1000 to N (default 1000000) hazards and how\n"
-    "it grows, then committed reports per second on SQLite, S seconds (default 2) for each line.\n";
+    "it grows, what a second of 10 000 vehicles costs the poll scheduler, then committed reports "
+    "per second on SQLite, S seconds (default 2) for each line.\n";
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
 constexpr double kSpacingM = 12.0;
@@ -241,6 +244,7 @@ int Run(const std::vector<std::string>& arguments) {
   const double max_hazards = Option(arguments, "--max-hazards", 1e6);
   const double seconds = Option(arguments, "--store-seconds", 2.0);
   PrintRegistry(static_cast<std::size_t>(max_hazards));
+  PrintPollScheduler(static_cast<std::size_t>(max_hazards));
   std::printf("committed reports/s on SQLite (WAL, synchronous=FULL), half new, half sightings\n");
   std::printf("%10s %14s %18s\n", "per commit", "picture, bytes", "reports/s");
   for (const std::size_t batch : {1U, 100U, 500U}) PrintStore(batch, 0, seconds);

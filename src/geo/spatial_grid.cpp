@@ -19,6 +19,17 @@ Eigen::Vector3d ToEarth(const GeoPoint& place) {
   return earth_m;
 }
 
+/// Geodesic distance of two places that are a chord apart. Solving the geodesic costs a
+/// microsecond; over some kilometres the ellipsoid is a sphere, and an arc is longer than its chord
+/// c by c^3 / (24 r^2): with the mean radius 0.02 mm off at 10 km.
+double DistanceM(double chord_m, const GeoPoint& a, const GeoPoint& b) {
+  constexpr double kFarM = 10e3;
+  constexpr double kEarthRadiusM = 6371e3;
+  if (chord_m > kFarM) return GeodesicDistanceM(a, b);
+  const double ratio = chord_m / kEarthRadiusM;
+  return chord_m * (1 + ratio * ratio / 24);
+}
+
 }  // namespace
 
 SpatialGrid SpatialGrid::ForRadius(double radius_m, std::uint64_t hash_seed) {
@@ -143,9 +154,9 @@ std::vector<SpatialGrid::Neighbour> SpatialGrid::Within(const GeoPoint& centre,
     for (std::size_t i = Home(hash); slots_[i].entry != kEmpty; i = Next(i)) {
       if (slots_[i].hash != hash) continue;
       const Entry& entry = entries_[slots_[i].entry];
-      if ((entry.earth_m - search.earth_m).squaredNorm() > search.ChordM() * search.ChordM())
-        continue;
-      const double distance_m = GeodesicDistanceM(entry.place, centre);
+      const double squared_m2 = (entry.earth_m - search.earth_m).squaredNorm();
+      if (squared_m2 > search.ChordM() * search.ChordM()) continue;
+      const double distance_m = DistanceM(std::sqrt(squared_m2), entry.place, centre);
       if (distance_m <= radius_m) found.push_back({entry.id, distance_m});
     }
   }

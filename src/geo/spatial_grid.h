@@ -41,8 +41,8 @@ class SpatialGrid {
   bool Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t id);
   /// The nearest place within `radius_m` (inclusive) of `centre`, the lowest id among equals.
   std::optional<Neighbour> Nearest(const GeoPoint& centre, double radius_m) const;
-  /// Every place within `radius_m` (inclusive) of `centre`, in no order. Costs one cell of the
-  /// table per cell that the radius touches: for radii of some cells.
+  /// Every place within `radius_m` (inclusive) of `centre`, in no order; distances are right to
+  /// 0.1 mm. Costs one cell of the table per cell that the radius touches: for radii of some cells.
   std::vector<Neighbour> Within(const GeoPoint& centre, double radius_m) const;
 
   std::size_t size() const { return entries_.size(); }

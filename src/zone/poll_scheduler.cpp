@@ -15,8 +15,22 @@ constexpr double kStandingReachM = 60;  // How far ahead a standing vehicle sees
 constexpr double kNearestM = 8;         // Nearer it has passed before it can look.
 constexpr double kLongestS = 1e8;       // Nothing is planned further ahead, about three years.
 constexpr double kMetresPerDegree = 111320;
+// What waits around a vehicle is sought again after this part of its lookahead, a turn by this, or
+// this time: a poll may have become worth its bytes meanwhile.
+constexpr double kLookAgainShare = 0.1;
+constexpr double kLookAgainRad = 0.2;
+constexpr double kLookAgainS = 5;
+// After a long silence a million hazards are due at once; the zone has more to do than to ask.
+constexpr std::size_t kMostPerTick = 20000;
 // Log odds that evidence moves, and rounding does not.
 constexpr double kMovedOdds = 1e-3;
+
+/// Metres north and east, for places some hundred metres apart.
+std::pair<double, double> Offset(const GeoPoint& from, const GeoPoint& to) {
+  const double east_deg = std::remainder(to.longitude_deg - from.longitude_deg, 360.0);
+  return {(to.latitude_deg - from.latitude_deg) * kMetresPerDegree,
+          east_deg * kMetresPerDegree * std::cos(from.latitude_deg * kRadiansPerDegree)};
+}
 
 double ProbabilityOf(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
@@ -176,8 +190,21 @@ void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& 
   Rider& rider = *known->second;
   rider.point = point;
   rider_grid_.Insert(point.position, rider.key);
-  if (!rider.moved) moved_.push_back(rider.key);
+  if (rider.moved || !SeesOtherPlaces(rider)) return;
+  moved_.push_back(rider.key);
   rider.moved = true;
+}
+
+bool PollScheduler::SeesOtherPlaces(const Rider& rider) const {
+  if (!rider.looked_from) return true;
+  const TrackPoint& from = *rider.looked_from;
+  const auto [north_m, east_m] = Offset(from.position, rider.point.position);
+  // A course that is not a number is always another one.
+  const double turn_rad = std::remainder(rider.point.course_rad - from.course_rad, 2 * M_PI);
+  return Seconds(rider.point.stamp_ns - from.stamp_ns) >= kLookAgainS ||
+         std::hypot(north_m, east_m) > kLookAgainShare * config_.lookahead_m ||
+         !(std::abs(turn_rad) < kLookAgainRad) ||
+         rider.point.speed_mps > from.speed_mps + kMinMovingMps;
 }
 
 void PollScheduler::ForgetRider(RiderPlace rider) {
@@ -209,7 +236,7 @@ std::vector<PollChoice> PollScheduler::TakeDue(std::int64_t now_ns) {
     if (found == riders_by_key_.end()) continue;
     Rider& rider = *found->second;
     rider.moved = false;
-    if (waiting_.size() == 0) continue;
+    rider.looked_from = rider.point;
     for (const auto& near : waiting_.Within(rider.point.position, config_.lookahead_m)) {
       TryAsk(near.id, rider, now_ns, choices);
     }
@@ -227,7 +254,8 @@ void PollScheduler::Refill(std::int64_t now_ns) {
 
 void PollScheduler::TakeFallenDue(std::int64_t now_ns) {
   const double price_s = PriceS();
-  while (!heap_.empty() && heap_.front().at_ns <= now_ns) {
+  for (std::size_t i = 0; i < kMostPerTick && !heap_.empty() && heap_.front().at_ns <= now_ns;
+       ++i) {
     const Due due = heap_.front();
     std::pop_heap(heap_.begin(), heap_.end());
     heap_.pop_back();
@@ -295,10 +323,7 @@ void PollScheduler::TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_
 
 bool PollScheduler::Passes(const TrackPoint& point, const GeoPoint& place) const {
   if (!std::isfinite(point.course_rad) || !std::isfinite(point.speed_mps)) return false;
-  const double north_m = (place.latitude_deg - point.position.latitude_deg) * kMetresPerDegree;
-  const double east_m = std::remainder(place.longitude_deg - point.position.longitude_deg, 360.0) *
-                        kMetresPerDegree *
-                        std::cos(point.position.latitude_deg * kRadiansPerDegree);
+  const auto [north_m, east_m] = Offset(point.position, place);
   const double sine = std::sin(point.course_rad);
   const double cosine = std::cos(point.course_rad);
   const double ahead_m = east_m * sine + north_m * cosine;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <list>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -47,8 +48,8 @@ struct PollChoice {
 /// rises, price / fill^2, so that what is worth most is asked still.
 ///
 /// Cost. Hazards wait in a heap for the time they are due, and due ones in a grid for a vehicle to
-/// come by: a tick looks at what fell due and at what lies around vehicles that moved, never at
-/// all.
+/// come by: a tick looks at what fell due and at what lies around vehicles that moved on or turned,
+/// never at all.
 class PollScheduler {
  public:
   struct Config {
@@ -121,6 +122,7 @@ class PollScheduler {
     TrackPoint point;
     std::size_t open = 0;
     bool moved = false;
+    std::optional<TrackPoint> looked_from;  ///< When what waits was last sought around it.
   };
   using RiderPlace = std::list<Rider>::iterator;
   struct Due {
@@ -153,6 +155,7 @@ class PollScheduler {
   void TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_ns,
               std::vector<PollChoice>& choices);
   bool Passes(const TrackPoint& point, const GeoPoint& place) const;
+  bool SeesOtherPlaces(const Rider& rider) const;
   void Close(Open& poll);
   void CompactHeap();
 

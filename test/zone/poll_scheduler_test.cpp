@@ -108,6 +108,52 @@ TEST_F(PollSchedulerTest, AHazardThatFallsDueFindsTheVehicleThatIsThereAlready) 
   EXPECT_THAT(asked, ::testing::ElementsAre("v"));
 }
 
+TEST_F(PollSchedulerTest, AVehicleThatStandsIsAskedTheRestWhenItHasAnswered) {
+  config_.max_open_per_vehicle = 1;
+  Rebuild();
+  const LifeRecord life = Active(5400, kStart);
+  Set(1, life, kStart);
+  Set(2, life, kStart, GeodesicDestination(kPlace, 0, 5));
+  std::vector<std::uint64_t> asked;
+  std::int64_t now_ns = kStart + 2 * kHour;
+  for (int second = 0; second < 12; ++second, now_ns += kSecond) {
+    scheduler_->SetVehicle("v", {now_ns, GeodesicDestination(kPlace, 3.14159265, 40), 0, 0});
+    for (const auto& choice : scheduler_->TakeDue(now_ns)) {
+      asked.push_back(choice.hazard);
+      EXPECT_TRUE(scheduler_->Answered(choice.hazard, "v", 600, now_ns));
+    }
+  }
+  EXPECT_THAT(asked, ::testing::UnorderedElementsAre(1, 2));
+}
+
+TEST_F(PollSchedulerTest, WhatATurnBringsBeforeAVehicleIsAskedAtOnce) {
+  Set(1, Active(5400, kStart), kStart);
+  const std::int64_t later = kStart + 2 * kHour;
+  Approach("v", later, 1.57);
+  ASSERT_TRUE(Asked(later).empty());
+  Approach("v", later + kSecond, 0);
+  EXPECT_THAT(Asked(later + kSecond), ::testing::ElementsAre("v"));
+}
+
+TEST_F(PollSchedulerTest, AllOfManyThatFallDueTogetherAreAskedInTheEnd) {
+  config_.bytes_per_hour = 1e9;
+  config_.max_open_per_vehicle = 1000;
+  Rebuild();
+  const LifeRecord life = Active(5400, kStart);
+  // Far more than one tick takes, and one of them before a vehicle.
+  for (std::uint64_t i = 0; i < 50000; ++i) {
+    Set(i, life, kStart, {10 + static_cast<double>(i) * 1e-3, 20});
+  }
+  Set(50000, life, kStart);
+  std::vector<std::string> asked;
+  std::int64_t now_ns = kStart + 2 * kHour;
+  for (int second = 0; second < 10 && asked.empty(); ++second, now_ns += kSecond) {
+    Approach("v", now_ns);
+    asked = Asked(now_ns);
+  }
+  EXPECT_THAT(asked, ::testing::ElementsAre("v"));
+}
+
 TEST_F(PollSchedulerTest, ShortLivesAreAskedSoonerByTheRootOfTheirRate) {
   const double hours = SecondsToFirstPoll(2 * 3600);
   const double days = SecondsToFirstPoll(32 * 3600);
