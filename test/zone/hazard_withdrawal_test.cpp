@@ -64,8 +64,7 @@ TEST_F(HazardWithdrawalTest, TheOddsAreAsIfItHadSaidNothing) {
   Withdraw(9, kStart + kHour);
   EXPECT_NEAR(life_.log_odds, unseen.log_odds, 0.02);
   EXPECT_NEAR(life_.undenied_log_odds, unseen.undenied_log_odds, 0.02);
-  EXPECT_NEAR(static_cast<double>(life_.last_yes_ns), static_cast<double>(unseen.last_yes_ns),
-              1e9);
+  EXPECT_NEAR(static_cast<double>(life_.last_yes_ns), static_cast<double>(unseen.last_yes_ns), 1e9);
 }
 
 TEST_F(HazardWithdrawalTest, ACandidateThatItAloneHeldBackIsTold) {
