@@ -40,7 +40,7 @@ function row(name, ...content) {
 
 /** Reports and answers to polls both count, so there may be more vehicles than reports. */
 function seenBy(hazard) {
-  if (hazard.vehicles === 0) return 'no vehicle that counts';
+  if (hazard.vehicles === 0) return hazard.state === REJECTED.name ? 'no vehicle' : 'no vehicle that counts';
   if (hazard.vehicles >= MOST_VEHICLES) return `${MOST_VEHICLES} vehicles or more`;
   return plural(hazard.vehicles, 'vehicle');
 }
@@ -62,7 +62,7 @@ export function popupContent(hazard, catalogue, extras) {
     ...row('Last seen', time(hazard.lastSeen)),
     ...(hazard.firstSeen === hazard.lastSeen ? [] : row('First seen', time(hazard.firstSeen))),
     ...row('Reported', plural(hazard.sightings, 'time')),
-    ...row('Seen by', seenBy(hazard)),
+    ...row(hazard.state === REJECTED.name ? 'Seen since' : 'Seen by', seenBy(hazard)),
     ...row('Confidence', ...bar(hazard.confidence)),
     ...(hazard.state === REJECTED.name ? [] : row('Still there', ...bar(hazard.presence))),
   ];

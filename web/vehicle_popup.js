@@ -37,7 +37,7 @@ export class VehiclePopup {
 
   update(vehicle) {
     this.speed.textContent = speedText(vehicle) || 'not known now';
-    this.heard.textContent = `${localTime(vehicle.heard)} (${ago(vehicle.heard)})`;
-    this.heard.title = utcTime(vehicle.heard);
+    this.heard.textContent = ago(vehicle.heard);
+    this.heard.title = `${localTime(vehicle.heard)}, ${utcTime(vehicle.heard)}`;
   }
 }
