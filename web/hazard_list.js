@@ -87,7 +87,7 @@ export class HazardList {
     row.badge.classList.toggle('struck', hazard.state === REJECTED.name);
     const state = hazard.state === 'active' ? '' : `${stateLabel(hazard.state)} \u00b7 `;
     setText(row.facts,
-      `${state}${plural(hazard.sightings, 'report')} \u00b7 confidence ${percent(hazard.confidence)}`);
+      `${state}${plural(hazard.sightings, 'report')} \u00b7 ${percent(hazard.confidence)} sure`);
   }
 
   keepOneTabStop() {
