@@ -82,7 +82,9 @@ export class VehicleLayer {
       this.vehicles.get(id)?.marker.closePopup();
       return;
     }
-    this.map.setView(vehicle.marker.getLatLng(), Math.max(this.map.getZoom(), 16));
+    // At once: the popup would stop a map that still glides.
+    this.map.setView(vehicle.marker.getLatLng(), Math.max(this.map.getZoom(), 16),
+      { animate: false });
     vehicle.marker.openPopup();
   }
 
