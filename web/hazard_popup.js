@@ -40,7 +40,9 @@ function row(name, ...content) {
 
 /** Reports and answers to polls both count, so there may be more vehicles than reports. */
 function seenBy(hazard) {
-  if (hazard.vehicles === 0) return hazard.state === REJECTED.name ? 'no vehicle' : 'no vehicle that counts';
+  if (hazard.vehicles === 0) {
+    return hazard.state === REJECTED.name ? 'no vehicle' : 'no vehicle that counts';
+  }
   if (hazard.vehicles >= MOST_VEHICLES) return `${MOST_VEHICLES} vehicles or more`;
   return plural(hazard.vehicles, 'vehicle');
 }

@@ -8,7 +8,9 @@ export const STATES = [
 
 /** Off the map; officials may look at them. */
 export const REJECTED = {
-  name: 'rejected', label: 'Rejected', meaning: 'Taken off the map by an official: drivers are not told',
+  name: 'rejected',
+  label: 'Rejected',
+  meaning: 'Taken off the map by an official: drivers are not told',
 };
 
 const GONE = { name: 'gone', label: 'Gone', meaning: 'No longer on the map' };

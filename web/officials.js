@@ -20,8 +20,9 @@ const DECISIONS = {
     bad: true, note: '', reason: `Reason, ${HAZARDS_HISTORY}` },
   distrust: { call: 'distrust', title: 'Distrust this vehicle?', button: 'Distrust',
     done: 'Distrusted', bad: true,
-    note: 'What it said is taken back from all hazards: those that nobody else saw go, those that too '
-      + 'few others saw are unconfirmed again. For about a week it counts as no witness.',
+    note: 'What it said is taken back from all hazards: those that nobody else saw go, those that '
+      + 'too few others saw are unconfirmed again. For a while it counts as no witness: a week, '
+      + 'unless the zone is set otherwise.',
     reason: 'Reason, kept in the history of each of these hazards' },
 };
 
