@@ -67,8 +67,8 @@ def start_rviz(rviz_file_path, display, master_uri, log=subprocess.DEVNULL):
                             stderr=subprocess.STDOUT)
 
 
-def photograph_map(url, path, width=1440, height=900):
-    """The live map with the popup of the first hazard of its list open."""
+def photograph_map(url, path, hazard=None, width=1440, height=900):
+    """The live map with the popup of `hazard` open, by its id; else that of the first of its list."""
     from selenium import webdriver
     from selenium.webdriver.common.by import By
     options = webdriver.ChromeOptions()
@@ -84,7 +84,8 @@ def photograph_map(url, path, width=1440, height=900):
             if time.monotonic() > deadline:
                 raise RuntimeError("the live map lists no hazard")
             time.sleep(0.2)
-        browser.find_elements(By.CSS_SELECTOR, "#hazard-list button")[0].click()
+        chosen = "" if hazard is None else f'[data-hazard="{hazard}"]'
+        browser.find_elements(By.CSS_SELECTOR, f"#hazard-list button{chosen}")[0].click()
         time.sleep(2)
         browser.save_screenshot(str(path))
     finally:

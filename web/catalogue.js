@@ -27,10 +27,10 @@ export class Catalogue {
     return (this.classes.get(className) ?? this.fallback).colour;
   }
 
-  /** A coloured disc with the class's icon; hollow for a candidate. */
+  /** A coloured disc with the class's icon; hollow for a candidate, struck out when rejected. */
   badge(className, state = 'active') {
-    const hollow = state === 'candidate' ? ' hollow' : '';
-    const badge = element('span', { class: `badge${hollow}`, 'aria-hidden': 'true' },
+    const look = { candidate: ' hollow', rejected: ' struck' }[state] ?? '';
+    const badge = element('span', { class: `badge${look}`, 'aria-hidden': 'true' },
       element('span', { class: `glyph glyph-${this.icon(className)}` }));
     badge.style.setProperty('--colour', this.colour(className));
     badge.style.setProperty('--on-colour', inkOn(this.colour(className)));

@@ -1,7 +1,7 @@
 // Check boxes that show or hide the hazards of a class or in a state.
 
 import { byId, element } from './dom.js';
-import { STATES } from './hazard_state.js';
+import { REJECTED, STATES } from './hazard_state.js';
 
 export class ClassFilter {
   /** `onChange()` is called when the set of hidden classes changed. */
@@ -57,31 +57,46 @@ export class ClassFilter {
   }
 }
 
-/** The three states, always there. */
+/** The three states on the map, always there; for officials also what was rejected, which is
+ * fetched when it is asked for. */
 export class StateFilter {
-  constructor(store, onChange) {
+  /** `onRejected(shown)` fetches or forgets rejected hazards; null where there are no officials. */
+  constructor(store, onChange, onRejected) {
     this.store = store;
     this.counts = new Map();
     for (const state of STATES) {
-      const box = element('input', { type: 'checkbox', 'data-state': state.name });
-      box.checked = true;
-      box.addEventListener('change', () => {
-        if (box.checked) store.hiddenStates.delete(state.name);
+      this.add(state, true, (shown) => {
+        if (shown) store.hiddenStates.delete(state.name);
         else store.hiddenStates.add(state.name);
         onChange();
       });
-      const count = element('span', { class: 'count' });
-      this.counts.set(state.name, count);
-      byId('states').append(element('li', {}, element('label',
-        { class: 'chip', title: state.meaning }, box,
-        element('span', { class: 'chip-label' }, state.label), count)));
     }
+    if (onRejected !== null) this.rejectedBox = this.add(REJECTED, false, onRejected);
+  }
+
+  add(state, checked, onToggle) {
+    const box = element('input', { type: 'checkbox', 'data-state': state.name });
+    box.checked = checked;
+    box.addEventListener('change', () => onToggle(box.checked));
+    const count = element('span', { class: 'count' });
+    this.counts.set(state.name, count);
+    byId('states').append(element('li', {}, element('label',
+      { class: 'chip', title: state.meaning }, box,
+      element('span', { class: 'chip-label' }, state.label), count)));
+    return box;
   }
 
   update() {
     for (const [name, node] of this.counts) {
-      node.textContent = (this.store.stateCounts.get(name) ?? 0).toLocaleString('en');
+      // How many were rejected is not known before they are fetched.
+      const unknown = name === REJECTED.name && !this.store.keepsRejected;
+      node.textContent = unknown ? '' : (this.store.stateCounts.get(name) ?? 0).toLocaleString('en');
     }
+  }
+
+  sayRejectedFailed() {
+    this.rejectedBox.checked = false;
+    this.counts.get(REJECTED.name).textContent = 'not loaded, try again';
   }
 }
 

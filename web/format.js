@@ -34,8 +34,9 @@ export function coordinate(degrees, positive, negative, digits) {
   return `${Math.abs(degrees).toFixed(digits)}\u00b0 ${degrees < 0 ? negative : positive}`;
 }
 
+/** "87 %", kept on one line. */
 export function percent(share) {
-  return `${Math.round(share * 100)} %`;
+  return `${Math.round(share * 100)}\u00a0%`;
 }
 
 export function plural(count, singular, many = `${singular}s`) {

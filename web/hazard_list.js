@@ -2,7 +2,7 @@
 
 import { byId, element } from './dom.js';
 import { ago, percent, plural, utcTime } from './format.js';
-import { stateLabel } from './hazard_state.js';
+import { REJECTED, stateLabel } from './hazard_state.js';
 
 const MAX_ROWS = 200;
 
@@ -84,9 +84,10 @@ export class HazardList {
     row.time.title = utcTime(hazard.updated);
     setText(row.time, ago(hazard.updated));
     row.badge.classList.toggle('hollow', hazard.state === 'candidate');
+    row.badge.classList.toggle('struck', hazard.state === REJECTED.name);
     const state = hazard.state === 'active' ? '' : `${stateLabel(hazard.state)} \u00b7 `;
     setText(row.facts,
-      `${state}${plural(hazard.sightings, 'sighting')} \u00b7 ${percent(hazard.confidence)}`);
+      `${state}${plural(hazard.sightings, 'report')} \u00b7 ${percent(hazard.confidence)} sure`);
   }
 
   keepOneTabStop() {

@@ -2,7 +2,10 @@
 
 import { element } from './dom.js';
 import { localTime, percent, plural, position, utcTime } from './format.js';
-import { stateLabel, stateMeaning } from './hazard_state.js';
+import { REJECTED, stateLabel, stateMeaning } from './hazard_state.js';
+
+/** A hazard remembers so many vehicles. */
+const MOST_VEHICLES = 6;
 
 /** Only the server's own pictures: a path of /images with a content hash. */
 function safeImage(url) {
@@ -35,9 +38,13 @@ function row(name, ...content) {
   return [element('dt', {}, name), element('dd', {}, ...content)];
 }
 
-function seen(hazard) {
-  const times = plural(hazard.sightings, 'time');
-  return hazard.sightings > 1 ? `${times} by ${plural(hazard.vehicles, 'vehicle')}` : times;
+/** Reports and answers to polls both count, so there may be more vehicles than reports. */
+function seenBy(hazard) {
+  if (hazard.vehicles === 0) {
+    return hazard.state === REJECTED.name ? 'no vehicle' : 'no vehicle that counts';
+  }
+  if (hazard.vehicles >= MOST_VEHICLES) return `${MOST_VEHICLES} vehicles or more`;
+  return plural(hazard.vehicles, 'vehicle');
 }
 
 function bar(share) {
@@ -56,9 +63,10 @@ export function popupContent(hazard, catalogue, extras) {
       position(hazard.latitude, hazard.longitude)), sigma),
     ...row('Last seen', time(hazard.lastSeen)),
     ...(hazard.firstSeen === hazard.lastSeen ? [] : row('First seen', time(hazard.firstSeen))),
-    ...row('Seen', seen(hazard)),
+    ...row('Reported', plural(hazard.sightings, 'time')),
+    ...row(hazard.state === REJECTED.name ? 'Seen since' : 'Seen by', seenBy(hazard)),
     ...row('Confidence', ...bar(hazard.confidence)),
-    ...row('Still there', ...bar(hazard.presence)),
+    ...(hazard.state === REJECTED.name ? [] : row('Still there', ...bar(hazard.presence))),
   ];
   return element('article', {
     class: 'popup', role: 'dialog', tabindex: '-1', 'aria-label': hazard.label,

@@ -6,12 +6,20 @@ export const STATES = [
   { name: 'verifying', label: 'Being checked', meaning: 'Passing vehicles are asked' },
 ];
 
-const OFF_MAP = { gone: 'Gone', rejected: 'Rejected' };
+/** Off the map; officials may look at them. */
+export const REJECTED = {
+  name: 'rejected',
+  label: 'Rejected',
+  meaning: 'Taken off the map by an official: drivers are not told',
+};
+
+const GONE = { name: 'gone', label: 'Gone', meaning: 'No longer on the map' };
+const ALL = [...STATES, REJECTED, GONE];
 
 export function stateLabel(name) {
-  return STATES.find((state) => state.name === name)?.label ?? OFF_MAP[name] ?? name;
+  return ALL.find((state) => state.name === name)?.label ?? name;
 }
 
 export function stateMeaning(name) {
-  return STATES.find((state) => state.name === name)?.meaning ?? '';
+  return ALL.find((state) => state.name === name)?.meaning ?? '';
 }

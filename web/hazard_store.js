@@ -1,6 +1,8 @@
 // The hazards that this page knows. Both the list at the start and every later event go through
 // here; an event older than what is known changes nothing.
 
+import { REJECTED } from './hazard_state.js';
+
 /** A GeoJSON feature of the API as the flat object that the page works with. */
 export function hazardOf(feature) {
   const { properties } = feature;
@@ -30,6 +32,8 @@ export class HazardStore {
     this.hazards = new Map();
     this.hidden = new Set();
     this.hiddenStates = new Set();
+    /** Whether rejected hazards are kept, too. */
+    this.keepsRejected = false;
     /** How many hazards there are of each class and in each state, hidden ones included. */
     this.counts = new Map();
     this.stateCounts = new Map();
@@ -51,6 +55,10 @@ export class HazardStore {
     const hazard = hazardOf(feature);
     const known = this.hazards.get(hazard.id);
     if (known && known.sequence >= hazard.sequence) return null;
+    if (action === 'removed' && this.keepsRejected && hazard.state === REJECTED.name) {
+      this.put(hazard);
+      return { change: 'changed', hazard };
+    }
     if (action === 'removed') {
       if (!known) return null;
       this.hazards.delete(hazard.id);
@@ -59,6 +67,22 @@ export class HazardStore {
     }
     this.put(hazard);
     return { change: known ? 'changed' : 'new', hazard };
+  }
+
+  /** Takes the list of rejected hazards; what an event told since is newer. */
+  addRejected(features) {
+    for (const hazard of features.map(hazardOf)) {
+      const known = this.hazards.get(hazard.id);
+      if (!known || known.sequence < hazard.sequence) this.put(hazard);
+    }
+  }
+
+  dropRejected() {
+    for (const hazard of [...this.hazards.values()]) {
+      if (hazard.state !== REJECTED.name) continue;
+      this.hazards.delete(hazard.id);
+      this.count(hazard, -1);
+    }
   }
 
   isShown(hazard) {

@@ -13,8 +13,10 @@ export async function getJson(url) {
   return answer.json();
 }
 
-async function loadAllHazards() {
-  let page = await getJson(`/api/v1/hazards?limit=${PAGE}`);
+/** All on the map, or all in one `state`. */
+export async function loadHazards(state = null) {
+  const url = `/api/v1/hazards?limit=${PAGE}${state === null ? '' : `&state=${state}`}`;
+  let page = await getJson(url);
   const latest = new Map();
   for (;;) {
     for (const feature of page.features) {
@@ -22,7 +24,7 @@ async function loadAllHazards() {
       else latest.set(feature.id, feature);
     }
     if (!page.truncated) return { sequence: page.sequence, features: [...latest.values()] };
-    page = await getJson(`/api/v1/hazards?limit=${PAGE}&since=${page.sequence}`);
+    page = await getJson(`${url}&since=${page.sequence}`);
   }
 }
 
@@ -45,7 +47,7 @@ export class LiveFeed {
     this.handlers.onState('connecting');
     try {
       if (this.sequence === null) {
-        const list = await loadAllHazards();
+        const list = await loadHazards();
         this.sequence = list.sequence;
         this.handlers.onList(list.features);
       }

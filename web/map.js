@@ -11,7 +11,7 @@ import { HazardLayer } from './hazard_layer.js';
 import { HazardList } from './hazard_list.js';
 import { popupContent } from './hazard_popup.js';
 import { HazardStore } from './hazard_store.js';
-import { LiveFeed, getJson } from './live_feed.js';
+import { LiveFeed, getJson, loadHazards } from './live_feed.js';
 import { Officials } from './officials.js';
 import { Sheet } from './sheet.js';
 import { VehicleLayer } from './vehicle_layer.js';
@@ -47,17 +47,20 @@ class Page {
     this.store = new HazardStore();
     this.sheet = new Sheet();
     this.map = createMap(config);
-    this.vehicles = new VehicleLayer(this.map, !config.tile_url);
+    this.vehicles = new VehicleLayer(this.map, !config.tile_url,
+      (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue,
         [this.history.section(hazard), ...this.officials.buttons(hazard)]),
       this.sheet.coveredHeight());
     this.history = new HazardHistory((id) => this.layer.refresh(id));
     this.officials = new Officials(config.officials, (text) => this.say(text),
-      (hazard) => this.layer.focusPopup(hazard.id, this.officials.decision));
+      ({ hazard, vehicle }, focus) => (hazard ? this.layer.focusPopup(hazard.id, focus)
+        : this.vehicles.focusPopup(vehicle.id, focus)));
     this.list = new HazardList(this.catalogue, (hazard) => this.choose(hazard));
     this.filter = new ClassFilter(this.store, this.catalogue, () => this.showAll());
-    this.states = new StateFilter(this.store, () => this.showAll());
+    this.states = new StateFilter(this.store, () => this.showAll(),
+      config.officials ? (shown) => this.showRejected(shown) : null);
     this.inView = byId('in-view');
     this.updateSoon = throttled(() => this.updatePanel(), 120);
     this.announced = [];
@@ -91,7 +94,7 @@ class Page {
     setInterval(() => {
       this.updateSoon();
       this.vehicles.updateRows();
-    }, 15000);
+    }, 5000);
   }
 
   start() {
@@ -110,6 +113,7 @@ class Page {
   onList(features) {
     this.store.replaceAll(features);
     this.showAll();
+    if (this.store.keepsRejected) this.showRejected(true);
     if (this.keepsAllInView) this.fit();
   }
 
@@ -128,6 +132,22 @@ class Page {
     }
     if (change === 'new') this.keepInView(feature);
     this.updateSoon();
+  }
+
+  /** For officials who look at what was rejected. From now on events keep it current. */
+  async showRejected(shown) {
+    this.store.keepsRejected = shown;
+    if (shown) {
+      try {
+        const list = await loadHazards('rejected');
+        if (this.store.keepsRejected) this.store.addRejected(list.features);
+      } catch (failure) {
+        this.store.keepsRejected = false;
+      }
+    }
+    if (!this.store.keepsRejected) this.store.dropRejected();
+    this.showAll();
+    if (shown && !this.store.keepsRejected) this.states.sayRejectedFailed();
   }
 
   showAll() {

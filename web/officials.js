@@ -1,13 +1,29 @@
-// Officials confirm and reject hazards. The token is asked for once and kept as long as the tab
-// lives, in sessionStorage; it is only ever sent to this server.
+// Officials confirm and reject hazards and distrust vehicles. The token is asked for once and kept
+// as long as the tab lives, in sessionStorage; it is only ever sent to this server.
 
 import { byId, element } from './dom.js';
+import { ago, localTime, position } from './format.js';
+import { REJECTED } from './hazard_state.js';
 
 const KEY = 'livemap.token';
+const HAZARDS_HISTORY = 'kept in the hazard\u2019s history';
 
-const WORDS = {
-  confirm: { title: 'Confirm this hazard?', button: 'Confirm', done: 'Confirmed' },
-  reject: { title: 'Reject this hazard?', button: 'Reject', done: 'Rejected' },
+/** `bad`: it takes something away, and must say why. */
+const DECISIONS = {
+  confirm: { call: 'confirm', title: 'Confirm this hazard?', button: 'Confirm', done: 'Confirmed',
+    note: 'Drivers are told of it from now on.',
+    reason: `Reason, ${HAZARDS_HISTORY}; may stay empty` },
+  restore: { call: 'confirm', title: 'Put this hazard back?', button: 'Put back', done: 'Put back',
+    note: 'It is confirmed, and drivers are told of it from now on.',
+    reason: `Reason, ${HAZARDS_HISTORY}; may stay empty` },
+  reject: { call: 'reject', title: 'Reject this hazard?', button: 'Reject', done: 'Rejected',
+    bad: true, note: '', reason: `Reason, ${HAZARDS_HISTORY}` },
+  distrust: { call: 'distrust', title: 'Distrust this vehicle?', button: 'Distrust',
+    done: 'Distrusted', bad: true,
+    note: 'What it said is taken back from all hazards: those that nobody else saw go, those that '
+      + 'too few others saw are unconfirmed again. For a while it counts as no witness: a week, '
+      + 'unless the zone is set otherwise.',
+    reason: 'Reason, kept in the history of each of these hazards' },
 };
 
 /** Where the browser keeps no session, the token lives in the page alone. */
@@ -31,10 +47,10 @@ function saveToken(token) {
 }
 
 /** Sends a decision; answers null when it was taken, else what is wrong: {status, sentence}. */
-async function send(hazard, decision, reason, token) {
+async function send(address, reason, token) {
   let answer;
   try {
-    answer = await fetch(`/api/v1/hazards/${hazard.id}/${decision}`, {
+    answer = await fetch(address, {
       method: 'POST', cache: 'no-store', credentials: 'omit',
       headers: { Authorization: `Bearer ${token}`, 'Content-Type': 'application/json' },
       body: JSON.stringify(reason ? { reason } : {}),
@@ -49,13 +65,29 @@ async function send(hazard, decision, reason, token) {
 
 function sentenceFor(status, error) {
   if (status === 401) return 'This token is not known here. Check it and try again.';
-  if (status === 404 || status === 409) return 'This hazard is no longer on the map.';
+  if (status === 409) return 'This hazard is no longer on the map.';
   return error ? `${error.charAt(0).toUpperCase()}${error.slice(1)}.` : `The zone answered ${status}.`;
 }
 
+/** What a decision is about: its address in the API, and how it reads. */
+function hazardSubject(hazard) {
+  return {
+    address: `/api/v1/hazards/${hazard.id}`, hazard, name: hazard.label,
+    detail: `${position(hazard.latitude, hazard.longitude)}, last seen ${localTime(hazard.lastSeen)}`,
+  };
+}
+
+function vehicleSubject(vehicle) {
+  return {
+    address: `/api/v1/vehicles/${encodeURIComponent(vehicle.id)}`, vehicle, name: vehicle.id,
+    detail: `last heard of ${ago(vehicle.heard)}`,
+  };
+}
+
 export class Officials {
-  /** `enabled`: the server has officials. `onDone(text)` announces what was done, `onClosed(hazard)`
-   * is called when the dialog goes away. */
+  /** `enabled`: the server has officials. `onDone(text)` announces what was done,
+   * `onClosed({hazard, vehicle}, focus)` is called when the dialog goes away: one of the two is set,
+   * `focus` names the control that opened it. */
   constructor(enabled, onDone, onClosed) {
     this.enabled = enabled;
     this.onDone = onDone;
@@ -65,7 +97,8 @@ export class Officials {
     this.reason = byId('decision-reason');
     this.error = byId('decision-error');
     this.submit = byId('decision-submit');
-    this.hazard = null;
+    this.subject = null;
+    this.decision = null;
     byId('decision-form').addEventListener('submit', (event) => {
       event.preventDefault();
       this.decide();
@@ -73,7 +106,7 @@ export class Officials {
     byId('decision-cancel').addEventListener('click', () => this.dialog.close());
     this.dialog.addEventListener('close', () => {
       this.token.value = '';
-      this.onClosed(this.hazard);
+      this.onClosed(this.subject, this.decision.call);
     });
   }
 
@@ -81,30 +114,41 @@ export class Officials {
     return this.dialog.open;
   }
 
-  /** The popup's buttons; nothing where nobody may decide. */
+  /** The buttons of a hazard's popup; nothing where nobody may decide. */
   buttons(hazard) {
-    if (!this.enabled) return [];
-    const confirm = element('button', { type: 'button', class: 'decide', 'data-focus': 'confirm' },
-      'Confirm');
-    const reject = element('button',
-      { type: 'button', class: 'decide decide-reject', 'data-focus': 'reject' }, 'Reject\u2026');
-    confirm.addEventListener('click', () => this.ask(hazard, 'confirm'));
-    reject.addEventListener('click', () => this.ask(hazard, 'reject'));
-    return [element('div', { class: 'decisions' }, confirm, reject)];
+    const offered = hazard.state === REJECTED.name ? ['restore'] : ['confirm', 'reject'];
+    return this.row(hazardSubject(hazard), offered);
   }
 
-  ask(hazard, decision) {
-    this.hazard = hazard;
+  /** Those of a vehicle's popup. */
+  vehicleButtons(vehicle) {
+    return this.row(vehicleSubject(vehicle), ['distrust']);
+  }
+
+  row(subject, offered) {
+    if (!this.enabled) return [];
+    return [element('div', { class: 'decisions' }, ...offered.map((name) => {
+      const { call, button, bad } = DECISIONS[name];
+      const node = element('button', { type: 'button', 'data-focus': call,
+        class: bad ? 'decide decide-reject' : 'decide' }, `${button}\u2026`);
+      node.addEventListener('click', () => this.ask(subject, DECISIONS[name]));
+      return node;
+    }))];
+  }
+
+  ask(subject, decision) {
+    this.subject = subject;
     this.decision = decision;
-    byId('decision-title').textContent = WORDS[decision].title;
-    byId('decision-label').textContent = hazard.label;
-    byId('decision-reason-row').hidden = decision !== 'reject';
-    this.submit.textContent = WORDS[decision].button;
-    this.submit.classList.toggle('decide-reject', decision === 'reject');
+    byId('decision-title').textContent = decision.title;
+    byId('decision-label').textContent = `${subject.name}, ${subject.detail}`;
+    byId('decision-note').textContent = decision.note;
+    byId('decision-reason-label').textContent = decision.reason;
+    this.submit.textContent = decision.button;
+    this.submit.classList.toggle('decide-reject', decision.bad === true);
     this.reason.value = '';
     this.show('', savedToken() === '');
     this.dialog.showModal();
-    this.focusFirst();
+    this.reason.focus();
   }
 
   /** An error, and whether the token must be given. */
@@ -114,30 +158,25 @@ export class Officials {
     this.submit.disabled = false;
   }
 
-  focusFirst() {
-    const field = [this.reason, this.token].find((one) => !one.closest('[hidden]'));
-    (field ?? this.submit).focus();
-  }
-
   async decide() {
-    const { hazard, decision } = this;
+    const { subject, decision } = this;
     const token = this.token.value.trim() || savedToken();
-    const reason = decision === 'reject' ? this.reason.value.trim().replace(/\s+/g, ' ') : '';
-    if (decision === 'reject' && reason === '') return this.refuse('Please say why.', this.reason);
+    const reason = this.reason.value.trim().replace(/\s+/g, ' ');
+    if (decision.bad && reason === '') return this.refuse('Please say why.', this.reason);
     if (token === '') return this.refuse('Please enter your token.', this.token);
     if (/[^\x21-\x7e]/.test(token)) {
       return this.refuse('A token has no blanks or special letters.', this.token);
     }
     this.submit.disabled = true;
-    const wrong = await send(hazard, decision, reason, token);
-    if (this.hazard !== hazard || !this.dialog.open) return undefined;
+    const wrong = await send(`${subject.address}/${decision.call}`, reason, token);
+    if (this.subject !== subject || !this.dialog.open) return undefined;
     if (wrong !== null) {
       if (wrong.status === 401) saveToken('');
       return this.refuse(wrong.sentence, wrong.status === 401 ? this.token : this.submit);
     }
     saveToken(token);
     this.dialog.close();
-    return this.onDone(`${WORDS[decision].done}: ${hazard.label}`);
+    return this.onDone(`${decision.done}: ${subject.name}`);
   }
 
   refuse(sentence, field) {

@@ -2,6 +2,7 @@
 
 import { byId, element, svgElement } from './dom.js';
 import { ago } from './format.js';
+import { VehiclePopup, isFresh, speedText } from './vehicle_popup.js';
 
 const L = window.L;
 const SPACING_M = 5;
@@ -29,10 +30,12 @@ const VehicleIcon = L.Icon.extend({
 });
 
 export class VehicleLayer {
-  /** `showRoads` draws the driven way as a road under the dots, where no map tiles do. */
-  constructor(map, showRoads) {
+  /** `showRoads` draws the driven way as a road under the dots, where no map tiles do.
+   * `extras(vehicle)` answers what people can do with it, for its popup. */
+  constructor(map, showRoads, extras) {
     this.map = map;
     this.showRoads = showRoads;
+    this.extras = extras;
     this.vehicles = new Map();
     this.followed = null;
     map.createPane('roads').style.zIndex = 350;
@@ -53,6 +56,7 @@ export class VehicleLayer {
     this.extendTrail(vehicle, here);
     vehicle.heard = Date.parse(properties.heard);
     vehicle.speed = properties.speed_mps;
+    vehicle.drive = String(properties.drive ?? '');
     vehicle.marker.setLatLng(here);
     this.turn(vehicle, properties.course_rad);
     if (this.followed === id) this.map.panTo(here, { animate: false });
@@ -74,8 +78,20 @@ export class VehicleLayer {
       vehicle.button.setAttribute('aria-pressed', String(vehicle.id === this.followed));
     }
     const vehicle = this.vehicles.get(this.followed);
-    if (!vehicle) return;
-    this.map.setView(vehicle.marker.getLatLng(), Math.max(this.map.getZoom(), 16));
+    if (!vehicle) {
+      this.vehicles.get(id)?.marker.closePopup();
+      return;
+    }
+    // At once: the popup would stop a map that still glides.
+    this.map.setView(vehicle.marker.getLatLng(), Math.max(this.map.getZoom(), 16),
+      { animate: false });
+    vehicle.marker.openPopup();
+  }
+
+  /** The control of this name in the vehicle's open popup, else the popup itself. */
+  focusPopup(id, name) {
+    const node = this.vehicles.get(id)?.popup?.node;
+    (node?.querySelector(`[data-focus="${name}"]`) ?? node)?.focus({ preventScroll: true });
   }
 
   updateRows() {
@@ -85,12 +101,23 @@ export class VehicleLayer {
   add(id) {
     const marker = L.marker([0, 0], { icon: new VehicleIcon(), zIndexOffset: 2000, keyboard: false });
     marker.bindTooltip(() => element('span', {}, id), { direction: 'top', offset: [0, -14] });
+    marker.bindPopup(() => {
+      vehicle.popup = new VehiclePopup(vehicle, this.extras(vehicle));
+      return vehicle.popup.node;
+    }, { minWidth: 240, maxWidth: 280, className: 'vehicle-window', offset: [0, -8] });
+    // Once it is in view the map does not run after it, unless it is followed.
+    marker.on('popupopen', () => { marker.getPopup().options.autoPan = false; });
+    marker.on('popupclose', () => {
+      marker.getPopup().options.autoPan = true;
+      vehicle.popup = null;
+    });
     const facts = element('span', { class: 'row-facts' });
     const button = element('button', { type: 'button', class: 'row', 'aria-pressed': 'false',
       title: 'Follow this vehicle on the map' },
     element('span', { class: 'vehicle-dot', 'aria-hidden': 'true' }),
     element('span', { class: 'row-label' }, id), facts);
-    const vehicle = { id, marker, dots: [], road: null, facts, button, heard: NaN, speed: null };
+    const vehicle = { id, marker, dots: [], road: null, facts, button, heard: NaN, speed: null,
+      drive: '', popup: null };
     button.addEventListener('click', () => this.follow(id));
     marker.addTo(this.map);
     this.vehicles.set(id, vehicle);
@@ -100,8 +127,10 @@ export class VehicleLayer {
   }
 
   updateRow(vehicle) {
-    const speed = Number.isFinite(vehicle.speed) ? `${Math.round(vehicle.speed * 3.6)} km/h \u00b7 ` : '';
-    vehicle.facts.textContent = speed + ago(vehicle.heard);
+    const speed = speedText(vehicle);
+    vehicle.facts.textContent = `${speed}${speed && ' \u00b7 '}${ago(vehicle.heard)}`;
+    vehicle.marker.getElement()?.classList.toggle('silent', !isFresh(vehicle));
+    vehicle.popup?.update(vehicle);
   }
 
   turn(vehicle, course) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -110,12 +111,20 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
       if (connected) {
         NODELET_INFO("connected to broker %s:%d as '%s'", config_.mqtt.host.c_str(),
                      config_.mqtt.port, config_.user.c_str());
-      } else if (say_loss_.Due()) {
-        NODELET_WARN("%s; trying again", reason.c_str());
+      } else {
+        SayLoss(reason);
       }
     };
     client_ =
         std::make_unique<MqttClient>(config_.mqtt, std::move(subscriptions), std::move(callbacks));
+  }
+
+  /// Each reason once a minute: a connection may end without one, and the next attempt have it.
+  void SayLoss(const std::string& reason) {
+    constexpr std::size_t kMostReasons = 10;
+    if (say_losses_again_.Due()) said_losses_.clear();
+    if (said_losses_.size() >= kMostReasons || !said_losses_.insert(reason).second) return;
+    NODELET_WARN("%s; trying again", reason.c_str());
   }
 
   void SubscribeOutgoing() {
@@ -241,7 +250,8 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   BridgeConfig config_;
   std::vector<std::unique_ptr<Topic>> topics_;  ///< The index is the tag of a publication.
   std::atomic<std::uint64_t> unexpected_{0};    ///< Received on a topic that is not in the list.
-  OnceAMinute say_loss_;
+  OnceAMinute say_losses_again_;
+  std::set<std::string> said_losses_;  ///< In this minute; the client's thread's.
   std::unique_ptr<MqttClient> client_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;

@@ -60,7 +60,6 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (config_.web) {
     web_ = std::make_unique<WebServer>(config_.web_options, zone_, config_.zone.catalogue);
-    ROS_INFO("live map at http://%s:%d/", config_.web_options.address.c_str(), web_->port());
     private_node.setParam("/livemap/web_port", web_->port());
   }
   subscription_ = zone_.Subscribe([this](const ZoneEvent& event) { OnEvent(event); });
@@ -76,8 +75,7 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       node.subscribe("vehicle/position", 2000, &ZoneNode::OnPosition, this),
       node.subscribe("hazard/poll_answer", 1000, &ZoneNode::OnAnswer, this),
   };
-  ROS_INFO("zone in '%s': %zu hazards on the map", config_.zone.directory.c_str(),
-           zone_.Statistics().active_hazards);
+  SayReady();
   const StoreDamage damage = zone_.Statistics().store_damage;
   if (damage.rows > 0) {
     ROS_ERROR(
@@ -85,6 +83,19 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
         "there and do not count. The first: %s",
         config_.zone.directory.c_str(), damage.rows, damage.first.c_str());
   }
+}
+
+/// One line for whoever waits for it in a terminal or a log file.
+void ZoneNode::SayReady() const {
+  std::string map = "no live map (web is false)";
+  if (web_) {
+    const bool everywhere = config_.web_options.address == "0.0.0.0";
+    const std::string host = everywhere ? "127.0.0.1" : config_.web_options.address;
+    map = "live map at http://" + host + ":" + std::to_string(web_->port()) + "/" +
+          (everywhere ? " and this machine's other addresses" : "");
+  }
+  ROS_INFO("zone ready in '%s' with %zu hazards: %s", config_.zone.directory.c_str(),
+           zone_.Statistics().active_hazards, map.c_str());
 }
 
 ZoneNode::~ZoneNode() {

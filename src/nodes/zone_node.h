@@ -53,6 +53,7 @@ class ZoneNode {
 
   /// Makes `datum` the origin of the map frame; mutex_ is held or no other thread runs yet.
   void SetMap(const GeoPoint& datum);
+  void SayReady() const;
   void WorkUntilClosed();
   void CommitBatch(const std::vector<Report>& reports);
   void NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence);

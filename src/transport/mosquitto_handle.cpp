@@ -110,7 +110,20 @@ int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::s
 
 std::string DescribeMosquittoError(int code) {
   if (code == MOSQ_ERR_ERRNO) return std::generic_category().message(errno);
-  return mosquitto_strerror(code);
+  std::string words = mosquitto_strerror(code);
+  if (!words.empty() && words.back() == '.') words.pop_back();
+  return words;
+}
+
+std::string UnreadableTlsFile(const MqttTlsOptions& tls) {
+  for (const auto& [name, path] : {std::pair{"ca_file", tls.ca_file},
+                                   {"certificate_file", tls.certificate_file},
+                                   {"key_file", tls.key_file}}) {
+    if (access(path.c_str(), R_OK) == 0) continue;
+    return "cannot read " + path + ", the bridge's " + name + ": " +
+           std::generic_category().message(errno);
+  }
+  return "";
 }
 
 std::string TlsErrorIn(const std::string& log_line) {

@@ -123,6 +123,9 @@ class MqttClient::Connection {
   void Attempt() {
     loss_reason_.clear();
     tls_error_.clear();
+    // They may have gone since the start, as a revoked vehicle's do on the zone's own machine.
+    if (options_.tls) loss_reason_ = UnreadableTlsFile(*options_.tls);
+    if (!loss_reason_.empty()) return;
     // The library's blocking connect cannot be interrupted and waits minutes for a silent host:
     // let it try only what has just answered.
     const TcpProbeResult probe =

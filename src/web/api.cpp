@@ -155,13 +155,14 @@ HttpAnswer Api::RouteApi(const RequestTarget& target) const {
 HttpAnswer Api::Hazards(const HazardQuery& query) const {
   // Read before the list: an event that comes between the two is in the list and told again.
   std::uint64_t sequence = zone_.Sequence();
-  const std::vector<Hazard> hazards = zone_.Query(query.box, query.since.value_or(0), query.limit);
+  // Since a sequence all that changed is looked at: what left the selection is told too.
+  const std::vector<Hazard> hazards = zone_.Query(query.box, query.since.value_or(0), query.limit,
+                                                  query.since ? HazardStates() : query.states);
   const bool truncated = hazards.size() == query.limit;
   Json features = Json::array();
   std::uint64_t newest = 0;
   for (const Hazard& hazard : hazards) {
     newest = std::max(newest, hazard.sequence);
-    if (!query.since && !query.Selects(hazard.state)) continue;
     Json feature = HazardFeature(hazard, catalogue_);
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
     features.push_back(std::move(feature));

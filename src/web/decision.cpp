@@ -8,19 +8,25 @@
 namespace livemap {
 namespace {
 
-constexpr std::string_view kHazardAddress = "/api/v1/hazards/";
+struct DecisionAddress {
+  std::string_view begin;
+  std::string_view end;
+  Decision decision;
+};
+constexpr DecisionAddress kAddresses[] = {
+    {"/api/v1/hazards/", "/confirm", Decision::kConfirm},
+    {"/api/v1/hazards/", "/reject", Decision::kReject},
+    {"/api/v1/vehicles/", "/distrust", Decision::kDistrust},
+};
 
 }  // namespace
 
 std::optional<DecisionTarget> ParseDecisionTarget(std::string_view path) {
-  if (path.substr(0, kHazardAddress.size()) != kHazardAddress) return std::nullopt;
-  path.remove_prefix(kHazardAddress.size());
-  for (const auto& [ending, decision] :
-       {std::pair<std::string_view, Decision>{"/confirm", Decision::kConfirm},
-        {"/reject", Decision::kReject}}) {
-    if (path.size() < ending.size()) continue;
-    if (path.substr(path.size() - ending.size()) != ending) continue;
-    return DecisionTarget{decision, std::string(path.substr(0, path.size() - ending.size()))};
+  for (const auto& [begin, end, decision] : kAddresses) {
+    if (path.size() < begin.size() + end.size() || path.substr(0, begin.size()) != begin) continue;
+    if (path.substr(path.size() - end.size()) != end) continue;
+    const std::size_t id_bytes = path.size() - begin.size() - end.size();
+    return DecisionTarget{decision, std::string(path.substr(begin.size(), id_bytes))};
   }
   return std::nullopt;
 }

@@ -8,14 +8,14 @@
 
 namespace livemap {
 
-/// What an official may do with a hazard.
-enum class Decision { kConfirm, kReject };
+/// What an official may do with a hazard, or with a vehicle (kDistrust).
+enum class Decision { kConfirm, kReject, kDistrust };
 
-/// The address of a decision, "/api/v1/hazards/UUID/reject" or ".../confirm"; none for any other.
-/// The id is not yet read.
+/// The address of a decision: "/api/v1/hazards/UUID/reject" or ".../confirm",
+/// "/api/v1/vehicles/NAME/distrust"; none for any other. The id is not yet read.
 struct DecisionTarget {
   Decision decision = Decision::kConfirm;
-  std::string id;
+  std::string id;  ///< Of the hazard, or the vehicle's name.
 };
 std::optional<DecisionTarget> ParseDecisionTarget(std::string_view path);
 
@@ -23,8 +23,8 @@ std::optional<DecisionTarget> ParseDecisionTarget(std::string_view path);
 constexpr std::size_t kMaxDecisionReasonBytes = 120;
 
 /// The reason in a decision's body: JSON `{"reason": TEXT}`, printable UTF-8 of at most
-/// kMaxDecisionReasonBytes. A rejection needs it; a confirmation may have an empty body or an empty
-/// object. Throws BadRequest saying what is accepted.
+/// kMaxDecisionReasonBytes. A confirmation may have an empty body or an empty object, the others
+/// need a reason. Throws BadRequest saying what is accepted.
 std::string ParseDecisionBody(Decision decision, const std::string& body);
 
 }  // namespace livemap

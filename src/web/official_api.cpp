@@ -32,7 +32,7 @@ OfficialApi::OfficialApi(const WebOptions& options, ZoneService& zone,
 std::optional<HttpAnswer> OfficialApi::WhyNotAllowed(const HttpQuestion& question,
                                                      std::string& official) {
   if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
-    return MakeErrorAnswer(403, "pages of another origin may not decide about hazards");
+    return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
   OfficialGate::Answer answer =
       gate_.Check(question.authorization, question.client, SteadySeconds());
@@ -43,7 +43,7 @@ std::optional<HttpAnswer> OfficialApi::WhyNotAllowed(const HttpQuestion& questio
       return std::nullopt;
     case OfficialGate::Verdict::kClosed:
       return MakeErrorAnswer(
-          403, "nobody may decide about hazards here: the server was started without a token file");
+          403, "nobody may decide anything here: the server was started without a token file");
     case OfficialGate::Verdict::kNoToken:
       refusal = MakeErrorAnswer(401, "a token is needed: Authorization: Bearer TOKEN");
       break;
@@ -67,13 +67,27 @@ HttpAnswer OfficialApi::Decide(const DecisionTarget& target, const HttpQuestion&
     return MakeErrorAnswer(415, "the body's type is not accepted, accepted is application/json");
   }
   const std::string reason = ParseDecisionBody(target.decision, question.body);
+  if (target.decision == Decision::kDistrust) return Distrust(target.id, official, reason);
+  return DecideHazard(target, official, reason);
+}
+
+HttpAnswer OfficialApi::DecideHazard(const DecisionTarget& target, const std::string& official,
+                                     const std::string& reason) {
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   if (!zone_.Find(*uuid)) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
-  const bool decided = target.decision == Decision::kReject ? zone_.Reject(*uuid, official, reason)
-                                                            : zone_.Confirm(*uuid, official);
+  const bool decided = target.decision == Decision::kReject
+                           ? zone_.Reject(*uuid, official, reason)
+                           : zone_.Confirm(*uuid, official, reason);
   if (!decided) return MakeErrorAnswer(409, "the hazard is no longer on the map");
   return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), "application/geo+json");
+}
+
+HttpAnswer OfficialApi::Distrust(const std::string& vehicle, const std::string& official,
+                                 const std::string& reason) {
+  const auto withdrawn = zone_.Distrust(vehicle, official, reason);
+  if (!withdrawn) return MakeErrorAnswer(404, "the zone has never heard of a vehicle of this name");
+  return JsonAnswer({{"vehicle", vehicle}, {"hazards", *withdrawn}});
 }
 
 }  // namespace livemap

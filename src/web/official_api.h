@@ -11,7 +11,8 @@
 
 namespace livemap {
 
-/// Officials' decisions about hazards. Thread-safe; store failures come out as exceptions.
+/// Officials' decisions about hazards and vehicles. Thread-safe; store failures come out as
+/// exceptions.
 class OfficialApi {
  public:
   /// Keeps references. Reads the token file of the options; throws Error when it is not accepted.
@@ -23,6 +24,10 @@ class OfficialApi {
   HttpAnswer Decide(const DecisionTarget& target, const HttpQuestion& question);
 
  private:
+  HttpAnswer DecideHazard(const DecisionTarget& target, const std::string& official,
+                          const std::string& reason);
+  HttpAnswer Distrust(const std::string& vehicle, const std::string& official,
+                      const std::string& reason);
   std::optional<HttpAnswer> WhyNotAllowed(const HttpQuestion& question, std::string& official);
 
   const WebOptions& options_;

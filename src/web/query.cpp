@@ -116,16 +116,16 @@ std::size_t ParseLimit(const std::string& text, std::size_t most) {
   return *number;
 }
 
-std::set<HazardState> ParseStates(const std::string& text) {
-  std::set<HazardState> states;
+HazardStates ParseStates(const std::string& text) {
+  HazardStates states;
   Split(text, ',', [&](std::string_view piece) {
-    for (const auto state :
-         {HazardState::kCandidate, HazardState::kActive, HazardState::kVerifying}) {
+    for (const auto state : {HazardState::kCandidate, HazardState::kActive, HazardState::kVerifying,
+                             HazardState::kGone, HazardState::kRejected}) {
       if (piece == StateName(state) && states.insert(state).second) return;
     }
     throw BadRequest("state is " + Quoted(text) +
-                     ", accepted are candidate, active and verifying, each once, with commas "
-                     "between");
+                     ", accepted are candidate, active, verifying, gone and rejected, each once, "
+                     "with commas between");
   });
   return states;
 }

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,7 +34,7 @@ struct HazardQuery {
   std::optional<GeoBox> box;           ///< May cross the antimeridian (west > east).
   std::optional<std::uint64_t> since;  ///< Only what changed after this sequence.
   std::size_t limit = 20000;
-  std::set<HazardState> states;  ///< Only these; empty: all that are on the map.
+  HazardStates states;  ///< Only these; empty: all that are on the map.
 
   bool Selects(HazardState state) const {
     return states.empty() ? IsOnMap(state) : states.count(state) != 0;
@@ -46,7 +45,7 @@ struct HazardQuery {
 constexpr std::size_t kMaxHazardsPerAnswer = 50000;
 
 /// Reads `bbox=minLon,minLat,maxLon,maxLat` (degrees, RFC 7946 section 5), `since`, `limit` and
-/// `state`, one or more of candidate, active and verifying with commas between.
+/// `state`, one or more of candidate, active, verifying, gone and rejected with commas between.
 /// Throws BadRequest naming the parameter, its value and what is accepted; unknown and repeated
 /// parameters are refused, so that a misspelt filter never answers with everything.
 HazardQuery ParseHazardQuery(const RequestTarget& target);

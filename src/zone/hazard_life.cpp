@@ -6,14 +6,10 @@
 #include <utility>
 
 #include "base/stamps.h"
+#include "zone/hazard_life_steps.h"
 
 namespace livemap {
 namespace {
-
-constexpr std::size_t kMaxTransitionBytes = 200;
-
-double Probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
-double LogOdds(double probability) { return std::log(probability / (1 - probability)); }
 
 bool SpeaksAgainst(EvidenceKind kind) {
   return kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
@@ -43,15 +39,6 @@ std::string DurationText(double seconds) {
   return text;
 }
 
-/// Cut where a character begins.
-std::string AsReason(std::string text) {
-  if (text.size() <= kMaxTransitionBytes) return text;
-  std::size_t size = kMaxTransitionBytes;
-  while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0U) == 0x80U) --size;
-  text.resize(size);
-  return text;
-}
-
 double AgeS(const LifeRecord& life, std::int64_t at_ns) {
   return Seconds(std::max<std::int64_t>(0, at_ns - life.first_seen_ns));
 }
@@ -76,21 +63,6 @@ Voice* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s, LifeReco
   if (place->vehicle != 0 && suspect && place->at_s >= at_s) return nullptr;
   *place = Voice{vehicle, 0, 0, false, suspect};
   return place;
-}
-
-LifeTransition Transition(const LifeRecord& life, HazardState to, std::string reason) {
-  return {life.state, to, AsReason(std::move(reason))};
-}
-
-void Enter(HazardState state, std::int64_t now_ns, LifeRecord& life) {
-  life.state = state;
-  life.since_ns = now_ns;
-}
-
-void NoteYes(std::int64_t stamp_ns, LifeRecord& life) {
-  life.first_seen_ns = life.first_seen_ns == 0 ? stamp_ns : std::min(life.first_seen_ns, stamp_ns);
-  life.last_yes_ns = std::max(life.last_yes_ns, stamp_ns);
-  if (life.first_no_ns <= life.last_yes_ns) life.first_no_ns = 0;
 }
 
 void NoteNo(std::int64_t stamp_ns, LifeRecord& life) {
@@ -320,47 +292,6 @@ std::optional<LifeTransition> HazardLife::DecideRejected(const LifeRecord& life)
   if (Seconds(life.at_ns - heard_ns) < config_.rejected_keep_s) return std::nullopt;
   return Transition(life, HazardState::kGone,
                     "rejected, and not seen for " + DurationText(Seconds(life.at_ns - heard_ns)));
-}
-
-LifeStep HazardLife::Confirm(const LifeClass& entry, const std::string& official,
-                             std::int64_t now_ns, LifeRecord& life) const {
-  LifeStep step;
-  if (life.state == HazardState::kGone) return step;
-  const bool told = IsTold(life.state);
-  MoveTo(entry, now_ns, life);
-  const std::int64_t stood_until_ns = told ? life.last_yes_ns : life.first_seen_ns;
-  JudgeOfficially(entry, true, life, step);
-  for (Voice& voice : life.voices) {
-    if (voice.against) voice = Voice();
-  }
-  NoteYes(now_ns, life);
-  life.official = true;
-  life.log_odds = life.undenied_log_odds = max_log_odds_;
-  step.counted = true;
-  step.lesson.stood_s = Seconds(life.last_yes_ns - stood_until_ns);
-  if (life.state == HazardState::kActive) return step;
-  step.transition = Transition(life, HazardState::kActive, "confirmed by " + official);
-  Enter(HazardState::kActive, now_ns, life);
-  return step;
-}
-
-LifeStep HazardLife::Reject(const LifeClass& entry, const std::string& official,
-                            const std::string& reason, std::int64_t now_ns,
-                            LifeRecord& life) const {
-  LifeStep step;
-  if (!IsOnMap(life.state)) return step;
-  JudgeOfficially(entry, false, life, step);
-  step.transition = Transition(life, HazardState::kRejected,
-                               "rejected by " + official + (reason.empty() ? "" : ": " + reason));
-  Enter(HazardState::kRejected, now_ns, life);
-  // From here on it must be shown anew that there is something.
-  life.official = false;
-  life.voices = {};
-  life.judged = 0;
-  life.first_no_ns = 0;
-  life.at_ns = std::max(life.at_ns, now_ns);
-  life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
-  return step;
 }
 
 double HazardLife::Presence(const LifeClass& entry, const LifeRecord& life,

@@ -40,6 +40,10 @@ struct LifeClass {
 };
 LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival);
 
+/// "`done` by `official`: `reason`", without the colon where there is no reason; at most 200 bytes.
+std::string DecisionText(const std::string& done, const std::string& official,
+                         const std::string& reason);
+
 /// A step from one state to another.
 struct LifeTransition {
   std::optional<HazardState> from;  ///< None: the hazard is new.
@@ -117,12 +121,19 @@ class HazardLife {
                  LifeRecord& life) const;
   /// Time passes. Cheap; nothing happens before NextChangeNs.
   LifeStep Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
-  /// An official says that it is there (also revokes a rejection), or that it is not and never was.
-  /// No transition when the state stays; nothing happens to a hazard that is gone.
-  LifeStep Confirm(const LifeClass& entry, const std::string& official, std::int64_t now_ns,
-                   LifeRecord& life) const;
+  /// An official says that it is there (also revokes a rejection), or that it is not and never was;
+  /// `reason` may be empty. Nothing happens to a hazard that is gone; Reject leaves one that is off
+  /// the map alone, Confirm has a transition from active to active too.
+  LifeStep Confirm(const LifeClass& entry, const std::string& official, const std::string& reason,
+                   std::int64_t now_ns, LifeRecord& life) const;
   LifeStep Reject(const LifeClass& entry, const std::string& official, const std::string& reason,
                   std::int64_t now_ns, LifeRecord& life) const;
+  /// All that the vehicle said is taken back: the odds are as if it had said nothing, and a hazard
+  /// that no other vehicle saw is gone, one that too few others saw a candidate again. What an
+  /// official confirmed stays. The transition, with `why` as its reason, may lead to the same
+  /// state; none where the vehicle has no voice, or the hazard is gone.
+  LifeStep Withdraw(const LifeClass& entry, std::uint64_t vehicle, const std::string& why,
+                    std::int64_t now_ns, LifeRecord& life) const;
 
   /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
   double Presence(const LifeClass& entry, const LifeRecord& life, std::int64_t now_ns) const;
@@ -144,6 +155,11 @@ class HazardLife {
   bool IsDeniedAway(const LifeRecord& life) const;
   std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;
   std::optional<LifeTransition> DecideRejected(const LifeRecord& life) const;
+
+  // Officials: hazard_officials.cpp.
+  void TakeBack(const LifeClass& entry, const Voice& taken, LifeRecord& life) const;
+  void Demote(const LifeClass& entry, const Voice& taken, std::int64_t now_ns,
+              LifeRecord& life) const;
 
   // Verdicts: hazard_verdicts.cpp.
   double WrongYes(const LifeClass& entry) const;

@@ -186,17 +186,33 @@ std::vector<HazardRegistry::Change>::const_iterator HazardRegistry::ChangesSince
 }
 
 std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
-                                          std::uint64_t since_sequence, std::size_t limit) const {
+                                          std::uint64_t since_sequence, std::size_t limit,
+                                          const HazardStates& states) const {
   std::vector<Hazard> result;
   auto change = ChangesSince(since_sequence);
   for (; change != changes_.end() && result.size() < limit; ++change) {
     const HazardRecord& record = records_[change->slot];
     if (record.sequence != change->sequence) continue;
-    if (!IsOnMap(record.life.state) && since_sequence == 0) continue;
+    const HazardState state = record.life.state;
+    const bool wanted =
+        states.empty() ? IsOnMap(state) || since_sequence > 0 : states.count(state) != 0;
+    if (!wanted) continue;
     if (box && !box->Contains(record.estimate.position)) continue;
     result.push_back(Get(change->slot));
   }
   return result;
+}
+
+std::vector<HazardRegistry::Slot> HazardRegistry::SpokenOfBy(std::uint64_t vehicle) const {
+  std::vector<Slot> slots;
+  for (Slot slot = 0; slot < records_.size(); ++slot) {
+    const LifeRecord& life = records_[slot].life;
+    if (life.state == HazardState::kGone) continue;
+    const bool spoke = std::any_of(life.voices.begin(), life.voices.end(),
+                                   [&](const Voice& voice) { return voice.vehicle == vehicle; });
+    if (spoke) slots.push_back(slot);
+  }
+  return slots;
 }
 
 std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double radius_m,

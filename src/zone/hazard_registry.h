@@ -77,7 +77,9 @@ class HazardRegistry {
 
   /// As ZoneService::Query.
   std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
-                            std::size_t limit) const;
+                            std::size_t limit, const HazardStates& states = {}) const;
+  /// Those that are not gone and of which the vehicle (VehicleKey) has said something.
+  std::vector<Slot> SpokenOfBy(std::uint64_t vehicle) const;
   /// As ZoneService::QueryNear.
   std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <set>
 
 namespace livemap {
 
@@ -15,6 +16,7 @@ enum class HazardState : std::uint8_t {
 };
 
 constexpr std::size_t kHazardStates = 5;
+using HazardStates = std::set<HazardState>;
 
 /// Officials see it on the map.
 constexpr bool IsOnMap(HazardState state) {

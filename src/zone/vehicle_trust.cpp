@@ -61,6 +61,13 @@ void VehicleTrust::Judge(const Verdict& verdict, std::int64_t now_ns) {
   record.suspicion = std::clamp(record.suspicion + verdict.log_ratio, 0.0, config_.most_suspicion);
 }
 
+void VehicleTrust::Distrust(std::uint64_t vehicle, std::int64_t now_ns) {
+  if (vehicle == 0) return;
+  TrustRecord& record = Find(vehicle, now_ns);
+  record.suspicion = config_.most_suspicion;
+  record.at_ns = std::max(record.at_ns, now_ns);
+}
+
 TrustRecord VehicleTrust::Get(std::uint64_t vehicle) const {
   const auto found = records_.find(vehicle);
   return found == records_.end() ? TrustRecord{} : found->second;

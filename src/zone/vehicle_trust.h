@@ -57,6 +57,9 @@ class VehicleTrust {
   /// Takes a verdict in; one whose ratio is not finite counts nothing.
   void Judge(const Verdict& verdict, std::int64_t now_ns);
 
+  /// Holds as much against the vehicle as is held against anybody; it fades like any suspicion.
+  void Distrust(std::uint64_t vehicle, std::int64_t now_ns);
+
   /// What is held against the vehicle; a fresh record when nothing is.
   TrustRecord Get(std::uint64_t vehicle) const;
   /// Takes in what the store kept. False, and nothing is taken in, when it is no such record.

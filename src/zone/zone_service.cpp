@@ -209,9 +209,10 @@ std::vector<Receipt> ZoneService::HandleBatch(const std::vector<Report>& reports
 }
 
 std::vector<Hazard> ZoneService::Query(const std::optional<GeoBox>& box,
-                                       std::uint64_t since_sequence, std::size_t limit) const {
+                                       std::uint64_t since_sequence, std::size_t limit,
+                                       const HazardStates& states) const {
   const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->registry_.Query(box, since_sequence, limit);
+  return implementation_->registry_.Query(box, since_sequence, limit, states);
 }
 
 std::vector<Hazard> ZoneService::QueryNear(const GeoPoint& centre, double radius_m,
@@ -242,8 +243,15 @@ bool ZoneService::Reject(const Uuid& hazard, const std::string& official,
   return implementation_->Reject(hazard, official, reason);
 }
 
-bool ZoneService::Confirm(const Uuid& hazard, const std::string& official) {
-  return implementation_->Confirm(hazard, official);
+bool ZoneService::Confirm(const Uuid& hazard, const std::string& official,
+                          const std::string& reason) {
+  return implementation_->Confirm(hazard, official, reason);
+}
+
+std::optional<std::size_t> ZoneService::Distrust(const std::string& vehicle_id,
+                                                 const std::string& official,
+                                                 const std::string& reason) {
+  return implementation_->Distrust(vehicle_id, official, reason);
 }
 
 bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {

@@ -144,9 +144,9 @@ class ZoneService {
 
   /// Hazards whose last event is newer than `since_sequence`, in the order of that sequence, at
   /// most `limit`. Those on the officials' map; gone and rejected ones too when `since_sequence`
-  /// > 0, so that a view catches up after a gap.
+  /// > 0, so that a view catches up after a gap. With `states` exactly those in one of them.
   std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
-                            std::size_t limit) const;
+                            std::size_t limit, const HazardStates& states = {}) const;
   /// Hazards that drivers are told of within `radius_m` of `centre`, nearest first, at most
   /// `limit`.
   std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
@@ -167,7 +167,15 @@ class ZoneService {
   /// hazard of that uuid is on the map (Confirm: or it is rejected, which it revokes). Throw Error
   /// for an unacceptable name, StoreError when the store fails.
   bool Reject(const Uuid& hazard, const std::string& official, const std::string& reason);
-  bool Confirm(const Uuid& hazard, const std::string& official);
+  bool Confirm(const Uuid& hazard, const std::string& official, const std::string& reason = "");
+  /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
+  /// suspicion does, and all that it said is taken back from the hazards that are not gone
+  /// (HazardLife::Withdraw), each with an event whose reason names vehicle and official as far as
+  /// 200 bytes go. Returns how many hazards that were; none when the zone has never heard of the
+  /// vehicle. A few thousand hazards are committed at a time: when it throws StoreError those
+  /// before stay changed, and another call does the rest. Throws Error as Reject does.
+  std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
+                                      const std::string& reason);
   /// Takes a hazard off the map for good. False when none of that uuid is on the map.
   bool Remove(const Uuid& hazard, const std::string& reason);
 

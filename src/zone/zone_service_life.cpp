@@ -18,11 +18,20 @@ std::string Shortened(std::string text) {
   return text;
 }
 
-void CheckOfficial(const std::string& official, std::size_t max_bytes) {
-  if (IsPrintableText(official, max_bytes)) return;
-  throw Error("the official's name of " + std::to_string(official.size()) +
-              " bytes is not accepted: it must be printable UTF-8 of 1 to " +
-              std::to_string(max_bytes) + " bytes");
+/// The reason, cut to an event's length. Throws Error when it or the official's name is no
+/// acceptable text; an empty reason is.
+std::string CheckedReason(const std::string& official, const std::string& reason,
+                          std::size_t max_name_bytes) {
+  if (!IsPrintableText(official, max_name_bytes)) {
+    throw Error("the official's name of " + std::to_string(official.size()) +
+                " bytes is not accepted: it must be printable UTF-8 of 1 to " +
+                std::to_string(max_name_bytes) + " bytes");
+  }
+  std::string why = Shortened(reason);
+  if (!why.empty() && !IsPrintableText(why, kMaxReasonBytes)) {
+    throw Error("the reason is not accepted: it must be printable UTF-8");
+  }
+  return why;
 }
 
 }  // namespace
@@ -116,27 +125,17 @@ void ZoneService::Implementation::NoteEvent(Slot slot, const std::optional<Befor
 
 bool ZoneService::Implementation::Reject(const Uuid& uuid, const std::string& official,
                                          const std::string& reason) {
-  CheckOfficial(official, config_.limits.max_text_bytes);
-  const std::string why = Shortened(reason);
-  if (!why.empty() && !IsPrintableText(why, kMaxReasonBytes)) {
-    throw Error("the reason is not accepted: it must be printable UTF-8");
-  }
-  return Decide(uuid, [&](Slot slot, LifeRecord& life) -> LifeStep {
-    if (!IsOnMap(life.state)) return {};
+  const std::string why = CheckedReason(official, reason, config_.limits.max_text_bytes);
+  return Decide(uuid, [&](Slot slot, LifeRecord& life) {
     return life_.Reject(ClassOf(slot), official, why, now_ns_(), life);
   });
 }
 
-bool ZoneService::Implementation::Confirm(const Uuid& uuid, const std::string& official) {
-  CheckOfficial(official, config_.limits.max_text_bytes);
-  return Decide(uuid, [&](Slot slot, LifeRecord& life) -> LifeStep {
-    if (life.state == HazardState::kGone) return {};
-    LifeStep step = life_.Confirm(ClassOf(slot), official, now_ns_(), life);
-    // Confirmed again it stays what it is; that somebody looked is an event all the same.
-    if (!step.transition) {
-      step.transition = LifeTransition{life.state, life.state, "confirmed by " + official};
-    }
-    return step;
+bool ZoneService::Implementation::Confirm(const Uuid& uuid, const std::string& official,
+                                          const std::string& reason) {
+  const std::string why = CheckedReason(official, reason, config_.limits.max_text_bytes);
+  return Decide(uuid, [&](Slot slot, LifeRecord& life) {
+    return life_.Confirm(ClassOf(slot), official, why, now_ns_(), life);
   });
 }
 
@@ -168,6 +167,51 @@ bool ZoneService::Implementation::Decide(const Uuid& uuid, const Decision& decis
   }
   Settle(change);
   return true;
+}
+
+bool ZoneService::Implementation::HasHeardOf(const std::string& vehicle_id) {
+  return !vehicles_.Track(vehicle_id).empty() || tracks_.count(vehicle_id) != 0 ||
+         store_.FindLastReport(vehicle_id).has_value();
+}
+
+std::optional<std::size_t> ZoneService::Implementation::Distrust(const std::string& vehicle_id,
+                                                                 const std::string& official,
+                                                                 const std::string& reason) {
+  // Reports wait while a portion is committed.
+  constexpr std::size_t kMostAtOnce = 2000;
+  const std::size_t max_bytes = config_.limits.max_text_bytes;
+  const std::string given = CheckedReason(official, reason, max_bytes);
+  if (!IsPrintableText(vehicle_id, max_bytes)) return std::nullopt;
+  const std::string why = DecisionText("words of " + vehicle_id + " withdrawn", official, given);
+  const std::uint64_t vehicle = VehicleKey(vehicle_id);
+  std::size_t withdrawn = 0;
+  for (bool first = true;; first = false) {
+    const std::lock_guard<std::mutex> writer(writer_mutex_);
+    std::vector<Slot> slots = registry_.SpokenOfBy(vehicle);
+    if (first && slots.empty() && !HasHeardOf(vehicle_id)) return std::nullopt;
+    const bool last = slots.size() <= kMostAtOnce;
+    slots.resize(std::min(slots.size(), kMostAtOnce));
+    Change change = NewChange();
+    {
+      const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+      InTransaction(change, [&] {
+        change.trust_before.emplace(vehicle, trust_.Get(vehicle));
+        trust_.Distrust(vehicle, change.now_ns);
+        for (const Slot slot : slots) Withdraw(slot, vehicle, why, change);
+      });
+    }
+    Settle(change);
+    withdrawn += slots.size();
+    if (last) return withdrawn;
+  }
+}
+
+/// All that the vehicle said of the hazard.
+void ZoneService::Implementation::Withdraw(Slot slot, std::uint64_t vehicle, const std::string& why,
+                                           Change& change) {
+  LifeRecord life = registry_.Record(slot).life;
+  const LifeStep step = life_.Withdraw(ClassOf(slot), vehicle, why, change.now_ns, life);
+  if (step.transition) Step(slot, life, step, why, BeforeOf(slot), change);
 }
 
 void ZoneService::Implementation::Advance() {

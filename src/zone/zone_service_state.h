@@ -33,7 +33,9 @@ class ZoneService::Implementation {
 
   std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
   bool Reject(const Uuid& uuid, const std::string& official, const std::string& reason);
-  bool Confirm(const Uuid& uuid, const std::string& official);
+  bool Confirm(const Uuid& uuid, const std::string& official, const std::string& reason);
+  std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
+                                      const std::string& reason);
   bool Remove(const Uuid& uuid, const std::string& reason);
   std::vector<PollOrder> TakeDuePolls();
   bool HandleAnswer(const PollAnswer& answer);
@@ -165,6 +167,9 @@ class ZoneService::Implementation {
   /// What a vehicle says of a hazard, with how far it is believed.
   Evidence EvidenceOf(EvidenceKind kind, const std::string& vehicle_id, std::int64_t stamp_ns,
                       std::int64_t now_ns) const;
+  void Withdraw(Slot slot, std::uint64_t vehicle, const std::string& why, Change& change);
+  /// Whether anything at all came from the vehicle.
+  bool HasHeardOf(const std::string& vehicle_id);
   /// A decision about one hazard, in a transaction of its own: false when it leads to no
   /// transition.
   template <typename Decision>

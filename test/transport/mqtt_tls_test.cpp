@@ -52,6 +52,9 @@ class MqttTlsTest : public ::testing::Test {
         << "use_identity_as_username true\ntls_version tlsv1.3\ncafile " << File("ca.pem")
         << "\ncertfile " << File("broker.pem") << "\nkeyfile " << File("broker.key")
         << (IsRoot() ? "\nuser root\n" : "\n");
+    StartBroker();
+  }
+  void StartBroker() {
     broker_.Start({"mosquitto", "-c", File("mosquitto.conf")}, port_, File("broker.log"));
   }
 
@@ -120,6 +123,21 @@ TEST_F(MqttTlsTest, NamesTheFileThatCannotBeRead) {
       }
     }
   }
+}
+
+TEST_F(MqttTlsTest, NamesAFileThatWentAwayAfterTheStartAndGoesOnWhenItIsBack) {
+  const MqttOptions options = Options("car-1", "ca.pem");
+  const MqttClient car(options, {}, {});
+  ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+  const std::string& key = options.tls->key_file;
+  std::filesystem::rename(key, key + ".away");
+  broker_.Kill();
+  StartBroker();
+  EXPECT_TRUE(Eventually([&] {
+    return Says(car, "cannot read " + key + ", the bridge's key_file: No such file");
+  })) << car.statistics().last_error;
+  std::filesystem::rename(key + ".away", key);
+  EXPECT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
 }
 
 TEST_F(MqttTlsTest, DoesNotConnectWithTheKeyOfAnotherCertificate) {

@@ -120,6 +120,29 @@ TEST_F(ApiTest, StateSelectsAndTellsWhatLeavesTheSelection) {
   EXPECT_NE(joined[0]["properties"]["action"], "removed");
 }
 
+TEST_F(ApiTest, WhatIsOffTheMapIsListedWhereItsStateIsAskedFor) {
+  fixture_.AddRow("pothole", kPittsburgh, 3);
+  const nlohmann::json all = Hazards();
+  const std::string rejected = all["features"][0]["id"];
+  const std::string gone = all["features"][1]["id"];
+  ASSERT_TRUE(fixture_.zone->Reject(*Uuid::Parse(rejected), "miller", "a shadow"));
+  ASSERT_TRUE(fixture_.zone->Remove(*Uuid::Parse(gone), "test"));
+  EXPECT_EQ(Hazards()["features"].size(), 1U);
+  const nlohmann::json listed = Hazards("state=rejected");
+  ASSERT_EQ(listed["features"].size(), 1U);
+  EXPECT_EQ(listed["features"][0]["id"], rejected);
+  EXPECT_EQ(listed["features"][0]["properties"]["state"], "rejected");
+  EXPECT_EQ(Hazards("state=gone")["features"][0]["id"], gone);
+  EXPECT_EQ(Hazards("state=gone,rejected&limit=1")["truncated"], true);
+  EXPECT_EQ(Hazards("state=candidate,active,verifying,gone,rejected")["features"].size(), 3U);
+
+  const std::string since = listed["sequence"].dump();
+  ASSERT_TRUE(fixture_.zone->Confirm(*Uuid::Parse(rejected), "miller"));
+  const auto left = Hazards("state=rejected&since=" + since)["features"];
+  ASSERT_EQ(left.size(), 1U);
+  EXPECT_EQ(left[0]["properties"]["action"], "removed");
+}
+
 TEST_F(ApiTest, LimitCutsAndTheSequenceLeadsToTheRest) {
   fixture_.AddRow("pothole", kPittsburgh, 25);
   nlohmann::json page = Hazards("limit=10");
@@ -136,7 +159,7 @@ TEST_F(ApiTest, LimitCutsAndTheSequenceLeadsToTheRest) {
 
 TEST_F(ApiTest, TellsWhatIsWrongWithAParameter) {
   for (const char* parameters : {"bbox=1,2,3", "since=x", "limit=0", "colour=red",
-                                 "state=", "state=gone", "state=active,active"}) {
+                                 "state=", "state=lost", "state=active,active"}) {
     const HttpResult answer = Get(port(), std::string("/api/v1/hazards?") + parameters);
     EXPECT_EQ(answer.status, 400);
     EXPECT_THAT(answer.Json()["error"].get<std::string>(), testing::HasSubstr("accepted"));

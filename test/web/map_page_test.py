@@ -75,7 +75,7 @@ class Desktop(MapPage):
         self.click(".leaflet-popup-close-button")
         self.wait(lambda: self.count(".popup") == 0, "the popup does not close")
         self.zone.report("deer", LAT, LON)
-        self.wait(lambda: "3 sightings" in self.find("#hazard-list").text, "not counted again")
+        self.wait(lambda: "3 reports" in self.find("#hazard-list").text, "not counted again")
         self.open_popup_of(hazard)
         self.wait_for_text(".popup", "3 times")
         self.zone.do("remove", id=hazard)
@@ -179,6 +179,14 @@ class Desktop(MapPage):
         self.picture("drive")
         self.click("#vehicles button")
         self.assertEqual(self.find("#vehicles button").get_attribute("aria-pressed"), "true")
+        self.wait_for_text(".vehicle-popup", "car-1", "km/h", "Last heard")
+        self.assertEqual(self.count(".vehicle-popup .decide-reject"), 1)
+        off_centre = self.browser.execute_script(
+            "const of = (one) => document.querySelector(one).getBoundingClientRect();"
+            "const [map, car] = [of('#map'), of('.vehicle')];"
+            "return Math.hypot(map.x + map.width / 2 - car.x - car.width / 2,"
+            "  map.y + map.height / 2 - car.y - car.height / 2)")
+        self.assertLess(off_centre, 20, "the vehicle that is followed is not in the middle")
         self.picture("drive_follow")
         self.assert_quiet()
 

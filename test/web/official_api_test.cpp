@@ -37,6 +37,16 @@ class OfficialApiTest : public testing::Test {
     headers.emplace_back("Content-Type", "application/json");
     return Request(port(), "POST", "/api/v1/hazards/" + id + "/" + what, headers, body);
   }
+  HttpResult Distrust(const std::string& vehicle, const std::string& body,
+                      const std::string& token) {
+    Headers headers{{"Content-Type", "application/json"}};
+    if (!token.empty()) headers.emplace_back("Authorization", "Bearer " + token);
+    return Request(port(), "POST", "/api/v1/vehicles/" + vehicle + "/distrust", headers, body);
+  }
+  std::string LastReason(const std::string& id) {
+    const auto events = Get(port(), "/api/v1/hazards/" + id + "/events?limit=1").Json()["events"];
+    return events.empty() ? "" : events[0]["reason"].get<std::string>();
+  }
   std::string StateOf(const std::string& id) {
     return Get(port(), "/api/v1/hazards/" + id).Json()["properties"]["state"];
   }
@@ -73,6 +83,39 @@ TEST_F(OfficialApiTest, AConfirmationIsEnoughForDrivers) {
   EXPECT_EQ(Post(id, "confirm", "", tokens_.token()).status, 200);
   EXPECT_EQ(StateOf(id), "active");
   EXPECT_EQ(Post(id, "confirm", "{}", tokens_.token()).status, 200);
+}
+
+TEST_F(OfficialApiTest, AConfirmationsReasonIsKeptInTheHistory) {
+  const std::string id = Add("pothole");
+  EXPECT_EQ(Post(id, "confirm", R"({"reason": "I was there"})", tokens_.token()).status, 200);
+  EXPECT_EQ(LastReason(id), "confirmed by miller: I was there");
+  EXPECT_EQ(Post(id, "confirm", R"({"reason": "still there"})", tokens_.token()).status, 200);
+  EXPECT_EQ(LastReason(id), "confirmed by miller: still there");
+  EXPECT_EQ(Post(id, "confirm", "", tokens_.token()).status, 200);
+  EXPECT_EQ(LastReason(id), "confirmed by miller");
+}
+
+TEST_F(OfficialApiTest, ADistrustedVehiclesWordsAreWithdrawn) {
+  const std::string id = Add("pothole");
+  const HttpResult answer = Distrust("car-1", R"({"reason": "stolen"})", tokens_.token());
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  EXPECT_EQ(answer.Json(), (nlohmann::json{{"vehicle", "car-1"}, {"hazards", 1}}));
+  EXPECT_EQ(StateOf(id), "gone");
+  EXPECT_EQ(LastReason(id), "words of car-1 withdrawn by miller: stolen");
+  EXPECT_EQ(Distrust("car%2d1", kReason, tokens_.token()).Json()["hazards"], 0);
+}
+
+TEST_F(OfficialApiTest, OnlyOfficialsDistrustAndOnlyVehiclesThatThereAre) {
+  const std::string id = Add("pothole");
+  EXPECT_EQ(Distrust("car-1", kReason, "").status, 401);
+  EXPECT_EQ(Distrust("car-1", kReason, "x" + tokens_.token()).status, 401);
+  EXPECT_EQ(Distrust("car-1", "", tokens_.token()).status, 400) << "a reason is needed";
+  EXPECT_EQ(Distrust("car-77", kReason, tokens_.token()).status, 404);
+  EXPECT_EQ(Distrust("%0a", kReason, tokens_.token()).status, 404);
+  const HttpResult get = Get(port(), "/api/v1/vehicles/car-1/distrust");
+  EXPECT_EQ(get.status, 405);
+  EXPECT_EQ(get.Field("Allow"), "POST");
+  EXPECT_EQ(StateOf(id), "candidate");
 }
 
 TEST_F(OfficialApiTest, TheStreamTellsADecision) {

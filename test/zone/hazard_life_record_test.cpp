@@ -40,7 +40,7 @@ TEST_F(HazardLifeTest, AfterQuarantineTwoFurtherVehiclesReopenARejectedHazardAnd
 TEST_F(HazardLifeTest, AnOfficialRevokesARejectionAtOnce) {
   MakeActive();
   rules_.Reject(cone_, "Ada", "", kStart + kHour, life_);
-  rules_.Confirm(cone_, "Bob", kStart + 2 * kHour, life_);
+  rules_.Confirm(cone_, "Bob", "", kStart + 2 * kHour, life_);
   EXPECT_EQ(life_.state, HazardState::kActive);
 }
 
@@ -58,7 +58,7 @@ TEST_F(HazardLifeTest, NothingHappensToWhatIsGone) {
   ASSERT_EQ(life_.state, HazardState::kGone);
   const std::string before = PackLife(life_);
   See(2, kStart + 1001 * kDay);
-  rules_.Confirm(cone_, "Ada", kStart + 1001 * kDay, life_);
+  rules_.Confirm(cone_, "Ada", "", kStart + 1001 * kDay, life_);
   rules_.Reject(cone_, "Ada", "", kStart + 1001 * kDay, life_);
   rules_.Advance(cone_, kStart + 1002 * kDay, life_);
   EXPECT_EQ(PackLife(life_), before);

@@ -45,11 +45,15 @@ TEST_F(HazardLifeTest, OneVehicleSufficesWhereTheClassSaysSo) {
 
 TEST_F(HazardLifeTest, AnOfficialSuffices) {
   Begin(1);
-  const LifeStep step = rules_.Confirm(cone_, "Ada", kStart + kSecond, life_);
+  const LifeStep step = rules_.Confirm(cone_, "Ada", "", kStart + kSecond, life_);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kActive);
   EXPECT_EQ(step.transition->reason, "confirmed by Ada");
-  EXPECT_FALSE(rules_.Confirm(cone_, "Ada", kStart + kSecond, life_).transition);
+  const LifeStep again = rules_.Confirm(cone_, "Bob", "still there", kStart + kSecond, life_);
+  ASSERT_TRUE(again.transition);
+  EXPECT_EQ(again.transition->from, HazardState::kActive);
+  EXPECT_EQ(again.transition->to, HazardState::kActive);
+  EXPECT_EQ(again.transition->reason, "confirmed by Bob: still there");
 }
 
 TEST_F(HazardLifeTest, OneVehicleCannotConfirmHoweverMuchItSays) {

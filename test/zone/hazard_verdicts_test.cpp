@@ -102,7 +102,7 @@ TEST_F(HazardVerdictsTest, AnOfficialsWordWeighsMost) {
   const LifeStep no = rules_.Reject(cone_, "Anna", "", kStart + 2 * kHour, rejected);
   EXPECT_NEAR(RatioOf(no, 1), 2, 1e-9);
   EXPECT_LT(RatioOf(no, 9), -1);
-  const LifeStep yes = rules_.Confirm(cone_, "Anna", kStart + 2 * kHour, life_);
+  const LifeStep yes = rules_.Confirm(cone_, "Anna", "", kStart + 2 * kHour, life_);
   EXPECT_LT(RatioOf(yes, 1), -1);
   EXPECT_GT(RatioOf(yes, 9), 1.9);
 }

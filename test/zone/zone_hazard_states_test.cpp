@@ -160,8 +160,59 @@ TEST_F(ZoneLifeTest, ARejectedHazardTakesSightingsAsEvidenceAndDoesNotReopen) {
 TEST_F(ZoneLifeTest, AnOfficialRevokesARejection) {
   const Uuid hazard = ActiveHazard();
   EXPECT_TRUE(Zone().Reject(hazard, "Anna", ""));
-  EXPECT_TRUE(Zone().Confirm(hazard, "Bert"));
+  EXPECT_TRUE(Zone().Confirm(hazard, "Bert", "no shadow after all"));
   EXPECT_EQ(State(hazard), HazardState::kActive);
+  EXPECT_EQ(Zone().Events(hazard, 1).front().reason, "confirmed by Bert: no shadow after all");
+  EXPECT_THROW(Zone().Confirm(hazard, "Bert", "a\nb"), Error);
+}
+
+TEST_F(ZoneLifeTest, WhatIsOffTheMapIsListedByItsState) {
+  const Uuid rejected = ActiveHazard();
+  EXPECT_TRUE(Zone().Reject(rejected, "Anna", ""));
+  EXPECT_TRUE(Zone().Query(std::nullopt, 0, 10).empty());
+  const auto listed = Zone().Query(std::nullopt, 0, 10, {HazardState::kRejected});
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_EQ(listed.front().uuid, rejected);
+  EXPECT_TRUE(Zone().Query(std::nullopt, 0, 10, {HazardState::kGone}).empty());
+}
+
+TEST_F(ZoneLifeTest, WordsOfADistrustedVehicleAreWithdrawnWithAnEventEach) {
+  const Uuid shared = ActiveHazard();
+  Report alone = MakeReport(GeodesicDestination(kPlace, 0, 500));
+  alone.vehicle_id = "car-2";
+  alone.stamp_ns = now_ns_ - 1;
+  const Uuid invented = Zone().Handle(alone).hazard_uuid;
+  const auto events =
+      EventsDuring([&] { EXPECT_EQ(Zone().Distrust("car-2", "Anna", "its key was stolen"), 2U); });
+  ASSERT_EQ(events.size(), 2U);
+  for (const HazardEvent& event : events) {
+    EXPECT_EQ(event.reason, "words of car-2 withdrawn by Anna: its key was stolen");
+  }
+  EXPECT_TRUE(events[0].announced) << "drivers are told that they cannot rely on it any more";
+  EXPECT_EQ(State(shared), HazardState::kCandidate);
+  EXPECT_EQ(Zone().Find(shared)->vehicles, 1U);
+  EXPECT_EQ(State(invented), HazardState::kGone);
+  EXPECT_EQ(Zone().Statistics().suspect_vehicles, 1U);
+
+  // It confirms nothing now, also after a restart; others do.
+  zone_.reset();
+  EXPECT_EQ(Zone().Statistics().suspect_vehicles, 1U);
+  ReportBy("car-2");
+  EXPECT_EQ(State(shared), HazardState::kCandidate);
+  ReportBy("car-3");
+  EXPECT_EQ(State(shared), HazardState::kActive);
+}
+
+TEST_F(ZoneLifeTest, OnlyAVehicleThatTheZoneHasHeardOfIsDistrusted) {
+  ReportBy("car-1");
+  EXPECT_FALSE(Zone().Distrust("car-7", "Anna", "who?"));
+  EXPECT_FALSE(Zone().Distrust("car\n1", "Anna", "who?"));
+  EXPECT_THROW(Zone().Distrust("car-1", "An\nna", "why"), Error);
+  Zone().UpdateVehicle({"car-8", "", kPlace, 0.0, 15.0, now_ns_});
+  EXPECT_EQ(Zone().Distrust("car-8", "Anna", "it only drives around"), 0U);
+  EXPECT_EQ(Zone().Statistics().suspect_vehicles, 1U);
+  EXPECT_EQ(Zone().Distrust("car-1", "Anna", ""), 1U);
+  EXPECT_EQ(Zone().Distrust("car-1", "Anna", "again"), 0U);
 }
 
 TEST_F(ZoneLifeTest, WhatNobodySeesAnyMoreIsVerifiedAndThenGone) {

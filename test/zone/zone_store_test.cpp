@@ -98,6 +98,8 @@ TEST_F(ZoneStoreTest, AFailedDecisionLeavesMemoryAndStoreAsTheyWere) {
       "CREATE TRIGGER no_space BEFORE UPDATE ON hazards BEGIN SELECT RAISE(ABORT, 'full'); END");
   EXPECT_THROW(zone.Reject(hazard, "Anna", "why"), StoreError);
   EXPECT_THROW(zone.Confirm(hazard, "Anna"), StoreError);
+  EXPECT_THROW(zone.Distrust("car-1", "Anna", "why"), StoreError);
+  EXPECT_EQ(zone.Statistics().suspect_vehicles, 0U);
   EXPECT_THROW(zone.Remove(hazard, "why"), StoreError);
   now_ns += 400 * 86400'000'000'000;
   EXPECT_THROW(zone.Advance(), StoreError);

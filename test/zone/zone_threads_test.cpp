@@ -108,6 +108,7 @@ TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnE
         zone.Confirm(hazard.uuid, "Anna");
         EXPECT_FALSE(zone.Events(hazard.uuid, 10).empty());
       }
+      zone.Distrust("car-" + std::to_string(2 * i), "Anna", "");
       zone.ChangedAround(place(3), 5000, zone.AnnouncedSequence() / 2, 100);
     }
     --working;

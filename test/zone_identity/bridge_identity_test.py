@@ -81,11 +81,14 @@ class BridgeIdentityTest(unittest.TestCase):
         self.assertEqual(self.reports_of("liar"), [])
 
     def test_a_revoked_vehicles_bridge_says_that_it_is_revoked(self):
-        self.vehicle("revoked", "car-3", "car-3")
+        bridge = self.vehicle("revoked", "car-3", "car-3")
         self.certificates.revoke("car-3")
         eventually(lambda: "certificate revoked" in self.vehicle_peer.diagnostics("revoked").get("last_error", ""),
                    "the bridge's diagnostics say so")
         self.assertEqual(self.zone_peer.diagnostics("zone_bridge").get("connections"), "1")
+        # The connection's end had no reason; the next attempt has, and is not kept for a minute.
+        eventually(lambda: "certificate revoked; trying again" in bridge.output(), "the bridge's log says so")
+        self.assertNotIn(".;", bridge.output())
 
 
 if __name__ == "__main__":
