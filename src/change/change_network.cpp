@@ -30,14 +30,6 @@ std::vector<std::int64_t> ValidityShape(const ModelManifest::Input& input) {
   return {1, 1, input.height, input.width};
 }
 
-void CheckMask(const cv::Mat& valid, cv::Size size) {
-  if (valid.type() == CV_8UC1 && valid.size() == size) return;
-  throw Error("a mask of what is valid is " + std::to_string(valid.cols) + "x" +
-              std::to_string(valid.rows) + " of OpenCV type " + cv::typeToString(valid.type()) +
-              ", accepted is CV_8UC1 of the pictures' " + std::to_string(size.width) + "x" +
-              std::to_string(size.height));
-}
-
 }  // namespace
 
 std::size_t ChangeFeatures::Bytes() const {
@@ -137,20 +129,12 @@ ChangeProbabilities ChangeNetwork::Compare(const ChangeFeatures& before,
                 std::to_string(after.size.width) + "x" + std::to_string(after.size.height) +
                 ", accepted are those that Encode makes of two pictures of one size");
   }
-  CheckMask(valid, after.size);
+  CheckValidity(valid, after.size);
   return Enlarged(head_.Run(HeadInputs(before.levels, after.levels, Validity(valid)))[0], valid);
 }
 
-cv::Mat ChangeNetwork::FillInvalid(const cv::Mat& warped, const cv::Mat& other,
-                                   const cv::Mat& valid) {
-  CheckMask(valid, warped.size());
-  cv::Mat filled = warped.clone();
-  other.copyTo(filled, valid == 0);
-  return filled;
-}
-
 ChangeProbabilities ChangeNetwork::Infer(const AlignedPair& pair) {
-  const cv::Mat before = FillInvalid(pair.before, pair.after, pair.valid);
+  const cv::Mat before = FillUnknown(pair.before, pair.after, pair.valid);
   const std::vector<cv::Mat> answers = whole_.Run({{"first", before_letterbox_.Fill(before)},
                                                    {"second", after_letterbox_.Fill(pair.after)},
                                                    {"validity", Validity(pair.valid)}});

@@ -39,13 +39,10 @@ class ChangeNetwork final : public ChangeMethod {
   /// `picture`: CV_8UC3, BGR; Error otherwise.
   ChangeFeatures Encode(const cv::Mat& picture);
   /// The same answer as Run, from features of both pictures. Where `valid` (CV_8UC1, their size)
-  /// is 0 the warped picture must have shown the other's pixels, see FillInvalid. Throws Error when
+  /// is 0 the warped picture must have shown the other's pixels, see FillUnknown. Throws Error when
   /// sizes or features do not fit.
   ChangeProbabilities Compare(const ChangeFeatures& before, const ChangeFeatures& after,
                               const cv::Mat& valid);
-
-  /// `warped` with the pixels of `other` where `valid` is 0: no edge stands there then.
-  static cv::Mat FillInvalid(const cv::Mat& warped, const cv::Mat& other, const cv::Mat& valid);
 
  protected:
   ChangeProbabilities Infer(const AlignedPair& pair) override;

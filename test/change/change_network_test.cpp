@@ -99,7 +99,7 @@ TEST_F(ChangeNetworkTest, FeaturesOfBothPicturesGiveTheSameAsThePictures) {
   const auto network = MakeChangeNetwork(ModelFolder() + "/tiny.yaml");
   AlignedPair pair = Pair(0);
   pair.valid(cv::Rect(0, 0, 70, 256)).setTo(0);
-  const cv::Mat filled = ChangeNetwork::FillInvalid(pair.before, pair.after, pair.valid);
+  const cv::Mat filled = FillUnknown(pair.before, pair.after, pair.valid);
   const ChangeFeatures before = network->Encode(filled);
   const ChangeFeatures after = network->Encode(pair.after);
   EXPECT_GT(before.Bytes(), 0U);
