@@ -79,8 +79,8 @@ ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
     return answer;
   }
   const FeaturedView view{picture.bgr.size(), ExtractFeatures(picture.bgr, config_.features)};
-  std::optional<Partner> partner = FindPartner(frame, view, answer);
-  if (partner) Compare(picture, std::move(*partner), answer);
+  const std::optional<Partner> partner = FindPartner(frame, view, answer);
+  if (partner) Compare(picture, *partner, answer);
   Remember(picture, frame, view.features, answer);
   return answer;
 }
@@ -108,7 +108,7 @@ std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& f
   return std::nullopt;
 }
 
-void ChangeWatch::Compare(const WatchedPicture& picture, Partner partner, Answer& answer) {
+void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner, Answer& answer) {
   answer.outcome = Outcome::kCompared;
   answer.earlier = partner.frame;
   // The outermost pixels of the warped picture are mixed with what lies beyond it.

@@ -95,7 +95,7 @@ class ChangeWatch {
   PlaceFrame FrameOf(const WatchedPicture& picture) const;
   std::optional<Partner> FindPartner(const PlaceFrame& frame, const FeaturedView& view,
                                      Answer& answer);
-  void Compare(const WatchedPicture& picture, Partner partner, Answer& answer);
+  void Compare(const WatchedPicture& picture, const Partner& partner, Answer& answer);
   void Remember(const WatchedPicture& picture, const PlaceFrame& frame,
                 const ImageFeatures& features, Answer& answer);
   /// The east-north frame in which objects are followed; a new one far from the old one.
