@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, Image, NavSatFix, NavSatStatus
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from livemap.msg import (Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
+from livemap.msg import (ChangedObjects, Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
                          LinkState, PictureRequest, ReportReceipt, VehiclePosition)
 from node_testing import NodeletUnderTest, eventually, parameters_of
 
@@ -114,7 +114,8 @@ class Vehicle(NodeletUnderTest):
                 ("hazard/detections", DetectionArray, False), *self.sources(),
                 ("fix", NavSatFix, False), ("camera_rect/camera_info", CameraInfo, True),
                 ("hazard/notice", HazardNotice, False), ("hazard/receipt", ReportReceipt, False),
-                ("hazard/poll", HazardPoll, False), ("link_state", LinkState, True)]}
+                ("hazard/poll", HazardPoll, False), ("link_state", LinkState, True),
+                ("change/report", ChangedObjects, False)]}
         for topic, message_class in [("hazard/report", HazardReport), ("vehicle/position", VehiclePosition),
                                      ("hazard/local_map", MarkerArray), ("path", Path),
                                      ("hazard/poll_answer", HazardPollAnswer),

@@ -14,7 +14,8 @@ from sensor_msgs.msg import Image, NavSatStatus
 
 from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, annotated, decode,
                                       detection, detections, east_north, fix, on_street, place, stamp)
-from livemap.msg import HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, LinkState, ReportReceipt
+from livemap.msg import (ChangedObject, ChangedObjects, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
+                         LinkState, ReportReceipt)
 from node_testing import eventually
 
 
@@ -35,8 +36,18 @@ def poll(number, where, life_s=60, **fields):
     latitude, longitude = place(*where)
     return HazardPoll(schema_version=HazardPoll.SCHEMA_VERSION, poll_uuid=bytes([number] * 16),
                       hazard_uuid=bytes([7] * 16), vehicle_id="car-1", stamp=rospy.Time(50),
-                      expires=rospy.Time(50 + life_s), class_name="pothole", latitude=latitude,
-                      longitude=longitude, covariance=[0.1, 0, 0, 0.1], **fields)
+                      expires=rospy.Time(50 + life_s), latitude=latitude, longitude=longitude,
+                      covariance=[0.1, 0, 0, 0.1], **dict({"class_name": "pothole"}, **fields))
+
+
+def changes(time_s, where, class_name, direction):
+    """What change detection knows after the image of that time: one object."""
+    latitude, longitude = place(*where)
+    changed = ChangedObject(id=1, class_name=class_name, direction=direction, latitude=latitude, longitude=longitude,
+                            covariance=[0.2, 0, 0, 0.2], confidence=0.75, seen=3, last_seen=stamp(time_s))
+    message = ChangedObjects(drive_id="drive", objects=[changed])
+    message.header.stamp = stamp(time_s)
+    return message
 
 
 class HazardReportingTest(unittest.TestCase):
@@ -269,6 +280,23 @@ class HazardReportingTest(unittest.TestCase):
         self.assertEqual((second.answer, second.poll_uuid), (HazardPollAnswer.CANT_SEE, bytes([2] * 16)))
         self.assertIn(second.reason, ("no image", "the place was out of the camera's view"))
         vehicle.wait_for(polls=3, polls_repeated=1, polls_no=1, polls_cant_see=1)
+
+    def test_what_change_detection_knows_has_a_say_in_an_answer(self):
+        vehicle = self.driving_vehicle(poll_reserve_s=0.5)
+        gone, came = on_street(3.0, 12.0), on_street(3.0, 12.5, 8.0)
+        vehicle.publish("hazard/poll", poll(1, gone, life_s=6, class_name="road_work_sign"))
+        vehicle.publish("hazard/poll", poll(2, on_street(3.0, 14.0), life_s=6, class_name="barrier"))
+        vehicle.wait_for(polls=2)
+        vehicle.publish("change/report", changes(2.9, gone, "sign", ChangedObject.VANISHED))
+        vehicle.publish("change/report", changes(2.9, came, "sign", ChangedObject.APPEARED))
+        vehicle.see(3.0)
+        answers = eventually(lambda: vehicle.received("hazard/poll_answer")[1:] and vehicle.received("hazard/poll_answer"),
+                             "both answers")
+        told = {answer.poll_uuid[0]: answer for answer in answers}
+        self.assertEqual(told[1].answer, HazardPollAnswer.NO, "one clear view, and it is known to have gone")
+        self.assertGreaterEqual(told[1].confidence, 0.75)
+        self.assertEqual(told[2].answer, HazardPollAnswer.CANT_SEE, "one clear view is not enough")
+        vehicle.wait_for(polls_no=1, polls_no_by_change=1, polls_cant_see=1, polls_disagreed=0)
 
     def test_without_a_fix_holds_back_counts_and_invents_nothing(self):
         vehicle = self.make_vehicle(max_wait_s=2.0)

@@ -13,7 +13,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 NODES = {
     "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "geo_localization": "geo_localization",
                 "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
-                "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard"},
+                "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard",
+                "change_detection": "change_detection"},
     "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone", "candidate_intake": "candidate_intake",
              "hazard_detection": "hazard_detection"},
 }
@@ -52,7 +53,8 @@ class LaunchArguments(unittest.TestCase):
             for node, file in nodes.items():
                 defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
                 wanted = {key: changed(value) for key, value in defaults.items() if key not in own_arguments}
-                optional = {"edge_vo": ["vo:=true"], "geo_localization": ["vo:=true"], "early_discard": ["profile:=small"]}.get(node, [])
+                optional = {"edge_vo": ["vo:=true"], "geo_localization": ["vo:=true"], "early_discard": ["profile:=small"],
+                            "change_detection": ["changes:=true"]}.get(node, [])
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
@@ -67,6 +69,13 @@ class LaunchArguments(unittest.TestCase):
         refused = nodes("vehicle.launch", "profile:=tiny")
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("profile:=tiny is neither big nor small", refused.stderr)
+
+    def test_a_vehicle_detects_changes_only_when_told_to(self):
+        self.assertNotIn("/change_detection", nodes("vehicle.launch").stdout)
+        self.assertIn("/change_detection", nodes("vehicle.launch", "changes:=true").stdout)
+        dumped = parameters("vehicle.launch", "changes:=true", "directory:=/var/car", "drive:=monday")
+        self.assertEqual(dumped["/change_detection/directory"], "/var/car/places")
+        self.assertEqual(dumped["/change_detection/drive_id"], "monday")
 
     def test_a_zone_detects_for_small_vehicles_unless_told_not_to(self):
         self.assertIn("/candidate_intake", nodes("zone.launch").stdout)

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "base/error.h"
@@ -182,6 +183,11 @@ std::vector<ChangeEvent> ChangeTracker::Add(const ChangeFrame& frame,
   }
   Forget(frame);
   return confirmed;
+}
+
+void ChangeTracker::Restart() {
+  tracks_.clear();
+  last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
 }
 
 std::vector<ChangeEvent> ChangeTracker::Confirmed() const {

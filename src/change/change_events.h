@@ -30,12 +30,15 @@ struct ChangeRegionOptions {
   double least_confidence = 0.5;  ///< Pixels below it do not belong to any.
 };
 
-/// Connected regions of change, the largest first: pixels whose most likely class is a change and
-/// whose probability of change is high enough, joined over eight neighbours whatever their class; a
-/// region has the class of most of its pixels. `before` and `after` are the aligned pictures
-/// (CV_8UC3, BGR). A region's direction is that of the picture in which its outline is the stronger
-/// edge: where a thing stands, its outline shows; unknown when neither is by a fifth. Throws Error
-/// when the sizes differ, or the probabilities tell no classes.
+/// CV_8UC1: where the probability of change is at least `least_confidence` the likeliest class of
+/// change (of probabilities without classes kOtherObjects), elsewhere kNoChange.
+cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_confidence);
+
+/// Connected regions of change, the largest first: the pixels of ChangedClasses, joined over eight
+/// neighbours whatever their class; a region has the class of most of its pixels. `before` and
+/// `after` are the aligned pictures (CV_8UC3, BGR). A region's direction is that of the picture in
+/// which its outline is the stronger edge: where a thing stands, its outline shows; unknown when
+/// neither is by a fifth. Throws Error when the sizes differ.
 std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabilities,
                                             const cv::Mat& before, const cv::Mat& after,
                                             const ChangeRegionOptions& options = {});
@@ -88,6 +91,8 @@ class ChangeTracker {
   /// Takes one picture's regions in; returns the objects that it confirmed. Stamps must rise: an
   /// older picture is ignored.
   std::vector<ChangeEvent> Add(const ChangeFrame& frame, const std::vector<ChangeRegion>& regions);
+  /// Forgets all objects; the next picture may have any stamp, and ids go on rising.
+  void Restart();
   /// All confirmed objects with their present figures, by id, until they are closed.
   std::vector<ChangeEvent> Confirmed() const;
 

@@ -14,6 +14,21 @@ ChangeProbabilities NothingChanged(cv::Size size, bool tells_classes) {
   return probabilities;
 }
 
+void CheckValidity(const cv::Mat& valid, cv::Size size) {
+  if (valid.type() == CV_8UC1 && valid.size() == size) return;
+  throw Error("a mask of what is valid is " + std::to_string(valid.cols) + "x" +
+              std::to_string(valid.rows) + " of OpenCV type " + cv::typeToString(valid.type()) +
+              ", accepted is CV_8UC1 of the pictures' " + std::to_string(size.width) + "x" +
+              std::to_string(size.height));
+}
+
+cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& valid) {
+  CheckValidity(valid, before.size());
+  cv::Mat filled = before.clone();
+  after.copyTo(filled, valid == 0);
+  return filled;
+}
+
 ChangeProbabilities ChangeMethod::Run(const AlignedPair& pair) {
   const cv::Size size = pair.after.size();
   if (pair.after.empty() || pair.after.type() != CV_8UC3 || pair.before.type() != CV_8UC3 ||

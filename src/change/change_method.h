@@ -16,6 +16,11 @@ struct AlignedPair {
   cv::Mat valid;   ///< CV_8UC1: 255 where `before` is known, else 0.
 };
 
+/// Throws Error unless `valid` is a mask as AlignedPair has it, of `size`.
+void CheckValidity(const cv::Mat& valid, cv::Size size);
+/// `before` with the pixels of `after` where `valid` is 0: no edge stands there then.
+cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& valid);
+
 /// Says what changed between two pictures. Not thread-safe.
 class ChangeMethod {
  public:

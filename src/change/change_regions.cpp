@@ -57,21 +57,38 @@ ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
 
 }  // namespace
 
+cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_confidence) {
+  const cv::Mat& no_change = probabilities.of_class[0];
+  cv::Mat classes(no_change.size(), CV_8UC1,
+                  cv::Scalar(static_cast<double>(ChangeClass::kOtherObjects)));
+  if (probabilities.tells_classes()) {
+    cv::Mat most = probabilities.of_class[1].clone();
+    classes.setTo(1);
+    for (int i = 2; i < kChangeClasses; ++i) {
+      const cv::Mat& probability = probabilities.of_class[static_cast<std::size_t>(i)];
+      classes.setTo(i, probability > most);
+      cv::max(most, probability, most);
+    }
+  }
+  classes.setTo(0, no_change > 1 - least_confidence);
+  return classes;
+}
+
 std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabilities,
                                             const cv::Mat& before, const cv::Mat& after,
                                             const ChangeRegionOptions& options) {
-  if (!probabilities.tells_classes() || before.type() != CV_8UC3 || after.type() != CV_8UC3 ||
-      before.size() != after.size() || probabilities.of_class[0].size() != after.size()) {
+  if (before.type() != CV_8UC3 || after.type() != CV_8UC3 || before.size() != after.size() ||
+      probabilities.of_class[0].size() != after.size()) {
     throw Error(
-        "regions of change want ten classes and two colour pictures, all of one size, not " +
-        std::to_string(probabilities.of_class.size()) + " classes with pictures of " +
+        "regions of change want probabilities and two colour pictures of one size, not pictures "
+        "of " +
         std::to_string(before.cols) + "x" + std::to_string(before.rows) + " and " +
         std::to_string(after.cols) + "x" + std::to_string(after.rows));
   }
-  const cv::Mat classes = MostLikely(probabilities);
+  const cv::Mat classes = ChangedClasses(probabilities, options.least_confidence);
   cv::Mat score;
   cv::subtract(1.0, probabilities.of_class[0], score);
-  const cv::Mat changed = (classes > 0) & (score >= options.least_confidence);
+  const cv::Mat changed = classes > 0;
   cv::Mat labels;
   cv::Mat stats;
   cv::Mat centres;

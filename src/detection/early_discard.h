@@ -3,8 +3,8 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
-#include "detection/letterbox.h"
 #include "inference/inference_engine.h"
+#include "inference/letterbox.h"
 #include "inference/model_manifest.h"
 
 namespace livemap {

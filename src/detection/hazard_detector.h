@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "detection/detection.h"
-#include "detection/letterbox.h"
 #include "inference/inference_engine.h"
+#include "inference/letterbox.h"
 #include "inference/model_manifest.h"
 
 namespace livemap {

@@ -84,6 +84,22 @@ void PollResponder::AddLuminance(std::int64_t stamp_ns, double luminance) {
   if (luminances_.size() > 2 * kMaxPollFrames) luminances_.erase(luminances_.begin());
 }
 
+void PollResponder::AddChange(const ChangeEvidence& evidence) {
+  if (!IsValid(evidence.position) || !evidence.covariance_m2.allFinite() ||
+      !(evidence.confidence > 0 && evidence.confidence <= 1)) {
+    return;
+  }
+  for (OpenPoll& open : open_) {
+    if (!MayBe(evidence.change_class, open.poll.class_name)) continue;
+    const double sigma_m =
+        std::sqrt((evidence.covariance_m2 + open.poll.covariance_m2).trace() / 2);
+    const double gate_m =
+        std::max(catalogue_.DuplicateRadiusM(open.poll.class_name), config_.gate_sigma * sigma_m);
+    if (GeodesicDistanceM(evidence.position, open.poll.position) > gate_m) continue;
+    (evidence.vanished ? open.vanished : open.appeared) = evidence.confidence;
+  }
+}
+
 std::vector<std::int64_t> PollResponder::TakePictureRequests() {
   return std::exchange(picture_requests_, {});
 }
@@ -164,7 +180,7 @@ void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const Place
   }
   ++open.troubles[*trouble];
   // The place has left the view: nearer images will not come.
-  const bool left = *trouble == Trouble::kOutside && open.clear_views >= config_.no_views;
+  const bool left = *trouble == Trouble::kOutside && IsGone(open);
   if (left) open.deadline_s = std::min(open.deadline_s, steady_s);
 }
 
@@ -218,10 +234,15 @@ void PollResponder::CountView(OpenPoll& open, const SightingFrame& frame, const 
   ++open.clear_views;
 }
 
+bool PollResponder::IsGone(const OpenPoll& open) const {
+  if (open.appeared > 0) return false;
+  return open.clear_views >= (open.vanished > 0 ? 1 : config_.no_views);
+}
+
 /// Asks for the picture when the answer stands and it is missed.
 bool PollResponder::IsReady(OpenPoll& open, double steady_s) {
   if (!open.matched_s && steady_s < open.deadline_s) return false;
-  const bool decided = open.matched_s || open.clear_views >= config_.no_views;
+  const bool decided = open.matched_s || IsGone(open);
   if (!decided || open.poll.picture == PollPicture::kNone || pictures_.count(open.view_ns) != 0) {
     return true;
   }
@@ -234,7 +255,7 @@ bool PollResponder::IsReady(OpenPoll& open, double steady_s) {
 
 void PollResponder::Answer(const OpenPoll& open) {
   const bool seen = open.matched_s.has_value();
-  const bool not_there = !seen && open.clear_views >= config_.no_views;
+  const bool not_there = !seen && IsGone(open);
   if (!seen && !not_there && !newest_base_) {
     ++counters_.unanswered;
     return;
@@ -254,13 +275,17 @@ void PollResponder::Answer(const OpenPoll& open) {
     ++counters_.yes;
   } else if (not_there) {
     reply.answer = PollReply::Answer::kNo;
+    // Both look at the same images: the surer one counts, not both together.
+    const double views = 1 - std::pow(config_.miss_share, open.clear_views);
     reply.confidence =
-        static_cast<float>(std::min(0.99, 1 - std::pow(config_.miss_share, open.clear_views)));
+        static_cast<float>(std::min(0.99, std::max(views, static_cast<double>(open.vanished))));
     ++counters_.no;
+    if (open.clear_views < config_.no_views) ++counters_.no_by_change;
   } else {
     reply.answer = PollReply::Answer::kCantSee;
     reply.reason = ReasonOf(open);
     ++counters_.cant_see;
+    if (open.clear_views >= config_.no_views) ++counters_.disagreed;
   }
   if (decided) AttachPicture(open, reply);
   replies_.push_back(std::move(reply));
@@ -286,6 +311,7 @@ void PollResponder::AttachPicture(const OpenPoll& open, PollReply& reply) {
 
 /// What kept most images from counting; at most 64 bytes.
 std::string PollResponder::ReasonOf(const OpenPoll& open) {
+  if (open.clear_views > 0 && open.appeared > 0) return "seen as changed, but not detected";
   if (open.clear_views > 0) return "the place was in view too few times";
   Trouble worst = Trouble::kTooFew;
   int most = 0;

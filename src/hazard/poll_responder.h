@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hazard/catalogue.h"
+#include "hazard/change_evidence.h"
 #include "hazard/fix_track.h"
 #include "hazard/picture.h"
 #include "hazard/place_view.h"
@@ -23,6 +24,9 @@ namespace livemap {
 /// detector, in several images from different spots, and none had a match. Otherwise "can't see",
 /// with the reason that kept most images from counting. A yes goes out at once; a no when the place
 /// has left the view, so that the nearest images count, too; the rest when the poll's time is over.
+///
+/// Change detection has a say, too: where it knows that a thing of the class went, one clear view
+/// without a match makes a no; where it knows that one came, nothing does.
 ///
 /// Pictures are asked for when an answer needs one, see TakePictureRequests; those that come by
 /// themselves are taken, too.
@@ -74,7 +78,9 @@ class PollResponder {
     std::uint64_t yes = 0;
     std::uint64_t no = 0;
     std::uint64_t cant_see = 0;
-    std::uint64_t unanswered = 0;  ///< No position at all to answer from.
+    std::uint64_t no_by_change = 0;  ///< Of `no`: the views alone would not have done.
+    std::uint64_t disagreed = 0;     ///< Of `cant_see`: the views said no, change detection yes.
+    std::uint64_t unanswered = 0;    ///< No position at all to answer from.
     std::uint64_t pictures = 0;
     std::uint64_t picture_bytes = 0;
   };
@@ -89,6 +95,8 @@ class PollResponder {
   void AddPicture(std::int64_t stamp_ns, const Picture& picture);
   /// How bright the image of that stamp is: its mean, 0..255. Best before its frame.
   void AddLuminance(std::int64_t stamp_ns, double luminance);
+  /// What change detection knows of a place; told again it counts once, with its newest figures.
+  void AddChange(const ChangeEvidence& evidence);
   /// Stamps of the images whose pictures are wanted now, each once.
   std::vector<std::int64_t> TakePictureRequests();
 
@@ -117,6 +125,8 @@ class PollResponder {
     Box view_box;  // The match's, or where the place is in that image.
     TrackPose view_base;
     float match_confidence = 0;
+    float vanished = 0;  // Confidence that a thing of the class went, by change detection; or came.
+    float appeared = 0;
     std::optional<double> matched_s;  // Steady; it only waits for the picture.
     std::optional<double> asked_s;    // Steady; when its picture began to be missed.
   };
@@ -135,6 +145,8 @@ class PollResponder {
   void CountView(OpenPoll& open, const SightingFrame& frame, const PlaceView& view,
                  const TrackPose& base);
   bool IsReady(OpenPoll& open, double steady_s);
+  /// Whether views and changes make a no.
+  bool IsGone(const OpenPoll& open) const;
   void Answer(const OpenPoll& open);
   void AttachPicture(const OpenPoll& open, PollReply& reply);
   static std::string ReasonOf(const OpenPoll& open);

@@ -1,86 +1,39 @@
-#include <algorithm>
-#include <opencv2/dnn.hpp>
 #include <string>
 
 #include "base/error.h"
 #include "inference/engines.h"
-#include "inference/onnx_inputs.h"
+#include "inference/onnx_graph.h"
 
 namespace livemap {
 namespace {
 
 constexpr char kInputName[] = "images";
 
-/// OpenCV's messages run over several lines; errors here are one sentence.
-std::string OneLine(std::string text) {
-  text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
-  return text;
-}
-
 /// OpenCV's DNN module on the CPU.
 class OpenCvEngine final : public InferenceEngine {
  public:
-  explicit OpenCvEngine(const ModelManifest& manifest) : file_(manifest.file) {
-    const std::string bytes = ReadModelFile(manifest);
-    CheckInput(bytes, manifest);
-    try {
-      network_ = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
-      network_.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-      network_.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
-    } catch (const cv::Exception& error) {
-      throw Error("model file '" + file_ +
-                  "' cannot be loaded, accepted is an ONNX file of layers that OpenCV knows (" +
-                  OneLine(error.err) + ")");
-    }
+  explicit OpenCvEngine(const ModelManifest& manifest)
+      : graph_(manifest.file, ReadModelFile(manifest)) {
+    graph_.RequireInput(kInputName, InputShape(manifest));
     CheckOutputName(manifest);
-    CheckOutput(*this, manifest, file_);
+    CheckOutput(*this, manifest, manifest.file);
   }
 
-  cv::Mat Run(const cv::Mat& images) override {
-    try {
-      network_.setInput(images, kInputName);
-      return network_.forward();
-    } catch (const cv::Exception& error) {
-      throw Error("model file '" + file_ + "' cannot run on an input of " +
-                  ShapeText(ShapeOf(images)) + " (" + OneLine(error.err) + ")");
-    }
-  }
+  cv::Mat Run(const cv::Mat& images) override { return graph_.Run({{kInputName, images}})[0]; }
 
   EngineKind Kind() const override { return EngineKind::kOpenCv; }
 
  private:
-  void CheckInput(const std::string& bytes, const ModelManifest& manifest) const {
-    std::vector<OnnxInput> inputs;
-    try {
-      inputs = ReadOnnxInputs(bytes);
-    } catch (const Error& error) {
-      throw Error("model file '" + file_ + "' cannot be loaded: " + error.what());
-    }
-    const auto images = std::find_if(inputs.begin(), inputs.end(), [](const OnnxInput& input) {
-      return input.name == kInputName;
-    });
-    if (images == inputs.end()) {
-      throw Error("model file '" + file_ + "' declares " + std::to_string(inputs.size()) +
-                  " inputs of other names, accepted is one named '" + kInputName + "'");
-    }
-    const std::vector<std::int64_t> shape = InputShape(manifest);
-    if (images->shape != shape) {
-      throw Error("model file '" + file_ + "' takes images of " + ShapeText(images->shape) +
-                  ", its manifest accepts " + ShapeText(shape));
-    }
-  }
-
   void CheckOutputName(const ModelManifest& manifest) const {
-    const std::vector<std::string> outputs = network_.getUnconnectedOutLayersNames();
+    const std::vector<std::string>& outputs = graph_.outputs();
     if (outputs.size() != 1 || outputs[0] != manifest.head.output) {
-      throw Error("model file '" + file_ + "' has " + std::to_string(outputs.size()) +
+      throw Error("model file '" + manifest.file + "' has " + std::to_string(outputs.size()) +
                   " outputs, the first named '" + (outputs.empty() ? "" : outputs[0]) +
                   "', its manifest accepts one named '" + manifest.head.output + "'");
     }
   }
 
-  std::string file_;
-  cv::dnn::Net network_;
+  OnnxGraph graph_;
 };
 
 }  // namespace

@@ -92,6 +92,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
         node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
         node.subscribe("hazard/poll", 100, &Self::OnPoll, this),
+        node.subscribe("change/report", 100, &Self::OnChanges, this),
     };
     // Whoever listens to hazard/annotated has every frame drawn and masked: not where pictures come
     // on demand.
@@ -262,6 +263,11 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
+  }
+
+  /// Has a say in what polls are answered.
+  void OnChanges(const ChangedObjects& message) {
+    for (const ChangeEvidence& evidence : ToEvidence(message)) responder_->AddChange(evidence);
   }
 
   void OnTick(const ros::SteadyTimerEvent&) {

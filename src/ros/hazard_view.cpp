@@ -159,7 +159,9 @@ void DescribePollResponder(const PollResponder& responder,
   status.add("polls_not_taken", counters.not_taken);
   status.add("polls_yes", counters.yes);
   status.add("polls_no", counters.no);
+  status.add("polls_no_by_change", counters.no_by_change);
   status.add("polls_cant_see", counters.cant_see);
+  status.add("polls_disagreed", counters.disagreed);
   status.add("polls_unanswered", counters.unanswered);
   status.add("poll_pictures", counters.pictures);
   status.add("poll_picture_bytes", counters.picture_bytes);

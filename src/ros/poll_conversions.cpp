@@ -99,6 +99,26 @@ PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
   return answer;
 }
 
+std::vector<ChangeEvidence> ToEvidence(const ChangedObjects& message) {
+  std::vector<ChangeEvidence> all;
+  for (const ChangedObject& object : message.objects) {
+    if (object.direction != ChangedObject::APPEARED &&
+        object.direction != ChangedObject::VANISHED) {
+      continue;
+    }
+    ChangeEvidence evidence;
+    evidence.stamp_ns = FromRosTime(object.last_seen);
+    evidence.change_class = object.class_name;
+    evidence.vanished = object.direction == ChangedObject::VANISHED;
+    evidence.position = {object.latitude, object.longitude};
+    evidence.covariance_m2 << object.covariance[0], object.covariance[1], object.covariance[2],
+        object.covariance[3];
+    evidence.confidence = object.confidence;
+    all.push_back(evidence);
+  }
+  return all;
+}
+
 HazardPollAnswer ToMessage(const PollReply& reply) {
   HazardPollAnswer message;
   message.schema_version = HazardPollAnswer::SCHEMA_VERSION;

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <livemap/ChangedObjects.h>
 #include <livemap/HazardPoll.h>
 #include <livemap/HazardPollAnswer.h>
 
+#include <vector>
+
+#include "hazard/change_evidence.h"
 #include "hazard/report.h"
 #include "zone/zone_service.h"
 
@@ -19,6 +23,10 @@ Poll FromMessage(const HazardPoll& message);
 HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns);
 /// The reply as the zone takes it; the vehicle_id is the one that the bridge wrote.
 PollAnswer ToPollAnswer(const HazardPollAnswer& message);
+
+/// What change detection tells of things that surely went or came; those of unknown direction are
+/// left out.
+std::vector<ChangeEvidence> ToEvidence(const ChangedObjects& message);
 
 HazardPollAnswer ToMessage(const PollReply& reply);
 PollReply FromMessage(const HazardPollAnswer& message);

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "change/change_method.h"
+#include "change/change_network.h"
 #include "change/change_pairs.h"
 #include "change/change_predictions.h"
 #include "change/change_report.h"
@@ -22,6 +23,7 @@ constexpr std::size_t kCurvePoints = 400;
 struct Options {
   std::string directory;
   std::string method;
+  std::string model;  ///< Path of a manifest; empty: the method.
   std::string predictions;
   std::string reversed_predictions;
   std::string write;
@@ -38,12 +40,13 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "Compares what a method says about pairs of pictures with the truth. DIR has VL-CMU-CD's\n"
       "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it) or t0/, t1/, "
       "mask/.\n"
-      "The method is a classical one (--method), or a folder of predictions (--predictions: "
-      "NAME.npy\n"
-      "or NAME.png per pair). docs/change.md defines the figures and the files.",
+      "The method is a classical one (--method), a network (--model), or a folder of predictions\n"
+      "(--predictions: NAME.npy or NAME.png per pair). docs/change.md defines the figures and the "
+      "files.",
       1,
       {{"json", "", "one line of JSON instead of a table"},
        {"method", "NAME", "dense-sift or daisy (dense-sift)"},
+       {"model", "FILE", "manifest of a network of change, run by OpenCV"},
        {"predictions", "DIR", "read predictions instead of running a method"},
        {"reversed-predictions", "DIR", "the same for the pairs with their pictures swapped"},
        {"register", "HOW", "none or homography: of the earlier picture, for a method (none)"},
@@ -54,10 +57,13 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   line.CheckNeeds({{"curves", line.Has("json"), "--json"},
                    {"reversed-predictions", line.Has("predictions"), "--predictions"},
                    {"method", !line.Has("predictions"), "to go without --predictions"},
+                   {"model", !line.Has("predictions"), "to go without --predictions"},
+                   {"model", !line.Has("method"), "to go without --method"},
                    {"register", !line.Has("predictions"), "to go without --predictions"}});
   Options options;
   options.directory = line.Positional(0);
   options.method = line.Text("method", "dense-sift");
+  options.model = line.Text("model", "");
   options.predictions = line.Text("predictions", "");
   options.reversed_predictions = line.Text("reversed-predictions", "");
   options.write = line.Text("write", "");
@@ -91,8 +97,14 @@ class Evaluation {
     report_.method = options.predictions;
     report_.has_reversed = !options.reversed_predictions.empty();
     if (!options.predictions.empty()) return;
-    method_ = MakeChangeMethod(options.method);
-    report_.method = options.method;
+    if (options.model.empty()) {
+      method_ = MakeChangeMethod(options.method);
+      report_.method = options.method;
+    } else {
+      auto network = MakeChangeNetwork(options.model);
+      report_.method = network->manifest().name;
+      method_ = std::move(network);
+    }
     report_.has_reversed = true;
   }
 

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "change/change_method.h"
 
 namespace livemap {
 namespace {
@@ -196,6 +197,47 @@ TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
   EXPECT_THROW(FindChangeRegions(OneRegion({10, 10, 50, 50}, ChangeClass::kBin), image,
                                  cv::Mat(10, 10, CV_8UC3)),
                Error);
+}
+
+TEST(FindChangeRegions, OfProbabilitiesWithoutClassesAreOtherObjects) {
+  const cv::Mat image = Background();
+  const cv::Rect box(10, 10, 50, 50);
+  ChangeProbabilities probabilities = NothingChanged(image.size(), false);
+  probabilities.of_class[0](box).setTo(0.6);
+  probabilities.of_class[1](box).setTo(0.4);
+  EXPECT_TRUE(FindChangeRegions(probabilities, image, image).empty());
+  ChangeRegionOptions sensitive;
+  sensitive.least_confidence = 0.35;
+  const auto regions = FindChangeRegions(probabilities, image, image, sensitive);
+  ASSERT_EQ(regions.size(), 1U);
+  EXPECT_EQ(regions[0].change_class, ChangeClass::kOtherObjects);
+  EXPECT_EQ(regions[0].box, box);
+}
+
+TEST(ChangedClasses, ArePickedByTheSumOfChangeNotByTheLikeliestClass) {
+  ChangeProbabilities probabilities = NothingChanged({4, 4}, true);
+  probabilities.of_class[0].setTo(0.4);
+  probabilities.of_class[3].setTo(0.25);
+  probabilities.of_class[7].setTo(0.35);
+  EXPECT_EQ(ChangedClasses(probabilities, 0.55).at<std::uint8_t>(1, 1), 7);
+  EXPECT_EQ(ChangedClasses(probabilities, 0.65).at<std::uint8_t>(1, 1), 0);
+}
+
+TEST(ChangeTracker, BeganAnewForgetsObjectsButNotTheirIds) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  const auto drive = [&tracker] {
+    std::uint64_t id = 0;
+    for (int i = 0; i < 4; ++i) {
+      const ChangeFrame frame = FrameAt(2.0 * i, i + 1);
+      for (const ChangeEvent& event : tracker.Add(frame, {SeenAt(frame, 22, -2)})) id = event.id;
+    }
+    return id;
+  };
+  const std::uint64_t first = drive();
+  EXPECT_EQ(drive(), 0U) << "stamps must rise";
+  tracker.Restart();
+  EXPECT_TRUE(tracker.Confirmed().empty());
+  EXPECT_GT(drive(), first);
 }
 
 }  // namespace

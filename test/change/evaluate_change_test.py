@@ -137,6 +137,20 @@ class EvaluateChangeTest(unittest.TestCase):
                                                      "change_worst.jpg"])
         self.assertEqual(cv2.imread(os.path.join(plots, "change_best.jpg")).shape[1], 4 * 320)
 
+    def test_a_network_is_measured_as_its_predictions_are(self):
+        model = os.environ.get("LIVEMAP_CHANGE_MODEL", "")
+        if not os.path.exists(os.path.join(model, "made_of")):
+            self.skipTest("skipped, no torch to make a network with")
+        pairs = os.path.join(model, "pairs")
+        own = self.figures("--model", os.path.join(model, "tiny.yaml"), pairs)
+        self.assertEqual((own["method"], own["pairs"], own["refused_pairs"]), ("tiny", 2, 0))
+        predicted = self.figures("--predictions", os.path.join(model, "predictions/forward"),
+                                 "--reversed-predictions", os.path.join(model, "predictions/reversed"), pairs)
+        for part, expected in ((own, predicted), (own["reversed"], predicted["reversed"])):
+            self.assertAlmostEqual(part["roc_area"], expected["roc_area"], places=3)
+            self.assertAlmostEqual(part["argmax"]["accuracy"], expected["argmax"]["accuracy"], places=3)
+            self.assertAlmostEqual(part["classes"]["sign"]["ap"], expected["classes"]["sign"]["ap"], places=3)
+
     def test_the_flat_layout_of_two_classes_is_read(self):
         flat = self.path("flat")
         for part in ("t0", "t1", "mask"):
@@ -166,6 +180,8 @@ class EvaluateChangeTest(unittest.TestCase):
                 (["--register", "well", self.data], "none and homography"),
                 (["--predictions", empty, self.data], "000/00' is missing"),
                 (["--method", "daisy", "--predictions", empty, self.data], "--method"),
+                (["--method", "daisy", "--model", "tiny.yaml", self.data], "--model"),
+                (["--model", os.path.join(self.folder, "tiny.yaml"), self.data], "tiny.yaml"),
                 (["--curves", self.data], "--json"), (["--bogus", self.data], "--bogus")]:
             done = run(PROGRAM, *arguments)
             self.assertEqual(done.returncode, 2, arguments)

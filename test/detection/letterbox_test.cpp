@@ -1,4 +1,4 @@
-#include "detection/letterbox.h"
+#include "inference/letterbox.h"
 
 #include <gtest/gtest.h>
 

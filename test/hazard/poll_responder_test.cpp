@@ -135,6 +135,82 @@ TEST_F(PollResponderTest, SaysNoWhenThePlaceWasWellInViewSeveralTimesAndNothingW
   EXPECT_LT(distance_m, 14) << "the nearest view speaks";
 }
 
+/// Change detection's word on a place beside the one asked about.
+ChangeEvidence Changed(const GeoPoint& position, bool vanished, const std::string& change_class) {
+  ChangeEvidence evidence;
+  evidence.change_class = change_class;
+  evidence.vanished = vanished;
+  evidence.position = position;
+  evidence.covariance_m2 = 0.25 * Eigen::Matrix2d::Identity();
+  evidence.confidence = 0.8F;
+  return evidence;
+}
+
+TEST_F(PollResponderTest, OneClearViewIsEnoughWhereChangeDetectionKnowsThatItWent) {
+  poll_.class_name = "road_work_sign";
+  responder_.Add(poll_, steady_s_);
+  // Just within range; the drive ends before a second view counts.
+  Drive(2.55, 2.65);
+  responder_.AddChange(Changed(PlaceAt(kAheadM + 1, kRightM), true, "sign"));
+  Expire();
+  const PollReply reply = OnlyReply();
+  EXPECT_EQ(reply.answer, Answer::kNo);
+  EXPECT_NEAR(reply.confidence, 0.8, 0.1);
+  EXPECT_EQ(responder_.counters().no_by_change, 1U);
+}
+
+TEST_F(PollResponderTest, ChangesOfOtherClassesOrPlacesSayNothing) {
+  poll_.class_name = "road_work_sign";
+  responder_.Add(poll_, steady_s_);
+  Drive(2.55, 2.65);
+  responder_.AddChange(Changed(PlaceAt(kAheadM, kRightM), true, "vehicle"));
+  responder_.AddChange(Changed(PlaceAt(kAheadM + 30, kRightM), true, "sign"));
+  ChangeEvidence unsound = Changed(PlaceAt(kAheadM, kRightM), true, "sign");
+  unsound.confidence = std::nanf("");
+  responder_.AddChange(unsound);
+  Expire();
+  EXPECT_EQ(OnlyReply().answer, Answer::kCantSee);
+}
+
+TEST_F(PollResponderTest, WithoutAClearViewAChangeAloneIsNoAnswer) {
+  poll_.class_name = "barrier";
+  responder_.Add(poll_, steady_s_);
+  Drive(0, 0.3);
+  responder_.AddChange(Changed(poll_.position, true, "barrier"));
+  Expire();
+  EXPECT_EQ(OnlyReply().answer, Answer::kCantSee);
+}
+
+TEST_F(PollResponderTest, NothingIsDeniedWhereChangeDetectionSawThatItCame) {
+  poll_.class_name = "barrier";
+  responder_.Add(poll_, steady_s_);
+  responder_.AddChange(Changed(poll_.position, false, "barrier"));
+  Drive(2.0, 4.0);
+  Expire();
+  const PollReply reply = OnlyReply();
+  EXPECT_EQ(reply.answer, Answer::kCantSee);
+  EXPECT_THAT(reply.reason, HasSubstr("not detected"));
+  EXPECT_EQ(responder_.counters().disagreed, 1U);
+}
+
+TEST_F(PollResponderTest, WhatTheDetectorSeesIsThereWhateverChangeDetectionSays) {
+  poll_.class_name = "barrier";
+  responder_.Add(poll_, steady_s_);
+  responder_.AddChange(Changed(poll_.position, true, "barrier"));
+  Drive(2.6, 2.8, [](double time_s) {
+    return std::vector<Sighting>{{"barrier", 0.7F, BoxOfPlace(time_s)}};
+  });
+  EXPECT_EQ(OnlyReply().answer, Answer::kYes);
+}
+
+TEST(MayBe, AThingOfNoCertainClassMayBeAnyHazardButAPothole) {
+  EXPECT_TRUE(MayBe("sign", "road_work_sign"));
+  EXPECT_FALSE(MayBe("sign", "barrier"));
+  EXPECT_TRUE(MayBe("other_objects", "barrier"));
+  EXPECT_FALSE(MayBe("other_objects", "pothole"));
+  EXPECT_FALSE(MayBe("person_cycle", "deer"));
+}
+
 TEST_F(PollResponderTest, AnImageWaitsUntilTheCameraIsKnown) {
   const auto intrinsics = std::exchange(vehicle_.intrinsics, std::nullopt);
   responder_.Add(poll_, steady_s_);

@@ -10,7 +10,9 @@ namespace livemap {
 /// Turns images of any size into the network's input tensor. Keeps its buffers between calls.
 class Letterbox {
  public:
-  explicit Letterbox(const ModelManifest& manifest);
+  Letterbox(const ModelManifest::Input& input, const ModelManifest::Normalisation& normalisation);
+  explicit Letterbox(const ModelManifest& manifest)
+      : Letterbox(manifest.input, manifest.normalisation) {}
 
   /// `bgr` (8 bit, 3 channels, not empty; anything else throws Error) scaled to fit by linear
   /// interpolation, padded right and bottom, normalised: 1 x 3 x H x W float32, valid until the
@@ -19,6 +21,8 @@ class Letterbox {
 
   /// Pixels of the input per pixel of an image of `size`.
   double Scale(cv::Size size) const;
+  /// What an image of `size` is scaled to before it is padded; pixels of the input.
+  cv::Size Fitted(cv::Size size) const;
 
  private:
   ModelManifest::Input input_;

@@ -1,4 +1,4 @@
-#include "detection/letterbox.h"
+#include "inference/letterbox.h"
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
@@ -7,13 +7,15 @@
 
 namespace livemap {
 
-Letterbox::Letterbox(const ModelManifest& manifest) : input_(manifest.input) {
+Letterbox::Letterbox(const ModelManifest::Input& input,
+                     const ModelManifest::Normalisation& normalisation)
+    : input_(input) {
   source_channel_ = input_.channels == ChannelOrder::kRgb ? std::array<int, 3>{2, 1, 0}
                                                           : std::array<int, 3>{0, 1, 2};
   for (std::size_t plane = 0; plane < 3; ++plane) {
     for (std::size_t pixel = 0; pixel < 256; ++pixel) {
-      normalised_[plane][pixel] = (static_cast<float>(pixel) - manifest.normalisation.mean[plane]) /
-                                  manifest.normalisation.std[plane];
+      normalised_[plane][pixel] =
+          (static_cast<float>(pixel) - normalisation.mean[plane]) / normalisation.std[plane];
     }
   }
   const int shape[] = {1, 3, input_.height, input_.width};
@@ -25,16 +27,20 @@ double Letterbox::Scale(cv::Size size) const {
                   static_cast<double>(input_.height) / size.height);
 }
 
+cv::Size Letterbox::Fitted(cv::Size size) const {
+  const double scale = Scale(size);
+  // A side of a very long image would round to nothing.
+  return {std::clamp(cvRound(size.width * scale), 1, input_.width),
+          std::clamp(cvRound(size.height * scale), 1, input_.height)};
+}
+
 const cv::Mat& Letterbox::Fill(const cv::Mat& bgr) {
   if (bgr.empty()) throw Error("an image is empty, accepted is at least 1 x 1 pixel");
   if (bgr.dims != 2 || bgr.type() != CV_8UC3) {
     throw Error("an image has OpenCV type " + cv::typeToString(bgr.type()) +
                 ", accepted is CV_8UC3 (BGR)");
   }
-  const double scale = Scale(bgr.size());
-  // A side of a very long image would round to nothing.
-  const cv::Size fitted(std::clamp(cvRound(bgr.cols * scale), 1, input_.width),
-                        std::clamp(cvRound(bgr.rows * scale), 1, input_.height));
+  const cv::Size fitted = Fitted(bgr.size());
   cv::Mat source = bgr;
   if (fitted != bgr.size()) {
     cv::resize(bgr, scaled_, fitted, 0, 0, cv::INTER_LINEAR);

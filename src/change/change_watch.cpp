@@ -1,0 +1,167 @@
+#include "change/change_watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+/// Of a map frame's datum: beyond it north is no longer the map's north to a milliradian.
+constexpr double kMapRadiusM = 5000;
+
+constexpr int kMixedPixels = 2;
+
+/// Counterclockwise from east.
+double YawOf(double heading_rad) { return M_PI / 2 - heading_rad; }
+
+double WrappedHeading(double heading_rad) {
+  const double wrapped = std::fmod(heading_rad, 2 * M_PI);
+  const double positive = wrapped < 0 ? wrapped + 2 * M_PI : wrapped;
+  return positive < 2 * M_PI ? positive : 0;
+}
+
+void CheckPicture(const WatchedPicture& picture) {
+  const CameraIntrinsics& camera = picture.camera;
+  if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3 ||
+      picture.bgr.size() != cv::Size(camera.width, camera.height)) {
+    throw Error("a picture to compare is " + std::to_string(picture.bgr.cols) + "x" +
+                std::to_string(picture.bgr.rows) + ", accepted is an 8-bit colour picture of its " +
+                "camera's " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
+  }
+  if (!IsValid(picture.position) || !picture.covariance_m2.allFinite() ||
+      !std::isfinite(picture.heading_rad)) {
+    throw Error(
+        "a picture to compare has a pose that is not finite, accepted is WGS84 degrees and "
+        "radians");
+  }
+}
+
+}  // namespace
+
+ChangeWatch::ChangeWatch(const Config& config, std::unique_ptr<ChangeMethod> method,
+                         std::int64_t now_ns)
+    : config_(config),
+      method_(std::move(method)),
+      memory_(config.memory, now_ns),
+      tracker_(config.tracker) {
+  if (config.drive_id.empty() || config.drive_id.size() > 64) {
+    throw Error("a drive's id has " + std::to_string(config.drive_id.size()) +
+                " bytes, accepted are 1 to 64");
+  }
+}
+
+PlaceFrame ChangeWatch::FrameOf(const WatchedPicture& picture) const {
+  PlaceFrame frame;
+  frame.drive_id = config_.drive_id;
+  frame.stamp_ns = picture.stamp_ns;
+  const Eigen::Rotation2Dd turn(YawOf(picture.heading_rad));
+  const Eigen::Vector2d camera_m = turn * picture.base_from_optical.translation().head<2>();
+  frame.position = LocalFrame(picture.position).ToGeo(camera_m);
+  frame.position_sigma_m = std::sqrt(std::max(0.0, picture.covariance_m2.trace() / 2));
+  const Eigen::Vector3d view = picture.base_from_optical.linear().col(2);
+  frame.heading_rad = WrappedHeading(picture.heading_rad - std::atan2(view.y(), view.x()));
+  frame.camera = picture.camera;
+  return frame;
+}
+
+ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
+  CheckPicture(picture);
+  Answer answer;
+  if (picture.stamp_ns < last_stamp_ns_) tracker_.Restart();
+  last_stamp_ns_ = picture.stamp_ns;
+  const PlaceFrame frame = FrameOf(picture);
+  if (frame.position_sigma_m > config_.most_position_sigma_m) {
+    answer.outcome = Outcome::kUncertain;
+    return answer;
+  }
+  const FeaturedView view{picture.bgr.size(), ExtractFeatures(picture.bgr, config_.features)};
+  const std::optional<Partner> partner = FindPartner(frame, view, answer);
+  if (partner) Compare(picture, *partner, answer);
+  Remember(picture, frame, view.features, answer);
+  return answer;
+}
+
+std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& frame,
+                                                             const FeaturedView& view,
+                                                             Answer& answer) {
+  const auto near = memory_.Nearest({frame.position, frame.heading_rad, config_.drive_id});
+  answer.outcome = near.empty() ? Outcome::kNothingEarlier : Outcome::kRefused;
+  const auto ranked = memory_.Rank(view.features, near);
+  for (std::size_t i = 0; i < std::min(config_.partners, ranked.size()); ++i) {
+    const auto record = memory_.Load(ranked[i].candidate.id);
+    if (!record) continue;
+    const cv::Size size(record->frame.camera.width, record->frame.camera.height);
+    const Registration registration =
+        RegisterByHomography({size, record->features}, view, config_.registration, config_.seed);
+    if (!registration.accepted()) {
+      if (answer.why.empty()) answer.why = registration.why;
+      continue;
+    }
+    const cv::Mat earlier = cv::imdecode(record->picture, cv::IMREAD_COLOR);
+    if (earlier.size() != size) continue;  // Its header was right, the rest is not.
+    return Partner{record->frame, WarpByHomography(earlier, registration.after_from_before)};
+  }
+  return std::nullopt;
+}
+
+void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner, Answer& answer) {
+  answer.outcome = Outcome::kCompared;
+  answer.earlier = partner.frame;
+  // The outermost pixels of the warped picture are mixed with what lies beyond it.
+  cv::Mat valid;
+  cv::erode(partner.warped.valid, valid, cv::Mat(), cv::Point(-1, -1), kMixedPixels,
+            cv::BORDER_CONSTANT, cv::Scalar(255));
+  answer.pair = {FillUnknown(partner.warped.picture, picture.bgr, valid), picture.bgr, valid};
+  const ChangeProbabilities probabilities = method_->Run(answer.pair);
+  answer.classes = ChangedClasses(probabilities, config_.regions.least_confidence);
+  answer.classes.setTo(kLeftOutPixel, answer.pair.valid == 0);
+  answer.regions =
+      FindChangeRegions(probabilities, answer.pair.before, answer.pair.after, config_.regions);
+
+  const LocalFrame& map = MapAt(picture.position);
+  ChangeFrame frame;
+  frame.stamp_ns = picture.stamp_ns;
+  frame.map_from_base.translation().head<2>() = map.ToEnu(picture.position);
+  frame.map_from_base.linear() =
+      Eigen::AngleAxisd(YawOf(picture.heading_rad), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  frame.base_from_optical = picture.base_from_optical;
+  frame.camera = picture.camera;
+  frame.valid = answer.pair.valid;
+  answer.newly_confirmed = tracker_.Add(frame, answer.regions).size();
+  for (const ChangeEvent& event : tracker_.Confirmed()) {
+    answer.objects.push_back(
+        {event, map.ToGeo(event.position_m), event.covariance_m2 + picture.covariance_m2});
+  }
+}
+
+void ChangeWatch::Remember(const WatchedPicture& picture, const PlaceFrame& frame,
+                           const ImageFeatures& features, Answer& answer) {
+  if (last_remembered_ &&
+      GeodesicDistanceM(*last_remembered_, frame.position) < config_.remember_spacing_m) {
+    return;
+  }
+  PlaceRecord record{frame, {}, features};
+  cv::imencode(".jpg", picture.bgr, record.picture,
+               {cv::IMWRITE_JPEG_QUALITY, config_.jpeg_quality});
+  try {
+    memory_.Add(record);
+    answer.remembered = true;
+    last_remembered_ = frame.position;
+  } catch (const StoreError& error) {
+    answer.store_error = error.what();
+  }
+}
+
+const LocalFrame& ChangeWatch::MapAt(const GeoPoint& position) {
+  if (!map_ || GeodesicDistanceM(map_->datum(), position) > kMapRadiusM) {
+    map_.emplace(position);
+    tracker_.Restart();
+  }
+  return *map_;
+}
+
+}  // namespace livemap

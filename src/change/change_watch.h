@@ -1,0 +1,118 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "change/change_events.h"
+#include "change/change_method.h"
+#include "change/place_memory.h"
+#include "change/registration.h"
+
+namespace livemap {
+
+/// A picture of the present drive and where it was taken.
+struct WatchedPicture {
+  std::int64_t stamp_ns = 0;
+  cv::Mat bgr;              ///< CV_8UC3, rectified, of the camera's size.
+  CameraIntrinsics camera;  ///< Of this picture.
+  Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
+  GeoPoint position;                                        ///< Of base_link.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< Of position, east-north axes.
+  double heading_rad = 0;  ///< Of base_link's x axis, clockwise from true north.
+};
+
+/// An object that changed, on the earth.
+struct PlacedChange {
+  ChangeEvent event;  ///< Its position_m is relative to a place that only the watch knows.
+  GeoPoint position;
+  /// East-north axes; with the position of the vehicle, which all its pictures share.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+};
+
+/// Remembers the street picture by picture, and says what changed since earlier drives (thesis
+/// 4.3): the nearest earlier pictures by position and heading, the best of them by matches,
+/// registration, the method, regions, objects on the ground. Not thread-safe.
+class ChangeWatch {
+ public:
+  struct Config {
+    std::string drive_id;  ///< Of the present drive: its own pictures are not compared with.
+    PlaceMemory::Config memory;
+    FeatureOptions features;
+    RegistrationOptions registration;
+    ChangeRegionOptions regions;
+    ChangeTracker::Config tracker;
+    double remember_spacing_m = 2;     ///< Between two pictures that are remembered.
+    double most_position_sigma_m = 5;  ///< Per axis; a picture placed worse is not used at all.
+    std::size_t partners = 2;          ///< Earlier pictures that are tried, the best one first.
+    int jpeg_quality = 90;             ///< Of remembered pictures, 1 to 100.
+    std::uint64_t seed = 1;            ///< Of registration.
+  };
+
+  enum class Outcome {
+    kUncertain,       ///< The position is too uncertain.
+    kNothingEarlier,  ///< No earlier drive passed here, looking that way.
+    kRefused,         ///< No earlier picture could be registered: `why`.
+    kCompared,
+  };
+
+  struct Answer {
+    Outcome outcome = Outcome::kNothingEarlier;
+    bool remembered = false;
+    std::string why;          ///< Of kRefused: of the best partner.
+    std::string store_error;  ///< The picture could not be remembered.
+    // What follows is of kCompared.
+    AlignedPair pair;
+    cv::Mat classes;  ///< CV_8UC1: ChangeClass, or kLeftOutPixel where nothing earlier is known.
+    std::vector<ChangeRegion> regions;
+    PlaceFrame earlier;                 ///< The partner.
+    std::size_t newly_confirmed = 0;    ///< By this picture.
+    std::vector<PlacedChange> objects;  ///< All that are confirmed, as they are known now.
+  };
+
+  /// Opens the memory; throws as PlaceMemory does, and Error for a drive id that is none. `now_ns`
+  /// names a corrupt index that is set aside.
+  ChangeWatch(const Config& config, std::unique_ptr<ChangeMethod> method, std::int64_t now_ns);
+
+  /// Compares and remembers one picture. A stamp that goes back begins the objects anew. Throws
+  /// Error for a picture that is not as WatchedPicture says, or when the method fails.
+  Answer Look(const WatchedPicture& picture);
+
+  const PlaceMemory& memory() const { return memory_; }
+
+ private:
+  struct Partner {
+    PlaceFrame frame;
+    WarpedPicture warped;
+  };
+
+  /// Where the camera was and looked.
+  PlaceFrame FrameOf(const WatchedPicture& picture) const;
+  std::optional<Partner> FindPartner(const PlaceFrame& frame, const FeaturedView& view,
+                                     Answer& answer);
+  void Compare(const WatchedPicture& picture, const Partner& partner, Answer& answer);
+  void Remember(const WatchedPicture& picture, const PlaceFrame& frame,
+                const ImageFeatures& features, Answer& answer);
+  /// The east-north frame in which objects are followed; a new one far from the old one.
+  const LocalFrame& MapAt(const GeoPoint& position);
+
+  Config config_;
+  std::unique_ptr<ChangeMethod> method_;
+  PlaceMemory memory_;
+  ChangeTracker tracker_;
+  std::optional<LocalFrame> map_;
+  std::optional<GeoPoint> last_remembered_;
+  std::int64_t last_stamp_ns_ = 0;
+};
+
+/// `bgr` with the changed classes in their colours, regions boxed with class and direction, and
+/// darker where nothing earlier is known. `classes` as in ChangeWatch::Answer.
+cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
+                    const std::vector<ChangeRegion>& regions);
+
+}  // namespace livemap
