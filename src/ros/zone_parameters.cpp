@@ -83,6 +83,7 @@ void ReadLife(ParameterReader& parameters, ZoneService::Config& zone) {
   HazardLife::Config& life = zone.life;
   parameters.Read("prior_presence", life.prior_presence, {0.01, 0.99});
   parameters.Read("active_above", life.active_above, {0.01, 0.99});
+  parameters.Read("active_alone_above", life.active_alone_above, {0.01, 0.99});
   parameters.Read("verify_below", life.verify_below, {0.01, 0.99});
   parameters.Read("sure_above", life.sure_above, {0.01, 0.99});
   parameters.Read("gone_below", life.gone_below, {0.001, 0.5});

@@ -236,6 +236,17 @@ void HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord&
   }
 }
 
+/// One newcomer's word alone brings a hazard just to active_above. Were that asked of a class that
+/// one vehicle confirms, a vehicle that was contradicted once would be believed nothing any more.
+double HazardLife::ActiveAbove(const LifeClass& entry) const {
+  return entry.confirmations > 1 ? config_.active_above : config_.active_alone_above;
+}
+
+double HazardLife::VerifyBelow(const LifeClass& entry) const {
+  return entry.confirmations > 1 ? config_.verify_below
+                                 : std::min(config_.verify_below, config_.active_alone_above);
+}
+
 std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
                                                  const LifeRecord& life) const {
   if (life.state == HazardState::kRejected) return DecideRejected(life);
@@ -246,10 +257,10 @@ std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
   switch (life.state) {
     case HazardState::kCandidate:
       if (supporters < entry.confirmations + opponents && !life.official) return std::nullopt;
-      if (presence < config_.active_above) return std::nullopt;
+      if (presence < ActiveAbove(entry)) return std::nullopt;
       return Transition(life, HazardState::kActive, "seen by " + VehiclesText(supporters));
     case HazardState::kActive:
-      if (presence >= config_.verify_below) return std::nullopt;
+      if (presence >= VerifyBelow(entry)) return std::nullopt;
       return Transition(
           life, HazardState::kVerifying,
           PresenceText(life.log_odds) +
@@ -316,7 +327,7 @@ std::int64_t HazardLife::NextChangeNs(const LifeClass& entry, const LifeRecord& 
     soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, config_.gone_below));
   }
   if (life.state == HazardState::kActive) {
-    soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, config_.verify_below));
+    soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, VerifyBelow(entry)));
   }
   // A little later than computed, so that rounding does not make it too early.
   const double margin_s = 1e-3 + 1e-9 * (entry.survival.scale_s + AgeS(life, life.at_ns));

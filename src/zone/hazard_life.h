@@ -90,8 +90,10 @@ class HazardLife {
  public:
   struct Config {
     double prior_presence = 0.2;        ///< Before the first vehicle speaks.
-    double active_above = 0.7;          ///< Drivers are told from this presence on.
-    double verify_below = 0.7;          ///< An active hazard is verified below this presence...
+    double active_above = 0.7;          ///< Drivers are told from this presence on,
+    double active_alone_above = 0.5;    ///< and of classes that one vehicle confirms from this one.
+    double verify_below = 0.7;          ///< An active hazard is verified below this presence (of
+                                        ///< classes that one vehicle confirms: active_alone_above)
     double sure_above = 0.85;           ///< ...and active again from this one on.
     double gone_below = 0.1;            ///< Off the map.
     double surest = 0.995;              ///< Presence never counts as more certain than this.
@@ -151,6 +153,8 @@ class HazardLife {
   bool HearUnasked(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
   double MaxVoice(const Evidence& evidence) const;
   void Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life, LifeStep& step) const;
+  double ActiveAbove(const LifeClass& entry) const;
+  double VerifyBelow(const LifeClass& entry) const;
   std::optional<LifeTransition> Decide(const LifeClass& entry, const LifeRecord& life) const;
   bool IsDeniedAway(const LifeRecord& life) const;
   std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;

@@ -20,6 +20,8 @@ HazardLife::HazardLife(const Config& config) : config_(config) {
   CheckRange("verify_below", config.verify_below, config.gone_below, config.surest);
   CheckRange("sure_above", config.sure_above, config.verify_below, config.surest);
   CheckRange("active_above", config.active_above, config.gone_below, config.surest);
+  CheckRange("active_alone_above", config.active_alone_above, config.gone_below,
+             config.active_above);
   CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
   CheckRange("suspect_above", config.suspect_above, config.hostile_share + 0.001, 1);
   CheckRange("most_against", config.most_against, 0, 10);

@@ -46,6 +46,23 @@ TEST_F(HazardVerdictsTest, WhoInventsAndIsDeniedAtOnceIsBelievedLess) {
   EXPECT_NEAR(Hostile(3), 0.05, 1e-9);
 }
 
+TEST_F(HazardVerdictsTest, OneContradictionIsForgivenWhereOneVehicleConfirmsAndTwoAreNot) {
+  cone_.confirmations = 1;
+  int contradictions = 0;
+  HazardState state = HazardState::kActive;
+  for (; state == HazardState::kActive && contradictions < 5; ++contradictions) {
+    Evidence word = Word(EvidenceKind::kSighting, 1, kStart);
+    word.hostile = Hostile(1);
+    rules_.Begin(cone_, word, kStart, life_);
+    state = life_.state;
+    Speak(EvidenceKind::kAnswerNo, 2, kStart + 60 * kSecond);
+    Speak(EvidenceKind::kAnswerNo, 3, kStart + 120 * kSecond);
+    ASSERT_EQ(life_.state, HazardState::kGone);
+  }
+  EXPECT_EQ(state, HazardState::kCandidate);
+  EXPECT_EQ(contradictions, 3);
+}
+
 TEST_F(HazardVerdictsTest, WhatMayHaveEndedMeanwhileIsHeldAgainstNobody) {
   cone_.survival = {5, 4 * 600.0};  // Ten minutes.
   Begin(1);
