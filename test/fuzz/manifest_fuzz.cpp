@@ -1,5 +1,5 @@
-// Whatever a model consists of: the text of a manifest, or the bytes of an ONNX file up to its
-// declared inputs. The first byte chooses.
+// Whatever a model consists of: the text of a manifest of a detector or of a network of change, or
+// the bytes of an ONNX file up to its declared inputs. The first byte chooses.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "change/change_manifest.h"
 #include "inference/model_manifest.h"
 #include "inference/onnx_inputs.h"
 
@@ -32,12 +33,27 @@ void CheckManifest(const ModelManifest& manifest) {
   }
 }
 
+void CheckChangeManifest(const ChangeManifest& manifest) {
+  Require(!manifest.name.empty() && !manifest.output.empty());
+  for (const auto& graph : {manifest.whole, manifest.encoder, manifest.head}) {
+    Require(!graph.file.empty() && graph.sha256.size() == 64);
+  }
+  Require(manifest.input.width > 0 && manifest.input.height > 0);
+  Require(manifest.levels >= 1 && manifest.levels <= 10);
+  for (const double threshold :
+       {manifest.changed, manifest.changed_at_fpr_001, manifest.changed_at_fpr_010}) {
+    Require(threshold > 0 && threshold < 1);
+  }
+}
+
 void FuzzOne(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return;
   const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
     if (data[0] == 'o') {
       ReadOnnxInputs(rest);
+    } else if (data[0] == 'c') {
+      CheckChangeManifest(ParseChangeManifest(std::string(rest), "fuzz", "models"));
     } else {
       CheckManifest(ParseModelManifest(std::string(rest), "fuzz", "models"));
     }
