@@ -277,7 +277,7 @@ class MqttBridgeTest(unittest.TestCase):
                 parameters = dict(self.common, user="car-3", **{"password_file": ""})
                 parameters.update(spoiled)
                 bridge = Bridge(self.vehicle_master, "vehicle", f"bad_{number}", **parameters)
-                self.assertNotEqual(bridge.process.wait(timeout=120), 0)
+                self.assertEqual(bridge.process.wait(timeout=120), 255, "refused, not crashed")
                 self.assertIn(sentence, bridge.output())
 
 

@@ -22,7 +22,7 @@ const DECISIONS = {
     done: 'Distrusted', bad: true,
     note: 'What it said is taken back from all hazards: those that nobody else saw go, those that '
       + 'too few others saw are unconfirmed again. For a while it counts as no witness: a week, '
-      + 'unless the zone is set otherwise.',
+      + 'unless the zone is set otherwise. None of this can be undone.',
     reason: 'Reason, kept in the history of each of these hazards' },
 };
 

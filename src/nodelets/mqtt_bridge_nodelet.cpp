@@ -43,12 +43,7 @@ class OnceAMinute {
 /// the MQTT topic) into each message, and sends messages with an addressee to that vehicle's topic.
 class MqttBridgeNodelet : public nodelet::Nodelet {
  public:
-  ~MqttBridgeNodelet() override {
-    // Nothing may call into the client while it goes, nor the client into the topics.
-    diagnostics_timer_.stop();
-    for (const auto& topic : topics_) topic->subscriber.shutdown();
-    client_.reset();
-  }
+  ~MqttBridgeNodelet() override { Close(); }
 
  private:
   struct Topic {
@@ -70,7 +65,23 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   };
 
   void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
+    InitializeOrExplain(getName(), [this] {
+      try {
+        Initialize();
+      } catch (...) {
+        // The loader takes the callback queues away before it destroys a nodelet that failed.
+        Close();
+        throw;
+      }
+    });
+  }
+
+  void Close() {
+    // Nothing may call into the client while it goes, nor the client into the topics.
+    diagnostics_timer_.stop();
+    for (const auto& topic : topics_) topic->subscriber.shutdown();
+    client_.reset();
+    topics_.clear();
   }
 
   void Initialize() {

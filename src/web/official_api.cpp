@@ -75,11 +75,16 @@ HttpAnswer OfficialApi::DecideHazard(const DecisionTarget& target, const std::st
                                      const std::string& reason) {
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
-  if (!zone_.Find(*uuid)) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
+  const auto hazard = zone_.Find(*uuid);
+  if (!hazard) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
   const bool decided = target.decision == Decision::kReject
                            ? zone_.Reject(*uuid, official, reason)
                            : zone_.Confirm(*uuid, official, reason);
-  if (!decided) return MakeErrorAnswer(409, "the hazard is no longer on the map");
+  if (!decided) {
+    return MakeErrorAnswer(409, hazard->state == HazardState::kRejected
+                                    ? "the hazard is rejected already"
+                                    : "the hazard is gone; seen again it is a new one");
+  }
   return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), "application/geo+json");
 }
 

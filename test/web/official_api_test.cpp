@@ -211,10 +211,14 @@ TEST_F(OfficialApiTest, KnowsWhichHazardsCanBeDecided) {
   EXPECT_EQ(Post(unknown, "reject", kReason, tokens_.token()).status, 404);
   EXPECT_EQ(Post("1%27or%271", "confirm", "", tokens_.token()).status, 400);
   EXPECT_EQ(Post(id, "reject", kReason, tokens_.token()).status, 200);
-  EXPECT_EQ(Post(id, "reject", kReason, tokens_.token()).status, 409);
+  const HttpResult again = Post(id, "reject", kReason, tokens_.token());
+  EXPECT_EQ(again.status, 409);
+  EXPECT_THAT(again.body, ::testing::HasSubstr("rejected already"));
   EXPECT_EQ(Post(id, "confirm", "", tokens_.token()).status, 200) << "a rejection can be revoked";
   ASSERT_TRUE(fixture_.zone->Remove(*Uuid::Parse(id), "test"));
-  EXPECT_EQ(Post(id, "confirm", "", tokens_.token()).status, 409);
+  const HttpResult gone = Post(id, "confirm", "", tokens_.token());
+  EXPECT_EQ(gone.status, 409);
+  EXPECT_THAT(gone.body, ::testing::HasSubstr("gone"));
   EXPECT_EQ(Get(port(), "/api/v1/hazards/" + unknown + "/events").status, 404);
   EXPECT_EQ(Get(port(), "/api/v1/hazards/x/events").status, 400);
   EXPECT_EQ(Get(port(), "/api/v1/hazards/" + id + "/events?limit=0").status, 400);
