@@ -142,6 +142,7 @@ cv::Matx33d StepHomography(const cv::Matx33d& h, const std::vector<cv::Point2d>&
 /// The inliers' own scale: what half of them keep to, as a standard deviation.
 double ScaleOf(const std::vector<double>& errors, const std::vector<std::size_t>& inliers) {
   std::vector<double> kept;
+  kept.reserve(inliers.size());
   for (const std::size_t i : inliers) kept.push_back(errors[i]);
   const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 2);
   std::nth_element(kept.begin(), middle, kept.end());
