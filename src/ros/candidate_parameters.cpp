@@ -13,17 +13,7 @@ void ReadSender(ParameterReader& parameters, CandidateSender::Config& sender) {
   parameters.Read("max_image_bytes", sender.max_image_bytes, {1000, 1e6});
   parameters.Read("min_image_bytes", sender.min_image_bytes, {1, 1e6});
   parameters.Read("max_waiting_frames", sender.max_waiting_frames, {1, 1000});
-  BasePoseSource::Config& pose = sender.pose;
-  std::string source = "gps";
-  parameters.ReadChoice("position_source", source, {"gps", "fused"});
-  pose.use_fused = source == "fused";
-  parameters.Read("fused_wait_s", pose.fused_wait_s, {0, 60});
-  parameters.Read("max_fused_gap_s", pose.poses.max_gap_s, {0.01, 10});
-  parameters.Read("bracket_wait_s", pose.bracket_wait_s, {0, 60});
-  parameters.Read("max_wait_s", pose.max_wait_s, {0, 600});
-  parameters.Read("antenna_x_m", pose.antenna_x_m, {-50, 50});
-  parameters.Read("antenna_y_m", pose.antenna_y_m, {-50, 50});
-  ReadFixTrack(parameters, pose.fixes);
+  ReadBasePoseSource(parameters, sender.pose);
 }
 
 }  // namespace

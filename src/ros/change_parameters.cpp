@@ -54,19 +54,6 @@ void ReadWatch(ParameterReader& parameters, ChangeWatch::Config& watch) {
   parameters.Read("height_sigma_m", tracker.ground.height_sigma_m, {0, 2});
 }
 
-void ReadPose(ParameterReader& parameters, BasePoseSource::Config& pose) {
-  std::string source = "gps";
-  parameters.ReadChoice("position_source", source, {"gps", "fused"});
-  pose.use_fused = source == "fused";
-  parameters.Read("fused_wait_s", pose.fused_wait_s, {0, 60});
-  parameters.Read("max_fused_gap_s", pose.poses.max_gap_s, {0.01, 10});
-  parameters.Read("bracket_wait_s", pose.bracket_wait_s, {0, 60});
-  parameters.Read("max_wait_s", pose.max_wait_s, {0, 600});
-  parameters.Read("antenna_x_m", pose.antenna_x_m, {-50, 50});
-  parameters.Read("antenna_y_m", pose.antenna_y_m, {-50, 50});
-  ReadFixTrack(parameters, pose.fixes);
-}
-
 }  // namespace
 
 ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std::int64_t now_ns) {
@@ -86,7 +73,7 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
   config.watch.drive_id = ReadDriveId(parameters, now_ns);
   ReadMemory(parameters, config.watch.memory);
   ReadWatch(parameters, config.watch);
-  ReadPose(parameters, config.pose);
+  ReadBasePoseSource(parameters, config.pose);
   parameters.Read("base_frame", config.base_frame);
   parameters.Read("map_frame", config.map_frame);
   parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});

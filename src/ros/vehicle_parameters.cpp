@@ -41,4 +41,17 @@ void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track) {
   parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
 }
 
+void ReadBasePoseSource(ParameterReader& parameters, BasePoseSource::Config& pose) {
+  std::string source = "gps";
+  parameters.ReadChoice("position_source", source, {"gps", "fused"});
+  pose.use_fused = source == "fused";
+  parameters.Read("fused_wait_s", pose.fused_wait_s, {0, 60});
+  parameters.Read("max_fused_gap_s", pose.poses.max_gap_s, {0.01, 10});
+  parameters.Read("bracket_wait_s", pose.bracket_wait_s, {0, 60});
+  parameters.Read("max_wait_s", pose.max_wait_s, {0, 600});
+  parameters.Read("antenna_x_m", pose.antenna_x_m, {-50, 50});
+  parameters.Read("antenna_y_m", pose.antenna_y_m, {-50, 50});
+  ReadFixTrack(parameters, pose.fixes);
+}
+
 }  // namespace livemap

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "hazard/base_pose_source.h"
 #include "hazard/fix_track.h"
 #include "ros/parameters.h"
 
@@ -15,5 +16,8 @@ std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns);
 
 /// How position and course are made of the fixes.
 void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track);
+
+/// Whose word counts for where the vehicle is: that, the fused poses, and how long is waited.
+void ReadBasePoseSource(ParameterReader& parameters, BasePoseSource::Config& pose);
 
 }  // namespace livemap
