@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "ros/hazard_conversions.h"
+#include "ros/map_change_conversions.h"
 #include "ros/poll_conversions.h"
 
 namespace livemap {
@@ -368,6 +369,47 @@ TEST(HazardConversions, DetectionsBecomeSightingsInTheirOrder) {
   EXPECT_EQ(frame.sightings[0].confidence, 0.75F);
   EXPECT_EQ(frame.sightings[0].box.x_max, 5);
   EXPECT_EQ(frame.sightings[1].class_name, "deer");
+}
+
+TEST(MapChangeConversions, ReportSurvivesTheWayThroughItsMessage) {
+  MapChangeReport report;
+  report.uuid = Id(1);
+  report.vehicle_id = "car-1";
+  report.drive_id = "tuesday";
+  report.stamp_ns = kStampNs;
+  report.earlier_stamp_ns = kStampNs - 1'000'000'000;
+  report.class_name = "sign";
+  report.vanished = true;
+  report.confidence = 0.75F;
+  report.seen = 5;
+  report.missed = 1;
+  report.position = {-12.5, 170.25};
+  report.covariance_m2 << 1.5, 0.25, 0.25, 2.5;
+  const MapChangeReport back = FromMessage(ToMessage(report));
+  EXPECT_EQ(back.uuid, report.uuid);
+  EXPECT_EQ(back.vehicle_id, report.vehicle_id);
+  EXPECT_EQ(back.drive_id, report.drive_id);
+  EXPECT_EQ(back.stamp_ns, report.stamp_ns);
+  EXPECT_EQ(back.earlier_stamp_ns, report.earlier_stamp_ns);
+  EXPECT_EQ(back.class_name, report.class_name);
+  EXPECT_TRUE(back.vanished);
+  EXPECT_EQ(back.confidence, report.confidence);
+  EXPECT_EQ(back.seen, report.seen);
+  EXPECT_EQ(back.missed, report.missed);
+  EXPECT_EQ(back.position.latitude_deg, report.position.latitude_deg);
+  EXPECT_EQ(back.position.longitude_deg, report.position.longitude_deg);
+  EXPECT_EQ(back.covariance_m2, report.covariance_m2);
+}
+
+TEST(MapChangeConversions, UnknownVersionsAndDirectionsAreRefused) {
+  MapChange message = ToMessage(MapChangeReport());
+  EXPECT_FALSE(FromMessage(message).vanished);
+  message.direction = 0;
+  EXPECT_THAT([&] { FromMessage(message); },
+              ThrowsMessage<Error>(HasSubstr("direction 0, accepted is 1")));
+  message.direction = MapChange::APPEARED;
+  message.schema_version = 2;
+  EXPECT_THAT([&] { FromMessage(message); }, ThrowsMessage<Error>(HasSubstr("schema version 2")));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <sqlite3.h>
 
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 namespace livemap {
@@ -14,6 +16,25 @@ void Check(int code, sqlite3* database, const std::string& doing) {
 }
 
 }  // namespace
+
+bool TellsCorruption(const StoreError& error) {
+  const std::string sentence = error.what();
+  return sentence.find("malformed") != std::string::npos ||
+         sentence.find("not a database") != std::string::npos;
+}
+
+std::string SetAsideDatabase(const std::string& path, std::int64_t now_ns) {
+  const std::string target = path + ".corrupt-" + std::to_string(now_ns);
+  for (const char* companion : {"", "-wal", "-shm"}) {
+    std::error_code error;
+    std::filesystem::rename(path + companion, target + companion, error);
+    if (error && error != std::errc::no_such_file_or_directory) {
+      throw StoreError("store '" + path + "' is corrupt and cannot be renamed to '" + target +
+                       "': " + error.message());
+    }
+  }
+  return target;
+}
 
 SqliteStatement::SqliteStatement(sqlite3* database, const std::string& sql) {
   Check(
@@ -109,6 +130,13 @@ void SqliteDatabase::Execute(const std::string& sql) {
 
 SqliteStatement SqliteDatabase::Prepare(const std::string& sql) {
   return SqliteStatement(database_, sql);
+}
+
+void SqliteDatabase::CheckPages() {
+  SqliteStatement check = Prepare("PRAGMA quick_check(1)");
+  if (!check.Step() || check.Text(0) != "ok") {
+    throw StoreError("store '" + path_ + "' is malformed: " + check.Text(0));
+  }
 }
 
 void SqliteDatabase::Transaction(const std::function<void()>& body) {

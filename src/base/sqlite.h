@@ -20,6 +20,12 @@ class StoreError : public Error {
   using Error::Error;
 };
 
+/// Whether these are SQLite's words for a damaged file.
+bool TellsCorruption(const StoreError& error);
+/// Renames a corrupt database and the files beside it to `<path>.corrupt-<now_ns>`, and returns
+/// that name. Throws StoreError.
+std::string SetAsideDatabase(const std::string& path, std::int64_t now_ns);
+
 /// One prepared statement. Bind indexes start at 1 and columns at 0, as in SQLite. Not thread-safe.
 class SqliteStatement {
  public:
@@ -57,6 +63,8 @@ class SqliteDatabase {
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
+  /// Reads all pages; throws StoreError, which TellsCorruption, when one is damaged.
+  void CheckPages();
   void Execute(const std::string& sql);
   SqliteStatement Prepare(const std::string& sql);
   /// Runs `body` as one transaction; rolls back and rethrows when it throws.

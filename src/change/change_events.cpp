@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "base/error.h"
 
@@ -127,13 +128,7 @@ bool ChangeTracker::IsConfirmed(const Track& track) const {
          event.seen >= config_.least_share * looked;
 }
 
-void ChangeTracker::Forget(const ChangeFrame& frame) {
-  const Eigen::Vector2d here_m = PlanarPlace(frame.map_from_base);
-  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
-                               [&](const Track& track) {
-                                 return (track.event.position_m - here_m).norm() > config_.forget_m;
-                               }),
-                tracks_.end());
+void ChangeTracker::LimitTracks() {
   while (tracks_.size() > config_.most_tracks) {
     tracks_.erase(std::min_element(tracks_.begin(), tracks_.end(), [](auto& a, auto& b) {
       return std::tie(a.event.seen, a.event.last_ns) < std::tie(b.event.seen, b.event.last_ns);
@@ -181,13 +176,36 @@ std::vector<ChangeEvent> ChangeTracker::Add(const ChangeFrame& frame,
     track.confirmed = true;
     confirmed.push_back(event);
   }
-  Forget(frame);
+  LimitTracks();
   return confirmed;
 }
 
-void ChangeTracker::Restart() {
+std::vector<ChangeEvent> ChangeTracker::LeaveBehind(const Eigen::Isometry3d& map_from_base) {
+  const Eigen::Matrix2d base_from_map = PlanarTurn(map_from_base).transpose();
+  std::vector<ChangeEvent> passed;
+  std::vector<Track> near;
+  for (Track& track : tracks_) {
+    const Eigen::Vector2d ahead_m =
+        base_from_map * (track.event.position_m - PlanarPlace(map_from_base));
+    const bool far = ahead_m.norm() > config_.forget_m;
+    if (track.confirmed && !track.told_passed && (far || ahead_m.x() < -config_.passed_m)) {
+      track.told_passed = true;
+      passed.push_back(track.event);
+    }
+    if (!far) near.push_back(std::move(track));
+  }
+  tracks_ = std::move(near);
+  return passed;
+}
+
+std::vector<ChangeEvent> ChangeTracker::Restart() {
+  std::vector<ChangeEvent> untold;
+  for (const Track& track : tracks_) {
+    if (track.confirmed && !track.told_passed) untold.push_back(track.event);
+  }
   tracks_.clear();
   last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
+  return untold;
 }
 
 std::vector<ChangeEvent> ChangeTracker::Confirmed() const {

@@ -81,7 +81,8 @@ class ChangeTracker {
     double process_sigma_m = 0.5;  ///< Added to each sight's position: pose and foot are not exact.
     double most_range_m = 40;      ///< Further away nothing is placed or missed.
     double least_direction_share = 0.6;  ///< Of the sights that know a direction.
-    double forget_m = 60;                ///< Behind the vehicle by this, an object is closed.
+    double passed_m = 5;                 ///< Behind the vehicle by this, an object is passed,
+    double forget_m = 60;                ///< and this far from it, it is forgotten.
     std::size_t most_tracks = 256;       ///< The least seen, longest unseen goes first.
     GroundProjectionNoise ground;
   };
@@ -91,9 +92,13 @@ class ChangeTracker {
   /// Takes one picture's regions in; returns the objects that it confirmed. Stamps must rise: an
   /// older picture is ignored.
   std::vector<ChangeEvent> Add(const ChangeFrame& frame, const std::vector<ChangeRegion>& regions);
-  /// Forgets all objects; the next picture may have any stamp, and ids go on rising.
-  void Restart();
-  /// All confirmed objects with their present figures, by id, until they are closed.
+  /// The confirmed objects that the vehicle has passed, now that it is here: each once, with its
+  /// last figures. Those it is far from are forgotten.
+  std::vector<ChangeEvent> LeaveBehind(const Eigen::Isometry3d& map_from_base);
+  /// Forgets all objects; the next picture may have any stamp, and ids go on rising. Returns the
+  /// confirmed ones that LeaveBehind has not told.
+  std::vector<ChangeEvent> Restart();
+  /// All confirmed objects with their present figures, by id, until they are forgotten.
   std::vector<ChangeEvent> Confirmed() const;
 
   std::size_t tracks() const { return tracks_.size(); }
@@ -108,6 +113,7 @@ class ChangeTracker {
     Eigen::Vector2d first_seen_from_m = Eigen::Vector2d::Zero();
     double travel_m = 0;
     bool confirmed = false;
+    bool told_passed = false;
   };
   struct Sight {
     Eigen::Vector2d position_m;
@@ -120,7 +126,7 @@ class ChangeTracker {
   void Update(Track& track, const Sight& sight, const ChangeFrame& frame) const;
   bool ShouldShow(const Track& track, const ChangeFrame& frame) const;
   bool IsConfirmed(const Track& track) const;
-  void Forget(const ChangeFrame& frame);
+  void LimitTracks();
 
   Config config_;
   std::vector<Track> tracks_;

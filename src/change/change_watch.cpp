@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "base/error.h"
 
@@ -71,16 +72,20 @@ PlaceFrame ChangeWatch::FrameOf(const WatchedPicture& picture) const {
 ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
   CheckPicture(picture);
   Answer answer;
-  if (picture.stamp_ns < last_stamp_ns_) tracker_.Restart();
+  if (picture.stamp_ns < last_stamp_ns_) Restart();
   last_stamp_ns_ = picture.stamp_ns;
   const PlaceFrame frame = FrameOf(picture);
   if (frame.position_sigma_m > config_.most_position_sigma_m) {
     answer.outcome = Outcome::kUncertain;
     return answer;
   }
+  const Eigen::Isometry3d map_from_base = MapFromBase(picture);
+  covariance_m2_ = picture.covariance_m2;
   const FeaturedView view{picture.bgr.size(), ExtractFeatures(picture.bgr, config_.features)};
   const std::optional<Partner> partner = FindPartner(frame, view, answer);
-  if (partner) Compare(picture, *partner, answer);
+  if (partner) Compare(picture, *partner, map_from_base, answer);
+  Place(tracker_.LeaveBehind(map_from_base), passed_);
+  answer.passed.swap(passed_);
   Remember(picture, frame, view.features, answer);
   return answer;
 }
@@ -108,7 +113,8 @@ std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& f
   return std::nullopt;
 }
 
-void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner, Answer& answer) {
+void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
+                          const Eigen::Isometry3d& map_from_base, Answer& answer) {
   answer.outcome = Outcome::kCompared;
   answer.earlier = partner.frame;
   // The outermost pixels of the warped picture are mixed with what lies beyond it.
@@ -122,20 +128,31 @@ void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
   answer.regions =
       FindChangeRegions(probabilities, answer.pair.before, answer.pair.after, config_.regions);
 
-  const LocalFrame& map = MapAt(picture.position);
   ChangeFrame frame;
   frame.stamp_ns = picture.stamp_ns;
-  frame.map_from_base.translation().head<2>() = map.ToEnu(picture.position);
-  frame.map_from_base.linear() =
-      Eigen::AngleAxisd(YawOf(picture.heading_rad), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  frame.map_from_base = map_from_base;
   frame.base_from_optical = picture.base_from_optical;
   frame.camera = picture.camera;
   frame.valid = answer.pair.valid;
   answer.newly_confirmed = tracker_.Add(frame, answer.regions).size();
-  for (const ChangeEvent& event : tracker_.Confirmed()) {
-    answer.objects.push_back(
-        {event, map.ToGeo(event.position_m), event.covariance_m2 + picture.covariance_m2});
+  Place(tracker_.Confirmed(), answer.objects);
+}
+
+void ChangeWatch::Place(const std::vector<ChangeEvent>& events,
+                        std::vector<PlacedChange>& placed) const {
+  for (const ChangeEvent& event : events) {
+    placed.push_back({event, map_->ToGeo(event.position_m), event.covariance_m2 + covariance_m2_});
   }
+}
+
+void ChangeWatch::Restart() {
+  const std::vector<ChangeEvent> untold = tracker_.Restart();
+  if (map_) Place(untold, passed_);
+}
+
+std::vector<PlacedChange> ChangeWatch::EndDrive() {
+  Restart();
+  return std::exchange(passed_, {});
 }
 
 void ChangeWatch::Remember(const WatchedPicture& picture, const PlaceFrame& frame,
@@ -156,12 +173,16 @@ void ChangeWatch::Remember(const WatchedPicture& picture, const PlaceFrame& fram
   }
 }
 
-const LocalFrame& ChangeWatch::MapAt(const GeoPoint& position) {
-  if (!map_ || GeodesicDistanceM(map_->datum(), position) > kMapRadiusM) {
-    map_.emplace(position);
-    tracker_.Restart();
+Eigen::Isometry3d ChangeWatch::MapFromBase(const WatchedPicture& picture) {
+  if (!map_ || GeodesicDistanceM(map_->datum(), picture.position) > kMapRadiusM) {
+    Restart();
+    map_.emplace(picture.position);
   }
-  return *map_;
+  Eigen::Isometry3d map_from_base = Eigen::Isometry3d::Identity();
+  map_from_base.translation().head<2>() = map_->ToEnu(picture.position);
+  map_from_base.linear() =
+      Eigen::AngleAxisd(YawOf(picture.heading_rad), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return map_from_base;
 }
 
 }  // namespace livemap

@@ -73,6 +73,8 @@ class ChangeWatch {
     PlaceFrame earlier;                 ///< The partner.
     std::size_t newly_confirmed = 0;    ///< By this picture.
     std::vector<PlacedChange> objects;  ///< All that are confirmed, as they are known now.
+    // Of every outcome but kUncertain.
+    std::vector<PlacedChange> passed;  ///< Confirmed and left behind by now: each once.
   };
 
   /// Opens the memory; throws as PlaceMemory does, and Error for a drive id that is none. `now_ns`
@@ -82,6 +84,9 @@ class ChangeWatch {
   /// Compares and remembers one picture. A stamp that goes back begins the objects anew. Throws
   /// Error for a picture that is not as WatchedPicture says, or when the method fails.
   Answer Look(const WatchedPicture& picture);
+
+  /// The drive is over: all confirmed objects that no answer told as passed.
+  std::vector<PlacedChange> EndDrive();
 
   const PlaceMemory& memory() const { return memory_; }
 
@@ -95,17 +100,23 @@ class ChangeWatch {
   PlaceFrame FrameOf(const WatchedPicture& picture) const;
   std::optional<Partner> FindPartner(const PlaceFrame& frame, const FeaturedView& view,
                                      Answer& answer);
-  void Compare(const WatchedPicture& picture, const Partner& partner, Answer& answer);
+  void Compare(const WatchedPicture& picture, const Partner& partner,
+               const Eigen::Isometry3d& map_from_base, Answer& answer);
   void Remember(const WatchedPicture& picture, const PlaceFrame& frame,
                 const ImageFeatures& features, Answer& answer);
-  /// The east-north frame in which objects are followed; a new one far from the old one.
-  const LocalFrame& MapAt(const GeoPoint& position);
+  /// Where base_link is in the map, which begins anew far from the old one.
+  Eigen::Isometry3d MapFromBase(const WatchedPicture& picture);
+  /// Begins the objects anew; those that nobody was told of are told with the next answer.
+  void Restart();
+  void Place(const std::vector<ChangeEvent>& events, std::vector<PlacedChange>& placed) const;
 
   Config config_;
   std::unique_ptr<ChangeMethod> method_;
   PlaceMemory memory_;
   ChangeTracker tracker_;
-  std::optional<LocalFrame> map_;
+  std::optional<LocalFrame> map_;  ///< East and north, in which objects are followed.
+  Eigen::Matrix2d covariance_m2_ = Eigen::Matrix2d::Zero();  ///< Of the vehicle, as last known.
+  std::vector<PlacedChange> passed_;                         ///< To be told with the next answer.
   std::optional<GeoPoint> last_remembered_;
   std::int64_t last_stamp_ns_ = 0;
 };

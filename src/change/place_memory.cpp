@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "base/error.h"
@@ -33,12 +32,6 @@ std::vector<std::string> PlaceMigrations() {
       "INSERT INTO state VALUES(0);"};
 }
 
-bool TellsCorruptIndex(const StoreError& error) {
-  const std::string sentence = error.what();
-  return sentence.find("malformed") != std::string::npos ||
-         sentence.find("not a database") != std::string::npos;
-}
-
 void CheckWithin(double value, double least, double most, const char* name) {
   if (value >= least && value <= most) return;
   throw Error("place memory's " + std::string(name) + " is " + std::to_string(value) +
@@ -67,9 +60,9 @@ PlaceMemory::PlaceMemory(const Config& config, std::int64_t now_ns)
   try {
     Open();
   } catch (const StoreError& error) {
-    if (!TellsCorruptIndex(error)) throw;
+    if (!TellsCorruption(error)) throw;
     database_.reset();
-    SetAsideIndex(now_ns);
+    recovery_.set_aside = SetAsideDatabase(IndexPath(), now_ns);
     Open();
   }
   SqliteStatement state = database_->Prepare("SELECT complete FROM state");
@@ -84,26 +77,9 @@ PlaceMemory::PlaceMemory(const Config& config, std::int64_t now_ns)
 
 void PlaceMemory::Open() {
   database_ = std::make_unique<SqliteDatabase>(IndexPath(), /*durable=*/true);
-  SqliteStatement check = database_->Prepare("PRAGMA quick_check(1)");
-  if (!check.Step() || check.Text(0) != "ok") {
-    throw StoreError("place memory '" + IndexPath() + "' is malformed: " + check.Text(0));
-  }
-  check.Reset();
+  database_->CheckPages();
   database_->Migrate(PlaceMigrations());
   LoadIndex();
-}
-
-void PlaceMemory::SetAsideIndex(std::int64_t now_ns) {
-  const std::string target = IndexPath() + ".corrupt-" + std::to_string(now_ns);
-  for (const char* companion : {"", "-wal", "-shm"}) {
-    std::error_code error;
-    std::filesystem::rename(IndexPath() + companion, target + companion, error);
-    if (error && error != std::errc::no_such_file_or_directory) {
-      throw StoreError("place memory '" + IndexPath() + "' is corrupt and cannot be renamed to '" +
-                       target + "': " + error.message());
-    }
-  }
-  recovery_.set_aside = target;
 }
 
 void PlaceMemory::Rebuild() {

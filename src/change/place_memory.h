@@ -98,7 +98,6 @@ class PlaceMemory {
 
   std::string IndexPath() const { return config_.directory + "/places.sqlite3"; }
   void Open();
-  void SetAsideIndex(std::int64_t now_ns);
   void Rebuild();
   void LoadIndex();
   void Reconcile();

@@ -1,7 +1,6 @@
 #include "hazard/local_hazard_map.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <utility>
 
 #include "hazard/report_table.h"
@@ -32,13 +31,6 @@ const std::vector<std::string>& Migrations() {
   return migrations;
 }
 
-/// SQLite's words for a damaged file, which StoreError carries.
-bool TellsCorruption(const StoreError& error) {
-  const std::string sentence = error.what();
-  return sentence.find("malformed") != std::string::npos ||
-         sentence.find("not a database") != std::string::npos;
-}
-
 }  // namespace
 
 LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& catalogue,
@@ -49,7 +41,7 @@ LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& cata
   } catch (const StoreError& error) {
     if (!TellsCorruption(error)) throw;
     database_.reset();
-    SetAside(now_ns);
+    set_aside_ = SetAsideDatabase(config_.path, now_ns);
     Open();
     RecoverFromSetAside();
   }
@@ -57,27 +49,10 @@ LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& cata
 
 void LocalHazardMap::Open() {
   database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
-  SqliteStatement check = database_->Prepare("PRAGMA quick_check(1)");
-  if (!check.Step() || check.Text(0) != "ok") {
-    throw StoreError("store '" + config_.path + "' is malformed: " + check.Text(0));
-  }
-  check.Reset();
+  database_->CheckPages();
   database_->Migrate(Migrations());
   broken_rows_ = MendRows(*database_);
   LoadFilter();
-}
-
-void LocalHazardMap::SetAside(std::int64_t now_ns) {
-  const std::string target = config_.path + ".corrupt-" + std::to_string(now_ns);
-  for (const char* companion : {"", "-wal", "-shm"}) {
-    std::error_code error;
-    std::filesystem::rename(config_.path + companion, target + companion, error);
-    if (error && error != std::errc::no_such_file_or_directory) {
-      throw StoreError("store '" + config_.path + "' is corrupt and cannot be renamed to '" +
-                       target + "': " + error.message());
-    }
-  }
-  set_aside_ = target;
 }
 
 void LocalHazardMap::RecoverFromSetAside() {

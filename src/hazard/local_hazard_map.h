@@ -123,7 +123,6 @@ class LocalHazardMap {
   };
 
   void Open();
-  void SetAside(std::int64_t now_ns);
   void RecoverFromSetAside();
   void LoadFilter();
   void CountPending();

@@ -1,5 +1,6 @@
 #include "change/change_events.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
@@ -144,7 +145,7 @@ TEST(ChangeTracker, ForgetsWhatLiesFarBehindAndStaysSmall) {
   tracker.Add(frame, {SeenAt(frame, 12, 3), SeenAt(frame, 12, -3), SeenAt(frame, 20, 3),
                       SeenAt(frame, 20, -3), SeenAt(frame, 28, 3)});
   EXPECT_EQ(tracker.tracks(), 3U);
-  tracker.Add(FrameAt(200, 2), {});
+  tracker.LeaveBehind(FrameAt(200, 2).map_from_base);
   EXPECT_EQ(tracker.tracks(), 0U);
 }
 
@@ -238,6 +239,37 @@ TEST(ChangeTracker, BeganAnewForgetsObjectsButNotTheirIds) {
   tracker.Restart();
   EXPECT_TRUE(tracker.Confirmed().empty());
   EXPECT_GT(drive(), first);
+}
+
+TEST(ChangeTracker, TellsOfAConfirmedObjectOnceWhenTheVehicleHasPassedIt) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  std::vector<double> told_at_m;
+  for (int i = 0; i < 50; ++i) {
+    const double along_m = 2.0 * i;
+    const ChangeFrame frame = FrameAt(along_m, i + 1);
+    std::vector<ChangeRegion> regions;
+    if (along_m < 18) regions.push_back(SeenAt(frame, 22, -2));
+    if (along_m == 4) regions.push_back(SeenAt(frame, 34, 3));  // Once: never confirmed.
+    tracker.Add(frame, regions);
+    for (const ChangeEvent& event : tracker.LeaveBehind(frame.map_from_base)) {
+      told_at_m.push_back(along_m);
+      EXPECT_EQ(event.seen, 9);
+      EXPECT_NEAR(event.position_m.x(), 22, 0.5);
+    }
+  }
+  EXPECT_THAT(told_at_m, ::testing::ElementsAre(28)) << "the first place 5 m beyond 22 m";
+  EXPECT_EQ(tracker.tracks(), 0U) << "60 m behind it is forgotten";
+}
+
+TEST(ChangeTracker, BeganAnewTellsOfWhatWasConfirmedAndNotYetPassed) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  for (int i = 0; i < 4; ++i) {
+    const ChangeFrame frame = FrameAt(2.0 * i, i + 1);
+    tracker.Add(frame, {SeenAt(frame, 22, -2)});
+    EXPECT_TRUE(tracker.LeaveBehind(frame.map_from_base).empty());
+  }
+  EXPECT_EQ(tracker.Restart().size(), 1U);
+  EXPECT_TRUE(tracker.Restart().empty());
 }
 
 }  // namespace

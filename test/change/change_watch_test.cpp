@@ -150,6 +150,7 @@ TEST_F(ChangeWatchTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
     const auto watch = Watch("tuesday");
     Drive drive(After(), 8.4, kFirstNs + kDayNs);
     std::vector<PlacedChange> objects;
+    std::vector<PlacedChange> passed;
     for (std::size_t frame = 0; frame < kFrames; frame += 3) {
       const auto answer = watch->Look(drive.Picture(frame));
       ASSERT_EQ(answer.outcome, ChangeWatch::Outcome::kCompared) << answer.why;
@@ -157,7 +158,11 @@ TEST_F(ChangeWatchTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
       EXPECT_EQ(answer.classes.size(), answer.pair.after.size());
       EXPECT_TRUE(frame >= 6 || answer.objects.empty()) << "said from " << frame / 3 + 1;
       objects = answer.objects;
+      passed.insert(passed.end(), answer.passed.begin(), answer.passed.end());
     }
+    const auto at_the_end = watch->EndDrive();
+    passed.insert(passed.end(), at_the_end.begin(), at_the_end.end());
+    EXPECT_EQ(passed.size(), objects.size()) << "each is told once, at the latest at the end";
     // DAISY takes some parallax for change, too.
     EXPECT_LE(objects.size(), 3U);
     const auto told = [&](double along_m, double left_m) {
