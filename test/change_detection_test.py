@@ -22,7 +22,7 @@ import yaml
 from sensor_msgs.msg import CameraInfo, Image, NavSatFix
 from tf2_msgs.msg import TFMessage
 
-from livemap.msg import ChangedObject, ChangedObjects
+from livemap.msg import ChangedObject, ChangedObjects, MapChange, ReportReceipt
 from node_testing import NodeletUnderTest, eventually, parameters_of
 
 SECONDS, RATE_HZ = 9, 5
@@ -72,9 +72,11 @@ class Vehicle(NodeletUnderTest):
         self.image = self.advertise("camera_rect/image", Image)
         self.info = self.advertise("camera_rect/camera_info", CameraInfo)
         self.fix = self.advertise("fix", NavSatFix)
+        self.receipt = self.advertise("change/receipt", ReportReceipt)
         self.mounting = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self.ends.append(self.mounting)
-        for topic, kind in (("change/report", ChangedObjects), ("change/mask", Image), ("change/overlay", Image)):
+        for topic, kind in (("change/report", ChangedObjects), ("change/mask", Image), ("change/overlay", Image),
+                            ("change/map_change", MapChange)):
             self.subscribe(topic, kind)
         self.process = self.start_nodelet("change_detection", "standalone", "livemap/ChangeDetectionNodelet")
 
@@ -124,7 +126,8 @@ class Vehicle(NodeletUnderTest):
         return image
 
     def reports(self):
-        return self.received("change/report")
+        """Of the pictures that were compared with earlier ones."""
+        return [report for report in self.received("change/report") if report.outcome == ChangedObjects.COMPARED]
 
     def objects(self):
         """All that were ever told, as they were told last: (along, left, message)."""
@@ -147,6 +150,7 @@ class ChangeDetectionTest(unittest.TestCase):
             cls.first_images = vehicle.drive(cls.first)
             cls.first_diagnostics = vehicle.diagnostics()
             cls.first_reports = vehicle.reports()
+            cls.first_outcomes = vehicle.received("change/report")
             # As a vehicle ends that nobody asks: what was told to be remembered is.
             os.killpg(vehicle.process.pid, 9)
             vehicle.process.wait()
@@ -176,9 +180,12 @@ class ChangeDetectionTest(unittest.TestCase):
         self.assertGreater(int(values["places"]), 30, values)
         self.assertEqual(values["places"], values["pictures_remembered"])
         self.assertEqual(self.first_reports, [])
+        self.assertEqual({report.outcome for report in self.first_outcomes}, {ChangedObjects.NOTHING_EARLIER})
+        self.assertEqual(len(self.first_outcomes), int(values["frames_looked_at"]))
 
     def test_2_the_second_pass_tells_what_went_and_what_came(self):
-        vehicle = self.second("changed", simulate(self.folder, "changed", AFTER, 80))
+        # DAISY's score is a distance and says little of how sure it is.
+        vehicle = self.second("changed", simulate(self.folder, "changed", AFTER, 80), tell_confidence=0.0)
         self.assertGreater(vehicle.count("pictures_compared"), 20, vehicle.diagnostics())
         reports, objects = vehicle.reports(), vehicle.objects()
         self.assertEqual(len(reports), vehicle.count("pictures_compared"))
@@ -211,6 +218,26 @@ class ChangeDetectionTest(unittest.TestCase):
             values = set(numpy.frombuffer(mask.data, numpy.uint8).tolist())
             self.assertLessEqual(values, {*range(10), UNKNOWN})
         self.assertEqual(overlays[0].encoding, "bgr8")
+        self.check_what_the_zone_is_told(vehicle)
+
+    def check_what_the_zone_is_told(self, vehicle):
+        """Each object that was passed, again and again until the zone has answered."""
+        told = vehicle.count("changes_told")
+        self.assertGreater(told, 0, vehicle.diagnostics())
+        eventually(lambda: len({bytes(each.uuid) for each in vehicle.received("change/map_change")}) == told, "all are sent")
+        eventually(lambda: vehicle.count("changes_resent") > 0, "what nobody answers is sent again")
+        changes = {bytes(each.uuid): each for each in vehicle.received("change/map_change")}
+        signs = [each for each in changes.values() if abs(along_left(each.latitude, each.longitude)[0] - SIGN_M) < 6]
+        self.assertIn(MapChange.VANISHED, [each.direction for each in signs], "the sign is passed and gone")
+        for each in changes.values():
+            self.assertEqual((each.schema_version, each.vehicle_id, each.drive_id, each.class_name),
+                             (MapChange.SCHEMA_VERSION, "", "tuesday", "other_objects"))
+            self.assertGreaterEqual(each.seen, 3)
+            self.assertGreater(each.stamp, rospy.Time(1))
+        for uuid in changes:
+            vehicle.receipt.publish(ReportReceipt(schema_version=ReportReceipt.SCHEMA_VERSION, status=ReportReceipt.COMMITTED,
+                                                  report_uuid=uuid, hazard_uuid=uuid))
+        vehicle.wait_for(changes_committed=told, changes_pending=0)
 
     def test_3_a_pass_with_nothing_changed_tells_nothing(self):
         vehicle = self.second("same", simulate(self.folder, "same", BEFORE, 80))

@@ -90,6 +90,7 @@ void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& 
   }
   ++event.seen;
   event.last_ns = frame.stamp_ns;
+  event.earlier_ns = frame.earlier_ns;
   track.travel_m = std::max(track.travel_m, (from_m - track.first_seen_from_m).norm());
   track.confidence_sum += region.confidence;
   track.class_weight[static_cast<std::size_t>(region.change_class)] += region.confidence;

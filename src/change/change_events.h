@@ -55,11 +55,13 @@ struct ChangeEvent {
   int missed = 0;         ///< Pictures that should have, but do not.
   std::int64_t first_ns = 0;
   std::int64_t last_ns = 0;
+  std::int64_t earlier_ns = 0;  ///< Of the picture that the last one was compared with.
 };
 
 /// Where a picture was taken.
 struct ChangeFrame {
   std::int64_t stamp_ns = 0;
+  std::int64_t earlier_ns = 0;  ///< Of the picture it was compared with.
   Eigen::Isometry3d map_from_base = Eigen::Isometry3d::Identity();  ///< map: ENU; base: REP 105.
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
   CameraIntrinsics camera;

@@ -130,6 +130,7 @@ void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
 
   ChangeFrame frame;
   frame.stamp_ns = picture.stamp_ns;
+  frame.earlier_ns = partner.frame.stamp_ns;
   frame.map_from_base = map_from_base;
   frame.base_from_optical = picture.base_from_optical;
   frame.camera = picture.camera;

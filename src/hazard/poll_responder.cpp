@@ -100,6 +100,10 @@ void PollResponder::AddChange(const ChangeEvidence& evidence) {
   }
 }
 
+void PollResponder::AddUnregistered() {
+  for (OpenPoll& open : open_) ++open.unregistered;
+}
+
 std::vector<std::int64_t> PollResponder::TakePictureRequests() {
   return std::exchange(picture_requests_, {});
 }
@@ -312,6 +316,9 @@ void PollResponder::AttachPicture(const OpenPoll& open, PollReply& reply) {
 /// What kept most images from counting; at most 64 bytes.
 std::string PollResponder::ReasonOf(const OpenPoll& open) {
   if (open.clear_views > 0 && open.appeared > 0) return "seen as changed, but not detected";
+  if (open.clear_views > 0 && open.unregistered > 0) {
+    return "in view too few times, and unregistered with earlier drives";
+  }
   if (open.clear_views > 0) return "the place was in view too few times";
   Trouble worst = Trouble::kTooFew;
   int most = 0;

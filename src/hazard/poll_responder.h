@@ -97,6 +97,8 @@ class PollResponder {
   void AddLuminance(std::int64_t stamp_ns, double luminance);
   /// What change detection knows of a place; told again it counts once, with its newest figures.
   void AddChange(const ChangeEvidence& evidence);
+  /// Change detection knew earlier pictures of where the vehicle is, and recognised none of them.
+  void AddUnregistered();
   /// Stamps of the images whose pictures are wanted now, each once.
   std::vector<std::int64_t> TakePictureRequests();
 
@@ -127,6 +129,7 @@ class PollResponder {
     float match_confidence = 0;
     float vanished = 0;  // Confidence that a thing of the class went, by change detection; or came.
     float appeared = 0;
+    int unregistered = 0;             // Images that change detection could not compare.
     std::optional<double> matched_s;  // Steady; it only waits for the picture.
     std::optional<double> asked_s;    // Steady; when its picture began to be missed.
   };

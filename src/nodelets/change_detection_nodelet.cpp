@@ -6,9 +6,6 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/image_encodings.h>
-#include <tf2_eigen/tf2_eigen.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <array>
 #include <boost/function.hpp>
@@ -25,15 +22,15 @@
 
 #include "change/change_watch.h"
 #include "detection/frame_queue.h"
-#include "geo/datum.h"
 #include "hazard/candidate_sender.h"
 #include "nodelets/change_frames.h"
+#include "nodelets/map_change_sender.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/vehicle_frames.h"
 #include "ros/camera_info_conversions.h"
 #include "ros/change_conversions.h"
 #include "ros/change_parameters.h"
 #include "ros/hazard_conversions.h"
-#include "ros/localization_conversions.h"
 
 namespace livemap {
 namespace {
@@ -52,6 +49,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     image_subscriber_.shutdown();
     if (queue_) queue_->Close();
     if (worker_.joinable()) worker_.join();
+    if (watch_ && sender_) sender_->Tell(watch_->EndDrive());
   }
 
  private:
@@ -93,6 +91,13 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     frames_ = std::make_unique<ChangeFrames>(ChangeFrames::Config{
         config_.spacing_m, static_cast<std::size_t>(config_.max_waiting_frames), config_.pose});
     queue_ = std::make_unique<Queue>(1);
+    if (config_.tell_zone) {
+      MapChangeSender::Config sender;
+      sender.drive_id = config_.watch.drive_id;
+      sender.least_confidence = config_.tell_confidence;
+      sender.outbox.path = config_.watch.memory.directory + "/map_changes.sqlite3";
+      sender_ = std::make_unique<MapChangeSender>(sender, getNodeHandle(), now_ns);
+    }
     Connect();
     worker_ = std::thread([this] { Work(); });
   }
@@ -114,7 +119,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     report_publisher_ = node.advertise<ChangedObjects>("change/report", 100);
     mask_publisher_ = node.advertise<sensor_msgs::Image>("change/mask", 2);
     overlay_publisher_ = node.advertise<sensor_msgs::Image>("change/overlay", 2);
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node);
+    vehicle_frames_ =
+        std::make_unique<VehicleFrames>(node, getName(), config_.map_frame, config_.base_frame);
     subscribers_ = {
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
@@ -154,26 +160,11 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     frames_->AddFix(ToFix(message));
   }
 
-  /// A fused pose of base_link in the map frame, whose datum is that of its owner: tf earth -> map.
   void OnPose(const nav_msgs::Odometry& message) {
-    if (message.header.frame_id != config_.map_frame ||
-        message.child_frame_id != config_.base_frame) {
-      NODELET_WARN_THROTTLE(kSayAgainS,
-                            "dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s'",
-                            message.child_frame_id.c_str(), message.header.frame_id.c_str(),
-                            config_.base_frame.c_str(), config_.map_frame.c_str());
-      return;
-    }
-    try {
-      const auto transform = tf_buffer_.lookupTransform("earth", config_.map_frame, ros::Time(0));
-      const LocalFrame map(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
-      const std::lock_guard<std::mutex> lock(mutex_);
-      frames_->AddPose(FromRosTime(message.header.stamp), ToTrackPose(message, map));
-    } catch (const tf2::TransformException& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped a fused pose: %s", error.what());
-    } catch (const Error& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped a fused pose: %s", error.what());
-    }
+    const std::optional<TrackPose> pose = vehicle_frames_->FusedPose(message);
+    if (!pose) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frames_->AddPose(FromRosTime(message.header.stamp), *pose);
   }
 
   void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
@@ -189,12 +180,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   /// The mounting does not change: looked up until it is known, then kept. The mutex is held.
   void LearnMounting(const std::string& frame_id) {
     if (mountings_.count(frame_id) != 0) return;
-    try {
-      const auto transform = tf_buffer_.lookupTransform(config_.base_frame, frame_id, ros::Time(0));
-      mountings_[frame_id] = Eigen::Isometry3d(tf2::transformToEigen(transform));
-    } catch (const tf2::TransformException& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "no mounting of the camera yet: %s", error.what());
-    }
+    const auto mounting = vehicle_frames_->Mounting(frame_id);
+    if (mounting) mountings_[frame_id] = *mounting;
   }
 
   void OnPickTimer(const ros::SteadyTimerEvent&) {
@@ -233,9 +220,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
       NODELET_ERROR_THROTTLE(kSayAgainS, "a place is not remembered: %s",
                              answer.store_error.c_str());
     }
-    if (answer.outcome == ChangeWatch::Outcome::kCompared) {
-      Publish(answer, job.posed.image->header);
-    }
+    Publish(answer, job.posed.image->header);
+    if (sender_) sender_->Tell(answer.passed);
     const std::lock_guard<std::mutex> lock(mutex_);
     ++figures_.outcomes[static_cast<std::size_t>(answer.outcome)];
     figures_.remembered += answer.remembered ? 1 : 0;
@@ -276,10 +262,11 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   }
 
   void Publish(const ChangeWatch::Answer& answer, const std_msgs::Header& header) {
-    if (mask_publisher_.getNumSubscribers() > 0) {
+    const bool compared = answer.outcome == ChangeWatch::Outcome::kCompared;
+    if (compared && mask_publisher_.getNumSubscribers() > 0) {
       mask_publisher_.publish(ToImageMessage(answer.classes, header));
     }
-    if (overlay_publisher_.getNumSubscribers() > 0) {
+    if (compared && overlay_publisher_.getNumSubscribers() > 0) {
       const cv::Mat drawn = DrawChanges(answer.pair.after, answer.classes, answer.regions);
       overlay_publisher_.publish(ToImageMessage(drawn, header));
     }
@@ -333,16 +320,17 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     status.add("looking_ms", looked > 0 ? figures_.ms_in_window / looked : 0.0);
     status.add("method", method_name_);
     status.add("threshold", config_.watch.regions.least_confidence);
+    if (sender_) sender_->Diagnose(status);
     figures_.looked_in_window = 0;
     figures_.ms_in_window = 0;
   }
 
   ChangeDetectionConfig config_;
   std::string method_name_;
-  std::unique_ptr<ChangeWatch> watch_;  // The worker's, once it runs.
+  std::unique_ptr<ChangeWatch> watch_;       // The worker's, once it runs.
+  std::unique_ptr<MapChangeSender> sender_;  // None: nothing is told to the zone.
   std::unique_ptr<Queue> queue_;
-  tf2_ros::Buffer tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<VehicleFrames> vehicle_frames_;
   ros::Publisher report_publisher_, mask_publisher_, overlay_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   image_transport::Subscriber image_subscriber_;

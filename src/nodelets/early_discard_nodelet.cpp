@@ -7,9 +7,6 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/image_encodings.h>
-#include <tf2_eigen/tf2_eigen.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
@@ -24,14 +21,13 @@
 #include "detection/early_discard.h"
 #include "detection/frame_queue.h"
 #include "detection/privacy_mask.h"
-#include "geo/datum.h"
 #include "hazard/candidate_sender.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/vehicle_frames.h"
 #include "ros/camera_info_conversions.h"
 #include "ros/candidate_conversions.h"
 #include "ros/candidate_parameters.h"
 #include "ros/hazard_conversions.h"
-#include "ros/localization_conversions.h"
 
 namespace livemap {
 namespace {
@@ -79,7 +75,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     using Self = EarlyDiscardNodelet;
     ros::NodeHandle& node = getNodeHandle();
     publisher_ = node.advertise<CandidateFrame>("candidate/frame", 100);
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node);
+    vehicle_frames_ =
+        std::make_unique<VehicleFrames>(node, getName(), config_.map_frame, config_.base_frame);
     subscribers_ = {
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
@@ -120,26 +117,11 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     sender_->AddFix(ToFix(message));
   }
 
-  /// A fused pose of base_link in the map frame, whose datum is that of its owner: tf earth -> map.
   void OnPose(const nav_msgs::Odometry& message) {
-    if (message.header.frame_id != config_.map_frame ||
-        message.child_frame_id != config_.base_frame) {
-      NODELET_WARN_THROTTLE(kSayAgainS,
-                            "dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s'",
-                            message.child_frame_id.c_str(), message.header.frame_id.c_str(),
-                            config_.base_frame.c_str(), config_.map_frame.c_str());
-      return;
-    }
-    try {
-      const auto transform = tf_buffer_.lookupTransform("earth", config_.map_frame, ros::Time(0));
-      const LocalFrame map(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
-      const std::lock_guard<std::mutex> lock(mutex_);
-      sender_->AddPose(FromRosTime(message.header.stamp), ToTrackPose(message, map));
-    } catch (const tf2::TransformException& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped a fused pose: %s", error.what());
-    } catch (const Error& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped a fused pose: %s", error.what());
-    }
+    const std::optional<TrackPose> pose = vehicle_frames_->FusedPose(message);
+    if (!pose) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    sender_->AddPose(FromRosTime(message.header.stamp), *pose);
   }
 
   void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
@@ -155,12 +137,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   /// The mounting does not change: looked up until it is known, then kept. The mutex is held.
   void LearnMounting(const std::string& frame_id) {
     if (sender_->HasMounting(frame_id)) return;
-    try {
-      const auto transform = tf_buffer_.lookupTransform(config_.base_frame, frame_id, ros::Time(0));
-      sender_->SetMounting(frame_id, tf2::transformToEigen(transform));
-    } catch (const tf2::TransformException& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "no mounting of the camera yet: %s", error.what());
-    }
+    const auto mounting = vehicle_frames_->Mounting(frame_id);
+    if (mounting) sender_->SetMounting(frame_id, *mounting);
   }
 
   void Work() {
@@ -264,8 +242,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::unique_ptr<EarlyDiscard> discard_;  // The worker's.
   std::unique_ptr<PrivacyMask> mask_;      // The send timer's; none: privacy is off.
   std::unique_ptr<Queue> queue_;
-  tf2_ros::Buffer tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<VehicleFrames> vehicle_frames_;
   ros::Publisher publisher_;
   std::vector<ros::Subscriber> subscribers_;
   image_transport::Subscriber image_subscriber_;

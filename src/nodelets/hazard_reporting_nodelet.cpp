@@ -267,6 +267,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   /// Has a say in what polls are answered.
   void OnChanges(const ChangedObjects& message) {
+    if (message.outcome == ChangedObjects::REFUSED) responder_->AddUnregistered();
     for (const ChangeEvidence& evidence : ToEvidence(message)) responder_->AddChange(evidence);
   }
 

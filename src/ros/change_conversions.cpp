@@ -20,6 +20,20 @@ std::uint8_t ToMessage(ChangeDirection direction) {
   return ChangedObject::UNKNOWN;
 }
 
+std::uint8_t ToMessage(ChangeWatch::Outcome outcome) {
+  switch (outcome) {
+    case ChangeWatch::Outcome::kCompared:
+      return ChangedObjects::COMPARED;
+    case ChangeWatch::Outcome::kNothingEarlier:
+      return ChangedObjects::NOTHING_EARLIER;
+    case ChangeWatch::Outcome::kRefused:
+      return ChangedObjects::REFUSED;
+    case ChangeWatch::Outcome::kUncertain:
+      break;
+  }
+  return ChangedObjects::UNCERTAIN;
+}
+
 ChangedObject ToMessage(const PlacedChange& change) {
   const ChangeEvent& event = change.event;
   ChangedObject message;
@@ -46,6 +60,9 @@ ChangedObjects ToMessage(const ChangeWatch::Answer& answer, const std_msgs::Head
   message.header = header;
   message.drive_id = drive_id;
   message.method = method;
+  message.outcome = ToMessage(answer.outcome);
+  if (answer.outcome == ChangeWatch::Outcome::kRefused) message.why = answer.why;
+  if (answer.outcome != ChangeWatch::Outcome::kCompared) return message;
   message.earlier_drive_id = answer.earlier.drive_id;
   message.earlier_stamp = ToRosTime(answer.earlier.stamp_ns);
   message.known_share = static_cast<float>(cv::mean(answer.pair.valid)[0] / 255);

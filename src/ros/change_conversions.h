@@ -11,7 +11,8 @@
 
 namespace livemap {
 
-/// What a compared picture tells. `header` is the image's, `method` the name of what compared.
+/// What a picture that was looked at tells. `header` is the image's, `method` the name of what
+/// compared.
 ChangedObjects ToMessage(const ChangeWatch::Answer& answer, const std_msgs::Header& header,
                          const std::string& drive_id, const std::string& method);
 

@@ -74,6 +74,8 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
   ReadMemory(parameters, config.watch.memory);
   ReadWatch(parameters, config.watch);
   ReadBasePoseSource(parameters, config.pose);
+  parameters.Read("tell_zone", config.tell_zone);
+  parameters.Read("tell_confidence", config.tell_confidence, {0, 1});
   parameters.Read("base_frame", config.base_frame);
   parameters.Read("map_frame", config.map_frame);
   parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});

@@ -46,4 +46,23 @@ MapChangeReport FromMessage(const MapChange& message) {
   return report;
 }
 
+std::optional<MapChangeReport> ToMapChangeReport(const PlacedChange& change,
+                                                 const std::string& drive_id, const Uuid& uuid) {
+  const ChangeEvent& event = change.event;
+  if (event.direction == ChangeDirection::kUnknown) return std::nullopt;
+  MapChangeReport report;
+  report.uuid = uuid;
+  report.drive_id = drive_id;
+  report.stamp_ns = event.last_ns;
+  report.earlier_stamp_ns = event.earlier_ns;
+  report.class_name = ChangeClassName(event.change_class);
+  report.vanished = event.direction == ChangeDirection::kVanished;
+  report.confidence = static_cast<float>(event.confidence);
+  report.seen = static_cast<std::uint32_t>(event.seen);
+  report.missed = static_cast<std::uint32_t>(event.missed);
+  report.position = change.position;
+  report.covariance_m2 = change.covariance_m2;
+  return report;
+}
+
 }  // namespace livemap

@@ -2,6 +2,10 @@
 
 #include <livemap/MapChange.h>
 
+#include <optional>
+#include <string>
+
+#include "change/change_watch.h"
 #include "hazard/map_change_report.h"
 
 namespace livemap {
@@ -10,5 +14,10 @@ MapChange ToMessage(const MapChangeReport& report);
 /// Throws Error for a schema version or a direction that is not known. What its numbers say is for
 /// the zone to check.
 MapChangeReport FromMessage(const MapChange& message);
+
+/// What the zone is told of an object that the vehicle has passed; nothing when nobody knows
+/// whether it came or went.
+std::optional<MapChangeReport> ToMapChangeReport(const PlacedChange& change,
+                                                 const std::string& drive_id, const Uuid& uuid);
 
 }  // namespace livemap

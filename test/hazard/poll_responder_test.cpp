@@ -243,6 +243,21 @@ TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo
   EXPECT_EQ(OnlyReply().answer, Answer::kYes) << "at 24 m";
 }
 
+TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
+  vehicle_.pose_at = [](std::int64_t) {
+    return FixTrack::Lookup{FixTrack::Answer::kReady, BaseAt(2.8)};
+  };
+  responder_.AddUnregistered();  // Before the poll: not of its place.
+  responder_.Add(poll_, steady_s_);
+  Drive(2.8, 4.0);
+  responder_.AddUnregistered();
+  Drive(4.0, 8.0);
+  Expire();
+  const PollReply reply = OnlyReply();
+  EXPECT_EQ(reply.answer, Answer::kCantSee);
+  EXPECT_THAT(reply.reason, HasSubstr("unregistered"));
+}
+
 TEST_F(PollResponderTest, FramesAtRestAreOneView) {
   vehicle_.pose_at = [](std::int64_t) {
     return FixTrack::Lookup{FixTrack::Answer::kReady, BaseAt(2.8)};

@@ -1,0 +1,152 @@
+#!/usr/bin/python3
+"""Semantic change detection, end to end: simulated passes of one street, two vehicles, the zone's live map.
+
+Everything is real but the detector, whose answers are the bags' labels, so that nothing but the change decides: two ROS masters,
+mosquitto, vehicle.launch with the network of change, zone.launch.
+"""
+
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import urllib.request
+
+import rostest
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "test")]
+import demo_system as system  # noqa: E402
+from node_testing import PATIENCE_S, eventually  # noqa: E402
+
+MODEL = ROOT / "models" / "change-small.yaml"
+SPEED_MPS, SECONDS, RATE_HZ = 8, 15, 5
+# Half the speed: the network has the time it has on a vehicle, whatever else this machine does.
+REPLAY_RATE = 0.5
+REMOVED_M, STANDING_M, BARRIER_M = 42, 66, 88
+LEFT_M = -3.4
+LATITUDE, LONGITUDE = 48.8566, 9.0  # Of the world's origin; the road goes east.
+BEFORE = [("road_work_sign", REMOVED_M), ("road_work_sign", STANDING_M)]
+AFTER = [("road_work_sign", STANDING_M), ("barrier", BARRIER_M)]
+VEHICLES = ("car-1", "car-2")
+NEAR_M = 6
+
+
+def simulate(folder, name, hazards, condition):
+    """A bag of a pass with its labels."""
+    world = folder / (name + ".yaml")
+    world.write_text(yaml.safe_dump({
+        "road": {"bearing_deg": 90, "pieces": [{"length_m": 400}], "crossings_m": []},
+        "scene": {"buildings": True, "trees": True, "parked_cars": False},
+        "hazards": [{"class": kind, "at_m": at, "left_m": LEFT_M} for kind, at in hazards]}), encoding="ascii")
+    bag = folder / (name + ".bag")
+    done = subprocess.run(
+        [system.program("livemap_simulate"), "--seed", "5", "--world", str(world), "--condition", condition, "--bag", str(bag),
+         "--size", "512x384", "--one-ray", "--seconds", str(SECONDS), "--rate", str(RATE_HZ), "--speed", str(SPEED_MPS),
+         "--fix-noise-m", "0.2", "--multipath-m", "0"], capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    return bag
+
+
+def along(longitude):
+    """Metres along the road from its start."""
+    radius, flattening = 6378137.0, 0.00669438
+    sine = math.sin(math.radians(LATITUDE))
+    return math.radians(longitude - LONGITUDE) * radius * math.cos(math.radians(LATITUDE)) / math.sqrt(1 - flattening * sine * sine)
+
+
+class Zone(system.LiveMapSystem):
+    """A zone that asks about a hazard as soon as it doubts, and the same vehicle as often as it passes."""
+
+    zone_parameters = "{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.0, max_evidence_per_hour: 100000.0}"
+
+    def __init__(self, directory):
+        super().__init__(directory, "test", ",".join(VEHICLES))
+
+    def start_pass(self, vehicle, bag, drive):
+        """`vehicle` drives down the street once, with what it remembers of its other drives."""
+        self.vehicle_port = system.free_port()
+        self.vehicle_master = f"http://127.0.0.1:{self.vehicle_port}"
+        self.launch(f"{vehicle}-{drive}", self.vehicle_port, "replay.launch", {
+            "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,
+            "directory": self.directory / vehicle, "broker_port": self.broker_port,
+            "password_file": self.password_file(vehicle), "use_truth": "true",
+            "changes": "true", "change_model": MODEL, "hazard_reporting": "{max_range_m: 30.0}"})
+
+    def end_pass(self, vehicle, drive):
+        """The replay ends its vehicle with the bag."""
+        process = self.processes.pop(f"{vehicle}-{drive}")
+        process.wait(SECONDS / REPLAY_RATE + PATIENCE_S)
+
+    def log_of(self, vehicle, drive):
+        return (self.directory / f"{vehicle}-{drive}.log").read_text(encoding="utf-8", errors="replace")
+
+    def features(self, what):
+        with urllib.request.urlopen(f"{self.url}api/v1/{what}?limit=1000", timeout=10) as answer:
+            return json.load(answer)["features"]
+
+    def places(self, what, **properties):
+        """(metres along the road, properties) of the features with these properties."""
+        return sorted((round(along(feature["geometry"]["coordinates"][0]), 1), feature["properties"])
+                      for feature in self.features(what)
+                      if all(feature["properties"].get(key) == value for key, value in properties.items()))
+
+    def signs(self, state):
+        return [place for place, _ in self.places("hazards", **{"class": "road_work_sign"}, state=state)]
+
+
+@unittest.skipUnless(MODEL.is_file(), "skipped, no weights: models/change-small.yaml")
+class ChangeToMapTest(unittest.TestCase):
+    """The tests are the chapters of one story, in this order."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="livemap_change_to_map_"))
+        cls.monday = simulate(cls.folder, "monday", BEFORE, "day")
+        cls.zone = Zone(cls.folder)
+        cls.zone.start_zone()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.zone.__exit__()
+
+    def drive(self, bag, drive, vehicles=VEHICLES, together=False):
+        for vehicle in vehicles:
+            self.zone.start_pass(vehicle, bag, drive)
+            if not together:
+                self.zone.end_pass(vehicle, drive)
+        for vehicle in vehicles if together else ():
+            self.zone.end_pass(vehicle, drive)
+
+    def test_1_the_first_pass_puts_the_signs_on_the_map_and_tells_no_change(self):
+        self.drive(self.monday, "monday", together=True)
+        eventually(lambda: len(self.zone.signs("active")) == 2, f"two vehicles have seen both signs: {self.zone.places('hazards')}")
+        self.assertEqual(self.zone.features("changes"), [])
+
+    def test_2_a_pass_in_another_season_with_nothing_changed_changes_nothing(self):
+        signs = self.zone.signs("active")
+        self.drive(simulate(self.folder, "winter", BEFORE, "snow"), "winter", VEHICLES[:1])
+        time.sleep(2)
+        self.assertEqual(self.zone.places("changes"), [])
+        self.assertEqual(self.zone.signs("active"), signs)
+
+    def test_3_a_removed_sign_leaves_the_map_a_standing_one_stays_and_a_new_barrier_appears(self):
+        self.drive(simulate(self.folder, "tuesday", AFTER, "day"), "tuesday")
+        eventually(lambda: len(self.zone.signs("active")) == 1, f"one sign is gone: {self.zone.places('hazards')}")
+        self.assertLess(abs(self.zone.signs("active")[0] - STANDING_M), NEAR_M)
+        barriers = eventually(lambda: self.zone.places("changes", direction="appeared", **{"class": "barrier"}), "the barrier is told")
+        self.assertEqual(len(barriers), 1, barriers)
+        self.assertLess(abs(barriers[0][0] - BARRIER_M), NEAR_M)
+        gone = self.zone.places("changes", direction="vanished")
+        self.assertTrue(all(abs(place - REMOVED_M) < NEAR_M for place, _ in gone), gone)
+        self.assertEqual([place for place, _ in self.zone.places("changes", direction="appeared")
+                          if abs(place - BARRIER_M) >= NEAR_M], [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("livemap", "change_to_map", ChangeToMapTest)
