@@ -179,6 +179,7 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Add(const MapChangeR
   feature.position = report.position;
   feature.covariance_m2 = WithLeastSigma(report.covariance_m2, rule_.fusion.min_report_sigma_m);
   feature.first_seen_ns = feature.last_seen_ns = report.stamp_ns;
+  feature.drives = counts ? 1 : 0;
   if (counts) Note(feature, report, false);
   if (counts && rule_.confirmations <= 1) feature.state = MapChangeState::kConfirmed;
   const Id id = ++last_id_;
