@@ -125,8 +125,9 @@ void ZoneService::Implementation::ApplyMapChange(const MapChangeReport& report, 
     change.map_change_events.push_back(std::move(effect->event));
   }
   change.map_change_reports.emplace_back(&report, feature);
-  batch.receipts[index] = Kept(report, feature);
-  batch.committed.emplace(report.uuid, *batch.receipts[index]);
+  const Receipt receipt = Kept(report, feature);
+  batch.receipts[index] = receipt;
+  batch.committed.emplace(report.uuid, receipt);
 }
 
 bool ZoneService::Implementation::DecideMapChange(const Uuid& uuid, MapChangeState to,
