@@ -85,7 +85,9 @@ def vehicle_rights(zone):
             f"pattern write {vehicle}/position",
             f"pattern write {vehicle}/answer",
             f"pattern write {vehicle}/candidate",
+            f"pattern write {vehicle}/change",
             f"pattern read {vehicle}/receipt",
+            f"pattern read {vehicle}/change_receipt",
             f"pattern read {vehicle}/notice",
             f"pattern read {vehicle}/poll"]
 

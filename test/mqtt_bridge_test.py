@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from livemap.msg import (  # noqa: E402
-    HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, ReportReceipt, VehiclePosition)
+    HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange, ReportReceipt, VehiclePosition)
 from mqtt_bridge_fixture import (  # noqa: E402
     Bridge, Broker, Master, Peer, envelope, eventually, serialise)
 
@@ -25,6 +25,8 @@ ZONE_TOPICS = {
     "pub:/hazard/vehicle_notice": HazardNotice,
     "pub:/hazard/poll": HazardPoll,
     "sub:/hazard/poll_answer": HazardPollAnswer,
+    "sub:/change/map_change": MapChange,
+    "pub:/change/receipt": ReportReceipt,
     "sub:/diagnostics": DiagnosticArray,
 }
 VEHICLE_TOPICS = {
@@ -36,6 +38,8 @@ VEHICLE_TOPICS = {
     "sub:/hazard/notice": HazardNotice,
     "sub:/hazard/poll": HazardPoll,
     "pub:/hazard/poll_answer": HazardPollAnswer,
+    "pub:/change/map_change": MapChange,
+    "sub:/change/receipt": ReportReceipt,
     "sub:/diagnostics": DiagnosticArray,
 }
 
@@ -150,6 +154,15 @@ class MqttBridgeTest(unittest.TestCase):
         self.vehicle_peer.publish("/hazard/poll_answer", sent)
         received = eventually(lambda: self.zone_peer.received("/hazard/poll_answer"), "the answer arrives")[0]
         self.assertEqual((received.vehicle_id, len(received.image.data)), ("car-1", 50000))
+
+    def test_a_map_change_comes_under_the_identity_of_the_connection_and_its_receipt_goes_back(self):
+        self.vehicle_peer.publish("/change/map_change", MapChange(vehicle_id="mayor", class_name="barrier"))
+        received = eventually(lambda: self.zone_peer.received("/change/map_change"), "the map change arrives")[0]
+        self.assertEqual((received.vehicle_id, received.class_name), ("car-1", "barrier"))
+        for vehicle in ("car-2", "car-1"):
+            self.zone_peer.publish("/change/receipt", ReportReceipt(vehicle_id=vehicle, reason="for " + vehicle))
+        receipts = eventually(lambda: self.vehicle_peer.received("/change/receipt"), "the receipt arrives")
+        self.assertEqual([r.reason for r in receipts], ["for car-1"])
 
     def test_receipt_without_a_possible_addressee_is_refused_and_counted(self):
         before = self.zone_count("receipts_refused")

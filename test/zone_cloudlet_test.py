@@ -20,8 +20,8 @@ import numpy
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
-from livemap.msg import (HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, ReportReceipt,
-                         VehiclePosition)
+from livemap.msg import (HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange,
+                         ReportReceipt, VehiclePosition)
 from visualization_msgs.msg import Marker, MarkerArray
 
 from node_testing import PATIENCE_S, eventually
@@ -40,6 +40,16 @@ def make_report(latitude=40.44, longitude=-79.94, class_name="pothole", vehicle_
     report.covariance = [1.0, 0.0, 0.0, 1.0]
     report.image_width, report.image_height = 640, 480
     return report
+
+
+def make_map_change(vehicle_id="car-1", direction=MapChange.APPEARED):
+    change = MapChange(schema_version=MapChange.SCHEMA_VERSION, vehicle_id=vehicle_id, drive_id="drive-1",
+                       class_name="barrier", direction=direction, confidence=0.5, seen=5, missed=1,
+                       latitude=40.44, longitude=-79.94, covariance=[1.0, 0.0, 0.0, 1.0])
+    change.uuid = uuid.uuid4().bytes
+    change.stamp = rospy.Time.from_sec(time.time() - 1)
+    change.earlier_stamp = rospy.Time.from_sec(time.time() - 86400)
+    return change
 
 
 def make_position(vehicle_id, latitude, longitude, map_sequence=0, course=1.0):
@@ -82,6 +92,8 @@ class ZoneCloudletTest(unittest.TestCase):
         cls.markers = Inbox("hazard/markers", MarkerArray)
         cls.diagnostics = Inbox("/diagnostics", DiagnosticArray)
         cls.reports = rospy.Publisher("hazard/report", HazardReport, queue_size=1000)
+        cls.map_changes = rospy.Publisher("change/map_change", MapChange, queue_size=100)
+        cls.change_receipts = Inbox("change/receipt", ReportReceipt)
         cls.positions = rospy.Publisher("vehicle/position", VehiclePosition, queue_size=1000)
 
     def setUp(self):
@@ -102,7 +114,8 @@ class ZoneCloudletTest(unittest.TestCase):
                 [f"_{name}:={value}" for name, value in values.items()])
 
     def start(self):
-        for inbox in (self.receipts, self.notices, self.own_notices, self.polls, self.markers, self.diagnostics):
+        for inbox in (self.receipts, self.notices, self.own_notices, self.polls, self.markers, self.diagnostics,
+                      self.change_receipts):
             inbox.clear()
         # Of its own process group: rosrun is a shell that does not pass signals on.
         self.process = subprocess.Popen(self.command(), start_new_session=True)
@@ -110,6 +123,8 @@ class ZoneCloudletTest(unittest.TestCase):
                    self.positions.get_num_connections() == 1 and
                    self.receipts.subscriber.get_num_connections() == 1 and
                    self.answers.get_num_connections() == 1 and
+                   self.map_changes.get_num_connections() == 1 and
+                   self.change_receipts.subscriber.get_num_connections() == 1 and
                    self.polls.subscriber.get_num_connections() == 1 and
                    self.own_notices.subscriber.get_num_connections() == 1 and
                    self.notices.subscriber.get_num_connections() == 1, "the zone connects")
@@ -225,6 +240,51 @@ class ZoneCloudletTest(unittest.TestCase):
         self.assertEqual(self.stored(), [])
         eventually(lambda: self.count("reports_refused") == 4, "refusals are counted")
         eventually(lambda: self.count("reports_malformed") == 1, "the unknown schema is counted")
+
+    def tell(self, change):
+        """Publishes a map change and returns its receipt."""
+        count = len(self.change_receipts.all())
+        self.map_changes.publish(change)
+        eventually(lambda: len(self.change_receipts.all()) > count, "a receipt")
+        receipt = self.change_receipts.all()[-1]
+        self.assertEqual((receipt.report_uuid, receipt.vehicle_id), (change.uuid, change.vehicle_id))
+        return receipt
+
+    def stored_map_changes(self):
+        """Map changes as (uuid, state, vehicles, reports), straight from the file."""
+        path = os.path.join(self.directory, "zone", "zone.sqlite3")
+        with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
+            return list(database.execute("SELECT uuid, state, vehicles, reports FROM map_changes"))
+
+    def test_a_map_change_is_answered_stored_and_counts_once(self):
+        change = make_map_change()
+        first = self.tell(change)
+        self.assertEqual(first.status, ReportReceipt.COMMITTED)
+        feature = str(uuid.UUID(bytes=first.hazard_uuid))
+        for signal_number in (None, signal.SIGKILL):
+            if signal_number:
+                self.restart(signal_number)
+            self.assertEqual(self.tell(change).hazard_uuid, first.hazard_uuid)
+            self.assertEqual(self.stored_map_changes(), [(feature, 0, 1, 1)])
+        self.tell(make_map_change("car-2"))
+        self.assertEqual(self.stored_map_changes(), [(feature, 1, 2, 2)], "two vehicles confirm")
+        eventually(lambda: self.count("map_changes_confirmed") == 1, "it is counted")
+        self.assertEqual(self.count("map_changes_repeated"), 1)
+        for vehicle in ("car-3", "car-4"):
+            self.assertEqual(self.tell(make_map_change(vehicle, MapChange.VANISHED)).hazard_uuid, first.hazard_uuid)
+        self.assertEqual(self.stored_map_changes(), [(feature, 2, 2, 2)], "two tell the opposite")
+
+    def test_hostile_map_changes_are_refused_with_a_reason_and_leave_nothing(self):
+        changes = [make_map_change() for _ in range(4)]
+        changes[0].latitude = float("nan")
+        changes[1].class_name = "no_change"
+        changes[2].direction = 7
+        changes[3].schema_version = 99
+        for change, word in zip(changes, ("position", "accepted is barrier", "direction 7", "schema version")):
+            receipt = self.tell(change)
+            self.assertEqual((receipt.status, receipt.hazard_uuid), (ReportReceipt.REFUSED, bytes(16)))
+            self.assertIn(word, receipt.reason)
+        self.assertEqual(self.stored_map_changes(), [])
 
     def told(self, vehicle):
         """What this vehicle alone was told, until the end of a catch-up."""

@@ -109,7 +109,7 @@ export class HazardLayer {
   update(marker, hazard) {
     if (marker.hazard.sequence === hazard.sequence) return;
     if (marker.hazard.state !== hazard.state) {
-      marker.setIcon(this.icon(hazard.className, hazard.state));
+      marker.setIcon(this.icon(hazard));
     }
     marker.hazard = hazard;
     const { lat, lng } = marker.getLatLng();
@@ -173,7 +173,7 @@ export class HazardLayer {
 
   createMarker(hazard) {
     const marker = L.marker([hazard.latitude, hazard.longitude],
-      { icon: this.icon(hazard.className, hazard.state), riseOnHover: true });
+      { icon: this.icon(hazard), riseOnHover: true });
     marker.hazard = hazard;
     marker.bindPopup(() => this.onOpen(marker.hazard),
       { minWidth: 296, maxWidth: 296, className: 'hazard-popup', autoPanPaddingTopLeft: [16, 16],
@@ -182,7 +182,7 @@ export class HazardLayer {
     return marker;
   }
 
-  icon(className, state) {
+  icon({ className, state }) {
     const key = `${state} ${className}`;
     let icon = this.icons.get(key);
     if (!icon) {

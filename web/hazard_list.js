@@ -3,6 +3,7 @@
 import { byId, element } from './dom.js';
 import { ago, percent, plural, utcTime } from './format.js';
 import { REJECTED, stateLabel } from './hazard_state.js';
+import { keepOneTabStop, moveFocus } from './list_focus.js';
 
 const MAX_ROWS = 200;
 
@@ -19,7 +20,7 @@ export class HazardList {
       const row = event.target.closest('button');
       if (row) onChoose(this.rows.get(row.dataset.hazard).hazard);
     });
-    this.list.addEventListener('keydown', (event) => this.moveFocus(event));
+    this.list.addEventListener('keydown', (event) => moveFocus(this.list, event));
   }
 
   /** Lights up the hazard's row when it is shown the next time. */
@@ -37,7 +38,7 @@ export class HazardList {
     if (keeps && document.activeElement !== keeps.button) {
       keeps.button.focus({ preventScroll: true });
     }
-    this.keepOneTabStop();
+    keepOneTabStop(this.list);
     this.count.textContent = hazards.length.toLocaleString('en');
     this.note.textContent = noteText(hazards.length, total);
   }
@@ -88,26 +89,6 @@ export class HazardList {
     const state = hazard.state === 'active' ? '' : `${stateLabel(hazard.state)} \u00b7 `;
     setText(row.facts,
       `${state}${plural(hazard.sightings, 'report')} \u00b7 ${percent(hazard.confidence)} sure`);
-  }
-
-  keepOneTabStop() {
-    const rows = [...this.list.querySelectorAll('button')];
-    const stops = rows.filter((row) => row.getAttribute('tabindex') === '0');
-    const stop = rows.find((row) => row === document.activeElement) ?? stops[0] ?? rows[0];
-    for (const row of stops) row.setAttribute('tabindex', '-1');
-    stop?.setAttribute('tabindex', '0');
-  }
-
-  /** One tab stop for the whole list; the arrows move within it. */
-  moveFocus(event) {
-    const rows = [...this.list.querySelectorAll('button')];
-    const at = rows.indexOf(document.activeElement);
-    const to = { ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: rows.length - 1 }[event.key];
-    if (to === undefined || at < 0 || !rows[to]) return;
-    event.preventDefault();
-    rows[at].setAttribute('tabindex', '-1');
-    rows[to].setAttribute('tabindex', '0');
-    rows[to].focus();
   }
 }
 

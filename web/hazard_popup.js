@@ -29,13 +29,18 @@ function picture(hazard) {
   }, image);
 }
 
-function time(value) {
+export function time(value) {
   return element('time', { datetime: new Date(value).toISOString(), title: utcTime(value) },
     localTime(value));
 }
 
 function row(name, ...content) {
   return [element('dt', {}, name), element('dd', {}, ...content)];
+}
+
+/** A list of facts from rows of [name, ...content]. */
+export function facts(rows) {
+  return element('dl', { class: 'facts' }, ...rows.flatMap((one) => row(...one)));
 }
 
 /** Reports and answers to polls both count, so there may be more vehicles than reports. */
@@ -57,16 +62,17 @@ function bar(share) {
 export function popupContent(hazard, catalogue, extras) {
   const sigma = hazard.sigma === null ? '' : ` \u00b1 ${hazard.sigma.toFixed(1)} m`;
   const state = element('span', { class: `state state-${hazard.state}` }, stateLabel(hazard.state));
-  const facts = [
-    ...row('State', state, element('span', { class: 'meaning' }, stateMeaning(hazard.state))),
-    ...row('Position', element('span', { class: 'copyable' },
-      position(hazard.latitude, hazard.longitude)), sigma),
-    ...row('Last seen', time(hazard.lastSeen)),
-    ...(hazard.firstSeen === hazard.lastSeen ? [] : row('First seen', time(hazard.firstSeen))),
-    ...row('Reported', plural(hazard.sightings, 'time')),
-    ...row(hazard.state === REJECTED.name ? 'Seen since' : 'Seen by', seenBy(hazard)),
-    ...row('Confidence', ...bar(hazard.confidence)),
-    ...(hazard.state === REJECTED.name ? [] : row('Still there', ...bar(hazard.presence))),
+  const isRejected = hazard.state === REJECTED.name;
+  const rows = [
+    ['State', state, element('span', { class: 'meaning' }, stateMeaning(hazard.state))],
+    ['Position', element('span', { class: 'copyable' },
+      position(hazard.latitude, hazard.longitude)), sigma],
+    ['Last seen', time(hazard.lastSeen)],
+    ...(hazard.firstSeen === hazard.lastSeen ? [] : [['First seen', time(hazard.firstSeen)]]),
+    ['Reported', plural(hazard.sightings, 'time')],
+    [isRejected ? 'Seen since' : 'Seen by', seenBy(hazard)],
+    ['Confidence', ...bar(hazard.confidence)],
+    ...(isRejected ? [] : [['Still there', ...bar(hazard.presence)]]),
   ];
   return element('article', {
     class: 'popup', role: 'dialog', tabindex: '-1', 'aria-label': hazard.label,
@@ -75,6 +81,6 @@ export function popupContent(hazard, catalogue, extras) {
   picture(hazard),
   element('h3', { class: 'popup-title' }, catalogue.badge(hazard.className, hazard.state),
     element('span', {}, hazard.label)),
-  element('dl', { class: 'facts' }, ...facts),
+  facts(rows),
   ...extras);
 }

@@ -14,8 +14,12 @@ export async function getJson(url) {
 }
 
 /** All on the map, or all in one `state`. */
-export async function loadHazards(state = null) {
-  const url = `/api/v1/hazards?limit=${PAGE}${state === null ? '' : `&state=${state}`}`;
+export function loadHazards(state = null) {
+  return loadList('hazards', state);
+}
+
+async function loadList(kind, state = null) {
+  const url = `/api/v1/${kind}?limit=${PAGE}${state === null ? '' : `&state=${state}`}`;
   let page = await getJson(url);
   const latest = new Map();
   for (;;) {
@@ -29,7 +33,8 @@ export async function loadHazards(state = null) {
 }
 
 export class LiveFeed {
-  /** Handlers: onList(features), onHazard(action, feature), onVehicle(feature), onState(state). */
+  /** Handlers: onList(features), onHazard(action, feature), onChangeList(features),
+   * onChange(action, feature), onVehicle(feature), onState(state). */
   constructor(handlers) {
     this.handlers = handlers;
     this.sequence = null;
@@ -48,7 +53,10 @@ export class LiveFeed {
     try {
       if (this.sequence === null) {
         const list = await loadHazards();
-        this.sequence = list.sequence;
+        const changes = await loadList('changes');
+        // Each list is complete up to its own: from the smaller one on nothing is left out.
+        this.sequence = Math.min(list.sequence, changes.sequence);
+        this.handlers.onChangeList(changes.features);
         this.handlers.onList(list.features);
       }
       this.connect();
@@ -80,8 +88,9 @@ export class LiveFeed {
       return;
     }
     if (message.type === 'hazard') this.handlers.onHazard(message.action, message.feature);
+    if (message.type === 'change') this.handlers.onChange(message.action, message.feature);
     if (message.type === 'vehicle') this.handlers.onVehicle(message.feature);
-    if (message.type === 'hazard' || message.type === 'live') {
+    if (['hazard', 'change', 'live'].includes(message.type)) {
       this.sequence = Math.max(this.sequence, message.sequence);
     }
     if (message.type === 'live') {

@@ -2,6 +2,7 @@
 
 import { Catalogue } from './catalogue.js';
 import { ClassFilter, StateFilter } from './class_filter.js';
+import { ChangeView } from './change_view.js';
 import { AttributionText, FitControl } from './controls.js';
 import { byId, throttled } from './dom.js';
 import { plural } from './format.js';
@@ -55,8 +56,9 @@ class Page {
       this.sheet.coveredHeight());
     this.history = new HazardHistory((id) => this.layer.refresh(id));
     this.officials = new Officials(config.officials, (text) => this.say(text),
-      ({ hazard, vehicle }, focus) => (hazard ? this.layer.focusPopup(hazard.id, focus)
-        : this.vehicles.focusPopup(vehicle.id, focus)));
+      (subject, focus) => this.focusPopup(subject, focus));
+    this.changes = new ChangeView(this.map, (change) => this.officials.changeButtons(change),
+      this.sheet.coveredHeight(), () => this.stepAside());
     this.list = new HazardList(this.catalogue, (hazard) => this.choose(hazard));
     this.filter = new ClassFilter(this.store, this.catalogue, () => this.showAll());
     this.states = new StateFilter(this.store, () => this.showAll(),
@@ -94,6 +96,7 @@ class Page {
     setInterval(() => {
       this.updateSoon();
       this.vehicles.updateRows();
+      this.changes.updateSoon();
     }, 5000);
   }
 
@@ -101,6 +104,8 @@ class Page {
     const feed = new LiveFeed({
       onList: (features) => this.onList(features),
       onHazard: (action, feature) => this.onHazard(action, feature),
+      onChangeList: (features) => this.changes.replaceAll(features),
+      onChange: (action, feature) => this.onChange(action, feature),
       onVehicle: (feature) => {
         this.vehicles.put(feature);
         this.keepInView(feature);
@@ -132,6 +137,13 @@ class Page {
     }
     if (change === 'new') this.keepInView(feature);
     this.updateSoon();
+  }
+
+  onChange(action, feature) {
+    const fresh = this.changes.apply(action, feature);
+    if (!fresh) return;
+    this.say(`New map change: ${fresh.title}`);
+    this.keepInView(feature);
   }
 
   /** For officials who look at what was rejected. From now on events keep it current. */
@@ -169,11 +181,23 @@ class Page {
 
   /** From the list: to the hazard on the map, with its popup open and focused. */
   choose(hazard) {
+    this.stepAside();
+    this.chosen = hazard.id;
+    this.layer.open(hazard);
+  }
+
+  /** Nothing else moves or covers the map while somebody looks at one place. */
+  stepAside() {
     this.sheet.toggle(false);
     this.keepsAllInView = false;
     this.vehicles.follow(null);
-    this.chosen = hazard.id;
-    this.layer.open(hazard);
+  }
+
+  /** After a decision, or without one: back to where it was asked for. */
+  focusPopup({ hazard, change, vehicle }, focus) {
+    if (hazard) this.layer.focusPopup(hazard.id, focus);
+    else if (change) this.changes.focusPopup(change.id, focus);
+    else this.vehicles.focusPopup(vehicle.id, focus);
   }
 
   onPopupOpen(popup) {
@@ -193,7 +217,7 @@ class Page {
 
   /** Shows everything that there is; an empty map stays where the zone lies. */
   fit() {
-    const bounds = this.vehicles.bounds();
+    const bounds = this.vehicles.bounds().extend(this.changes.bounds());
     for (const hazard of this.store.hazards.values()) {
       bounds.extend([hazard.latitude, hazard.longitude]);
     }

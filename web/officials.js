@@ -1,5 +1,6 @@
-// Officials confirm and reject hazards and distrust vehicles. The token is asked for once and kept
-// as long as the tab lives, in sessionStorage; it is only ever sent to this server.
+// Officials confirm and reject hazards, confirm and dismiss map changes, and distrust vehicles.
+// The token is asked for once and kept as long as the tab lives, in sessionStorage; it is only ever
+// sent to this server.
 
 import { byId, element } from './dom.js';
 import { ago, localTime, position } from './format.js';
@@ -7,8 +8,10 @@ import { REJECTED } from './hazard_state.js';
 
 const KEY = 'livemap.token';
 const HAZARDS_HISTORY = 'kept in the hazard\u2019s history';
+const CHANGES_HISTORY = 'kept in the map change\u2019s history';
 
-/** `bad`: it takes something away, and must say why. */
+/** `call`: below the subject's address. `bad`: it takes something away, and must say why. `focus`
+ * names the button, where `call` does not; `body` is sent besides the reason. */
 const DECISIONS = {
   confirm: { call: 'confirm', title: 'Confirm this hazard?', button: 'Confirm', done: 'Confirmed',
     note: 'Drivers are told of it from now on.',
@@ -18,6 +21,13 @@ const DECISIONS = {
     reason: `Reason, ${HAZARDS_HISTORY}; may stay empty` },
   reject: { call: 'reject', title: 'Reject this hazard?', button: 'Reject', done: 'Rejected',
     bad: true, note: '', reason: `Reason, ${HAZARDS_HISTORY}` },
+  confirmChange: { call: 'decision', focus: 'confirm', body: { decision: 'confirm' },
+    title: 'Confirm this map change?', button: 'Confirm', done: 'Confirmed', note: '',
+    reason: `Reason, ${CHANGES_HISTORY}; may stay empty` },
+  dismissChange: { call: 'decision', focus: 'dismiss', body: { decision: 'dismiss' },
+    title: 'Dismiss this map change?', button: 'Dismiss', done: 'Dismissed', bad: true,
+    note: 'Vehicles that tell it again do not bring it back.',
+    reason: `Reason, ${CHANGES_HISTORY}` },
   distrust: { call: 'distrust', title: 'Distrust this vehicle?', button: 'Distrust',
     done: 'Distrusted', bad: true,
     note: 'What it said is taken back from all hazards: those that nobody else saw go, those that '
@@ -47,25 +57,26 @@ function saveToken(token) {
 }
 
 /** Sends a decision; answers null when it was taken, else what is wrong: {status, sentence}. */
-async function send(address, reason, token) {
+async function send(subject, { call, body }, reason, token) {
   let answer;
   try {
-    answer = await fetch(address, {
+    answer = await fetch(`${subject.address}/${call}`, {
       method: 'POST', cache: 'no-store', credentials: 'omit',
       headers: { Authorization: `Bearer ${token}`, 'Content-Type': 'application/json' },
-      body: JSON.stringify(reason ? { reason } : {}),
+      body: JSON.stringify({ ...body, ...(reason ? { reason } : {}) }),
     });
   } catch (failure) {
     return { status: 0, sentence: 'The zone does not answer. Try again in a moment.' };
   }
   if (answer.ok) return null;
   const told = await answer.json().catch(() => ({}));
-  return { status: answer.status, sentence: sentenceFor(answer.status, told.error) };
+  return { status: answer.status, sentence: sentenceFor(answer.status, told.error, subject) };
 }
 
-function sentenceFor(status, error) {
+function sentenceFor(status, error, subject) {
   if (status === 401) return 'This token is not known here. Check it and try again.';
-  if (status === 409) return 'This hazard is no longer on the map.';
+  const what = subject.change ? 'map change' : 'hazard';
+  if (status === 409) return `This ${what} is no longer on the map.`;
   return error ? `${error.charAt(0).toUpperCase()}${error.slice(1)}.` : `The zone answered ${status}.`;
 }
 
@@ -74,6 +85,13 @@ function hazardSubject(hazard) {
   return {
     address: `/api/v1/hazards/${hazard.id}`, hazard, name: hazard.label,
     detail: `${position(hazard.latitude, hazard.longitude)}, last seen ${localTime(hazard.lastSeen)}`,
+  };
+}
+
+function changeSubject(change) {
+  return {
+    address: `/api/v1/changes/${change.id}`, change, name: change.title,
+    detail: `${position(change.latitude, change.longitude)}, last seen ${localTime(change.lastSeen)}`,
   };
 }
 
@@ -86,8 +104,8 @@ function vehicleSubject(vehicle) {
 
 export class Officials {
   /** `enabled`: the server has officials. `onDone(text)` announces what was done,
-   * `onClosed({hazard, vehicle}, focus)` is called when the dialog goes away: one of the two is set,
-   * `focus` names the control that opened it. */
+   * `onClosed({hazard, change, vehicle}, focus)` is called when the dialog goes away: one of the
+   * three is set, `focus` names the control that opened it. */
   constructor(enabled, onDone, onClosed) {
     this.enabled = enabled;
     this.onDone = onDone;
@@ -106,7 +124,7 @@ export class Officials {
     byId('decision-cancel').addEventListener('click', () => this.dialog.close());
     this.dialog.addEventListener('close', () => {
       this.token.value = '';
-      this.onClosed(this.subject, this.decision.call);
+      this.onClosed(this.subject, this.decision.focus ?? this.decision.call);
     });
   }
 
@@ -120,6 +138,11 @@ export class Officials {
     return this.row(hazardSubject(hazard), offered);
   }
 
+  /** Those of a map change's popup. */
+  changeButtons(change) {
+    return this.row(changeSubject(change), ['confirmChange', 'dismissChange']);
+  }
+
   /** Those of a vehicle's popup. */
   vehicleButtons(vehicle) {
     return this.row(vehicleSubject(vehicle), ['distrust']);
@@ -128,8 +151,8 @@ export class Officials {
   row(subject, offered) {
     if (!this.enabled) return [];
     return [element('div', { class: 'decisions' }, ...offered.map((name) => {
-      const { call, button, bad } = DECISIONS[name];
-      const node = element('button', { type: 'button', 'data-focus': call,
+      const { call, focus = call, button, bad } = DECISIONS[name];
+      const node = element('button', { type: 'button', 'data-focus': focus,
         class: bad ? 'decide decide-reject' : 'decide' }, `${button}\u2026`);
       node.addEventListener('click', () => this.ask(subject, DECISIONS[name]));
       return node;
@@ -168,7 +191,7 @@ export class Officials {
       return this.refuse('A token has no blanks or special letters.', this.token);
     }
     this.submit.disabled = true;
-    const wrong = await send(`${subject.address}/${decision.call}`, reason, token);
+    const wrong = await send(subject, decision, reason, token);
     if (this.subject !== subject || !this.dialog.open) return undefined;
     if (wrong !== null) {
       if (wrong.status === 401) saveToken('');

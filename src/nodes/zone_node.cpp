@@ -44,6 +44,7 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       queue_(static_cast<std::size_t>(config_.queue_reports),
              static_cast<std::size_t>(config_.queue_bytes)),
       catch_up_(config_.catch_up),
+      map_changes_(node, zone_, static_cast<std::size_t>(config_.batch_reports)),
       pictures_(zone_, static_cast<std::size_t>(config_.notice_picture_bytes)),
       updater_(node, private_node) {
   if (config_.map_datum) SetMap(*config_.map_datum);
@@ -101,6 +102,7 @@ void ZoneNode::SayReady() const {
 ZoneNode::~ZoneNode() {
   for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
   for (ros::SteadyTimer& timer : timers_) timer.stop();
+  map_changes_.Close();
   queue_.Close();
   worker_.join();
   zone_.Unsubscribe(subscription_);
@@ -176,6 +178,8 @@ void ZoneNode::NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence)
 }
 
 void ZoneNode::OnEvent(const ZoneEvent& event) {
+  // Not shown in rviz, and no vehicle is told.
+  if (event.map_change) return;
   view_changed_ = true;
   const GeoPoint place = event.hazard ? event.hazard->hazard.position : event.vehicle->position;
   {
@@ -192,6 +196,7 @@ void ZoneNode::WorkUntilClosed() {
     const bool telling = TellVehicles();
     HandleAnswers();
     LetTimePass();
+    CommitMapChanges();
     const std::vector<Report> reports = queue_.Take(static_cast<std::size_t>(config_.batch_reports),
                                                     telling ? kTellPause : kPatience);
     if (!reports.empty()) CommitBatch(reports);
@@ -209,18 +214,34 @@ void ZoneNode::CommitBatch(const std::vector<Report>& reports) {
       }
       receipt_publisher_.publish(ToMessage(receipt));
     }
-    Count([](ZoneCloudletCounters& counters) {
-      ++counters.commits;
-      counters.store_error.clear();
-    });
+    NoteCommit();
   } catch (const Error& error) {
-    Count([&error](ZoneCloudletCounters& counters) {
-      ++counters.store_errors;
-      counters.store_error = error.what();
-    });
-    ROS_ERROR_THROTTLE(kSayAgainS, "%s; the reports' vehicles will send them again", error.what());
-    std::this_thread::sleep_for(kStorePause);
+    NoteFailedCommit(error);
   }
+}
+
+void ZoneNode::CommitMapChanges() {
+  try {
+    if (map_changes_.CommitWaiting()) NoteCommit();
+  } catch (const Error& error) {
+    NoteFailedCommit(error);
+  }
+}
+
+void ZoneNode::NoteCommit() {
+  Count([](ZoneCloudletCounters& counters) {
+    ++counters.commits;
+    counters.store_error.clear();
+  });
+}
+
+void ZoneNode::NoteFailedCommit(const Error& error) {
+  Count([&error](ZoneCloudletCounters& counters) {
+    ++counters.store_errors;
+    counters.store_error = error.what();
+  });
+  ROS_ERROR_THROTTLE(kSayAgainS, "%s; the reports' vehicles will send them again", error.what());
+  std::this_thread::sleep_for(kStorePause);
 }
 
 /// Publishes the next portion of what single vehicles must know; true while there is more.
@@ -313,6 +334,11 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     counters = counters_;
   }
   counters.reports_waiting = queue_.size();
+  const MapChangeDesk::Counters changes = map_changes_.counters();
+  counters.map_changes_received = changes.received;
+  counters.map_changes_malformed = changes.malformed;
+  counters.map_changes_not_queued = changes.not_queued;
+  counters.map_changes_waiting = changes.waiting;
   counters.notices_sent = notices_->sent();
   counters.notice_pictures = notices_->pictures();
   counters.notice_pictures_failed = pictures_.failed();

@@ -18,6 +18,7 @@
 #include <thread>
 #include <vector>
 
+#include "nodes/map_change_desk.h"
 #include "nodes/notice_sender.h"
 #include "nodes/vehicle_teller.h"
 #include "ros/zone_conversions.h"
@@ -29,7 +30,8 @@
 
 namespace livemap {
 
-/// The zone cloudlet as a ROS node. The callbacks' thread queues reports and poll answers and takes
+/// The zone cloudlet as a ROS node. The callbacks' thread queues reports, map changes and poll
+/// answers and takes
 /// positions; one worker thread commits what is queued in groups, answers with receipts, tells
 /// single vehicles what they missed, lets time pass and asks polls; NoticeSender's thread tells
 /// everybody what is announced.
@@ -56,6 +58,9 @@ class ZoneNode {
   void SayReady() const;
   void WorkUntilClosed();
   void CommitBatch(const std::vector<Report>& reports);
+  void CommitMapChanges();
+  void NoteCommit();
+  void NoteFailedCommit(const Error& error);
   void NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence);
   bool TellVehicles();
   void HandleAnswers();
@@ -75,6 +80,7 @@ class ZoneNode {
   std::deque<CatchUpOrder> orders_;  ///< Not yet the worker's.
   std::deque<PollAnswer> answers_;
 
+  MapChangeDesk map_changes_;
   NoticePictures pictures_;
   std::unique_ptr<VehicleTeller> teller_;  ///< The worker's.
   std::int64_t advanced_ns_ = 0;           ///< The worker's: when time last passed, steady.

@@ -5,6 +5,7 @@
 #include <livemap/HazardPoll.h>
 #include <livemap/HazardPollAnswer.h>
 #include <livemap/HazardReport.h>
+#include <livemap/MapChange.h>
 #include <livemap/ReportReceipt.h>
 #include <livemap/VehiclePosition.h>
 #include <ros/message_traits.h>
@@ -106,6 +107,7 @@ const std::map<std::string, Factory>& Registry() {
       Entry<HazardPoll>({}, {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
       Entry<HazardPollAnswer>({"image.data"}),
       Entry<HazardReport>({"image.data"}, {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
+      Entry<MapChange>(),
       Entry<ReportReceipt>(),
       Entry<VehiclePosition>(),
   };

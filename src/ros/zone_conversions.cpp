@@ -96,6 +96,25 @@ void AppendVehicle(const VehicleState& vehicle, const std::deque<GeoPoint>& path
   array.markers.push_back(trail);
 }
 
+void DescribeMapChanges(const ZoneCloudletCounters& counters, const MapChangeStatistics& changes,
+                        diagnostic_updater::DiagnosticStatusWrapper& status) {
+  for (std::size_t i = 0; i < kMapChangeStates; ++i) {
+    status.add(std::string("map_changes_") + StateName(static_cast<MapChangeState>(i)),
+               changes.by_state[i]);
+  }
+  status.add("map_changes_received", counters.map_changes_received);
+  status.add("map_changes_accepted", changes.added);
+  status.add("map_changes_merged", changes.merged);
+  status.add("map_changes_denied", changes.denied);
+  status.add("map_changes_known", changes.known);
+  status.add("map_changes_repeated", changes.repeated);
+  status.add("map_changes_refused", changes.refused);
+  status.add("map_changes_not_now", changes.not_now);
+  status.add("map_changes_malformed", counters.map_changes_malformed);
+  status.add("map_changes_not_queued", counters.map_changes_not_queued);
+  status.add("map_changes_waiting", counters.map_changes_waiting);
+}
+
 }  // namespace
 
 void VehiclePaths::Add(const VehicleState& vehicle) {
@@ -182,6 +201,7 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
   status.add("vehicles_joined", counters.vehicles_joined);
   status.add("vehicles_behind", counters.vehicles_behind);
   status.add("image_bytes", statistics.image_bytes);
+  DescribeMapChanges(counters, statistics.map_changes, status);
 }
 
 }  // namespace livemap

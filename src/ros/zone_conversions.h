@@ -56,6 +56,10 @@ struct ZoneCloudletCounters {
   std::uint64_t answers_malformed = 0;
   std::uint64_t answers_dropped = 0;  ///< Too many at the same time.
   std::size_t reports_waiting = 0;
+  std::uint64_t map_changes_received = 0;
+  std::uint64_t map_changes_malformed = 0;   ///< Answered REFUSED: an unknown schema or direction.
+  std::uint64_t map_changes_not_queued = 0;  ///< Too many waited: they are sent again.
+  std::size_t map_changes_waiting = 0;
   std::string store_error;  ///< Of the newest batch; empty when it went well.
 };
 

@@ -64,6 +64,8 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   ReadCount(parameters, "max_vehicles", zone.max_vehicles, {1, 1e6});
   ReadCount(parameters, "max_hazards", zone.max_hazards, {1, 1e8});
   parameters.Read("max_reports_per_hour", zone.allowance.reports_per_hour, {1, 1e9});
+  ReadCount(parameters, "max_map_changes", zone.map_changes.max_features, {1, 1e6});
+  parameters.Read("max_map_changes_per_hour", zone.map_changes_per_hour, {1, 1e9});
   parameters.Read("max_evidence_per_hour", zone.allowance.evidence_per_hour, {1, 1e9});
   ReadCount(parameters, "max_reporting_vehicles", zone.allowance.max_vehicles, {1, 1e7});
   parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000});

@@ -70,6 +70,7 @@ Api::Api(const WebOptions& options, ZoneService& zone, const HazardCatalogue& ca
       catalogue_(catalogue),
       trails_(trails),
       officials_(options_, zone, catalogue),
+      map_changes_(zone),
       pictures_(LimitsOf(options), options.picture_cache_bytes),
       page_(options.web_root),
       leaflet_(options.leaflet_root + "/leaflet"),
@@ -143,8 +144,10 @@ HttpAnswer Api::RouteApi(const RequestTarget& target) const {
     const std::size_t id_bytes = path.size() - kHazardPrefix.size() - kEventsEnding.size();
     return Events(path.substr(kHazardPrefix.size(), id_bytes), ParseEventsQuery(target));
   }
+  const bool is_decision = ParseDecisionTarget(path).has_value();
+  if (!is_decision && StartsWith(path, kMapChangeAddress)) return map_changes_.Answer(target);
   RefuseParameters(target);
-  if (ParseDecisionTarget(path)) return PostOnly();
+  if (is_decision) return PostOnly();
   if (StartsWith(path, kHazardPrefix)) return OneHazard(path.substr(kHazardPrefix.size()));
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
   if (path == "/api/v1/vehicles") return Vehicles();

@@ -5,6 +5,7 @@
 
 #include "hazard/catalogue.h"
 #include "web/http_answer.h"
+#include "web/map_change_api.h"
 #include "web/official_api.h"
 #include "web/options.h"
 #include "web/query.h"
@@ -46,6 +47,7 @@ class Api {
   const HazardCatalogue& catalogue_;
   const VehicleTrails& trails_;
   OfficialApi officials_;
+  const MapChangeApi map_changes_;
   ServedPictures pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;

@@ -17,7 +17,14 @@ constexpr DecisionAddress kAddresses[] = {
     {"/api/v1/hazards/", "/confirm", Decision::kConfirm},
     {"/api/v1/hazards/", "/reject", Decision::kReject},
     {"/api/v1/vehicles/", "/distrust", Decision::kDistrust},
+    {"/api/v1/changes/", "/decision", Decision::kMapChange},
 };
+
+void CheckReason(const std::string& reason, const std::string& accepted) {
+  if (IsPrintableText(reason, kMaxDecisionReasonBytes)) return;
+  throw BadRequest("the reason of " + std::to_string(reason.size()) + " bytes is not accepted, " +
+                   accepted);
+}
 
 }  // namespace
 
@@ -45,11 +52,33 @@ std::string ParseDecisionBody(Decision decision, const std::string& body) {
   if (json.empty() && decision == Decision::kConfirm) return "";
   std::string reason = json.value("reason", "");
   if (reason.empty()) throw BadRequest("there is no reason, " + kAccepted);
-  if (!IsPrintableText(reason, kMaxDecisionReasonBytes)) {
-    throw BadRequest("the reason of " + std::to_string(reason.size()) + " bytes is not accepted, " +
-                     kAccepted);
-  }
+  CheckReason(reason, kAccepted);
   return reason;
+}
+
+MapChangeDecision ParseMapChangeDecision(const std::string& body) {
+  static const std::string kAccepted =
+      R"(accepted is {"decision": "confirm" or "dismiss", "reason": TEXT} with one line of )"
+      "printable text of 1 to " +
+      std::to_string(kMaxDecisionReasonBytes) + " bytes, which confirm may leave out";
+  const nlohmann::json json = nlohmann::json::parse(body, nullptr, false);
+  if (!json.is_object()) throw BadRequest("the body is no JSON object, " + kAccepted);
+  for (const auto& [key, value] : json.items()) {
+    if (key != "decision" && key != "reason") {
+      throw BadRequest("the body has an unknown key, " + kAccepted);
+    }
+    if (!value.is_string()) throw BadRequest("the body's values are no texts, " + kAccepted);
+  }
+  const std::string name = json.value("decision", "");
+  if (name != "confirm" && name != "dismiss")
+    throw BadRequest("there is no decision, " + kAccepted);
+  MapChangeDecision decision;
+  decision.confirms = name == "confirm";
+  decision.reason = json.value("reason", "");
+  if (decision.reason.empty() && decision.confirms) return decision;
+  if (decision.reason.empty()) throw BadRequest("there is no reason, " + kAccepted);
+  CheckReason(decision.reason, kAccepted);
+  return decision;
 }
 
 }  // namespace livemap

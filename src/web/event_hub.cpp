@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "web/json.h"
+#include "web/map_change_json.h"
 
 namespace livemap {
 
@@ -46,6 +47,10 @@ void EventHub::Publish(const ZoneEvent& event) {
     message.sequence = event.hazard->hazard.sequence;
     message.text = std::make_shared<const std::string>(
         ToText(HazardMessage(event.hazard->action, event.hazard->hazard, catalogue_)));
+  } else if (event.map_change) {
+    message.sequence = event.map_change->feature.sequence;
+    message.text = std::make_shared<const std::string>(
+        ToText(MapChangeMessage(event.map_change->Action(), event.map_change->feature)));
   } else if (event.vehicle) {
     message.text = std::make_shared<const std::string>(ToText(VehicleMessage(*event.vehicle)));
   } else {

@@ -15,7 +15,7 @@ namespace livemap {
 /// One message of the live stream, written once for all clients.
 struct LiveMessage {
   std::shared_ptr<const std::string> text;
-  std::uint64_t sequence = 0;  ///< Of a hazard event; 0 for a vehicle position.
+  std::uint64_t sequence = 0;  ///< Of an event; 0 for a vehicle position.
 };
 
 /// A client of the live stream.

@@ -10,15 +10,20 @@
 namespace livemap {
 namespace {
 
-/// Rounds to `digits` after the point: 1e-7 degree is a centimetre, and float32 noise such as
-/// 0.8700000047683716 helps nobody.
+Json Coordinates(const GeoPoint& position) {
+  return Json::array({Rounded(position.longitude_deg, 7), Rounded(position.latitude_deg, 7)});
+}
+
+Json ImageUrl(const Hazard& hazard) {
+  if (hazard.image_sha256.empty()) return nullptr;
+  return "/images/" + hazard.image_sha256;
+}
+
+}  // namespace
+
 double Rounded(double value, int digits) {
   const double scale = std::pow(10.0, digits);
   return std::round(value * scale) / scale;
-}
-
-Json Coordinates(const GeoPoint& position) {
-  return Json::array({Rounded(position.longitude_deg, 7), Rounded(position.latitude_deg, 7)});
 }
 
 Json PointFeature(const std::string& id, const GeoPoint& position) {
@@ -29,7 +34,6 @@ Json PointFeature(const std::string& id, const GeoPoint& position) {
   return feature;
 }
 
-/// Standard deviation along the worst direction, metres; null when the covariance says nothing.
 Json PositionSigma(const Eigen::Matrix2d& covariance_m2) {
   if (!covariance_m2.allFinite()) return nullptr;
   const double largest =
@@ -39,13 +43,6 @@ Json PositionSigma(const Eigen::Matrix2d& covariance_m2) {
   if (!(largest > 0)) return nullptr;
   return Rounded(std::sqrt(largest), 2);
 }
-
-Json ImageUrl(const Hazard& hazard) {
-  if (hazard.image_sha256.empty()) return nullptr;
-  return "/images/" + hazard.image_sha256;
-}
-
-}  // namespace
 
 std::string ToText(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "web/map_change_json.h"
 #include "web/origin.h"
 
 namespace livemap {
@@ -66,6 +67,9 @@ HttpAnswer OfficialApi::Decide(const DecisionTarget& target, const HttpQuestion&
   if (!question.body.empty() && !IsJsonType(question.content_type)) {
     return MakeErrorAnswer(415, "the body's type is not accepted, accepted is application/json");
   }
+  if (target.decision == Decision::kMapChange) {
+    return DecideMapChange(target, official, question.body);
+  }
   const std::string reason = ParseDecisionBody(target.decision, question.body);
   if (target.decision == Decision::kDistrust) return Distrust(target.id, official, reason);
   return DecideHazard(target, official, reason);
@@ -86,6 +90,23 @@ HttpAnswer OfficialApi::DecideHazard(const DecisionTarget& target, const std::st
                                     : "the hazard is gone; seen again it is a new one");
   }
   return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), "application/geo+json");
+}
+
+HttpAnswer OfficialApi::DecideMapChange(const DecisionTarget& target, const std::string& official,
+                                        const std::string& body) {
+  const MapChangeDecision decision = ParseMapChangeDecision(body);
+  const auto uuid = Uuid::Parse(target.id);
+  if (!uuid) throw BadRequest("the map change's id is no UUID");
+  const auto feature = zone_.FindMapChange(*uuid);
+  if (!feature) return MakeErrorAnswer(404, "the zone knows no map change with this id");
+  const bool decided = decision.confirms ? zone_.ConfirmMapChange(*uuid, official, decision.reason)
+                                         : zone_.DismissMapChange(*uuid, official, decision.reason);
+  if (!decided) {
+    return MakeErrorAnswer(409, feature->state == MapChangeState::kDismissed
+                                    ? "the map change is dismissed already"
+                                    : "the map change is undone; told again it is a new one");
+  }
+  return JsonAnswer(MapChangeGeoJson(*zone_.FindMapChange(*uuid)), "application/geo+json");
 }
 
 HttpAnswer OfficialApi::Distrust(const std::string& vehicle, const std::string& official,

@@ -11,8 +11,8 @@
 
 namespace livemap {
 
-/// Officials' decisions about hazards and vehicles. Thread-safe; store failures come out as
-/// exceptions.
+/// Officials' decisions about hazards, vehicles and map changes. Thread-safe; store failures come
+/// out as exceptions.
 class OfficialApi {
  public:
   /// Keeps references. Reads the token file of the options; throws Error when it is not accepted.
@@ -26,6 +26,8 @@ class OfficialApi {
  private:
   HttpAnswer DecideHazard(const DecisionTarget& target, const std::string& official,
                           const std::string& reason);
+  HttpAnswer DecideMapChange(const DecisionTarget& target, const std::string& official,
+                             const std::string& body);
   HttpAnswer Distrust(const std::string& vehicle, const std::string& official,
                       const std::string& reason);
   std::optional<HttpAnswer> WhyNotAllowed(const HttpQuestion& question, std::string& official);

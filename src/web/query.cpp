@@ -5,6 +5,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 namespace livemap {
 namespace {
@@ -116,16 +117,25 @@ std::size_t ParseLimit(const std::string& text, std::size_t most) {
   return *number;
 }
 
-HazardStates ParseStates(const std::string& text) {
-  HazardStates states;
+/// "a, b and c".
+template <typename State, std::size_t kCount>
+std::string StateNames(const std::array<State, kCount>& all) {
+  std::string names = StateName(all.front());
+  for (std::size_t i = 1; i < kCount; ++i) {
+    names += (i + 1 < kCount ? ", " : " and ") + std::string(StateName(all[i]));
+  }
+  return names;
+}
+
+template <typename State, std::size_t kCount>
+std::set<State> ParseStates(const std::string& text, const std::array<State, kCount>& all) {
+  std::set<State> states;
   Split(text, ',', [&](std::string_view piece) {
-    for (const auto state : {HazardState::kCandidate, HazardState::kActive, HazardState::kVerifying,
-                             HazardState::kGone, HazardState::kRejected}) {
+    for (const State state : all) {
       if (piece == StateName(state) && states.insert(state).second) return;
     }
-    throw BadRequest("state is " + Quoted(text) +
-                     ", accepted are candidate, active, verifying, gone and rejected, each once, "
-                     "with commas between");
+    throw BadRequest("state is " + Quoted(text) + ", accepted are " + StateNames(all) +
+                     ", each once, with commas between");
   });
   return states;
 }
@@ -141,6 +151,26 @@ void RefuseRepeated(const RequestTarget& target) {
 
 [[noreturn]] void RefuseUnknown(const std::string& name, const std::string& accepted) {
   throw BadRequest("the parameter " + Quoted(name) + " is unknown, " + accepted);
+}
+
+template <typename Query, typename States>
+Query ParseListQuery(const RequestTarget& target, const States& all_states) {
+  RefuseRepeated(target);
+  Query query;
+  for (const auto& [name, value] : target.parameters) {
+    if (name == "bbox") {
+      query.box = ParseBox(value);
+    } else if (name == "since") {
+      query.since = ParseSequence(value);
+    } else if (name == "limit") {
+      query.limit = ParseLimit(value, kMaxHazardsPerAnswer);
+    } else if (name == "state") {
+      query.states = ParseStates(value, all_states);
+    } else {
+      RefuseUnknown(name, "accepted are bbox, since, limit and state");
+    }
+  }
+  return query;
 }
 
 }  // namespace
@@ -172,22 +202,17 @@ RequestTarget ParseTarget(std::string_view target) {
 }
 
 HazardQuery ParseHazardQuery(const RequestTarget& target) {
-  RefuseRepeated(target);
-  HazardQuery query;
-  for (const auto& [name, value] : target.parameters) {
-    if (name == "bbox") {
-      query.box = ParseBox(value);
-    } else if (name == "since") {
-      query.since = ParseSequence(value);
-    } else if (name == "limit") {
-      query.limit = ParseLimit(value, kMaxHazardsPerAnswer);
-    } else if (name == "state") {
-      query.states = ParseStates(value);
-    } else {
-      RefuseUnknown(name, "accepted are bbox, since, limit and state");
-    }
-  }
-  return query;
+  return ParseListQuery<HazardQuery>(
+      target, std::array<HazardState, kHazardStates>{HazardState::kCandidate, HazardState::kActive,
+                                                     HazardState::kVerifying, HazardState::kGone,
+                                                     HazardState::kRejected});
+}
+
+MapChangeQuery ParseMapChangeQuery(const RequestTarget& target) {
+  return ParseListQuery<MapChangeQuery>(
+      target, std::array<MapChangeState, kMapChangeStates>{
+                  MapChangeState::kProposed, MapChangeState::kConfirmed, MapChangeState::kUndone,
+                  MapChangeState::kDismissed});
 }
 
 std::size_t ParseEventsQuery(const RequestTarget& target) {

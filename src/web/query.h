@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "zone/hazard.h"
+#include "zone/map_change.h"
 
 namespace livemap {
 
@@ -49,6 +50,21 @@ constexpr std::size_t kMaxHazardsPerAnswer = 50000;
 /// Throws BadRequest naming the parameter, its value and what is accepted; unknown and repeated
 /// parameters are refused, so that a misspelt filter never answers with everything.
 HazardQuery ParseHazardQuery(const RequestTarget& target);
+
+/// What `GET /api/v1/changes` asks for; as HazardQuery.
+struct MapChangeQuery {
+  std::optional<GeoBox> box;
+  std::optional<std::uint64_t> since;
+  std::size_t limit = 20000;
+  MapChangeStates states;  ///< Only these; empty: proposed and confirmed.
+
+  bool Selects(MapChangeState state) const {
+    return states.empty() ? IsOpen(state) : states.count(state) != 0;
+  }
+};
+
+/// As ParseHazardQuery; states are proposed, confirmed, undone and dismissed.
+MapChangeQuery ParseMapChangeQuery(const RequestTarget& target);
 
 /// The most events of a hazard that one answer may hold.
 constexpr std::size_t kMaxEventsPerAnswer = 1000;

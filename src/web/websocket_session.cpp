@@ -4,9 +4,11 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 #include <chrono>
+#include <map>
 #include <utility>
 
 #include "web/json.h"
+#include "web/map_change_json.h"
 
 namespace livemap {
 namespace {
@@ -130,14 +132,26 @@ void WebSocketSession::OnMessage(const LiveMessage& message) {
 void WebSocketSession::ReplayPage() {
   WebContext& context = slot_.context();
   try {
+    // Read before the lists, and the end of both: what happens between the two comes later.
     const std::uint64_t newest = context.zone.Sequence();
-    const std::vector<Hazard> page = context.zone.Query(std::nullopt, told_sequence_, kReplayPage);
-    for (const Hazard& hazard : page) {
-      told_sequence_ = std::max(told_sequence_, hazard.sequence);
-      Enqueue(Shared(HazardMessage(ReplayAction(hazard), hazard, context.catalogue)));
+    const auto hazards = context.zone.Query(std::nullopt, told_sequence_, kReplayPage);
+    const auto changes = context.zone.QueryMapChanges(std::nullopt, told_sequence_, kReplayPage);
+    std::uint64_t end = newest;
+    if (hazards.size() == kReplayPage) end = std::min(end, hazards.back().sequence);
+    if (changes.size() == kReplayPage) end = std::min(end, changes.back().sequence);
+    std::map<std::uint64_t, std::shared_ptr<const std::string>> messages;
+    for (const Hazard& hazard : hazards) {
+      if (hazard.sequence > end) break;
+      messages[hazard.sequence] =
+          Shared(HazardMessage(ReplayAction(hazard), hazard, context.catalogue));
     }
-    if (page.size() < kReplayPage) told_sequence_ = std::max(told_sequence_, newest);
-    if (page.empty() || (page.size() < kReplayPage && announced_sequence_ <= told_sequence_)) {
+    for (const MapChangeFeature& change : changes) {
+      if (change.sequence > end) break;
+      messages[change.sequence] = Shared(MapChangeMessage(ReplayAction(change), change));
+    }
+    for (auto& entry : messages) Enqueue(std::move(entry.second));
+    told_sequence_ = std::max(told_sequence_, end);
+    if (end == newest && announced_sequence_ <= told_sequence_) {
       state_ = State::kLive;
       Enqueue(Shared({{"type", "live"}, {"sequence", told_sequence_}}));
     }

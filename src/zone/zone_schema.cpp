@@ -172,6 +172,61 @@ const Statements& ToVersion3() {
   return kStatements;
 }
 
+/// Map changes. A report names its feature by uuid: it is kept when the feature is forgotten.
+const Statements& ToVersion4() {
+  static const Statements kStatements{
+      R"(CREATE TABLE map_changes (
+           id INTEGER PRIMARY KEY,
+           uuid VARCHAR(36) NOT NULL,
+           class_name TEXT NOT NULL,
+           vanished INTEGER NOT NULL,
+           state INTEGER NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL,
+           reports BIGINT NOT NULL,
+           drives BIGINT NOT NULL,
+           vehicles INTEGER NOT NULL,
+           first_seen_ns BIGINT NOT NULL,
+           last_seen_ns BIGINT NOT NULL,
+           denied_ns BIGINT NOT NULL,
+           updated_ns BIGINT NOT NULL,
+           sequence BIGINT NOT NULL,
+           witnesses TEXT NOT NULL))",
+      R"(CREATE TABLE map_change_reports (
+           uuid VARCHAR(36) PRIMARY KEY,
+           change_uuid VARCHAR(36) NOT NULL,
+           vehicle_id TEXT NOT NULL,
+           drive_id TEXT NOT NULL,
+           stamp_ns BIGINT NOT NULL,
+           earlier_stamp_ns BIGINT NOT NULL,
+           received_ns BIGINT NOT NULL,
+           class_name TEXT NOT NULL,
+           vanished INTEGER NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           seen BIGINT NOT NULL,
+           missed BIGINT NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL))",
+      R"(CREATE TABLE map_change_events (
+           sequence INTEGER PRIMARY KEY,
+           change_id INTEGER NOT NULL,
+           previous_sequence BIGINT NOT NULL,
+           from_state INTEGER,
+           to_state INTEGER NOT NULL,
+           reason TEXT NOT NULL,
+           at_ns BIGINT NOT NULL))",
+      "CREATE INDEX map_change_events_by_change ON map_change_events (change_id)",
+      "INSERT INTO livemap_schema (version) VALUES (4)"};
+  return kStatements;
+}
+
 int Version(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -193,7 +248,7 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
                      std::to_string(version) + ", which no program wrote");
   }
   const std::array<const Statements*, kZoneSchemaVersion> steps{&ToVersion1(), &ToVersion2(),
-                                                                &ToVersion3()};
+                                                                &ToVersion3(), &ToVersion4()};
   for (int step = version; step < kZoneSchemaVersion; ++step) {
     soci::transaction transaction(session);
     for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;

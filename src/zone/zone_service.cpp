@@ -31,6 +31,14 @@ void CheckSettings(const ZoneService::Config& config) {
   if (config.max_vehicles == 0) throw Error("max_vehicles is 0, accepted is at least 1");
 }
 
+/// What one vehicle tells of map changes is counted apart from its reports of hazards.
+VehicleAllowance::Config MapChangeAllowance(const ZoneService::Config& config) {
+  VehicleAllowance::Config allowance;
+  allowance.reports_per_hour = config.map_changes_per_hour;
+  allowance.max_vehicles = config.allowance.max_vehicles;
+  return allowance;
+}
+
 }  // namespace
 
 ZoneService::Implementation::Implementation(Config config, Clock now_ns, std::uint64_t uuid_seed)
@@ -42,11 +50,13 @@ ZoneService::Implementation::Implementation(Config config, Clock now_ns, std::ui
       survival_(config_.catalogue, config_.survival),
       trust_(config_.trust),
       allowance_(config_.allowance),
+      map_change_allowance_(MapChangeAllowance(config_)),
       images_(directory_.path() + "/images", static_cast<std::uint64_t>(config_.image_cap_bytes)),
       vehicles_(config_.vehicle_retention_s, config_.max_vehicles),
       sequence_(store_.LastSequence()),
       generator_(MakeGenerator(uuid_seed, sequence_)),
       registry_(config_.catalogue, generator_()),
+      map_changes_(config_.map_changes, generator_()),
       scheduler_(config_.polls, generator_()) {
   Load();
 }
@@ -74,6 +84,11 @@ void ZoneService::Implementation::Load() {
     sequence_ = std::max(sequence_, hazard.sequence);
   });
   registry_.SkipIdsTo(static_cast<std::uint32_t>(store_.LastHazardId()));
+  damage += store_.LoadMapChanges([this](const ZoneStore::MapChangeRow& row) {
+    map_changes_.Restore(static_cast<std::uint32_t>(row.id), row.feature);
+    sequence_ = std::max(sequence_, row.feature.sequence);
+  });
+  map_changes_.SkipIdsTo(static_cast<std::uint32_t>(store_.LastMapChangeId()));
   const std::int64_t now_ns = now_ns_();
   for (Slot slot = 0; slot < registry_.size(); ++slot) Schedule(slot, now_ns);
 }
@@ -111,6 +126,7 @@ void ZoneService::Implementation::Write(Change& change) {
   for (const auto& [vehicle, before] : change.trust_before) {
     store_.WriteTrust(vehicle, trust_.Get(vehicle));
   }
+  WriteMapChanges(change);
 }
 
 /// What a failed transaction taught.
@@ -131,6 +147,11 @@ void ZoneService::Implementation::Settle(const Change& change) {
   for (const HazardEvent& event : change.events) {
     ZoneEvent message;
     message.hazard = event;
+    stream_.Publish(message);
+  }
+  for (const MapChangeEvent& event : change.map_change_events) {
+    ZoneEvent message;
+    message.map_change = event;
     stream_.Publish(message);
   }
 }
@@ -183,6 +204,7 @@ ZoneStatistics ZoneService::Implementation::Statistics() const {
   statistics.store_errors = store_errors_;
   statistics.active_hazards = registry_.on_map_count();
   statistics.hazards_by_state = registry_.counts();
+  statistics.map_changes.by_state = map_changes_.counts();
   statistics.image_bytes = images_.total_bytes();
   statistics.suspect_vehicles = trust_.Count(config_.life.suspect_above, now_ns_());
   return statistics;
@@ -213,6 +235,39 @@ std::vector<Hazard> ZoneService::Query(const std::optional<GeoBox>& box,
                                        const HazardStates& states) const {
   const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
   return implementation_->registry_.Query(box, since_sequence, limit, states);
+}
+
+std::vector<Receipt> ZoneService::HandleMapChanges(const std::vector<MapChangeReport>& reports) {
+  return implementation_->HandleMapChanges(reports);
+}
+
+std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<GeoBox>& box,
+                                                           std::uint64_t since_sequence,
+                                                           std::size_t limit,
+                                                           const MapChangeStates& states) const {
+  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
+  return implementation_->map_changes_.Query(box, since_sequence, limit, states);
+}
+
+std::optional<MapChangeFeature> ZoneService::FindMapChange(const Uuid& uuid) const {
+  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
+  const MapChangeFeature* feature = implementation_->map_changes_.Find(uuid);
+  return feature != nullptr ? std::optional<MapChangeFeature>(*feature) : std::nullopt;
+}
+
+std::vector<StoredMapChangeEvent> ZoneService::MapChangeEvents(const Uuid& uuid,
+                                                               std::size_t limit) const {
+  return implementation_->MapChangeEvents(uuid, limit);
+}
+
+bool ZoneService::ConfirmMapChange(const Uuid& uuid, const std::string& official,
+                                   const std::string& reason) {
+  return implementation_->DecideMapChange(uuid, MapChangeState::kConfirmed, official, reason);
+}
+
+bool ZoneService::DismissMapChange(const Uuid& uuid, const std::string& official,
+                                   const std::string& reason) {
+  return implementation_->DecideMapChange(uuid, MapChangeState::kDismissed, official, reason);
 }
 
 std::vector<Hazard> ZoneService::QueryNear(const GeoPoint& centre, double radius_m,

@@ -11,9 +11,12 @@
 
 #include "base/sqlite.h"
 #include "hazard/catalogue.h"
+#include "hazard/map_change_report.h"
 #include "hazard/report.h"
 #include "zone/hazard.h"
 #include "zone/hazard_life.h"
+#include "zone/map_change.h"
+#include "zone/map_change_registry.h"
 #include "zone/poll_scheduler.h"
 #include "zone/report_validation.h"
 #include "zone/speed_rule.h"
@@ -36,9 +39,10 @@ struct VehicleState {
   std::int64_t heard_ns = 0;  ///< Zone clock (UTC), set by UpdateVehicle.
 };
 
-/// One message of the zone's stream: exactly one of the two is set.
+/// One message of the zone's stream: exactly one of the three is set.
 struct ZoneEvent {
   std::optional<HazardEvent> hazard;
+  std::optional<MapChangeEvent> map_change;
   std::optional<VehicleState> vehicle;
 };
 
@@ -90,7 +94,8 @@ struct ZoneStatistics {
   std::array<std::size_t, kHazardStates> hazards_by_state{};  ///< By HazardState.
   std::uint64_t image_bytes = 0;                              ///< On disk.
   std::size_t suspect_vehicles = 0;  ///< Too often contradicted: they do not count as vehicles.
-  StoreDamage store_damage;          ///< What was found broken in the store at start.
+  MapChangeStatistics map_changes;
+  StoreDamage store_damage;  ///< What was found broken in the store at start.
 };
 
 /// The zone's state behind one thread-safe door: registry, store, pictures, vehicles, event stream.
@@ -115,7 +120,9 @@ class ZoneService {
     SurvivalModel::Config survival;
     VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
     PollScheduler::Config polls;
-    SightRule sight;  ///< Whose answer to a poll counts.
+    MapChangeRegistry::Rule map_changes;
+    double map_changes_per_hour = 240;  ///< Of one vehicle, >= 1; further ones must wait.
+    SightRule sight;                    ///< Whose answer to a poll counts.
     /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
     /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
     bool replay = false;
@@ -141,6 +148,25 @@ class ZoneService {
   /// reports, but none for a report that is not taken now (see Config::allowance): its
   /// vehicle sends it again. All or nothing when the store fails.
   std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
+
+  /// What vehicles tell of map changes: as HandleBatch, with their own hourly cap
+  /// (Config::map_changes_per_hour) and without a rule about speed. A receipt's hazard_uuid is that
+  /// of the feature.
+  std::vector<Receipt> HandleMapChanges(const std::vector<MapChangeReport>& reports);
+  /// Features whose last event is newer than `since_sequence`, in the order of that sequence, at
+  /// most `limit`: open ones, with `since_sequence` > 0 the others too. With `states` exactly those
+  /// in one of them. Sequences are those of hazards' events, too.
+  std::vector<MapChangeFeature> QueryMapChanges(const std::optional<GeoBox>& box,
+                                                std::uint64_t since_sequence, std::size_t limit,
+                                                const MapChangeStates& states = {}) const;
+  std::optional<MapChangeFeature> FindMapChange(const Uuid& uuid) const;
+  /// As Events.
+  std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit) const;
+  /// An official's decisions, as Confirm and Reject below. False when there is no such feature, or
+  /// none to decide about (MapChangeRegistry::Decide).
+  bool ConfirmMapChange(const Uuid& uuid, const std::string& official,
+                        const std::string& reason = "");
+  bool DismissMapChange(const Uuid& uuid, const std::string& official, const std::string& reason);
 
   /// Hazards whose last event is newer than `since_sequence`, in the order of that sequence, at
   /// most `limit`. Those on the officials' map; gone and rejected ones too when `since_sequence`

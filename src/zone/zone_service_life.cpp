@@ -18,8 +18,8 @@ std::string Shortened(std::string text) {
   return text;
 }
 
-/// The reason, cut to an event's length. Throws Error when it or the official's name is no
-/// acceptable text; an empty reason is.
+}  // namespace
+
 std::string CheckedReason(const std::string& official, const std::string& reason,
                           std::size_t max_name_bytes) {
   if (!IsPrintableText(official, max_name_bytes)) {
@@ -33,8 +33,6 @@ std::string CheckedReason(const std::string& official, const std::string& reason
   }
   return why;
 }
-
-}  // namespace
 
 LifeClass ZoneService::Implementation::ClassOf(Slot slot) const {
   const std::string& name = registry_.ClassName(slot);

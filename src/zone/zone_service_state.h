@@ -23,6 +23,11 @@
 
 namespace livemap {
 
+/// An official's reason, cut to an event's length. Throws Error when it or the official's name is
+/// no acceptable text; an empty reason is.
+std::string CheckedReason(const std::string& official, const std::string& reason,
+                          std::size_t max_name_bytes);
+
 /// What stands behind ZoneService; only its own sources include this. Locks are taken in the order
 /// writer_mutex_, data_mutex_, polls_mutex_.
 class ZoneService::Implementation {
@@ -37,6 +42,10 @@ class ZoneService::Implementation {
   std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
                                       const std::string& reason);
   bool Remove(const Uuid& uuid, const std::string& reason);
+  std::vector<Receipt> HandleMapChanges(const std::vector<MapChangeReport>& reports);
+  bool DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
+                       const std::string& reason);
+  std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit);
   std::vector<PollOrder> TakeDuePolls();
   bool HandleAnswer(const PollAnswer& answer);
   void Advance();
@@ -56,6 +65,7 @@ class ZoneService::Implementation {
   SurvivalModel survival_;
   VehicleTrust trust_;
   VehicleAllowance allowance_;
+  VehicleAllowance map_change_allowance_;
   std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id; the rest is stored.
   DueQueue due_;
   struct OpenPoll {
@@ -71,12 +81,13 @@ class ZoneService::Implementation {
   EventStream stream_;
 
   /// Held exclusively from the first change to the end of its commit, so that no reader ever sees
-  /// what is not on disk: guards sequence_, announced_, registry_ and statistics_.
+  /// what is not on disk: guards sequence_, announced_, the registries and statistics_.
   mutable std::shared_mutex data_mutex_;
   std::uint64_t sequence_;
   std::uint64_t announced_ = 0;
   std::mt19937_64 generator_;
   HazardRegistry registry_;
+  MapChangeRegistry map_changes_;
   ZoneStatistics statistics_;
   std::atomic<std::uint64_t> vehicle_positions_{0};
   std::atomic<std::uint64_t> vehicle_positions_refused_{0};
@@ -115,6 +126,8 @@ class ZoneService::Implementation {
     std::vector<AcceptedReport> reports;
     const PollAnswer* answer = nullptr;
     std::uint32_t answered_id = 0;  ///< Hazard of the answer.
+    std::vector<MapChangeEvent> map_change_events;
+    std::vector<std::pair<const MapChangeReport*, Uuid>> map_change_reports;  ///< And the feature.
   };
   /// A report that may change the map.
   struct Candidate {
@@ -192,6 +205,13 @@ class ZoneService::Implementation {
   void Settle(const Change& change);
   void Schedule(Slot slot, std::int64_t now_ns);
 
+  // Map changes: zone_service_map_changes.cpp.
+  struct MapChangeBatch;
+  bool ExamineMapChange(const MapChangeReport& report, std::size_t index, MapChangeBatch& batch);
+  void ApplyMapChange(const MapChangeReport& report, std::size_t index, MapChangeBatch& batch);
+  void WriteMapChanges(const Change& change);
+  void CountMapChanges(const MapChangeStatistics& counted);
+
   // Polls: zone_service_polls.cpp.
   bool IsAcceptable(const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns) const;
   Change CommitAnswer(const PollAnswer& answer, const OpenPoll& poll);
@@ -203,6 +223,7 @@ void ZoneService::Implementation::InTransaction(Change& change, const Body& body
   try {
     store_.Begin();
     registry_.Begin();
+    map_changes_.Begin();
     try {
       body();
       Write(change);
@@ -210,6 +231,7 @@ void ZoneService::Implementation::InTransaction(Change& change, const Body& body
     } catch (...) {
       store_.Rollback();
       registry_.Rollback();
+      map_changes_.Rollback();
       Forget(change);
       throw;
     }
@@ -218,6 +240,7 @@ void ZoneService::Implementation::InTransaction(Change& change, const Body& body
     throw;
   }
   registry_.Commit();
+  map_changes_.Commit();
   sequence_ = change.sequence;
   announced_ = change.announced;
 }

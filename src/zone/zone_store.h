@@ -7,9 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "hazard/map_change_report.h"
 #include "hazard/report.h"
 #include "zone/hazard.h"
 #include "zone/hazard_life.h"
+#include "zone/map_change.h"
 #include "zone/speed_rule.h"
 #include "zone/store_damage.h"
 #include "zone/survival_model.h"
@@ -20,8 +22,9 @@ namespace livemap {
 struct PollAnswer;
 
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
-/// was learned of classes and of vehicles, and where each vehicle's last report lies. SQLite in WAL
-/// mode with synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
+/// was learned of classes and of vehicles, where each vehicle's last report lies, and the same of
+/// map changes. SQLite in WAL mode with synchronous=FULL, through SOCI. Not thread-safe: one writer
+/// owns it.
 ///
 /// Every function throws StoreError with the database's own words when it fails.
 class ZoneStore {
@@ -48,7 +51,7 @@ class ZoneStore {
   /// The greatest id that a row of a hazard has, sound or not; 0 without rows. What lies beyond the
   /// ids that hazards can have is passed over.
   std::uint64_t LastHazardId();
-  /// Of the newest event; 0 without events.
+  /// Of the newest event of a hazard or a map change; 0 without events.
   std::uint64_t LastSequence();
   struct KnownReport {
     Uuid hazard;  ///< What it became or was merged into; nil when its hazard's row is broken.
@@ -62,6 +65,21 @@ class ZoneStore {
   /// rows are left out.
   std::vector<StoredEvent> LoadEvents(const Uuid& hazard, std::uint64_t sequence,
                                       std::size_t limit);
+
+  /// Map changes: as the functions above.
+  struct MapChangeRow {
+    std::uint64_t id = 0;
+    MapChangeFeature feature;
+  };
+  StoreDamage LoadMapChanges(const std::function<void(MapChangeRow)>& take);
+  std::uint64_t LastMapChangeId();
+  struct KnownMapChangeReport {
+    Uuid change;  ///< The feature that it was about; the row of that may be gone.
+    std::string vehicle_id;
+  };
+  std::optional<KnownMapChangeReport> FindMapChangeReport(const Uuid& report_uuid);
+  /// The newest `limit` events of a feature whose newest one is `sequence`, oldest first.
+  std::vector<StoredMapChangeEvent> LoadMapChangeEvents(std::uint64_t sequence, std::size_t limit);
 
   /// Writes happen between Begin and Commit; Commit returns when they are on disk.
   void Begin();
@@ -80,6 +98,12 @@ class ZoneStore {
   void WriteLife(const std::string& class_name, const LearnedLife& learned);
   void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
   void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
+  void WriteMapChange(const MapChangeRow& row);
+  /// Forgets a feature and its history; what vehicles told of it stays, so that they are answered.
+  void DropMapChange(std::uint64_t id);
+  void WriteMapChangeReport(const MapChangeReport& report, const Uuid& change,
+                            std::int64_t received_ns);
+  void WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t id);
 
   /// The schema that this program writes.
   static int SchemaVersion();

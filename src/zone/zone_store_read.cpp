@@ -2,7 +2,6 @@
 // written into it. Types and sizes are checked by the database before a value is fetched.
 #include <soci/soci.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,19 +9,12 @@
 #include "base/stamp_range.h"
 #include "base/stamps.h"
 #include "zone/report_validation.h"
+#include "zone/zone_store_checks.h"
 #include "zone/zone_store_state.h"
 
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxTextBytes = 64;
-constexpr std::size_t kMaxEventReasonBytes = 200;
-/// The registry counts hazards in 32 bits; a row beyond is none of ours.
-constexpr long long kMaxHazardId = 4'000'000'000;
-/// More events than there will ever be; far from where a further one would overflow.
-constexpr long long kMaxSequence = 1LL << 60;
-constexpr double kMaxVarianceM2 = 1e8;              // Reports may say 10 km.
-constexpr double kMinVarianceM2 = 1e-4;             // Fusion stops at 0.15 m.
 constexpr std::int16_t kReporterWeight1000 = 1000;  // A voice of which only a report is known.
 constexpr double kMaxEnded = 1e6;                   // SurvivalModel's largest memory.
 constexpr double kMaxStoodS = 1e15;
@@ -60,15 +52,6 @@ bool IsState(int number) { return number >= 0 && number < static_cast<int>(kHaza
 
 bool IsShare(double value) { return value >= 0 && value <= 1; }
 
-bool IsCovariance(const Eigen::Matrix2d& covariance_m2) {
-  if (!covariance_m2.allFinite() || covariance_m2.cwiseAbs().maxCoeff() > kMaxVarianceM2) {
-    return false;
-  }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
-  solver.computeDirect(covariance_m2, Eigen::EigenvaluesOnly);
-  return solver.eigenvalues().minCoeff() >= kMinVarianceM2;
-}
-
 bool IsPicture(const std::string& sha256, const std::string& format) {
   if (sha256.empty() && format.empty()) return true;
   const auto is_digit = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
@@ -79,11 +62,11 @@ bool IsPicture(const std::string& sha256, const std::string& format) {
 /// Why these are no values of a hazard; nullptr when they are.
 template <typename Row>
 const char* WhyNoHazard(const Row& row, const Hazard& hazard) {
-  const bool counts = row.id >= 1 && row.id <= kMaxHazardId && row.sightings >= 1 &&
+  const bool counts = row.id >= 1 && row.id <= kMaxRowId && row.sightings >= 1 &&
                       row.sightings <= UINT32_MAX && row.vehicles >= 0;
   if (!counts) return "counts out of range";
   if (hazard.uuid.IsNil()) return "no uuid";
-  if (!IsPrintableText(hazard.class_name, kMaxTextBytes)) return "no printable class";
+  if (!IsPrintableText(hazard.class_name, kMaxStoredTextBytes)) return "no printable class";
   if (!IsShare(row.confidence) || !IsShare(row.presence)) return "no probability";
   if (!IsValid(hazard.position)) return "no position on Earth";
   if (!IsCovariance(hazard.covariance_m2)) return "no covariance";
@@ -110,15 +93,6 @@ LifeRecord LifeOf(const Hazard& hazard) {
   life.log_odds = static_cast<float>(std::log(presence / (1 - presence)));
   life.undenied_log_odds = life.log_odds;
   return life;
-}
-
-/// Runs a query for at most one row. Reads to the end: an unfinished query would keep its snapshot
-/// and with it the whole log.
-bool FetchOne(soci::statement& statement) {
-  if (!statement.execute(true)) return false;
-  while (statement.fetch()) {
-  }
-  return true;
 }
 
 }  // namespace
@@ -174,6 +148,7 @@ void ZoneStore::Implementation::PrepareReads() {
                        use(row_.sequence), into(row_.previous_sequence), into(row_.action),
                        into(row_.from_state, row_.has_from), into(row_.state), into(row_.announced),
                        into(row_.reason), into(row_.updated_ns)));
+  PrepareMapChangeReads();
 }
 
 StoreDamage ZoneStore::Implementation::LoadRows(const std::string& table, soci::statement& query,
@@ -262,7 +237,7 @@ StoreDamage ZoneStore::LoadLives(const std::function<void(const std::string&, Le
                                            << kSoundLife,
          soci::into(row.class_name), soci::into(row.ended), soci::into(row.stood_s));
     return implementation_->LoadRows("lives", query, [&] {
-      const bool sound = IsPrintableText(row.class_name, kMaxTextBytes) && row.ended >= 0 &&
+      const bool sound = IsPrintableText(row.class_name, kMaxStoredTextBytes) && row.ended >= 0 &&
                          row.ended <= kMaxEnded && row.stood_s >= 0 && row.stood_s <= kMaxStoodS;
       if (!sound) throw Error("what was learned of a class is no such thing");
       take(row.class_name, {row.ended, row.stood_s});
@@ -295,7 +270,7 @@ std::uint64_t ZoneStore::LastHazardId() {
   return ExplainStore("reading the newest hazard", [&] {
     long long id = 0;
     implementation_->session_ << "SELECT coalesce(max(id), 0) FROM hazards WHERE id <= :most",
-        soci::use(kMaxHazardId), soci::into(id);
+        soci::use(kMaxRowId), soci::into(id);
     return static_cast<std::uint64_t>(std::max(id, 0LL));
   });
 }
@@ -304,8 +279,9 @@ std::uint64_t ZoneStore::LastSequence() {
   return ExplainStore("reading the newest sequence", [&] {
     long long sequence = 0;
     implementation_->session_
-        << "SELECT coalesce(max(sequence), 0) FROM events WHERE sequence < :most",
-        soci::use(kMaxSequence), soci::into(sequence);
+        << "SELECT max((SELECT coalesce(max(sequence), 0) FROM events WHERE sequence < :most), "
+           "(SELECT coalesce(max(sequence), 0) FROM map_change_events WHERE sequence < :most))",
+        soci::use(kMaxSequence, "most"), soci::into(sequence);
     return static_cast<std::uint64_t>(std::max(sequence, 0LL));
   });
 }

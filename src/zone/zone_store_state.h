@@ -21,6 +21,8 @@ class ZoneStore::Implementation {
   void Prepare();
   void PrepareReads();
   void PrepareWrites();
+  void PrepareMapChangeReads();
+  void PrepareMapChangeWrites();
 
   /// The values of all statements: SOCI binds to places, not to values.
   struct Row {
@@ -35,7 +37,19 @@ class ZoneStore::Implementation {
     int state = 0, vehicles = 0, action = 0, from_state = 0, announced = 0, answer = 0;
     soci::indicator has_from = soci::i_ok;
   };
-  /// Throws Error for a row of impossible values.
+  /// The same for map changes.
+  struct ChangeRow {
+    std::string uuid, change_uuid, class_name, vehicle_id, drive_id, reason, witnesses;
+    double confidence = 0, latitude = 0, longitude = 0;
+    double covariance_ee = 0, covariance_en = 0, covariance_nn = 0;
+    long long id = 0, reports = 0, drives = 0, first_seen_ns = 0, last_seen_ns = 0, denied_ns = 0;
+    long long updated_ns = 0, sequence = 0, previous_sequence = 0;
+    long long stamp_ns = 0, earlier_stamp_ns = 0, received_ns = 0, seen = 0, missed = 0;
+    int vanished = 0, state = 0, vehicles = 0, from_state = 0;
+    soci::indicator has_from = soci::i_ok;
+  };
+  /// Throw Error for a row of impossible values.
+  static MapChangeRow ToMapChange(const ChangeRow& row);
   static HazardRow ToHazard(const Row& row);
   std::map<long long, std::vector<Voice>> VoicesOfReports();
   /// Calls `take_row` for every row of a prepared query; what it throws as Error is told. The
@@ -47,6 +61,7 @@ class ZoneStore::Implementation {
   std::string path_;
   soci::session session_;
   Row row_;
+  ChangeRow change_row_;
   std::optional<soci::statement> find_report_;
   std::optional<soci::statement> find_last_report_;
   std::optional<soci::statement> find_event_;
@@ -57,6 +72,13 @@ class ZoneStore::Implementation {
   std::optional<soci::statement> write_life_;
   std::optional<soci::statement> write_trust_;
   std::optional<soci::statement> write_last_report_;
+  std::optional<soci::statement> find_map_change_report_;
+  std::optional<soci::statement> find_map_change_event_;
+  std::optional<soci::statement> write_map_change_;
+  std::optional<soci::statement> write_map_change_report_;
+  std::optional<soci::statement> write_map_change_event_;
+  std::optional<soci::statement> drop_map_change_;
+  std::optional<soci::statement> drop_map_change_events_;
 };
 
 /// Runs `body` and turns the library's exceptions into the project's.

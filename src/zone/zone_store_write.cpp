@@ -73,6 +73,7 @@ void ZoneStore::Implementation::PrepareWrites() {
               "longitude = excluded.longitude, sigma_m = excluded.sigma_m",
        use(row_.vehicle_id), use(row_.stamp_ns), use(row_.latitude), use(row_.longitude),
        use(row_.sigma_m)));
+  PrepareMapChangeWrites();
 }
 
 void ZoneStore::Begin() {

@@ -29,6 +29,13 @@ void CheckHazardQuery(const livemap::RequestTarget& target) {
     // Refused: what a bad address deserves.
   }
   try {
+    const livemap::MapChangeQuery query = livemap::ParseMapChangeQuery(target);
+    Require(query.limit >= 1 && query.limit <= livemap::kMaxHazardsPerAnswer);
+    Require(query.states.size() <= livemap::kMapChangeStates);
+  } catch (const livemap::BadRequest&) {
+    // Refused.
+  }
+  try {
     Require(livemap::ParseEventsQuery(target) <= livemap::kMaxEventsPerAnswer);
   } catch (const livemap::BadRequest&) {
     // Refused.
@@ -46,6 +53,13 @@ void CheckDecision(const std::string& text) {
   if (target) {
     const auto uuid = livemap::Uuid::Parse(target->id);
     if (uuid) Require(uuid->ToString().size() == target->id.size());
+  }
+  try {
+    const livemap::MapChangeDecision decision = livemap::ParseMapChangeDecision(text);
+    Require(decision.reason.size() <= livemap::kMaxDecisionReasonBytes);
+    Require(decision.confirms || !decision.reason.empty());
+  } catch (const livemap::BadRequest& mistake) {
+    Require(std::string(mistake.what()).find("accepted is") != std::string::npos);
   }
   static livemap::OfficialGate gate({{"miller", std::string(64, 'a')}});
   Require(gate.Check(text, "client", 0).verdict != livemap::OfficialGate::Verdict::kAllowed);

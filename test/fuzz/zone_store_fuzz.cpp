@@ -36,6 +36,22 @@ Report MakeReport(std::uint8_t number, const std::string& vehicle, double latitu
   return report;
 }
 
+MapChangeReport MakeMapChange(std::uint8_t number, const std::string& vehicle,
+                              double latitude_deg) {
+  MapChangeReport report;
+  report.uuid.bytes[0] = number;
+  report.uuid.bytes[15] = 2;
+  report.vehicle_id = vehicle;
+  report.drive_id = "drive";
+  report.stamp_ns = kNowNs - 1'000'000'000;
+  report.class_name = "barrier";
+  report.confidence = 0.5F;
+  report.seen = 3;
+  report.position = {latitude_deg, 8};
+  report.covariance_m2 = Eigen::Matrix2d::Identity();
+  return report;
+}
+
 ZoneService::Config ConfigOf(const std::string& directory) {
   ZoneService::Config config;
   config.directory = directory;
@@ -60,6 +76,8 @@ struct Template {
       const auto all = zone.Query(std::nullopt, 0, 10);
       zone.Reject(all.at(2).uuid, "Anna", "a shadow");
       zone.Confirm(all.at(3).uuid, "Anna");
+      zone.HandleMapChanges({MakeMapChange(1, "car-1", 50), MakeMapChange(2, "car-2", 50),
+                             MakeMapChange(3, "car-1", 51)});
     }
     database = ReadFile(made + "/zone.sqlite3", 100 << 20);
     SqliteDatabase open(made + "/zone.sqlite3", false);
@@ -69,6 +87,9 @@ struct Template {
               ReadFuzzTable(open, "lives", "class_name"),
               ReadFuzzTable(open, "trust", "vehicle_key"),
               ReadFuzzTable(open, "last_reports", "vehicle_id"),
+              ReadFuzzTable(open, "map_changes", "id"),
+              ReadFuzzTable(open, "map_change_events", "sequence"),
+              ReadFuzzTable(open, "map_change_reports", "uuid"),
               ReadFuzzTable(open, "livemap_schema", "version")};
   }
   ~Template() { std::filesystem::remove_all(folder); }
@@ -91,6 +112,15 @@ void RequireSound(const Hazard& hazard) {
   Require(hazard.sightings > 0 && hazard.vehicles <= kMaxVoices);
 }
 
+void RequireSound(const MapChangeFeature& feature) {
+  Require(!feature.uuid.IsNil() && IsPrintableText(feature.class_name, 64));
+  Require(feature.confidence >= 0 && feature.confidence <= 1);
+  Require(IsValid(feature.position) && feature.covariance_m2.allFinite());
+  Require(feature.covariance_m2.determinant() > 0 && feature.covariance_m2(0, 0) > 0);
+  Require(feature.first_seen_ns >= 0 && feature.first_seen_ns <= feature.last_seen_ns);
+  Require(feature.sequence > 0 && feature.witnesses.size() <= 2 * kMaxWitnesses);
+}
+
 void RequireWorking(ZoneService& zone, const Template& made) {
   const auto spared = zone.Find(made.spared.uuid);
   Require(spared && spared->position.latitude_deg == made.spared.position.latitude_deg);
@@ -102,6 +132,13 @@ void RequireWorking(ZoneService& zone, const Template& made) {
     }
   }
   for (const Hazard& hazard : zone.QueryNear({42, 8}, 1e6, 100)) RequireSound(hazard);
+  for (const MapChangeFeature& feature : zone.QueryMapChanges(std::nullopt, 1, 1000)) {
+    RequireSound(feature);
+    for (const StoredMapChangeEvent& event : zone.MapChangeEvents(feature.uuid, 100)) {
+      Require(event.reason.size() <= 200 && event.at_ns >= 0);
+    }
+  }
+  zone.HandleMapChanges({MakeMapChange(3, "car-1", 51), MakeMapChange(4, "car-3", 50)});
   // What was committed is committed still, and what is new is taken.
   Require(zone.Handle(MakeReport(3, "car-1", 43)).status == Receipt::Status::kCommitted ||
           zone.Statistics().refused > 0);

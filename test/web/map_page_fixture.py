@@ -1,4 +1,4 @@
-"""A zone with its real web server, and the live map's page in real Chromium, for map_page_test.py and map_page_officials_test.py."""
+"""A zone with its real web server, and the live map's page in real Chromium, for the programs map_page_*test.py."""
 
 import argparse
 import json
@@ -55,6 +55,9 @@ class ZoneProcess:
                          vehicle=vehicle)
         assert answer["status"] == "committed", answer
         return answer["id"]
+
+    def change(self, class_name, lat, lon, vanished=False, vehicle="car-1"):
+        return self.do("change", **{"class": class_name}, lat=lat, lon=lon, vanished=vanished, vehicle=vehicle)["id"]
 
     def drive(self, points, vehicle="car-1", speed=13.0):
         """Moves a vehicle along points, each step as one position."""

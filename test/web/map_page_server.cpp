@@ -4,6 +4,7 @@
 //   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
 //                                                                       -> {"id", "status",
 //                                                                       "reason"}
+//   {"do": "change", "class": C, "lat": D, "lon": D, "vanished": false, "vehicle": V} -> {"id"}
 //   {"do": "remove", "id": UUID}                                        -> {"removed"}
 //   {"do": "confirm", "id": UUID}           as an official              -> {"confirmed"}
 //   {"do": "pass", "seconds": S}            the zone's clock goes on    -> {"passed"}
@@ -73,6 +74,7 @@ class Session {
   Json Do(const Json& command) {
     const std::string verb = command.at("do");
     if (verb == "report") return AddReport(command);
+    if (verb == "change") return AddMapChange(command);
     if (verb == "remove") return Remove(command);
     if (verb == "confirm") return Confirm(command);
     if (verb == "pass") return Pass(command);
@@ -128,6 +130,17 @@ class Session {
     return {{"id", receipt.hazard_uuid.ToString()},
             {"status", committed ? "committed" : "refused"},
             {"reason", receipt.reason}};
+  }
+
+  Json AddMapChange(const Json& command) {
+    Tick();
+    auto report =
+        fixture_.MakeMapChange(command.at("class"), {command.at("lat"), command.at("lon")});
+    report.vehicle_id = command.value("vehicle", report.vehicle_id);
+    report.vanished = command.value("vanished", false);
+    const livemap::Receipt receipt = fixture_.zone->HandleMapChanges({report}).at(0);
+    if (!receipt.reason.empty()) throw livemap::Error(receipt.reason);
+    return {{"id", receipt.hazard_uuid.ToString()}};
   }
 
   Json Remove(const Json& command) {

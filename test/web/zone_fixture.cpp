@@ -32,6 +32,7 @@ ZoneFixture::ZoneFixture() {
   ZoneService::Config config;
   config.speed.max_speed_mps = 1e9;  // Reports of one vehicle lie all over the town.
   config.allowance.reports_per_hour = 1e9;
+  config.map_changes_per_hour = 1e9;
   config.directory = folder_.path();
   config.catalogue = catalogue;
   zone = std::make_unique<ZoneService>(
@@ -51,6 +52,23 @@ Report ZoneFixture::MakeReport(const std::string& class_name, const GeoPoint& po
   report.covariance_m2 << 4, 0, 0, 1;
   report.image_width = 640;
   report.image_height = 480;
+  return report;
+}
+
+MapChangeReport ZoneFixture::MakeMapChange(const std::string& class_name,
+                                           const GeoPoint& position) {
+  MapChangeReport report;
+  report.uuid = Uuid::Random(generator_);
+  report.vehicle_id = "car-1";
+  report.drive_id = "drive-1";
+  report.stamp_ns = now_ns;
+  report.earlier_stamp_ns = now_ns - 86'400'000'000'000;
+  report.class_name = class_name;
+  report.confidence = 0.8F;
+  report.seen = 6;
+  report.missed = 1;
+  report.position = position;
+  report.covariance_m2 = Eigen::Matrix2d::Identity();
   return report;
 }
 

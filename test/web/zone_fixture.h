@@ -57,6 +57,8 @@ class ZoneFixture {
 
   /// A report that the zone accepts, without a picture.
   Report MakeReport(const std::string& class_name, const GeoPoint& position);
+  /// A word of an object that appeared, which the zone accepts.
+  MapChangeReport MakeMapChange(const std::string& class_name, const GeoPoint& position);
   /// Adds `count` hazards of `class_name` about 20 m apart, going north from `start`.
   void AddRow(const std::string& class_name, const GeoPoint& start, std::size_t count);
 

@@ -114,8 +114,10 @@ TEST_F(ZoneBrokenRowsTest, WhatIsHeldAgainstVehiclesOutlivesARestartAndOldSchema
     ZoneService zone(config, Clock(), 1);
     invent(zone, 1);
   }
-  // As the version before wrote it.
-  Write("DROP TABLE trust; DELETE FROM livemap_schema WHERE version = 3");
+  // As version 2 wrote it.
+  Write(
+      "DROP TABLE trust; DROP TABLE map_changes; DROP TABLE map_change_reports; "
+      "DROP TABLE map_change_events; DELETE FROM livemap_schema WHERE version >= 3");
   {
     ZoneService zone(config, Clock(), 2);
     EXPECT_EQ(zone.Statistics().suspect_vehicles, 0U);

@@ -16,6 +16,9 @@ from zone_fixture import NOTICE, Zone, free_port, livemap_zone, topic
 
 MAX_MESSAGE_BYTES = 1 << 20
 GRANTED_QOS_1 = 1
+# What a vehicle tells the zone on its own topics, and hears from it.
+WRITTEN = ("report", "position", "answer", "change")
+HEARD = ("receipt", "notice", "poll", "change_receipt")
 
 
 class NoOneInTest(unittest.TestCase):
@@ -36,7 +39,7 @@ class NoOneInTest(unittest.TestCase):
 
     def listening_zone(self):
         zone = self.connect("zone")
-        for name in ("report", "position", "answer"):
+        for name in WRITTEN:
             self.assertEqual(zone.subscribe(topic("+", name)), GRANTED_QOS_1)
         return zone
 
@@ -47,12 +50,12 @@ class NoOneInTest(unittest.TestCase):
 
     def test_a_vehicle_reports_and_hears_its_receipt_and_what_the_zone_tells_all(self):
         zone, car = self.listening_zone(), self.connect("car-1")
-        for topic_filter in (*(topic("car-1", name) for name in ("receipt", "notice", "poll")), NOTICE):
+        for topic_filter in (*(topic("car-1", name) for name in HEARD), NOTICE):
             self.assertEqual(car.subscribe(topic_filter), GRANTED_QOS_1)
-        for name in ("report", "position", "answer"):
+        for name in WRITTEN:
             self.assertEqual(car.publish(topic("car-1", name), b"mine"), 0)
             self.assertEqual(zone.receive(), Message(topic("car-1", name), b"mine"))
-        for name in ("receipt", "notice", "poll"):
+        for name in HEARD:
             self.assertEqual(zone.publish(topic("car-1", name), b"yours"), 0)
             self.assertEqual(car.receive(), Message(topic("car-1", name), b"yours"))
         self.assertEqual(zone.publish(NOTICE, b"all"), 0)
@@ -60,7 +63,7 @@ class NoOneInTest(unittest.TestCase):
 
     def test_anothers_topic_is_not_authorized_and_nothing_arrives(self):
         zone, car = self.listening_zone(), self.connect("car-1")
-        for name in ("report", "position", "answer"):
+        for name in WRITTEN:
             self.assertEqual(car.publish(topic("car-2", name), b"forged"), NOT_AUTHORIZED)
         self.assertEqual(car.publish(topic("car-1", "report"), b"own"), 0)
         self.assertEqual(zone.receive(), Message(topic("car-1", "report"), b"own"))
@@ -74,25 +77,25 @@ class NoOneInTest(unittest.TestCase):
     def test_no_way_leads_from_vehicle_to_vehicle(self):
         """mosquitto 2 grants every subscription and then delivers only what may be read."""
         zone, spy, car = self.connect("zone"), self.connect("car-2"), self.connect("car-1")
-        own = [topic("car-1", name) for name in ("report", "position", "answer", "receipt", "notice", "poll")]
+        own = [topic("car-1", name) for name in WRITTEN + HEARD]
         for topic_filter in ("#", "+/#", topic("+", "#"), "$SYS/#", *own):
             spy.subscribe(topic_filter)
         self.assertEqual(spy.subscribe(NOTICE), GRANTED_QOS_1)
-        for name in ("receipt", "report", "position", "answer", "notice", "poll", "chat"):
+        for name in WRITTEN + HEARD + ("chat",):
             self.assertEqual(car.publish(topic("car-2", name), b"psst"), NOT_AUTHORIZED)
         for other in (NOTICE, "livemap/v1/test/chat", "chat", "$SYS/broker/version",
                       "livemap/v1/other/vehicle/car-1/report"):
             self.assertEqual(car.publish(other, b"psst"), NOT_AUTHORIZED)
-        for name in ("report", "position", "answer"):
+        for name in WRITTEN:
             self.assertIn(car.publish(topic("car-1", name), b"for the zone"), ACCEPTED)
-        for name in ("receipt", "notice", "poll"):
+        for name in HEARD:
             zone.publish(topic("car-1", name), b"for car-1")
         zone.publish(NOTICE, b"for all")
         self.assertEqual(spy.receive(), Message(NOTICE, b"for all"))
 
     def test_a_vehicle_cannot_ask_or_tell_itself_in_the_zones_name(self):
         zone, car = self.connect("zone"), self.connect("car-1")
-        for name in ("receipt", "notice", "poll"):
+        for name in HEARD:
             car.subscribe(topic("car-1", name))
             self.assertEqual(car.publish(topic("car-1", name), b"invented"), NOT_AUTHORIZED)
         zone.publish(topic("car-1", "poll"), b"asked")
@@ -100,7 +103,7 @@ class NoOneInTest(unittest.TestCase):
 
     def test_the_zones_own_client_can_write_no_report(self):
         zone, car = self.listening_zone(), self.connect("car-1")
-        for name in ("report", "answer"):
+        for name in ("report", "answer", "change"):
             self.assertEqual(zone.publish(topic("car-1", name), b"invented"), NOT_AUTHORIZED)
         car.publish(topic("car-1", "report"), b"true")
         self.assertEqual(zone.receive().payload, b"true")

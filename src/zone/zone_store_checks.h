@@ -1,0 +1,39 @@
+#pragma once
+
+// What the sources of ZoneStore that read share; nobody else includes this.
+#include <soci/soci.h>
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <cstddef>
+
+namespace livemap {
+
+constexpr std::size_t kMaxStoredTextBytes = 64;
+constexpr std::size_t kMaxEventReasonBytes = 200;
+/// Hazards and map changes are counted in 32 bits; a row beyond is none of ours.
+constexpr long long kMaxRowId = 4'000'000'000;
+/// More events than there will ever be; far from where a further one would overflow.
+constexpr long long kMaxSequence = 1LL << 60;
+constexpr double kMaxVarianceM2 = 1e8;   // Reports may say 10 km.
+constexpr double kMinVarianceM2 = 1e-4;  // Fusion stops at 0.15 m.
+
+inline bool IsCovariance(const Eigen::Matrix2d& covariance_m2) {
+  if (!covariance_m2.allFinite() || covariance_m2.cwiseAbs().maxCoeff() > kMaxVarianceM2) {
+    return false;
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(covariance_m2, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().minCoeff() >= kMinVarianceM2;
+}
+
+/// Runs a query for at most one row. Reads to the end: an unfinished query would keep its snapshot
+/// and with it the whole log.
+inline bool FetchOne(soci::statement& statement) {
+  if (!statement.execute(true)) return false;
+  while (statement.fetch()) {
+  }
+  return true;
+}
+
+}  // namespace livemap
