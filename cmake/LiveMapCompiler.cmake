@@ -11,6 +11,13 @@ endif()
 # as in Release, with line tables only.
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 
+# The sources of a target are compiled as a few, since their headers cost more than they do. Names in
+# anonymous namespaces have to differ then within a room, and within a program of tests.
+if(LIVEMAP_UNITY)
+  set(CMAKE_UNITY_BUILD ON)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
+endif()
+
 add_library(livemap_options INTERFACE)
 target_compile_options(livemap_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror)

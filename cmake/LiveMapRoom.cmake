@@ -1,11 +1,3 @@
-# livemap_compile_together(TARGET...): with LIVEMAP_UNITY the sources of a target are compiled as a few,
-# since their headers cost more than they do. Names in anonymous namespaces have to differ then.
-function(livemap_compile_together)
-  if(LIVEMAP_UNITY)
-    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
-  endif()
-endfunction()
-
 # livemap_room(NAME SOURCES a.cpp ... DEPENDS target ... [SYSTEM_INCLUDES dir ...])
 #
 # One ROS-free room of the house: the static library livemap_NAME from src/NAME, its headers included
@@ -16,7 +8,6 @@ function(livemap_room name)
   target_include_directories(livemap_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
   target_include_directories(livemap_${name} SYSTEM PUBLIC ${ROOM_SYSTEM_INCLUDES})
   target_link_libraries(livemap_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE livemap_options)
-  livemap_compile_together(livemap_${name})
 endfunction()
 
 # livemap_gtest(NAME SOURCES a_test.cpp ... DEPENDS target ...)
@@ -25,12 +16,15 @@ endfunction()
 # LIVEMAP_SOURCE_DIR; the ones that want the real drives read LIVEMAP_DATA_DIR (environment, else
 # ../shared/data beside the source tree) and say "skipped, no data" where it is absent.
 find_package(GTest REQUIRED)
+# All of them, without what they do not need.
+add_custom_target(livemap_gtests)
 function(livemap_gtest name)
   cmake_parse_arguments(TEST "" "" "SOURCES;DEPENDS" ${ARGN})
   list(TRANSFORM TEST_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/test/)
   add_executable(${name} ${TEST_SOURCES})
   target_compile_definitions(${name} PRIVATE LIVEMAP_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_libraries(${name} PRIVATE ${TEST_DEPENDS} GTest::gmock GTest::gtest_main livemap_options)
+  add_dependencies(livemap_gtests ${name})
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
 endfunction()

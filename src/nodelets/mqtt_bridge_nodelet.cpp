@@ -18,25 +18,6 @@
 #include "transport/topic_template.h"
 
 namespace livemap {
-namespace {
-
-/// What goes wrong with messages is counted always and said once a minute: of real time, for a
-/// simulated clock may stand still. Thread-safe.
-class OnceAMinute {
- public:
-  bool Due() {
-    const std::int64_t now_s = std::chrono::duration_cast<std::chrono::seconds>(
-                                   std::chrono::steady_clock::now().time_since_epoch())
-                                   .count();
-    std::int64_t next_s = next_s_;
-    return now_s >= next_s && next_s_.compare_exchange_strong(next_s, now_s + 60);
-  }
-
- private:
-  std::atomic<std::int64_t> next_s_{0};
-};
-
-}  // namespace
 
 /// The multi-master bridge: carries the listed topics between this ROS master and the zone's MQTT
 /// broker. On the zone's side it writes the vehicle whose login the broker checked (it stands in
@@ -46,6 +27,22 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   ~MqttBridgeNodelet() override { Close(); }
 
  private:
+  /// What goes wrong with messages is counted always and said once a minute: of real time, for a
+  /// simulated clock may stand still. Thread-safe.
+  class OnceAMinute {
+   public:
+    bool Due() {
+      const std::int64_t now_s = std::chrono::duration_cast<std::chrono::seconds>(
+                                     std::chrono::steady_clock::now().time_since_epoch())
+                                     .count();
+      std::int64_t next_s = next_s_;
+      return now_s >= next_s && next_s_.compare_exchange_strong(next_s, now_s + 60);
+    }
+
+   private:
+    std::atomic<std::int64_t> next_s_{0};
+  };
+
   struct Topic {
     Topic(const BridgeTopic& topic_config)
         : config(topic_config),

@@ -18,7 +18,7 @@ using test::TwoLevelManifest;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-const cv::Size kImage(128, 96);  // twice the input
+const cv::Size kPicture(128, 96);  // twice the input
 constexpr double kScale = 0.5;
 
 void SetRow(cv::Mat& predictions, int row, const std::vector<float>& values) {
@@ -36,7 +36,7 @@ TEST(YoloxDecoder, ABoxOfEachLevelLandsWhereItsCellSays) {
   SetRow(predictions, 2 * 8 + 3, {0.5F, 0.25F, std::log(2.0F), 0, 0.9F, 1.0F, 0});
   // Stride 16, column 1, row 2: centre ((0 + 1) * 16, (0.5 + 2) * 16) = (16, 40), size 8 x 16.
   SetRow(predictions, 48 + 2 * 4 + 1, {0, 0.5F, std::log(0.5F), 0, 1.0F, 0, 0.85F});
-  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kPicture);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].class_name, "pothole");
   EXPECT_EQ(found[0].class_index, 0);
@@ -58,7 +58,7 @@ TEST(YoloxDecoder, EachClassHasItsOwnThresholdOnObjectnessTimesClassScore) {
   cv::Mat predictions = NothingSeen(manifest);
   SetRow(predictions, 0, {0.5F, 0.5F, 0, 0, 0.75F, 0.75F, 1.0F});  // 0.5625 and 0.75
   SetRow(predictions, 20, {0.5F, 0.5F, 0, 0, 0.75F, 0.5F, 0});     // 0.375
-  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kPicture);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].class_name, "pothole");
   EXPECT_FLOAT_EQ(found[0].confidence, 0.5625F);
@@ -69,7 +69,7 @@ TEST(YoloxDecoder, BoxesAreCutToTheImage) {
   cv::Mat predictions = NothingSeen(manifest);
   SetRow(predictions, 0, {0, 0, std::log(100.0F), std::log(2.0F), 1, 1, 0});
   SetRow(predictions, 47, {0.5F, 0.5F, 200, 200, 0.9F, 0, 1});  // exp(200) overflows a float
-  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kImage);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kPicture);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].box, cv::Rect2f(0, 0, 128, 16));
   EXPECT_EQ(found[1].box, cv::Rect2f(0, 0, 128, 96));
@@ -81,7 +81,7 @@ TEST(YoloxDecoder, BoxesOutsideTheImageAreDropped) {
   SetRow(predictions, 0, {-5, 0.5F, 0, 0, 1, 1, 0});
   SetRow(predictions, 1, {0.5F, 100, 0, 0, 1, 1, 0});
   SetRow(predictions, 2, {0.5F, 0.5F, -300, 0, 1, 1, 0});  // exp(-300) is nothing
-  EXPECT_TRUE(DecodeYolox(predictions, manifest, kScale, kImage).empty());
+  EXPECT_TRUE(DecodeYolox(predictions, manifest, kScale, kPicture).empty());
 }
 
 TEST(YoloxDecoder, NumbersThatAreNotFiniteOrNoScoresAreDropped) {
@@ -98,7 +98,7 @@ TEST(YoloxDecoder, NumbersThatAreNotFiniteOrNoScoresAreDropped) {
   SetRow(predictions, row++, {0.5F, 0.5F, 0, 0, -1, -0.9F, 0});
   SetRow(predictions, row++, {0.5F, 0.5F, 0, 0, 2, 0.5F, 0});
   SetRow(predictions, row++, {0.5F, 0.5F, 0, 0, 0.5F, 2, 0});
-  EXPECT_TRUE(DecodeYolox(predictions, manifest, kScale, kImage).empty());
+  EXPECT_TRUE(DecodeYolox(predictions, manifest, kScale, kPicture).empty());
 }
 
 TEST(YoloxDecoder, AnotherShapeIsRefused) {
@@ -109,7 +109,7 @@ TEST(YoloxDecoder, AnotherShapeIsRefused) {
   for (const cv::Mat& predictions : {cv::Mat(3, too_few_rows, CV_32F, cv::Scalar(0)),
                                      cv::Mat(3, too_few_columns, CV_32F, cv::Scalar(0)),
                                      cv::Mat(2, flat, CV_32F, cv::Scalar(0)), cv::Mat()}) {
-    EXPECT_THROW(DecodeYolox(predictions, manifest, kScale, kImage), Error);
+    EXPECT_THROW(DecodeYolox(predictions, manifest, kScale, kPicture), Error);
   }
 }
 

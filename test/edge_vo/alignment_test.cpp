@@ -13,14 +13,13 @@
 namespace livemap {
 namespace {
 
-constexpr CameraIntrinsics kCamera{260, 260, 159.5, 119.5, 320, 240};
 const cv::Mat kExact;  // No uncertainty of the depths.
 
 EdgePoints PointsOf(const RgbdFrame& frame) {
   EdgeExtractor extractor({});
   PointSelector selector;
   EdgePoints points;
-  selector.Select({frame.grey, frame.depth, kExact}, extractor.Extract(frame.grey), kCamera, {},
+  selector.Select({frame.grey, frame.depth, kExact}, extractor.Extract(frame.grey), kWallCamera, {},
                   points);
   return points;
 }
@@ -30,14 +29,14 @@ TEST(EdgePoints, JacobianIsTheDerivativeOfTheGreyValueByTheTwist) {
   const double slope_u = 0.7, slope_v = -0.4;
   const Eigen::Vector3d point(0.31, -0.22, 1.7);
   const auto grey_of = [&](const Eigen::Vector3d& p) {
-    return slope_u * (kCamera.fx * p.x() / p.z() + kCamera.cx) +
-           slope_v * (kCamera.fy * p.y() / p.z() + kCamera.cy);
+    return slope_u * (kWallCamera.fx * p.x() / p.z() + kWallCamera.cx) +
+           slope_v * (kWallCamera.fy * p.y() / p.z() + kWallCamera.cy);
   };
   EdgePoints points;
-  points.Add(static_cast<float>(kCamera.fx * point.x() / point.z() + kCamera.cx),
-             static_cast<float>(kCamera.fy * point.y() / point.z() + kCamera.cy),
+  points.Add(static_cast<float>(kWallCamera.fx * point.x() / point.z() + kWallCamera.cx),
+             static_cast<float>(kWallCamera.fy * point.y() / point.z() + kWallCamera.cy),
              static_cast<float>(point.z()), 0, static_cast<float>(slope_u),
-             static_cast<float>(slope_v), kCamera);
+             static_cast<float>(slope_v), kWallCamera);
   for (int i = 0; i < 6; ++i) {
     const double step = 1e-5;
     Vector6d twist = Vector6d::Zero();
@@ -60,20 +59,20 @@ TEST(PointSelector, AStepInDepthGivesItsEdgeToTheNearerSide) {
   mask.colRange(158, 162).setTo(255);
   PointSelector selector;
   EdgePoints points;
-  selector.Select({grey, depth, kExact}, mask, kCamera, {}, points);
+  selector.Select({grey, depth, kExact}, mask, kWallCamera, {}, points);
   ASSERT_GT(points.size(), 100U);
   for (const float z : points.z) EXPECT_EQ(z, 1);
 }
 
 TEST(PointSelector, ThinsEvenlyToTheAllowedNumber) {
-  const RgbdFrame frame = SyntheticWall(kCamera).See(1, Eigen::Isometry3d::Identity());
+  const RgbdFrame frame = SyntheticWall(kWallCamera).See(1, Eigen::Isometry3d::Identity());
   const cv::Mat all(frame.grey.size(), CV_8UC1, cv::Scalar(255));
   PointSelection selection;
   selection.max_points = 1000;
   selection.least_gradient = 0;
   PointSelector selector;
   EdgePoints points;
-  selector.Select({frame.grey, frame.depth, kExact}, all, kCamera, selection, points);
+  selector.Select({frame.grey, frame.depth, kExact}, all, kWallCamera, selection, points);
   ASSERT_EQ(points.size(), 1000U);
   std::size_t upper = 0;
   for (const float y : points.y) upper += y < 0 ? 1U : 0U;
@@ -83,7 +82,7 @@ TEST(PointSelector, ThinsEvenlyToTheAllowedNumber) {
 /// The wall under its edges, chosen as asked.
 EdgePoints PointsChosen(PixelChoice choice, double share, std::uint32_t seed,
                         std::size_t max_points = 100000) {
-  const RgbdFrame frame = SyntheticWall(kCamera).See(1, Eigen::Isometry3d::Identity());
+  const RgbdFrame frame = SyntheticWall(kWallCamera).See(1, Eigen::Isometry3d::Identity());
   EdgeExtractor extractor({});
   PointSelection selection;
   selection.max_points = max_points;
@@ -91,7 +90,7 @@ EdgePoints PointsChosen(PixelChoice choice, double share, std::uint32_t seed,
   selection.share = share;
   PointSelector selector(seed);
   EdgePoints points;
-  selector.Select({frame.grey, frame.depth, kExact}, extractor.Extract(frame.grey), kCamera,
+  selector.Select({frame.grey, frame.depth, kExact}, extractor.Extract(frame.grey), kWallCamera,
                   selection, points);
   return points;
 }
@@ -99,7 +98,7 @@ EdgePoints PointsChosen(PixelChoice choice, double share, std::uint32_t seed,
 double MeanGradient(const EdgePoints& points) {
   double sum = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    sum += std::hypot(points.jacobian[0][i], points.jacobian[1][i]) * points.z[i] / kCamera.fx;
+    sum += std::hypot(points.jacobian[0][i], points.jacobian[1][i]) * points.z[i] / kWallCamera.fx;
   }
   return sum / static_cast<double>(points.size());
 }
@@ -134,11 +133,11 @@ TEST(PointSelector, NoPixelIsDrawnTwiceAndNoMoreThanThereAre) {
 class AlignerMotion : public ::testing::TestWithParam<Eigen::Isometry3d> {};
 
 TEST_P(AlignerMotion, IsFoundFromStandstill) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   const RgbdFrame reference = wall.See(1, Eigen::Isometry3d::Identity());
   const RgbdFrame moved = wall.See(2, GetParam());
   Aligner aligner({});
-  const AlignmentResult result = aligner.Align(PointsOf(reference), moved.grey, kCamera, {});
+  const AlignmentResult result = aligner.Align(PointsOf(reference), moved.grey, kWallCamera, {});
   const Vector6d error = Se3Log(result.state.new_from_reference * GetParam());
   EXPECT_LT(error.head<3>().norm(), 1e-3) << "m";
   EXPECT_LT(error.tail<3>().norm(), 5e-4) << "rad";
@@ -152,46 +151,46 @@ INSTANTIATE_TEST_SUITE_P(Small, AlignerMotion,
                                            Pose(0.006, -0.004, 0.01, 0.002, 0.003, -0.01)));
 
 TEST(Aligner, GainAndBiasAreFoundAndDoNotMoveThePose) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   const Eigen::Isometry3d motion = Pose(0.008, 0.003, -0.01, 0.002, -0.002, 0.004);
   const RgbdFrame reference = wall.See(1, Eigen::Isometry3d::Identity());
   const RgbdFrame moved = wall.See(2, motion, 0.7, 25);
   Aligner aligner({});
-  const AlignmentResult result = aligner.Align(PointsOf(reference), moved.grey, kCamera, {});
+  const AlignmentResult result = aligner.Align(PointsOf(reference), moved.grey, kWallCamera, {});
   EXPECT_NEAR(result.state.gain, 0.7, 0.01);
   EXPECT_NEAR(result.state.bias, 25, 1.5);
   EXPECT_LT(Se3Log(result.state.new_from_reference * motion).norm(), 1e-3);
 }
 
 TEST(Aligner, AThirdOfForeignPixelsDoesNotMoveThePose) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   const Eigen::Isometry3d motion = Pose(0.006, 0.002, 0, 0, 0, 0.004);
   const RgbdFrame reference = wall.See(1, Eigen::Isometry3d::Identity());
   RgbdFrame moved = wall.See(2, motion);
   moved.grey(cv::Rect(100, 60, 130, 130)).setTo(20);
   Aligner aligner({});
-  const AlignmentResult result = aligner.Align(PointsOf(reference), moved.grey, kCamera, {});
+  const AlignmentResult result = aligner.Align(PointsOf(reference), moved.grey, kWallCamera, {});
   EXPECT_LT(Se3Log(result.state.new_from_reference * motion).norm(), 2e-3);
 }
 
 TEST(Aligner, NeverEndsWithAHigherCostThanItBeganWith) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   const EdgePoints points = PointsOf(wall.See(1, Eigen::Isometry3d::Identity()));
   AlignmentConfig config;
   Aligner aligner(config);
   for (int i = 0; i < 12; ++i) {
     const double far = 0.02 * i;
     const cv::Mat grey = wall.See(2, Pose(far, -far, 0, 0, far, 0)).grey;
-    const AlignmentResult result = aligner.Align(points, grey, kCamera, {});
+    const AlignmentResult result = aligner.Align(points, grey, kWallCamera, {});
     const double sigma = result.sigma;
-    EXPECT_LE(aligner.CostAt(points, grey, kCamera, result.state, sigma),
-              aligner.CostAt(points, grey, kCamera, {}, sigma) * 1.0001)
+    EXPECT_LE(aligner.CostAt(points, grey, kWallCamera, result.state, sigma),
+              aligner.CostAt(points, grey, kWallCamera, {}, sigma) * 1.0001)
         << far;
   }
 }
 
 TEST(Aligner, InformationIsTheInverseOfTheScatterOverManyNoisyImages) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   const Eigen::Isometry3d motion = Pose(0.004, 0.002, 0.003, 0.001, -0.001, 0.002);
   RgbdFrame reference = wall.See(1, Eigen::Isometry3d::Identity());
   const cv::Mat clean = wall.See(2, motion).grey;
@@ -207,7 +206,7 @@ TEST(Aligner, InformationIsTheInverseOfTheScatterOverManyNoisyImages) {
     cv::Mat noise(clean.size(), CV_16SC1), noisy;
     random.fill(noise, cv::RNG::NORMAL, 0, 8);
     cv::add(clean, noise, noisy, cv::noArray(), CV_8U);
-    const AlignmentResult result = aligner.Align(points, noisy, kCamera, {});
+    const AlignmentResult result = aligner.Align(points, noisy, kWallCamera, {});
     errors.push_back(Se3Log(motion * result.state.new_from_reference));
     mean += errors.back() / images;
     information = result.information / (result.sigma * result.sigma);

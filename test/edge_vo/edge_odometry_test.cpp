@@ -15,7 +15,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr CameraIntrinsics kCamera{260, 260, 159.5, 119.5, 320, 240};
 constexpr std::int64_t kStepNs = 33'333'333;
 
 std::int64_t Stamp(int frame) { return 1'000'000'000 + frame * kStepNs; }
@@ -34,10 +33,10 @@ double ErrorM(const VoResult& result, int frame) {
 class EdgeOdometryOf : public ::testing::TestWithParam<EdgeSource> {};
 
 TEST_P(EdgeOdometryOf, FollowsASwayingHandWithinMillimetres) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   EdgeOdometry::Config config;
   config.edge_source = GetParam();
-  EdgeOdometry odometry(config, kCamera);
+  EdgeOdometry odometry(config, kWallCamera);
   for (int i = 0; i < 90; ++i) {
     const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i)));
     ASSERT_EQ(result.state, VoState::kTracking) << i;
@@ -49,13 +48,13 @@ INSTANTIATE_TEST_SUITE_P(EdgesOf, EdgeOdometryOf,
                          ::testing::Values(EdgeSource::kKeyframe, EdgeSource::kNewImage));
 
 TEST(EdgeOdometry, FollowsByRandomPixelsAndWithoutConstantMotion) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   for (const PixelChoice choice : {PixelChoice::kRandomEdges, PixelChoice::kRandomPixels}) {
     EdgeOdometry::Config config;
     config.points.choice = choice;
     config.points.share = 0.5;
     config.constant_motion = false;
-    EdgeOdometry odometry(config, kCamera);
+    EdgeOdometry odometry(config, kWallCamera);
     for (int i = 0; i < 30; ++i) {
       const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i)));
       ASSERT_EQ(result.state, VoState::kTracking) << i;
@@ -65,13 +64,13 @@ TEST(EdgeOdometry, FollowsByRandomPixelsAndWithoutConstantMotion) {
 }
 
 TEST(EdgeOdometry, AnotherSeedDrawsOtherPixels) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   EdgeOdometry::Config config;
   config.points.choice = PixelChoice::kRandomEdges;
   config.points.share = 0.2;
   const auto last = [&](std::uint32_t seed) {
     config.points.seed = seed;
-    EdgeOdometry odometry(config, kCamera);
+    EdgeOdometry odometry(config, kWallCamera);
     odometry.Track(wall.See(Stamp(0), Sway(0)));
     return odometry.Track(wall.See(Stamp(1), Sway(1))).world_from_camera.matrix();
   };
@@ -80,8 +79,8 @@ TEST(EdgeOdometry, AnotherSeedDrawsOtherPixels) {
 }
 
 TEST(EdgeOdometry, SixteenBitAndFloatDepthAgree) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry with_float({}, kCamera), with_units({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry with_float({}, kWallCamera), with_units({}, kWallCamera);
   for (int i = 0; i < 10; ++i) {
     RgbdFrame frame = wall.See(Stamp(i), Sway(i));
     const VoResult expected = with_float.Track(frame);
@@ -95,8 +94,8 @@ TEST(EdgeOdometry, SixteenBitAndFloatDepthAgree) {
 }
 
 TEST(EdgeOdometry, TheSameFramesGiveTheSameBits) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry first({}, kCamera), second({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry first({}, kWallCamera), second({}, kWallCamera);
   for (int i = 0; i < 20; ++i) {
     const RgbdFrame frame = wall.See(Stamp(i), Sway(i));
     EXPECT_EQ(first.Track(frame).world_from_camera.matrix(),
@@ -106,8 +105,8 @@ TEST(EdgeOdometry, TheSameFramesGiveTheSameBits) {
 }
 
 TEST(EdgeOdometry, FlickeringLightDoesNotBreakTracking) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry odometry({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   for (int i = 0; i < 60; ++i) {
     const double gain = 1 + 0.3 * std::sin(0.6 * i), bias = 15 * std::cos(0.4 * i);
     const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i), gain, bias));
@@ -117,13 +116,13 @@ TEST(EdgeOdometry, FlickeringLightDoesNotBreakTracking) {
 }
 
 TEST(EdgeOdometry, AFastCameraKeepsItsKeyframeForSomeSteps) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   // 7 px a step, at 2 m: more than keyframe_motion.
   const auto pose = [](int i) { return Pose(0.05 * i, 0, 0, 0, 0, 0); };
   const auto count_keyframes = [&](double keyframe_steps) {
     EdgeOdometry::Config config;
     config.keyframe_steps = keyframe_steps;
-    EdgeOdometry odometry(config, kCamera);
+    EdgeOdometry odometry(config, kWallCamera);
     int keyframes = 0;
     VoResult result;
     for (int i = 0; i < 13; ++i) {
@@ -139,8 +138,8 @@ TEST(EdgeOdometry, AFastCameraKeepsItsKeyframeForSomeSteps) {
 }
 
 TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry odometry({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   VoResult result;
   for (int i = 0; i < 5; ++i) {
     result = odometry.Track(wall.See(Stamp(i), Pose(0.003 * i, 0, 0, 0, 0, 0)));
@@ -154,8 +153,8 @@ TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
 }
 
 TEST(EdgeOdometry, BlackFramesHoldThePoseWithGrowingUncertaintyAndTrackingComesBack) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry odometry({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   VoResult held;
   int frame = 0;
   for (; frame < 20; ++frame) held = odometry.Track(wall.See(Stamp(frame), Sway(frame)));
@@ -179,10 +178,10 @@ TEST(EdgeOdometry, BlackFramesHoldThePoseWithGrowingUncertaintyAndTrackingComesB
 }
 
 TEST(EdgeOdometry, LostForLongItGoesOnFromTheHeldPose) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   EdgeOdometry::Config config;
   config.give_up_s = 0.5;
-  EdgeOdometry odometry(config, kCamera);
+  EdgeOdometry odometry(config, kWallCamera);
   VoResult held;
   int frame = 0;
   for (; frame < 10; ++frame) held = odometry.Track(wall.See(Stamp(frame), Sway(frame)));
@@ -203,10 +202,10 @@ TEST(EdgeOdometry, LostForLongItGoesOnFromTheHeldPose) {
 }
 
 TEST(EdgeOdometry, AFrameWithoutDepthIsTrackedButBecomesNoKeyframe) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   EdgeOdometry::Config config;
   config.keyframe_every = 1;
-  EdgeOdometry odometry(config, kCamera);
+  EdgeOdometry odometry(config, kWallCamera);
   odometry.Track(wall.See(Stamp(0), Sway(0)));
   for (int i = 1; i < 5; ++i) {
     RgbdFrame frame = wall.See(Stamp(i), Sway(i));
@@ -219,8 +218,8 @@ TEST(EdgeOdometry, AFrameWithoutDepthIsTrackedButBecomesNoKeyframe) {
 }
 
 TEST(EdgeOdometry, ResetMakesTheNextFrameTheOrigin) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry odometry({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   for (int i = 0; i < 30; ++i) odometry.Track(wall.See(Stamp(i), Sway(i)));
   odometry.Reset();
   const VoResult result = odometry.Track(wall.See(Stamp(3), Sway(30)));
@@ -229,8 +228,8 @@ TEST(EdgeOdometry, ResetMakesTheNextFrameTheOrigin) {
 }
 
 TEST(EdgeOdometry, NothingToSeeAtTheStartIsWaitedFor) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry odometry({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   RgbdFrame empty = wall.See(Stamp(0), Sway(0));
   empty.grey.setTo(90);
   EXPECT_EQ(odometry.Track(empty).state, VoState::kInitialising);
@@ -241,8 +240,8 @@ TEST(EdgeOdometry, NothingToSeeAtTheStartIsWaitedFor) {
 }
 
 TEST(EdgeOdometry, WhatCannotBeAFrameIsRefusedInASentenceAndChangesNothing) {
-  const SyntheticWall wall(kCamera);
-  EdgeOdometry odometry({}, kCamera);
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   odometry.Track(wall.See(Stamp(0), Sway(0)));
   RgbdFrame small = wall.See(Stamp(1), Sway(1));
   small.grey = cv::Mat(1, 1, CV_8UC1, cv::Scalar(0));
@@ -274,7 +273,7 @@ TEST(EdgeOdometry, StraightEdgesAllOneWayDoNotFixThePose) {
   stripes.grey.create(240, 320, CV_8UC1);
   for (int x = 0; x < 320; ++x) stripes.grey.col(x).setTo(x / 16 % 2 == 0 ? 60 : 190);
   stripes.depth = cv::Mat(240, 320, CV_32FC1, cv::Scalar(2));
-  EdgeOdometry odometry({}, kCamera);
+  EdgeOdometry odometry({}, kWallCamera);
   for (int i = 0; i < 5; ++i) {
     stripes.stamp_ns = Stamp(i);
     const VoResult result = odometry.Track(stripes);

@@ -11,8 +11,6 @@
 namespace livemap {
 namespace {
 
-constexpr CameraIntrinsics kCamera{260, 260, 159.5, 119.5, 320, 240};
-
 struct TwoViews {
   RgbdFrame keyframe, other;
   Eigen::Isometry3d other_from_keyframe;
@@ -20,7 +18,7 @@ struct TwoViews {
 
 /// The patterned wall, two metres away, from two places.
 TwoViews SeeWall(const Eigen::Isometry3d& keyframe_from_other, double gain = 1, double bias = 0) {
-  const SyntheticWall wall(kCamera);
+  const SyntheticWall wall(kWallCamera);
   return {wall.See(0, Eigen::Isometry3d::Identity()), wall.See(1, keyframe_from_other, gain, bias),
           keyframe_from_other.inverse()};
 }
@@ -29,7 +27,7 @@ TEST(EpipolarSearch, FindsTheDepthsOfAWallSidewaysAndForward) {
   for (const Eigen::Isometry3d& motion :
        {Pose(0.08, 0, 0, 0, 0, 0), Pose(0.03, 0.05, 0.1, 0.01, -0.02, 0.03)}) {
     const TwoViews views = SeeWall(motion);
-    const EpipolarSearch search(views.keyframe.grey, views.other.grey, kCamera,
+    const EpipolarSearch search(views.keyframe.grey, views.other.grey, kWallCamera,
                                 views.other_from_keyframe, {});
     int found = 0, right = 0, within_sigmas = 0;
     for (int v = 10; v < 230; v += 4) {
@@ -50,7 +48,7 @@ TEST(EpipolarSearch, FindsTheDepthsOfAWallSidewaysAndForward) {
 
 TEST(EpipolarSearch, DoesNotMindADifferenceOfBrightness) {
   const TwoViews views = SeeWall(Pose(0.08, 0, 0, 0, 0, 0), 1, 20);
-  const EpipolarSearch search(views.keyframe.grey, views.other.grey, kCamera,
+  const EpipolarSearch search(views.keyframe.grey, views.other.grey, kWallCamera,
                               views.other_from_keyframe, {});
   int found = 0;
   for (int u = 20; u < 300; u += 5) found += search.Find(u, 120, 0.3F, 0.8F, true) ? 1 : 0;
@@ -59,7 +57,7 @@ TEST(EpipolarSearch, DoesNotMindADifferenceOfBrightness) {
 
 /// Bars of a period, seen again a little to the left.
 cv::Mat Bars(double period_px, double shift_px, bool vertical) {
-  cv::Mat image(kCamera.height, kCamera.width, CV_8UC1);
+  cv::Mat image(kWallCamera.height, kWallCamera.width, CV_8UC1);
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {
       const double at = vertical ? u + shift_px : v;
@@ -72,7 +70,7 @@ cv::Mat Bars(double period_px, double shift_px, bool vertical) {
 
 TEST(EpipolarSearch, RefusesWhatLooksAlikeInTwoPlaces) {
   const cv::Mat bars = Bars(12, 0, true), moved = Bars(12, 3, true);
-  const EpipolarSearch search(bars, moved, kCamera, Pose(-0.1, 0, 0, 0, 0, 0), {});
+  const EpipolarSearch search(bars, moved, kWallCamera, Pose(-0.1, 0, 0, 0, 0, 0), {});
   // 26 px long: two periods.
   EXPECT_FALSE(search.Find(160, 120, 0.1F, 1.1F, true));
   // Among known depths within half a period there is one.
@@ -83,9 +81,10 @@ TEST(EpipolarSearch, RefusesEdgesAlongTheLineAndMotionWithoutTranslation) {
   const cv::Mat level = Bars(12, 0, false), upright = Bars(12, 0, true);
   const Eigen::Isometry3d sideways = Pose(-0.1, 0, 0, 0, 0, 0);
   const Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
-  EXPECT_FALSE(EpipolarSearch(level, level, kCamera, sideways, {}).Find(160, 120, 0.1F, 1, false));
   EXPECT_FALSE(
-      EpipolarSearch(upright, upright, kCamera, standing, {}).Find(160, 120, 0.1F, 1, false));
+      EpipolarSearch(level, level, kWallCamera, sideways, {}).Find(160, 120, 0.1F, 1, false));
+  EXPECT_FALSE(
+      EpipolarSearch(upright, upright, kWallCamera, standing, {}).Find(160, 120, 0.1F, 1, false));
 }
 
 InverseDepthMap::Config NearRange() {
@@ -115,7 +114,7 @@ Quality Compare(const InverseDepthMap& map, const cv::Mat& depth_m) {
 TEST(InverseDepthMap, LearnsDepthsAndTakesThemAlongToTheNextKeyframe) {
   const TwoViews views = SeeWall(Pose(0.06, 0.02, 0.03, 0, 0, 0));
   EdgeExtractor extractor({});
-  InverseDepthMap map(NearRange(), kCamera);
+  InverseDepthMap map(NearRange(), kWallCamera);
   map.MoveTo(extractor.Extract(views.keyframe.grey), Eigen::Isometry3d::Identity());
   EXPECT_EQ(map.CountKnown(), 0U);
   map.Measure(views.keyframe.grey, views.other.grey, views.other_from_keyframe, true);
@@ -134,7 +133,7 @@ TEST(InverseDepthMap, MoreViewsMakeDepthsMoreCertain) {
   const TwoViews views = SeeWall(Pose(0.04, 0, 0, 0, 0, 0));
   const TwoViews farther = SeeWall(Pose(0.12, 0, 0, 0, 0, 0));
   EdgeExtractor extractor({});
-  InverseDepthMap map(NearRange(), kCamera);
+  InverseDepthMap map(NearRange(), kWallCamera);
   map.MoveTo(extractor.Extract(views.keyframe.grey), Eigen::Isometry3d::Identity());
   map.Measure(views.keyframe.grey, views.other.grey, views.other_from_keyframe, true);
   const auto mean_sigma = [&] {
@@ -152,7 +151,7 @@ TEST(InverseDepthMap, MoreViewsMakeDepthsMoreCertain) {
 TEST(InverseDepthMap, ForgetsDepthsThatTheNextViewsContradict) {
   const TwoViews views = SeeWall(Pose(0.08, 0, 0, 0, 0, 0));
   EdgeExtractor extractor({});
-  InverseDepthMap map(NearRange(), kCamera);
+  InverseDepthMap map(NearRange(), kWallCamera);
   map.MoveTo(extractor.Extract(views.keyframe.grey), Eigen::Isometry3d::Identity());
   // The wrong baseline: depths three quarters of the true ones.
   map.Measure(views.keyframe.grey, views.other.grey, Pose(-0.06, 0, 0, 0, 0, 0), true);

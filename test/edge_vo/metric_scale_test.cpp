@@ -55,7 +55,7 @@ TEST(MetricScale, IgnoresWhatIsNotANumberOrNotPositive) {
   EXPECT_FALSE(scale.log_sigma());
 }
 
-constexpr CameraIntrinsics kCamera{500, 500, 319.5, 239.5, 640, 480};
+constexpr CameraIntrinsics kRoadCamera{500, 500, 319.5, 239.5, 640, 480};
 
 /// Edges of a road under a camera that looks down a little, and as many of other things.
 std::vector<EdgeDepth> RoadAndOtherThings(double height, double pitch_rad) {
@@ -70,7 +70,7 @@ std::vector<EdgeDepth> RoadAndOtherThings(double height, double pitch_rad) {
     edge.v = static_cast<std::int16_t>(v(random));
     edge.known = true;
     const double slope =
-        (edge.v - kCamera.cy) / kCamera.fy * std::cos(pitch_rad) + std::sin(pitch_rad);
+        (edge.v - kRoadCamera.cy) / kRoadCamera.fy * std::cos(pitch_rad) + std::sin(pitch_rad);
     edge.inverse_depth =
         i % 2 == 0 ? static_cast<float>(slope / height * (1 + noise(random))) : other(random);
     edge.variance = 1e-4F * edge.inverse_depth * edge.inverse_depth;
@@ -81,7 +81,7 @@ std::vector<EdgeDepth> RoadAndOtherThings(double height, double pitch_rad) {
 
 TEST(RoadHeight, IsThatOfTheRoadAmongOtherThings) {
   for (const double pitch_rad : {0.0, 0.1}) {
-    const auto height = RoadHeight(RoadAndOtherThings(1.5, pitch_rad), kCamera, pitch_rad);
+    const auto height = RoadHeight(RoadAndOtherThings(1.5, pitch_rad), kRoadCamera, pitch_rad);
     ASSERT_TRUE(height);
     EXPECT_NEAR(*height, 1.5, 0.03);
   }
@@ -90,8 +90,8 @@ TEST(RoadHeight, IsThatOfTheRoadAmongOtherThings) {
 TEST(RoadHeight, IsNotKnownWithoutARoad) {
   std::vector<EdgeDepth> edges = RoadAndOtherThings(1.5, 0);
   for (std::size_t i = 0; i < edges.size(); i += 2) edges[i].known = false;
-  EXPECT_FALSE(RoadHeight(edges, kCamera, 0));
-  EXPECT_FALSE(RoadHeight({}, kCamera, 0));
+  EXPECT_FALSE(RoadHeight(edges, kRoadCamera, 0));
+  EXPECT_FALSE(RoadHeight({}, kRoadCamera, 0));
 }
 
 }  // namespace

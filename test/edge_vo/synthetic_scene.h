@@ -10,6 +10,9 @@
 
 namespace livemap {
 
+/// Looks at the wall in most tests.
+inline constexpr CameraIntrinsics kWallCamera{260, 260, 159.5, 119.5, 320, 240};
+
 /// The simulator's patterned wall as frames for odometry.
 class SyntheticWall {
  public:

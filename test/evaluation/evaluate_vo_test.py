@@ -24,11 +24,6 @@ def run(*arguments):
     return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False)
 
 
-def street_with_two_eyes(folder):
-    subprocess.run([SIMULATE, "--tum", folder, "--seed", "5", "--seconds", "1.6", "--rate", "10", "--size", "320x240",
-                    "--one-ray", "--stereo", "0.4"], check=True, capture_output=True, timeout=600)
-
-
 def as_kitti(tum, kitti):
     """The same drive as KITTI lays it out: numbered pictures of two eyes, projections, poses as matrices."""
     with open(os.path.join(tum, "camera.yaml"), encoding="ascii") as file:
@@ -76,6 +71,9 @@ class EvaluateVoTest(unittest.TestCase):
         cls.room = os.path.join(cls.temporary.name, "room")
         subprocess.run([SIMULATE, "--room", "--tum", cls.room, "--seconds", "2", "--rate", "15", "--size",
                         "320x240", "--seed", "4"], check=True, capture_output=True, timeout=600)
+        cls.street = os.path.join(cls.temporary.name, "street_with_two_eyes")
+        subprocess.run([SIMULATE, "--tum", cls.street, "--seed", "5", "--seconds", "1.6", "--rate", "10", "--size",
+                        "320x240", "--one-ray", "--stereo", "0.4"], check=True, capture_output=True, timeout=600)
 
     @classmethod
     def tearDownClass(cls):
@@ -146,7 +144,7 @@ class EvaluateVoTest(unittest.TestCase):
             self.assertIn(words, done.stderr)
     def test_two_eyes_are_followed_in_either_layout_and_their_matching_timed_apart(self):
         tum, kitti = (os.path.join(self.temporary.name, name) for name in ("street", "street_kitti"))
-        street_with_two_eyes(tum)
+        shutil.copytree(self.street, tum)
         figures = self.figures(tum, "--stereo")
         self.assertEqual((figures["frames"], figures["lost"]), (16, 0))
         self.assertLess(figures["ate_rmse_m"], 0.01 * figures["length_m"])
@@ -179,7 +177,7 @@ class EvaluateVoTest(unittest.TestCase):
 
     def test_one_eye_follows_a_street_in_metres_by_the_speed(self):
         street, kitti = (os.path.join(self.temporary.name, name) for name in ("one_eye", "one_eye_kitti"))
-        street_with_two_eyes(street)
+        shutil.copytree(self.street, street)
         figures = self.figures(street, "--mono")
         self.assertEqual((figures["frames"], figures["lost"], figures["depth"]), (16, 0, "mono"))
         self.assertLess(figures["end_error_percent"], 3)
@@ -201,7 +199,7 @@ class EvaluateVoTest(unittest.TestCase):
 
     def test_frames_of_one_eye_before_its_start_have_no_pose(self):
         tum, kitti = (os.path.join(self.temporary.name, name) for name in ("begin", "begin_kitti"))
-        street_with_two_eyes(tum)
+        shutil.copytree(self.street, tum)
         as_kitti(tum, kitti)
         out = os.path.join(self.temporary.name, "begin.txt")
         figures = self.figures(kitti, "--out", out)
@@ -228,7 +226,7 @@ class EvaluateVoTest(unittest.TestCase):
 
     def test_one_eye_that_never_starts_says_so_and_has_no_errors(self):
         tum, still = (os.path.join(self.temporary.name, name) for name in ("stands", "stands_kitti"))
-        street_with_two_eyes(tum)
+        shutil.copytree(self.street, tum)
         as_kitti(tum, still)
         moving = self.figures(still)
         for number in range(1, 16):

@@ -4,11 +4,10 @@
 #include <filesystem>
 
 #include "hazard/local_hazard_map.h"
+#include "known_reports.h"
 
 namespace livemap {
 namespace {
-
-constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
 
 class BrokenRowsTest : public testing::Test {
  protected:

@@ -2,23 +2,13 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <random>
 
 #include "base/error.h"
+#include "known_reports.h"
 
 namespace livemap {
 namespace {
-
-constexpr GeoPoint kStreet{40.4433, -79.9436};
-
-Uuid Id(std::uint8_t number) {
-  Uuid id;
-  id.bytes[15] = number;
-  return id;
-}
-
-GeoPoint East(double distance_m) { return GeodesicDestination(kStreet, M_PI / 2, distance_m); }
 
 TEST(DuplicateFilter, SameClassWithinTheRadiusIsADuplicate) {
   DuplicateFilter filter{HazardCatalogue()};

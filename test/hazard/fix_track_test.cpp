@@ -5,19 +5,16 @@
 #include <cmath>
 #include <random>
 
+#include "driving_reporter.h"
+
 namespace livemap {
 namespace {
 
 using Answer = FixTrack::Answer;
 using Verdict = FixTrack::Verdict;
 
-constexpr GeoPoint kStart{40.4433, -79.9436};
-constexpr std::int64_t kEpochNs = 1'600'000'000'000'000'000;
-
-std::int64_t At(double seconds) { return kEpochNs + std::llround(seconds * 1e9); }
-
-Fix FixAt(double seconds, const GeoPoint& position, double sigma_m = 0.1) {
-  return {At(seconds), true, position, Eigen::Matrix2d::Identity() * sigma_m * sigma_m};
+Fix FixOf(double seconds, const GeoPoint& position, double sigma_m = 0.1) {
+  return {StampNs(seconds), true, position, Eigen::Matrix2d::Identity() * sigma_m * sigma_m};
 }
 
 /// Where a vehicle is that has driven straight on for some seconds.
@@ -33,7 +30,7 @@ double AngleBetween(double a_rad, double b_rad) {
 FixTrack Drive(double bearing_rad, double speed_mps, double period_s, double last_s) {
   FixTrack track{FixTrack::Config{}};
   for (double time_s = 0; time_s <= last_s + 1e-9; time_s += period_s) {
-    EXPECT_EQ(track.Add(FixAt(time_s, Straight(bearing_rad, speed_mps, time_s))),
+    EXPECT_EQ(track.Add(FixOf(time_s, Straight(bearing_rad, speed_mps, time_s))),
               Verdict::kAccepted);
   }
   return track;
@@ -44,7 +41,7 @@ class FixTrackCourse : public ::testing::TestWithParam<double> {};
 TEST_P(FixTrackCourse, InterpolatesPositionAndCourseOfAStraightDrive) {
   const double bearing = GetParam();
   const FixTrack track = Drive(bearing, 16.0, 1.0, 5.0);
-  const auto lookup = track.At(At(2.37));
+  const auto lookup = track.At(StampNs(2.37));
   ASSERT_EQ(lookup.answer, Answer::kReady);
   EXPECT_LT(GeodesicDistanceM(lookup.pose.position, Straight(bearing, 16.0, 2.37)), 0.001);
   EXPECT_LT(AngleBetween(lookup.pose.course_rad, bearing), 1e-4);
@@ -54,7 +51,7 @@ TEST_P(FixTrackCourse, InterpolatesPositionAndCourseOfAStraightDrive) {
 TEST_P(FixTrackCourse, CarriesThePositionOnAShortTimeBeyondTheNewestFix) {
   const double bearing = GetParam();
   const FixTrack track = Drive(bearing, 16.0, 0.2, 5.0);
-  const auto lookup = track.At(At(5.5));
+  const auto lookup = track.At(StampNs(5.5));
   ASSERT_EQ(lookup.answer, Answer::kExtrapolated);
   EXPECT_LT(GeodesicDistanceM(lookup.pose.position, Straight(bearing, 16.0, 5.5)), 0.001);
   EXPECT_LT(AngleBetween(lookup.pose.course_rad, bearing), 1e-4);
@@ -65,34 +62,34 @@ INSTANTIATE_TEST_SUITE_P(Bearings, FixTrackCourse,
 
 TEST(FixTrack, ExtrapolationMakesThePositionLessCertain) {
   const FixTrack track = Drive(1.0, 16.0, 1.0, 5.0);
-  const double at_fix = track.At(At(5.0)).pose.covariance_m2.trace();
-  const double soon = track.At(At(5.2)).pose.covariance_m2.trace();
-  const double later = track.At(At(5.9)).pose.covariance_m2.trace();
+  const double at_fix = track.At(StampNs(5.0)).pose.covariance_m2.trace();
+  const double soon = track.At(StampNs(5.2)).pose.covariance_m2.trace();
+  const double later = track.At(StampNs(5.9)).pose.covariance_m2.trace();
   EXPECT_LT(at_fix, soon);
   EXPECT_LT(soon, later);
 }
 
 TEST(FixTrack, StaleFixIsWaitedFor) {
   const FixTrack track = Drive(1.0, 16.0, 1.0, 5.0);
-  EXPECT_EQ(track.At(At(6.01)).answer, Answer::kWait);
+  EXPECT_EQ(track.At(StampNs(6.01)).answer, Answer::kWait);
 }
 
 TEST(FixTrack, MomentBeforeTheFirstFixIsNeverKnown) {
   const FixTrack track = Drive(1.0, 16.0, 1.0, 5.0);
-  EXPECT_EQ(track.At(At(-0.1)).answer, Answer::kHopeless);
+  EXPECT_EQ(track.At(StampNs(-0.1)).answer, Answer::kHopeless);
 }
 
 TEST(FixTrack, LongGapIsNotInterpolated) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 5.0);
-  track.Add(FixAt(9.0, Straight(1.0, 16.0, 9.0)));
-  EXPECT_EQ(track.At(At(7.0)).answer, Answer::kHopeless);
+  track.Add(FixOf(9.0, Straight(1.0, 16.0, 9.0)));
+  EXPECT_EQ(track.At(StampNs(7.0)).answer, Answer::kHopeless);
 }
 
 TEST(FixTrack, WithoutAnyMotionTheCourseIsUnknown) {
   FixTrack track{FixTrack::Config{}};
-  EXPECT_EQ(track.At(At(0)).answer, Answer::kWait);
-  for (int second = 0; second < 5; ++second) track.Add(FixAt(second, kStart));
-  EXPECT_EQ(track.At(At(4)).answer, Answer::kWait);
+  EXPECT_EQ(track.At(StampNs(0)).answer, Answer::kWait);
+  for (int second = 0; second < 5; ++second) track.Add(FixOf(second, kStart));
+  EXPECT_EQ(track.At(StampNs(4)).answer, Answer::kWait);
   EXPECT_TRUE(std::isnan(track.Newest()->course_rad));
 }
 
@@ -103,8 +100,8 @@ TEST(FixTrack, NoiseOfAStandingVehicleIsNoCourse) {
   FixTrack track{FixTrack::Config{}};
   int claimed = 0;
   for (double time_s = 0; time_s < 60; time_s += 0.2) {
-    track.Add(FixAt(time_s, frame.ToGeo({noise(random), noise(random)}), 0.5));
-    claimed += track.At(At(time_s)).answer == Answer::kWait ? 0 : 1;
+    track.Add(FixOf(time_s, frame.ToGeo({noise(random), noise(random)}), 0.5));
+    claimed += track.At(StampNs(time_s)).answer == Answer::kWait ? 0 : 1;
   }
   EXPECT_EQ(claimed, 0);
 }
@@ -112,9 +109,9 @@ TEST(FixTrack, NoiseOfAStandingVehicleIsNoCourse) {
 TEST(FixTrack, StandingVehicleKeepsTheCourseItArrivedWith) {
   FixTrack track = Drive(0.7, 10.0, 0.2, 5.0);
   for (double time_s = 5.2; time_s < 25; time_s += 0.2) {
-    track.Add(FixAt(time_s, Straight(0.7, 10.0, 5.0)));
+    track.Add(FixOf(time_s, Straight(0.7, 10.0, 5.0)));
   }
-  const auto lookup = track.At(At(20.1));
+  const auto lookup = track.At(StampNs(20.1));
   ASSERT_EQ(lookup.answer, Answer::kReady);
   EXPECT_LT(AngleBetween(lookup.pose.course_rad, 0.7), 0.05);
   EXPECT_LT(lookup.pose.speed_mps, 0.01);
@@ -126,10 +123,10 @@ TEST(FixTrack, CourseInACurveLagsLessThanItsStatedUncertaintySays) {
   FixTrack track{FixTrack::Config{}};
   for (double time_s = 0; time_s < 12; time_s += 0.1) {
     const double angle = 0.2 * time_s;
-    track.Add(FixAt(time_s, frame.ToGeo({50 * (1 - std::cos(angle)), 50 * std::sin(angle)})));
+    track.Add(FixOf(time_s, frame.ToGeo({50 * (1 - std::cos(angle)), 50 * std::sin(angle)})));
   }
   for (const double moment_s : {6.03, 11.9}) {
-    const TrackPose pose = track.At(At(moment_s)).pose;
+    const TrackPose pose = track.At(StampNs(moment_s)).pose;
     const double lag_rad = AngleBetween(pose.course_rad, 0.2 * moment_s);
     EXPECT_LT(lag_rad, 0.15) << moment_s;
     EXPECT_LT(lag_rad, 2 * std::sqrt(pose.course_variance_rad2)) << moment_s;
@@ -143,14 +140,14 @@ TEST(FixTrack, FixesThatComeLaterDoNotChangeAnAnswerThatWasReady) {
   std::vector<Fix> fixes;
   for (double time_s = 0; time_s < 12; time_s += 0.2) {
     const double way_m = time_s < 3 ? 0 : 8 * (time_s - 3);  // Stands at first.
-    fixes.push_back(FixAt(time_s, frame.ToGeo({noise(random), way_m + noise(random)}), 0.5));
+    fixes.push_back(FixOf(time_s, frame.ToGeo({noise(random), way_m + noise(random)}), 0.5));
   }
   for (const double moment_s : {1.3, 2.9, 3.3, 5.1, 8.05, 10.4}) {
     FixTrack track{FixTrack::Config{}};
     std::optional<TrackPose> first;
     for (const Fix& fix : fixes) {
       track.Add(fix);
-      const auto lookup = track.At(At(moment_s));
+      const auto lookup = track.At(StampNs(moment_s));
       if (lookup.answer != Answer::kReady) continue;
       if (!first) first = lookup.pose;
       EXPECT_EQ(lookup.pose.course_rad, first->course_rad) << moment_s;
@@ -170,9 +167,9 @@ TEST(FixTrack, StatedUncertaintyOfTheCourseHoldsUnderNoise) {
   for (int drive = 0; drive < 40; ++drive) {
     FixTrack track{FixTrack::Config{}};
     for (double time_s = 0; time_s < 8; time_s += 0.2) {
-      track.Add(FixAt(time_s, frame.ToGeo({noise(random), 16 * time_s + noise(random)}), 0.5));
+      track.Add(FixOf(time_s, frame.ToGeo({noise(random), 16 * time_s + noise(random)}), 0.5));
     }
-    const auto lookup = track.At(At(5.1));
+    const auto lookup = track.At(StampNs(5.1));
     ASSERT_EQ(lookup.answer, Answer::kReady);
     normalised +=
         std::pow(AngleBetween(lookup.pose.course_rad, 0), 2) / lookup.pose.course_variance_rad2;
@@ -186,12 +183,12 @@ TEST(FixTrack, StatedUncertaintyOfTheCourseHoldsUnderNoise) {
 
 TEST(FixTrack, WhatIsNoPositionIsRefused) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 2.0);
-  Fix fix = FixAt(3.0, Straight(1.0, 16.0, 3.0));
+  Fix fix = FixOf(3.0, Straight(1.0, 16.0, 3.0));
   fix.has_fix = false;
   EXPECT_EQ(track.Add(fix), Verdict::kNoFix);
-  EXPECT_EQ(track.Add(FixAt(3.0, {std::nan(""), 0})), Verdict::kInvalid);
-  EXPECT_EQ(track.Add(FixAt(3.0, {95, 0})), Verdict::kInvalid);
-  fix = FixAt(3.0, Straight(1.0, 16.0, 3.0));
+  EXPECT_EQ(track.Add(FixOf(3.0, {std::nan(""), 0})), Verdict::kInvalid);
+  EXPECT_EQ(track.Add(FixOf(3.0, {95, 0})), Verdict::kInvalid);
+  fix = FixOf(3.0, Straight(1.0, 16.0, 3.0));
   fix.covariance_m2 = Eigen::Matrix2d::Constant(std::nan(""));
   EXPECT_EQ(track.Add(fix), Verdict::kInvalid);
   fix.covariance_m2 = -Eigen::Matrix2d::Identity();
@@ -200,13 +197,13 @@ TEST(FixTrack, WhatIsNoPositionIsRefused) {
   EXPECT_EQ(track.Add(fix), Verdict::kInvalid);
   fix.covariance_m2 = Eigen::Matrix2d::Identity() * 1e9;
   EXPECT_EQ(track.Add(fix), Verdict::kInvalid) << "a fix to 30 km is none";
-  EXPECT_EQ(track.Add(FixAt(2.0, Straight(1.0, 16.0, 2.0))), Verdict::kOutOfOrder);
-  EXPECT_EQ(track.newest_ns(), At(2.0));
+  EXPECT_EQ(track.Add(FixOf(2.0, Straight(1.0, 16.0, 2.0))), Verdict::kOutOfOrder);
+  EXPECT_EQ(track.newest_ns(), StampNs(2.0));
 }
 
 TEST(FixTrack, UnknownCovarianceBecomesTheDefault) {
   FixTrack track{FixTrack::Config{}};
-  Fix fix = FixAt(0, kStart);
+  Fix fix = FixOf(0, kStart);
   fix.covariance_m2.reset();
   ASSERT_EQ(track.Add(fix), Verdict::kAccepted);
   EXPECT_DOUBLE_EQ(track.Newest()->covariance_m2(0, 0), 9.0);
@@ -214,44 +211,44 @@ TEST(FixTrack, UnknownCovarianceBecomesTheDefault) {
 
 TEST(FixTrack, SingleJumpIsNotBelieved) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 3.0);
-  EXPECT_EQ(track.Add(FixAt(4.0, Straight(1.0, 16.0, 400.0))), Verdict::kJump);
-  EXPECT_EQ(track.Add(FixAt(5.0, Straight(1.0, 16.0, 5.0))), Verdict::kAccepted);
-  const auto lookup = track.At(At(4.5));
+  EXPECT_EQ(track.Add(FixOf(4.0, Straight(1.0, 16.0, 400.0))), Verdict::kJump);
+  EXPECT_EQ(track.Add(FixOf(5.0, Straight(1.0, 16.0, 5.0))), Verdict::kAccepted);
+  const auto lookup = track.At(StampNs(4.5));
   ASSERT_EQ(lookup.answer, Answer::kReady);
   EXPECT_LT(GeodesicDistanceM(lookup.pose.position, Straight(1.0, 16.0, 4.5)), 0.01);
 }
 
 TEST(FixTrack, JumpThatLastsStartsTheTrackAnew) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 3.0);
-  EXPECT_EQ(track.Add(FixAt(4.0, Straight(1.0, 16.0, 404.0))), Verdict::kJump);
-  EXPECT_EQ(track.Add(FixAt(5.0, Straight(1.0, 16.0, 405.0))), Verdict::kJump);
-  EXPECT_EQ(track.Add(FixAt(6.0, Straight(1.0, 16.0, 406.0))), Verdict::kRestarted);
-  EXPECT_EQ(track.At(At(3.5)).answer, Answer::kHopeless) << "nothing is drawn across the jump";
-  EXPECT_EQ(track.At(At(5.5)).answer, Answer::kReady);
+  EXPECT_EQ(track.Add(FixOf(4.0, Straight(1.0, 16.0, 404.0))), Verdict::kJump);
+  EXPECT_EQ(track.Add(FixOf(5.0, Straight(1.0, 16.0, 405.0))), Verdict::kJump);
+  EXPECT_EQ(track.Add(FixOf(6.0, Straight(1.0, 16.0, 406.0))), Verdict::kRestarted);
+  EXPECT_EQ(track.At(StampNs(3.5)).answer, Answer::kHopeless) << "nothing is drawn across the jump";
+  EXPECT_EQ(track.At(StampNs(5.5)).answer, Answer::kReady);
 }
 
 TEST(FixTrack, ScatteredJumpsDoNotStartTheTrackAnew) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 3.0);
   for (int i = 0; i < 6; ++i) {
-    EXPECT_EQ(track.Add(FixAt(4.0 + i, Straight(i * 1.0, 16.0, 500.0))), Verdict::kJump);
+    EXPECT_EQ(track.Add(FixOf(4.0 + i, Straight(i * 1.0, 16.0, 500.0))), Verdict::kJump);
   }
 }
 
 TEST(FixTrack, ClockSetBackStartsTheTrackAnew) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 40.0);
-  EXPECT_EQ(track.Add(FixAt(0.0, kStart)), Verdict::kRestarted);
-  EXPECT_EQ(track.newest_ns(), At(0.0));
-  EXPECT_EQ(track.At(At(0.5)).answer, Answer::kWait) << "the old course is forgotten too";
+  EXPECT_EQ(track.Add(FixOf(0.0, kStart)), Verdict::kRestarted);
+  EXPECT_EQ(track.newest_ns(), StampNs(0.0));
+  EXPECT_EQ(track.At(StampNs(0.5)).answer, Answer::kWait) << "the old course is forgotten too";
 }
 
 TEST(FixTrack, WorksAcrossTheAntimeridian) {
   const GeoPoint start{-16.5, 179.9995};
   FixTrack track{FixTrack::Config{}};
   for (int second = 0; second < 12; ++second) {
-    track.Add(FixAt(second, GeodesicDestination(start, M_PI / 2, 16.0 * second)));
+    track.Add(FixOf(second, GeodesicDestination(start, M_PI / 2, 16.0 * second)));
   }
   for (const double time_s : {2.5, 3.4, 6.5}) {
-    const auto lookup = track.At(At(time_s));
+    const auto lookup = track.At(StampNs(time_s));
     ASSERT_EQ(lookup.answer, Answer::kReady);
     EXPECT_LT(GeodesicDistanceM(lookup.pose.position,
                                 GeodesicDestination(start, M_PI / 2, 16.0 * time_s)),

@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-using Answer = PollReply::Answer;
+using PollAnswer = PollReply::Answer;
 
 /// base_link at a moment of the straight drive, known to 0.2 m and 0.01 rad.
 TrackPose BaseAt(double seconds) {
@@ -111,7 +111,7 @@ TEST_F(PollResponderTest, SaysYesAtOnceWhenTheDetectorSeesTheHazardAtItsPlace) {
                          : std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kYes);
+  EXPECT_EQ(reply.answer, PollAnswer::kYes);
   EXPECT_EQ(reply.poll, poll_.poll);
   EXPECT_EQ(reply.hazard, poll_.hazard);
   EXPECT_EQ(reply.drive_id, "drive-1");
@@ -128,7 +128,7 @@ TEST_F(PollResponderTest, SaysNoWhenThePlaceWasWellInViewSeveralTimesAndNothingW
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kNo);
+  EXPECT_EQ(reply.answer, PollAnswer::kNo);
   EXPECT_GT(reply.confidence, 0.9F);
   EXPECT_THAT(reply.image, IsEmpty()) << "none was wanted";
   const double distance_m = GeodesicDistanceM(reply.vehicle_position, poll_.position);
@@ -154,7 +154,7 @@ TEST_F(PollResponderTest, OneClearViewIsEnoughWhereChangeDetectionKnowsThatItWen
   responder_.AddChange(Changed(PlaceAt(kAheadM + 1, kRightM), true, "sign"));
   Expire();
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kNo);
+  EXPECT_EQ(reply.answer, PollAnswer::kNo);
   EXPECT_NEAR(reply.confidence, 0.8, 0.1);
   EXPECT_EQ(responder_.counters().no_by_change, 1U);
 }
@@ -169,7 +169,7 @@ TEST_F(PollResponderTest, ChangesOfOtherClassesOrPlacesSayNothing) {
   unsound.confidence = std::nanf("");
   responder_.AddChange(unsound);
   Expire();
-  EXPECT_EQ(OnlyReply().answer, Answer::kCantSee);
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kCantSee);
 }
 
 TEST_F(PollResponderTest, WithoutAClearViewAChangeAloneIsNoAnswer) {
@@ -178,7 +178,7 @@ TEST_F(PollResponderTest, WithoutAClearViewAChangeAloneIsNoAnswer) {
   Drive(0, 0.3);
   responder_.AddChange(Changed(poll_.position, true, "barrier"));
   Expire();
-  EXPECT_EQ(OnlyReply().answer, Answer::kCantSee);
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kCantSee);
 }
 
 TEST_F(PollResponderTest, NothingIsDeniedWhereChangeDetectionSawThatItCame) {
@@ -188,7 +188,7 @@ TEST_F(PollResponderTest, NothingIsDeniedWhereChangeDetectionSawThatItCame) {
   Drive(2.0, 4.0);
   Expire();
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kCantSee);
+  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("not detected"));
   EXPECT_EQ(responder_.counters().disagreed, 1U);
 }
@@ -200,7 +200,7 @@ TEST_F(PollResponderTest, WhatTheDetectorSeesIsThereWhateverChangeDetectionSays)
   Drive(2.6, 2.8, [](double time_s) {
     return std::vector<Sighting>{{"barrier", 0.7F, BoxOfPlace(time_s)}};
   });
-  EXPECT_EQ(OnlyReply().answer, Answer::kYes);
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes);
 }
 
 TEST(MayBe, AThingOfNoCertainClassMayBeAnyHazardButAPothole) {
@@ -220,7 +220,7 @@ TEST_F(PollResponderTest, AnImageWaitsUntilTheCameraIsKnown) {
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
   vehicle_.intrinsics = intrinsics;
   responder_.Process(2.8, steady_s_, vehicle_);
-  EXPECT_EQ(OnlyReply().answer, Answer::kYes);
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes);
 }
 
 TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
@@ -229,7 +229,7 @@ TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
     return std::vector<Sighting>{{"deer", 0.9F, BoxOfPlace(time_s)},
                                  {"pothole", 0.9F, BoxOfPlace(time_s, kAheadM + 12)}};
   });
-  EXPECT_EQ(OnlyReply().answer, Answer::kNo);
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kNo);
 }
 
 TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo) {
@@ -240,7 +240,7 @@ TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo
   Drive(1.0, 1.05, seen);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty()) << "at 44 m it could be another one";
   Drive(2.25, 2.3, seen);
-  EXPECT_EQ(OnlyReply().answer, Answer::kYes) << "at 24 m";
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes) << "at 24 m";
 }
 
 TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
@@ -267,7 +267,7 @@ TEST_F(PollResponderTest, FramesAtRestAreOneView) {
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
   Expire();
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kCantSee);
+  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_EQ(reply.reason, "the place was in view too few times");
 }
 
@@ -283,7 +283,7 @@ TEST_F(PollResponderTest, CannotSeeWhatIsTooFarAwayOrNeverInTheImage) {
   Drive(2.8, 4.5);
   Expire();
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kCantSee);
+  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("out of the camera's view"));
   EXPECT_NEAR(static_cast<double>(reply.stamp_ns - kEpochNs) * 1e-9, 4.5, 0.11) << "the last image";
 }
@@ -333,7 +333,7 @@ TEST_F(PollResponderTest, APoorPositionMakesNoNo) {
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
   Expire();
-  EXPECT_EQ(OnlyReply().answer, Answer::kCantSee) << "8 m: who knows where it looked";
+  EXPECT_EQ(OnlyReply().answer, PollAnswer::kCantSee) << "8 m: who knows where it looked";
 }
 
 TEST_F(PollResponderTest, ARepeatedPollIsAnsweredOnceAndTooManyAreNotTaken) {
@@ -403,7 +403,7 @@ TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
   responder_.AddPicture(wanted[0], Lit(100));
   responder_.Process(4.1, steady_s_, vehicle_);
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kNo);
+  EXPECT_EQ(reply.answer, PollAnswer::kNo);
   EXPECT_EQ(reply.stamp_ns, wanted[0]);
   const cv::Size shown = cv::imdecode(reply.image, cv::IMREAD_COLOR).size();
   EXPECT_GE(shown.width, 240);

@@ -5,17 +5,14 @@
 #include <cmath>
 #include <limits>
 
+#include "driving_reporter.h"
+
 namespace livemap {
 namespace {
 
 using Answer = FixTrack::Answer;
 
-constexpr GeoPoint kStart{40.4433, -79.9436};
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-std::int64_t StampNs(double seconds) {
-  return 1'600'000'000'000'000'000 + std::llround(seconds * 1e9);
-}
 
 /// 10 m/s to the east, turning through north.
 TrackPose PoseAt(double seconds) {

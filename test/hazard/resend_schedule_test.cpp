@@ -2,17 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include "known_reports.h"
+
 namespace livemap {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-
-Uuid Id(int number) {
-  Uuid id;
-  id.bytes[15] = static_cast<std::uint8_t>(number);
-  return id;
-}
 
 ResendSchedule WithoutJitter() {
   ResendSchedule::Config config;

@@ -41,8 +41,8 @@ OdometrySample OdometryAt(double time_s) {
 }
 
 /// Fixes and odometry at 10 Hz that arrive so late after their stamps.
-std::vector<Arrival> Drive(const std::function<double(int)>& fix_late_s,
-                           const std::function<double(int)>& odometry_late_s) {
+std::vector<Arrival> ArrivalsOfDrive(const std::function<double(int)>& fix_late_s,
+                                     const std::function<double(int)>& odometry_late_s) {
   std::vector<Arrival> arrivals;
   for (int i = 0; i <= 120; ++i) {
     const double time_s = 0.1 * i;
@@ -93,20 +93,21 @@ class FedLocalizer {
 
 TEST(LocalizerFeed, GivesTheSamePosesInWhateverOrderTheMessagesArrive) {
   FedLocalizer in_order;
-  in_order.Play(Drive([](int) { return 0.0; }, [](int) { return 0.001; }));
+  in_order.Play(ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; }));
   ASSERT_THAT(in_order.easts_m, Not(IsEmpty()));
   FedLocalizer odometry_late;
   odometry_late.Play(
-      Drive([](int) { return 0.0; }, [](int i) { return i % 3 == 0 ? 0.14 : 0.06; }));
+      ArrivalsOfDrive([](int) { return 0.0; }, [](int i) { return i % 3 == 0 ? 0.14 : 0.06; }));
   FedLocalizer fixes_late;
-  fixes_late.Play(Drive([](int i) { return i % 4 == 0 ? 0.14 : 0.05; }, [](int) { return 0.005; }));
+  fixes_late.Play(
+      ArrivalsOfDrive([](int i) { return i % 4 == 0 ? 0.14 : 0.05; }, [](int) { return 0.005; }));
   EXPECT_EQ(odometry_late.easts_m, in_order.easts_m);
   EXPECT_EQ(fixes_late.easts_m, in_order.easts_m);
 }
 
 TEST(LocalizerFeed, OdometryWaitsForFixesNoLongerThanItMay) {
   FedLocalizer run;
-  run.Play(Drive([](int) { return 0.0; }, [](int) { return 0.001; }));
+  run.Play(ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; }));
   const std::size_t before = run.stamps_ns.size();
   run.feed.AddOdometry(OdometryAt(12.1), 100.0);
   EXPECT_EQ(run.stamps_ns.size(), before) << "a fix of its moment may come";
@@ -117,7 +118,7 @@ TEST(LocalizerFeed, OdometryWaitsForFixesNoLongerThanItMay) {
 }
 
 TEST(LocalizerFeed, AReplayThatBeginsAgainGivesTheSamePosesAgain) {
-  const auto arrivals = Drive([](int) { return 0.0; }, [](int) { return 0.001; });
+  const auto arrivals = ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; });
   FedLocalizer run;
   run.Play(arrivals);
   const std::vector<double> first = run.easts_m;
@@ -128,7 +129,7 @@ TEST(LocalizerFeed, AReplayThatBeginsAgainGivesTheSamePosesAgain) {
 
 TEST(LocalizerFeed, AFixThatIsStampedWronglyOnceHarmsNothing) {
   FedLocalizer run;
-  auto arrivals = Drive([](int) { return 0.0; }, [](int) { return 0.001; });
+  auto arrivals = ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; });
   FedLocalizer undisturbed;
   undisturbed.Play(arrivals);
   const auto without = undisturbed.localizer.counters().fixes_without_odometry;
@@ -145,7 +146,7 @@ TEST(LocalizerFeed, AFixThatIsStampedWronglyOnceHarmsNothing) {
 
 TEST(LocalizerFeed, LostOdometryIsBridgedByTheLastSpeed) {
   FedLocalizer run;
-  run.Play(Drive([](int) { return 0.0; }, [](int) { return 0.001; }));
+  run.Play(ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; }));
   const double before_m = run.easts_m.back();
   OdometrySample held = OdometryAt(12.0);
   held.lost = true;

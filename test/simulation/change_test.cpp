@@ -6,16 +6,17 @@
 #include <set>
 
 #include "drives/camera_file.h"
+#include "same_pixels.h"
 #include "simulation/change_truth.h"
 #include "simulation/pass_drive.h"
 
 namespace livemap {
 namespace {
 
-constexpr double kLengthM = 500;
+constexpr double kPassLengthM = 500;
 constexpr double kShare = 0.5;
 
-SimulatedCamera SmallCamera() {
+SimulatedCamera PassCamera() {
   SimulatedCamera camera;
   camera.intrinsics = CameraIntrinsics{160, 160, 99.5, 59.5, 200, 120};
   return camera;
@@ -29,16 +30,11 @@ CameraMounting Mounting() {
 }
 
 Street MakeStreet(StreetPass::Which which, bool leaves, double share = kShare) {
-  return {WorldDescription(), 3, kLengthM, leaves, {which, share}};
+  return {WorldDescription(), 3, kPassLengthM, leaves, {which, share}};
 }
 
-CameraMotion View(const Street& street, std::size_t frame) {
+CameraMotion ViewOfFrame(const Street& street, std::size_t frame) {
   return PassDrive(street, DrawSecondManner(3, 8, 0.5, 20), Mounting(), 0).Camera(frame);
-}
-
-bool Equal(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() &&
-         std::equal(a.datastart, a.dataend, b.datastart);
 }
 
 TEST(ChangeClass, KnowsEveryObjectThatMayChangeAndNoOther) {
@@ -153,7 +149,7 @@ TEST(TwoPasses, DifferInEveryListedObjectAndInNothingElse) {
 TEST(TwoPasses, KeepPlacesAndInstancesOfWhatStaysInAnySeason) {
   const Street summer = MakeStreet(StreetPass::Which::kFirst, true);
   const Street winter = MakeStreet(StreetPass::Which::kSecond, false);
-  const Street whole(WorldDescription(), 3, kLengthM, true);
+  const Street whole(WorldDescription(), 3, kPassLengthM, true);
   std::size_t bare = 0;
   std::size_t houses = 0;
   for (int index = 0; index < 8; ++index) {
@@ -214,12 +210,12 @@ TEST(ChangeTruth, MasksAreTheDifferenceOfTheRenderedInstances) {
   const Lighting light = MakeLighting(Condition::kSnow, 5);
   RenderOptions options;
   options.smooth_edges = false;
-  StreetRenderer old_renderer(before, SmallCamera(), light, options);
-  StreetRenderer new_renderer(after, SmallCamera(), light, options);
-  ChangeTruth truth(WorldDescription(), 3, kLengthM, false, kShare, SmallCamera(), 2);
+  StreetRenderer old_renderer(before, PassCamera(), light, options);
+  StreetRenderer new_renderer(after, PassCamera(), light, options);
+  ChangeTruth truth(WorldDescription(), 3, kPassLengthM, false, kShare, PassCamera(), 2);
   std::set<int> classes;
   for (const std::size_t frame : {0U, 3U, 6U}) {
-    const CameraMotion view = View(after, frame);
+    const CameraMotion view = ViewOfFrame(after, frame);
     const cv::Mat was = old_renderer.Render(view, 0).instances;
     const cv::Mat is = new_renderer.Render(view, 1).instances;
     const cv::Mat mask = truth.Look(view).mask;
@@ -248,14 +244,14 @@ TEST(ChangeTruth, MasksAreTheDifferenceOfTheRenderedInstances) {
 TEST(ChangeTruth, IsEmptyWithoutChangesThoughSnowHasFallen) {
   const Street summer = MakeStreet(StreetPass::Which::kFirst, true, 0);
   const Street winter = MakeStreet(StreetPass::Which::kSecond, false, 0);
-  ChangeTruth truth(WorldDescription(), 3, kLengthM, false, 0, SmallCamera(), 2);
-  InstanceCaster green(summer, SmallCamera(), 2);
-  InstanceCaster white(winter, SmallCamera(), 2);
+  ChangeTruth truth(WorldDescription(), 3, kPassLengthM, false, 0, PassCamera(), 2);
+  InstanceCaster green(summer, PassCamera(), 2);
+  InstanceCaster white(winter, PassCamera(), 2);
   bool leaves_fell = false;
   for (const std::size_t frame : {0U, 4U, 8U}) {
-    const CameraMotion view = View(winter, frame);
+    const CameraMotion view = ViewOfFrame(winter, frame);
     EXPECT_EQ(cv::countNonZero(truth.Look(view).mask), 0);
-    leaves_fell |= !Equal(green.Cast(view), white.Cast(view));
+    leaves_fell |= !SamePixels(green.Cast(view), white.Cast(view));
   }
   EXPECT_TRUE(truth.changes().empty());
   EXPECT_TRUE(leaves_fell);
@@ -263,22 +259,22 @@ TEST(ChangeTruth, IsEmptyWithoutChangesThoughSnowHasFallen) {
 
 TEST(ChangeTruth, DoesNotDependOnThreadsOrOnWhatWasSeenBefore) {
   const Street after = MakeStreet(StreetPass::Which::kSecond, true);
-  ChangeTruth one(WorldDescription(), 3, kLengthM, true, kShare, SmallCamera(), 1);
-  ChangeTruth three(WorldDescription(), 3, kLengthM, true, kShare, SmallCamera(), 3);
-  one.Look(View(after, 9));
-  const ChangeView a = one.Look(View(after, 2));
-  const ChangeView b = three.Look(View(after, 2));
-  EXPECT_TRUE(Equal(a.mask, b.mask));
+  ChangeTruth one(WorldDescription(), 3, kPassLengthM, true, kShare, PassCamera(), 1);
+  ChangeTruth three(WorldDescription(), 3, kPassLengthM, true, kShare, PassCamera(), 3);
+  one.Look(ViewOfFrame(after, 9));
+  const ChangeView a = one.Look(ViewOfFrame(after, 2));
+  const ChangeView b = three.Look(ViewOfFrame(after, 2));
+  EXPECT_TRUE(SamePixels(a.mask, b.mask));
   EXPECT_EQ(a.pixels, b.pixels);
   EXPECT_GT(cv::countNonZero(a.mask), 0);
 }
 
 TEST(ChangeTruth, ListsWhatItsMasksShow) {
   const Street after = MakeStreet(StreetPass::Which::kSecond, true);
-  ChangeTruth truth(WorldDescription(), 3, kLengthM, true, kShare, SmallCamera(), 2);
+  ChangeTruth truth(WorldDescription(), 3, kPassLengthM, true, kShare, PassCamera(), 2);
   std::size_t shown = 0;
   for (std::size_t frame = 0; frame < 10; ++frame) {
-    for (const auto& [instance, pixels] : truth.Look(View(after, frame)).pixels) {
+    for (const auto& [instance, pixels] : truth.Look(ViewOfFrame(after, frame)).pixels) {
       EXPECT_EQ(truth.changes().count(instance), 1U) << instance;
       ++shown;
     }
@@ -291,7 +287,7 @@ TEST(PassDrive, SecondPassKeepsItsDistanceBesideTheFirst) {
   straight.pieces = {{400, 0, 0}};
   std::set<bool> sides;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
-    const Street street(straight, seed, kLengthM, true);
+    const Street street(straight, seed, kPassLengthM, true);
     const PassManner manner = DrawSecondManner(seed, 8, 2, 10);
     PassManner beside = manner;
     beside.left_m = 0;
@@ -309,7 +305,7 @@ TEST(PassDrive, SecondPassKeepsItsDistanceBesideTheFirst) {
 }
 
 TEST(PassDrive, FindsTheNearestPicture) {
-  const Street street(WorldDescription(), 3, kLengthM, true);
+  const Street street(WorldDescription(), 3, kPassLengthM, true);
   const PassDrive drive(street, PassManner(), Mounting(), 0);
   for (double along = -1; along < 60; along += 0.37) {
     std::size_t best = 0;

@@ -6,19 +6,20 @@
 #include <set>
 
 #include "drives/camera_file.h"
+#include "same_pixels.h"
 #include "simulation/labels_in_view.h"
 #include "simulation/vehicle_motion.h"
 
 namespace livemap {
 namespace {
 
-SimulatedCamera SmallCamera() {
+SimulatedCamera StreetCamera() {
   SimulatedCamera camera;
   camera.intrinsics = CameraIntrinsics{160, 160, 119.5, 79.5, 240, 160};
   return camera;
 }
 
-CameraMotion View(const Street& street, double time_s) {
+CameraMotion ViewAt(const Street& street, double time_s) {
   const VehicleMotion motion(street, DrivingStyle(), 20);
   CameraMounting mounting;
   mounting.height_m = 1.4;
@@ -35,17 +36,12 @@ SimulatedFrame Picture(const Street& street, const SimulatedCamera& camera, int 
   RenderOptions options;
   options.threads = threads;
   StreetRenderer renderer(street, camera, MakeLighting(condition, street.seed()), options);
-  return renderer.Render(View(street, time_s), 3);
+  return renderer.Render(ViewAt(street, time_s), 3);
 }
 
-bool Equal(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() &&
-         std::equal(a.datastart, a.dataend, b.datastart);
-}
-
-bool Equal(const SimulatedFrame& a, const SimulatedFrame& b) {
-  return Equal(a.bgr, b.bgr) && Equal(a.depth, b.depth) && Equal(a.instances, b.instances) &&
-         Equal(a.classes, b.classes);
+bool SameFrame(const SimulatedFrame& a, const SimulatedFrame& b) {
+  return SamePixels(a.bgr, b.bgr) && SamePixels(a.depth, b.depth) &&
+         SamePixels(a.instances, b.instances) && SamePixels(a.classes, b.classes);
 }
 
 class Renderer : public ::testing::Test {
@@ -55,29 +51,29 @@ class Renderer : public ::testing::Test {
 
 TEST_F(Renderer, GivesTheSameBytesForOneAndTwoThreadsInEveryWeather) {
   for (const Condition condition : {Condition::kDay, Condition::kRain, Condition::kSnow}) {
-    const SimulatedFrame one = Picture(street_, SmallCamera(), 1, 1, condition);
-    const SimulatedFrame two = Picture(street_, SmallCamera(), 2, 1, condition);
-    EXPECT_TRUE(Equal(one, two)) << ConditionName(condition);
+    const SimulatedFrame one = Picture(street_, StreetCamera(), 1, 1, condition);
+    const SimulatedFrame two = Picture(street_, StreetCamera(), 2, 1, condition);
+    EXPECT_TRUE(SameFrame(one, two)) << ConditionName(condition);
   }
 }
 
 TEST_F(Renderer, DoesNotDependOnWhatWasRenderedBefore) {
   RenderOptions options;
-  StreetRenderer renderer(street_, SmallCamera(), MakeLighting(Condition::kDay, 3), options);
-  renderer.Render(View(street_, 0), 0);
-  renderer.Render(View(street_, 6), 60);
-  const SimulatedFrame late = renderer.Render(View(street_, 12), 3);
-  EXPECT_TRUE(Equal(late, Picture(street_, SmallCamera(), 1, 12)));
+  StreetRenderer renderer(street_, StreetCamera(), MakeLighting(Condition::kDay, 3), options);
+  renderer.Render(ViewAt(street_, 0), 0);
+  renderer.Render(ViewAt(street_, 6), 60);
+  const SimulatedFrame late = renderer.Render(ViewAt(street_, 12), 3);
+  EXPECT_TRUE(SameFrame(late, Picture(street_, StreetCamera(), 1, 12)));
 }
 
 TEST_F(Renderer, AnotherSeedGivesAnotherPicture) {
   const Street other(WorldDescription(), 4, 400, true);
-  EXPECT_FALSE(
-      Equal(Picture(street_, SmallCamera(), 2, 1).bgr, Picture(other, SmallCamera(), 2, 1).bgr));
+  EXPECT_FALSE(SamePixels(Picture(street_, StreetCamera(), 2, 1).bgr,
+                          Picture(other, StreetCamera(), 2, 1).bgr));
 }
 
 TEST_F(Renderer, EveryInstanceHasOneClassAndTheClassImageAgrees) {
-  const SimulatedFrame frame = Picture(street_, SmallCamera(), 2, 2);
+  const SimulatedFrame frame = Picture(street_, StreetCamera(), 2, 2);
   std::set<int> classes;
   for (int row = 0; row < frame.classes.rows; ++row) {
     for (int column = 0; column < frame.classes.cols; ++column) {
@@ -144,7 +140,7 @@ TEST(Truth, DepthPoseAndProjectionAgreeToAHundredthOfAPixel) {
   world.pieces = {{400, 0, 0}};
   world.hazards.emplace();
   const Street street(world, 3, 400, true);
-  SimulatedCamera camera = SmallCamera();
+  SimulatedCamera camera = StreetCamera();
   for (const double k1 : {0.0, -0.2}) {
     camera.k1 = k1;
     const SimulatedFrame a = Picture(street, camera, 2, 1.0);
@@ -165,7 +161,7 @@ TEST(Truth, HazardsLieWhereTheyAreSaidToLie) {
   world.hazards->push_back(placed);
   world.parked_cars = false;
   const Street street(world, 3, 400, true);
-  const SimulatedCamera camera = SmallCamera();
+  const SimulatedCamera camera = StreetCamera();
   const SimulatedFrame frame = Picture(street, camera, 2, 0);
   const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
   ASSERT_EQ(hazards.size(), 1U);

@@ -9,7 +9,7 @@
 namespace livemap {
 namespace {
 
-constexpr double kLengthM = 400;
+constexpr double kStreetLengthM = 400;
 
 TEST(CounterRandom, DependsOnKeyAndCounterOnly) {
   CounterRandom a(7, 1, 2);
@@ -59,9 +59,9 @@ TEST(RoadLine, BearingIsClockwiseFromNorthAndLeftIsLeft) {
 }
 
 TEST(Street, SameSeedGivesTheSameBlocksAndAnotherSeedOthers) {
-  const Street street(WorldDescription(), 3, kLengthM, true);
-  const Street again(WorldDescription(), 3, kLengthM, true);
-  const Street other(WorldDescription(), 4, kLengthM, true);
+  const Street street(WorldDescription(), 3, kStreetLengthM, true);
+  const Street again(WorldDescription(), 3, kStreetLengthM, true);
+  const Street other(WorldDescription(), 4, kStreetLengthM, true);
   const StreetBlock a = street.Build(2);
   const StreetBlock b = again.Build(2);
   const StreetBlock c = other.Build(2);
@@ -73,7 +73,7 @@ TEST(Street, SameSeedGivesTheSameBlocksAndAnotherSeedOthers) {
 }
 
 TEST(Street, HazardsHaveInstancesOfTheirOwnThatCarryTheirClass) {
-  const Street street(WorldDescription(), 5, kLengthM, true);
+  const Street street(WorldDescription(), 5, kStreetLengthM, true);
   std::set<std::uint32_t> instances;
   std::set<ObjectClass> classes;
   for (int index = 0; index < 60; ++index) {
@@ -111,7 +111,7 @@ TEST(Street, PlacesTheHazardsOfItsFileAndNoOthers) {
   deer.at_m = 55;
   deer.left_m = 2;
   world.hazards->push_back(deer);
-  const Street street(world, 5, kLengthM, true);
+  const Street street(world, 5, kStreetLengthM, true);
   for (int index = 0; index < 8; ++index) {
     const std::vector<StreetHazard> hazards = street.Hazards(index);
     ASSERT_EQ(hazards.size(), index == 1 ? 1U : 0U);

@@ -4,14 +4,10 @@
 
 #include <cstdint>
 
+#include "test_times.h"
 #include "zone/hazard_life.h"
 
 namespace livemap {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kHour = 3600 * kSecond;
-constexpr std::int64_t kDay = 24 * kHour;
-constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
 
 class HazardLifeTest : public ::testing::Test {
  protected:

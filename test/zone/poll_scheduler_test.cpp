@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/stamps.h"
+#include "test_times.h"
 
 namespace livemap {
 namespace {
@@ -16,9 +17,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kHour = 3600 * kSecond;
-constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
 const GeoPoint kPlace{40.44, -79.95};
 
 class PollSchedulerTest : public ::testing::Test {

@@ -20,7 +20,6 @@ std::string Why(const std::function<void(Report&)>& change, const ReportLimits& 
   return refusal ? refusal->sentence : "";
 }
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr float kNanF = std::numeric_limits<float>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

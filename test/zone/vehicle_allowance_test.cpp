@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "test_times.h"
 
 namespace livemap {
 namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kHour = 3600 * kSecond;
 
 VehicleAllowance::Config SmallCaps() {
   VehicleAllowance::Config config;

@@ -5,25 +5,26 @@
 #include <cmath>
 #include <limits>
 
+#include "test_times.h"
+
 namespace livemap {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
-const GeoPoint kStart{40.44, -79.95};
+const GeoPoint kTrackStart{40.44, -79.95};
 
-/// North at 10 m/s from kStart at second 100, a point every `every_s`.
+/// North at 10 m/s from kTrackStart at second 100, a point every `every_s`.
 std::vector<TrackPoint> DriveNorth(double seconds, double every_s, double course_rad = 0) {
   std::vector<TrackPoint> track;
   for (double t = 0; t <= seconds; t += every_s) {
     track.push_back({static_cast<std::int64_t>((100 + t) * 1e9),
-                     GeodesicDestination(kStart, 0, 10 * t), course_rad, 10});
+                     GeodesicDestination(kTrackStart, 0, 10 * t), course_rad, 10});
   }
   return track;
 }
 
 GeoPoint Ahead(double distance_m, double aside_m = 0) {
-  return GeodesicDestination(GeodesicDestination(kStart, 0, distance_m), 90 * kRadiansPerDegree,
-                             aside_m);
+  return GeodesicDestination(GeodesicDestination(kTrackStart, 0, distance_m),
+                             90 * kRadiansPerDegree, aside_m);
 }
 
 TEST(CouldSee, WhatLiesAheadWithinRangeAtItsTime) {
@@ -61,7 +62,7 @@ TEST(CouldSee, NothingAcrossALongGapInTheTrack) {
 TEST(CouldSee, AVehicleThatDrivesTheOtherWayPassesToo) {
   auto track = DriveNorth(30, 1);
   for (std::size_t i = 0; i < track.size(); ++i) {
-    track[i].position = GeodesicDestination(kStart, 0, 300 - 10.0 * static_cast<double>(i));
+    track[i].position = GeodesicDestination(kTrackStart, 0, 300 - 10.0 * static_cast<double>(i));
     track[i].course_rad = 180 * kRadiansPerDegree;
   }
   EXPECT_TRUE(CouldSee(track, 115 * kSecond, Ahead(120)));
@@ -69,16 +70,17 @@ TEST(CouldSee, AVehicleThatDrivesTheOtherWayPassesToo) {
 }
 
 TEST(CouldSee, AStandingVehicleSeesAheadOfIt) {
-  const std::vector<TrackPoint> track{{100 * kSecond, kStart, 0, 0}, {105 * kSecond, kStart, 0, 0}};
+  const std::vector<TrackPoint> track{{100 * kSecond, kTrackStart, 0, 0},
+                                      {105 * kSecond, kTrackStart, 0, 0}};
   EXPECT_TRUE(CouldSee(track, 103 * kSecond, Ahead(40)));
-  EXPECT_FALSE(CouldSee(track, 103 * kSecond, GeodesicDestination(kStart, 3.14, 40)));
+  EXPECT_FALSE(CouldSee(track, 103 * kSecond, GeodesicDestination(kTrackStart, 3.14, 40)));
 }
 
 TEST(CouldSee, NothingWithoutATrackAndNothingThatIsNoPlace) {
-  EXPECT_FALSE(CouldSee({}, 100 * kSecond, kStart));
+  EXPECT_FALSE(CouldSee({}, 100 * kSecond, kTrackStart));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(CouldSee(DriveNorth(30, 1), 110 * kSecond, {nan, 0}));
-  EXPECT_FALSE(CouldSee({{100 * kSecond, {nan, nan}, 0, 1}}, 100 * kSecond, kStart));
+  EXPECT_FALSE(CouldSee({{100 * kSecond, {nan, nan}, 0, 1}}, 100 * kSecond, kTrackStart));
 }
 
 TEST(CouldSee, AWildTrackEndsInBoundedTime) {

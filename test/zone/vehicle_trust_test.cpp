@@ -5,16 +5,13 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "test_times.h"
 
 namespace livemap {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
-
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kDay = 86400 * kSecond;
-constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
 
 TEST(VehicleTrust, NobodyIsKnownAndEverybodyIsANewcomer) {
   const VehicleTrust trust;

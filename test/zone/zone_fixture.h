@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 namespace livemap {
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// A directory of its own for each test, removed afterwards.
 class ZoneTest : public testing::Test {

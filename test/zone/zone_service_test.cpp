@@ -16,8 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 class ZoneServiceTest : public ZoneTest {
  protected:
   void TearDown() override { zone_.reset(); }
