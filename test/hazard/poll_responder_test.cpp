@@ -254,7 +254,7 @@ TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
   Drive(4.0, 8.0);
   Expire();
   const PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, Answer::kCantSee);
+  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("unregistered"));
 }
 
