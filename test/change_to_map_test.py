@@ -9,6 +9,7 @@ import json
 import math
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -63,7 +64,9 @@ def along(longitude):
 class Zone(system.LiveMapSystem):
     """A zone that asks about a hazard as soon as it doubts, and the same vehicle as often as it passes."""
 
-    zone_parameters = "{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.0, max_evidence_per_hour: 100000.0}"
+    zone_parameters = "{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.1, max_evidence_per_hour: 100000.0}"
+
+    zone_arguments = {"detect_for_small": "false"}
 
     def __init__(self, directory):
         super().__init__(directory, "test", ",".join(VEHICLES))
@@ -107,13 +110,11 @@ class ChangeToMapTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="livemap_change_to_map_"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
         cls.monday = simulate(cls.folder, "monday", BEFORE, "day")
         cls.zone = Zone(cls.folder)
+        cls.addClassCleanup(cls.zone.__exit__)
         cls.zone.start_zone()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.zone.__exit__()
 
     def drive(self, bag, drive, vehicles=VEHICLES, together=False):
         for vehicle in vehicles:
