@@ -150,12 +150,17 @@ class ZoneCloudletTest(unittest.TestCase):
         self.assertEqual(receipt.report_uuid, report.uuid)
         return receipt
 
-    def stored(self):
-        """Hazards as (uuid, class, latitude, longitude, sightings), straight from the file."""
+    def rows(self, query):
+        """Straight from the file."""
         path = os.path.join(self.directory, "zone", "zone.sqlite3")
         with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
-            return sorted(database.execute(
-                "SELECT uuid, class_name, latitude, longitude, sightings FROM hazards"))
+            return sorted(database.execute(query))
+
+    def stored(self):
+        return self.rows("SELECT uuid, class_name, latitude, longitude, sightings FROM hazards")
+
+    def stored_map_changes(self):
+        return self.rows("SELECT uuid, state, vehicles, reports FROM map_changes")
 
     def count(self, key):
         for message in reversed(self.diagnostics.all()):
@@ -249,12 +254,6 @@ class ZoneCloudletTest(unittest.TestCase):
         receipt = self.change_receipts.all()[-1]
         self.assertEqual((receipt.report_uuid, receipt.vehicle_id), (change.uuid, change.vehicle_id))
         return receipt
-
-    def stored_map_changes(self):
-        """Map changes as (uuid, state, vehicles, reports), straight from the file."""
-        path = os.path.join(self.directory, "zone", "zone.sqlite3")
-        with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
-            return list(database.execute("SELECT uuid, state, vehicles, reports FROM map_changes"))
 
     def test_a_map_change_is_answered_stored_and_counts_once(self):
         change = make_map_change()
