@@ -7,7 +7,6 @@ mosquitto, vehicle.launch with the network of change, zone.launch.
 
 import json
 import math
-import os
 import pathlib
 import shutil
 import subprocess
@@ -23,7 +22,8 @@ import yaml
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "test")]
 import demo_system as system  # noqa: E402
-from node_testing import PATIENCE_S, eventually  # noqa: E402
+from demo_observers import parse_time  # noqa: E402
+from node_testing import eventually  # noqa: E402
 
 MODEL = ROOT / "models" / "change-small.yaml"
 SPEED_MPS, SECONDS, RATE_HZ = 8, 15, 5
@@ -36,6 +36,7 @@ BEFORE = [("road_work_sign", REMOVED_M), ("road_work_sign", STANDING_M)]
 AFTER = [("road_work_sign", STANDING_M), ("barrier", BARRIER_M)]
 VEHICLES = ("car-1", "car-2")
 NEAR_M = 6
+AFTER_THE_DRIVE_S = 6
 
 
 def simulate(folder, name, hazards, condition):
@@ -79,18 +80,23 @@ class Zone(system.LiveMapSystem):
             "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,
             "directory": self.directory / vehicle, "broker_port": self.broker_port,
             "password_file": self.password_file(vehicle), "use_truth": "true",
-            "changes": "true", "change_model": MODEL, "hazard_reporting": "{max_range_m: 30.0}"})
+            "changes": "true", "change_model": MODEL})
 
-    def end_pass(self, vehicle, drive):
-        """The replay ends its vehicle with the bag."""
-        process = self.processes.pop(f"{vehicle}-{drive}")
-        process.wait(SECONDS / REPLAY_RATE + PATIENCE_S)
+    def end_pass(self, vehicle, bag, drive):
+        """When the vehicle has told the zone where the bag ends, and what it saw there."""
+        end_s = system.read_bag(bag).start_s + system.read_bag(bag).duration_s
+        eventually(lambda: self.position_time(vehicle, drive) > end_s - 1.5, f"{vehicle} drives to the end")
+        time.sleep(AFTER_THE_DRIVE_S)
+        self.stop(f"{vehicle}-{drive}")
 
-    def log_of(self, vehicle, drive):
-        return (self.directory / f"{vehicle}-{drive}.log").read_text(encoding="utf-8", errors="replace")
+    def position_time(self, vehicle, drive):
+        """Of the newest position of that drive, seconds of the bag; 0 when there is none."""
+        self.check_alive()
+        return max([parse_time(feature["properties"]["time"]) for feature in self.features("vehicles")
+                    if (feature["properties"]["vehicle"], feature["properties"]["drive"]) == (vehicle, drive)], default=0)
 
     def features(self, what):
-        with urllib.request.urlopen(f"{self.url}api/v1/{what}?limit=1000", timeout=10) as answer:
+        with urllib.request.urlopen(f"{self.url}api/v1/{what}", timeout=10) as answer:
             return json.load(answer)["features"]
 
     def places(self, what, **properties):
@@ -110,7 +116,7 @@ class ChangeToMapTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="livemap_change_to_map_"))
-        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        #cls.addClassCleanup(shutil.rmtree, cls.folder)
         cls.monday = simulate(cls.folder, "monday", BEFORE, "day")
         cls.zone = Zone(cls.folder)
         cls.addClassCleanup(cls.zone.__exit__)
@@ -120,9 +126,9 @@ class ChangeToMapTest(unittest.TestCase):
         for vehicle in vehicles:
             self.zone.start_pass(vehicle, bag, drive)
             if not together:
-                self.zone.end_pass(vehicle, drive)
+                self.zone.end_pass(vehicle, bag, drive)
         for vehicle in vehicles if together else ():
-            self.zone.end_pass(vehicle, drive)
+            self.zone.end_pass(vehicle, bag, drive)
 
     def test_1_the_first_pass_puts_the_signs_on_the_map_and_tells_no_change(self):
         self.drive(self.monday, "monday", together=True)

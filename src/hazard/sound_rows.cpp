@@ -12,9 +12,6 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxIdBytes = 64;
-constexpr double kMaxVarianceM2 = 1e8;
-
 // The zone's numbers of its announcements lie far below 2^60, and stamps below 2106.
 constexpr char kBrokenKnown[] =
     "NOT (typeof(id) = 'blob' AND length(id) = 16 AND id <> zeroblob(16) AND "
@@ -39,11 +36,6 @@ std::size_t Count(SqliteDatabase& database, const std::string& table, const std:
   return static_cast<std::size_t>(query.Int(0));
 }
 
-bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2) {
-  return covariance_m2.allFinite() && covariance_m2(0, 0) > 0 && covariance_m2(1, 1) > 0 &&
-         covariance_m2.cwiseAbs().maxCoeff() <= kMaxVarianceM2 && covariance_m2.determinant() > 0;
-}
-
 /// One row of `zone`, whatever there was: knowing nothing, the vehicle is told everything.
 std::size_t MendZone(SqliteDatabase& database) {
   if (Count(database, "zone", kBrokenZone) == 0 && Count(database, "zone", "1") == 1) return 0;
@@ -58,6 +50,12 @@ std::size_t TakeOut(SqliteDatabase& database, const std::string& table, const st
 }
 
 }  // namespace
+
+bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2) {
+  constexpr double kMaxVarianceM2 = 1e8;
+  return covariance_m2.allFinite() && covariance_m2(0, 0) > 0 && covariance_m2(1, 1) > 0 &&
+         covariance_m2.cwiseAbs().maxCoeff() <= kMaxVarianceM2 && covariance_m2.determinant() > 0;
+}
 
 const char* const kFetchableReport =
     "typeof(uuid) = 'blob' AND length(uuid) = 16 AND uuid <> zeroblob(16) AND "

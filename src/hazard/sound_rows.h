@@ -11,6 +11,11 @@ namespace livemap {
 
 /// Pictures of reports in the outbox may be this large; a larger one was not made by this program.
 constexpr std::size_t kMaxStoredImageBytes = 16 << 20;
+/// And a drive's id this long.
+constexpr std::size_t kMaxIdBytes = 64;
+
+/// Whether it can be that of a reported position: finite, positive definite, below 1e8 m^2.
+bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2);
 
 /// Whether the program can have made this report. What a damaged page turned into, or something
 /// else wrote, must not become one: the zone would refuse it, or never answer.
