@@ -6,16 +6,15 @@
 
 #include "base/stamp_range.h"
 #include "hazard/report_table.h"
+#include "hazard/sound_rows.h"
 
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMaxIdBytes = 64;
-constexpr double kMaxVarianceM2 = 1e8;
 /// All changes are as urgent as each other.
-constexpr int kUrgency = 1;
+constexpr int kChangeUrgency = 1;
 
-const std::vector<std::string>& Migrations() {
+const std::vector<std::string>& ChangeMigrations() {
   static const std::vector<std::string> migrations = {R"sql(
     CREATE TABLE pending(
       uuid BLOB PRIMARY KEY, drive_id TEXT NOT NULL, stamp_ns INTEGER NOT NULL,
@@ -69,12 +68,10 @@ bool IsSound(const MapChangeReport& report) {
   const auto is_name = [](const std::string& text) {
     return !text.empty() && text.size() <= kMaxIdBytes;
   };
-  const Eigen::Matrix2d& covariance = report.covariance_m2;
   return !report.uuid.IsNil() && is_name(report.drive_id) && is_name(report.class_name) &&
          IsStamp(report.stamp_ns) && IsStamp(report.earlier_stamp_ns) && report.confidence >= 0 &&
          report.confidence <= 1 && report.seen >= 2 && IsValid(report.position) &&
-         covariance.allFinite() && covariance(0, 0) > 0 &&
-         covariance.cwiseAbs().maxCoeff() <= kMaxVarianceM2 && covariance.determinant() > 0;
+         IsCovarianceOfReport(report.covariance_m2);
 }
 
 MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, std::int64_t now_ns,
@@ -94,7 +91,7 @@ MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, s
 void MapChangeOutbox::Open() {
   database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
   database_->CheckPages();
-  database_->Migrate(Migrations());
+  database_->Migrate(ChangeMigrations());
 }
 
 void MapChangeOutbox::Load(double steady_s) {
@@ -110,7 +107,7 @@ void MapChangeOutbox::Load(double steady_s) {
       continue;
     }
     pending_[report.uuid].report = report;
-    schedule_.Add(report.uuid, kUrgency, report.stamp_ns, steady_s);
+    schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
   }
   Displace();
 }
@@ -122,7 +119,7 @@ void MapChangeOutbox::Add(const MapChangeReport& report, double steady_s) {
   }
   Insert(*database_, report);
   pending_[report.uuid] = {report, false};
-  schedule_.Add(report.uuid, kUrgency, report.stamp_ns, steady_s);
+  schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
   ++counters_.added;
   Displace();
 }
