@@ -63,9 +63,11 @@ def along(longitude):
 
 
 class Zone(system.LiveMapSystem):
-    """A zone that asks about a hazard as soon as it doubts, and the same vehicle as often as it passes."""
+    """A zone that asks about a hazard as soon as it doubts, the same vehicle as often as it passes, and lets two denials do:
+    the default asks for more where many were sure."""
 
-    zone_parameters = "{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.1, max_evidence_per_hour: 100000.0}"
+    zone_parameters = ("{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.1, max_evidence_per_hour: 100000.0, "
+                       "sure_above: 0.8, surest_presence: 0.84, gone_below: 0.19}")
 
     zone_arguments = {"detect_for_small": "false"}
 

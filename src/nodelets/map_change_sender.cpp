@@ -7,9 +7,9 @@
 namespace livemap {
 namespace {
 
-constexpr double kTickS = 0.2;
+constexpr double kChangeTickS = 0.2;
 /// At most so many a tick: a full outbox must not crowd out the reports of hazards.
-constexpr std::size_t kMostPerTick = 20;
+constexpr std::size_t kMostChangesPerTick = 20;
 
 }  // namespace
 
@@ -24,7 +24,7 @@ MapChangeSender::MapChangeSender(const Config& config, ros::NodeHandle& node, st
   publisher_ = node.advertise<MapChange>("change/map_change", 100);
   subscriber_ = node.subscribe("change/receipt", 1000, &MapChangeSender::OnReceipt, this);
   // Steady time: a replay that stands still must not keep a report from being sent again.
-  timer_ = node.createSteadyTimer(ros::WallDuration(kTickS), &MapChangeSender::OnTick, this);
+  timer_ = node.createSteadyTimer(ros::WallDuration(kChangeTickS), &MapChangeSender::OnTick, this);
 }
 
 void MapChangeSender::Tell(const std::vector<PlacedChange>& passed) {
@@ -61,7 +61,7 @@ void MapChangeSender::OnReceipt(const ReportReceipt& message) {
 void MapChangeSender::OnTick(const ros::SteadyTimerEvent&) {
   if (publisher_.getNumSubscribers() == 0) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMostPerTick)) {
+  for (const MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMostChangesPerTick)) {
     publisher_.publish(ToMessage(report));
   }
 }
