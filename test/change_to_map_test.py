@@ -67,7 +67,7 @@ class Zone(system.LiveMapSystem):
     the default asks for more where many were sure."""
 
     zone_parameters = ("{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.1, max_evidence_per_hour: 100000.0, "
-                       "sure_above: 0.8, surest_presence: 0.84, gone_below: 0.19}")
+                       "surest_presence: 0.9, gone_below: 0.28}")
 
     zone_arguments = {"detect_for_small": "false"}
 
@@ -82,7 +82,7 @@ class Zone(system.LiveMapSystem):
             "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,
             "directory": self.directory / vehicle, "broker_port": self.broker_port,
             "password_file": self.password_file(vehicle), "use_truth": "true",
-            "changes": "true", "change_model": MODEL})
+            "changes": "true", "change_model": MODEL, "change_detection": "{most_range_m: 22.0, tell_confidence: 0.4}"})
 
     def end_pass(self, vehicle, bag, drive):
         """When the vehicle has told the zone where the bag ends, and what it saw there."""

@@ -107,10 +107,12 @@ void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& 
   }
 }
 
-bool ChangeTracker::ShouldShow(const Track& track, const ChangeFrame& frame) const {
+bool ChangeTracker::IsMissed(const Track& track, const ChangeFrame& frame,
+                             const std::vector<ChangeRegion>& regions) const {
   const Eigen::Vector2d ahead_m = PlanarTurn(frame.map_from_base).transpose() *
                                   (track.event.position_m - PlanarPlace(frame.map_from_base));
-  if (ahead_m.norm() > config_.most_range_m) return false;
+  const double range_m = ahead_m.norm();
+  if (range_m > config_.most_range_m || range_m < config_.least_missed_m) return false;
   const Eigen::Vector3d point =
       frame.base_from_optical.inverse() * Eigen::Vector3d(ahead_m.x(), ahead_m.y(), 0);
   if (point.z() < 1) return false;
@@ -119,7 +121,12 @@ bool ChangeTracker::ShouldShow(const Track& track, const ChangeFrame& frame) con
   if (!(column >= 0 && row >= 0 && column < frame.valid.cols && row < frame.valid.rows)) {
     return false;
   }
-  return frame.valid.at<std::uint8_t>(static_cast<int>(row), static_cast<int>(column)) != 0;
+  const cv::Point foot(static_cast<int>(column), static_cast<int>(row));
+  // One that the picture's edge cuts off, or that is taken together with another, is not missed.
+  const bool covered = std::any_of(regions.begin(), regions.end(), [&](const ChangeRegion& region) {
+    return region.box.contains(foot);
+  });
+  return !covered && frame.valid.at<std::uint8_t>(foot) != 0;
 }
 
 bool ChangeTracker::IsConfirmed(const Track& track) const {
@@ -161,7 +168,7 @@ std::vector<ChangeEvent> ChangeTracker::Add(const ChangeFrame& frame,
     Update(*track, *sight, frame);
   }
   for (std::size_t i = 0; i < taken.size(); ++i) {
-    if (!taken[i] && ShouldShow(tracks_[i], frame)) ++tracks_[i].event.missed;
+    if (!taken[i] && IsMissed(tracks_[i], frame, regions)) ++tracks_[i].event.missed;
   }
   for (const Sight& sight : unmatched) {
     Track track;

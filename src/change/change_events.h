@@ -82,6 +82,7 @@ class ChangeTracker {
     double most_gate_m = 6;        ///< and in no case those further than this.
     double process_sigma_m = 0.5;  ///< Added to each sight's position: pose and foot are not exact.
     double most_range_m = 40;      ///< Further away nothing is placed or missed.
+    double least_missed_m = 10;    ///< Nearer than this nothing is missed: it may be out of view.
     double least_direction_share = 0.6;  ///< Of the sights that know a direction.
     double passed_m = 5;                 ///< Behind the vehicle by this, an object is passed,
     double forget_m = 60;                ///< and this far from it, it is forgotten.
@@ -126,7 +127,9 @@ class ChangeTracker {
   std::optional<Sight> Place(const ChangeFrame& frame, const ChangeRegion& region) const;
   Track* Nearest(const Sight& sight, const std::vector<bool>& taken);
   void Update(Track& track, const Sight& sight, const ChangeFrame& frame) const;
-  bool ShouldShow(const Track& track, const ChangeFrame& frame) const;
+  /// Whether the picture should show the object, and does not.
+  bool IsMissed(const Track& track, const ChangeFrame& frame,
+                const std::vector<ChangeRegion>& regions) const;
   bool IsConfirmed(const Track& track) const;
   void LimitTracks();
 

@@ -261,6 +261,23 @@ TEST(ChangeTracker, TellsOfAConfirmedObjectOnceWhenTheVehicleHasPassedIt) {
   EXPECT_EQ(tracker.tracks(), 0U) << "60 m behind it is forgotten";
 }
 
+TEST(ChangeTracker, AnObjectThatThePictureCutsOffIsNotMissed) {
+  ChangeTracker tracker{ChangeTracker::Config()};
+  for (int k = 0; k < 4; ++k) {
+    const ChangeFrame frame = FrameAt(2.0 * k, k + 1);
+    tracker.Add(frame, {SeenAt(frame, 22, -2)});
+  }
+  ChangeFrame near = FrameAt(11, 9);
+  ChangeRegion cut = SeenAt(near, 22, -2);
+  cut.box.height = kHeight - cut.box.y;  // What hides its foot reaches the lower edge.
+  tracker.Add(near, {cut});
+  ASSERT_EQ(tracker.Confirmed().size(), 1U);
+  EXPECT_EQ(tracker.Confirmed()[0].missed, 0);
+  near.stamp_ns += 1;
+  tracker.Add(near, {});
+  EXPECT_EQ(tracker.Confirmed()[0].missed, 1) << "nothing at all is there";
+}
+
 TEST(ChangeTracker, BeganAnewTellsOfWhatWasConfirmedAndNotYetPassed) {
   ChangeTracker tracker{ChangeTracker::Config()};
   for (int i = 0; i < 4; ++i) {
