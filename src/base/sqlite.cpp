@@ -24,7 +24,7 @@ bool TellsCorruption(const StoreError& error) {
 }
 
 std::string SetAsideDatabase(const std::string& path, std::int64_t now_ns) {
-  const std::string target = path + ".corrupt-" + std::to_string(now_ns);
+  std::string target = path + ".corrupt-" + std::to_string(now_ns);
   for (const char* companion : {"", "-wal", "-shm"}) {
     std::error_code error;
     std::filesystem::rename(path + companion, target + companion, error);
