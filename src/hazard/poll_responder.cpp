@@ -101,7 +101,8 @@ void PollResponder::AddChange(const ChangeEvidence& evidence) {
 }
 
 void PollResponder::AddUnregistered() {
-  for (OpenPoll& open : open_) ++open.unregistered;
+  // Before its first clear view a place is not what the picture shows.
+  for (OpenPoll& open : open_) open.unregistered += open.clear_views > 0 ? 1 : 0;
 }
 
 std::vector<std::int64_t> PollResponder::TakePictureRequests() {
