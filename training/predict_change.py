@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> None:
     paths = data.pair_paths(options.pairs)
     for path in paths:
         pair = data.read_pair(path, {}, None)
-        pair.homography = np.eye(3) if options.registered else data.registration.by_features(pair.first, pair.second)
+        pair.homography = np.eye(3) if options.registered else pair.register()
         refused += pair.homography is None
         height, width = cv2.imread(str(path), cv2.IMREAD_UNCHANGED).shape[:2]
         for order, found in zip(("forward", "reversed"), predict(detect, pair)):

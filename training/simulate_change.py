@@ -82,15 +82,16 @@ def render(options: argparse.Namespace, seed: int) -> None:
     command = [options.program, "--seed", str(seed), "--seconds", f"{seconds + 0.01:.2f}", "--rate", str(RATE_HZ),
                "--speed", str(SPEED_MPS), "--threads", "1", "--first-condition", str(rng.choice(CONDITIONS)),
                "--condition", str(rng.choice(CONDITIONS))]
-    changes = PLAIN_CHANGES
+    changes, busy = PLAIN_CHANGES, options.busy
     if not options.plain:
         (unfinished / "camera.yaml").write_text(yaml.safe_dump(camera(rng), sort_keys=False))
         command += ["--camera", str(unfinished / "camera.yaml")]
         changes = float(rng.choice([0.25, 0.5]))
-        if rng.random() < MANY_HAZARDS_SHARE:
-            world = busy_street(rng, seconds * SPEED_MPS * 1.3 + 120)
-            (unfinished / "world.yaml").write_text(yaml.safe_dump(world, sort_keys=False))
-            command += ["--world", str(unfinished / "world.yaml")]
+        busy = busy or rng.random() < MANY_HAZARDS_SHARE
+    if busy:
+        world = busy_street(rng, seconds * SPEED_MPS * 1.3 + 120)
+        (unfinished / "world.yaml").write_text(yaml.safe_dump(world, sort_keys=False))
+        command += ["--world", str(unfinished / "world.yaml")]
     for name, share in (("some", changes), ("none", 0.0), ("all", 1.0)):
         subprocess.run(
             command + ["--changes", str(share), "--change", str(unfinished / "street" / name)],
@@ -109,6 +110,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--worlds", type=int, default=60, help="streets")
     parser.add_argument("--pairs", type=int, default=10, help="of each street")
     parser.add_argument("--plain", action="store_true", help="the simulator's own camera and town, for measuring")
+    parser.add_argument("--busy", action="store_true", help="many hazards in every street")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="streets at once")
     options = parser.parse_args(arguments)
     seeds = range(options.first_seed, options.first_seed + options.worlds)

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from change import data, objects
 from change.augment import Augmenter, SceneAugmenter, Source
 from change.loss import change_loss, class_weights
-from change.network import ARCHITECTURES
+from change.network import ARCHITECTURES, widened
 from change.training import Settings, batches, make_optimizer, to_input
 from change.validation import RegisteredPair, photo_pairs, registered_pairs, torch_detector, validate
 from detector.training import AveragedModel, EpochSamples, learning_rate_factor, save_atomically
@@ -74,7 +74,7 @@ class Trainer:
     def start_from(self, state: dict) -> None:
         """Begin a new schedule with the averaged weights of another run."""
         try:
-            self.network.load_state_dict(state["average"])
+            self.network.load_state_dict(widened(state["average"], self.network))
         except (KeyError, RuntimeError) as error:
             raise UsageError("--start-from: the checkpoint is of another network.") from error
         self.average = AveragedModel(self.network)

@@ -27,7 +27,11 @@ struct ChangeRegion {
 /// What counts as a region.
 struct ChangeRegionOptions {
   int least_pixels = 60;          ///< Smaller pieces are noise; of a picture 320 wide.
-  double least_confidence = 0.5;  ///< Pixels below it do not belong to any.
+  double least_confidence = 0.5;  ///< Of a pixel that makes a region.
+  /// Of a pixel that a region takes in besides, as a share of least_confidence: a network is unsure
+  /// at outlines, and where an object meets the ground is what says where it stands.
+  double rim_share = 0.5;
+  int rim_px = 8;  ///< How far from a pixel that makes the region; of a picture 320 wide.
 };
 
 /// CV_8UC1: where the probability of change is at least `least_confidence` the likeliest class of
@@ -35,7 +39,8 @@ struct ChangeRegionOptions {
 cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_confidence);
 
 /// Connected regions of change, the largest first: the pixels of ChangedClasses, joined over eight
-/// neighbours whatever their class; a region has the class of most of its pixels. `before` and
+/// neighbours whatever their class, with their rim; a region has the class of most of the pixels
+/// that make it, and their confidence. `before` and
 /// `after` are the aligned pictures (CV_8UC3, BGR). A region's direction is that of the picture in
 /// which its outline is the stronger edge: where a thing stands, its outline shows; unknown when
 /// neither is by a fifth. Throws Error when the sizes differ.

@@ -1,6 +1,7 @@
 // Connected regions of change, and which of two pictures has what changed.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
@@ -55,6 +56,16 @@ ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
   return static_cast<ChangeClass>(most - counts.begin());
 }
 
+/// Lets each labelled region take in pixels of `rim` that no region has, a ring at a time; where
+/// two meet, the one with the greater label goes on. `labels`: CV_16UC1, 0 is none.
+void GrowInto(const cv::Mat& rim, int rings, cv::Mat& labels) {
+  for (int i = 0; i < rings; ++i) {
+    cv::Mat larger;
+    cv::dilate(labels, larger, cv::Mat());
+    larger.copyTo(labels, rim & (labels == 0));
+  }
+}
+
 }  // namespace
 
 cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_confidence) {
@@ -92,8 +103,14 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
   cv::Mat labels;
   cv::Mat stats;
   cv::Mat centres;
-  const int count = cv::connectedComponentsWithStats(changed, labels, stats, centres, 8, CV_32S);
+  // What does not fit a 16 bit label is noise by its number.
+  const int count = std::min(
+      cv::connectedComponentsWithStats(changed, labels, stats, centres, 8, CV_32S), 1 << 16);
   const double scale = after.cols / kRegionReferenceWidth;
+  cv::Mat grown;
+  labels.convertTo(grown, CV_16U);
+  GrowInto(score >= options.rim_share * options.least_confidence,
+           static_cast<int>(std::lround(options.rim_px * scale)), grown);
   const cv::Mat before_edges = EdgeStrength(before);
   const cv::Mat after_edges = EdgeStrength(after);
   std::vector<ChangeRegion> regions;
@@ -101,12 +118,12 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
     ChangeRegion region;
     region.pixels = stats.at<int>(i, cv::CC_STAT_AREA);
     if (region.pixels < options.least_pixels * scale * scale) continue;
-    region.box = {stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
-                  stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT)};
-    const cv::Mat pixels = labels == i;
-    region.confidence = cv::mean(score, pixels)[0];
-    region.change_class = MostFrequent(classes, pixels);
-    region.direction = DirectionOf(pixels, before_edges, after_edges);
+    const cv::Mat sure = labels == i;
+    const cv::Mat whole = grown == i;
+    region.box = cv::boundingRect(whole);
+    region.confidence = cv::mean(score, sure)[0];
+    region.change_class = MostFrequent(classes, sure);
+    region.direction = DirectionOf(sure, before_edges, after_edges);
     regions.push_back(region);
   }
   std::stable_sort(

@@ -17,12 +17,12 @@ struct ChangeFigures {
 /// The result of `livemap evaluate change`.
 struct ChangeReport {
   std::string method;                 ///< Its name, or the folder of predictions.
-  std::string registration;           ///< "none" or "homography".
+  std::string registration;           ///< "none", "edges", "homography" or "both".
   std::size_t refused = 0;            ///< Pairs that could not be registered: no change is said.
   std::vector<std::string> refusals;  ///< "NAME: why", in order.
   std::size_t unknown_colour_pixels = 0;
   double method_ms_p50 = 0;        ///< Wall time of the method alone, ms; 0 for predictions.
-  double registration_ms_p50 = 0;  ///< Of features, matches, homography and warp.
+  double registration_ms_p50 = 0;  ///< Of a pair, with its warp.
   ChangeFigures forward;
   bool has_reversed = false;
   ChangeFigures reversed;  ///< The two aligned pictures swapped.

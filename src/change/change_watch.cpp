@@ -82,7 +82,7 @@ ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
   const Eigen::Isometry3d map_from_base = MapFromBase(picture);
   covariance_m2_ = picture.covariance_m2;
   const FeaturedView view{picture.bgr.size(), ExtractFeatures(picture.bgr, config_.features)};
-  const std::optional<Partner> partner = FindPartner(frame, view, answer);
+  const std::optional<Partner> partner = FindPartner(frame, picture.bgr, view, answer);
   if (partner) Compare(picture, *partner, map_from_base, answer);
   Place(tracker_.LeaveBehind(map_from_base), passed_);
   answer.passed.swap(passed_);
@@ -91,6 +91,7 @@ ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
 }
 
 std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& frame,
+                                                             const cv::Mat& bgr,
                                                              const FeaturedView& view,
                                                              Answer& answer) {
   const auto near = memory_.Nearest({frame.position, frame.heading_rad, config_.drive_id});
@@ -100,15 +101,18 @@ std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& f
     const auto record = memory_.Load(ranked[i].candidate.id);
     if (!record) continue;
     const cv::Size size(record->frame.camera.width, record->frame.camera.height);
-    const Registration registration =
-        RegisterByHomography({size, record->features}, view, config_.registration, config_.seed);
-    if (!registration.accepted()) {
-      if (answer.why.empty()) answer.why = registration.why;
-      continue;
-    }
     const cv::Mat earlier = cv::imdecode(record->picture, cv::IMREAD_COLOR);
     if (earlier.size() != size) continue;  // Its header was right, the rest is not.
-    return Partner{record->frame, WarpByHomography(earlier, registration.after_from_before)};
+    Registration registration = RegisterByEdges(earlier, bgr, config_.registration);
+    const std::string why_not_by_edges = registration.why;
+    if (!registration.accepted()) {
+      registration =
+          RegisterByHomography({size, record->features}, view, config_.registration, config_.seed);
+    }
+    if (registration.accepted()) {
+      return Partner{record->frame, WarpByHomography(earlier, registration.after_from_before)};
+    }
+    if (answer.why.empty()) answer.why = why_not_by_edges + "; " + registration.why;
   }
   return std::nullopt;
 }

@@ -37,7 +37,8 @@ struct PlacedChange {
 
 /// Remembers the street picture by picture, and says what changed since earlier drives (thesis
 /// 4.3): the nearest earlier pictures by position and heading, the best of them by matches,
-/// registration, the method, regions, objects on the ground. Not thread-safe.
+/// registration by edges or else by features, the method, regions, objects on the ground. Not
+/// thread-safe.
 class ChangeWatch {
  public:
   struct Config {
@@ -98,8 +99,8 @@ class ChangeWatch {
 
   /// Where the camera was and looked.
   PlaceFrame FrameOf(const WatchedPicture& picture) const;
-  std::optional<Partner> FindPartner(const PlaceFrame& frame, const FeaturedView& view,
-                                     Answer& answer);
+  std::optional<Partner> FindPartner(const PlaceFrame& frame, const cv::Mat& bgr,
+                                     const FeaturedView& view, Answer& answer);
   void Compare(const WatchedPicture& picture, const Partner& partner,
                const Eigen::Isometry3d& map_from_base, Answer& answer);
   void Remember(const WatchedPicture& picture, const PlaceFrame& frame,

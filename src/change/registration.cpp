@@ -79,6 +79,15 @@ std::string WhyDegenerate(const cv::Matx33d& h, cv::Size size, const Registratio
   return "";
 }
 
+void CheckSizes(cv::Size before, cv::Size after, Registration& registration) {
+  if (before == after) return;
+  Refuse(RegistrationRefusal::kSize,
+         "the earlier picture is " + std::to_string(before.width) + "x" +
+             std::to_string(before.height) + ", the later one " + std::to_string(after.width) +
+             "x" + std::to_string(after.height),
+         registration);
+}
+
 /// Matched points of both pictures, in one order.
 struct MatchedPoints {
   std::vector<cv::Point2d> before;
@@ -89,14 +98,8 @@ struct MatchedPoints {
 MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
                     const RegistrationOptions& options, Registration& registration) {
   MatchedPoints points;
-  if (before.size != after.size) {
-    Refuse(RegistrationRefusal::kSize,
-           "the earlier picture is " + std::to_string(before.size.width) + "x" +
-               std::to_string(before.size.height) + ", the later one " +
-               std::to_string(after.size.width) + "x" + std::to_string(after.size.height),
-           registration);
-    return points;
-  }
+  CheckSizes(before.size, after.size, registration);
+  if (!registration.accepted()) return points;
   const std::size_t fewer = std::min(before.features.points.size(), after.features.points.size());
   if (fewer < static_cast<std::size_t>(options.least_features)) {
     Refuse(RegistrationRefusal::kTexture,
@@ -193,6 +196,8 @@ const char* RegistrationRefusalName(RegistrationRefusal refusal) {
       return "degenerate";
     case RegistrationRefusal::kOverlap:
       return "overlap";
+    case RegistrationRefusal::kEdges:
+      return "edges";
   }
   return "unknown";
 }
@@ -215,6 +220,35 @@ Registration RegisterByHomography(const FeaturedView& before, const FeaturedView
   }
   const cv::Mat full(before.size, CV_8UC1, cv::Scalar(255));
   CheckOverlap(WarpByHomography(full, fit.after_from_before), options, registration);
+  return registration;
+}
+
+Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
+                             const RegistrationOptions& options) {
+  Registration registration;
+  CheckSizes(before.size(), after.size(), registration);
+  if (!registration.accepted()) return registration;
+  const EdgeAlignment alignment =
+      AlignByEdges(ExtractEdgeCells(before, EdgeDetail::kCoarse),
+                   ExtractEdgeCells(after, EdgeDetail::kCoarse), options.edges);
+  cv::Mat aligned;
+  cv::warpPerspective(before, aligned, alignment.after_from_before, before.size(), cv::INTER_LINEAR,
+                      cv::BORDER_REPLICATE);
+  const double agreement = EdgeAgreement(ExtractEdgeCells(aligned, EdgeDetail::kFine),
+                                         ExtractEdgeCells(after, EdgeDetail::kFine));
+  registration.edge_evidence = alignment.correlation + alignment.lead + agreement;
+  if (registration.edge_evidence < options.least_edge_evidence) {
+    Refuse(RegistrationRefusal::kEdges,
+           "the edges correlate by " + Figure(alignment.correlation) + ", " +
+               Figure(alignment.lead) + " above any other place, and agree by " +
+               Figure(agreement) + " in detail, accepted is a sum of " +
+               Figure(options.least_edge_evidence) + " and more",
+           registration);
+    return registration;
+  }
+  registration.after_from_before = alignment.after_from_before;
+  const cv::Mat full(before.size(), CV_8UC1, cv::Scalar(255));
+  CheckOverlap(WarpByHomography(full, alignment.after_from_before), options, registration);
   return registration;
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "change/edge_correlation.h"
 #include "change/image_features.h"
 #include "geo/ground_projection.h"
 
@@ -29,6 +30,10 @@ struct RegistrationOptions {
   double most_turn_deg = 15;      ///< In the picture: vehicles stand upright.
   double most_baseline_m = 10;    ///< Between the two cameras, when there is depth.
   double most_rotation_deg = 30;  ///< The same.
+  EdgeSearch edges;               ///< What RegisterByEdges looks through.
+  /// Of the edges' correlation, its lead over all other places, and the fine edges' agreement
+  /// together. Right pairs have all three, wrong ones at most one of them.
+  double least_edge_evidence = 0.82;
 };
 
 /// Why a pair was refused.
@@ -42,6 +47,7 @@ enum class RegistrationRefusal {
   kReprojection,  ///< They agree badly.
   kDegenerate,    ///< The warp mirrors, shears, turns or scales as no second drive does.
   kOverlap,       ///< The earlier picture covers too little of the later one.
+  kEdges,         ///< Their edges fit nowhere clearly.
 };
 
 /// "none", "size", "texture", ...
@@ -53,9 +59,11 @@ struct Registration {
   std::string why;  ///< One sentence with the figures; empty when not refused.
   std::size_t matches = 0;
   std::size_t inliers = 0;
-  double error_px = 0;  ///< Root mean square of the inliers, real pixels.
-  double overlap = 0;   ///< Share of the later picture.
-  /// Pixel of the earlier picture to pixel of the later one; of RegisterByHomography.
+  double error_px = 0;       ///< Root mean square of the inliers, real pixels.
+  double overlap = 0;        ///< Share of the later picture.
+  double edge_evidence = 0;  ///< The sum that least_edge_evidence limits.
+  /// Pixel of the earlier picture to pixel of the later one; of RegisterByHomography and
+  /// RegisterByEdges.
   cv::Matx33d after_from_before = cv::Matx33d::eye();
   /// Optical frames; of RegisterByDepth.
   Eigen::Isometry3d before_from_after = Eigen::Isometry3d::Identity();
@@ -74,6 +82,14 @@ struct FeaturedView {
 /// result. `overlap` is computed from the warp of the picture's frame.
 Registration RegisterByHomography(const FeaturedView& before, const FeaturedView& after,
                                   const RegistrationOptions& options, std::uint64_t seed);
+
+/// Finds the scale and the shift by which the earlier picture's edges fit the later one's. It needs
+/// no feature to look the same, and so works across seasons where RegisterByHomography does not; it
+/// costs a tenth of that. What it leaves out is that a second drive also turns and shears the view:
+/// on a road by little. Pictures: 8 bit, grey or BGR; Error for what ExtractEdgeCells does not
+/// take.
+Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
+                             const RegistrationOptions& options);
 
 /// Finds the pose of the earlier camera from matches whose place in the later picture has a depth:
 /// RANSAC over a perspective-three-point solver, then Levenberg-Marquardt. `after_depth` is

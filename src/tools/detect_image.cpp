@@ -11,6 +11,7 @@
 #include "detection/hazard_detector.h"
 #include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
+#include "tools/shipped_model.h"
 
 namespace livemap {
 namespace {
@@ -41,7 +42,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   Options options;
   options.images = line.Positionals();
   options.model = line.Text("model", "");
-  if (options.model.empty()) options.model = DefaultModelPath();
+  if (options.model.empty()) options.model = ShippedModel("hazards-first");
   options.draw = line.Text("draw", "");
   if (line.Has("threshold")) options.threshold = line.Number("threshold", 0, 0.001, 0.999);
   options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");

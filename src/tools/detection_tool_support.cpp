@@ -1,6 +1,5 @@
 #include "tools/detection_tool_support.h"
 
-#include <filesystem>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
@@ -26,15 +25,6 @@ std::string JoinNames(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
   return list;
-}
-
-std::string DefaultModelPath() {
-  namespace fs = std::filesystem;
-  const fs::path program = fs::read_symlink("/proc/self/exe");
-  const fs::path installed =
-      program.parent_path() / "../../share/livemap/models/hazards-first.yaml";
-  if (fs::exists(installed)) return installed.lexically_normal().string();
-  return LIVEMAP_SOURCE_DIR "/models/hazards-first.yaml";
 }
 
 cv::Mat ReadImage(const std::string& path) {

@@ -14,6 +14,7 @@
 #include "change/change_report.h"
 #include "change/registration.h"
 #include "tools/command_line.h"
+#include "tools/shipped_model.h"
 
 namespace livemap {
 namespace {
@@ -28,7 +29,7 @@ struct Options {
   std::string reversed_predictions;
   std::string write;
   std::uint64_t seed = 1;
-  bool homography = false;
+  std::string registration;  ///< "none", "edges", "homography" or "both".
   bool json = false;
   bool curves = false;
 };
@@ -40,16 +41,18 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "Compares what a method says about pairs of pictures with the truth. DIR has VL-CMU-CD's\n"
       "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it) or t0/, t1/, "
       "mask/.\n"
-      "The method is a classical one (--method), a network (--model), or a folder of predictions\n"
+      "The method is a network (--model), a classical one (--method), or a folder of predictions\n"
       "(--predictions: NAME.npy or NAME.png per pair). docs/change.md defines the figures and the "
       "files.",
       1,
       {{"json", "", "one line of JSON instead of a table"},
-       {"method", "NAME", "dense-sift or daisy (dense-sift)"},
-       {"model", "FILE", "manifest of a network of change, run by OpenCV"},
+       {"method", "NAME", "dense-sift or daisy"},
+       {"model", "FILE", "manifest of a network of change (models/change-small.yaml)"},
        {"predictions", "DIR", "read predictions instead of running a method"},
        {"reversed-predictions", "DIR", "the same for the pairs with their pictures swapped"},
-       {"register", "HOW", "none or homography: of the earlier picture, for a method (none)"},
+       {"register", "HOW",
+        "of the earlier picture: none, edges, homography, or both: edges first, as on board "
+        "(both)"},
        {"seed", "N", "of the registration's draws (1)"},
        {"curves", "", "with --json: curves, figures per pair, refusals"},
        {"write", "DIR", "the method's scores (NAME.png) and classes (NAME_class.png)"}});
@@ -62,17 +65,21 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
                    {"register", !line.Has("predictions"), "to go without --predictions"}});
   Options options;
   options.directory = line.Positional(0);
-  options.method = line.Text("method", "dense-sift");
+  options.method = line.Text("method", "");
   options.model = line.Text("model", "");
   options.predictions = line.Text("predictions", "");
   options.reversed_predictions = line.Text("reversed-predictions", "");
   options.write = line.Text("write", "");
   options.seed = line.Seed("seed", 1);
-  const std::string how = line.Text("register", "none");
-  if (how != "none" && how != "homography") {
-    throw Error("--register is '" + how + "', accepted are none and homography");
+  options.registration = line.Text("register", "both");
+  if (options.registration != "none" && options.registration != "edges" &&
+      options.registration != "homography" && options.registration != "both") {
+    throw Error("--register is '" + options.registration +
+                "', accepted are none, edges, homography and both");
   }
-  options.homography = how == "homography";
+  if (options.method.empty() && options.model.empty() && options.predictions.empty()) {
+    options.model = ShippedModel("change-small");
+  }
   options.json = line.Has("json");
   options.curves = line.Has("curves");
   return options;
@@ -93,7 +100,7 @@ double Median(std::vector<double> values) {
 class Evaluation {
  public:
   explicit Evaluation(const Options& options) : options_(options) {
-    report_.registration = options.homography ? "homography" : "none";
+    report_.registration = options.predictions.empty() ? options.registration : "none";
     report_.method = options.predictions;
     report_.has_reversed = !options.reversed_predictions.empty();
     if (!options.predictions.empty()) return;
@@ -154,16 +161,30 @@ class Evaluation {
     return method_->Run({aligned_->after, aligned_->before, aligned_->valid});
   }
 
+  /// As on board, or by one of the two ways alone.
+  Registration Register(const ChangePair& pair) const {
+    Registration by_edges;
+    if (options_.registration != "homography") {
+      by_edges = RegisterByEdges(pair.before, pair.after, RegistrationOptions());
+      if (by_edges.accepted() || options_.registration == "edges") return by_edges;
+    }
+    const FeaturedView before{pair.before.size(), ExtractFeatures(pair.before)};
+    const FeaturedView after{pair.after.size(), ExtractFeatures(pair.after)};
+    Registration by_features =
+        RegisterByHomography(before, after, RegistrationOptions(), options_.seed);
+    if (!by_features.accepted() && !by_edges.why.empty()) {
+      by_features.why = by_edges.why + "; " + by_features.why;
+    }
+    return by_features;
+  }
+
   std::optional<AlignedPair> Align(const ChangePairFiles& files, const ChangePair& pair) {
-    if (!options_.homography) {
+    if (options_.registration == "none") {
       return AlignedPair{pair.before, pair.after,
                          cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255))};
     }
     const auto start = std::chrono::steady_clock::now();
-    const FeaturedView before{pair.before.size(), ExtractFeatures(pair.before)};
-    const FeaturedView after{pair.after.size(), ExtractFeatures(pair.after)};
-    const Registration registration =
-        RegisterByHomography(before, after, RegistrationOptions(), options_.seed);
+    const Registration registration = Register(pair);
     if (!registration.accepted()) {
       ++report_.refused;
       report_.refusals.push_back(files.name + ": " + registration.why);

@@ -15,6 +15,7 @@
 #include "ingest/decode.h"
 #include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
+#include "tools/shipped_model.h"
 
 namespace livemap {
 namespace {
@@ -60,7 +61,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   Options options;
   options.folders = line.Positionals();
   options.model = line.Text("model", "");
-  if (options.model.empty()) options.model = DefaultModelPath();
+  if (options.model.empty()) options.model = ShippedModel("hazards-first");
   options.json = line.Has("json");
   options.sweep = line.Has("sweep");
   options.tracking = line.Has("tracking");

@@ -14,6 +14,7 @@
 #include "detection/privacy_mask.h"
 #include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
+#include "tools/shipped_model.h"
 
 namespace livemap {
 namespace {
@@ -46,7 +47,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
   options.images = line.Positionals();
-  options.model = line.Text("model", DefaultModelPath());
+  options.model = line.Text("model", ShippedModel("hazards-first"));
   options.output = line.Text("output", "");
   PrivateRegionConfig& regions = options.mask.regions;
   regions.cascades = line.Text("cascades", regions.cascades);

@@ -200,6 +200,40 @@ TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
                Error);
 }
 
+TEST(FindChangeRegions, TakeInTheUnsureRimAroundThemDownToTheFoot) {
+  const cv::Mat image = Background();
+  const cv::Rect box(100, 80, 30, 40);
+  auto probabilities = OneRegion(box, ChangeClass::kSign);
+  // Below it the network is unsure: six rows nearly, and a tail that leads far away.
+  const cv::Rect foot(110, 120, 10, 6);
+  const cv::Rect tail(114, 126, 2, 60);
+  for (const cv::Rect& part : {foot, tail}) {
+    probabilities.of_class[0](part).setTo(0.7);
+    probabilities.of_class[static_cast<std::size_t>(ChangeClass::kSign)](part).setTo(0.3);
+  }
+  const auto regions = FindChangeRegions(probabilities, image, image);
+  ASSERT_EQ(regions.size(), 1U);
+  EXPECT_EQ(regions[0].box, cv::Rect(100, 80, 30, 48)) << "rows 120 to 127: the rim is 8 px";
+  EXPECT_EQ(regions[0].pixels, box.area());
+  EXPECT_NEAR(regions[0].confidence, 0.9, 1e-5);
+  ChangeRegionOptions without_rim;
+  without_rim.rim_px = 0;
+  EXPECT_EQ(FindChangeRegions(probabilities, image, image, without_rim)[0].box, box);
+}
+
+TEST(FindChangeRegions, StayApartWhereTheirRimsMeet) {
+  const cv::Mat image = Background();
+  auto probabilities = OneRegion({60, 80, 20, 30}, ChangeClass::kSign);
+  const auto second = OneRegion({92, 80, 20, 30}, ChangeClass::kSign);
+  for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
+    second.of_class[i].colRange(86, 160).copyTo(probabilities.of_class[i].colRange(86, 160));
+  }
+  probabilities.of_class[0](cv::Rect(80, 80, 12, 30)).setTo(0.6);
+  const auto regions = FindChangeRegions(probabilities, image, image);
+  ASSERT_EQ(regions.size(), 2U);
+  EXPECT_EQ(regions[0].box.width + regions[1].box.width, 20 + 12 + 20);
+}
+
 TEST(FindChangeRegions, OfProbabilitiesWithoutClassesAreOtherObjects) {
   const cv::Mat image = Background();
   const cv::Rect box(10, 10, 50, 50);

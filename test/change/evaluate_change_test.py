@@ -142,7 +142,7 @@ class EvaluateChangeTest(unittest.TestCase):
         if not os.path.exists(os.path.join(model, "made_of")):
             self.skipTest("skipped, no torch to make a network with")
         pairs = os.path.join(model, "pairs")
-        own = self.figures("--model", os.path.join(model, "tiny.yaml"), pairs)
+        own = self.figures("--model", os.path.join(model, "tiny.yaml"), "--register", "none", pairs)
         self.assertEqual((own["method"], own["pairs"], own["refused_pairs"]), ("tiny", 2, 0))
         predicted = self.figures("--predictions", os.path.join(model, "predictions/forward"),
                                  "--reversed-predictions", os.path.join(model, "predictions/reversed"), pairs)
@@ -150,6 +150,12 @@ class EvaluateChangeTest(unittest.TestCase):
             self.assertAlmostEqual(part["roc_area"], expected["roc_area"], places=3)
             self.assertAlmostEqual(part["argmax"]["accuracy"], expected["argmax"]["accuracy"], places=3)
             self.assertAlmostEqual(part["classes"]["sign"]["ap"], expected["classes"]["sign"]["ap"], places=3)
+
+    def test_without_flags_it_measures_what_a_vehicle_runs(self):
+        figures = self.figures(self.data)
+        self.assertEqual((figures["method"], figures["registration"], figures["pairs"]), ("change-small", "both", PAIRS))
+        alone = self.figures("--register", "edges", self.data)
+        self.assertGreaterEqual(alone["refused_pairs"], figures["refused_pairs"])
 
     def test_the_flat_layout_of_two_classes_is_read(self):
         flat = self.path("flat")
@@ -161,8 +167,8 @@ class EvaluateChangeTest(unittest.TestCase):
             shutil.copy(os.path.join(self.data, f"raw/000/RGB/1_{number}.png"), os.path.join(flat, "t0", name))
             shutil.copy(os.path.join(self.data, f"raw/000/RGB/2_{number}.png"), os.path.join(flat, "t1", name))
             cv2.imwrite(os.path.join(flat, "mask", name), ((mask > 0) * 255).astype(np.uint8))
-        own = self.figures("--method", "daisy", self.data)
-        figures = self.figures("--method", "daisy", flat)
+        own = self.figures("--method", "daisy", "--register", "none", self.data)
+        figures = self.figures("--method", "daisy", "--register", "none", flat)
         self.assertEqual(figures["at_fpr"], own["at_fpr"])
 
     def test_without_json_it_is_a_table(self):
@@ -177,7 +183,7 @@ class EvaluateChangeTest(unittest.TestCase):
         for arguments, expected in [
                 ([], "got 0 arguments"), (["/nowhere"], "/nowhere"), ([empty], "0 pairs"),
                 (["--method", "best", self.data], "dense-sift and daisy"),
-                (["--register", "well", self.data], "none and homography"),
+                (["--register", "well", self.data], "none, edges, homography and both"),
                 (["--predictions", empty, self.data], "000/00' is missing"),
                 (["--method", "daisy", "--predictions", empty, self.data], "--method"),
                 (["--method", "daisy", "--model", "tiny.yaml", self.data], "--model"),

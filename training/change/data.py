@@ -9,7 +9,7 @@ import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, List, Optional
+from typing import Dict, List, Optional, Tuple
 
 import cv2
 import numpy as np
@@ -25,7 +25,7 @@ IGNORED = 255
 """In a mask: neither changed nor unchanged."""
 
 PLANE_DEPTHS_M = (9.0, 14.0, 25.0)
-"""Walls onto which a pair of known poses is registered where features do not match."""
+"""Walls onto which a pair of known poses is registered where the pictures do not match."""
 
 VALIDATION_SIGNS = 5
 """Every so-many-th crop of a kind of sign is kept for validation."""
@@ -38,9 +38,15 @@ class Pair:
     first: np.ndarray  # H x W x 3 uint8, RGB
     second: np.ndarray
     mask: np.ndarray  # H x W uint8, into CLASSES, or IGNORED
-    homography: Optional[np.ndarray]  # first's pixels to the second's, from features; None: they do not match
+    homography: Optional[np.ndarray]  # first's pixels to the second's, from what they show; None: they do not match
     fallbacks: List[np.ndarray]  # the same from poses, where known
     name: str = ""
+    content: Tuple[int, int] = (INPUT_HEIGHT, INPUT_WIDTH)  # rows and columns; what lies beyond is padding
+
+    def register(self) -> Optional[np.ndarray]:
+        """As a vehicle would, without looking at the padding."""
+        rows, columns = self.content
+        return registration.as_on_board(self.first[:rows, :columns], self.second[:rows, :columns])
 
     def homographies(self) -> List[np.ndarray]:
         """What the pair may be registered with in training: as a vehicle would, else by poses."""
@@ -83,12 +89,16 @@ def read_mask(path: Path) -> np.ndarray:
     return mask
 
 
+def fitted_size(height: int, width: int) -> Tuple[int, int]:
+    """Rows and columns of a picture in the network's input."""
+    scale = min(INPUT_WIDTH / width, INPUT_HEIGHT / height)
+    return round(height * scale), round(width * scale)
+
+
 def fit_mask(mask: np.ndarray) -> np.ndarray:
     """A mask in the network's size; the padding is ignored."""
-    height, width = mask.shape
-    scale = min(INPUT_WIDTH / width, INPUT_HEIGHT / height)
     fitted = np.full((INPUT_HEIGHT, INPUT_WIDTH), IGNORED, np.uint8)
-    width, height = round(width * scale), round(height * scale)
+    height, width = fitted_size(*mask.shape)
     fitted[:height, :width] = cv2.resize(mask, (width, height), interpolation=cv2.INTER_NEAREST)
     return fitted
 
@@ -133,12 +143,13 @@ def read_intrinsics(data_set: Path) -> Optional[np.ndarray]:
 def read_pair(truth: Path, poses: Dict[str, np.ndarray], intrinsics: Optional[np.ndarray]) -> Pair:
     """One pair by its ground truth's path."""
     pictures, number = truth.parent.parent / "RGB", truth.stem[2:]
-    first, second = (letterbox(read_image(pictures / f"{which}_{number}.png")) for which in (1, 2))
+    first, second = (read_image(pictures / f"{which}_{number}.png") for which in (1, 2))
+    content = fitted_size(*second.shape[:2])
     pose = poses.get(f"{truth.parent.parent.name}/{number}")
     fallbacks = []
     if pose is not None and intrinsics is not None:
         fallbacks = [registration.by_plane(pose[0], pose[1], intrinsics, depth_m) for depth_m in PLANE_DEPTHS_M]
-    return Pair(first, second, fit_mask(read_mask(truth)), None, fallbacks, str(truth))
+    return Pair(letterbox(first), letterbox(second), fit_mask(read_mask(truth)), None, fallbacks, str(truth), content)
 
 
 class Registrations:
@@ -153,11 +164,11 @@ class Registrations:
             except (OSError, ValueError, zipfile.BadZipFile) as error:
                 raise DataError(f"Cannot read the kept registrations {path}: {error}; delete it.") from error
 
-    def of(self, first: np.ndarray, second: np.ndarray) -> Optional[np.ndarray]:
-        """As registration.by_features; each pair is registered once."""
-        key = hashlib.blake2b(first.tobytes() + second.tobytes(), digest_size=16).hexdigest()
+    def of(self, pair: Pair) -> Optional[np.ndarray]:
+        """As Pair.register; each pair is registered once."""
+        key = hashlib.blake2b(pair.first.tobytes() + pair.second.tobytes(), digest_size=16).hexdigest()
         if key not in self.known:
-            found, self.fresh = registration.by_features(first, second), True
+            found, self.fresh = pair.register(), True
             self.known[key] = np.zeros((0, 3)) if found is None else found
         return self.known[key] if len(self.known[key]) else None
 
@@ -184,7 +195,7 @@ def read_pairs(root: Path, cache: Optional[Path] = None, registered: bool = Fals
             data_sets[data_set] = read_poses(data_set), read_intrinsics(data_set)
         pair = read_pair(path, *data_sets[data_set])
         pair.name = str(path.relative_to(root))
-        pair.homography = np.eye(3) if registered else registrations.of(pair.first, pair.second)
+        pair.homography = np.eye(3) if registered else registrations.of(pair)
         pairs.append(pair)
     registrations.keep()
     return pairs

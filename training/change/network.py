@@ -2,14 +2,15 @@
 
 The structure is the thesis's (section 4.4, figure 4.3). `ChangeNetwork` at `Widths()` is change-small: separable
 convolutions and one thing the thesis does not have, namely that a decoder's skip connections bring beside its own
-picture's features how far they are from the other's. `ThesisNetwork` is the original, shaped like VGG-16.
+picture's features how far they are from the other's, at the same place (`apart`) and from all that the other has near
+that place (`beyond`): a registration leaves pixels. `ThesisNetwork` is the original, shaped like VGG-16.
 
 Which pixels the warp could fill does not go into the encoder: its features depend on one picture alone and can be
 kept. It decides at the very end, where a pixel outside of the warp is told to be no change (`Network.probabilities`).
 """
 
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import Dict, List, Tuple
 
 import torch
 from torch import Tensor, nn
@@ -31,6 +32,7 @@ class Widths:
     encoder: Tuple[int, ...] = (16, 48, 96, 192, 256)  # at strides 2, 4, 8, 16, 32
     blocks: Tuple[int, ...] = (1, 2, 3, 3, 2)  # separable convolutions at each stride
     decoder: Tuple[int, ...] = (24, 40, 72, 128)  # at strides 2, 4, 8, 16
+    windows: Tuple[int, ...] = (0, 7, 5, 3)  # cells, odd, or 0, at these strides: within how many `beyond` looks for the same
     final: int = 32
 
 
@@ -84,25 +86,42 @@ def enlarge(features: Tensor) -> Tensor:
     return F.interpolate(features, scale_factor=2, mode="nearest")
 
 
+def highest_near(features: Tensor, window: int) -> Tensor:
+    """The greatest value of each channel within window x window cells."""
+    rows = F.max_pool2d(features, (1, window), 1, (0, window // 2))
+    return F.max_pool2d(rows, (window, 1), 1, (window // 2, 0))
+
+
+def beyond(own: Tensor, other: Tensor, window: int) -> Tensor:
+    """How far features lie outside of all that the other picture's take on within window x window cells; 0 within."""
+    above = F.relu(own - highest_near(other, window))
+    below = F.relu(-highest_near(-other, window) - own)
+    return above + below
+
+
 class Decoder(nn.Module):
     """One picture's features, and how far they are from the other's, back to stride 2."""
 
     def __init__(self, widths: Widths):
         super().__init__()
         encoder, decoder = widths.encoder, widths.decoder
+        self.windows = widths.windows
         self.enter = ConvBlock(2 * encoder[-1], decoder[-1], 1)
         joins, blocks = [], []
         for index in reversed(range(len(decoder))):
             here, below = decoder[index], decoder[max(index - 1, 0)]
-            joins.append(ConvBlock(here + 2 * encoder[index], here, 1))
+            joins.append(ConvBlock(here + (3 if self.windows[index] else 2) * encoder[index], here, 1))
             blocks.append(SeparableBlock(here, below))  # narrowed before it is enlarged: four times fewer cells
         self.joins, self.blocks = nn.ModuleList(joins), nn.ModuleList(blocks)
 
-    def forward(self, own: List[Tensor], apart: List[Tensor]) -> Tensor:
+    def forward(self, own: List[Tensor], other: List[Tensor], apart: List[Tensor]) -> Tensor:
         features = self.enter(torch.cat([own[-1], apart[-1]], dim=1))
         for step, (join, block) in enumerate(zip(self.joins, self.blocks)):
             level = len(self.joins) - 1 - step
-            features = block(join(torch.cat([enlarge(features), own[level], apart[level]], dim=1)))
+            parts = [enlarge(features), own[level], apart[level]]
+            if self.windows[level]:
+                parts.append(beyond(own[level], other[level], self.windows[level]))
+            features = block(join(torch.cat(parts, dim=1)))
         return features
 
 
@@ -188,11 +207,12 @@ class ChangeNetwork(Network):
 
     def classify(self, images: Tensor) -> Tensor:
         levels = self.encode(images)
-        return self.objects(self.second(levels, levels))
+        nothing = [torch.zeros_like(level) for level in levels]
+        return self.objects(self.second(levels, nothing, levels))
 
     def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
         apart = [torch.abs(one - other) for one, other in zip(first, second)]
-        return self.final(torch.cat([self.first(first, apart), self.second(second, apart)], dim=1))
+        return self.final(torch.cat([self.first(first, second, apart), self.second(second, first, apart)], dim=1))
 
 
 def convolutions(channels_in: int, channels_out: int, count: int) -> nn.Sequential:
@@ -259,6 +279,18 @@ class ThesisNetwork(Network):
 
     def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
         return self.final(torch.cat([self.first(first), self.second(second)], dim=1))
+
+
+def widened(state: Dict[str, Tensor], network: Network) -> Dict[str, Tensor]:
+    """Weights of a network whose convolutions saw fewer channels, for `network`: what it sees besides begins at 0."""
+    grown = dict(state)
+    for name, here in network.state_dict().items():
+        before = state.get(name)
+        if before is None or before.dim() != 4 or before.shape[1] >= here.shape[1] or before.shape[0] != here.shape[0]:
+            continue
+        grown[name] = torch.zeros_like(here)
+        grown[name][:, : before.shape[1]] = before
+    return grown
 
 
 ARCHITECTURES = {"change-small": ChangeNetwork, "thesis": ThesisNetwork}

@@ -85,12 +85,12 @@ class Reading(unittest.TestCase):
         write_streets(self.root / "pairs", (1,))
         cache = self.root / "cache.npz"
         pairs = data.read_pairs(self.root / "pairs", cache)
-        register, registration.by_features = registration.by_features, None  # must not be called again
+        register, registration.as_on_board = registration.as_on_board, None  # must not be called again
         try:
             for pair, again in zip(pairs, data.read_pairs(self.root / "pairs", cache)):
                 np.testing.assert_array_equal(pair.homography, again.homography)
         finally:
-            registration.by_features = register
+            registration.as_on_board = register
         # Other pictures of the same names, as another rendering leaves them.
         blank = np.full((256, 320, 3), 90, np.uint8)
         write_pair(self.root / "pairs" / "000001" / "some", 0, blank, blank, np.zeros((256, 320), np.uint8))
@@ -116,10 +116,21 @@ class Registering(unittest.TestCase):
         found = registration.by_features(image, cv2.warpPerspective(image, shift, (320, 256)))
         np.testing.assert_allclose(found / found[2, 2], shift, atol=0.1)
 
+    def test_edges_find_a_shift_and_a_scale_to_three_pixels(self):
+        image = ground(3)
+        for scale, right, down in ((1, 9, -5), (1.1, -20, -14), (0.85, 20, 26)):
+            onto = np.array([[scale, 0, right], [0, scale, down], [0, 0, 1.0]])
+            found = registration.by_edges(image, cv2.warpPerspective(image, onto, (320, 256)))
+            self.assertIsNotNone(found, f"scale {scale}")
+            corners = np.float32([[[40, 40]], [[280, 40]], [[40, 210]], [[280, 210]]])
+            places = [cv2.perspectiveTransform(corners, homography) for homography in (found, onto)]
+            self.assertLess(np.abs(places[0] - places[1]).max(), 3, f"scale {scale}")
+
     def test_what_does_not_match_is_refused(self):
-        self.assertIsNone(registration.by_features(ground(3), np.full((256, 320, 3), 90, np.uint8)))
-        for seed in range(10, 14):
-            self.assertIsNone(registration.by_features(ground(3), ground(seed)))
+        for register in (registration.by_features, registration.by_edges):
+            self.assertIsNone(register(ground(3), np.full((256, 320, 3), 90, np.uint8)))
+            for seed in range(10, 14):
+                self.assertIsNone(register(ground(3), ground(seed)))
 
     def test_a_wall_seen_from_nearer_is_larger_about_the_middle(self):
         intrinsics = registration.camera_matrix(300, 300, 160, 128)

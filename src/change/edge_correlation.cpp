@@ -1,0 +1,253 @@
+#include "change/edge_correlation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr int kOrientations = 4;
+constexpr int kWorkingWidth = 320;  // Pixels.
+constexpr double kSmoothingPx = 0.8;
+constexpr double kNeighbourhoodPx = 8;  // Within which an edge is measured by the others.
+constexpr double kPlainGradient = 20;   // Grey levels: what is weaker everywhere is no edge.
+constexpr int kLeadCells = 3;
+constexpr double kLeastEnergy = 1e-3;
+constexpr int kBlockCells = 32;
+constexpr int kParallaxCells = 5;
+
+cv::Mat Grey(const cv::Mat& picture) {
+  if (picture.channels() == 1) return picture;
+  cv::Mat grey;
+  cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
+/// Strength of the gradient against the gradients around it, and its direction.
+struct Gradient {
+  cv::Mat strength;
+  cv::Mat x;  // Of unit length with y.
+  cv::Mat y;
+};
+
+Gradient GradientOf(const cv::Mat& grey) {
+  Gradient gradient;
+  cv::Mat smooth;
+  grey.convertTo(smooth, CV_32FC1);
+  cv::GaussianBlur(smooth, smooth, cv::Size(), kSmoothingPx);
+  cv::Sobel(smooth, gradient.x, CV_32F, 1, 0);
+  cv::Sobel(smooth, gradient.y, CV_32F, 0, 1);
+  cv::Mat magnitude;
+  cv::magnitude(gradient.x, gradient.y, magnitude);
+  cv::Mat around = magnitude.mul(magnitude);
+  cv::GaussianBlur(around, around, cv::Size(), kNeighbourhoodPx);
+  cv::sqrt(around, around);
+  gradient.strength = magnitude / (around + kPlainGradient);
+  const cv::Mat length = cv::max(magnitude, 1e-6);
+  gradient.x /= length;
+  gradient.y /= length;
+  return gradient;
+}
+
+/// One correlation for every shift, at one scale of the earlier picture.
+cv::Mat Correlations(const cv::Mat& before, double scale, const cv::Mat& after_padded,
+                     const cv::Mat& after_squared, const cv::Mat& after_inside) {
+  const cv::Matx23d about_the_middle{scale, 0,     (1 - scale) * (before.cols - 1) / 2,
+                                     0,     scale, (1 - scale) * (before.rows - 1) / 2};
+  cv::Mat scaled;
+  cv::Mat known;
+  cv::warpAffine(before, scaled, about_the_middle, before.size());
+  cv::warpAffine(cv::Mat::ones(before.size(), CV_32FC1), known, about_the_middle, before.size());
+  cv::Mat squared;
+  cv::transform(scaled.mul(scaled), squared, cv::Matx14f(1, 1, 1, 1));
+  cv::Mat products;
+  cv::Mat before_energy;
+  cv::Mat after_energy;
+  cv::matchTemplate(after_padded, scaled, products, cv::TM_CCORR);
+  cv::matchTemplate(after_inside, squared, before_energy, cv::TM_CCORR);
+  cv::matchTemplate(after_squared, known, after_energy, cv::TM_CCORR);
+  cv::Mat energy = before_energy.mul(after_energy);
+  cv::sqrt(cv::max(energy, kLeastEnergy), energy);
+  return products / energy;
+}
+
+/// Where a parabola through three values a step apart is highest, in steps from the middle one.
+double Vertex(double before, double here, double after) {
+  const double curvature = before - 2 * here + after;
+  if (curvature >= 0) return 0;
+  return std::clamp((before - after) / (2 * curvature), -0.5, 0.5);
+}
+
+/// Best of all scales and shifts, as indices.
+struct Peak {
+  int scale = 0;
+  cv::Point shift;
+  double correlation = -1;
+};
+
+Peak FindPeak(const std::vector<cv::Mat>& correlations) {
+  Peak peak;
+  for (std::size_t i = 0; i < correlations.size(); ++i) {
+    double highest = 0;
+    cv::Point at;
+    cv::minMaxLoc(correlations[i], nullptr, &highest, nullptr, &at);
+    if (highest > peak.correlation) peak = {static_cast<int>(i), at, highest};
+  }
+  return peak;
+}
+
+/// The highest correlation away from the peak's shift, at any scale.
+double BestElsewhere(const std::vector<cv::Mat>& correlations, const Peak& peak) {
+  const cv::Size size = correlations[0].size();
+  cv::Mat elsewhere(size, CV_8UC1, cv::Scalar(255));
+  cv::rectangle(elsewhere, peak.shift - cv::Point(kLeadCells, kLeadCells),
+                peak.shift + cv::Point(kLeadCells, kLeadCells), 0, cv::FILLED);
+  double best = -1;
+  for (const cv::Mat& correlation : correlations) {
+    double highest = 0;
+    cv::minMaxLoc(correlation, nullptr, &highest, nullptr, nullptr, elsewhere);
+    best = std::max(best, highest);
+  }
+  return best;
+}
+
+/// The peak's place to a fraction of a step: x, y of the shift and index of the scale.
+cv::Vec3d Refined(const std::vector<cv::Mat>& correlations, const Peak& peak) {
+  const auto at = [&](int scale, int x, int y) {
+    const cv::Mat& values = correlations[static_cast<std::size_t>(scale)];
+    return static_cast<double>(values.at<float>(y, x));
+  };
+  const auto [x, y] = peak.shift;
+  const int scale = peak.scale;
+  cv::Vec3d refined(x, y, scale);
+  if (x > 0 && x + 1 < correlations[0].cols) {
+    refined[0] += Vertex(at(scale, x - 1, y), peak.correlation, at(scale, x + 1, y));
+  }
+  if (y > 0 && y + 1 < correlations[0].rows) {
+    refined[1] += Vertex(at(scale, x, y - 1), peak.correlation, at(scale, x, y + 1));
+  }
+  if (scale > 0 && scale + 1 < static_cast<int>(correlations.size())) {
+    refined[2] += Vertex(at(scale - 1, x, y), peak.correlation, at(scale + 1, x, y));
+  }
+  return refined;
+}
+
+/// The index-th of `search.scales` that rise from one over most_scale to most_scale by one ratio.
+double ScaleAt(double index, const EdgeSearch& search) {
+  return std::pow(search.most_scale, 2 * index / (search.scales - 1) - 1);
+}
+
+void CheckAlike(const EdgeCells& before, const EdgeCells& after) {
+  if (before.picture != after.picture || before.cells.size() != after.cells.size()) {
+    throw Error("edges of pictures of different sizes cannot be compared");
+  }
+}
+
+}  // namespace
+
+EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
+  constexpr int kLeastSide = 32;
+  if (picture.empty() || (picture.type() != CV_8UC1 && picture.type() != CV_8UC3) ||
+      std::min(picture.cols, picture.rows) < kLeastSide ||
+      std::max(picture.cols, picture.rows) > 4 * std::min(picture.cols, picture.rows)) {
+    throw Error("edges are looked for in a picture of " + std::to_string(picture.cols) + "x" +
+                std::to_string(picture.rows) +
+                ", accepted are 8 bit grey or colour, 32 pixels and more, a side up to four times "
+                "the other");
+  }
+  const int columns = static_cast<int>(detail);
+  const int cell_px = kWorkingWidth / columns;
+  const int rows = static_cast<int>(std::lround(1.0 * columns * picture.rows / picture.cols));
+  cv::Mat grey;
+  cv::resize(Grey(picture), grey, cv::Size(kWorkingWidth, rows * cell_px), 0, 0,
+             picture.cols > kWorkingWidth ? cv::INTER_AREA : cv::INTER_LINEAR);
+  const Gradient gradient = GradientOf(grey);
+  // Twice the angle: an edge may be dark on the left by day and on the right in snow.
+  const cv::Mat cosine = gradient.x.mul(gradient.x) - gradient.y.mul(gradient.y);
+  const cv::Mat sine = 2 * gradient.x.mul(gradient.y);
+  std::vector<cv::Mat> orientations;
+  for (int k = 0; k < kOrientations; ++k) {
+    const double angle = 2 * CV_PI * k / kOrientations;
+    cv::Mat part = cv::max(std::cos(angle) * cosine + std::sin(angle) * sine, 0);
+    part = part.mul(gradient.strength);
+    cv::GaussianBlur(part, part, cv::Size(), 0.6 * cell_px);
+    cv::resize(part, part, cv::Size(columns, rows), 0, 0, cv::INTER_AREA);
+    orientations.push_back(part - cv::mean(part)[0]);
+  }
+  EdgeCells edges;
+  edges.picture = picture.size();
+  cv::merge(orientations, edges.cells);
+  return edges;
+}
+
+EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
+                           const EdgeSearch& search) {
+  CheckAlike(before, after);
+  const cv::Size size = after.cells.size();
+  const cv::Point most(static_cast<int>(search.most_shift_x * size.width),
+                       static_cast<int>(search.most_shift_y * size.height));
+  const auto padded = [&](const cv::Mat& cells) {
+    cv::Mat larger;
+    cv::copyMakeBorder(cells, larger, most.y, most.y, most.x, most.x, cv::BORDER_CONSTANT);
+    return larger;
+  };
+  cv::Mat squared;
+  cv::transform(after.cells.mul(after.cells), squared, cv::Matx14f(1, 1, 1, 1));
+  const cv::Mat after_padded = padded(after.cells);
+  const cv::Mat after_squared = padded(squared);
+  const cv::Mat after_inside = padded(cv::Mat::ones(size, CV_32FC1));
+  std::vector<cv::Mat> correlations;
+  for (int i = 0; i < search.scales; ++i) {
+    correlations.push_back(
+        Correlations(before.cells, ScaleAt(i, search), after_padded, after_squared, after_inside));
+  }
+  const Peak peak = FindPeak(correlations);
+  const cv::Vec3d refined = Refined(correlations, peak);
+
+  EdgeAlignment alignment;
+  alignment.correlation = peak.correlation;
+  alignment.lead = peak.correlation - BestElsewhere(correlations, peak);
+  // Cells to pixels; a cell's middle lies half a cell from its edge.
+  const double scale = ScaleAt(refined[2], search);
+  const cv::Vec2d cell_px(1.0 * before.picture.width / size.width,
+                          1.0 * before.picture.height / size.height);
+  for (int axis = 0; axis < 2; ++axis) {
+    const double cells = axis == 0 ? size.width : size.height;
+    const double shift = refined[axis] - (axis == 0 ? most.x : most.y);
+    const double shift_cells = (1 - scale) * (cells - 1) / 2 + shift;
+    const double half_px = (cell_px[axis] - 1) / 2;
+    alignment.after_from_before(axis, axis) = scale;
+    alignment.after_from_before(axis, 2) = shift_cells * cell_px[axis] + (1 - scale) * half_px;
+  }
+  return alignment;
+}
+
+double EdgeAgreement(const EdgeCells& before, const EdgeCells& after) {
+  CheckAlike(before, after);
+  const cv::Rect all(cv::Point(), after.cells.size());
+  double sum = 0;
+  double weights = 0;
+  for (int row = 0; row + kBlockCells <= all.height; row += kBlockCells) {
+    for (int column = 0; column + kBlockCells <= all.width; column += kBlockCells) {
+      const cv::Rect block(column, row, kBlockCells, kBlockCells);
+      const double weight = cv::norm(after.cells(block));
+      if (weight * weight < kLeastEnergy) continue;
+      const cv::Point margin(kParallaxCells, kParallaxCells);
+      const cv::Rect near = cv::Rect(block.tl() - margin, block.br() + margin) & all;
+      cv::Mat correlations;
+      cv::matchTemplate(before.cells(near), after.cells(block), correlations, cv::TM_CCORR_NORMED);
+      double best = 0;
+      cv::minMaxLoc(correlations, nullptr, &best);
+      sum += weight * best;
+      weights += weight;
+    }
+  }
+  return weights > 0 ? sum / weights : 0;
+}
+
+}  // namespace livemap

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <string>
+
+namespace livemap {
+
+/// models/NAME.yaml: of the installed package (share/livemap beside this program's lib/livemap),
+/// else of the source tree that this program was built from.
+std::string ShippedModel(const std::string& name);
+
+}  // namespace livemap
