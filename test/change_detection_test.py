@@ -187,6 +187,7 @@ class ChangeDetectionTest(unittest.TestCase):
         # DAISY's score is a distance and says little of how sure it is.
         vehicle = self.second("changed", simulate(self.folder, "changed", AFTER, 80), tell_confidence=0.0)
         self.assertGreater(vehicle.count("pictures_compared"), 20, vehicle.diagnostics())
+        self.assertEqual(vehicle.count("registered_by_edges", "registered_by_features"), vehicle.count("pictures_compared"))
         reports, objects = vehicle.reports(), vehicle.objects()
         self.assertEqual(len(reports), vehicle.count("pictures_compared"))
         for report in reports:

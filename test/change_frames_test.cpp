@@ -61,6 +61,40 @@ TEST(ChangeFrames, AnImageThatWasNotTakenDoesNotCountAsLookedAt) {
   EXPECT_TRUE(frames.Next(50.1)) << "the first one was skipped: this one is as good";
 }
 
+TEST(ChangeFrames, AnImageWaitsForItsDepthButNotForEver) {
+  ChangeFrames::Config config = Config();
+  config.depth_wait_s = 0.3;
+  ChangeFrames frames(config);
+  for (double seconds = 0; seconds < 20; seconds += 0.5) frames.AddFix(FixAt(seconds));
+  frames.AddDepth(ImageAt(2.0));
+  frames.AddImage(ImageAt(2.0), 50);
+  const auto early = frames.Next(50);
+  ASSERT_TRUE(early) << "its depth came first";
+  EXPECT_EQ(early->depth->header.stamp, early->image->header.stamp);
+  frames.Taken(*early);
+
+  frames.AddImage(ImageAt(5.0), 51);
+  EXPECT_FALSE(frames.Next(51.2));
+  frames.AddDepth(ImageAt(4.9));
+  EXPECT_FALSE(frames.Next(51.2)) << "of another image";
+  frames.AddDepth(ImageAt(5.0));
+  ASSERT_TRUE(frames.Next(51.2));
+
+  frames.AddImage(ImageAt(8.0), 52);
+  EXPECT_FALSE(frames.Next(52.29));
+  const auto late = frames.Next(52.31);
+  ASSERT_TRUE(late);
+  EXPECT_FALSE(late->depth);
+
+  frames.Taken(*late);
+  frames.AddImage(ImageAt(8.1), 53);
+  frames.AddImage(ImageAt(11.0), 53);
+  frames.AddDepth(ImageAt(11.0));
+  const auto next = frames.Next(53);
+  ASSERT_TRUE(next) << "one that is too near is not waited for";
+  EXPECT_TRUE(next->depth);
+}
+
 TEST(ChangeFrames, WithoutPositionsTheOldestGoAndTheOthersAreGivenUp) {
   ChangeFrames frames(Config());
   for (int i = 0; i < 5; ++i) frames.AddImage(ImageAt(i), 50);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "change/robust_fit.h"
 
 namespace livemap {
 namespace {
@@ -33,6 +34,7 @@ void CheckPicture(const WatchedPicture& picture) {
                 std::to_string(picture.bgr.rows) + ", accepted is an 8-bit colour picture of its " +
                 "camera's " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
   }
+  if (!picture.depth.empty()) CheckDepth(picture.depth, picture.bgr.size());
   if (!IsValid(picture.position) || !picture.covariance_m2.allFinite() ||
       !std::isfinite(picture.heading_rad)) {
     throw Error(
@@ -82,7 +84,7 @@ ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
   const Eigen::Isometry3d map_from_base = MapFromBase(picture);
   covariance_m2_ = picture.covariance_m2;
   const FeaturedView view{picture.bgr.size(), ExtractFeatures(picture.bgr, config_.features)};
-  const std::optional<Partner> partner = FindPartner(frame, picture.bgr, view, answer);
+  const std::optional<Partner> partner = FindPartner(frame, picture, view, answer);
   if (partner) Compare(picture, *partner, map_from_base, answer);
   Place(tracker_.LeaveBehind(map_from_base), passed_);
   answer.passed.swap(passed_);
@@ -91,7 +93,7 @@ ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
 }
 
 std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& frame,
-                                                             const cv::Mat& bgr,
+                                                             const WatchedPicture& picture,
                                                              const FeaturedView& view,
                                                              Answer& answer) {
   const auto near = memory_.Nearest({frame.position, frame.heading_rad, config_.drive_id});
@@ -100,20 +102,47 @@ std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& f
   for (std::size_t i = 0; i < std::min(config_.partners, ranked.size()); ++i) {
     const auto record = memory_.Load(ranked[i].candidate.id);
     if (!record) continue;
-    const cv::Size size(record->frame.camera.width, record->frame.camera.height);
-    const cv::Mat earlier = cv::imdecode(record->picture, cv::IMREAD_COLOR);
-    if (earlier.size() != size) continue;  // Its header was right, the rest is not.
-    Registration registration = RegisterByEdges(earlier, bgr, config_.registration);
-    const std::string why_not_by_edges = registration.why;
-    if (!registration.accepted()) {
-      registration =
-          RegisterByHomography({size, record->features}, view, config_.registration, config_.seed);
-    }
-    if (registration.accepted()) {
-      return Partner{record->frame, WarpByHomography(earlier, registration.after_from_before)};
-    }
-    if (answer.why.empty()) answer.why = why_not_by_edges + "; " + registration.why;
+    std::string why;
+    if (auto partner = Register(*record, picture, view, why)) return partner;
+    if (answer.why.empty()) answer.why = why;
   }
+  return std::nullopt;
+}
+
+std::optional<ChangeWatch::Partner> ChangeWatch::Register(const PlaceRecord& record,
+                                                          const WatchedPicture& picture,
+                                                          const FeaturedView& view,
+                                                          std::string& why) const {
+  const RegistrationOptions& options = config_.registration;
+  const FeaturedView before{cv::Size(record.frame.camera.width, record.frame.camera.height),
+                            record.features};
+  const cv::Mat earlier = cv::imdecode(record.picture, cv::IMREAD_COLOR);
+  if (earlier.size() != before.size) {
+    why = "the earlier picture is damaged";  // Its header was right, the rest is not.
+    return std::nullopt;
+  }
+  if (!picture.depth.empty()) {
+    Registration by_depth = RegisterByDepth(before, record.frame.camera, view, picture.camera,
+                                            picture.depth, options, config_.seed);
+    if (by_depth.accepted()) {
+      const WarpedPicture warped = WarpByDepth(earlier, record.frame.camera, picture.depth,
+                                               picture.camera, by_depth.before_from_after);
+      CheckOverlap(warped, options, by_depth);
+      if (by_depth.accepted()) return Partner{record.frame, warped, RegisteredBy::kDepth};
+    }
+    why = by_depth.why + "; ";
+  }
+  const Registration by_edges = RegisterByEdges(earlier, picture.bgr, options);
+  if (by_edges.accepted()) {
+    return Partner{record.frame, WarpByHomography(earlier, by_edges.after_from_before),
+                   RegisteredBy::kEdges};
+  }
+  const Registration by_features = RegisterByHomography(before, view, options, config_.seed);
+  if (by_features.accepted()) {
+    return Partner{record.frame, WarpByHomography(earlier, by_features.after_from_before),
+                   RegisteredBy::kFeatures};
+  }
+  why += by_edges.why + "; " + by_features.why;
   return std::nullopt;
 }
 
@@ -121,6 +150,7 @@ void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
                           const Eigen::Isometry3d& map_from_base, Answer& answer) {
   answer.outcome = Outcome::kCompared;
   answer.earlier = partner.frame;
+  answer.registered_by = partner.registered_by;
   // The outermost pixels of the warped picture are mixed with what lies beyond it.
   cv::Mat valid;
   cv::erode(partner.warped.valid, valid, cv::Mat(), cv::Point(-1, -1), kMixedPixels,

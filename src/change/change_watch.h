@@ -20,6 +20,7 @@ namespace livemap {
 struct WatchedPicture {
   std::int64_t stamp_ns = 0;
   cv::Mat bgr;              ///< CV_8UC3, rectified, of the camera's size.
+  cv::Mat depth;            ///< Empty, or CV_32FC1 of its size: m ahead; 0 and NaN are unknown.
   CameraIntrinsics camera;  ///< Of this picture.
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
   GeoPoint position;                                        ///< Of base_link.
@@ -37,7 +38,7 @@ struct PlacedChange {
 
 /// Remembers the street picture by picture, and says what changed since earlier drives (thesis
 /// 4.3): the nearest earlier pictures by position and heading, the best of them by matches,
-/// registration by edges or else by features, the method, regions, objects on the ground. Not
+/// registration, the method, regions, objects on the ground. Not
 /// thread-safe.
 class ChangeWatch {
  public:
@@ -55,6 +56,13 @@ class ChangeWatch {
     std::uint64_t seed = 1;            ///< Of registration.
   };
 
+  /// What laid the earlier picture onto the present one.
+  enum class RegisteredBy {
+    kDepth,     ///< Each pixel by its depth: the only way that fits near and far things at once.
+    kEdges,     ///< RegisterByEdges.
+    kFeatures,  ///< RegisterByHomography.
+  };
+
   enum class Outcome {
     kUncertain,       ///< The position is too uncertain.
     kNothingEarlier,  ///< No earlier drive passed here, looking that way.
@@ -68,6 +76,7 @@ class ChangeWatch {
     std::string why;          ///< Of kRefused: of the best partner.
     std::string store_error;  ///< The picture could not be remembered.
     // What follows is of kCompared.
+    RegisteredBy registered_by = RegisteredBy::kEdges;
     AlignedPair pair;
     cv::Mat classes;  ///< CV_8UC1: ChangeClass, or kLeftOutPixel where nothing earlier is known.
     std::vector<ChangeRegion> regions;
@@ -95,12 +104,16 @@ class ChangeWatch {
   struct Partner {
     PlaceFrame frame;
     WarpedPicture warped;
+    RegisteredBy registered_by;
   };
 
   /// Where the camera was and looked.
   PlaceFrame FrameOf(const WatchedPicture& picture) const;
-  std::optional<Partner> FindPartner(const PlaceFrame& frame, const cv::Mat& bgr,
+  std::optional<Partner> FindPartner(const PlaceFrame& frame, const WatchedPicture& picture,
                                      const FeaturedView& view, Answer& answer);
+  /// By depth where there is one, else by edges, else by features; none with the reasons in `why`.
+  std::optional<Partner> Register(const PlaceRecord& record, const WatchedPicture& picture,
+                                  const FeaturedView& view, std::string& why) const;
   void Compare(const WatchedPicture& picture, const Partner& partner,
                const Eigen::Isometry3d& map_from_base, Answer& answer);
   void Remember(const WatchedPicture& picture, const PlaceFrame& frame,

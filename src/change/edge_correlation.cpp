@@ -21,7 +21,7 @@ constexpr double kLeastEnergy = 1e-3;
 constexpr int kBlockCells = 32;
 constexpr int kParallaxCells = 5;
 
-cv::Mat Grey(const cv::Mat& picture) {
+cv::Mat GreyOf(const cv::Mat& picture) {
   if (picture.channels() == 1) return picture;
   cv::Mat grey;
   cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
@@ -164,7 +164,7 @@ EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
   const int cell_px = kWorkingWidth / columns;
   const int rows = static_cast<int>(std::lround(1.0 * columns * picture.rows / picture.cols));
   cv::Mat grey;
-  cv::resize(Grey(picture), grey, cv::Size(kWorkingWidth, rows * cell_px), 0, 0,
+  cv::resize(GreyOf(picture), grey, cv::Size(kWorkingWidth, rows * cell_px), 0, 0,
              picture.cols > kWorkingWidth ? cv::INTER_AREA : cv::INTER_LINEAR);
   const Gradient gradient = GradientOf(grey);
   // Twice the angle: an edge may be dark on the left by day and on the right in snow.

@@ -30,6 +30,7 @@
 #include "ros/camera_info_conversions.h"
 #include "ros/change_conversions.h"
 #include "ros/change_parameters.h"
+#include "ros/depth_conversions.h"
 #include "ros/hazard_conversions.h"
 
 namespace livemap {
@@ -64,6 +65,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   /// Of the worker; `outcomes` by ChangeWatch::Outcome.
   struct Figures {
     std::array<std::uint64_t, 4> outcomes{};
+    std::array<std::uint64_t, 3> registered{};  ///< By ChangeWatch::RegisteredBy.
+    std::uint64_t depths_unusable = 0;
     std::uint64_t remembered = 0;
     std::uint64_t store_errors = 0;
     std::uint64_t objects = 0;
@@ -89,7 +92,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     SayRecovery(watch_->memory().recovery());
     figures_.places = watch_->memory().size();
     frames_ = std::make_unique<ChangeFrames>(ChangeFrames::Config{
-        config_.spacing_m, static_cast<std::size_t>(config_.max_waiting_frames), config_.pose});
+        config_.spacing_m, static_cast<std::size_t>(config_.max_waiting_frames),
+        config_.use_depth ? config_.depth_wait_s : 0, config_.pose});
     queue_ = std::make_unique<Queue>(1);
     if (config_.tell_zone) {
       MapChangeSender::Config sender;
@@ -128,6 +132,9 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     if (config_.pose.use_fused) {
       subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
     }
+    if (config_.use_depth) {
+      subscribers_.push_back(node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this));
+    }
     updater_ =
         std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
     updater_->setHardwareID("change_detection");
@@ -153,6 +160,11 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     LearnMounting(image->header.frame_id);
     frames_->AddImage(image, ros::Time::now().toSec());
+  }
+
+  void OnDepth(const sensor_msgs::ImageConstPtr& depth) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frames_->AddDepth(depth);
   }
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
@@ -224,6 +236,9 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     if (sender_) sender_->Tell(answer.passed);
     const std::lock_guard<std::mutex> lock(mutex_);
     ++figures_.outcomes[static_cast<std::size_t>(answer.outcome)];
+    if (answer.outcome == ChangeWatch::Outcome::kCompared) {
+      ++figures_.registered[static_cast<std::size_t>(answer.registered_by)];
+    }
     figures_.remembered += answer.remembered ? 1 : 0;
     figures_.store_errors += answer.store_error.empty() ? 0 : 1;
     figures_.objects += answer.newly_confirmed;
@@ -234,7 +249,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     figures_.ms_in_window += ms;
   }
 
-  WatchedPicture ToPicture(const Job& job) const {
+  WatchedPicture ToPicture(const Job& job) {
     const auto shared = cv_bridge::toCvShare(job.posed.image, sensor_msgs::image_encodings::BGR8);
     const cv::Mat& bgr = shared->image;
     if (bgr.cols != job.camera.width || bgr.rows != job.camera.height) {
@@ -254,11 +269,25 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
       picture.bgr = bgr.clone();  // The message's pixels end with it.
     }
     picture.camera = Resized(job.camera, picture.bgr.cols, picture.bgr.rows);
+    picture.depth = DepthOf(job, picture.bgr.size());
     picture.base_from_optical = job.base_from_optical;
     picture.position = job.posed.base.position;
     picture.covariance_m2 = job.posed.base.covariance_m2;
     picture.heading_rad = job.posed.base.course_rad;
     return picture;
+  }
+
+  /// Empty where there is none, or none that is usable: then the picture goes without.
+  cv::Mat DepthOf(const Job& job, cv::Size size) {
+    if (!job.posed.depth) return {};
+    try {
+      return ToDepthMetres(job.posed.depth, size, config_.depth_units_per_m);
+    } catch (const std::exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "depth image not used: %s", error.what());
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++figures_.depths_unusable;
+      return {};
+    }
   }
 
   void Publish(const ChangeWatch::Answer& answer, const std_msgs::Header& header) {
@@ -310,6 +339,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     status.add("pictures_without_earlier", outcome(Outcome::kNothingEarlier));
     status.add("pictures_refused", outcome(Outcome::kRefused));
     status.add("pictures_compared", outcome(Outcome::kCompared));
+    status.add("registered_by_depth", figures_.registered[0]);
+    status.add("registered_by_edges", figures_.registered[1]);
+    status.add("registered_by_features", figures_.registered[2]);
+    status.add("depths_unusable", figures_.depths_unusable);
     status.add("pictures_remembered", figures_.remembered);
     status.add("pictures_not_stored", figures_.store_errors);
     status.add("objects_confirmed", figures_.objects);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 
 #include "hazard/base_pose_source.h"
@@ -17,7 +18,8 @@ class ChangeFrames {
  public:
   struct Config {
     double spacing_m = 1;           ///< Between two images that are looked at.
-    std::size_t most_waiting = 30;  ///< Then the oldest goes.
+    std::size_t most_waiting = 30;  ///< Then the oldest goes; as many depth images are kept.
+    double depth_wait_s = 0;        ///< How long an image waits for its depth image; 0: none comes.
     BasePoseSource::Config pose;
   };
 
@@ -31,7 +33,8 @@ class ChangeFrames {
 
   struct Posed {
     sensor_msgs::ImageConstPtr image;
-    TrackPose base;  ///< Of base_link.
+    sensor_msgs::ImageConstPtr depth;  ///< Of its stamp; null when none came.
+    TrackPose base;                    ///< Of base_link.
   };
 
   explicit ChangeFrames(const Config& config) : config_(config), pose_(config.pose) {}
@@ -39,6 +42,8 @@ class ChangeFrames {
   void AddFix(const Fix& fix) { pose_.AddFix(fix); }
   void AddPose(std::int64_t stamp_ns, const TrackPose& pose) { pose_.AddPose(stamp_ns, pose); }
   void AddImage(const sensor_msgs::ImageConstPtr& image, double now_s);
+  /// Before or after its image.
+  void AddDepth(const sensor_msgs::ImageConstPtr& depth);
 
   /// The next image whose position is known and that is far enough from the last one taken; none
   /// when there is none now. Who looks at it says so by Taken.
@@ -57,6 +62,7 @@ class ChangeFrames {
   Config config_;
   BasePoseSource pose_;
   std::deque<Waiting> waiting_;
+  std::map<std::int64_t, sensor_msgs::ImageConstPtr> depths_;  ///< By stamp, ns.
   std::optional<GeoPoint> last_taken_;
   Counters counters_;
 };

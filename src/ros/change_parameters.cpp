@@ -74,6 +74,9 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
   ReadMemory(parameters, config.watch.memory);
   ReadWatch(parameters, config.watch);
   ReadBasePoseSource(parameters, config.pose);
+  parameters.Read("use_depth", config.use_depth);
+  parameters.Read("depth_wait_s", config.depth_wait_s, {0, 60});
+  parameters.Read("depth_units_per_m", config.depth_units_per_m, {1, 1e6});
   parameters.Read("tell_zone", config.tell_zone);
   parameters.Read("tell_confidence", config.tell_confidence, {0, 1});
   parameters.Read("base_frame", config.base_frame);

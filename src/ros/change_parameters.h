@@ -21,8 +21,11 @@ struct ChangeDetectionConfig {
   int max_waiting_frames = 30;     ///< Images that wait for their position.
   std::string base_frame = "base_link";
   std::string map_frame = "map";  ///< Of fused poses.
-  bool tell_zone = true;          ///< Objects that were passed, as MapChange.
-  double tell_confidence = 0.5;   ///< Least, of these.
+  bool use_depth = false;         ///< Of camera/depth/image_raw.
+  double depth_wait_s = 0.3;
+  double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
+  bool tell_zone = true;            ///< Objects that were passed, as MapChange.
+  double tell_confidence = 0.5;     ///< Least, of these.
   double diagnostics_period_s = 1.0;
   ChangeWatch::Config watch;
   BasePoseSource::Config pose;

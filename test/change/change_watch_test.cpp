@@ -45,6 +45,7 @@ class Drive {
     WatchedPicture picture;
     picture.stamp_ns = first_ns_ + static_cast<std::int64_t>(frame) * 100'000'000;
     picture.bgr = seen.bgr;
+    depth_ = seen.depth;
     picture.camera = Camera().intrinsics;
     picture.base_from_optical = Mounting().BaseFromOptical();
     const Eigen::Isometry3d base = seen.world_from_optical * picture.base_from_optical.inverse();
@@ -52,6 +53,13 @@ class Drive {
     const Eigen::Vector3d forward = base.linear().col(0);
     picture.heading_rad = std::atan2(forward.x(), forward.y());
     picture.covariance_m2 = 0.01 * Eigen::Matrix2d::Identity();
+    return picture;
+  }
+
+  /// The same with its depth.
+  WatchedPicture PictureWithDepth(std::size_t frame) {
+    WatchedPicture picture = Picture(frame);
+    picture.depth = depth_;
     return picture;
   }
 
@@ -97,6 +105,7 @@ class Drive {
   PassDrive drive_;
   StreetRenderer renderer_;
   std::int64_t first_ns_;
+  cv::Mat depth_;
 };
 
 const std::vector<PlacedHazard>& Before() {
@@ -188,6 +197,39 @@ TEST_F(ChangeWatchTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
   for (std::size_t frame = 0; frame < kFrames; frame += 4) {
     EXPECT_TRUE(watch->Look(drive.Picture(frame)).objects.empty()) << frame;
   }
+}
+
+TEST_F(ChangeWatchTest, DepthLaysTheEarlierPictureOnWhereItIsKnownAndEdgesDoWhereItIsNot) {
+  Remember();
+  const auto with_depth = Watch("tuesday");
+  Drive drive(Before(), 8.9, kFirstNs + kDayNs);
+  int by_depth = 0;
+  double depth_error = 0;
+  double edges_error = 0;
+  const auto error = [](const AlignedPair& pair) {
+    cv::Mat difference;
+    cv::absdiff(pair.before, pair.after, difference);
+    const cv::Scalar mean = cv::mean(difference, pair.valid);
+    return mean[0] + mean[1] + mean[2];
+  };
+  for (std::size_t frame = 10; frame < 50; frame += 10) {
+    WatchedPicture picture = drive.PictureWithDepth(frame);
+    const auto answer = with_depth->Look(picture);
+    ASSERT_EQ(answer.outcome, ChangeWatch::Outcome::kCompared) << answer.why;
+    by_depth += answer.registered_by == ChangeWatch::RegisteredBy::kDepth ? 1 : 0;
+    depth_error += error(answer.pair);
+    picture.depth.setTo(0);
+    ++picture.stamp_ns;
+    const auto without = with_depth->Look(picture);
+    ASSERT_EQ(without.outcome, ChangeWatch::Outcome::kCompared) << without.why;
+    EXPECT_NE(without.registered_by, ChangeWatch::RegisteredBy::kDepth);
+    edges_error += error(without.pair);
+  }
+  EXPECT_GE(by_depth, 3);
+  EXPECT_LT(depth_error, edges_error);
+  WatchedPicture wrong = drive.PictureWithDepth(60);
+  wrong.depth = cv::Mat(10, 10, CV_32FC1, cv::Scalar(5));
+  EXPECT_THROW(with_depth->Look(wrong), Error);
 }
 
 TEST_F(ChangeWatchTest, NeverComparesWithItsOwnDriveNorWithAnotherPlace) {

@@ -1,0 +1,37 @@
+#include "ros/depth_conversions.h"
+
+#include <cv_bridge/cv_bridge.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "base/error.h"
+
+namespace livemap {
+
+cv::Mat ToDepthMetres(const sensor_msgs::ImageConstPtr& message, cv::Size size,
+                      double units_per_m) {
+  namespace encodings = sensor_msgs::image_encodings;
+  const bool units =
+      message->encoding == encodings::TYPE_16UC1 || message->encoding == encodings::MONO16;
+  if (!units && message->encoding != encodings::TYPE_32FC1) {
+    throw Error("depth has encoding '" + message->encoding + "', accepted are 16UC1 and 32FC1");
+  }
+  const auto shared = cv_bridge::toCvShare(message);
+  const cv::Mat& depth = shared->image;
+  // A pixel of rounding in either direction.
+  if (depth.empty() || std::abs(1.0 * depth.cols * size.height - 1.0 * depth.rows * size.width) >
+                           depth.cols + size.width) {
+    throw Error("depth is " + std::to_string(depth.cols) + "x" + std::to_string(depth.rows) +
+                ", accepted is the shape of its image, " + std::to_string(size.width) + "x" +
+                std::to_string(size.height));
+  }
+  cv::Mat metres;
+  depth.convertTo(metres, CV_32FC1, units ? 1 / units_per_m : 1);
+  if (metres.size() != size) cv::resize(metres, metres, size, 0, 0, cv::INTER_NEAREST);
+  return metres;
+}
+
+}  // namespace livemap
