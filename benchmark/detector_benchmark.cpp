@@ -25,14 +25,14 @@
 #include "detection/hazard_detector.h"
 #include "detection/yolox_decoder.h"
 #include "run_benchmarks.h"
-#include "tools/detection_tool_support.h"
+#include "tools/shipped_model.h"
 
 namespace livemap {
 namespace {
 
 std::string ModelPath() {
   const char* path = std::getenv("LIVEMAP_MODEL");
-  return path != nullptr ? path : DefaultModelPath();
+  return path != nullptr ? path : ShippedModel("hazards-first");
 }
 
 int Threads() {
