@@ -1,5 +1,5 @@
 // What it costs to find the pictures of a place: the 15 nearest of 1e3 to 1e6 remembered frames,
-// and the best of them by their features.
+// and the best of them by their features. And what it costs to compare a pair of pictures.
 
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -8,13 +8,19 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "change/change_network.h"
 #include "change/image_features.h"
 #include "change/place_index.h"
+#include "change/registration.h"
 #include "run_benchmarks.h"
+#include "test/change/simulated_pairs.h"
+#include "tools/shipped_model.h"
 
 namespace livemap {
 namespace {
@@ -99,6 +105,81 @@ void MatchFifteen(benchmark::State& state) {
   }
 }
 
+constexpr int kThreads = 2;
+
+/// Pictures of one street on two days, of the network's size.
+struct SmallPair {
+  cv::Mat before;
+  cv::Mat after;
+};
+
+const std::vector<SmallPair>& SmallPairs() {
+  static const std::vector<SmallPair> pairs = [] {
+    std::vector<SmallPair> made;
+    for (const SimulatedPair& pair : MakePairs({})) {
+      SmallPair small;
+      cv::resize(pair.before.bgr, small.before, cv::Size(320, 256), 0, 0, cv::INTER_AREA);
+      cv::resize(pair.after.bgr, small.after, cv::Size(320, 256), 0, 0, cv::INTER_AREA);
+      made.push_back(small);
+    }
+    return made;
+  }();
+  return pairs;
+}
+
+/// Of all of them in turn; rendered before a clock runs.
+class PairsInTurn {
+ public:
+  PairsInTurn() : pairs_(SmallPairs()) {}
+  const SmallPair& Next() { return pairs_[next_++ % pairs_.size()]; }
+
+ private:
+  const std::vector<SmallPair>& pairs_;
+  std::size_t next_ = 0;
+};
+
+WarpedPicture RegisteredByEdges(const SmallPair& pair) {
+  const Registration found = RegisterByEdges(pair.before, pair.after, RegistrationOptions());
+  return WarpByHomography(pair.before, found.after_from_before);
+}
+
+void RegisterByItsEdges(benchmark::State& state) {
+  cv::setNumThreads(kThreads);
+  PairsInTurn pairs;
+  for (auto _ : state) benchmark::DoNotOptimize(RegisteredByEdges(pairs.Next()).picture.data);
+}
+
+void RegisterByItsFeatures(benchmark::State& state) {
+  cv::setNumThreads(kThreads);
+  PairsInTurn pairs;
+  for (auto _ : state) {
+    const SmallPair& pair = pairs.Next();
+    const Registration found = RegisterByHomography(
+        {pair.before.size(), ExtractFeatures(pair.before)},
+        {pair.after.size(), ExtractFeatures(pair.after)}, RegistrationOptions(), 1);
+    benchmark::DoNotOptimize(WarpByHomography(pair.before, found.after_from_before).picture.data);
+  }
+}
+
+/// The network that ships; with its registration when the argument is 1.
+void ComparePair(benchmark::State& state) {
+  const auto network = MakeChangeNetwork(ShippedModel("change-small"), kThreads);
+  const cv::Mat everywhere(256, 320, CV_8UC1, cv::Scalar(255));
+  PairsInTurn pairs;
+  for (auto _ : state) {
+    const SmallPair& pair = pairs.Next();
+    const WarpedPicture warped =
+        state.range(0) == 1 ? RegisteredByEdges(pair) : WarpedPicture{pair.before, everywhere};
+    const auto found = network->Run({warped.picture, pair.after, warped.valid});
+    benchmark::DoNotOptimize(found.of_class[0].data);
+  }
+  state.counters["pairs/s"] =
+      benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+
+BENCHMARK(RegisterByItsEdges)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(RegisterByItsFeatures)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(ComparePair)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(NearestFifteen)->RangeMultiplier(10)->Range(1000, 1000000);
 BENCHMARK(MatchFifteen)->Arg(300)->Arg(600)->Unit(benchmark::kMillisecond);
 
@@ -132,7 +213,8 @@ int main(int argc, char** argv) {
   livemap::GrowthReporter reporter;
   const int status = livemap::RunBenchmarks(
       argc, argv, "livemap_change_benchmark",
-      "Cost of finding the pictures of a place among 1e3 to 1e6, and of matching 15 of them.",
+      "Cost of comparing a pair of 320x256 on two threads, with and without its registration; of\n"
+      "finding the pictures of a place among 1e3 to 1e6, and of matching 15 of them.",
       &reporter);
   reporter.PrintGrowth();
   return status;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
@@ -14,7 +16,7 @@ namespace {
 constexpr int kOrientations = 4;
 constexpr int kWorkingWidth = 320;  // Pixels.
 constexpr double kSmoothingPx = 0.8;
-constexpr double kNeighbourhoodPx = 8;  // Within which an edge is measured by the others.
+const cv::Size kNeighbourhood(17, 17);  // Pixels within which an edge is measured by the others.
 constexpr double kPlainGradient = 20;   // Grey levels: what is weaker everywhere is no edge.
 constexpr int kLeadCells = 3;
 constexpr double kLeastEnergy = 1e-3;
@@ -45,8 +47,9 @@ Gradient GradientOf(const cv::Mat& grey) {
   cv::Mat magnitude;
   cv::magnitude(gradient.x, gradient.y, magnitude);
   cv::Mat around = magnitude.mul(magnitude);
-  cv::GaussianBlur(around, around, cv::Size(), kNeighbourhoodPx);
-  cv::sqrt(around, around);
+  // Nearly a Gaussian's window, at a tenth of its cost.
+  for (int i = 0; i < 3; ++i) cv::blur(around, around, kNeighbourhood);
+  cv::sqrt(cv::max(around, 0.0), around);  // Running sums end a little below 0.
   gradient.strength = magnitude / (around + kPlainGradient);
   const cv::Mat length = cv::max(magnitude, 1e-6);
   gradient.x /= length;
@@ -54,26 +57,52 @@ Gradient GradientOf(const cv::Mat& grey) {
   return gradient;
 }
 
-/// One correlation for every shift, at one scale of the earlier picture.
+/// Sums of squares over any rectangle of cells.
+class Energy {
+ public:
+  explicit Energy(const cv::Mat& cells) {
+    cv::Mat squared;
+    cv::transform(cells.mul(cells), squared, cv::Matx14f(1, 1, 1, 1));
+    cv::integral(squared, sums_, CV_64F);
+  }
+
+  double In(const cv::Rect& cells) const {
+    return sums_.at<double>(cells.y, cells.x) + sums_.at<double>(cells.br().y, cells.br().x) -
+           sums_.at<double>(cells.y, cells.br().x) - sums_.at<double>(cells.br().y, cells.x);
+  }
+
+ private:
+  cv::Mat sums_;
+};
+
+/// The cells that a picture fills when it is scaled about its middle, as far as they are its own.
+cv::Rect FilledBy(double scale, cv::Size size) {
+  const int left = std::max(0, cvCeil((1 - scale) * (size.width - 1) / 2));
+  const int top = std::max(0, cvCeil((1 - scale) * (size.height - 1) / 2));
+  return {left, top, size.width - 2 * left, size.height - 2 * top};
+}
+
+/// One correlation for every shift up to `most`, at one scale of the earlier picture.
 cv::Mat Correlations(const cv::Mat& before, double scale, const cv::Mat& after_padded,
-                     const cv::Mat& after_squared, const cv::Mat& after_inside) {
+                     const Energy& after_energy, const cv::Point& most) {
   const cv::Matx23d about_the_middle{scale, 0,     (1 - scale) * (before.cols - 1) / 2,
                                      0,     scale, (1 - scale) * (before.rows - 1) / 2};
   cv::Mat scaled;
-  cv::Mat known;
   cv::warpAffine(before, scaled, about_the_middle, before.size());
-  cv::warpAffine(cv::Mat::ones(before.size(), CV_32FC1), known, about_the_middle, before.size());
-  cv::Mat squared;
-  cv::transform(scaled.mul(scaled), squared, cv::Matx14f(1, 1, 1, 1));
-  cv::Mat products;
-  cv::Mat before_energy;
-  cv::Mat after_energy;
-  cv::matchTemplate(after_padded, scaled, products, cv::TM_CCORR);
-  cv::matchTemplate(after_inside, squared, before_energy, cv::TM_CCORR);
-  cv::matchTemplate(after_squared, known, after_energy, cv::TM_CCORR);
-  cv::Mat energy = before_energy.mul(after_energy);
-  cv::sqrt(cv::max(energy, kLeastEnergy), energy);
-  return products / energy;
+  const Energy before_energy(scaled);
+  const cv::Rect filled = FilledBy(scale, before.size());
+  cv::Mat correlations;
+  cv::matchTemplate(after_padded, scaled, correlations, cv::TM_CCORR);
+  for (int row = 0; row < correlations.rows; ++row) {
+    for (int column = 0; column < correlations.cols; ++column) {
+      const cv::Point shift = cv::Point(column, row) - most;
+      const cv::Rect overlap = (filled + shift) & cv::Rect(cv::Point(), before.size());
+      const double energy = before_energy.In(overlap - shift) * after_energy.In(overlap);
+      correlations.at<float>(row, column) /=
+          static_cast<float>(std::sqrt(std::max(energy, kLeastEnergy)));
+    }
+  }
+  return correlations;
 }
 
 /// Where a parabola through three values a step apart is highest, in steps from the middle one.
@@ -191,21 +220,16 @@ EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
   const cv::Size size = after.cells.size();
   const cv::Point most(static_cast<int>(search.most_shift_x * size.width),
                        static_cast<int>(search.most_shift_y * size.height));
-  const auto padded = [&](const cv::Mat& cells) {
-    cv::Mat larger;
-    cv::copyMakeBorder(cells, larger, most.y, most.y, most.x, most.x, cv::BORDER_CONSTANT);
-    return larger;
-  };
-  cv::Mat squared;
-  cv::transform(after.cells.mul(after.cells), squared, cv::Matx14f(1, 1, 1, 1));
-  const cv::Mat after_padded = padded(after.cells);
-  const cv::Mat after_squared = padded(squared);
-  const cv::Mat after_inside = padded(cv::Mat::ones(size, CV_32FC1));
-  std::vector<cv::Mat> correlations;
-  for (int i = 0; i < search.scales; ++i) {
-    correlations.push_back(
-        Correlations(before.cells, ScaleAt(i, search), after_padded, after_squared, after_inside));
-  }
+  cv::Mat padded;
+  cv::copyMakeBorder(after.cells, padded, most.y, most.y, most.x, most.x, cv::BORDER_CONSTANT);
+  const Energy after_energy(after.cells);
+  std::vector<cv::Mat> correlations(static_cast<std::size_t>(search.scales));
+  cv::parallel_for_(cv::Range(0, search.scales), [&](const cv::Range& scales) {
+    for (int i = scales.start; i < scales.end; ++i) {
+      correlations[static_cast<std::size_t>(i)] =
+          Correlations(before.cells, ScaleAt(i, search), padded, after_energy, most);
+    }
+  });
   const Peak peak = FindPeak(correlations);
   const cv::Vec3d refined = Refined(correlations, peak);
 
@@ -230,11 +254,13 @@ EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
 double EdgeAgreement(const EdgeCells& before, const EdgeCells& after) {
   CheckAlike(before, after);
   const cv::Rect all(cv::Point(), after.cells.size());
-  double sum = 0;
-  double weights = 0;
-  for (int row = 0; row + kBlockCells <= all.height; row += kBlockCells) {
-    for (int column = 0; column + kBlockCells <= all.width; column += kBlockCells) {
-      const cv::Rect block(column, row, kBlockCells, kBlockCells);
+  const int columns = all.width / kBlockCells;
+  const int blocks = columns * (all.height / kBlockCells);
+  std::vector<cv::Vec2d> found(static_cast<std::size_t>(blocks));  // Weighted best, and weight.
+  cv::parallel_for_(cv::Range(0, blocks), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const cv::Rect block(i % columns * kBlockCells, i / columns * kBlockCells, kBlockCells,
+                           kBlockCells);
       const double weight = cv::norm(after.cells(block));
       if (weight * weight < kLeastEnergy) continue;
       const cv::Point margin(kParallaxCells, kParallaxCells);
@@ -243,11 +269,11 @@ double EdgeAgreement(const EdgeCells& before, const EdgeCells& after) {
       cv::matchTemplate(before.cells(near), after.cells(block), correlations, cv::TM_CCORR_NORMED);
       double best = 0;
       cv::minMaxLoc(correlations, nullptr, &best);
-      sum += weight * best;
-      weights += weight;
+      found[static_cast<std::size_t>(i)] = {weight * best, weight};
     }
-  }
-  return weights > 0 ? sum / weights : 0;
+  });
+  const cv::Vec2d sum = std::accumulate(found.begin(), found.end(), cv::Vec2d());
+  return sum[1] > 0 ? sum[0] / sum[1] : 0;
 }
 
 }  // namespace livemap

@@ -64,7 +64,10 @@ def edge_cells(image: np.ndarray, columns: int = EDGE_COLUMNS) -> np.ndarray:
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 0.8)
     x, y = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
     magnitude = cv2.magnitude(x, y)
-    strength = magnitude / (np.sqrt(cv2.GaussianBlur(magnitude * magnitude, (0, 0), 8)) + 20)
+    around = magnitude * magnitude
+    for _ in range(3):  # nearly a Gaussian's window
+        around = cv2.blur(around, (17, 17))
+    strength = magnitude / (np.sqrt(np.maximum(around, 0)) + 20)
     x, y = x / np.maximum(magnitude, 1e-6), y / np.maximum(magnitude, 1e-6)
     cosine, sine = x * x - y * y, 2 * x * y
     parts = []
@@ -75,23 +78,35 @@ def edge_cells(image: np.ndarray, columns: int = EDGE_COLUMNS) -> np.ndarray:
     return np.stack(parts, axis=-1).astype(np.float32)
 
 
+def energies(cells: np.ndarray) -> np.ndarray:
+    """Integral image of the squares of cells (h x w x 4)."""
+    return cv2.integral((cells * cells).sum(axis=-1), sdepth=cv2.CV_64F)
+
+
+def within(integral: np.ndarray, left: np.ndarray, top: np.ndarray, end: np.ndarray, bottom: np.ndarray) -> np.ndarray:
+    """Sums over rectangles, whose right column and lowest row are no longer theirs."""
+    return integral[top, left] + integral[bottom, end] - integral[top, end] - integral[bottom, left]
+
+
 def edge_correlations(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Correlation of two pictures' cells (h x w x 4) for every scale and shift: SCALES x shifts down x shifts right."""
     height, width = first.shape[:2]
     down, right = int(MOST_SHIFT_Y * height), int(MOST_SHIFT_X * width)
-    inside, energy = np.ones((height, width), np.float32), (second * second).sum(axis=-1)
-    padded, inside, energy = (
-        cv2.copyMakeBorder(cells, down, down, right, right, cv2.BORDER_CONSTANT) for cells in (second, inside, energy)
-    )
+    padded = cv2.copyMakeBorder(second, down, down, right, right, cv2.BORDER_CONSTANT)
+    column, row = np.meshgrid(np.arange(-right, right + 1), np.arange(-down, down + 1))
+    energy = energies(second)
     found = []
     for scale in MOST_SCALE ** np.linspace(-1, 1, SCALES):
         onto = np.array([[scale, 0, (1 - scale) * (width - 1) / 2], [0, scale, (1 - scale) * (height - 1) / 2]])
         scaled = cv2.warpAffine(first, onto, (width, height))
-        known = cv2.warpAffine(np.ones((height, width), np.float32), onto, (width, height))
         products = cv2.matchTemplate(padded, scaled, cv2.TM_CCORR)
-        energies = cv2.matchTemplate(inside, (scaled * scaled).sum(axis=-1), cv2.TM_CCORR)
-        energies = energies * cv2.matchTemplate(energy, known, cv2.TM_CCORR)
-        found.append(products / np.sqrt(np.maximum(energies, 1e-3)))
+        # What of the second picture the first one fills, where it is shifted to.
+        beside, above = (max(int(np.ceil((1 - scale) * (length - 1) / 2)), 0) for length in (width, height))
+        left, top = np.maximum(beside + column, 0), np.maximum(above + row, 0)
+        end, bottom = np.minimum(width - beside + column, width), np.minimum(height - above + row, height)
+        shared = within(energy, left, top, end, bottom)
+        shared = shared * within(energies(scaled), left - column, top - row, end - column, bottom - row)
+        found.append(products / np.sqrt(np.maximum(shared, 1e-3)))
     return np.stack(found)
 
 
