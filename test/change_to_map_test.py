@@ -96,7 +96,7 @@ class Zone(system.LiveMapSystem):
             "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,
             "directory": self.directory / vehicle, "broker_port": self.broker_port,
             "password_file": self.password_file(vehicle), "use_truth": "true",
-            "changes": "true", "change_detection": "{most_range_m: 22.0, tell_confidence: 0.4}"})
+            "changes": "true", "change_detection": "{most_range_m: 30.0}"})
 
     def end_pass(self, vehicle, bag, drive):
         """When the vehicle has told the zone where the bag ends, and what it saw there."""

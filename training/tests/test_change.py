@@ -17,7 +17,7 @@ from change.data import IGNORED, Pair
 from change.inference import fill_invalid
 from change.loss import change_loss, class_weights
 from change.metrics import PixelCounts
-from change.network import ChangeNetwork, ThesisNetwork
+from change.network import ChangeNetwork, ThesisNetwork, Widths, beyond, widened
 from change.objects import CutOut, Ground
 from change.paste import paste_pair
 from change.validation import registered_pairs, validate
@@ -239,6 +239,23 @@ class Networks(unittest.TestCase):
             kept = self.network.encode(self.pictures[0])
             at_once = self.network.detect(*self.pictures, validity)
             torch.testing.assert_close(self.network.probabilities(kept, self.network.encode(self.pictures[1]), validity), at_once)
+
+    def test_what_is_only_shifted_is_not_beyond(self):
+        features = torch.rand(1, 4, 12, 16)
+        inner = (..., slice(3, -3), slice(3, -3))
+        self.assertEqual(beyond(features, features.roll((2, -2), (2, 3)), 5)[inner].max().item(), 0)
+        self.assertGreater(beyond(features, features.roll((3, 0), (2, 3)), 5)[inner].max().item(), 0)
+        apart = beyond(features + 2, features, 5)
+        self.assertGreater(apart.min().item(), 1, "brighter than all that is near")
+        torch.testing.assert_close(beyond(-features - 2, -features, 5), apart)
+
+    def test_a_widened_network_begins_as_the_narrower_one_ended(self):
+        narrow = ChangeNetwork(Widths(windows=(0, 0, 0, 0))).eval()
+        self.network.load_state_dict(widened(narrow.state_dict(), self.network))
+        with torch.no_grad():
+            torch.testing.assert_close(self.network(*self.pictures), narrow(*self.pictures))
+        with self.assertRaises(RuntimeError):
+            self.network.load_state_dict(widened(ThesisNetwork(base=4).state_dict(), self.network))
 
     def test_an_invalid_pixel_is_no_change(self):
         nn.init.constant_(self.network.final[-1].bias, 0)
