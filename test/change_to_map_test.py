@@ -96,7 +96,7 @@ class Zone(system.LiveMapSystem):
             "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,
             "directory": self.directory / vehicle, "broker_port": self.broker_port,
             "password_file": self.password_file(vehicle), "use_truth": "true",
-            "changes": "true", "change_detection": "{most_range_m: 30.0}"})
+            "changes": "true"})
 
     def end_pass(self, vehicle, bag, drive):
         """When the vehicle has told the zone where the bag ends, and what it saw there."""
@@ -165,7 +165,7 @@ class ChangeToMapTest(unittest.TestCase):
         barriers = eventually(lambda: self.zone.places("changes", direction="appeared", **{"class": "barrier"}), "the barrier is told")
         self.assertEqual(len(barriers), 1, barriers)
         self.assertLess(abs(barriers[0][0] - BARRIER_M), NEAR_M)
-        # Of the sign that went, class and direction are not sure yet: docs/change.md.
+        # Whether the sign that went is told, and as what, is not sure yet: docs/change.md.
         for place, properties in self.zone.places("changes"):
             self.assertLess(min(abs(place - changed_m) for changed_m in (REMOVED_M, BARRIER_M)), NEAR_M, (place, properties))
 
