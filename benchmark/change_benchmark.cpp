@@ -19,6 +19,7 @@
 #include "change/place_index.h"
 #include "change/registration.h"
 #include "run_benchmarks.h"
+#include "simulation/renderer.h"
 #include "test/change/simulated_pairs.h"
 #include "tools/shipped_model.h"
 
