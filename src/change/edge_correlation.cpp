@@ -179,11 +179,14 @@ void CheckAlike(const EdgeCells& before, const EdgeCells& after) {
 
 }  // namespace
 
-EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
+bool HasEdgeCells(cv::Size picture) {
   constexpr int kLeastSide = 32;
-  if (picture.empty() || (picture.type() != CV_8UC1 && picture.type() != CV_8UC3) ||
-      std::min(picture.cols, picture.rows) < kLeastSide ||
-      std::max(picture.cols, picture.rows) > 4 * std::min(picture.cols, picture.rows)) {
+  const int shorter = std::min(picture.width, picture.height);
+  return shorter >= kLeastSide && std::max(picture.width, picture.height) / 4.0 <= shorter;
+}
+
+EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
+  if (!HasEdgeCells(picture.size()) || (picture.type() != CV_8UC1 && picture.type() != CV_8UC3)) {
     throw Error("edges are looked for in a picture of " + std::to_string(picture.cols) + "x" +
                 std::to_string(picture.rows) +
                 ", accepted are 8 bit grey or colour, 32 pixels and more, a side up to four times "

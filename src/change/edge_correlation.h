@@ -15,8 +15,11 @@ struct EdgeCells {
 /// How many cells a picture is wide.
 enum class EdgeDetail { kCoarse = 80, kFine = 160 };
 
-/// `picture`: CV_8UC1 or CV_8UC3 (BGR), at least 32x32 pixels and at most four times as wide as it
-/// is high or the reverse; Error otherwise.
+/// Whether pictures of this size have cells: at least 32x32 pixels, and at most four times as wide
+/// as they are high or the reverse.
+bool HasEdgeCells(cv::Size picture);
+
+/// `picture`: CV_8UC1 or CV_8UC3 (BGR) of a size that HasEdgeCells; Error otherwise.
 EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail);
 
 /// What AlignByEdges looks through.

@@ -228,6 +228,13 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
   Registration registration;
   CheckSizes(before.size(), after.size(), registration);
   if (!registration.accepted()) return registration;
+  if (!HasEdgeCells(after.size())) {
+    Refuse(RegistrationRefusal::kEdges,
+           "the pictures are " + std::to_string(after.cols) + "x" + std::to_string(after.rows) +
+               ", for their edges 32x32 and more are accepted, a side up to four times the other",
+           registration);
+    return registration;
+  }
   const EdgeAlignment alignment =
       AlignByEdges(ExtractEdgeCells(before, EdgeDetail::kCoarse),
                    ExtractEdgeCells(after, EdgeDetail::kCoarse), options.edges);

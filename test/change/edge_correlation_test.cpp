@@ -92,6 +92,15 @@ TEST(EdgeCorrelation, PicturesOfDifferentSizesAreRefused) {
   EXPECT_EQ(ByEdges(smaller, image).refusal, RegistrationRefusal::kSize);
 }
 
+TEST(EdgeCorrelation, PicturesThatAreTooSmallOrTooLongAreRefused) {
+  for (const cv::Size size : {cv::Size(64, 31), cv::Size(401, 100), cv::Size(100, 401)}) {
+    const cv::Mat picture(size, CV_8UC3, cv::Scalar::all(90));
+    const Registration found = ByEdges(picture, picture);
+    EXPECT_EQ(found.refusal, RegistrationRefusal::kEdges) << size;
+    EXPECT_THAT(found.why, testing::HasSubstr("32x32 and more")) << size;
+  }
+}
+
 TEST(EdgeCorrelation, WhatIsNoPictureOfAStreetIsAMistake) {
   EXPECT_THROW(ExtractEdgeCells(cv::Mat(), EdgeDetail::kFine), Error);
   EXPECT_THROW(ExtractEdgeCells(cv::Mat(200, 300, CV_32FC1, cv::Scalar(0)), EdgeDetail::kFine),
