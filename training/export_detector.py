@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data, inference, onnx_model
 from detector.manifest import write_manifest
 from detector.metrics import average_precision, best_f1_threshold
-from detector.network import Detector
+from detector.network import SIZES, Detector
 from detector.validation import detect_simulated, validate
 from export_torch import ExportError, add_torch_file
 
@@ -43,11 +43,13 @@ DEFAULT_CHECKPOINT = Path("build/training/hazards/last.pt")
 
 def load_averaged(checkpoints: List[Path]) -> Detector:
     """The averaged weights of a checkpoint, or the mean of those of several."""
-    detector = Detector(len(CLASSES))
-    mean = {name: torch.zeros_like(value) for name, value in detector.state_dict().items()}
+    detector, mean = None, {}
     for checkpoint in checkpoints:
         try:
             state = torch.load(checkpoint, map_location="cpu")
+            if detector is None:
+                detector = Detector(len(CLASSES), SIZES[state["settings"]["size"]])
+                mean = {name: torch.zeros_like(value) for name, value in detector.state_dict().items()}
             detector.load_state_dict(state["average"])
         except (OSError, KeyError, RuntimeError) as error:
             raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error

@@ -23,6 +23,9 @@ from typing import Any, Dict, List, Optional
 import numpy as np
 import yaml
 
+sys.path.insert(0, str(Path(__file__).parent))
+from streets import busy_street
+
 CONDITIONS = ("day", "day", "dusk", "rain", "snow")
 """By day as often as twice any other weather."""
 
@@ -39,23 +42,6 @@ recall 0.87 at precision 0.38 and a false positive rate of 0.10). F1 at such a r
 
 MANY_HAZARDS_SHARE = 0.5
 """Streets with many hazards: a street that the seed makes up has few, and cones and barriers have to be learnt too."""
-
-
-def busy_street(rng: np.random.Generator, length_m: float) -> Dict[str, Any]:
-    """A world file's content: a town whose road is full of hazards, at the kerb and on the lanes."""
-    hazards, at_m = [], 10.0
-    while at_m < length_m:
-        kind = str(rng.choice(HAZARDS))
-        side = -1 if rng.random() < 0.6 else 1
-        for row in range(int(rng.integers(1, 5)) if kind in ("traffic_cone", "barrier") else 1):
-            hazards.append({
-                "class": kind, "at_m": round(at_m + 2.5 * row, 2), "left_m": round(side * float(rng.uniform(2.2, 4.6)), 2),
-            })
-        at_m += float(rng.uniform(8, 20))
-    return {
-        "scene": {"buildings": bool(rng.random() < 0.9), "trees": bool(rng.random() < 0.9), "parked_cars": True},
-        "hazards": sorted(hazards, key=lambda hazard: hazard["at_m"]),
-    }
 
 
 def camera(rng: np.random.Generator) -> Dict[str, Any]:
@@ -89,7 +75,7 @@ def render(options: argparse.Namespace, seed: int) -> None:
         changes = float(rng.choice([0.25, 0.5]))
         busy = busy or rng.random() < MANY_HAZARDS_SHARE
     if busy:
-        world = busy_street(rng, seconds * SPEED_MPS * 1.3 + 120)
+        world = busy_street(rng, seconds * SPEED_MPS * 1.3 + 120, HAZARDS)
         (unfinished / "world.yaml").write_text(yaml.safe_dump(world, sort_keys=False))
         command += ["--world", str(unfinished / "world.yaml")]
     for name, share in (("some", changes), ("none", 0.0), ("all", 1.0)):

@@ -2,6 +2,7 @@
 """Render simulated drives for training or for measuring, each with a street, weather and camera of its own.
 
     training/simulate_drives.py --out build/training/simulated --first-seed 10001 --drives 110
+    training/simulate_drives.py --out build/training/simulated --first-seed 15001 --drives 50 --rare
     training/simulate_drives.py --out build/training/simulated_validation --first-seed 20001 --drives 12
 
 A drive that is there already is left as it is, so that a stopped run continues with the same command.
@@ -18,11 +19,17 @@ from typing import Any, Dict, List, Optional
 import numpy as np
 import yaml
 
+sys.path.insert(0, str(Path(__file__).parent))
+from streets import busy_street
+
 CONDITIONS = ("day", "day", "dusk", "rain", "snow")
 """By day as often as twice any other weather."""
 
 COUNTRY_ROAD_SHARE = 0.4
 """Drives on open road with many potholes, through a camera like the road survey's."""
+
+RARE_HAZARDS = ("debris", "deer", "stopped_accident", "road_work_sign", "construction_machine")
+"""What a street that a seed makes up has too few of to learn them; --rare fills streets with them."""
 
 SPEED_MPS = 9.0
 
@@ -64,22 +71,31 @@ def camera(rng: np.random.Generator, survey: bool) -> Dict[str, Any]:
             "cx": (width - 1) / 2, "cy": (height - 1) / 2, "mounting": mounting}
 
 
-def render(program: str, out: Path, seed: int, frames: int, rate_hz: float) -> None:
+def world(rng: np.random.Generator, survey: bool, rare: bool, length_m: float) -> Optional[Dict[str, Any]]:
+    """A world file's content; none where the simulator makes the street up."""
+    if rare:
+        return busy_street(rng, length_m, RARE_HAZARDS)
+    return country_road(rng, length_m) if survey else None
+
+
+def render(options: argparse.Namespace, seed: int) -> None:
     """One drive in OUT/SEED; its folder appears when it is complete."""
     rng = np.random.default_rng(seed)
-    survey = rng.random() < COUNTRY_ROAD_SHARE
-    folder, unfinished = out / f"{seed:06d}", out / f".{seed:06d}"
+    survey = rng.random() < COUNTRY_ROAD_SHARE and not options.rare
+    folder, unfinished = options.out / f"{seed:06d}", options.out / f".{seed:06d}"
     if folder.exists():
         return
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.mkdir(parents=True)
     camera_file, world_file = unfinished / "camera.yaml", unfinished / "world.yaml"
     camera_file.write_text(yaml.safe_dump(camera(rng, survey), sort_keys=False))
-    command = [program, "--seed", str(seed), "--condition", str(rng.choice(CONDITIONS)), "--camera", str(camera_file),
-               "--seconds", str(frames / rate_hz), "--rate", str(rate_hz), "--speed", str(SPEED_MPS), "--threads", "1",
+    seconds = options.frames / options.rate
+    command = [options.program, "--seed", str(seed), "--condition", str(rng.choice(CONDITIONS)), "--camera", str(camera_file),
+               "--seconds", str(seconds), "--rate", str(options.rate), "--speed", str(SPEED_MPS), "--threads", "1",
                "--blur", str(rng.choice([0, 0, 3])), "--yolo", str(unfinished / "drive")]
-    if survey:
-        world_file.write_text(yaml.safe_dump(country_road(rng, frames / rate_hz * SPEED_MPS * 1.1 + 200), sort_keys=False))
+    street = world(rng, survey, options.rare, seconds * SPEED_MPS * 1.1 + 200)
+    if street:
+        world_file.write_text(yaml.safe_dump(street, sort_keys=False))
         command += ["--world", str(world_file)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     camera_file.rename(unfinished / "drive" / camera_file.name)
@@ -96,12 +112,13 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--drives", type=int, default=110)
     parser.add_argument("--frames", type=int, default=20, help="pictures of each drive")
     parser.add_argument("--rate", type=float, default=0.8, help="pictures per second")
+    parser.add_argument("--rare", action="store_true", help="town streets full of hazards that are rare elsewhere")
     parser.add_argument("--jobs", type=int, default=2, help="drives at once")
     options = parser.parse_args(arguments)
     seeds = range(options.first_seed, options.first_seed + options.drives)
     try:
         with ThreadPoolExecutor(options.jobs) as pool:
-            jobs = [pool.submit(render, options.program, options.out, seed, options.frames, options.rate) for seed in seeds]
+            jobs = [pool.submit(render, options, seed) for seed in seeds]
             for number, job in enumerate(jobs, 1):
                 job.result()
                 print(f"drive {number} of {len(jobs)}", flush=True)

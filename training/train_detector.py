@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data
 from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
-from detector.network import Detector
-from detector.pretrained import ConversionError, load_backbone
+from detector.network import SIZES, Detector
+from detector.pretrained import ConversionError, load_backbone, load_exported
 from detector.training import (
     VIEWS, AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
 )
@@ -42,7 +42,7 @@ class Trainer:
     def __init__(self, settings: Settings, device: torch.device):
         torch.manual_seed(settings.seed)
         self.settings, self.device = settings, device
-        self.model = Detector(len(CLASSES)).to(device, memory_format=torch.channels_last)
+        self.model = Detector(len(CLASSES), SIZES[settings.size]).to(device, memory_format=torch.channels_last)
         self.average = AveragedModel(self.model)
         self.frozen = [self.model.backbone.stem] if settings.freeze else []
         for part in self.frozen:
@@ -88,13 +88,17 @@ class Trainer:
         self.model.load_state_dict(weights)
         self.average = AveragedModel(self.model)
 
-    def start_from_backbone(self, path: Path, pictures: dict) -> None:
-        """Begin with the backbone of another network, its normalisation calibrated on our samples."""
+    def start_from_others(self, backbone: Optional[Path], exported: Optional[Path], pictures: dict) -> None:
+        """Begin with the backbone of another network, with what an exported detector shares with ours, or with both."""
         views = VIEWS["crops"]
         augmenter = Augmenter(pictures, views.recipe, views.width, views.height)
         samples = EpochSamples(augmenter, self.settings.seed, 0, CALIBRATION_SAMPLES)
         images, targets = next(iter(batches(samples, CALIBRATION_SAMPLES, 0)))
-        load_backbone(self.model.backbone, path, to_device(images, targets, self.device)[0])
+        images = to_device(images, targets, self.device)[0]
+        if backbone:
+            load_backbone(self.model.backbone, backbone, images)
+        if exported:
+            print(f"{load_exported(self.model, exported, images)} convolutions are those of {exported}", flush=True)
         self.average = AveragedModel(self.model)
 
     def train_epoch(self, pictures: dict, workers: int) -> dict:
@@ -148,8 +152,9 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
     parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
-    parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with")
+    parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights, or an exported .onnx, to begin a new run with")
     parser.add_argument("--pretrained", type=Path, metavar="BACKBONE", help="file of training/convert_backbone.py to begin with")
+    parser.add_argument("--size", choices=tuple(SIZES), default=defaults["size"], help="of the network")
     parser.add_argument("--workers", type=int, default=1, help="processes that prepare samples")
     parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
     parser.add_argument("--validate-every", type=int, default=10, metavar="EPOCHS")
@@ -167,6 +172,11 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
+def exported(arguments: argparse.Namespace) -> Optional[Path]:
+    """What --start-from names, where that is an exported model and no checkpoint."""
+    return arguments.start_from if arguments.start_from and arguments.start_from.suffix == ".onnx" else None
+
+
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """Settings of the command line, checked."""
     for name in ("epochs", "samples_per_epoch", "validate_every", "threads"):
@@ -178,8 +188,8 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
     if not 0 <= arguments.backbone_rate <= 10:
         raise UsageError(f"--backbone-rate must be from 0 to 10, not {arguments.backbone_rate}.")
-    if arguments.pretrained and arguments.start_from:
-        raise UsageError("--pretrained and --start-from exclude each other.")
+    if arguments.pretrained and arguments.start_from and not exported(arguments):
+        raise UsageError("--pretrained and the checkpoint of --start-from exclude each other.")
     if not 0 <= arguments.settle <= 1:
         raise UsageError(f"--settle must be from 0 to 1, not {arguments.settle}.")
     known = {field.name for field in fields(Settings)}
@@ -205,12 +215,13 @@ def run(arguments: argparse.Namespace) -> None:
     elif arguments.start_from:
         if not arguments.start_from.is_file():
             raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
-        trainer.start_from(torch.load(arguments.start_from, map_location=device))
+        if not exported(arguments):
+            trainer.start_from(torch.load(arguments.start_from, map_location=device))
     pictures = data.read_training_pictures(arguments.data)
     if arguments.simulated:
         pictures["simulated"] = data.read_simulated(arguments.simulated)
-    if arguments.pretrained and not last.exists():
-        trainer.start_from_backbone(arguments.pretrained, pictures)
+    if (arguments.pretrained or exported(arguments)) and not last.exists():
+        trainer.start_from_others(arguments.pretrained, exported(arguments), pictures)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
     arguments.out.mkdir(parents=True, exist_ok=True)

@@ -29,6 +29,14 @@ cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& 
   return filled;
 }
 
+void SpreadOverUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities) {
+  const cv::Mat unseen = valid == 0;
+  const auto kinds = static_cast<float>(probabilities.of_class.size() - 1);
+  for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
+    probabilities.of_class[i].setTo(i == 0 ? 1 - kUnseenChange : kUnseenChange / kinds, unseen);
+  }
+}
+
 ChangeProbabilities ChangeMethod::Run(const AlignedPair& pair) {
   const cv::Size size = pair.after.size();
   if (pair.after.empty() || pair.after.type() != CV_8UC3 || pair.before.type() != CV_8UC3 ||

@@ -27,6 +27,12 @@ Json CountsJson(const BinaryCounts& counts) {
   return json;
 }
 
+/// The most that the share of changed pixels allows: every one found, at as many false positives.
+BinaryCounts FullRecall(BinaryCounts counts) {
+  counts.true_positive += std::exchange(counts.false_negative, 0);
+  return counts;
+}
+
 Json OperationsJson(const ScoreHistogram& scores) {
   Json json;
   for (const auto& [name, rate] : kRates) {
@@ -37,6 +43,7 @@ Json OperationsJson(const ScoreHistogram& scores) {
     }
     json[name]["threshold"] = operation->threshold;
     json[name].update(CountsJson(operation->counts));
+    json[name]["f1_at_full_recall"] = FigureOrNull(FullRecall(operation->counts).f1());
   }
   return json;
 }
@@ -150,6 +157,7 @@ Json ToJson(const ChangeReport& report, std::size_t curve_points) {
   json["registration"] = report.registration;
   json["pairs"] = report.forward.community.pairs().size();
   json["refused_pairs"] = report.refused;
+  json["left_out_pairs"] = report.hardly_changed;
   if (curve_points > 0) json["refusals"] = report.refusals;
   json["unknown_colour_pixels"] = report.unknown_colour_pixels;
   json["method_ms_p50"] = report.method_ms_p50;
@@ -163,6 +171,9 @@ std::string ToText(const ChangeReport& report) {
   const std::size_t pairs = report.forward.community.pairs().size();
   std::string text =
       report.method + ", " + std::to_string(pairs) + " pairs, registration: " + report.registration;
+  if (report.hardly_changed > 0) {
+    text += ", " + std::to_string(report.hardly_changed) + " left out as hardly changed";
+  }
   if (report.refused > 0) text += ", " + std::to_string(report.refused) + " refused";
   text += "\n" + FiguresText(report.forward);
   if (report.has_reversed) text += "order reversed\n" + FiguresText(report.reversed);

@@ -20,6 +20,7 @@ struct ChangeReport {
   std::string registration;           ///< "none", "edges", "homography" or "both".
   std::size_t refused = 0;            ///< Pairs that could not be registered: no change is said.
   std::vector<std::string> refusals;  ///< "NAME: why", in order.
+  std::size_t hardly_changed = 0;     ///< Pairs left out as too little of them has changed.
   std::size_t unknown_colour_pixels = 0;
   double method_ms_p50 = 0;        ///< Wall time of the method alone, ms; 0 for predictions.
   double registration_ms_p50 = 0;  ///< Of a pair, with its warp.

@@ -1,8 +1,11 @@
 #include "change/registration.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -174,6 +177,15 @@ double DepthAt(const cv::Mat& depth, const cv::Point2d& point) {
   return z;
 }
 
+/// Runs all of them, in OpenCV's threads; returns when the last is done.
+template <typename... Tasks>
+void InParallel(const Tasks&... tasks) {
+  const std::array<std::function<void()>, sizeof...(Tasks)> all{tasks...};
+  cv::parallel_for_(cv::Range(0, static_cast<int>(all.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) all[static_cast<std::size_t>(i)]();
+  });
+}
+
 }  // namespace
 
 const char* RegistrationRefusalName(RegistrationRefusal refusal) {
@@ -235,14 +247,18 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
            registration);
     return registration;
   }
-  const EdgeAlignment alignment =
-      AlignByEdges(ExtractEdgeCells(before, EdgeDetail::kCoarse),
-                   ExtractEdgeCells(after, EdgeDetail::kCoarse), options.edges);
+  // Filters of small pictures leave most cores idle: the pictures are looked at side by side.
+  EdgeCells before_coarse;
+  EdgeCells after_coarse;
+  EdgeCells after_fine;
+  InParallel([&] { before_coarse = ExtractEdgeCells(before, EdgeDetail::kCoarse); },
+             [&] { after_coarse = ExtractEdgeCells(after, EdgeDetail::kCoarse); },
+             [&] { after_fine = ExtractEdgeCells(after, EdgeDetail::kFine); });
+  const EdgeAlignment alignment = AlignByEdges(before_coarse, after_coarse, options.edges);
   cv::Mat aligned;
   cv::warpPerspective(before, aligned, alignment.after_from_before, before.size(), cv::INTER_LINEAR,
                       cv::BORDER_REPLICATE);
-  const double agreement = EdgeAgreement(ExtractEdgeCells(aligned, EdgeDetail::kFine),
-                                         ExtractEdgeCells(after, EdgeDetail::kFine));
+  const double agreement = EdgeAgreement(ExtractEdgeCells(aligned, EdgeDetail::kFine), after_fine);
   registration.edge_evidence = alignment.correlation + alignment.lead + agreement;
   if (registration.edge_evidence < options.least_edge_evidence) {
     Refuse(RegistrationRefusal::kEdges,

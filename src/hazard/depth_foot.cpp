@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "hazard/road_foot.h"
+
 namespace livemap {
 namespace {
 
@@ -98,7 +100,7 @@ std::optional<GroundPoint> FootByDepth(const DepthImage& image, const Box& box,
   const auto foot = MeasureFoot(image, box, depth_noise);
   if (!foot) return std::nullopt;
   const double depth_m = foot->depth.median_m;
-  const Eigen::Vector2d pixel(0.5 * (box.x_min + box.x_max) - 0.5, box.y_max - 0.5);
+  const Eigen::Vector2d pixel = FootPixel(box);
   const Eigen::Matrix3d rotation = base_from_optical.linear();
   const Eigen::Vector3d direction =
       rotation * Eigen::Vector3d((pixel.x() - intrinsics.cx) / intrinsics.fx,

@@ -1,23 +1,17 @@
 #include "hazard/hazard_reporter.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "base/stamps.h"
+#include "hazard/road_foot.h"
 
 namespace livemap {
 namespace {
 
 constexpr std::size_t kMaxEarlyPictures = 8;
 constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
-
-/// Standard deviation along the worst axis.
-double LargestSigma(const Eigen::Matrix2d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(axes.eigenvalues().maxCoeff());
-}
 
 }  // namespace
 
@@ -96,12 +90,7 @@ void HazardReporter::AddPose(std::int64_t stamp_ns, const TrackPose& pose) {
 }
 
 bool HazardReporter::IsUsable(const Sighting& sighting) {
-  const Box& box = sighting.box;
-  const bool finite = std::isfinite(box.x_min) && std::isfinite(box.y_min) &&
-                      std::isfinite(box.x_max) && std::isfinite(box.y_max);
-  if (!finite || box.x_min >= box.x_max || box.y_min >= box.y_max ||
-      !(sighting.confidence >= 0 && sighting.confidence <= 1) || sighting.class_name.empty() ||
-      sighting.class_name.size() > kMaxClassNameBytes) {
+  if (!IsWellFormed(sighting)) {
     ++counters_.invalid_detections;
     return false;
   }
@@ -280,21 +269,19 @@ std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& fram
         FootByDepth(depth->second, box, *intrinsics_, mounting, config_.projection, config_.depth);
     if (ground) ++counters_.distances_by_depth;
   }
+  if (!ground && IsCutBySide(box, intrinsics_->width)) {
+    ++counters_.cut_by_side;
+    return std::nullopt;
+  }
   if (!ground) {
-    // Bottom centre of the box. Box edges count from the first pixel's outer corner, the camera
-    // model from its centre.
-    const Eigen::Vector2d foot(0.5 * (box.x_min + box.x_max) - 0.5, box.y_max - 0.5);
-    ground = ProjectToGround(foot, *intrinsics_, mounting, config_.projection);
+    ground = ProjectToGround(FootPixel(box), *intrinsics_, mounting, config_.projection);
   }
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
   }
-  const Eigen::Vector2d swing_m(ground->position_m.y(), -ground->position_m.x());
-  const Eigen::Matrix2d seen_from_vehicle_m2 =
-      ground->covariance_m2 + heading_variance_rad2 * swing_m * swing_m.transpose();
-  if (ground->position_m.norm() > config_.max_range_m ||
-      LargestSigma(seen_from_vehicle_m2) > config_.max_ground_sigma_m) {
+  if (!IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
+                    config_.max_ground_sigma_m)) {
     ++counters_.too_far;
     return std::nullopt;
   }

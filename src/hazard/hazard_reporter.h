@@ -100,6 +100,7 @@ class HazardReporter {
     std::uint64_t dropped_no_fix = 0;     ///< Waited in vain, or overflowed the waiting room.
     std::uint64_t dropped_no_camera = 0;  ///< No camera_info or mounting, or another image size.
     std::uint64_t not_on_ground = 0;      ///< Box ends at or above the horizon.
+    std::uint64_t cut_by_side = 0;        ///< By the image's: the foot may be out of view.
     std::uint64_t too_far = 0;            ///< Waits for a nearer view.
     std::uint64_t duplicates_suppressed = 0;
     std::uint64_t reports_created = 0;

@@ -1,10 +1,10 @@
 #include "hazard/place_view.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <optional>
 
 #include "hazard/hazard_placement.h"
+#include "hazard/road_foot.h"
 
 namespace livemap {
 namespace {
@@ -33,12 +33,6 @@ Eigen::Matrix2d RelativeCovariance(const Eigen::Vector2d& east_north_m,
   const Eigen::Vector2d swing_m(east_north_m.y(), -east_north_m.x());
   return place_m2 + base.covariance_m2 + base.course_variance_rad2 * swing_m * swing_m.transpose() +
          swing_m * base.position_course.transpose() + base.position_course * swing_m.transpose();
-}
-
-/// Standard deviation along the worst axis.
-double LargestSigmaM(const Eigen::Matrix2d& covariance_m2) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance_m2, Eigen::EigenvaluesOnly);
-  return std::sqrt(axes.eigenvalues().maxCoeff());
 }
 
 bool IsInside(double pixel, double sigma_px, int size, double margin_share) {
@@ -78,8 +72,7 @@ bool IsAtPlace(const Box& box, const GeoPoint& place, const PlaceView& view,
                const PlacedCamera& camera, const GroundProjectionNoise& noise, double gate_sigma,
                double radius_m) {
   if (view.visibility == PlaceView::Visibility::kBehind) return false;
-  // Box edges count from the first pixel's outer corner, the camera model from its centre.
-  const Eigen::Vector2d foot(0.5 * (box.x_min + box.x_max) - 0.5, box.y_max - 0.5);
+  const Eigen::Vector2d foot = FootPixel(box);
   const auto ground = ProjectToGround(foot, camera.intrinsics, camera.base_from_optical, noise);
   // Far away a few pixels are many metres: it could be another one behind or before the place.
   if (!ground || LargestSigmaM(ground->covariance_m2) > radius_m / 2) return false;

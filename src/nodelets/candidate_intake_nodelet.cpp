@@ -193,6 +193,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     status.add("sightings", counters.sightings);
     status.add("sightings_invalid", counters.invalid_sightings);
     status.add("sightings_below_confidence", counters.below_confidence);
+    status.add("sightings_cut_by_side", counters.cut_by_side);
     status.add("sightings_not_on_ground", counters.not_on_ground);
     status.add("sightings_too_far", counters.too_far);
     status.add("reports", counters.reports);

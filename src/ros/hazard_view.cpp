@@ -114,6 +114,7 @@ void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
   status.add("dropped_no_fix", counters.dropped_no_fix);
   status.add("dropped_no_camera", counters.dropped_no_camera);
   status.add("not_on_ground", counters.not_on_ground);
+  status.add("cut_by_side", counters.cut_by_side);
   status.add("too_far", counters.too_far);
   status.add("duplicates_suppressed", counters.duplicates_suppressed);
   status.add("reports_created", counters.reports_created);

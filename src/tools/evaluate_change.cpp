@@ -30,6 +30,7 @@ struct Options {
   std::string write;
   std::uint64_t seed = 1;
   std::string registration;  ///< "none", "edges", "homography" or "both".
+  double least_changed = 0;  ///< Share of the pixels that count; pairs below are left out.
   bool json = false;
   bool curves = false;
 };
@@ -54,6 +55,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
         "of the earlier picture: none, edges, homography, or both: edges first, as on board "
         "(both)"},
        {"seed", "N", "of the registration's draws (1)"},
+       {"least-changed", "SHARE", "leave out pairs of which a smaller share has changed (0)"},
        {"curves", "", "with --json: curves, figures per pair, refusals"},
        {"write", "DIR", "the method's scores (NAME.png) and classes (NAME_class.png)"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
@@ -80,6 +82,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (options.method.empty() && options.model.empty() && options.predictions.empty()) {
     options.model = ShippedModel("change-small");
   }
+  options.least_changed = line.Number("least-changed", 0, 0, 1);
   options.json = line.Has("json");
   options.curves = line.Has("curves");
   return options;
@@ -95,6 +98,13 @@ double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Of the pixels that the truth does not leave out; 0 where it leaves all out.
+double ChangedShare(const cv::Mat& truth) {
+  const int known = cv::countNonZero(truth != kLeftOutPixel);
+  const int unchanged = cv::countNonZero(truth == static_cast<int>(ChangeClass::kNoChange));
+  return known == 0 ? 0 : 1 - static_cast<double>(unchanged) / known;
 }
 
 class Evaluation {
@@ -117,6 +127,10 @@ class Evaluation {
 
   void Add(const ChangePairFiles& files) {
     const ChangePair pair = LoadChangePair(files);
+    if (ChangedShare(pair.truth) < options_.least_changed) {
+      ++report_.hardly_changed;
+      return;
+    }
     report_.unknown_colour_pixels += pair.unknown_colour_pixels;
     const ChangeProbabilities forward = Forward(files, pair);
     Count(files.name, forward, pair, report_.forward);
@@ -144,11 +158,11 @@ class Evaluation {
       return ReadPrediction(options_.predictions, files.name, pair.truth.size());
     }
     aligned_ = Align(files, pair);
-    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
+    if (!aligned_) return NothingSeen(pair.truth.size());
     const auto start = std::chrono::steady_clock::now();
     ChangeProbabilities probabilities = method_->Run(*aligned_);
     method_ms_.push_back(MillisecondsSince(start));
-    return probabilities;
+    return WithUnseen(aligned_->valid, std::move(probabilities));
   }
 
   /// After Forward of the same pair: the view stays that of the later picture, whose mask the truth
@@ -157,8 +171,21 @@ class Evaluation {
     if (method_ == nullptr) {
       return ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
     }
-    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
-    return method_->Run({aligned_->after, aligned_->before, aligned_->valid});
+    if (!aligned_) return NothingSeen(pair.truth.size());
+    return WithUnseen(aligned_->valid,
+                      method_->Run({aligned_->after, aligned_->before, aligned_->valid}));
+  }
+
+  /// Of a pair that was refused.
+  ChangeProbabilities NothingSeen(cv::Size size) const {
+    return WithUnseen(cv::Mat::zeros(size, CV_8UC1),
+                      NothingChanged(size, method_->tells_classes()));
+  }
+
+  /// A network's scores are probabilities, so it can say how little it knows; a distance can't.
+  ChangeProbabilities WithUnseen(const cv::Mat& valid, ChangeProbabilities probabilities) const {
+    if (!options_.model.empty()) SpreadOverUnseen(valid, probabilities);
+    return probabilities;
   }
 
   /// As on board, or by one of the two ways alone.

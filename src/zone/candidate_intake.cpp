@@ -1,21 +1,16 @@
 #include "zone/candidate_intake.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "base/sha256.h"
 #include "hazard/hazard_placement.h"
+#include "hazard/road_foot.h"
 
 namespace livemap {
 namespace {
 
 constexpr double kEndlessM = 1e4;  // The projection's own limit; max_range_m is ours.
-
-double WorstSigmaM(const Eigen::Matrix2d& covariance_m2) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance_m2, Eigen::EigenvaluesOnly);
-  return std::sqrt(axes.eigenvalues().maxCoeff());
-}
 
 std::uint8_t HexDigit(char digit) {
   return static_cast<std::uint8_t>(digit <= '9' ? digit - '0' : digit - 'a' + 10);
@@ -131,12 +126,7 @@ std::vector<Report> CandidateIntake::Finish(std::int64_t internal_ns, const Sigh
 }
 
 bool CandidateIntake::IsUsable(const Sighting& sighting) {
-  const Box& box = sighting.box;
-  const bool finite = std::isfinite(box.x_min) && std::isfinite(box.y_min) &&
-                      std::isfinite(box.x_max) && std::isfinite(box.y_max);
-  if (!finite || box.x_min >= box.x_max || box.y_min >= box.y_max ||
-      !(sighting.confidence >= 0 && sighting.confidence <= 1) || sighting.class_name.empty() ||
-      sighting.class_name.size() > kMaxClassNameBytes) {
+  if (!IsWellFormed(sighting)) {
     ++counters_.invalid_sightings;
     return false;
   }
@@ -149,25 +139,21 @@ bool CandidateIntake::IsUsable(const Sighting& sighting) {
 
 std::optional<GroundPoint> CandidateIntake::PlaceOnRoad(const Candidate& frame,
                                                         const Sighting& sighting) {
+  if (IsCutBySide(sighting.box, frame.intrinsics.width)) {
+    ++counters_.cut_by_side;
+    return std::nullopt;
+  }
   GroundProjectionNoise noise = config_.projection;
   noise.max_range_m = kEndlessM;
-  const Box& box = sighting.box;
-  // Bottom centre of the box. Box edges count from the first pixel's outer corner, the camera model
-  // from its centre.
-  const Eigen::Vector2d foot(0.5 * (static_cast<double>(box.x_min) + box.x_max) - 0.5,
-                             static_cast<double>(box.y_max) - 0.5);
-  auto ground = ProjectToGround(foot, frame.intrinsics, frame.base_from_optical, noise);
+  auto ground =
+      ProjectToGround(FootPixel(sighting.box), frame.intrinsics, frame.base_from_optical, noise);
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
   }
-  const Eigen::Vector2d swing_m(ground->position_m.y(), -ground->position_m.x());
   const double heading_variance_rad2 = frame.fused ? frame.base.course_variance_rad2 : 0.0;
-  const Eigen::Matrix2d seen_from_vehicle_m2 =
-      ground->covariance_m2 + heading_variance_rad2 * swing_m * swing_m.transpose();
-  // Written so that NaN is too far.
-  if (!(ground->position_m.norm() <= config_.max_range_m &&
-        WorstSigmaM(seen_from_vehicle_m2) <= config_.max_ground_sigma_m)) {
+  if (!IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
+                    config_.max_ground_sigma_m)) {
     ++counters_.too_far;
     return std::nullopt;
   }

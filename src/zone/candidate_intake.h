@@ -57,6 +57,7 @@ class CandidateIntake {
     std::uint64_t sightings = 0;         ///< In them.
     std::uint64_t invalid_sightings = 0;
     std::uint64_t below_confidence = 0;
+    std::uint64_t cut_by_side = 0;  ///< By the image's: the foot may be out of view.
     std::uint64_t not_on_ground = 0;
     std::uint64_t too_far = 0;
     std::uint64_t reports = 0;

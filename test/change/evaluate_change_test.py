@@ -157,6 +157,18 @@ class EvaluateChangeTest(unittest.TestCase):
         alone = self.figures("--register", "edges", self.data)
         self.assertGreaterEqual(alone["refused_pairs"], figures["refused_pairs"])
 
+    def test_pairs_of_which_less_has_changed_are_left_out(self):
+        shares = {pair: float((mask > 0).mean()) for pair, mask in self.masks().items()}
+        least = max(shares.values())
+        figures = self.figures("--method", "daisy", "--register", "none", "--least-changed", str(least), self.data)
+        self.assertEqual((figures["pairs"], figures["left_out_pairs"]), (1, PAIRS - 1))
+        self.assertAlmostEqual(figures["change_pixels"] / figures["pixels"], least)
+        for rate in ("0.10", "0.01"):
+            at_rate = figures["at_fpr"][rate]
+            full = 2 * least / (2 * least + at_rate["fpr"] * (1 - least))
+            self.assertAlmostEqual(at_rate["f1_at_full_recall"], full)
+            self.assertLess(at_rate["f1"], full)
+
     def test_the_flat_layout_of_two_classes_is_read(self):
         flat = self.path("flat")
         for part in ("t0", "t1", "mask"):
@@ -183,6 +195,7 @@ class EvaluateChangeTest(unittest.TestCase):
         for arguments, expected in [
                 ([], "got 0 arguments"), (["/nowhere"], "/nowhere"), ([empty], "0 pairs"),
                 (["--method", "best", self.data], "dense-sift and daisy"),
+                (["--least-changed", "2", self.data], "--least-changed"),
                 (["--register", "well", self.data], "none, edges, homography and both"),
                 (["--predictions", empty, self.data], "000/00' is missing"),
                 (["--method", "daisy", "--predictions", empty, self.data], "--method"),

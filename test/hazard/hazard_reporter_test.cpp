@@ -104,6 +104,19 @@ TEST_F(HazardReporterTest, BoxAboveTheHorizonIsNotPlaced) {
   EXPECT_EQ(counters().not_on_ground, 1u);
 }
 
+TEST_F(HazardReporterTest, BoxThatTheImagesSideCutsWaitsForAViewOfItsFoot) {
+  DriveFixes(0, 4);
+  const Box whole = BoxAt(12, 0);
+  for (const float left : {0.0F, 620.0F}) {
+    const Box cut{left, whole.y_min, left + (whole.x_max - whole.x_min), whole.y_max};
+    See(3.0, {{"road_work_sign", 0.8F, cut}});
+  }
+  EXPECT_THAT(TakeDue(), IsEmpty());
+  EXPECT_EQ(counters().cut_by_side, 2u);
+  See(3.5, {{"road_work_sign", 0.8F, whole}});
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
 TEST_F(HazardReporterTest, WithoutAFixSightingsAreHeldBackThenDroppedAndCounted) {
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}, {"debris", 0.8F, BoxAt(9, 0)}});
   EXPECT_EQ(counters().held_back_no_fix, 2u);

@@ -101,7 +101,9 @@ TEST_F(CandidateIntakeTest, WhatIsTooFarOrNotOnTheRoadIsNotReported) {
   SightingFrame answer = AnswerOf(stamp, 31, 0);
   answer.sightings.push_back({"deer", 0.9F, {100, 10, 200, 100}});  // Ends above the horizon.
   answer.sightings.push_back({"deer", 0.9F, {100, 10, std::nanf(""), 100}});
+  answer.sightings.push_back({"deer", 0.9F, {0, 200, 100, 390}});  // Its foot may be out of view.
   EXPECT_THAT(intake.Finish(stamp, answer), IsEmpty());
+  EXPECT_EQ(intake.counters().cut_by_side, 1U);
   EXPECT_EQ(intake.counters().too_far, 1U);
   EXPECT_EQ(intake.counters().not_on_ground, 1U);
   EXPECT_EQ(intake.counters().invalid_sightings, 1U);

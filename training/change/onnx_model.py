@@ -16,11 +16,10 @@ import cv2
 import numpy as np
 import onnx
 import torch
-from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from detector.onnx_model import golden_image
+from detector.onnx_model import for_opencv, golden_image
 
 from .inference import INPUT_HEIGHT, INPUT_WIDTH, normalise
 from .network import ConvBlock, Network
@@ -108,27 +107,6 @@ def export(network: Network, folder: Path, name: str, parts: Sequence[str] = PAR
             )
         onnx.save(for_opencv(onnx.load(str(path))), str(path))
     return network
-
-
-def for_opencv(model: onnx.ModelProto) -> onnx.ModelProto:
-    """The same graph with constants as initializers and without nodes that only pass a tensor on.
-
-    torch 1.13 shares equal weights through Identity nodes on initializers, which OpenCV 4.6 refuses.
-    """
-    graph, renamed, kept = model.graph, {}, []
-    outputs = {output.name for output in graph.output}
-    for node in graph.node:
-        node.input[:] = [renamed.get(name, name) for name in node.input]
-        if node.op_type == "Identity" and node.output[0] not in outputs:
-            renamed[node.output[0]] = node.input[0]
-        elif node.op_type == "Constant" and node.attribute[0].name == "value":
-            value = numpy_helper.to_array(node.attribute[0].t)
-            graph.initializer.append(numpy_helper.from_array(value, node.output[0]))
-        else:
-            kept.append(node)
-    del graph.node[:]
-    graph.node.extend(kept)
-    return model
 
 
 class OpenCvModel:

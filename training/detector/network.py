@@ -35,11 +35,21 @@ class Widths:
 
     stem: int = 32  # twice as many at each stride from 4 on: 64, 128, 256
     pyramid: Tuple[int, int, int] = (32, 64, 96)  # at strides 4, 8, 16
+    context: int = 128  # of one window of the pooled context
+    deep: bool = False  # the backbone goes on to stride 32, for context: no head there
 
     @property
-    def backbone(self) -> Tuple[int, int, int]:
-        """Channels that the backbone gives at strides 4, 8 and 16."""
-        return 2 * self.stem, 4 * self.stem, 8 * self.stem
+    def backbone(self) -> Tuple[int, int, int, int]:
+        """Channels that the backbone gives at strides 4, 8, 16 and, if it is deep, 32."""
+        return 2 * self.stem, 4 * self.stem, 8 * self.stem, 16 * self.stem
+
+
+SIZES = {
+    "first": Widths(),
+    "small": Widths(pyramid=(32, 64, 64), context=64),
+    "base": Widths(pyramid=(48, 96, 128), deep=True),
+}
+"""Networks by name: 1.19 M, 0.96 M and 4.6 M parameters."""
 
 
 class ConvBlock(nn.Sequential):
@@ -83,11 +93,11 @@ class CspStage(nn.Module):
 class PooledContext(nn.Module):
     """Spatial pyramid pooling (He et al. 2014) in YOLOv5's sequential form: windows of 5, 9 and 13 cells."""
 
-    def __init__(self, channels: int):
+    def __init__(self, channels_in: int, channels: int):
         super().__init__()
-        self.reduce = ConvBlock(channels, channels // 2, kernel=1)
+        self.reduce = ConvBlock(channels_in, channels, kernel=1)
         self.pool = nn.MaxPool2d(5, stride=1, padding=2)
-        self.expand = ConvBlock(channels * 2, channels, kernel=1)
+        self.expand = ConvBlock(channels * 4, channels * 2, kernel=1)
 
     def forward(self, features: Tensor) -> Tensor:
         near = self.reduce(features)
@@ -97,22 +107,24 @@ class PooledContext(nn.Module):
 
 
 class Backbone(nn.Module):
-    """Image to features at strides 4, 8 and 16."""
+    """Image to features at strides 4, 8 and 16, and at 32 where it is deep."""
 
     def __init__(self, widths: Widths):
         super().__init__()
-        fine, middle, _ = widths.backbone
+        fine, middle, coarse, _ = widths.backbone
         self.stem = nn.Sequential(
             ConvBlock(3, widths.stem, stride=2, slope=LEAK), nn.MaxPool2d(3, stride=2, padding=1)
         )
         self.stride4 = CspStage(widths.stem, pairs=1, stride=1)
         self.stride8 = CspStage(fine, pairs=2, stride=2)
         self.stride16 = CspStage(middle, pairs=2, stride=2)
+        self.stride32 = CspStage(coarse, pairs=3, stride=2) if widths.deep else None
 
     def forward(self, images: Tensor) -> List[Tensor]:
         fine = self.stride4(self.stem(images))
         middle = self.stride8(fine)
-        return [fine, middle, self.stride16(middle)]
+        coarse = self.stride16(middle)
+        return [fine, middle, coarse] + ([self.stride32(coarse)] if self.stride32 else [])
 
 
 class Pyramid(nn.Module):
@@ -121,23 +133,35 @@ class Pyramid(nn.Module):
     def __init__(self, widths: Widths):
         super().__init__()
         backbone, pyramid = widths.backbone, widths.pyramid
-        self.coarse = nn.Sequential(PooledContext(backbone[2]), ConvBlock(backbone[2], pyramid[2], kernel=1))
+        top = nn.Sequential(
+            PooledContext(backbone[3 if widths.deep else 2], widths.context), ConvBlock(2 * widths.context, pyramid[2], kernel=1)
+        )
+        if widths.deep:
+            self.deep = top
+            self.coarse = nn.Sequential(
+                ConvBlock(backbone[2] + pyramid[2], pyramid[2], kernel=1), ConvBlock(pyramid[2], pyramid[2])
+            )
+        else:
+            self.deep, self.coarse = None, top
         self.middle_in = ConvBlock(backbone[1] + pyramid[2], pyramid[1], kernel=1)
         self.middle = ConvBlock(pyramid[1], pyramid[1])
         self.fine_in = ConvBlock(backbone[0] + pyramid[1], pyramid[0], kernel=1)
         self.fine = ConvBlock(pyramid[0], pyramid[0])
 
     def forward(self, levels: List[Tensor]) -> List[Tensor]:
-        fine, middle, coarse = levels
-        coarse = self.coarse(coarse)
-        middle = self.middle(self.middle_in(torch.cat([middle, enlarge(coarse)], dim=1)))
-        fine = self.fine(self.fine_in(torch.cat([fine, enlarge(middle)], dim=1)))
+        fine, middle, coarse = levels[:3]
+        coarse = self.coarse(beside(coarse, self.deep(levels[3])) if self.deep else coarse)
+        middle = self.middle(self.middle_in(beside(middle, coarse)))
+        fine = self.fine(self.fine_in(beside(fine, middle)))
         return [fine, middle, coarse]
 
 
-def enlarge(features: Tensor) -> Tensor:
-    """Nearest-neighbour upsampling by 2."""
-    return F.interpolate(features, scale_factor=2, mode="nearest")
+def beside(features: Tensor, coarser: Tensor) -> Tensor:
+    """Features and those of half the resolution (the larger half of an odd size), enlarged to nearest neighbours."""
+    enlarged = F.interpolate(coarser, scale_factor=2, mode="nearest")
+    if enlarged.shape[2:] != features.shape[2:]:
+        enlarged = enlarged[:, :, : features.shape[2], : features.shape[3]]
+    return torch.cat([features, enlarged], dim=1)
 
 
 class Head(nn.Module):

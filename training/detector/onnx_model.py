@@ -1,12 +1,15 @@
 """The network as one ONNX graph that OpenCV 4.6 loads, and running it there."""
 
 import copy
+import warnings
 from pathlib import Path
 from typing import Tuple
 
 import cv2
 import numpy as np
+import onnx
 import torch
+from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
@@ -60,11 +63,35 @@ def with_certain_objectness(scores: nn.Conv2d) -> nn.Conv2d:
 def export(detector: Detector, path: Path, width: int, height: int) -> ExportableDetector:
     """Write the graph; returns the module that it was traced from."""
     exportable = ExportableDetector(detector)
-    torch.onnx.export(
-        exportable, torch.zeros(1, 3, height, width), str(path), opset_version=11,
-        input_names=["images"], output_names=["predictions"],
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)  # sizes are compared while tracing: the graph's are fixed
+        torch.onnx.export(
+            exportable, torch.zeros(1, 3, height, width), str(path), opset_version=11,
+            input_names=["images"], output_names=["predictions"],
+        )
+    onnx.save(for_opencv(onnx.load(str(path))), str(path))
     return exportable
+
+
+def for_opencv(model: onnx.ModelProto) -> onnx.ModelProto:
+    """The same graph with constants as initializers and without nodes that only pass a tensor on.
+
+    torch 1.13 shares equal weights through Identity nodes on initializers, which OpenCV 4.6 refuses.
+    """
+    graph, renamed, kept = model.graph, {}, []
+    outputs = {output.name for output in graph.output}
+    for node in graph.node:
+        node.input[:] = [renamed.get(name, name) for name in node.input]
+        if node.op_type == "Identity" and node.output[0] not in outputs:
+            renamed[node.output[0]] = node.input[0]
+        elif node.op_type == "Constant" and node.attribute[0].name == "value":
+            value = numpy_helper.to_array(node.attribute[0].t)
+            graph.initializer.append(numpy_helper.from_array(value, node.output[0]))
+        else:
+            kept.append(node)
+    del graph.node[:]
+    graph.node.extend(kept)
+    return model
 
 
 def opencv_outputs(path: Path, images: np.ndarray) -> np.ndarray:

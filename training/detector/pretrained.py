@@ -11,16 +11,18 @@ from pathlib import Path
 from typing import Any, Dict, List, Tuple
 
 import numpy as np
+import onnx
 import torch
+from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from .inference import MEAN, STD
-from .network import Backbone, ConvBlock
+from .network import Backbone, ConvBlock, Detector
 
 NODE_PREFIX = "PartitionedCall/"
-LEVEL_NODES = tuple(NODE_PREFIX + "onnx_tf_prefix_Concat_" + number for number in ("12", "27", "42"))
-"""The graph's nodes that give the features at strides 4, 8 and 16."""
+LEVEL_NODES = tuple(NODE_PREFIX + "onnx_tf_prefix_Concat_" + number for number in ("12", "27", "42", "62"))
+"""The graph's nodes that give the features at strides 4, 8, 16 and 32."""
 
 MEAN_BGR, STD_BGR = (103.53, 116.28, 123.675), (57.375, 57.12, 58.395)
 """What NanoDet was trained with: (pixel - mean) / std, channels in the order blue, green, red."""
@@ -119,8 +121,8 @@ def for_our_input(weight: Tensor, bias: Tensor) -> Tuple[Tensor, Tensor]:
     return weight * (STD / std)[None, :, None, None], bias
 
 
-def blocks_of(backbone: Backbone) -> List[ConvBlock]:
-    """The convolutions of our backbone in their order of execution."""
+def blocks_of(backbone: nn.Module) -> List[ConvBlock]:
+    """The normalised convolutions of a backbone (of any module) in their order of execution."""
     return [module for module in backbone.modules() if isinstance(module, ConvBlock)]
 
 
@@ -154,10 +156,14 @@ def unfold_normalisation(backbone: nn.Module, images: Tensor) -> None:
     for hook in hooks:
         hook.remove()
     for block, (deviations, means) in moments.items():
+        norm = block[1]
+        slope = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+        offset = norm.bias - slope * norm.running_mean
         block[0].weight.div_(deviations[:, None, None, None])
-        block[1].running_mean.copy_(means / deviations)
-        block[1].weight.copy_(deviations)
-        block[1].bias.add_(means)
+        norm.running_mean.copy_(means / deviations)
+        norm.running_var.fill_(1 - norm.eps)
+        norm.weight.copy_(slope * deviations)
+        norm.bias.copy_(offset + slope * means)
 
 
 def load_backbone(backbone: nn.Module, path: Path, images: Tensor) -> None:
@@ -166,7 +172,38 @@ def load_backbone(backbone: nn.Module, path: Path, images: Tensor) -> None:
         convolutions = torch.load(path, map_location="cpu")["convolutions"]
     except (OSError, KeyError, RuntimeError) as error:
         raise ConversionError(f"Cannot read the backbone {path}: {error}.") from error
-    if len(convolutions) != len(blocks_of(backbone)):
-        raise ConversionError(f"{path} holds {len(convolutions)} convolutions, not {len(blocks_of(backbone))}.")
+    if len(convolutions) < len(blocks_of(backbone)):
+        raise ConversionError(f"{path} holds {len(convolutions)} convolutions, fewer than {len(blocks_of(backbone))}.")
     put_into(backbone, convolutions)
     unfold_normalisation(backbone, images)
+
+
+@torch.no_grad()
+def load_exported(detector: Detector, path: Path, images: Tensor) -> int:
+    """Begin with the weights of an exported detector (onnx_model.py), normalisation calibrated on `images`.
+
+    Layers of another shape keep theirs, so that a network of another size takes over what it shares. Returns how many
+    convolutions were taken over.
+    """
+    try:
+        stored = {entry.name: torch.from_numpy(numpy_helper.to_array(entry).copy()) for entry in onnx.load(str(path)).graph.initializer}
+    except Exception as error:  # python3-onnx passes on what protobuf throws.
+        raise ConversionError(f"Cannot read the exported detector {path}: {error}.") from error
+    taken = 0
+    for name, module in detector.named_modules():
+        if isinstance(module, ConvBlock):
+            weight, bias = (stored.get(f"detector.{name}.0.{part}") for part in ("weight", "bias"))
+            if weight is not None and bias is not None and weight.shape == module[0].weight.shape:
+                put_into(module, [(weight, bias)])
+                taken += 1
+    for level, head in enumerate(detector.heads):
+        for part, layer, skipped in (("box", head.box[-1], 0), ("score", head.score[-1], 1)):  # objectness comes first
+            weight, bias = (stored.get(f"detector.heads.{level}.{part}.1.{kind}") for kind in ("weight", "bias"))
+            if weight is not None and bias is not None and weight[skipped:].shape == layer.weight.shape:
+                layer.weight.copy_(weight[skipped:])
+                layer.bias.copy_(bias[skipped:])
+                taken += 1
+    if not taken:
+        raise ConversionError(f"{path} is no exported detector of such a network.")
+    unfold_normalisation(detector, images)
+    return taken

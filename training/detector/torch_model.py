@@ -56,6 +56,15 @@ def enlargement(node: onnx.NodeProto, attributes: Dict) -> Callable:
     return run
 
 
+def cut(tensor: Tensor, starts: Tensor, ends: Tensor, axes: Tensor, steps: Tensor) -> Tensor:
+    """Some rows of some axes."""
+    if any(step != 1 for step in steps.tolist()):
+        raise UnknownOperator("A Slice takes steps.")
+    for start, end, axis in zip(starts.tolist(), ends.tolist(), axes.tolist()):
+        tensor = tensor.narrow(axis, start, min(end, tensor.shape[axis]) - start)
+    return tensor
+
+
 OPERATORS: Dict[str, Callable[[onnx.NodeProto, Dict], Callable]] = {
     "AveragePool": lambda node, attributes: pooling(node, attributes, F.avg_pool2d),
     "Concat": lambda _, attributes: lambda *tensors: torch.cat(tensors, dim=attributes["axis"]),
@@ -67,6 +76,7 @@ OPERATORS: Dict[str, Callable[[onnx.NodeProto, Dict], Callable]] = {
     "Reshape": lambda *_: lambda tensor, shape: tensor.reshape([int(size) for size in shape]),
     "Resize": enlargement,
     "Sigmoid": lambda *_: torch.sigmoid,
+    "Slice": lambda *_: cut,
     "Transpose": lambda _, attributes: lambda tensor: tensor.permute(attributes["perm"]),
 }
 

@@ -14,8 +14,8 @@ import numpy as np
 import torch
 
 import convert_backbone
-from detector import inference, pretrained
-from detector.network import Backbone, CspStage, PairBlock, Widths
+from detector import CLASSES, inference, onnx_model, pretrained
+from detector.network import SIZES, Backbone, CspStage, Detector, PairBlock, Widths
 
 ARCHIVE = os.environ.get("LIVEMAP_BACKBONE_ARCHIVE", "")
 
@@ -92,12 +92,12 @@ class GraphWriter:
 
     def write(self, folder: Path, shifted: bool = False) -> Path:
         """A random graph of our backbone's shape; `shifted` as TensorFlow's own padding would have it at stride 2."""
-        backbone = Backbone(Widths())
+        backbone = Backbone(Widths(deep=True))
         features = self.convolve("input_1", backbone.stem[0][0].weight.shape, 2, before=0 if shifted else 1)
         size = {"list": {"i": ["1", "3", "3", "1"]}}
         features = self.window("MaxPool", "", features, [], 2, [[0, 0], [0, 0], [1, 1], [1, 1]], ksize=size)
         names = [name[len(pretrained.NODE_PREFIX):] for name in pretrained.LEVEL_NODES]
-        for stage, name in zip((backbone.stride4, backbone.stride8, backbone.stride16), names):
+        for stage, name in zip((backbone.stride4, backbone.stride8, backbone.stride16, backbone.stride32), names):
             features = self.stage(stage, features, name)
         (folder / "graph.bin").write_bytes(self.content)
         manifest = [{"paths": ["graph.bin"], "weights": self.entries}]
@@ -112,7 +112,7 @@ class Pretrained(unittest.TestCase):
             return convert_backbone.converted(pretrained.GraphModel(GraphWriter().write(Path(folder), shifted)))
 
     def test_a_graph_is_read_and_a_different_one_refused(self):
-        self.assertEqual(len(self.convert(False)), 17)
+        self.assertEqual(len(self.convert(False)), 25)
         with self.assertRaisesRegex(pretrained.ConversionError, "differs from the graph"):
             self.convert(True)
 
@@ -144,20 +144,45 @@ class Pretrained(unittest.TestCase):
             before = backbone(images)
             pretrained.unfold_normalisation(backbone, images)
             after = backbone(images)
+            pretrained.unfold_normalisation(backbone, images)
+            again = backbone(images)
             trained = backbone.train()(images)
         for level in range(3):
             scale = float(before[level].abs().max())
-            self.assertLess(float((after[level] - before[level]).abs().max()), 1e-3 * scale)
+            for same in (after, again):
+                self.assertLess(float((same[level] - before[level]).abs().max()), 1e-3 * scale)
             self.assertLess(float((trained[level] - before[level]).abs().max()), 2e-2 * scale)
         deviation = torch.std(blocks[0][0](images), dim=(0, 2, 3))
         torch.testing.assert_close(deviation, torch.ones_like(deviation), rtol=1e-3, atol=0)
+
+    def test_an_exported_detector_goes_on_as_it_was_and_gives_another_size_what_they_share(self):
+        torch.manual_seed(2)
+        images = torch.randn(2, 3, inference.INPUT_HEIGHT, inference.INPUT_WIDTH)
+        exported = Detector(len(CLASSES)).eval()
+        with torch.no_grad():
+            for parameter in exported.parameters():  # torch writes equal tensors, such as biases of 0, but once
+                parameter.add_(0.01 * torch.randn_like(parameter))
+        pretrained.unfold_normalisation(exported, images)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "exported.onnx"
+            onnx_model.export(exported, path, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+            same, small = Detector(len(CLASSES)), Detector(len(CLASSES), SIZES["small"])
+            self.assertEqual(pretrained.load_exported(same, path, images), 36)
+            self.assertEqual(pretrained.load_exported(small, path, images), 28)
+            path.write_bytes(b"nonsense")
+            with self.assertRaisesRegex(pretrained.ConversionError, "Cannot read the exported detector"):
+                pretrained.load_exported(same, path, images)
+        with torch.no_grad():
+            torch.testing.assert_close(same.eval()(images), exported(images), rtol=1e-3, atol=1e-3)
+            expected, taken = exported.backbone(images), small.eval().backbone(images)
+        torch.testing.assert_close(taken, expected, rtol=1e-3, atol=1e-3)
 
     @unittest.skipUnless(Path(ARCHIVE).is_file(), "LIVEMAP_BACKBONE_ARCHIVE names no package as npm pack leaves it")
     def test_the_published_weights(self):
         with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
             out = Path(folder) / "backbone.pt"
             self.assertEqual(convert_backbone.main(["--archive", ARCHIVE, "--out", str(out)]), 0)
-            self.assertEqual(len(torch.load(out)["convolutions"]), 17)
+            self.assertEqual(len(torch.load(out)["convolutions"]), 25)
 
 
 if __name__ == "__main__":
