@@ -41,9 +41,7 @@ cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_co
 /// Connected regions of change, the largest first: the pixels of ChangedClasses, joined over eight
 /// neighbours whatever their class, with their rim; a region has the class of most of the pixels
 /// that make it, and their confidence. `before` and `after` are the aligned pictures (CV_8UC3,
-/// BGR). A region's direction is that of the picture in which its outline is the stronger edge:
-/// where a thing stands, its outline shows; unknown when neither is by a fifth. Throws Error when
-/// the sizes differ.
+/// BGR); a region's direction is DirectionJudge's. Throws Error when the sizes differ.
 std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabilities,
                                             const cv::Mat& before, const cv::Mat& after,
                                             const ChangeRegionOptions& options = {});

@@ -61,8 +61,11 @@ void AddSequence(const fs::path& sequence, const std::string& prefix,
     const std::string stem = mask.stem().string();
     if (stem.size() < 3 || stem.compare(0, 2, "gt") != 0) continue;
     const std::string number = stem.substr(2);
+    const fs::path direction = sequence / "GT_direction" / mask.filename();
+    std::error_code ignored;
     pairs.push_back({prefix + number, PictureOf(sequence / "RGB", "1_" + number, mask),
-                     PictureOf(sequence / "RGB", "2_" + number, mask), mask.string()});
+                     PictureOf(sequence / "RGB", "2_" + number, mask), mask.string(),
+                     fs::is_regular_file(direction, ignored) ? direction.string() : ""});
   }
 }
 
@@ -81,7 +84,7 @@ void AddFlat(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
   for (const fs::path& mask : Listed(folder / "mask", false)) {
     const std::string stem = mask.stem().string();
     pairs.push_back({stem, PictureOf(folder / "t0", stem, mask),
-                     PictureOf(folder / "t1", stem, mask), mask.string()});
+                     PictureOf(folder / "t1", stem, mask), mask.string(), ""});
   }
 }
 
@@ -224,6 +227,15 @@ ChangePair LoadChangePair(const ChangePairFiles& files) {
   };
   check(pair.before, files.before);
   check(pair.truth, files.truth);
+  if (files.direction.empty()) return pair;
+  pair.direction = ReadPicture(files.direction, cv::IMREAD_UNCHANGED);
+  check(pair.direction, files.direction);
+  if (pair.direction.type() != CV_8UC1 ||
+      cv::countNonZero(pair.direction > int{kVanishedPixel}) > 0) {
+    throw Error("mask '" + files.direction +
+                "' is no mask of direction, accepted are 8 bits of one channel with 0, 1 "
+                "(appeared) and 2 (vanished)");
+  }
   return pair;
 }
 

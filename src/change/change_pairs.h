@@ -8,27 +8,35 @@
 
 namespace livemap {
 
+/// In masks of direction.
+constexpr std::uint8_t kAppearedPixel = 1;
+constexpr std::uint8_t kVanishedPixel = 2;
+
 /// The files of one pair.
 struct ChangePairFiles {
   std::string name;    ///< Without extension, e.g. "000/07" or "1_00_0".
   std::string before;  ///< Path of the earlier picture.
   std::string after;   ///< Path of the later picture, whose view the mask has.
   std::string truth;   ///< Path of the mask.
+  /// Path of the mask that says what appeared and what vanished; empty: the data set has none.
+  std::string direction;
 };
 
 /// Finds the pairs of a data set, sorted by name:
 /// - `raw/NNN/RGB/1_II.png`, `2_II.png`, `raw/NNN/GT/gtII.png`, as VL-CMU-CD and `livemap simulate
 ///   --change` have them; `directory` may also be the folder `raw`, or one of the NNN;
 /// - `t0/NAME`, `t1/NAME`, `mask/NAME`, as it is passed on for two-class work (jpg or png).
+/// Where a file `raw/NNN/GT_direction/gtII.png` is, as the simulator writes it, it comes along.
 /// Other files beside them are ignored; a mask without its two pictures is an Error. Throws Error
 /// naming the folder and what is accepted when it is neither or holds no pair.
 std::vector<ChangePairFiles> FindChangePairs(const std::string& directory);
 
 /// One pair in memory; all images have one size.
 struct ChangePair {
-  cv::Mat before;  ///< CV_8UC3, BGR.
-  cv::Mat after;   ///< CV_8UC3, BGR.
-  cv::Mat truth;   ///< CV_8UC1: ChangeClass, or kLeftOutPixel.
+  cv::Mat before;     ///< CV_8UC3, BGR.
+  cv::Mat after;      ///< CV_8UC3, BGR.
+  cv::Mat truth;      ///< CV_8UC1: ChangeClass, or kLeftOutPixel.
+  cv::Mat direction;  ///< CV_8UC1: 0, kAppearedPixel, kVanishedPixel; empty without its file.
   /// False: the mask knows change and no change only, 1 and 0.
   bool with_classes = true;
   /// Pixels of the mask whose colour is none of the published ones; they are left out.
@@ -36,7 +44,8 @@ struct ChangePair {
 };
 
 /// Reads a pair. Throws Error naming the path: missing, above 64 MiB or 64 megapixels, corrupt, of
-/// another size than the others, or a mask that DecodeChangeMask refuses.
+/// another size than the others, a mask that DecodeChangeMask refuses, or one of direction with
+/// other values.
 ChangePair LoadChangePair(const ChangePairFiles& files);
 
 /// What a mask file's pixels mean.

@@ -1,48 +1,18 @@
-// Connected regions of change, and which of two pictures has what changed.
+// Connected regions of change.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "base/error.h"
+#include "change/change_direction.h"
 #include "change/change_events.h"
 
 namespace livemap {
 namespace {
 
 constexpr double kRegionReferenceWidth = 320;
-constexpr double kClearlyStronger = 1.2;
-
-/// Strength of grey edges, CV_32FC1.
-cv::Mat EdgeStrength(const cv::Mat& bgr) {
-  cv::Mat grey;
-  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
-  cv::GaussianBlur(grey, grey, cv::Size(), 0.8);
-  cv::Mat dx;
-  cv::Mat dy;
-  cv::Sobel(grey, dx, CV_32FC1, 1, 0);
-  cv::Sobel(grey, dy, CV_32FC1, 0, 1);
-  cv::Mat strength;
-  cv::magnitude(dx, dy, strength);
-  return strength;
-}
-
-/// Along a region's outline, as a share of the picture's mean edge: light and exposure differ.
-double OutlineStrength(const cv::Mat& edges, const cv::Mat& outline, double mean_edge) {
-  return cv::mean(edges, outline)[0] / std::max(mean_edge, 1e-6);
-}
-
-ChangeDirection DirectionOf(const cv::Mat& region, const cv::Mat& before_edges,
-                            const cv::Mat& after_edges) {
-  cv::Mat outline;
-  cv::morphologyEx(region, outline, cv::MORPH_GRADIENT,
-                   cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3)));
-  const double before = OutlineStrength(before_edges, outline, cv::mean(before_edges)[0]);
-  const double after = OutlineStrength(after_edges, outline, cv::mean(after_edges)[0]);
-  if (after > kClearlyStronger * before) return ChangeDirection::kAppeared;
-  if (before > kClearlyStronger * after) return ChangeDirection::kVanished;
-  return ChangeDirection::kUnknown;
-}
 
 ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
   std::array<int, kChangeClasses> counts{};
@@ -111,8 +81,7 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
   labels.convertTo(grown, CV_16U);
   GrowInto(score >= options.rim_share * options.least_confidence,
            static_cast<int>(std::lround(options.rim_px * scale)), grown);
-  const cv::Mat before_edges = EdgeStrength(before);
-  const cv::Mat after_edges = EdgeStrength(after);
+  std::optional<DirectionJudge> judge;  // Most pictures have nothing to judge.
   std::vector<ChangeRegion> regions;
   for (int i = 1; i < count; ++i) {
     ChangeRegion region;
@@ -123,7 +92,8 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
     region.box = cv::boundingRect(whole);
     region.confidence = cv::mean(score, sure)[0];
     region.change_class = MostFrequent(classes, sure);
-    region.direction = DirectionOf(sure, before_edges, after_edges);
+    if (!judge) judge.emplace(before, after);
+    region.direction = judge->Of(sure, region.box);
     regions.push_back(region);
   }
   std::stable_sort(

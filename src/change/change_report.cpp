@@ -1,9 +1,12 @@
 #include "change/change_report.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <optional>
 #include <utility>
+
+#include "change/change_pairs.h"
 
 namespace livemap {
 namespace {
@@ -151,6 +154,26 @@ std::string FiguresText(const ChangeFigures& figures) {
 
 }  // namespace
 
+void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& classes,
+                     const cv::Mat& truth, DirectionCounts& counts) {
+  const cv::Mat changed = classes > 0;
+  for (const ChangeRegion& region : regions) {
+    const cv::Mat here = changed(region.box);
+    const int appeared = cv::countNonZero((truth(region.box) == int{kAppearedPixel}) & here);
+    const int vanished = cv::countNonZero((truth(region.box) == int{kVanishedPixel}) & here);
+    const int true_pixels = appeared + vanished;
+    if (true_pixels < 0.4 * cv::countNonZero(here)) continue;
+    if (std::max(appeared, vanished) < 0.75 * true_pixels) continue;
+    const ChangeDirection expected =
+        appeared > vanished ? ChangeDirection::kAppeared : ChangeDirection::kVanished;
+    if (region.direction == ChangeDirection::kUnknown) {
+      ++counts.unknown;
+    } else {
+      ++(region.direction == expected ? counts.right : counts.wrong);
+    }
+  }
+}
+
 Json ToJson(const ChangeReport& report, std::size_t curve_points) {
   Json json;
   json["method"] = report.method;
@@ -163,6 +186,12 @@ Json ToJson(const ChangeReport& report, std::size_t curve_points) {
   json["method_ms_p50"] = report.method_ms_p50;
   json["registration_ms_p50"] = report.registration_ms_p50;
   json.update(FiguresJson(report.forward, curve_points));
+  json["directions"] = nullptr;
+  if (report.directions) {
+    json["directions"] = {{"right", report.directions->right},
+                          {"wrong", report.directions->wrong},
+                          {"unknown", report.directions->unknown}};
+  }
   json["reversed"] = report.has_reversed ? FiguresJson(report.reversed, 0) : Json(nullptr);
   return json;
 }
@@ -176,6 +205,11 @@ std::string ToText(const ChangeReport& report) {
   }
   if (report.refused > 0) text += ", " + std::to_string(report.refused) + " refused";
   text += "\n" + FiguresText(report.forward);
+  if (report.directions) {
+    text += "  directions of regions: " + std::to_string(report.directions->right) + " right, " +
+            std::to_string(report.directions->wrong) + " wrong, " +
+            std::to_string(report.directions->unknown) + " not known\n";
+  }
   if (report.has_reversed) text += "order reversed\n" + FiguresText(report.reversed);
   return text;
 }

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "change/change_events.h"
 #include "change/change_metrics.h"
 
 namespace livemap {
@@ -13,6 +16,19 @@ struct ChangeFigures {
   PooledChangeScores pooled;
   CommunityChangeScores community;
 };
+
+/// What became of the directions of the regions that are changes in truth.
+struct DirectionCounts {
+  std::size_t right = 0;
+  std::size_t wrong = 0;
+  std::size_t unknown = 0;
+};
+
+/// Counts the regions of one pair: those where at least two in five of their `classes` (CV_8UC1,
+/// ChangedClasses') have a direction in truth (ChangePair::direction), three in four of these the
+/// same. The others are false, or several things at once.
+void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& classes,
+                     const cv::Mat& truth, DirectionCounts& counts);
 
 /// The result of `livemap evaluate change`.
 struct ChangeReport {
@@ -25,6 +41,7 @@ struct ChangeReport {
   double method_ms_p50 = 0;        ///< Wall time of the method alone, ms; 0 for predictions.
   double registration_ms_p50 = 0;  ///< Of a pair, with its warp.
   ChangeFigures forward;
+  std::optional<DirectionCounts> directions;  ///< None where no pair has them in truth.
   bool has_reversed = false;
   ChangeFigures reversed;  ///< The two aligned pictures swapped.
 };

@@ -68,11 +68,13 @@ void ChangeDatasetWriter::Add(const PassPicture& first, const PassPicture& secon
   std::snprintf(number, sizeof(number), "%02zu", pairs_ % kPairsPerSequence);
   const std::string folder = directory_ + "/raw/" + sequence;
   if (pairs_ % kPairsPerSequence == 0) {
-    for (const char* inside : {"/RGB", "/GT", "/GT_colours"}) MakeFolder(folder + inside);
+    for (const char* inside : {"/RGB", "/GT", "/GT_colours", "/GT_direction"})
+      MakeFolder(folder + inside);
   }
   WritePng(folder + "/RGB/1_" + number + ".png", first.frame.bgr);
   WritePng(folder + "/RGB/2_" + number + ".png", second.frame.bgr);
   WritePng(folder + "/GT/gt" + number + ".png", view.mask);
+  WritePng(folder + "/GT_direction/gt" + number + ".png", view.direction);
   WritePng(folder + "/GT_colours/gt" + number + ".png", ColourChanges(view.mask));
   poses_ << pairs_ << "," << sequence << "/" << number;
   for (const PassPicture* picture : {&first, &second}) {

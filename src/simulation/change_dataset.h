@@ -22,9 +22,9 @@ struct PassPicture {
 /// Writes pairs of pictures as VL-CMU-CD lays them out: raw/NNN/RGB/1_II.png (first pass) and
 /// 2_II.png (second pass), raw/NNN/GT/gtII.png (CV_8UC1, ChangeClass, in the second picture's
 /// view), up to 100 pairs per NNN. Beside them raw/NNN/GT_colours/gtII.png (the same in the
-/// published colours), classes.txt (one name per line, by index), camera.yaml, poses.csv (optical
-/// frames in the world frame, metres and quaternions) and changes.geojson. Every Error names the
-/// path.
+/// published colours), raw/NNN/GT_direction/gtII.png (ChangeView::direction), classes.txt (one name
+/// per line, by index), camera.yaml, poses.csv (optical frames in the world frame, metres and
+/// quaternions) and changes.geojson. Every Error names the path.
 class ChangeDatasetWriter {
  public:
   static constexpr std::size_t kPairsPerSequence = 100;

@@ -57,16 +57,20 @@ ChangeView CompareInstances(const cv::Mat& before, const cv::Mat& after,
                             const std::map<std::uint32_t, StreetChange>& changed) {
   ChangeView view;
   view.mask = cv::Mat::zeros(after.size(), CV_8UC1);
+  view.direction = view.mask.clone();
   for (int row = 0; row < after.rows; ++row) {
     const auto* old_line = before.ptr<int>(row);
     const auto* new_line = after.ptr<int>(row);
     auto* mask = view.mask.ptr<std::uint8_t>(row);
+    auto* direction = view.direction.ptr<std::uint8_t>(row);
     for (int column = 0; column < after.cols; ++column) {
       if (old_line[column] == new_line[column]) continue;
       for (const int id : {new_line[column], old_line[column]}) {
         const auto instance = static_cast<std::uint32_t>(id);
-        if (changed.count(instance) == 0) continue;
+        const auto change = changed.find(instance);
+        if (change == changed.end()) continue;
         mask[column] = static_cast<std::uint8_t>(ChangeClassOf(ClassOfInstance(instance)));
+        direction[column] = change->second.appeared ? ChangeView::kAppeared : ChangeView::kVanished;
         ++view.pixels[instance];
         break;
       }

@@ -134,6 +134,7 @@ class Evaluation {
     report_.unknown_colour_pixels += pair.unknown_colour_pixels;
     const ChangeProbabilities forward = Forward(files, pair);
     Count(files.name, forward, pair, report_.forward);
+    if (aligned_ && !pair.direction.empty()) CountRegions(forward, pair);
     if (report_.has_reversed) Count(files.name, Reversed(files, pair), pair, report_.reversed);
     if (options_.write.empty()) return;
     WriteScorePicture(options_.write + "/" + files.name + ".png", forward);
@@ -151,6 +152,15 @@ class Evaluation {
                     const ChangePair& pair, ChangeFigures& figures) {
     figures.pooled.Add(probabilities, pair.truth, pair.with_classes);
     figures.community.Add(name, probabilities, pair.truth);
+  }
+
+  void CountRegions(const ChangeProbabilities& probabilities, const ChangePair& pair) {
+    const ChangeRegionOptions options;
+    const cv::Mat before = FillUnknown(aligned_->before, aligned_->after, aligned_->valid);
+    if (!report_.directions) report_.directions.emplace();
+    CountDirections(FindChangeRegions(probabilities, before, aligned_->after, options),
+                    ChangedClasses(probabilities, options.least_confidence), pair.direction,
+                    *report_.directions);
   }
 
   ChangeProbabilities Forward(const ChangePairFiles& files, const ChangePair& pair) {

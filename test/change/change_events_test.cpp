@@ -186,6 +186,22 @@ TEST(FindChangeRegions, SayWhereWhatAndWhichPictureHasIt) {
             ChangeDirection::kUnknown);
 }
 
+TEST(FindChangeRegions, FindThePictureThatHasAThingWhoseOutlineShowsInNeither) {
+  // Stripes end at a board as they end at each other: its outline is no stronger an edge.
+  cv::Mat stripes(kHeight, kWidth, CV_8UC3);
+  for (int column = 0; column < stripes.cols; ++column) {
+    stripes.col(column).setTo(column / 4 % 2 == 0 ? cv::Scalar::all(60) : cv::Scalar::all(160));
+  }
+  const cv::Rect box(100, 80, 40, 60);
+  cv::Mat board = stripes.clone();
+  board(box).setTo(cv::Scalar(40, 120, 200));
+  const auto probabilities = OneRegion(box, ChangeClass::kSign);
+  EXPECT_EQ(FindChangeRegions(probabilities, stripes, board)[0].direction,
+            ChangeDirection::kAppeared);
+  EXPECT_EQ(FindChangeRegions(probabilities, board, stripes)[0].direction,
+            ChangeDirection::kVanished);
+}
+
 TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
   const cv::Mat image = Background();
   EXPECT_TRUE(

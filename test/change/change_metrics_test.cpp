@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "change/change_pairs.h"
 #include "change/change_report.h"
 
 namespace livemap {
@@ -210,11 +211,12 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   auto json = ToJson(report, 0);
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys, testing::ElementsAre(
-                        "method", "registration", "pairs", "refused_pairs", "left_out_pairs",
-                        "unknown_colour_pixels", "method_ms_p50", "registration_ms_p50", "pixels",
-                        "change_pixels", "left_out_pixels", "at_fpr", "roc_area", "ap", "argmax",
-                        "multi_class_accuracy", "classes", "confusion", "community", "reversed"));
+  EXPECT_THAT(keys, testing::ElementsAre("method", "registration", "pairs", "refused_pairs",
+                                         "left_out_pairs", "unknown_colour_pixels", "method_ms_p50",
+                                         "registration_ms_p50", "pixels", "change_pixels",
+                                         "left_out_pixels", "at_fpr", "roc_area", "ap", "argmax",
+                                         "multi_class_accuracy", "classes", "confusion",
+                                         "community", "directions", "reversed"));
   EXPECT_EQ(json["at_fpr"]["0.01"]["f1"], 1.0);
   EXPECT_EQ(json["at_fpr"]["0.01"]["f1_at_full_recall"], 1.0);
   EXPECT_EQ(json["multi_class_accuracy"], 1.0);
@@ -225,6 +227,32 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   EXPECT_EQ(json["pair_figures"][0]["name"], "000/00");
   EXPECT_EQ(json["curve"]["recall"].back(), 1.0);
   EXPECT_THAT(ToText(report), testing::HasSubstr("multi-class accuracy  1.0000"));
+}
+
+TEST(CountDirections, LeavesOutWhatIsNoChangeInTruthOrSeveralThings) {
+  cv::Mat classes = cv::Mat::zeros(20, 60, CV_8UC1);
+  cv::Mat truth = classes.clone();
+  std::vector<ChangeRegion> regions;
+  const auto add = [&](int column, ChangeDirection direction, int appeared, int vanished) {
+    ChangeRegion region;
+    region.box = cv::Rect(column, 5, 10, 10);
+    region.direction = direction;
+    classes(region.box).setTo(7);
+    truth(cv::Rect(column, 5, 10, appeared)).setTo(kAppearedPixel);
+    truth(cv::Rect(column, 5 + appeared, 10, vanished)).setTo(kVanishedPixel);
+    regions.push_back(region);
+  };
+  add(0, ChangeDirection::kAppeared, 8, 1);
+  add(10, ChangeDirection::kAppeared, 0, 5);
+  add(20, ChangeDirection::kUnknown, 0, 5);
+  add(30, ChangeDirection::kVanished, 3, 0);
+  add(40, ChangeDirection::kVanished, 5, 5);
+  add(50, ChangeDirection::kVanished, 0, 10);
+  DirectionCounts counts;
+  CountDirections(regions, classes, truth, counts);
+  EXPECT_EQ(counts.right, 2U);
+  EXPECT_EQ(counts.wrong, 1U);
+  EXPECT_EQ(counts.unknown, 1U);
 }
 
 }  // namespace

@@ -81,6 +81,19 @@ TEST_F(ChangePairsTest, FindsThePublishedLayoutFromEveryFolderOfIt) {
   EXPECT_TRUE(pair.with_classes);
 }
 
+TEST_F(ChangePairsTest, ReadsTheMaskOfDirectionsWhereThereIsOne) {
+  WriteSequencePair("raw/000", "00");
+  EXPECT_TRUE(LoadChangePair(FindChangePairs(folder_.path())[0]).direction.empty());
+  cv::Mat direction = LoadChangePair(FindChangePairs(folder_.path())[0]).truth * 0;
+  direction.at<std::uint8_t>(1, 2) = kVanishedPixel;
+  Write("raw/000/GT_direction/gt00.png", direction);
+  const ChangePair pair = LoadChangePair(FindChangePairs(folder_.path())[0]);
+  EXPECT_EQ(cv::countNonZero(pair.direction != direction), 0);
+  direction.at<std::uint8_t>(1, 2) = 3;
+  Write("raw/000/GT_direction/gt00.png", direction);
+  EXPECT_THROW(LoadChangePair(FindChangePairs(folder_.path())[0]), Error);
+}
+
 TEST_F(ChangePairsTest, FindsTheFlatLayout) {
   for (const std::string name : {"1_00_0", "1_01_0"}) {
     Write("t0/" + name + ".png", Picture(8, 6, 50));

@@ -36,8 +36,10 @@ class ChangeDataset : public ::testing::Test {
     second_.frame.world_from_optical =
         Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
     view_.mask = cv::Mat::zeros(12, 16, CV_8UC1);
+    view_.direction = view_.mask.clone();
     for (int i = 0; i < kChangeClasses; ++i) {
       view_.mask.at<std::uint8_t>(1, i) = static_cast<std::uint8_t>(i);
+      view_.direction.at<std::uint8_t>(1, i) = ChangeView::kVanished;
     }
     view_.pixels = {{kCone, 30}, {kCar, 3}};
   }
@@ -73,6 +75,10 @@ TEST_F(ChangeDataset, PairsAreReadBackFromThePublishedLayout) {
     EXPECT_EQ(second.at<cv::Vec3b>(5, 5), cv::Vec3b(40, 50, 60));
     ASSERT_EQ(mask.type(), CV_8UC1);
     EXPECT_EQ(cv::countNonZero(mask != view_.mask), 0);
+    const cv::Mat direction =
+        cv::imread(sequence + "/GT_direction/gt" + number + ".png", cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(direction.type(), CV_8UC1);
+    EXPECT_EQ(cv::countNonZero(direction != view_.direction), 0);
     double greatest = 0;
     cv::minMaxLoc(mask, nullptr, &greatest);
     EXPECT_LT(greatest, kChangeClasses);

@@ -201,6 +201,10 @@ TEST(CompareInstances, PaintsTheAppearedObjectElseTheVanishedOneAndNothingUnlist
               expected[static_cast<std::size_t>(i)])
         << i;
   }
+  const std::vector<int> directions(view.direction.begin<std::uint8_t>(),
+                                    view.direction.end<std::uint8_t>());
+  EXPECT_EQ(directions, (std::vector<int>{ChangeView::kAppeared, ChangeView::kAppeared,
+                                          ChangeView::kVanished, ChangeView::kVanished, 0, 0}));
   EXPECT_EQ(view.pixels, (std::map<std::uint32_t, int>{{cone, 2}, {car, 2}}));
 }
 
