@@ -16,7 +16,7 @@ import export_torch
 import train_detector
 from detector import CLASSES, onnx_model, pretrained
 from detector.manifest import sha256_of
-from detector.network import Backbone, Detector, Widths
+from detector.network import SIZES, Backbone, Detector, Widths
 
 from .synthetic import write_data
 
@@ -30,19 +30,6 @@ def quietly(program, *arguments):
         except SystemExit as stop:
             status = stop.code
     return status, errors.getvalue()
-
-
-def scattered_detector() -> Detector:
-    """An untrained network whose biases all differ, as trained ones do.
-
-    The exporter shares equal tensors through Identity nodes, which OpenCV 4.6 cannot load.
-    """
-    torch.manual_seed(1)
-    detector = Detector(len(CLASSES))
-    with torch.no_grad():
-        for parameter in detector.parameters():
-            parameter.add_(0.01 * torch.randn_like(parameter))
-    return detector
 
 
 class Programs(unittest.TestCase):
@@ -113,7 +100,8 @@ class Programs(unittest.TestCase):
         models = self.root / "models"
         models.mkdir()
         checkpoint = self.root / "random.pt"
-        torch.save({"average": scattered_detector().state_dict()}, checkpoint)
+        detector = Detector(len(CLASSES), SIZES["base"])
+        torch.save({"settings": {"size": "base"}, "average": detector.state_dict()}, checkpoint)
         exported = quietly(
             export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data
         )
@@ -122,6 +110,9 @@ class Programs(unittest.TestCase):
         self.assertEqual(quietly(evaluate_detector, *arguments), (0, ""))
         manifest = yaml.safe_load((models / "tiny.yaml").read_text())
         self.assertEqual((manifest["torch_file"], manifest["torch_sha256"]), ("tiny.pt", sha256_of(models / "tiny.pt")))
+        small = ("--size", "small", "--start-from", models / "tiny.onnx")
+        self.assertEqual(self.train("small", *small), (0, ""))
+        self.assertIn("size small", self.train("small", "--size", "base", "--resume")[1])
         (models / "tiny.onnx").write_bytes(b"something else")
         self.assertIn("SHA-256", quietly(export_torch, models / "tiny.yaml")[1])
         status, errors = quietly(evaluate_detector, *arguments)
