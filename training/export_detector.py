@@ -24,6 +24,7 @@ from detector import CLASSES, data, inference, onnx_model
 from detector.manifest import write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import SIZES, Detector
+from detector.packing import pack, round_weights
 from detector.validation import detect_simulated, validate
 from export_torch import ExportError, add_torch_file
 
@@ -101,6 +102,9 @@ def run(arguments: argparse.Namespace) -> None:
     weights = arguments.out / f"{arguments.name}.onnx"
     exportable = onnx_model.export(detector, weights, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
     check_against_torch(weights, exportable)
+    if arguments.packed:
+        round_weights(weights)
+        weights = pack(weights)
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights)
 
     runner = onnx_model.opencv_runner(weights)
@@ -126,6 +130,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
+    parser.add_argument("--packed", action="store_true", help="weights of half the precision, in gzip files")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(options.threads)

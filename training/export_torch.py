@@ -19,6 +19,7 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parent))
 from detector import onnx_model, torch_model
 from detector.manifest import sha256_of
+from detector.packing import pack
 
 TOLERANCE = 1e-3
 """Largest difference between OpenCV and torch, in raw units, that a file may have."""
@@ -50,6 +51,7 @@ def add_torch_file(manifest: Path) -> Path:
     if found != digest:
         raise ExportError(f"{manifest}: the SHA-256 of {weights} is {found}, the manifest's is {digest}.")
     path = manifest.with_suffix(".pt")
+    packed = weights.suffix == ".gz"
     try:
         network = torch_model.export_torch(weights, path)
     except torch_model.UnknownOperator as error:
@@ -59,6 +61,8 @@ def add_torch_file(manifest: Path) -> Path:
     if not difference <= TOLERANCE:
         path.unlink()
         raise ExportError(f"torch's output for {weights} differs from OpenCV's by {difference:.2g} > {TOLERANCE}.")
+    if packed:
+        path = pack(path)
     manifest.write_text(with_torch_file(text, path))
     print(f"wrote {path} ({path.stat().st_size} bytes); OpenCV and torch differ by at most {difference:.2g}")
     return path

@@ -174,7 +174,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
 
 def exported(arguments: argparse.Namespace) -> Optional[Path]:
     """What --start-from names, where that is an exported model and no checkpoint."""
-    return arguments.start_from if arguments.start_from and arguments.start_from.suffix == ".onnx" else None
+    return arguments.start_from if arguments.start_from and ".onnx" in arguments.start_from.suffixes else None
 
 
 def settings_from(arguments: argparse.Namespace) -> Settings:

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "base/error.h"
 #include "base/sha256.h"
+#include "inference/unpack.h"
 
 namespace livemap {
 namespace {
@@ -156,7 +158,7 @@ std::string ReadHashedFile(const std::string& name, const std::string& file,
     throw Error("model file '" + file + "' has SHA-256 " + found + ", the manifest of '" + name +
                 "' accepts " + sha256);
   }
-  return bytes;
+  return Unpacked(std::move(bytes), file, kMostModelBytes);
 }
 
 }  // namespace livemap

@@ -1,5 +1,6 @@
 // Whatever a model consists of: the text of a manifest of a detector or of a network of change, or
-// the bytes of an ONNX file up to its declared inputs. The first byte chooses.
+// the bytes of an ONNX file up to its declared inputs, or a packed file. The first byte chooses.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -10,9 +11,12 @@
 #include "change/change_manifest.h"
 #include "inference/model_manifest.h"
 #include "inference/onnx_inputs.h"
+#include "inference/unpack.h"
 
 namespace livemap {
 namespace {
+
+constexpr std::size_t kMostUnpacked = 1 << 16;
 
 void Require(bool holds) {
   if (!holds) std::abort();
@@ -50,7 +54,10 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return;
   const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
-    if (data[0] == 'o') {
+    if (data[0] == 'z') {
+      Require(Unpacked(std::string(rest), "fuzz", kMostUnpacked).size() <=
+              std::max(kMostUnpacked, rest.size()));
+    } else if (data[0] == 'o') {
       ReadOnnxInputs(rest);
     } else if (data[0] == 'c') {
       CheckChangeManifest(ParseChangeManifest(std::string(rest), "fuzz", "models"));

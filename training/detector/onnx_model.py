@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from .network import ConvBlock, Detector
+from .packing import model_bytes
 from .validation import Runner
 
 CERTAIN = 30.0
@@ -94,16 +95,21 @@ def for_opencv(model: onnx.ModelProto) -> onnx.ModelProto:
     return model
 
 
+def opencv_network(path: Path) -> cv2.dnn.Net:
+    """A graph, packed or not, as OpenCV loads it."""
+    return cv2.dnn.readNetFromONNX(np.frombuffer(model_bytes(path), np.uint8))
+
+
 def opencv_outputs(path: Path, images: np.ndarray) -> np.ndarray:
     """Predictions (1 x N x (5 + C)) of OpenCV for a 1 x 3 x H x W float32 input."""
-    network = cv2.dnn.readNetFromONNX(str(path))
+    network = opencv_network(path)
     network.setInput(images)
     return network.forward("predictions")
 
 
 def opencv_runner(path: Path) -> Runner:
     """A runner as validation uses it, on OpenCV's own backend."""
-    network = cv2.dnn.readNetFromONNX(str(path))
+    network = opencv_network(path)
 
     def run(image: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         network.setInput(image[None])

@@ -19,6 +19,7 @@ from torch.nn import functional as F
 
 from .inference import MEAN, STD
 from .network import Backbone, ConvBlock, Detector
+from .packing import model_bytes
 
 NODE_PREFIX = "PartitionedCall/"
 LEVEL_NODES = tuple(NODE_PREFIX + "onnx_tf_prefix_Concat_" + number for number in ("12", "27", "42", "62"))
@@ -186,7 +187,7 @@ def load_exported(detector: Detector, path: Path, images: Tensor) -> int:
     convolutions were taken over.
     """
     try:
-        stored = {entry.name: torch.from_numpy(numpy_helper.to_array(entry).copy()) for entry in onnx.load(str(path)).graph.initializer}
+        stored = {entry.name: torch.from_numpy(numpy_helper.to_array(entry).copy()) for entry in onnx.load_from_string(model_bytes(path)).graph.initializer}
     except Exception as error:  # python3-onnx passes on what protobuf throws.
         raise ConversionError(f"Cannot read the exported detector {path}: {error}.") from error
     taken = 0

@@ -17,6 +17,8 @@ from onnx import helper, numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from .packing import model_bytes
+
 
 class UnknownOperator(Exception):
     """The ONNX file asks for something that is not known here; the text is one sentence for the user."""
@@ -110,7 +112,7 @@ class OnnxNetwork(nn.Module):
 
 def export_torch(weights: Path, path: Path) -> OnnxNetwork:
     """Write the network of the ONNX file `weights` as TorchScript; returns the network that was traced."""
-    network = OnnxNetwork(onnx.load(str(weights))).eval()
+    network = OnnxNetwork(onnx.load_from_string(model_bytes(weights))).eval()
     with torch.no_grad(), warnings.catch_warnings():
         # Shapes and scales are constants of the graph: that the trace keeps them is what is wanted.
         warnings.simplefilter("ignore", torch.jit.TracerWarning)
@@ -138,4 +140,4 @@ def without_sources(archive: bytes) -> bytes:
 def torch_outputs(path: Path, images: np.ndarray) -> np.ndarray:
     """Predictions (1 x N x (5 + C)) of torch for a 1 x 3 x H x W float32 input."""
     with torch.no_grad():
-        return torch.jit.load(str(path))(torch.from_numpy(images)).numpy()
+        return torch.jit.load(io.BytesIO(model_bytes(path)))(torch.from_numpy(images)).numpy()

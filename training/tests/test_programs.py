@@ -103,17 +103,17 @@ class Programs(unittest.TestCase):
         detector = Detector(len(CLASSES), SIZES["base"])
         torch.save({"settings": {"size": "base"}, "average": detector.state_dict()}, checkpoint)
         exported = quietly(
-            export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data
+            export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data, "--packed"
         )
         self.assertEqual(exported, (0, ""))
         arguments = ("--manifest", models / "tiny.yaml", "--data", self.data)
         self.assertEqual(quietly(evaluate_detector, *arguments), (0, ""))
         manifest = yaml.safe_load((models / "tiny.yaml").read_text())
-        self.assertEqual((manifest["torch_file"], manifest["torch_sha256"]), ("tiny.pt", sha256_of(models / "tiny.pt")))
-        small = ("--size", "small", "--start-from", models / "tiny.onnx")
+        self.assertEqual((manifest["torch_file"], manifest["torch_sha256"]), ("tiny.pt.gz", sha256_of(models / "tiny.pt.gz")))
+        small = ("--size", "small", "--start-from", models / "tiny.onnx.gz")
         self.assertEqual(self.train("small", *small), (0, ""))
         self.assertIn("size small", self.train("small", "--size", "base", "--resume")[1])
-        (models / "tiny.onnx").write_bytes(b"something else")
+        (models / "tiny.onnx.gz").write_bytes(b"something else")
         self.assertIn("SHA-256", quietly(export_torch, models / "tiny.yaml")[1])
         status, errors = quietly(evaluate_detector, *arguments)
         self.assertEqual(status, 2)
