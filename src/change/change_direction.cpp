@@ -9,7 +9,7 @@
 namespace livemap {
 namespace {
 
-constexpr double kReferenceWidth = 320;
+constexpr double kDirectionReferenceWidth = 320;
 constexpr int kGapPx = 2;   // Between a region and what lies around it, of a picture 320 wide,
 constexpr int kRingPx = 7;  // and where that ends.
 constexpr int kLeastRingPixels = 30;
@@ -86,7 +86,7 @@ DirectionJudge::DirectionJudge(const cv::Mat& before, const cv::Mat& after)
 DirectionJudge::~DirectionJudge() = default;
 
 ChangeDirection DirectionJudge::Of(const cv::Mat& region, const cv::Rect& box) const {
-  const double scale = region.cols / kReferenceWidth;
+  const double scale = region.cols / kDirectionReferenceWidth;
   const auto pixels = [scale](int px) { return std::max(1, static_cast<int>(px * scale)); };
   const cv::Point margin(pixels(kRingPx) + 1, pixels(kRingPx) + 1);
   const cv::Rect where =

@@ -80,6 +80,19 @@ void AddSequences(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
   }
 }
 
+/// The deepest folder above all of `folders`, which are absolute.
+fs::path CommonAncestor(const std::vector<fs::path>& folders) {
+  fs::path common = folders[0].parent_path();
+  for (const fs::path& folder : folders) {
+    const auto holds = [&folder](const fs::path& above) {
+      return std::mismatch(above.begin(), above.end(), folder.begin(), folder.end()).first ==
+             above.end();
+    };
+    while (!holds(common) || common == folder) common = common.parent_path();
+  }
+  return common;
+}
+
 void AddFlat(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
   for (const fs::path& mask : Listed(folder / "mask", false)) {
     const std::string stem = mask.stem().string();
@@ -174,6 +187,29 @@ std::vector<ChangePairFiles> FindChangePairs(const std::string& directory) {
   }
   std::sort(pairs.begin(), pairs.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
+  return pairs;
+}
+
+std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& directories) {
+  if (directories.size() == 1) return FindChangePairs(directories[0]);
+  std::vector<fs::path> folders;
+  for (const std::string& directory : directories) {
+    fs::path folder = fs::absolute(directory).lexically_normal();
+    if (!folder.has_filename()) folder = folder.parent_path();  // It ended in a slash.
+    if (std::count(folders.begin(), folders.end(), folder) != 0) {
+      throw Error("folder '" + directory + "' is named twice");
+    }
+    folders.push_back(folder);
+  }
+  const fs::path common = CommonAncestor(folders);
+  std::vector<ChangePairFiles> pairs;
+  for (const fs::path& folder : folders) {
+    const std::string prefix = folder.lexically_relative(common).string() + "/";
+    for (ChangePairFiles& files : FindChangePairs(folder.string())) {
+      files.name.insert(0, prefix);
+      pairs.push_back(std::move(files));
+    }
+  }
   return pairs;
 }
 

@@ -30,6 +30,9 @@ struct ChangePairFiles {
 /// Other files beside them are ignored; a mask without its two pictures is an Error. Throws Error
 /// naming the folder and what is accepted when it is neither or holds no pair.
 std::vector<ChangePairFiles> FindChangePairs(const std::string& directory);
+/// Of several data sets: each pair's name begins with the way to its data set from the folder that
+/// holds them all. Throws Error as above, and when one is named twice.
+std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& directories);
 
 /// One pair in memory; all images have one size.
 struct ChangePair {

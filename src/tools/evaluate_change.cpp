@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kCurvePoints = 400;
 
 struct Options {
-  std::string directory;
+  std::vector<std::string> directories;
   std::string method;
   std::string model;  ///< Path of a manifest; empty: the method.
   std::string predictions;
@@ -38,14 +38,14 @@ struct Options {
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
   CommandLine line(
-      "livemap_evaluate_change [FLAGS] DIR",
+      "livemap_evaluate_change [FLAGS] DIR...",
       "Compares what a method says about pairs of pictures with the truth. DIR has VL-CMU-CD's\n"
       "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it) or t0/, t1/, "
       "mask/.\n"
       "The method is a network (--model), a classical one (--method), or a folder of predictions\n"
       "(--predictions: NAME.npy or NAME.png per pair). docs/change.md defines the figures and the "
       "files.",
-      1,
+      CommandLine::kOneOrMore,
       {{"json", "", "one line of JSON instead of a table"},
        {"method", "NAME", "dense-sift or daisy"},
        {"model", "FILE", "manifest of a network of change (models/change-small.yaml)"},
@@ -66,7 +66,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
                    {"model", !line.Has("method"), "to go without --method"},
                    {"register", !line.Has("predictions"), "to go without --predictions"}});
   Options options;
-  options.directory = line.Positional(0);
+  options.directories = line.Positionals();
   options.method = line.Text("method", "");
   options.model = line.Text("model", "");
   options.predictions = line.Text("predictions", "");
@@ -120,6 +120,7 @@ class Evaluation {
     } else {
       auto network = MakeChangeNetwork(options.model);
       report_.method = network->manifest().name;
+      regions_.least_confidence = network->manifest().changed;
       method_ = std::move(network);
     }
     report_.has_reversed = true;
@@ -155,11 +156,10 @@ class Evaluation {
   }
 
   void CountRegions(const ChangeProbabilities& probabilities, const ChangePair& pair) {
-    const ChangeRegionOptions options;
     const cv::Mat before = FillUnknown(aligned_->before, aligned_->after, aligned_->valid);
     if (!report_.directions) report_.directions.emplace();
-    CountDirections(FindChangeRegions(probabilities, before, aligned_->after, options),
-                    ChangedClasses(probabilities, options.least_confidence), pair.direction,
+    CountDirections(FindChangeRegions(probabilities, before, aligned_->after, regions_),
+                    ChangedClasses(probabilities, regions_.least_confidence), pair.direction,
                     *report_.directions);
   }
 
@@ -234,6 +234,7 @@ class Evaluation {
 
   const Options& options_;
   std::unique_ptr<ChangeMethod> method_;
+  ChangeRegionOptions regions_;
   std::optional<AlignedPair> aligned_;
   std::vector<double> method_ms_;
   std::vector<double> registration_ms_;
@@ -243,7 +244,7 @@ class Evaluation {
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  const std::vector<ChangePairFiles> pairs = FindChangePairs(options->directory);
+  const std::vector<ChangePairFiles> pairs = FindChangePairs(options->directories);
   Evaluation evaluation(*options);
   Progress progress("comparing", pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -251,6 +252,10 @@ int Run(int argc, char** argv) {
     progress.At(i + 1);
   }
   const ChangeReport report = evaluation.Report();
+  if (report.forward.community.pairs().empty()) {
+    throw Error("none of " + std::to_string(pairs.size()) + " pairs has changed by the share of " +
+                std::to_string(options->least_changed) + " that --least-changed accepts");
+  }
   std::cout << (options->json ? ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"
                               : ToText(report));
   return 0;

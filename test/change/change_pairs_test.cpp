@@ -94,6 +94,24 @@ TEST_F(ChangePairsTest, ReadsTheMaskOfDirectionsWhereThereIsOne) {
   EXPECT_THROW(LoadChangePair(FindChangePairs(folder_.path())[0]), Error);
 }
 
+TEST_F(ChangePairsTest, OfSeveralDataSetsAreNamedByTheWayToThem) {
+  WriteSequencePair("7/some/raw/000", "00");
+  WriteSequencePair("7/all/raw/000", "00");
+  WriteSequencePair("8/some/raw/000", "00");
+  const auto names_of = [this](const std::vector<std::string>& sets) {
+    std::vector<std::string> folders;
+    for (const std::string& set : sets) folders.push_back(folder_.path() + set);
+    std::vector<std::string> names;
+    for (const ChangePairFiles& files : FindChangePairs(folders)) names.push_back(files.name);
+    return names;
+  };
+  EXPECT_THAT(names_of({"/7/some", "/8/some/", "/7/all"}),
+              testing::ElementsAre("7/some/000/00", "8/some/000/00", "7/all/000/00"));
+  EXPECT_THAT(names_of({"/7/some", "/7/all"}), testing::ElementsAre("some/000/00", "all/000/00"));
+  EXPECT_THAT(names_of({"/7/some"}), testing::ElementsAre("000/00"));
+  EXPECT_THROW(names_of({"/7/some", "/8/some", "/7/some/"}), Error);
+}
+
 TEST_F(ChangePairsTest, FindsTheFlatLayout) {
   for (const std::string name : {"1_00_0", "1_01_0"}) {
     Write("t0/" + name + ".png", Picture(8, 6, 50));

@@ -160,7 +160,7 @@ class EvaluateChangeTest(unittest.TestCase):
     def test_pairs_of_which_less_has_changed_are_left_out(self):
         shares = {pair: float((mask > 0).mean()) for pair, mask in self.masks().items()}
         least = max(shares.values())
-        figures = self.figures("--method", "daisy", "--register", "none", "--least-changed", str(least), self.data)
+        figures = self.figures("--method", "daisy", "--register", "none", "--least-changed", str(0.999 * least), self.data)
         self.assertEqual((figures["pairs"], figures["left_out_pairs"]), (1, PAIRS - 1))
         self.assertAlmostEqual(figures["change_pixels"] / figures["pixels"], least)
         for rate in ("0.10", "0.01"):
@@ -196,6 +196,7 @@ class EvaluateChangeTest(unittest.TestCase):
                 ([], "got 0 arguments"), (["/nowhere"], "/nowhere"), ([empty], "0 pairs"),
                 (["--method", "best", self.data], "dense-sift and daisy"),
                 (["--least-changed", "2", self.data], "--least-changed"),
+                (["--least-changed", "1", self.data], "none of 4 pairs"), ([self.data, self.data], "named twice"),
                 (["--register", "well", self.data], "none, edges, homography and both"),
                 (["--predictions", empty, self.data], "000/00' is missing"),
                 (["--method", "daisy", "--predictions", empty, self.data], "--method"),
@@ -206,9 +207,28 @@ class EvaluateChangeTest(unittest.TestCase):
             self.assertEqual(done.returncode, 2, arguments)
             self.assertEqual(done.stdout, "", arguments)
             self.assertIn(expected, done.stderr)
-        done = run(PLOT, os.path.join(self.data, "camera.yaml"), "--out", empty)
-        self.assertEqual(done.returncode, 2)
-        self.assertIn("camera.yaml", done.stderr)
+        report = self.path("report.json")
+        with open(report, "w", encoding="utf-8") as file:
+            json.dump(self.figures("--curves", "--method", "daisy", "--register", "none", self.data), file)
+        for arguments, expected in [
+                ([os.path.join(self.data, "camera.yaml"), "--out", empty], "camera.yaml"),
+                ([report, "--out", report], "cannot be made"), ([report, "--out", empty, "--rows", "0"], "--rows is 0"),
+                ([report, "--out", empty, "--data", "/nowhere", "--predictions", empty], "/nowhere")]:
+            done = run(PLOT, *arguments)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn(expected, done.stderr)
+
+    def test_figures_of_pairs_without_any_change_are_drawn(self):
+        folder = self.path("unchanged")
+        done = run(SIMULATE, "--seed", "3", "--size", "96x72", "--seconds", "0.2", "--changes", "0", "--change", folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run(PROGRAM, "--json", "--curves", "--method", "daisy", "--register", "none", folder)
+        report = self.path("unchanged.json")
+        with open(report, "w", encoding="utf-8") as file:
+            file.write(done.stdout)
+        self.assertIsNone(json.loads(done.stdout)["ap"])
+        done = run(PLOT, report, "--out", self.path("unchanged_plots"))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
 
     def test_it_has_help(self):
         done = run(PROGRAM, "--help")
