@@ -21,7 +21,7 @@ InstanceCaster::InstanceCaster(const Street& street, const SimulatedCamera& came
   }
 }
 
-cv::Mat InstanceCaster::Cast(const CameraMotion& motion) {
+cv::Mat InstanceCaster::Cast(const CameraExposure& motion) {
   scene_.MoveTo(motion.along_m);
   changes_.clear();
   for (const auto& block : scene_.visible()) {
@@ -86,7 +86,7 @@ ChangeTruth::ChangeTruth(const WorldDescription& description, std::uint64_t seed
       before_caster_(before_, camera, threads),
       after_caster_(after_, camera, threads) {}
 
-ChangeView ChangeTruth::Look(const CameraMotion& motion) {
+ChangeView ChangeTruth::Look(const CameraExposure& motion) {
   const cv::Mat before = before_caster_.Cast(motion);
   const cv::Mat after = after_caster_.Cast(motion);
   std::map<std::uint32_t, StreetChange> here;

@@ -19,7 +19,7 @@ class InstanceCaster {
 
   /// CV_32SC1: the instance that the ray through each pixel's centre meets, as StreetRenderer's
   /// but for the ground, which is all road here, potholes included.
-  cv::Mat Cast(const CameraMotion& motion);
+  cv::Mat Cast(const CameraExposure& motion);
   /// What only one pass shows within the range of sight of the last picture.
   const std::vector<StreetChange>& changes() const { return changes_; }
 
@@ -58,7 +58,7 @@ class ChangeTruth {
               double changes, const SimulatedCamera& camera, int threads);
 
   /// A later pose of `motion` (motion blur) is left out of account.
-  ChangeView Look(const CameraMotion& motion);
+  ChangeView Look(const CameraExposure& motion);
   /// All that changed ahead of the cameras so far, within the range of sight, seen or hidden.
   const std::map<std::uint32_t, StreetChange>& changes() const { return changes_; }
 

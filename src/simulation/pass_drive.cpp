@@ -45,8 +45,8 @@ Eigen::Isometry3d PassDrive::WorldFromOptical(double time_s) const {
          base_from_optical_;
 }
 
-CameraMotion PassDrive::Camera(std::size_t frame) const {
-  CameraMotion camera;
+CameraExposure PassDrive::Camera(std::size_t frame) const {
+  CameraExposure camera;
   camera.world_from_optical = WorldFromOptical(TimeS(frame));
   camera.world_from_optical_end = WorldFromOptical(TimeS(frame) + exposure_s_);
   camera.along_m = AlongM(frame);

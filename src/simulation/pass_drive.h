@@ -31,7 +31,7 @@ class PassDrive {
 
   /// Of the picture `frame`, metres along the road's middle line; grows with `frame`.
   double AlongM(std::size_t frame) const;
-  CameraMotion Camera(std::size_t frame) const;
+  CameraExposure Camera(std::size_t frame) const;
   /// The picture whose place along the road is the nearest to `along_m`.
   std::size_t Nearest(double along_m) const;
 

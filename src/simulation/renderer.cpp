@@ -172,7 +172,7 @@ StreetRenderer::StreetRenderer(const Street& street, const SimulatedCamera& came
 
 StreetRenderer::~StreetRenderer() = default;
 
-SimulatedFrame StreetRenderer::Render(const CameraMotion& motion, std::uint32_t frame_number) {
+SimulatedFrame StreetRenderer::Render(const CameraExposure& motion, std::uint32_t frame_number) {
   scene_.MoveTo(motion.along_m);
   const int height = camera_.intrinsics.height;
   const int width = camera_.intrinsics.width;

@@ -24,7 +24,7 @@ struct SimulatedFrame {
 };
 
 /// Where a camera is and where it will be at the exposure's end; equal without motion blur.
-struct CameraMotion {
+struct CameraExposure {
   Eigen::Isometry3d world_from_optical = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d world_from_optical_end = Eigen::Isometry3d::Identity();
   double along_m = 0;  ///< Along the road, which part of the street is needed.
@@ -44,7 +44,7 @@ class StreetRenderer {
                  const RenderOptions& options);
   ~StreetRenderer();
 
-  SimulatedFrame Render(const CameraMotion& motion, std::uint32_t frame_number);
+  SimulatedFrame Render(const CameraExposure& motion, std::uint32_t frame_number);
 
  private:
   class Exposure;

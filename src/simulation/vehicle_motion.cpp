@@ -52,9 +52,9 @@ Eigen::Isometry3d VehicleMotion::WorldFromBase(double time_s) const {
          Eigen::AngleAxisd(crown, Eigen::Vector3d::UnitX());
 }
 
-VehicleState VehicleMotion::StateAt(double time_s) const {
+VehicleKinematics VehicleMotion::StateAt(double time_s) const {
   constexpr double kHalfS = 0.005;
-  VehicleState state;
+  VehicleKinematics state;
   state.world_from_base = WorldFromBase(time_s);
   const Eigen::Isometry3d before = WorldFromBase(time_s - kHalfS);
   const Eigen::Isometry3d after = WorldFromBase(time_s + kHalfS);

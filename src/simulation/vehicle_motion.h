@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// What a vehicle does at a moment.
-struct VehicleState {
+struct VehicleKinematics {
   Eigen::Isometry3d world_from_base = Eigen::Isometry3d::Identity();
   Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();     ///< Of base_link, in base_link.
   Eigen::Vector3d turn_rate_radps = Eigen::Vector3d::Zero();  ///< In base_link.
@@ -30,7 +30,7 @@ class VehicleMotion {
   /// Pose of base_link (x forward, y left, z up, on the road) in the world frame.
   Eigen::Isometry3d WorldFromBase(double time_s) const;
   /// Pose and how it changes, by differences over 10 ms.
-  VehicleState StateAt(double time_s) const;
+  VehicleKinematics StateAt(double time_s) const;
 
  private:
   struct Phases {

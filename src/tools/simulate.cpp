@@ -50,9 +50,9 @@ DrivingStyle ReadStyle(const CommandLine& line) {
 }
 
 /// The camera's view at a time, and where it will be when the exposure ends.
-CameraMotion ViewAt(const VehicleMotion& motion, const SimulationSetup& setup, double time_s) {
+CameraExposure ViewAt(const VehicleMotion& motion, const SimulationSetup& setup, double time_s) {
   const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
-  CameraMotion camera;
+  CameraExposure camera;
   camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
   camera.world_from_optical_end =
       motion.WorldFromBase(time_s + setup.camera.exposure_s) * base_from_optical;
@@ -107,7 +107,7 @@ int Run(int argc, char** argv) {
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < frames; ++i) {
     const double time_s = static_cast<double>(i) / rate_hz;
-    CameraMotion camera = ViewAt(motion, setup, time_s);
+    CameraExposure camera = ViewAt(motion, setup, time_s);
     const auto number = static_cast<std::uint32_t>(i);
     const SimulatedFrame frame = renderer.Render(camera, number);
     cv::Mat right;

@@ -88,7 +88,7 @@ class FirstPass {
   const PassPicture& Near(double along_m) {
     const std::size_t frame = drive_.Nearest(along_m);
     if (frame != rendered_) {
-      const CameraMotion camera = drive_.Camera(frame);
+      const CameraExposure camera = drive_.Camera(frame);
       picture_ = {renderer_.Render(camera, static_cast<std::uint32_t>(frame)), camera.along_m};
       rendered_ = frame;
     }
@@ -156,7 +156,7 @@ int SimulateChange(const CommandLine& line) {
   Progress progress("pair", run.pairs);
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < run.pairs; ++i) {
-    const CameraMotion camera = drive.Camera(i);
+    const CameraExposure camera = drive.Camera(i);
     const auto number = static_cast<std::uint32_t>(i) + kSecondNoise;
     const PassPicture second{renderer.Render(camera, number), camera.along_m};
     const PassPicture& near = first.Near(camera.along_m);

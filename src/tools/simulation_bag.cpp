@@ -60,7 +60,7 @@ geometry_msgs::Vector3 ToVector(const Eigen::Vector3d& vector) {
   return message;
 }
 
-nav_msgs::Odometry ToOdometry(const VehicleState& state, const std_msgs::Header& header) {
+nav_msgs::Odometry ToOdometry(const VehicleKinematics& state, const std_msgs::Header& header) {
   nav_msgs::Odometry odometry;
   odometry.header = header;
   odometry.header.frame_id = "map";
@@ -155,7 +155,7 @@ class RosSimulationBag : public SimulationBag {
       const double twist_s = static_cast<double>(next_twist_) / kTwistRateHz;
       if (twist_s > time_s) return;
       bag_.AdvanceTo(twist_s);
-      const VehicleState state = setup_.state(twist_s);
+      const VehicleKinematics state = setup_.state(twist_s);
       const WheelTwist measured =
           odometer_.Measure(state.velocity_mps.x(), state.turn_rate_radps.z());
       geometry_msgs::TwistWithCovarianceStamped message;

@@ -35,7 +35,7 @@ class SimulationBag {
     double baseline_m = 0;  ///< Of the second eye to the right; 0: none.
     GeoPoint datum;         ///< Of the world's origin.
     /// Of the vehicle in the world; also a second before and after.
-    std::function<VehicleState(double time_s)> state;
+    std::function<VehicleKinematics(double time_s)> state;
     /// Error of a fix, east and north, metres; called once per fix in order of time.
     std::function<Eigen::Vector2d(double time_s)> multipath_m;
     std::uint64_t seed = 1;  ///< Of the sensors' errors.

@@ -33,7 +33,7 @@ Street MakeStreet(StreetPass::Which which, bool leaves, double share = kShare) {
   return {WorldDescription(), 3, kPassLengthM, leaves, {which, share}};
 }
 
-CameraMotion ViewOfFrame(const Street& street, std::size_t frame) {
+CameraExposure ViewOfFrame(const Street& street, std::size_t frame) {
   return PassDrive(street, DrawSecondManner(3, 8, 0.5, 20), Mounting(), 0).Camera(frame);
 }
 
@@ -219,7 +219,7 @@ TEST(ChangeTruth, MasksAreTheDifferenceOfTheRenderedInstances) {
   ChangeTruth truth(WorldDescription(), 3, kPassLengthM, false, kShare, PassCamera(), 2);
   std::set<int> classes;
   for (const std::size_t frame : {0U, 3U, 6U}) {
-    const CameraMotion view = ViewOfFrame(after, frame);
+    const CameraExposure view = ViewOfFrame(after, frame);
     const cv::Mat was = old_renderer.Render(view, 0).instances;
     const cv::Mat is = new_renderer.Render(view, 1).instances;
     const cv::Mat mask = truth.Look(view).mask;
@@ -253,7 +253,7 @@ TEST(ChangeTruth, IsEmptyWithoutChangesThoughSnowHasFallen) {
   InstanceCaster white(winter, PassCamera(), 2);
   bool leaves_fell = false;
   for (const std::size_t frame : {0U, 4U, 8U}) {
-    const CameraMotion view = ViewOfFrame(winter, frame);
+    const CameraExposure view = ViewOfFrame(winter, frame);
     EXPECT_EQ(cv::countNonZero(truth.Look(view).mask), 0);
     leaves_fell |= !SamePixels(green.Cast(view), white.Cast(view));
   }

@@ -19,12 +19,12 @@ SimulatedCamera StreetCamera() {
   return camera;
 }
 
-CameraMotion ViewAt(const Street& street, double time_s) {
+CameraExposure ViewAt(const Street& street, double time_s) {
   const VehicleMotion motion(street, DrivingStyle(), 20);
   CameraMounting mounting;
   mounting.height_m = 1.4;
   mounting.pitch_deg = 4;
-  CameraMotion view;
+  CameraExposure view;
   view.world_from_optical = motion.WorldFromBase(time_s) * mounting.BaseFromOptical();
   view.world_from_optical_end = view.world_from_optical;
   view.along_m = motion.AlongM(time_s);

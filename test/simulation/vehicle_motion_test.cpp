@@ -120,7 +120,7 @@ TEST(VehicleMotion, StateIsTheChangeOfThePose) {
   const Street street(WorldDescription(), 6, 1000, true);
   const VehicleMotion motion(street, Style(10, 60), 0);
   for (double t = 1; t < 60; t += 7.3) {
-    const VehicleState state = motion.StateAt(t);
+    const VehicleKinematics state = motion.StateAt(t);
     EXPECT_NEAR(state.velocity_mps.x(), motion.SpeedMps(t), 0.5);
     const Eigen::Isometry3d later = motion.WorldFromBase(t + 0.02);
     const Eigen::Vector3d guess = state.world_from_base.translation() +
