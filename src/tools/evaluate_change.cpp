@@ -168,11 +168,11 @@ class Evaluation {
       return ReadPrediction(options_.predictions, files.name, pair.truth.size());
     }
     aligned_ = Align(files, pair);
-    if (!aligned_) return NothingSeen(pair.truth.size());
+    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
     const auto start = std::chrono::steady_clock::now();
     ChangeProbabilities probabilities = method_->Run(*aligned_);
     method_ms_.push_back(MillisecondsSince(start));
-    return WithUnseen(aligned_->valid, std::move(probabilities));
+    return WithUnseen(std::move(probabilities));
   }
 
   /// After Forward of the same pair: the view stays that of the later picture, whose mask the truth
@@ -181,20 +181,13 @@ class Evaluation {
     if (method_ == nullptr) {
       return ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
     }
-    if (!aligned_) return NothingSeen(pair.truth.size());
-    return WithUnseen(aligned_->valid,
-                      method_->Run({aligned_->after, aligned_->before, aligned_->valid}));
-  }
-
-  /// Of a pair that was refused.
-  ChangeProbabilities NothingSeen(cv::Size size) const {
-    return WithUnseen(cv::Mat::zeros(size, CV_8UC1),
-                      NothingChanged(size, method_->tells_classes()));
+    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
+    return WithUnseen(method_->Run({aligned_->after, aligned_->before, aligned_->valid}));
   }
 
   /// A network's scores are probabilities, so it can say how little it knows; a distance can't.
-  ChangeProbabilities WithUnseen(const cv::Mat& valid, ChangeProbabilities probabilities) const {
-    if (!options_.model.empty()) SpreadOverUnseen(valid, probabilities);
+  ChangeProbabilities WithUnseen(ChangeProbabilities probabilities) const {
+    if (!options_.model.empty()) SpreadOverUnseen(aligned_->valid, probabilities);
     return probabilities;
   }
 
