@@ -17,10 +17,10 @@ import train_discard
 from detector import CLASSES, onnx_model
 from detector.data import Picture
 from detector.loss import Target
+from detector.network import Detector
 from early_discard import INPUT_HEIGHT, INPUT_WIDTH, figures, labels, loss, network
 
 from .synthetic import TRAINING_SECTION, write_data
-from .test_programs import scattered_detector
 
 LEVEL = labels.Camera(500, 500, 319.5, 199.5, 1.6, 0, 0, 0)
 """A camera that looks straight ahead, 1.6 m above the road."""
@@ -126,7 +126,7 @@ class Programs(unittest.TestCase):
         shutil.copytree(sections / TRAINING_SECTION, sections / labels.CALIBRATION_SECTIONS[0])
         cls.detector = cls.root / "detector.onnx"
         cls.threads = torch.get_num_threads()
-        onnx_model.export(scattered_detector(), cls.detector, 640, 400)
+        onnx_model.export(Detector(len(CLASSES)), cls.detector, 640, 400)
 
     @classmethod
     def tearDownClass(cls):
