@@ -49,7 +49,7 @@ SIZES = {
     "small": Widths(pyramid=(32, 64, 64), context=64),
     "base": Widths(pyramid=(48, 96, 128), deep=True),
 }
-"""Networks by name: 1.19 M, 0.96 M and 4.6 M parameters."""
+"""Networks by name: 1.19 M, 0.96 M and 4.25 M parameters."""
 
 
 class ConvBlock(nn.Sequential):
