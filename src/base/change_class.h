@@ -21,6 +21,11 @@ enum class ChangeClass : std::uint8_t {
 };
 constexpr int kChangeClasses = 10;
 
+/// Where a mask of directions (GT_direction) says that the later drive has what the earlier one has
+/// not, and the other way round; 0: nothing changed.
+constexpr std::uint8_t kAppearedPixel = 1;
+constexpr std::uint8_t kVanishedPixel = 2;
+
 /// "no_change", "barrier", ..., "vehicle".
 const char* ChangeClassName(ChangeClass change_class);
 /// Red, green, blue as the published ground truth paints it, white for no change.

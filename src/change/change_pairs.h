@@ -8,10 +8,6 @@
 
 namespace livemap {
 
-/// In masks of direction.
-constexpr std::uint8_t kAppearedPixel = 1;
-constexpr std::uint8_t kVanishedPixel = 2;
-
 /// The files of one pair.
 struct ChangePairFiles {
   std::string name;    ///< Without extension, e.g. "000/07" or "1_00_0".

@@ -13,7 +13,19 @@ struct ScoredMatch {
   bool matched = false;
 };
 
-/// Matches the frame's detections to its labels, appending one entry per detection.
+/// Share of a detection that a box has to cover for the detection to be about that box, as for the
+/// "don't care" regions of KITTI's object benchmark.
+constexpr float kShareInDifficult = 0.5F;
+
+bool IsDifficult(const ScoredBox& detection, const ScoredFrame& frame) {
+  return std::any_of(
+      frame.difficult.begin(), frame.difficult.end(), [&](const cv::Rect2f& difficult) {
+        return (detection.box & difficult).area() >= kShareInDifficult * detection.box.area();
+      });
+}
+
+/// Matches the frame's detections to its labels, appending one entry per detection that is right or
+/// wrong.
 void MatchFrame(const ScoredFrame& frame, double iou, std::vector<ScoredMatch>& matches) {
   std::vector<const ScoredBox*> descending;
   for (const ScoredBox& detection : frame.detections) descending.push_back(&detection);
@@ -33,6 +45,7 @@ void MatchFrame(const ScoredFrame& frame, double iou, std::vector<ScoredMatch>& 
     }
     const bool matched = best < frame.labels.size() && best_overlap >= iou;
     if (matched) taken[best] = true;
+    if (!matched && IsDifficult(*detection, frame)) continue;
     matches.push_back({detection->score, matched});
   }
 }
@@ -49,12 +62,6 @@ std::size_t CountLabels(const std::vector<ScoredFrame>& frames) {
   std::size_t labels = 0;
   for (const ScoredFrame& frame : frames) labels += frame.labels.size();
   return labels;
-}
-
-bool OverlapsALabel(const ScoredBox& detection, const ScoredFrame& frame, double iou) {
-  return std::any_of(frame.labels.begin(), frame.labels.end(), [&](const cv::Rect2f& label) {
-    return IntersectionOverUnion(detection.box, label) >= iou;
-  });
 }
 
 std::vector<ScoredFrame> Pool(const std::vector<ScoredDrive>& drives,
@@ -150,18 +157,35 @@ std::vector<std::vector<std::size_t>> FindEvents(const ScoredDrive& drive) {
   return events;
 }
 
+double BestOverlap(const ScoredBox& detection, const std::vector<cv::Rect2f>& labels) {
+  double best = 0;
+  for (const cv::Rect2f& label : labels) {
+    best = std::max(best, IntersectionOverUnion(detection.box, label));
+  }
+  return best;
+}
+
+bool IsFalse(const ScoredBox& detection, const ScoredFrame& frame, double iou) {
+  return BestOverlap(detection, frame.labels) < iou && !IsDifficult(detection, frame);
+}
+
+bool IsRecalled(const ScoredDrive& drive, const std::vector<std::size_t>& event, double threshold,
+                double iou) {
+  return std::any_of(event.begin(), event.end(), [&](std::size_t index) {
+    const ScoredFrame& frame = drive[index];
+    return std::any_of(
+        frame.detections.begin(), frame.detections.end(), [&](const ScoredBox& detection) {
+          return detection.score >= threshold && BestOverlap(detection, frame.labels) >= iou;
+        });
+  });
+}
+
 std::size_t CountRecalledEvents(const ScoredDrive& drive, double threshold, double iou) {
   const std::vector<std::vector<std::size_t>> events = FindEvents(drive);
-  const auto recalled = [&](const std::vector<std::size_t>& event) {
-    return std::any_of(event.begin(), event.end(), [&](std::size_t index) {
-      const ScoredFrame& frame = drive[index];
-      return std::any_of(
-          frame.detections.begin(), frame.detections.end(), [&](const ScoredBox& detection) {
-            return detection.score >= threshold && OverlapsALabel(detection, frame, iou);
-          });
-    });
-  };
-  return static_cast<std::size_t>(std::count_if(events.begin(), events.end(), recalled));
+  return static_cast<std::size_t>(
+      std::count_if(events.begin(), events.end(), [&](const std::vector<std::size_t>& event) {
+        return IsRecalled(drive, event, threshold, iou);
+      }));
 }
 
 FalseCounts CountFalse(const ScoredDrive& drive, double threshold, double iou) {
@@ -170,7 +194,7 @@ FalseCounts CountFalse(const ScoredDrive& drive, double threshold, double iou) {
   for (const ScoredFrame& frame : drive) {
     const auto wrong = std::count_if(
         frame.detections.begin(), frame.detections.end(), [&](const ScoredBox& detection) {
-          return detection.score >= threshold && !OverlapsALabel(detection, frame, iou);
+          return detection.score >= threshold && IsFalse(detection, frame, iou);
         });
     if (wrong == 0) continue;
     counts.detections += static_cast<std::size_t>(wrong);

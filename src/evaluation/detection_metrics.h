@@ -25,6 +25,9 @@ struct ScoredFrame {
   std::vector<cv::Rect2f> labels;
   std::vector<ScoredBox> detections;
   double chainage_m = 0;  ///< Place along the road; without meaning outside drives.
+  /// Objects of the class that need not be found: a detection at least half of which lies in one
+  /// is neither right nor wrong, unless it overlaps a label enough.
+  std::vector<cv::Rect2f> difficult;
 };
 
 /// Frames in driving order: chainage does not descend.
@@ -52,13 +55,22 @@ MatchCounts CountMatches(const std::vector<ScoredFrame>& frames, double threshol
 /// apart.
 std::vector<std::vector<std::size_t>> FindEvents(const ScoredDrive& drive);
 
-/// How many of the drive's events are recalled: a detection of at least `threshold` overlaps a
-/// label of one of the event's frames by at least `iou`.
+/// The largest IoU with one of `labels`, 0 without any.
+double BestOverlap(const ScoredBox& detection, const std::vector<cv::Rect2f>& labels);
+
+/// Whether it overlaps no label of its frame by at least `iou` and is about no difficult object.
+bool IsFalse(const ScoredBox& detection, const ScoredFrame& frame, double iou);
+
+/// Whether a detection of at least `threshold` overlaps a label of one of the event's frames by at
+/// least `iou`.
+bool IsRecalled(const ScoredDrive& drive, const std::vector<std::size_t>& event, double threshold,
+                double iou);
+
+/// How many of the drive's events are recalled.
 std::size_t CountRecalledEvents(const ScoredDrive& drive, double threshold, double iou);
 
-/// Detections of at least `threshold` that overlap no label of their frame by at least `iou`, and
-/// the reports that they cause: in driving order one starts a report unless its frame is within
-/// kEventGapM of the frame where the last report began.
+/// False detections of at least `threshold`, and the reports that they cause: in driving order one
+/// starts a report unless its frame is within kEventGapM of the frame where the last report began.
 struct FalseCounts {
   std::size_t detections = 0;
   std::size_t reports = 0;

@@ -25,6 +25,10 @@ struct Layout {
   fs::path root;  // may hold frames.csv and classes.txt
   fs::path images;
   fs::path labels;
+
+  fs::path Difficult() const {
+    return root / "difficult" / labels.lexically_relative(root / "labels");
+  }
 };
 
 bool IsImage(const fs::path& path) {
@@ -216,15 +220,19 @@ std::vector<std::string> FindClasses(const std::string& text, const Layout& layo
   return found;
 }
 
+std::vector<LabelledFrame::Label> ReadLabels(const fs::path& path,
+                                             const std::vector<std::string>& classes) {
+  if (!fs::exists(path)) return {};
+  return ParseYoloLabels(ReadFile(path.string(), kMostTextBytes), classes, path.string());
+}
+
 LabelledFrame ReadFrame(const fs::path& image, const Layout& layout,
                         const std::vector<std::string>& classes) {
   LabelledFrame frame;
   frame.image_path = image.string();
-  const fs::path labels = layout.labels / image.stem().concat(".txt");
-  if (fs::exists(labels)) {
-    frame.labels =
-        ParseYoloLabels(ReadFile(labels.string(), kMostTextBytes), classes, labels.string());
-  }
+  const fs::path name = image.stem().concat(".txt");
+  frame.labels = ReadLabels(layout.labels / name, classes);
+  frame.difficult = ReadLabels(layout.Difficult() / name, classes);
   return frame;
 }
 

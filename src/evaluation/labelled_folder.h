@@ -17,7 +17,8 @@ struct LabelledFrame {
 
   std::string image_path;
   std::vector<Label> labels;
-  double chainage_m = 0;  ///< Of drives.
+  std::vector<Label> difficult;  ///< Objects that need not be found, as nobody could name them.
+  double chainage_m = 0;         ///< Of drives.
 };
 
 /// A folder of labelled images: a YOLO folder or a drive.
@@ -43,6 +44,7 @@ struct LabelledFolderOptions {
 ///  - a folder with images/ and labels/ (with frames.csv, "frame,chainage_m,...", a drive),
 ///  - one whose images/ and labels/ are divided into splits, with `options.split`, or
 ///  - an images/ folder or one of its splits, its labels beside it (a/images/val, a/labels/val).
+/// A folder difficult/ beside labels/, divided as that is, may hold more files of the same form.
 /// A label file has lines "class x_centre y_centre width height", fractions of the image; a missing
 /// one means an empty image. Without class names from options or classes.txt, class 0 is taken as
 /// pothole in a drive whose frames.csv has the column "potholes", and otherwise as the model's

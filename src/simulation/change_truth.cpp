@@ -70,7 +70,7 @@ ChangeView CompareInstances(const cv::Mat& before, const cv::Mat& after,
         const auto change = changed.find(instance);
         if (change == changed.end()) continue;
         mask[column] = static_cast<std::uint8_t>(ChangeClassOf(ClassOfInstance(instance)));
-        direction[column] = change->second.appeared ? ChangeView::kAppeared : ChangeView::kVanished;
+        direction[column] = change->second.appeared ? kAppearedPixel : kVanishedPixel;
         ++view.pixels[instance];
         break;
       }

@@ -33,11 +33,8 @@ class InstanceCaster {
 
 /// What changed, as a picture of the second pass shows it.
 struct ChangeView {
-  static constexpr std::uint8_t kAppeared = 1;
-  static constexpr std::uint8_t kVanished = 2;
-
   cv::Mat mask;       ///< CV_8UC1, ChangeClass.
-  cv::Mat direction;  ///< CV_8UC1: where something changed, kAppeared or kVanished.
+  cv::Mat direction;  ///< CV_8UC1: where something changed, kAppearedPixel or kVanishedPixel.
   std::map<std::uint32_t, int> pixels;  ///< Of the mask, by the changed object that decided them.
 };
 

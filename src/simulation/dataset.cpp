@@ -16,6 +16,16 @@ namespace {
 
 constexpr int kJpegQuality = 90;
 
+std::string YoloLine(const HazardInView& hazard, const cv::Size& size) {
+  const int class_id =
+      static_cast<int>(hazard.object_class) - static_cast<int>(ObjectClass::kPothole);
+  const cv::Rect& box = hazard.box;
+  return std::to_string(class_id) + FormatNumber(" %.6f", (box.x + 0.5 * box.width) / size.width) +
+         FormatNumber(" %.6f", (box.y + 0.5 * box.height) / size.height) +
+         FormatNumber(" %.6f", static_cast<double>(box.width) / size.width) +
+         FormatNumber(" %.6f", static_cast<double>(box.height) / size.height) + "\n";
+}
+
 }  // namespace
 
 TumWriter::TumWriter(const std::string& directory, const SimulatedCamera& camera,
@@ -68,7 +78,7 @@ void TumWriter::Finish() {
 }
 
 YoloWriter::YoloWriter(const std::string& directory) : directory_(directory) {
-  MakeNewFolder(directory, {"images", "labels"});
+  MakeNewFolder(directory, {"images", "labels", "difficult"});
   std::ofstream classes = OpenFile(directory + "/classes.txt");
   for (const ObjectClass object_class : HazardClasses()) classes << ClassName(object_class) << "\n";
   CloseFile(classes, directory + "/classes.txt");
@@ -82,19 +92,14 @@ void YoloWriter::Add(double chainage_m, const SimulatedFrame& frame,
   std::snprintf(name, sizeof(name), "%06zu", count_++);
   WriteImage(directory_ + "/images/" + name + ".jpg", frame.bgr,
              {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
-  const std::string path = directory_ + "/labels/" + name + ".txt";
-  std::ofstream labels = OpenFile(path);
-  const double width = frame.bgr.cols;
-  const double height = frame.bgr.rows;
-  for (const HazardInView& hazard : hazards) {
-    const int class_id =
-        static_cast<int>(hazard.object_class) - static_cast<int>(ObjectClass::kPothole);
-    labels << class_id << FormatNumber(" %.6f", (hazard.box.x + 0.5 * hazard.box.width) / width)
-           << FormatNumber(" %.6f", (hazard.box.y + 0.5 * hazard.box.height) / height)
-           << FormatNumber(" %.6f", hazard.box.width / width)
-           << FormatNumber(" %.6f", hazard.box.height / height) << "\n";
+  for (const bool difficult : {false, true}) {
+    const std::string path = directory_ + (difficult ? "/difficult/" : "/labels/") + name + ".txt";
+    std::ofstream labels = OpenFile(path);
+    for (const HazardInView& hazard : hazards) {
+      if (hazard.difficult == difficult) labels << YoloLine(hazard, frame.bgr.size());
+    }
+    CloseFile(labels, path);
   }
-  CloseFile(labels, path);
   frames_ << name << FormatNumber(",%.3f", chainage_m) << "\n";
 }
 
@@ -126,22 +131,6 @@ std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
     }
   }
   return nlohmann::json({{"type", "FeatureCollection"}, {"features", features}}).dump(1) + "\n";
-}
-
-cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns) {
-  if (pictures.empty()) throw Error("a contact sheet needs at least one picture");
-  constexpr int kGap = 4;
-  const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
-  const cv::Size size = pictures.front().size();
-  cv::Mat sheet(rows * (size.height + kGap) + kGap, columns * (size.width + kGap) + kGap, CV_8UC3,
-                cv::Scalar(24, 24, 24));
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const int column = static_cast<int>(i) % columns;
-    const int row = static_cast<int>(i) / columns;
-    pictures[i].copyTo(sheet(cv::Rect(kGap + column * (size.width + kGap),
-                                      kGap + row * (size.height + kGap), size.width, size.height)));
-  }
-  return sheet;
 }
 
 cv::Mat ColourClasses(const cv::Mat& classes) {

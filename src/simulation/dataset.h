@@ -42,7 +42,8 @@ class TumWriter {
   std::ofstream truth_;
 };
 
-/// Writes a labelled drive: images/ (JPEG), labels/ (YOLO lines), classes.txt and frames.csv.
+/// Writes a labelled drive: images/ (JPEG), labels/ (YOLO lines), difficult/ (the same of hazards
+/// that are difficult), classes.txt and frames.csv.
 class YoloWriter {
  public:
   explicit YoloWriter(const std::string& directory);
@@ -61,9 +62,6 @@ class YoloWriter {
 /// drive ends, is marked as passed.
 std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
                              const std::map<std::uint32_t, int>& frames_seen, double end_along_m);
-
-/// Pictures of one size side by side on dark ground, `columns` per row; CV_8UC3.
-cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns);
 
 /// Each class in its colour, for looking at truth; CV_8UC3.
 cv::Mat ColourClasses(const cv::Mat& classes);

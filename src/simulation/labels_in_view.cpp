@@ -1,5 +1,6 @@
 #include "simulation/labels_in_view.h"
 
+#include <algorithm>
 #include <map>
 
 namespace livemap {
@@ -13,9 +14,17 @@ struct Extent {
   int pixels;
 };
 
+bool IsDifficult(const HazardInView& hazard, const OutlinePixels& outlines,
+                 const LabelLimits& limits) {
+  if (std::min(hazard.box.width, hazard.box.height) < limits.clear_side) return true;
+  const auto outline = outlines.find(hazard.instance);
+  return outline != outlines.end() && hazard.visible_pixels < limits.clear_share * outline->second;
+}
+
 }  // namespace
 
-std::vector<HazardInView> FindHazards(const cv::Mat& instances, const LabelLimits& limits) {
+std::vector<HazardInView> FindHazards(const cv::Mat& instances, const OutlinePixels& outlines,
+                                      const LabelLimits& limits) {
   std::map<std::uint32_t, Extent> extents;
   for (int row = 0; row < instances.rows; ++row) {
     const auto* line = instances.ptr<int>(row);
@@ -41,6 +50,7 @@ std::vector<HazardInView> FindHazards(const cv::Mat& instances, const LabelLimit
     hazard.visible_pixels = extent.pixels;
     if (extent.pixels >= limits.least_pixels && hazard.box.width >= limits.least_width &&
         hazard.box.height >= limits.least_height) {
+      hazard.difficult = IsDifficult(hazard, outlines, limits);
       hazards.push_back(hazard);
     }
   }

@@ -178,6 +178,7 @@ SimulatedFrame StreetRenderer::Render(const CameraExposure& motion, std::uint32_
   const int width = camera_.intrinsics.width;
   SimulatedFrame frame;
   frame.world_from_optical = motion.world_from_optical;
+  frame.outlines = CountOutlinePixels(scene_, camera_, motion.world_from_optical);
   cv::Mat light(height, width, CV_32FC3);
   const int instants = std::max(1, camera_.blur_samples);
   for (int i = 0; i < instants; ++i) {

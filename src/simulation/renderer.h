@@ -6,6 +6,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "simulation/hazard_outline.h"
 #include "simulation/lighting.h"
 #include "simulation/scene.h"
 #include "simulation/sensor.h"
@@ -20,6 +21,7 @@ struct SimulatedFrame {
   cv::Mat depth;      ///< CV_32FC1, metres along the optical axis; 0: sky.
   cv::Mat classes;    ///< CV_8UC1, ObjectClass.
   cv::Mat instances;  ///< CV_32SC1, see MakeInstance.
+  OutlinePixels outlines;
   Eigen::Isometry3d world_from_optical = Eigen::Isometry3d::Identity();
 };
 

@@ -12,6 +12,7 @@
 #include "simulation/dataset.h"
 #include "simulation/pass_drive.h"
 #include "simulation/random.h"
+#include "tools/contact_sheet.h"
 #include "tools/simulation_flags.h"
 #include "tools/simulation_outputs.h"
 #include "tools/simulation_setup.h"

@@ -10,6 +10,7 @@
 #include "simulation/dataset.h"
 #include "simulation/patterned_wall.h"
 #include "simulation/room.h"
+#include "tools/contact_sheet.h"
 #include "tools/simulation_outputs.h"
 #include "tools/simulation_setup.h"
 

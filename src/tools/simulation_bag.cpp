@@ -37,9 +37,11 @@ DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
   return drive;
 }
 
+/// Of the hazards that a detector should find.
 std::vector<Detection> ToBoxes(const std::vector<HazardInView>& hazards) {
   std::vector<Detection> boxes;
   for (const HazardInView& hazard : hazards) {
+    if (hazard.difficult) continue;
     Detection box;
     box.class_name = ClassName(hazard.object_class);
     box.confidence = 1;

@@ -7,6 +7,7 @@
 #include "drives/multipath.h"
 #include "simulation/output_files.h"
 #include "simulation/skyline.h"
+#include "tools/contact_sheet.h"
 #include "tools/simulation_flags.h"
 
 namespace livemap {
@@ -101,7 +102,7 @@ cv::Mat SimulationOutputs::Sense(std::size_t index, const SimulatedFrame& frame)
 
 void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
                             const SimulatedFrame& frame, const cv::Mat& right) {
-  const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
+  const std::vector<HazardInView> hazards = FindHazards(frame.instances, frame.outlines);
   for (const HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
   const cv::Mat depth = tum_ || bag_depth_ ? Sense(index, frame) : cv::Mat();
   if (tum_) {

@@ -15,7 +15,7 @@ const cv::Rect2f kAway(100, 0, 10, 10);
 
 ScoredFrame Frame(std::vector<cv::Rect2f> labels, std::vector<ScoredBox> detections,
                   double chainage_m = 0) {
-  return {std::move(labels), std::move(detections), chainage_m};
+  return {std::move(labels), std::move(detections), chainage_m, {}};
 }
 
 TEST(AveragePrecision, IsOneWhenEveryLabelIsFoundAndNothingElse) {
@@ -116,6 +116,28 @@ TEST(FalseReports, AreNotMadeByDetectionsOfALabelOrBelowTheThreshold) {
   const FalseCounts counts = CountFalse(drive, 0.5, 0.5);
   EXPECT_EQ(counts.detections, 1U);
   EXPECT_EQ(counts.reports, 1U);
+}
+
+TEST(DifficultObjects, NeedNotBeFoundAndAreNotWrong) {
+  ScoredFrame frame = Frame({kHere}, {{kAway, 0.9F}, {kHere, 0.8F}}, 0);
+  frame.difficult = {kAway};
+  EXPECT_DOUBLE_EQ(AveragePrecision({frame}, 0.5), 1);
+  EXPECT_EQ(CountMatches({frame}, 0.5, 0.5).detections, 1U);
+  EXPECT_EQ(CountFalse({frame}, 0.5, 0.5).detections, 0U);
+  frame.labels.clear();
+  EXPECT_TRUE(FindEvents({frame}).empty());
+}
+
+TEST(DifficultObjects, ExcuseOnlyWhatLiesHalfInThem) {
+  ScoredFrame frame = Frame({kHere}, {{{106, 0, 10, 10}, 0.9F}, {{104, 0, 10, 10}, 0.8F}}, 0);
+  frame.difficult = {kAway};
+  EXPECT_EQ(CountFalse({frame}, 0.5, 0.5).detections, 1U);
+}
+
+TEST(DifficultObjects, DoNotTakeDetectionsFromLabels) {
+  ScoredFrame frame = Frame({kHere}, {{kHere, 0.9F}}, 0);
+  frame.difficult = {kHere};
+  EXPECT_DOUBLE_EQ(AveragePrecision({frame}, 0.5), 1);
 }
 
 TEST(DrivenKm, CountsALongGapAsTwelveMetres) {

@@ -97,6 +97,19 @@ TEST_F(LabelledFolderTest, SplitsAreReadByFlagOrByPath) {
               AllOf(HasSubstr("images/test"), HasSubstr("train, val")));
 }
 
+TEST_F(LabelledFolderTest, DifficultObjectsAreReadBesideTheLabels) {
+  Write("pothole/images/val/a.jpg", "");
+  Write("pothole/labels/val/a.txt", "");
+  Write("pothole/difficult/val/a.txt", "0 0.5 0.5 0.2 0.4\n");
+  const LabelledFolder folder = Read("pothole", Options({}, "val"));
+  ASSERT_EQ(folder.frames.size(), 1U);
+  EXPECT_TRUE(folder.frames[0].labels.empty());
+  ASSERT_EQ(folder.frames[0].difficult.size(), 1U);
+  EXPECT_DOUBLE_EQ(folder.frames[0].difficult[0].box.width, 0.2);
+  Write("pothole/difficult/val/a.txt", "0 0.5\n");
+  EXPECT_THAT(ErrorOf("pothole/images/val"), HasSubstr("difficult/val/a.txt"));
+}
+
 TEST_F(LabelledFolderTest, TheFoldersOwnNameSaysWhatClassZeroIs) {
   Write("deer/pothole_closeups/images/a.jpg", "");
   Write("deer/pothole_closeups/labels/a.txt", "");

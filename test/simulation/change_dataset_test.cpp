@@ -39,7 +39,7 @@ class ChangeDataset : public ::testing::Test {
     view_.direction = view_.mask.clone();
     for (int i = 0; i < kChangeClasses; ++i) {
       view_.mask.at<std::uint8_t>(1, i) = static_cast<std::uint8_t>(i);
-      view_.direction.at<std::uint8_t>(1, i) = ChangeView::kVanished;
+      view_.direction.at<std::uint8_t>(1, i) = kVanishedPixel;
     }
     view_.pixels = {{kCone, 30}, {kCar, 3}};
   }

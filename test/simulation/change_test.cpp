@@ -203,8 +203,8 @@ TEST(CompareInstances, PaintsTheAppearedObjectElseTheVanishedOneAndNothingUnlist
   }
   const std::vector<int> directions(view.direction.begin<std::uint8_t>(),
                                     view.direction.end<std::uint8_t>());
-  EXPECT_EQ(directions, (std::vector<int>{ChangeView::kAppeared, ChangeView::kAppeared,
-                                          ChangeView::kVanished, ChangeView::kVanished, 0, 0}));
+  EXPECT_EQ(directions, (std::vector<int>{kAppearedPixel, kAppearedPixel, kVanishedPixel,
+                                          kVanishedPixel, 0, 0}));
   EXPECT_EQ(view.pixels, (std::map<std::uint32_t, int>{{cone, 2}, {car, 2}}));
 }
 

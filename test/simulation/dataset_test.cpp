@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 
 #include "base/error.h"
@@ -45,11 +46,38 @@ TEST_F(Dataset, BoxesEncloseTheirInstancesExactly) {
   frame_.instances.at<int>(10, 10) = static_cast<int>(MakeInstance(9, ObjectClass::kDeer));
   frame_.instances(cv::Rect(100, 50, 30, 30)) =
       static_cast<int>(MakeInstance(5, ObjectClass::kVehicle));
-  const std::vector<HazardInView> hazards = FindHazards(frame_.instances, LabelLimits());
+  const std::vector<HazardInView> hazards = FindHazards(frame_.instances, frame_.outlines);
   ASSERT_EQ(hazards.size(), 1U) << "one pixel of deer and a parked car are not labelled";
   EXPECT_EQ(hazards[0].box, cv::Rect(40, 30, 12, 41));
   EXPECT_EQ(hazards[0].visible_pixels, 12 * 20 + 1);
   EXPECT_EQ(hazards[0].object_class, ObjectClass::kTrafficCone);
+}
+
+TEST_F(Dataset, WhatIsTooSmallOrTooHiddenToBeNamedIsDifficult) {
+  const std::uint32_t deer = MakeInstance(9, ObjectClass::kDeer);
+  const std::uint32_t pothole = MakeInstance(8, ObjectClass::kPothole);
+  frame_.instances(cv::Rect(100, 50, 20, 20)) = static_cast<int>(deer);
+  frame_.instances(cv::Rect(60, 100, 40, 7)) = static_cast<int>(pothole);
+  frame_.outlines[kCone] = 2 * 12 * 20;
+  frame_.outlines[deer] = 3 * 20 * 20;
+  std::map<std::uint32_t, bool> difficult;
+  for (const HazardInView& hazard : FindHazards(frame_.instances, frame_.outlines)) {
+    difficult[hazard.instance] = hazard.difficult;
+  }
+  ASSERT_EQ(difficult.size(), 3U);
+  EXPECT_FALSE(difficult[kCone]) << "half of it is visible";
+  EXPECT_TRUE(difficult[deer]) << "a third of it is visible";
+  EXPECT_TRUE(difficult[pothole]) << "7 px high";
+}
+
+TEST_F(Dataset, YoloFolderKeepsDifficultHazardsApart) {
+  frame_.outlines[kCone] = 1000;
+  YoloWriter writer(folder_.string());
+  writer.Add(12.5, frame_, FindHazards(frame_.instances, frame_.outlines));
+  writer.Finish();
+  EXPECT_EQ(ReadFile((folder_ / "labels" / "000000.txt").string(), 1000), "");
+  EXPECT_EQ(ReadFile((folder_ / "difficult" / "000000.txt").string(), 1000),
+            "1 0.287500 0.333333 0.075000 0.166667\n");
 }
 
 TEST_F(Dataset, TumFolderIsReadBackByTheReaderOfDrives) {
@@ -101,7 +129,7 @@ TEST_F(Dataset, CoarserTumDepthReachesFurther) {
 
 TEST_F(Dataset, YoloFolderHasFractionsOfTheImage) {
   YoloWriter writer(folder_.string());
-  writer.Add(12.5, frame_, FindHazards(frame_.instances, LabelLimits()));
+  writer.Add(12.5, frame_, FindHazards(frame_.instances, frame_.outlines));
   writer.Finish();
   const std::vector<LabelledBox> boxes =
       ParseYoloLabels(ReadFile((folder_ / "labels" / "000000.txt").string(), 1000), "000000.txt");

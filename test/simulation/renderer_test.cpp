@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "drives/camera_file.h"
@@ -163,13 +164,51 @@ TEST(Truth, HazardsLieWhereTheyAreSaidToLie) {
   const Street street(world, 3, 400, true);
   const SimulatedCamera camera = StreetCamera();
   const SimulatedFrame frame = Picture(street, camera, 2, 0);
-  const std::vector<HazardInView> hazards = FindHazards(frame.instances, LabelLimits());
+  const std::vector<HazardInView> hazards = FindHazards(frame.instances, frame.outlines);
   ASSERT_EQ(hazards.size(), 1U);
   const Eigen::Vector3d foot = street.line().At(30, -2.2, -0.04);
   const Eigen::Vector2d pixel = camera.Project(frame.world_from_optical.inverse() * foot);
   const cv::Rect& box = hazards[0].box;
   EXPECT_NEAR(pixel.x(), box.x + 0.5 * (box.width - 1), 1.5);
   EXPECT_NEAR(pixel.y(), box.br().y - 1, 2.5);
+}
+
+TEST(Truth, OutlinesCountWhatIsHiddenToo) {
+  WorldDescription world;
+  world.hazards.emplace();
+  PlacedHazard placed;
+  placed.object_class = ObjectClass::kTrafficCone;
+  placed.at_m = 24;
+  placed.left_m = 0.8;
+  world.hazards->push_back(placed);
+  placed.object_class = ObjectClass::kConstructionMachine;
+  placed.at_m = 25;
+  placed.left_m = -2.2;
+  world.hazards->push_back(placed);
+  placed.object_class = ObjectClass::kTrafficCone;
+  placed.at_m = 36;
+  world.hazards->push_back(placed);
+  world.parked_cars = false;
+  const Street street(world, 3, 400, true);
+  const SimulatedFrame frame = Picture(street, StreetCamera(), 2, 0);
+  std::map<std::uint32_t, int> visible;
+  for (const HazardInView& hazard : FindHazards(frame.instances, frame.outlines)) {
+    visible[hazard.instance] = hazard.visible_pixels;
+  }
+  int hidden = 0;
+  for (const auto& [instance, pixels] : frame.outlines) {
+    const auto seen = visible.find(instance);
+    if (seen == visible.end()) {
+      EXPECT_EQ(ClassOfInstance(instance), ObjectClass::kTrafficCone);
+      ++hidden;
+    } else {
+      // A ray meets a pixel's middle only, an outline counts each pixel that it touches.
+      EXPECT_GE(pixels, seen->second) << ClassName(ClassOfInstance(instance));
+      EXPECT_LT(pixels, 1.5 * seen->second) << ClassName(ClassOfInstance(instance));
+    }
+  }
+  EXPECT_EQ(hidden, 1) << "the cone behind the machine";
+  EXPECT_EQ(visible.size(), 2U) << "the cone beside it and the machine";
 }
 
 TEST(Camera, DistortionAndItsInverseAgree) {

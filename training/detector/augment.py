@@ -4,7 +4,7 @@ Everything random comes from one numpy generator that the caller seeds per sampl
 depends on (seed, epoch, index) alone: not on workers, not on an interrupted run.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Dict, List, Tuple
 
 import cv2
@@ -73,7 +73,7 @@ SETTLING = Recipe(
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.46, "survey_empty": 0.16, "closeups": 0.04, "cones": 0.08, "simulated": 0.26}
+GROUP_SHARES = {"survey_potholes": 0.44, "survey_empty": 0.15, "closeups": 0.04, "cones": 0.11, "simulated": 0.26}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
 
 GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0}
@@ -105,6 +105,15 @@ class Sample:
     classes: np.ndarray  # G
     ignored: np.ndarray  # K x 4 corners
     labelled: np.ndarray  # C: how much background of the class counts, 1 where every object is labelled
+
+
+def move_boxes(boxes: np.ndarray, transform: np.ndarray) -> np.ndarray:
+    """N x 4 corners by a 2 x 3 transform without rotation."""
+    if not len(boxes):
+        return boxes
+    xs = boxes[:, 0::2] * transform[0, 0] + transform[0, 2]
+    ys = boxes[:, 1::2] * transform[1, 1] + transform[1, 2]
+    return np.stack([xs.min(1), ys.min(1), xs.max(1), ys.max(1)], axis=1)
 
 
 def ratio(rng: np.random.Generator, spread: float) -> float:
@@ -224,9 +233,8 @@ class Augmenter:
             image, warp, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
             borderValue=(PAD_VALUE,) * 3,
         )
-        xs = picture.boxes[:, 0::2] * transform[0, 0] + transform[0, 2]
-        ys = picture.boxes[:, 1::2] * transform[1, 1] + transform[1, 2]
-        moved = np.stack([xs.min(1), ys.min(1), xs.max(1), ys.max(1)], axis=1) if len(xs) else picture.boxes
+        moved = move_boxes(picture.boxes, transform)
+        difficult = box_math.clip_to_image(move_boxes(picture.difficult, transform), width, height)
         clipped = box_math.clip_to_image(moved, width, height)
         sizes = clipped[:, 2:] - clipped[:, :2]
         areas = box_math.areas(clipped)
@@ -236,7 +244,7 @@ class Augmenter:
             image,
             clipped[clear].astype(np.float32),
             picture.classes[clear],
-            clipped[~clear & (sizes > 0).all(1)].astype(np.float32),
+            np.vstack([clipped[~clear & (areas > 0)], difficult[box_math.areas(difficult) > 0]]).astype(np.float32),
             np.zeros(len(CLASSES), np.float32),
         )
 
@@ -248,7 +256,7 @@ class Augmenter:
             pasted = blend_patch(rng, image, donor, box, boxes)
             if pasted is not None:
                 boxes, classes = np.vstack([boxes, pasted]).astype(np.float32), np.append(classes, POTHOLE)
-        return Picture(image, boxes, classes, picture.labelled_classes, picture.name)
+        return replace(picture, image=image, boxes=boxes, classes=classes)
 
     def draw_donor(self, rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray]:
         """A picture with a pothole of a size as in survey frames, and its box."""

@@ -5,7 +5,7 @@ more than the network on a CPU.
 """
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Sequence, Tuple
 
@@ -34,6 +34,8 @@ class Picture:
     labelled_classes: Sequence[int]
     name: str = ""
     weight: float = 1.0  # how often to draw it, relative to others of its group
+    difficult: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.float32))  # K x 4 corners: nobody could name these
+    difficult_classes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 @dataclass
@@ -65,13 +67,17 @@ def read_yolo_labels(path: Path, width: int, height: int, class_ids: Sequence[in
 
 
 def read_picture(image_path: Path, label_path: Path, class_ids: Sequence[int]) -> Picture:
-    """One image and its labels; `class_ids` as in read_yolo_labels."""
+    """One image and its labels; `class_ids` as in read_yolo_labels. A folder difficult/ beside that of the labels is read too."""
     image = cv2.imread(str(image_path), cv2.IMREAD_COLOR)
     if image is None:
         raise DataError(f"Cannot read the image {image_path}.")
     boxes, classes = read_yolo_labels(label_path, image.shape[1], image.shape[0], class_ids)
     labelled = [class_id for class_id in class_ids if class_id >= 0]
-    return Picture(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, classes, labelled, image_path.stem)
+    picture = Picture(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, classes, labelled, image_path.stem)
+    difficult = label_path.parent.parent / "difficult" / label_path.name
+    if difficult.exists():
+        picture.difficult, picture.difficult_classes = read_yolo_labels(difficult, image.shape[1], image.shape[0], class_ids)
+    return picture
 
 
 def read_folder(images: Path, labels: Path, class_ids: Sequence[int]) -> List[Picture]:

@@ -4,15 +4,18 @@ The same definitions as `livemap evaluate detection`. All boxes are N x 4 corner
 are N x 5, corners and score.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Dict, List, Sequence
 
 import numpy as np
 
-from .boxes import pairwise_iou
+from .boxes import areas, pairwise_iou
 
 NEAR_M = 12.0
 """Labelled frames at most this far apart belong to one event, false detections to one false report."""
+
+SHARE_IN_DIFFICULT = 0.5
+"""Of a detection's area, from which on it is about a difficult object."""
 
 
 @dataclass
@@ -22,6 +25,16 @@ class ScoredFrame:
     labels: np.ndarray  # N x 4
     detections: np.ndarray  # M x 5
     chainage_m: float = 0.0
+    difficult: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))  # K x 4: neither to be found nor wrong
+
+    def about_difficult(self) -> np.ndarray:
+        """Which detections lie at least half in a difficult box: those are not wrong."""
+        if not len(self.difficult) or not len(self.detections):
+            return np.zeros(len(self.detections), bool)
+        boxes = self.detections[:, None, :4]
+        sides = np.minimum(boxes[..., 2:], self.difficult[None, :, 2:]) - np.maximum(boxes[..., :2], self.difficult[None, :, :2])
+        covered = sides.clip(min=0).prod(axis=2)
+        return (covered >= SHARE_IN_DIFFICULT * areas(self.detections[:, :4])[:, None]).any(axis=1)
 
 
 Drive = Sequence[ScoredFrame]
@@ -39,12 +52,15 @@ def average_precision(frames: Sequence[ScoredFrame], iou: float) -> float:
         free = np.ones(len(frame.labels), bool)
         order = np.argsort(-frame.detections[:, 4], kind="stable")
         overlaps = pairwise_iou(frame.detections[order, :4], frame.labels)
-        for score, overlap in zip(frame.detections[order, 4], overlaps):
+        excused = frame.about_difficult()[order]
+        for score, overlap, is_excused in zip(frame.detections[order, 4], overlaps, excused):
             overlap = np.where(free, overlap, -1.0)
             best = int(overlap.argmax()) if len(overlap) else -1
             hit = best >= 0 and overlap[best] >= iou
             if hit:
                 free[best] = False
+            elif is_excused:
+                continue
             scores.append(score)
             hits.append(hit)
     if not label_count or not scores:
@@ -92,7 +108,7 @@ def highest_false_scores(drive: Drive, iou: float) -> np.ndarray:
 def false_scores(frame: ScoredFrame, iou: float) -> np.ndarray:
     """Scores of the detections that overlap no label."""
     overlaps = pairwise_iou(frame.detections[:, :4], frame.labels)
-    return frame.detections[~(overlaps >= iou).any(axis=1), 4]
+    return frame.detections[~(overlaps >= iou).any(axis=1) & ~frame.about_difficult(), 4]
 
 
 def false_reports(drive: Drive, highest_false: np.ndarray, threshold: float) -> int:
@@ -152,6 +168,6 @@ def f1_score(frames: Sequence[ScoredFrame], threshold: float, iou: float) -> flo
         detections = frame.detections[frame.detections[:, 4] >= threshold]
         overlaps = pairwise_iou(detections[:, :4], frame.labels)
         true_positives += min((overlaps >= iou).any(axis=1).sum(), (overlaps >= iou).any(axis=0).sum())
-        detection_count += len(detections)
+        detection_count += (overlaps >= iou).any(axis=1).sum() + (false_scores(frame, iou) >= threshold).sum()
     label_count = sum(len(frame.labels) for frame in frames)
     return 2 * true_positives / max(detection_count + label_count, 1)

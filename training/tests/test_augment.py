@@ -37,6 +37,16 @@ class Reading(unittest.TestCase):
         self.assertEqual(sorted(picture.labelled_classes), [POTHOLE, TRAFFIC_CONE])
         np.testing.assert_allclose(picture.boxes[1], [480, 260, 544, 300], atol=0.01)
 
+    def test_difficult_objects_are_read_apart(self):
+        with tempfile.TemporaryDirectory() as folder:
+            drive = write_simulated(Path(folder)) / "000001"
+            (drive / "labels").rename(drive / "difficult")
+            (drive / "labels").mkdir()
+            (drive / "labels" / "000000.txt").write_text("")
+            picture, = read_simulated(Path(folder))
+        self.assertEqual(len(picture.boxes), 0)
+        self.assertEqual(picture.difficult_classes.tolist(), [TRAFFIC_CONE, POTHOLE])
+
     def test_a_class_beyond_the_list_is_refused_by_file(self):
         with tempfile.TemporaryDirectory() as folder:
             root = write_simulated(Path(folder))
@@ -61,6 +71,21 @@ class Samples(unittest.TestCase):
                 self.assertGreater(inside.mean(), 240)
                 labels += 1
         self.assertGreater(labels, 40)
+
+    def test_difficult_objects_are_ignored_where_they_are(self):
+        picture = bright_square()
+        picture.difficult, picture.boxes, picture.classes = picture.boxes, picture.boxes[:0], picture.classes[:0]
+        sees = Augmenter({"survey_empty": [picture]}, Recipe(**{**CALM, "mosaic": 0.0}), 416, 320)
+        ignored = 0
+        for index in range(30):
+            sample = sees.draw(np.random.default_rng(index))
+            self.assertEqual(len(sample.boxes), 0)
+            for x1, y1, x2, y2 in sample.ignored:
+                inside = sample.image[int(y1) + 2 : int(y2) - 1, int(x1) + 2 : int(x2) - 1]
+                if inside.size:
+                    self.assertGreater(inside.mean(), 240)
+                    ignored += 1
+        self.assertGreater(ignored, 10)
 
     def test_mosaic_labels_one_class(self):
         for index in range(20):

@@ -38,6 +38,20 @@ class AveragePrecision(unittest.TestCase):
         self.assertEqual(average_precision([frame(detections=[BOX + [0.5]])], 0.5), 0.0)
 
 
+class DifficultObjects(unittest.TestCase):
+    def setUp(self):
+        self.frame = frame(labels=[BOX], detections=[FAR + [0.9], BOX + [0.8], [330, 300, 370, 320, 0.7]])
+        self.frame.difficult = np.array([FAR], float)
+
+    def test_need_not_be_found_and_are_not_wrong(self):
+        self.assertAlmostEqual(average_precision([self.frame], 0.5), 1.0)
+        self.assertEqual(highest_false_scores([self.frame], 0.5).tolist(), [0.7], "less than half of it lies in the difficult box")
+
+    def test_do_not_take_detections_from_labels(self):
+        self.frame.difficult = np.array([BOX], float)
+        self.assertAlmostEqual(average_precision([self.frame], 0.5), 0.5)
+
+
 class Drives(unittest.TestCase):
     def test_events_split_at_gaps_over_12_m(self):
         drive = [frame(0, [BOX]), frame(5), frame(12, [BOX]), frame(25, [BOX]), frame(30)]
