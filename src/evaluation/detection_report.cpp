@@ -36,6 +36,8 @@ nlohmann::ordered_json ClassJson(const ClassReport& report) {
   json["threshold"] = std::round(figures.threshold * 1e6) / 1e6;
   json["n"] = figures.frames;
   json["km"] = figures.km;
+  json["missed_by_cause"] = report.missed_by_cause;
+  json["false_by_cause"] = report.false_by_cause;
   for (const ClassFigures& at : report.sweep) {
     nlohmann::ordered_json entry;
     entry["threshold"] = std::round(at.threshold * 1e6) / 1e6;

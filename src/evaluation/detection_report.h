@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -16,6 +17,9 @@ struct ClassReport {
   /// The tracker's events instead of single detections, by how sure it must be (`threshold`, a
   /// multiple of the class's). Empty unless asked for.
   std::vector<ClassFigures> tracking = {};
+  /// Events of drives that are missed and false reports at the threshold, by CauseName.
+  std::map<std::string, std::size_t> missed_by_cause = {};
+  std::map<std::string, std::size_t> false_by_cause = {};
 };
 
 /// The result of `livemap evaluate detection`.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "ingest/decode.h"
 #include "tools/command_line.h"
 #include "tools/detection_tool_support.h"
+#include "tools/error_sheets.h"
 #include "tools/shipped_model.h"
 
 namespace livemap {
@@ -26,6 +28,7 @@ struct Options {
   bool json = false;
   bool sweep = false;
   bool tracking = false;
+  std::string errors;
   TrackedDriveOptions tracked;
   ObjectTracker::Config tracker;
   double lowest_score = 0.01;
@@ -48,6 +51,9 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"split", "NAME", "part of a DIR whose images/ and labels/ are divided, e.g. val"},
        {"label-classes", "A,B", "names of the label files' classes 0, 1, ..., default classes.txt"},
        {"sweep", "", "figures at thresholds from 0.05 to 0.95 too"},
+       {"errors", "DIR",
+        "drives: write contact sheets of missed events and false reports, and\n"
+        "a list of them, into this new folder"},
        {"tracking", "", "drives: the tracker's events at several degrees of certainty too"},
        {"camera", "FILE",
         "with --tracking: camera of the drives (config/cameras), default none:\n"
@@ -65,6 +71,10 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.json = line.Has("json");
   options.sweep = line.Has("sweep");
   options.tracking = line.Has("tracking");
+  options.errors = line.Text("errors", "");
+  if (!options.errors.empty() && std::filesystem::exists(options.errors)) {
+    throw Error("--errors is '" + options.errors + "', which exists, accepted is a new folder");
+  }
   const std::string camera = line.Text("camera", "");
   if (!camera.empty()) options.tracked.camera = ReadCameraFile(camera);
   options.tracker.repeat_gain = line.Number("repeat-gain", options.tracker.repeat_gain, 0, 1);
@@ -80,6 +90,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 /// Frames of one class: what EvaluateClass wants.
 struct ClassFrames {
   std::vector<ScoredDrive> drives;
+  std::vector<std::vector<std::string>> pictures;  ///< Paths, of the drives' frames.
   std::vector<ScoredFrame> photos;
 };
 
@@ -112,7 +123,7 @@ class Evaluation {
     for (std::size_t i = 0; i < classes.size(); ++i) {
       const auto frames = by_class_.find(classes[i]);
       if (frames == by_class_.end()) continue;
-      const auto& [drives, photos] = frames->second;
+      const auto& [drives, pictures, photos] = frames->second;
       // Through the float that the detector compares with, so that its boundary cases count alike.
       ClassReport entry{classes[i], EvaluateClass(drives, photos, double{thresholds_[i]}), {}};
       if (options_.sweep) {
@@ -121,6 +132,8 @@ class Evaluation {
         entry.sweep = SweepThresholds(drives, photos, thresholds);
       }
       if (options_.tracking) AddTracking(drives, entry);
+      AddCauses(drives, entry);
+      if (!options_.errors.empty()) WriteErrors(drives, pictures, entry);
       report.classes.push_back(std::move(entry));
     }
     return report;
@@ -143,11 +156,32 @@ class Evaluation {
     }
   }
 
+  static void AddCauses(const std::vector<ScoredDrive>& drives, ClassReport& entry) {
+    for (const ScoredDrive& drive : drives) {
+      for (const MissedEvent& missed : FindMissedEvents(drive, entry.figures.threshold)) {
+        ++entry.missed_by_cause[CauseName(missed.cause)];
+      }
+      for (const FalseReport& report : FindFalseReports(drive, entry.figures.threshold)) {
+        ++entry.false_by_cause[CauseName(report.cause)];
+      }
+    }
+  }
+
+  void WriteErrors(const std::vector<ScoredDrive>& drives,
+                   const std::vector<std::vector<std::string>>& pictures,
+                   const ClassReport& entry) const {
+    std::vector<PicturedDrive> pictured;
+    for (std::size_t i = 0; i < drives.size(); ++i) pictured.push_back({&drives[i], &pictures[i]});
+    WriteErrorSheets(options_.errors, entry.class_name, pictured, entry.figures.threshold);
+  }
+
   void RunFolder(const LabelledFolder& folder, Progress& progress) {
     std::map<std::string, std::vector<ScoredFrame>> scored;
     std::vector<TrackerFrame> recording;
+    std::vector<std::string> pictures;
     for (const LabelledFrame& frame : folder.frames) {
       const cv::Mat image = ReadImage(frame.image_path);
+      pictures.push_back(frame.image_path);
       const auto start = std::chrono::steady_clock::now();
       const std::vector<HazardDetection> found = detector_->Detect(image);
       milliseconds_.push_back(
@@ -168,6 +202,7 @@ class Evaluation {
       ClassFrames& all = by_class_[name];
       if (folder.is_drive) {
         all.drives.push_back(std::move(frames));
+        all.pictures.push_back(pictures);
         drive_recordings_[name].push_back(recordings_.size());
       } else {
         all.photos.insert(all.photos.end(), frames.begin(), frames.end());
@@ -176,15 +211,23 @@ class Evaluation {
     recordings_.push_back(std::move(recording));
   }
 
+  static std::vector<cv::Rect2f> BoxesOf(const std::vector<LabelledFrame::Label>& labels,
+                                         cv::Size size, const std::string& class_name) {
+    std::vector<cv::Rect2f> boxes;
+    for (const LabelledFrame::Label& label : labels) {
+      if (label.class_name != class_name) continue;
+      boxes.emplace_back(label.box.x * size.width, label.box.y * size.height,
+                         label.box.width * size.width, label.box.height * size.height);
+    }
+    return boxes;
+  }
+
   static ScoredFrame Score(const LabelledFrame& frame, const std::vector<HazardDetection>& found,
                            cv::Size size, const std::string& class_name) {
     ScoredFrame scored;
     scored.chainage_m = frame.chainage_m;
-    for (const LabelledFrame::Label& label : frame.labels) {
-      if (label.class_name != class_name) continue;
-      scored.labels.emplace_back(label.box.x * size.width, label.box.y * size.height,
-                                 label.box.width * size.width, label.box.height * size.height);
-    }
+    scored.labels = BoxesOf(frame.labels, size, class_name);
+    scored.difficult = BoxesOf(frame.difficult, size, class_name);
     for (const HazardDetection& detection : found) {
       if (detection.class_name == class_name) {
         scored.detections.push_back({detection.box, detection.confidence});

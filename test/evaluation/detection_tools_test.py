@@ -72,6 +72,23 @@ class DetectionToolsTest(unittest.TestCase):
         self.assertGreater(pothole["ap50"], 0.3)
         self.assertGreater(result["inference_ms_p50"], 0)
 
+    def test_errors_are_listed_by_cause_and_shown(self):
+        folder = os.path.join(self.temporary.name, "errors")
+        done = run("livemap_evaluate_detection", "--json", "--model", MODEL, "--errors", folder, self.drive)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        pothole = json.loads(done.stdout)["classes"]["pothole"]
+        self.assertEqual((pothole["missed_by_cause"], pothole["false_by_cause"]), ({"unseen": 1}, {"background": 1}))
+        with open(os.path.join(folder, "errors.csv"), encoding="ascii") as file:
+            rows = [line.split(",") for line in file.read().splitlines()]
+        self.assertEqual([row[:3] for row in rows[1:]], [["pothole", "missed", "unseen"], ["pothole", "false", "background"]])
+        self.assertEqual([os.path.basename(row[-1]) for row in rows[1:]], ["c.png", "d.png"])
+        for kind in ("missed", "false"):
+            sheet = cv2.imread(os.path.join(folder, f"pothole_{kind}.jpg"))
+            self.assertGreater(sheet.std(), 10)
+        again = run("livemap_evaluate_detection", "--model", MODEL, "--errors", folder, self.drive)
+        self.assertEqual(again.returncode, 2)
+        self.assertIn("accepted is a new folder", again.stderr)
+
     def test_folders_are_pooled_and_the_table_names_the_class(self):
         done = run("livemap_evaluate_detection", "--sweep", "--model", MODEL, self.drive, self.drive)
         self.assertEqual(done.returncode, 0, done.stderr)
