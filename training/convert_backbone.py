@@ -59,7 +59,7 @@ def unpack(archive: Path, folder: Path) -> Path:
 
 def converted(graph: GraphModel) -> list:
     """The convolutions of our backbone; fails unless it computes what the graph does."""
-    backbone = Backbone(Widths(deep=True)).eval()
+    backbone = Backbone(Widths(deep=256)).eval()
     convolutions = graph.convolutions(len(blocks_of(backbone)))
     put_into(backbone, convolutions)
     image = torch.randn(3, 96, 128, generator=torch.Generator().manual_seed(1))

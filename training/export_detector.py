@@ -10,9 +10,10 @@ classes without real pictures by the best F1 on simulated drives (--simulated; s
 """
 
 import argparse
+import re
 import sys
 from pathlib import Path
-from typing import List, Optional
+from typing import List, Optional, Tuple
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data, inference, onnx_model
 from detector.manifest import write_manifest
 from detector.metrics import average_precision, best_f1_threshold
-from detector.network import SIZES, Detector
+from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
 from detector.validation import detect_simulated, validate
 from export_torch import ExportError, add_torch_file
@@ -63,10 +64,18 @@ def load_averaged(checkpoints: List[Path]) -> Detector:
     return detector.eval()
 
 
-def check_against_torch(weights: Path, exportable: torch.nn.Module) -> None:
+def input_size(text: str) -> Tuple[int, int]:
+    """Width and height of the network's input, from WIDTHxHEIGHT."""
+    found = re.fullmatch(r"([1-9]\d{1,3})x([1-9]\d{1,3})", text)
+    size = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not found or any(side % STRIDES[-1] for side in size):
+        raise argparse.ArgumentTypeError(f"'{text}' is no WIDTHxHEIGHT in multiples of {STRIDES[-1]}")
+    return size
+
+
+def check_against_torch(weights: Path, exportable: torch.nn.Module, size: Tuple[int, int]) -> None:
     """Compare OpenCV with torch on random input."""
-    shape = (1, 3, inference.INPUT_HEIGHT, inference.INPUT_WIDTH)
-    images = np.random.default_rng(1).normal(size=shape).astype(np.float32)
+    images = np.random.default_rng(1).normal(size=(1, 3, size[1], size[0])).astype(np.float32)
     with torch.no_grad():
         expected = exportable(torch.from_numpy(images)).numpy()
     difference = float(np.abs(onnx_model.opencv_outputs(weights, images) - expected).max())
@@ -75,14 +84,14 @@ def check_against_torch(weights: Path, exportable: torch.nn.Module) -> None:
     print(f"OpenCV and torch differ by at most {difference:.2g}")
 
 
-def write_golden(path: Path, weights: Path) -> None:
+def write_golden(path: Path, weights: Path, size: Tuple[int, int]) -> None:
     """Expected output rows for the golden image, at equal steps over all anchor points."""
-    image = inference.normalise(onnx_model.golden_image(inference.INPUT_WIDTH, inference.INPUT_HEIGHT))
+    image = inference.normalise(onnx_model.golden_image(*size))
     predictions = onnx_model.opencv_outputs(weights, image[None])[0]
     rows = np.linspace(0, len(predictions) - 1, GOLDEN_ROWS).astype(int)
     content = {
         "image": "pixel(x, y, c) = (x * (c + 1) + 2 * y + x * y / 64) mod 256, integer division, c = 0 red",
-        "width": inference.INPUT_WIDTH, "height": inference.INPUT_HEIGHT, "tolerance": TOLERANCE,
+        "width": size[0], "height": size[1], "tolerance": TOLERANCE,
         "anchor_points": len(predictions),
         "rows": [
             {"index": int(row), "values": [round(float(value), 6) for value in predictions[row]]} for row in rows
@@ -100,24 +109,24 @@ def run(arguments: argparse.Namespace) -> None:
     cones = data.read_validation_cones(arguments.data)
 
     weights = arguments.out / f"{arguments.name}.onnx"
-    exportable = onnx_model.export(detector, weights, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
-    check_against_torch(weights, exportable)
+    exportable = onnx_model.export(detector, weights, *arguments.input)
+    check_against_torch(weights, exportable, arguments.input)
     if arguments.packed:
         round_weights(weights)
         weights = pack(weights)
-    write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights)
+    write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights, arguments.input)
 
     runner = onnx_model.opencv_runner(weights)
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in CLASSES}
     if arguments.simulated:
-        for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated)).items():
+        for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated), arguments.input).items():
             thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
             print(f"simulated {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
-    found = validate(runner, drives, cones)
+    found = validate(runner, drives, cones, arguments.input)
     thresholds["pothole"] = found.best_drive_figures().threshold
     thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
     manifest = arguments.out / f"{arguments.name}.yaml"
-    write_manifest(manifest, weights, thresholds)
+    write_manifest(manifest, weights, thresholds, arguments.input, arguments.engine)
     add_torch_file(manifest)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 
@@ -130,6 +139,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
+    parser.add_argument("--input", type=input_size, default=inference.INPUT_SIZE, metavar="WIDTHxHEIGHT", help="of the network (640x400)")
+    parser.add_argument("--engine", choices=("opencv", "torch"), default="", help="entered into the manifest; else the vehicle's default")
     parser.add_argument("--packed", action="store_true", help="weights of half the precision, in gzip files")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)

@@ -3,8 +3,9 @@
 
     training/export_discard.py --data ../shared/data --out models --training build/training/discard --simulated DIR
 
-The threshold is the lower one of those that send 0.9 of the frames with a hazard on the survey sections kept for
-calibration and on simulated drives (--simulated; seeds that training has not seen). Figures are of the validation
+The threshold is the lower one of those that send 0.95 of the frames with a hazard on the survey sections kept for
+calibration and on simulated drives (--simulated; seeds that training has not seen): on roads that no part of the
+network has seen 0.9 are left of that. Figures are of the validation
 sections, which chose nothing.
 """
 
@@ -30,7 +31,8 @@ from early_discard.network import Features, Head, NetworkError, export
 TOLERANCE = 1e-3
 """Largest difference between OpenCV and torch that an export may have."""
 
-RECALL = 0.9
+RECALL = 0.95
+"""Where the threshold is chosen. The goal is 0.9 on other roads; the backbone has been trained on these."""
 
 
 class ExportError(Exception):

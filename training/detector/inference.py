@@ -19,6 +19,7 @@ MOST_CANDIDATES = 3000
 """Per class, only this many of the best enter the suppression, as in the vehicle."""
 
 INPUT_WIDTH, INPUT_HEIGHT = 640, 400
+INPUT_SIZE = (INPUT_WIDTH, INPUT_HEIGHT)
 
 
 def letterbox(image: np.ndarray, width: int, height: int) -> Tuple[np.ndarray, float]:

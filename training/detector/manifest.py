@@ -31,15 +31,18 @@ def sha256_of(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def write_manifest(path: Path, weights: Path, thresholds: Dict[str, float]) -> None:
-    """Describe `weights`, which lies beside the manifest."""
+def write_manifest(
+    path: Path, weights: Path, thresholds: Dict[str, float], size: Tuple[int, int] = inference.INPUT_SIZE, engine: str = ""
+) -> None:
+    """Describe `weights`, which lies beside the manifest; `size` of the input is width and height, no `engine` leaves it open."""
     content = {
         "name": path.stem,
         "file": weights.name,
         "sha256": sha256_of(weights),
+        **({"engine": engine} if engine else {}),
         "classes": list(CLASSES),
         "input": {
-            "width": inference.INPUT_WIDTH, "height": inference.INPUT_HEIGHT, "channels": "rgb",
+            "width": size[0], "height": size[1], "channels": "rgb",
             "resize": "letterbox", "pad_value": inference.PAD_VALUE,
         },
         "normalisation": {"mean": [inference.MEAN] * 3, "std": [inference.STD] * 3},

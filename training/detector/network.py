@@ -36,20 +36,21 @@ class Widths:
     stem: int = 32  # twice as many at each stride from 4 on: 64, 128, 256
     pyramid: Tuple[int, int, int] = (32, 64, 96)  # at strides 4, 8, 16
     context: int = 128  # of one window of the pooled context
-    deep: bool = False  # the backbone goes on to stride 32, for context: no head there
+    deep: int = 0  # channels that enter the backbone's stage at stride 32, for context: no head there; 0: there is none
 
     @property
     def backbone(self) -> Tuple[int, int, int, int]:
         """Channels that the backbone gives at strides 4, 8, 16 and, if it is deep, 32."""
-        return 2 * self.stem, 4 * self.stem, 8 * self.stem, 16 * self.stem
+        return 2 * self.stem, 4 * self.stem, 8 * self.stem, 2 * self.deep
 
 
 SIZES = {
     "first": Widths(),
     "small": Widths(pyramid=(32, 64, 64), context=64),
-    "base": Widths(pyramid=(48, 96, 128), deep=True),
+    "medium": Widths(pyramid=(48, 96, 128), deep=88),
+    "base": Widths(pyramid=(48, 96, 128), deep=256),
 }
-"""Networks by name: 1.19 M, 0.96 M and 4.25 M parameters."""
+"""Networks by name: 1.19 M, 0.96 M, 1.97 M and 4.25 M parameters."""
 
 
 class ConvBlock(nn.Sequential):
@@ -106,6 +107,13 @@ class PooledContext(nn.Module):
         return self.expand(torch.cat([near, middle, far, self.pool(far)], dim=1))
 
 
+def deep_stage(channels: int, entering: int) -> nn.Module:
+    """From stride 16 to 32: NanoDet-g's own stage, or a narrow one after a projection to fewer channels."""
+    if entering == channels:
+        return CspStage(channels, pairs=3, stride=2)
+    return nn.Sequential(ConvBlock(channels, entering, kernel=1, slope=LEAK), CspStage(entering, pairs=2, stride=2))
+
+
 class Backbone(nn.Module):
     """Image to features at strides 4, 8 and 16, and at 32 where it is deep."""
 
@@ -118,7 +126,7 @@ class Backbone(nn.Module):
         self.stride4 = CspStage(widths.stem, pairs=1, stride=1)
         self.stride8 = CspStage(fine, pairs=2, stride=2)
         self.stride16 = CspStage(middle, pairs=2, stride=2)
-        self.stride32 = CspStage(coarse, pairs=3, stride=2) if widths.deep else None
+        self.stride32 = deep_stage(coarse, widths.deep) if widths.deep else None
 
     def forward(self, images: Tensor) -> List[Tensor]:
         fine = self.stride4(self.stem(images))

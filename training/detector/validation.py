@@ -59,26 +59,30 @@ class Validation:
         return drive_figures(self.potholes, calibrate_threshold(self.potholes, FALSE_REPORTS_PER_KM))
 
 
-def detect_simulated(run: Runner, pictures: List[Picture]) -> Dict[str, List[ScoredFrame]]:
-    """Detections and labels in frames of simulated drives, by class."""
-    grid = inference.AnchorGrid.of(inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+def detect_simulated(
+    run: Runner, pictures: List[Picture], size: Tuple[int, int] = inference.INPUT_SIZE
+) -> Dict[str, List[ScoredFrame]]:
+    """Detections and labels in frames of simulated drives, by class; `size` is the network's input, width and height."""
+    grid = inference.AnchorGrid.of(*size)
     frames = {name: [] for name in CLASSES}
     for picture in pictures:
-        found = detect(picture, run, grid, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+        found = detect(picture, run, grid, *size)
         for class_id, name in enumerate(CLASSES):
-            frames[name].append(ScoredFrame(picture.boxes[picture.classes == class_id], found[class_id]))
+            labels, difficult = (boxes[classes == class_id] for boxes, classes in (
+                (picture.boxes, picture.classes), (picture.difficult, picture.difficult_classes)))
+            frames[name].append(ScoredFrame(labels, found[class_id], difficult=difficult))
     return frames
 
 
 def validate(
     run: Runner, drives: Dict[str, List[DriveFrame]], cones: List[Picture],
-    width: int = inference.INPUT_WIDTH, height: int = inference.INPUT_HEIGHT,
+    size: Tuple[int, int] = inference.INPUT_SIZE,
 ) -> Validation:
-    """Detect in every validation picture."""
-    grid = inference.AnchorGrid.of(width, height)
+    """Detect in every validation picture; `size` is the network's input, width and height."""
+    grid = inference.AnchorGrid.of(*size)
     result = Validation({}, [], {})
     for name, drive in drives.items():
-        found = [detect(frame.picture, run, grid, width, height) for frame in drive]
+        found = [detect(frame.picture, run, grid, *size) for frame in drive]
         result.potholes[name] = [
             ScoredFrame(frame.picture.boxes, detections[POTHOLE], frame.chainage_m)
             for frame, detections in zip(drive, found)
@@ -88,6 +92,6 @@ def validate(
             for frame, detections in zip(drive, found)
         ]
     result.cones = [
-        ScoredFrame(picture.boxes, detect(picture, run, grid, width, height)[TRAFFIC_CONE]) for picture in cones
+        ScoredFrame(picture.boxes, detect(picture, run, grid, *size)[TRAFFIC_CONE]) for picture in cones
     ]
     return result

@@ -92,7 +92,7 @@ class GraphWriter:
 
     def write(self, folder: Path, shifted: bool = False) -> Path:
         """A random graph of our backbone's shape; `shifted` as TensorFlow's own padding would have it at stride 2."""
-        backbone = Backbone(Widths(deep=True))
+        backbone = Backbone(Widths(deep=256))
         features = self.convolve("input_1", backbone.stem[0][0].weight.shape, 2, before=0 if shifted else 1)
         size = {"list": {"i": ["1", "3", "3", "1"]}}
         features = self.window("MaxPool", "", features, [], 2, [[0, 0], [0, 0], [1, 1], [1, 1]], ksize=size)

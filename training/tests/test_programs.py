@@ -100,16 +100,20 @@ class Programs(unittest.TestCase):
         models = self.root / "models"
         models.mkdir()
         checkpoint = self.root / "random.pt"
-        detector = Detector(len(CLASSES), SIZES["base"])
-        torch.save({"settings": {"size": "base"}, "average": detector.state_dict()}, checkpoint)
+        detector = Detector(len(CLASSES), SIZES["medium"])
+        torch.save({"settings": {"size": "medium"}, "average": detector.state_dict()}, checkpoint)
         exported = quietly(
-            export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data, "--packed"
+            export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data, "--packed",
+            "--input", "320x208", "--engine", "torch",
         )
         self.assertEqual(exported, (0, ""))
         arguments = ("--manifest", models / "tiny.yaml", "--data", self.data)
         self.assertEqual(quietly(evaluate_detector, *arguments), (0, ""))
         manifest = yaml.safe_load((models / "tiny.yaml").read_text())
         self.assertEqual((manifest["torch_file"], manifest["torch_sha256"]), ("tiny.pt.gz", sha256_of(models / "tiny.pt.gz")))
+        self.assertEqual((manifest["engine"], manifest["input"]["width"], manifest["input"]["height"]), ("torch", 320, 208))
+        golden = yaml.safe_load((models / "tiny.golden.yaml").read_text())
+        self.assertEqual((golden["width"], golden["anchor_points"]), (320, 80 * 52 + 40 * 26 + 20 * 13))
         small = ("--size", "small", "--start-from", models / "tiny.onnx.gz")
         self.assertEqual(self.train("small", *small), (0, ""))
         self.assertIn("size small", self.train("small", "--size", "base", "--resume")[1])
@@ -154,6 +158,7 @@ class Programs(unittest.TestCase):
             (train_detector, ("--frobnicate",)),
             (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
             (export_detector, ("--out", nowhere)),
+            (export_detector, ("--input", "640x401", "--out", self.root)),
             (evaluate_detector, ("--manifest", nowhere)),
             (export_torch, (nowhere,)),
         ]
