@@ -26,6 +26,8 @@ COUNTS = {
                          "duplicates_suppressed"),
     "mqtt_bridge": ("uplink_bytes",),
 }
+# Only small vehicles have this one.
+DISCARD = "early_discard"
 
 
 def parse_time(text):
@@ -122,7 +124,7 @@ class VehicleObserver:
     def _take_diagnostics(self, message):
         with self.lock:
             for status in message.status:
-                if status.hardware_id in COUNTS:
+                if status.hardware_id in COUNTS or status.hardware_id == DISCARD:
                     self.values.setdefault(status.hardware_id, {}).update(
                         {pair.key: pair.value for pair in status.values})
 
@@ -174,7 +176,9 @@ class VehicleObserver:
                 "frames_processed": self._count("hazard_detection", "frames_processed"),
                 "frames_dropped": (self._count("camera_ingest", "frames_dropped")
                                    + self._count("camera_ingest", "frames_bad")
-                                   + self._count("hazard_detection", "frames_dropped")),
+                                   + self._count("hazard_detection", "frames_dropped")
+                                   + self._count(DISCARD, "frames_dropped")),
+                "frames_judged": self._count(DISCARD, "frames_judged"),
                 "detections": self._count("hazard_detection", "detections"),
                 "detections_taken": self._count("hazard_reporting", "detections"),
                 "duplicates_suppressed": self._count("hazard_reporting", "duplicates_suppressed"),

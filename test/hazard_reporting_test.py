@@ -109,7 +109,7 @@ class HazardReportingTest(unittest.TestCase):
         vehicle.wait_for(reports_without_picture=1, pictures_requested=1)
 
     def test_without_events_every_detection_counts_with_the_annotated_image(self):
-        vehicle = self.driving_vehicle(use_events=False, picture_context=0.0, max_image_bytes=100000)
+        vehicle = self.driving_vehicle(use_events=False, pictures_on_demand=False, picture_context=0.0, max_image_bytes=100000)
         vehicle.see(3.1, detection(12.0))
         report = eventually(vehicle.reports, "a report")[0]
         self.assertEqual(decode(report.image).shape, (400, 640, 3))

@@ -46,7 +46,8 @@ class LaunchArguments(unittest.TestCase):
     def test_every_parameter_of_every_node_can_be_set_by_the_argument_of_its_node(self):
         # What an argument of its own sets already is not set twice.
         own_arguments = {"source", "transport", "uri", "camera_info_url", "stereo", "model", "database", "drive_id",
-                         "catalogue", "publish_tf", "position_source", "use_depth", "use_events", "tracking", "user",
+                         "catalogue", "publish_tf", "position_source", "use_depth", "use_events",
+                         "pictures_on_demand", "tracking", "user",
                          "zone", "host", "port", "password_file", "directory", "hazards", "web_address", "web_port",
                          "tile_url", "tile_attribution"}
         for launch, nodes in NODES.items():

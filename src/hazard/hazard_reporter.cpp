@@ -202,6 +202,7 @@ void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
 bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
   if (!waiting.picture.bgr.empty()) return false;
   AskForPicture(waiting, now_s);
+  if (!expects_pictures_) return false;
   waiting.asked_s = std::min(*waiting.asked_s, now_s);  // The clock was set back.
   return now_s - *waiting.asked_s < config_.picture_wait_s;
 }

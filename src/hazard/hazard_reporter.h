@@ -58,7 +58,7 @@ class HazardReporter {
     double bracket_wait_s = 0.3;
     /// A frame with something to report waits this long for its picture, from when it is known to
     /// need one, s.
-    double picture_wait_s = 0.5;
+    double picture_wait_s = 3.0;
     /// Pictures come when they are asked for (TakePictureRequests); false: by themselves.
     bool pictures_on_demand = true;
     /// Frames that wait at the same time; beyond it the oldest is dropped.
@@ -145,6 +145,8 @@ class HazardReporter {
   void AddDepth(std::int64_t stamp_ns, const DepthImage& depth);
   /// The annotated image of the frame with this stamp, before or after it.
   void AddPicture(std::int64_t stamp_ns, const Picture& picture);
+  /// Whether there is anyone to give pictures, as there is at first; else no frame waits for one.
+  void ExpectPictures(bool expected) { expects_pictures_ = expected; }
   /// Stamps of the images whose pictures are wanted now, each once.
   std::vector<std::int64_t> TakePictureRequests();
   void SetLink(LinkCost link) { link_ = link; }
@@ -230,6 +232,7 @@ class HazardReporter {
   std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
   std::map<std::int64_t, DepthImage> depths_;       // By stamp.
   std::vector<std::int64_t> picture_requests_;
+  bool expects_pictures_ = true;
   LinkCost link_ = LinkCost::kUnknown;
   bool held_at_start_ = false;
   std::int64_t start_ns_;  // UTC at the start...

@@ -6,6 +6,7 @@
 #include <nodelet/nodelet.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
@@ -105,7 +106,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       events_publisher_ = node.advertise<DetectionArray>("hazard/events", 100);
       tracking_ = std::make_unique<HazardTracking>(config_.tracking, manifest, node);
     }
-    request_subscriber_ = node.subscribe<PictureRequest>(
+    // Beside the images' queue: masking a picture takes longer than detecting in it.
+    request_subscriber_ = getMTNodeHandle().subscribe<PictureRequest>(
         "hazard/picture_request", 100,
         [this](const PictureRequest::ConstPtr& request) { AnswerPicture(request->stamp); });
     StartPool();
@@ -174,7 +176,6 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   /// Called image after image in the order in which they came.
   void HandOn(const Seen& seen, const std_msgs::Header& header) {
-    const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
     const cv::Mat& bgr = seen.bgr->image;
     std::vector<HazardDetection> found = seen.found;
     found.erase(std::remove_if(found.begin(), found.end(),
@@ -189,9 +190,11 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       }
     }
     ++frame_;
+    // The image is kept before anything is told of it: who hears of it may ask for it at once.
+    const std::vector<DetectionArray> events = Keep(seen, header);
     detections_publisher_.publish(boost::make_shared<DetectionArray>(
         ToMessage(found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
-    Track(seen, header);
+    for (const DetectionArray& event : events) events_publisher_.publish(event);
     const std::lock_guard<std::mutex> lock(figures_mutex_);
     figures_.detections += found.size();
     ++figures_.processed_in_window;
@@ -203,8 +206,9 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     return found.confidence < thresholds_[static_cast<std::size_t>(found.class_index)];
   }
 
-  /// The image is kept before its events go out: who gets one may ask at once.
-  void Track(const Seen& seen, const std_msgs::Header& header) {
+  /// The tracker's events, if it runs; the image may be asked for from now on.
+  std::vector<DetectionArray> Keep(const Seen& seen, const std_msgs::Header& header) {
+    const std::lock_guard<std::mutex> lock(pictures_mutex_);
     std::vector<DetectionArray> events;
     std::vector<std::int64_t> wanted;
     if (tracking_) {
@@ -215,19 +219,23 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       recent_->Add(static_cast<std::int64_t>(header.stamp.toNSec()), {seen.bgr, seen.found, header},
                    wanted);
     }
-    for (const DetectionArray& event : events) events_publisher_.publish(event);
+    return events;
   }
 
   void AnswerPicture(const ros::Time& stamp) {
-    const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
-    const auto kept = recent_->Find(static_cast<std::int64_t>(stamp.toNSec()));
+    std::optional<Kept> kept;
+    std::vector<HazardDetection> shown;
+    {
+      const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
+      const auto stamp_ns = static_cast<std::int64_t>(stamp.toNSec());
+      kept = recent_->Find(stamp_ns);
+      if (kept && tracking_) shown = tracking_->ReportedIn(stamp_ns);
+    }
     if (!kept) {
       const std::lock_guard<std::mutex> lock(figures_mutex_);
       ++figures_.unknown_requests;
       return;
     }
-    std::vector<HazardDetection> shown;
-    if (tracking_) shown = tracking_->ReportedIn(static_cast<std::int64_t>(stamp.toNSec()));
     shown.erase(std::remove_if(shown.begin(), shown.end(),
                                [this](const HazardDetection& each) { return !IsWeak(each); }),
                 shown.end());
@@ -246,10 +254,13 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
                               const std_msgs::Header& header) {
     cv::Mat picture = bgr;
+    std::size_t masked_regions = 0;
     if (mask_) {
+      const std::lock_guard<std::mutex> mask_lock(mask_mutex_);
       picture = bgr.clone();
       try {
         mask_->Apply(picture, frame_);
+        masked_regions = mask_->Masked().size();
       } catch (const std::exception& error) {
         NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", error.what());
         const std::lock_guard<std::mutex> lock(figures_mutex_);
@@ -257,9 +268,9 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
         return nullptr;
       }
     }
-    if (mask_) {
+    {
       const std::lock_guard<std::mutex> lock(figures_mutex_);
-      figures_.masked_regions += mask_->Masked().size();
+      figures_.masked_regions += masked_regions;
     }
     return ToAnnotatedMessage(picture, found, header);
   }
@@ -351,12 +362,13 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   HazardDetectionConfig config_;
   std::vector<std::unique_ptr<HazardDetector>> detectors_;  ///< Each its engine's thread's own.
   std::vector<float> thresholds_;                           ///< The model's, by class index.
-  // HandOn's and AnswerPicture's:
-  std::mutex pictures_mutex_;                 ///< Taken before figures_mutex_.
+  // HandOn's and AnswerPicture's, which run at once:
+  std::mutex pictures_mutex_;                 ///< Guards tracking_ and recent_.
   std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
   std::unique_ptr<Recent> recent_;
+  std::mutex mask_mutex_;              ///< Guards mask_; taken before figures_mutex_.
   std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
-  std::uint64_t frame_ = 0;
+  std::atomic<std::uint64_t> frame_{0};
   image_transport::Subscriber subscriber_;
   ros::Subscriber request_subscriber_;
   ros::Publisher detections_publisher_;

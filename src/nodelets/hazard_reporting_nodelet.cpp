@@ -94,14 +94,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
         node.subscribe("hazard/poll", 100, &Self::OnPoll, this),
         node.subscribe("change/report", 100, &Self::OnChanges, this),
     };
-    // Whoever listens to hazard/annotated has every frame drawn and masked: not where pictures come
-    // on demand.
     if (config_.use_events) {
       subscribers_.push_back(node.subscribe("hazard/events", 100, &Self::OnEvents, this));
-      subscribers_.push_back(node.subscribe("hazard/picture", 10, &Self::OnPicture, this));
-    } else {
-      subscribers_.push_back(node.subscribe("hazard/annotated", 10, &Self::OnPicture, this));
     }
+    // Whoever listens to hazard/annotated has every frame drawn and masked: not where pictures come
+    // on demand.
+    const bool on_demand = config_.reporter.pictures_on_demand;
+    picture_subscriber_ = node.subscribe(on_demand ? "hazard/picture" : "hazard/annotated", 10,
+                                         &Self::OnPicture, this);
     if (IsFused()) {
       subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
     }
@@ -277,6 +277,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void Work() {
+    reporter_->ExpectPictures(picture_subscriber_.getNumPublishers() > 0);
     reporter_->Process(ros::Time::now().toSec(), SteadyS());
     if (!reporter_->store_error().empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "%s", reporter_->store_error().c_str());
@@ -365,6 +366,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::Publisher report_publisher_, answer_publisher_, request_publisher_;
   ros::Subscriber images_;  // While a poll is open.
+  ros::Subscriber picture_subscriber_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;
 };

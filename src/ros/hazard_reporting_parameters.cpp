@@ -93,6 +93,7 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("antenna_y_m", reporter.antenna_y_m, {-50, 50});
   parameters.Read("use_events", config.use_events);
   reporter.pictures_on_demand = config.use_events;
+  parameters.Read("pictures_on_demand", reporter.pictures_on_demand);
   parameters.Read("memory_s", reporter.track.keep_s, {5, 600});
   reporter.poses.keep_s = reporter.track.keep_s;
   parameters.Read("jpeg_quality", reporter.picture.quality, {1, 100});

@@ -170,13 +170,22 @@ TEST_F(HazardReporterTest, WaitsForThePictureThenGoesWithout) {
   DriveFixes(0, 4);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
-  reporter_->Process(3.4, steady_s_);
+  reporter_->Process(3.0 + config_.picture_wait_s - 0.1, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
-  reporter_->Process(3.51, steady_s_);
+  reporter_->Process(3.0 + config_.picture_wait_s + 0.01, steady_s_);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
   EXPECT_THAT(reports[0].image, IsEmpty());
   EXPECT_EQ(reports[0].image_format, "");
+  EXPECT_EQ(counters().reports_without_picture, 1u);
+}
+
+TEST_F(HazardReporterTest, WaitsForNoPictureWhereNobodyGivesAny) {
+  DriveFixes(0, 4);
+  reporter_->ExpectPictures(false);
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Process(3.0, steady_s_);
+  EXPECT_THAT(TakeDue(), SizeIs(1));
   EXPECT_EQ(counters().reports_without_picture, 1u);
 }
 
