@@ -123,7 +123,9 @@ def stages_of(run, profile):
     """Lists of milliseconds by stage, of one run."""
     vehicle, zone = run["vehicle"], run["zone"]
     clock = ReplayClock(vehicle)
-    detections = of_kind(zone if profile == "small" else vehicle, "detections", "hazard/detections")
+    # The zone's detector serves several vehicles and has topics of its own.
+    detections = (of_kind(zone, "detections", "candidate/detections") if profile == "small"
+                  else of_kind(vehicle, "detections", "hazard/detections"))
     detected = {entry["stamp"]: entry["wall"] for entry in reversed(detections)}
     sent = {entry["uuid"]: entry for entry in first_of_each(of_kind(vehicle, "report", "hazard/report"))}
     answered = {entry["uuid"]: entry for entry in first_of_each(of_kind(vehicle, "receipt"))}
@@ -170,13 +172,13 @@ def boil_down(run, figures):
     drive, counts, profile = run["drive"], figures["counts"], run["profile"]
     small = "small" if profile == "small" else "big"
     told = {"name": drive["name"], "profile": profile, "radius": run["radius"], "link": bool(run["link"]),
-            "complete": figures["complete"], "load": figures["load"], "drive_s": figures["drive_s"],
+            "version": figures.get("version"), "complete": figures["complete"], "load": figures["load"], "drive_s": figures["drive_s"],
             "frames": figures["frames"], "processed": counts["frames_processed"], "dropped": counts["frames_dropped"],
             "uplink_bytes": counts["uplink_bytes"], "wire_bytes": figures["wire_bytes"],
             "reports": len(reports_of(figures, small)), "on_map": len(figures["stored"]),
             "stages": stages_of(figures, small), "pictures": picture_bytes([figures]), "map_ms": figures["map_ms"]}
     if profile == "small":
-        told["processed"] = len(of_kind(figures["zone"], "detections", "hazard/detections"))
+        told["processed"] = counts["frames_judged"]
     if drive["folder"]:
         stamps, boxes = read_truth(drive["bag"])
         told["found"] = found_events(figures, small, (stamps, boxes, read_chainage(drive["folder"])), "pothole")

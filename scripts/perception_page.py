@@ -99,11 +99,12 @@ def latency_section(results, out):
         Milliseconds, mean (standard deviation). *Link*: a relay between vehicle and broker that delays each way so that
         the round trip is {link['rtt_ms']:g} +- {link['rtt_sigma_ms']:g} ms, as the thesis measured over LTE, and lets
         {link['up_mbit_s']:g} Mbit/s up and {link['down_mbit_s']:g} down through, in order, as TCP has it. *Loopback*: without
-        it. *Detection*: from the decoded image to the boxes, per frame. *Placing*: from the boxes to the report: the
+        it. *Early discard*: from the image's stamp to the candidate frame that leaves the vehicle: judging, the wait for the next
+        fix, masking, encoding. *Detection*: from the decoded image to the boxes, per frame; of the SVC, in the zone. *Placing*: from the boxes to the report: the
         wait for the first fix after the image (up to 0.3 s), projection, and the picture. *Round trip*: from the report to
         the zone's receipt of it, which comes after its fsync; of the SVC, from the candidate frame to the zone's report,
         with the zone's detection in it. *End to end*: from the image's stamp to the receipt (SVC: to the report in the
-        zone); detection of the thesis had no further stage, so its end to end is the sum of two.""")
+        zone); what its stages do not sum up to is waiting, for the camera's rectified image and for a turn at the detector; detection of the thesis had no further stage, so its end to end is the sum of two.""")
     text += "\n" + table(["configuration", "early discard", "detection", "placing", "round trip", "end to end"], cells)
     return text + "\n![Latency per stage](perception_latency.png)\n"
 
@@ -123,7 +124,7 @@ def detection_section(results):
     frames = sum(run["frames"] for run in Group(results, "big").runs)
     seconds = sum(run["drive_s"] for run in Group(results, "big").runs)
     text = "## Table 3.2: detection\n" + prose(f"""
-        Frames/s is what was processed of what the drives hold: {frames} frames in {seconds:.0f} s, so
+        Frames/s is what was processed (of the SVC: judged by its classifier) of what the drives hold: {frames} frames in {seconds:.0f} s, so
         {frames / max(seconds, 1e-9):.1f} is the most there (the thesis's camera gave 30; what the engines could do stands
         below). Radius of duplicates {results['usual_radius_m']} m. Mbit/s is the uplink as the bridge counts it, of reports,
         pictures, positions and everything else.""")
@@ -217,6 +218,15 @@ def starved(results):
         the ratios between engines.""")
 
 
+def other_versions(results):
+    """Runs that --resume took up from an earlier version."""
+    others = {}
+    for run in results["runs"]:
+        if run["version"] not in (None, results["version"]):
+            others.setdefault(run["version"], set()).add(f"{NAMES[run['profile']]}, {run['radius']} m")
+    return "".join(prose(f"Measured with version {version}: {'; '.join(sorted(found))}.") for version, found in sorted(others.items()))
+
+
 def write(results, out):
     out.mkdir(parents=True, exist_ok=True)
     machine = results["machine"]
@@ -233,7 +243,7 @@ def write(results, out):
         bags by `launch/replay.launch`; GPS fixes are simulated along the road.""")
     if results["quick"]:
         text += prose("""**The quick form**: one drive and three radii. Its figures have few events; the whole run's have more.""")
-    text += starved(results)
+    text += starved(results) + other_versions(results)
     if incomplete:
         text += prose(f"""Not everything came through in {len(incomplete)} of {len(results['runs'])} runs within a minute of the
             drive's end: {', '.join(sorted({f"{run['name']} {run['profile']} {run['radius']} m" for run in incomplete}))}.""")
