@@ -113,9 +113,9 @@ class LinkTest(unittest.TestCase):
 
 
 class PageTest(unittest.TestCase):
-    def run_of(self, profile, radius, link=False):
+    def run_of(self, profile, radius, link=False, version="v"):
         stages = {"detection": [40.0, 50.0], "placing": [300.0], "round_trip": [210.0], "end_to_end": [560.0]}
-        return {"name": "d", "profile": profile, "radius": radius, "link": link, "complete": True, "load": [1.0, 2.0],
+        return {"name": "d", "profile": profile, "radius": radius, "link": link, "version": version, "complete": True, "load": [1.0, 2.0],
                 "drive_s": 30.0, "frames": 100, "processed": 90, "dropped": 10, "uplink_bytes": 30000,
                 "wire_bytes": 40000 if link else None, "reports": 5, "on_map": 4, "stages": stages, "pictures": [9000, 11000],
                 "map_ms": [], "found": {"events": 10, "found": 7, "false": 1, "km": 0.5}}
@@ -128,7 +128,7 @@ class PageTest(unittest.TestCase):
                    "link": {"rtt_ms": 205.6, "rtt_sigma_ms": 50.2, "up_mbit_s": 10.0, "down_mbit_s": 30.0},
                    "streams": [{"frames": 100, "seconds": 30.0, "bytes": 3000000}],
                    "runs": [self.run_of("big", 1), self.run_of("big", 5), self.run_of("big", 5, link=True),
-                            self.run_of("perfect", 5)]}
+                            self.run_of("perfect", 5, version="earlier")]}
         with tempfile.TemporaryDirectory() as folder:
             text = perception_page.write(results, pathlib.Path(folder)).read_text(encoding="utf-8")
             for name in ("perception_uplink.png", "perception_latency.png"):
@@ -137,7 +137,7 @@ class PageTest(unittest.TestCase):
                      "| BVC | 3.0 | 10 of 100 | - | 0.700 (7 of 10) | 2.0 | 0.008 | 5 |",
                      "| BVC, 1 m | 0.700 (7 of 10) | 5 | 4 | 0.0080 |", "| perfect detector, 5 m | 0.700 (7 of 10) | 5 | 4 | 0.0213 |",
                      "| H.264 stream, 3.3 frames/s | - | - | - | 0.8000 |", "| torch | 1 | 1 | 10.0 | 2.50 | 50 |",
-                     "the SVC's rows are missing", "**The quick form**"):
+                     "the SVC's rows are missing", "**The quick form**", "Measured with version earlier: perfect detector, 5 m."):
             self.assertIn(part, text)
 
 
