@@ -68,7 +68,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
         manifest = read_manifest(options.manifest)
         drives, cones = data.read_validation_drives(options.data), data.read_validation_cones(options.data)
         run = opencv_runner(manifest.weights)
-        print_figures(validate(run, drives, cones, (manifest.width, manifest.height)), manifest)
+        print_figures(validate(run, drives, cones, (manifest.width, manifest.height), manifest.scales), manifest)
         median, shortest = milliseconds_per_frame(run, manifest)
         print(f"milliseconds_per_frame: {median:.0f} median, {shortest:.0f} shortest, {options.threads} threads")
     except (ManifestError, data.DataError) as error:

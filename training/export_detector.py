@@ -21,7 +21,7 @@ import torch
 import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import CLASSES, data, inference, onnx_model
+from detector import CLASSES, data, inference, onnx_model, pretrained
 from detector.manifest import write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import SIZES, STRIDES, Detector
@@ -43,25 +43,42 @@ UNCALIBRATED_THRESHOLD = 0.5
 DEFAULT_CHECKPOINT = Path("build/training/hazards/last.pt")
 
 
+def load_exported_again(weights: Path) -> Detector:
+    """An exported network, of whatever size it is."""
+    for size in SIZES.values():
+        detector = Detector(len(CLASSES), size)
+        convolutions = sum(isinstance(module, torch.nn.Conv2d) for module in detector.modules())
+        if pretrained.load_exported(detector, weights) == convolutions:
+            return detector
+    raise ExportError(f"{weights} is a network of none of the sizes {', '.join(SIZES)}.")
+
+
+def load_checkpoint(checkpoint: Path) -> Detector:
+    """The averaged weights of a checkpoint, or the weights of an exported .onnx; normalisation folded, so that means of several make sense."""
+    if ".onnx" in checkpoint.suffixes:
+        return load_exported_again(checkpoint)
+    try:
+        state = torch.load(checkpoint, map_location="cpu")
+        detector = Detector(len(CLASSES), SIZES[state["settings"]["size"]])
+        detector.load_state_dict(state["average"])
+    except (OSError, KeyError, RuntimeError) as error:
+        raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
+    pretrained.fold_normalisation(detector.eval())
+    return detector
+
+
 def load_averaged(checkpoints: List[Path]) -> Detector:
-    """The averaged weights of a checkpoint, or the mean of those of several."""
-    detector, mean = None, {}
-    for checkpoint in checkpoints:
-        try:
-            state = torch.load(checkpoint, map_location="cpu")
-            if detector is None:
-                detector = Detector(len(CLASSES), SIZES[state["settings"]["size"]])
-                mean = {name: torch.zeros_like(value) for name, value in detector.state_dict().items()}
-            detector.load_state_dict(state["average"])
-        except (OSError, KeyError, RuntimeError) as error:
-            raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
-        for name, value in detector.state_dict().items():
-            if value.dtype.is_floating_point:
-                mean[name] += value / len(checkpoints)
-            else:
-                mean[name] = value
-    detector.load_state_dict(mean)
-    return detector.eval()
+    """The weights of a checkpoint, or the mean of those of several."""
+    detectors = [load_checkpoint(checkpoint) for checkpoint in checkpoints]
+    mean = detectors[0].state_dict()
+    for name, value in mean.items():
+        if value.dtype.is_floating_point:
+            try:
+                mean[name] = torch.stack([detector.state_dict()[name] for detector in detectors]).mean(dim=0)
+            except (KeyError, RuntimeError) as error:
+                raise ExportError("The checkpoints are of networks of different sizes.") from error
+    detectors[0].load_state_dict(mean)
+    return detectors[0].eval()
 
 
 def input_size(text: str) -> Tuple[int, int]:
@@ -71,6 +88,25 @@ def input_size(text: str) -> Tuple[int, int]:
     if not found or any(side % STRIDES[-1] for side in size):
         raise argparse.ArgumentTypeError(f"'{text}' is no WIDTHxHEIGHT in multiples of {STRIDES[-1]}")
     return size
+
+
+def view_scales(text: str) -> Tuple[float, ...]:
+    """Scales of the views from text like 1,0.8; at each a cell must be whole pixels of the input."""
+    try:
+        scales = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        scales = ()
+    fitting = [scale for scale in scales if 0.25 <= scale <= 1 and all(abs(stride / scale - round(stride / scale)) < 1e-9 for stride in STRIDES)]
+    if not 1 <= len(scales) <= 4 or len(fitting) != len(scales):
+        raise argparse.ArgumentTypeError(f"'{text}' is no list of 1 to 4 scales such as 1, 0.8 and 0.5, of which {STRIDES[0]} is a whole multiple")
+    return scales
+
+
+def check_views(size: Tuple[int, int], scales: Tuple[float, ...]) -> None:
+    """Every view must be covered by whole cells."""
+    for scale in scales:
+        if any(abs(side * scale / STRIDES[-1] - round(side * scale / STRIDES[-1])) > 1e-9 for side in size):
+            raise ExportError(f"--scales: {scale} of --input {size[0]}x{size[1]} is no multiple of {STRIDES[-1]} pixels.")
 
 
 def check_against_torch(weights: Path, exportable: torch.nn.Module, size: Tuple[int, int]) -> None:
@@ -104,12 +140,13 @@ def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
+    check_views(arguments.input, arguments.scales)
     detector = load_averaged(arguments.checkpoint or [DEFAULT_CHECKPOINT])
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
 
     weights = arguments.out / f"{arguments.name}.onnx"
-    exportable = onnx_model.export(detector, weights, *arguments.input)
+    exportable = onnx_model.export(detector, weights, *arguments.input, arguments.scales)
     check_against_torch(weights, exportable, arguments.input)
     if arguments.packed:
         round_weights(weights)
@@ -119,14 +156,14 @@ def run(arguments: argparse.Namespace) -> None:
     runner = onnx_model.opencv_runner(weights)
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in CLASSES}
     if arguments.simulated:
-        for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated), arguments.input).items():
+        for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated), arguments.input, arguments.scales).items():
             thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
             print(f"simulated {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
-    found = validate(runner, drives, cones, arguments.input)
+    found = validate(runner, drives, cones, arguments.input, arguments.scales)
     thresholds["pothole"] = found.best_drive_figures().threshold
     thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
     manifest = arguments.out / f"{arguments.name}.yaml"
-    write_manifest(manifest, weights, thresholds, arguments.input, arguments.engine)
+    write_manifest(manifest, weights, thresholds, arguments.input, arguments.engine, arguments.scales)
     add_torch_file(manifest)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 
@@ -134,12 +171,13 @@ def run(arguments: argparse.Namespace) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 exported, 2 the command line, the checkpoint or the data is wrong."""
     parser = argparse.ArgumentParser(description="Export a checkpoint as ONNX with its manifest.")
-    parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; may be repeated")
+    parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; may be repeated; an exported .onnx will do")
     parser.add_argument("--name", default="hazards-first", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
     parser.add_argument("--input", type=input_size, default=inference.INPUT_SIZE, metavar="WIDTHxHEIGHT", help="of the network (640x400)")
+    parser.add_argument("--scales", type=view_scales, default=(1.0,), metavar="S,...", help="views of the picture whose findings are fused (1)")
     parser.add_argument("--engine", choices=("opencv", "torch"), default="", help="entered into the manifest; else the vehicle's default")
     parser.add_argument("--packed", action="store_true", help="weights of half the precision, in gzip files")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
@@ -148,7 +186,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     torch.set_num_threads(max(options.threads, 1))
     try:
         run(options)
-    except (ExportError, data.DataError) as error:
+    except (ExportError, data.DataError, pretrained.ConversionError) as error:
         print(f"export_detector: {error}", file=sys.stderr)
         return 2
     return 0

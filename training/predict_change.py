@@ -6,8 +6,8 @@
     livemap evaluate change DIR --predictions build/predictions/forward --reversed-predictions build/predictions/reversed
 
 Per pair OUT/forward/NNN/II.npy and OUT/reversed/NNN/II.npy (the same with the pictures swapped): float32, classes x height x
-width of the pair's pictures. A pair that features cannot register is no change, with certainty, as it is in a vehicle;
---registered takes pairs as they are.
+width of the pair's pictures. Where the earlier picture shows nothing, and of a pair that cannot be registered, they are what the
+network believes without it; a vehicle says nothing there. --registered takes pairs as they are.
 """
 
 import argparse
@@ -21,10 +21,9 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
 from change import data, onnx_model
-from change.classes import CLASSES, NO_CHANGE
 from change.inference import INPUT_HEIGHT, INPUT_WIDTH
 from change.manifest import read_manifest
-from change.validation import Detect, register, torch_detector
+from change.validation import Detect, aligned, torch_detector
 from detector.manifest import ManifestError
 from export_change import ExportError, load_averaged
 
@@ -37,15 +36,9 @@ def enlarge(probabilities: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def predict(detect: Detect, pair: data.Pair) -> Tuple[np.ndarray, np.ndarray]:
-    """Probabilities in the network's size, in both orders; no change where the pair is not registered."""
-    if pair.homography is None:
-        nothing = np.zeros((len(CLASSES), INPUT_HEIGHT, INPUT_WIDTH), np.float32)
-        nothing[NO_CHANGE] = 1
-        return nothing, nothing
-    aligned = register(pair, "changes")
-    return (
-        detect(aligned.first, aligned.second, aligned.validity), detect(aligned.second, aligned.first, aligned.validity),
-    )
+    """Probabilities in the network's size, in both orders."""
+    first, validity = aligned(pair)
+    return detect(first, pair.second, validity), detect(pair.second, first, validity)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -28,8 +28,9 @@ CONDITIONS = ("day", "day", "dusk", "rain", "snow")
 COUNTRY_ROAD_SHARE = 0.4
 """Drives on open road with many potholes, through a camera like the road survey's."""
 
-RARE_HAZARDS = ("debris", "deer", "stopped_accident", "road_work_sign", "construction_machine")
-"""What a street that a seed makes up has too few of to learn them; --rare fills streets with them."""
+RARE_HAZARDS = ("debris", "debris", "debris", "deer", "stopped_accident", "stopped_accident", "road_work_sign", "construction_machine")
+"""What a street that a seed makes up has too few of to learn them; --rare fills streets with them. Debris is hidden or far away
+more often than it can be seen, and an accident has to be told from cars that are merely parked: they stand there more often."""
 
 SPEED_MPS = 9.0
 

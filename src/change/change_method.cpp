@@ -29,15 +29,21 @@ cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& 
   return filled;
 }
 
-void SpreadOverUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities) {
+void SayNothingOfUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities) {
+  CheckValidity(valid, probabilities.of_class[0].size());
   const cv::Mat unseen = valid == 0;
-  const auto kinds = static_cast<float>(probabilities.of_class.size() - 1);
   for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
-    probabilities.of_class[i].setTo(i == 0 ? 1 - kUnseenChange : kUnseenChange / kinds, unseen);
+    probabilities.of_class[i].setTo(i == 0 ? 1 : 0, unseen);
   }
 }
 
 ChangeProbabilities ChangeMethod::Run(const AlignedPair& pair) {
+  ChangeProbabilities probabilities = Estimate(pair);
+  SayNothingOfUnseen(pair.valid, probabilities);
+  return probabilities;
+}
+
+ChangeProbabilities ChangeMethod::Estimate(const AlignedPair& pair) {
   const cv::Size size = pair.after.size();
   if (pair.after.empty() || pair.after.type() != CV_8UC3 || pair.before.type() != CV_8UC3 ||
       pair.valid.type() != CV_8UC1 || pair.before.size() != size || pair.valid.size() != size) {
@@ -46,12 +52,7 @@ ChangeProbabilities ChangeMethod::Run(const AlignedPair& pair) {
                 "x" + std::to_string(size.height) +
                 ", accepted are two 8-bit colour pictures of one size with their mask");
   }
-  ChangeProbabilities probabilities = Infer(pair);
-  const cv::Mat unknown = pair.valid == 0;
-  for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
-    probabilities.of_class[i].setTo(i == 0 ? 1 : 0, unknown);
-  }
-  return probabilities;
+  return Infer(pair);
 }
 
 std::vector<std::string> ChangeMethodNames() { return {"dense-sift", "daisy"}; }

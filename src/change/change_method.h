@@ -21,14 +21,8 @@ void CheckValidity(const cv::Mat& valid, cv::Size size);
 /// `before` with the pixels of `after` where `valid` is 0: no edge stands there then.
 cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& valid);
 
-/// Share of change among pixels that the registered earlier picture does not show: of simulated
-/// validation streets 0.105, of test streets 0.156 (docs/change.md).
-constexpr float kUnseenChange = 0.1F;
-
-/// Gives the pixels where `valid` is 0 the probability kUnseenChange of a change, of all classes
-/// alike: for measuring, as to be certain of what was never seen is wrong. A map must not hear of
-/// such pixels.
-void SpreadOverUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities);
+/// Makes no change certain where `valid` is 0: a map must not hear of what was never seen.
+void SayNothingOfUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities);
 
 /// Says what changed between two pictures. Not thread-safe.
 class ChangeMethod {
@@ -37,6 +31,9 @@ class ChangeMethod {
   /// Probabilities of the pair's size. Where the pair is not valid nothing is said to have changed.
   /// Throws Error when the sizes or types are not as AlignedPair states.
   ChangeProbabilities Run(const AlignedPair& pair);
+  /// The same, with what the method believes of pixels where the pair is not valid: a network knows
+  /// that cars come and go and skies stay. For measuring how good its probabilities are.
+  ChangeProbabilities Estimate(const AlignedPair& pair);
   /// True: Run gives kChangeClasses images; false: two.
   virtual bool tells_classes() const = 0;
 

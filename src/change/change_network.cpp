@@ -130,7 +130,11 @@ ChangeProbabilities ChangeNetwork::Compare(const ChangeFeatures& before,
                 ", accepted are those that Encode makes of two pictures of one size");
   }
   CheckValidity(valid, after.size);
-  return Enlarged(head_.Run(HeadInputs(before.levels, after.levels, Validity(valid)))[0], valid);
+  const std::vector<cv::Mat> answers =
+      head_.Run(HeadInputs(before.levels, after.levels, Validity(valid)));
+  ChangeProbabilities probabilities = Enlarged(answers[0], valid.size());
+  SayNothingOfUnseen(valid, probabilities);
+  return probabilities;
 }
 
 ChangeProbabilities ChangeNetwork::Infer(const AlignedPair& pair) {
@@ -138,7 +142,7 @@ ChangeProbabilities ChangeNetwork::Infer(const AlignedPair& pair) {
   const std::vector<cv::Mat> answers = whole_.Run({{"first", before_letterbox_.Fill(before)},
                                                    {"second", after_letterbox_.Fill(pair.after)},
                                                    {"validity", Validity(pair.valid)}});
-  return Enlarged(answers[0], pair.valid);
+  return Enlarged(answers[0], pair.valid.size());
 }
 
 cv::Mat ChangeNetwork::Validity(const cv::Mat& valid) const {
@@ -153,9 +157,8 @@ cv::Mat ChangeNetwork::Validity(const cv::Mat& valid) const {
   return validity;
 }
 
-ChangeProbabilities ChangeNetwork::Enlarged(const cv::Mat& answer, const cv::Mat& valid) const {
-  const cv::Rect shown(cv::Point(), after_letterbox_.Fitted(valid.size()));
-  const cv::Mat unknown = valid == 0;
+ChangeProbabilities ChangeNetwork::Enlarged(const cv::Mat& answer, cv::Size size) const {
+  const cv::Rect shown(cv::Point(), after_letterbox_.Fitted(size));
   ChangeProbabilities probabilities;
   for (int i = 0; i < kChangeClasses; ++i) {
     const cv::Mat plane(manifest_.input.height, manifest_.input.width, CV_32FC1,
@@ -166,10 +169,9 @@ ChangeProbabilities ChangeNetwork::Enlarged(const cv::Mat& answer, const cv::Mat
                   " a value that is no probability, accepted is 0 to 1");
     }
     cv::Mat enlarged;
-    cv::resize(plane(shown), enlarged, valid.size(), 0, 0, cv::INTER_LINEAR);
+    cv::resize(plane(shown), enlarged, size, 0, 0, cv::INTER_LINEAR);
     cv::min(enlarged, 1, enlarged);
     cv::max(enlarged, 0, enlarged);
-    enlarged.setTo(i == 0 ? 1 : 0, unknown);
     probabilities.of_class.push_back(enlarged);
   }
   return probabilities;

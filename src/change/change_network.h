@@ -59,9 +59,9 @@ class ChangeNetwork final : public ChangeMethod {
                                  const std::vector<cv::Mat>& second, const cv::Mat& validity);
   /// 1 x 1 x H x W: 1 where the pair is valid, and on the padding.
   cv::Mat Validity(const cv::Mat& valid) const;
-  /// From the network's answer to images of the size of `valid`; certain of no change where that is
-  /// 0. Throws Error when the answer holds something that is no probability.
-  ChangeProbabilities Enlarged(const cv::Mat& answer, const cv::Mat& valid) const;
+  /// From the network's answer to images of `size`. Throws Error when it holds something that is no
+  /// probability.
+  ChangeProbabilities Enlarged(const cv::Mat& answer, cv::Size size) const;
 
   ChangeManifest manifest_;
   Letterbox before_letterbox_;

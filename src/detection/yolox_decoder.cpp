@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "detection/view_fusion.h"
 
 namespace livemap {
 double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
@@ -24,6 +25,12 @@ namespace {
 
 /// exp() of more than this is wider than any image; the limit keeps the arithmetic finite.
 constexpr float kMostLogSize = 8.0F;
+
+/// Of two views' boxes, from which on they are of one object.
+constexpr float kFusionIou = 0.5F;
+
+/// Confidence from which on a box of one view is compared with those of the others.
+constexpr float kLeastOfView = 0.05F;
 
 /// Rows of one level of the output, in image pixels.
 struct Cell {
@@ -47,13 +54,14 @@ cv::Rect2f DecodeBox(const float* values, Cell cell, double scale, cv::Size imag
           cut(centre_y + half_height, image_size.height) - y_min};
 }
 
-void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest, double scale,
-               cv::Size image_size, std::vector<HazardDetection>& detections) {
+void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest,
+               const std::vector<float>& thresholds, double scale, cv::Size image_size,
+               std::vector<HazardDetection>& detections) {
   const float objectness = values[4];
   for (std::size_t index = 0; index < manifest.classes.size(); ++index) {
     const float confidence = objectness * values[5 + index];
     // Written so that NaN is refused too. Two negative scores would make a positive product.
-    if (!(confidence >= manifest.thresholds[index] && objectness <= 1 && objectness >= 0 &&
+    if (!(confidence >= thresholds[index] && objectness <= 1 && objectness >= 0 &&
           values[5 + index] <= 1)) {
       continue;
     }
@@ -144,6 +152,24 @@ void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
   }
 }
 
+/// A view may be surer than the mean of all: what is weak in one is looked at too.
+std::vector<float> ThresholdsOfViews(const ModelManifest& manifest) {
+  std::vector<float> thresholds = manifest.thresholds;
+  if (manifest.head.views == 1) return thresholds;
+  for (float& threshold : thresholds) threshold = std::min(threshold, kLeastOfView);
+  return thresholds;
+}
+
+std::vector<HazardDetection> AboveThresholds(std::vector<HazardDetection> detections,
+                                             const ModelManifest& manifest) {
+  const auto weak = [&](const HazardDetection& detection) {
+    return detection.confidence <
+           manifest.thresholds[static_cast<std::size_t>(detection.class_index)];
+  };
+  detections.erase(std::remove_if(detections.begin(), detections.end(), weak), detections.end());
+  return detections;
+}
+
 }  // namespace
 
 std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candidates,
@@ -179,17 +205,26 @@ std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const Model
                                          double scale, cv::Size image_size) {
   CheckShape(predictions, manifest);
   const std::size_t columns = 5 + manifest.classes.size();
+  const std::vector<float> thresholds = ThresholdsOfViews(manifest);
   const float* values = predictions.ptr<float>();
-  std::vector<HazardDetection> candidates;
-  for (const int stride : manifest.head.strides) {
+  const auto view_count = static_cast<std::size_t>(manifest.head.views);
+  const std::size_t levels = manifest.head.strides.size() / view_count;
+  std::vector<std::vector<HazardDetection>> views(view_count);
+  for (std::size_t level = 0; level < manifest.head.strides.size(); ++level) {
+    const int stride = manifest.head.strides[level];
     for (int row = 0; row < manifest.input.height / stride; ++row) {
       for (int column = 0; column < manifest.input.width / stride; ++column) {
-        DecodeRow(values, {column, row, stride}, manifest, scale, image_size, candidates);
+        DecodeRow(values, {column, row, stride}, manifest, thresholds, scale, image_size,
+                  views[level / levels]);
         values += columns;
       }
     }
   }
-  return SuppressOverlaps(std::move(candidates), manifest.nms_iou);
+  for (std::vector<HazardDetection>& view : views) {
+    view = SuppressOverlaps(std::move(view), manifest.nms_iou);
+  }
+  if (view_count == 1) return views[0];
+  return AboveThresholds(FuseViews(views, kFusionIou), manifest);
 }
 
 }  // namespace livemap

@@ -15,8 +15,9 @@ namespace livemap {
 /// network's input, the score objectness * class score. `scale` is input pixels per image pixel
 /// (the letterbox's) and `image_size` the image, to which boxes are cut. Rows with a number that is
 /// not finite, scores outside 0..1 and boxes outside the image are dropped. Returns what is at
-/// least at its class's threshold and survives suppression, descending confidence. Throws Error
-/// when the shape of `predictions` is another.
+/// least at its class's threshold and survives suppression, descending confidence. Several views
+/// are suppressed each on its own, then fused (view_fusion.h); their mean is held against the
+/// threshold. Throws Error when the shape of `predictions` is another.
 std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
                                          double scale, cv::Size image_size);
 

@@ -23,8 +23,9 @@ class ManifestSection {
                   const std::vector<std::string>& keys,
                   const std::vector<std::string>& optional = {});
 
-  ManifestSection Sub(const std::string& key, const std::vector<std::string>& keys) const {
-    return {node_[key], origin_, Path(key), keys};
+  ManifestSection Sub(const std::string& key, const std::vector<std::string>& keys,
+                      const std::vector<std::string>& optional = {}) const {
+    return {node_[key], origin_, Path(key), keys, optional};
   }
 
   bool Has(const std::string& key) const { return node_[key].IsDefined(); }

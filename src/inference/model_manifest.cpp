@@ -11,6 +11,7 @@ namespace livemap {
 namespace {
 
 constexpr std::size_t kMostClasses = 1000;
+constexpr int kMostViews = 4;
 
 void ReadFiles(const ManifestSection& root, const std::filesystem::path& directory,
                ModelManifest& manifest) {
@@ -65,11 +66,11 @@ void ReadScoreHead(const ManifestSection& root, ModelManifest& manifest) {
 }
 
 void ReadYoloxHead(const ManifestSection& root, ModelManifest& manifest) {
-  const ManifestSection head = root.Sub("head", {"type", "strides", "output"});
+  const ManifestSection head = root.Sub("head", {"type", "strides", "output"}, {"views"});
   if (head.Text("type") != "yolox") head.Refuse("type", "yolox or score");
   manifest.head.output = head.Text("output");
   manifest.head.strides =
-      head.List("strides", 1, 8, [&](const YAML::Node& node, const std::string& path) {
+      head.List("strides", 1, 16, [&](const YAML::Node& node, const std::string& path) {
         const int stride = head.IntegerOf(node, path, 1, kLargestInputSide);
         if (manifest.input.width % stride != 0 || manifest.input.height % stride != 0) {
           head.RefuseNode(path, node,
@@ -78,6 +79,11 @@ void ReadYoloxHead(const ManifestSection& root, ModelManifest& manifest) {
         }
         return stride;
       });
+  if (head.Has("views")) manifest.head.views = head.Integer("views", 1, kMostViews);
+  if (manifest.head.strides.size() % static_cast<std::size_t>(manifest.head.views) != 0) {
+    head.Refuse("views", "a divisor of the number of strides, " +
+                             std::to_string(manifest.head.strides.size()));
+  }
   manifest.nms_iou = root.Number("nms_iou", 0.0, 1.0);
 }
 

@@ -50,7 +50,10 @@ struct ModelManifest {
   struct Head {
     HeadType type = HeadType::kYolox;
     std::vector<int> strides;  ///< px of the input per cell
-    std::string output;        ///< name of the output tensor
+    /// The network looks at its input so many times, at different scales: the strides are as many
+    /// groups of one length, one after the other.
+    int views = 1;
+    std::string output;  ///< name of the output tensor
   } head;
 
   std::vector<float> thresholds;  ///< Least confidence that is reported, by class index, (0, 1).

@@ -135,7 +135,7 @@ class Evaluation {
     report_.unknown_colour_pixels += pair.unknown_colour_pixels;
     const ChangeProbabilities forward = Forward(files, pair);
     Count(files.name, forward, pair, report_.forward);
-    if (aligned_ && !pair.direction.empty()) CountRegions(forward, pair);
+    if (registered_ && !pair.direction.empty()) CountRegions(forward, pair);
     if (report_.has_reversed) Count(files.name, Reversed(files, pair), pair, report_.reversed);
     if (options_.write.empty()) return;
     WriteScorePicture(options_.write + "/" + files.name + ".png", forward);
@@ -155,10 +155,15 @@ class Evaluation {
     figures.community.Add(name, probabilities, pair.truth);
   }
 
-  void CountRegions(const ChangeProbabilities& probabilities, const ChangePair& pair) {
-    const cv::Mat before = FillUnknown(aligned_->before, aligned_->after, aligned_->valid);
+  void CountRegions(const ChangeProbabilities& measured, const ChangePair& pair) {
+    const cv::Mat before = FillUnknown(aligned_.before, aligned_.after, aligned_.valid);
+    ChangeProbabilities probabilities;
+    for (const cv::Mat& of_class : measured.of_class) {
+      probabilities.of_class.push_back(of_class.clone());
+    }
+    SayNothingOfUnseen(aligned_.valid, probabilities);
     if (!report_.directions) report_.directions.emplace();
-    CountDirections(FindChangeRegions(probabilities, before, aligned_->after, regions_),
+    CountDirections(FindChangeRegions(probabilities, before, aligned_.after, regions_),
                     ChangedClasses(probabilities, regions_.least_confidence), pair.direction,
                     *report_.directions);
   }
@@ -168,11 +173,10 @@ class Evaluation {
       return ReadPrediction(options_.predictions, files.name, pair.truth.size());
     }
     aligned_ = Align(files, pair);
-    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
     const auto start = std::chrono::steady_clock::now();
-    ChangeProbabilities probabilities = method_->Run(*aligned_);
-    method_ms_.push_back(MillisecondsSince(start));
-    return WithUnseen(std::move(probabilities));
+    ChangeProbabilities probabilities = Measured(aligned_);
+    if (registered_) method_ms_.push_back(MillisecondsSince(start));
+    return probabilities;
   }
 
   /// After Forward of the same pair: the view stays that of the later picture, whose mask the truth
@@ -181,14 +185,15 @@ class Evaluation {
     if (method_ == nullptr) {
       return ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
     }
-    if (!aligned_) return NothingChanged(pair.truth.size(), method_->tells_classes());
-    return WithUnseen(method_->Run({aligned_->after, aligned_->before, aligned_->valid}));
+    return Measured({aligned_.after, aligned_.before, aligned_.valid});
   }
 
-  /// A network's scores are probabilities, so it can say how little it knows; a distance can't.
-  ChangeProbabilities WithUnseen(ChangeProbabilities probabilities) const {
-    if (!options_.model.empty()) SpreadOverUnseen(aligned_->valid, probabilities);
-    return probabilities;
+  /// A network's scores are probabilities, so it can say how little it knows of what was not seen;
+  /// a distance can't, and says that nothing has changed.
+  ChangeProbabilities Measured(const AlignedPair& pair) {
+    if (!options_.model.empty()) return method_->Estimate(pair);
+    return registered_ ? method_->Run(pair)
+                       : NothingChanged(pair.after.size(), method_->tells_classes());
   }
 
   /// As on board, or by one of the two ways alone.
@@ -208,27 +213,30 @@ class Evaluation {
     return by_features;
   }
 
-  std::optional<AlignedPair> Align(const ChangePairFiles& files, const ChangePair& pair) {
+  /// Of a refused pair nothing earlier is known.
+  AlignedPair Align(const ChangePairFiles& files, const ChangePair& pair) {
+    registered_ = true;
     if (options_.registration == "none") {
-      return AlignedPair{pair.before, pair.after,
-                         cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255))};
+      return {pair.before, pair.after, cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255))};
     }
     const auto start = std::chrono::steady_clock::now();
     const Registration registration = Register(pair);
     if (!registration.accepted()) {
       ++report_.refused;
       report_.refusals.push_back(files.name + ": " + registration.why);
-      return std::nullopt;
+      registered_ = false;
+      return {pair.after, pair.after, cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(0))};
     }
     const WarpedPicture warped = WarpByHomography(pair.before, registration.after_from_before);
     registration_ms_.push_back(MillisecondsSince(start));
-    return AlignedPair{warped.picture, pair.after, warped.valid};
+    return {warped.picture, pair.after, warped.valid};
   }
 
   const Options& options_;
   std::unique_ptr<ChangeMethod> method_;
   ChangeRegionOptions regions_;
-  std::optional<AlignedPair> aligned_;
+  AlignedPair aligned_;      ///< Of the pair that was added last.
+  bool registered_ = false;  ///< It was not refused.
   std::vector<double> method_ms_;
   std::vector<double> registration_ms_;
   ChangeReport report_;

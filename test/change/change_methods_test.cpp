@@ -110,19 +110,19 @@ TEST(Daisy, ARampPointsOneWayInEveryHistogram) {
   }
 }
 
-TEST(SpreadOverUnseen, GivesWhatWasNotSeenTheShareOfChangeAndLeavesTheRest) {
+TEST(SayNothingOfUnseen, MakesNoChangeCertainThereAndLeavesTheRest) {
   const cv::Size size(4, 2);
   cv::Mat valid(size, CV_8UC1, cv::Scalar(255));
   valid.at<uchar>(1, 3) = 0;
   for (const bool tells_classes : {true, false}) {
     ChangeProbabilities probabilities = NothingChanged(size, tells_classes);
-    SpreadOverUnseen(valid, probabilities);
-    float sum = 0;
-    for (const cv::Mat& of_class : probabilities.of_class) sum += of_class.at<float>(1, 3);
-    EXPECT_NEAR(sum, 1, 1e-6);
-    EXPECT_NEAR(probabilities.of_class[0].at<float>(1, 3), 1 - kUnseenChange, 1e-6);
-    EXPECT_EQ(probabilities.of_class[0].at<float>(0, 3), 1);
-    EXPECT_EQ(cv::countNonZero(MostLikely(probabilities)), 0) << "nothing is said to have changed";
+    probabilities.of_class[0].setTo(0.25);
+    probabilities.of_class[1].setTo(0.75);
+    SayNothingOfUnseen(valid, probabilities);
+    EXPECT_EQ(probabilities.of_class[0].at<float>(1, 3), 1);
+    EXPECT_EQ(probabilities.of_class[1].at<float>(1, 3), 0);
+    EXPECT_EQ(probabilities.of_class[0].at<float>(0, 3), 0.25F);
+    EXPECT_EQ(probabilities.of_class[1].at<float>(0, 3), 0.75F);
   }
 }
 

@@ -64,6 +64,22 @@ TEST(YoloxDecoder, EachClassHasItsOwnThresholdOnObjectnessTimesClassScore) {
   EXPECT_FLOAT_EQ(found[0].confidence, 0.5625F);
 }
 
+TEST(YoloxDecoder, ViewsAreFusedAndTheirMeanIsHeldAgainstTheThreshold) {
+  ModelManifest manifest = TwoLevelManifest();  // pothole 0.5; one level each: strides 8 and 16
+  manifest.head.views = 2;
+  cv::Mat predictions = NothingSeen(manifest);
+  // 16 x 16 px around (24, 24) of the input in both views, and one around (8, 8) in the first
+  // alone.
+  SetRow(predictions, 3 * 8 + 3, {0, 0, std::log(2.0F), std::log(2.0F), 0.8F, 1, 0});
+  SetRow(predictions, 48 + 4 + 1, {0.5F, 0.5F, 0, 0, 0.3F, 1, 0});
+  SetRow(predictions, 8 + 1, {0, 0, std::log(2.0F), std::log(2.0F), 0.95F, 1, 0});
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kPicture);
+  ASSERT_EQ(found.size(), 1U) << "0.95 / 2 is below the threshold";
+  EXPECT_FLOAT_EQ(found[0].confidence, 0.55F);
+  EXPECT_FLOAT_EQ(found[0].box.x, 2 * 16);
+  EXPECT_FLOAT_EQ(found[0].box.width, 32);
+}
+
 TEST(YoloxDecoder, BoxesAreCutToTheImage) {
   const ModelManifest manifest = TwoLevelManifest();
   cv::Mat predictions = NothingSeen(manifest);

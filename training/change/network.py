@@ -6,7 +6,8 @@ picture's features how far they are from the other's, at the same place (`apart`
 that place (`beyond`): a registration leaves pixels. `ThesisNetwork` is the original, shaped like VGG-16.
 
 Which pixels the warp could fill does not go into the encoder: its features depend on one picture alone and can be
-kept. It decides at the very end, where a pixel outside of the warp is told to be no change (`Network.probabilities`).
+kept. It decides at the very end (`Network.probabilities`), where what the two pictures show of a pixel outside of the warp
+gives way to what is known without them (`surroundings.py`).
 """
 
 from dataclasses import dataclass
@@ -16,13 +17,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from .classes import CLASSES, NO_CHANGE
+from .blocks import ConvBlock, SeparableBlock, enlarge
+from .classes import CLASSES
+from .surroundings import Prior, Surroundings, encoded_of
 
 STRIDE = 32
 """Height and width of an input are multiples of this."""
-
-CERTAINTY = 8192.0
-"""Logits by which every change falls behind no change where a pixel is not valid (a power of two: exact in bf16)."""
 
 
 @dataclass(frozen=True)
@@ -34,31 +34,6 @@ class Widths:
     decoder: Tuple[int, ...] = (24, 40, 72, 128)  # at strides 2, 4, 8, 16
     windows: Tuple[int, ...] = (0, 7, 5, 3)  # cells, odd, or 0, at these strides: within how many `beyond` looks for the same
     final: int = 32
-
-
-class ConvBlock(nn.Sequential):
-    """Convolution, batch normalisation, ReLU."""
-
-    def __init__(self, channels_in: int, channels_out: int, kernel: int = 3, stride: int = 1, groups: int = 1):
-        super().__init__(
-            nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, groups=groups, bias=False),
-            nn.BatchNorm2d(channels_out, momentum=0.03),
-            nn.ReLU(inplace=True),
-        )
-
-
-class SeparableBlock(nn.Module):
-    """A 3x3 convolution per channel, then a 1x1 convolution across channels; added to its input where shapes agree."""
-
-    def __init__(self, channels_in: int, channels_out: int, stride: int = 1):
-        super().__init__()
-        self.spatial = ConvBlock(channels_in, channels_in, 3, stride, groups=channels_in)
-        self.mixing = ConvBlock(channels_in, channels_out, 1)
-        self.residual = stride == 1 and channels_in == channels_out
-
-    def forward(self, features: Tensor) -> Tensor:
-        mixed = self.mixing(self.spatial(features))
-        return features + mixed if self.residual else mixed
 
 
 class Encoder(nn.Module):
@@ -79,11 +54,6 @@ class Encoder(nn.Module):
             images = stage(images)
             levels.append(images)
         return levels
-
-
-def enlarge(features: Tensor) -> Tensor:
-    """Nearest-neighbour upsampling by 2."""
-    return F.interpolate(features, scale_factor=2, mode="nearest")
 
 
 def highest_near(features: Tensor, window: int) -> Tensor:
@@ -152,17 +122,25 @@ class Network(nn.Module):
     def probabilities(self, first: List[Tensor], second: List[Tensor], validity: Tensor) -> Tensor:
         """Probabilities (B x 10 x H x W) from features and validity (B x 1 x H x W: 1, or 0 where the warp had nothing).
 
-        Softmax is taken in the logits' cells and then enlarged, which costs a quarter. A cell that has a share in
-        an invalid pixel's result is no change, so that every invalid pixel is, and up to two pixels beside it.
+        Softmax is taken in the logits' cells and then enlarged, which costs a quarter. A cell that has a share in an
+        invalid pixel's result counts as not seen.
         """
-        logits = self.compare(first, second)
-        invalid = 1 - validity
-        if self.logits_stride == 2:
-            invalid = F.max_pool2d(invalid, 4, stride=2, padding=1)
-        found = torch.softmax(logits + self.penalty(invalid), dim=1)
+        return self.enlarged(torch.softmax(self.judge(first, second, self.unseen_cells(validity)), dim=1))
+
+    def unseen_cells(self, validity: Tensor) -> Tensor:
+        """B x 1 x h x w in the logits' cells: 1 where a cell was not seen, else 0."""
+        unseen = 1 - validity
+        return F.max_pool2d(unseen, 4, stride=2, padding=1) if self.logits_stride == 2 else unseen
+
+    def enlarged(self, found: Tensor) -> Tensor:
+        """From the logits' cells to pixels."""
         if self.logits_stride == 1:
             return found
         return F.interpolate(found, scale_factor=self.logits_stride, mode="bilinear", align_corners=False)
+
+    def judge(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
+        """Logits as compare's, where `unseen` (B x 1 x h x w, one value per cell) is 1 without what the pictures show there."""
+        raise NotImplementedError
 
     def classify(self, images: Tensor) -> Tensor:
         """Logits of the class of each pixel's object, as coarse as compare's: what pretraining trains.
@@ -180,14 +158,6 @@ class Network(nn.Module):
         return self.probabilities(self.encode(first), self.encode(second), validity)
 
 
-def invalidity_penalty() -> nn.Conv2d:
-    """1 where a pixel is not valid to what its logits lose there: nothing for no change, CERTAINTY for every change."""
-    penalty = nn.Conv2d(1, len(CLASSES), 1, bias=False).requires_grad_(False)
-    with torch.no_grad():
-        penalty.weight.fill_(-CERTAINTY)[NO_CHANGE] = 0
-    return penalty
-
-
 class ChangeNetwork(Network):
     """change-small at the default widths."""
 
@@ -202,7 +172,7 @@ class ChangeNetwork(Network):
             SeparableBlock(widths.final, widths.final),
             nn.Conv2d(widths.final, len(CLASSES), 1),
         )
-        self.penalty = invalidity_penalty()
+        self.surroundings = Surroundings(widths.final, widths.encoder)
         self.objects = nn.Conv2d(widths.decoder[0], len(CLASSES), 1)  # in pretraining only
 
     def classify(self, images: Tensor) -> Tensor:
@@ -210,9 +180,18 @@ class ChangeNetwork(Network):
         nothing = [torch.zeros_like(level) for level in levels]
         return self.objects(self.second(levels, nothing, levels))
 
-    def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
+    def features(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
+        """Of a pair, at stride 2: what the last convolution makes logits of."""
         apart = [torch.abs(one - other) for one, other in zip(first, second)]
-        return self.final(torch.cat([self.first(first, second, apart), self.second(second, first, apart)], dim=1))
+        decoded = torch.cat([self.first(first, second, apart), self.second(second, first, apart)], dim=1)
+        return self.final[:-1](decoded)
+
+    def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
+        return self.final[-1](self.features(first, second))
+
+    def judge(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
+        features = self.features(first, second)
+        return self.surroundings(features, self.final[-1](features), unseen, encoded_of(first, second))
 
 
 def convolutions(channels_in: int, channels_out: int, count: int) -> nn.Sequential:
@@ -271,7 +250,7 @@ class ThesisNetwork(Network):
         self.final = nn.Sequential(
             ConvBlock(2 * base, base), ConvBlock(base, base), nn.Conv2d(base, len(CLASSES), 3, padding=1)
         )
-        self.penalty = invalidity_penalty()
+        self.prior = Prior()
         self.objects = nn.Conv2d(base, len(CLASSES), 1)  # in pretraining only
 
     def classify(self, images: Tensor) -> Tensor:
@@ -279,6 +258,9 @@ class ThesisNetwork(Network):
 
     def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
         return self.final(torch.cat([self.first(first), self.second(second)], dim=1))
+
+    def judge(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
+        return self.prior(self.compare(first, second), unseen)
 
 
 def widened(state: Dict[str, Tensor], network: Network) -> Dict[str, Tensor]:

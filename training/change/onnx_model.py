@@ -22,7 +22,8 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 from detector.onnx_model import for_opencv, golden_image
 
 from .inference import INPUT_HEIGHT, INPUT_WIDTH, normalise
-from .network import ConvBlock, Network
+from .blocks import ConvBlock
+from .network import Network
 from .validation import Detect
 
 OPSET = 13

@@ -1,7 +1,7 @@
 """Figures on held-out pairs, as the vehicle would see them: registered by features, the network's whole picture."""
 
 from dataclasses import dataclass, field
-from typing import Callable, Dict, List, Sequence
+from typing import Callable, Dict, List, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -45,13 +45,31 @@ def torch_detector(network: Network, device: torch.device, precision: str) -> De
     return detect
 
 
+def aligned(pair: Pair) -> Tuple[np.ndarray, np.ndarray]:
+    """The first picture in the second one's view, and where it is known (H x W uint8, 1 or 0): nowhere when the pair was refused.
+
+    As in a vehicle, which warps before it adds the padding.
+    """
+    rows, columns = pair.content
+    if pair.homography is None:
+        validity, warped = np.zeros(pair.mask.shape, np.uint8), pair.second
+    else:
+        ones = np.zeros(pair.mask.shape, np.uint8)
+        ones[:rows, :columns] = 1
+        size = (INPUT_WIDTH, INPUT_HEIGHT)
+        validity = cv2.warpPerspective(ones, pair.homography, size, flags=cv2.INTER_NEAREST)
+        warped = cv2.warpPerspective(pair.first, pair.homography, size, borderValue=(PAD_VALUE,) * 3)
+    filled = fill_invalid(warped, pair.second, validity)
+    for padding in (np.s_[rows:], np.s_[:, columns:]):
+        validity[padding], filled[padding] = 1, PAD_VALUE
+    return filled, validity
+
+
 def register(pair: Pair, part: str) -> RegisteredPair:
-    """The first picture warped onto the second by the homography from features."""
-    size = (INPUT_WIDTH, INPUT_HEIGHT)
-    validity = cv2.warpPerspective(np.ones(pair.mask.shape, np.uint8), pair.homography, size, flags=cv2.INTER_NEAREST)
-    warped = cv2.warpPerspective(pair.first, pair.homography, size, borderValue=(PAD_VALUE,) * 3)
+    """A pair as it is validated: what the warp could not fill is left out."""
+    first, validity = aligned(pair)
     mask = np.where(validity > 0, pair.mask, IGNORED).astype(np.uint8)
-    return RegisteredPair(fill_invalid(warped, pair.second, validity), pair.second, validity, mask, part)
+    return RegisteredPair(first, pair.second, validity, mask, part)
 
 
 def registered_pairs(pairs: Sequence[Pair]) -> List[RegisteredPair]:

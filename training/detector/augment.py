@@ -73,7 +73,7 @@ SETTLING = Recipe(
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.44, "survey_empty": 0.15, "closeups": 0.04, "cones": 0.11, "simulated": 0.26}
+GROUP_SHARES = {"survey_potholes": 0.41, "survey_empty": 0.14, "closeups": 0.03, "cones": 0.11, "simulated": 0.31}
 """How often each group of pictures is drawn; survey frames rule because they are what is measured."""
 
 GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0}

@@ -1,12 +1,12 @@
 """From a picture to detections, as the vehicle does it: letterbox, network, decode, suppression."""
 
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import List, Sequence, Tuple
 
 import cv2
 import numpy as np
 
-from .boxes import clip_to_image, non_maximum_suppression
+from .boxes import clip_to_image, non_maximum_suppression, pairwise_iou
 from .network import STRIDES
 
 MEAN, STD = 114.0, 58.0
@@ -39,22 +39,34 @@ def normalise(image: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(((image.astype(np.float32) - MEAN) / STD).transpose(2, 0, 1))
 
 
+FUSION_IOU = 0.5
+"""Of two views' boxes, from which on they are of one object."""
+
+
+def strides_of(scales: Sequence[float]) -> List[int]:
+    """Pixels of the input per cell, level by level of each view: seen at half the size, a stride of 4 is 8 pixels."""
+    return [round(stride / scale) for scale in scales for stride in STRIDES]
+
+
 @dataclass(frozen=True)
 class AnchorGrid:
     """Where the rows of the network's output lie in the picture."""
 
     cells: np.ndarray  # N x 2: grid_x, grid_y
     strides: np.ndarray  # N x 1
+    view_ends: Tuple[int, ...] = ()  # row behind each view's last one
 
     @staticmethod
-    def of(width: int, height: int, level_strides: Tuple[int, ...] = STRIDES) -> "AnchorGrid":
-        """All anchor points: levels in the order of the strides, rows first."""
-        cells, strides = [], []
-        for stride in level_strides:
+    def of(width: int, height: int, scales: Tuple[float, ...] = (1.0,)) -> "AnchorGrid":
+        """All anchor points: views in the order of their scales, levels in that of the strides, rows first."""
+        cells, strides, ends = [], [], []
+        for stride in strides_of(scales):
             rows, columns = np.mgrid[: height // stride, : width // stride]
             cells.append(np.stack([columns.ravel(), rows.ravel()], axis=1))
             strides.append(np.full((rows.size, 1), stride))
-        return AnchorGrid(np.concatenate(cells).astype(np.float32), np.concatenate(strides).astype(np.float32))
+            if len(strides) % len(STRIDES) == 0:
+                ends.append(sum(map(len, strides)))
+        return AnchorGrid(np.concatenate(cells).astype(np.float32), np.concatenate(strides).astype(np.float32), tuple(ends))
 
 
 def decode(
@@ -65,6 +77,37 @@ def decode(
 
     `scale` is the letterbox's; `image_size` is (width, height) of the picture, to which boxes are cut.
     """
+    views, begin = [], 0
+    for end in grid.view_ends:
+        view = AnchorGrid(grid.cells[begin:end], grid.strides[begin:end])
+        views.append(decode_view(raw_boxes[begin:end], scores[begin:end], view, scale, image_size, nms_iou))
+        begin = end
+    return views[0] if len(views) == 1 else [fuse(of_class) for of_class in zip(*views)]
+
+
+def fuse(views: Sequence[np.ndarray]) -> np.ndarray:
+    """Detections (M x 5) of one class in several views to M x 5, as the vehicle does it (weighted boxes fusion)."""
+    rows = np.concatenate([np.hstack([found, np.full((len(found), 1), view)]) for view, found in enumerate(views)])
+    rows = rows[np.argsort(-rows[:, 4], kind="stable")]
+    free, fused = np.ones(len(rows), bool), []
+    for index, row in enumerate(rows):
+        if not free[index]:
+            continue
+        same = free & (pairwise_iou(row[None, :4], rows[:, :4])[0] >= FUSION_IOU)
+        same[index] = True
+        free &= ~same
+        best = [rows[same & (rows[:, 5] == view)][0] for view in range(len(views)) if (same & (rows[:, 5] == view)).any()]
+        weights = np.array([one[4] for one in best])
+        box = (np.array([one[:4] for one in best]) * weights[:, None]).sum(axis=0) / weights.sum()
+        fused.append([*box, weights.sum() / len(views)])
+    fused = np.array(fused, np.float32).reshape(-1, 5)
+    return fused[np.argsort(-fused[:, 4], kind="stable")]
+
+
+def decode_view(
+    raw_boxes: np.ndarray, scores: np.ndarray, grid: AnchorGrid, scale: float, image_size: Tuple[int, int], nms_iou: float,
+) -> List[np.ndarray]:
+    """The same of one view alone."""
     detections = []
     for class_scores in scores.T:
         rows = np.argsort(-class_scores, kind="stable")[:MOST_CANDIDATES]

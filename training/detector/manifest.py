@@ -24,6 +24,7 @@ class Manifest:
     width: int
     height: int
     thresholds: Dict[str, float]
+    scales: Tuple[float, ...] = (1.0,)  # of the views
 
 
 def sha256_of(path: Path) -> str:
@@ -32,9 +33,11 @@ def sha256_of(path: Path) -> str:
 
 
 def write_manifest(
-    path: Path, weights: Path, thresholds: Dict[str, float], size: Tuple[int, int] = inference.INPUT_SIZE, engine: str = ""
+    path: Path, weights: Path, thresholds: Dict[str, float], size: Tuple[int, int] = inference.INPUT_SIZE, engine: str = "",
+    scales: Tuple[float, ...] = (1.0,),
 ) -> None:
     """Describe `weights`, which lies beside the manifest; `size` of the input is width and height, no `engine` leaves it open."""
+    views = {"views": len(scales)} if len(scales) > 1 else {}
     content = {
         "name": path.stem,
         "file": weights.name,
@@ -46,7 +49,7 @@ def write_manifest(
             "resize": "letterbox", "pad_value": inference.PAD_VALUE,
         },
         "normalisation": {"mean": [inference.MEAN] * 3, "std": [inference.STD] * 3},
-        "head": {"type": "yolox", "strides": list(STRIDES), "output": "predictions"},
+        "head": {"type": "yolox", "strides": inference.strides_of(scales), **views, "output": "predictions"},
         "thresholds": thresholds,
         "nms_iou": inference.NMS_IOU,
     }
@@ -57,9 +60,11 @@ def read_manifest(path: Path) -> Manifest:
     """Read a manifest and check its weights against it."""
     try:
         content = yaml.safe_load(path.read_text())
+        strides = [int(stride) for stride in content["head"]["strides"]]
         manifest = Manifest(
             path.parent / content["file"], tuple(content["classes"]), int(content["input"]["width"]),
             int(content["input"]["height"]), {name: float(value) for name, value in content["thresholds"].items()},
+            tuple(STRIDES[0] / first for first in strides[:: len(STRIDES)]),
         )
         digest = content["sha256"]
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:

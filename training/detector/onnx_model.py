@@ -3,7 +3,7 @@
 import copy
 import warnings
 from pathlib import Path
-from typing import Tuple
+from typing import Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ import onnx
 import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
+from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from .network import ConvBlock, Detector
@@ -28,8 +29,9 @@ class ExportableDetector(nn.Module):
     exported as 1: a channel with zero weights and a large bias, which needs no constant in the graph.
     """
 
-    def __init__(self, detector: Detector):
+    def __init__(self, detector: Detector, scales: Sequence[float] = (1.0,)):
         super().__init__()
+        self.scales = tuple(scales)
         detector = copy.deepcopy(detector).cpu().eval()
         fuse_batch_norms(detector)
         self.detector = detector
@@ -37,12 +39,24 @@ class ExportableDetector(nn.Module):
             head.score[-1] = with_certain_objectness(head.score[-1])
 
     def forward(self, images: Tensor) -> Tensor:
+        views = [self.view(self.scaled(images, scale)) for scale in self.scales]
+        return torch.cat(views, dim=2).permute(0, 2, 1)
+
+    @staticmethod
+    def scaled(images: Tensor, scale: float) -> Tensor:
+        """As resizing the picture would: the middle of a pixel stays where it is."""
+        if scale == 1:
+            return images
+        return F.interpolate(images, scale_factor=scale, mode="bilinear", align_corners=False, recompute_scale_factor=False)
+
+    def view(self, images: Tensor) -> Tensor:
+        """1 x (5 + C) x N of the network at one scale."""
         levels = self.detector.pyramid(self.detector.backbone(images))
         outputs = []
         for head, level in zip(self.detector.heads, levels):
             rows = torch.cat([head.box(level), head.score(level).sigmoid()], dim=1)
             outputs.append(rows.reshape(1, 5 + self.detector.class_count, -1))
-        return torch.cat(outputs, dim=2).permute(0, 2, 1)
+        return torch.cat(outputs, dim=2)
 
 
 def fuse_batch_norms(module: nn.Module) -> None:
@@ -61,9 +75,9 @@ def with_certain_objectness(scores: nn.Conv2d) -> nn.Conv2d:
     return extended
 
 
-def export(detector: Detector, path: Path, width: int, height: int) -> ExportableDetector:
+def export(detector: Detector, path: Path, width: int, height: int, scales: Sequence[float] = (1.0,)) -> ExportableDetector:
     """Write the graph; returns the module that it was traced from."""
-    exportable = ExportableDetector(detector)
+    exportable = ExportableDetector(detector, scales)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", torch.jit.TracerWarning)  # sizes are compared while tracing: the graph's are fixed
         torch.onnx.export(

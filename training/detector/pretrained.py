@@ -8,7 +8,7 @@ as a new one would.
 import base64
 import json
 from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
 import onnx
@@ -16,6 +16,7 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional as F
+from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from .inference import MEAN, STD
 from .network import Backbone, ConvBlock, Detector
@@ -141,6 +142,15 @@ def put_into(backbone: nn.Module, convolutions: List[Tuple[Tensor, Tensor]]) -> 
 
 
 @torch.no_grad()
+def fold_normalisation(network: nn.Module) -> None:
+    """Every block's normalisation into its convolution: it then adds the bias and does nothing else. In place, for inference."""
+    for module in network.modules():
+        if isinstance(module, ConvBlock):
+            fused = fuse_conv_bn_eval(module[0], module[1])
+            put_into(module, [(fused.weight, fused.bias)])
+
+
+@torch.no_grad()
 def unfold_normalisation(backbone: nn.Module, images: Tensor) -> None:
     """Scale every convolution to outputs of variance 1 on `images` (B x 3 x H x W), undone by its normalisation.
 
@@ -180,8 +190,8 @@ def load_backbone(backbone: nn.Module, path: Path, images: Tensor) -> None:
 
 
 @torch.no_grad()
-def load_exported(detector: Detector, path: Path, images: Tensor) -> int:
-    """Begin with the weights of an exported detector (onnx_model.py), normalisation calibrated on `images`.
+def load_exported(detector: Detector, path: Path, images: Optional[Tensor] = None) -> int:
+    """Begin with the weights of an exported detector (onnx_model.py), normalisation calibrated on `images`, if any: to train on.
 
     Layers of another shape keep theirs, so that a network of another size takes over what it shares. Returns how many
     convolutions were taken over.
@@ -206,5 +216,6 @@ def load_exported(detector: Detector, path: Path, images: Tensor) -> int:
                 taken += 1
     if not taken:
         raise ConversionError(f"{path} is no exported detector of such a network.")
-    unfold_normalisation(detector, images)
+    if images is not None:
+        unfold_normalisation(detector, images)
     return taken

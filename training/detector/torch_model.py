@@ -48,12 +48,17 @@ def pooling(node: onnx.NodeProto, attributes: Dict, pool: Callable) -> Callable:
 
 
 def enlargement(node: onnx.NodeProto, attributes: Dict) -> Callable:
-    """Nearest-neighbour upsampling by whole factors; the second input, the region of interest, is not used."""
-    if attributes.get("mode") != b"nearest" or attributes.get("nearest_mode", b"") not in (b"floor", b""):
-        raise UnknownOperator(f"Resize '{node.name}' is not of the nearest neighbour, rounded down.")
+    """Nearest-neighbour upsampling by whole factors, or linear interpolation; the second input, the region of interest, is not used."""
+    linear = attributes.get("mode") == b"linear" and attributes.get("coordinate_transformation_mode") in (b"half_pixel", b"pytorch_half_pixel")
+    nearest = attributes.get("mode") == b"nearest" and attributes.get("nearest_mode", b"") in (b"floor", b"")
+    if not linear and not nearest:
+        raise UnknownOperator(f"Resize '{node.name}' is neither of the nearest neighbour, rounded down, nor linear between pixels' middles.")
 
     def run(images: Tensor, _: Tensor, scales: Tensor) -> Tensor:
-        return F.interpolate(images, scale_factor=[float(scale) for scale in scales[2:]], mode="nearest")
+        factors = [float(scale) for scale in scales[2:]]
+        if nearest:
+            return F.interpolate(images, scale_factor=factors, mode="nearest")
+        return F.interpolate(images, scale_factor=factors, mode="bilinear", align_corners=False, recompute_scale_factor=False)
 
     return run
 

@@ -60,10 +60,10 @@ class Validation:
 
 
 def detect_simulated(
-    run: Runner, pictures: List[Picture], size: Tuple[int, int] = inference.INPUT_SIZE
+    run: Runner, pictures: List[Picture], size: Tuple[int, int] = inference.INPUT_SIZE, scales: Tuple[float, ...] = (1.0,)
 ) -> Dict[str, List[ScoredFrame]]:
     """Detections and labels in frames of simulated drives, by class; `size` is the network's input, width and height."""
-    grid = inference.AnchorGrid.of(*size)
+    grid = inference.AnchorGrid.of(*size, scales)
     frames = {name: [] for name in CLASSES}
     for picture in pictures:
         found = detect(picture, run, grid, *size)
@@ -76,10 +76,10 @@ def detect_simulated(
 
 def validate(
     run: Runner, drives: Dict[str, List[DriveFrame]], cones: List[Picture],
-    size: Tuple[int, int] = inference.INPUT_SIZE,
+    size: Tuple[int, int] = inference.INPUT_SIZE, scales: Tuple[float, ...] = (1.0,),
 ) -> Validation:
-    """Detect in every validation picture; `size` is the network's input, width and height."""
-    grid = inference.AnchorGrid.of(*size)
+    """Detect in every validation picture; `size` is the network's input, width and height, `scales` those of its views."""
+    grid = inference.AnchorGrid.of(*size, scales)
     result = Validation({}, [], {})
     for name, drive in drives.items():
         found = [detect(frame.picture, run, grid, *size) for frame in drive]

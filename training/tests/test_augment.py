@@ -9,7 +9,7 @@ import numpy as np
 from detector.augment import SETTLING, Augmenter, Recipe
 from detector.boxes import non_maximum_suppression
 from detector.data import POTHOLE, TRAFFIC_CONE, DataError, Picture, read_simulated
-from detector.inference import AnchorGrid, decode, letterbox
+from detector.inference import AnchorGrid, decode, fuse, letterbox
 
 from .synthetic import write_simulated
 
@@ -118,6 +118,21 @@ class Inference(unittest.TestCase):
         (detections,) = decode(raw, scores, grid, 0.5, (128, 64))
         # Centre (28, 10), size 24 x 16 in the input; the picture is twice as large.
         np.testing.assert_allclose(detections, [[32, 4, 80, 36, 0.7]], rtol=1e-5)
+
+    def test_a_smaller_view_lands_where_the_whole_one_does(self):
+        grid = AnchorGrid.of(640, 400, (1.0, 0.8))
+        self.assertEqual(grid.view_ends, (160 * 100 + 80 * 50 + 40 * 25, len(grid.cells)))
+        raw, scores = np.zeros((len(grid.cells), 4), np.float32), np.zeros((len(grid.cells), 1), np.float32)
+        # 16 x 16 px around (320, 200), at stride 4 of the whole picture and at stride 5 of the smaller one.
+        for row, stride, score in ((50 * 160 + 80, 4, 0.9), (grid.view_ends[0] + 40 * 128 + 64, 5, 0.7)):
+            raw[row, 2:], scores[row] = np.log(16 / stride), score
+        found, = decode(raw, scores, grid, 1.0, (640, 400))
+        np.testing.assert_allclose(found, [[312, 192, 328, 208, 0.8]], rtol=1e-5)
+
+    def test_what_one_view_alone_shows_is_doubted(self):
+        here, there = [10, 10, 30, 20, 0.8], [60, 10, 80, 20, 0.6]
+        fused = fuse([np.array([here, there]), np.array([[15, 10, 35, 20, 0.2]])])
+        np.testing.assert_allclose(fused, [[11, 10, 31, 20, 0.5], [60, 10, 80, 20, 0.3]], rtol=1e-5)
 
     def test_suppression_keeps_the_best(self):
         boxes = np.array([[0, 0, 10, 10], [1, 0, 11, 10], [50, 50, 60, 60]], float)

@@ -12,9 +12,12 @@ import export_change
 import predict_change
 import simulate_change
 import train_change
+import train_change_surroundings
 from change import data, onnx_model
 from change.manifest import read_manifest
+from change.exported import load_exported
 from change.network import ChangeNetwork, ThesisNetwork
+from change.surroundings import UNSEEN_CHANGE
 from detector.manifest import ManifestError
 
 from .synthetic_change import street, write_pair, write_photos, write_streets
@@ -74,6 +77,51 @@ class ChangePrograms(unittest.TestCase):
         self.assertEqual(status, 2)
         self.assertIn("learning_rate", errors)
 
+    def test_the_surroundings_are_learnt_and_all_else_stays(self):
+        start = self.root / "start.pt"
+        torch.manual_seed(3)
+        before = ChangeNetwork().state_dict()
+        torch.save({"settings": {"architecture": "change-small"}, "average": before}, start)
+
+        def learn(out, *more):
+            return quietly(
+                train_change_surroundings, "--start-from", start, "--pairs", self.pairs, "--validation", self.held_out,
+                "--out", self.root / out, "--epochs", 2, "--threads", 1, *more,
+            )
+
+        self.assertEqual(learn("around"), (0, ""))
+        learnt = torch.load(self.root / "around" / "last.pt")["average"]
+        for name, tensor in before.items():
+            if not name.startswith("surroundings."):
+                torch.testing.assert_close(learnt[name], tensor, rtol=0, atol=0, msg=name)
+        self.assertFalse(torch.equal(learnt["surroundings.judge.bias"], before["surroundings.judge.bias"]))
+        for fixed in ("surroundings.prior.unseen.weight", "surroundings.weigh.weight"):
+            self.assertTrue(torch.equal(learnt[fixed], before[fixed]))
+        status, errors = learn("around")
+        self.assertEqual((status, errors.count("\n")), (2, 1))
+        self.assertIn("--resume", errors)
+        self.check_resumed(learn, learnt)
+
+    def check_resumed(self, learn, learnt):
+        """A run that was killed after its first epoch ends as the one that was not."""
+        save = train_change_surroundings.save_atomically
+
+        def stop(content, path):
+            save(content, path)
+            if path.name == "last.pt" and content["epoch"] == 1:
+                raise KeyboardInterrupt
+
+        train_change_surroundings.save_atomically = stop
+        try:
+            with self.assertRaises(KeyboardInterrupt):
+                learn("stopped_around")
+        finally:
+            train_change_surroundings.save_atomically = save
+        self.assertEqual(learn("stopped_around", "--resume"), (0, ""))
+        continued = torch.load(self.root / "stopped_around" / "last.pt")["average"]
+        for name, tensor in learnt.items():
+            torch.testing.assert_close(continued[name], tensor, rtol=0, atol=0, msg=name)
+
     def test_exported_graphs_are_torchs(self):
         models = self.root / "models"
         models.mkdir()
@@ -99,7 +147,7 @@ class ChangePrograms(unittest.TestCase):
         found = whole.run({"first": first, "second": second, "validity": validity})[0]
         np.testing.assert_allclose(found, expected, atol=1e-3)
         np.testing.assert_allclose(onnx_model.run_parts(encoder, head, first, second, validity), expected, atol=1e-3)
-        self.assertTrue((found[0, 0, 100:, 200:] == 1).all())
+        np.testing.assert_allclose(found[0, 0, 100:, 200:], 1 - UNSEEN_CHANGE, atol=1e-3)
         self.check_predictions(models / "tiny.yaml", checkpoint)
         for part in onnx_model.PARTS:
             self.assertLess(manifest.files[part].stat().st_size, 10_000_000)
@@ -107,8 +155,21 @@ class ChangePrograms(unittest.TestCase):
         with self.assertRaisesRegex(ManifestError, "SHA-256"):
             read_manifest(models / "tiny.yaml")
 
+    def test_an_exported_network_can_be_taken_up_again(self):
+        torch.manual_seed(4)
+        network = ChangeNetwork().eval()
+        with torch.no_grad():
+            for weight in network.parameters():
+                if weight.requires_grad:  # unlike each other: the exporter stores equal tensors once
+                    weight += 0.02 * torch.randn_like(weight)
+        onnx_model.export(network, self.root, "kept", ["whole"])
+        inputs = [torch.from_numpy(part) for part in onnx_model.golden_inputs()]
+        with torch.no_grad():
+            taken_up, expected = (one.detect(*inputs) for one in (load_exported(self.root / "kept.onnx"), network))
+        torch.testing.assert_close(taken_up, expected, rtol=0, atol=1e-4)
+
     def check_predictions(self, manifest, checkpoint):
-        """OpenCV and torch write the same for the evaluation, and what cannot be registered is no change."""
+        """OpenCV and torch write the same for the evaluation, and what cannot be registered was not seen."""
         pairs = self.root / "to_predict"
         first, second, mask = street(4, False, True)
         write_pair(pairs, 0, first, second, mask)
@@ -120,7 +181,7 @@ class ChangePrograms(unittest.TestCase):
             found = np.load(self.root / "opencv" / order / "000" / "00.npy")
             self.assertEqual((found.shape, found.dtype), ((10, 256, 320), np.float32))
             np.testing.assert_allclose(found, np.load(self.root / "torch" / order / "000" / "00.npy"), atol=1e-3)
-            self.assertTrue((np.load(self.root / "opencv" / order / "000" / "01.npy")[0] == 1).all())
+            np.testing.assert_allclose(np.load(self.root / "opencv" / order / "000" / "01.npy")[0], 1 - UNSEEN_CHANGE, atol=1e-3)
 
     def test_predictions_have_the_size_of_the_pictures(self):
         ramp = np.tile(np.linspace(0, 1, 320, dtype=np.float32), (10, 256, 1))

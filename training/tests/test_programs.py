@@ -104,16 +104,18 @@ class Programs(unittest.TestCase):
         torch.save({"settings": {"size": "medium"}, "average": detector.state_dict()}, checkpoint)
         exported = quietly(
             export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data, "--packed",
-            "--input", "320x208", "--engine", "torch",
+            "--input", "320x240", "--engine", "torch", "--scales", "1,0.8",
         )
         self.assertEqual(exported, (0, ""))
         arguments = ("--manifest", models / "tiny.yaml", "--data", self.data)
         self.assertEqual(quietly(evaluate_detector, *arguments), (0, ""))
         manifest = yaml.safe_load((models / "tiny.yaml").read_text())
         self.assertEqual((manifest["torch_file"], manifest["torch_sha256"]), ("tiny.pt.gz", sha256_of(models / "tiny.pt.gz")))
-        self.assertEqual((manifest["engine"], manifest["input"]["width"], manifest["input"]["height"]), ("torch", 320, 208))
+        self.assertEqual((manifest["engine"], manifest["input"]["width"], manifest["input"]["height"]), ("torch", 320, 240))
         golden = yaml.safe_load((models / "tiny.golden.yaml").read_text())
-        self.assertEqual((golden["width"], golden["anchor_points"]), (320, 80 * 52 + 40 * 26 + 20 * 13))
+        self.assertEqual((manifest["head"]["views"], manifest["head"]["strides"]), (2, [4, 8, 16, 5, 10, 20]))
+        whole, smaller = 80 * 60 + 40 * 30 + 20 * 15, 64 * 48 + 32 * 24 + 16 * 12
+        self.assertEqual((golden["width"], golden["anchor_points"]), (320, whole + smaller))
         small = ("--size", "small", "--start-from", models / "tiny.onnx.gz")
         self.assertEqual(self.train("small", *small), (0, ""))
         self.assertIn("size small", self.train("small", "--size", "base", "--resume")[1])
@@ -159,6 +161,8 @@ class Programs(unittest.TestCase):
             (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
             (export_detector, ("--out", nowhere)),
             (export_detector, ("--input", "640x401", "--out", self.root)),
+            (export_detector, ("--scales", "1,0.7", "--out", self.root)),
+            (export_detector, ("--scales", "1,0.8", "--input", "320x208", "--out", self.root)),
             (evaluate_detector, ("--manifest", nowhere)),
             (export_torch, (nowhere,)),
         ]
