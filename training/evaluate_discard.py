@@ -19,12 +19,11 @@ import numpy as np
 import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import inference
 from detector.data import POTHOLE, VALIDATION_SECTIONS, DataError, DriveFrame, read_drive
-from detector.manifest import ManifestError, read_manifest, sha256_of
+from detector.manifest import Manifest, ManifestError, read_manifest, sha256_of
 from detector.metrics import NEAR_M, ScoredFrame, drive_figures
 from detector.onnx_model import opencv_runner
-from detector.validation import detect
+from detector.validation import Looker
 from export_discard import Scorer
 
 CONFIG = Path(__file__).parents[1] / "config" / "early_discard.yaml"
@@ -107,17 +106,17 @@ def read_classifier(manifest: Path) -> Tuple[Scorer, float]:
 class Drives:
     """Both profiles over the drives, and what they saw and sent."""
 
-    def __init__(self, run, classify: Scorer, threshold: float, settings: dict, speed_mps: float):
-        self.run, self.classify, self.threshold = run, classify, threshold
+    def __init__(self, detector: Manifest, classify: Scorer, threshold: float, settings: dict, speed_mps: float):
+        self.looker = Looker(opencv_runner(detector.weights), detector.look)
+        self.classify, self.threshold = classify, threshold
         self.settings, self.speed_mps = settings, speed_mps
-        self.grid = inference.AnchorGrid.of(inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
         self.big: Dict[str, List[ScoredFrame]] = {}
         self.small: Dict[str, List[ScoredFrame]] = {}
         self.seconds, self.bytes, self.judged, self.candidates, self.sent = 0.0, 0, 0, 0, 0
 
     def potholes(self, picture) -> np.ndarray:
         """Detections (M x 5) in a picture."""
-        return detect(picture, self.run, self.grid, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)[POTHOLE]
+        return self.looker.detect(picture.image)[POTHOLE]
 
     def drive(self, name: str, frames: List[DriveFrame]) -> None:
         """One drive; stretches without pictures are cut to NEAR_M, as replays cut them."""
@@ -155,7 +154,7 @@ def run(options: argparse.Namespace) -> None:
     manifest = read_manifest(options.detector)
     classify, threshold = read_classifier(options.manifest)
     settings = yaml.safe_load(CONFIG.read_text())
-    drives = Drives(opencv_runner(manifest.weights), classify, threshold, settings, options.speed_mps)
+    drives = Drives(manifest, classify, threshold, settings, options.speed_mps)
     for name in options.sections:
         drives.drive(name, read_drive(options.data / "road_survey" / name))
     frames = sum(len(drive) for drive in drives.big.values())

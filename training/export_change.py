@@ -21,8 +21,10 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from change import data, inference, onnx_model
+from change.exported import load_exported
 from change.manifest import write_manifest
-from change.network import ARCHITECTURES, Network
+from change.network import ARCHITECTURES, ChangeNetwork, Network
+from change.surroundings import together
 from change.validation import FALSE_POSITIVE_RATES, photo_pairs, registered_pairs, validate
 from train_change import VALIDATION_PHOTOS, read_source
 
@@ -32,6 +34,7 @@ TOLERANCE = 1e-3
 MOST_BYTES = 10_000_000
 """Of a file that is committed."""
 
+DEFAULT_CHECKPOINT = Path("build/training/change_small/best.pt")
 GOLDEN_PIXELS = 24
 LEAST_CHANGED = 0.5
 """What a vehicle tells of is likelier than not: most streets have not changed at all, unlike the pairs that are calibrated on."""
@@ -45,7 +48,9 @@ class ExportError(Exception):
 
 
 def load_averaged(checkpoint: Path) -> Network:
-    """The averaged weights of a checkpoint."""
+    """The averaged weights of a checkpoint, or the weights of a whole exported graph."""
+    if checkpoint.suffix == ".onnx":
+        return load_exported(checkpoint)
     try:
         state = torch.load(checkpoint, map_location="cpu")
         network = ARCHITECTURES[state["settings"]["architecture"]]()
@@ -53,6 +58,20 @@ def load_averaged(checkpoint: Path) -> Network:
     except (OSError, KeyError, RuntimeError, TypeError) as error:
         raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
     return network.eval()
+
+
+def load_together(checkpoints: List[Path]) -> Network:
+    """The network of a checkpoint; of several, with the judges of all."""
+    networks = [load_averaged(checkpoint) for checkpoint in checkpoints]
+    if len(networks) == 1:
+        return networks[0]
+    if not all(isinstance(network, ChangeNetwork) for network in networks):
+        raise ExportError("Several checkpoints are joined of change-small only.")
+    kept = [{name: value for name, value in network.state_dict().items() if not name.startswith("surroundings.")} for network in networks]
+    if not all(torch.equal(value, other[name]) for other in kept[1:] for name, value in kept[0].items()):
+        raise ExportError("The checkpoints have learnt the surroundings of different networks: --start-from must be the same.")
+    networks[0].surroundings = together([network.surroundings for network in networks])
+    return networks[0]
 
 
 def check_against_torch(folder: Path, name: str, network: Network) -> None:
@@ -98,7 +117,7 @@ def calibrate(arguments: argparse.Namespace) -> dict:
     names = [f"changed_at_fpr_{rate:.2f}" for rate in FALSE_POSITIVE_RATES]
     if arguments.validation is None:
         return {"changed": UNCALIBRATED_THRESHOLD, **{name: UNCALIBRATED_THRESHOLD for name in names}}
-    cache = arguments.checkpoint.parent / "registration_validation.npz"
+    cache = (arguments.checkpoint or [DEFAULT_CHECKPOINT])[0].parent / "registration_validation.npz"
     source = read_source(arguments.validation, arguments.data, cache, True, arguments.registered)
     pairs = registered_pairs(source.pairs) + photo_pairs(source, VALIDATION_PHOTOS, 1)
     if not any(pair.part == "changes" for pair in pairs):
@@ -117,7 +136,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
-    network = onnx_model.export(load_averaged(arguments.checkpoint), arguments.out, arguments.name)
+    network = onnx_model.export(load_together(arguments.checkpoint or [DEFAULT_CHECKPOINT]), arguments.out, arguments.name)
     for part in onnx_model.PARTS:
         size = onnx_model.file_of(arguments.out, arguments.name, part).stat().st_size
         if size > MOST_BYTES:
@@ -132,7 +151,7 @@ def run(arguments: argparse.Namespace) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 exported, 2 the command line, the checkpoint or the data is wrong."""
     parser = argparse.ArgumentParser(description="Export a checkpoint of the change network as ONNX with its manifest.")
-    parser.add_argument("--checkpoint", type=Path, default=Path("build/training/change_small/best.pt"))
+    parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; of train_change_surroundings.py it may be repeated: all judge together")
     parser.add_argument("--name", default="change-small", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--validation", type=Path, help="held-out pairs (training/simulate_change.py --plain)")

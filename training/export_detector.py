@@ -26,7 +26,7 @@ from detector.manifest import write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
-from detector.validation import detect_simulated, validate
+from detector.validation import Looker, detect_simulated, validate
 from export_torch import ExportError, add_torch_file
 
 TOLERANCE = 1e-3
@@ -102,11 +102,13 @@ def view_scales(text: str) -> Tuple[float, ...]:
     return scales
 
 
-def check_views(size: Tuple[int, int], scales: Tuple[float, ...]) -> None:
-    """Every view must be covered by whole cells."""
-    for scale in scales:
-        if any(abs(side * scale / STRIDES[-1] - round(side * scale / STRIDES[-1])) > 1e-9 for side in size):
-            raise ExportError(f"--scales: {scale} of --input {size[0]}x{size[1]} is no multiple of {STRIDES[-1]} pixels.")
+def look_of(arguments: argparse.Namespace) -> inference.Look:
+    """How the network is to look; every view must be covered by whole cells."""
+    look = inference.Look(*arguments.input, arguments.scales, arguments.mirrored)
+    for scale in look.scales:
+        if any(abs(side * scale / STRIDES[-1] - round(side * scale / STRIDES[-1])) > 1e-9 for side in arguments.input):
+            raise ExportError(f"--scales: {scale} of --input {look.width}x{look.height} is no multiple of {STRIDES[-1]} pixels.")
+    return look
 
 
 def check_against_torch(weights: Path, exportable: torch.nn.Module, size: Tuple[int, int]) -> None:
@@ -140,30 +142,30 @@ def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
-    check_views(arguments.input, arguments.scales)
+    look = look_of(arguments)
     detector = load_averaged(arguments.checkpoint or [DEFAULT_CHECKPOINT])
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
 
     weights = arguments.out / f"{arguments.name}.onnx"
-    exportable = onnx_model.export(detector, weights, *arguments.input, arguments.scales)
+    exportable = onnx_model.export(detector, weights, look)
     check_against_torch(weights, exportable, arguments.input)
     if arguments.packed:
         round_weights(weights)
         weights = pack(weights)
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights, arguments.input)
 
-    runner = onnx_model.opencv_runner(weights)
+    looker = Looker(onnx_model.opencv_runner(weights), look)
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in CLASSES}
     if arguments.simulated:
-        for name, frames in detect_simulated(runner, data.read_simulated(arguments.simulated), arguments.input, arguments.scales).items():
+        for name, frames in detect_simulated(looker, data.read_simulated(arguments.simulated)).items():
             thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
             print(f"simulated {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
-    found = validate(runner, drives, cones, arguments.input, arguments.scales)
+    found = validate(looker, drives, cones)
     thresholds["pothole"] = found.best_drive_figures().threshold
     thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
     manifest = arguments.out / f"{arguments.name}.yaml"
-    write_manifest(manifest, weights, thresholds, arguments.input, arguments.engine, arguments.scales)
+    write_manifest(manifest, weights, thresholds, look, arguments.engine)
     add_torch_file(manifest)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 
@@ -176,8 +178,9 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
-    parser.add_argument("--input", type=input_size, default=inference.INPUT_SIZE, metavar="WIDTHxHEIGHT", help="of the network (640x400)")
+    parser.add_argument("--input", type=input_size, default=(inference.INPUT_WIDTH, inference.INPUT_HEIGHT), metavar="WIDTHxHEIGHT", help="of the network (640x400)")
     parser.add_argument("--scales", type=view_scales, default=(1.0,), metavar="S,...", help="views of the picture whose findings are fused (1)")
+    parser.add_argument("--mirrored", action="store_true", help="the mirrored picture is looked at besides, at the same scales")
     parser.add_argument("--engine", choices=("opencv", "torch"), default="", help="entered into the manifest; else the vehicle's default")
     parser.add_argument("--packed", action="store_true", help="weights of half the precision, in gzip files")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")

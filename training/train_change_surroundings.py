@@ -6,7 +6,8 @@
         --pairs build/training/change_surroundings --validation build/training/change_validation --out build/training/change_whole
 
 The network itself is held fixed; the streets must be others than those it was trained on, on which it is too good. Instead of
-its checkpoint the exported NAME.onnx will do. OUT/best.pt is a checkpoint for training/export_change.py. A run that was
+its checkpoint the exported NAME.onnx will do; what that had learnt of surroundings is left aside. OUT/best.pt is a checkpoint for
+training/export_change.py, which joins those of several runs with other seeds: their judges err less together. A run that was
 stopped, at whatever moment, continues with the same command and --resume.
 """
 
@@ -27,12 +28,11 @@ from torch.nn import functional as F
 sys.path.insert(0, str(Path(__file__).parent))
 from change import data
 from change.classes import NO_CHANGE
-from change.exported import load_exported
 from change.inference import fill_invalid, normalise
 from change.loss import shares_of
 from change.metrics import PixelCounts
 from change.network import ChangeNetwork
-from change.surroundings import encoded_of
+from change.surroundings import Surroundings, encoded_of
 from change.validation import FALSE_POSITIVE_RATES, aligned
 from detector.training import learning_rate_factor, save_atomically
 from export_change import ExportError, load_averaged
@@ -164,7 +164,7 @@ def corrected(network: ChangeNetwork, examples: Sequence[Example]) -> ChangeNetw
     """A copy with the prior correction in its bias."""
     network = copy.deepcopy(network)
     with torch.no_grad():
-        network.surroundings.judge.bias -= prior_correction(network, examples)
+        network.surroundings.judges[0].verdict.bias -= prior_correction(network, examples)
     return network
 
 
@@ -178,9 +178,10 @@ def run(options: argparse.Namespace) -> None:
     if not options.start_from.is_file():
         raise UsageError(f"--start-from: there is no file {options.start_from}.")
     torch.manual_seed(options.seed)
-    network = load_exported(options.start_from) if options.start_from.suffix == ".onnx" else load_averaged(options.start_from)
+    network = load_averaged(options.start_from)
     if not isinstance(network, ChangeNetwork):
         raise UsageError(f"--start-from: {options.start_from} is no change-small.")
+    network.surroundings = Surroundings(network.widths.final, network.widths.encoder)  # what others have judged counts for nothing here
     network.eval().requires_grad_(False)
     network.surroundings.requires_grad_(True)
     network.surroundings.prior.unseen.requires_grad_(False)

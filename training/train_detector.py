@@ -25,7 +25,7 @@ from detector.pretrained import ConversionError, load_backbone, load_exported
 from detector.training import (
     VIEWS, AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
 )
-from detector.validation import torch_runner, validate
+from detector.validation import Looker, torch_runner, validate
 
 
 CALIBRATION_SAMPLES = 64
@@ -135,7 +135,7 @@ class Trainer:
 
     def validate(self, drives: dict, cones: list) -> dict:
         """Figures of the averaged weights on the validation parts."""
-        result = validate(torch_runner(self.average.model, self.device, self.settings.precision), drives, cones)
+        result = validate(Looker(torch_runner(self.average.model, self.device, self.settings.precision)), drives, cones)
         figures = result.best_drive_figures()
         return {
             "AP50": result.pothole_ap(0.5), "AP30": result.pothole_ap(0.3), "cone_AP50": result.cone_ap(0.5),

@@ -21,9 +21,19 @@ HazardDetector::HazardDetector(const ModelManifest& manifest,
 }
 
 std::vector<HazardDetection> HazardDetector::Detect(const cv::Mat& bgr) {
-  const cv::Mat& input = letterbox_.Fill(bgr);
-  const cv::Mat predictions = engine_->Run(input);
-  return DecodeYolox(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());
+  DetectionsOfViews views = Views(bgr);
+  if (manifest_.head.mirrored) {
+    cv::flip(bgr, mirrored_, 1);
+    for (std::vector<HazardDetection>& view : Mirrored(Views(mirrored_), bgr.cols)) {
+      views.push_back(std::move(view));
+    }
+  }
+  return JoinViews(std::move(views), manifest_);
+}
+
+DetectionsOfViews HazardDetector::Views(const cv::Mat& bgr) {
+  const cv::Mat predictions = engine_->Run(letterbox_.Fill(bgr));
+  return DecodeViews(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());
 }
 
 }  // namespace livemap

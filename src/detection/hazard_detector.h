@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "detection/detection.h"
+#include "detection/view_fusion.h"
 #include "inference/inference_engine.h"
 #include "inference/letterbox.h"
 #include "inference/model_manifest.h"
@@ -32,9 +33,12 @@ class HazardDetector {
   EngineKind Engine() const { return engine_->Kind(); }
 
  private:
+  DetectionsOfViews Views(const cv::Mat& bgr);
+
   ModelManifest manifest_;
   std::unique_ptr<InferenceEngine> engine_;
   Letterbox letterbox_;
+  cv::Mat mirrored_;  // Its memory serves again.
 };
 
 }  // namespace livemap

@@ -70,8 +70,7 @@ bool MoreConfident(const HazardDetection& a, const HazardDetection& b) {
 
 }  // namespace
 
-std::vector<HazardDetection> FuseViews(const std::vector<std::vector<HazardDetection>>& views,
-                                       float iou_limit) {
+std::vector<HazardDetection> FuseViews(const DetectionsOfViews& views, float iou_limit) {
   std::map<int, std::vector<Seen>> by_class;
   for (std::size_t view = 0; view < views.size(); ++view) {
     std::map<int, std::size_t> counts;

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/error.h"
-#include "detection/view_fusion.h"
 
 namespace livemap {
 double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
@@ -155,7 +154,7 @@ void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
 /// A view may be surer than the mean of all: what is weak in one is looked at too.
 std::vector<float> ThresholdsOfViews(const ModelManifest& manifest) {
   std::vector<float> thresholds = manifest.thresholds;
-  if (manifest.head.views == 1) return thresholds;
+  if (manifest.head.views == 1 && !manifest.head.mirrored) return thresholds;
   for (float& threshold : thresholds) threshold = std::min(threshold, kLeastOfView);
   return thresholds;
 }
@@ -201,15 +200,15 @@ std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candi
   return kept;
 }
 
-std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
-                                         double scale, cv::Size image_size) {
+DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& manifest,
+                              double scale, cv::Size image_size) {
   CheckShape(predictions, manifest);
   const std::size_t columns = 5 + manifest.classes.size();
   const std::vector<float> thresholds = ThresholdsOfViews(manifest);
   const float* values = predictions.ptr<float>();
   const auto view_count = static_cast<std::size_t>(manifest.head.views);
   const std::size_t levels = manifest.head.strides.size() / view_count;
-  std::vector<std::vector<HazardDetection>> views(view_count);
+  DetectionsOfViews views(view_count);
   for (std::size_t level = 0; level < manifest.head.strides.size(); ++level) {
     const int stride = manifest.head.strides[level];
     for (int row = 0; row < manifest.input.height / stride; ++row) {
@@ -223,8 +222,27 @@ std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const Model
   for (std::vector<HazardDetection>& view : views) {
     view = SuppressOverlaps(std::move(view), manifest.nms_iou);
   }
-  if (view_count == 1) return views[0];
+  return views;
+}
+
+std::vector<HazardDetection> JoinViews(DetectionsOfViews views, const ModelManifest& manifest) {
+  if (views.size() == 1) return std::move(views[0]);
   return AboveThresholds(FuseViews(views, kFusionIou), manifest);
+}
+
+DetectionsOfViews Mirrored(DetectionsOfViews views, int width) {
+  for (std::vector<HazardDetection>& view : views) {
+    for (HazardDetection& detection : view) {
+      const float right = detection.box.x + detection.box.width;
+      detection.box.x = std::max(static_cast<float>(width) - right, 0.0F);
+    }
+  }
+  return views;
+}
+
+std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
+                                         double scale, cv::Size image_size) {
+  return JoinViews(DecodeViews(predictions, manifest, scale, image_size), manifest);
 }
 
 }  // namespace livemap

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "detection/detection.h"
+#include "detection/view_fusion.h"
 #include "inference/model_manifest.h"
 
 namespace livemap {
@@ -20,6 +21,19 @@ namespace livemap {
 /// threshold. Throws Error when the shape of `predictions` is another.
 std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const ModelManifest& manifest,
                                          double scale, cv::Size image_size);
+
+/// The first half of DecodeYolox: the detections of each view, suppressed, in descending
+/// confidence. Of a network that looks more than once they reach down to `kLeastOfView`.
+DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& manifest,
+                              double scale, cv::Size image_size);
+
+/// The second half: what several views found as one list, at least at its class's threshold, in
+/// descending confidence.
+std::vector<HazardDetection> JoinViews(DetectionsOfViews views, const ModelManifest& manifest);
+
+/// What was found in an image that was mirrored (left and right exchanged), `width` pixels wide, in
+/// pixels of the image itself.
+DetectionsOfViews Mirrored(DetectionsOfViews views, int width);
 
 /// Greedy non-maximum suppression within each class: going down in confidence, a box that overlaps
 /// a kept one of its class by more than `iou_limit` goes. At most `kMostCandidates` of each class,

@@ -66,7 +66,8 @@ void ReadScoreHead(const ManifestSection& root, ModelManifest& manifest) {
 }
 
 void ReadYoloxHead(const ManifestSection& root, ModelManifest& manifest) {
-  const ManifestSection head = root.Sub("head", {"type", "strides", "output"}, {"views"});
+  const ManifestSection head =
+      root.Sub("head", {"type", "strides", "output"}, {"views", "mirrored"});
   if (head.Text("type") != "yolox") head.Refuse("type", "yolox or score");
   manifest.head.output = head.Text("output");
   manifest.head.strides =
@@ -83,6 +84,9 @@ void ReadYoloxHead(const ManifestSection& root, ModelManifest& manifest) {
   if (manifest.head.strides.size() % static_cast<std::size_t>(manifest.head.views) != 0) {
     head.Refuse("views", "a divisor of the number of strides, " +
                              std::to_string(manifest.head.strides.size()));
+  }
+  if (head.Has("mirrored")) {
+    manifest.head.mirrored = head.Choice("mirrored", {"true", "false"}) == "true";
   }
   manifest.nms_iou = root.Number("nms_iou", 0.0, 1.0);
 }

@@ -53,7 +53,8 @@ struct ModelManifest {
     /// The network looks at its input so many times, at different scales: the strides are as many
     /// groups of one length, one after the other.
     int views = 1;
-    std::string output;  ///< name of the output tensor
+    bool mirrored = false;  ///< kYolox: it looks at the mirrored image too, in a second run.
+    std::string output;     ///< name of the output tensor
   } head;
 
   std::vector<float> thresholds;  ///< Least confidence that is reported, by class index, (0, 1).

@@ -37,6 +37,35 @@ TEST(HazardDetector, FindsWhatTheModelFindsInPixelsOfTheImage) {
   EXPECT_NEAR(cone.box.y, 64, 0.1);
 }
 
+TEST(HazardDetector, WhatTheMirroredImageShowsIsAtTheSamePlace) {
+  ModelManifest manifest = ReadModelManifest(LIVEMAP_SOURCE_DIR "/test/inference/tiny.yaml");
+  manifest.head.mirrored = true;
+  HazardDetector detector(manifest);
+  cv::Mat image(96, 128, CV_8UC3, cv::Scalar(0, 0, 0));
+  image(cv::Rect(32, 16, 16, 16)) = kRed;
+  const std::vector<HazardDetection> found = detector.Detect(image);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_GT(found[0].confidence, 0.99F) << "both views are sure, so is their mean";
+  EXPECT_NEAR(found[0].box.x, 24, 0.1);
+  EXPECT_NEAR(found[0].box.y, 16, 0.1);
+  EXPECT_NEAR(found[0].box.width, 32, 0.1);
+}
+
+TEST(HazardDetector, WhatOnlyOneOfTheTwoImagesShowsIsDoubted) {
+  ModelManifest manifest = ReadModelManifest(LIVEMAP_SOURCE_DIR "/test/inference/tiny.yaml");
+  manifest.head.mirrored = true;
+  HazardDetector detector(manifest);
+  // The input is 64 px wide, this image 60: mirrored, its red block lies across two cells.
+  cv::Mat image(48, 60, CV_8UC3, cv::Scalar(0, 0, 0));
+  image(cv::Rect(16, 8, 8, 8)) = kRed;
+  const std::vector<HazardDetection> found = detector.Detect(image);
+  manifest.head.mirrored = false;
+  const std::vector<HazardDetection> alone = HazardDetector(manifest).Detect(image);
+  ASSERT_EQ(alone.size(), 1U);
+  EXPECT_GT(alone[0].confidence, 0.99F);
+  for (const HazardDetection& detection : found) EXPECT_LT(detection.confidence, 0.9F);
+}
+
 TEST(HazardDetector, AnEmptyRoadGivesNothing) {
   HazardDetector detector = TinyDetector();
   EXPECT_TRUE(detector.Detect(cv::Mat(96, 128, CV_8UC3, cv::Scalar(90, 90, 90))).empty());

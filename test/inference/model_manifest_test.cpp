@@ -130,6 +130,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadManifest{"type: yolox", "type: score", "unknown key 'nms_iou'", "thresholds"},
         BadManifest{"strides: [8, 16]", "strides: [8, 16], views: 3", "head.views is '3'",
                     "a divisor of the number of strides, 2"},
+        BadManifest{"strides: [8, 16]", "strides: [8, 16], mirrored: 1", "head.mirrored is '1'",
+                    "true or false"},
         BadManifest{"strides: [8, 16]", "strides: [8, 16], views: 0", "head.views is '0'",
                     "1 to 4"},
         BadManifest{"strides: [8, 16]", "strides: [8, 0]", "head.strides[1]", "whole number"},

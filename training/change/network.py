@@ -163,8 +163,9 @@ class ChangeNetwork(Network):
 
     logits_stride = 2
 
-    def __init__(self, widths: Widths = Widths()):
+    def __init__(self, widths: Widths = Widths(), judges: int = 1):
         super().__init__()
+        self.widths = widths
         self.encoder = Encoder(widths)
         self.first, self.second = Decoder(widths), Decoder(widths)
         self.final = nn.Sequential(
@@ -172,7 +173,7 @@ class ChangeNetwork(Network):
             SeparableBlock(widths.final, widths.final),
             nn.Conv2d(widths.final, len(CLASSES), 1),
         )
-        self.surroundings = Surroundings(widths.final, widths.encoder)
+        self.surroundings = Surroundings(widths.final, widths.encoder, judges)
         self.objects = nn.Conv2d(widths.decoder[0], len(CLASSES), 1)  # in pretraining only
 
     def classify(self, images: Tensor) -> Tensor:

@@ -3,11 +3,12 @@
 The network judges every cell by what two pictures show there. That leaves two things unused. Objects are wholes: cells
 beside a sure change are likelier to have changed than those on an empty road, and a faint change amid none is likelier an
 error. And where the registered earlier picture shows nothing, what stands there now (a car, the road, the sky) and what has
-changed beside it say how likely a change is. `Surroundings` learns both, after the network and with it held fixed, on
-streets that the network has not seen: on its own it is too sure.
+changed beside it say how likely a change is. A `Judge` learns both, after the network and with it held fixed, on
+streets that the network has not seen: on its own it is too sure. Several judges that learnt apart err less together.
 """
 
-from typing import Dict, List, Tuple
+import copy
+from typing import Dict, List, Sequence, Tuple
 
 import torch
 from torch import Tensor, nn
@@ -26,7 +27,7 @@ DROPOUT = 0.1
 """Share of the channels that a training step hides: there are few streets to learn from."""
 
 UNSEEN_CHANGE = 0.1
-"""Probability of a change, of all classes alike, that an untrained `Surroundings` gives a cell that was not seen."""
+"""Probability of a change, of all classes alike, that untrained `Surroundings` give a cell that was not seen."""
 
 
 def per_class(weights: Tensor) -> nn.Conv2d:
@@ -62,15 +63,15 @@ class Prior(nn.Module):
         return logits * self.seen(1 - unseen) + self.unseen(unseen)
 
 
-class Surroundings(nn.Module):
-    """Features (B x F x h x w), logits and what was not seen (B x 1 x h x w, 0 or 1), all at stride 2, to logits.
+class Judge(nn.Module):
+    """Features (B x F x h x w) and what was not seen (B x 1 x h x w, 0 or 1), at stride 2, to how much likelier a change is.
 
-    `encoded` are the encoder's features of both pictures: they say what stands there, whether it has changed or not.
+    `encoded` are the encoder's features of both pictures: they say what stands there, whether it has changed or not. The verdict
+    (B x 2 x h x w) is a difference of log-odds for cells that were seen and one for others.
     """
 
     def __init__(self, features: int, encoder: Tuple[int, ...]):
         super().__init__()
-        self.prior = Prior()
         self.enter = ConvBlock(features + 1, WIDTHS[0], 1)
         self.hidden = nn.Dropout2d(DROPOUT)
         self.known = nn.ModuleDict({str(level): ConvBlock(2 * encoder[level], KNOWN, 1) for level in KNOWN_LEVELS})
@@ -81,14 +82,12 @@ class Surroundings(nn.Module):
             nn.Sequential(ConvBlock(below + here, here, 1), SeparableBlock(here, here))
             for below, here in zip(WIDTHS[:1:-1], WIDTHS[-2:0:-1])
         )
-        self.judge = nn.Conv2d(WIDTHS[1], 2, 1)  # for cells that were seen, and for others
-        self.weigh = nn.Conv2d(2, len(CLASSES), 1, bias=False).requires_grad_(False)
+        self.verdict = nn.Conv2d(WIDTHS[1], 2, 1)
         with torch.no_grad():
-            self.judge.weight.zero_()
-            self.judge.bias.zero_()
-            self.weigh.weight.zero_()[NO_CHANGE] = -1
+            self.verdict.weight.zero_()
+            self.verdict.bias.zero_()
 
-    def forward(self, features: Tensor, logits: Tensor, unseen: Tensor, encoded: Dict[int, Tensor]) -> Tensor:
+    def forward(self, features: Tensor, unseen: Tensor, encoded: Dict[int, Tensor]) -> Tensor:
         levels = [self.enter(torch.cat([self.hidden(features), unseen], dim=1))]
         for level, block in enumerate(self.down, 1):
             around = block(levels[-1])
@@ -99,5 +98,35 @@ class Surroundings(nn.Module):
         around = self.deepest(levels[-1])
         for block, level in zip(self.up, levels[-2:0:-1]):
             around = block(torch.cat([enlarge(around), level], dim=1))
-        verdict = F.interpolate(self.judge(around), scale_factor=2, mode="bilinear", align_corners=False)
+        return F.interpolate(self.verdict(around), scale_factor=2, mode="bilinear", align_corners=False)
+
+
+class Surroundings(nn.Module):
+    """Logits as the network alone has them to logits that know their surroundings: the verdicts of all judges are added."""
+
+    def __init__(self, features: int, encoder: Tuple[int, ...], judges: int = 1):
+        super().__init__()
+        self.prior = Prior()
+        self.judges = nn.ModuleList(Judge(features, encoder) for _ in range(judges))
+        self.weigh = nn.Conv2d(2, len(CLASSES), 1, bias=False).requires_grad_(False)
+        with torch.no_grad():
+            self.weigh.weight.zero_()[NO_CHANGE] = -1
+
+    def forward(self, features: Tensor, logits: Tensor, unseen: Tensor, encoded: Dict[int, Tensor]) -> Tensor:
+        verdicts = [judge(features, unseen, encoded) for judge in self.judges]
+        verdict = verdicts[0]
+        for other in verdicts[1:]:
+            verdict = verdict + other
         return self.prior(logits, unseen) + self.weigh(verdict * torch.cat([1 - unseen, unseen], dim=1))
+
+
+@torch.no_grad()
+def together(several: Sequence[Surroundings]) -> Surroundings:
+    """Several that learnt apart, with the same network, as one that gives the mean of their logits."""
+    joined = copy.deepcopy(several[0])
+    joined.prior.seen.weight.copy_(torch.stack([one.prior.seen.weight for one in several]).mean(dim=0))
+    joined.judges = nn.ModuleList(copy.deepcopy(judge) for one in several for judge in one.judges)
+    for judge in joined.judges:
+        judge.verdict.weight.div_(len(several))
+        judge.verdict.bias.div_(len(several))
+    return joined

@@ -19,7 +19,16 @@ MOST_CANDIDATES = 3000
 """Per class, only this many of the best enter the suppression, as in the vehicle."""
 
 INPUT_WIDTH, INPUT_HEIGHT = 640, 400
-INPUT_SIZE = (INPUT_WIDTH, INPUT_HEIGHT)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a network looks at a picture."""
+
+    width: int = INPUT_WIDTH  # of its input
+    height: int = INPUT_HEIGHT
+    scales: Tuple[float, ...] = (1.0,)  # of the views within its graph
+    mirrored: bool = False  # at the mirrored picture too
 
 
 def letterbox(image: np.ndarray, width: int, height: int) -> Tuple[np.ndarray, float]:
@@ -69,11 +78,11 @@ class AnchorGrid:
         return AnchorGrid(np.concatenate(cells).astype(np.float32), np.concatenate(strides).astype(np.float32), tuple(ends))
 
 
-def decode(
+def decode_views(
     raw_boxes: np.ndarray, scores: np.ndarray, grid: AnchorGrid, scale: float, image_size: Tuple[int, int],
     nms_iou: float = NMS_IOU,
-) -> List[np.ndarray]:
-    """Raw boxes (N x 4: tx, ty, tw, th) and scores (N x C) to M x 5 detections per class.
+) -> List[List[np.ndarray]]:
+    """Raw boxes (N x 4: tx, ty, tw, th) and scores (N x C) to M x 5 detections per view and class.
 
     `scale` is the letterbox's; `image_size` is (width, height) of the picture, to which boxes are cut.
     """
@@ -82,7 +91,17 @@ def decode(
         view = AnchorGrid(grid.cells[begin:end], grid.strides[begin:end])
         views.append(decode_view(raw_boxes[begin:end], scores[begin:end], view, scale, image_size, nms_iou))
         begin = end
+    return views
+
+
+def fuse_views(views: List[List[np.ndarray]]) -> List[np.ndarray]:
+    """Detections per view and class to such per class."""
     return views[0] if len(views) == 1 else [fuse(of_class) for of_class in zip(*views)]
+
+
+def mirrored_boxes(detections: np.ndarray, width: float) -> np.ndarray:
+    """Detections (M x 5) in a mirrored picture of that width, in pixels of the picture itself."""
+    return np.hstack([width - detections[:, 2:3], detections[:, 1:2], width - detections[:, 0:1], detections[:, 3:]])
 
 
 def fuse(views: Sequence[np.ndarray]) -> np.ndarray:

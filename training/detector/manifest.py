@@ -21,10 +21,8 @@ class Manifest:
 
     weights: Path
     classes: Tuple[str, ...]
-    width: int
-    height: int
+    look: inference.Look
     thresholds: Dict[str, float]
-    scales: Tuple[float, ...] = (1.0,)  # of the views
 
 
 def sha256_of(path: Path) -> str:
@@ -33,11 +31,10 @@ def sha256_of(path: Path) -> str:
 
 
 def write_manifest(
-    path: Path, weights: Path, thresholds: Dict[str, float], size: Tuple[int, int] = inference.INPUT_SIZE, engine: str = "",
-    scales: Tuple[float, ...] = (1.0,),
+    path: Path, weights: Path, thresholds: Dict[str, float], look: inference.Look = inference.Look(), engine: str = ""
 ) -> None:
-    """Describe `weights`, which lies beside the manifest; `size` of the input is width and height, no `engine` leaves it open."""
-    views = {"views": len(scales)} if len(scales) > 1 else {}
+    """Describe `weights`, which lies beside the manifest; no `engine` leaves it open."""
+    views = {**({"views": len(look.scales)} if len(look.scales) > 1 else {}), **({"mirrored": True} if look.mirrored else {})}
     content = {
         "name": path.stem,
         "file": weights.name,
@@ -45,11 +42,11 @@ def write_manifest(
         **({"engine": engine} if engine else {}),
         "classes": list(CLASSES),
         "input": {
-            "width": size[0], "height": size[1], "channels": "rgb",
+            "width": look.width, "height": look.height, "channels": "rgb",
             "resize": "letterbox", "pad_value": inference.PAD_VALUE,
         },
         "normalisation": {"mean": [inference.MEAN] * 3, "std": [inference.STD] * 3},
-        "head": {"type": "yolox", "strides": inference.strides_of(scales), **views, "output": "predictions"},
+        "head": {"type": "yolox", "strides": inference.strides_of(look.scales), **views, "output": "predictions"},
         "thresholds": thresholds,
         "nms_iou": inference.NMS_IOU,
     }
@@ -61,11 +58,12 @@ def read_manifest(path: Path) -> Manifest:
     try:
         content = yaml.safe_load(path.read_text())
         strides = [int(stride) for stride in content["head"]["strides"]]
-        manifest = Manifest(
-            path.parent / content["file"], tuple(content["classes"]), int(content["input"]["width"]),
-            int(content["input"]["height"]), {name: float(value) for name, value in content["thresholds"].items()},
-            tuple(STRIDES[0] / first for first in strides[:: len(STRIDES)]),
+        look = inference.Look(
+            int(content["input"]["width"]), int(content["input"]["height"]),
+            tuple(STRIDES[0] / first for first in strides[:: len(STRIDES)]), bool(content["head"].get("mirrored", False)),
         )
+        thresholds = {name: float(value) for name, value in content["thresholds"].items()}
+        manifest = Manifest(path.parent / content["file"], tuple(content["classes"]), look, thresholds)
         digest = content["sha256"]
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ManifestError(f"Cannot read the manifest {path}: {error!r}.") from error

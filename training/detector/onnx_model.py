@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from .inference import Look
 from .network import ConvBlock, Detector
 from .packing import model_bytes
 from .validation import Runner
@@ -75,13 +76,13 @@ def with_certain_objectness(scores: nn.Conv2d) -> nn.Conv2d:
     return extended
 
 
-def export(detector: Detector, path: Path, width: int, height: int, scales: Sequence[float] = (1.0,)) -> ExportableDetector:
+def export(detector: Detector, path: Path, look: Look = Look()) -> ExportableDetector:
     """Write the graph; returns the module that it was traced from."""
-    exportable = ExportableDetector(detector, scales)
+    exportable = ExportableDetector(detector, look.scales)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", torch.jit.TracerWarning)  # sizes are compared while tracing: the graph's are fixed
         torch.onnx.export(
-            exportable, torch.zeros(1, 3, height, width), str(path), opset_version=11,
+            exportable, torch.zeros(1, 3, look.height, look.width), str(path), opset_version=11,
             input_names=["images"], output_names=["predictions"],
         )
     onnx.save(for_opencv(onnx.load(str(path))), str(path))

@@ -30,12 +30,25 @@ def torch_runner(model: torch.nn.Module, device: torch.device, precision: str) -
     return run
 
 
-def detect(picture: Picture, run: Runner, grid: inference.AnchorGrid, width: int, height: int) -> List[np.ndarray]:
-    """Detections (M x 5) per class of one picture."""
-    image, scale = inference.letterbox(picture.image, width, height)
-    raw_boxes, scores = run(inference.normalise(image))
-    size = (picture.image.shape[1], picture.image.shape[0])
-    return inference.decode(raw_boxes, scores, grid, scale, size)
+class Looker:
+    """A network that looks at whole pictures."""
+
+    def __init__(self, run: Runner, look: inference.Look = inference.Look()):
+        self.run, self.look = run, look
+        self.grid = inference.AnchorGrid.of(look.width, look.height, look.scales)
+
+    def views(self, pixels: np.ndarray) -> List[List[np.ndarray]]:
+        """Detections (M x 5) per view and class of H x W x 3."""
+        image, scale = inference.letterbox(pixels, self.look.width, self.look.height)
+        return inference.decode_views(*self.run(inference.normalise(image)), self.grid, scale, pixels.shape[1::-1])
+
+    def detect(self, pixels: np.ndarray) -> List[np.ndarray]:
+        """Detections (M x 5) per class."""
+        views = self.views(pixels)
+        if self.look.mirrored:
+            mirrored = self.views(np.ascontiguousarray(pixels[:, ::-1]))
+            views += [[inference.mirrored_boxes(found, pixels.shape[1]) for found in view] for view in mirrored]
+        return inference.fuse_views(views)
 
 
 @dataclass
@@ -59,14 +72,11 @@ class Validation:
         return drive_figures(self.potholes, calibrate_threshold(self.potholes, FALSE_REPORTS_PER_KM))
 
 
-def detect_simulated(
-    run: Runner, pictures: List[Picture], size: Tuple[int, int] = inference.INPUT_SIZE, scales: Tuple[float, ...] = (1.0,)
-) -> Dict[str, List[ScoredFrame]]:
-    """Detections and labels in frames of simulated drives, by class; `size` is the network's input, width and height."""
-    grid = inference.AnchorGrid.of(*size, scales)
+def detect_simulated(looker: Looker, pictures: List[Picture]) -> Dict[str, List[ScoredFrame]]:
+    """Detections and labels in frames of simulated drives, by class."""
     frames = {name: [] for name in CLASSES}
     for picture in pictures:
-        found = detect(picture, run, grid, *size)
+        found = looker.detect(picture.image)
         for class_id, name in enumerate(CLASSES):
             labels, difficult = (boxes[classes == class_id] for boxes, classes in (
                 (picture.boxes, picture.classes), (picture.difficult, picture.difficult_classes)))
@@ -74,15 +84,11 @@ def detect_simulated(
     return frames
 
 
-def validate(
-    run: Runner, drives: Dict[str, List[DriveFrame]], cones: List[Picture],
-    size: Tuple[int, int] = inference.INPUT_SIZE, scales: Tuple[float, ...] = (1.0,),
-) -> Validation:
-    """Detect in every validation picture; `size` is the network's input, width and height, `scales` those of its views."""
-    grid = inference.AnchorGrid.of(*size, scales)
+def validate(looker: Looker, drives: Dict[str, List[DriveFrame]], cones: List[Picture]) -> Validation:
+    """Detect in every validation picture."""
     result = Validation({}, [], {})
     for name, drive in drives.items():
-        found = [detect(frame.picture, run, grid, *size) for frame in drive]
+        found = [looker.detect(frame.picture.image) for frame in drive]
         result.potholes[name] = [
             ScoredFrame(frame.picture.boxes, detections[POTHOLE], frame.chainage_m)
             for frame, detections in zip(drive, found)
@@ -92,6 +98,6 @@ def validate(
             for frame, detections in zip(drive, found)
         ]
     result.cones = [
-        ScoredFrame(picture.boxes, detect(picture, run, grid, *size)[TRAFFIC_CONE]) for picture in cones
+        ScoredFrame(picture.boxes, looker.detect(picture.image)[TRAFFIC_CONE]) for picture in cones
     ]
     return result

@@ -9,7 +9,8 @@ import numpy as np
 from detector.augment import SETTLING, Augmenter, Recipe
 from detector.boxes import non_maximum_suppression
 from detector.data import POTHOLE, TRAFFIC_CONE, DataError, Picture, read_simulated
-from detector.inference import AnchorGrid, decode, fuse, letterbox
+from detector.inference import AnchorGrid, Look, decode_views, fuse, fuse_views, letterbox
+from detector.validation import Looker
 
 from .synthetic import write_simulated
 
@@ -115,7 +116,7 @@ class Inference(unittest.TestCase):
         raw, scores = np.zeros((168, 4), np.float32), np.zeros((168, 1), np.float32)
         row = 16 * 8 + 8 + 3  # stride 8, second row, fourth column
         raw[row], scores[row] = [0.5, 0.25, np.log(3), np.log(2)], 0.7
-        (detections,) = decode(raw, scores, grid, 0.5, (128, 64))
+        ((detections,),) = decode_views(raw, scores, grid, 0.5, (128, 64))
         # Centre (28, 10), size 24 x 16 in the input; the picture is twice as large.
         np.testing.assert_allclose(detections, [[32, 4, 80, 36, 0.7]], rtol=1e-5)
 
@@ -126,13 +127,26 @@ class Inference(unittest.TestCase):
         # 16 x 16 px around (320, 200), at stride 4 of the whole picture and at stride 5 of the smaller one.
         for row, stride, score in ((50 * 160 + 80, 4, 0.9), (grid.view_ends[0] + 40 * 128 + 64, 5, 0.7)):
             raw[row, 2:], scores[row] = np.log(16 / stride), score
-        found, = decode(raw, scores, grid, 1.0, (640, 400))
+        found, = fuse_views(decode_views(raw, scores, grid, 1.0, (640, 400)))
         np.testing.assert_allclose(found, [[312, 192, 328, 208, 0.8]], rtol=1e-5)
 
     def test_what_one_view_alone_shows_is_doubted(self):
         here, there = [10, 10, 30, 20, 0.8], [60, 10, 80, 20, 0.6]
         fused = fuse([np.array([here, there]), np.array([[15, 10, 35, 20, 0.2]])])
         np.testing.assert_allclose(fused, [[11, 10, 31, 20, 0.5], [60, 10, 80, 20, 0.3]], rtol=1e-5)
+
+    def test_what_the_mirrored_picture_shows_is_fused_at_its_place(self):
+        def bright(image):
+            """A network that is sure of the brightest cell at stride 4, of the right half as sure as of the left one times 0.5."""
+            raw, scores = np.zeros((64 * 32 // 16 + 8 * 4 + 4 * 2, 4), np.float32), np.zeros((168, 1), np.float32)
+            row, column = np.argwhere(image[0, ::4, ::4] == image.max())[0]
+            raw[row * 16 + column, :2], scores[row * 16 + column] = 0.5, 0.8 if column < 8 else 0.4
+            return raw, scores
+
+        picture = np.zeros((32, 64, 3), np.uint8)
+        picture[8:12, 12:16] = 255
+        found, = Looker(bright, Look(64, 32, mirrored=True)).detect(picture)
+        np.testing.assert_allclose(found, [[12, 8, 16, 12, 0.6]], rtol=1e-5)
 
     def test_suppression_keeps_the_best(self):
         boxes = np.array([[0, 0, 10, 10], [1, 0, 11, 10], [50, 50, 60, 60]], float)

@@ -26,6 +26,14 @@ from .test_programs import quietly
 SIMULATOR = Path(__file__).resolve().parents[2] / "install/lib/livemap/livemap_simulate"
 
 
+@torch.no_grad()
+def shake(network):
+    """Weights that are trained, each moved a little."""
+    for weight in network.parameters():
+        if weight.requires_grad:
+            weight += 0.02 * torch.randn_like(weight)
+
+
 class ChangePrograms(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -94,7 +102,7 @@ class ChangePrograms(unittest.TestCase):
         for name, tensor in before.items():
             if not name.startswith("surroundings."):
                 torch.testing.assert_close(learnt[name], tensor, rtol=0, atol=0, msg=name)
-        self.assertFalse(torch.equal(learnt["surroundings.judge.bias"], before["surroundings.judge.bias"]))
+        self.assertFalse(torch.equal(learnt["surroundings.judges.0.verdict.bias"], before["surroundings.judges.0.verdict.bias"]))
         for fixed in ("surroundings.prior.unseen.weight", "surroundings.weigh.weight"):
             self.assertTrue(torch.equal(learnt[fixed], before[fixed]))
         status, errors = learn("around")
@@ -157,16 +165,34 @@ class ChangePrograms(unittest.TestCase):
 
     def test_an_exported_network_can_be_taken_up_again(self):
         torch.manual_seed(4)
-        network = ChangeNetwork().eval()
-        with torch.no_grad():
-            for weight in network.parameters():
-                if weight.requires_grad:  # unlike each other: the exporter stores equal tensors once
-                    weight += 0.02 * torch.randn_like(weight)
+        network = ChangeNetwork(judges=2).eval()
+        shake(network)  # the exporter stores equal tensors once
         onnx_model.export(network, self.root, "kept", ["whole"])
         inputs = [torch.from_numpy(part) for part in onnx_model.golden_inputs()]
         with torch.no_grad():
             taken_up, expected = (one.detect(*inputs) for one in (load_exported(self.root / "kept.onnx"), network))
         torch.testing.assert_close(taken_up, expected, rtol=0, atol=1e-4)
+
+    def test_judges_of_several_runs_give_their_mean_verdict(self):
+        torch.manual_seed(5)
+        base = ChangeNetwork().eval()
+        checkpoints, log_odds = [], []
+        inputs = [torch.from_numpy(part) for part in onnx_model.golden_inputs()]
+        unseen = base.unseen_cells(inputs[2])
+        for run in range(3):
+            shake(base.surroundings)
+            checkpoints.append(self.root / f"judge{run}.pt")
+            torch.save({"settings": {"architecture": "change-small"}, "average": base.state_dict()}, checkpoints[-1])
+            with torch.no_grad():
+                log_odds.append(base.judge(*map(base.encode, inputs[:2]), unseen))
+        joined = export_change.load_together(checkpoints)
+        with torch.no_grad():
+            found = joined.judge(*map(joined.encode, inputs[:2]), unseen)
+        torch.testing.assert_close(found, torch.stack(log_odds).mean(dim=0), rtol=0, atol=1e-4)
+        shake(base.encoder)
+        torch.save({"settings": {"architecture": "change-small"}, "average": base.state_dict()}, checkpoints[1])
+        with self.assertRaisesRegex(export_change.ExportError, "different networks"):
+            export_change.load_together(checkpoints)
 
     def check_predictions(self, manifest, checkpoint):
         """OpenCV and torch write the same for the evaluation, and what cannot be registered was not seen."""

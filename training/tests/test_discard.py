@@ -126,7 +126,7 @@ class Programs(unittest.TestCase):
         shutil.copytree(sections / TRAINING_SECTION, sections / labels.CALIBRATION_SECTIONS[0])
         cls.detector = cls.root / "detector.onnx"
         cls.threads = torch.get_num_threads()
-        onnx_model.export(Detector(len(CLASSES)), cls.detector, 640, 400)
+        onnx_model.export(Detector(len(CLASSES)), cls.detector)
 
     @classmethod
     def tearDownClass(cls):

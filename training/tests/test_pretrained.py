@@ -165,7 +165,7 @@ class Pretrained(unittest.TestCase):
         pretrained.unfold_normalisation(exported, images)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "exported.onnx"
-            onnx_model.export(exported, path, inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+            onnx_model.export(exported, path)
             same, small = Detector(len(CLASSES)), Detector(len(CLASSES), SIZES["small"])
             self.assertEqual(pretrained.load_exported(same, path, images), 36)
             self.assertEqual(pretrained.load_exported(small, path, images), 28)
