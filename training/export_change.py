@@ -67,7 +67,8 @@ def load_together(checkpoints: List[Path]) -> Network:
         return networks[0]
     if not all(isinstance(network, ChangeNetwork) for network in networks):
         raise ExportError("Several checkpoints are joined of change-small only.")
-    kept = [{name: value for name, value in network.state_dict().items() if not name.startswith("surroundings.")} for network in networks]
+    apart = ("surroundings.", "objects.")  # the latter serve pretraining only: an exported network has none
+    kept = [{name: value for name, value in network.state_dict().items() if not name.startswith(apart)} for network in networks]
     if not all(torch.equal(value, other[name]) for other in kept[1:] for name, value in kept[0].items()):
         raise ExportError("The checkpoints have learnt the surroundings of different networks: --start-from must be the same.")
     networks[0].surroundings = together([network.surroundings for network in networks])
