@@ -61,10 +61,11 @@ class Trainer:
 
     def restore(self, state: dict) -> None:
         """Continue from `state`, which must come from a run with the same settings."""
+        written = {**asdict(Settings()), **state["settings"]}  # older runs had settings' later fields as they are by default
         for name, value in asdict(self.settings).items():
-            if state["settings"].get(name) != value:
+            if written[name] != value:
                 raise UsageError(
-                    f"The checkpoint was written with {name} {state['settings'].get(name)}, not {value}; "
+                    f"The checkpoint was written with {name} {written[name]}, not {value}; "
                     "resume with the same settings or choose another --out."
                 )
         self.model.load_state_dict(state["model"])
@@ -107,7 +108,7 @@ class Trainer:
         # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
         torch.manual_seed(settings.seed * 100003 + self.epoch)
         views = settings.views_of(self.epoch)
-        augmenter = Augmenter(pictures, views.recipe, views.width, views.height)
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, settings.simulated_share)
         batch, count = round(settings.batch * views.share), round(settings.samples_per_epoch * views.share)
         loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
         loss_of = TaskAlignedLoss(views.height, views.width, self.device)
@@ -165,6 +166,9 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument(
         "--backbone-rate", type=float, default=defaults["backbone_rate"], help="multiple of the learning rate for the backbone"
     )
+    parser.add_argument(
+        "--simulated-share", type=float, default=defaults["simulated_share"], help="of the samples, from simulated drives"
+    )
     parser.add_argument("--settle", type=float, default=defaults["settle"], help="last fraction of the epochs: whole frames")
     parser.add_argument("--views", choices=tuple(VIEWS), default=defaults["views"], help="what epochs before the last show")
     parser.add_argument("--freeze", action="store_true", help="leave the first convolution as it begins")
@@ -190,8 +194,9 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--backbone-rate must be from 0 to 10, not {arguments.backbone_rate}.")
     if arguments.pretrained and arguments.start_from and not exported(arguments):
         raise UsageError("--pretrained and the checkpoint of --start-from exclude each other.")
-    if not 0 <= arguments.settle <= 1:
-        raise UsageError(f"--settle must be from 0 to 1, not {arguments.settle}.")
+    for name in ("settle", "simulated_share"):
+        if not 0 <= getattr(arguments, name) <= 1:
+            raise UsageError(f"--{name.replace('_', '-')} must be from 0 to 1, not {getattr(arguments, name)}.")
     known = {field.name for field in fields(Settings)}
     return Settings(**{name: value for name, value in vars(arguments).items() if name in known})
 

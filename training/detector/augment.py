@@ -124,11 +124,17 @@ def ratio(rng: np.random.Generator, spread: float) -> float:
 class Augmenter:
     """Draws samples of one size from groups of pictures."""
 
-    def __init__(self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int):
+    def __init__(
+        self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int,
+        simulated_share: float = GROUP_SHARES["simulated"],
+    ):
         self.groups, self.recipe = groups, recipe
         self.width, self.height = width, height
         self.names = [name for name in GROUP_SHARES if groups.get(name)]
-        shares = np.array([GROUP_SHARES[name] for name in self.names])
+        real = 1.0 - GROUP_SHARES["simulated"]
+        shares = np.array([
+            simulated_share if name == "simulated" else GROUP_SHARES[name] * (1.0 - simulated_share) / real for name in self.names
+        ])
         self.shares = shares / shares.sum()
         weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
         self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}

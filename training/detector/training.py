@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 
 from . import inference
-from .augment import FRAMES, LIGHT, SETTLING, Augmenter, Recipe, Sample
+from .augment import FRAMES, GROUP_SHARES, LIGHT, SETTLING, Augmenter, Recipe, Sample
 from .inference import MEAN, STD
 from .loss import Target
 from .network import Detector
@@ -35,6 +35,7 @@ class Settings:
     weight_decay: float = 0.05
     settle: float = 0.2  # last fraction of the epochs: whole frames, weak augmentation
     precision: str = "bf16"
+    simulated_share: float = GROUP_SHARES["simulated"]  # of the samples, where there are simulated drives
 
     def views_of(self, epoch: int) -> "Views":
         """What an epoch shows: the last ones whole frames, weakly changed."""

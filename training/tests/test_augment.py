@@ -56,6 +56,20 @@ class Reading(unittest.TestCase):
                 read_simulated(root)
 
 
+class Shares(unittest.TestCase):
+    def test_simulated_pictures_have_the_share_asked_for_and_the_rest_keep_their_proportions(self):
+        groups = {name: [bright_square()] for name in ("survey_potholes", "cones", "simulated")}
+        shares = [Augmenter(groups, SETTLING, 416, 320, simulated_share=share).shares for share in (0.31, 0.7)]
+        for share, (potholes, cones, simulated) in zip((0.31, 0.7), shares):
+            self.assertGreater(simulated, share - 1e-9)
+            self.assertAlmostEqual(potholes / cones, 0.41 / 0.11)
+
+    def test_without_simulated_pictures_their_share_does_not_matter(self):
+        groups = {name: [bright_square()] for name in ("survey_potholes", "cones")}
+        few, many = (Augmenter(groups, SETTLING, 416, 320, simulated_share=share).shares for share in (0.1, 0.9))
+        np.testing.assert_allclose(few, many)
+
+
 class Samples(unittest.TestCase):
     def test_same_generator_same_sample(self):
         for recipe in (Recipe(), SETTLING):
