@@ -195,7 +195,7 @@ def engines_section(results):
     cells = [[engine, engines, threads, number(row["items_per_second"], 1), number(row["items_per_second"] / slowest, 2),
               number(row.get("pool_mib"), 0)] for (engine, engines, threads), row in sorted(rates.items())]
     failed = [row["name"] for row in results["engines"] if row.get("error_occurred")]
-    text = "## Engines\n" + prose("""What a pool of engines makes of 640x400 frames that never end, with the model that ships
+    text = "## Engines\n" + prose("""What a pool of engines makes of 640x400 frames that never end, with the same model
         (`livemap_detector_benchmark --benchmark_filter=BM_Pool`): letterbox, network, decoding. All in one run of one process, so
         the ratios to OpenCV with one thread mean more than the rates. MiB: what the process grew by, in the order of the
         runs; later ones reuse what earlier ones left.""")
@@ -240,7 +240,8 @@ def write(results, out):
         ({machine['cores']} is full): times are those of a crowded machine where it is higher, and only their ratios travel.
         Drives: {drives} ({'simulated' if results['simulated'] else 'road survey at 16 m/s, stretches without pictures cut to 1 s'}),
         each configuration driven once per drive. The vehicles are real ones of `launch/vehicle.launch`, played from
-        bags by `launch/replay.launch`; GPS fixes are simulated along the road.""")
+        bags by `launch/replay.launch`; GPS fixes are simulated along the road. The detector, on board and in the zone, is
+        {results.get('model', 'hazards-first')}.""")
     if results["quick"]:
         text += prose("""**The quick form**: one drive and three radii. Its figures have few events; the whole run's have more.""")
     text += starved(results) + other_versions(results)

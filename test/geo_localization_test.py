@@ -146,8 +146,8 @@ class GeoLocalizationTest(unittest.TestCase):
             poses = {round(seconds(m), 3): pose_matrix(m.pose.pose) for m in vehicle.poses()[told:]}
             return poses if max(first) in poses else None
         second = eventually(again, "the last pose of the drive again")
-        # How soon the first poses come depends on how fast the machine is.
-        common = sorted(first.keys() & second.keys())[20:]
+        # When the first poses come, and how fast their heading settles, depends on how busy the machine is.
+        common = [t for t in sorted(first.keys() & second.keys()) if t > 7.5]
         self.assertGreater(len(common), 30)
         numpy.testing.assert_allclose([second[t] for t in common], [first[t] for t in common], atol=0.05)
         self.assertIn("stamps went back", vehicle.output())

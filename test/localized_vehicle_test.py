@@ -118,8 +118,10 @@ class LocalizedVehicleTest(unittest.TestCase):
         counters = {key: int(value) for key, value in vehicle.diagnostics().items() if value.isdigit()}
         self.assertGreater(counters["placed_by_fusion"], 10)
         self.assertGreater(counters["distances_by_depth"], 10)
+        # The counters are read anew each time: the last reports may come after the diagnostics above.
         reports = eventually(lambda: len({bytes(r.uuid) for r in vehicle.received("hazard/report")})
-                             == counters["reports_created"] and vehicle.received("hazard/report"), "all reports")
+                             == int(vehicle.diagnostics()["reports_created"]) and vehicle.received("hazard/report"),
+                             "all reports")
         errors = []
         for report in reports:
             there = east_north(report.latitude, report.longitude)

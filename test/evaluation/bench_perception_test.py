@@ -124,7 +124,7 @@ class PageTest(unittest.TestCase):
         engines = [{"name": f"BM_Pool/torch:{kind}/engines:1/threads:1/real_time", "label": label, "items_per_second": rate,
                     "pool_mib": 50.0} for kind, label, rate in ((0, "opencv", 4.0), (1, "torch", 10.0))]
         results = {"quick": True, "simulated": False, "usual_radius_m": 5, "drives": ["d"], "date": "2026-01-01",
-                   "version": "v", "machine": {"cpu": "c", "cores": 2}, "detector": None, "engines": engines,
+                   "version": "v", "model": "hazards-most", "machine": {"cpu": "c", "cores": 2}, "detector": None, "engines": engines,
                    "link": {"rtt_ms": 205.6, "rtt_sigma_ms": 50.2, "up_mbit_s": 10.0, "down_mbit_s": 30.0},
                    "streams": [{"frames": 100, "seconds": 30.0, "bytes": 3000000}],
                    "runs": [self.run_of("big", 1), self.run_of("big", 5), self.run_of("big", 5, link=True),
@@ -137,7 +137,8 @@ class PageTest(unittest.TestCase):
                      "| BVC | 3.0 | 10 of 100 | - | 0.700 (7 of 10) | 2.0 | 0.008 | 5 |",
                      "| BVC, 1 m | 0.700 (7 of 10) | 5 | 4 | 0.0080 |", "| perfect detector, 5 m | 0.700 (7 of 10) | 5 | 4 | 0.0213 |",
                      "| H.264 stream, 3.3 frames/s | - | - | - | 0.8000 |", "| torch | 1 | 1 | 10.0 | 2.50 | 50 |",
-                     "the SVC's rows are missing", "**The quick form**", "Measured with version earlier: perfect detector, 5 m."):
+                     "the SVC's rows are missing", "**The quick form**",
+                     "The detector, on board and in the zone, is hazards-most.", "Measured with version earlier: perfect detector, 5 m."):
             self.assertIn(part, text)
 
 
@@ -145,6 +146,7 @@ class MistakesTest(unittest.TestCase):
     def test_each_mistake_is_one_sentence_and_exit_status_2(self):
         for arguments, sentence in ((["--drive", "/nowhere"], "--drive is '/nowhere', which has no frames.csv"),
                                     (["--rtt-ms", "-1"], "--rtt-ms is -1, accepted is 0 to 10000"),
+                                    (["--model", "/nowhere"], "--model is '/nowhere', which is no file"),
                                     (["--again", "/nowhere"], "--again is '/nowhere', which is no file"),
                                     (["--qick"], "unrecognized arguments: --qick")):
             done = subprocess.run([SCRIPT, *arguments], capture_output=True, text=True)
