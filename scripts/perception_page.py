@@ -205,6 +205,19 @@ def engines_section(results):
     return text
 
 
+def saturated_section(results):
+    runs = results.get("saturated")
+    if not runs:
+        return ""
+    cells = [[run["model"], number(run["processed_hz"], 1), f"{run['dropped']} of {run['frames']}", run["committed"]] for run in runs]
+    return "## From the camera to the report\n" + prose(f"""
+        A simulated street through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s, which is what the
+        thesis's camera gave and more than a vehicle here can do: what it cannot, it drops, oldest first. So what it processes is
+        the rate of the whole: decoding, rectification, detector (as many engines as cores, two threads each, the engine of the model's
+        manifest), tracking, placing, masking of the reports' pictures, report. Player, broker and zone take their share of the same cores.""") + "\n" + table(
+        ["model", "frames/s", "dropped", "reports in the zone's store"], cells)
+
+
 def starved(results):
     """A warning where frames were dropped: then rates, latencies and recall are the machine's and not the detector's."""
     runs = [run for run in results["runs"] if run["profile"] == "big"]
@@ -249,7 +262,8 @@ def write(results, out):
         text += prose(f"""Not everything came through in {len(incomplete)} of {len(results['runs'])} runs within a minute of the
             drive's end: {', '.join(sorted({f"{run['name']} {run['profile']} {run['radius']} m" for run in incomplete}))}.""")
     text += "\n" + "\n".join(section for section in (latency_section(results, out), detection_section(results),
-                                                     uplink_section(results, out), engines_section(results)) if section)
+                                                     uplink_section(results, out), engines_section(results),
+                                                     saturated_section(results)) if section)
     page = out / "perception.md"
     page.write_text(text, encoding="utf-8")
     return page
