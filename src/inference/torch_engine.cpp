@@ -1,16 +1,43 @@
 // The one file that sees libtorch's headers: they take as long to compile as a room.
 #include <ATen/Parallel.h>
+#include <c10/core/CPUAllocator.h>
 #include <torch/script.h>
 #include <torch/version.h>
 
+#include <mutex>
 #include <sstream>
 #include <thread>
 
 #include "base/error.h"
+#include "inference/block_cache.h"
 #include "inference/engines.h"
 
 namespace livemap {
 namespace {
+
+/// The memory of all tensors of the process, on the CPU.
+class TensorMemory final : public c10::Allocator {
+ public:
+  c10::DataPtr allocate(std::size_t bytes) const override {
+    void* block = bytes == 0 ? nullptr : Blocks().Take(bytes);
+    return {block, block, &Give, c10::DeviceType::CPU};
+  }
+  c10::DeleterFnPtr raw_deleter() const override { return &Give; }
+
+  /// From now on; tensors that are older keep theirs.
+  static void Use() {
+    static std::once_flag once;
+    std::call_once(once, [] { c10::SetCPUAllocator(new TensorMemory); });
+  }
+
+ private:
+  static void Give(void* block) { Blocks().Give(block); }
+  /// Never destroyed: libtorch's own static tensors may go later.
+  static BlockCache& Blocks() {
+    static auto* blocks = new BlockCache;
+    return *blocks;
+  }
+};
 
 /// libtorch (TorchScript) on the CPU.
 class TorchEngine final : public InferenceEngine {
@@ -22,6 +49,7 @@ class TorchEngine final : public InferenceEngine {
     // Only bytes with the manifest's hash reach the loader: TorchScript is code as well as weights.
     std::istringstream bytes(ReadTorchFile(manifest));
     const c10::InferenceMode inference_only;
+    TensorMemory::Use();
     try {
       UseThreads();
       network_ = torch::jit::load(bytes, c10::kCPU);
