@@ -1,12 +1,18 @@
 #include "base/error.h"
 
+#include <filesystem>
 #include <fstream>
+#include <system_error>
 
 namespace livemap {
 
 Error::Error(const std::string& sentence) : std::runtime_error(sentence) {}
 
 std::string ReadFile(const std::string& path, std::size_t max_bytes) {
+  std::error_code unknown;
+  if (std::filesystem::is_directory(path, unknown)) {
+    throw Error("'" + path + "' is a folder, accepted is a file");
+  }
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
   if (size < 0) throw Error("cannot read file '" + path + "'");

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 
@@ -53,15 +54,18 @@ void AnnotateImage(cv::Mat& bgr, const std::vector<HazardDetection>& detections)
   const double size = std::max(bgr.rows, bgr.cols);
   const double font_scale = std::max(0.4, size / 1300);
   const int thickness = std::max(1, cvRound(size / 640));
+  std::vector<std::pair<cv::Rect, cv::Scalar>> frames;
   // The most confident last, so that its label lies on top.
   for (auto detection = detections.rbegin(); detection != detections.rend(); ++detection) {
     const cv::Rect frame(cvFloor(detection->box.x), cvFloor(detection->box.y),
                          cvCeil(detection->box.width), cvCeil(detection->box.height));
     const cv::Scalar& colour =
         kColours[static_cast<std::size_t>(detection->class_index) % kColours.size()];
-    cv::rectangle(bgr, frame, colour, thickness + 1);
     DrawLabel(bgr, frame, LabelOf(*detection), colour, font_scale, thickness);
+    frames.emplace_back(frame, colour);
   }
+  // No label hides where another hazard is.
+  for (const auto& [frame, colour] : frames) cv::rectangle(bgr, frame, colour, thickness + 1);
 }
 
 }  // namespace livemap

@@ -218,8 +218,10 @@ ClassFigures EvaluateClass(const std::vector<ScoredDrive>& drives,
                            const std::vector<ScoredFrame>& photos, double threshold) {
   const std::vector<ScoredFrame> all = Pool(drives, photos);
   ClassFigures figures = FiguresAt(drives, all, threshold);
-  figures.ap50 = AveragePrecision(all, 0.5);
-  figures.ap30 = AveragePrecision(all, 0.3);
+  if (figures.labels > 0) {
+    figures.ap50 = AveragePrecision(all, 0.5);
+    figures.ap30 = AveragePrecision(all, 0.3);
+  }
   return figures;
 }
 

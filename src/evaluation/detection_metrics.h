@@ -85,8 +85,8 @@ struct ClassFigures {
   double threshold = 0;
   std::size_t frames = 0;  ///< In which the class is labelled.
   std::size_t labels = 0;
-  double ap50 = 0;
-  double ap30 = 0;
+  std::optional<double> ap50;       ///< None without labels.
+  std::optional<double> ap30;       ///< None without labels.
   std::optional<double> precision;  ///< At IoU 0.5.
   std::optional<double> recall;     ///< At IoU 0.5.
   std::size_t events = 0;

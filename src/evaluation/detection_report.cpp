@@ -29,9 +29,9 @@ nlohmann::ordered_json ClassJson(const ClassReport& report) {
   const ClassFigures& figures = report.figures;
   nlohmann::ordered_json json;
   json["labels"] = figures.labels;
-  json["ap50"] = figures.ap50;
+  json["ap50"] = OrNull(figures.ap50);
   AddThresholdFigures(figures, json);
-  json["ap30"] = figures.ap30;
+  json["ap30"] = OrNull(figures.ap30);
   // The detector compares in single precision: 0.4 there is 0.4000000059604645.
   json["threshold"] = std::round(figures.threshold * 1e6) / 1e6;
   json["n"] = figures.frames;

@@ -97,10 +97,10 @@ Layout FindLayout(const std::string& text, const std::string& split) {
     layout.labels /= split;
   }
   if (!fs::is_directory(layout.images)) {
-    throw Error("folder '" + layout.images.string() +
-                "' does not exist, accepted for --split is "
-                "one of: " +
-                NamesOfFolders(layout.images.parent_path()));
+    const std::string splits = NamesOfFolders(layout.images.parent_path());
+    throw Error("folder '" + layout.images.string() + "' does not exist, " +
+                (splits.empty() ? "'" + text + "' is not divided: accepted is no --split"
+                                : "accepted for --split is one of: " + splits));
   }
   if (!fs::is_directory(layout.labels)) {
     throw Error("labels '" + layout.labels.string() + "' do not exist, accepted is a labels/ " +

@@ -111,7 +111,8 @@ ModelManifest ParseModelManifest(const std::string& yaml, const std::string& ori
                                  const std::string& directory) {
   if (yaml.size() > kMostManifestBytes) {
     throw Error("model manifest '" + origin + "' has " + std::to_string(yaml.size()) +
-                " bytes, at most " + std::to_string(kMostManifestBytes) + " are accepted");
+                " bytes, accepted is a manifest (models/NAME.yaml) of at most " +
+                std::to_string(kMostManifestBytes));
   }
   try {
     const YAML::Node file = YAML::Load(yaml);

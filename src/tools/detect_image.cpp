@@ -1,6 +1,7 @@
 // livemap_detect_image: what a model finds in single images.
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -25,6 +26,18 @@ struct Options {
   std::optional<EngineKind> engine;
 };
 
+/// Before the work: what cannot be written is refused.
+void CheckDrawable(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder)) {
+    throw Error("--draw is '" + path + "', whose folder does not exist");
+  }
+  const std::string kind = std::filesystem::path(path).extension().string();
+  if (kind != ".jpg" && kind != ".jpeg" && kind != ".png") {
+    throw Error("--draw is '" + path + "', accepted is a path ending in .jpg or .png");
+  }
+}
+
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
   CommandLine line(
@@ -48,11 +61,12 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.draw = line.Text("draw", "");
   if (line.Has("threshold")) options.threshold = line.Number("threshold", 0, 0.001, 0.999);
   options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
-  options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
+  options.threads = line.Whole("threads", 0, 1, 256);
   if (!options.draw.empty() && options.images.size() != 1) {
     throw Error("--draw is given with " + std::to_string(options.images.size()) +
                 " images, accepted is one");
   }
+  if (!options.draw.empty()) CheckDrawable(options.draw);
   return options;
 }
 
@@ -73,13 +87,7 @@ nlohmann::ordered_json ToJson(const std::string& path, cv::Size size,
 
 void Draw(cv::Mat image, const std::vector<HazardDetection>& found, const std::string& path) {
   AnnotateImage(image, found);
-  bool written = false;
-  try {
-    written = cv::imwrite(path, image);
-  } catch (const cv::Exception&) {  // an unknown extension
-  }
-  if (!written)
-    throw Error("cannot write '" + path + "', accepted is a path ending in .jpg or .png");
+  if (!cv::imwrite(path, image)) throw Error("'" + path + "' cannot be written");
 }
 
 int Run(int argc, char** argv) {

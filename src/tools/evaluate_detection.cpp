@@ -6,6 +6,8 @@
 #include <iostream>
 #include <map>
 #include <optional>
+#include <set>
+#include <system_error>
 
 #include "base/error.h"
 #include "detection/hazard_detector.h"
@@ -77,13 +79,16 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (!options.errors.empty() && std::filesystem::exists(options.errors)) {
     throw Error("--errors is '" + options.errors + "', which exists, accepted is a new folder");
   }
+  line.CheckNeeds({{"camera", options.tracking, "--tracking"},
+                   {"repeat-gain", options.tracking, "--tracking"},
+                   {"low-share", options.tracking, "--tracking"}});
   const std::string camera = line.Text("camera", "");
   if (!camera.empty()) options.tracked.camera = ReadCameraFile(camera);
   options.tracker.repeat_gain = line.Number("repeat-gain", options.tracker.repeat_gain, 0, 1);
   options.tracker.low_share = line.Number("low-share", options.tracker.low_share, 0.01, 1);
   options.lowest_score = line.Number("lowest-score", options.lowest_score, 0.001, 0.999);
   options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
-  options.threads = static_cast<int>(line.Number("threads", 0, 1, 256));
+  options.threads = line.Whole("threads", 0, 1, 256);
   options.labels.split = line.Text("split", "");
   options.labels.label_classes = SplitNames("--label-classes", line.Text("label-classes", ""));
   return options;
@@ -247,11 +252,23 @@ class Evaluation {
   std::map<std::string, std::vector<std::size_t>> drive_recordings_;  ///< By class, as its drives.
 };
 
+/// A folder given twice would count double.
+void RefuseRepeated(const std::vector<std::string>& folders) {
+  std::set<std::filesystem::path> seen;
+  for (const std::string& path : folders) {
+    std::error_code unknown;  // A folder that does not exist is the reader's to refuse.
+    if (!seen.insert(std::filesystem::weakly_canonical(path, unknown)).second && !unknown) {
+      throw Error("folder '" + path + "' is given twice, its figures would count double");
+    }
+  }
+}
+
 /// All folders, read before the long work, so that a mistake in the last one shows at once.
 std::vector<LabelledFolder> ReadFolders(const Options& options, const ModelManifest& manifest) {
   LabelledFolderOptions reading = options.labels;
   reading.model_classes = manifest.classes;
   std::vector<LabelledFolder> folders;
+  RefuseRepeated(options.folders);
   for (const std::string& path : options.folders) {
     std::optional<std::string> deduced;
     folders.push_back(ReadLabelledFolder(path, reading, &deduced));
@@ -265,6 +282,11 @@ std::vector<LabelledFolder> ReadFolders(const Options& options, const ModelManif
                   "' accepts " + JoinNames(manifest.classes));
     }
   }
+  if (!options.errors.empty() &&
+      std::none_of(folders.begin(), folders.end(),
+                   [](const LabelledFolder& folder) { return folder.is_drive; })) {
+    throw Error("--errors needs a drive, a DIR with frames.csv");
+  }
   return folders;
 }
 
@@ -276,6 +298,7 @@ int Run(int argc, char** argv) {
   Evaluation evaluation(manifest, *options);
   evaluation.Run(folders);
   const DetectionReport report = evaluation.Report();
+  if (!options->errors.empty()) std::cerr << "errors: " << options->errors << "/errors.csv\n";
   std::cout << (options->json ? ToJson(report).dump() + "\n" : ToText(report));
   return 0;
 }

@@ -26,6 +26,18 @@ TEST(AnnotateImage, DrawsFrameAndLabelAndLeavesTheInsideVisible) {
       << "label above the frame";
 }
 
+TEST(AnnotateImage, NoLabelHidesTheFrameOfAnotherHazard) {
+  const HazardDetection below{"pothole", 0, 0.5F, {100, 100, 40, 20}};
+  const HazardDetection above{
+      "traffic_cone", 1, 0.9F, {100, 118, 40, 20}};  // its label: on `below`
+  cv::Mat both(300, 400, CV_8UC3, cv::Scalar::all(128));
+  AnnotateImage(both, {above, below});
+  cv::Mat alone(300, 400, CV_8UC3, cv::Scalar::all(128));
+  AnnotateImage(alone, {below});
+  EXPECT_EQ(both.at<cv::Vec3b>(105, 139), alone.at<cv::Vec3b>(105, 139));
+  EXPECT_NE(both.at<cv::Vec3b>(105, 139), cv::Vec3b(128, 128, 128));
+}
+
 TEST(AnnotateImage, NothingDetectedChangesNothing) {
   const cv::Mat before(40, 64, CV_8UC3, cv::Scalar(90, 90, 90));
   cv::Mat after = before.clone();

@@ -155,7 +155,7 @@ TEST(EvaluateClass, PoolsDrivesAndPhotosButTakesEventsFromDrives) {
   const ClassFigures figures = EvaluateClass(drives, photos, 0.5);
   EXPECT_EQ(figures.frames, 5U);
   EXPECT_EQ(figures.labels, 3U);
-  EXPECT_DOUBLE_EQ(figures.ap50, (1 + 2.0 / 3) / 3);
+  EXPECT_DOUBLE_EQ(figures.ap50.value_or(-1), (1 + 2.0 / 3) / 3);
   EXPECT_DOUBLE_EQ(figures.precision.value(), 0.5);
   EXPECT_DOUBLE_EQ(figures.recall.value(), 2.0 / 3);
   EXPECT_EQ(figures.events, 2U);

@@ -46,6 +46,7 @@ TEST(DetectionReport, JsonHasThePublishedKeys) {
 
 TEST(DetectionReport, UndefinedFiguresAreNullInJsonAndADashInText) {
   const nlohmann::ordered_json cone = ToJson(ExampleReport())["classes"]["traffic_cone"];
+  EXPECT_TRUE(cone["ap50"].is_null());
   EXPECT_TRUE(cone["event_recall"].is_null());
   EXPECT_TRUE(cone["false_per_km"].is_null());
   EXPECT_FALSE(cone.contains("sweep"));

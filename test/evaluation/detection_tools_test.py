@@ -8,6 +8,7 @@ The model is the tiny one of test/inference/make_tiny_model.py: a red block is a
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -85,23 +86,34 @@ class DetectionToolsTest(unittest.TestCase):
         for kind in ("missed", "false"):
             sheet = cv2.imread(os.path.join(folder, f"pothole_{kind}.jpg"))
             self.assertGreater(sheet.std(), 10)
+        self.assertIn(f"errors: {folder}/errors.csv", done.stderr)
         again = run("livemap_evaluate_detection", "--model", MODEL, "--errors", folder, self.drive)
         self.assertEqual(again.returncode, 2)
         self.assertIn("accepted is a new folder", again.stderr)
 
     def test_folders_are_pooled_and_the_table_names_the_class(self):
-        done = run("livemap_evaluate_detection", "--sweep", "--model", MODEL, self.drive, self.drive)
+        same = os.path.join(self.temporary.name, "same")
+        shutil.copytree(self.drive, same)
+        done = run("livemap_evaluate_detection", "--sweep", "--model", MODEL, self.drive, same)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("8 frames", done.stdout)
         self.assertIn("pothole", done.stdout)
 
     def test_mistakes_are_one_sentence_and_exit_2(self):
+        stills = os.path.join(self.temporary.name, "stills")
+        shutil.copytree(self.drive, stills, ignore=shutil.ignore_patterns("frames.csv"))
         for arguments, expected in [
                 ([], "got 0 arguments"), (["--bogus", self.drive], "--bogus"),
                 (["/nowhere"], "/nowhere"), (["--threads", "0", self.drive], "--threads"),
                 (["--lowest-score", "nan", self.drive], "nan"),
                 (["--model", "/nowhere.yaml", self.drive], "/nowhere.yaml"),
-                (["--model", MODEL, "--label-classes", "deer", self.drive], "deer")]:
+                (["--model", MODEL, "--label-classes", "deer", self.drive], "deer"),
+                (["--model", MODEL, self.drive, self.drive + "/"], "given twice"),
+                (["--model", MODEL, "--split", "val", self.drive], "is not divided"),
+                (["--repeat-gain", "0.5", self.drive], "--repeat-gain needs --tracking"),
+                (["--model", MODEL, "--label-classes", "pothole", "--errors", os.path.join(self.temporary.name, "new"), stills],
+                 "--errors needs a drive"),
+                (["--threads", "1.5", self.drive], "--threads")]:
             done = run("livemap_evaluate_detection", *arguments)
             self.assertEqual(done.returncode, 2, arguments)
             self.assertEqual(done.stdout, "", arguments)
@@ -120,6 +132,11 @@ class DetectionToolsTest(unittest.TestCase):
             self.assertAlmostEqual(edge, expected, delta=0.1)
         self.assertGreater(numpy.abs(cv2.imread(drawn).astype(int) - cv2.imread(image)).sum(), 0)
         self.assertEqual(run("livemap_detect_image", "--model", MODEL, MODEL).returncode, 2)
+        for arguments, expected in [(["--draw", "/nowhere/x.png", image], "folder does not exist"),
+                                    (["--draw", drawn + ".gif", image], "ending in .jpg or .png"), ([self.drive], "is a folder")]:
+            refused = run("livemap_detect_image", "--model", MODEL, *arguments)
+            self.assertEqual((refused.returncode, refused.stdout), (2, ""))
+            self.assertIn(expected, refused.stderr)
 
     def test_both_have_help(self):
         for program in ("livemap_evaluate_detection", "livemap_detect_image"):
