@@ -15,7 +15,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from livemap.msg import (ChangedObjects, Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
-                         LinkState, PictureRequest, ReportReceipt, VehiclePosition)
+                         LinkState, PicturePart, PictureRequest, ReportReceipt, VehiclePosition)
 from node_testing import NodeletUnderTest, eventually, parameters_of
 
 LATITUDE, LONGITUDE = 40.4433, -79.9436
@@ -130,7 +130,8 @@ class Vehicle(NodeletUnderTest):
     def sources(self):
         """Where sightings and their pictures come from."""
         if self.uses_events():
-            return [("hazard/events", DetectionArray, False), ("hazard/picture", Image, False)]
+            return [("hazard/events", DetectionArray, False), ("hazard/picture", Image, False),
+                    ("hazard/picture_part", PicturePart, False)]
         return [("hazard/annotated", Image, False)]
 
     def answer_picture_requests(self, draw=None):
@@ -138,7 +139,10 @@ class Vehicle(NodeletUnderTest):
         def answer(request):
             picture = (draw or annotated)((request.stamp - stamp(0)).to_sec())
             picture.header.stamp = request.stamp
-            self.publish("hazard/picture", picture)
+            if request.part.width:
+                self.publish("hazard/picture_part", PicturePart(image=picture, part=request.part))
+            else:
+                self.publish("hazard/picture", picture)
         self.ends.append(rospy.Subscriber(f"/{self.name}/hazard/picture_request", PictureRequest, answer))
 
     def link(self, state):

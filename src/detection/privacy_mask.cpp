@@ -40,6 +40,16 @@ void Pixelate(cv::Mat& bgr, const cv::Rect& region) {
   cv::resize(coarse, part, inside.size(), 0, 0, cv::INTER_NEAREST);
 }
 
+namespace {
+
+void PixelateAround(cv::Mat& bgr, const cv::Rect& part) {
+  const cv::Mat clear = bgr(part).clone();
+  Pixelate(bgr, cv::Rect({}, bgr.size()));
+  clear.copyTo(bgr(part));
+}
+
+}  // namespace
+
 PrivacyMask::PrivacyMask(const Config& config)
     : PrivacyMask(config, MakePrivateRegionFinder(config.regions)) {}
 
@@ -49,10 +59,19 @@ PrivacyMask::PrivacyMask(const Config& config, std::unique_ptr<PrivateRegionFind
 }
 
 void PrivacyMask::Apply(cv::Mat& bgr, std::uint64_t frame) {
+  Apply(bgr, frame, cv::Rect({}, bgr.size()));
+}
+
+void PrivacyMask::Apply(cv::Mat& bgr, std::uint64_t frame, const cv::Rect& part) {
+  const cv::Rect image({}, bgr.size());
   if (bgr.empty() || bgr.type() != CV_8UC3) {
     throw Error("only images of 8 bit and 3 channels can be masked");
   }
-  const std::vector<cv::Rect> found = finder_->Find(bgr);
+  if (part.empty() || (part & image) != part) {
+    throw Error("the part of a picture that is wanted does not lie in it");
+  }
+  const std::vector<cv::Rect> found = finder_->Find(bgr, part);
+  if (part != image) PixelateAround(bgr, part);
   const auto is_over = [&](const Region& region) {
     const bool too_old =
         frame - region.found_at > static_cast<std::uint64_t>(std::max(0, config_.keep_frames));

@@ -1,5 +1,6 @@
 #include "detection/private_regions.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
@@ -27,6 +28,19 @@ constexpr float kLeastFaceScore = 0.5F;
 
 /// Width of a plate that is `side` high, European or American, at least.
 constexpr int kPlateAspect = 2;
+
+/// A face of at most this side that meets a part lies wholly within the part grown by it. So only
+/// larger ones need to be looked for elsewhere, and the small ones are what takes the time.
+constexpr int kNearMarginPx = 64;
+/// Where looking elsewhere begins: two steps of kFaceSearch below, as finds of neighbouring sizes
+/// must agree.
+constexpr int kFarFacePx = 44;
+
+cv::Rect Near(const cv::Rect& part, const cv::Size& image) {
+  return cv::Rect(part.x - kNearMarginPx, part.y - kNearMarginPx, part.width + 2 * kNearMarginPx,
+                  part.height + 2 * kNearMarginPx) &
+         cv::Rect({}, image);
+}
 
 class Cascade {
  public:
@@ -101,48 +115,56 @@ class Finder final : public PrivateRegionFinder {
     profile_.emplace_back(config.cascades, "haarcascade_profileface.xml", kFaceSearch);
   }
 
-  std::vector<cv::Rect> Find(const cv::Mat& bgr) override {
+  std::vector<cv::Rect> Find(const cv::Mat& bgr, const cv::Rect& part) override {
     if (bgr.empty() || bgr.type() != CV_8UC3) {
       throw Error("faces and plates are looked for in images of 8 bit and 3 channels only");
     }
     try {
-      return FindAll(bgr);
+      return FindAll(bgr, part);
     } catch (const cv::Exception& error) {
       throw Error("looking for faces and plates failed: " + error.err);
     }
   }
 
  private:
-  std::vector<cv::Rect> FindAll(const cv::Mat& bgr) {
+  std::vector<cv::Rect> FindAll(const cv::Mat& bgr, const cv::Rect& part) {
     cv::Mat grey;
     cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
-    std::vector<cv::Rect> all;
     const cv::Rect image({}, bgr.size());
-    const auto take = [&](const std::vector<cv::Rect>& found) {
-      for (const cv::Rect& region : found) {
-        if (!(region & image).empty()) all.push_back(region & image);
-      }
-    };
-    const cv::Size face(min_side_px_, min_side_px_);
-    for (Cascade& cascade : frontal_) take(cascade.Find(grey, face));
-    FindProfiles(grey, face, take);
+    const cv::Rect near = Near(part, bgr.size());
+    std::vector<cv::Rect> all;
+    FindFaces(grey, near, min_side_px_, all);
+    if (near != image) FindFaces(grey, image, std::max(min_side_px_, kFarFacePx), all);
     for (Cascade& cascade : plates_) {
-      take(cascade.Find(grey, {kPlateAspect * min_side_px_, min_side_px_}));
+      const cv::Size smallest(kPlateAspect * min_side_px_, min_side_px_);
+      for (const cv::Rect& plate : cascade.Find(grey, smallest)) all.push_back(plate);
     }
-    if (yunet_) take(yunet_->Find(bgr));
+    if (yunet_) {
+      for (const cv::Rect& face : yunet_->Find(bgr)) all.push_back(face);
+    }
+    for (cv::Rect& region : all) region &= image;
+    all.erase(std::remove_if(all.begin(), all.end(),
+                             [](const cv::Rect& region) { return region.empty(); }),
+              all.end());
     return all;
   }
 
-  /// The cascade knows faces that look to one side; the mirror image gives the other.
-  template <typename Take>
-  void FindProfiles(const cv::Mat& grey, cv::Size smallest, const Take& take) {
+  /// Those that the cascades know, at least `smallest` pixels large, in `where`.
+  void FindFaces(const cv::Mat& grey, const cv::Rect& where, int smallest,
+                 std::vector<cv::Rect>& all) {
+    const cv::Size size(smallest, smallest);
+    const auto take = [&](const std::vector<cv::Rect>& found) {
+      for (const cv::Rect& face : found) all.push_back(face + where.tl());
+    };
+    for (Cascade& cascade : frontal_) take(cascade.Find(grey(where), size));
     if (profile_.empty()) return;
+    // The cascade knows faces that look to one side; the mirror image gives the other.
     cv::Mat mirrored;
-    cv::flip(grey, mirrored, 1);
+    cv::flip(grey(where), mirrored, 1);
     for (Cascade& cascade : profile_) {
-      take(cascade.Find(grey, smallest));
-      std::vector<cv::Rect> found = cascade.Find(mirrored, smallest);
-      for (cv::Rect& region : found) region.x = grey.cols - region.x - region.width;
+      take(cascade.Find(grey(where), size));
+      std::vector<cv::Rect> found = cascade.Find(mirrored, size);
+      for (cv::Rect& face : found) face.x = where.width - face.x - face.width;
       take(found);
     }
   }

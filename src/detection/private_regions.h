@@ -12,8 +12,9 @@ class PrivateRegionFinder {
  public:
   virtual ~PrivateRegionFinder() = default;
 
-  /// Rectangles in pixels of `bgr` (8 bit, 3 channels), inside it. Throws Error when it cannot say.
-  virtual std::vector<cv::Rect> Find(const cv::Mat& bgr) = 0;
+  /// All that meets `part` of `bgr` (8 bit, 3 channels), as rectangles in pixels of `bgr` and
+  /// inside it; others may be among them. Throws Error when it cannot say.
+  virtual std::vector<cv::Rect> Find(const cv::Mat& bgr, const cv::Rect& part) = 0;
 };
 
 struct PrivateRegionConfig {

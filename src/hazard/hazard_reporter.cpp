@@ -123,12 +123,15 @@ void HazardReporter::AddFrame(const SightingFrame& frame, double now_s) {
   }
 }
 
-void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
+void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture,
+                                const PixelRegion& part) {
+  bool is_known = false;
   for (WaitingFrame& waiting : waiting_) {
     if (waiting.frame.stamp_ns != stamp_ns) continue;
-    waiting.picture = picture;
-    return;
+    is_known = true;
+    if (Contains(part, waiting.wanted)) waiting.picture = picture;
   }
+  if (is_known || !part.IsWholeImage()) return;
   early_pictures_[stamp_ns] = picture;
   if (early_pictures_.size() > kMaxEarlyPictures) early_pictures_.erase(early_pictures_.begin());
 }
@@ -196,7 +199,21 @@ void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
   // A picture that comes unasked is on its way since the frame came.
   waiting.asked_s = config_.pictures_on_demand ? now_s : waiting.arrival_s;
   ++counters_.pictures_requested;
-  if (config_.pictures_on_demand) picture_requests_.push_back(waiting.frame.stamp_ns);
+  if (!config_.pictures_on_demand) return;
+  waiting.wanted = ShownIn(waiting);
+  picture_requests_.push_back({waiting.frame.stamp_ns, waiting.wanted});
+}
+
+/// What the pictures of its reports may show of the image.
+PixelRegion HazardReporter::ShownIn(const WaitingFrame& waiting) const {
+  std::optional<PixelRegion> shown;
+  for (const Candidate& candidate : waiting.candidates) {
+    const PixelRegion crop =
+        WidestCrop(candidate.sighting.box, static_cast<int>(waiting.frame.image_width),
+                   static_cast<int>(waiting.frame.image_height), config_.picture);
+    shown = shown ? Union(*shown, crop) : crop;
+  }
+  return shown.value_or(PixelRegion{});
 }
 
 bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
@@ -207,7 +224,7 @@ bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
   return now_s - *waiting.asked_s < config_.picture_wait_s;
 }
 
-std::vector<std::int64_t> HazardReporter::TakePictureRequests() {
+std::vector<PictureWish> HazardReporter::TakePictureRequests() {
   return std::exchange(picture_requests_, {});
 }
 

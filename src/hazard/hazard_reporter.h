@@ -144,11 +144,12 @@ class HazardReporter {
   /// The depth image of the frame with this stamp, before or after it.
   void AddDepth(std::int64_t stamp_ns, const DepthImage& depth);
   /// The annotated image of the frame with this stamp, before or after it.
-  void AddPicture(std::int64_t stamp_ns, const Picture& picture);
+  /// `part` is what of the image it shows clearly.
+  void AddPicture(std::int64_t stamp_ns, const Picture& picture, const PixelRegion& part = {});
   /// Whether there is anyone to give pictures, as there is at first; else no frame waits for one.
   void ExpectPictures(bool expected) { expects_pictures_ = expected; }
-  /// Stamps of the images whose pictures are wanted now, each once.
-  std::vector<std::int64_t> TakePictureRequests();
+  /// The images whose pictures are wanted now, each once.
+  std::vector<PictureWish> TakePictureRequests();
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const Notice& notice);
   void AddReceipt(const Receipt& receipt);
@@ -190,7 +191,8 @@ class HazardReporter {
     double arrival_s;
     bool held_back = false;
     bool placed = false;
-    std::optional<double> asked_s;      // When its picture began to be missed.
+    std::optional<double> asked_s;      // When its picture began to be missed...
+    PixelRegion wanted;                 // ...and what of it.
     std::vector<Candidate> candidates;  // Once placed.
     Picture picture;
   };
@@ -200,6 +202,7 @@ class HazardReporter {
   bool HasNews(const WaitingFrame& waiting) const;
   bool IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const;
   void AskForPicture(WaitingFrame& waiting, double now_s);
+  PixelRegion ShownIn(const WaitingFrame& waiting) const;
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
   bool FitsCamera(const SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
@@ -231,7 +234,7 @@ class HazardReporter {
   std::deque<WaitingFrame> waiting_;
   std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
   std::map<std::int64_t, DepthImage> depths_;       // By stamp.
-  std::vector<std::int64_t> picture_requests_;
+  std::vector<PictureWish> picture_requests_;
   bool expects_pictures_ = true;
   LinkCost link_ = LinkCost::kUnknown;
   bool held_at_start_ = false;

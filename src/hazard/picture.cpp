@@ -42,6 +42,8 @@ cv::Rect CropAround(const cv::Rect2d& box, double context, double least_px, cons
           start(box.y + box.height / 2, size.height, image.height), size.width, size.height};
 }
 
+double Widest(const CropConfig& config) { return std::max(config.context, kLeastContext); }
+
 bool EncodeAt(const cv::Mat& image, int quality, std::size_t max_bytes, CroppedPicture& cropped) {
   if (!cv::imencode(".jpg", image, cropped.jpeg, {cv::IMWRITE_JPEG_QUALITY, quality})) return false;
   cropped.quality = quality;
@@ -78,6 +80,21 @@ PixelRegion ToRegion(const cv::Rect& part) {
 
 }  // namespace
 
+bool Contains(const PixelRegion& outer, const PixelRegion& inner) {
+  if (outer.IsWholeImage()) return true;
+  return !inner.IsWholeImage() && inner.x >= outer.x && inner.y >= outer.y &&
+         inner.x + inner.width <= outer.x + outer.width &&
+         inner.y + inner.height <= outer.y + outer.height;
+}
+
+PixelRegion Union(const PixelRegion& a, const PixelRegion& b) {
+  if (a.IsWholeImage() || b.IsWholeImage()) return {};
+  const std::uint32_t x = std::min(a.x, b.x);
+  const std::uint32_t y = std::min(a.y, b.y);
+  return {x, y, std::max(a.x + a.width, b.x + b.width) - x,
+          std::max(a.y + a.height, b.y + b.height) - y};
+}
+
 std::vector<std::uint8_t> EncodeJpeg(const Picture& picture, int quality, std::size_t max_bytes) {
   if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return {};
   cv::Mat image = picture.bgr;
@@ -96,6 +113,13 @@ std::vector<std::uint8_t> EncodeJpeg(const Picture& picture, int quality, std::s
   }
 }
 
+PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& config) {
+  const cv::Size image(width, height);
+  const cv::Rect2d inside = InsideImage(box, image);
+  if (inside.empty() || config.context <= 0) return {};
+  return ToRegion(CropAround(inside, Widest(config), kLeastCropPx, image));
+}
+
 CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config) {
   CroppedPicture cropped;
   if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return cropped;
@@ -106,7 +130,7 @@ CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropCon
       inside.empty() ? std::min(image.width, image.height) : std::min(inside.width, inside.height);
   const double least_scale = std::min(1.0, kLegibleSidePx / std::max(side, 1.0));
   cv::Rect part({}, image);
-  const double widest = std::max(config.context, kLeastContext);
+  const double widest = Widest(config);
   double context = widest;
   while (true) {
     if (!whole) part = CropAround(inside, context, kLeastCropPx * context / widest, image);

@@ -16,6 +16,17 @@ struct Picture {
   std::shared_ptr<const void> owner;
 };
 
+/// Whether all of `inner` lies in `outer`; of one image.
+bool Contains(const PixelRegion& outer, const PixelRegion& inner);
+/// The least region that contains both.
+PixelRegion Union(const PixelRegion& a, const PixelRegion& b);
+
+/// An image of which a picture is wanted.
+struct PictureWish {
+  std::int64_t stamp_ns = 0;
+  PixelRegion part;  ///< What of it has to be clear.
+};
+
 /// The picture as a JPEG file of at most `max_bytes`: first at `quality` (1..100), then at lower
 /// ones, then at half the size and so on. Empty when there is no picture, when it is not 8-bit with
 /// three channels, or when even a thumbnail of 64 pixels is too large.
@@ -44,6 +55,10 @@ struct CroppedPicture {
   int quality = 0;   ///< Of the JPEG.
   bool legible = false;
 };
+
+/// All that CropPicture may show of an image of `width` x `height` pixels around `box`; the whole
+/// image where it would show that.
+PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& config);
 
 /// The surroundings of `box`, 3 to 2, within the image, as a JPEG of at most `max_bytes`. What the
 /// bytes do not allow is given up in this order: quality down to kLegibleQuality, pixels down to

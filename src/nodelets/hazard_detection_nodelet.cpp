@@ -2,6 +2,7 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <image_transport/image_transport.h>
 #include <livemap/DetectionArray.h>
+#include <livemap/PicturePart.h>
 #include <livemap/PictureRequest.h>
 #include <nodelet/nodelet.h>
 
@@ -44,7 +45,7 @@ struct HazardDetectionConfig {
 /// image's stamp for each processed frame, also when it is empty, and `hazard/annotated` when
 /// somebody listens. With tracking also `hazard/events`, each object once at its best view, and the
 /// picture of an image of the last moments as `hazard/picture` to who asks for it by
-/// `hazard/picture_request`.
+/// `hazard/picture_request`, or as `hazard/picture_part` where a part of it is enough.
 ///
 /// The subscriber's callback only puts the pointer of the image into a queue, so ROS's own
 /// queue, which would lose frames without a word, never fills: it has no bound. The bound is
@@ -101,6 +102,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     image_transport::ImageTransport transport(node);
     annotated_publisher_ = transport.advertise("hazard/annotated", 10);
     picture_publisher_ = node.advertise<sensor_msgs::Image>("hazard/picture", 10);
+    part_publisher_ = node.advertise<PicturePart>("hazard/picture_part", 10);
     recent_ = std::make_unique<Recent>(static_cast<std::size_t>(config_.picture_frames));
     if (config_.tracking.tracking) {
       events_publisher_ = node.advertise<DetectionArray>("hazard/events", 100);
@@ -109,7 +111,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     // Beside the images' queue: masking a picture takes longer than detecting in it.
     request_subscriber_ = getMTNodeHandle().subscribe<PictureRequest>(
         "hazard/picture_request", 100,
-        [this](const PictureRequest::ConstPtr& request) { AnswerPicture(request->stamp); });
+        [this](const PictureRequest::ConstPtr& request) { AnswerPicture(*request); });
     StartPool();
     StartDiagnostics();
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
@@ -184,7 +186,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     // The picture first: who reports a detection wants it at hand.
     if ((config_.annotate_empty || !found.empty()) &&
         annotated_publisher_.getNumSubscribers() > 0) {
-      if (const auto picture = Drawn(bgr, found, header)) {
+      if (const auto picture = Drawn(bgr, found, header, cv::Rect({}, bgr.size()))) {
         annotated_publisher_.publish(picture);
         CountPicture();
       }
@@ -222,12 +224,12 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     return events;
   }
 
-  void AnswerPicture(const ros::Time& stamp) {
+  void AnswerPicture(const PictureRequest& request) {
     std::optional<Kept> kept;
     std::vector<HazardDetection> shown;
     {
       const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
-      const auto stamp_ns = static_cast<std::int64_t>(stamp.toNSec());
+      const auto stamp_ns = static_cast<std::int64_t>(request.stamp.toNSec());
       kept = recent_->Find(stamp_ns);
       if (kept && tracking_) shown = tracking_->ReportedIn(stamp_ns);
     }
@@ -242,24 +244,46 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     for (const HazardDetection& each : kept->found) {
       if (!IsWeak(each)) shown.push_back(each);
     }
-    if (const auto picture = Drawn(kept->bgr->image, shown, kept->header)) {
+    const cv::Rect image({}, kept->bgr->image.size());
+    const cv::Rect part = PartOf(request, image);
+    const auto picture = Drawn(kept->bgr->image, shown, kept->header, part);
+    if (!picture) return;
+    if (part == image) {
       picture_publisher_.publish(picture);
-      const std::lock_guard<std::mutex> lock(figures_mutex_);
-      ++figures_.sent_pictures;
+    } else {
+      const auto answer = boost::make_shared<PicturePart>();
+      answer->image = std::move(*picture);
+      answer->part = request.part;
+      part_publisher_.publish(answer);
     }
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    ++figures_.sent_pictures;
   }
 
-  /// Masked first, so that the drawn boxes stay whole; a picture that cannot be masked stays here:
-  /// none.
+  /// The part of the image that is wanted; all of it where none or one beyond its edges is named.
+  static cv::Rect PartOf(const PictureRequest& request, const cv::Rect& image) {
+    const auto& part = request.part;
+    const std::uint64_t right = std::uint64_t{part.x_offset} + part.width;
+    const std::uint64_t bottom = std::uint64_t{part.y_offset} + part.height;
+    if (part.width == 0 || part.height == 0 || right > static_cast<std::uint64_t>(image.width) ||
+        bottom > static_cast<std::uint64_t>(image.height)) {
+      return image;
+    }
+    return {static_cast<int>(part.x_offset), static_cast<int>(part.y_offset),
+            static_cast<int>(part.width), static_cast<int>(part.height)};
+  }
+
+  /// `part` of the picture is clear. Masked first, so that the drawn boxes stay whole; a picture
+  /// that cannot be masked stays here: none.
   sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
-                              const std_msgs::Header& header) {
+                              const std_msgs::Header& header, const cv::Rect& part) {
     cv::Mat picture = bgr;
     std::size_t masked_regions = 0;
     if (mask_) {
       const std::lock_guard<std::mutex> mask_lock(mask_mutex_);
       picture = bgr.clone();
       try {
-        mask_->Apply(picture, frame_);
+        mask_->Apply(picture, frame_, part);
         masked_regions = mask_->Masked().size();
       } catch (const std::exception& error) {
         NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", error.what());
@@ -374,6 +398,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   ros::Publisher detections_publisher_;
   ros::Publisher events_publisher_;
   ros::Publisher picture_publisher_;
+  ros::Publisher part_publisher_;
   image_transport::Publisher annotated_publisher_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;

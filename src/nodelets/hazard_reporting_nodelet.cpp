@@ -1,5 +1,6 @@
 #include <cv_bridge/cv_bridge.h>
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <livemap/PicturePart.h>
 #include <livemap/PictureRequest.h>
 #include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
@@ -102,6 +103,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     const bool on_demand = config_.reporter.pictures_on_demand;
     picture_subscriber_ = node.subscribe(on_demand ? "hazard/picture" : "hazard/annotated", 10,
                                          &Self::OnPicture, this);
+    if (on_demand) {
+      part_subscriber_ = node.subscribe("hazard/picture_part", 10, &Self::OnPicturePart, this);
+    }
     if (IsFused()) {
       subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
     }
@@ -139,19 +143,35 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void OnPicture(const sensor_msgs::ImageConstPtr& message) {
+    if (const auto picture = Shared(*message, message)) {
+      responder_->AddPicture(FromRosTime(message->header.stamp), *picture);
+      reporter_->AddPicture(FromRosTime(message->header.stamp), *picture);
+    }
+    Work();
+  }
+
+  void OnPicturePart(const PicturePartConstPtr& message) {
+    const auto& part = message->part;
+    if (const auto picture = Shared(message->image, message)) {
+      reporter_->AddPicture(FromRosTime(message->image.header.stamp), *picture,
+                            {part.x_offset, part.y_offset, part.width, part.height});
+    }
+    Work();
+  }
+
+  /// Shares the pixels with the detector's message where it is bgr8 already.
+  template <typename Message>
+  std::optional<Picture> Shared(const sensor_msgs::Image& image,
+                                const boost::shared_ptr<const Message>& message) {
     try {
-      // Shares the pixels with the detector's message where it is bgr8 already.
-      const auto shared = cv_bridge::toCvShare(message, sensor_msgs::image_encodings::BGR8);
-      const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
-      const Picture picture{shared->image, owner};
-      responder_->AddPicture(FromRosTime(message->header.stamp), picture);
-      reporter_->AddPicture(FromRosTime(message->header.stamp), picture);
+      const auto shared = cv_bridge::toCvShare(image, message, sensor_msgs::image_encodings::BGR8);
+      return Picture{shared->image, std::make_shared<const cv_bridge::CvImageConstPtr>(shared)};
     } catch (const cv::Exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "picture dropped: %s", error.what());
     } catch (const cv_bridge::Exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "picture dropped: %s", error.what());
     }
-    Work();
+    return std::nullopt;
   }
 
   /// Only while a poll is open, and only for its brightness.
@@ -277,7 +297,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void Work() {
-    reporter_->ExpectPictures(picture_subscriber_.getNumPublishers() > 0);
+    reporter_->ExpectPictures(picture_subscriber_.getNumPublishers() > 0 ||
+                              part_subscriber_.getNumPublishers() > 0);
     reporter_->Process(ros::Time::now().toSec(), SteadyS());
     if (!reporter_->store_error().empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "%s", reporter_->store_error().c_str());
@@ -288,7 +309,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
     placed_by_fixes_ = by_fixes;
     AnswerPolls();
-    for (const std::int64_t stamp_ns : reporter_->TakePictureRequests()) RequestPicture(stamp_ns);
+    for (const PictureWish& wish : reporter_->TakePictureRequests()) RequestPicture(wish);
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
     for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
@@ -307,13 +328,19 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     for (const PollReply& reply : responder_->TakeReplies()) {
       answer_publisher_.publish(ToMessage(reply));
     }
-    for (const std::int64_t stamp_ns : responder_->TakePictureRequests()) RequestPicture(stamp_ns);
+    for (const std::int64_t stamp_ns : responder_->TakePictureRequests()) {
+      RequestPicture({stamp_ns, {}});
+    }
     WatchImages();
   }
 
-  void RequestPicture(std::int64_t stamp_ns) {
+  void RequestPicture(const PictureWish& wish) {
     PictureRequest request;
-    request.stamp = ToRosTime(stamp_ns);
+    request.stamp = ToRosTime(wish.stamp_ns);
+    request.part.x_offset = wish.part.x;
+    request.part.y_offset = wish.part.y;
+    request.part.width = wish.part.width;
+    request.part.height = wish.part.height;
     request_publisher_.publish(request);
   }
 
@@ -367,6 +394,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   ros::Publisher report_publisher_, answer_publisher_, request_publisher_;
   ros::Subscriber images_;  // While a poll is open.
   ros::Subscriber picture_subscriber_;
+  ros::Subscriber part_subscriber_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;
 };

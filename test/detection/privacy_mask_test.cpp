@@ -43,7 +43,7 @@ bool IsCovered(const cv::Rect& part, const PrivacyMask& mask) {
 class ToldFinder final : public PrivateRegionFinder {
  public:
   explicit ToldFinder(const std::vector<cv::Rect>& regions) : regions_(regions) {}
-  std::vector<cv::Rect> Find(const cv::Mat&) override { return regions_; }
+  std::vector<cv::Rect> Find(const cv::Mat&, const cv::Rect&) override { return regions_; }
 
  private:
   const std::vector<cv::Rect>& regions_;
@@ -60,7 +60,7 @@ TEST(PrivacyMask, AFaceOfAnySizeIsNotRecognisableAnyMore) {
     const cv::Rect face(160 - height * 3 / 10, 120 - height * 3 / 10, height * 6 / 10,
                         height * 7 / 10);
     EXPECT_TRUE(IsCovered(face, mask)) << "face of " << height << " pixels";
-    std::vector<cv::Rect> found = MakePrivateRegionFinder({})->Find(after);
+    std::vector<cv::Rect> found = MakePrivateRegionFinder({})->Find(after, {{}, after.size()});
     for (const cv::Rect& again : found) {
       EXPECT_LT((again & face).area(), 0.5 * face.area()) << "still a face of " << height;
     }
@@ -88,6 +88,53 @@ TEST(PrivacyMask, NumberPlatesAreNotReadableAnyMore) {
     EXPECT_LE(ColoursIn(after, plate), 60U) << "masked, but readable: plate " << i;
   }
   EXPECT_GE(masked, 18) << "of " << kPlates;
+}
+
+/// Wherever a face lies that meets the wanted part, and however large it is.
+TEST(PrivacyMask, AFaceThatMeetsTheWantedPartIsMaskedAsInTheWholePicture) {
+  const cv::Rect part(260, 160, 240, 160);
+  cv::RNG random(11);
+  int in_whole = 0;
+  int in_part = 0;
+  for (int i = 0; i < 30; ++i) {
+    const int height = 30 + 6 * i;
+    cv::Mat street(400, 640, CV_8UC3);
+    random.fill(street, cv::RNG::NORMAL, 120, 6);
+    const cv::Rect face(random.uniform(part.x - height / 2, part.br().x), random.uniform(100, 260),
+                        height * 6 / 10, height * 7 / 10);
+    DrawFace(street, {face.x + height * 3 / 10, face.y + height * 3 / 10}, height);
+    cv::GaussianBlur(street, street, {}, height / 60.0);
+    if ((face & part).empty()) continue;
+    cv::Mat again = street.clone();
+    PrivacyMask whole({});
+    whole.Apply(street, 1);
+    PrivacyMask partly({});
+    partly.Apply(again, 1, part);
+    in_whole += IsCovered(face, whole);
+    in_part += IsCovered(face, partly);
+  }
+  EXPECT_GE(in_whole, 20);
+  EXPECT_GE(in_part, in_whole);
+}
+
+TEST(PrivacyMask, AroundTheWantedPartNothingIsRecognisableAndThePartStaysAsItIs) {
+  const cv::Rect part(40, 60, 100, 80);
+  cv::Mat before = Street();
+  cv::Mat after = before.clone();
+  const std::vector<cv::Rect> nobody;
+  PrivacyMask mask({}, std::make_unique<ToldFinder>(nobody));
+  mask.Apply(after, 1, part);
+  EXPECT_EQ(cv::norm(before(part), after(part), cv::NORM_INF), 0);
+  EXPECT_GT(ColoursIn(before, {150, 0, 170, 240}), 1000U);
+  EXPECT_LE(ColoursIn(after, {150, 0, 170, 240}), 20U);
+}
+
+TEST(PrivacyMask, APartBeyondThePictureIsRefused) {
+  PrivacyMask mask({});
+  cv::Mat picture = Street();
+  for (const cv::Rect& part : {cv::Rect(300, 0, 40, 40), cv::Rect(-1, 0, 9, 9), cv::Rect()}) {
+    EXPECT_THROW(mask.Apply(picture, 1, part), Error) << part;
+  }
 }
 
 TEST(PrivacyMask, TheRestOfThePictureStaysAsItIs) {

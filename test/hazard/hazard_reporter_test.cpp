@@ -196,7 +196,9 @@ TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
     reporter_->Process(seconds, steady_s_);
   };
   look(3.0, BoxAt(12, 0));
-  EXPECT_THAT(reporter_->TakePictureRequests(), ElementsAre(StampNs(3.0)));
+  const std::vector<PictureWish> wishes = reporter_->TakePictureRequests();
+  ASSERT_THAT(wishes, SizeIs(1));
+  EXPECT_EQ(wishes[0].stamp_ns, StampNs(3.0));
   reporter_->Process(3.1, steady_s_);
   EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
   reporter_->AddPicture(StampNs(3.0), GreyPicture());
@@ -205,6 +207,25 @@ TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
   EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
   EXPECT_EQ(counters().pictures_requested, 1u);
   EXPECT_FALSE(TakeDue().at(0).image.empty());
+}
+
+TEST_F(HazardReporterTest, APictureOfAnotherPartDoesNotDo) {
+  DriveFixes(0, 4);
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Process(3.0, steady_s_);
+  const std::vector<PictureWish> wishes = reporter_->TakePictureRequests();
+  ASSERT_THAT(wishes, SizeIs(1));
+  const PixelRegion part = wishes[0].part;
+  ASSERT_FALSE(part.IsWholeImage());
+  reporter_->AddPicture(StampNs(3.0), GreyPicture(), {part.x + 1, part.y, part.width, part.height});
+  reporter_->Process(3.1, steady_s_);
+  EXPECT_THAT(TakeDue(), IsEmpty());
+  reporter_->AddPicture(StampNs(3.0), GreyPicture(), part);
+  reporter_->Process(3.2, steady_s_);
+  const std::vector<Report> due = TakeDue();
+  ASSERT_THAT(due, SizeIs(1));
+  EXPECT_TRUE(Contains(part, due[0].shown));
+  EXPECT_FALSE(due[0].image.empty());
 }
 
 TEST_F(HazardReporterTest, FramesWaitForTheirPicturesSideBySide) {

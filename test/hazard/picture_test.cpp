@@ -22,6 +22,36 @@ Picture Noise(int width, int height) {
   return picture;
 }
 
+TEST(PixelRegion, TheUnionContainsBoth) {
+  const PixelRegion a{10, 20, 30, 40};
+  const PixelRegion b{50, 5, 10, 10};
+  const PixelRegion both = Union(a, b);
+  EXPECT_TRUE(Contains(both, a) && Contains(both, b));
+  EXPECT_FALSE(Contains(a, both) || Contains(b, both) || Contains(a, b));
+  EXPECT_EQ(both.x + both.width, 60U);
+  EXPECT_EQ(both.y + both.height, 60U);
+  EXPECT_TRUE(Union(a, {}).IsWholeImage());
+  EXPECT_TRUE(Contains({}, a) && Contains({}, {}));
+  EXPECT_FALSE(Contains(a, {}));
+}
+
+TEST(CropPicture, NothingIsShownBeyondTheWidestCrop) {
+  const Picture picture{cv::Mat(400, 640, CV_8UC3, cv::Scalar(9, 9, 9)), nullptr};
+  for (const std::size_t max_bytes : {12000, 900}) {
+    CropConfig config;
+    config.max_bytes = max_bytes;
+    for (const Box& box : {Box{600, 380, 660, 420}, Box{100, 100, 400, 180}, Box{5, 5, 9, 9}}) {
+      const CroppedPicture cropped = CropPicture(picture, box, config);
+      ASSERT_FALSE(cropped.shown.IsWholeImage());
+      EXPECT_TRUE(Contains(WidestCrop(box, 640, 400, config), cropped.shown));
+    }
+  }
+  EXPECT_TRUE(WidestCrop({700, 0, 800, 9}, 640, 400, {}).IsWholeImage());
+  CropConfig whole;
+  whole.context = 0;
+  EXPECT_TRUE(WidestCrop({10, 10, 20, 20}, 640, 400, whole).IsWholeImage());
+}
+
 TEST(EncodeJpeg, KeepsSizeWithinTheBudget) {
   const auto file = EncodeJpeg(Noise(320, 200), 90, 200000);
   EXPECT_EQ(cv::imdecode(file, cv::IMREAD_COLOR).size(), cv::Size(320, 200));
