@@ -1,5 +1,6 @@
 // How fast frames become detections: the whole detector with a model, pools of both engines, and
-// decoding with suppression alone at several numbers of candidates.
+// decoding with suppression alone at several numbers of candidates. And what masking costs before a
+// picture leaves the car.
 //
 //     livemap_detector_benchmark [--benchmark_filter=REGEX] [Google Benchmark's flags]
 //
@@ -15,6 +16,7 @@
 #include <fstream>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
 #include <thread>
@@ -23,8 +25,10 @@
 #include "detection/annotation.h"
 #include "detection/detector_pool.h"
 #include "detection/hazard_detector.h"
+#include "detection/privacy_mask.h"
 #include "detection/yolox_decoder.h"
 #include "run_benchmarks.h"
+#include "test/change/simulated_pairs.h"
 #include "tools/shipped_model.h"
 
 namespace livemap {
@@ -149,6 +153,25 @@ BENCHMARK(BM_Pool)
     ->ArgsProduct({{0, 1}, {1, 2}, {1, 2}})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
+
+/// Street pictures of 640 x 400: all of them, or the part that a report's picture of a hazard
+/// shows.
+void BM_Mask(benchmark::State& state) {
+  std::vector<cv::Mat> streets;
+  for (const SimulatedPair& pair : MakePairs({})) {
+    cv::resize(pair.after.bgr, streets.emplace_back(), {640, 400}, 0, 0, cv::INTER_AREA);
+  }
+  const cv::Rect part =
+      state.range(0) == 0 ? cv::Rect(0, 0, 640, 400) : cv::Rect(200, 220, 240, 160);
+  PrivacyMask mask({});
+  std::uint64_t frame = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    cv::Mat picture = streets[frame % streets.size()].clone();
+    mask.Apply(picture, ++frame, part);
+    benchmark::DoNotOptimize(picture.data);
+  }
+}
+BENCHMARK(BM_Mask)->ArgName("part")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 /// Boxes of one class all over an image.
 std::vector<HazardDetection> Candidates(int count) {

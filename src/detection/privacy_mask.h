@@ -30,8 +30,8 @@ class PrivacyMask {
   /// nobody wants a picture of; it never falls. Throws Error when it cannot: the picture is then to
   /// be thrown away.
   void Apply(cv::Mat& bgr, std::uint64_t frame);
-  /// The same where only `part`, inside `bgr`, is wanted, in about half the time: everything around
-  /// it is pixelated, whatever it shows.
+  /// The same where only `part`, inside `bgr`, is wanted, in two thirds of the time: everything
+  /// around it is pixelated, whatever it shows.
   void Apply(cv::Mat& bgr, std::uint64_t frame, const cv::Rect& part);
 
   /// What the last call masked, px; without all that lies around a part.

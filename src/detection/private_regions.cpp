@@ -133,8 +133,9 @@ class Finder final : public PrivateRegionFinder {
     const cv::Rect image({}, bgr.size());
     const cv::Rect near = Near(part, bgr.size());
     std::vector<cv::Rect> all;
-    FindFaces(grey, near, min_side_px_, all);
-    if (near != image) FindFaces(grey, image, std::max(min_side_px_, kFarFacePx), all);
+    for (const cv::Rect& face : FindFaces(grey(near), min_side_px_))
+      all.push_back(face + near.tl());
+    if (near != image) FindLargeFaces(grey, all);
     for (Cascade& cascade : plates_) {
       const cv::Size smallest(kPlateAspect * min_side_px_, min_side_px_);
       for (const cv::Rect& plate : cascade.Find(grey, smallest)) all.push_back(plate);
@@ -149,24 +150,34 @@ class Finder final : public PrivateRegionFinder {
     return all;
   }
 
-  /// Those that the cascades know, at least `smallest` pixels large, in `where`.
-  void FindFaces(const cv::Mat& grey, const cv::Rect& where, int smallest,
-                 std::vector<cv::Rect>& all) {
+  /// Those of kFarFacePx or more, in half as many lines and columns: a cascade takes no finer look
+  /// at them in any case.
+  void FindLargeFaces(const cv::Mat& grey, std::vector<cv::Rect>& all) {
+    cv::Mat half;
+    cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
+    for (const cv::Rect& face : FindFaces(half, std::max(min_side_px_, kFarFacePx) / 2)) {
+      all.emplace_back(2 * face.x, 2 * face.y, 2 * face.width, 2 * face.height);
+    }
+  }
+
+  /// Those that the cascades know, at least `smallest` pixels large.
+  std::vector<cv::Rect> FindFaces(const cv::Mat& grey, int smallest) {
     const cv::Size size(smallest, smallest);
-    const auto take = [&](const std::vector<cv::Rect>& found) {
-      for (const cv::Rect& face : found) all.push_back(face + where.tl());
-    };
-    for (Cascade& cascade : frontal_) take(cascade.Find(grey(where), size));
-    if (profile_.empty()) return;
+    std::vector<cv::Rect> all;
+    for (Cascade& cascade : frontal_) {
+      for (const cv::Rect& face : cascade.Find(grey, size)) all.push_back(face);
+    }
+    if (profile_.empty()) return all;
     // The cascade knows faces that look to one side; the mirror image gives the other.
     cv::Mat mirrored;
-    cv::flip(grey(where), mirrored, 1);
+    cv::flip(grey, mirrored, 1);
     for (Cascade& cascade : profile_) {
-      take(cascade.Find(grey(where), size));
-      std::vector<cv::Rect> found = cascade.Find(mirrored, size);
-      for (cv::Rect& face : found) face.x = where.width - face.x - face.width;
-      take(found);
+      for (const cv::Rect& face : cascade.Find(grey, size)) all.push_back(face);
+      for (const cv::Rect& face : cascade.Find(mirrored, size)) {
+        all.emplace_back(grey.cols - face.x - face.width, face.y, face.width, face.height);
+      }
     }
+    return all;
   }
 
   int min_side_px_;
