@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
+#include <set>
 
 #include "base/change_class.h"
 #include "base/error.h"
@@ -203,9 +204,14 @@ std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& dir
   }
   const fs::path common = CommonAncestor(folders);
   std::vector<ChangePairFiles> pairs;
+  std::set<fs::path> masks;
   for (const fs::path& folder : folders) {
     const std::string prefix = folder.lexically_relative(common).string() + "/";
     for (ChangePairFiles& files : FindChangePairs(folder.string())) {
+      if (!masks.insert(fs::canonical(files.truth)).second) {
+        throw Error("folder '" + folder.string() + "' has pairs of another folder: mask '" +
+                    files.truth + "' is named twice");
+      }
       files.name.insert(0, prefix);
       pairs.push_back(std::move(files));
     }

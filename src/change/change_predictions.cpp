@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 
@@ -94,6 +95,21 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
   return header;
 }
 
+/// What rounding to 255ths of ten classes may cost, and some.
+constexpr double kMostSumError = 0.05;
+
+void CheckSumIsOne(const ChangeProbabilities& probabilities, const std::string& path) {
+  cv::Mat sum = probabilities.of_class.at(0).clone();
+  for (std::size_t i = 1; i < kChangeClasses; ++i) sum += probabilities.of_class[i];
+  double least = 0;
+  double most = 0;
+  cv::minMaxLoc(sum, &least, &most);
+  if (least < 1 - kMostSumError || most > 1 + kMostSumError) {
+    throw Error("prediction '" + path + "' holds probabilities of which those of a pixel sum to " +
+                std::to_string(least) + " to " + std::to_string(most) + ", accepted is 1");
+  }
+}
+
 ChangeProbabilities FromScore(const cv::Mat& score) {
   ChangeProbabilities probabilities;
   probabilities.of_class.resize(2);
@@ -159,6 +175,7 @@ ChangeProbabilities ReadPrediction(const std::string& folder, const std::string&
     probabilities = FromScore(score);
   }
   CheckProbabilities(probabilities, size, path);
+  if (probabilities.of_class.size() == kChangeClasses) CheckSumIsOne(probabilities, path);
   return probabilities;
 }
 

@@ -177,6 +177,7 @@ void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& cl
 Json ToJson(const ChangeReport& report, std::size_t curve_points) {
   Json json;
   json["method"] = report.method;
+  json["directories"] = report.directories;
   json["registration"] = report.registration;
   json["pairs"] = report.forward.community.pairs().size();
   json["refused_pairs"] = report.refused;

@@ -32,11 +32,12 @@ void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& cl
 
 /// The result of `livemap evaluate change`.
 struct ChangeReport {
-  std::string method;                 ///< Its name, or the folder of predictions.
-  std::string registration;           ///< "none", "edges", "homography" or "both".
-  std::size_t refused = 0;            ///< Pairs that could not be registered: no change is said.
-  std::vector<std::string> refusals;  ///< "NAME: why", in order.
-  std::size_t hardly_changed = 0;     ///< Pairs left out as too little of them has changed.
+  std::string method;                    ///< Its name, or the folder of predictions.
+  std::vector<std::string> directories;  ///< Absolute paths of the data.
+  std::string registration;              ///< "none", "edges", "homography" or "both".
+  std::size_t refused = 0;               ///< Pairs that could not be registered: no change is said.
+  std::vector<std::string> refusals;     ///< "NAME: why", in order.
+  std::size_t hardly_changed = 0;        ///< Pairs left out as too little of them has changed.
   std::size_t unknown_colour_pixels = 0;
   double method_ms_p50 = 0;        ///< Wall time of the method alone, ms; 0 for predictions.
   double registration_ms_p50 = 0;  ///< Of a pair, with its warp.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <optional>
 #include <sstream>
 
@@ -157,7 +158,11 @@ void Progress::At(std::size_t done) {
 
 int RunProgram(const char* name, int argc, char** argv, int (*body)(int, char**)) {
   try {
-    return body(argc, argv);
+    const int status = body(argc, argv);
+    // A full disk shows only now; half a line of JSON must not look like success.
+    if (std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+    std::fprintf(stderr, "%s: what it prints cannot be written\n", name);
+    return 1;
   } catch (const Error& error) {
     std::fprintf(stderr, "%s: %s\n", name, error.what());
     return 2;

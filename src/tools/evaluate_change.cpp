@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/error.h"
@@ -35,6 +38,21 @@ struct Options {
   bool curves = false;
 };
 
+/// Where results go: not among the pictures that they are about.
+void CheckWritable(const std::string& folder, const std::vector<std::string>& data) {
+  std::error_code unknown;
+  if (std::filesystem::exists(folder, unknown) && !std::filesystem::is_directory(folder, unknown)) {
+    throw Error("--write is '" + folder + "', which is no folder");
+  }
+  const std::string target = std::filesystem::weakly_canonical(folder, unknown).string() + "/";
+  for (const std::string& each : data) {
+    const std::string source = std::filesystem::weakly_canonical(each, unknown).string() + "/";
+    if (target.compare(0, source.size(), source) == 0) {
+      throw Error("--write is '" + folder + "', which lies in the data of '" + each + "'");
+    }
+  }
+}
+
 /// None when --help was asked for and printed.
 std::optional<Options> ParseOptions(int argc, char** argv) {
   CommandLine line(
@@ -57,7 +75,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"seed", "N", "of the registration's draws (1)"},
        {"least-changed", "SHARE", "leave out pairs of which a smaller share has changed (0)"},
        {"curves", "", "with --json: curves, figures per pair, refusals"},
-       {"write", "DIR", "the method's scores (NAME.png) and classes (NAME_class.png)"}});
+       {"write", "DIR",
+        "the method's scores (NAME.png), classes (NAME_class.png), whose: scores.json"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
   line.CheckNeeds({{"curves", line.Has("json"), "--json"},
                    {"reversed-predictions", line.Has("predictions"), "--predictions"},
@@ -72,6 +91,13 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.predictions = line.Text("predictions", "");
   options.reversed_predictions = line.Text("reversed-predictions", "");
   options.write = line.Text("write", "");
+  if (!options.write.empty()) CheckWritable(options.write, options.directories);
+  for (const std::string& folder : {options.predictions, options.reversed_predictions}) {
+    std::error_code unknown;
+    if (!folder.empty() && !std::filesystem::is_directory(folder, unknown)) {
+      throw Error("predictions: '" + folder + "' is not a folder");
+    }
+  }
   options.seed = line.Seed("seed", 1);
   options.registration = line.Text("register", "both");
   if (options.registration != "none" && options.registration != "edges" &&
@@ -242,6 +268,15 @@ class Evaluation {
   ChangeReport report_;
 };
 
+/// Whose scores lie in the folder, so that nobody draws them as another method's.
+void WriteOrigin(const std::string& folder, const std::string& method,
+                 const std::vector<std::string>& directories) {
+  const std::string path = folder + "/scores.json";
+  std::ofstream file(path);
+  file << nlohmann::json{{"method", method}, {"directories", directories}}.dump() << "\n";
+  if (!file.flush()) throw Error("file '" + path + "' cannot be written");
+}
+
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
@@ -252,11 +287,15 @@ int Run(int argc, char** argv) {
     evaluation.Add(pairs[i]);
     progress.At(i + 1);
   }
-  const ChangeReport report = evaluation.Report();
+  ChangeReport report = evaluation.Report();
+  for (const std::string& directory : options->directories) {
+    report.directories.push_back(std::filesystem::canonical(directory).string());
+  }
   if (report.forward.community.pairs().empty()) {
     throw Error("none of " + std::to_string(pairs.size()) + " pairs has changed by the share of " +
                 std::to_string(options->least_changed) + " that --least-changed accepts");
   }
+  if (!options->write.empty()) WriteOrigin(options->write, report.method, report.directories);
   std::cout << (options->json ? ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"
                               : ToText(report));
   return 0;

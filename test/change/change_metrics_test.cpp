@@ -211,12 +211,12 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   auto json = ToJson(report, 0);
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys, testing::ElementsAre("method", "registration", "pairs", "refused_pairs",
-                                         "left_out_pairs", "unknown_colour_pixels", "method_ms_p50",
-                                         "registration_ms_p50", "pixels", "change_pixels",
-                                         "left_out_pixels", "at_fpr", "roc_area", "ap", "argmax",
-                                         "multi_class_accuracy", "classes", "confusion",
-                                         "community", "directions", "reversed"));
+  EXPECT_THAT(keys, testing::ElementsAre("method", "directories", "registration", "pairs",
+                                         "refused_pairs", "left_out_pairs", "unknown_colour_pixels",
+                                         "method_ms_p50", "registration_ms_p50", "pixels",
+                                         "change_pixels", "left_out_pixels", "at_fpr", "roc_area",
+                                         "ap", "argmax", "multi_class_accuracy", "classes",
+                                         "confusion", "community", "directions", "reversed"));
   EXPECT_EQ(json["at_fpr"]["0.01"]["f1"], 1.0);
   EXPECT_EQ(json["at_fpr"]["0.01"]["f1_at_full_recall"], 1.0);
   EXPECT_EQ(json["multi_class_accuracy"], 1.0);

@@ -136,6 +136,12 @@ class EvaluateChangeTest(unittest.TestCase):
         self.assertEqual(sorted(os.listdir(plots)), ["change_best.jpg", "change_precision_recall.png", "change_roc.png",
                                                      "change_worst.jpg"])
         self.assertEqual(cv2.imread(os.path.join(plots, "change_best.jpg")).shape[1], 4 * 320)
+        for arguments, expected in [
+                ([reports[1], "--data", self.data, "--predictions", self.path("scores_dense-sift")], "are of method dense-sift"),
+                ([reports[0], "--data", self.folder + "/plots", "--predictions", self.path("scores_dense-sift")], "--data is")]:
+            done = run(PLOT, "--out", plots, *arguments)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn(expected, done.stderr)
 
     def test_a_network_is_measured_as_its_predictions_are(self):
         model = os.environ.get("LIVEMAP_CHANGE_MODEL", "")
@@ -192,11 +198,17 @@ class EvaluateChangeTest(unittest.TestCase):
     def test_mistakes_are_one_sentence_and_exit_2(self):
         empty = self.path("empty")
         os.makedirs(empty, exist_ok=True)
+        certain_of_nothing = self.write_predictions("nothing", lambda mask: np.zeros((CLASSES, *mask.shape), np.float32))
         for arguments, expected in [
                 ([], "got 0 arguments"), (["/nowhere"], "/nowhere"), ([empty], "0 pairs"),
                 (["--method", "best", self.data], "dense-sift and daisy"),
                 (["--least-changed", "2", self.data], "--least-changed"),
                 (["--least-changed", "1", self.data], "none of 4 pairs"), ([self.data, self.data], "named twice"),
+                ([self.data, self.data + "/raw"], "named twice"),
+                (["--write", self.data + "/scores", self.data], "lies in the data"),
+                (["--write", self.data + "/camera.yaml", self.data], "is no folder"),
+                (["--predictions", certain_of_nothing, self.data], "accepted is 1"),
+                (["--predictions", "/nowhere", self.data], "'/nowhere' is not a folder"),
                 (["--register", "well", self.data], "none, edges, homography and both"),
                 (["--predictions", empty, self.data], "000/00' is missing"),
                 (["--method", "daisy", "--predictions", empty, self.data], "--method"),
@@ -210,8 +222,12 @@ class EvaluateChangeTest(unittest.TestCase):
         report = self.path("report.json")
         with open(report, "w", encoding="utf-8") as file:
             json.dump(self.figures("--curves", "--method", "daisy", "--register", "none", self.data), file)
+        broken = self.path("broken.json")
+        with open(broken, "w", encoding="utf-8") as file:
+            file.write('{"curve": 3}')
         for arguments, expected in [
                 ([os.path.join(self.data, "camera.yaml"), "--out", empty], "camera.yaml"),
+                ([broken, "--out", empty], "is not what --json --curves prints"),
                 ([report, "--out", report], "cannot be made"), ([report, "--out", empty, "--rows", "0"], "--rows is 0"),
                 ([report, "--out", empty, "--data", "/nowhere", "--predictions", empty], "/nowhere")]:
             done = run(PLOT, *arguments)
@@ -229,6 +245,13 @@ class EvaluateChangeTest(unittest.TestCase):
         self.assertIsNone(json.loads(done.stdout)["ap"])
         done = run(PLOT, report, "--out", self.path("unchanged_plots"))
         self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_a_full_disk_is_no_success(self):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            done = subprocess.run([PROGRAM, "--json", "--method", "daisy", "--register", "none", self.data], stdout=full,
+                                  stderr=subprocess.PIPE, text=True, timeout=280, check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("cannot be written", done.stderr)
 
     def test_it_has_help(self):
         done = run(PROGRAM, "--help")
