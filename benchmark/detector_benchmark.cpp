@@ -28,6 +28,7 @@
 #include "detection/privacy_mask.h"
 #include "detection/yolox_decoder.h"
 #include "run_benchmarks.h"
+#include "simulation/renderer.h"
 #include "test/change/simulated_pairs.h"
 #include "tools/shipped_model.h"
 
