@@ -37,7 +37,7 @@ TEST(PixelRegion, TheUnionContainsBoth) {
 
 TEST(CropPicture, NothingIsShownBeyondTheWidestCrop) {
   const Picture picture{cv::Mat(400, 640, CV_8UC3, cv::Scalar(9, 9, 9)), nullptr};
-  for (const std::size_t max_bytes : {12000, 900}) {
+  for (const std::size_t max_bytes : {12000U, 900U}) {
     CropConfig config;
     config.max_bytes = max_bytes;
     for (const Box& box : {Box{600, 380, 660, 420}, Box{100, 100, 400, 180}, Box{5, 5, 9, 9}}) {
