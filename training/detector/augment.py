@@ -131,11 +131,11 @@ class Augmenter:
         self.groups, self.recipe = groups, recipe
         self.width, self.height = width, height
         self.names = [name for name in GROUP_SHARES if groups.get(name)]
-        real = 1.0 - GROUP_SHARES["simulated"]
-        shares = np.array([
-            simulated_share if name == "simulated" else GROUP_SHARES[name] * (1.0 - simulated_share) / real for name in self.names
-        ])
-        self.shares = shares / shares.sum()
+        simulated_share = simulated_share if "simulated" in self.names else 0.0
+        real = sum(GROUP_SHARES[name] for name in self.names if name != "simulated")
+        self.shares = {
+            name: simulated_share if name == "simulated" else GROUP_SHARES[name] * (1.0 - simulated_share) / real for name in self.names
+        }
         weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
         self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}
         self.backgrounds = {
@@ -159,6 +159,11 @@ class Augmenter:
         sample.image = self.recolour(rng, sample.image)
         return sample
 
+    def draw_group(self, rng: np.random.Generator, names: List[str]) -> str:
+        """One of `names`, by their shares."""
+        shares = np.array([self.shares[name] for name in names])
+        return names[rng.choice(len(names), p=shares / shares.sum())]
+
     def mosaic(self, rng: np.random.Generator) -> Sample:
         """Four views around a random corner (YOLOv4). A class is background only in tiles that label it."""
         corner_x = int(self.width * rng.uniform(0.3, 0.7))
@@ -169,7 +174,7 @@ class Augmenter:
             for x, width in ((0, corner_x), (corner_x, self.width - corner_x))
         ]
         canvas = np.empty((self.height, self.width, 3), np.uint8)
-        name = self.names[rng.choice(len(self.names), p=self.shares)]
+        name = self.draw_group(rng, self.names)
         names = TILES_OF_MOSAICS.get(name) or [n for n in self.names if n not in TILES_OF_MOSAICS]
         views = []
         for x, y, width, height in tiles:
@@ -195,9 +200,7 @@ class Augmenter:
 
     def view(self, rng: np.random.Generator, width: int, height: int, names: List[str] = ()) -> Sample:
         """A scaled, shifted, perhaps mirrored window of one random picture."""
-        names = list(names) or self.names
-        shares = np.array([GROUP_SHARES[name] for name in names])
-        name = names[rng.choice(len(names), p=shares / shares.sum())]
+        name = self.draw_group(rng, list(names) or self.names)
         picture = self.groups[name][rng.choice(len(self.groups[name]), p=self.picture_shares[name])]
         if name.startswith("survey") and rng.random() < self.recipe.paste:
             picture = self.paste_potholes(rng, picture)

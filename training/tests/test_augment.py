@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from detector import CLASSES
 from detector.augment import SETTLING, Augmenter, Recipe
 from detector.boxes import non_maximum_suppression
 from detector.data import POTHOLE, TRAFFIC_CONE, DataError, Picture, read_simulated
@@ -57,16 +58,25 @@ class Reading(unittest.TestCase):
 
 
 class Shares(unittest.TestCase):
-    def test_simulated_pictures_have_the_share_asked_for_and_the_rest_keep_their_proportions(self):
-        groups = {name: [bright_square()] for name in ("survey_potholes", "cones", "simulated")}
-        shares = [Augmenter(groups, SETTLING, 416, 320, simulated_share=share).shares for share in (0.31, 0.7)]
-        for share, (potholes, cones, simulated) in zip((0.31, 0.7), shares):
-            self.assertGreater(simulated, share - 1e-9)
-            self.assertAlmostEqual(potholes / cones, 0.41 / 0.11)
+    @staticmethod
+    def drawn(groups, mosaic: float, simulated_share: float) -> np.ndarray:
+        """What fraction of 300 samples comes from pictures of potholes, of cones and of simulated deer."""
+        classes = {"survey_potholes": POTHOLE, "cones": TRAFFIC_CONE, "simulated": CLASSES.index("deer")}
+        pictures = {name: [bright_square(classes[name])] for name in groups}
+        source = Augmenter(pictures, Recipe(**{**CALM, "mosaic": mosaic}), 96, 64, simulated_share)
+        samples = [source.draw(np.random.default_rng(index)) for index in range(300)]
+        return np.mean([[sample.labelled[class_id] == 1 for class_id in classes.values()] for sample in samples], axis=0)
+
+    def test_simulated_pictures_have_the_share_asked_for_in_views_and_in_mosaics(self):
+        for mosaic in (0.0, 1.0):
+            for share in (0.31, 0.7):
+                potholes, cones, simulated = self.drawn(("survey_potholes", "cones", "simulated"), mosaic, share)
+                self.assertAlmostEqual(simulated, share, delta=0.08)
+                if mosaic == 0.0:
+                    self.assertAlmostEqual(potholes / (potholes + cones), 0.41 / 0.52, delta=0.12)
 
     def test_without_simulated_pictures_their_share_does_not_matter(self):
-        groups = {name: [bright_square()] for name in ("survey_potholes", "cones")}
-        few, many = (Augmenter(groups, SETTLING, 416, 320, simulated_share=share).shares for share in (0.1, 0.9))
+        few, many = (self.drawn(("survey_potholes", "cones"), 0.0, share) for share in (0.1, 1.0))
         np.testing.assert_allclose(few, many)
 
 
