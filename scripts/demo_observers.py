@@ -244,7 +244,11 @@ def distance_m(a, b):
     return math.hypot(north, east)
 
 
-def compare_with_truth(hazards, truth_file, radius_m=5.0):
+MATCH_RADIUS_M = 5.0
+"""A hazard on the map within so far of a true one of its class is that one."""
+
+
+def compare_with_truth(hazards, truth_file, radius_m=MATCH_RADIUS_M):
     """Found and missed true hazards, false ones on the map, and the error of the found ones' positions.
 
     Only hazards that the vehicle went by can be missed. One hazard on the map stands for all of its class

@@ -41,7 +41,12 @@ def program(name):
 def package_file(name):
     """Full path: a source tree with an install folder in it holds every file of the package twice."""
     source = PROGRAMS.parent / name
-    return source if source.is_file() else pathlib.Path(rospkg.RosPack().get_path("livemap")) / name
+    if source.is_file():
+        return source
+    try:
+        return pathlib.Path(rospkg.RosPack().get_path("livemap")) / name
+    except rospkg.ResourceNotFound as error:
+        raise StartError("ROS does not know the package livemap; source install/setup.bash or call ./livemap demo") from error
 
 
 def launch_file(name):

@@ -213,7 +213,7 @@ def saturated_section(results):
     return "## From the camera to the report\n" + prose(f"""
         A simulated street through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s, which is what the
         thesis's camera gave and more than a vehicle here can do: what it cannot, it drops, oldest first. So what it processes is
-        the rate of the whole: decoding, rectification, detector (as many engines as cores, two threads each, the engine of the model's
+        the rate of the whole: decoding, rectification, detector (as many engines as cores, one thread each, the engine of the model's
         manifest), tracking, placing, masking of the reports' pictures, report. Player, broker and zone take their share of the same cores.""") + "\n" + table(
         ["model", "frames/s", "dropped", "reports in the zone's store"], cells)
 
