@@ -24,6 +24,7 @@
 #include "edge_vo/edge_view.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/camera_info_conversions.h"
+#include "ros/depth_conversions.h"
 #include "ros/edge_vo_parameters.h"
 #include "ros/odometry_conversions.h"
 
@@ -155,16 +156,10 @@ class EdgeVoNodelet : public nodelet::Nodelet {
   }
 
   RgbdFrame ToFrame(const ImageConstPtr& image, const ImageConstPtr& depth) const {
-    namespace encodings = sensor_msgs::image_encodings;
     RgbdFrame frame;
     frame.stamp_ns = static_cast<std::int64_t>(image->header.stamp.toNSec());
-    frame.grey = cv_bridge::toCvShare(image, encodings::MONO8)->image;
-    const bool units =
-        depth->encoding == encodings::TYPE_16UC1 || depth->encoding == encodings::MONO16;
-    if (!units && depth->encoding != encodings::TYPE_32FC1) {
-      throw Error("depth has encoding '" + depth->encoding + "', accepted are 16UC1 and 32FC1");
-    }
-    frame.depth = cv_bridge::toCvShare(depth)->image;
+    frame.grey = cv_bridge::toCvShare(image, sensor_msgs::image_encodings::MONO8)->image;
+    frame.depth = ToSharedDepth(depth)->image;
     frame.depth_units_per_m = config_.depth_units_per_m;
     return frame;
   }

@@ -23,6 +23,7 @@
 #include "nodelets/nodelet_support.h"
 #include "nodelets/vehicle_view.h"
 #include "ros/camera_info_conversions.h"
+#include "ros/depth_conversions.h"
 #include "ros/hazard_conversions.h"
 #include "ros/hazard_reporting_parameters.h"
 #include "ros/hazard_view.h"
@@ -225,24 +226,13 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void OnDepth(const sensor_msgs::ImageConstPtr& message) {
-    namespace encodings = sensor_msgs::image_encodings;
-    const std::string& encoding = message->encoding;
-    if (encoding != encodings::TYPE_16UC1 && encoding != encodings::MONO16 &&
-        encoding != encodings::TYPE_32FC1) {
-      NODELET_WARN_THROTTLE(kSayAgainS,
-                            "depth has encoding '%s', accepted are 16UC1 and 32FC1: dropped",
-                            encoding.c_str());
-      return;
-    }
     try {
-      const auto shared = cv_bridge::toCvShare(message);
+      const cv_bridge::CvImageConstPtr shared = ToSharedDepth(message);
       const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
       reporter_->AddDepth(FromRosTime(message->header.stamp),
                           {shared->image, config_.depth_units_per_m, owner});
-    } catch (const cv::Exception& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "depth image dropped: %s", error.what());
-    } catch (const cv_bridge::Exception& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "depth image dropped: %s", error.what());
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
     }
     Work();
   }
