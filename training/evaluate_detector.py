@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Measure a model on the validation parts of the data, run by OpenCV as in a vehicle.
 
-    training/evaluate_detector.py --manifest models/hazards-first.yaml --data ../shared/data
+    training/evaluate_detector.py --manifest models/hazards-base.yaml --data ../shared/data
 """
 
 import argparse
@@ -59,7 +59,7 @@ def print_figures(found: Validation, manifest: Manifest) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 measured, 2 the command line, the model or the data is wrong."""
     parser = argparse.ArgumentParser(description="Measure a model on the validation parts of the data.")
-    parser.add_argument("--manifest", type=Path, default=Path("models/hazards-first.yaml"))
+    parser.add_argument("--manifest", type=Path, default=Path("models/hazards-base.yaml"))
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV")
     options = parser.parse_args(arguments)

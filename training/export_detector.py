@@ -1,19 +1,21 @@
 #!/usr/bin/python3
 """Export a checkpoint as ONNX and TorchScript with its manifest and golden outputs.
 
-    training/export_detector.py --checkpoint build/training/hazards/last.pt --name hazards-first --data ../shared/data
+    training/export_detector.py --checkpoint build/training/hazards/last.pt --name my-hazards --data ../shared/data
 
 The averaged weights are exported; with several --checkpoint flags, of runs that began from one another, the
 mean of all (model soup, Wortsman et al. 2022). Thresholds are calibrated on the validation parts of the data, with
 the exported file run by OpenCV: the pothole's by the limit on false reports, the cone's by the best F1, those of
-classes without real pictures by the best F1 on simulated drives (--simulated; seeds that training has not seen).
+classes without real pictures by the best F1 on simulated drives (--simulated; seeds that training has not seen), those of
+a user's own by the best F1 on pictures that were held back (--own).
 """
 
 import argparse
 import re
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import cv2
 import numpy as np
@@ -22,11 +24,11 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data, inference, onnx_model, pretrained
-from detector.manifest import write_manifest
+from detector.manifest import ManifestError, read_manifest, write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
-from detector.validation import Looker, detect_simulated, validate
+from detector.validation import Looker, detect_labelled, validate
 from export_torch import ExportError, add_torch_file
 
 TOLERANCE = 1e-3
@@ -43,33 +45,47 @@ UNCALIBRATED_THRESHOLD = 0.5
 DEFAULT_CHECKPOINT = Path("build/training/hazards/last.pt")
 
 
-def load_exported_again(weights: Path) -> Detector:
-    """An exported network, of whatever size it is."""
+@dataclass
+class Loaded:
+    """A network and what its outputs are called."""
+
+    detector: Detector
+    classes: Tuple[str, ...]
+
+
+def load_exported_again(weights: Path) -> Loaded:
+    """An exported network, of whatever size it is; its classes are those of the manifest beside it, where there is one."""
+    manifest = weights.parent / f"{weights.name.split('.')[0]}.yaml"
+    classes = read_manifest(manifest).classes if manifest.is_file() else CLASSES
     for size in SIZES.values():
-        detector = Detector(len(CLASSES), size)
+        detector = Detector(len(classes), size)
         convolutions = sum(isinstance(module, torch.nn.Conv2d) for module in detector.modules())
         if pretrained.load_exported(detector, weights) == convolutions:
-            return detector
-    raise ExportError(f"{weights} is a network of none of the sizes {', '.join(SIZES)}.")
+            return Loaded(detector, classes)
+    raise ExportError(f"{weights} is a network of none of the sizes {', '.join(SIZES)} with {len(classes)} classes.")
 
 
-def load_checkpoint(checkpoint: Path) -> Detector:
+def load_checkpoint(checkpoint: Path) -> Loaded:
     """The averaged weights of a checkpoint, or the weights of an exported .onnx; normalisation folded, so that means of several make sense."""
     if ".onnx" in checkpoint.suffixes:
         return load_exported_again(checkpoint)
     try:
         state = torch.load(checkpoint, map_location="cpu")
-        detector = Detector(len(CLASSES), SIZES[state["settings"]["size"]])
+        classes = tuple(state["settings"].get("classes", CLASSES))  # older ones do not say them
+        detector = Detector(len(classes), SIZES[state["settings"]["size"]])
         detector.load_state_dict(state["average"])
     except (OSError, KeyError, RuntimeError) as error:
         raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
     pretrained.fold_normalisation(detector.eval())
-    return detector
+    return Loaded(detector, classes)
 
 
-def load_averaged(checkpoints: List[Path]) -> Detector:
+def load_averaged(checkpoints: List[Path]) -> Loaded:
     """The weights of a checkpoint, or the mean of those of several."""
-    detectors = [load_checkpoint(checkpoint) for checkpoint in checkpoints]
+    loaded = [load_checkpoint(checkpoint) for checkpoint in checkpoints]
+    if any(each.classes != loaded[0].classes for each in loaded):
+        raise ExportError("The checkpoints are of networks with different classes.")
+    detectors = [each.detector for each in loaded]
     mean = detectors[0].state_dict()
     for name, value in mean.items():
         if value.dtype.is_floating_point:
@@ -78,7 +94,7 @@ def load_averaged(checkpoints: List[Path]) -> Detector:
             except (KeyError, RuntimeError) as error:
                 raise ExportError("The checkpoints are of networks of different sizes.") from error
     detectors[0].load_state_dict(mean)
-    return detectors[0].eval()
+    return Loaded(detectors[0].eval(), loaded[0].classes)
 
 
 def input_size(text: str) -> Tuple[int, int]:
@@ -138,17 +154,36 @@ def write_golden(path: Path, weights: Path, size: Tuple[int, int]) -> None:
     path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120))
 
 
+def calibrate(looker: Looker, arguments: argparse.Namespace, classes: Tuple[str, ...], drives: dict, cones: list) -> Dict[str, float]:
+    """A threshold for each class; real pictures count more than simulated ones."""
+    thresholds = {name: UNCALIBRATED_THRESHOLD for name in classes}
+    simulated = data.read_simulated(arguments.simulated) if arguments.simulated else []
+    for kind, pictures in (("simulated", simulated), ("own", data.read_own(arguments.own, classes))):
+        for name, frames in detect_labelled(looker, pictures, classes).items():
+            thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
+            print(f"{kind} {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
+    found = validate(looker, drives, cones)
+    if drives:
+        thresholds["pothole"] = found.best_drive_figures().threshold
+    if cones:
+        thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
+    return thresholds
+
+
 def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
     look = look_of(arguments)
-    detector = load_averaged(arguments.checkpoint or [DEFAULT_CHECKPOINT])
+    loaded = load_averaged(arguments.checkpoint or [DEFAULT_CHECKPOINT])
+    strangers = set(data.with_own_classes(arguments.own)) - set(loaded.classes)
+    if strangers:
+        raise ExportError(f"--own has the class {min(strangers)}, which the checkpoint was not trained on.")
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
 
     weights = arguments.out / f"{arguments.name}.onnx"
-    exportable = onnx_model.export(detector, weights, look)
+    exportable = onnx_model.export(loaded.detector, weights, look)
     check_against_torch(weights, exportable, arguments.input)
     if arguments.packed:
         round_weights(weights)
@@ -156,14 +191,7 @@ def run(arguments: argparse.Namespace) -> None:
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights, arguments.input)
 
     looker = Looker(onnx_model.opencv_runner(weights), look)
-    thresholds = {name: UNCALIBRATED_THRESHOLD for name in CLASSES}
-    if arguments.simulated:
-        for name, frames in detect_simulated(looker, data.read_simulated(arguments.simulated)).items():
-            thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
-            print(f"simulated {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
-    found = validate(looker, drives, cones)
-    thresholds["pothole"] = found.best_drive_figures().threshold
-    thresholds["traffic_cone"] = best_f1_threshold(found.cones, 0.5)
+    thresholds = calibrate(looker, arguments, loaded.classes, drives, cones)
     manifest = arguments.out / f"{arguments.name}.yaml"
     write_manifest(manifest, weights, thresholds, look, arguments.engine)
     add_torch_file(manifest)
@@ -174,9 +202,10 @@ def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 exported, 2 the command line, the checkpoint or the data is wrong."""
     parser = argparse.ArgumentParser(description="Export a checkpoint as ONNX with its manifest.")
     parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; may be repeated; an exported .onnx will do")
-    parser.add_argument("--name", default="hazards-first", help="name of the model")
+    parser.add_argument("--name", required=True, help="name of the model; files of the same name in --out are replaced")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets; none: calibrate on own and simulated pictures alone")
+    parser.add_argument("--own", type=Path, metavar="DIR", action="append", default=[], help="pictures of your own that were held back from training; may be repeated")
     parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
     parser.add_argument("--input", type=input_size, default=(inference.INPUT_WIDTH, inference.INPUT_HEIGHT), metavar="WIDTHxHEIGHT", help="of the network (640x400)")
     parser.add_argument("--scales", type=view_scales, default=(1.0,), metavar="S,...", help="views of the picture whose findings are fused (1)")
@@ -189,7 +218,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     torch.set_num_threads(max(options.threads, 1))
     try:
         run(options)
-    except (ExportError, data.DataError, pretrained.ConversionError) as error:
+    except (ExportError, ManifestError, data.DataError, pretrained.ConversionError) as error:
         print(f"export_detector: {error}", file=sys.stderr)
         return 2
     return 0

@@ -11,13 +11,13 @@ import sys
 import time
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import List, Optional
+from typing import Dict, List, Optional
 
 import cv2
 import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import CLASSES, data
+from detector import data
 from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
 from detector.network import SIZES, Detector
@@ -42,7 +42,7 @@ class Trainer:
     def __init__(self, settings: Settings, device: torch.device):
         torch.manual_seed(settings.seed)
         self.settings, self.device = settings, device
-        self.model = Detector(len(CLASSES), SIZES[settings.size]).to(device, memory_format=torch.channels_last)
+        self.model = Detector(len(settings.classes), SIZES[settings.size]).to(device, memory_format=torch.channels_last)
         self.average = AveragedModel(self.model)
         self.frozen = [self.model.backbone.stem] if settings.freeze else []
         for part in self.frozen:
@@ -79,6 +79,9 @@ class Trainer:
 
         Where that run knew the first of our classes only, the others' outputs begin untrained.
         """
+        known = tuple(state["settings"].get("classes", ()))
+        if known != self.settings.classes[: len(known)]:
+            raise UsageError(f"--start-from: the checkpoint's classes are {', '.join(known)}, which ours do not begin with.")
         weights = self.model.state_dict()
         if set(weights) != set(state["average"]):
             raise UsageError("--start-from: the checkpoint is of another network.")
@@ -92,7 +95,7 @@ class Trainer:
     def start_from_others(self, backbone: Optional[Path], exported: Optional[Path], pictures: dict) -> None:
         """Begin with the backbone of another network, with what an exported detector shares with ours, or with both."""
         views = VIEWS["crops"]
-        augmenter = Augmenter(pictures, views.recipe, views.width, views.height)
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, classes=self.settings.classes)
         samples = EpochSamples(augmenter, self.settings.seed, 0, CALIBRATION_SAMPLES)
         images, targets = next(iter(batches(samples, CALIBRATION_SAMPLES, 0)))
         images = to_device(images, targets, self.device)[0]
@@ -108,7 +111,7 @@ class Trainer:
         # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
         torch.manual_seed(settings.seed * 100003 + self.epoch)
         views = settings.views_of(self.epoch)
-        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, settings.simulated_share)
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, settings.simulated_share, settings.classes)
         batch, count = round(settings.batch * views.share), round(settings.samples_per_epoch * views.share)
         loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
         loss_of = TaskAlignedLoss(views.height, views.width, self.device)
@@ -149,7 +152,8 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     """The command line; argparse itself exits with 2 on a wrong flag."""
     defaults = {field.name: field.default for field in fields(Settings)}
     parser = argparse.ArgumentParser(description="Train the hazard detector.")
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets; none: own and simulated pictures alone")
+    parser.add_argument("--own", type=Path, metavar="DIR", action="append", default=[], help="your own pictures: images/, labels/ and classes.txt, which may name new classes; may be repeated")
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
     parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
@@ -198,7 +202,20 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         if not 0 <= getattr(arguments, name) <= 1:
             raise UsageError(f"--{name.replace('_', '-')} must be from 0 to 1, not {getattr(arguments, name)}.")
     known = {field.name for field in fields(Settings)}
-    return Settings(**{name: value for name, value in vars(arguments).items() if name in known})
+    given = {name: value for name, value in vars(arguments).items() if name in known}
+    return Settings(**given, classes=data.with_own_classes(arguments.own))
+
+
+def read_pictures(arguments: argparse.Namespace, settings: Settings) -> Dict[str, List[data.Picture]]:
+    """Training pictures by group."""
+    pictures = {} if data.is_none(arguments.data) else data.read_training_pictures(arguments.data)
+    if arguments.simulated:
+        pictures["simulated"] = data.read_simulated(arguments.simulated)
+    if arguments.own:
+        pictures["own"] = data.read_own(arguments.own, settings.classes)
+    if not pictures:
+        raise UsageError("--data is none: give --own or --simulated pictures to train on.")
+    return pictures
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -222,9 +239,7 @@ def run(arguments: argparse.Namespace) -> None:
             raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
         if not exported(arguments):
             trainer.start_from(torch.load(arguments.start_from, map_location=device))
-    pictures = data.read_training_pictures(arguments.data)
-    if arguments.simulated:
-        pictures["simulated"] = data.read_simulated(arguments.simulated)
+    pictures = read_pictures(arguments, settings)
     if (arguments.pretrained or exported(arguments)) and not last.exists():
         trainer.start_from_others(arguments.pretrained, exported(arguments), pictures)
     drives = data.read_validation_drives(arguments.data)
@@ -234,7 +249,7 @@ def run(arguments: argparse.Namespace) -> None:
     while trainer.epoch < settings.epochs:
         began = time.monotonic()
         report = trainer.train_epoch(pictures, arguments.workers)
-        if trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs:
+        if drives and (trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs):
             report.update(trainer.validate(drives, cones))
             if report["AP50"] > trainer.best_ap:
                 trainer.best_ap = report["AP50"]

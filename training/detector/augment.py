@@ -5,7 +5,7 @@ depends on (seed, epoch, index) alone: not on workers, not on an interrupted run
 """
 
 from dataclasses import dataclass, replace
-from typing import Dict, List, Tuple
+from typing import Dict, List, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -73,13 +73,13 @@ SETTLING = Recipe(
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.41, "survey_empty": 0.14, "closeups": 0.03, "cones": 0.11, "simulated": 0.31}
-"""How often each group of pictures is drawn; survey frames rule because they are what is measured."""
+GROUP_SHARES = {"survey_potholes": 0.41, "survey_empty": 0.14, "closeups": 0.03, "cones": 0.11, "simulated": 0.31, "own": 0.25}
+"""How often each group of pictures is drawn, relative to the others there are; survey frames rule because they are what is measured."""
 
-GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0}
+GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0, "own": 1.0}
 """Typical scale of a group's pictures in a view: close-ups shrink to the size of potholes seen from a car."""
 
-TILES_OF_MOSAICS = {"cones": ["cones"], "simulated": ["simulated"]}
+TILES_OF_MOSAICS = {"cones": ["cones"], "simulated": ["simulated"], "own": ["own"]}
 """Groups that label other classes than the rest do: as the loss masks classes per image, a mosaic does not mix them."""
 
 
@@ -126,9 +126,9 @@ class Augmenter:
 
     def __init__(
         self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int,
-        simulated_share: float = GROUP_SHARES["simulated"],
+        simulated_share: float = GROUP_SHARES["simulated"], classes: Sequence[str] = CLASSES,
     ):
-        self.groups, self.recipe = groups, recipe
+        self.groups, self.recipe, self.class_count = groups, recipe, len(classes)
         self.width, self.height = width, height
         self.names = [name for name in GROUP_SHARES if groups.get(name)]
         simulated_share = simulated_share if "simulated" in self.names else 0.0
@@ -139,7 +139,7 @@ class Augmenter:
         weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
         self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}
         self.backgrounds = {
-            name: np.array([background_weight(name, class_name) for class_name in CLASSES], np.float32) for name in self.names
+            name: np.array([background_weight(name, class_name) for class_name in classes], np.float32) for name in self.names
         }
 
     def draw(self, rng: np.random.Generator) -> Sample:
@@ -254,7 +254,7 @@ class Augmenter:
             clipped[clear].astype(np.float32),
             picture.classes[clear],
             np.vstack([clipped[~clear & (areas > 0)], difficult[box_math.areas(difficult) > 0]]).astype(np.float32),
-            np.zeros(len(CLASSES), np.float32),
+            np.zeros(self.class_count, np.float32),
         )
 
     def paste_potholes(self, rng: np.random.Generator, picture: Picture) -> Picture:

@@ -1,10 +1,11 @@
-"""Readers of the data sets: survey drives, close-ups of potholes, street photos with cones, simulated drives.
+"""Readers of the data sets: survey drives, close-ups of potholes, street photos with cones, simulated drives, a user's own.
 
 Images are kept decoded in memory (about 1.2 GB in all): decoding anew for every draw would cost
 more than the network on a CPU.
 """
 
 import csv
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Sequence, Tuple
@@ -16,6 +17,9 @@ from . import CLASSES
 
 VALIDATION_SECTIONS = ("386RS169832", "251BDF0530", "080BDF0070", "290RS070691")
 """Drives that are never trained on; the split is fixed by the data's README."""
+
+CLASS_NAME = "[a-z][a-z0-9_]{0,63}"
+"""What a class may be called; a report's class has 64 bytes."""
 
 POTHOLE, TRAFFIC_CONE = CLASSES.index("pothole"), CLASSES.index("traffic_cone")
 
@@ -30,7 +34,7 @@ class Picture:
 
     image: np.ndarray  # H x W x 3 uint8, RGB
     boxes: np.ndarray  # N x 4 float32 corners in pixels
-    classes: np.ndarray  # N int64, into CLASSES
+    classes: np.ndarray  # N int64, into CLASSES or, with classes of the user's own, with_own_classes()
     labelled_classes: Sequence[int]
     name: str = ""
     weight: float = 1.0  # how often to draw it, relative to others of its group
@@ -88,23 +92,51 @@ def read_folder(images: Path, labels: Path, class_ids: Sequence[int]) -> List[Pi
     return [read_picture(path, labels / (path.stem + ".txt"), class_ids) for path in paths]
 
 
+def read_class_names(folder: Path) -> List[str]:
+    """The names of a labelled folder's classes, one per line of its classes.txt."""
+    try:
+        return (folder / "classes.txt").read_text().split()
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"Cannot read {folder / 'classes.txt'}: {error}.") from error
+
+
+def read_labelled_folder(folder: Path, classes: Sequence[str] = CLASSES) -> List[Picture]:
+    """The pictures of a folder with images, labels and classes.txt; its classes are found in `classes` by their names."""
+    class_ids = [list(classes).index(name) if name in classes else -1 for name in read_class_names(folder)]
+    return read_folder(folder / "images", folder / "labels", class_ids)
+
+
 def read_simulated(root: Path) -> List[Picture]:
     """The frames of all labelled drives (images, labels, classes.txt) below `root`."""
     drives = sorted(path.parent for path in root.glob("*/classes.txt"))
     if not drives:
         raise DataError(f"No labelled drive (*/classes.txt) below the folder {root}.")
-    pictures = []
-    for drive in drives:
-        names = (drive / "classes.txt").read_text().split()
-        class_ids = [CLASSES.index(name) if name in CLASSES else -1 for name in names]
-        pictures += read_folder(drive / "images", drive / "labels", class_ids)
+    pictures = [picture for drive in drives for picture in read_labelled_folder(drive)]
+    weigh_by_rarest_class(pictures)
+    return pictures
+
+
+def with_own_classes(folders: Sequence[Path]) -> Tuple[str, ...]:
+    """CLASSES, and after them what the user's own folders add, in the order in which it appears."""
+    names = list(CLASSES)
+    for folder in folders:
+        for name in read_class_names(folder):
+            if not re.fullmatch(CLASS_NAME, name):
+                raise DataError(f"{folder / 'classes.txt'} has the class '{name}', accepted is {CLASS_NAME}.")
+            names += [name] if name not in names else []
+    return tuple(names)
+
+
+def read_own(folders: Sequence[Path], classes: Sequence[str]) -> List[Picture]:
+    """The pictures of the user's own folders."""
+    pictures = [picture for folder in folders for picture in read_labelled_folder(folder, classes)]
     weigh_by_rarest_class(pictures)
     return pictures
 
 
 def weigh_by_rarest_class(pictures: List[Picture]) -> None:
     """Draw pictures of rare classes more often, by the root of how much rarer they are than the most frequent."""
-    counts = np.zeros(len(CLASSES))
+    counts = np.zeros(1 + max((int(picture.classes.max()) for picture in pictures if len(picture.classes)), default=0))
     for picture in pictures:
         counts[np.unique(picture.classes)] += 1
     rarity = np.sqrt(counts.max() / np.maximum(counts, 1))
@@ -128,6 +160,11 @@ def read_drive(section: Path) -> List[DriveFrame]:
     ]
 
 
+def is_none(data: Path) -> bool:
+    """Whether --data says that there are no data sets of others."""
+    return str(data) == "none"
+
+
 def section_folders(data: Path) -> List[Path]:
     """Folders of all survey sections."""
     folders = sorted(path.parent for path in (data / "road_survey").glob("*/frames.csv"))
@@ -138,11 +175,15 @@ def section_folders(data: Path) -> List[Path]:
 
 def read_validation_drives(data: Path) -> Dict[str, List[DriveFrame]]:
     """The validation drives by section name."""
+    if is_none(data):
+        return {}
     return {path.name: read_drive(path) for path in section_folders(data) if path.name in VALIDATION_SECTIONS}
 
 
 def read_validation_cones(data: Path) -> List[Picture]:
     """The validation photos of traffic cones."""
+    if is_none(data):
+        return []
     cones = data / "traffic_cones"
     return read_folder(cones / "images" / "val", cones / "labels" / "val", [TRAFFIC_CONE])
 

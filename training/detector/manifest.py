@@ -33,14 +33,14 @@ def sha256_of(path: Path) -> str:
 def write_manifest(
     path: Path, weights: Path, thresholds: Dict[str, float], look: inference.Look = inference.Look(), engine: str = ""
 ) -> None:
-    """Describe `weights`, which lies beside the manifest; no `engine` leaves it open."""
+    """Describe `weights`, which lies beside the manifest; `thresholds` has the classes in their order, no `engine` leaves it open."""
     views = {**({"views": len(look.scales)} if len(look.scales) > 1 else {}), **({"mirrored": True} if look.mirrored else {})}
     content = {
         "name": path.stem,
         "file": weights.name,
         "sha256": sha256_of(weights),
         **({"engine": engine} if engine else {}),
-        "classes": list(CLASSES),
+        "classes": list(thresholds),
         "input": {
             "width": look.width, "height": look.height, "channels": "rgb",
             "resize": "letterbox", "pad_value": inference.PAD_VALUE,
@@ -67,8 +67,8 @@ def read_manifest(path: Path) -> Manifest:
         digest = content["sha256"]
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ManifestError(f"Cannot read the manifest {path}: {error!r}.") from error
-    if manifest.classes != CLASSES:
-        raise ManifestError(f"{path}: classes are {manifest.classes}, this program evaluates {CLASSES}.")
+    if manifest.classes[: len(CLASSES)] != CLASSES:
+        raise ManifestError(f"{path}: classes are {manifest.classes}, which do not begin with {CLASSES}.")
     if not manifest.weights.is_file():
         raise ManifestError(f"{path}: the weights {manifest.weights} do not exist.")
     if sha256_of(manifest.weights) != digest:

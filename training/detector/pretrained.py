@@ -193,8 +193,8 @@ def load_backbone(backbone: nn.Module, path: Path, images: Tensor) -> None:
 def load_exported(detector: Detector, path: Path, images: Optional[Tensor] = None) -> int:
     """Begin with the weights of an exported detector (onnx_model.py), normalisation calibrated on `images`, if any: to train on.
 
-    Layers of another shape keep theirs, so that a network of another size takes over what it shares. Returns how many
-    convolutions were taken over.
+    Layers of another shape keep theirs, so that a network of another size takes over what it shares; of scores those of the
+    classes that it has go into the first of ours. Returns how many convolutions were taken over as a whole.
     """
     try:
         stored = {entry.name: torch.from_numpy(numpy_helper.to_array(entry).copy()) for entry in onnx.load_from_string(model_bytes(path)).graph.initializer}
@@ -210,10 +210,11 @@ def load_exported(detector: Detector, path: Path, images: Optional[Tensor] = Non
     for level, head in enumerate(detector.heads):
         for part, layer, skipped in (("box", head.box[-1], 0), ("score", head.score[-1], 1)):  # objectness comes first
             weight, bias = (stored.get(f"detector.heads.{level}.{part}.1.{kind}") for kind in ("weight", "bias"))
-            if weight is not None and bias is not None and weight[skipped:].shape == layer.weight.shape:
-                layer.weight.copy_(weight[skipped:])
-                layer.bias.copy_(bias[skipped:])
-                taken += 1
+            if weight is not None and bias is not None and weight.shape[1:] == layer.weight.shape[1:]:
+                shared = min(len(weight) - skipped, len(layer.weight))
+                layer.weight[:shared].copy_(weight[skipped : skipped + shared])
+                layer.bias[:shared].copy_(bias[skipped : skipped + shared])
+                taken += len(weight) - skipped == len(layer.weight)
     if not taken:
         raise ConversionError(f"{path} is no exported detector of such a network.")
     if images is not None:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 
-from . import inference
+from . import CLASSES, inference
 from .augment import FRAMES, GROUP_SHARES, LIGHT, SETTLING, Augmenter, Recipe, Sample
 from .inference import MEAN, STD
 from .loss import Target
@@ -36,6 +36,7 @@ class Settings:
     settle: float = 0.2  # last fraction of the epochs: whole frames, weak augmentation
     precision: str = "bf16"
     simulated_share: float = GROUP_SHARES["simulated"]  # of the samples, where there are simulated drives
+    classes: Tuple[str, ...] = CLASSES  # in the order of the outputs
 
     def views_of(self, epoch: int) -> "Views":
         """What an epoch shows: the last ones whole frames, weakly changed."""

@@ -1,12 +1,12 @@
 """Running a network over the validation parts of the data."""
 
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Tuple
+from typing import Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 import torch
 
-from . import CLASSES, inference
+from . import inference
 from .data import POTHOLE, TRAFFIC_CONE, DriveFrame, Picture
 from .metrics import DriveFigures, ScoredFrame, average_precision, calibrate_threshold, drive_figures
 
@@ -72,15 +72,15 @@ class Validation:
         return drive_figures(self.potholes, calibrate_threshold(self.potholes, FALSE_REPORTS_PER_KM))
 
 
-def detect_simulated(looker: Looker, pictures: List[Picture]) -> Dict[str, List[ScoredFrame]]:
-    """Detections and labels in frames of simulated drives, by class."""
-    frames = {name: [] for name in CLASSES}
+def detect_labelled(looker: Looker, pictures: List[Picture], classes: Sequence[str]) -> Dict[str, List[ScoredFrame]]:
+    """Detections and labels by class, in pictures that label it."""
+    frames: Dict[str, List[ScoredFrame]] = {}
     for picture in pictures:
         found = looker.detect(picture.image)
-        for class_id, name in enumerate(CLASSES):
+        for class_id in sorted(set(picture.labelled_classes)):
             labels, difficult = (boxes[classes == class_id] for boxes, classes in (
                 (picture.boxes, picture.classes), (picture.difficult, picture.difficult_classes)))
-            frames[name].append(ScoredFrame(labels, found[class_id], difficult=difficult))
+            frames.setdefault(classes[class_id], []).append(ScoredFrame(labels, found[class_id], difficult=difficult))
     return frames
 
 

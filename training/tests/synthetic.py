@@ -37,6 +37,15 @@ def write_simulated(root: Path) -> Path:
     return root
 
 
+def write_own(root: Path) -> Path:
+    """A user's own pictures of potholes and a sinkhole, a class that LiveMap does not have; returns it."""
+    for index, label in enumerate(("1 0.5 0.5 0.1 0.1", "0 0.5 0.5 0.2 0.2")):
+        write_picture(root, f"own{index}", 60 + index)
+        (root / "labels" / f"own{index}.txt").write_text(f"{label}\n1 0.2 0.8 0.1 0.1\n")
+    (root / "classes.txt").write_text("sinkhole\npothole\n")
+    return root
+
+
 def write_data(root: Path) -> Path:
     """A whole data folder; returns it."""
     for number, section in enumerate((TRAINING_SECTION, VALIDATION_SECTION)):

@@ -18,7 +18,7 @@ from detector import CLASSES, onnx_model, pretrained
 from detector.manifest import sha256_of
 from detector.network import SIZES, Backbone, Detector, Widths
 
-from .synthetic import write_data
+from .synthetic import write_data, write_own
 
 
 def quietly(program, *arguments):
@@ -125,6 +125,38 @@ class Programs(unittest.TestCase):
         self.assertEqual(status, 2)
         self.assertIn("SHA-256", errors)
 
+    def test_a_class_of_the_users_own_is_trained_and_exported_without_a_change_of_the_programs(self):
+        own = write_own(self.root / "own")
+        first = self.root / "eight" / "last.pt"
+        self.assertEqual(self.train("eight"), (0, ""))
+        self.assertEqual(self.train("nine", "--own", own, "--start-from", first), (0, ""))
+        begun, state = torch.load(first), torch.load(self.root / "nine" / "last.pt")
+        self.assertEqual(state["settings"]["classes"], (*CLASSES, "sinkhole"))
+        self.assertEqual(len(state["model"]["heads.0.score.1.weight"]), len(begun["model"]["heads.0.score.1.weight"]) + 1)
+        models = self.root / "own_models"
+        models.mkdir()
+        export = ("--checkpoint", self.root / "nine" / "last.pt", "--name", "mine", "--out", models)
+        self.assertEqual(quietly(export_detector, *export, "--data", self.data, "--own", own), (0, ""))
+        manifest = yaml.safe_load((models / "mine.yaml").read_text())
+        self.assertEqual(manifest["classes"], [*CLASSES, "sinkhole"])
+        self.assertEqual(list(manifest["thresholds"]), manifest["classes"])
+        self.assertNotEqual(manifest["thresholds"]["sinkhole"], export_detector.UNCALIBRATED_THRESHOLD)
+        self.assertEqual(quietly(evaluate_detector, "--manifest", models / "mine.yaml", "--data", self.data), (0, ""))
+        # What was exported begins the next training, and its mean with others, with its classes.
+        self.assertEqual(self.train("ten", "--own", own, "--start-from", models / "mine.onnx"), (0, ""))
+        again = ("--checkpoint", models / "mine.onnx", "--checkpoint", self.root / "ten" / "last.pt", "--name", "mean", "--out", models)
+        self.assertEqual(quietly(export_detector, *again, "--data", "none"), (0, ""))
+        self.assertEqual(self.train("back", "--start-from", self.root / "nine" / "last.pt")[0], 2)
+        status, errors = quietly(export_detector, "--checkpoint", first, "--name", "x", "--out", models, "--own", own)
+        self.assertEqual((status, "sinkhole" in errors), (2, True))
+
+    def test_own_pictures_alone_suffice(self):
+        own = write_own(self.root / "alone")
+        self.assertEqual(self.train("alone_out", "--data", "none", "--own", own), (0, ""))
+        self.assertIn("--own", self.train("nothing", "--data", "none")[1])
+        (own / "classes.txt").write_text("Sink-Hole\npothole\n")
+        self.assertIn("Sink-Hole", self.train("misnamed", "--data", "none", "--own", own)[1])
+
     def test_a_torch_file_is_entered_once_and_leaves_the_rest_of_the_manifest(self):
         source = Path(__file__).resolve().parents[2] / "test" / "inference"
         models = self.root / "tiny"
@@ -158,11 +190,13 @@ class Programs(unittest.TestCase):
             (train_detector, ("--backbone-rate", 20)),
             (convert_backbone, ("--archive", nowhere, "--out", self.root / "new.pt")),
             (train_detector, ("--frobnicate",)),
-            (export_detector, ("--checkpoint", nowhere, "--out", self.root)),
-            (export_detector, ("--out", nowhere)),
-            (export_detector, ("--input", "640x401", "--out", self.root)),
-            (export_detector, ("--scales", "1,0.7", "--out", self.root)),
-            (export_detector, ("--scales", "1,0.8", "--input", "320x208", "--out", self.root)),
+            (export_detector, ("--out", self.root)),
+            (export_detector, ("--name", "x", "--checkpoint", nowhere, "--out", self.root)),
+            (export_detector, ("--name", "x", "--out", nowhere)),
+            (export_detector, ("--name", "x", "--input", "640x401", "--out", self.root)),
+            (export_detector, ("--name", "x", "--scales", "1,0.7", "--out", self.root)),
+            (export_detector, ("--name", "x", "--scales", "1,0.8", "--input", "320x208", "--out", self.root)),
+            (train_detector, ("--own", nowhere, "--out", self.root / "new")),
             (evaluate_detector, ("--manifest", nowhere)),
             (export_torch, (nowhere,)),
         ]
