@@ -140,6 +140,7 @@ def stages_of(run, profile):
         made = reports_of(run, profile)
         stages["discard"] = [1e3 * (wall - clock.wall(stamp)) for stamp, wall in candidates.items()
                              if clock.wall(stamp) is not None]
+        stages["judging"] = [entry["ms"] for entry in of_kind(vehicle, "judging")]
         stages["to_zone"] = [since(entry, candidates.get(entry["stamp"])) for entry in made]
         stages["end_to_end"] = [since(entry, clock.wall(entry["stamp"])) for entry in made]
         return stages
@@ -172,7 +173,7 @@ def boil_down(run, figures):
     drive, counts, profile = run["drive"], figures["counts"], run["profile"]
     small = "small" if profile == "small" else "big"
     told = {"name": drive["name"], "profile": profile, "radius": run["radius"], "link": bool(run["link"]),
-            "version": figures.get("version"), "complete": figures["complete"], "load": figures["load"], "drive_s": figures["drive_s"],
+            "complete": figures["complete"], "load": figures["load"], "drive_s": figures["drive_s"],
             "frames": figures["frames"], "processed": counts["frames_processed"], "dropped": counts["frames_dropped"],
             "uplink_bytes": counts["uplink_bytes"], "wire_bytes": figures["wire_bytes"],
             "reports": len(reports_of(figures, small)), "on_map": len(figures["stored"]),

@@ -83,9 +83,17 @@ def latency_rows(results):
     return rows
 
 
+def judging(rows):
+    """How much of the early discard its classifier takes."""
+    times = [row["stages"]["judging"] for row in rows if row["stages"].get("judging")]
+    return f" (the classifier: {max(found['mean'] for found in times):.0f} ms at most, on one thread)" if times else ""
+
+
 def latency_section(results, out):
     rows = latency_rows(results)
-    perception_plots.draw_latency(rows, out / "perception_latency.png")
+    thesis = [(f"thesis: {NAMES[profile]}", float(detection.split()[0]), float(round_trip.split()[0]))
+              for profile, (detection, round_trip, _) in THESIS_LATENCY.items()]
+    perception_plots.draw_latency(rows, thesis, out / "perception_latency.png")
     link = results["link"]
     cells = []
     for row in rows:
@@ -99,8 +107,8 @@ def latency_section(results, out):
         Milliseconds, mean (standard deviation). *Link*: a relay between vehicle and broker that delays each way so that
         the round trip is {link['rtt_ms']:g} +- {link['rtt_sigma_ms']:g} ms, as the thesis measured over LTE, and lets
         {link['up_mbit_s']:g} Mbit/s up and {link['down_mbit_s']:g} down through, in order, as TCP has it. *Loopback*: without
-        it. *Early discard*: from the image's stamp to the candidate frame that leaves the vehicle: judging, the wait for the next
-        fix, masking, encoding. *Detection*: from the decoded image to the boxes, per frame; of the SVC, in the zone. *Placing*: from the boxes to the report: the
+        it. *Early discard*: from the image's stamp to the candidate frame that leaves the vehicle: judging{judging(rows)}, the
+        wait for the next fix, masking, encoding. *Detection*: from the decoded image to the boxes, per frame; of the SVC, in the zone. *Placing*: from the boxes to the report: the
         wait for the first fix after the image (up to 0.3 s), projection, and the picture. *Round trip*: from the report to
         the zone's receipt of it, which comes after its fsync; of the SVC, from the candidate frame to the zone's report,
         with the zone's detection in it. *End to end*: from the image's stamp to the receipt (SVC: to the report in the
@@ -131,7 +139,8 @@ def detection_section(results):
     if detector:
         text += prose(f"""AP50 is the detector's own over all labelled frames of the drives (n = {detector['n']} frames,
             {detector['labels']} potholes), by `livemap evaluate detection`; there, frame by frame and without places, its event recall
-            is {number(detector['event_recall'], 3)} of {detector['events']} events. Event recall in the table is harder: an event
+            is {number(detector['event_recall'], 3)} of {detector['events']} events at {number(detector.get('false_per_km'), 1)} false
+            reports per km. Event recall in the table is harder: an event
             counts when a *report* reached the zone whose box overlaps a label of its own frame by IoU
             {figures.HIT_IOU}. What is too far away or badly placed to report, or suppressed as a duplicate, is missed.""")
     else:
@@ -205,17 +214,28 @@ def engines_section(results):
     return text
 
 
+def pool_rate(rows, engine):
+    """Frames/s of a pool with as many engines as cores."""
+    rates = [row["items_per_second"] for row in rows or [] if row.get("label") == engine and not row.get("error_occurred")]
+    return number(rates[0] if rates else None, 1)
+
+
 def saturated_section(results):
     runs = results.get("saturated")
     if not runs:
         return ""
-    cells = [[run["model"], number(run["processed_hz"], 1), f"{run['dropped']} of {run['frames']}", run["committed"]] for run in runs]
+    pools = results.get("pools", {})
+    cells = [[run["model"], pool_rate(pools.get(run["model"]), "opencv"), pool_rate(pools.get(run["model"]), "torch"),
+              number(run["processed_hz"], 1), f"{run['dropped']} of {run['frames']}", run["committed"]] for run in runs]
     return "## From the camera to the report\n" + prose(f"""
-        A simulated street through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s, which is what the
+        A simulated street (seed 20201, 20 s) through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s, which is what the
         thesis's camera gave and more than a vehicle here can do: what it cannot, it drops, oldest first. So what it processes is
         the rate of the whole: decoding, rectification, detector (as many engines as cores, one thread each, the engine of the model's
-        manifest), tracking, placing, masking of the reports' pictures, report. Player, broker and zone take their share of the same cores.""") + "\n" + table(
-        ["model", "frames/s", "dropped", "reports in the zone's store"], cells)
+        manifest), placing, masking of the reports' pictures, report. Player, broker and zone take their share of the same cores.
+        *Pool*: the same engines alone, on noise, as in the table above; noise has more to decode and suppress than a street where a
+        model sees boxes in it, so the whole way may be quicker than its pool.""") + "\n" + table(
+        ["model", "pool, OpenCV (frames/s)", "pool, libtorch (frames/s)", "camera to report (frames/s)", "dropped",
+         "reports in the zone's store"], cells)
 
 
 def starved(results):
@@ -232,12 +252,12 @@ def starved(results):
 
 
 def other_versions(results):
-    """Runs that --resume took up from an earlier version."""
+    """What --resume took up from an earlier version, by the names of the runs."""
     others = {}
-    for run in results["runs"]:
-        if run["version"] not in (None, results["version"]):
-            others.setdefault(run["version"], set()).add(f"{NAMES[run['profile']]}, {run['radius']} m")
-    return "".join(prose(f"Measured with version {version}: {'; '.join(sorted(found))}.") for version, found in sorted(others.items()))
+    for name, version in results.get("versions", {}).items():
+        if version != results["version"]:
+            others.setdefault(version, []).append(name)
+    return "".join(prose(f"Measured with version {version}: {', '.join(sorted(found))}.") for version, found in sorted(others.items()))
 
 
 def write(results, out):
@@ -254,7 +274,11 @@ def write(results, out):
         Drives: {drives} ({'simulated' if results['simulated'] else 'road survey at 16 m/s, stretches without pictures cut to 1 s'}),
         each configuration driven once per drive. The vehicles are real ones of `launch/vehicle.launch`, played from
         bags by `launch/replay.launch`; GPS fixes are simulated along the road. The detector, on board and in the zone, is
-        {results.get('model', 'hazards-first')}.""")
+        {results['model']}, one engine of two threads, as those launch files have it.""")
+    text += prose("""*BVC* is the thesis's big vehicle cloudlet, `vehicle.launch profile:=big`: the detector runs on board. *SVC* is its
+        small one, `profile:=small`: a classifier on board sends the frames worth it to the zone, whose detector finishes the job.
+        Numbers of tables and figures are those of the thesis's chapter 3. How to measure all this again:
+        [evaluation.md](../evaluation.md#both-vehicle-cloudlets).""")
     if results["quick"]:
         text += prose("""**The quick form**: one drive and three radii. Its figures have few events; the whole run's have more.""")
     text += starved(results) + other_versions(results)

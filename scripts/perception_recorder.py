@@ -14,6 +14,7 @@ import time
 
 import rosgraph
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock
 
 from livemap.msg import DetectionArray, HazardReport, ReportReceipt
@@ -38,9 +39,16 @@ def told_receipt(message):
     return {"uuid": message.report_uuid.hex(), "committed": message.status == ReportReceipt.COMMITTED}
 
 
+def told_judging(message):
+    """A period's mean time per picture that the early discard judged; None where there was none."""
+    times = [float(value.value) for status in message.status for value in status.values if value.key == "judging_ms"]
+    return {"ms": times[0]} if times and times[0] > 0 else None
+
+
 KINDS = {"livemap/DetectionArray": ("detections", DetectionArray, told_detections),
          "livemap/HazardReport": ("report", HazardReport, told_report),
-         "livemap/ReportReceipt": ("receipt", ReportReceipt, told_receipt)}
+         "livemap/ReportReceipt": ("receipt", ReportReceipt, told_receipt),
+         "diagnostic_msgs/DiagnosticArray": ("judging", DiagnosticArray, told_judging)}
 try:  # Only a vehicle without a detector of its own sends these.
     from livemap.msg import CandidateFrame
     KINDS["livemap/CandidateFrame"] = ("candidate", CandidateFrame, lambda message: {"stamp": message.stamp.to_nsec()})
@@ -82,7 +90,11 @@ class Recorder:
             self.look()
 
     def _taker(self, topic, name, told):
-        return lambda message: self._write({"topic": topic, "kind": name, **told(message)})
+        def take(message):
+            said = told(message)
+            if said is not None:
+                self._write({"topic": topic, "kind": name, **said})
+        return take
 
     def _take_clock(self, message):
         self.clocks += 1

@@ -69,6 +69,11 @@ class FiguresTest(unittest.TestCase):
             self.assertAlmostEqual(told[stage]["mean"], expected, places=3)
             self.assertEqual(told[stage]["n"], 1)
 
+    def test_of_a_small_vehicle_it_is_told_how_long_its_classifier_takes(self):
+        judging = {"wall": 1.0, "kind": "judging", "topic": "/diagnostics", "ms": 20.0}
+        told = figures.together([figures.stages_of({"vehicle": [judging], "zone": []}, "small")])
+        self.assertEqual(told["judging"]["mean"], 20.0)
+
     def test_a_small_vehicles_reports_are_those_of_the_zone(self):
         run = {"vehicle": [report("a", 20, WRONG)], "zone": [report("b", 20, RIGHT)]}
         self.assertEqual([entry["uuid"] for entry in figures.reports_of(run, "small")], ["b"])
@@ -113,9 +118,9 @@ class LinkTest(unittest.TestCase):
 
 
 class PageTest(unittest.TestCase):
-    def run_of(self, profile, radius, link=False, version="v"):
+    def run_of(self, profile, radius, link=False):
         stages = {"detection": [40.0, 50.0], "placing": [300.0], "round_trip": [210.0], "end_to_end": [560.0]}
-        return {"name": "d", "profile": profile, "radius": radius, "link": link, "version": version, "complete": True, "load": [1.0, 2.0],
+        return {"name": "d", "profile": profile, "radius": radius, "link": link, "complete": True, "load": [1.0, 2.0],
                 "drive_s": 30.0, "frames": 100, "processed": 90, "dropped": 10, "uplink_bytes": 30000,
                 "wire_bytes": 40000 if link else None, "reports": 5, "on_map": 4, "stages": stages, "pictures": [9000, 11000],
                 "map_ms": [], "found": {"events": 10, "found": 7, "false": 1, "km": 0.5}}
@@ -130,7 +135,8 @@ class PageTest(unittest.TestCase):
                                   "processed_hz": 21.0, "committed": 9, "load": [1.0, 2.0]}],
                    "streams": [{"frames": 100, "seconds": 30.0, "bytes": 3000000}],
                    "runs": [self.run_of("big", 1), self.run_of("big", 5), self.run_of("big", 5, link=True),
-                            self.run_of("perfect", 5, version="earlier")]}
+                            self.run_of("perfect", 5)],
+                   "pools": {"hazards-small": engines}, "versions": {"d_perfect_5m_loopback": "earlier", "engines": "v"}}
         with tempfile.TemporaryDirectory() as folder:
             text = perception_page.write(results, pathlib.Path(folder)).read_text(encoding="utf-8")
             for name in ("perception_uplink.png", "perception_latency.png"):
@@ -139,8 +145,9 @@ class PageTest(unittest.TestCase):
                      "| BVC | 3.0 | 10 of 100 | - | 0.700 (7 of 10) | 2.0 | 0.008 | 5 |",
                      "| BVC, 1 m | 0.700 (7 of 10) | 5 | 4 | 0.0080 |", "| perfect detector, 5 m | 0.700 (7 of 10) | 5 | 4 | 0.0213 |",
                      "| H.264 stream, 3.3 frames/s | - | - | - | 0.8000 |", "| torch | 1 | 1 | 10.0 | 2.50 | 50 |",
-                     "the SVC's rows are missing", "**The quick form**", "| hazards-small | 21.0 | 60 of 200 | 9 |",
-                     "The detector, on board and in the zone, is hazards-most.", "Measured with version earlier: perfect detector, 5 m."):
+                     "the SVC's rows are missing", "**The quick form**", "| hazards-small | 4.0 | 10.0 | 21.0 | 60 of 200 | 9 |",
+                     "The detector, on board and in the zone, is hazards-most,",
+                     "Measured with version earlier: d_perfect_5m_loopback."):
             self.assertIn(part, text)
 
 
