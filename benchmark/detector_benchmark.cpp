@@ -4,7 +4,7 @@
 //
 //     livemap_detector_benchmark [--benchmark_filter=REGEX] [Google Benchmark's flags]
 //
-// LIVEMAP_MODEL names another manifest than models/hazards-first.yaml, LIVEMAP_THREADS the threads
+// LIVEMAP_MODEL names another manifest than models/hazards-base.yaml, LIVEMAP_THREADS the threads
 // of the engine (default: all cores), LIVEMAP_ENGINE the engine (default: the manifest's).
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -37,7 +37,7 @@ namespace {
 
 std::string ModelPath() {
   const char* path = std::getenv("LIVEMAP_MODEL");
-  return path != nullptr ? path : ShippedModel("hazards-first");
+  return path != nullptr ? path : ShippedModel(kDefaultDetector);
 }
 
 int Threads() {

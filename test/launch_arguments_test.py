@@ -44,21 +44,24 @@ def changed(value):
 
 class LaunchArguments(unittest.TestCase):
     def test_every_parameter_of_every_node_can_be_set_by_the_argument_of_its_node(self):
-        # What an argument of its own sets already is not set twice.
-        own_arguments = {"source", "transport", "uri", "camera_info_url", "stereo", "model", "database", "drive_id",
-                         "catalogue", "publish_tf", "position_source", "use_depth", "use_events",
-                         "pictures_on_demand", "tracking", "user",
-                         "zone", "host", "port", "password_file", "directory", "hazards", "web_address", "web_port",
-                         "tile_url", "tile_attribution"}
+        """Also those that another argument sets: what was said of the node itself holds."""
         for launch, nodes in NODES.items():
             for node, file in nodes.items():
                 defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
-                wanted = {key: changed(value) for key, value in defaults.items() if key not in own_arguments}
+                wanted = {key: changed(value) for key, value in defaults.items()}
                 optional = {"edge_vo": ["vo:=true"], "geo_localization": ["vo:=true"], "early_discard": ["profile:=small"],
                             "change_detection": ["changes:=true"]}.get(node, [])
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
+
+    def test_what_an_argument_of_its_own_sets_can_be_set_by_the_argument_of_the_node_too(self):
+        for launch in NODES:
+            own = "tracking:=false" if launch == "vehicle" else "detect_for_small:=true"
+            dumped = parameters(f"{launch}.launch", own, "model:=/models/one.yaml",
+                                "hazard_detection:={model: /models/another.yaml, tracking: true}")
+            self.assertEqual(dumped["/hazard_detection/model"], "/models/another.yaml", launch)
+            self.assertIs(dumped["/hazard_detection/tracking"], True, launch)
 
     def test_a_small_vehicle_discards_early_and_has_no_detector(self):
         big, small = nodes("vehicle.launch").stdout, nodes("vehicle.launch", "profile:=small").stdout

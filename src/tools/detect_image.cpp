@@ -46,9 +46,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "{\"image\":...,\"width\":w,\"height\":h,\n"
       " \"detections\":[{\"class\":...,\"confidence\":c,\"box\":[x1,y1,x2,y2]}]}",
       CommandLine::kOneOrMore,
-      {{"model", "FILE",
-        "manifest of the model, default models/hazards-medium.yaml, the most exact; a vehicle's\n"
-        "default is hazards-first, the quicker"},
+      {{"model", "FILE", "manifest of the model, default models/hazards-base.yaml, as a vehicle's"},
        {"threshold", "X", "least confidence, instead of the manifest's"},
        {"draw", "FILE", "write the image with what was found drawn in (.jpg or .png; one IMAGE)"},
        {"engine", "NAME", "auto (what the manifest says, default), opencv or torch"},
@@ -57,7 +55,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   Options options;
   options.images = line.Positionals();
   options.model = line.Text("model", "");
-  if (options.model.empty()) options.model = ShippedModel("hazards-medium");
+  if (options.model.empty()) options.model = ShippedModel(kDefaultDetector);
   options.draw = line.Text("draw", "");
   if (line.Has("threshold")) options.threshold = line.Number("threshold", 0, 0.001, 0.999);
   options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");

@@ -49,9 +49,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "km. docs/evaluation.md defines the figures.",
       CommandLine::kOneOrMore,
       {{"json", "", "one line of JSON instead of a table"},
-       {"model", "FILE",
-        "manifest of the model, default models/hazards-medium.yaml, the most exact; a vehicle's\n"
-        "default is hazards-first, the quicker"},
+       {"model", "FILE", "manifest of the model, default models/hazards-base.yaml, as a vehicle's"},
        {"split", "NAME", "part of a DIR whose images/ and labels/ are divided, e.g. val"},
        {"label-classes", "A,B", "names of the label files' classes 0, 1, ..., default classes.txt"},
        {"sweep", "", "figures at thresholds from 0.05 to 0.95 too"},
@@ -71,7 +69,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   Options options;
   options.folders = line.Positionals();
   options.model = line.Text("model", "");
-  if (options.model.empty()) options.model = ShippedModel("hazards-medium");
+  if (options.model.empty()) options.model = ShippedModel(kDefaultDetector);
   options.json = line.Has("json");
   options.sweep = line.Has("sweep");
   options.tracking = line.Has("tracking");

@@ -38,7 +38,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "x y width height), then counts, and the time in relation to the detector's on the same "
       "photos.",
       CommandLine::kOneOrMore,
-      {{"model", "FILE", "manifest of the detector, default models/hazards-first.yaml"},
+      {{"model", "FILE", "manifest of the detector, default models/hazards-base.yaml"},
        {"cascades", "FOLDER", "OpenCV's cascades, default those of Debian's opencv-data"},
        {"face-model", "FILE", "a YuNet model that looks for the faces instead"},
        {"min-side", "PIXELS", "smaller ones are not looked for, default 16"},
@@ -47,7 +47,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (!line.Parse(argc, argv)) return std::nullopt;
   Options options;
   options.images = line.Positionals();
-  options.model = line.Text("model", ShippedModel("hazards-first"));
+  options.model = line.Text("model", ShippedModel(kDefaultDetector));
   options.output = line.Text("output", "");
   PrivateRegionConfig& regions = options.mask.regions;
   regions.cascades = line.Text("cascades", regions.cascades);
