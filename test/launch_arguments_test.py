@@ -63,6 +63,13 @@ class LaunchArguments(unittest.TestCase):
             self.assertEqual(dumped["/hazard_detection/model"], "/models/another.yaml", launch)
             self.assertIs(dumped["/hazard_detection/tracking"], True, launch)
 
+    def test_texts_that_yaml_would_read_as_numbers_or_quotes_stay_as_they_are(self):
+        dumped = parameters("vehicle.launch", "vehicle:=007", "drive:=2024_01", "zone:=1e3")
+        self.assertEqual([dumped["/mqtt_bridge/user"], dumped["/hazard_reporting/drive_id"], dumped["/mqtt_bridge/zone"]],
+                         ["007", "2024_01", "1e3"])
+        credit = """(c) l'Institut, "open" data: {all} #1"""
+        self.assertEqual(parameters("zone.launch", f"tile_attribution:={credit}")["/zone_cloudlet/tile_attribution"], credit)
+
     def test_a_small_vehicle_discards_early_and_has_no_detector(self):
         big, small = nodes("vehicle.launch").stdout, nodes("vehicle.launch", "profile:=small").stdout
         self.assertIn("/hazard_detection", big)
