@@ -173,7 +173,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 measured, 2 the command line, a model or the data is wrong."""
     parser = argparse.ArgumentParser(description="Uplink and event recall of the small vehicle.")
     parser.add_argument("--manifest", type=Path, default=Path("models/early-discard.yaml"), help="the classifier")
-    parser.add_argument("--detector", type=Path, default=Path("models/hazards-first.yaml"), help="the zone's")
+    parser.add_argument("--detector", type=Path, default=Path("models/hazards-base.yaml"), help="the zone's")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--sections", nargs="+", default=list(VALIDATION_SECTIONS), help="of the road survey")
     parser.add_argument("--speed-mps", type=float, default=16.0)
