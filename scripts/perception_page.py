@@ -232,8 +232,7 @@ def saturated_section(results):
         thesis's camera gave and more than a vehicle here can do: what it cannot, it drops, oldest first. So what it processes is
         the rate of the whole: decoding, rectification, detector (as many engines as cores, one thread each, the engine of the model's
         manifest), placing, masking of the reports' pictures, report. Player, broker and zone take their share of the same cores.
-        *Pool*: the same engines alone, on noise, as in the table above; noise has more to decode and suppress than a street where a
-        model sees boxes in it, so the whole way may be quicker than its pool.""") + "\n" + table(
+        *Pool*: the same engines alone, as in the table above.""") + "\n" + table(
         ["model", "pool, OpenCV (frames/s)", "pool, libtorch (frames/s)", "camera to report (frames/s)", "dropped",
          "reports in the zone's store"], cells)
 
