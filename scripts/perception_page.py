@@ -112,7 +112,8 @@ def latency_section(results, out):
         wait for the first fix after the image (up to 0.3 s), projection, and the picture. *Round trip*: from the report to
         the zone's receipt of it, which comes after its fsync; of the SVC, from the candidate frame to the zone's report,
         with the zone's detection in it. *End to end*: from the image's stamp to the receipt (SVC: to the report in the
-        zone); what its stages do not sum up to is waiting, for the camera's rectified image and for a turn at the detector; detection of the thesis had no further stage, so its end to end is the sum of two.""")
+        zone); what its stages do not sum up to is waiting, for the camera's rectified image and for a turn at the detector. Stages that
+        every frame goes through are means over all frames, the others over the reports, so that the sum may exceed the end to end too. Detection of the thesis had no further stage, so its end to end is the sum of two.""")
     text += "\n" + table(["configuration", "early discard", "detection", "placing", "round trip", "end to end"], cells)
     return text + "\n![Latency per stage](perception_latency.png)\n"
 
@@ -134,7 +135,9 @@ def detection_section(results):
     text = "## Table 3.2: detection\n" + prose(f"""
         Frames/s is what was processed (of the SVC: judged by its classifier) of what the drives hold: {frames} frames in {seconds:.0f} s, so
         {frames / max(seconds, 1e-9):.1f} is the most there (the thesis's camera gave 30; what the engines could do stands
-        below). Radius of duplicates {results['usual_radius_m']} m. Mbit/s is the uplink as the bridge counts it, of reports,
+        below). What the SVC's classifier did not judge it left out on
+        purpose, as it looks at 3 frames a second; *dropped* is what came too fast. Radius of duplicates {results['usual_radius_m']} m. A false report is each whose
+        box overlaps no label of its frame by IoU {figures.HIT_IOU}; `livemap evaluate detection` counts those within 12 m as one, so its figure is another. Mbit/s is the uplink as the bridge counts it, of reports,
         pictures, positions and everything else.""")
     if detector:
         text += prose(f"""AP50 is the detector's own over all labelled frames of the drives (n = {detector['n']} frames,
@@ -269,7 +272,7 @@ def write(results, out):
     text += prose(f"""Written by `./livemap bench perception{' --quick' if results['quick'] else ''}` on {results['date']}, version
         {results['version'] or 'unknown'}: {machine['cpu']}, {machine['cores']} cores. Vehicle, broker, zone, live map, player and
         recorder all ran on these cores, with a load of {min(loads):.1f} to {max(loads):.1f} before and after the runs
-        ({machine['cores']} is full): times are those of a crowded machine where it is higher, and only their ratios travel.
+        ({machine['cores']} is full), the system's own among it. Times are those of a crowded machine where it is higher, and only their ratios travel.
         Drives: {drives} ({'simulated' if results['simulated'] else 'road survey at 16 m/s, stretches without pictures cut to 1 s'}),
         each configuration driven once per drive. The vehicles are real ones of `launch/vehicle.launch`, played from
         bags by `launch/replay.launch`; GPS fixes are simulated along the road. The detector, on board and in the zone, is

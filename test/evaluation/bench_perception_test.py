@@ -4,6 +4,9 @@
     bench_perception_test.py SCRIPT
 """
 
+import argparse
+import importlib.machinery
+import importlib.util
 import json
 import pathlib
 import signal
@@ -149,6 +152,19 @@ class PageTest(unittest.TestCase):
                      "The detector, on board and in the zone, is hazards-most,",
                      "Measured with version earlier: d_perfect_5m_loopback."):
             self.assertIn(part, text)
+
+
+class ResumeTest(unittest.TestCase):
+    def test_figures_of_another_model_or_link_are_refused_and_those_of_the_same_taken_up(self):
+        loader = importlib.machinery.SourceFileLoader("bench", str(SCRIPT))
+        bench = importlib.util.module_from_spec(importlib.util.spec_from_loader("bench", loader))
+        loader.exec_module(bench)
+        with tempfile.TemporaryDirectory() as folder:
+            options = argparse.Namespace(cache=pathlib.Path(folder), quick=True, resume=True, root=".")
+            bench.Kept(options, {"model": "one"}).figures("run", lambda: [1])
+            self.assertEqual(bench.Kept(options, {"model": "one"}).figures("run", lambda: [2]), [1])
+            with self.assertRaisesRegex(bench.BenchError, "run.json' was measured with another --model or link"):
+                bench.Kept(options, {"model": "another"}).figures("run", lambda: [2])
 
 
 class MistakesTest(unittest.TestCase):
