@@ -64,7 +64,8 @@ class LaunchArguments(unittest.TestCase):
             self.assertIs(dumped["/hazard_detection/tracking"], True, launch)
 
     def test_texts_that_yaml_would_read_as_numbers_or_quotes_stay_as_they_are(self):
-        dumped = parameters("vehicle.launch", "vehicle:=007", "drive:=2024_01", "zone:=1e3")
+        dumped = parameters("vehicle.launch", "vehicle:=007", "drive:=2024_01", "zone:=1e3", "directory:=/home/o'neill")
+        self.assertEqual(dumped["/hazard_reporting/database"], "/home/o'neill/local_hazards.sqlite3")
         self.assertEqual([dumped["/mqtt_bridge/user"], dumped["/hazard_reporting/drive_id"], dumped["/mqtt_bridge/zone"]],
                          ["007", "2024_01", "1e3"])
         credit = """(c) l'Institut, "open" data: {all} #1"""

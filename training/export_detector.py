@@ -24,7 +24,7 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data, inference, onnx_model, pretrained
-from detector.manifest import ManifestError, read_manifest, write_manifest
+from detector.manifest import ManifestError, classes_of, write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
@@ -54,9 +54,8 @@ class Loaded:
 
 
 def load_exported_again(weights: Path) -> Loaded:
-    """An exported network, of whatever size it is; its classes are those of the manifest beside it, where there is one."""
-    manifest = weights.parent / f"{weights.name.split('.')[0]}.yaml"
-    classes = read_manifest(manifest).classes if manifest.is_file() else CLASSES
+    """An exported network, of whatever size it is."""
+    classes = classes_of(weights)
     for size in SIZES.values():
         detector = Detector(len(classes), size)
         convolutions = sum(isinstance(module, torch.nn.Conv2d) for module in detector.modules())

@@ -11,7 +11,7 @@ import sys
 import time
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Dict, List, Optional
+from typing import Dict, List, Optional, Tuple
 
 import cv2
 import torch
@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from detector import data
 from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
+from detector.manifest import ManifestError, classes_of
 from detector.network import SIZES, Detector
 from detector.pretrained import ConversionError, load_backbone, load_exported
 from detector.training import (
@@ -74,14 +75,17 @@ class Trainer:
         self.optimizer.load_state_dict(state["optimizer"])
         self.epoch, self.best_ap = state["epoch"], state["best_ap"]
 
+    def check_classes(self, begun: Tuple[str, ...]) -> None:
+        """Refuse weights whose outputs would become those of other classes."""
+        if begun != self.settings.classes[: len(begun)]:
+            raise UsageError(f"--start-from: its classes are {', '.join(begun)}, which ours do not begin with.")
+
     def start_from(self, state: dict) -> None:
         """Begin a new schedule with the averaged weights of another run (a warm restart, SGDR).
 
         Where that run knew the first of our classes only, the others' outputs begin untrained.
         """
-        known = tuple(state["settings"].get("classes", ()))
-        if known != self.settings.classes[: len(known)]:
-            raise UsageError(f"--start-from: the checkpoint's classes are {', '.join(known)}, which ours do not begin with.")
+        self.check_classes(tuple(state["settings"].get("classes", ())))
         weights = self.model.state_dict()
         if set(weights) != set(state["average"]):
             raise UsageError("--start-from: the checkpoint is of another network.")
@@ -102,6 +106,7 @@ class Trainer:
         if backbone:
             load_backbone(self.model.backbone, backbone, images)
         if exported:
+            self.check_classes(classes_of(exported))
             print(f"{load_exported(self.model, exported, images)} convolutions are those of {exported}", flush=True)
         self.average = AveragedModel(self.model)
 
@@ -263,7 +268,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 trained, 2 the command line or the data is wrong."""
     try:
         run(parse_arguments(arguments))
-    except (UsageError, ConversionError, data.DataError) as error:
+    except (UsageError, ManifestError, ConversionError, data.DataError) as error:
         print(f"train_detector: {error}", file=sys.stderr)
         return 2
     return 0

@@ -74,3 +74,9 @@ def read_manifest(path: Path) -> Manifest:
     if sha256_of(manifest.weights) != digest:
         raise ManifestError(f"{path}: the SHA-256 of {manifest.weights} is not the manifest's {digest}.")
     return manifest
+
+
+def classes_of(weights: Path) -> Tuple[str, ...]:
+    """What the outputs of an exported network are called: by the manifest beside it, CLASSES where there is none."""
+    manifest = weights.parent / f"{weights.name.split('.')[0]}.yaml"
+    return read_manifest(manifest).classes if manifest.is_file() else CLASSES

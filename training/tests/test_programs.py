@@ -146,7 +146,9 @@ class Programs(unittest.TestCase):
         self.assertEqual(self.train("ten", "--own", own, "--start-from", models / "mine.onnx"), (0, ""))
         again = ("--checkpoint", models / "mine.onnx", "--checkpoint", self.root / "ten" / "last.pt", "--name", "mean", "--out", models)
         self.assertEqual(quietly(export_detector, *again, "--data", "none"), (0, ""))
-        self.assertEqual(self.train("back", "--start-from", self.root / "nine" / "last.pt")[0], 2)
+        for begun in (self.root / "nine" / "last.pt", models / "mine.onnx"):
+            status, errors = self.train("back", "--start-from", begun)
+            self.assertEqual((status, "which ours do not begin with" in errors), (2, True), begun)
         status, errors = quietly(export_detector, "--checkpoint", first, "--name", "x", "--out", models, "--own", own)
         self.assertEqual((status, "sinkhole" in errors), (2, True))
 
