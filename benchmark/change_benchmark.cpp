@@ -14,14 +14,14 @@
 #include <string>
 #include <vector>
 
-#include "change/change_network.h"
-#include "change/image_features.h"
-#include "change/place_index.h"
-#include "change/registration.h"
+#include "change/memory/place_index.h"
+#include "change/methods/change_network.h"
+#include "change/registration/image_features.h"
+#include "change/registration/registration.h"
 #include "run_benchmarks.h"
-#include "simulation/renderer.h"
+#include "simulation/render/renderer.h"
 #include "test/change/simulated_pairs.h"
-#include "tools/shipped_model.h"
+#include "tools/common/shipped_model.h"
 
 namespace livemap {
 namespace {

@@ -21,16 +21,16 @@
 #include <string>
 #include <thread>
 
-#include "base/error.h"
-#include "detection/annotation.h"
-#include "detection/detector_pool.h"
-#include "detection/hazard_detector.h"
-#include "detection/privacy_mask.h"
-#include "detection/yolox_decoder.h"
+#include "common/error.h"
+#include "perception/detection/annotation.h"
+#include "perception/detection/detector_pool.h"
+#include "perception/detection/hazard_detector.h"
+#include "perception/detection/yolox_decoder.h"
+#include "perception/privacy/privacy_mask.h"
 #include "run_benchmarks.h"
-#include "simulation/renderer.h"
+#include "simulation/render/renderer.h"
 #include "test/change/simulated_pairs.h"
-#include "tools/shipped_model.h"
+#include "tools/common/shipped_model.h"
 
 namespace livemap {
 namespace {

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "hazard/duplicate_filter.h"
 #include "run_benchmarks.h"
+#include "vehicle/reporting/duplicate_filter.h"
 
 namespace livemap {
 namespace {

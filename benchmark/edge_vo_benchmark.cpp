@@ -5,11 +5,11 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "edge_vo/canny.h"
-#include "edge_vo/edge_odometry.h"
+#include "odometry/edge/canny.h"
+#include "odometry/edge/edge_odometry.h"
 #include "run_benchmarks.h"
-#include "simulation/room.h"
-#include "tools/vo_method.h"
+#include "simulation/room/room.h"
+#include "tools/odometry/vo_method.h"
 
 namespace livemap {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "run_benchmarks.h"
-#include "zone/picture_recoder.h"
+#include "zone/pictures/picture_recoder.h"
 
 namespace livemap {
 namespace {

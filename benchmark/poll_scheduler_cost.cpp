@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "zone/poll_scheduler.h"
+#include "zone/polling/poll_scheduler.h"
 
 namespace livemap {
 namespace {

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "poll_scheduler_cost.h"
-#include "zone/hazard_registry.h"
-#include "zone/zone_service.h"
+#include "zone/registry/hazard_registry.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 namespace {

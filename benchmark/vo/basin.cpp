@@ -3,11 +3,11 @@
 #include <random>
 #include <vector>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "geo/wgs84.h"
 #include "measurements.h"
 #include "pair_alignment.h"
-#include "tools/command_line.h"
+#include "tools/common/command_line.h"
 
 namespace livemap {
 namespace {

@@ -3,9 +3,9 @@
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "measurements.h"
-#include "tools/command_line.h"
+#include "tools/common/command_line.h"
 
 namespace livemap {
 namespace {

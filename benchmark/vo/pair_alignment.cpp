@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "tools/opencv_odometry.h"
+#include "tools/odometry/opencv_odometry.h"
 
 namespace livemap {
 namespace {

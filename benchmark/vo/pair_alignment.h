@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "edge_vo/edge_odometry.h"
+#include "odometry/edge/edge_odometry.h"
 
 namespace livemap {
 

@@ -4,11 +4,11 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "base/error.h"
-#include "drives/stamp_pairs.h"
+#include "common/error.h"
+#include "datasets/stamp_pairs.h"
 #include "evaluation/quantile.h"
-#include "evaluation/trajectory_report.h"
-#include "tools/sequence_pictures.h"
+#include "evaluation/trajectory/trajectory_report.h"
+#include "tools/odometry/sequence_pictures.h"
 
 namespace livemap {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "drives/sequences.h"
-#include "edge_vo/edge_odometry.h"
+#include "datasets/sequences.h"
+#include "odometry/edge/edge_odometry.h"
 
 namespace livemap {
 

@@ -5,11 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/trajectory_alignment.h"
+#include "evaluation/trajectory/trajectory_alignment.h"
 #include "measurements.h"
 #include "thread_time.h"
-#include "tools/command_line.h"
-#include "tools/vo_method.h"
+#include "tools/common/command_line.h"
+#include "tools/odometry/vo_method.h"
 
 namespace livemap {
 namespace {

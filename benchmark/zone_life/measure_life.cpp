@@ -3,8 +3,8 @@
 #include <exception>
 #include <map>
 
-#include "base/error.h"
-#include "tools/command_line.h"
+#include "common/error.h"
+#include "tools/common/command_line.h"
 #include "zone_life/study.h"
 
 namespace livemap {

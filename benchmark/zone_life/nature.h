@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <iterator>
 
-#include "drives/seeded_random.h"
+#include "datasets/seeded_random.h"
 #include "zone_life/town.h"
 
 namespace livemap {

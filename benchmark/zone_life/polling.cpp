@@ -1,6 +1,6 @@
 #include "zone_life/polling.h"
 
-#include "base/stamps.h"
+#include "common/time.h"
 
 namespace livemap {
 

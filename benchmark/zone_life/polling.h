@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "zone/poll_scheduler.h"
+#include "zone/polling/poll_scheduler.h"
 
 namespace livemap {
 

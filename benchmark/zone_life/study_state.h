@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "base/stamps.h"
-#include "zone/hazard_life.h"
-#include "zone/vehicle_allowance.h"
-#include "zone/vehicle_trust.h"
+#include "common/time.h"
+#include "zone/admission/vehicle_allowance.h"
+#include "zone/belief/hazard_lifecycle.h"
+#include "zone/belief/vehicle_trust.h"
 #include "zone_life/nature.h"
 #include "zone_life/study.h"
 #include "zone_life/town.h"

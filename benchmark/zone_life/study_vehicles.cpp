@@ -1,7 +1,7 @@
 // What the vehicles of the study do, honest and hostile ones.
 #include <algorithm>
 
-#include "zone/vehicle_track.h"
+#include "zone/registry/vehicle_track.h"
 #include "zone_life/study_state.h"
 
 namespace livemap {

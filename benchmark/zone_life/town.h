@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "drives/seeded_random.h"
+#include "datasets/seeded_random.h"
 #include "geo/wgs84.h"
 
 namespace livemap {

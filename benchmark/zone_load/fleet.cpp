@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
-#include "base/error.h"
-#include "ros/hazard_conversions.h"
+#include "common/error.h"
+#include "ros/conversions/hazard_conversions.h"
 #include "transport/envelope.h"
 
 namespace livemap {

@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "base/uuid.h"
+#include "common/uuid.h"
 #include "transport/mqtt_client.h"
 #include "zone_load/report_street.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "geo/wgs84.h"
-#include "hazard/report.h"
+#include "protocol/report.h"
 
 namespace livemap {
 

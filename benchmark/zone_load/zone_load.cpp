@@ -5,9 +5,9 @@
 #include <iostream>
 #include <string>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "evaluation/quantile.h"
-#include "tools/command_line.h"
+#include "tools/common/command_line.h"
 #include "zone_load/fleet.h"
 
 namespace livemap {

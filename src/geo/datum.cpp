@@ -3,7 +3,7 @@
 #include <GeographicLib/Geocentric.hpp>
 #include <cmath>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

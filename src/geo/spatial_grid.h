@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "base/huge_pages.h"
+#include "common/huge_pages.h"
 #include "geo/wgs84.h"
 
 namespace livemap {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/stamps.h"
+#include "common/time.h"
 #include "geo/datum.h"
 #include "geo/fix_covariance.h"
 #include "localization/median.h"

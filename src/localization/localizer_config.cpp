@@ -4,7 +4,7 @@
 #include <sstream>
 #include <string>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/stamps.h"
+#include "common/time.h"
 
 namespace livemap {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/stamps.h"
+#include "common/time.h"
 
 namespace livemap {
 namespace {

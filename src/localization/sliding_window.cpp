@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/stamps.h"
+#include "common/time.h"
 #include "localization/track_alignment.h"
 
 namespace livemap {

@@ -3,7 +3,7 @@
 #include <ros/console.h>
 #include <ros/time.h>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "base/error.h"
-#include "zone/picture_recoder.h"
+#include "common/error.h"
+#include "zone/pictures/picture_recoder.h"
 
 namespace livemap {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "zone/zone_service.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 

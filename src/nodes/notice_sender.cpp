@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "ros/hazard_conversions.h"
+#include "ros/conversions/hazard_conversions.h"
 
 namespace livemap {
 namespace {

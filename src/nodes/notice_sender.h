@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "nodes/notice_pictures.h"
-#include "zone/zone_service.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 

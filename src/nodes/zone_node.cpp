@@ -8,8 +8,8 @@
 #include <random>
 #include <utility>
 
-#include "ros/hazard_conversions.h"
-#include "ros/poll_conversions.h"
+#include "ros/conversions/hazard_conversions.h"
+#include "ros/conversions/poll_conversions.h"
 
 namespace livemap {
 namespace {

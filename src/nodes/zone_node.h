@@ -18,15 +18,15 @@
 #include <thread>
 #include <vector>
 
-#include "nodes/map_change_desk.h"
+#include "nodes/catch_up_publisher.h"
+#include "nodes/map_change_receiver.h"
 #include "nodes/notice_sender.h"
-#include "nodes/vehicle_teller.h"
-#include "ros/zone_conversions.h"
-#include "ros/zone_parameters.h"
-#include "web/server.h"
-#include "zone/catch_up.h"
-#include "zone/report_queue.h"
-#include "zone/zone_service.h"
+#include "ros/conversions/zone_conversions.h"
+#include "ros/parameters/zone_parameters.h"
+#include "web/server/server.h"
+#include "zone/service/catch_up.h"
+#include "zone/service/report_queue.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <limits>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <system_error>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 

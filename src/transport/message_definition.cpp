@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

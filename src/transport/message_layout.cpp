@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "transport/message_definition.h"
 
 namespace livemap {

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <system_error>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <thread>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "transport/backoff.h"
 #include "transport/event_fd.h"
 #include "transport/mosquitto_handle.h"

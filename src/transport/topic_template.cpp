@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

@@ -5,10 +5,10 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "drives/camera_file.h"
-#include "simulation/lighting.h"
-#include "simulation/pass_drive.h"
-#include "simulation/renderer.h"
+#include "datasets/camera_file.h"
+#include "simulation/motion/pass_drive.h"
+#include "simulation/render/lighting.h"
+#include "simulation/render/renderer.h"
 
 namespace livemap {
 

@@ -16,7 +16,7 @@ import numpy
 import rospy
 from sensor_msgs.msg import CameraInfo, Image, NavSatFix
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import hazard_reporting_fixture as street  # noqa: E402
 from livemap.msg import DetectionArray  # noqa: E402
 

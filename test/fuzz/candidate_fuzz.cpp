@@ -7,7 +7,7 @@
 #include <cstring>
 #include <string>
 
-#include "zone/candidate_intake.h"
+#include "zone/offload/offload_intake.h"
 
 namespace livemap {
 namespace {

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "base/error.h"
-#include "change/change_predictions.h"
-#include "change/place_record.h"
+#include "change/measures/change_predictions.h"
+#include "change/memory/place_record.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

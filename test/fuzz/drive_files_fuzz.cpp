@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "base/image_header.h"
-#include "drives/camera_file.h"
-#include "drives/labels.h"
-#include "drives/route.h"
-#include "drives/sequences.h"
-#include "drives/survey.h"
+#include "common/error.h"
+#include "datasets/camera_file.h"
+#include "datasets/labels.h"
+#include "datasets/route.h"
+#include "datasets/sequences.h"
+#include "datasets/survey.h"
+#include "imaging/image_header.h"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "base/error.h"
-#include "edge_vo/edge_odometry.h"
+#include "common/error.h"
+#include "odometry/edge/edge_odometry.h"
 
 namespace {
 

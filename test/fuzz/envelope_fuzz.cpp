@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "transport/envelope.h"
 #include "transport/message_layout.h"
 #include "transport/topic_template.h"

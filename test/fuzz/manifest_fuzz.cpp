@@ -7,11 +7,11 @@
 #include <string>
 #include <string_view>
 
-#include "base/error.h"
-#include "change/change_manifest.h"
-#include "inference/model_manifest.h"
-#include "inference/onnx_inputs.h"
-#include "inference/unpack.h"
+#include "change/methods/change_manifest.h"
+#include "common/error.h"
+#include "perception/inference/model_manifest.h"
+#include "perception/inference/onnx_inputs.h"
+#include "perception/inference/unpack.h"
 
 namespace livemap {
 namespace {

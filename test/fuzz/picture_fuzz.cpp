@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "base/image_header.h"
-#include "ingest/decode.h"
-#include "zone/picture_recoder.h"
+#include "common/error.h"
+#include "imaging/decode.h"
+#include "imaging/image_header.h"
+#include "zone/pictures/picture_recoder.h"
 
 namespace livemap {
 namespace {

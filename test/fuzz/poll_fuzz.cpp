@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/error.h"
-#include "hazard/poll_checks.h"
-#include "store_script.h"
-#include "zone/zone_service.h"
+#include "common/error.h"
+#include "protocol/poll_validation.h"
+#include "test/fuzz/store_script.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 namespace {

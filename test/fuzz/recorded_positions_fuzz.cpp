@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string>
 
-#include "base/error.h"
-#include "drives/comma2k19.h"
+#include "common/error.h"
+#include "datasets/comma2k19.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;

@@ -5,10 +5,10 @@
 #include <cstdlib>
 #include <string>
 
-#include "base/error.h"
-#include "evaluation/labelled_folder.h"
-#include "hazard/catalogue.h"
-#include "web/official_gate.h"
+#include "common/error.h"
+#include "evaluation/detection/labelled_folder.h"
+#include "protocol/hazard_catalogue.h"
+#include "web/api/official_authenticator.h"
 
 namespace livemap {
 namespace {

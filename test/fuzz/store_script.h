@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "base/sqlite.h"
+#include "common/sqlite.h"
 
 namespace livemap {
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <string>
 
-#include "base/error.h"
-#include "evaluation/trajectory.h"
-#include "evaluation/trajectory_report.h"
+#include "common/error.h"
+#include "evaluation/trajectory/trajectory.h"
+#include "evaluation/trajectory/trajectory_report.h"
 
 namespace {
 

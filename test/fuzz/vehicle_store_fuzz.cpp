@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "hazard/local_hazard_map.h"
-#include "store_script.h"
+#include "test/fuzz/store_script.h"
+#include "vehicle/reporting/local_hazard_map.h"
 
 namespace livemap {
 namespace {

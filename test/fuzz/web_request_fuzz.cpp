@@ -4,12 +4,12 @@
 #include <cstdlib>
 #include <string>
 
-#include "base/uuid.h"
-#include "web/decision.h"
-#include "web/official_gate.h"
-#include "web/origin.h"
-#include "web/query.h"
-#include "web/static_files.h"
+#include "common/uuid.h"
+#include "web/api/official_authenticator.h"
+#include "web/api/official_decision.h"
+#include "web/api/query.h"
+#include "web/http/origin.h"
+#include "web/http/static_files.h"
 
 namespace {
 

@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <string>
 
-#include "base/error.h"
-#include "simulation/road_line.h"
-#include "simulation/world_file.h"
+#include "common/error.h"
+#include "simulation/world/road_line.h"
+#include "simulation/world/world_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {

@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "base/image_header.h"
-#include "zone/report_validation.h"
+#include "imaging/image_header.h"
+#include "zone/admission/report_validation.h"
 
 namespace livemap {
 namespace {

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <random>
 
-#include "store_script.h"
-#include "zone/report_validation.h"
-#include "zone/zone_service.h"
+#include "test/fuzz/store_script.h"
+#include "zone/admission/report_validation.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

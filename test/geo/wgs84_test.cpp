@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

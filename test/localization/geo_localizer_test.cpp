@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
-#include "localization/simulated_drive.h"
+#include "common/error.h"
+#include "test/localization/simulated_drive.h"
 
 namespace livemap {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "localization/simulated_drive.h"
+#include "test/localization/simulated_drive.h"
 
 namespace livemap {
 namespace {

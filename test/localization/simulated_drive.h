@@ -7,7 +7,7 @@
 #include <map>
 #include <optional>
 
-#include "base/stamps.h"
+#include "common/time.h"
 #include "geo/wgs84.h"
 #include "localization/geo_localizer.h"
 #include "localization/planar.h"

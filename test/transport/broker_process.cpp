@@ -1,4 +1,4 @@
-#include "broker_process.h"
+#include "test/transport/broker_process.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -15,7 +15,7 @@
 #include <fstream>
 #include <thread>
 
-#include "base/error.h"
+#include "common/error.h"
 #include "transport/event_fd.h"
 #include "transport/tcp_probe.h"
 

@@ -11,9 +11,9 @@
 #include <set>
 #include <thread>
 
-#include "base/error.h"
-#include "broker_process.h"
-#include "waiting.h"
+#include "common/error.h"
+#include "test/transport/broker_process.h"
+#include "test/transport/waiting.h"
 
 namespace livemap {
 namespace {

@@ -9,10 +9,10 @@
 #include <map>
 #include <mutex>
 
-#include "base/error.h"
-#include "broker_process.h"
+#include "common/error.h"
+#include "test/transport/broker_process.h"
+#include "test/transport/waiting.h"
 #include "transport/mqtt_client.h"
-#include "waiting.h"
 
 namespace livemap {
 namespace {

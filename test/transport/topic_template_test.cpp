@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "common/error.h"
 
 namespace livemap {
 namespace {

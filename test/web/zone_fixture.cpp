@@ -1,4 +1,4 @@
-#include "zone_fixture.h"
+#include "test/web/zone_fixture.h"
 
 #include <sys/stat.h>
 

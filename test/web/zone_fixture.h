@@ -7,9 +7,9 @@
 #include <random>
 #include <string>
 
-#include "hazard/catalogue.h"
-#include "web/server.h"
-#include "zone/zone_service.h"
+#include "protocol/hazard_catalogue.h"
+#include "web/server/server.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "geo/wgs84.h"
-#include "hazard/map_change_report.h"
+#include "protocol/map_change_report.h"
 
 namespace livemap {
 

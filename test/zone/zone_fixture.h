@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "hazard/report.h"
-#include "zone/zone_service.h"
+#include "protocol/report.h"
+#include "zone/service/zone_service.h"
 
 namespace livemap {
 

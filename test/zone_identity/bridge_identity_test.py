@@ -8,7 +8,7 @@ import tempfile
 import unittest
 
 HERE = os.path.dirname(os.path.realpath(__file__))
-sys.path[:0] = [HERE, os.path.dirname(HERE)]
+sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "support")]
 
 import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402

@@ -1,0 +1,90 @@
+#include "change/methods/change_manifest.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+
+#include "common/error.h"
+#include "perception/inference/manifest_section.h"
+#include "protocol/change_class.h"
+
+namespace livemap {
+namespace {
+
+/// Names of features are told apart by one digit.
+constexpr int kMostLevels = 10;
+
+ChangeManifest::Graph ReadGraph(const ManifestSection& graphs, const std::string& part,
+                                const std::filesystem::path& directory) {
+  const ManifestSection graph = graphs.Sub(part, {"file", "sha256"});
+  return {(directory / graph.Text("file")).string(), graph.Hash("sha256")};
+}
+
+/// Their order is that of the channels of the answer, so it must be the program's.
+void CheckClasses(const ManifestSection& root) {
+  const std::vector<std::string> classes = root.DistinctTexts("classes", 1000);
+  std::string accepted;
+  bool same = classes.size() == static_cast<std::size_t>(kChangeClasses);
+  for (int i = 0; i < kChangeClasses; ++i) {
+    const std::string name = ChangeClassName(static_cast<ChangeClass>(i));
+    accepted += (accepted.empty() ? "" : ", ") + name;
+    same = same && classes[static_cast<std::size_t>(i)] == name;
+  }
+  if (!same) root.Refuse("classes", "in this order " + accepted);
+}
+
+double Threshold(const ManifestSection& thresholds, const std::string& key) {
+  return static_cast<double>(thresholds.Number(key, 1e-6, 1));
+}
+
+}  // namespace
+
+ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& origin,
+                                   const std::string& directory) {
+  if (yaml.size() > kMostManifestBytes) {
+    throw Error("model manifest '" + origin + "' has " + std::to_string(yaml.size()) +
+                " bytes, at most " + std::to_string(kMostManifestBytes) + " are accepted");
+  }
+  try {
+    const YAML::Node file = YAML::Load(yaml);
+    if (file.IsMap() && !file["kind"].IsDefined()) {
+      throw Error("model manifest '" + origin +
+                  "' has no key 'kind', accepted is a network of change: kind: change");
+    }
+    const ManifestSection root(
+        file, origin, "",
+        {"name", "kind", "graphs", "classes", "input", "normalisation", "head", "thresholds"});
+    root.Choice("kind", {"change"});
+    ChangeManifest manifest;
+    manifest.name = root.Text("name");
+    CheckClasses(root);
+    const ManifestSection graphs = root.Sub("graphs", {"whole", "encoder", "head"});
+    manifest.whole = ReadGraph(graphs, "whole", directory);
+    manifest.encoder = ReadGraph(graphs, "encoder", directory);
+    manifest.head = ReadGraph(graphs, "head", directory);
+    const ManifestSection input =
+        root.Sub("input", {"width", "height", "channels", "resize", "pad_value", "invalid"});
+    manifest.input = ReadManifestInput(input);
+    input.Choice("invalid", {"other_picture"});
+    manifest.normalisation = ReadManifestNormalisation(root);
+    const ManifestSection head = root.Sub("head", {"type", "levels", "output"});
+    head.Choice("type", {"change"});
+    manifest.levels = head.Integer("levels", 1, kMostLevels);
+    manifest.output = head.Text("output");
+    const ManifestSection thresholds =
+        root.Sub("thresholds", {"changed", "changed_at_fpr_0.01", "changed_at_fpr_0.10"});
+    manifest.changed = Threshold(thresholds, "changed");
+    manifest.changed_at_fpr_001 = Threshold(thresholds, "changed_at_fpr_0.01");
+    manifest.changed_at_fpr_010 = Threshold(thresholds, "changed_at_fpr_0.10");
+    return manifest;
+  } catch (const YAML::Exception& error) {
+    throw Error("model manifest '" + origin + "' is no valid YAML: " + error.what());
+  }
+}
+
+ChangeManifest ReadChangeManifest(const std::string& path) {
+  const std::string yaml = ReadFile(path, kMostManifestBytes);
+  return ParseChangeManifest(yaml, path, std::filesystem::path(path).parent_path().string());
+}
+
+}  // namespace livemap

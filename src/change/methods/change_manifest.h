@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+
+#include "perception/inference/model_manifest.h"
+
+namespace livemap {
+
+/// Everything that must be known about a network of change to run it: the content of
+/// models/NAME.yaml of `kind: change`, checked. docs/training.md ("The exported model") describes
+/// the file.
+struct ChangeManifest {
+  /// An ONNX file.
+  struct Graph {
+    std::string file;    ///< Path.
+    std::string sha256;  ///< 64 lower-case hexadecimal digits.
+  };
+
+  std::string name;
+  Graph whole;    ///< Two pictures and validity to probabilities.
+  Graph encoder;  ///< One picture to its features.
+  Graph head;     ///< Features of both and validity to probabilities.
+  ModelManifest::Input input;
+  ModelManifest::Normalisation normalisation;
+  int levels = 0;      ///< Of features, 1 to 10.
+  std::string output;  ///< Name of the probabilities.
+  /// Least 1 - probability of no change at which a pixel counts as changed, (0, 1); the others have
+  /// that share of false positives on the validation pairs.
+  double changed = 0.5;
+  double changed_at_fpr_001 = 0.5;
+  double changed_at_fpr_010 = 0.5;
+};
+
+/// Reads and checks a manifest file; its graphs are resolved against its folder and not touched.
+/// Throws Error naming the file, the key, its value and what is accepted; unknown, missing and
+/// repeated keys are errors too, and so are classes other than those of ChangeClass.
+ChangeManifest ReadChangeManifest(const std::string& path);
+
+/// The same from text; `origin` names it in errors, `directory` is what its files are relative to.
+ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& origin,
+                                   const std::string& directory);
+
+}  // namespace livemap

@@ -1,0 +1,184 @@
+#include "change/methods/change_network.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "common/error.h"
+#include "perception/inference/engines.h"
+#include "perception/inference/manifest_section.h"
+
+namespace livemap {
+namespace {
+
+/// Of a probability beyond [0, 1]: sums of float32 are not exact.
+constexpr double kRounding = 1e-3;
+
+OnnxGraph LoadGraph(const ChangeManifest& manifest, const ChangeManifest::Graph& graph) {
+  return {graph.file, ReadHashedFile(manifest.name, graph.file, graph.sha256)};
+}
+
+cv::Mat Zeros(const std::vector<std::int64_t>& shape) {
+  const std::vector<int> sizes(shape.begin(), shape.end());
+  return {sizes, CV_32F, cv::Scalar(0)};
+}
+
+std::vector<std::int64_t> PictureShape(const ModelManifest::Input& input) {
+  return {1, 3, input.height, input.width};
+}
+
+std::vector<std::int64_t> ValidityShape(const ModelManifest::Input& input) {
+  return {1, 1, input.height, input.width};
+}
+
+}  // namespace
+
+std::size_t ChangeFeatures::Bytes() const {
+  std::size_t bytes = 0;
+  for (const cv::Mat& level : levels) bytes += level.total() * level.elemSize();
+  return bytes;
+}
+
+ChangeNetwork::ChangeNetwork(const ChangeManifest& manifest, int threads)
+    : manifest_(manifest),
+      before_letterbox_(manifest.input, manifest.normalisation),
+      after_letterbox_(manifest.input, manifest.normalisation),
+      whole_(LoadGraph(manifest, manifest.whole)),
+      encoder_(LoadGraph(manifest, manifest.encoder)),
+      head_(LoadGraph(manifest, manifest.head)) {
+  if (threads > 0) cv::setNumThreads(threads);
+  CheckWhole();
+  CheckParts();
+}
+
+void ChangeNetwork::CheckWhole() {
+  const std::vector<std::int64_t> picture = PictureShape(manifest_.input);
+  const std::vector<std::int64_t> validity = ValidityShape(manifest_.input);
+  whole_.RequireInput("first", picture);
+  whole_.RequireInput("second", picture);
+  whole_.RequireInput("validity", validity);
+  CheckAnswer(whole_, whole_.Run({{"first", Zeros(picture)},
+                                  {"second", Zeros(picture)},
+                                  {"validity", Zeros(validity)}}));
+}
+
+void ChangeNetwork::CheckParts() {
+  encoder_.RequireInput("image", PictureShape(manifest_.input));
+  const auto levels = static_cast<std::size_t>(manifest_.levels);
+  for (std::size_t level = 0; level < levels; ++level) {
+    const std::string name = "features_" + std::to_string(level);
+    if (encoder_.outputs().size() == levels && encoder_.outputs()[level] == name) continue;
+    throw Error("model file '" + encoder_.file() + "' has " +
+                std::to_string(encoder_.outputs().size()) + " outputs, its manifest accepts " +
+                std::to_string(levels) + " named features_0, features_1, ...");
+  }
+  const std::vector<cv::Mat> features = RunEncoder(Zeros(PictureShape(manifest_.input)));
+  for (std::size_t level = 0; level < levels; ++level) {
+    head_.RequireInput("first_" + std::to_string(level), ShapeOf(features[level]));
+    head_.RequireInput("second_" + std::to_string(level), ShapeOf(features[level]));
+  }
+  head_.RequireInput("validity", ValidityShape(manifest_.input));
+  CheckAnswer(head_,
+              head_.Run(HeadInputs(features, features, Zeros(ValidityShape(manifest_.input)))));
+}
+
+void ChangeNetwork::CheckAnswer(const OnnxGraph& graph, const std::vector<cv::Mat>& answers) const {
+  const std::vector<std::string>& names = graph.outputs();
+  if (names.size() != 1 || names[0] != manifest_.output) {
+    throw Error("model file '" + graph.file() + "' has " + std::to_string(names.size()) +
+                " outputs, the first named '" + (names.empty() ? "" : names[0]) +
+                "', its manifest accepts one named '" + manifest_.output + "'");
+  }
+  const std::vector<std::int64_t> shape = {1, kChangeClasses, manifest_.input.height,
+                                           manifest_.input.width};
+  if (answers[0].type() != CV_32F || ShapeOf(answers[0]) != shape) {
+    throw Error("model file '" + graph.file() + "' answers with a tensor of " +
+                ShapeText(ShapeOf(answers[0])) + ", its manifest accepts " + ShapeText(shape));
+  }
+}
+
+std::vector<cv::Mat> ChangeNetwork::RunEncoder(const cv::Mat& image) {
+  std::vector<cv::Mat> features = encoder_.Run({{"image", image}});
+  // The graph's own buffers are written again by the next picture.
+  for (cv::Mat& level : features) level = level.clone();
+  return features;
+}
+
+ChangeNetwork::NamedTensors ChangeNetwork::HeadInputs(const std::vector<cv::Mat>& first,
+                                                      const std::vector<cv::Mat>& second,
+                                                      const cv::Mat& validity) {
+  NamedTensors inputs;
+  for (std::size_t level = 0; level < first.size(); ++level) {
+    inputs.emplace_back("first_" + std::to_string(level), first[level]);
+    inputs.emplace_back("second_" + std::to_string(level), second[level]);
+  }
+  inputs.emplace_back("validity", validity);
+  return inputs;
+}
+
+ChangeFeatures ChangeNetwork::Encode(const cv::Mat& picture) {
+  return {RunEncoder(before_letterbox_.Fill(picture)), picture.size()};
+}
+
+ChangeProbabilities ChangeNetwork::Compare(const ChangeFeatures& before,
+                                           const ChangeFeatures& after, const cv::Mat& valid) {
+  const auto levels = static_cast<std::size_t>(manifest_.levels);
+  if (before.size != after.size || before.levels.size() != levels ||
+      after.levels.size() != levels) {
+    throw Error("features to compare are of pictures of " + std::to_string(before.size.width) +
+                "x" + std::to_string(before.size.height) + " and " +
+                std::to_string(after.size.width) + "x" + std::to_string(after.size.height) +
+                ", accepted are those that Encode makes of two pictures of one size");
+  }
+  CheckValidity(valid, after.size);
+  const std::vector<cv::Mat> answers =
+      head_.Run(HeadInputs(before.levels, after.levels, Validity(valid)));
+  ChangeProbabilities probabilities = Enlarged(answers[0], valid.size());
+  SayNothingOfUnseen(valid, probabilities);
+  return probabilities;
+}
+
+ChangeProbabilities ChangeNetwork::Infer(const AlignedPair& pair) {
+  const cv::Mat before = FillUnknown(pair.before, pair.after, pair.valid);
+  const std::vector<cv::Mat> answers = whole_.Run({{"first", before_letterbox_.Fill(before)},
+                                                   {"second", after_letterbox_.Fill(pair.after)},
+                                                   {"validity", Validity(pair.valid)}});
+  return Enlarged(answers[0], pair.valid.size());
+}
+
+cv::Mat ChangeNetwork::Validity(const cv::Mat& valid) const {
+  const cv::Size fitted = after_letterbox_.Fitted(valid.size());
+  cv::Mat share;
+  cv::resize(valid, share, fitted, 0, 0, cv::INTER_AREA);
+  const int shape[] = {1, 1, manifest_.input.height, manifest_.input.width};
+  cv::Mat validity(4, shape, CV_32F, cv::Scalar(1));
+  cv::Mat plane(manifest_.input.height, manifest_.input.width, CV_32FC1, validity.ptr<float>());
+  // What is known in part is not known.
+  plane(cv::Rect(cv::Point(), fitted)).setTo(0, share < 255);
+  return validity;
+}
+
+ChangeProbabilities ChangeNetwork::Enlarged(const cv::Mat& answer, cv::Size size) const {
+  const cv::Rect shown(cv::Point(), after_letterbox_.Fitted(size));
+  ChangeProbabilities probabilities;
+  for (int i = 0; i < kChangeClasses; ++i) {
+    const cv::Mat plane(manifest_.input.height, manifest_.input.width, CV_32FC1,
+                        const_cast<float*>(answer.ptr<float>(0, i)));
+    if (!cv::checkRange(plane, true, nullptr, -kRounding, 1 + kRounding)) {
+      throw Error("model '" + manifest_.name + "' gives class " +
+                  ChangeClassName(static_cast<ChangeClass>(i)) +
+                  " a value that is no probability, accepted is 0 to 1");
+    }
+    cv::Mat enlarged;
+    cv::resize(plane(shown), enlarged, size, 0, 0, cv::INTER_LINEAR);
+    cv::min(enlarged, 1, enlarged);
+    cv::max(enlarged, 0, enlarged);
+    probabilities.of_class.push_back(enlarged);
+  }
+  return probabilities;
+}
+
+std::unique_ptr<ChangeNetwork> MakeChangeNetwork(const std::string& path, int threads) {
+  return std::make_unique<ChangeNetwork>(ReadChangeManifest(path), threads);
+}
+
+}  // namespace livemap

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "change/methods/change_manifest.h"
+#include "change/methods/change_method.h"
+#include "perception/inference/letterbox.h"
+#include "perception/inference/onnx_graph.h"
+
+namespace livemap {
+
+/// What the network's encoder makes of one picture; depends on that picture alone, so that those of
+/// remembered pictures can be kept. Continuous float32, finest first.
+struct ChangeFeatures {
+  std::vector<cv::Mat> levels;
+  cv::Size size;  ///< Of the picture, pixels.
+
+  std::size_t Bytes() const;
+};
+
+/// The network of change (thesis, section 4.4) on OpenCV's DNN module, on the CPU. Pictures may
+/// have any size: they are letterboxed to the network's, and its answer is enlarged to theirs.
+/// Where the pair is not valid the probability of no change is 1. Not thread-safe.
+class ChangeNetwork final : public ChangeMethod {
+ public:
+  /// Loads the three graphs and runs each once. Throws Error when a file is missing, has another
+  /// SHA-256 than the manifest's, cannot be loaded, or takes or gives something else than the
+  /// manifest says. `threads` > 0: of OpenCV's pool, which is one for the process.
+  explicit ChangeNetwork(const ChangeManifest& manifest, int threads = 0);
+
+  bool tells_classes() const override { return true; }
+  const ChangeManifest& manifest() const { return manifest_; }
+
+  /// `picture`: CV_8UC3, BGR; Error otherwise.
+  ChangeFeatures Encode(const cv::Mat& picture);
+  /// The same answer as Run, from features of both pictures. Where `valid` (CV_8UC1, their size)
+  /// is 0 the warped picture must have shown the other's pixels, see FillUnknown. Throws Error when
+  /// sizes or features do not fit.
+  ChangeProbabilities Compare(const ChangeFeatures& before, const ChangeFeatures& after,
+                              const cv::Mat& valid);
+
+ protected:
+  ChangeProbabilities Infer(const AlignedPair& pair) override;
+
+ private:
+  using NamedTensors = std::vector<std::pair<std::string, cv::Mat>>;
+
+  void CheckWhole();
+  void CheckParts();
+  /// Throws Error unless it is what the manifest says of the probabilities.
+  void CheckAnswer(const OnnxGraph& graph, const std::vector<cv::Mat>& answers) const;
+  std::vector<cv::Mat> RunEncoder(const cv::Mat& image);
+  static NamedTensors HeadInputs(const std::vector<cv::Mat>& first,
+                                 const std::vector<cv::Mat>& second, const cv::Mat& validity);
+  /// 1 x 1 x H x W: 1 where the pair is valid, and on the padding.
+  cv::Mat Validity(const cv::Mat& valid) const;
+  /// From the network's answer to images of `size`. Throws Error when it holds something that is no
+  /// probability.
+  ChangeProbabilities Enlarged(const cv::Mat& answer, cv::Size size) const;
+
+  ChangeManifest manifest_;
+  Letterbox before_letterbox_;
+  Letterbox after_letterbox_;
+  OnnxGraph whole_;
+  OnnxGraph encoder_;
+  OnnxGraph head_;
+};
+
+/// Reads `path` and makes the network. Throws Error as ReadChangeManifest and ChangeNetwork do.
+std::unique_ptr<ChangeNetwork> MakeChangeNetwork(const std::string& path, int threads = 0);
+
+}  // namespace livemap

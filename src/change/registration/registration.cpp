@@ -1,0 +1,335 @@
+#include "change/registration/registration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "change/registration/robust_fit.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kReferenceWidth = 640;
+
+std::string Figure(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3g", value);
+  return text;
+}
+
+void Refuse(RegistrationRefusal refusal, const std::string& why, Registration& registration) {
+  registration.refusal = refusal;
+  registration.why = why;
+}
+
+/// Local magnifications and turn of a homography at a pixel.
+struct LocalShape {
+  bool in_front = false;
+  double determinant = 0;
+  double greatest = 0;
+  double least = 0;
+  double turn_rad = 0;
+};
+
+LocalShape ShapeAt(const cv::Matx33d& h, double x, double y) {
+  LocalShape shape;
+  const double w = h(2, 0) * x + h(2, 1) * y + h(2, 2);
+  shape.in_front = w > 1e-6;
+  if (!shape.in_front) return shape;
+  const double u = (h(0, 0) * x + h(0, 1) * y + h(0, 2)) / w;
+  const double v = (h(1, 0) * x + h(1, 1) * y + h(1, 2)) / w;
+  const double a = (h(0, 0) - u * h(2, 0)) / w;
+  const double b = (h(0, 1) - u * h(2, 1)) / w;
+  const double c = (h(1, 0) - v * h(2, 0)) / w;
+  const double d = (h(1, 1) - v * h(2, 1)) / w;
+  shape.determinant = a * d - b * c;
+  // Singular values of a 2x2 matrix in closed form.
+  const double sum = std::hypot(a + d, c - b);
+  const double difference = std::hypot(a - d, c + b);
+  shape.greatest = (sum + difference) / 2;
+  shape.least = std::abs(sum - difference) / 2;
+  shape.turn_rad = std::atan2(c - b, a + d);
+  return shape;
+}
+
+/// What is wrong with a homography for two drives down one road; empty when nothing is.
+std::string WhyDegenerate(const cv::Matx33d& h, cv::Size size, const RegistrationOptions& options) {
+  const double right = size.width - 1;
+  const double low = size.height - 1;
+  for (const auto& [x, y] :
+       {std::pair(0.0, 0.0), {right, 0.0}, {0.0, low}, {right, low}, {right / 2, low / 2}}) {
+    const LocalShape shape = ShapeAt(h, x, y);
+    if (!shape.in_front || shape.determinant <= 0) return "the warp mirrors a part of the picture";
+    if (shape.greatest > options.most_scale || shape.least * options.most_scale < 1) {
+      return "the warp scales by " + Figure(shape.least) + " to " + Figure(shape.greatest) +
+             ", accepted is up to " + Figure(options.most_scale) + " and its inverse";
+    }
+    if (shape.greatest > options.most_shear * shape.least) {
+      return "the warp shears by " + Figure(shape.greatest / shape.least) + ", accepted is up to " +
+             Figure(options.most_shear);
+    }
+    const double turn_deg = std::abs(shape.turn_rad) * 180 / CV_PI;
+    if (turn_deg > options.most_turn_deg) {
+      return "the warp turns the picture by " + Figure(turn_deg) + " degrees, accepted are up to " +
+             Figure(options.most_turn_deg);
+    }
+  }
+  return "";
+}
+
+void CheckSizes(cv::Size before, cv::Size after, Registration& registration) {
+  if (before == after) return;
+  Refuse(RegistrationRefusal::kSize,
+         "the earlier picture is " + std::to_string(before.width) + "x" +
+             std::to_string(before.height) + ", the later one " + std::to_string(after.width) +
+             "x" + std::to_string(after.height),
+         registration);
+}
+
+/// Matched points of both pictures, in one order.
+struct MatchedPoints {
+  std::vector<cv::Point2d> before;
+  std::vector<cv::Point2d> after;
+};
+
+/// The checks that both registrations begin with.
+MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
+                    const RegistrationOptions& options, Registration& registration) {
+  MatchedPoints points;
+  CheckSizes(before.size, after.size, registration);
+  if (!registration.accepted()) return points;
+  const std::size_t fewer = std::min(before.features.points.size(), after.features.points.size());
+  if (fewer < static_cast<std::size_t>(options.least_features)) {
+    Refuse(RegistrationRefusal::kTexture,
+           "a picture has " + std::to_string(fewer) + " features, accepted are " +
+               std::to_string(options.least_features) + " and more",
+           registration);
+    return points;
+  }
+  for (const auto& [a, b] : MatchFeatures(before.features, after.features, options.ratio)) {
+    points.before.emplace_back(before.features.points[static_cast<std::size_t>(a)]);
+    points.after.emplace_back(after.features.points[static_cast<std::size_t>(b)]);
+  }
+  registration.matches = points.before.size();
+  if (points.before.size() < static_cast<std::size_t>(options.least_matches)) {
+    Refuse(RegistrationRefusal::kMatches,
+           std::to_string(points.before.size()) + " features match, accepted are " +
+               std::to_string(options.least_matches) + " and more",
+           registration);
+  }
+  return points;
+}
+
+/// Are there enough inliers, do they lie apart, and do they fit?
+void CheckInliers(const std::vector<cv::Point2d>& after, const RobustFit& fit, cv::Size size,
+                  const RegistrationOptions& options, Registration& registration) {
+  registration.inliers = fit.inliers.size();
+  registration.error_px = fit.error_px;
+  const auto inliers = static_cast<double>(fit.inliers.size());
+  if (inliers < options.least_inliers ||
+      inliers < options.least_inlier_share * static_cast<double>(registration.matches)) {
+    Refuse(RegistrationRefusal::kInliers,
+           std::to_string(fit.inliers.size()) + " of " + std::to_string(registration.matches) +
+               " matches agree, accepted are " + std::to_string(options.least_inliers) +
+               " and more, and a share of " + Figure(options.least_inlier_share),
+           registration);
+    return;
+  }
+  std::vector<cv::Point2f> agreeing;
+  for (const std::size_t i : fit.inliers) agreeing.emplace_back(after[i]);
+  std::vector<cv::Point2f> hull;
+  cv::convexHull(agreeing, hull);
+  const double spread = cv::contourArea(hull) / size.area();
+  if (spread < options.least_spread) {
+    Refuse(RegistrationRefusal::kSpread,
+           "the matches that agree cover a share of " + Figure(spread) +
+               " of the picture, accepted is " + Figure(options.least_spread) + " and more",
+           registration);
+    return;
+  }
+  const double most_error_px = options.most_error_px * size.width / kReferenceWidth;
+  if (fit.error_px > most_error_px) {
+    Refuse(RegistrationRefusal::kReprojection,
+           "the matches that agree are off by " + Figure(fit.error_px) + " px, accepted is up to " +
+               Figure(most_error_px),
+           registration);
+  }
+}
+
+/// Depth at a feature; none where it jumps: nobody knows which side the feature belongs to.
+double DepthAt(const cv::Mat& depth, const cv::Point2d& point) {
+  const int x = static_cast<int>(std::lround(point.x));
+  const int y = static_cast<int>(std::lround(point.y));
+  if (x < 1 || y < 1 || x >= depth.cols - 1 || y >= depth.rows - 1) return 0;
+  const double z = static_cast<double>(depth.at<float>(y, x));
+  if (!(z > 0) || !std::isfinite(z)) return 0;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const double other = static_cast<double>(depth.at<float>(y + dy, x + dx));
+      if (!(std::abs(other - z) <= 0.1 * z)) return 0;
+    }
+  }
+  return z;
+}
+
+/// Runs all of them, in OpenCV's threads; returns when the last is done.
+template <typename... Tasks>
+void InParallel(const Tasks&... tasks) {
+  const std::array<std::function<void()>, sizeof...(Tasks)> all{tasks...};
+  cv::parallel_for_(cv::Range(0, static_cast<int>(all.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) all[static_cast<std::size_t>(i)]();
+  });
+}
+
+}  // namespace
+
+const char* RegistrationRefusalName(RegistrationRefusal refusal) {
+  switch (refusal) {
+    case RegistrationRefusal::kNone:
+      return "none";
+    case RegistrationRefusal::kSize:
+      return "size";
+    case RegistrationRefusal::kTexture:
+      return "texture";
+    case RegistrationRefusal::kMatches:
+      return "matches";
+    case RegistrationRefusal::kInliers:
+      return "inliers";
+    case RegistrationRefusal::kSpread:
+      return "spread";
+    case RegistrationRefusal::kReprojection:
+      return "reprojection";
+    case RegistrationRefusal::kDegenerate:
+      return "degenerate";
+    case RegistrationRefusal::kOverlap:
+      return "overlap";
+    case RegistrationRefusal::kEdges:
+      return "edges";
+  }
+  return "unknown";
+}
+
+Registration RegisterByHomography(const FeaturedView& before, const FeaturedView& after,
+                                  const RegistrationOptions& options, std::uint64_t seed) {
+  Registration registration;
+  const MatchedPoints points = Match(before, after, options, registration);
+  if (!registration.accepted()) return registration;
+  const double inlier_px = options.inlier_px * after.size.width / kReferenceWidth;
+  const HomographyFit fit =
+      FitHomography(points.before, points.after, inlier_px, options.most_tries, seed);
+  CheckInliers(points.after, fit.fit, after.size, options, registration);
+  if (!registration.accepted()) return registration;
+  registration.after_from_before = fit.after_from_before;
+  const std::string degenerate = WhyDegenerate(fit.after_from_before, after.size, options);
+  if (!degenerate.empty()) {
+    Refuse(RegistrationRefusal::kDegenerate, degenerate, registration);
+    return registration;
+  }
+  const cv::Mat full(before.size, CV_8UC1, cv::Scalar(255));
+  CheckOverlap(WarpByHomography(full, fit.after_from_before), options, registration);
+  return registration;
+}
+
+Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
+                             const RegistrationOptions& options) {
+  Registration registration;
+  CheckSizes(before.size(), after.size(), registration);
+  if (!registration.accepted()) return registration;
+  if (!HasEdgeCells(after.size())) {
+    Refuse(RegistrationRefusal::kEdges,
+           "the pictures are " + std::to_string(after.cols) + "x" + std::to_string(after.rows) +
+               ", for their edges 32x32 and more are accepted, a side up to four times the other",
+           registration);
+    return registration;
+  }
+  // Filters of small pictures leave most cores idle: the pictures are looked at side by side.
+  EdgeCells before_coarse;
+  EdgeCells after_coarse;
+  EdgeCells after_fine;
+  InParallel([&] { before_coarse = ExtractEdgeCells(before, EdgeDetail::kCoarse); },
+             [&] { after_coarse = ExtractEdgeCells(after, EdgeDetail::kCoarse); },
+             [&] { after_fine = ExtractEdgeCells(after, EdgeDetail::kFine); });
+  const EdgeAlignment alignment = AlignByEdges(before_coarse, after_coarse, options.edges);
+  cv::Mat aligned;
+  cv::warpPerspective(before, aligned, alignment.after_from_before, before.size(), cv::INTER_LINEAR,
+                      cv::BORDER_REPLICATE);
+  const double agreement = EdgeAgreement(ExtractEdgeCells(aligned, EdgeDetail::kFine), after_fine);
+  registration.edge_evidence = alignment.correlation + alignment.lead + agreement;
+  if (registration.edge_evidence < options.least_edge_evidence) {
+    Refuse(RegistrationRefusal::kEdges,
+           "the edges correlate by " + Figure(alignment.correlation) + ", " +
+               Figure(alignment.lead) + " above any other place, and agree by " +
+               Figure(agreement) + " in detail, accepted is a sum of " +
+               Figure(options.least_edge_evidence) + " and more",
+           registration);
+    return registration;
+  }
+  registration.after_from_before = alignment.after_from_before;
+  const cv::Mat full(before.size(), CV_8UC1, cv::Scalar(255));
+  CheckOverlap(WarpByHomography(full, alignment.after_from_before), options, registration);
+  return registration;
+}
+
+Registration RegisterByDepth(const FeaturedView& before, const CameraIntrinsics& before_camera,
+                             const FeaturedView& after, const CameraIntrinsics& after_camera,
+                             const cv::Mat& after_depth, const RegistrationOptions& options,
+                             std::uint64_t seed) {
+  CheckDepth(after_depth, after.size);
+  Registration registration;
+  const MatchedPoints points = Match(before, after, options, registration);
+  if (!registration.accepted()) return registration;
+  std::vector<cv::Point3d> places;
+  std::vector<cv::Point2d> seen;
+  std::vector<cv::Point2d> at;
+  for (std::size_t i = 0; i < points.after.size(); ++i) {
+    const cv::Point2d& pixel = points.after[i];
+    const double z = DepthAt(after_depth, pixel);
+    if (z <= 0) continue;
+    places.emplace_back((pixel.x - after_camera.cx) / after_camera.fx * z,
+                        (pixel.y - after_camera.cy) / after_camera.fy * z, z);
+    seen.push_back(points.before[i]);
+    at.push_back(pixel);
+  }
+  registration.matches = places.size();
+  if (places.size() < static_cast<std::size_t>(options.least_matches)) {
+    Refuse(RegistrationRefusal::kMatches,
+           std::to_string(places.size()) + " features with depth match, accepted are " +
+               std::to_string(options.least_matches) + " and more",
+           registration);
+    return registration;
+  }
+  const double inlier_px = options.inlier_px * after.size.width / kReferenceWidth;
+  const PoseFit fit = FitPose(places, seen, before_camera, inlier_px, options.most_tries, seed);
+  CheckInliers(at, fit.fit, after.size, options, registration);
+  if (!registration.accepted()) return registration;
+  registration.before_from_after = fit.camera_from_world;
+  const double baseline_m = fit.camera_from_world.translation().norm();
+  const double rotation_deg =
+      Eigen::AngleAxisd(fit.camera_from_world.linear()).angle() * 180 / CV_PI;
+  if (baseline_m > options.most_baseline_m || rotation_deg > options.most_rotation_deg) {
+    Refuse(RegistrationRefusal::kDegenerate,
+           "the cameras are " + Figure(baseline_m) + " m and " + Figure(rotation_deg) +
+               " degrees apart, accepted are up to " + Figure(options.most_baseline_m) + " and " +
+               Figure(options.most_rotation_deg),
+           registration);
+  }
+  return registration;
+}
+
+void CheckOverlap(const WarpedPicture& warped, const RegistrationOptions& options,
+                  Registration& registration) {
+  if (!registration.accepted()) return;
+  registration.overlap = warped.ValidShare();
+  if (registration.overlap >= options.least_overlap) return;
+  Refuse(RegistrationRefusal::kOverlap,
+         "the earlier picture covers a share of " + Figure(registration.overlap) +
+             " of the later one, accepted is " + Figure(options.least_overlap) + " and more",
+         registration);
+}
+
+}  // namespace livemap

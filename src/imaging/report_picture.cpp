@@ -1,0 +1,149 @@
+#include "imaging/report_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace livemap {
+namespace {
+
+constexpr int kLowestQuality = 30;  // Below it a box is no longer legible: make it smaller instead.
+constexpr int kQualityStep = 20;
+constexpr int kSmallestSidePx = 64;
+constexpr double kCropAspect = 1.5;
+constexpr double kLeastContext = 1.5;
+constexpr double kContextStep = 0.7;
+constexpr double kScaleStep = 0.84;
+
+/// The box's part of the image; empty when it has none.
+cv::Rect2d InsideImage(const Box& box, const cv::Size& image) {
+  // Written so that NaN has no part.
+  if (!(box.x_max > box.x_min && box.y_max > box.y_min)) return {};
+  const double left = std::max(0.0, static_cast<double>(box.x_min));
+  const double top = std::max(0.0, static_cast<double>(box.y_min));
+  const double right = std::min(1.0 * image.width, static_cast<double>(box.x_max));
+  const double bottom = std::min(1.0 * image.height, static_cast<double>(box.y_max));
+  if (!(right > left && bottom > top)) return {};
+  return {left, top, right - left, bottom - top};
+}
+
+/// 3 to 2 around the box, at least `least_px` wide, moved into the image and cut where it is
+/// larger.
+cv::Rect CropAround(const cv::Rect2d& box, double context, double least_px, const cv::Size& image) {
+  const double width =
+      std::max({context * box.width, context * box.height * kCropAspect, least_px});
+  const cv::Size size(std::min(image.width, cvCeil(width)),
+                      std::min(image.height, cvCeil(width / kCropAspect)));
+  const auto start = [](double middle, int length, int available) {
+    return std::clamp(cvRound(middle - length / 2.0), 0, available - length);
+  };
+  return {start(box.x + box.width / 2, size.width, image.width),
+          start(box.y + box.height / 2, size.height, image.height), size.width, size.height};
+}
+
+double Widest(const CropConfig& config) { return std::max(config.context, kLeastContext); }
+
+bool EncodeAt(const cv::Mat& image, int quality, std::size_t max_bytes, CroppedPicture& cropped) {
+  if (!cv::imencode(".jpg", image, cropped.jpeg, {cv::IMWRITE_JPEG_QUALITY, quality})) return false;
+  cropped.quality = quality;
+  return cropped.jpeg.size() <= max_bytes;
+}
+
+/// The best of the part within the bytes whose scale is not below `least_scale`; false: there is
+/// none.
+bool EncodeLegibly(const cv::Mat& part, double least_scale, const CropConfig& config,
+                   CroppedPicture& cropped) {
+  const int worst = std::min(config.quality, kLegibleQuality);
+  for (double scale = 1;; scale = std::max(least_scale, scale * kScaleStep)) {
+    cv::Mat image = part;
+    if (scale < 1) {
+      const cv::Size size(std::max(1, cvRound(part.cols * scale)),
+                          std::max(1, cvRound(part.rows * scale)));
+      cv::resize(part, image, size, 0, 0, cv::INTER_AREA);
+    }
+    cropped.scale = scale;
+    if (EncodeAt(image, worst, config.max_bytes, cropped)) {
+      for (int quality = config.quality; quality > worst; quality -= kQualityStep / 2) {
+        if (EncodeAt(image, quality, config.max_bytes, cropped)) return true;
+      }
+      return EncodeAt(image, worst, config.max_bytes, cropped);
+    }
+    if (scale <= least_scale) return false;
+  }
+}
+
+PixelRegion ToRegion(const cv::Rect& part) {
+  return {static_cast<std::uint32_t>(part.x), static_cast<std::uint32_t>(part.y),
+          static_cast<std::uint32_t>(part.width), static_cast<std::uint32_t>(part.height)};
+}
+
+}  // namespace
+
+bool Contains(const PixelRegion& outer, const PixelRegion& inner) {
+  if (outer.IsWholeImage()) return true;
+  return !inner.IsWholeImage() && inner.x >= outer.x && inner.y >= outer.y &&
+         inner.x + inner.width <= outer.x + outer.width &&
+         inner.y + inner.height <= outer.y + outer.height;
+}
+
+PixelRegion Union(const PixelRegion& a, const PixelRegion& b) {
+  if (a.IsWholeImage() || b.IsWholeImage()) return {};
+  const std::uint32_t x = std::min(a.x, b.x);
+  const std::uint32_t y = std::min(a.y, b.y);
+  return {x, y, std::max(a.x + a.width, b.x + b.width) - x,
+          std::max(a.y + a.height, b.y + b.height) - y};
+}
+
+std::vector<std::uint8_t> EncodeJpeg(const Picture& picture, int quality, std::size_t max_bytes) {
+  if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return {};
+  cv::Mat image = picture.bgr;
+  std::vector<std::uint8_t> file;
+  while (true) {
+    for (int tried = quality;; tried = std::max(kLowestQuality, tried - kQualityStep)) {
+      if (!cv::imencode(".jpg", image, file, {cv::IMWRITE_JPEG_QUALITY, tried})) return {};
+      if (file.size() <= max_bytes) return file;
+      if (tried <= kLowestQuality) break;
+    }
+    if (std::max(image.cols, image.rows) < 2 * kSmallestSidePx) return {};
+    cv::Mat half;
+    cv::resize(image, half, cv::Size(std::max(1, image.cols / 2), std::max(1, image.rows / 2)), 0,
+               0, cv::INTER_AREA);
+    image = half;
+  }
+}
+
+PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& config) {
+  const cv::Size image(width, height);
+  const cv::Rect2d inside = InsideImage(box, image);
+  if (inside.empty() || config.context <= 0) return {};
+  return ToRegion(CropAround(inside, Widest(config), kLeastCropPx, image));
+}
+
+CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config) {
+  CroppedPicture cropped;
+  if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return cropped;
+  const cv::Size image = picture.bgr.size();
+  const cv::Rect2d inside = InsideImage(box, image);
+  const bool whole = inside.empty() || config.context <= 0;
+  const double side =
+      inside.empty() ? std::min(image.width, image.height) : std::min(inside.width, inside.height);
+  const double least_scale = std::min(1.0, kLegibleSidePx / std::max(side, 1.0));
+  cv::Rect part({}, image);
+  const double widest = Widest(config);
+  double context = widest;
+  while (true) {
+    if (!whole) part = CropAround(inside, context, kLeastCropPx * context / widest, image);
+    cropped.shown = ToRegion(part);
+    cropped.legible = EncodeLegibly(picture.bgr(part), least_scale, config, cropped);
+    if (cropped.legible) return cropped;
+    if (whole || context <= kLeastContext) break;
+    context = std::max(kLeastContext, context * kContextStep);
+  }
+  cropped.jpeg = EncodeJpeg({picture.bgr(part), nullptr}, kLegibleQuality, config.max_bytes);
+  cropped.quality = 0;
+  if (cropped.jpeg.empty()) cropped.shown = {};
+  return cropped;
+}
+
+}  // namespace livemap

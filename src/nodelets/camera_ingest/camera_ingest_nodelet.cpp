@@ -1,0 +1,228 @@
+#include <camera_info_manager/camera_info_manager.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <image_transport/image_transport.h>
+#include <nodelet/nodelet.h>
+#include <sensor_msgs/CompressedImage.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <pluginlib/class_list_macros.hpp>
+#include <thread>
+
+#include "common/frame_queue.h"
+#include "nodelets/camera_ingest/ingest_frames.h"
+#include "nodelets/camera_ingest/ingest_reader.h"
+#include "nodelets/camera_ingest/ingest_stereo.h"
+#include "nodelets/nodelet_support.h"
+#include "ros/conversions/camera_info_conversions.h"
+#include "ros/parameters/ingest_parameters.h"
+
+namespace livemap {
+
+/// The vehicle's eyes: takes images from a topic, device, video file or folder, takes the lens
+/// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`; with
+/// a second eye depth too (IngestStereo).
+///
+/// Callbacks only enqueue; one worker decodes, rectifies and publishes. When it is behind, the
+/// oldest waiting frame goes: frames_in = published + dropped + bad + waiting, at any moment.
+class CameraIngestNodelet : public nodelet::Nodelet {
+ public:
+  ~CameraIngestNodelet() override {
+    diagnostics_timer_.stop();
+    image_subscriber_.shutdown();
+    info_subscriber_.shutdown();
+    reader_.reset();
+    calibrations_.Close();
+    if (queue_) queue_->Close();
+    if (worker_.joinable()) worker_.join();
+  }
+
+ private:
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ReadIngestConfig(parameters);
+    queue_ =
+        std::make_unique<FrameQueue<IngestFrame>>(static_cast<std::size_t>(config_.queue_size));
+    processor_ =
+        std::make_unique<FrameProcessor>(OutputSize{config_.output_width, config_.output_height},
+                                         static_cast<std::int64_t>(config_.max_megapixels * 1e6));
+    std::unique_ptr<FrameSource> source = OpenSource(config_);
+    image_transport::ImageTransport transport(getNodeHandle());
+    publisher_ = transport.advertiseCamera("camera_rect/image", 10);
+    if (config_.stereo) {
+      stereo_ = std::make_unique<IngestStereo>(config_, getNodeHandle(), getName());
+    }
+    worker_ = std::thread([this] { Work(); });
+    if (source) {
+      StartReader(std::move(source));
+    } else {
+      Subscribe();
+    }
+    StartDiagnostics();
+  }
+
+  void Subscribe() {
+    ros::NodeHandle& node = getNodeHandle();
+    const auto queue_size = static_cast<std::uint32_t>(config_.subscriber_queue_size);
+    info_subscriber_ = node.subscribe<sensor_msgs::CameraInfo>(
+        "camera/camera_info", queue_size,
+        [this](const sensor_msgs::CameraInfoConstPtr& info) { calibrations_.Put(info); });
+    const std::string topic = node.resolveName("camera/image_raw");
+    const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+    if (config_.transport == "raw") {
+      image_subscriber_ = node.subscribe<sensor_msgs::Image>(
+          topic, queue_size,
+          [this](const sensor_msgs::ImageConstPtr& image) {
+            queue_->Push({image, nullptr});
+          },
+          ros::VoidConstPtr(), hints);
+      return;
+    }
+    // Not through image_transport, whose plugin would decode inside the callback: there a slow
+    // decoder fills ROS's own queue, which drops frames without counting them.
+    image_subscriber_ = node.subscribe<sensor_msgs::CompressedImage>(
+        topic + "/compressed", queue_size,
+        [this](const sensor_msgs::CompressedImageConstPtr& image) {
+          queue_->Push({nullptr, image});
+        },
+        ros::VoidConstPtr(), hints);
+  }
+
+  void StartReader(std::unique_ptr<FrameSource> source) {
+    // Its set_camera_info service lets a calibrator replace the calibration while this runs.
+    info_manager_ = std::make_unique<camera_info_manager::CameraInfoManager>(
+        ros::NodeHandle(getNodeHandle(), "camera"), config_.frame_id);
+    if (!info_manager_->loadCameraInfo(config_.camera_info_url) || !info_manager_->isCalibrated()) {
+      throw Error("parameter 'camera_info_url' is '" + config_.camera_info_url +
+                  "', which is no readable camera calibration file");
+    }
+    reader_ = std::make_unique<IngestReader>(
+        config_, std::move(source), [this](IngestFrame frame) { Take(std::move(frame)); },
+        [this](const std::string& reason) { MissFrame(reason); });
+  }
+
+  /// A frame of the own reader, with the calibration as it is now.
+  void Take(IngestFrame frame) {
+    auto info = boost::make_shared<sensor_msgs::CameraInfo>(info_manager_->getCameraInfo());
+    info->header.frame_id = config_.frame_id;
+    calibrations_.Put(info);
+    queue_->Push(std::move(frame));
+  }
+
+  /// A frame that the source had but could not give.
+  void MissFrame(const std::string& reason) {
+    {
+      const std::lock_guard<std::mutex> lock(accounts_mutex_);
+      ++unread_;
+    }
+    NODELET_WARN_THROTTLE(kSayAgainS, "%s", reason.c_str());
+  }
+
+  void Work() {
+    while (std::optional<IngestFrame> frame = queue_->Pop()) {
+      std::string fault;
+      try {
+        const sensor_msgs::CameraInfoConstPtr info =
+            calibrations_.Find(frame->header().frame_id, config_.calibration_wait_s);
+        const ProcessedFrame result = processor_->Process(*frame, info);
+        publisher_.publish(result.image, result.info);
+        if (stereo_) stereo_->Take(result);
+      } catch (const std::exception& exception) {
+        fault = exception.what();
+      }
+      Account(fault.empty());
+      if (fault.empty()) continue;
+      NODELET_WARN_THROTTLE(kSayAgainS, "dropped a frame of '%s': %s",
+                            frame->header().frame_id.c_str(), fault.c_str());
+    }
+  }
+
+  void Account(bool published) {
+    const std::lock_guard<std::mutex> lock(accounts_mutex_);
+    if (published) {
+      queue_->Done();
+      ++published_in_window_;
+    } else {
+      queue_->Unusable();
+      ++bad_;
+    }
+  }
+
+  void StartDiagnostics() {
+    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
+                                                             getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("camera_ingest");
+    updater_->add("camera ingest", this, &CameraIngestNodelet::Diagnose);
+    window_start_ = ros::WallTime::now();
+    // Wall time: a replay that stands still must not silence the nodelet.
+    diagnostics_timer_ = getNodeHandle().createWallTimer(
+        ros::WallDuration(config_.diagnostics_period_s),
+        [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const std::lock_guard<std::mutex> lock(accounts_mutex_);
+    const FrameQueue<IngestFrame>::Counters counters = queue_->counters();
+    // The queue counts unusable frames among its dropped ones.
+    const std::uint64_t dropped = counters.dropped - bad_;
+    const ros::WallTime now = ros::WallTime::now();
+    const double window_s = (now - window_start_).toSec();
+    if (window_s > 0.5) {
+      rate_hz_ = static_cast<double>(published_in_window_) / window_s;
+      published_in_window_ = 0;
+      window_start_ = now;
+    }
+    const bool ended = reader_ && reader_->ended();
+    if (ended) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "the source has ended");
+    } else if (bad_ + unread_ > bad_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "bad frames");
+    } else if (dropped > dropped_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "behind: dropping frames");
+    } else if (rate_hz_ == 0) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
+    } else {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
+    }
+    bad_said_ = bad_ + unread_;
+    dropped_said_ = dropped;
+    status.add("frames_in", counters.in + unread_);
+    status.add("frames_published", counters.processed);
+    status.add("frames_dropped", dropped);
+    status.add("frames_bad", bad_ + unread_);
+    status.add("rate_hz", rate_hz_);
+    if (stereo_) stereo_->Diagnose(status);
+  }
+
+  IngestConfig config_;
+  CalibrationBook calibrations_;
+  std::unique_ptr<FrameQueue<IngestFrame>> queue_;
+  std::unique_ptr<FrameProcessor> processor_;  ///< The worker's.
+  image_transport::CameraPublisher publisher_;
+  std::unique_ptr<IngestStereo> stereo_;  ///< Null: one eye.
+  ros::Subscriber image_subscriber_;
+  ros::Subscriber info_subscriber_;
+  std::unique_ptr<camera_info_manager::CameraInfoManager> info_manager_;
+  std::unique_ptr<IngestReader> reader_;
+  std::thread worker_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::WallTimer diagnostics_timer_;
+
+  std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
+  std::uint64_t bad_ = 0;
+  std::uint64_t unread_ = 0;  ///< Bad ones that never reached the queue.
+  std::uint64_t published_in_window_ = 0;
+  std::uint64_t bad_said_ = 0;
+  std::uint64_t dropped_said_ = 0;
+  ros::WallTime window_start_;
+  double rate_hz_ = 0;
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::CameraIngestNodelet, nodelet::Nodelet)

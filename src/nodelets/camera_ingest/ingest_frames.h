@@ -1,0 +1,65 @@
+#pragma once
+
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "imaging/rectifier.h"
+
+namespace livemap {
+
+/// A frame as it came in; exactly one pointer is set.
+struct IngestFrame {
+  sensor_msgs::ImageConstPtr raw;
+  sensor_msgs::CompressedImageConstPtr compressed;
+
+  const std_msgs::Header& header() const { return raw ? raw->header : compressed->header; }
+};
+
+struct ProcessedFrame {
+  sensor_msgs::ImageConstPtr image;  ///< The incoming pointer itself when nothing had to change.
+  sensor_msgs::CameraInfoConstPtr info;
+};
+
+/// The newest calibration of each camera, by frame_id. Thread-safe.
+class CalibrationBook {
+ public:
+  void Put(const sensor_msgs::CameraInfoConstPtr& info);
+  /// Waits up to `wait_s` when there is none yet: the first camera_info may come just behind the
+  /// first image. Throws Error when there is still none.
+  sensor_msgs::CameraInfoConstPtr Find(const std::string& frame_id, double wait_s);
+  /// Ends all waiting.
+  void Close();
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::map<std::string, sensor_msgs::CameraInfoConstPtr> by_frame_id_;
+  bool closed_ = false;
+};
+
+/// Checks, decodes, rectifies and resizes one frame after the other. Not thread-safe.
+class FrameProcessor {
+ public:
+  FrameProcessor(OutputSize output_size, std::int64_t max_pixels)
+      : output_size_(output_size), max_pixels_(max_pixels) {}
+
+  /// Throws Error saying what is wrong with the frame or its calibration.
+  ProcessedFrame Process(const IngestFrame& frame, const sensor_msgs::CameraInfoConstPtr& info);
+
+ private:
+  const Rectifier& RectifierFor(const sensor_msgs::CameraInfo& info);
+
+  const OutputSize output_size_;
+  const std::int64_t max_pixels_;
+  std::unique_ptr<Rectifier> rectifier_;
+};
+
+}  // namespace livemap

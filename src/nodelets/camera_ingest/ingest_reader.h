@@ -1,0 +1,53 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "imaging/frame_source.h"
+#include "nodelets/camera_ingest/ingest_frames.h"
+#include "ros/parameters/ingest_parameters.h"
+
+namespace livemap {
+
+/// None when the configuration names a topic. Throws Error when the source cannot be opened.
+std::unique_ptr<FrameSource> OpenSource(const IngestConfig& config);
+
+/// Reads a device, video or folder on its own thread at its rate and stamps the frames. Like a
+/// camera it does not wait for whoever takes them. The destructor stops it.
+class IngestReader {
+ public:
+  /// `take` gets every frame; `miss` the reason why one could not be read.
+  IngestReader(const IngestConfig& config, std::unique_ptr<FrameSource> source,
+               std::function<void(IngestFrame)> take, std::function<void(const std::string&)> miss);
+  ~IngestReader();
+
+  /// The file or folder has no more frames.
+  bool ended() const { return ended_; }
+
+ private:
+  void Run();
+  /// At the end of the frames: false when reading is over.
+  bool GoOn();
+  IngestFrame Wrap(SourceFrame frame, ros::Time stamp) const;
+  /// False when stopped while sleeping.
+  bool SleepUntil(ros::WallTime wanted);
+
+  const IngestConfig config_;
+  const std::unique_ptr<FrameSource> source_;
+  const std::function<void(IngestFrame)> take_;
+  const std::function<void(const std::string&)> miss_;
+  std::mutex mutex_;
+  std::condition_variable stop_requested_;
+  bool stopped_ = false;
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <image_transport/image_transport.h>
+#include <ros/node_handle.h>
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/frame_queue.h"
+#include "imaging/stereo_depth.h"
+#include "nodelets/camera_ingest/ingest_frames.h"
+#include "nodelets/camera_ingest/stereo_pair_buffer.h"
+#include "ros/parameters/ingest_parameters.h"
+
+namespace livemap {
+
+/// The second eye of camera_ingest: takes `camera_right/image_raw` with `camera_right/camera_info`,
+/// pairs it with the left images and publishes `camera_rect/depth/image_raw` (32FC1, metres, NaN:
+/// unknown) with `camera_rect/depth/camera_info`, stamp and frame_id those of the left image.
+///
+/// One worker of its own, so that left images never wait for depth. Works while somebody listens to
+/// the depth: left images = published + dropped + bad + missing + waiting, at any moment.
+class IngestStereo {
+ public:
+  /// `name` stands before what it says.
+  IngestStereo(const IngestConfig& config, ros::NodeHandle& node, std::string name);
+  ~IngestStereo();
+
+  /// A left image as it was published. Never blocks.
+  void Take(const ProcessedFrame& left);
+  /// Adds the figures, and what is wrong to the summary.
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+ private:
+  void Subscribe(ros::NodeHandle& node);
+  void Work();
+  /// False when the left image has no partner.
+  bool PublishDepth(const ProcessedFrame& left);
+  ProcessedFrame RectifyRight(const IngestFrame& right);
+  StereoDepth& MatcherFor(const sensor_msgs::CameraInfo& left,
+                          const sensor_msgs::CameraInfo& right);
+  void SayMissing(const std_msgs::Header& left) const;
+
+  const IngestConfig config_;
+  const std::string name_;
+  image_transport::CameraPublisher publisher_;
+  ros::Subscriber image_subscriber_;
+  ros::Subscriber info_subscriber_;
+  CalibrationBook calibrations_;
+  RightImages rights_;
+  FrameQueue<ProcessedFrame> queue_;
+
+  FrameProcessor processor_;  // These three are the worker's.
+  CameraCalibration left_, right_;
+  std::unique_ptr<StereoDepth> matcher_;
+  std::thread worker_;
+
+  std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
+  std::uint64_t bad_ = 0;
+  std::uint64_t missing_ = 0;
+  std::uint64_t bad_said_ = 0;
+  std::uint64_t missing_said_ = 0;
+  std::vector<double> milliseconds_;  ///< Of the matching, since the last diagnostics.
+};
+
+}  // namespace livemap

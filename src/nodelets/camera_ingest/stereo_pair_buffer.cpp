@@ -1,0 +1,66 @@
+#include "nodelets/camera_ingest/stereo_pair_buffer.h"
+
+#include <chrono>
+#include <utility>
+
+namespace livemap {
+namespace {
+
+ros::Duration Between(ros::Time a, ros::Time b) { return a < b ? b - a : a - b; }
+
+}  // namespace
+
+void RightImages::Put(IngestFrame frame) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counters_.in;
+    silent_ = false;
+    if (!frames_.empty() && frame.header().stamp < frames_.back().header().stamp) {
+      Forget(frames_.size());
+    }
+    if (frames_.size() == capacity_) Forget(1);
+    frames_.push_back(std::move(frame));
+  }
+  arrived_.notify_all();
+}
+
+std::optional<IngestFrame> RightImages::Take(ros::Time stamp) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const auto decided = [&] {
+    return closed_ || (!frames_.empty() && frames_.back().header().stamp + tolerance_ >= stamp);
+  };
+  if (!silent_) arrived_.wait_for(lock, std::chrono::duration<double>(wait_s_), decided);
+  silent_ = !decided();
+
+  while (!frames_.empty() && frames_.front().header().stamp + tolerance_ < stamp) Forget(1);
+  while (frames_.size() > 1 &&
+         Between(frames_[1].header().stamp, stamp) <= Between(frames_[0].header().stamp, stamp)) {
+    Forget(1);
+  }
+  if (frames_.empty() || Between(frames_.front().header().stamp, stamp) > tolerance_) {
+    return std::nullopt;
+  }
+  std::optional<IngestFrame> partner(std::move(frames_.front()));
+  frames_.pop_front();
+  return partner;
+}
+
+void RightImages::Close() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = true;
+  }
+  arrived_.notify_all();
+}
+
+RightImages::Counters RightImages::counters() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return counters_;
+}
+
+void RightImages::Forget(std::size_t count) {
+  counters_.unpaired += count;
+  frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(count));
+}
+
+}  // namespace livemap

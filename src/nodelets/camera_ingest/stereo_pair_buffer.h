@@ -1,0 +1,54 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+
+#include "nodelets/camera_ingest/ingest_frames.h"
+
+namespace livemap {
+
+/// The second eye's images, kept until the left image of the same moment asks for its own.
+/// Thread-safe.
+class RightImages {
+ public:
+  struct Counters {
+    std::uint64_t in = 0;
+    std::uint64_t unpaired = 0;  ///< That no left image asked for.
+  };
+
+  /// `tolerance_s`: how far the stamps of a pair may differ, 0: not at all; `wait_s`: how long a
+  /// left image waits for its partner; `capacity`: how many are kept, the oldest goes.
+  RightImages(double tolerance_s, double wait_s, std::size_t capacity)
+      : tolerance_(tolerance_s), wait_s_(wait_s), capacity_(capacity) {}
+
+  /// Images come in the order of their stamps; one whose stamp goes back begins anew.
+  void Put(IngestFrame frame);
+  /// The partner of a left image of this stamp, the nearest one; older ones are forgotten. Waits
+  /// while it may still come, but not for an eye that has been silent since the last one waited in
+  /// vain. None when there is none.
+  std::optional<IngestFrame> Take(ros::Time stamp);
+  /// Ends all waiting.
+  void Close();
+  Counters counters() const;
+
+ private:
+  void Forget(std::size_t count);
+
+  const ros::Duration tolerance_;
+  const double wait_s_;
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<IngestFrame> frames_;
+  Counters counters_;
+  bool silent_ = false;
+  bool closed_ = false;
+};
+
+}  // namespace livemap

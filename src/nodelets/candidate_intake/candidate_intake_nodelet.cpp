@@ -1,0 +1,215 @@
+#include <cv_bridge/cv_bridge.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <livemap/CandidateFrame.h>
+#include <livemap/DetectionArray.h>
+#include <livemap/HazardReport.h>
+#include <nodelet/nodelet.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <boost/make_shared.hpp>
+#include <map>
+#include <memory>
+#include <pluginlib/class_list_macros.hpp>
+#include <string>
+#include <vector>
+
+#include "imaging/decode.h"
+#include "imaging/report_picture.h"
+#include "nodelets/nodelet_support.h"
+#include "perception/detection/annotation.h"
+#include "ros/conversions/hazard_conversions.h"
+#include "ros/conversions/offload_conversions.h"
+#include "ros/parameters/offload_parameters.h"
+#include "zone/offload/offload_intake.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kWorkPeriodS = 0.05;
+
+std::vector<HazardDetection> ToDetections(const SightingFrame& answer) {
+  std::vector<HazardDetection> detections;
+  for (const Sighting& sighting : answer.sightings) {
+    HazardDetection detection;
+    detection.class_name = sighting.class_name;
+    detection.confidence = sighting.confidence;
+    detection.box = {sighting.box.x_min, sighting.box.y_min,
+                     sighting.box.x_max - sighting.box.x_min,
+                     sighting.box.y_max - sighting.box.y_min};
+    detections.push_back(detection);
+  }
+  return detections;
+}
+
+}  // namespace
+
+/// The zone's door for small vehicles: CandidateIntake with topics and clocks. Frames come from the
+/// bridge, which has written who sent them; their pictures go to an unchanged hazard_detection
+/// nodelet under stamps of the zone's own; its answers become reports on the topic of all reports.
+/// All callbacks run one at a time, in the nodelet's own queue.
+class CandidateIntakeNodelet : public nodelet::Nodelet {
+ private:
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    using Self = CandidateIntakeNodelet;
+    ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ReadCandidateIntakeConfig(parameters);
+    intake_ = std::make_unique<CandidateIntake>(config_.intake);
+    ros::NodeHandle& node = getNodeHandle();
+    image_publisher_ = node.advertise<sensor_msgs::Image>("candidate/image", 100);
+    report_publisher_ = node.advertise<HazardReport>("hazard/report", 1000);
+    updater_ =
+        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("candidate_intake");
+    updater_->add("candidate_intake", this, &Self::Diagnose);
+    subscribers_ = {
+        node.subscribe("candidate/frame", 1000, &Self::OnFrame, this),
+        node.subscribe("candidate/detections", 1000, &Self::OnDetections, this),
+    };
+    timers_ = {
+        node.createSteadyTimer(ros::WallDuration(kWorkPeriodS), &Self::OnWorkTimer, this),
+        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
+                               &Self::OnDiagnosticsTimer, this),
+    };
+  }
+
+  static std::int64_t NowNs() { return static_cast<std::int64_t>(ros::WallTime::now().toNSec()); }
+
+  void OnFrame(const CandidateFrame& message) {
+    std::string why;
+    try {
+      why = intake_->Add(FromMessage(message), NowNs());
+    } catch (const Error& error) {
+      ++unreadable_;
+      why = error.what();
+    }
+    if (!why.empty()) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "candidate frame of '%s' not taken: %s",
+                            message.vehicle_id.c_str(), why.c_str());
+    }
+    Work();
+  }
+
+  void OnWorkTimer(const ros::SteadyTimerEvent&) {
+    for (const std::int64_t lost : intake_->Expire(SteadyS())) pictures_.erase(lost);
+    Work();
+  }
+
+  void Work() {
+    // Without a detector a frame would be spent.
+    if (image_publisher_.getNumSubscribers() == 0) return;
+    while (const CandidateIntake::Job* job = intake_->Next(NowNs(), SteadyS())) HandOn(*job);
+  }
+
+  void HandOn(const CandidateIntake::Job& job) {
+    const std::int64_t internal_ns = job.internal_ns;
+    cv::Mat decoded;
+    try {
+      decoded = DecodeImage(job.frame.image.data(), job.frame.image.size(),
+                            config_.intake.limits.report.max_image_pixels);
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "candidate frame of '%s' dropped: %s",
+                            job.frame.vehicle_id.c_str(), error.what());
+    }
+    if (decoded.size() != cv::Size(job.frame.intrinsics.width, job.frame.intrinsics.height)) {
+      intake_->Abandon(internal_ns);
+      return;
+    }
+    const bool grey = decoded.channels() == 1;
+    std_msgs::Header header;
+    header.stamp = ToRosTime(internal_ns);
+    header.frame_id = "candidate";
+    const auto image =
+        cv_bridge::CvImage(
+            header, grey ? sensor_msgs::image_encodings::MONO8 : sensor_msgs::image_encodings::BGR8,
+            decoded)
+            .toImageMsg();
+    pictures_[internal_ns] = image;
+    image_publisher_.publish(image);
+  }
+
+  void OnDetections(const DetectionArray& message) {
+    const SightingFrame answer = ToSightingFrame(message);
+    std::vector<Report> reports = intake_->Finish(answer.stamp_ns, answer);
+    const auto picture = pictures_.find(answer.stamp_ns);
+    if (!reports.empty() && picture != pictures_.end()) {
+      AddPicture(*picture->second, ToDetections(answer), reports);
+    }
+    if (picture != pictures_.end()) pictures_.erase(picture);
+    for (const Report& report : reports) {
+      report_publisher_.publish(boost::make_shared<HazardReport>(ToMessage(report)));
+    }
+    Work();
+  }
+
+  /// The picture that a big vehicle would have sent: with all boxes of the frame.
+  void AddPicture(const sensor_msgs::Image& image, const std::vector<HazardDetection>& detections,
+                  std::vector<Report>& reports) {
+    cv::Mat bgr = cv_bridge::toCvCopy(image, sensor_msgs::image_encodings::BGR8)->image;
+    const Picture picture{bgr, nullptr};
+    AnnotateImage(bgr, detections);
+    CropConfig crop;
+    crop.max_bytes = static_cast<std::size_t>(config_.max_image_bytes);
+    crop.quality = config_.jpeg_quality;
+    for (Report& report : reports) {
+      CroppedPicture cropped = CropPicture(picture, report.box, crop);
+      if (cropped.jpeg.empty()) continue;
+      report.image_format = "jpeg";
+      report.image = std::move(cropped.jpeg);
+      report.shown = cropped.shown;
+    }
+  }
+
+  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const CandidateIntake::Counters& counters = intake_->counters();
+    const std::uint64_t lost = counters.displaced + counters.lost_by_detector;
+    if (image_publisher_.getNumSubscribers() == 0) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no detector listens");
+    } else if (lost > lost_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "behind: dropping frames");
+    } else {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
+    }
+    lost_said_ = lost;
+    status.add("frames_in", counters.frames + unreadable_);
+    status.add("frames_bytes", counters.bytes);
+    status.add("frames_refused", counters.refused + unreadable_);
+    status.add("frames_over_allowance", counters.over_allowance);
+    status.add("frames_repeated", counters.repeated);
+    status.add("frames_displaced", counters.displaced);
+    status.add("frames_undecodable", counters.undecodable);
+    status.add("frames_lost_by_detector", counters.lost_by_detector);
+    status.add("frames_detected", counters.detected);
+    status.add("frames_empty", counters.empty);
+    status.add("frames_waiting", intake_->waiting());
+    status.add("frames_in_flight", intake_->in_flight());
+    status.add("sightings", counters.sightings);
+    status.add("sightings_invalid", counters.invalid_sightings);
+    status.add("sightings_below_confidence", counters.below_confidence);
+    status.add("sightings_cut_by_side", counters.cut_by_side);
+    status.add("sightings_not_on_ground", counters.not_on_ground);
+    status.add("sightings_too_far", counters.too_far);
+    status.add("reports", counters.reports);
+  }
+
+  CandidateIntakeConfig config_;
+  std::unique_ptr<CandidateIntake> intake_;
+  std::map<std::int64_t, sensor_msgs::ImageConstPtr> pictures_;  // At the detector, by stamp.
+  std::uint64_t unreadable_ = 0;  // Frames whose message the conversion refused.
+  std::uint64_t lost_said_ = 0;
+  ros::Publisher image_publisher_, report_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::vector<ros::SteadyTimer> timers_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::CandidateIntakeNodelet, nodelet::Nodelet)

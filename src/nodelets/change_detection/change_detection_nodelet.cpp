@@ -1,0 +1,388 @@
+#include <cv_bridge/cv_bridge.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <image_transport/image_transport.h>
+#include <nav_msgs/Odometry.h>
+#include <nodelet/nodelet.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <array>
+#include <boost/function.hpp>
+#include <boost/make_shared.hpp>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <pluginlib/class_list_macros.hpp>
+#include <string>
+#include <thread>
+
+#include "change/objects/change_detector.h"
+#include "common/frame_queue.h"
+#include "nodelets/change_detection/map_change_sender.h"
+#include "nodelets/change_detection/posed_frame_queue.h"
+#include "nodelets/nodelet_support.h"
+#include "nodelets/vehicle_tf.h"
+#include "ros/conversions/camera_info_conversions.h"
+#include "ros/conversions/change_conversions.h"
+#include "ros/conversions/depth_conversions.h"
+#include "ros/conversions/hazard_conversions.h"
+#include "ros/parameters/change_parameters.h"
+#include "vehicle/reporting/offload_sender.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kPickPeriodS = 0.02;
+
+}  // namespace
+
+/// Change detection on board: ChangeWatch with topics, tf and clocks. One worker thread compares
+/// and remembers; all else runs in the nodelet's own queue. An image whose turn comes while the
+/// worker is busy is skipped and counted: what the CPU allows sets the rate, `spacing_m` bounds it.
+class ChangeDetectionNodelet : public nodelet::Nodelet {
+ public:
+  ~ChangeDetectionNodelet() override {
+    for (ros::SteadyTimer& timer : timers_) timer.stop();
+    image_subscriber_.shutdown();
+    if (queue_) queue_->Close();
+    if (worker_.joinable()) worker_.join();
+    if (watch_ && sender_) sender_->Tell(watch_->EndDrive());
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Job {
+    ChangeFrames::Posed posed;
+    CameraIntrinsics camera;
+    Eigen::Isometry3d base_from_optical;
+  };
+  using Queue = FrameQueue<Job>;
+
+  /// Of the worker; `outcomes` by ChangeWatch::Outcome.
+  struct Figures {
+    std::array<std::uint64_t, 4> outcomes{};
+    std::array<std::uint64_t, 3> registered{};  ///< By ChangeWatch::RegisteredBy.
+    std::uint64_t depths_unusable = 0;
+    std::uint64_t remembered = 0;
+    std::uint64_t store_errors = 0;
+    std::uint64_t objects = 0;
+    std::size_t places = 0;
+    double megabytes = 0;
+    std::size_t damaged = 0;
+    std::uint64_t looked_in_window = 0;
+    double ms_in_window = 0;
+  };
+
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    const auto now_ns = static_cast<std::int64_t>(ros::WallTime::now().toNSec());
+    ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ReadChangeDetectionConfig(parameters, now_ns);
+    ConfiguredChangeMethod method = MakeConfiguredMethod(config_);
+    method_name_ = method.name;
+    config_.watch.regions.least_confidence = method.threshold;
+    watch_ = std::make_unique<ChangeWatch>(config_.watch, std::move(method.method), now_ns);
+    SayRecovery(watch_->memory().recovery());
+    figures_.places = watch_->memory().size();
+    frames_ = std::make_unique<ChangeFrames>(ChangeFrames::Config{
+        config_.spacing_m, static_cast<std::size_t>(config_.max_waiting_frames),
+        config_.use_depth ? config_.depth_wait_s : 0, config_.pose});
+    queue_ = std::make_unique<Queue>(1);
+    if (config_.tell_zone) {
+      MapChangeSender::Config sender;
+      sender.drive_id = config_.watch.drive_id;
+      sender.least_confidence = config_.tell_confidence;
+      sender.outbox.path = config_.watch.memory.directory + "/map_changes.sqlite3";
+      sender_ = std::make_unique<MapChangeSender>(sender, getNodeHandle(), now_ns);
+    }
+    Connect();
+    worker_ = std::thread([this] { Work(); });
+  }
+
+  void SayRecovery(const PlaceMemory::Recovery& recovery) {
+    if (!recovery.set_aside.empty()) {
+      NODELET_ERROR("the index of places was corrupt: it is now '%s', %zu places were read again",
+                    recovery.set_aside.c_str(), recovery.rebuilt);
+    }
+    if (recovery.unreadable + recovery.lost_files > 0) {
+      NODELET_ERROR("of the places %zu files were damaged and %zu missing", recovery.unreadable,
+                    recovery.lost_files);
+    }
+  }
+
+  void Connect() {
+    using Self = ChangeDetectionNodelet;
+    ros::NodeHandle& node = getNodeHandle();
+    report_publisher_ = node.advertise<ChangedObjects>("change/report", 100);
+    mask_publisher_ = node.advertise<sensor_msgs::Image>("change/mask", 2);
+    overlay_publisher_ = node.advertise<sensor_msgs::Image>("change/overlay", 2);
+    vehicle_frames_ =
+        std::make_unique<VehicleFrames>(node, getName(), config_.map_frame, config_.base_frame);
+    subscribers_ = {
+        node.subscribe("fix", 100, &Self::OnFix, this),
+        node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
+    };
+    if (config_.pose.use_fused) {
+      subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
+    }
+    if (config_.use_depth) {
+      subscribers_.push_back(node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this));
+    }
+    updater_ =
+        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("change_detection");
+    updater_->add("change_detection", this, &Self::Diagnose);
+    // Steady time: a replay that stands still must not silence the nodelet.
+    timers_ = {
+        node.createSteadyTimer(ros::WallDuration(kPickPeriodS), &Self::OnPickTimer, this),
+        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
+                               &Self::OnDiagnosticsTimer, this),
+    };
+    image_transport::ImageTransport transport(node);
+    const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
+                                                getPrivateNodeHandle());
+    // No bound of ROS's, which would lose frames without a word: ChangeFrames has one, and counts.
+    image_subscriber_ = transport.subscribe(
+        "camera_rect/image", 0,
+        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
+            [this](const sensor_msgs::ImageConstPtr& image) { OnImage(image); }),
+        ros::VoidPtr(), hints);
+  }
+
+  void OnImage(const sensor_msgs::ImageConstPtr& image) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    LearnMounting(image->header.frame_id);
+    frames_->AddImage(image, ros::Time::now().toSec());
+  }
+
+  void OnDepth(const sensor_msgs::ImageConstPtr& depth) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frames_->AddDepth(depth);
+  }
+
+  void OnFix(const sensor_msgs::NavSatFix& message) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frames_->AddFix(ToFix(message));
+  }
+
+  void OnPose(const nav_msgs::Odometry& message) {
+    const std::optional<TrackPose> pose = vehicle_frames_->FusedPose(message);
+    if (!pose) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frames_->AddPose(FromRosTime(message.header.stamp), *pose);
+  }
+
+  void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
+    try {
+      const CameraIntrinsics intrinsics = ToRectifiedIntrinsics(message);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      intrinsics_ = intrinsics;
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
+    }
+  }
+
+  /// The mounting does not change: looked up until it is known, then kept. The mutex is held.
+  void LearnMounting(const std::string& frame_id) {
+    if (mountings_.count(frame_id) != 0) return;
+    const auto mounting = vehicle_frames_->Mounting(frame_id);
+    if (mounting) mountings_[frame_id] = *mounting;
+  }
+
+  void OnPickTimer(const ros::SteadyTimerEvent&) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    while (const auto posed = frames_->Next(ros::Time::now().toSec())) {
+      const auto mounting = mountings_.find(posed->image->header.frame_id);
+      if (!intrinsics_ || mounting == mountings_.end()) {
+        ++no_camera_;
+      } else if (queue_->counters().waiting > 0) {
+        ++busy_;
+      } else {
+        frames_->Taken(*posed);
+        queue_->Push({*posed, *intrinsics_, mounting->second});
+      }
+    }
+  }
+
+  void Work() {
+    while (const std::optional<Job> job = queue_->Pop()) {
+      try {
+        LookAt(*job);
+        queue_->Done();
+      } catch (const std::exception& error) {
+        queue_->Unusable();
+        NODELET_ERROR_THROTTLE(kSayAgainS, "dropped an image of %s: %s",
+                               image_subscriber_.getTopic().c_str(), error.what());
+      }
+    }
+  }
+
+  void LookAt(const Job& job) {
+    const Clock::time_point start = Clock::now();
+    const ChangeWatch::Answer answer = watch_->Look(ToPicture(job));
+    const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    if (!answer.store_error.empty()) {
+      NODELET_ERROR_THROTTLE(kSayAgainS, "a place is not remembered: %s",
+                             answer.store_error.c_str());
+    }
+    Publish(answer, job.posed.image->header);
+    if (sender_) sender_->Tell(answer.passed);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++figures_.outcomes[static_cast<std::size_t>(answer.outcome)];
+    if (answer.outcome == ChangeWatch::Outcome::kCompared) {
+      ++figures_.registered[static_cast<std::size_t>(answer.registered_by)];
+    }
+    figures_.remembered += answer.remembered ? 1 : 0;
+    figures_.store_errors += answer.store_error.empty() ? 0 : 1;
+    figures_.objects += answer.newly_confirmed;
+    figures_.places = watch_->memory().size();
+    figures_.megabytes = watch_->memory().bytes() / 1e6;
+    figures_.damaged = watch_->memory().damaged();
+    ++figures_.looked_in_window;
+    figures_.ms_in_window += ms;
+  }
+
+  WatchedPicture ToPicture(const Job& job) {
+    const auto shared = cv_bridge::toCvShare(job.posed.image, sensor_msgs::image_encodings::BGR8);
+    const cv::Mat& bgr = shared->image;
+    if (bgr.cols != job.camera.width || bgr.rows != job.camera.height) {
+      throw Error("it is " + std::to_string(bgr.cols) + "x" + std::to_string(bgr.rows) +
+                  ", its camera_info accepts " + std::to_string(job.camera.width) + "x" +
+                  std::to_string(job.camera.height));
+    }
+    WatchedPicture picture;
+    picture.stamp_ns = FromRosTime(job.posed.image->header.stamp);
+    picture.bgr = bgr;
+    if (bgr.cols > config_.width_px) {
+      const double scale = static_cast<double>(config_.width_px) / bgr.cols;
+      const cv::Size size(config_.width_px, std::max(1, cvRound(bgr.rows * scale)));
+      picture.bgr = cv::Mat();
+      cv::resize(bgr, picture.bgr, size, 0, 0, cv::INTER_AREA);
+    } else {
+      picture.bgr = bgr.clone();  // The message's pixels end with it.
+    }
+    picture.camera = Resized(job.camera, picture.bgr.cols, picture.bgr.rows);
+    picture.depth = DepthOf(job, picture.bgr.size());
+    picture.base_from_optical = job.base_from_optical;
+    picture.position = job.posed.base.position;
+    picture.covariance_m2 = job.posed.base.covariance_m2;
+    picture.heading_rad = job.posed.base.course_rad;
+    return picture;
+  }
+
+  /// Empty where there is none, or none that is usable: then the picture goes without.
+  cv::Mat DepthOf(const Job& job, cv::Size size) {
+    if (!job.posed.depth) return {};
+    try {
+      return ToDepthMetres(job.posed.depth, size, config_.depth_units_per_m);
+    } catch (const std::exception& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "depth image not used: %s", error.what());
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++figures_.depths_unusable;
+      return {};
+    }
+  }
+
+  void Publish(const ChangeWatch::Answer& answer, const std_msgs::Header& header) {
+    const bool compared = answer.outcome == ChangeWatch::Outcome::kCompared;
+    if (compared && mask_publisher_.getNumSubscribers() > 0) {
+      mask_publisher_.publish(ToImageMessage(answer.classes, header));
+    }
+    if (compared && overlay_publisher_.getNumSubscribers() > 0) {
+      const cv::Mat drawn = DrawChanges(answer.pair.after, answer.classes, answer.regions);
+      overlay_publisher_.publish(ToImageMessage(drawn, header));
+    }
+    report_publisher_.publish(boost::make_shared<ChangedObjects>(
+        ToMessage(answer, header, config_.watch.drive_id, method_name_)));
+  }
+
+  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    using Outcome = ChangeWatch::Outcome;
+    const Queue::Counters queue = queue_->counters();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const ChangeFrames::Counters& frames = frames_->counters();
+    const auto outcome = [this](Outcome which) {
+      return figures_.outcomes[static_cast<std::size_t>(which)];
+    };
+    if (figures_.store_errors > store_errors_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "places are not remembered");
+    } else if (queue.dropped > dropped_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "dropping unusable images");
+    } else if (frames.frames == frames_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
+    } else {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
+    }
+    store_errors_said_ = figures_.store_errors;
+    dropped_said_ = queue.dropped;
+    frames_said_ = frames.frames;
+    status.add("frames_in", frames.frames);
+    status.add("frames_waiting", frames_->waiting());
+    status.add("frames_displaced", frames.displaced);
+    status.add("frames_no_pose", frames.no_pose);
+    status.add("frames_no_camera", no_camera_);
+    status.add("frames_near", frames.near);
+    status.add("frames_skipped_busy", busy_);
+    status.add("frames_in_work", queue.waiting);
+    status.add("frames_unusable", queue.dropped);
+    status.add("frames_looked_at", queue.processed);
+    status.add("pictures_uncertain", outcome(Outcome::kUncertain));
+    status.add("pictures_without_earlier", outcome(Outcome::kNothingEarlier));
+    status.add("pictures_refused", outcome(Outcome::kRefused));
+    status.add("pictures_compared", outcome(Outcome::kCompared));
+    status.add("registered_by_depth", figures_.registered[0]);
+    status.add("registered_by_edges", figures_.registered[1]);
+    status.add("registered_by_features", figures_.registered[2]);
+    status.add("depths_unusable", figures_.depths_unusable);
+    status.add("pictures_remembered", figures_.remembered);
+    status.add("pictures_not_stored", figures_.store_errors);
+    status.add("objects_confirmed", figures_.objects);
+    status.add("places", figures_.places);
+    status.add("places_mb", figures_.megabytes);
+    status.add("places_damaged", figures_.damaged);
+    const auto looked = static_cast<double>(figures_.looked_in_window);
+    status.add("looking_ms", looked > 0 ? figures_.ms_in_window / looked : 0.0);
+    status.add("method", method_name_);
+    status.add("threshold", config_.watch.regions.least_confidence);
+    if (sender_) sender_->Diagnose(status);
+    figures_.looked_in_window = 0;
+    figures_.ms_in_window = 0;
+  }
+
+  ChangeDetectionConfig config_;
+  std::string method_name_;
+  std::unique_ptr<ChangeWatch> watch_;       // The worker's, once it runs.
+  std::unique_ptr<MapChangeSender> sender_;  // None: nothing is told to the zone.
+  std::unique_ptr<Queue> queue_;
+  std::unique_ptr<VehicleFrames> vehicle_frames_;
+  ros::Publisher report_publisher_, mask_publisher_, overlay_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  image_transport::Subscriber image_subscriber_;
+  std::vector<ros::SteadyTimer> timers_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  std::uint64_t store_errors_said_ = 0;
+  std::uint64_t dropped_said_ = 0;
+  std::uint64_t frames_said_ = 0;
+  std::thread worker_;
+
+  std::mutex mutex_;  ///< Guards the rest.
+  std::unique_ptr<ChangeFrames> frames_;
+  std::optional<CameraIntrinsics> intrinsics_;
+  std::map<std::string, Eigen::Isometry3d> mountings_;  ///< By frame id.
+  std::uint64_t no_camera_ = 0;
+  std::uint64_t busy_ = 0;
+  Figures figures_;
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::ChangeDetectionNodelet, nodelet::Nodelet)

@@ -1,0 +1,88 @@
+#include "nodelets/change_detection/map_change_sender.h"
+
+#include "nodelets/nodelet_support.h"
+#include "ros/conversions/hazard_conversions.h"
+#include "ros/conversions/map_change_conversions.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kChangeTickS = 0.2;
+/// At most so many a tick: a full outbox must not crowd out the reports of hazards.
+constexpr std::size_t kMostChangesPerTick = 20;
+
+}  // namespace
+
+MapChangeSender::MapChangeSender(const Config& config, ros::NodeHandle& node, std::int64_t now_ns)
+    : config_(config),
+      random_(EntropySeededGenerator()),
+      outbox_(config.outbox, EntropySeededGenerator(), now_ns, SteadyS()) {
+  if (!outbox_.set_aside().empty()) {
+    ROS_ERROR("the store of changes for the zone was corrupt: it is now '%s'",
+              outbox_.set_aside().c_str());
+  }
+  publisher_ = node.advertise<MapChange>("change/map_change", 100);
+  subscriber_ = node.subscribe("change/receipt", 1000, &MapChangeSender::OnReceipt, this);
+  // Steady time: a replay that stands still must not keep a report from being sent again.
+  timer_ = node.createSteadyTimer(ros::WallDuration(kChangeTickS), &MapChangeSender::OnTick, this);
+}
+
+void MapChangeSender::Tell(const std::vector<PlacedChange>& passed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const PlacedChange& change : passed) {
+    const auto report = ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
+    if (!report || report->confidence < config_.least_confidence) {
+      ++unsure_;
+      continue;
+    }
+    try {
+      outbox_.Add(*report, SteadyS());
+    } catch (const Error& error) {
+      TellStoreError(error);
+    }
+  }
+}
+
+void MapChangeSender::OnReceipt(const ReportReceipt& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    const Receipt receipt = FromMessage(message);
+    if (receipt.status == Receipt::Status::kRefused) {
+      ROS_WARN_THROTTLE(kSayAgainS, "the zone refused a change: %s", receipt.reason.c_str());
+    }
+    outbox_.AddReceipt(receipt);
+  } catch (const StoreError& error) {
+    TellStoreError(error);  // It is sent again; so the zone answers again.
+  } catch (const Error& error) {
+    ROS_WARN_THROTTLE(kSayAgainS, "dropped an answer of the zone: %s", error.what());
+  }
+}
+
+void MapChangeSender::OnTick(const ros::SteadyTimerEvent&) {
+  if (publisher_.getNumSubscribers() == 0) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMostChangesPerTick)) {
+    publisher_.publish(ToMessage(report));
+  }
+}
+
+void MapChangeSender::TellStoreError(const Error& error) {
+  ++store_errors_;
+  ROS_ERROR_THROTTLE(kSayAgainS, "a change is not kept for the zone: %s", error.what());
+}
+
+void MapChangeSender::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const MapChangeOutbox::Counters& counters = outbox_.counters();
+  status.add("changes_unsure", unsure_);
+  status.add("changes_told", counters.added);
+  status.add("changes_pending", outbox_.pending());
+  status.add("changes_sent", counters.sent);
+  status.add("changes_resent", counters.resends);
+  status.add("changes_committed", counters.committed);
+  status.add("changes_refused", counters.refused);
+  status.add("changes_displaced", counters.displaced);
+  status.add("changes_not_kept", store_errors_);
+}
+
+}  // namespace livemap

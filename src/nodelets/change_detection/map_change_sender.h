@@ -1,0 +1,50 @@
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <livemap/ReportReceipt.h>
+#include <ros/ros.h>
+
+#include <memory>
+#include <mutex>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "change/objects/change_detector.h"
+#include "vehicle/outbox/map_change_outbox.h"
+
+namespace livemap {
+
+/// MapChangeOutbox with topics and clocks: sends change/map_change, hears change/receipt.
+class MapChangeSender {
+ public:
+  struct Config {
+    std::string drive_id;
+    double least_confidence = 0.5;  ///< Less sure objects are not told.
+    MapChangeOutbox::Config outbox;
+  };
+
+  /// Throws StoreError.
+  MapChangeSender(const Config& config, ros::NodeHandle& node, std::int64_t now_ns);
+
+  /// What the zone is to know of objects that the vehicle has passed. Any thread.
+  void Tell(const std::vector<PlacedChange>& passed);
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
+
+ private:
+  void OnReceipt(const ReportReceipt& message);
+  void OnTick(const ros::SteadyTimerEvent&);
+  void TellStoreError(const Error& error);
+
+  Config config_;
+  ros::Publisher publisher_;
+  ros::Subscriber subscriber_;
+  ros::SteadyTimer timer_;
+  mutable std::mutex mutex_;  ///< Guards the rest.
+  std::mt19937_64 random_;
+  MapChangeOutbox outbox_;
+  std::uint64_t unsure_ = 0;
+  std::uint64_t store_errors_ = 0;
+};
+
+}  // namespace livemap

@@ -1,0 +1,43 @@
+#include "nodelets/change_detection/posed_frame_queue.h"
+
+#include "ros/conversions/hazard_conversions.h"
+
+namespace livemap {
+
+void ChangeFrames::AddImage(const sensor_msgs::ImageConstPtr& image, double now_s) {
+  ++counters_.frames;
+  if (waiting_.size() == config_.most_waiting) {
+    waiting_.pop_front();
+    ++counters_.displaced;
+  }
+  waiting_.push_back({image, now_s});
+}
+
+void ChangeFrames::AddDepth(const sensor_msgs::ImageConstPtr& depth) {
+  depths_[FromRosTime(depth->header.stamp)] = depth;
+  if (depths_.size() > config_.most_waiting) depths_.erase(depths_.begin());
+}
+
+std::optional<ChangeFrames::Posed> ChangeFrames::Next(double now_s) {
+  while (!waiting_.empty()) {
+    const Waiting& waiting = waiting_.front();
+    const std::int64_t stamp_ns = FromRosTime(waiting.image->header.stamp);
+    const double waited_s = now_s - waiting.arrival_s;
+    const BasePoseSource::Lookup lookup = pose_.At(stamp_ns, waited_s);
+    // In their order: those behind it wait too.
+    if (lookup.answer == BasePoseSource::Answer::kWait) return std::nullopt;
+    const bool hopeless = lookup.answer == BasePoseSource::Answer::kHopeless;
+    const bool near = !hopeless && last_taken_ &&
+                      GeodesicDistanceM(*last_taken_, lookup.base.position) < config_.spacing_m;
+    const auto depth = depths_.find(stamp_ns);
+    const bool has_depth = depth != depths_.end();
+    if (!hopeless && !near && !has_depth && waited_s < config_.depth_wait_s) return std::nullopt;
+    const Posed posed{waiting.image, has_depth ? depth->second : nullptr, lookup.base};
+    waiting_.pop_front();
+    if (!hopeless && !near) return posed;
+    ++(hopeless ? counters_.no_pose : counters_.near);
+  }
+  return std::nullopt;
+}
+
+}  // namespace livemap

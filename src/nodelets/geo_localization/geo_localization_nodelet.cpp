@@ -1,0 +1,259 @@
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <nodelet/nodelet.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_eigen/tf2_eigen.h>
+#include <tf2_ros/static_transform_broadcaster.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <pluginlib/class_list_macros.hpp>
+#include <string>
+
+#include "nodelets/nodelet_support.h"
+#include "ros/conversions/hazard_conversions.h"
+#include "ros/conversions/localization_conversions.h"
+#include "ros/parameters/datum_parameter.h"
+#include "ros/parameters/geo_localization_parameters.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kTickS = 0.02;
+
+}  // namespace
+
+/// Where the vehicle is on the map: fixes and odometry in, fused position and pose and tf
+/// map -> odom out. All callbacks run one at a time, in the nodelet's own queue; an optimisation
+/// takes one of the manager's threads for some milliseconds.
+class GeoLocalizationNodelet : public nodelet::Nodelet {
+ private:
+  /// Messages that came since the last look.
+  struct Arrivals {
+    int fixes = 0, odometry = 0;
+  };
+  struct Figures {
+    std::uint64_t published = 0, foreign_frames = 0, begun_anew = 0;
+    double total_ms = 0, longest_ms = 0;  // Of the localizer, since the last diagnostics.
+    std::uint64_t used_before = 0;        // Fixes, at the last diagnostics.
+  };
+
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ReadGeoLocalizationConfig(parameters);
+    localizer_ = std::make_unique<GeoLocalizer>(config_.localizer);
+    feed_ = std::make_unique<LocalizerFeed>(
+        config_.feed, *localizer_, [this](const OdometrySample& sample) { Publish(sample); },
+        [this](const PositionFix&, GeoLocalizer::FixVerdict verdict) {
+          if (verdict != GeoLocalizer::FixVerdict::kRefused) Explain(verdict);
+        });
+    ros::NodeHandle& node = getNodeHandle();
+    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>("localization/fix", 10);
+    odometry_publisher_ = node.advertise<nav_msgs::Odometry>("localization/odometry", 10);
+    reset_service_ =
+        getPrivateNodeHandle().advertiseService("reset", &GeoLocalizationNodelet::OnReset, this);
+    StartDiagnostics();
+    fix_subscriber_ = node.subscribe("fix", 1000, &GeoLocalizationNodelet::OnFix, this);
+    odometry_subscriber_ = node.subscribe("odom", 1000, &GeoLocalizationNodelet::OnOdometry, this);
+    // Steady: a bag that pauses must not keep back what has come.
+    tick_timer_ =
+        node.createSteadyTimer(ros::WallDuration(kTickS), &GeoLocalizationNodelet::OnTick, this);
+    silence_timer_ = node.createSteadyTimer(ros::WallDuration(config_.silence_warning_s),
+                                            &GeoLocalizationNodelet::OnSilenceTimer, this);
+  }
+
+  void OnFix(const sensor_msgs::NavSatFix& message) {
+    ++arrivals_.fixes;
+    const Stopwatch stopwatch(figures_);
+    feed_->AddFix(ToPositionFix(message), SteadyS());
+    TellNews();
+  }
+
+  void OnOdometry(const nav_msgs::OdometryConstPtr& message) {
+    ++arrivals_.odometry;
+    if (message->header.frame_id != config_.odom_frame ||
+        message->child_frame_id != config_.base_frame) {
+      ++figures_.foreign_frames;
+      NODELET_WARN_THROTTLE(kSayAgainS, "dropped odometry of '%s' in '%s', wanted is '%s' in '%s'",
+                            message->child_frame_id.c_str(), message->header.frame_id.c_str(),
+                            config_.base_frame.c_str(), config_.odom_frame.c_str());
+      return;
+    }
+    const bool by_message = config_.odometry_covariance == "message" && newest_odometry_;
+    const OdometrySample sample = ToOdometrySample(
+        *message, by_message ? std::make_optional(FromRosTime(newest_odometry_->header.stamp))
+                             : std::nullopt);
+    // Kept until the localizer has it: its twist goes on.
+    newest_odometry_ = message;
+    waiting_.push_back(message);
+    if (waiting_.size() > kMaxWaiting) waiting_.pop_front();
+    const Stopwatch stopwatch(figures_);
+    if (feed_->AddOdometry(sample, SteadyS())) {
+      ++figures_.begun_anew;
+      NODELET_WARN("the odometry's stamps went back: localisation starts anew");
+    }
+    TellNews();
+  }
+
+  void OnTick(const ros::SteadyTimerEvent&) {
+    const Stopwatch stopwatch(figures_);
+    feed_->Advance(SteadyS());
+    TellNews();
+  }
+
+  /// An odometry that the localizer has taken.
+  void Publish(const OdometrySample& sample) {
+    const nav_msgs::OdometryConstPtr odometry = TakeWaiting(sample.stamp_ns);
+    const auto map_from_odom = localizer_->MapFromOdom();
+    const auto fused = localizer_->Fused(sample.stamp_ns);
+    if (!odometry || !map_from_odom || !fused) return;
+    fix_publisher_.publish(ToFusedFix(*fused, config_.base_frame, sample.stamp_ns));
+    odometry_publisher_.publish(
+        ToFusedOdometry(*fused, *map_from_odom, sample, *odometry, config_.map_frame));
+    ++figures_.published;
+    if (!config_.publish_tf) return;
+    geometry_msgs::TransformStamped transform = tf2::eigenToTransform(*map_from_odom);
+    transform.header.stamp = odometry->header.stamp;
+    transform.header.frame_id = config_.map_frame;
+    transform.child_frame_id = config_.odom_frame;
+    tf_broadcaster_.sendTransform(transform);
+  }
+
+  /// The message of a sample; those before it are done with.
+  nav_msgs::OdometryConstPtr TakeWaiting(std::int64_t stamp_ns) {
+    const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& message) {
+      return FromRosTime(message->header.stamp) == stamp_ns;
+    });
+    if (found == waiting_.end()) return nullptr;
+    nav_msgs::OdometryConstPtr message = *found;
+    waiting_.erase(waiting_.begin(), std::next(found));
+    return message;
+  }
+
+  void Explain(GeoLocalizer::FixVerdict verdict) {
+    const char* reason = RefusalReason(verdict);
+    if (reason == nullptr) return;
+    last_refusal_ = reason;
+    // The warning of silence says that better; at a start it is as it should be.
+    if (verdict == GeoLocalizer::FixVerdict::kWithoutOdometry) return;
+    NODELET_WARN_THROTTLE(kSayAgainS, "refused a fix: %s", reason);
+  }
+
+  /// Outliers, which show when the odometry has reached them, and earth -> map once the datum is
+  /// known; that stays while the nodelet lives.
+  void TellNews() {
+    const std::uint64_t refused = localizer_->counters().fixes_refused;
+    if (refused > refused_before_) Explain(GeoLocalizer::FixVerdict::kRefused);
+    refused_before_ = refused;
+    if (datum_told_ || !config_.publish_tf || !localizer_->datum()) return;
+    datum_told_ = true;
+    static_broadcaster_.sendTransform(
+        EarthFromMap(*localizer_->datum(), config_.map_frame, ros::Time::now()));
+  }
+
+  bool OnReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    localizer_->Forget();
+    ++figures_.begun_anew;
+    response.success = true;
+    response.message = "everything but the datum is forgotten";
+    return true;
+  }
+
+  void OnSilenceTimer(const ros::SteadyTimerEvent&) {
+    const Arrivals came = arrivals_;
+    arrivals_ = {};
+    missing_.clear();
+    if (came.fixes == 0) missing_ = "no fixes on " + fix_subscriber_.getTopic();
+    if (came.odometry == 0) {
+      missing_ += (missing_.empty() ? "" : ", ") + std::string("no odometry on ") +
+                  odometry_subscriber_.getTopic();
+      // Visual odometry may be wanted and have failed to load.
+      if (odometry_subscriber_.getNumPublishers() == 0) {
+        missing_ += ", which nobody publishes (edge_vo does, with vo:=true)";
+      }
+    }
+    if (missing_.empty()) return;
+    NODELET_WARN_THROTTLE(kSayAgainS, "for %.1f s %s", config_.silence_warning_s, missing_.c_str());
+  }
+
+  void StartDiagnostics() {
+    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
+                                                             getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("geo_localization");
+    updater_->add("geo localization", this, &GeoLocalizationNodelet::Diagnose);
+    // Not the updater's own timer: that one follows the simulated clock.
+    diagnostics_timer_ = getNodeHandle().createSteadyTimer(
+        ros::WallDuration(config_.diagnostics_period_s),
+        [this](const ros::SteadyTimerEvent&) { updater_->force_update(); });
+  }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    using Level = diagnostic_msgs::DiagnosticStatus;
+    const LocalizerState state = localizer_->state();
+    const std::string name = LocalizerStateName(state);
+    status.summary(state == LocalizerState::kOk && missing_.empty() ? Level::OK : Level::WARN,
+                   missing_.empty() ? name : name + ": " + missing_);
+    status.add("state", name);
+    DescribeLocalizer(*localizer_, status);
+    const std::uint64_t used = localizer_->counters().fixes_used;
+    const std::uint64_t fresh = used > figures_.used_before ? used - figures_.used_before : 0;
+    status.add("last_refusal", last_refusal_);
+    status.add("milliseconds_per_fix",
+               fresh > 0 ? figures_.total_ms / static_cast<double>(fresh) : 0.0);
+    status.add("milliseconds_longest", figures_.longest_ms);
+    status.add("poses_published", figures_.published);
+    status.add("odometry_of_other_frames", figures_.foreign_frames);
+    status.add("begun_anew", figures_.begun_anew);
+    figures_.total_ms = figures_.longest_ms = 0;
+    figures_.used_before = used;
+  }
+
+  /// Adds the time that it lives to the figures.
+  class Stopwatch {
+   public:
+    explicit Stopwatch(Figures& figures) : figures_(figures) {}
+    ~Stopwatch() {
+      const double ms = 1e3 * (SteadyS() - begin_s_);
+      figures_.total_ms += ms;
+      figures_.longest_ms = std::max(figures_.longest_ms, ms);
+    }
+    Stopwatch(const Stopwatch&) = delete;
+    Stopwatch& operator=(const Stopwatch&) = delete;
+
+   private:
+    Figures& figures_;
+    const double begin_s_ = SteadyS();
+  };
+
+  static constexpr std::size_t kMaxWaiting = 2000;
+
+  GeoLocalizationConfig config_;
+  std::unique_ptr<GeoLocalizer> localizer_;
+  std::unique_ptr<LocalizerFeed> feed_;
+  nav_msgs::OdometryConstPtr newest_odometry_;
+  std::deque<nav_msgs::OdometryConstPtr> waiting_;  // Not yet taken by the localizer.
+  Arrivals arrivals_;
+  Figures figures_;
+  std::string missing_;
+  std::string last_refusal_;
+  std::uint64_t refused_before_ = 0;
+  bool datum_told_ = false;
+
+  tf2_ros::TransformBroadcaster tf_broadcaster_;
+  tf2_ros::StaticTransformBroadcaster static_broadcaster_;
+  ros::Publisher fix_publisher_, odometry_publisher_;
+  ros::Subscriber fix_subscriber_, odometry_subscriber_;
+  ros::ServiceServer reset_service_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::SteadyTimer tick_timer_, silence_timer_, diagnostics_timer_;
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::GeoLocalizationNodelet, nodelet::Nodelet)

@@ -1,0 +1,417 @@
+#include <cv_bridge/cv_bridge.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <image_transport/image_transport.h>
+#include <livemap/DetectionArray.h>
+#include <livemap/PicturePart.h>
+#include <livemap/PictureRequest.h>
+#include <nodelet/nodelet.h>
+
+#include <algorithm>
+#include <atomic>
+#include <boost/function.hpp>
+#include <boost/make_shared.hpp>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "nodelets/hazard_detection/hazard_tracking.h"
+#include "nodelets/hazard_detection/recent_pictures.h"
+#include "nodelets/nodelet_support.h"
+#include "perception/detection/detector_pool.h"
+#include "perception/detection/hazard_detector.h"
+#include "perception/privacy/privacy_mask.h"
+#include "ros/conversions/detection_conversions.h"
+#include "ros/parameters/parameters.h"
+
+namespace livemap {
+
+/// Parameters of the hazard_detection nodelet; config/hazard_detection.yaml explains them.
+struct HazardDetectionConfig {
+  std::string model;            ///< Path of the manifest; must be given.
+  std::string engine = "auto";  ///< auto (the manifest's choice), opencv or torch.
+  int engines = 1;              ///< Networks that work side by side on frames in turn.
+  int threads = 2;              ///< Of each engine; OpenCV's are one pool; 0 = all cores.
+  int queue_size = 4;           ///< Frames that may wait.
+  bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
+  bool privacy = true;          ///< Mask faces and number plates in the picture.
+  PrivacyMask::Config mask;
+  HazardTrackingConfig tracking;
+  int picture_frames = 64;          ///< Images with detections that may be asked for.
+  double diagnostics_period_s = 1;  ///< s
+};
+
+/// Detects hazards in the rectified images of the vehicle: exactly one `hazard/detections` with the
+/// image's stamp for each processed frame, also when it is empty, and `hazard/annotated` when
+/// somebody listens. With tracking also `hazard/events`, each object once at its best view, and the
+/// picture of an image of the last moments as `hazard/picture` to who asks for it by
+/// `hazard/picture_request`, or as `hazard/picture_part` where a part of it is enough.
+///
+/// The subscriber's callback only puts the pointer of the image into a queue, so ROS's own
+/// queue, which would lose frames without a word, never fills: it has no bound. The bound is
+/// queue_size, where the oldest frame goes and is counted: frames_in = frames_processed +
+/// frames_dropped + frames_waiting, at any moment. The engines of a pool take from the queue, and
+/// HandOn gets their results in the order of the frames, on a thread of its own.
+class HazardDetectionNodelet : public nodelet::Nodelet {
+ public:
+  ~HazardDetectionNodelet() override {
+    diagnostics_timer_.stop();
+    subscriber_.shutdown();
+    request_subscriber_.shutdown();
+    if (pool_) pool_->Close();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// What an engine makes of an image.
+  struct Seen {
+    cv_bridge::CvImageConstPtr bgr;
+    std::vector<HazardDetection> found;
+    double ms = 0;  ///< conversion and detection
+  };
+  /// An image that may be asked for.
+  struct Kept {
+    cv_bridge::CvImageConstPtr bgr;
+    std::vector<HazardDetection> found;
+    std_msgs::Header header;
+  };
+  using Recent = RecentPictures<Kept>;
+  using Pool = DetectorPool<sensor_msgs::ImageConstPtr, Seen>;
+
+  void onInit() override {
+    InitializeOrExplain(getName(), [this] { Initialize(); });
+  }
+
+  void Initialize() {
+    ReadParameters();
+    const ModelManifest manifest = ReadModelManifest(config_.model);
+    const std::optional<EngineKind> engine = ParseEngineChoice(
+        config_.engine, "parameter '" + getPrivateNodeHandle().resolveName("engine") + "'");
+    thresholds_ = manifest.thresholds;
+    ModelManifest lowered = manifest;
+    if (config_.tracking.tracking) {
+      const auto share = static_cast<float>(config_.tracking.tracker.low_share);
+      for (float& threshold : lowered.thresholds) threshold *= share;
+    }
+    for (int i = 0; i < config_.engines; ++i) {
+      detectors_.push_back(std::make_unique<HazardDetector>(lowered, config_.threads, engine));
+    }
+    if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
+    ros::NodeHandle& node = getNodeHandle();
+    detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
+    image_transport::ImageTransport transport(node);
+    annotated_publisher_ = transport.advertise("hazard/annotated", 10);
+    picture_publisher_ = node.advertise<sensor_msgs::Image>("hazard/picture", 10);
+    part_publisher_ = node.advertise<PicturePart>("hazard/picture_part", 10);
+    recent_ = std::make_unique<Recent>(static_cast<std::size_t>(config_.picture_frames));
+    if (config_.tracking.tracking) {
+      events_publisher_ = node.advertise<DetectionArray>("hazard/events", 100);
+      tracking_ = std::make_unique<HazardTracking>(config_.tracking, manifest, node);
+    }
+    // Beside the images' queue: masking a picture takes longer than detecting in it.
+    request_subscriber_ = getMTNodeHandle().subscribe<PictureRequest>(
+        "hazard/picture_request", 100,
+        [this](const PictureRequest::ConstPtr& request) { AnswerPicture(*request); });
+    StartPool();
+    StartDiagnostics();
+    const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
+                                                getPrivateNodeHandle());
+    subscriber_ = transport.subscribe(
+        "camera_rect/image", 0,
+        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
+            [this](const sensor_msgs::ImageConstPtr& image) { pool_->Push(image); }),
+        ros::VoidPtr(), hints);
+  }
+
+  void ReadParameters() {
+    ParameterReader parameters(getPrivateNodeHandle());
+    parameters.Read("model", config_.model);
+    parameters.Read("engine", config_.engine);
+    parameters.Read("engines", config_.engines, {1, 64});
+    parameters.Read("threads", config_.threads, {0, 256});
+    parameters.Read("queue_size", config_.queue_size, {1, 1000});
+    parameters.Read("annotate_empty", config_.annotate_empty);
+    parameters.Read("privacy", config_.privacy);
+    parameters.Read("privacy_cascades", config_.mask.regions.cascades);
+    parameters.Read("privacy_face_model", config_.mask.regions.face_model);
+    parameters.Read("privacy_min_side_px", config_.mask.regions.min_side_px, {8, 1000});
+    parameters.Read("privacy_grow", config_.mask.grow, {0, 5});
+    parameters.Read("privacy_keep_frames", config_.mask.keep_frames, {0, 1000});
+    config_.tracking = ReadHazardTrackingConfig(parameters);
+    parameters.Read("picture_frames", config_.picture_frames, {1, 1000});
+    parameters.Read("diagnostics_period_s", config_.diagnostics_period_s, {0.1, 60});
+    parameters.RejectUnknown({"image_transport", "diagnostic_period"});
+    if (config_.model.empty()) {
+      throw Error("parameter '" + getPrivateNodeHandle().resolveName("model") +
+                  "' is empty, accepted is the path of a model manifest (models/NAME.yaml)");
+    }
+  }
+
+  void StartPool() {
+    std::vector<Pool::Engine> engines;
+    for (const std::unique_ptr<HazardDetector>& detector : detectors_) {
+      engines.emplace_back([&detector](const sensor_msgs::ImageConstPtr& image) {
+        const Clock::time_point start = Clock::now();
+        Seen seen;
+        seen.bgr = cv_bridge::toCvShare(image, "bgr8");
+        seen.found = detector->Detect(seen.bgr->image);
+        seen.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        return seen;
+      });
+    }
+    pool_ = std::make_unique<Pool>(std::move(engines), static_cast<std::size_t>(config_.queue_size),
+                                   [this](const Pool::Outcome& outcome) {
+                                     if (outcome.result) {
+                                       HandOn(*outcome.result, outcome.item->header);
+                                     } else {
+                                       Drop(outcome.error);
+                                     }
+                                   });
+  }
+
+  void Drop(const std::string& error) {
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    ++figures_.bad;
+    NODELET_ERROR_THROTTLE(60, "dropped an image of %s: %s", subscriber_.getTopic().c_str(),
+                           error.c_str());
+  }
+
+  /// Called image after image in the order in which they came.
+  void HandOn(const Seen& seen, const std_msgs::Header& header) {
+    const cv::Mat& bgr = seen.bgr->image;
+    std::vector<HazardDetection> found = seen.found;
+    found.erase(std::remove_if(found.begin(), found.end(),
+                               [this](const HazardDetection& each) { return IsWeak(each); }),
+                found.end());
+    // The picture first: who reports a detection wants it at hand.
+    if ((config_.annotate_empty || !found.empty()) &&
+        annotated_publisher_.getNumSubscribers() > 0) {
+      if (const auto picture = Drawn(bgr, found, header, cv::Rect({}, bgr.size()))) {
+        annotated_publisher_.publish(picture);
+        CountPicture();
+      }
+    }
+    ++frame_;
+    // The image is kept before anything is told of it: who hears of it may ask for it at once.
+    const std::vector<DetectionArray> events = Keep(seen, header);
+    detections_publisher_.publish(boost::make_shared<DetectionArray>(
+        ToMessage(found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
+    for (const DetectionArray& event : events) events_publisher_.publish(event);
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    figures_.detections += found.size();
+    ++figures_.processed_in_window;
+    figures_.ms_in_window += seen.ms;
+  }
+
+  /// Below the model's threshold: for the tracker alone.
+  bool IsWeak(const HazardDetection& found) const {
+    return found.confidence < thresholds_[static_cast<std::size_t>(found.class_index)];
+  }
+
+  /// The tracker's events, if it runs; the image may be asked for from now on.
+  std::vector<DetectionArray> Keep(const Seen& seen, const std_msgs::Header& header) {
+    const std::lock_guard<std::mutex> lock(pictures_mutex_);
+    std::vector<DetectionArray> events;
+    std::vector<std::int64_t> wanted;
+    if (tracking_) {
+      events = tracking_->Add(seen.found, header, seen.bgr->image.size());
+      wanted = tracking_->WantedPictures();
+    }
+    if (!seen.found.empty()) {
+      recent_->Add(static_cast<std::int64_t>(header.stamp.toNSec()), {seen.bgr, seen.found, header},
+                   wanted);
+    }
+    return events;
+  }
+
+  void AnswerPicture(const PictureRequest& request) {
+    std::optional<Kept> kept;
+    std::vector<HazardDetection> shown;
+    {
+      const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
+      const auto stamp_ns = static_cast<std::int64_t>(request.stamp.toNSec());
+      kept = recent_->Find(stamp_ns);
+      if (kept && tracking_) shown = tracking_->ReportedIn(stamp_ns);
+    }
+    if (!kept) {
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      ++figures_.unknown_requests;
+      return;
+    }
+    shown.erase(std::remove_if(shown.begin(), shown.end(),
+                               [this](const HazardDetection& each) { return !IsWeak(each); }),
+                shown.end());
+    for (const HazardDetection& each : kept->found) {
+      if (!IsWeak(each)) shown.push_back(each);
+    }
+    const cv::Rect image({}, kept->bgr->image.size());
+    const cv::Rect part = PartOf(request, image);
+    const auto picture = Drawn(kept->bgr->image, shown, kept->header, part);
+    if (!picture) return;
+    if (part == image) {
+      picture_publisher_.publish(picture);
+    } else {
+      const auto answer = boost::make_shared<PicturePart>();
+      answer->image = std::move(*picture);
+      answer->part = request.part;
+      part_publisher_.publish(answer);
+    }
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    ++figures_.sent_pictures;
+  }
+
+  /// The part of the image that is wanted; all of it where none or one beyond its edges is named.
+  static cv::Rect PartOf(const PictureRequest& request, const cv::Rect& image) {
+    const auto& part = request.part;
+    const std::uint64_t right = std::uint64_t{part.x_offset} + part.width;
+    const std::uint64_t bottom = std::uint64_t{part.y_offset} + part.height;
+    if (part.width == 0 || part.height == 0 || right > static_cast<std::uint64_t>(image.width) ||
+        bottom > static_cast<std::uint64_t>(image.height)) {
+      return image;
+    }
+    return {static_cast<int>(part.x_offset), static_cast<int>(part.y_offset),
+            static_cast<int>(part.width), static_cast<int>(part.height)};
+  }
+
+  /// `part` of the picture is clear. Masked first, so that the drawn boxes stay whole; a picture
+  /// that cannot be masked stays here: none.
+  sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
+                              const std_msgs::Header& header, const cv::Rect& part) {
+    cv::Mat picture = bgr;
+    std::size_t masked_regions = 0;
+    if (mask_) {
+      const std::lock_guard<std::mutex> mask_lock(mask_mutex_);
+      picture = bgr.clone();
+      try {
+        mask_->Apply(picture, frame_, part);
+        masked_regions = mask_->Masked().size();
+      } catch (const std::exception& error) {
+        NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", error.what());
+        const std::lock_guard<std::mutex> lock(figures_mutex_);
+        ++figures_.withheld;
+        return nullptr;
+      }
+    }
+    {
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      figures_.masked_regions += masked_regions;
+    }
+    return ToAnnotatedMessage(picture, found, header);
+  }
+
+  void CountPicture() {
+    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    ++figures_.annotated;
+  }
+
+  void StartDiagnostics() {
+    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
+                                                             getPrivateNodeHandle(), getName());
+    updater_->setHardwareID("hazard_detection");
+    updater_->add("hazard_detection", this, &HazardDetectionNodelet::Diagnose);
+    window_start_ = Clock::now();
+    // Wall time: a replay that stands still must not silence the nodelet.
+    diagnostics_timer_ = getNodeHandle().createWallTimer(
+        ros::WallDuration(config_.diagnostics_period_s),
+        [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  }
+
+  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    Figures figures;
+    {
+      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      figures = figures_;
+      figures_.processed_in_window = 0;
+      figures_.ms_in_window = 0;
+    }
+    const Pool::Counters counters = pool_->counters();
+    const Clock::time_point now = Clock::now();
+    const double window_s = std::chrono::duration<double>(now - window_start_).count();
+    window_start_ = now;
+    const auto in_window = static_cast<double>(figures.processed_in_window);
+    if (counters.dropped > dropped_said_) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, figures.bad > bad_said_
+                                                                  ? "dropping unusable images"
+                                                                  : "behind: dropping frames");
+    } else if (figures.processed_in_window == 0) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
+    } else {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
+    }
+    dropped_said_ = counters.dropped;
+    bad_said_ = figures.bad;
+    status.add("frames_in", counters.in);
+    status.add("frames_processed", counters.processed);
+    status.add("frames_dropped", counters.dropped);  // unusable ones among them
+    status.add("frames_waiting", counters.waiting);
+    status.add("frames_unusable", figures.bad);
+    status.add("frames_annotated", figures.annotated);
+    status.add("pictures_withheld", figures.withheld);
+    status.add("regions_masked", figures.masked_regions);
+    status.add("detections", figures.detections);
+    status.add("pictures_sent", figures.sent_pictures);
+    status.add("pictures_unknown", figures.unknown_requests);
+    if (tracking_) DiagnoseTracking(status);
+    status.add("rate_hz", window_s > 0 ? in_window / window_s : 0.0);
+    status.add("detection_ms", in_window > 0 ? figures.ms_in_window / in_window : 0.0);
+    status.add("model", detectors_.front()->manifest().name);
+    status.add("engine", NameOf(detectors_.front()->Engine()));
+    status.add("engines", detectors_.size());
+  }
+
+  void DiagnoseTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const std::lock_guard<std::mutex> lock(pictures_mutex_);
+    const ObjectTracker::Counters& counters = tracking_->counters();
+    status.add("events", counters.events);
+    status.add("tracks", counters.tracks);
+    status.add("tracks_forgotten", counters.forgotten);
+    status.add("tracker_resets", counters.resets);
+    status.add("boxes_refused", counters.refused);
+    status.add("frames_with_motion", tracking_->frames_with_motion());
+  }
+
+  /// What the queue does not count.
+  struct Figures {
+    std::uint64_t bad = 0;
+    std::uint64_t annotated = 0;
+    std::uint64_t withheld = 0;        ///< Pictures that could not be masked.
+    std::uint64_t masked_regions = 0;  ///< Over all pictures.
+    std::uint64_t detections = 0;
+    std::uint64_t sent_pictures = 0;     ///< On request.
+    std::uint64_t unknown_requests = 0;  ///< For images that are not kept any more.
+    std::uint64_t processed_in_window = 0;
+    double ms_in_window = 0;
+  };
+
+  HazardDetectionConfig config_;
+  std::vector<std::unique_ptr<HazardDetector>> detectors_;  ///< Each its engine's thread's own.
+  std::vector<float> thresholds_;                           ///< The model's, by class index.
+  // HandOn's and AnswerPicture's, which run at once:
+  std::mutex pictures_mutex_;                 ///< Guards tracking_ and recent_.
+  std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
+  std::unique_ptr<Recent> recent_;
+  std::mutex mask_mutex_;              ///< Guards mask_; taken before figures_mutex_.
+  std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
+  std::atomic<std::uint64_t> frame_{0};
+  image_transport::Subscriber subscriber_;
+  ros::Subscriber request_subscriber_;
+  ros::Publisher detections_publisher_;
+  ros::Publisher events_publisher_;
+  ros::Publisher picture_publisher_;
+  ros::Publisher part_publisher_;
+  image_transport::Publisher annotated_publisher_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::WallTimer diagnostics_timer_;
+  // The diagnostics timer's own:
+  Clock::time_point window_start_;
+  std::uint64_t dropped_said_ = 0;
+  std::uint64_t bad_said_ = 0;
+
+  std::mutex figures_mutex_;
+  Figures figures_;
+  std::unique_ptr<Pool> pool_;  ///< Last: its threads use the rest.
+};
+
+}  // namespace livemap
+
+PLUGINLIB_EXPORT_CLASS(livemap::HazardDetectionNodelet, nodelet::Nodelet)

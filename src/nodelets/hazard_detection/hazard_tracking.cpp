@@ -1,0 +1,153 @@
+#include "nodelets/hazard_detection/hazard_tracking.h"
+
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "ros/conversions/camera_info_conversions.h"
+#include "ros/conversions/detection_conversions.h"
+
+namespace livemap {
+namespace {
+
+/// Pictures of this many events are kept for who asks for them.
+constexpr std::size_t kReportedViews = 32;
+
+}  // namespace
+
+HazardTrackingConfig ReadHazardTrackingConfig(ParameterReader& parameters) {
+  HazardTrackingConfig config;
+  ObjectTracker::Config& tracker = config.tracker;
+  parameters.Read("tracking", config.tracking);
+  parameters.Read("track_low_share", tracker.low_share, {0.01, 1});
+  parameters.Read("track_sure", tracker.sure, {0.01, 100});
+  parameters.Read("track_repeat_gain", tracker.repeat_gain, {0, 1});
+  parameters.Read("track_max_delay_s", tracker.max_delay_s, {0, 60});
+  parameters.Read("track_max_unseen_s", tracker.max_unseen_s, {0, 60});
+  parameters.Read("track_max_unseen_m", tracker.max_unseen_m, {0, 1000});
+  parameters.Read("track_good_range_m", tracker.good_range_m, {0.1, 1000});
+  parameters.Read("track_max", tracker.max_tracks, {1, 10000});
+  XmlRpc::XmlRpcValue delays = parameters.ReadStructured("track_class_max_delay_s");
+  if (delays.valid()) {
+    const auto refuse = [] {
+      throw Error(
+          "parameter 'track_class_max_delay_s' is wrong, accepted is a map from class to seconds, "
+          "0 to 60");
+    };
+    if (delays.getType() != XmlRpc::XmlRpcValue::TypeStruct) refuse();
+    tracker.class_max_delay_s.clear();
+    for (auto& [name, value] : delays) {
+      double seconds = std::nan("");
+      if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) seconds = static_cast<double>(value);
+      if (value.getType() == XmlRpc::XmlRpcValue::TypeInt) seconds = static_cast<int>(value);
+      if (!(seconds >= 0 && seconds <= 60)) refuse();
+      tracker.class_max_delay_s[name] = seconds;
+    }
+  }
+  parameters.Read("motion_frame", config.motion_frame);
+  parameters.Read("base_frame", config.base_frame);
+  parameters.Read("motion_max_age_s", config.motion_max_age_s, {0, 10});
+  return config;
+}
+
+HazardTracking::HazardTracking(const HazardTrackingConfig& config, const ModelManifest& manifest,
+                               ros::NodeHandle node)
+    : config_(config),
+      model_(manifest.name),
+      tracker_(config.tracker, manifest.thresholds),
+      listener_(buffer_) {
+  info_ = node.subscribe<sensor_msgs::CameraInfo>(
+      "camera_rect/camera_info", 2, [this](const sensor_msgs::CameraInfo::ConstPtr& info) {
+        try {
+          const CameraIntrinsics intrinsics = ToRectifiedIntrinsics(*info);
+          const std::lock_guard<std::mutex> lock(mutex_);
+          intrinsics_ = intrinsics;
+        } catch (const Error& error) {
+          ROS_WARN_THROTTLE(60, "tracking knows no camera: %s", error.what());
+        }
+      });
+}
+
+std::vector<DetectionArray> HazardTracking::Add(const std::vector<HazardDetection>& found,
+                                                const std_msgs::Header& header, cv::Size size) {
+  TrackerFrame frame;
+  frame.stamp_ns = static_cast<std::int64_t>(header.stamp.toNSec());
+  frame.image_size = size;
+  frame.detections = found;
+  frame.motion = MotionAt(header);
+  if (frame.motion) ++frames_with_motion_;
+
+  std::map<std::int64_t, std::vector<ObjectEvent>> by_view;
+  for (const ObjectEvent& event : tracker_.Add(frame)) by_view[event.stamp_ns].push_back(event);
+  std::vector<DetectionArray> messages;
+  for (const auto& [stamp_ns, events] : by_view) {
+    std_msgs::Header view = header;
+    view.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns));
+    std::vector<HazardDetection> detections;
+    for (const ObjectEvent& event : events) detections.push_back(event.detection);
+    std::stable_sort(detections.begin(), detections.end(),
+                     [](const HazardDetection& a, const HazardDetection& b) {
+                       return a.confidence > b.confidence;
+                     });
+    messages.push_back(ToMessage(detections, view, model_, events.front().image_size, 0));
+    reported_.insert(reported_.end(), events.begin(), events.end());
+    while (reported_.size() > kReportedViews) reported_.pop_front();
+  }
+  return messages;
+}
+
+std::vector<std::int64_t> HazardTracking::WantedPictures() const {
+  std::vector<std::int64_t> wanted = tracker_.BestViews();
+  for (const ObjectEvent& event : reported_) wanted.push_back(event.stamp_ns);
+  return wanted;
+}
+
+std::vector<HazardDetection> HazardTracking::ReportedIn(std::int64_t stamp_ns) const {
+  std::vector<HazardDetection> detections;
+  for (const ObjectEvent& event : reported_) {
+    if (event.stamp_ns == stamp_ns) detections.push_back(event.detection);
+  }
+  return detections;
+}
+
+std::optional<CameraMotion> HazardTracking::MotionAt(const std_msgs::Header& header) {
+  CameraMotion motion;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!intrinsics_) return std::nullopt;
+    motion.intrinsics = *intrinsics_;
+  }
+  const auto pose = PoseAt(header.stamp);
+  if (!pose) return std::nullopt;
+  try {
+    motion.base_from_optical = tf2::transformToEigen(
+        buffer_.lookupTransform(config_.base_frame, header.frame_id, ros::Time(0)));
+  } catch (const tf2::TransformException&) {
+    return std::nullopt;
+  }
+  motion.world_from_base = tf2::transformToEigen(*pose);
+  return motion;
+}
+
+/// Odometry may come later than the detector: then the newest pose serves, whose lag is nearly the
+/// same at the next image, so that the way between the two is right.
+std::optional<geometry_msgs::TransformStamped> HazardTracking::PoseAt(const ros::Time& stamp) {
+  const auto look = [&](const ros::Time& at) {
+    return buffer_.lookupTransform(config_.motion_frame, config_.base_frame, at);
+  };
+  try {
+    return look(stamp);
+  } catch (const tf2::TransformException&) {
+  }
+  try {
+    const geometry_msgs::TransformStamped newest = look(ros::Time(0));
+    const double age_s = (stamp - newest.header.stamp).toSec();
+    if (std::abs(age_s) <= config_.motion_max_age_s) return newest;
+  } catch (const tf2::TransformException&) {
+  }
+  return std::nullopt;
+}
+
+}  // namespace livemap

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <geometry_msgs/Transform.h>
+#include <nav_msgs/Path.h>
+#include <ros/node_handle.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <cstdint>
+#include <optional>
+
+#include "geo/datum.h"
+#include "ros/parameters/hazard_reporting_parameters.h"
+#include "vehicle/reporting/hazard_reporter.h"
+
+namespace livemap {
+
+/// Tells and shows where the vehicle is and what it knows: vehicle/position, path, tf and
+/// hazard/local_map. Not thread-safe.
+class VehicleView {
+ public:
+  /// Advertises its topics. `config`, `reporter` and `catalogue` outlive it.
+  VehicleView(const HazardReportingConfig& config, const HazardReporter& reporter,
+              const HazardCatalogue& catalogue, ros::NodeHandle& node);
+
+  /// The datum of the map frame is that of its owner, the localisation: tf earth -> map.
+  void LearnDatum(const tf2_ros::Buffer& buffer);
+  /// The map frame's place on earth, once it is known.
+  const std::optional<LocalFrame>& map() const { return map_; }
+
+  /// Where the fix of this stamp, the newest, is.
+  void ShowFix(std::int64_t stamp_ns);
+  /// Where base_link is by a fused pose; the map is known.
+  void ShowPose(const TrackPose& base, const ros::Time& stamp);
+  /// Path and markers, where somebody looks at them.
+  void Publish();
+
+ private:
+  void TellPosition(const TrackPose& pose, const ros::Time& stamp);
+  void ShowVehicle(const TrackPose& base, const ros::Time& stamp);
+
+  const HazardReportingConfig& config_;
+  const HazardReporter& reporter_;
+  const HazardCatalogue& catalogue_;
+  std::optional<LocalFrame> map_;
+  geometry_msgs::Transform earth_from_map_;  // By which map_ was made, if it was.
+  std::optional<ros::Time> position_stamp_;
+  nav_msgs::Path path_;
+  tf2_ros::TransformBroadcaster tf_broadcaster_;
+  ros::Publisher position_publisher_, marker_publisher_, path_publisher_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,54 @@
+#include "nodelets/vehicle_tf.h"
+
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <utility>
+
+#include "common/error.h"
+#include "geo/datum.h"
+#include "nodelets/nodelet_support.h"
+#include "ros/conversions/localization_conversions.h"
+
+namespace livemap {
+
+VehicleFrames::VehicleFrames(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
+                             std::string base_frame)
+    : nodelet_name_(std::move(nodelet_name)),
+      map_frame_(std::move(map_frame)),
+      base_frame_(std::move(base_frame)),
+      listener_(buffer_, node) {}
+
+std::optional<TrackPose> VehicleFrames::FusedPose(const nav_msgs::Odometry& message) const {
+  if (message.header.frame_id != map_frame_ || message.child_frame_id != base_frame_) {
+    ROS_WARN_THROTTLE(kSayAgainS,
+                      "%s: dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s'",
+                      nodelet_name_.c_str(), message.child_frame_id.c_str(),
+                      message.header.frame_id.c_str(), base_frame_.c_str(), map_frame_.c_str());
+    return std::nullopt;
+  }
+  try {
+    const auto transform = buffer_.lookupTransform("earth", map_frame_, ros::Time(0));
+    const LocalFrame map(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
+    return ToTrackPose(message, map);
+  } catch (const tf2::TransformException& error) {
+    ROS_WARN_THROTTLE(kSayAgainS, "%s: dropped a fused pose: %s", nodelet_name_.c_str(),
+                      error.what());
+  } catch (const Error& error) {
+    ROS_WARN_THROTTLE(kSayAgainS, "%s: dropped a fused pose: %s", nodelet_name_.c_str(),
+                      error.what());
+  }
+  return std::nullopt;
+}
+
+std::optional<Eigen::Isometry3d> VehicleFrames::Mounting(const std::string& optical_frame) const {
+  try {
+    return Eigen::Isometry3d(
+        tf2::transformToEigen(buffer_.lookupTransform(base_frame_, optical_frame, ros::Time(0))));
+  } catch (const tf2::TransformException& error) {
+    ROS_WARN_THROTTLE(kSayAgainS, "%s: no mounting of the camera yet: %s", nodelet_name_.c_str(),
+                      error.what());
+    return std::nullopt;
+  }
+}
+
+}  // namespace livemap

@@ -1,0 +1,81 @@
+#include "nodes/map_change_receiver.h"
+
+#include <livemap/ReportReceipt.h>
+#include <ros/console.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "ros/conversions/hazard_conversions.h"
+#include "ros/conversions/map_change_conversions.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kRepeatS = 60.0;
+constexpr std::size_t kMaxWaiting = 10000;
+
+}  // namespace
+
+MapChangeDesk::MapChangeDesk(ros::NodeHandle node, ZoneService& zone, std::size_t batch)
+    : zone_(zone), batch_(batch) {
+  receipt_publisher_ = node.advertise<ReportReceipt>("change/receipt", 20000);
+  subscriber_ = node.subscribe("change/map_change", 1000, &MapChangeDesk::OnMapChange, this);
+}
+
+void MapChangeDesk::OnMapChange(const MapChange& message) {
+  try {
+    MapChangeReport report = FromMessage(message);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counters_.received;
+    if (waiting_.size() < kMaxWaiting) {
+      waiting_.push_back(std::move(report));
+    } else {
+      ++counters_.not_queued;
+    }
+  } catch (const Error& error) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++counters_.received;
+      ++counters_.malformed;
+    }
+    ReportReceipt receipt;
+    receipt.schema_version = ReportReceipt::SCHEMA_VERSION;
+    receipt.status = ReportReceipt::REFUSED;
+    receipt.report_uuid = message.uuid;
+    receipt.vehicle_id = message.vehicle_id;
+    receipt.reason = error.what();
+    receipt_publisher_.publish(receipt);
+    ROS_WARN_THROTTLE(kRepeatS, "map change refused: %s", error.what());
+  }
+}
+
+bool MapChangeDesk::CommitWaiting() {
+  std::vector<MapChangeReport> reports;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    while (!waiting_.empty() && reports.size() < batch_) {
+      reports.push_back(std::move(waiting_.front()));
+      waiting_.pop_front();
+    }
+  }
+  if (reports.empty()) return false;
+  for (const Receipt& receipt : zone_.HandleMapChanges(reports)) {
+    if (receipt.status == Receipt::Status::kRefused) {
+      ROS_WARN_THROTTLE(kRepeatS, "map change of '%.64s' refused: %s", receipt.vehicle_id.c_str(),
+                        receipt.reason.c_str());
+    }
+    receipt_publisher_.publish(ToMessage(receipt));
+  }
+  return true;
+}
+
+MapChangeDesk::Counters MapChangeDesk::counters() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Counters counters = counters_;
+  counters.waiting = waiting_.size();
+  return counters;
+}
+
+}  // namespace livemap

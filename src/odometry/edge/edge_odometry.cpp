@@ -1,0 +1,379 @@
+#include "odometry/edge/edge_odometry.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/error.h"
+#include "common/time.h"
+
+namespace livemap {
+namespace {
+
+/// A motion is carried on only over a short pause, s.
+constexpr double kMaxPredictionS = 0.5;
+/// Below this reciprocal condition number the information matrix says nothing about some direction.
+constexpr double kLeastCondition = 1e-12;
+/// Light that fades further than this, or grows, between two images is a covered lens.
+constexpr double kLeastBelievedGain = 0.3;
+
+AlignmentConfig RotationOnly(AlignmentConfig config) {
+  config.rotation_only = true;
+  return config;
+}
+
+}  // namespace
+
+const char* VoStateName(VoState state) {
+  switch (state) {
+    case VoState::kInitialising:
+      return "initialising";
+    case VoState::kTracking:
+      return "tracking";
+    case VoState::kLost:
+      return "lost";
+  }
+  return "";
+}
+
+EdgeOdometry::EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics)
+    : config_(config),
+      extractor_(config.edges),
+      selector_(config.points.seed),
+      aligner_(config.alignment),
+      rotation_aligner_(RotationOnly(config.alignment)) {
+  cameras_[0] = CheckedCamera(intrinsics);
+  levels_ = CountLevels({intrinsics.width, intrinsics.height});
+  for (std::size_t level = 1; level < cameras_.size(); ++level) {
+    cameras_[level] = HalvedIntrinsics(cameras_[level - 1]);
+  }
+}
+
+EdgeOdometry::~EdgeOdometry() = default;
+
+void EdgeOdometry::Reset() {
+  for (auto& keyframe : keyframes_) spare_.push_back(std::move(keyframe));
+  keyframes_.clear();
+  keyframe_ = nullptr;
+  last_ = {};
+  last_stamp_ns_.reset();
+  light_ = {};
+}
+
+void EdgeOdometry::Check(const RgbdFrame& frame) const {
+  CheckPictures(frame, cameras_[0]);
+  if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
+    throw Error("a frame's stamp of " + std::to_string(frame.stamp_ns) +
+                " ns is not later than the last one's, " + std::to_string(*last_stamp_ns_) + " ns");
+  }
+}
+
+VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
+  Check(frame);
+  frame_images_.Build(frame.grey);
+  VoResult result;
+  if (keyframe_ == nullptr) {
+    result = last_;
+    result.state = VoState::kInitialising;
+    if (MakeKeyframe(frame, {}, result)) result.state = VoState::kTracking;
+  } else {
+    Attempt attempt = last_.state == VoState::kLost ? FindBack() : Follow(frame.stamp_ns);
+    if (!attempt.good && last_.state != VoState::kLost) attempt = FindBack();
+    result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
+    const bool gives_up = result.state == VoState::kLost &&
+                          Seconds(frame.stamp_ns - tracked_stamp_ns_) >= config_.give_up_s;
+    result.keyframe_due =
+        gives_up || (attempt.good && WantsKeyframe(attempt.fine, result.world_from_camera));
+    if (result.keyframe_due) {
+      result.new_keyframe = MakeKeyframe(frame, {}, result);
+      if (gives_up && result.new_keyframe) result.state = VoState::kTracking;
+    }
+  }
+  if (result.state == VoState::kTracking) tracked_stamp_ns_ = frame.stamp_ns;
+  last_stamp_ns_ = frame.stamp_ns;
+  last_ = result;
+  return result;
+}
+
+bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
+                               const std::optional<Vector6d>& twist) {
+  if (!last_stamp_ns_ || frame_images_.levels() == 0) return false;
+  const RgbdFrame frame = {*last_stamp_ns_, frame_images_[0], depth_m, 1};
+  if (!MakeKeyframe(frame, inverse_depth_sigma, last_)) return false;
+  last_.state = VoState::kTracking;
+  last_.twist = twist;
+  tracked_stamp_ns_ = *last_stamp_ns_;
+  return true;
+}
+
+/// Makes the current frame the one that later frames are aligned with; false, and nothing changed,
+/// when it has no depth or too few edges.
+bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
+                                const VoResult& result) {
+  if (frame.depth.empty()) return false;
+  if (keyframes_.empty() && spare_.empty()) ReserveBuffers();
+  std::unique_ptr<Keyframe> fresh = std::move(spare_.back());
+  spare_.pop_back();
+  fresh->stamp_ns = frame.stamp_ns;
+  fresh->world_from_camera = result.world_from_camera;
+  fresh->covariance = result.covariance;
+  fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, levels_);
+  fresh->inverse_depth_sigmas.Clear();
+  if (!inverse_depth_sigma.empty()) {
+    constexpr DepthPyramid::Range kAny = {std::numeric_limits<float>::min(),
+                                          std::numeric_limits<float>::max()};
+    fresh->inverse_depth_sigmas.Build(inverse_depth_sigma, 1, kAny, levels_);
+  }
+  std::swap(fresh->images, frame_images_);
+  if (!SelectPoints(*fresh)) {
+    std::swap(fresh->images, frame_images_);
+    spare_.push_back(std::move(fresh));
+    return false;
+  }
+  ForgetNearOnes();
+  keyframes_.push_back(std::move(fresh));
+  keyframe_ = keyframes_.back().get();
+  keyframe_first_sigma_ = 0;
+  frames_since_keyframe_ = 0;
+  light_ = {};
+  return true;
+}
+
+/// All memory of the frames to come, at the first one: later frames allocate nothing.
+void EdgeOdometry::ReserveBuffers() {
+  const auto kept = static_cast<std::size_t>(std::max(2, config_.keyframes_kept));
+  keyframes_.reserve(kept);
+  spare_.reserve(kept + 1);
+  const cv::Size size = frame_images_[0].size();
+  const cv::Mat empty_depth = cv::Mat::zeros(size, CV_32FC1);
+  const std::size_t thumbnail = frame_images_.thumbnail().total();
+  while (spare_.size() < kept + 1) {
+    spare_.push_back(std::make_unique<Keyframe>());
+    Keyframe& keyframe = *spare_.back();
+    keyframe.images.Build(frame_images_[0]);
+    keyframe.depths.Build(empty_depth, 1, config_.depth_range, levels_);
+    for (std::size_t level = 0; level < kMaxLevels; ++level) {
+      keyframe.points[level].Reserve(static_cast<std::size_t>(config_.max_points[level]));
+    }
+    keyframe.thumbnail_points.Reserve(thumbnail);
+  }
+  const std::size_t most =
+      std::max(thumbnail, static_cast<std::size_t>(*std::max_element(config_.max_points.begin(),
+                                                                     config_.max_points.end())));
+  masked_points_.Reserve(most);
+  selector_.Reserve(frame_images_[0].total());
+  extractor_.Reserve(size);
+  aligner_.Reserve(most);
+  rotation_aligner_.Reserve(most);
+}
+
+/// Makes room for a new keyframe: the newest goes when it is close to the one before it, else the
+/// oldest once there are too many.
+void EdgeOdometry::ForgetNearOnes() {
+  const std::size_t count = keyframes_.size();
+  auto leaving = keyframes_.end();
+  if (count >= 2 && Motion(*keyframes_[count - 2], keyframes_[count - 2]->world_from_camera,
+                           keyframes_[count - 1]->world_from_camera) < config_.kept_motion) {
+    leaving = std::prev(keyframes_.end());
+  } else if (count >= static_cast<std::size_t>(std::max(2, config_.keyframes_kept))) {
+    leaving = keyframes_.begin();
+  }
+  if (leaving == keyframes_.end()) return;
+  spare_.push_back(std::move(*leaving));
+  keyframes_.erase(leaving);
+}
+
+bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
+  for (int level = 0; level < levels_; ++level) {
+    const auto index = static_cast<std::size_t>(level);
+    PointSelection selection = config_.points;
+    selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
+    const cv::Mat& grey = keyframe.images[level];
+    const ReferenceLevel reference = {grey, keyframe.depths[level],
+                                      keyframe.inverse_depth_sigmas[level]};
+    selector_.Select(reference, extractor_.Extract(grey), cameras_[index], selection,
+                     keyframe.points[index]);
+  }
+  selector_.SelectAll(keyframe.images.thumbnail(), cameras_[static_cast<std::size_t>(levels_)],
+                      keyframe.thumbnail_points);
+  return keyframe.points[0].size() >= static_cast<std::size_t>(config_.least_points);
+}
+
+const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
+  const auto index = static_cast<std::size_t>(level);
+  if (config_.edge_source == EdgeSource::kKeyframe) return keyframe.points[index];
+  PointSelection selection = config_.points;
+  selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
+  const ReferenceLevel reference = {keyframe.images[level], keyframe.depths[level],
+                                    keyframe.inverse_depth_sigmas[level]};
+  selector_.Select(reference, extractor_.Extract(frame_images_[level]), cameras_[index], selection,
+                   masked_points_);
+  return masked_points_;
+}
+
+AlignmentState EdgeOdometry::BestStart(const EdgePoints& points, int level,
+                                       const Guesses& guesses) {
+  AlignmentState best = light_;
+  best.new_from_reference = *guesses.begin();
+  if (guesses.count == 1) return best;
+  double least_cost = std::numeric_limits<double>::infinity();
+  for (const Eigen::Isometry3d& guess : guesses) {
+    AlignmentState state = light_;
+    state.new_from_reference = guess;
+    const double cost =
+        aligner_.CostAt(points, frame_images_[level], cameras_[static_cast<std::size_t>(level)],
+                        state, config_.lost_sigma / 2);
+    if (cost >= least_cost) continue;
+    least_cost = cost;
+    best = state;
+  }
+  return best;
+}
+
+/// Coarse to fine from the best of the guesses.
+EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses& guesses) {
+  Attempt attempt;
+  attempt.keyframe = &keyframe;
+  AlignmentState state;
+  for (int level = levels_ - 1; level >= 0; --level) {
+    const EdgePoints& points = PointsOf(keyframe, level);
+    if (level == levels_ - 1) state = BestStart(points, level, guesses);
+    attempt.fine = aligner_.Align(points, frame_images_[level],
+                                  cameras_[static_cast<std::size_t>(level)], state);
+    state = attempt.fine.state;
+    attempt.iterations += attempt.fine.iterations;
+  }
+  attempt.good = IsGood(attempt.fine);
+  return attempt;
+}
+
+EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
+  // The thesis's equation 5.7: the motion goes on as it was; or the camera stands.
+  Guesses guesses;
+  const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
+  if (config_.constant_motion && last_.twist && step_s <= kMaxPredictionS) {
+    const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
+    guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
+  }
+  guesses.Add(world_from_last.inverse() * keyframe_->world_from_camera);
+  return TrackFrom(*keyframe_, guesses);
+}
+
+/// The rotation that brings the keyframe's thumbnail nearest to the current one's, with the
+/// translation of `from`.
+Eigen::Isometry3d EdgeOdometry::RotationGuess(Keyframe& keyframe, const Eigen::Isometry3d& from) {
+  AlignmentState state;
+  state.new_from_reference.linear() = from.linear();
+  const AlignmentResult turned =
+      rotation_aligner_.Align(keyframe.thumbnail_points, frame_images_.thumbnail(),
+                              cameras_[static_cast<std::size_t>(levels_)], state);
+  Eigen::Isometry3d guess = turned.state.new_from_reference;
+  guess.translation() = from.translation();
+  return guess;
+}
+
+/// Searches the motion anew: from the thumbnails' rotation, with the newest keyframes first.
+EdgeOdometry::Attempt EdgeOdometry::FindBack() {
+  Attempt attempt;
+  for (auto candidate = keyframes_.rbegin(); candidate != keyframes_.rend() && !attempt.good;
+       ++candidate) {
+    Keyframe& keyframe = **candidate;
+    const Eigen::Isometry3d held = last_.world_from_camera.inverse() * keyframe.world_from_camera;
+    const Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
+    light_ = {};
+    Guesses guesses;
+    for (const auto& guess :
+         {RotationGuess(keyframe, held), held, standing, RotationGuess(keyframe, standing)}) {
+      guesses.Add(guess);
+    }
+    attempt = TrackFrom(keyframe, guesses);
+  }
+  return attempt;
+}
+
+bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
+  // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
+  const Eigen::LLT<Matrix6d> determined(result.information);
+  return std::isfinite(result.cost) && result.state.new_from_reference.matrix().allFinite() &&
+         determined.info() == Eigen::Success && determined.rcond() > kLeastCondition &&
+         result.visible >= static_cast<std::size_t>(config_.least_points) &&
+         result.Overlap() >= config_.least_overlap && result.sigma <= config_.lost_sigma &&
+         result.state.gain > kLeastBelievedGain && result.state.gain < 1 / kLeastBelievedGain;
+}
+
+bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
+                                 const Eigen::Isometry3d& world_from_camera) {
+  ++frames_since_keyframe_;
+  if (keyframe_first_sigma_ == 0) keyframe_first_sigma_ = result.sigma;
+  if (config_.keyframe_every > 0 && frames_since_keyframe_ >= config_.keyframe_every) return true;
+  const double step = Motion(*keyframe_, last_.world_from_camera, world_from_camera);
+  const double enough = step < config_.keyframe_motion
+                            ? config_.keyframe_motion
+                            : std::min(config_.keyframe_steps * step, config_.keyframe_most_motion);
+  return Motion(*keyframe_, keyframe_->world_from_camera, world_from_camera) > enough ||
+         result.Overlap() < config_.keyframe_overlap ||
+         result.sigma > config_.keyframe_sigma_ratio * keyframe_first_sigma_;
+}
+
+/// How far the keyframe's points move over the image on average between two poses of the camera, if
+/// they all are in the middle of it: share of its width.
+double EdgeOdometry::Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
+                            const Eigen::Isometry3d& world_from_other) const {
+  const Vector6d twist = Se3Log(world_from_other.inverse() * world_from_one);
+  return cameras_[0].fx / cameras_[0].width *
+         (twist.head<3>().norm() * keyframe.points[0].mean_inverse_depth + twist.tail<3>().norm());
+}
+
+VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
+  keyframe_ = attempt.keyframe;
+  const AlignmentResult& fine = attempt.fine;
+  light_.gain = fine.state.gain;
+  light_.bias = fine.state.bias;
+  VoResult result;
+  result.state = VoState::kTracking;
+  const Eigen::Isometry3d reference_from_new = fine.state.new_from_reference.inverse();
+  result.world_from_camera = Renormalised(keyframe_->world_from_camera * reference_from_new);
+  // new_from_reference Exp(d) turned around is Exp(-d) reference_from_new: carried to the
+  // right-hand side of the new pose by the adjoint.
+  const Matrix6d relative = config_.covariance_factor * fine.sigma * fine.sigma *
+                            fine.information.ldlt().solve(Matrix6d::Identity());
+  const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);
+  result.covariance = to_new * (keyframe_->covariance + relative) * to_new.transpose();
+  result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
+  if (last_.state == VoState::kTracking) {
+    result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
+    // Both ends err by the alignment with the keyframe.
+    result.twist_covariance = 2 / (step_s * step_s) * (to_new * relative * to_new.transpose());
+  }
+  result.keyframe_stamp_ns = keyframe_->stamp_ns;
+  result.points = fine.points;
+  result.inliers = fine.inliers;
+  result.sigma = fine.sigma;
+  result.overlap = fine.Overlap();
+  result.iterations = attempt.iterations;
+  return result;
+}
+
+VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
+  VoResult result = last_;
+  result.state = VoState::kLost;
+  result.twist.reset();
+  result.twist_covariance.setZero();
+  result.new_keyframe = false;
+  const double lost_s = Seconds(stamp_ns - tracked_stamp_ns_);
+  GrowWhileLost(config_, lost_s - Seconds(stamp_ns - *last_stamp_ns_), lost_s, result.covariance);
+  return result;
+}
+
+void GrowWhileLost(const EdgeOdometry::Config& config, double from_s, double to_s,
+                   Matrix6d& covariance) {
+  // The error grows with the time lost: the variance by the difference of the squares.
+  const double growth = to_s * to_s - from_s * from_s;
+  covariance.diagonal().head<3>().array() += growth * config.lost_speed_mps * config.lost_speed_mps;
+  covariance.diagonal().tail<3>().array() += growth * config.lost_turn_rps * config.lost_turn_rps;
+}
+
+}  // namespace livemap

@@ -1,0 +1,181 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "odometry/edge/alignment.h"
+#include "odometry/edge/edge_extractor.h"
+#include "odometry/edge/keyframe.h"
+#include "odometry/edge/rgbd_frame.h"
+
+namespace livemap {
+
+/// Whose edges choose the pixels of the keyframe that are aligned.
+enum class EdgeSource {
+  kKeyframe,  ///< The keyframe's own: extracted once, with their Jacobians.
+  kNewImage,  ///< The new image's, as a mask on the keyframe (thesis, equation 5.2).
+};
+
+enum class VoState { kInitialising, kTracking, kLost };
+const char* VoStateName(VoState state);
+
+/// Where the camera is after one frame.
+struct VoResult {
+  VoState state = VoState::kInitialising;
+  /// World: the optical frame of the first keyframe.
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  /// Of a right-hand perturbation, world_from_camera * Exp(delta): translation (m^2), then rotation
+  /// (rad^2), in the camera's own axes. Grows while lost.
+  Matrix6d covariance = Matrix6d::Zero();
+  /// Velocity in the camera's axes: m/s, rad/s; none without two tracked frames in a row.
+  std::optional<Vector6d> twist;
+  Matrix6d twist_covariance = Matrix6d::Zero();  ///< Same axes, squared units of twist.
+  bool new_keyframe = false;
+  bool keyframe_due = false;  ///< The rules ask for one; it was made if the frame had depth.
+  std::int64_t keyframe_stamp_ns = 0;
+  std::size_t points = 0;   ///< Of the finest level that was used.
+  std::size_t inliers = 0;  ///< Of them.
+  double sigma = 0;         ///< Of the residuals, grey levels.
+  double overlap = 0;       ///< Share of the keyframe's points in view.
+  int iterations = 0;       ///< All levels.
+};
+
+/// Edge-direct visual odometry (thesis, chapter 5) over rectified images with depth. One thread,
+/// deterministic; the buffers of one frame serve the next. Not thread-safe.
+class EdgeOdometry {
+ public:
+  struct Config {
+    EdgeExtractor::Config edges;
+    EdgeSource edge_source = EdgeSource::kKeyframe;
+    AlignmentConfig alignment;
+    /// Points per level, finest first.
+    std::array<int, kMaxLevels> max_points = {6000, 4000, 2000};
+    PointSelection points;  ///< Its max_points is taken from above.
+    /// Each frame starts from the last motion too (thesis, equation 5.7), not the last pose alone.
+    bool constant_motion = true;
+    DepthPyramid::Range depth_range;
+
+    /// A keyframe every so many frames; 1 is frame to frame, 0 only by the rules below.
+    int keyframe_every = 0;
+    /// A new keyframe when less than this share of the points is in view,
+    double keyframe_overlap = 0.6;
+    /// or the points moved further than this on average, share of the image's width; if they do
+    double keyframe_motion = 0.018;
+    /// in a single step already: then further than so many steps, or than this share of the width:
+    /// a keyframe costs more than a frame, and a fast camera would make every frame one,
+    double keyframe_steps = 3.5;
+    double keyframe_most_motion = 0.13;
+    /// or the residuals grew by this factor since the keyframe's first frame.
+    double keyframe_sigma_ratio = 1.6;
+
+    /// Tracking is lost with fewer points in view than this,
+    int least_points = 150;
+    /// a smaller share of them,
+    double least_overlap = 0.25;
+    /// or residuals of this standard deviation, grey levels.
+    double lost_sigma = 30;
+    /// Keyframes that are kept to find back, and how far apart: motion as above.
+    int keyframes_kept = 8;
+    double kept_motion = 0.1;
+    /// Lost for so long, a new keyframe starts at the held pose, s.
+    double give_up_s = 2.0;
+
+    /// How fast a camera that is lost may move: growth of the held pose's uncertainty, standard
+    /// deviation after one second, m and rad.
+    double lost_speed_mps = 1.0;
+    double lost_turn_rps = 1.0;
+    /// Neighbouring edge pixels err together: the covariance of independent ones times this.
+    double covariance_factor = 15;
+  };
+
+  /// Throws Error naming what is wrong with the intrinsics or the configuration.
+  EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics);
+  ~EdgeOdometry();
+
+  /// Works off the next frame. Throws Error, and changes nothing, when its size or type is wrong or
+  /// its stamp is not later than the last one's.
+  VoResult Track(const RgbdFrame& frame);
+
+  /// Throws as Track() would for this frame.
+  void Check(const RgbdFrame& frame) const;
+
+  /// Makes the last frame, which came without depth, a keyframe with this one: CV_32FC1, m, 0
+  /// unknown, and the standard deviations of the inverse depths, 1/m. `twist` (as in VoResult) is
+  /// how the camera moves, where Track() could not tell yet. False, and nothing changed, when there
+  /// are too few edges with depth.
+  bool AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
+                   const std::optional<Vector6d>& twist);
+
+  /// Of the last frame, the finest level smoothed; valid until it is made a keyframe.
+  const ImagePyramid& images() const { return frame_images_; }
+
+  /// Forgets everything; the next frame is the world's origin.
+  void Reset();
+
+  /// The keyframe that the last frame was aligned with; none before the first.
+  const Keyframe* keyframe() const { return keyframe_; }
+
+ private:
+  /// Starts of an alignment; at most four.
+  struct Guesses {
+    std::array<Eigen::Isometry3d, 4> new_from_reference;
+    std::size_t count = 0;
+    void Add(const Eigen::Isometry3d& guess) { new_from_reference[count++] = guess; }
+    const Eigen::Isometry3d* begin() const { return new_from_reference.data(); }
+    const Eigen::Isometry3d* end() const { return new_from_reference.data() + count; }
+  };
+  struct Attempt {
+    Keyframe* keyframe = nullptr;
+    AlignmentResult fine;
+    int iterations = 0;
+    bool good = false;
+  };
+
+  bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
+                    const VoResult& result);
+  bool SelectPoints(Keyframe& keyframe);
+  Attempt TrackFrom(Keyframe& keyframe, const Guesses& guesses);
+  AlignmentState BestStart(const EdgePoints& points, int level, const Guesses& guesses);
+  const EdgePoints& PointsOf(Keyframe& keyframe, int level);
+  Eigen::Isometry3d RotationGuess(Keyframe& keyframe, const Eigen::Isometry3d& from);
+  Attempt Follow(std::int64_t stamp_ns);
+  Attempt FindBack();
+  bool IsGood(const AlignmentResult& result) const;
+  bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
+  double Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
+                const Eigen::Isometry3d& world_from_other) const;
+  void ForgetNearOnes();
+  void ReserveBuffers();
+  VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);
+  VoResult Hold(std::int64_t stamp_ns);
+
+  Config config_;
+  std::array<CameraIntrinsics, kMaxLevels + 1> cameras_;  // The last one is the thumbnail's.
+  int levels_ = 1;
+  EdgeExtractor extractor_;
+  PointSelector selector_;
+  Aligner aligner_, rotation_aligner_;
+  ImagePyramid frame_images_;
+  EdgePoints masked_points_;
+
+  std::vector<std::unique_ptr<Keyframe>> keyframes_;  // In use, oldest first.
+  std::vector<std::unique_ptr<Keyframe>> spare_;
+  Keyframe* keyframe_ = nullptr;
+  double keyframe_first_sigma_ = 0;
+  int frames_since_keyframe_ = 0;
+  AlignmentState light_;  // Gain and bias of the last frame.
+
+  VoResult last_;
+  std::optional<std::int64_t> last_stamp_ns_;
+  std::int64_t tracked_stamp_ns_ = 0;
+};
+
+/// How the uncertainty of a held pose grows between two times since tracking was lost, s.
+void GrowWhileLost(const EdgeOdometry::Config& config, double from_s, double to_s,
+                   Matrix6d& covariance);
+
+}  // namespace livemap

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+
+#include "odometry/edge/edge_extractor.h"
+#include "odometry/edge/edge_points.h"
+#include "odometry/edge/pyramid.h"
+#include "odometry/se3.h"
+
+namespace livemap {
+
+/// A frame with depth that later frames are aligned with. Its buffers are used again when a newer
+/// keyframe takes its place.
+struct Keyframe {
+  std::int64_t stamp_ns = 0;
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  Matrix6d covariance = Matrix6d::Zero();  ///< Of world_from_camera, see VoResult::covariance.
+  ImagePyramid images;
+  DepthPyramid depths;
+  /// Standard deviations of the inverse depths, 1/m, where depths are estimates; else no levels.
+  DepthPyramid inverse_depth_sigmas;
+  std::array<EdgePoints, kMaxLevels> points;  ///< Under its own edges.
+  EdgePoints thumbnail_points;                ///< Every pixel of the thumbnail, for rotations.
+};
+
+}  // namespace livemap

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "geo/camera_intrinsics.h"
+
+namespace livemap {
+
+/// Edges alias on coarser images than this (thesis, section 5.2.4); no level goes below.
+constexpr int kLeastLevelWidth = 160;
+constexpr int kLeastLevelHeight = 120;
+constexpr int kMaxLevels = 3;
+
+/// Levels of an image of this size, 1..kMaxLevels; level 0 is the image itself.
+int CountLevels(cv::Size size);
+
+/// The camera of a level whose pixels are 2x2 pixels of the level before: the centre of the first
+/// pixel moves by half a pixel.
+CameraIntrinsics HalvedIntrinsics(const CameraIntrinsics& intrinsics);
+
+/// Grey images, CV_8UC1. The buffers are kept from frame to frame.
+class ImagePyramid {
+ public:
+  /// `grey` is smoothed by (1 2 1)/4 both ways; its size decides the number of levels.
+  void Build(const cv::Mat& grey);
+  int levels() const { return levels_; }
+  const cv::Mat& operator[](int level) const { return images_[static_cast<std::size_t>(level)]; }
+  /// A small and smooth view of the whole image: 80x60 for 640x480.
+  const cv::Mat& thumbnail() const { return thumbnail_; }
+
+ private:
+  int levels_ = 0;
+  std::array<cv::Mat, kMaxLevels> images_;
+  cv::Mat thumbnail_;
+  std::vector<std::uint16_t> row_;
+};
+
+/// Depth along the optical axis in metres, CV_32FC1, 0 where it is not known.
+class DepthPyramid {
+ public:
+  struct Range {
+    float min_m = 0.1F;
+    float max_m = 100.0F;
+  };
+
+  /// `depth` is CV_16UC1 in 1/units_per_m or CV_32FC1 in metres; what is not finite or outside the
+  /// range becomes unknown. A coarser pixel is the mean of those of its four that lie within
+  /// kSameSurface of the nearest: neither holes nor the step behind an edge are blended in.
+  void Build(const cv::Mat& depth, double units_per_m, Range range, int levels);
+  const cv::Mat& operator[](int level) const { return depths_[static_cast<std::size_t>(level)]; }
+  void Clear() { depths_ = {}; }
+
+  static constexpr float kSameSurface = 1.05F;
+
+ private:
+  std::array<cv::Mat, kMaxLevels> depths_;
+};
+
+}  // namespace livemap

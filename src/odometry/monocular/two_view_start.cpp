@@ -1,0 +1,170 @@
+#include "odometry/monocular/two_view_start.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "odometry/se3.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kCornerQuality = 0.005;
+constexpr double kCornerDistancePx = 8;
+constexpr float kThereAndBackPx = 1.0F;
+constexpr double kConfidence = 0.9999;
+
+Eigen::Vector3d Ray(const cv::Point2f& pixel, const CameraIntrinsics& camera) {
+  return {(static_cast<double>(pixel.x) - camera.cx) / camera.fx,
+          (static_cast<double>(pixel.y) - camera.cy) / camera.fy, 1};
+}
+
+}  // namespace
+
+TwoViewStart::TwoViewStart(const Config& config, const CameraIntrinsics& camera)
+    : config_(config), camera_(camera) {}
+
+void TwoViewStart::Begin(const cv::Mat& grey) {
+  grey.copyTo(first_);
+  grey.copyTo(last_);
+  cv::goodFeaturesToTrack(first_, begin_, config_.corners, kCornerQuality, kCornerDistancePx);
+  end_ = begin_;
+  just_begun_ = true;
+}
+
+std::optional<Eigen::Isometry3d> TwoViewStart::Follow(const cv::Mat& grey) {
+  std::vector<cv::Point2f> now, back;
+  std::vector<std::uint8_t> found, found_back;
+  if (!end_.empty()) {
+    std::vector<float> error;
+    cv::calcOpticalFlowPyrLK(last_, grey, end_, now, found, error);
+    cv::calcOpticalFlowPyrLK(grey, last_, now, back, found_back, error);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const cv::Point2f way = back[i] - end_[i];
+      const bool same = std::hypot(way.x, way.y) <= kThereAndBackPx;
+      found[i] = found[i] != 0 && found_back[i] != 0 && same ? 1 : 0;
+    }
+    KeepFollowed(now, found);
+  }
+  if (end_.size() < static_cast<std::size_t>(config_.least_corners)) {
+    Begin(grey);
+    return std::nullopt;
+  }
+  grey.copyTo(last_);
+  just_begun_ = false;
+  if (MedianWayPx() < config_.least_way * camera_.width) return std::nullopt;
+  std::optional<Eigen::Isometry3d> motion = Motion();
+  if (!motion && MedianWayPx() > config_.longest_way * camera_.width) Begin(grey);
+  return motion;
+}
+
+void TwoViewStart::KeepFollowed(const std::vector<cv::Point2f>& now,
+                                const std::vector<std::uint8_t>& found) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i] == 0) continue;
+    begin_[kept] = begin_[i];
+    end_[kept++] = now[i];
+  }
+  begin_.resize(kept);
+  end_.resize(kept);
+}
+
+double TwoViewStart::MedianWayPx() const {
+  std::vector<double> ways;
+  for (std::size_t i = 0; i < begin_.size(); ++i) {
+    const cv::Point2f way = end_[i] - begin_[i];
+    ways.push_back(std::hypot(way.x, way.y));
+  }
+  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
+  std::nth_element(ways.begin(), middle, ways.end());
+  return *middle;
+}
+
+std::optional<Eigen::Isometry3d> TwoViewStart::Motion() const {
+  const cv::Matx33d k(camera_.fx, 0, camera_.cx, 0, camera_.fy, camera_.cy, 0, 0, 1);
+  cv::Mat inliers;
+  const cv::Mat essential = cv::findEssentialMat(begin_, end_, k, cv::USAC_MAGSAC, kConfidence,
+                                                 config_.inlier_px, inliers);
+  if (essential.rows != 3 || essential.cols != 3) return std::nullopt;
+  cv::Matx33d rotation;
+  cv::Vec3d translation;
+  const int agree = cv::recoverPose(essential, begin_, end_, k, rotation, translation, inliers);
+  if (agree < config_.least_corners ||
+      agree < config_.least_inliers * static_cast<double>(begin_.size())) {
+    return std::nullopt;
+  }
+  Eigen::Isometry3d new_from_first = Eigen::Isometry3d::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      new_from_first.linear()(row, column) = rotation(row, column);
+    }
+    new_from_first.translation()[row] = translation[row];
+  }
+  if (!new_from_first.matrix().allFinite()) return std::nullopt;
+  Refine(new_from_first);
+  return new_from_first;
+}
+
+/// First-order geometric errors of all corners against the epipolar constraint, px (Hartley and
+/// Zisserman 2004, equation 11.9).
+Eigen::VectorXd TwoViewStart::SampsonErrors(const Eigen::Isometry3d& new_from_first) const {
+  const Eigen::Matrix3d essential =
+      CrossMatrix(new_from_first.translation()) * new_from_first.linear();
+  Eigen::VectorXd errors(static_cast<Eigen::Index>(begin_.size()));
+  for (std::size_t i = 0; i < begin_.size(); ++i) {
+    const Eigen::Vector3d first = Ray(begin_[i], camera_), now = Ray(end_[i], camera_);
+    const Eigen::Vector3d line = essential * first;
+    const Eigen::Vector3d line_back = essential.transpose() * now;
+    const double slope =
+        std::sqrt(line.head<2>().squaredNorm() + line_back.head<2>().squaredNorm());
+    errors[static_cast<Eigen::Index>(i)] = camera_.fx * now.dot(line) / slope;
+  }
+  return errors;
+}
+
+/// Gauss-Newton with Huber weights over the rotation and the translation's direction.
+void TwoViewStart::Refine(Eigen::Isometry3d& new_from_first) const {
+  constexpr int kUnknowns = 5;
+  constexpr double kStep = 1e-6;
+  const auto moved = [](const Eigen::Isometry3d& from, const Eigen::Matrix<double, 5, 1>& delta) {
+    const Eigen::Vector3d t = from.translation();
+    const Eigen::Vector3d side = t.unitOrthogonal();
+    Vector6d turn = Vector6d::Zero();
+    turn.tail<3>() = delta.head<3>();
+    Eigen::Isometry3d to = from;
+    to.linear() = from.linear() * Se3Exp(turn).linear();
+    to.translation() = (t + delta[3] * side + delta[4] * t.cross(side)).normalized();
+    return to;
+  };
+  const auto cost = [&](const Eigen::VectorXd& errors) {
+    const Eigen::ArrayXd size = errors.array().abs();
+    const Eigen::ArrayXd clipped = size.min(config_.inlier_px);
+    return (clipped * (2 * size - clipped)).sum();
+  };
+  Eigen::VectorXd errors = SampsonErrors(new_from_first);
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    Eigen::Matrix<double, Eigen::Dynamic, kUnknowns> jacobian(errors.size(), kUnknowns);
+    for (int i = 0; i < kUnknowns; ++i) {
+      const Eigen::Matrix<double, kUnknowns, 1> delta =
+          kStep * Eigen::Matrix<double, kUnknowns, 1>::Unit(i);
+      jacobian.col(i) = (SampsonErrors(moved(new_from_first, delta)) - errors) / kStep;
+    }
+    const Eigen::VectorXd weights =
+        (config_.inlier_px / errors.array().abs().max(config_.inlier_px)).matrix();
+    const Eigen::Matrix<double, kUnknowns, kUnknowns> normal =
+        jacobian.transpose() * weights.asDiagonal() * jacobian;
+    const Eigen::Matrix<double, kUnknowns, 1> step =
+        normal.ldlt().solve(jacobian.transpose() * weights.asDiagonal() * errors);
+    if (!step.allFinite()) return;
+    const Eigen::Isometry3d candidate = moved(new_from_first, -step);
+    const Eigen::VectorXd candidate_errors = SampsonErrors(candidate);
+    if (!(cost(candidate_errors) < cost(errors))) return;
+    new_from_first = candidate;
+    errors = candidate_errors;
+  }
+}
+
+}  // namespace livemap

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "perception/detection/hazard_detection.h"
+#include "perception/detection/view_fusion.h"
+#include "perception/inference/inference_engine.h"
+#include "perception/inference/letterbox.h"
+#include "perception/inference/model_manifest.h"
+
+namespace livemap {
+
+/// Finds hazards in single images: letterbox, network, decoding, thresholds, suppression. Not
+/// thread-safe: one detector per thread.
+class HazardDetector {
+ public:
+  /// Loads the model; throws Error when it is not what the manifest says. `threads` and `engine` as
+  /// in MakeInferenceEngine.
+  explicit HazardDetector(const ModelManifest& manifest, int threads = 0,
+                          std::optional<EngineKind> engine = {});
+  /// With another engine, which must have been made for the same manifest.
+  HazardDetector(const ModelManifest& manifest, std::unique_ptr<InferenceEngine> engine);
+
+  /// Detections in `bgr` (8 bit, 3 channels, not empty; anything else throws Error), in pixels of
+  /// that image, descending confidence.
+  std::vector<HazardDetection> Detect(const cv::Mat& bgr);
+
+  const ModelManifest& manifest() const { return manifest_; }
+  /// The library that runs it.
+  EngineKind Engine() const { return engine_->Kind(); }
+
+ private:
+  DetectionsOfViews Views(const cv::Mat& bgr);
+
+  ModelManifest manifest_;
+  std::unique_ptr<InferenceEngine> engine_;
+  Letterbox letterbox_;
+  cv::Mat mirrored_;  // Its memory serves again.
+};
+
+}  // namespace livemap

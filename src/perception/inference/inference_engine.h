@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "perception/inference/model_manifest.h"
+
+namespace livemap {
+
+/// Runs one network. Not thread-safe: one engine per thread.
+class InferenceEngine {
+ public:
+  virtual ~InferenceEngine() = default;
+
+  /// `images`: continuous float32 of 1 x 3 x H x W as the manifest says. Returns continuous float32
+  /// of the manifest's OutputShape, valid until the next call. Throws Error when the library fails.
+  virtual cv::Mat Run(const cv::Mat& images) = 0;
+
+  /// The library that runs it: kOpenCv or kTorch.
+  virtual EngineKind Kind() const = 0;
+};
+
+/// Which library runs a network, as a parameter or a flag says it: "opencv", "torch", or "auto",
+/// which leaves the choice to the manifest (none). Throws Error for any other text; `what` names
+/// the parameter there.
+std::optional<EngineKind> ParseEngineChoice(const std::string& text, const std::string& what);
+
+/// "opencv" or "torch".
+std::string NameOf(EngineKind kind);
+
+/// Whether this build has libtorch.
+bool HasTorchEngine();
+
+/// An engine for the manifest's model, on the CPU. `choice` none: the manifest's own choice, or
+/// OpenCV where that is torch and this build has no libtorch. Checks the file's hash and, by
+/// running the network once, its input and output shapes; throws Error on any difference, and when
+/// libtorch is asked for but is not in this build or has no file in the manifest.
+///
+/// `threads` > 0: OpenCV's pool has so many threads, one pool for the process, whoever set it last.
+/// libtorch's count holds for the calling thread alone: N engines on their own threads compute with
+/// N x `threads` threads. 0 leaves OpenCV's pool alone and gives libtorch one thread per core.
+std::unique_ptr<InferenceEngine> MakeInferenceEngine(const ModelManifest& manifest, int threads,
+                                                     std::optional<EngineKind> choice = {});
+
+}  // namespace livemap

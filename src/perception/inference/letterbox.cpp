@@ -1,0 +1,69 @@
+#include "perception/inference/letterbox.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "common/error.h"
+
+namespace livemap {
+
+Letterbox::Letterbox(const ModelManifest::Input& input,
+                     const ModelManifest::Normalisation& normalisation)
+    : input_(input) {
+  source_channel_ = input_.channels == ChannelOrder::kRgb ? std::array<int, 3>{2, 1, 0}
+                                                          : std::array<int, 3>{0, 1, 2};
+  for (std::size_t plane = 0; plane < 3; ++plane) {
+    for (std::size_t pixel = 0; pixel < 256; ++pixel) {
+      normalised_[plane][pixel] =
+          (static_cast<float>(pixel) - normalisation.mean[plane]) / normalisation.std[plane];
+    }
+  }
+  const int shape[] = {1, 3, input_.height, input_.width};
+  tensor_.create(4, shape, CV_32F);
+}
+
+double Letterbox::Scale(cv::Size size) const {
+  return std::min(static_cast<double>(input_.width) / size.width,
+                  static_cast<double>(input_.height) / size.height);
+}
+
+cv::Size Letterbox::Fitted(cv::Size size) const {
+  const double scale = Scale(size);
+  // A side of a very long image would round to nothing.
+  return {std::clamp(cvRound(size.width * scale), 1, input_.width),
+          std::clamp(cvRound(size.height * scale), 1, input_.height)};
+}
+
+const cv::Mat& Letterbox::Fill(const cv::Mat& bgr) {
+  if (bgr.empty()) throw Error("an image is empty, accepted is at least 1 x 1 pixel");
+  if (bgr.dims != 2 || bgr.type() != CV_8UC3) {
+    throw Error("an image has OpenCV type " + cv::typeToString(bgr.type()) +
+                ", accepted is CV_8UC3 (BGR)");
+  }
+  const cv::Size fitted = Fitted(bgr.size());
+  cv::Mat source = bgr;
+  if (fitted != bgr.size()) {
+    cv::resize(bgr, scaled_, fitted, 0, 0, cv::INTER_LINEAR);
+    source = scaled_;
+  }
+  for (std::size_t plane = 0; plane < 3; ++plane) {
+    const std::array<float, 256>& normalised = normalised_[plane];
+    const float padding = normalised[static_cast<std::size_t>(input_.pad_value)];
+    const int channel = source_channel_[plane];
+    for (int row = 0; row < input_.height; ++row) {
+      float* target = tensor_.ptr<float>(0, static_cast<int>(plane)) +
+                      static_cast<std::ptrdiff_t>(row) * input_.width;
+      const int filled = row < source.rows ? source.cols : 0;
+      if (filled > 0) {
+        const std::uint8_t* pixel = source.ptr<std::uint8_t>(row) + channel;
+        for (int column = 0; column < filled; ++column) {
+          target[column] = normalised[pixel[std::ptrdiff_t{3} * column]];
+        }
+      }
+      std::fill(target + filled, target + input_.width, padding);
+    }
+  }
+  return tensor_;
+}
+
+}  // namespace livemap

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "geo/ground_projection.h"
+#include "geo/vehicle_pose.h"
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+/// A place on the map with its uncertainty.
+struct PlacedHazard {
+  GeoPoint position;
+  Eigen::Matrix2d covariance_m2;  ///< East-north axes, m^2.
+};
+
+/// Puts a point of the road that the camera saw on the map.
+///
+/// `antenna` is where the antenna was and which way the vehicle drove, `antenna_in_base_m` the
+/// antenna's place in base_link (x forward, y left, metres) and `ground` the point in base_link.
+/// The covariance sums those of the fix and of the projection and what the course's error does at
+/// that distance, to first order. Assumes that the vehicle drives the way it points.
+PlacedHazard PlaceHazard(const TrackPose& antenna, const Eigen::Vector2d& antenna_in_base_m,
+                         const GroundPoint& ground);
+
+}  // namespace livemap

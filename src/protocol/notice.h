@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/uuid.h"
+#include "geo/wgs84.h"
+
+namespace livemap {
+
+/// The zone tells vehicles what changed on its map (HazardNotice.msg without ROS).
+struct Notice {
+  enum class Action { kAdded, kUpdated, kRemoved, kCaughtUp };
+  Action action = Action::kAdded;
+  std::uint64_t sequence = 0;  ///< Of the zone's event log, strictly increasing.
+  /// To everybody: of the announcement before; 0: there was none. With kCaughtUp: where the telling
+  /// began, see HazardNotice.msg.
+  std::uint64_t previous_sequence = 0;
+  std::string vehicle_id;     ///< Addressee; empty: everybody.
+  Uuid hazard_uuid;           ///< Nil with kCaughtUp.
+  std::int64_t stamp_ns = 0;  ///< When the zone decided, zone clock (UTC).
+  std::string class_name;
+  float confidence = 0;  ///< 0..1.
+  GeoPoint position;     ///< With kCaughtUp: the middle of what was told.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
+  std::uint32_t sightings = 0;                              ///< Reports merged so far.
+  std::int64_t first_seen_ns = 0;                           ///< Image stamp of the first report.
+  std::int64_t last_seen_ns = 0;                            ///< Image stamp of the newest report.
+  double radius_m = 0;                                      ///< kCaughtUp: around `position`.
+  std::uint32_t told = 0;           ///< kCaughtUp: hazards told since the kCaughtUp before.
+  std::string image_format;         ///< "jpeg", or empty when there is no picture.
+  std::vector<std::uint8_t> image;  ///< Small annotated picture; may be empty.
+};
+
+}  // namespace livemap

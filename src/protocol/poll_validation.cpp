@@ -1,0 +1,74 @@
+#include "protocol/poll_validation.h"
+
+#include <cmath>
+#include <string>
+
+#include "common/error.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxReasonBytes = 64;
+constexpr std::size_t kMaxNameBytes = 64;
+
+void RequireIds(const Uuid& poll, const Uuid& hazard, const std::string& name) {
+  if (!poll.IsNil() && !hazard.IsNil()) return;
+  throw Error(name + " has a nil " + (poll.IsNil() ? "poll_uuid" : "hazard_uuid") +
+              ", accepted is the uuid of one");
+}
+
+void RequirePosition(const GeoPoint& position, const std::string& name) {
+  if (IsValid(position)) return;
+  throw Error(name + " has position " + std::to_string(position.latitude_deg) + ", " +
+              std::to_string(position.longitude_deg) + ", accepted are WGS84 degrees");
+}
+
+void RequireShort(const std::string& text, std::size_t limit, const std::string& what) {
+  if (text.size() <= limit) return;
+  throw Error(what + " has " + std::to_string(text.size()) + " bytes, accepted are at most " +
+              std::to_string(limit));
+}
+
+void RequireCovariance(const Eigen::Matrix2d& covariance_m2) {
+  const double determinant =
+      covariance_m2(0, 0) * covariance_m2(1, 1) - covariance_m2(0, 1) * covariance_m2(1, 0);
+  const bool positive = covariance_m2.allFinite() && covariance_m2(0, 0) > 0 &&
+                        covariance_m2(1, 1) > 0 && determinant > 0 && std::isfinite(determinant) &&
+                        covariance_m2(0, 1) == covariance_m2(1, 0);
+  if (positive) return;
+  throw Error(
+      "hazard poll has a covariance that is none, accepted is one that is finite, symmetric and "
+      "positive definite");
+}
+
+}  // namespace
+
+void CheckPoll(const Poll& poll) {
+  RequireIds(poll.poll, poll.hazard, "hazard poll");
+  RequirePosition(poll.position, "hazard poll");
+  RequireCovariance(poll.covariance_m2);
+  RequireShort(poll.class_name, kMaxClassNameBytes, "class_name of a hazard poll");
+  if (poll.class_name.empty()) {
+    throw Error("hazard poll has no class_name, accepted is the hazard's class");
+  }
+  if (poll.expires_ns <= poll.stamp_ns) {
+    throw Error("hazard poll expires before it was asked, accepted is a later moment");
+  }
+}
+
+void CheckReply(const PollReply& reply) {
+  RequireIds(reply.poll, reply.hazard, "poll answer");
+  if (!(reply.confidence >= 0 && reply.confidence <= 1)) {
+    throw Error("poll answer has confidence " + std::to_string(reply.confidence) +
+                ", accepted is 0 to 1");
+  }
+  RequirePosition(reply.vehicle_position, "poll answer");
+  if (std::isinf(reply.course_rad)) {
+    throw Error("poll answer has an infinite course, accepted are radians, or NaN when standing");
+  }
+  RequireShort(reply.reason, kMaxReasonBytes, "reason of a poll answer");
+  RequireShort(reply.drive_id, kMaxNameBytes, "drive_id of a poll answer");
+  RequireShort(reply.image_format, kMaxNameBytes, "image format of a poll answer");
+}
+
+}  // namespace livemap

@@ -1,0 +1,305 @@
+#include "ros/conversions/hazard_conversions.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "common/error.h"
+#include "ros/conversions/message_fields.h"
+
+namespace livemap {
+
+ros::Time ToRosTime(std::int64_t stamp_ns) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  constexpr std::int64_t kLatest = std::numeric_limits<std::uint32_t>::max() * kSecond;
+  const std::int64_t clamped = std::clamp<std::int64_t>(stamp_ns, 0, kLatest);
+  return {static_cast<std::uint32_t>(clamped / kSecond),
+          static_cast<std::uint32_t>(clamped % kSecond)};
+}
+
+HazardReport ToMessage(const Report& report) {
+  HazardReport message;
+  message.schema_version = HazardReport::SCHEMA_VERSION;
+  message.uuid = ToBytes(report.uuid);
+  message.vehicle_id = report.vehicle_id;
+  message.drive_id = report.drive_id;
+  message.stamp = ToRosTime(report.stamp_ns);
+  message.class_name = report.class_name;
+  message.confidence = report.confidence;
+  message.x_min = report.box.x_min;
+  message.y_min = report.box.y_min;
+  message.x_max = report.box.x_max;
+  message.y_max = report.box.y_max;
+  message.latitude = report.position.latitude_deg;
+  message.longitude = report.position.longitude_deg;
+  message.covariance = ToArray(report.covariance_m2);
+  message.image_width = report.image_width;
+  message.image_height = report.image_height;
+  message.image.header.stamp = message.stamp;
+  message.image.header.frame_id = report.image_frame_id;
+  message.image.format = report.image_format;
+  message.image.data = report.image;
+  message.shown_x = report.shown.x;
+  message.shown_y = report.shown.y;
+  message.shown_width = report.shown.width;
+  message.shown_height = report.shown.height;
+  return message;
+}
+
+Report FromMessage(const HazardReport& message) {
+  constexpr std::uint16_t kWholeImages = 1;  // Has no region: its pictures show the whole image.
+  CheckVersion(message, "hazard report", kWholeImages);
+  Report report;
+  report.uuid = ToUuid(message.uuid);
+  report.vehicle_id = message.vehicle_id;
+  report.drive_id = message.drive_id;
+  report.stamp_ns = FromRosTime(message.stamp);
+  report.class_name = message.class_name;
+  report.confidence = message.confidence;
+  report.box = {message.x_min, message.y_min, message.x_max, message.y_max};
+  report.position = {message.latitude, message.longitude};
+  report.covariance_m2 = ToMatrix(message.covariance);
+  report.image_width = message.image_width;
+  report.image_height = message.image_height;
+  report.image_frame_id = message.image.header.frame_id;
+  report.image_format = message.image.format;
+  report.image = message.image.data;
+  if (message.schema_version != kWholeImages) {
+    report.shown = {message.shown_x, message.shown_y, message.shown_width, message.shown_height};
+  }
+  return report;
+}
+
+ReportReceipt ToMessage(const Receipt& receipt) {
+  ReportReceipt message;
+  message.schema_version = ReportReceipt::SCHEMA_VERSION;
+  message.status = receipt.status == Receipt::Status::kCommitted ? ReportReceipt::COMMITTED
+                                                                 : ReportReceipt::REFUSED;
+  message.report_uuid = ToBytes(receipt.report_uuid);
+  message.hazard_uuid = ToBytes(receipt.hazard_uuid);
+  message.vehicle_id = receipt.vehicle_id;
+  message.reason = receipt.reason;
+  return message;
+}
+
+Receipt FromMessage(const ReportReceipt& message) {
+  CheckVersion(message, "report receipt");
+  Receipt receipt;
+  switch (message.status) {
+    case ReportReceipt::COMMITTED:
+      receipt.status = Receipt::Status::kCommitted;
+      break;
+    case ReportReceipt::REFUSED:
+      receipt.status = Receipt::Status::kRefused;
+      break;
+    default:
+      throw Error("report receipt has status " + std::to_string(message.status) +
+                  ", accepted is 0 (committed) or 1 (refused)");
+  }
+  receipt.report_uuid = ToUuid(message.report_uuid);
+  receipt.hazard_uuid = ToUuid(message.hazard_uuid);
+  receipt.vehicle_id = message.vehicle_id;
+  receipt.reason = message.reason;
+  return receipt;
+}
+
+namespace {
+
+Notice::Action ToNoticeAction(HazardAction action) {
+  switch (action) {
+    case HazardAction::kAdded:
+      return Notice::Action::kAdded;
+    case HazardAction::kUpdated:
+      return Notice::Action::kUpdated;
+    case HazardAction::kRemoved:
+      return Notice::Action::kRemoved;
+  }
+  return Notice::Action::kRemoved;
+}
+
+Notice NoticeOf(const Hazard& hazard) {
+  Notice notice;
+  notice.hazard_uuid = hazard.uuid;
+  notice.stamp_ns = hazard.updated_ns;
+  notice.class_name = hazard.class_name;
+  notice.confidence = hazard.confidence;
+  notice.position = hazard.position;
+  notice.covariance_m2 = hazard.covariance_m2;
+  notice.sightings = hazard.sightings;
+  notice.first_seen_ns = hazard.first_seen_ns;
+  notice.last_seen_ns = hazard.last_seen_ns;
+  return notice;
+}
+
+}  // namespace
+
+HazardNotice ToMessage(const HazardEvent& event) {
+  Notice notice = NoticeOf(event.hazard);
+  // What drivers knew before decides: a candidate that becomes active is new to them.
+  notice.action =
+      ToNoticeAction(DriversAction(event.from, event.hazard.state).value_or(event.action));
+  notice.sequence = event.hazard.sequence;
+  notice.previous_sequence = event.previous_announced;
+  return ToMessage(notice);
+}
+
+HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+                              const std::string& vehicle_id) {
+  Notice notice = NoticeOf(hazard);
+  notice.action = ToNoticeAction(action);
+  notice.sequence = hazard.announced_sequence;
+  notice.vehicle_id = vehicle_id;
+  return ToMessage(notice);
+}
+
+HazardNotice ToMessage(const Notice& notice) {
+  HazardNotice message;
+  message.schema_version = HazardNotice::SCHEMA_VERSION;
+  switch (notice.action) {
+    case Notice::Action::kAdded:
+      message.action = HazardNotice::ADDED;
+      break;
+    case Notice::Action::kUpdated:
+      message.action = HazardNotice::UPDATED;
+      break;
+    case Notice::Action::kRemoved:
+      message.action = HazardNotice::REMOVED;
+      break;
+    case Notice::Action::kCaughtUp:
+      message.action = HazardNotice::CAUGHT_UP;
+      break;
+  }
+  message.sequence = notice.sequence;
+  message.previous_sequence = notice.previous_sequence;
+  message.vehicle_id = notice.vehicle_id;
+  message.hazard_uuid = ToBytes(notice.hazard_uuid);
+  message.stamp = ToRosTime(notice.stamp_ns);
+  message.class_name = notice.class_name;
+  message.confidence = notice.confidence;
+  message.latitude = notice.position.latitude_deg;
+  message.longitude = notice.position.longitude_deg;
+  message.covariance = ToArray(notice.covariance_m2);
+  message.sightings = notice.sightings;
+  message.first_seen = ToRosTime(notice.first_seen_ns);
+  message.last_seen = ToRosTime(notice.last_seen_ns);
+  message.radius = static_cast<float>(notice.radius_m);
+  message.told = notice.told;
+  message.image.header.stamp = message.last_seen;
+  message.image.format = notice.image_format;
+  message.image.data = notice.image;
+  return message;
+}
+
+Notice FromMessage(const HazardNotice& message) {
+  CheckVersion(message, "hazard notice");
+  Notice notice;
+  switch (message.action) {
+    case HazardNotice::ADDED:
+      notice.action = Notice::Action::kAdded;
+      break;
+    case HazardNotice::UPDATED:
+      notice.action = Notice::Action::kUpdated;
+      break;
+    case HazardNotice::REMOVED:
+      notice.action = Notice::Action::kRemoved;
+      break;
+    case HazardNotice::CAUGHT_UP:
+      notice.action = Notice::Action::kCaughtUp;
+      break;
+    default:
+      throw Error("hazard notice has action " + std::to_string(message.action) +
+                  ", accepted is 0 (added), 1 (updated), 2 (removed) or 3 (caught up)");
+  }
+  notice.sequence = message.sequence;
+  notice.previous_sequence = message.previous_sequence;
+  notice.vehicle_id = message.vehicle_id;
+  notice.hazard_uuid = ToUuid(message.hazard_uuid);
+  notice.stamp_ns = FromRosTime(message.stamp);
+  notice.class_name = message.class_name;
+  notice.confidence = message.confidence;
+  notice.position = {message.latitude, message.longitude};
+  notice.covariance_m2 = ToMatrix(message.covariance);
+  notice.sightings = message.sightings;
+  notice.first_seen_ns = FromRosTime(message.first_seen);
+  notice.last_seen_ns = FromRosTime(message.last_seen);
+  notice.radius_m = static_cast<double>(message.radius);
+  notice.told = message.told;
+  notice.image_format = message.image.format;
+  notice.image = message.image.data;
+  return notice;
+}
+
+VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
+                          std::uint64_t map_sequence) {
+  VehiclePosition message;
+  message.schema_version = VehiclePosition::SCHEMA_VERSION;
+  message.vehicle_id = vehicle.vehicle_id;
+  message.drive_id = vehicle.drive_id;
+  message.stamp = ToRosTime(vehicle.stamp_ns);
+  message.latitude = vehicle.position.latitude_deg;
+  message.longitude = vehicle.position.longitude_deg;
+  message.course = static_cast<float>(vehicle.course_rad);
+  message.speed = static_cast<float>(vehicle.speed_mps);
+  message.horizontal_sigma = static_cast<float>(horizontal_sigma_m);
+  message.map_sequence = map_sequence;
+  return message;
+}
+
+VehicleState FromMessage(const VehiclePosition& message) {
+  CheckVersion(message, "vehicle position");
+  VehicleState vehicle;
+  vehicle.vehicle_id = message.vehicle_id;
+  vehicle.drive_id = message.drive_id;
+  vehicle.position = {message.latitude, message.longitude};
+  vehicle.course_rad = static_cast<double>(message.course);
+  vehicle.speed_mps = static_cast<double>(message.speed);
+  vehicle.stamp_ns = FromRosTime(message.stamp);
+  return vehicle;
+}
+
+LinkCost FromMessage(const LinkState& message) {
+  switch (message.state) {
+    case LinkState::UNKNOWN:
+      return LinkCost::kUnknown;
+    case LinkState::CHEAP:
+      return LinkCost::kCheap;
+    case LinkState::METERED:
+      return LinkCost::kMetered;
+    case LinkState::NONE:
+      return LinkCost::kNone;
+    default:
+      throw Error("link state is " + std::to_string(message.state) +
+                  ", accepted is 0 (unknown), 1 (cheap), 2 (metered) or 3 (none)");
+  }
+}
+
+SightingFrame ToSightingFrame(const DetectionArray& message) {
+  SightingFrame frame;
+  frame.stamp_ns = FromRosTime(message.header.stamp);
+  frame.frame_id = message.header.frame_id;
+  frame.image_width = message.image_width;
+  frame.image_height = message.image_height;
+  for (const auto& detection : message.detections) {
+    frame.sightings.push_back(
+        {detection.class_name,
+         detection.confidence,
+         {detection.x_min, detection.y_min, detection.x_max, detection.y_max}});
+  }
+  return frame;
+}
+
+Fix ToFix(const sensor_msgs::NavSatFix& message) {
+  Fix fix;
+  fix.stamp_ns = FromRosTime(message.header.stamp);
+  fix.has_fix = message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX;
+  fix.position = {message.latitude, message.longitude};
+  if (message.position_covariance_type != sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) {
+    // East-north part of the row-major 3x3 east-north-up covariance.
+    Eigen::Matrix2d covariance_m2;
+    covariance_m2 << message.position_covariance[0], message.position_covariance[1],
+        message.position_covariance[3], message.position_covariance[4];
+    fix.covariance_m2 = covariance_m2;
+  }
+  return fix;
+}
+
+}  // namespace livemap

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <nav_msgs/Odometry.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <string>
+
+#include "odometry/edge/edge_odometry.h"
+
+namespace livemap {
+
+/// Variance of what nobody measured, as REP 105's users write it.
+constexpr double kUnknownVariance = 1e6;
+
+/// Where odometry's poses belong to (REP 105).
+struct OdometryFrames {
+  std::string odom = "odom";
+  std::string base = "base_link";
+  /// The camera's mounting. The odometry's world is the optical frame of the first keyframe; odom
+  /// is where base_link was then.
+  Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
+};
+
+/// Pose of base_link in odom.
+Eigen::Isometry3d OdomFromBase(const VoResult& result, const OdometryFrames& frames);
+
+/// The message with both covariances: the pose's about odom's fixed axes, the twist's in base_link.
+/// Where there is no twist, its covariance's diagonal is 1e6: unknown.
+nav_msgs::Odometry ToOdometry(const VoResult& result, const OdometryFrames& frames,
+                              const ros::Time& stamp);
+
+/// The keyframe's edge points in odom with their grey values as intensity, thinned to one point per
+/// cube of `voxel_m` (0: all).
+sensor_msgs::PointCloud2 ToEdgeCloud(const Keyframe& keyframe, const OdometryFrames& frames,
+                                     double voxel_m, const ros::Time& stamp);
+
+}  // namespace livemap

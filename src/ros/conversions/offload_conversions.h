@@ -1,0 +1,15 @@
+#pragma once
+
+#include <livemap/CandidateFrame.h>
+
+#include "protocol/offloaded_frame.h"
+
+namespace livemap {
+
+CandidateFrame ToMessage(const Candidate& candidate);
+/// Throws Error, with one sentence that says why, for a schema version that this program does not
+/// know, an image side beyond what an int holds, or a mounting that is no rotation and translation;
+/// other ranges of values are the receiver's business (WhyCandidateRefused).
+Candidate FromMessage(const CandidateFrame& message);
+
+}  // namespace livemap

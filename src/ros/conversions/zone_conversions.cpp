@@ -1,0 +1,207 @@
+#include "ros/conversions/zone_conversions.h"
+
+#include <cmath>
+#include <set>
+
+#include "ros/views/class_colour.h"
+
+namespace livemap {
+namespace {
+
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+
+// Larger than life: a zone is looked at from far above.
+constexpr double kHazardDiameterM = 3.0;
+constexpr double kLabelHeightM = 2.5;
+constexpr std::size_t kMaxLabels = 500;
+constexpr double kVehicleLengthM = 8.0;
+constexpr double kVehicleWidthM = 3.5;
+constexpr double kTrailDotM = 1.2;
+constexpr double kTrailSpacingM = 1.0;
+
+std_msgs::ColorRGBA Colour(float red, float green, float blue) {
+  std_msgs::ColorRGBA colour;
+  colour.r = red;
+  colour.g = green;
+  colour.b = blue;
+  colour.a = 1.0F;
+  return colour;
+}
+
+geometry_msgs::Point ToPoint(const Eigen::Vector2d& east_north_m, double z_m) {
+  geometry_msgs::Point point;
+  point.x = east_north_m.x();
+  point.y = east_north_m.y();
+  point.z = z_m;
+  return point;
+}
+
+Marker Begin(const Marker& base, const std::string& name_space, int id, int type, double size_m) {
+  Marker marker = base;
+  marker.ns = name_space;
+  marker.id = id;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.scale.x = marker.scale.y = marker.scale.z = size_m;
+  return marker;
+}
+
+void AppendHazards(const std::vector<Hazard>& hazards, const HazardCatalogue& catalogue,
+                   const LocalFrame& map, const Marker& base, MarkerArray& array) {
+  std::map<std::string, Marker> spheres;
+  std::vector<Marker> labels;
+  for (const Hazard& hazard : hazards) {
+    const auto known = spheres.find(hazard.class_name);
+    Marker& list = known != spheres.end() ? known->second : spheres[hazard.class_name];
+    const HazardClass entry = catalogue.Get(hazard.class_name);
+    if (known == spheres.end()) {
+      list = Begin(base, "hazards", static_cast<int>(spheres.size()), Marker::SPHERE_LIST,
+                   kHazardDiameterM);
+      list.color = ClassColour(entry, 1.0F);
+    }
+    const Eigen::Vector2d place_m = map.ToEnu(hazard.position);
+    list.points.push_back(ToPoint(place_m, kHazardDiameterM / 2));
+    if (hazards.size() > kMaxLabels) continue;
+    labels.push_back(Begin(base, "labels", static_cast<int>(labels.size()),
+                           Marker::TEXT_VIEW_FACING, kLabelHeightM));
+    // North of the sphere: seen from above, height would leave the label on top of it.
+    const Eigen::Vector2d beside_m(0, kHazardDiameterM);
+    labels.back().pose.position = ToPoint(place_m + beside_m, kHazardDiameterM);
+    labels.back().color = Colour(1.0F, 1.0F, 1.0F);
+    labels.back().text = entry.label;
+  }
+  for (const auto& list : spheres) array.markers.push_back(list.second);
+  array.markers.insert(array.markers.end(), labels.begin(), labels.end());
+}
+
+void AppendVehicle(const VehicleState& vehicle, const std::deque<GeoPoint>& path, int id,
+                   const LocalFrame& map, const Marker& base, MarkerArray& array) {
+  Marker body = Begin(base, "vehicles", id, Marker::ARROW, kVehicleWidthM);
+  body.pose.position = ToPoint(map.ToEnu(vehicle.position), kVehicleWidthM / 2);
+  if (std::isfinite(vehicle.course_rad)) {
+    body.scale.x = kVehicleLengthM;
+    const double yaw_rad = M_PI / 2 - vehicle.course_rad;  // Counterclockwise from east.
+    body.pose.orientation.z = std::sin(yaw_rad / 2);
+    body.pose.orientation.w = std::cos(yaw_rad / 2);
+  } else {
+    body.type = Marker::CUBE;
+  }
+  body.color = Colour(0.9F, 0.1F, 0.1F);
+  array.markers.push_back(body);
+  if (path.empty()) return;
+  Marker trail = Begin(base, "trails", id, Marker::SPHERE_LIST, kTrailDotM);
+  trail.color = Colour(0.15F, 0.4F, 1.0F);
+  for (const GeoPoint& point : path) trail.points.push_back(ToPoint(map.ToEnu(point), 0.0));
+  array.markers.push_back(trail);
+}
+
+void DescribeMapChanges(const ZoneCloudletCounters& counters, const MapChangeStatistics& changes,
+                        diagnostic_updater::DiagnosticStatusWrapper& status) {
+  for (std::size_t i = 0; i < kMapChangeStates; ++i) {
+    status.add(std::string("map_changes_") + StateName(static_cast<MapChangeState>(i)),
+               changes.by_state[i]);
+  }
+  status.add("map_changes_received", counters.map_changes_received);
+  status.add("map_changes_accepted", changes.added);
+  status.add("map_changes_merged", changes.merged);
+  status.add("map_changes_denied", changes.denied);
+  status.add("map_changes_known", changes.known);
+  status.add("map_changes_repeated", changes.repeated);
+  status.add("map_changes_refused", changes.refused);
+  status.add("map_changes_not_now", changes.not_now);
+  status.add("map_changes_malformed", counters.map_changes_malformed);
+  status.add("map_changes_not_queued", counters.map_changes_not_queued);
+  status.add("map_changes_waiting", counters.map_changes_waiting);
+}
+
+}  // namespace
+
+void VehiclePaths::Add(const VehicleState& vehicle) {
+  std::deque<GeoPoint>& path = paths_[vehicle.vehicle_id];
+  if (!path.empty() && GeodesicDistanceM(path.back(), vehicle.position) < kTrailSpacingM) return;
+  path.push_back(vehicle.position);
+  if (path.size() > kMaxPoints) path.pop_front();
+}
+
+void VehiclePaths::KeepOnly(const std::vector<VehicleState>& vehicles) {
+  std::set<std::string> kept;
+  for (const VehicleState& vehicle : vehicles) kept.insert(vehicle.vehicle_id);
+  for (auto path = paths_.begin(); path != paths_.end();) {
+    path = kept.count(path->first) != 0 ? std::next(path) : paths_.erase(path);
+  }
+}
+
+MarkerArray ZoneMarkers(const std::vector<Hazard>& hazards,
+                        const std::vector<VehicleState>& vehicles, const VehiclePaths& paths,
+                        const HazardCatalogue& catalogue, const LocalFrame& map,
+                        const std::string& map_frame, const ros::Time& stamp) {
+  Marker base;
+  base.header.frame_id = map_frame;
+  base.header.stamp = stamp;
+  base.pose.orientation.w = 1.0;
+  base.action = Marker::DELETEALL;
+  MarkerArray array;
+  array.markers.push_back(base);
+  AppendHazards(hazards, catalogue, map, base, array);
+  int id = 0;
+  for (const VehicleState& vehicle : vehicles) {
+    const auto path = paths.paths().find(vehicle.vehicle_id);
+    AppendVehicle(vehicle, path == paths.paths().end() ? std::deque<GeoPoint>{} : path->second,
+                  id++, map, base, array);
+  }
+  return array;
+}
+
+void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& statistics,
+                  diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using diagnostic_msgs::DiagnosticStatus;
+  if (!counters.store_error.empty()) {
+    status.summary(DiagnosticStatus::ERROR, counters.store_error);
+  } else if (statistics.store_damage.rows > 0) {
+    status.summary(DiagnosticStatus::WARN, "the store holds rows of impossible values");
+  } else if (statistics.active_hazards == 0) {
+    status.summary(DiagnosticStatus::OK, "no hazard yet");
+  } else {
+    status.summary(DiagnosticStatus::OK, "serving");
+  }
+  status.add("hazards_on_map", statistics.active_hazards);
+  for (std::size_t i = 0; i < kHazardStates; ++i) {
+    status.add(std::string("hazards_") + StateName(static_cast<HazardState>(i)),
+               statistics.hazards_by_state[i]);
+  }
+  status.add("store_rows_broken", statistics.store_damage.rows);
+  status.add("vehicles_suspect", statistics.suspect_vehicles);
+  status.add("reports_received", counters.reports_received);
+  status.add("reports_accepted", statistics.added);
+  status.add("reports_merged", statistics.merged);
+  status.add("reports_repeated", statistics.repeated);
+  status.add("reports_refused", statistics.refused);
+  for (std::size_t i = 0; i < kRefusalKinds; ++i) {
+    status.add(std::string("refused_") + RefusalName(static_cast<RefusalKind>(i)),
+               statistics.refused_by_kind[i]);
+  }
+  status.add("reports_not_now", statistics.not_now);
+  status.add("reports_malformed", counters.reports_malformed);
+  status.add("reports_not_queued", counters.reports_not_queued);
+  status.add("reports_waiting", counters.reports_waiting);
+  status.add("commits", counters.commits);
+  status.add("store_errors", counters.store_errors);
+  status.add("notices_sent", counters.notices_sent);
+  status.add("notice_pictures", counters.notice_pictures);
+  status.add("notice_pictures_failed", counters.notice_pictures_failed);
+  status.add("vehicle_notices_sent", counters.vehicle_notices_sent);
+  status.add("polls", statistics.polls);
+  status.add("answers", statistics.answers);
+  status.add("answers_refused",
+             statistics.answers_refused + counters.answers_malformed + counters.answers_dropped);
+  status.add("vehicle_positions", statistics.vehicle_positions);
+  status.add("vehicle_positions_refused",
+             statistics.vehicle_positions_refused + counters.positions_malformed);
+  status.add("vehicles_joined", counters.vehicles_joined);
+  status.add("vehicles_behind", counters.vehicles_behind);
+  status.add("image_bytes", statistics.image_bytes);
+  DescribeMapChanges(counters, statistics.map_changes, status);
+}
+
+}  // namespace livemap

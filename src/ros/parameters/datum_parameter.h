@@ -1,0 +1,21 @@
+#pragma once
+
+#include <geometry_msgs/TransformStamped.h>
+
+#include <optional>
+#include <string>
+
+#include "geo/wgs84.h"
+#include "ros/parameters/parameters.h"
+
+namespace livemap {
+
+/// Reads `map_datum`, LATITUDE,LONGITUDE in degrees; nothing when it is empty. Throws Error that
+/// says what comes in its place: `otherwise`, such as "the first fix".
+std::optional<GeoPoint> ReadDatum(ParameterReader& parameters, const std::string& otherwise);
+
+/// tf `earth` -> `map_frame` (REP 105): by it all nodes of a vehicle agree about the datum.
+geometry_msgs::TransformStamped EarthFromMap(const GeoPoint& datum, const std::string& map_frame,
+                                             const ros::Time& stamp);
+
+}  // namespace livemap

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+#include "odometry/edge/edge_odometry.h"
+#include "ros/parameters/parameters.h"
+
+namespace livemap {
+
+/// Defaults of the edge_vo nodelet; config/edge_vo.yaml explains each.
+struct EdgeVoConfig {
+  EdgeOdometry::Config odometry;
+  std::string sync = "exact";       ///< "exact" or "approximate".
+  int queue_size = 10;              ///< Messages that may wait for their partners.
+  double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
+  std::string odom_frame = "odom";
+  std::string base_frame = "base_link";
+  bool publish_tf = true;  ///< odom -> base_link.
+  double path_spacing_m = 0.1;
+  int path_max_poses = 10000;
+  double cloud_voxel_m = 0.05;     ///< 0: every point.
+  double silence_warning_s = 5.0;  ///< Without a synchronised frame for so long, it says why.
+  double diagnostics_period_s = 1.0;
+};
+
+/// Reads and checks all of them; throws Error.
+EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters);
+
+}  // namespace livemap

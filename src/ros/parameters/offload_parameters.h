@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "perception/privacy/privacy_mask.h"
+#include "ros/parameters/parameters.h"
+#include "vehicle/reporting/offload_sender.h"
+#include "zone/offload/offload_intake.h"
+
+namespace livemap {
+
+/// Defaults of the small vehicle's early_discard nodelet; config/early_discard.yaml explains each.
+struct EarlyDiscardConfig {
+  std::string model;      ///< Path of the classifier's manifest; must be given.
+  double threshold = -1;  ///< Least score that is sent; below 0: the manifest's.
+  int threads = 1;        ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
+  int queue_size = 2;     ///< Frames that may wait for the classifier.
+  CandidateSender::Config sender;
+  int jpeg_quality = 75;  ///< 1..100; lowered where the bytes do not suffice.
+  bool privacy = true;    ///< Mask faces and number plates.
+  PrivacyMask::Config mask;
+  std::string base_frame = "base_link";
+  std::string map_frame = "map";  ///< Of fused poses.
+  double diagnostics_period_s = 1.0;
+};
+
+/// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.
+EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int64_t now_ns);
+
+/// Defaults of the zone's candidate_intake nodelet; config/candidate_intake.yaml explains each.
+struct CandidateIntakeConfig {
+  CandidateIntake::Config intake;
+  int jpeg_quality = 80;         ///< 1..100, of a report's picture.
+  int max_image_bytes = 100000;  ///< Of a report's picture.
+  double diagnostics_period_s = 1.0;
+};
+
+/// Reads and checks all of them; throws Error.
+CandidateIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters);
+
+}  // namespace livemap

@@ -1,0 +1,100 @@
+#include "simulation/sensors/depth_sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "simulation/objects/noise.h"
+
+namespace livemap {
+namespace {
+
+/// What both kinds measure is disparity; its errors make those of depth grow with the square.
+struct Model {
+  float focal_px;
+  float baseline_m;
+  float sigma_px;
+  float step_px;  ///< 0: none.
+  float nearest_m;
+  float farthest_m;
+  float edge;  ///< Neighbours whose depth differs by this share leave a hole.
+};
+
+Model ModelOf(const CameraIntrinsics& camera, DepthSensor sensor, double baseline_m) {
+  const auto focal = static_cast<float>(camera.fx);
+  if (sensor == DepthSensor::kKinect) {
+    return {focal, 0.075F, 0.06F, 0.125F, 0.5F, 10, 0.06F};
+  }
+  return {focal, static_cast<float>(baseline_m), 0.12F, 0, 0.8F, 80, 0.25F};
+}
+
+/// The sum of three uniform numbers, standard deviation 1.
+float Gaussian(int row, int column, std::uint32_t seed) {
+  std::uint32_t bits = HashLattice(column, row, seed);
+  float sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    bits = HashBits(bits + 0x9e3779b9U);
+    sum += UnitFloat(bits);
+  }
+  return (sum - 1.5F) * 2;
+}
+
+bool IsAtEdge(const cv::Mat& depth, int row, int column, float share) {
+  const float here = depth.at<float>(row, column);
+  for (const int step : {-1, 1}) {
+    const int beside = std::min(std::max(column + step, 0), depth.cols - 1);
+    const float there = depth.at<float>(row, beside);
+    if (there <= 0 || std::abs(there - here) > share * here) return true;
+  }
+  return false;
+}
+
+/// For each column of the other eye the nearest surface's disparity.
+std::vector<float> OtherEye(const cv::Mat& depth, int row, const Model& model) {
+  std::vector<float> seen(static_cast<std::size_t>(depth.cols), 0.0F);
+  for (int column = 0; column < depth.cols; ++column) {
+    const float metres = depth.at<float>(row, column);
+    if (metres <= 0) continue;
+    const float disparity = model.focal_px * model.baseline_m / metres;
+    const auto other = static_cast<int>(std::lround(static_cast<float>(column) - disparity));
+    if (other < 0 || other >= depth.cols) continue;
+    float& nearest = seen[static_cast<std::size_t>(other)];
+    nearest = std::max(nearest, disparity);
+  }
+  return seen;
+}
+
+}  // namespace
+
+std::optional<DepthSensor> ParseDepthSensor(const std::string& name) {
+  if (name == "exact") return DepthSensor::kExact;
+  if (name == "kinect") return DepthSensor::kKinect;
+  if (name == "stereo") return DepthSensor::kStereo;
+  return std::nullopt;
+}
+
+cv::Mat SenseDepth(const cv::Mat& depth, const CameraIntrinsics& camera, DepthSensor sensor,
+                   double baseline_m, std::uint32_t seed) {
+  if (sensor == DepthSensor::kExact) return depth;
+  const Model model = ModelOf(camera, sensor, baseline_m);
+  cv::Mat sensed(depth.size(), CV_32FC1, cv::Scalar(0));
+  for (int row = 0; row < depth.rows; ++row) {
+    const std::vector<float> other = OtherEye(depth, row, model);
+    for (int column = 0; column < depth.cols; ++column) {
+      const float metres = depth.at<float>(row, column);
+      if (metres < model.nearest_m || metres > model.farthest_m) continue;
+      if (IsAtEdge(depth, row, column, model.edge)) continue;
+      float disparity = model.focal_px * model.baseline_m / metres;
+      const auto there = static_cast<int>(std::lround(static_cast<float>(column) - disparity));
+      if (there < 0 || there >= depth.cols) continue;
+      if (other[static_cast<std::size_t>(there)] > disparity + 1.5F) continue;
+      disparity += model.sigma_px * Gaussian(row, column, seed);
+      if (model.step_px > 0) disparity = std::round(disparity / model.step_px) * model.step_px;
+      if (disparity <= 0) continue;
+      sensed.at<float>(row, column) = model.focal_px * model.baseline_m / disparity;
+    }
+  }
+  return sensed;
+}
+
+}  // namespace livemap

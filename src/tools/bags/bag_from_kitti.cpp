@@ -1,0 +1,33 @@
+#include <cstdio>
+
+#include "datasets/sequences.h"
+#include "tools/bags/drive_bag.h"
+#include "tools/bags/sequence_bag.h"
+#include "tools/common/command_line.h"
+
+namespace livemap {
+namespace {
+
+int Run(int argc, char** argv) {
+  CommandLine line(
+      "livemap_bag_from_kitti DIR OUT.bag [flags]",
+      "Makes a bag of a KITTI odometry folder: images/ (or image_0, image_2), calib.txt,\n"
+      "poses.txt and, where there are such, times.txt and the right eye's image_1 (image_3).",
+      2,
+      {{"rate-hz", "HZ", "frames per second without times.txt (10)"},
+       {"start-time", "ISO8601", "stamp of time zero, UTC (2026-01-01T12:00:00Z)"}});
+  if (!line.Parse(argc, argv)) return 0;
+  const Sequence sequence =
+      ReadKittiSequence(line.Positional(0), line.Number("rate-hz", 10, 0.1, 1000));
+  WriteSequenceBag(sequence, line.Positional(1), ReadStartTime(line) - ros::Time(0));
+  std::printf("%s: %zu frames, %zu poses\n", line.Positional(1).c_str(), sequence.frames.size(),
+              sequence.poses.size());
+  return 0;
+}
+
+}  // namespace
+}  // namespace livemap
+
+int main(int argc, char** argv) {
+  return livemap::RunProgram("livemap_bag_from_kitti", argc, argv, livemap::Run);
+}

@@ -1,0 +1,94 @@
+// livemap_evaluate_trajectory: how far an estimated trajectory is from the true one.
+
+#include <cmath>
+#include <iostream>
+#include <optional>
+
+#include "common/error.h"
+#include "evaluation/trajectory/trajectory.h"
+#include "evaluation/trajectory/trajectory_report.h"
+#include "tools/common/command_line.h"
+
+namespace livemap {
+namespace {
+
+struct Options {
+  std::string truth_path;
+  std::string estimate_path;
+  bool json = false;
+  double kitti_rate_hz = 10;
+  TrajectoryOptions evaluation;
+};
+
+AlignmentKind ChosenAlignment(const CommandLine& line) {
+  const std::string name = line.Text("align", line.Has("scale") ? "sim3" : "se3");
+  const std::optional<AlignmentKind> kind = ParseAlignmentKind(name);
+  if (!kind) throw Error("--align is '" + name + "', accepted are none, se3, sim3 and origin");
+  if (line.Has("scale") && *kind != AlignmentKind::kSim3) {
+    throw Error("--scale means --align sim3, but --align is '" + name + "'");
+  }
+  return *kind;
+}
+
+std::size_t DeltaFrames(const CommandLine& line) {
+  const double frames = line.Number("delta-frames", 0, 1, 1e6);
+  if (frames != std::floor(frames)) {
+    throw Error("--delta-frames is '" + line.Text("delta-frames", "") +
+                "', accepted is a whole number");
+  }
+  return static_cast<std::size_t>(frames);
+}
+
+/// None when --help was asked for and printed.
+std::optional<Options> ParseOptions(int argc, char** argv) {
+  CommandLine line(
+      "livemap_evaluate_trajectory [FLAGS] TRUTH ESTIMATE",
+      "Compares two trajectories: absolute error (ATE) and relative error (RPE) as the TUM RGB-D\n"
+      "benchmark's scripts define them, segment errors as the KITTI odometry devkit does. A file "
+      "has\n"
+      "TUM lines \"stamp tx ty tz qx qy qz qw\" or KITTI lines of 12 numbers, camera to world.\n"
+      "docs/evaluation.md defines the figures.",
+      2,
+      {{"json", "", "one line of JSON instead of a table"},
+       {"align", "KIND", "none, se3, sim3 or origin (first poses on each other), default se3"},
+       {"scale", "", "the same as --align sim3: find the estimate's scale too"},
+       {"max-difference", "SECONDS", "stamps nearer than this may be a pair, default 0.02"},
+       {"offset", "SECONDS", "added to the stamps of ESTIMATE, default 0"},
+       {"delta", "SECONDS", "time over which RPE is measured, default 1"},
+       {"delta-frames", "N", "RPE also over N poses of ESTIMATE"},
+       {"rate", "HZ", "frames per second of KITTI files, which have no stamps, default 10"}});
+  if (!line.Parse(argc, argv)) return std::nullopt;
+  Options options;
+  options.truth_path = line.Positional(0);
+  options.estimate_path = line.Positional(1);
+  options.json = line.Has("json");
+  options.kitti_rate_hz = line.Number("rate", options.kitti_rate_hz, 0.01, 10000);
+  AssociationOptions& association = options.evaluation.association;
+  association.max_difference_s =
+      line.Number("max-difference", association.max_difference_s, 1e-6, 1000);
+  association.offset_s = line.Number("offset", 0, -4e9, 4e9);
+  options.evaluation.alignment = ChosenAlignment(line);
+  options.evaluation.rpe_delta_s =
+      line.Number("delta", options.evaluation.rpe_delta_s, 0.001, 100000);
+  options.evaluation.rpe_delta_frames = DeltaFrames(line);
+  return options;
+}
+
+int Run(int argc, char** argv) {
+  const std::optional<Options> options = ParseOptions(argc, argv);
+  if (!options) return 0;
+  const std::vector<StampedPose> truth =
+      ReadTrajectory(options->truth_path, options->kitti_rate_hz);
+  const std::vector<StampedPose> estimate =
+      ReadTrajectory(options->estimate_path, options->kitti_rate_hz);
+  const TrajectoryFigures figures = EvaluateTrajectory(truth, estimate, options->evaluation);
+  std::cout << (options->json ? ToJson(figures).dump() + "\n" : ToText(figures));
+  return 0;
+}
+
+}  // namespace
+}  // namespace livemap
+
+int main(int argc, char** argv) {
+  return livemap::RunProgram("livemap_evaluate_trajectory", argc, argv, livemap::Run);
+}

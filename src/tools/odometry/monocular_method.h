@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "datasets/sequences.h"
+#include "odometry/monocular/monocular_odometry.h"
+#include "tools/odometry/vo_method.h"
+
+namespace livemap {
+
+/// What tells a single camera metres in a recorded sequence.
+struct MonocularOptions {
+  ScaleSource scale_source = ScaleSource::kSpeed;
+  double speed_sigma_mps = 0;  ///< Noise added to the true speed, standard deviation.
+  std::uint64_t seed = 1;      ///< Of that noise.
+  double camera_height_m = 1.65;
+  double camera_pitch_rad = 0;  ///< Positive looks down.
+};
+
+/// Follows the sequence, of which every `step`th frame comes, with one eye; depth is not looked at.
+/// The speed is that between the true poses before and after a frame, as a satellite receiver
+/// would measure it. Throws Error when the speed is asked for and there are no true poses.
+std::unique_ptr<VoMethod> MakeMonocularMethod(const MonocularOptions& options,
+                                              const EdgeOdometry::Config& config,
+                                              const CameraIntrinsics& intrinsics,
+                                              const Sequence& sequence, std::size_t step);
+
+}  // namespace livemap

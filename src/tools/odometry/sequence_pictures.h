@@ -1,0 +1,16 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "datasets/sequences.h"
+
+namespace livemap {
+
+/// A picture of the camera's size, decoded with OpenCV's `flags`. Throws Error naming the file.
+cv::Mat ReadPicture(const std::string& path, const CameraIntrinsics& camera, int flags);
+
+/// The sequence's camera; one without width and height has those of the first picture.
+CameraIntrinsics IntrinsicsOf(const Sequence& sequence);
+
+}  // namespace livemap

@@ -1,0 +1,60 @@
+#include "tools/odometry/stereo_source.h"
+
+#include <algorithm>
+#include <chrono>
+#include <opencv2/imgcodecs.hpp>
+
+#include "common/error.h"
+#include "datasets/image_file.h"
+
+namespace livemap {
+namespace {
+
+/// A rectified eye, `right_m` beside the left one.
+CameraCalibration Eye(const CameraIntrinsics& k, double right_m) {
+  CameraCalibration eye;
+  eye.width = k.width;
+  eye.height = k.height;
+  eye.k = {k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1};
+  eye.p = {k.fx, 0, k.cx, -k.fx * right_m, 0, k.fy, k.cy, 0, 0, 0, 1, 0};
+  return eye;
+}
+
+StereoDepth MakeStereo(const Sequence& sequence, const CameraIntrinsics& intrinsics,
+                       const StereoConfig& config) {
+  const auto alone =
+      std::find_if(sequence.frames.begin(), sequence.frames.end(),
+                   [](const SequenceFrame& frame) { return frame.right_path.empty(); });
+  if (alone == sequence.frames.begin()) {
+    throw Error(
+        "the sequence has no right eye: --stereo wants rgb_right.txt beside rgb.txt, or image_1 "
+        "beside image_0");
+  }
+  if (alone != sequence.frames.end()) {
+    throw Error("the picture '" + alone->image_path + "' has no right eye's beside it");
+  }
+  if (!(sequence.baseline_m > 0)) {
+    throw Error(
+        "the sequence has no baseline: --stereo wants baseline_m in camera.yaml, or P1 in "
+        "calib.txt");
+  }
+  return {config, Eye(intrinsics, 0), Eye(intrinsics, sequence.baseline_m)};
+}
+
+}  // namespace
+
+StereoSource::StereoSource(const Sequence& sequence, const CameraIntrinsics& intrinsics,
+                           const StereoConfig& config)
+    : stereo_(MakeStereo(sequence, intrinsics, config)), intrinsics_(intrinsics) {}
+
+cv::Mat StereoSource::Depth(const SequenceFrame& frame, const cv::Mat& left) {
+  const ImageFile file = ReadImageFile(frame.right_path, intrinsics_.width, intrinsics_.height);
+  const cv::Mat right = cv::imdecode(file.bytes, cv::IMREAD_COLOR);
+  const auto start = std::chrono::steady_clock::now();
+  cv::Mat depth = stereo_.Compute(left, right);
+  milliseconds_ =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return depth;
+}
+
+}  // namespace livemap

@@ -1,0 +1,92 @@
+#include "tools/simulation/simulation_setup.h"
+
+#include <cmath>
+
+#include "common/error.h"
+#include "datasets/text_parsing.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kDefaultFieldOfViewDeg = 66;
+
+/// "a<separator>b" as two numbers.
+std::pair<double, double> ReadPair(const CommandLine& line, const std::string& flag,
+                                   const std::string& otherwise, char separator,
+                                   const std::string& accepted) {
+  const std::string text = line.Text(flag, otherwise);
+  const std::vector<std::string> parts = Split(text, separator);
+  if (parts.size() == 2) {
+    const auto a = ParseFinite(parts[0]);
+    const auto b = ParseFinite(parts[1]);
+    if (a && b) return {*a, *b};
+  }
+  throw Error("--" + flag + " is '" + text + "', accepted is " + accepted);
+}
+
+}  // namespace
+
+SimulationSetup ReadSimulationSetup(const CommandLine& line) {
+  SimulationSetup setup;
+  setup.mounting.height_m = 1.45;
+  setup.mounting.pitch_deg = 4;
+  CameraIntrinsics& k = setup.camera.intrinsics;
+  if (line.Has("camera")) {
+    if (line.Has("size")) throw Error("--size and --camera exclude each other");
+    const CameraFile file = ReadCameraFile(line.Text("camera", ""));
+    k = file.intrinsics;
+    setup.mounting = file.mounting;
+  } else {
+    const std::string accepted = "WxH in whole pixels from 64 to 4096, such as 640x480";
+    const auto [width, height] = ReadPair(line, "size", "640x480", 'x', accepted);
+    for (const double side : {width, height}) {
+      if (side < 64 || side > 4096 || side != std::floor(side)) {
+        throw Error("--size is '" + line.Text("size", "") + "', accepted is " + accepted);
+      }
+    }
+    k.width = static_cast<int>(width);
+    k.height = static_cast<int>(height);
+    k.fx = k.fy = 0.5 * width / std::tan(0.5 * kDefaultFieldOfViewDeg * M_PI / 180);
+    k.cx = 0.5 * (width - 1);
+    k.cy = 0.5 * (height - 1);
+  }
+  const auto [k1, k2] = ReadPair(line, "distortion", "0,0", ',', "K1,K2 from -0.4 to 0.4");
+  if (std::abs(k1) > 0.4 || std::abs(k2) > 0.4) {
+    throw Error("--distortion is '" + line.Text("distortion", "") +
+                "', accepted is K1,K2 from -0.4 to 0.4");
+  }
+  setup.camera.k1 = k1;
+  setup.camera.k2 = k2;
+  setup.baseline_m = line.Has("stereo") ? line.Number("stereo", 0, 0.02, 2) : 0;
+  const std::optional<DepthSensor> depth = ParseDepthSensor(line.Text("depth", "exact"));
+  if (!depth) {
+    throw Error("--depth is '" + line.Text("depth", "") + "', accepted are: exact, kinect, stereo");
+  }
+  setup.depth = *depth;
+  if (line.Has("stereo") && !line.Has("tum") && !line.Has("bag")) {
+    throw Error("--stereo needs --tum or --bag, which write what it makes");
+  }
+  if (line.Has("depth") && !line.Has("tum") && !line.Has("bag-depth")) {
+    throw Error("--depth needs --tum or --bag-depth, which write what it makes");
+  }
+  setup.camera.blur_samples = static_cast<int>(line.Number("blur", 0, 0, 64));
+  const std::string place = "LAT,LON in degrees";
+  const auto [latitude, longitude] = ReadPair(line, "start", "48.8566,9.0", ',', place);
+  setup.datum = {latitude, longitude};
+  if (!IsValid(setup.datum)) {
+    throw Error("--start is '" + line.Text("start", "") + "', accepted is " + place);
+  }
+  return setup;
+}
+
+Condition ReadCondition(const CommandLine& line, const std::string& flag,
+                        const std::string& otherwise) {
+  const std::string name = line.Text(flag, otherwise);
+  const std::optional<Condition> condition = ParseCondition(name);
+  if (!condition) {
+    throw Error("--" + flag + " is '" + name + "', accepted are: day, dusk, rain, snow");
+  }
+  return *condition;
+}
+
+}  // namespace livemap

@@ -1,0 +1,163 @@
+#include "vehicle/outbox/map_change_outbox.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "common/time.h"
+#include "vehicle/outbox/report_table.h"
+#include "vehicle/outbox/row_validation.h"
+
+namespace livemap {
+namespace {
+
+/// All changes are as urgent as each other.
+constexpr int kChangeUrgency = 1;
+
+const std::vector<std::string>& ChangeMigrations() {
+  static const std::vector<std::string> migrations = {R"sql(
+    CREATE TABLE pending(
+      uuid BLOB PRIMARY KEY, drive_id TEXT NOT NULL, stamp_ns INTEGER NOT NULL,
+      earlier_stamp_ns INTEGER NOT NULL, class_name TEXT NOT NULL, vanished INTEGER NOT NULL,
+      confidence REAL NOT NULL, seen INTEGER NOT NULL, missed INTEGER NOT NULL,
+      latitude REAL NOT NULL, longitude REAL NOT NULL,
+      var_east REAL NOT NULL, cov_east_north REAL NOT NULL, var_north REAL NOT NULL
+    ) WITHOUT ROWID)sql"};
+  return migrations;
+}
+
+void Insert(SqliteDatabase& database, const MapChangeReport& report) {
+  SqliteStatement insert =
+      database.Prepare("INSERT OR REPLACE INTO pending VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+  insert.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
+      .Bind(2, report.drive_id)
+      .Bind(3, report.stamp_ns)
+      .Bind(4, report.earlier_stamp_ns)
+      .Bind(5, report.class_name)
+      .Bind(6, static_cast<std::int64_t>(report.vanished))
+      .Bind(7, static_cast<double>(report.confidence))
+      .Bind(8, static_cast<std::int64_t>(report.seen))
+      .Bind(9, static_cast<std::int64_t>(report.missed))
+      .Bind(10, report.position.latitude_deg)
+      .Bind(11, report.position.longitude_deg)
+      .Bind(12, report.covariance_m2(0, 0))
+      .Bind(13, report.covariance_m2(0, 1))
+      .Bind(14, report.covariance_m2(1, 1));
+  insert.Execute();
+}
+
+MapChangeReport ReadRow(const SqliteStatement& row) {
+  MapChangeReport report;
+  report.uuid = UuidFromBlob(row.Blob(0));
+  report.drive_id = row.Text(1);
+  report.stamp_ns = row.Int(2);
+  report.earlier_stamp_ns = row.Int(3);
+  report.class_name = row.Text(4);
+  report.vanished = row.Int(5) != 0;
+  report.confidence = static_cast<float>(row.Real(6));
+  report.seen = static_cast<std::uint32_t>(row.Int(7));
+  report.missed = static_cast<std::uint32_t>(row.Int(8));
+  report.position = {row.Real(9), row.Real(10)};
+  report.covariance_m2 << row.Real(11), row.Real(12), row.Real(12), row.Real(13);
+  return report;
+}
+
+}  // namespace
+
+bool IsSound(const MapChangeReport& report) {
+  const auto is_name = [](const std::string& text) {
+    return !text.empty() && text.size() <= kMaxIdBytes;
+  };
+  return !report.uuid.IsNil() && is_name(report.drive_id) && is_name(report.class_name) &&
+         IsStamp(report.stamp_ns) && IsStamp(report.earlier_stamp_ns) && report.confidence >= 0 &&
+         report.confidence <= 1 && report.seen >= 2 && IsValid(report.position) &&
+         IsCovarianceOfReport(report.covariance_m2);
+}
+
+MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, std::int64_t now_ns,
+                                 double steady_s)
+    : config_(config), schedule_(config.resend, random) {
+  try {
+    Open();
+  } catch (const StoreError& error) {
+    if (!TellsCorruption(error)) throw;
+    database_.reset();
+    set_aside_ = SetAsideDatabase(config_.path, now_ns);
+    Open();
+  }
+  Load(steady_s);
+}
+
+void MapChangeOutbox::Open() {
+  database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
+  database_->CheckPages();
+  database_->Migrate(ChangeMigrations());
+}
+
+void MapChangeOutbox::Load(double steady_s) {
+  // Of a text that something else made endless only the beginning is fetched: too long as it is.
+  SqliteStatement rows = database_->Prepare(
+      "SELECT substr(uuid, 1, 17), substr(drive_id, 1, 65), stamp_ns, earlier_stamp_ns, "
+      "substr(class_name, 1, 65), vanished, confidence, seen, missed, latitude, longitude, "
+      "var_east, cov_east_north, var_north FROM pending");
+  while (rows.Step()) {
+    const MapChangeReport report = ReadRow(rows);
+    if (!IsSound(report)) {
+      ++counters_.unsound;
+      continue;
+    }
+    pending_[report.uuid].report = report;
+    schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
+  }
+  Displace();
+}
+
+void MapChangeOutbox::Add(const MapChangeReport& report, double steady_s) {
+  if (!IsSound(report)) {
+    throw Error("a change of class '" + report.class_name.substr(0, kMaxIdBytes) +
+                "' has values that no zone accepts");
+  }
+  Insert(*database_, report);
+  pending_[report.uuid] = {report, false};
+  schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
+  ++counters_.added;
+  Displace();
+}
+
+std::vector<MapChangeReport> MapChangeOutbox::TakeDue(double steady_s, std::size_t limit) {
+  std::vector<MapChangeReport> reports;
+  for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
+    Entry& entry = pending_.at(uuid);
+    ++(entry.sent ? counters_.resends : counters_.sent);
+    entry.sent = true;
+    reports.push_back(entry.report);
+  }
+  return reports;
+}
+
+void MapChangeOutbox::AddReceipt(const Receipt& receipt) {
+  if (pending_.count(receipt.report_uuid) == 0) return;
+  Erase(receipt.report_uuid);
+  ++(receipt.status == Receipt::Status::kCommitted ? counters_.committed : counters_.refused);
+}
+
+void MapChangeOutbox::Erase(const Uuid& uuid) {
+  SqliteStatement erase = database_->Prepare("DELETE FROM pending WHERE uuid=?");
+  erase.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
+  erase.Execute();
+  pending_.erase(uuid);
+  schedule_.Remove(uuid);
+}
+
+void MapChangeOutbox::Displace() {
+  while (pending_.size() > config_.most) {
+    const auto oldest =
+        std::min_element(pending_.begin(), pending_.end(), [](const auto& a, const auto& b) {
+          return a.second.report.stamp_ns < b.second.report.stamp_ns;
+        });
+    Erase(Uuid(oldest->first));
+    ++counters_.displaced;
+  }
+}
+
+}  // namespace livemap

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "common/uuid.h"
+
+namespace livemap {
+
+/// Says which unfinished reports are to be sent now: each at once, then again after a pause that
+/// doubles, with jitter so that vehicles which lost the same link do not return in step. The first
+/// answer after a silence shows that the way to the zone is open again: then the long pauses end
+/// for all. Urgent classes go first, then older reports. A report may be held: it then waits for a
+/// cheap link, or until its time is over. Times are steady seconds from any origin.
+class ResendSchedule {
+ public:
+  struct Config {
+    double first_pause_s = 1.0;
+    double longest_pause_s = 30.0;
+    double jitter = 0.2;  ///< A pause is drawn from (1 - jitter) to (1 + jitter) times its length.
+  };
+
+  ResendSchedule(const Config& config, std::mt19937_64 random);
+
+  /// A report to send from `now_s` on, on a link that is not cheap from `hold_until_s` on.
+  /// `urgency` as in HazardClass; `created_ns` orders equals.
+  void Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s,
+           double hold_until_s = 0);
+  /// Whether held reports may go, too; true until told otherwise.
+  void SetCheapLink(bool cheap) { cheap_ = cheap; }
+  /// The report is finished: the zone answered. Unknown ones are ignored.
+  void Remove(const Uuid& report);
+  /// At most `limit` reports whose time has come, in the order to send them; plans their next time.
+  std::vector<Uuid> TakeDue(double now_s, std::size_t limit);
+
+  std::size_t size() const { return entries_.size(); }
+  /// How many wait while the link is not cheap.
+  std::size_t Held(double now_s) const;
+
+ private:
+  struct Entry {
+    int urgency;
+    std::int64_t created_ns;
+    double due_s;
+    double pause_s;
+    double sent_s;  ///< Last, if it was.
+    double hold_until_s;
+  };
+
+  void NoteAnswer(double now_s);
+
+  Config config_;
+  bool cheap_ = true;
+  bool answered_ = false;                ///< Since the last TakeDue.
+  std::optional<double> last_answer_s_;  ///< Or the first report's time, while there is none.
+  std::mt19937_64 random_;
+  std::map<Uuid, Entry> entries_;
+};
+
+}  // namespace livemap

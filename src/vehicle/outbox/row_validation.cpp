@@ -1,0 +1,114 @@
+#include "vehicle/outbox/row_validation.h"
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/time.h"
+#include "imaging/image_header.h"
+#include "vehicle/outbox/report_table.h"
+
+namespace livemap {
+namespace {
+
+// The zone's numbers of its announcements lie far below 2^60, and stamps below 2106.
+constexpr char kBrokenKnown[] =
+    "NOT (typeof(id) = 'blob' AND length(id) = 16 AND id <> zeroblob(16) AND "
+    "typeof(of_zone) = 'integer' AND of_zone IN (0, 1) AND "
+    "typeof(class_name) IN ('text', 'blob') AND "
+    "length(CAST(class_name AS BLOB)) BETWEEN 1 AND 64 AND "
+    "typeof(confidence) IN ('real', 'integer') AND confidence BETWEEN 0 AND 1 AND "
+    "typeof(latitude) IN ('real', 'integer') AND latitude BETWEEN -90 AND 90 AND "
+    "typeof(longitude) IN ('real', 'integer') AND longitude BETWEEN -180 AND 180 AND "
+    "typeof(sequence) = 'integer' AND sequence BETWEEN 0 AND 1152921504606846975 AND "
+    "typeof(news_ns) = 'integer' AND news_ns BETWEEN 0 AND 4294967294999999999)";
+constexpr char kBrokenGone[] =
+    "NOT (typeof(id) = 'blob' AND length(id) = 16 AND typeof(sequence) = 'integer' AND "
+    "sequence BETWEEN 0 AND 1152921504606846975)";
+constexpr char kBrokenZone[] =
+    "NOT (typeof(map_sequence) = 'integer' AND "
+    "map_sequence BETWEEN 0 AND 1152921504606846975)";
+
+std::size_t Count(SqliteDatabase& database, const std::string& table, const std::string& which) {
+  SqliteStatement query = database.Prepare("SELECT count(*) FROM " + table + " WHERE " + which);
+  query.Step();
+  return static_cast<std::size_t>(query.Int(0));
+}
+
+/// One row of `zone`, whatever there was: knowing nothing, the vehicle is told everything.
+std::size_t MendZone(SqliteDatabase& database) {
+  if (Count(database, "zone", kBrokenZone) == 0 && Count(database, "zone", "1") == 1) return 0;
+  database.Execute("DELETE FROM zone; INSERT INTO zone(map_sequence) VALUES(0)");
+  return 1;
+}
+
+std::size_t TakeOut(SqliteDatabase& database, const std::string& table, const std::string& which) {
+  const std::size_t count = Count(database, table, which);
+  if (count > 0) database.Execute("DELETE FROM " + table + " WHERE " + which);
+  return count;
+}
+
+}  // namespace
+
+bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2) {
+  constexpr double kMaxVarianceM2 = 1e8;
+  return covariance_m2.allFinite() && covariance_m2(0, 0) > 0 && covariance_m2(1, 1) > 0 &&
+         covariance_m2.cwiseAbs().maxCoeff() <= kMaxVarianceM2 && covariance_m2.determinant() > 0;
+}
+
+const char* const kFetchableReport =
+    "typeof(uuid) = 'blob' AND length(uuid) = 16 AND uuid <> zeroblob(16) AND "
+    "length(CAST(drive_id AS BLOB)) <= 64 AND length(CAST(class_name AS BLOB)) <= 64 AND "
+    "length(CAST(image_frame_id AS BLOB)) <= 256 AND length(CAST(image_format AS BLOB)) <= 64 AND "
+    "length(CAST(image AS BLOB)) <= 16777216 AND typeof(stamp_ns) = 'integer' AND "
+    "typeof(confidence) IN ('real', 'integer') AND typeof(latitude) IN ('real', 'integer') AND "
+    "typeof(longitude) IN ('real', 'integer') AND typeof(x_min) IN ('real', 'integer') AND "
+    "typeof(y_min) IN ('real', 'integer') AND typeof(x_max) IN ('real', 'integer') AND "
+    "typeof(y_max) IN ('real', 'integer') AND typeof(variance_east) IN ('real', 'integer') AND "
+    "typeof(covariance_east_north) IN ('real', 'integer') AND "
+    "typeof(variance_north) IN ('real', 'integer') AND "
+    "image_width BETWEEN 0 AND 4294967295 AND image_height BETWEEN 0 AND 4294967295 AND "
+    "shown_x BETWEEN 0 AND 4294967295 AND shown_y BETWEEN 0 AND 4294967295 AND "
+    "shown_width BETWEEN 0 AND 4294967295 AND shown_height BETWEEN 0 AND 4294967295 AND "
+    "typeof(hold_until_ns) = 'integer'";
+
+bool IsSound(const Report& report) {
+  const Box& box = report.box;
+  return !report.uuid.IsNil() && IsValid(report.position) && IsStamp(report.stamp_ns) &&
+         IsCovarianceOfReport(report.covariance_m2) && report.confidence >= 0 &&
+         report.confidence <= 1 && std::isfinite(box.x_min) && std::isfinite(box.y_min) &&
+         std::isfinite(box.x_max) && std::isfinite(box.y_max) && box.x_min < box.x_max &&
+         box.y_min < box.y_max && !report.class_name.empty() &&
+         report.class_name.size() <= kMaxClassNameBytes && report.drive_id.size() <= kMaxIdBytes;
+}
+
+void DropBrokenPicture(Report& report) {
+  const std::uint8_t* data = report.image.data();
+  const auto header = ReadImageHeader(data, report.image.size());
+  if (header && HasImageEnd(data, report.image.size(), header->format)) return;
+  report.image.clear();
+  report.image_format.clear();
+}
+
+BrokenRows MendRows(SqliteDatabase& database) {
+  BrokenRows broken;
+  database.Transaction([&] {
+    broken.known = TakeOut(database, "known", kBrokenKnown) +
+                   TakeOut(database, "gone", kBrokenGone) + MendZone(database);
+  });
+  broken.reports = Count(database, "pending", std::string("NOT (") + kFetchableReport + ")");
+  std::vector<Uuid> uuids;
+  SqliteStatement rows =
+      database.Prepare(std::string("SELECT uuid FROM pending WHERE ") + kFetchableReport);
+  while (rows.Step()) uuids.push_back(UuidFromBlob(rows.Blob(0)));
+  for (const Uuid& uuid : uuids) {
+    const auto report = SelectReport(database, uuid);
+    if (report && IsSound(*report)) continue;
+    broken.unsendable.insert(uuid);
+    ++broken.reports;
+  }
+  return broken;
+}
+
+}  // namespace livemap

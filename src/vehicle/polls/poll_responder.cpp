@@ -1,0 +1,353 @@
+#include "vehicle/polls/poll_responder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxAnsweredKept = 1000;
+constexpr std::size_t kMaxPollFrames = 50;
+constexpr std::size_t kMaxPollPictures = 24;  // Full images: about a second of them.
+constexpr int kLuminanceGridPx = 64;
+constexpr double kLeastPlacePx = 32;
+
+/// Where a place lies in an image: two standard deviations around its pixel.
+Box BoxOf(const PlaceView& view) {
+  const auto half = [&view](int axis) {
+    return static_cast<float>(
+        std::max(kLeastPlacePx / 2, 2 * std::sqrt(view.covariance_px2(axis, axis))));
+  };
+  const auto u = static_cast<float>(view.pixel.x());
+  const auto v = static_cast<float>(view.pixel.y());
+  return {u - half(0), v - half(1), u + half(0), v + half(1)};
+}
+
+}  // namespace
+
+double PollResponder::MeanLuminance(const cv::Mat& image) {
+  cv::Mat grid;
+  cv::resize(image, grid, cv::Size(kLuminanceGridPx, kLuminanceGridPx), 0, 0, cv::INTER_NEAREST);
+  if (grid.channels() == 3) cv::cvtColor(grid, grid, cv::COLOR_BGR2GRAY);
+  return cv::mean(grid)[0];
+}
+
+void PollResponder::Add(const Poll& poll, double steady_s) {
+  ++counters_.polls;
+  const bool known = std::find(answered_.begin(), answered_.end(), poll.poll) != answered_.end() ||
+                     std::any_of(open_.begin(), open_.end(), [&poll](const OpenPoll& open) {
+                       return open.poll.poll == poll.poll;
+                     });
+  if (known) {
+    ++counters_.repeated;
+    return;
+  }
+  const double life_s =
+      std::min(static_cast<double>(poll.expires_ns - poll.stamp_ns) * 1e-9, config_.max_life_s);
+  if (!(life_s > config_.reserve_s) || open_.size() >= static_cast<std::size_t>(config_.max_open)) {
+    ++counters_.not_taken;
+    return;
+  }
+  OpenPoll open;
+  open.poll = poll;
+  open.deadline_s = steady_s + life_s - config_.reserve_s;
+  open_.push_back(std::move(open));
+}
+
+void PollResponder::AddFrame(const SightingFrame& frame, double now_s) {
+  if (open_.empty()) return;
+  waiting_.push_back({frame, now_s});
+  if (waiting_.size() > kMaxPollFrames) waiting_.pop_front();
+}
+
+void PollResponder::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
+  if (open_.empty() || picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return;
+  AddLuminance(stamp_ns, MeanLuminance(picture.bgr));
+  pictures_[stamp_ns] = picture;
+  // The oldest that speaks for no answer goes.
+  for (auto old = pictures_.begin();
+       pictures_.size() > kMaxPollPictures && old != pictures_.end();) {
+    const std::int64_t old_ns = old->first;
+    const bool wanted = std::any_of(open_.begin(), open_.end(), [old_ns](const OpenPoll& open) {
+      return open.poll.picture != PollPicture::kNone && open.view_ns == old_ns;
+    });
+    old = wanted ? std::next(old) : pictures_.erase(old);
+  }
+}
+
+void PollResponder::AddLuminance(std::int64_t stamp_ns, double luminance) {
+  if (open_.empty()) return;
+  luminances_[stamp_ns] = luminance;
+  if (luminances_.size() > 2 * kMaxPollFrames) luminances_.erase(luminances_.begin());
+}
+
+void PollResponder::AddChange(const ChangeEvidence& evidence) {
+  if (!IsValid(evidence.position) || !evidence.covariance_m2.allFinite() ||
+      !(evidence.confidence > 0 && evidence.confidence <= 1)) {
+    return;
+  }
+  for (OpenPoll& open : open_) {
+    if (!MayBe(evidence.change_class, open.poll.class_name)) continue;
+    const double sigma_m =
+        std::sqrt((evidence.covariance_m2 + open.poll.covariance_m2).trace() / 2);
+    const double gate_m =
+        std::max(catalogue_.DuplicateRadiusM(open.poll.class_name), config_.gate_sigma * sigma_m);
+    if (GeodesicDistanceM(evidence.position, open.poll.position) > gate_m) continue;
+    (evidence.vanished ? open.vanished : open.appeared) = evidence.confidence;
+  }
+}
+
+void PollResponder::AddUnregistered() {
+  // Before its first clear view a place is not what the picture shows.
+  for (OpenPoll& open : open_) open.unregistered += open.clear_views > 0 ? 1 : 0;
+}
+
+std::vector<std::int64_t> PollResponder::TakePictureRequests() {
+  return std::exchange(picture_requests_, {});
+}
+
+void PollResponder::Process(double now_s, double steady_s, const Vehicle& vehicle) {
+  while (!waiting_.empty() && Work(waiting_.front(), now_s, steady_s, vehicle)) {
+    waiting_.pop_front();
+  }
+  for (auto open = open_.begin(); open != open_.end();) {
+    if (!IsReady(*open, steady_s)) {
+      ++open;
+      continue;
+    }
+    Answer(*open);
+    answered_.push_back(open->poll.poll);
+    if (answered_.size() > kMaxAnsweredKept) answered_.pop_front();
+    open = open_.erase(open);
+  }
+  if (!open_.empty()) return;
+  waiting_.clear();
+  pictures_.clear();
+  luminances_.clear();
+}
+
+/// True when the frame is done, whatever became of it.
+bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
+                         const Vehicle& vehicle) {
+  waiting.arrival_s = std::min(waiting.arrival_s, now_s);  // The clock was set back.
+  const double waited_s = now_s - waiting.arrival_s;
+  const SightingFrame& frame = waiting.frame;
+  const FixTrack::Lookup lookup = vehicle.pose_at(frame.stamp_ns);
+  const bool ready =
+      lookup.answer == FixTrack::Answer::kReady ||
+      (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s);
+  if (!ready && lookup.answer != FixTrack::Answer::kHopeless && waited_s < config_.pose_wait_s) {
+    return false;
+  }
+  if (!ready) {
+    for (OpenPoll& open : open_) ++open.troubles[Trouble::kNoFix];
+    return true;
+  }
+  newest_base_ = lookup.pose;
+  newest_ns_ = frame.stamp_ns;
+  const auto mounting = vehicle.mounting(frame.frame_id);
+  // At a start the camera's calibration and mounting may come after its first image.
+  if ((!vehicle.intrinsics || !mounting) && waited_s < config_.pose_wait_s) return false;
+  const bool fits = vehicle.intrinsics && mounting &&
+                    static_cast<std::uint32_t>(vehicle.intrinsics->width) == frame.image_width &&
+                    static_cast<std::uint32_t>(vehicle.intrinsics->height) == frame.image_height;
+  if (!fits) {
+    for (OpenPoll& open : open_) ++open.troubles[Trouble::kNoCamera];
+    return true;
+  }
+  const PlacedCamera camera{lookup.pose, *vehicle.intrinsics, *mounting};
+  for (OpenPoll& open : open_) {
+    if (!open.matched_s) Look(open, frame, camera, steady_s, vehicle);
+  }
+  return true;
+}
+
+/// One image's word on one poll.
+void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const PlacedCamera& camera,
+                         double steady_s, const Vehicle& vehicle) {
+  const PlaceView view = ViewPlace(open.poll.position, open.poll.covariance_m2, camera,
+                                   config_.projection, config_.margin_share);
+  if (const Sighting* match = Match(open, frame, view, camera)) {
+    open.matched_s = steady_s;
+    open.match_confidence = match->confidence;
+    open.view_ns = frame.stamp_ns;
+    open.view_base = camera.base;
+    open.view_box = match->box;
+    return;
+  }
+  const auto trouble = WhyNotClear(view, frame, vehicle);
+  if (!trouble) {
+    CountView(open, frame, view, camera.base);
+    return;
+  }
+  ++open.troubles[*trouble];
+  // The place has left the view: nearer images will not come.
+  const bool left = *trouble == Trouble::kOutside && IsGone(open);
+  if (left) open.deadline_s = std::min(open.deadline_s, steady_s);
+}
+
+/// A match counts wherever the detector sees it, also beyond the range of a no.
+const Sighting* PollResponder::Match(const OpenPoll& open, const SightingFrame& frame,
+                                     const PlaceView& view, const PlacedCamera& camera) const {
+  const double radius_m = catalogue_.DuplicateRadiusM(open.poll.class_name);
+  const Sighting* best = nullptr;
+  for (const Sighting& sighting : frame.sightings) {
+    const bool counts = sighting.class_name == open.poll.class_name &&
+                        sighting.confidence >= config_.min_confidence && sighting.confidence <= 1;
+    if (!counts || (best != nullptr && best->confidence >= sighting.confidence)) continue;
+    if (IsAtPlace(sighting.box, open.poll.position, view, camera, config_.projection,
+                  config_.gate_sigma, radius_m)) {
+      best = &sighting;
+    }
+  }
+  return best;
+}
+
+std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(const PlaceView& view,
+                                                                 const SightingFrame& frame,
+                                                                 const Vehicle& vehicle) const {
+  if (view.visibility == PlaceView::Visibility::kBehind) return Trouble::kOutside;
+  if (view.distance_m > config_.max_range_m) return Trouble::kTooFar;
+  if (view.visibility == PlaceView::Visibility::kOutside) return Trouble::kOutside;
+  const auto luminance = luminances_.find(frame.stamp_ns);
+  if (luminance != luminances_.end() && luminance->second < config_.dark_luminance) {
+    return Trouble::kDark;
+  }
+  if (vehicle.hidden && vehicle.hidden(frame.stamp_ns, view.pixel, view.distance_m)) {
+    return Trouble::kHidden;
+  }
+  return std::nullopt;
+}
+
+void PollResponder::CountView(OpenPoll& open, const SightingFrame& frame, const PlaceView& view,
+                              const TrackPose& base) {
+  if (open.last_view &&
+      GeodesicDistanceM(*open.last_view, base.position) < config_.view_spacing_m) {
+    return;
+  }
+  // The nearest view shows best that nothing is there.
+  if (open.clear_views == 0 || view.distance_m < open.view_distance_m) {
+    open.view_ns = frame.stamp_ns;
+    open.view_distance_m = view.distance_m;
+    open.view_base = base;
+    open.view_box = BoxOf(view);
+  }
+  open.last_view = base.position;
+  ++open.clear_views;
+}
+
+bool PollResponder::IsGone(const OpenPoll& open) const {
+  if (open.appeared > 0) return false;
+  return open.clear_views >= (open.vanished > 0 ? 1 : config_.no_views);
+}
+
+/// Asks for the picture when the answer stands and it is missed.
+bool PollResponder::IsReady(OpenPoll& open, double steady_s) {
+  if (!open.matched_s && steady_s < open.deadline_s) return false;
+  const bool decided = open.matched_s || IsGone(open);
+  if (!decided || open.poll.picture == PollPicture::kNone || pictures_.count(open.view_ns) != 0) {
+    return true;
+  }
+  if (!open.asked_s) {
+    open.asked_s = steady_s;
+    picture_requests_.push_back(open.view_ns);
+  }
+  return steady_s - *open.asked_s >= config_.picture_wait_s;
+}
+
+void PollResponder::Answer(const OpenPoll& open) {
+  const bool seen = open.matched_s.has_value();
+  const bool not_there = !seen && IsGone(open);
+  if (!seen && !not_there && !newest_base_) {
+    ++counters_.unanswered;
+    return;
+  }
+  PollReply reply;
+  reply.poll = open.poll.poll;
+  reply.hazard = open.poll.hazard;
+  reply.drive_id = config_.drive_id;
+  const bool decided = seen || not_there;
+  const TrackPose& base = decided ? open.view_base : *newest_base_;
+  reply.stamp_ns = decided ? open.view_ns : newest_ns_;
+  reply.vehicle_position = base.position;
+  reply.course_rad = base.course_rad;
+  if (seen) {
+    reply.answer = PollReply::Answer::kYes;
+    reply.confidence = open.match_confidence;
+    ++counters_.yes;
+  } else if (not_there) {
+    reply.answer = PollReply::Answer::kNo;
+    // Both look at the same images: the surer one counts, not both together.
+    const double views = 1 - std::pow(config_.miss_share, open.clear_views);
+    reply.confidence =
+        static_cast<float>(std::min(0.99, std::max(views, static_cast<double>(open.vanished))));
+    ++counters_.no;
+    if (open.clear_views < config_.no_views) ++counters_.no_by_change;
+  } else {
+    reply.answer = PollReply::Answer::kCantSee;
+    reply.reason = ReasonOf(open);
+    ++counters_.cant_see;
+    if (open.clear_views >= config_.no_views) ++counters_.disagreed;
+  }
+  if (decided) AttachPicture(open, reply);
+  replies_.push_back(std::move(reply));
+}
+
+void PollResponder::AttachPicture(const OpenPoll& open, PollReply& reply) {
+  const auto picture = pictures_.find(open.view_ns);
+  if (open.poll.picture == PollPicture::kNone || picture == pictures_.end()) return;
+  const std::size_t max_bytes = open.poll.max_picture_bytes;
+  if (open.poll.picture == PollPicture::kCrop) {
+    CropConfig crop = config_.crop;
+    crop.quality = config_.jpeg_quality;
+    crop.max_bytes = std::min(crop.max_bytes, max_bytes);
+    reply.image = CropPicture(picture->second, open.view_box, crop).jpeg;
+  } else {
+    reply.image = EncodeJpeg(picture->second, config_.jpeg_quality, max_bytes);
+  }
+  if (reply.image.empty()) return;
+  reply.image_format = "jpeg";
+  ++counters_.pictures;
+  counters_.picture_bytes += reply.image.size();
+}
+
+/// What kept most images from counting; at most 64 bytes.
+std::string PollResponder::ReasonOf(const OpenPoll& open) {
+  if (open.clear_views > 0 && open.appeared > 0) return "seen as changed, but not detected";
+  if (open.clear_views > 0 && open.unregistered > 0) {
+    return "in view too few times, and unregistered with earlier drives";
+  }
+  if (open.clear_views > 0) return "the place was in view too few times";
+  Trouble worst = Trouble::kTooFew;
+  int most = 0;
+  for (const auto& [trouble, count] : open.troubles) {
+    if (count > most) {
+      worst = trouble;
+      most = count;
+    }
+  }
+  switch (worst) {
+    case Trouble::kNoFix:
+      return "no position of the vehicle";
+    case Trouble::kNoCamera:
+      return "no calibrated camera";
+    case Trouble::kTooFar:
+      return "the place was too far away";
+    case Trouble::kOutside:
+      return "the place was out of the camera's view";
+    case Trouble::kHidden:
+      return "something stood before the place";
+    case Trouble::kDark:
+      return "too dark";
+    case Trouble::kTooFew:
+      break;
+  }
+  return "no image";
+}
+
+std::vector<PollReply> PollResponder::TakeReplies() { return std::exchange(replies_, {}); }
+
+}  // namespace livemap

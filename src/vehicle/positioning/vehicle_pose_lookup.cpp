@@ -1,0 +1,50 @@
+#include "vehicle/positioning/vehicle_pose_lookup.h"
+
+#include <cmath>
+
+#include "placement/hazard_placement.h"
+
+namespace livemap {
+
+BasePoseSource::BasePoseSource(const Config& config)
+    : config_(config), fixes_(config.fixes), poses_(config.poses) {}
+
+BasePoseSource::Lookup BasePoseSource::At(std::int64_t stamp_ns, double waited_s) const {
+  if (config_.use_fused) {
+    const FixTrack::Lookup fused = poses_.At(stamp_ns);
+    if (fused.answer == FixTrack::Answer::kReady) return {Answer::kReady, fused.pose, true};
+    if (fused.answer == FixTrack::Answer::kWait && waited_s < config_.fused_wait_s) return {};
+  }
+  const FixTrack::Lookup lookup = fixes_.At(stamp_ns);
+  const bool patient = waited_s < config_.max_wait_s;
+  switch (lookup.answer) {
+    case FixTrack::Answer::kReady:
+      return {Answer::kReady, BaseOf(lookup.pose), false};
+    case FixTrack::Answer::kExtrapolated:
+      if (waited_s < config_.bracket_wait_s) return {};
+      return {Answer::kReady, BaseOf(lookup.pose), false};
+    case FixTrack::Answer::kWait:
+      return {patient ? Answer::kWait : Answer::kHopeless, {}, false};
+    case FixTrack::Answer::kHopeless:
+      break;
+  }
+  return {Answer::kHopeless, {}, false};
+}
+
+TrackPose BasePoseSource::BaseOf(const TrackPose& antenna) const {
+  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
+  const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const PlacedHazard placed = PlaceHazard(antenna, antenna_m, origin);
+  TrackPose base = antenna;
+  base.position = placed.position;
+  base.covariance_m2 = placed.covariance_m2;
+  // What the course's error does to the way from the antenna, base_link's place shares with it.
+  const double sine = std::sin(antenna.course_rad);
+  const double cosine = std::cos(antenna.course_rad);
+  const Eigen::Vector2d way_m(-sine * antenna_m.x() + cosine * antenna_m.y(),
+                              -cosine * antenna_m.x() - sine * antenna_m.y());
+  base.position_course += antenna.course_variance_rad2 * Eigen::Vector2d(way_m.y(), -way_m.x());
+  return base;
+}
+
+}  // namespace livemap

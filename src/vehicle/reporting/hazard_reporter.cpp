@@ -1,0 +1,322 @@
+#include "vehicle/reporting/hazard_reporter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/time.h"
+#include "placement/road_ground_contact.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxEarlyPictures = 8;
+constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
+
+}  // namespace
+
+HazardReporter::HazardReporter(const Config& config, const HazardCatalogue& catalogue,
+                               std::mt19937_64 random, std::int64_t now_ns, double steady_s)
+    : config_(config),
+      catalogue_(catalogue),
+      random_(random),
+      map_(config.map, catalogue, now_ns),
+      track_(config.track),
+      poses_(config.poses),
+      schedule_(config.resend, std::mt19937_64(random_())),
+      start_ns_(now_ns),
+      start_steady_s_(steady_s) {
+  config_.projection.max_range_m = kEndlessRangeM;
+  for (const auto& pending : map_.Pending()) {
+    const int urgency = catalogue_.Get(pending.class_name).urgency;
+    // Never longer than from now on: the clock may have been set since.
+    const double left_s =
+        pending.hold_until_ns <= 0
+            ? 0.0
+            : std::clamp(Seconds(pending.hold_until_ns - now_ns), 0.0, HoldS(urgency));
+    held_at_start_ = held_at_start_ || (left_s > 0 && !pending.sent);
+    schedule_.Add(pending.uuid, urgency, pending.created_ns, steady_s, steady_s + left_s);
+    if (!pending.sent) unsent_.insert(pending.uuid);
+  }
+}
+
+void HazardReporter::SetMounting(const std::string& frame_id,
+                                 const Eigen::Isometry3d& base_from_optical) {
+  mountings_[frame_id] = base_from_optical;
+}
+
+std::optional<Eigen::Isometry3d> HazardReporter::Mounting(const std::string& frame_id) const {
+  const auto found = mountings_.find(frame_id);
+  if (found == mountings_.end()) return std::nullopt;
+  return found->second;
+}
+
+FixTrack::Lookup HazardReporter::BasePoseAt(std::int64_t stamp_ns) const {
+  if (config_.position_source == PositionSource::kFused) {
+    FixTrack::Lookup fused = poses_.At(stamp_ns);
+    if (fused.answer == FixTrack::Answer::kReady) return fused;
+  }
+  FixTrack::Lookup lookup = track_.At(stamp_ns);
+  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
+  const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const bool known =
+      lookup.answer == FixTrack::Answer::kReady || lookup.answer == FixTrack::Answer::kExtrapolated;
+  if (known) lookup.pose.position = PlaceHazard(lookup.pose, antenna_m, origin).position;
+  return lookup;
+}
+
+void HazardReporter::AddFix(const Fix& fix) {
+  ++counters_.fixes;
+  switch (track_.Add(fix)) {
+    case FixTrack::Verdict::kAccepted:
+    case FixTrack::Verdict::kRestarted:
+      break;
+    case FixTrack::Verdict::kNoFix:
+      ++counters_.no_fixes;
+      break;
+    case FixTrack::Verdict::kInvalid:
+    case FixTrack::Verdict::kOutOfOrder:
+      ++counters_.invalid_fixes;
+      break;
+    case FixTrack::Verdict::kJump:
+      ++counters_.jumps;
+      break;
+  }
+}
+
+void HazardReporter::AddPose(std::int64_t stamp_ns, const TrackPose& pose) {
+  ++counters_.poses;
+  if (!poses_.Add(stamp_ns, pose)) ++counters_.invalid_poses;
+}
+
+bool HazardReporter::IsUsable(const Sighting& sighting) {
+  if (!IsWellFormed(sighting)) {
+    ++counters_.invalid_detections;
+    return false;
+  }
+  if (sighting.confidence < config_.min_confidence) {
+    ++counters_.below_confidence;
+    return false;
+  }
+  return true;
+}
+
+void HazardReporter::AddFrame(const SightingFrame& frame, double now_s) {
+  counters_.detections += frame.sightings.size();
+  WaitingFrame waiting;
+  waiting.frame = frame;
+  waiting.arrival_s = now_s;
+  auto& sightings = waiting.frame.sightings;
+  sightings.erase(std::remove_if(sightings.begin(), sightings.end(),
+                                 [this](const Sighting& sighting) { return !IsUsable(sighting); }),
+                  sightings.end());
+  const auto picture = early_pictures_.find(frame.stamp_ns);
+  if (picture != early_pictures_.end()) {
+    waiting.picture = picture->second;
+    early_pictures_.erase(picture);
+  }
+  if (sightings.empty()) return;
+  waiting_.push_back(std::move(waiting));
+  while (waiting_.size() > static_cast<std::size_t>(config_.max_waiting_frames)) {
+    counters_.dropped_no_fix += waiting_.front().frame.sightings.size();
+    waiting_.pop_front();
+  }
+}
+
+void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture,
+                                const PixelRegion& part) {
+  bool is_known = false;
+  for (WaitingFrame& waiting : waiting_) {
+    if (waiting.frame.stamp_ns != stamp_ns) continue;
+    is_known = true;
+    if (Contains(part, waiting.wanted)) waiting.picture = picture;
+  }
+  if (is_known || !part.IsWholeImage()) return;
+  early_pictures_[stamp_ns] = picture;
+  if (early_pictures_.size() > kMaxEarlyPictures) early_pictures_.erase(early_pictures_.begin());
+}
+
+void HazardReporter::AddDepth(std::int64_t stamp_ns, const DepthImage& depth) {
+  depths_[stamp_ns] = depth;
+  if (depths_.size() <= static_cast<std::size_t>(config_.depth_images)) return;
+  // The oldest, but for those of before a clock that was set back.
+  const bool set_back = depths_.rbegin()->first - stamp_ns > 1'000'000'000;
+  depths_.erase(set_back ? std::prev(depths_.end()) : depths_.begin());
+}
+
+void HazardReporter::Process(double now_s, double steady_s) {
+  ApplyNotices();
+  ForgetUnannounced(now_s);
+  while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
+  // All of them, so that none waits for its picture only after the one before it has waited.
+  for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
+    if (IsPlaced(*waiting, now_s) && HasNews(*waiting) && !IsForetold(waiting)) {
+      AskForPicture(*waiting, now_s);
+    }
+  }
+}
+
+/// Whether the frames before it will have reported all that it shows.
+bool HazardReporter::IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const {
+  const auto is_same = [this](const Candidate& one, const Candidate& other) {
+    const std::string& name = one.sighting.class_name;
+    return name == other.sighting.class_name &&
+           GeodesicDistanceM(one.place.position, other.place.position) <=
+               catalogue_.Get(name).duplicate_radius_m;
+  };
+  const auto will_be_known = [&](const Candidate& candidate) {
+    return std::any_of(waiting_.begin(), waiting, [&](const WaitingFrame& earlier) {
+      return std::any_of(earlier.candidates.begin(), earlier.candidates.end(),
+                         [&](const Candidate& other) { return is_same(candidate, other); });
+    });
+  };
+  return std::all_of(waiting->candidates.begin(), waiting->candidates.end(), will_be_known);
+}
+
+bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {
+  // A clock that was set back must not make a frame wait for ever.
+  waiting.arrival_s = std::min(waiting.arrival_s, now_s);
+  return waiting.placed || Place(waiting, now_s - waiting.arrival_s);
+}
+
+bool HazardReporter::HasNews(const WaitingFrame& waiting) const {
+  return std::any_of(waiting.candidates.begin(), waiting.candidates.end(),
+                     [this](const Candidate& candidate) {
+                       return !map_.Find(candidate.sighting.class_name, candidate.place.position);
+                     });
+}
+
+/// True when the frame is done, whatever became of it.
+bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_s) {
+  if (!IsPlaced(waiting, now_s)) return false;
+  if (HasNews(waiting) && WaitsForPicture(waiting, now_s)) return false;
+  ReportCandidates(waiting, steady_s);
+  return true;
+}
+
+void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
+  if (waiting.asked_s || !waiting.picture.bgr.empty()) return;
+  // A picture that comes unasked is on its way since the frame came.
+  waiting.asked_s = config_.pictures_on_demand ? now_s : waiting.arrival_s;
+  ++counters_.pictures_requested;
+  if (!config_.pictures_on_demand) return;
+  waiting.wanted = ShownIn(waiting);
+  picture_requests_.push_back({waiting.frame.stamp_ns, waiting.wanted});
+}
+
+/// What the pictures of its reports may show of the image.
+PixelRegion HazardReporter::ShownIn(const WaitingFrame& waiting) const {
+  std::optional<PixelRegion> shown;
+  for (const Candidate& candidate : waiting.candidates) {
+    const PixelRegion crop =
+        WidestCrop(candidate.sighting.box, static_cast<int>(waiting.frame.image_width),
+                   static_cast<int>(waiting.frame.image_height), config_.picture);
+    shown = shown ? Union(*shown, crop) : crop;
+  }
+  return shown.value_or(PixelRegion{});
+}
+
+bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
+  if (!waiting.picture.bgr.empty()) return false;
+  AskForPicture(waiting, now_s);
+  if (!expects_pictures_) return false;
+  waiting.asked_s = std::min(*waiting.asked_s, now_s);  // The clock was set back.
+  return now_s - *waiting.asked_s < config_.picture_wait_s;
+}
+
+std::vector<PictureWish> HazardReporter::TakePictureRequests() {
+  return std::exchange(picture_requests_, {});
+}
+
+bool HazardReporter::FitsCamera(const SightingFrame& frame) const {
+  return intrinsics_ && HasMounting(frame.frame_id) &&
+         static_cast<std::uint32_t>(intrinsics_->width) == frame.image_width &&
+         static_cast<std::uint32_t>(intrinsics_->height) == frame.image_height;
+}
+
+/// Places the frame's sightings as soon as camera and position are known; false while they may yet
+/// come. A frame for which they never come ends up placed, without candidates.
+bool HazardReporter::Place(WaitingFrame& waiting, double waited_s) {
+  const std::size_t count = waiting.frame.sightings.size();
+  const bool patient = waited_s < config_.max_wait_s;
+  if (!FitsCamera(waiting.frame)) {
+    if (patient) return false;
+    counters_.dropped_no_camera += count;
+    waiting.placed = true;
+    return true;
+  }
+  if (WaitsForPose(waiting, waited_s) || WaitsForDepth(waiting, waited_s)) return false;
+  FixTrack::Lookup lookup;
+  if (config_.position_source == PositionSource::kFused) lookup = poses_.At(waiting.frame.stamp_ns);
+  const bool fused = lookup.answer == FixTrack::Answer::kReady;
+  if (!fused) lookup = track_.At(waiting.frame.stamp_ns);
+  if (lookup.answer == FixTrack::Answer::kReady ||
+      (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s)) {
+    PlaceSightings(waiting, lookup.pose, fused);
+    return true;
+  }
+  if (lookup.answer == FixTrack::Answer::kExtrapolated) return false;
+  if (!waiting.held_back) counters_.held_back_no_fix += count;
+  waiting.held_back = true;
+  if (lookup.answer == FixTrack::Answer::kWait && patient) return false;
+  counters_.dropped_no_fix += count;
+  waiting.placed = true;
+  return true;
+}
+
+bool HazardReporter::WaitsForPose(const WaitingFrame& waiting, double waited_s) const {
+  return config_.position_source == PositionSource::kFused && waited_s < config_.fused_wait_s &&
+         poses_.At(waiting.frame.stamp_ns).answer == FixTrack::Answer::kWait;
+}
+
+bool HazardReporter::WaitsForDepth(const WaitingFrame& waiting, double waited_s) const {
+  return config_.use_depth && waited_s < config_.depth_wait_s &&
+         depths_.count(waiting.frame.stamp_ns) == 0;
+}
+
+/// Where the sighting's foot stands in base_link; counted where it is not on the road or too far.
+std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& frame,
+                                                       const Sighting& sighting,
+                                                       double heading_variance_rad2) {
+  const Eigen::Isometry3d& mounting = mountings_.at(frame.frame_id);
+  const Box& box = sighting.box;
+  std::optional<GroundPoint> ground;
+  const auto depth = depths_.find(frame.stamp_ns);
+  if (config_.use_depth && depth != depths_.end()) {
+    ground =
+        FootByDepth(depth->second, box, *intrinsics_, mounting, config_.projection, config_.depth);
+    if (ground) ++counters_.distances_by_depth;
+  }
+  if (!ground && IsCutBySide(box, intrinsics_->width)) {
+    ++counters_.cut_by_side;
+    return std::nullopt;
+  }
+  if (!ground) {
+    ground = ProjectToGround(FootPixel(box), *intrinsics_, mounting, config_.projection);
+  }
+  if (!ground) {
+    ++counters_.not_on_ground;
+    return std::nullopt;
+  }
+  if (!IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
+                    config_.max_ground_sigma_m)) {
+    ++counters_.too_far;
+    return std::nullopt;
+  }
+  return ground;
+}
+
+void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused) {
+  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
+  const Eigen::Vector2d pose_in_base_m = fused ? Eigen::Vector2d::Zero() : antenna_m;
+  for (const Sighting& sighting : waiting.frame.sightings) {
+    const auto ground =
+        PlaceOnRoad(waiting.frame, sighting, fused ? pose.course_variance_rad2 : 0.0);
+    if (!ground) continue;
+    waiting.candidates.push_back({sighting, PlaceHazard(pose, pose_in_base_m, *ground)});
+    ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
+  }
+  waiting.placed = true;
+}
+
+}  // namespace livemap

@@ -1,0 +1,251 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "geo/ground_projection.h"
+#include "imaging/report_picture.h"
+#include "placement/depth_ground_contact.h"
+#include "placement/hazard_placement.h"
+#include "placement/sighting.h"
+#include "protocol/hazard_catalogue.h"
+#include "protocol/notice.h"
+#include "protocol/report.h"
+#include "vehicle/outbox/resend_schedule.h"
+#include "vehicle/positioning/fix_track.h"
+#include "vehicle/positioning/pose_track.h"
+#include "vehicle/reporting/local_hazard_map.h"
+
+namespace livemap {
+
+/// Whose positions count.
+enum class PositionSource {
+  kFixes,  ///< The receiver's fixes; the course is that of their track.
+  kFused,  ///< Poses of fixes fused with odometry; the fixes where those do not come.
+};
+
+/// What the vehicle's way to the zone costs now (LinkState.msg).
+enum class LinkCost { kUnknown, kCheap, kMetered, kNone };
+
+/// Turns what the detector sees into reports: places each hazard on the ground, sends nothing for a
+/// known one, keeps the others until the zone has answered (thesis, sections 3.1 and 3.2.2).
+///
+/// Fixes, frames, pictures, notices and receipts come in as they arrive; Process works off what can
+/// be worked off; TakeDue gives the reports to send now. Two clocks: `now_s` is the clock of the
+/// stamps (it may be a simulated one that pauses), `steady_s` never pauses. Not thread-safe.
+class HazardReporter {
+ public:
+  struct Config {
+    std::string drive_id;
+    /// Sightings below this confidence are ignored; the detector's own threshold stands before it.
+    double min_confidence = 0.0;
+    /// A sighting further away than this waits for a nearer view: its place is too uncertain, m.
+    double max_range_m = 30.0;
+    /// So does one whose place on the road is less certain than this, seen from the vehicle:
+    /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m. By
+    /// fused poses the heading's error at that distance counts, too.
+    double max_ground_sigma_m = 1.0;
+    /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
+    double max_wait_s = 5.0;
+    /// A frame whose position can only be carried on waits this long for a fix after it, s.
+    double bracket_wait_s = 0.3;
+    /// A frame with something to report waits this long for its picture, from when it is known to
+    /// need one, s.
+    double picture_wait_s = 3.0;
+    /// Pictures come when they are asked for (TakePictureRequests); false: by themselves.
+    bool pictures_on_demand = true;
+    /// Frames that wait at the same time; beyond it the oldest is dropped.
+    int max_waiting_frames = 50;
+    /// Antenna in base_link: forward and left of its origin, m.
+    double antenna_x_m = 0.0;
+    double antenna_y_m = 0.0;
+    PositionSource position_source = PositionSource::kFixes;
+    /// A frame waits at most this long for its fused pose; then the fixes count, s.
+    double fused_wait_s = 1.0;
+    PoseTrack::Config poses;
+    /// Distances by depth images, where they know the one of the hazard's foot.
+    bool use_depth = false;
+    /// A frame waits at most this long for its depth image; then the road's plane counts, s.
+    double depth_wait_s = 0.3;
+    DepthNoise depth;
+    int depth_images = 60;  ///< So many are kept: detections come late, events later.
+    CropConfig picture;
+    /// How long a report of each rank of urgency may wait for a cheap link, s; rank 1 first. Below
+    /// the age at which the zone refuses reports.
+    std::array<double, 3> hold_s{0, 300, 21600};
+    /// Whether a link of which nothing is known counts as cheap: nothing is held then.
+    bool unknown_link_is_cheap = true;
+    /// Where held reports lie in the outbox at the start, so long nothing is known as metered, s:
+    /// the word about the link may come after us.
+    double link_wait_s = 5;
+    FixTrack::Config track;
+    GroundProjectionNoise projection;
+    ResendSchedule::Config resend;
+    LocalHazardMap::Config map;
+  };
+
+  /// Since the start; sightings unless it says otherwise.
+  struct Counters {
+    std::uint64_t detections = 0;          ///< All that came in.
+    std::uint64_t invalid_detections = 0;  ///< NaN, empty box, overlong class: dropped.
+    std::uint64_t below_confidence = 0;
+    std::uint64_t held_back_no_fix = 0;   ///< Had to wait for a fix or course.
+    std::uint64_t dropped_no_fix = 0;     ///< Waited in vain, or overflowed the waiting room.
+    std::uint64_t dropped_no_camera = 0;  ///< No camera_info or mounting, or another image size.
+    std::uint64_t not_on_ground = 0;      ///< Box ends at or above the horizon.
+    std::uint64_t cut_by_side = 0;        ///< By the image's: the foot may be out of view.
+    std::uint64_t too_far = 0;            ///< Waits for a nearer view.
+    std::uint64_t duplicates_suppressed = 0;
+    std::uint64_t reports_created = 0;
+    std::uint64_t reports_without_picture = 0;
+    std::uint64_t pictures_requested = 0;  ///< Images whose picture was asked for.
+    std::uint64_t pictures_illegible = 0;  ///< Reports whose bytes did not suffice: CropPicture.
+    std::uint64_t refused_map_full = 0;    ///< Too many unfinished reports.
+    std::uint64_t reports_sent = 0;        ///< Distinct reports, at their first sending.
+    std::uint64_t resends = 0;
+    std::uint64_t committed = 0;  ///< Reports that the zone stored.
+    std::uint64_t refused = 0;    ///< Reports that the zone will never accept.
+    std::uint64_t notices = 0;
+    std::uint64_t invalid_notices = 0;
+    std::uint64_t forgotten_unannounced =
+        0;  ///< Hazards that the zone took in and never announced.
+    std::uint64_t fixes = 0;
+    std::uint64_t invalid_fixes = 0;  ///< NaN, out of range, out of order.
+    std::uint64_t no_fixes = 0;       ///< The receiver said that it had none.
+    std::uint64_t jumps = 0;          ///< Fixes that need an impossible speed.
+    std::uint64_t store_errors = 0;
+    std::uint64_t poses = 0;          ///< Fused poses that came.
+    std::uint64_t invalid_poses = 0;  ///< Not finite or not later than the one before.
+    std::uint64_t placed_by_fusion = 0;
+    std::uint64_t placed_by_fixes = 0;
+    std::uint64_t distances_by_depth = 0;  ///< Sightings; the others' are by the road's plane.
+  };
+
+  /// `random` makes uuids and jitter; `now_ns` (UTC) names a corrupt database's new name.
+  HazardReporter(const Config& config, const HazardCatalogue& catalogue, std::mt19937_64 random,
+                 std::int64_t now_ns, double steady_s);
+
+  void SetIntrinsics(const CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
+  /// Pose of the camera's optical frame in base_link.
+  void SetMounting(const std::string& frame_id, const Eigen::Isometry3d& base_from_optical);
+  bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
+
+  void AddFix(const Fix& fix);
+  /// Where base_link was then and which way it looked: fixes and odometry fused.
+  void AddPose(std::int64_t stamp_ns, const TrackPose& pose);
+  void AddFrame(const SightingFrame& frame, double now_s);
+  /// The depth image of the frame with this stamp, before or after it.
+  void AddDepth(std::int64_t stamp_ns, const DepthImage& depth);
+  /// The annotated image of the frame with this stamp, before or after it.
+  /// `part` is what of the image it shows clearly.
+  void AddPicture(std::int64_t stamp_ns, const Picture& picture, const PixelRegion& part = {});
+  /// Whether there is anyone to give pictures, as there is at first; else no frame waits for one.
+  void ExpectPictures(bool expected) { expects_pictures_ = expected; }
+  /// The images whose pictures are wanted now, each once.
+  std::vector<PictureWish> TakePictureRequests();
+  void SetLink(LinkCost link) { link_ = link; }
+  void AddNotice(const Notice& notice);
+  void AddReceipt(const Receipt& receipt);
+
+  /// Works off waiting notices and frames, in their order.
+  void Process(double now_s, double steady_s);
+  /// At most `limit` reports to send now.
+  std::vector<Report> TakeDue(double steady_s, std::size_t limit);
+
+  /// Where base_link was at a moment and which way it looked: by the source that counts, for kFused
+  /// the fixes where the fusion has no word.
+  FixTrack::Lookup BasePoseAt(std::int64_t stamp_ns) const;
+  const std::optional<CameraIntrinsics>& intrinsics() const { return intrinsics_; }
+  std::optional<Eigen::Isometry3d> Mounting(const std::string& frame_id) const;
+
+  /// Intrinsics and some camera's mounting are known.
+  bool HasCamera() const { return intrinsics_ && !mountings_.empty(); }
+  const FixTrack& track() const { return track_; }
+  const PoseTrack& poses() const { return poses_; }
+  const Config& config() const { return config_; }
+  const LocalHazardMap& map() const { return map_; }
+  const Counters& counters() const { return counters_; }
+  std::size_t waiting_frames() const { return waiting_.size(); }
+  LinkCost link() const { return link_; }
+  /// Reports that wait for a cheap link.
+  std::size_t HeldReports(double steady_s) const {
+    return IsCheap(steady_s) ? 0 : schedule_.Held(steady_s);
+  }
+  /// The store's last complaint; empty while it works.
+  const std::string& store_error() const { return store_error_; }
+
+ private:
+  struct Candidate {
+    Sighting sighting;
+    PlacedHazard place;
+  };
+  struct WaitingFrame {
+    SightingFrame frame;
+    double arrival_s;
+    bool held_back = false;
+    bool placed = false;
+    std::optional<double> asked_s;      // When its picture began to be missed...
+    PixelRegion wanted;                 // ...and what of it.
+    std::vector<Candidate> candidates;  // Once placed.
+    Picture picture;
+  };
+
+  bool IsUsable(const Sighting& sighting);
+  bool IsPlaced(WaitingFrame& waiting, double now_s);
+  bool HasNews(const WaitingFrame& waiting) const;
+  bool IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const;
+  void AskForPicture(WaitingFrame& waiting, double now_s);
+  PixelRegion ShownIn(const WaitingFrame& waiting) const;
+  bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
+  bool FitsCamera(const SightingFrame& frame) const;
+  bool Place(WaitingFrame& waiting, double waited_s);
+  bool WaitsForDepth(const WaitingFrame& waiting, double waited_s) const;
+  bool WaitsForPose(const WaitingFrame& waiting, double waited_s) const;
+  void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused);
+  std::optional<GroundPoint> PlaceOnRoad(const SightingFrame& frame, const Sighting& sighting,
+                                         double heading_variance_rad2);
+  bool WaitsForPicture(WaitingFrame& waiting, double now_s);
+  void ReportCandidates(const WaitingFrame& waiting, double steady_s);
+  Report MakeReport(const WaitingFrame& waiting, const Candidate& candidate);
+  void AttachPicture(const WaitingFrame& waiting, Report& report);
+  double HoldS(int urgency) const;
+  bool IsCheap(double steady_s) const;
+  std::int64_t UtcNs(double steady_s) const;
+  void ApplyNotices();
+  void ForgetUnannounced(double now_s);
+  void TellStoreError(const StoreError& error);
+
+  Config config_;
+  HazardCatalogue catalogue_;
+  std::mt19937_64 random_;
+  LocalHazardMap map_;
+  FixTrack track_;
+  PoseTrack poses_;
+  ResendSchedule schedule_;
+  std::optional<CameraIntrinsics> intrinsics_;
+  std::map<std::string, Eigen::Isometry3d> mountings_;
+  std::deque<WaitingFrame> waiting_;
+  std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
+  std::map<std::int64_t, DepthImage> depths_;       // By stamp.
+  std::vector<PictureWish> picture_requests_;
+  bool expects_pictures_ = true;
+  LinkCost link_ = LinkCost::kUnknown;
+  bool held_at_start_ = false;
+  std::int64_t start_ns_;  // UTC at the start...
+  double start_steady_s_;  // ...and the steady clock then.
+  std::deque<Notice> notices_;
+  std::optional<double> forgot_s_;  // When ForgetUnannounced last looked.
+  std::set<Uuid> unsent_;
+  Counters counters_;
+  std::string store_error_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,263 @@
+#include "vehicle/reporting/local_hazard_map.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "vehicle/outbox/report_table.h"
+
+namespace livemap {
+namespace {
+
+const std::vector<std::string>& Migrations() {
+  static const std::vector<std::string> migrations = {
+      std::string("CREATE TABLE known("
+                  "  id BLOB PRIMARY KEY,"
+                  "  of_zone INTEGER NOT NULL,"
+                  "  class_name TEXT NOT NULL,"
+                  "  confidence REAL NOT NULL,"
+                  "  latitude REAL NOT NULL,"
+                  "  longitude REAL NOT NULL,"
+                  "  sequence INTEGER NOT NULL,"
+                  "  news_ns INTEGER NOT NULL"
+                  ") WITHOUT ROWID;"
+                  "CREATE INDEX known_by_news ON known(news_ns);") +
+          kCreateReportTable,
+      // Removed hazards are remembered, lest an older notice that comes late brings them back.
+      "CREATE TABLE gone(id BLOB PRIMARY KEY, sequence INTEGER NOT NULL) WITHOUT ROWID;"
+      "CREATE INDEX gone_by_sequence ON gone(sequence);"
+      "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
+      "INSERT INTO zone(map_sequence) VALUES(0);",
+      kAddShownRegionAndHold};
+  return migrations;
+}
+
+}  // namespace
+
+LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& catalogue,
+                               std::int64_t now_ns)
+    : config_(config), catalogue_(catalogue), filter_(catalogue) {
+  try {
+    Open();
+  } catch (const StoreError& error) {
+    if (!TellsCorruption(error)) throw;
+    database_.reset();
+    set_aside_ = SetAsideDatabase(config_.path, now_ns);
+    Open();
+    RecoverFromSetAside();
+  }
+}
+
+void LocalHazardMap::Open() {
+  database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
+  database_->CheckPages();
+  database_->Migrate(Migrations());
+  broken_rows_ = MendRows(*database_);
+  LoadFilter();
+}
+
+void LocalHazardMap::RecoverFromSetAside() {
+  // So that the first page of the new file is in the file itself.
+  database_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Execute();
+  salvage_ = SalvageReports(set_aside_, config_.path, [this](const StoredReport& stored) {
+    const Report& report = stored.report;
+    if (LoadPending(report.uuid)) return;
+    database_->Transaction([&] {
+      InsertReport(*database_, report, stored.hold_until_ns);
+      if (!filter_.Find(report.class_name, report.position)) InsertKnown(report);
+    });
+    if (stored.sent) MarkSent(report.uuid);
+  });
+  LoadFilter();
+}
+
+void LocalHazardMap::LoadFilter() {
+  filter_ = DuplicateFilter(catalogue_);
+  SqliteStatement rows = database_->Prepare("SELECT id,class_name,latitude,longitude FROM known");
+  while (rows.Step()) {
+    filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), {rows.Real(2), rows.Real(3)});
+  }
+  SqliteStatement zone = database_->Prepare("SELECT map_sequence FROM zone");
+  if (zone.Step()) chain_ = AnnouncementChain(static_cast<std::uint64_t>(zone.Int(0)));
+  CountPending();
+}
+
+void LocalHazardMap::CountPending() {
+  SqliteStatement sizes = database_->Prepare(
+      std::string("SELECT uuid,length(CAST(image AS BLOB)) FROM pending WHERE ") +
+      kFetchableReport);
+  pending_count_ = pending_bytes_ = 0;
+  while (sizes.Step()) {
+    if (broken_rows_.unsendable.count(UuidFromBlob(sizes.Blob(0))) != 0) continue;
+    ++pending_count_;
+    pending_bytes_ += static_cast<std::size_t>(sizes.Int(1)) + kReportBytes;
+  }
+}
+
+std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& class_name,
+                                                           const GeoPoint& position) const {
+  return filter_.Find(class_name, position);
+}
+
+LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report, std::int64_t hold_until_ns) {
+  if (filter_.Find(report.class_name, report.position)) return AddResult::kDuplicate;
+  const std::size_t bytes = report.image.size() + kReportBytes;
+  if (pending_count_ >= static_cast<std::size_t>(config_.max_pending) ||
+      static_cast<double>(pending_bytes_ + bytes) > config_.max_pending_bytes) {
+    return AddResult::kFull;
+  }
+  std::vector<Change> changes = {{report.uuid, true, report.class_name, report.position}};
+  database_->Transaction([&] {
+    InsertKnown(report);
+    InsertReport(*database_, report, hold_until_ns);
+    EvictBeyondLimit(changes);
+  });
+  Show(changes);
+  ++pending_count_;
+  pending_bytes_ += bytes;
+  return AddResult::kAdded;
+}
+
+void LocalHazardMap::InsertKnown(const Report& report) {
+  SqliteStatement known = database_->Prepare(
+      "INSERT INTO known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
+      " VALUES(?,0,?,?,?,?,0,?)");
+  known.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
+      .Bind(2, report.class_name)
+      .Bind(3, static_cast<double>(report.confidence))
+      .Bind(4, report.position.latitude_deg)
+      .Bind(5, report.position.longitude_deg)
+      .Bind(6, report.stamp_ns)
+      .Execute();
+}
+
+/// The filter learns what a transaction did.
+void LocalHazardMap::Show(const std::vector<Change>& changes) {
+  for (const Change& change : changes) {
+    if (change.known) {
+      filter_.Put(change.id, change.class_name, change.position);
+    } else {
+      filter_.Remove(change.id);
+    }
+  }
+  if (!changes.empty()) ++revision_;
+}
+
+void LocalHazardMap::Forget(const Uuid& id, std::vector<Change>& changes) {
+  database_->Prepare("DELETE FROM known WHERE id=?")
+      .BindBlob(1, id.bytes.data(), id.bytes.size())
+      .Execute();
+  changes.push_back({id, false, "", {}});
+}
+
+void LocalHazardMap::EvictBeyondLimit(std::vector<Change>& changes) {
+  SqliteStatement count = database_->Prepare("SELECT count(*) FROM known");
+  count.Step();
+  const std::int64_t excess = count.Int(0) - config_.max_known;
+  if (excess <= 0) return;
+  SqliteStatement oldest = database_->Prepare(
+      "SELECT id FROM known WHERE id NOT IN (SELECT uuid FROM pending WHERE uuid IS NOT NULL)"
+      " ORDER BY news_ns LIMIT ?");
+  oldest.Bind(1, excess);
+  std::vector<Uuid> evicted;
+  while (oldest.Step()) evicted.push_back(UuidFromBlob(oldest.Blob(0)));
+  for (const Uuid& id : evicted) Forget(id, changes);
+}
+
+std::size_t LocalHazardMap::ForgetUnannounced(std::int64_t now_ns) {
+  std::vector<Uuid> passed;
+  SqliteStatement rows =
+      database_->Prepare("SELECT id,class_name,news_ns FROM known WHERE of_zone=1 AND sequence=0");
+  while (rows.Step()) {
+    const double age_s = static_cast<double>(now_ns - rows.Int(2)) * 1e-9;
+    if (age_s > catalogue_.Get(rows.Text(1)).expected_life_s) {
+      passed.push_back(UuidFromBlob(rows.Blob(0)));
+    }
+  }
+  if (passed.empty()) return 0;
+  std::vector<Change> changes;
+  database_->Transaction([&] {
+    for (const Uuid& id : passed) Forget(id, changes);
+  });
+  Show(changes);
+  return passed.size();
+}
+
+bool LocalHazardMap::Apply(const Receipt& receipt) {
+  const auto report = LoadPending(receipt.report_uuid);
+  if (!report) return false;
+  const auto& own_id = receipt.report_uuid.bytes;
+  const auto& zone_id = receipt.hazard_uuid.bytes;
+  const bool renames = receipt.status == Receipt::Status::kCommitted &&
+                       !receipt.hazard_uuid.IsNil() && filter_.Knows(receipt.report_uuid);
+  database_->Transaction([&] {
+    database_->Prepare("DELETE FROM pending WHERE uuid=?")
+        .BindBlob(1, own_id.data(), own_id.size())
+        .Execute();
+    if (!renames) return;
+    // The zone may have announced it already: its word about the place counts.
+    database_->Prepare("UPDATE OR IGNORE known SET id=?, of_zone=1 WHERE id=?")
+        .BindBlob(1, zone_id.data(), zone_id.size())
+        .BindBlob(2, own_id.data(), own_id.size())
+        .Execute();
+    if (receipt.report_uuid == receipt.hazard_uuid) return;
+    database_->Prepare("DELETE FROM known WHERE id=?")
+        .BindBlob(1, own_id.data(), own_id.size())
+        .Execute();
+  });
+  --pending_count_;
+  pending_bytes_ -= report->image.size() + kReportBytes;
+  if (!renames) return true;
+  if (receipt.report_uuid != receipt.hazard_uuid) filter_.Remove(receipt.report_uuid);
+  if (!filter_.Knows(receipt.hazard_uuid)) {
+    filter_.Put(receipt.hazard_uuid, report->class_name, report->position);
+  }
+  ++revision_;
+  return true;
+}
+
+std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
+  SqliteStatement rows = database_->Prepare(
+      std::string("SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending WHERE ") +
+      kFetchableReport + " ORDER BY stamp_ns,uuid");
+  std::vector<PendingReport> pending;
+  while (rows.Step()) {
+    const Uuid uuid = UuidFromBlob(rows.Blob(0));
+    if (broken_rows_.unsendable.count(uuid) != 0) continue;
+    pending.push_back({uuid, rows.Text(1), rows.Int(2), rows.Int(3) != 0, rows.Int(4)});
+  }
+  return pending;
+}
+
+std::optional<Report> LocalHazardMap::LoadPending(const Uuid& uuid) const {
+  if (broken_rows_.unsendable.count(uuid) != 0) return std::nullopt;
+  SqliteStatement row =
+      database_->Prepare(std::string("SELECT 1 FROM pending WHERE uuid=? AND ") + kFetchableReport);
+  row.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
+  if (!row.Step()) return std::nullopt;
+  row.Reset();
+  return SelectReport(*database_, uuid);
+}
+
+void LocalHazardMap::MarkSent(const Uuid& uuid) {
+  database_->Prepare("UPDATE pending SET sent=1 WHERE uuid=?")
+      .BindBlob(1, uuid.bytes.data(), uuid.bytes.size())
+      .Execute();
+}
+
+std::vector<KnownHazard> LocalHazardMap::Known(std::size_t limit) const {
+  SqliteStatement rows = database_->Prepare(
+      "SELECT id,of_zone,class_name,confidence,latitude,longitude FROM known"
+      " ORDER BY news_ns DESC LIMIT ?");
+  rows.Bind(1, static_cast<std::int64_t>(limit));
+  std::vector<KnownHazard> known;
+  while (rows.Step()) {
+    known.push_back({UuidFromBlob(rows.Blob(0)),
+                     rows.Int(1) != 0,
+                     rows.Text(2),
+                     static_cast<float>(rows.Real(3)),
+                     {rows.Real(4), rows.Real(5)}});
+  }
+  return known;
+}
+
+}  // namespace livemap

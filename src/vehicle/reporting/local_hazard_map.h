@@ -1,0 +1,154 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/sqlite.h"
+#include "protocol/hazard_catalogue.h"
+#include "protocol/notice.h"
+#include "protocol/report.h"
+#include "vehicle/outbox/report_salvage.h"
+#include "vehicle/outbox/row_validation.h"
+#include "vehicle/reporting/duplicate_filter.h"
+#include "vehicle/reporting/notice_sequence_tracker.h"
+
+namespace livemap {
+
+/// What the vehicle knows about one hazard.
+struct KnownHazard {
+  Uuid id;  ///< The zone's once it has told; until then that of the vehicle's own report.
+  bool of_zone = false;
+  std::string class_name;
+  float confidence = 0;
+  GeoPoint position;
+};
+
+/// The vehicle's memory: the hazards it knows, its own and those that the zone announced, up to
+/// which of the zone's announcements it knows all, and its reports that the zone has not answered
+/// yet (the outbox). All stand in one durable SQLite database, so that "known" and "to be sent" are
+/// one transaction: what Add accepted is reported whatever dies.
+/// Not thread-safe. Every method that writes throws StoreError when the store fails; then nothing
+/// has changed.
+class LocalHazardMap {
+ public:
+  struct Config {
+    std::string path;  ///< The database file; its directory exists.
+    /// Hazards kept; beyond it the ones longest without news are forgotten (and would be reported
+    /// anew), never one whose report is unfinished.
+    int max_known = 100000;
+    /// Unfinished reports kept; beyond it new hazards are refused, nothing accepted is dropped.
+    int max_pending = 1000;
+    /// The same in bytes: of each report its picture and kReportBytes.
+    double max_pending_bytes = 200e6;
+  };
+  static constexpr std::size_t kReportBytes = 1024;
+
+  enum class AddResult {
+    kAdded,      ///< Durably known and to be sent.
+    kDuplicate,  ///< Of a known hazard; nothing is stored.
+    kFull,       ///< Too many unfinished reports, or bytes of them; nothing is stored.
+  };
+
+  struct PendingReport {
+    Uuid uuid;
+    std::string class_name;
+    std::int64_t created_ns = 0;     ///< The report's stamp.
+    bool sent = false;               ///< At least once.
+    std::int64_t hold_until_ns = 0;  ///< As for Add.
+  };
+
+  /// Opens or creates the database. A corrupt file is renamed to `<path>.corrupt-<now_ns>` with
+  /// its companions and a new one started, with those of its reports that can still be read: see
+  /// set_aside() and salvage(). In a sound file rows of impossible values count for nothing: see
+  /// broken_rows(). Throws Error for every other failure.
+  LocalHazardMap(const Config& config, const HazardCatalogue& catalogue, std::int64_t now_ns);
+
+  /// Where a corrupt database was moved; empty when the file was sound.
+  const std::string& set_aside() const { return set_aside_; }
+  /// What became of the reports in it.
+  const Salvage& salvage() const { return salvage_; }
+  /// What was found that the program cannot have written.
+  const BrokenRows& broken_rows() const { return broken_rows_; }
+
+  /// The known hazard that a sighting duplicates.
+  std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
+                                             const GeoPoint& position) const;
+  /// `hold_until_ns` is kept with it, for whoever sends it: UTC by the vehicle's clock, until which
+  /// it may wait for a cheap link; 0: not at all.
+  AddResult Add(const Report& report, std::int64_t hold_until_ns = 0);
+
+  /// Takes in what the zone announced, in one transaction. Returns how many were unusable (nil id,
+  /// impossible position, overlong class name) and left out. A kCaughtUp takes away what the zone
+  /// no longer has; one that came without all that belongs to it counts as unusable.
+  std::size_t Apply(const std::vector<Notice>& notices);
+  /// Up to which announcement of the zone this vehicle knows all; 0: none. Survives a restart.
+  std::uint64_t map_sequence() const { return chain_.known(); }
+  /// Announcements came ahead of one that is missing.
+  bool has_gap() const { return chain_.has_gap(); }
+  /// Ends the report that the receipt answers; false when no such report is unfinished. A committed
+  /// hazard goes on under the zone's id. A refused one stays known, or it would be reported anew
+  /// at the next sight.
+  bool Apply(const Receipt& receipt);
+
+  std::vector<PendingReport> Pending() const;
+  /// Forgets hazards that the zone took in but never announced, whose class's expected life has
+  /// passed since they were seen: the zone tells nobody when it gives up such a one. Seen again,
+  /// they are reported anew. Returns how many.
+  std::size_t ForgetUnannounced(std::int64_t now_ns);
+
+  /// The whole report, as it was added.
+  std::optional<Report> LoadPending(const Uuid& uuid) const;
+  void MarkSent(const Uuid& uuid);
+
+  /// At most `limit` known hazards, those with the newest news first.
+  std::vector<KnownHazard> Known(std::size_t limit) const;
+  std::size_t known_count() const { return filter_.size(); }
+  std::size_t pending_count() const { return pending_count_; }
+  /// As max_pending_bytes counts them.
+  std::size_t pending_bytes() const { return pending_bytes_; }
+  /// Changes whenever a known hazard does.
+  std::uint64_t revision() const { return revision_; }
+
+ private:
+  /// What a transaction did to `known`, for the filter after its commit.
+  struct Change {
+    Uuid id;
+    bool known;  ///< False: forgotten.
+    std::string class_name;
+    GeoPoint position;
+  };
+
+  void Open();
+  void RecoverFromSetAside();
+  void LoadFilter();
+  void CountPending();
+  void InsertKnown(const Report& report);
+  bool IsNews(const Notice& notice) const;
+  void StoreNotice(const Notice& notice);
+  bool CatchUp(const Notice& notice, const std::set<Uuid>& told, AnnouncementChain& chain,
+               std::vector<Change>& changes);
+  std::vector<Uuid> NotTold(const Notice& notice, const std::set<Uuid>& told) const;
+  void Forget(const Uuid& id, std::vector<Change>& changes);
+  void EvictBeyondLimit(std::vector<Change>& changes);
+  void Show(const std::vector<Change>& changes);
+
+  Config config_;
+  HazardCatalogue catalogue_;
+  std::string set_aside_;
+  Salvage salvage_;
+  BrokenRows broken_rows_;
+  std::unique_ptr<SqliteDatabase> database_;
+  DuplicateFilter filter_;
+  AnnouncementChain chain_;
+  std::set<Uuid> told_;  // To this vehicle alone, since the last kCaughtUp.
+  std::size_t pending_count_ = 0;
+  std::size_t pending_bytes_ = 0;
+  std::uint64_t revision_ = 0;
+};
+
+}  // namespace livemap

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "protocol/hazard_catalogue.h"
+#include "web/api/vehicle_trails.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap {
+
+/// One message of the live stream, written once for all clients.
+struct LiveMessage {
+  std::shared_ptr<const std::string> text;
+  std::uint64_t sequence = 0;  ///< Of an event; 0 for a vehicle position.
+};
+
+/// A client of the live stream.
+class LiveListener {
+ public:
+  virtual ~LiveListener() = default;
+  /// Called from the zone's threads, in the order of the sequence; must not block.
+  virtual void Deliver(const LiveMessage& message) = 0;
+};
+
+/// Hands the zone's events to every listener and to the vehicles' trails. Thread-safe.
+class EventHub {
+ public:
+  /// Subscribes to the zone; keeps references.
+  EventHub(ZoneService& zone, const HazardCatalogue& catalogue, VehicleTrails& trails);
+  ~EventHub();
+  EventHub(const EventHub&) = delete;
+  EventHub& operator=(const EventHub&) = delete;
+
+  /// Every event that is published after this call reaches the listener until it leaves; the hub
+  /// keeps it alive until then.
+  void Join(const std::shared_ptr<LiveListener>& listener);
+  void Leave(const LiveListener* listener);
+  /// Lets go of every listener, for good: when it returns, none is being called.
+  void Stop();
+
+ private:
+  void Publish(const ZoneEvent& event);
+
+  ZoneService& zone_;
+  const HazardCatalogue& catalogue_;
+  VehicleTrails& trails_;
+  std::mutex mutex_;
+  std::map<const LiveListener*, std::shared_ptr<LiveListener>> listeners_;
+  bool stopped_ = false;
+  int subscription_ = 0;
+};
+
+}  // namespace livemap

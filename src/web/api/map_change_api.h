@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+
+#include "web/api/query.h"
+#include "web/http/http_message.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap {
+
+/// The list of map changes; "/UUID" and "/UUID/events" stand below it.
+constexpr const char* kMapChangeAddress = "/api/v1/changes";
+
+/// Answers what may be read of map changes (docs/web.md). Thread-safe; store failures and bad
+/// requests come out as exceptions.
+class MapChangeApi {
+ public:
+  /// Keeps the reference.
+  explicit MapChangeApi(ZoneService& zone) : zone_(zone) {}
+
+  /// `target.path` starts with kMapChangeAddress.
+  HttpAnswer Answer(const RequestTarget& target) const;
+
+ private:
+  HttpAnswer List(const MapChangeQuery& query) const;
+  HttpAnswer One(const std::string& id) const;
+  HttpAnswer Events(const std::string& id, std::size_t limit) const;
+
+  ZoneService& zone_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,159 @@
+#include "web/api/official_authenticator.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+
+#include "common/error.h"
+#include "common/sha256.h"
+#include "zone/admission/report_validation.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxTokenFileBytes = 64 << 10;
+constexpr std::size_t kMaxOfficials = 200;
+constexpr std::size_t kMinTokenBytes = 16;
+constexpr std::size_t kMaxTokenBytes = 256;
+constexpr std::size_t kMaxNameBytes = 64;
+constexpr std::size_t kMaxClients = 4096;
+
+bool IsTokenCharacter(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+         std::string_view("-._~+/=").find(c) != std::string_view::npos;
+}
+
+bool IsToken(std::string_view text) {
+  return text.size() >= kMinTokenBytes && text.size() <= kMaxTokenBytes &&
+         std::all_of(text.begin(), text.end(), IsTokenCharacter);
+}
+
+/// Looks at every byte whatever it finds.
+bool EqualInConstantTime(const std::string& a, const std::string& b) {
+  if (a.size() != b.size()) return false;
+  unsigned char difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    difference = static_cast<unsigned char>(difference | (a[i] ^ b[i]));
+  }
+  return difference == 0;
+}
+
+/// Throws Error for anything but "NAME TOKEN".
+Official ParseOfficial(std::string_view line, const std::string& where) {
+  const std::size_t blank = line.find(' ');
+  const std::string name(line.substr(0, blank));
+  const std::string_view token =
+      blank == std::string_view::npos ? std::string_view() : line.substr(blank + 1);
+  if (!IsPrintableText(name, kMaxNameBytes) || !IsToken(token)) {
+    throw Error(where + " is not accepted, accepted is NAME TOKEN: a name of 1 to " +
+                std::to_string(kMaxNameBytes) + " bytes, one blank, a token of " +
+                std::to_string(kMinTokenBytes) + " to " + std::to_string(kMaxTokenBytes) +
+                " letters, digits and -._~+/=");
+  }
+  return {name, Sha256Hex(std::string(token))};
+}
+
+/// The token of "Bearer TOKEN", the scheme in any case; empty for anything else.
+std::string BearerToken(const std::string& authorization) {
+  constexpr std::string_view kScheme = "bearer ";
+  if (authorization.size() <= kScheme.size()) return "";
+  for (std::size_t i = 0; i < kScheme.size(); ++i) {
+    const auto c = static_cast<unsigned char>(authorization[i]);
+    if (static_cast<char>(std::tolower(c)) != kScheme[i]) return "";
+  }
+  return authorization.substr(kScheme.size());
+}
+
+}  // namespace
+
+std::vector<Official> ParseTokenFile(const std::string& text, const std::string& name) {
+  std::vector<Official> officials;
+  std::string_view rest = text;
+  for (int number = 1; !rest.empty(); ++number) {
+    const std::size_t end = rest.find('\n');
+    std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    if (line.empty() || line.front() == '#') continue;
+    const std::string where = "token file '" + name + "', line " + std::to_string(number) + ",";
+    Official official = ParseOfficial(line, where);
+    for (const Official& other : officials) {
+      if (other.name != official.name && other.token_sha256 != official.token_sha256) continue;
+      throw Error(where + " has a name or token that was given before");
+    }
+    if (officials.size() == kMaxOfficials) {
+      throw Error("token file '" + name + "' has more than " + std::to_string(kMaxOfficials) +
+                  " officials");
+    }
+    officials.push_back(std::move(official));
+  }
+  if (officials.empty()) {
+    throw Error("token file '" + name + "' names nobody, accepted are lines NAME TOKEN");
+  }
+  return officials;
+}
+
+std::vector<Official> ReadTokenFile(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) {
+    throw Error("token file '" + path + "' cannot be read: " + std::strerror(errno));
+  }
+  if (!S_ISREG(status.st_mode)) throw Error("token file '" + path + "' is no regular file");
+  if ((status.st_mode & (S_IROTH | S_IWOTH)) != 0) {
+    throw Error("token file '" + path +
+                "' may be read or written by everybody, accepted is mode 0600 or 0640");
+  }
+  return ParseTokenFile(ReadFile(path, kMaxTokenFileBytes), path);
+}
+
+OfficialGate::Answer OfficialGate::Check(const std::string& authorization,
+                                         const std::string& client, double now_s) {
+  if (officials_.empty()) return {Verdict::kClosed, ""};
+  const std::string token = BearerToken(authorization);
+  if (token.empty()) return {Verdict::kNoToken, ""};
+  if (!MayTry(client, now_s)) return {Verdict::kTooManyWrong, ""};
+  const auto name = NameOf(token);
+  if (name) return {Verdict::kAllowed, *name};
+  CountMistake(client, now_s);
+  return {Verdict::kWrongToken, ""};
+}
+
+/// Compares hashes, which tell nothing of how much of a token was right, with every official's.
+std::optional<std::string> OfficialGate::NameOf(const std::string& token) const {
+  const std::string hash = Sha256Hex(token);
+  const Official* found = nullptr;
+  for (const Official& official : officials_) {
+    if (EqualInConstantTime(hash, official.token_sha256)) found = &official;
+  }
+  return found == nullptr ? std::nullopt : std::optional<std::string>(found->name);
+}
+
+bool OfficialGate::MayTry(const std::string& client, double now_s) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = mistakes_.find(client);
+  if (found == mistakes_.end()) return true;
+  const double healed = (now_s - found->second.at_s) / kSecondsPerWrong;
+  return found->second.wrong - healed <= kMostWrong - 1;
+}
+
+void OfficialGate::CountMistake(const std::string& client, double now_s) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = mistakes_.find(client);
+  double wrong = 1;
+  if (found != mistakes_.end()) {
+    const double healed = (now_s - found->second.at_s) / kSecondsPerWrong;
+    wrong += std::max(0.0, found->second.wrong - healed);
+    ages_.erase(found->second.age);
+  } else if (mistakes_.size() >= kMaxClients) {
+    mistakes_.erase(ages_.front());
+    ages_.pop_front();
+  }
+  ages_.push_back(client);
+  mistakes_[client] = {wrong, now_s, std::prev(ages_.end())};
+}
+
+}  // namespace livemap

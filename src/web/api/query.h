@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/error.h"
+#include "geo/geo_box.h"
+#include "zone/model/hazard.h"
+#include "zone/model/map_change.h"
+
+namespace livemap {
+
+/// A request that the client must mend; answered with status 400 and this sentence.
+class BadRequest : public Error {
+ public:
+  using Error::Error;
+};
+
+/// An HTTP request target in origin form, percent-decoded.
+struct RequestTarget {
+  std::string path;  ///< Starts with '/'; may hold any byte but NUL.
+  std::vector<std::pair<std::string, std::string>> parameters;  ///< In the order of the query.
+};
+
+/// Splits and decodes "/path?key=value&...". Throws BadRequest when it does not start with '/', has
+/// a malformed %-escape, a NUL byte, more than 32 parameters, or is longer than 4096 bytes.
+RequestTarget ParseTarget(std::string_view target);
+
+/// What `GET /api/v1/hazards` asks for.
+struct HazardQuery {
+  std::optional<GeoBox> box;           ///< May cross the antimeridian (west > east).
+  std::optional<std::uint64_t> since;  ///< Only what changed after this sequence.
+  std::size_t limit = 20000;
+  HazardStates states;  ///< Only these; empty: all that are on the map.
+
+  bool Selects(HazardState state) const {
+    return states.empty() ? IsOnMap(state) : states.count(state) != 0;
+  }
+};
+
+/// The most hazards that one answer may hold.
+constexpr std::size_t kMaxHazardsPerAnswer = 50000;
+
+/// Reads `bbox=minLon,minLat,maxLon,maxLat` (degrees, RFC 7946 section 5), `since`, `limit` and
+/// `state`, one or more of candidate, active, verifying, gone and rejected with commas between.
+/// Throws BadRequest naming the parameter, its value and what is accepted; unknown and repeated
+/// parameters are refused, so that a misspelt filter never answers with everything.
+HazardQuery ParseHazardQuery(const RequestTarget& target);
+
+/// What `GET /api/v1/changes` asks for; as HazardQuery.
+struct MapChangeQuery {
+  std::optional<GeoBox> box;
+  std::optional<std::uint64_t> since;
+  std::size_t limit = 20000;
+  MapChangeStates states;  ///< Only these; empty: proposed and confirmed.
+
+  bool Selects(MapChangeState state) const {
+    return states.empty() ? IsOpen(state) : states.count(state) != 0;
+  }
+};
+
+/// As ParseHazardQuery; states are proposed, confirmed, undone and dismissed.
+MapChangeQuery ParseMapChangeQuery(const RequestTarget& target);
+
+/// The most events of a hazard that one answer may hold.
+constexpr std::size_t kMaxEventsPerAnswer = 1000;
+
+/// The `limit` parameter of a hazard's history, 100 by default; refuses every other parameter.
+std::size_t ParseEventsQuery(const RequestTarget& target);
+
+/// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
+std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);
+
+/// Throws BadRequest when the target has any parameter.
+void RefuseParameters(const RequestTarget& target);
+
+}  // namespace livemap

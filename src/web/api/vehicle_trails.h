@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "web/json/json.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap {
+
+/// Where each vehicle lately drove, so that a page opened in the middle of a drive shows the whole
+/// trail. Bounded in points and vehicles; lives in memory only. Thread-safe.
+class VehicleTrails {
+ public:
+  struct Config {
+    double spacing_m = 5;             ///< A position nearer to its predecessor adds no point.
+    std::size_t max_points = 2000;    ///< Per vehicle; the oldest goes first.
+    std::size_t max_vehicles = 1000;  ///< Vehicles beyond this get no trail.
+  };
+
+  VehicleTrails() = default;
+  explicit VehicleTrails(Config config) : config_(config) {}
+
+  void Add(const VehicleState& vehicle);
+  /// Oldest first; empty for an unknown vehicle.
+  TrailPositions Get(const std::string& vehicle_id) const;
+
+ private:
+  Config config_;
+  mutable std::mutex mutex_;
+  std::map<std::string, std::deque<GeoPoint>> trails_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,14 @@
+#include "web/http/origin.h"
+
+#include <algorithm>
+
+namespace livemap {
+
+bool IsAllowedOrigin(const std::string& origin, const std::string& host,
+                     const std::vector<std::string>& allowed) {
+  if (origin.empty()) return true;
+  if (!host.empty() && (origin == "http://" + host || origin == "https://" + host)) return true;
+  return std::find(allowed.begin(), allowed.end(), origin) != allowed.end();
+}
+
+}  // namespace livemap

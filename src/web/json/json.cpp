@@ -1,0 +1,167 @@
+#include "web/json/json.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+
+namespace livemap {
+namespace {
+
+Json Coordinates(const GeoPoint& position) {
+  return Json::array({Rounded(position.longitude_deg, 7), Rounded(position.latitude_deg, 7)});
+}
+
+Json ImageUrl(const Hazard& hazard) {
+  if (hazard.image_sha256.empty()) return nullptr;
+  return "/images/" + hazard.image_sha256;
+}
+
+}  // namespace
+
+double Rounded(double value, int digits) {
+  const double scale = std::pow(10.0, digits);
+  return std::round(value * scale) / scale;
+}
+
+Json PointFeature(const std::string& id, const GeoPoint& position) {
+  Json feature;
+  feature["type"] = "Feature";
+  feature["id"] = id;
+  feature["geometry"] = {{"type", "Point"}, {"coordinates", Coordinates(position)}};
+  return feature;
+}
+
+Json PositionSigma(const Eigen::Matrix2d& covariance_m2) {
+  if (!covariance_m2.allFinite()) return nullptr;
+  const double largest =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance_m2, Eigen::EigenvaluesOnly)
+          .eigenvalues()
+          .maxCoeff();
+  if (!(largest > 0)) return nullptr;
+  return Rounded(std::sqrt(largest), 2);
+}
+
+std::string ToText(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string Rfc3339(std::int64_t time_ns) {
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  std::int64_t seconds = time_ns / kNsPerSecond;
+  std::int64_t rest_ns = time_ns % kNsPerSecond;
+  if (rest_ns < 0) {
+    rest_ns += kNsPerSecond;
+    --seconds;
+  }
+  const std::time_t time = seconds;
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "%04d-%02d-%02dT%02d:%02d:%02d.%03dZ", utc.tm_year + 1900,
+                utc.tm_mon + 1, utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec,
+                static_cast<int>(rest_ns / 1'000'000));
+  return text.data();
+}
+
+const char* ActionName(HazardAction action) {
+  switch (action) {
+    case HazardAction::kAdded:
+      return "added";
+    case HazardAction::kUpdated:
+      return "updated";
+    case HazardAction::kRemoved:
+      return "removed";
+  }
+  return "updated";
+}
+
+HazardAction ReplayAction(const Hazard& hazard) {
+  if (!IsOnMap(hazard.state)) return HazardAction::kRemoved;
+  // A hazard's first event leaves it with one sighting; every later event is an update.
+  return hazard.sightings <= 1 ? HazardAction::kAdded : HazardAction::kUpdated;
+}
+
+Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue) {
+  Json feature = PointFeature(hazard.uuid.ToString(), hazard.position);
+  Json& properties = feature["properties"];
+  properties["id"] = hazard.uuid.ToString();
+  properties["class"] = hazard.class_name;
+  properties["label"] = catalogue.Get(hazard.class_name).label;
+  properties["confidence"] = Rounded(static_cast<double>(hazard.confidence), 4);
+  properties["sightings"] = hazard.sightings;
+  properties["state"] = StateName(hazard.state);
+  properties["presence"] = Rounded(static_cast<double>(hazard.presence), 4);
+  properties["vehicles"] = hazard.vehicles;
+  properties["first_seen"] = Rfc3339(hazard.first_seen_ns);
+  properties["last_seen"] = Rfc3339(hazard.last_seen_ns);
+  properties["updated"] = Rfc3339(hazard.updated_ns);
+  properties["position_sigma_m"] = PositionSigma(hazard.covariance_m2);
+  properties["image"] = ImageUrl(hazard);
+  properties["sequence"] = hazard.sequence;
+  return feature;
+}
+
+Json EventJson(const StoredEvent& event) {
+  Json json;
+  json["sequence"] = event.sequence;
+  json["action"] = ActionName(event.action);
+  json["from"] = event.from ? Json(StateName(*event.from)) : Json(nullptr);
+  json["to"] = StateName(event.to);
+  json["reason"] = event.reason;
+  json["time"] = Rfc3339(event.at_ns);
+  return json;
+}
+
+Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalogue& catalogue) {
+  Json message;
+  message["type"] = "hazard";
+  message["action"] = ActionName(action);
+  message["sequence"] = hazard.sequence;
+  message["feature"] = HazardFeature(hazard, catalogue);
+  return message;
+}
+
+Json VehicleFeature(const VehicleState& vehicle, const TrailPositions& trail) {
+  Json feature = PointFeature(vehicle.vehicle_id, vehicle.position);
+  Json& properties = feature["properties"];
+  properties["vehicle"] = vehicle.vehicle_id;
+  properties["drive"] = vehicle.drive_id;
+  // JSON knows no NaN: an unknown course or speed is null.
+  properties["course_rad"] = Rounded(vehicle.course_rad, 4);
+  properties["speed_mps"] = Rounded(vehicle.speed_mps, 2);
+  properties["time"] = Rfc3339(vehicle.stamp_ns);
+  properties["heard"] = Rfc3339(vehicle.heard_ns);
+  if (trail.empty()) return feature;
+  Json& positions = properties["trail"] = Json::array();
+  for (const auto& [longitude, latitude] : trail) {
+    positions.push_back(Json::array({Rounded(longitude, 7), Rounded(latitude, 7)}));
+  }
+  return feature;
+}
+
+Json VehicleMessage(const VehicleState& vehicle) {
+  Json message;
+  message["type"] = "vehicle";
+  message["feature"] = VehicleFeature(vehicle, {});
+  return message;
+}
+
+Json ClassesJson(const HazardCatalogue& catalogue) {
+  Json classes = Json::array();
+  for (const auto& [name, hazard_class] : catalogue.classes()) {
+    classes.push_back({{"class", name},
+                       {"label", hazard_class.label},
+                       {"icon", hazard_class.icon},
+                       {"colour", hazard_class.colour}});
+  }
+  const HazardClass fallback = catalogue.Get("");
+  Json answer;
+  answer["classes"] = std::move(classes);
+  answer["default"] = {{"icon", fallback.icon}, {"colour", fallback.colour}};
+  return answer;
+}
+
+}  // namespace livemap

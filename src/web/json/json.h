@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/hazard_catalogue.h"
+#include "zone/model/hazard.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap {
+
+/// Keys stay in the order in which a person reads them.
+using Json = nlohmann::ordered_json;
+
+/// JSON text in UTF-8; bytes that are no UTF-8 become U+FFFD, so that text that a vehicle sent
+/// never breaks an answer.
+std::string ToText(const Json& json);
+
+/// RFC 3339 in UTC with milliseconds, "2026-01-31T12:00:00.250Z", of nanoseconds since 1970.
+std::string Rfc3339(std::int64_t time_ns);
+
+/// Rounds to `digits` after the point: 1e-7 degree is a centimetre, and float32 noise such as
+/// 0.8700000047683716 helps nobody.
+double Rounded(double value, int digits);
+
+/// A GeoJSON Feature without properties (RFC 7946, position as [longitude, latitude]).
+Json PointFeature(const std::string& id, const GeoPoint& position);
+
+/// Standard deviation along the worst direction, metres; null when the covariance says nothing.
+Json PositionSigma(const Eigen::Matrix2d& covariance_m2);
+
+/// "added", "updated" or "removed".
+const char* ActionName(HazardAction action);
+
+/// What a client that knows nothing newer than the hazard's predecessor should do with it.
+HazardAction ReplayAction(const Hazard& hazard);
+
+/// The hazard as a GeoJSON Feature (RFC 7946, position as [longitude, latitude]).
+Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue);
+
+/// One line of a hazard's history: sequence, action, from, to, reason, time.
+Json EventJson(const StoredEvent& event);
+
+/// The message of the live stream for one hazard event.
+Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalogue& catalogue);
+
+/// Positions as (longitude, latitude) degrees, oldest first.
+using TrailPositions = std::vector<std::pair<double, double>>;
+
+/// The vehicle as a GeoJSON Feature; `trail` is where it lately drove.
+Json VehicleFeature(const VehicleState& vehicle, const TrailPositions& trail);
+
+/// The message of the live stream for one vehicle position (its feature has no trail).
+Json VehicleMessage(const VehicleState& vehicle);
+
+/// The catalogue's classes for the map's filter: name, label, icon, colour.
+Json ClassesJson(const HazardCatalogue& catalogue);
+
+}  // namespace livemap

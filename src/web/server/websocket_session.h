@@ -1,0 +1,65 @@
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "web/server/connection.h"
+
+namespace livemap {
+
+/// One client of the live stream.
+///
+/// It first *replays* what happened after the client's `since`, page by page from the store, and
+/// then is *live*: events go from the hub into its queue. Events that come during the replay are
+/// not queued but remembered by their sequence; the replay goes on until it has passed them. So
+/// no event is lost or told twice, and memory stays bounded however long the client was away.
+/// A live client whose queue is full is closed with a reason; it reconnects with `since`.
+class WebSocketSession : public LiveListener,
+                         public std::enable_shared_from_this<WebSocketSession> {
+ public:
+  using Request = boost::beast::http::request<boost::beast::http::string_body>;
+
+  /// Without `since` the client is told only what happens from now on.
+  WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot,
+                   std::optional<std::uint64_t> since);
+
+  void Start(const Request& upgrade);
+  void Deliver(const LiveMessage& message) override;
+
+ private:
+  enum class State { kReplaying, kLive, kClosing };
+
+  void OnAccepted();
+  void Read();
+  void OnMessage(const LiveMessage& message);
+  void ReplayPage();
+  void Enqueue(std::shared_ptr<const std::string> text);
+  void BeatLater();
+  void WriteNext();
+  void OnWritten(boost::beast::error_code failure);
+  void CloseAsTooSlow();
+  void CloseAsFailed();
+  void CloseWith(boost::beast::websocket::close_code code, const char* reason);
+
+  ConnectionSlot slot_;
+  boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
+  boost::asio::steady_timer close_deadline_;
+  boost::asio::steady_timer heartbeat_;
+  boost::beast::flat_buffer read_buffer_;
+  State state_ = State::kReplaying;
+  std::optional<std::uint64_t> since_;
+  std::uint64_t told_sequence_ = 0;       ///< The client knows everything up to here.
+  std::uint64_t announced_sequence_ = 0;  ///< The newest event that came during the replay.
+  std::deque<std::shared_ptr<const std::string>> queue_;  ///< The front one is being written.
+  std::size_t queued_bytes_ = 0;
+  bool writing_ = false;
+};
+
+}  // namespace livemap

@@ -1,0 +1,338 @@
+#include "zone/belief/hazard_lifecycle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "common/time.h"
+#include "zone/belief/hazard_lifecycle_internal.h"
+
+namespace livemap {
+namespace {
+
+bool SpeaksAgainst(EvidenceKind kind) {
+  return kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
+}
+
+std::string VehiclesText(std::uint32_t vehicles) {
+  if (vehicles == 1) return "1 vehicle";
+  return std::to_string(vehicles) + " vehicles";
+}
+
+std::string PresenceText(double log_odds) {
+  char text[40];
+  std::snprintf(text, sizeof text, "presence %.0f %%", 100 * Probability(log_odds));
+  return text;
+}
+
+std::string DurationText(double seconds) {
+  struct Unit {
+    double seconds;
+    const char* name;
+  };
+  constexpr Unit kUnits[] = {{86400, "days"}, {3600, "h"}, {60, "min"}, {1, "s"}};
+  const Unit* unit = kUnits;
+  while (unit->seconds > 1 && seconds < 2 * unit->seconds) ++unit;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.0f %s", seconds / unit->seconds, unit->name);
+  return text;
+}
+
+double AgeS(const LifeRecord& life, std::int64_t at_ns) {
+  return Seconds(std::max<std::int64_t>(0, at_ns - life.first_seen_ns));
+}
+
+double Faded(const LifeClass& entry, double log_odds, const LifeRecord& life, double dt_s) {
+  const double standing =
+      Probability(log_odds) * entry.survival.Survival(AgeS(life, life.at_ns), dt_s);
+  return LogOdds(standing);
+}
+
+/// The vehicle's place among the voices: its own, a free one, or that of the longest silent, if it
+/// has been silent since before `at_s`. One that does not count goes before one that does, and
+/// drives none away that does.
+Voice* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s, LifeRecord& life) {
+  const auto keeps = [](const Voice& voice) { return std::make_pair(voice.Counts(), voice.at_s); };
+  Voice* place = nullptr;
+  for (Voice& voice : life.voices) {
+    if (voice.vehicle == vehicle) return &voice;
+    if (place == nullptr || keeps(voice) < keeps(*place)) place = &voice;
+  }
+  if (place->Counts() && (suspect || place->at_s >= at_s)) return nullptr;
+  if (place->vehicle != 0 && suspect && place->at_s >= at_s) return nullptr;
+  *place = Voice{vehicle, 0, 0, false, suspect};
+  return place;
+}
+
+void NoteNo(std::int64_t stamp_ns, LifeRecord& life) {
+  if (stamp_ns <= life.last_yes_ns) return;
+  life.first_no_ns = life.first_no_ns == 0 ? stamp_ns : std::min(life.first_no_ns, stamp_ns);
+}
+
+}  // namespace
+
+LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival) {
+  LifeClass result;
+  result.confirmations =
+      static_cast<std::uint32_t>(std::clamp(entry.confirmations, 1, static_cast<int>(kMaxVoices)));
+  result.hit_rate = entry.hit_rate;
+  result.false_rate = entry.false_rate;
+  result.survival = survival;
+  return result;
+}
+
+void HazardLife::MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const {
+  if (to_ns <= life.at_ns) return;
+  if (life.state != HazardState::kRejected) {
+    const double dt_s = Seconds(to_ns - life.at_ns);
+    const auto fade = [&](double log_odds) {
+      return std::max(-max_log_odds_, Faded(entry, log_odds, life, dt_s));
+    };
+    life.log_odds = fade(life.log_odds);
+    life.undenied_log_odds = fade(life.undenied_log_odds);
+  }
+  life.at_ns = to_ns;
+}
+
+double HazardLife::LogRatio(const LifeClass& entry, const Evidence& evidence,
+                            double ended_since) const {
+  const EvidenceKind kind = evidence.kind;
+  const bool change = kind == EvidenceKind::kVanished;
+  const bool against = SpeaksAgainst(kind);
+  // P(this word | there) and P(it | not there), of honest vehicles.
+  double there = against ? 1 - entry.hit_rate : entry.hit_rate;
+  double absent = against ? 1 - entry.false_rate : entry.false_rate;
+  if (change) {
+    there = config_.vanished_false_rate;
+    absent = config_.vanished_hit_rate;
+  }
+  // What is not there now may have been there then.
+  absent = ended_since * there + (1 - ended_since) * absent;
+  const double h = std::clamp(evidence.hostile, config_.hostile_share, 1.0);
+  const double ratio = std::log(((1 - h) * there + h) / ((1 - h) * absent + h));
+  const double bound = MaxVoice(evidence);
+  return std::clamp(ratio, -bound, bound);
+}
+
+/// Half hostile is worth nothing; who is more so must not be believed the other way round.
+double HazardLife::MaxVoice(const Evidence& evidence) const {
+  if (!(evidence.hostile > config_.hostile_share)) return max_voice_;
+  return std::max(0.0, -LogOdds(std::min(evidence.hostile, 0.5)));
+}
+
+bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const {
+  const bool against = SpeaksAgainst(evidence.kind);
+  if (evidence.kind == EvidenceKind::kVanished && IsTold(life.state)) {
+    return HearUnasked(entry, evidence, life);
+  }
+  const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
+  const bool suspect = evidence.hostile >= config_.suspect_above;
+  Voice* voice = PlaceOf(evidence.vehicle, suspect, at_s, life);
+  if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
+  const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
+  const double ended_since = 1 - entry.survival.Survival(AgeS(life, evidence.stamp_ns), late_s);
+  const double ratio = LogRatio(entry, evidence, ended_since);
+
+  // What the vehicle said for the hazard earlier has faded with the odds.
+  double before = 1e-3 * voice->weight_1000;
+  if (before > 0 && at_s > voice->at_s) {
+    before *= std::exp(-static_cast<double>(at_s - voice->at_s) / entry.survival.MeanLifeS());
+  }
+  // The nearer a voice is to its bound, the less a further word adds; factors commute.
+  const double bound = MaxVoice(evidence);
+  const double room = ratio > 0 ? bound - before : bound + before;
+  double after = before + ratio * (bound > 0 ? std::clamp(room / bound, 0.0, 1.0) : 0.0);
+  // What the odds' own bound cuts off was not said: it must not be taken back later.
+  const double odds = std::clamp(life.log_odds + after - before, -max_log_odds_, max_log_odds_);
+  after = before + odds - life.log_odds;
+  life.log_odds = odds;
+  const double gain = std::max(0.0, after) - std::max(0.0, before);
+  life.undenied_log_odds = std::min(max_log_odds_, life.undenied_log_odds + std::max(0.0, gain));
+
+  voice->weight_1000 = static_cast<std::int16_t>(std::lround(1000 * after));
+  if (at_s >= voice->at_s) {
+    voice->at_s = at_s;
+    voice->against = against;
+    voice->suspect = suspect;
+    life.SetJudged(static_cast<std::size_t>(voice - life.voices.data()), false);
+  }
+  if (suspect) return true;
+  against ? NoteNo(evidence.stamp_ns, life) : NoteYes(evidence.stamp_ns, life);
+  return true;
+}
+
+bool HazardLife::HearUnasked(const LifeClass& entry, const Evidence& evidence,
+                             LifeRecord& life) const {
+  const double least = LogOdds(config_.sure_above);
+  if (life.log_odds <= least) return false;
+  const double ratio = LogRatio(entry, evidence, 0);
+  life.log_odds = std::max(least, life.log_odds + ratio);
+  return true;
+}
+
+LifeStep HazardLife::Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
+                           LifeRecord& life) const {
+  life = LifeRecord();
+  life.since_ns = now_ns;
+  life.at_ns = std::min(sighting.stamp_ns, now_ns);
+  life.first_seen_ns = life.last_yes_ns = life.at_ns;
+  life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
+  LifeStep step = Apply(entry, sighting, now_ns, life);
+  if (!step.transition) {
+    step.transition = LifeTransition{std::nullopt, life.state, "first seen by 1 vehicle"};
+  }
+  step.transition->from.reset();
+  return step;
+}
+
+LifeStep HazardLife::Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
+                           LifeRecord& life) const {
+  LifeStep step;
+  if (life.state == HazardState::kGone || evidence.kind == EvidenceKind::kCantSee ||
+      evidence.vehicle == 0) {
+    return step;
+  }
+  Evidence word = evidence;
+  word.stamp_ns = std::min(word.stamp_ns, now_ns);
+  const bool quarantined = life.state == HazardState::kRejected &&
+                           Seconds(word.stamp_ns - life.since_ns) < config_.quarantine_s;
+  if (quarantined) return step;
+  const bool told = IsTold(life.state);
+  const std::int64_t stood_until_ns = life.last_yes_ns;
+  MoveTo(entry, word.stamp_ns, life);
+  step.counted = Hear(entry, word, life);
+  if (step.counted && !SpeaksAgainst(word.kind)) JudgeSeen(entry, word, life, step);
+  Settle(entry, now_ns, life, step);
+  if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
+  return step;
+}
+
+LifeStep HazardLife::Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const {
+  LifeStep step;
+  if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
+  return step;
+}
+
+void HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life,
+                        LifeStep& step) const {
+  MoveTo(entry, now_ns, life);
+  step.transition = Decide(entry, life);
+  if (!step.transition) return;
+  if (life.state != HazardState::kRejected && IsDeniedAway(life)) {
+    JudgeDeniedAway(entry, life, step);
+  }
+  const HazardState from = life.state;
+  const HazardState to = step.transition->to;
+  Enter(to, now_ns, life);
+  if (from == HazardState::kCandidate && to == HazardState::kActive) {
+    step.lesson.stood_s = Seconds(life.last_yes_ns - life.first_seen_ns);
+  }
+  // It ended somewhere between the last word for it and the first against it; without such a word
+  // it was only lost from sight.
+  if (IsTold(from) && to == HazardState::kGone && life.first_no_ns > life.last_yes_ns) {
+    step.lesson.stood_s = 0.5 * Seconds(life.first_no_ns - life.last_yes_ns);
+    step.lesson.ended = true;
+  }
+}
+
+/// One newcomer's word alone brings a hazard just to active_above. Were that asked of a class that
+/// one vehicle confirms, a vehicle that was contradicted once would be believed nothing any more.
+double HazardLife::ActiveAbove(const LifeClass& entry) const {
+  return entry.confirmations > 1 ? config_.active_above : config_.active_alone_above;
+}
+
+double HazardLife::VerifyBelow(const LifeClass& entry) const {
+  return entry.confirmations > 1 ? config_.verify_below
+                                 : std::min(config_.verify_below, config_.active_alone_above);
+}
+
+std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
+                                                 const LifeRecord& life) const {
+  if (life.state == HazardState::kRejected) return DecideRejected(life);
+  if (auto gone = DecideGone(life)) return gone;
+  const double presence = Probability(life.log_odds);
+  const std::uint32_t supporters = Supporters(life);
+  const std::uint32_t opponents = Opponents(life);
+  switch (life.state) {
+    case HazardState::kCandidate:
+      if (supporters < entry.confirmations + opponents && !life.official) return std::nullopt;
+      if (presence < ActiveAbove(entry)) return std::nullopt;
+      return Transition(life, HazardState::kActive, "seen by " + VehiclesText(supporters));
+    case HazardState::kActive:
+      if (presence >= VerifyBelow(entry)) return std::nullopt;
+      return Transition(
+          life, HazardState::kVerifying,
+          PresenceText(life.log_odds) +
+              (opponents > 0
+                   ? ": denied by " + VehiclesText(opponents)
+                   : ": not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns))));
+    case HazardState::kVerifying:
+      if (presence < config_.sure_above) return std::nullopt;
+      return Transition(
+          life, HazardState::kActive,
+          "still there by " + VehiclesText(supporters) + ", " + PresenceText(life.log_odds));
+    default:
+      return std::nullopt;
+  }
+}
+
+bool HazardLife::IsDeniedAway(const LifeRecord& life) const {
+  return Opponents(life) >= config_.denials && Probability(life.log_odds) < config_.gone_below;
+}
+
+std::optional<LifeTransition> HazardLife::DecideGone(const LifeRecord& life) const {
+  if (IsDeniedAway(life)) {
+    return Transition(
+        life, HazardState::kGone,
+        "denied by " + VehiclesText(Opponents(life)) + ", " + PresenceText(life.log_odds));
+  }
+  if (Probability(life.undenied_log_odds) >= config_.gone_below) return std::nullopt;
+  return Transition(life, HazardState::kGone,
+                    "not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns)) + ", " +
+                        PresenceText(life.undenied_log_odds));
+}
+
+std::optional<LifeTransition> HazardLife::DecideRejected(const LifeRecord& life) const {
+  const std::uint32_t supporters = Supporters(life);
+  if (supporters >= config_.reopen_vehicles && Probability(life.log_odds) >= config_.active_above) {
+    return Transition(life, HazardState::kActive,
+                      "seen by " + VehiclesText(supporters) + " after its rejection");
+  }
+  const std::int64_t heard_ns = std::max(life.since_ns, life.last_yes_ns);
+  if (Seconds(life.at_ns - heard_ns) < config_.rejected_keep_s) return std::nullopt;
+  return Transition(life, HazardState::kGone,
+                    "rejected, and not seen for " + DurationText(Seconds(life.at_ns - heard_ns)));
+}
+
+double HazardLife::Presence(const LifeClass& entry, const LifeRecord& life,
+                            std::int64_t now_ns) const {
+  if (life.state == HazardState::kRejected || now_ns <= life.at_ns) {
+    return Probability(life.log_odds);
+  }
+  return Probability(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
+}
+
+std::int64_t HazardLife::NextChangeNs(const LifeClass& entry, const LifeRecord& life) const {
+  if (life.state == HazardState::kGone) return kNever;
+  if (life.state == HazardState::kRejected) {
+    return std::max(life.since_ns, life.last_yes_ns) + Nanoseconds(config_.rejected_keep_s);
+  }
+  const auto falls_in_s = [&](double log_odds, double below) {
+    const double share = below / Probability(log_odds);
+    return share >= 1 ? 0.0 : entry.survival.TimeTo(share, AgeS(life, life.at_ns));
+  };
+  double soonest_s = falls_in_s(life.undenied_log_odds, config_.gone_below);
+  if (Opponents(life) >= config_.denials) {
+    soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, config_.gone_below));
+  }
+  if (life.state == HazardState::kActive) {
+    soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, VerifyBelow(entry)));
+  }
+  // A little later than computed, so that rounding does not make it too early.
+  const double margin_s = 1e-3 + 1e-9 * (entry.survival.scale_s + AgeS(life, life.at_ns));
+  const double limited_s = std::min(soonest_s + margin_s, 1e9);
+  return life.at_ns + Nanoseconds(limited_s);
+}
+
+}  // namespace livemap

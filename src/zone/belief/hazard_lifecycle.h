@@ -1,0 +1,182 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/hazard_catalogue.h"
+#include "zone/belief/survival_model.h"
+#include "zone/belief/vehicle_trust.h"
+#include "zone/model/presence_record.h"
+
+namespace livemap {
+
+enum class EvidenceKind : std::uint8_t {
+  kSighting,    ///< A report.
+  kAnswerYes,   ///< To a poll, by a vehicle that could see the place.
+  kAnswerNo,    ///< The same.
+  kCantSee,     ///< Counts nothing.
+  kStillThere,  ///< Change detection between drives saw it on both.
+  kVanished,    ///< Change detection saw it on the earlier drive only.
+};
+
+/// What one vehicle says of one hazard.
+struct Evidence {
+  EvidenceKind kind = EvidenceKind::kSighting;
+  std::uint64_t vehicle = 0;  ///< VehicleKey.
+  std::int64_t stamp_ns = 0;  ///< Of the image.
+  /// P(its vehicle says what it likes), of VehicleTrust; `hostile_share` at least.
+  double hostile = 0;
+};
+
+/// What HazardLife knows of a hazard's class; made by LifeClassOf, cheap to copy.
+struct LifeClass {
+  std::uint32_t confirmations = 2;  ///< Distinct vehicles before drivers are told, 1 to kMaxVoices.
+  double hit_rate = 0.85;           ///< P(a vehicle that looks says yes | it is there).
+  double false_rate = 0.03;         ///< P(the same | it is not there).
+  ClassSurvival survival;
+};
+LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival);
+
+/// "`done` by `official`: `reason`", without the colon where there is no reason; at most 200 bytes.
+std::string DecisionText(const std::string& done, const std::string& official,
+                         const std::string& reason);
+
+/// A step from one state to another.
+struct LifeTransition {
+  std::optional<HazardState> from;  ///< None: the hazard is new.
+  HazardState to = HazardState::kCandidate;
+  std::string reason;  ///< One sentence of at most 200 bytes without full stop.
+};
+
+/// What came of one call.
+struct LifeStep {
+  std::optional<LifeTransition> transition;
+  bool counted = false;           ///< The evidence moved the odds.
+  LifeLesson lesson;              ///< For SurvivalModel::Learn, when the step is committed.
+  std::vector<Verdict> verdicts;  ///< For VehicleTrust::Judge, likewise.
+};
+
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+
+/// The rules by which one hazard lives: candidate, active, verifying, gone, rejected.
+///
+/// The presence probability p is a two-state filter in log odds (as of occupancy grids: Moravec and
+/// Elfes, 1985): between words of vehicles p shrinks by the class's survival, p(t + dt) = p(t)
+/// S(dt), for what has vanished does not come back; a word adds the logarithm of its likelihood
+/// ratio. Rates are of honest vehicles; a share h of hostile ones says what it likes, so the ratio
+/// of a yes is ((1-h) hit + h) / ((1-h) false + h). Evidence older than the odds counts less: the
+/// hazard may have ended since.
+///
+/// One vehicle is one voice: all that it says together moves the odds by at most ln((1-h)/h) either
+/// way, the second message of a kind adds less than the first, and messages lose nothing by their
+/// order. A voice for the hazard fades with the class's life, as what it said ages. Drivers are
+/// told when `confirmations` distinct vehicles more speak for a hazard than against it, or an
+/// official. What nobody asked for is chosen by its sender, so change evidence against a told
+/// hazard lowers p to `sure_above` at most: it makes the zone ask, and the answers decide. It is
+/// gone when two distinct vehicles speak against it and p is small, or by time alone: one vehicle
+/// can neither confirm nor remove, nor hasten the removal. See docs/life.md.
+///
+/// How far a vehicle is believed comes with its word (Evidence::hostile): h is the vehicle's own
+/// where it is above the share, so its voice has a lower bound, and from `suspect_above` on it
+/// counts as no vehicle. What becomes of words teaches that in turn, by verdicts, one per word. A
+/// hazard that another vehicle sees when the others make it sure bears out every voice for it and
+/// contradicts every voice against it: what is gone does not come back. One that is denied away
+/// bears out its opponents, and contradicts its supporters as far as it is likely that they saw
+/// nothing, rather than something that ended since. An official's word settles all.
+class HazardLife {
+ public:
+  struct Config {
+    double prior_presence = 0.2;        ///< Before the first vehicle speaks.
+    double active_above = 0.7;          ///< Drivers are told from this presence on,
+    double active_alone_above = 0.5;    ///< and of classes that one vehicle confirms from this one.
+    double verify_below = 0.7;          ///< An active hazard is verified below this presence (of
+                                        ///< classes that one vehicle confirms: active_alone_above)
+    double sure_above = 0.85;           ///< ...and active again from this one on.
+    double gone_below = 0.1;            ///< Off the map.
+    double surest = 0.995;              ///< Presence never counts as more certain than this.
+    double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
+    double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
+    double vanished_false_rate = 0.05;  ///< P(the same | it is there).
+    double suspect_above = 0.5;         ///< A vehicle this likely hostile is not counted as one.
+    double most_against = 1;            ///< No one verdict weighs more, log odds; an official's
+    double official_weight = 2;         ///< ...weighs this many times as much as a vehicle's.
+    std::uint32_t denials = 2;          ///< Distinct vehicles against it before it is gone.
+    double quarantine_s = 86400;        ///< A rejected hazard takes no support for this long.
+    std::uint32_t reopen_vehicles = 2;  ///< Distinct vehicles that reopen it afterwards.
+    double rejected_keep_s =
+        90 * 86400.0;  ///< Without support for this long it is forgotten (gone).
+  };
+
+  HazardLife();
+  /// Throws Error naming the first value that is out of range, and what is accepted.
+  explicit HazardLife(const Config& config);
+
+  /// A new hazard's first report. The transition has no `from`; its `to` is active at once where
+  /// one vehicle confirms the class.
+  LifeStep Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
+                 LifeRecord& life) const;
+  /// A further word, in any order of stamps. Does nothing to a hazard that is gone.
+  LifeStep Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
+                 LifeRecord& life) const;
+  /// Time passes. Cheap; nothing happens before NextChangeNs.
+  LifeStep Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
+  /// An official says that it is there (also revokes a rejection), or that it is not and never was;
+  /// `reason` may be empty. Nothing happens to a hazard that is gone; Reject leaves one that is off
+  /// the map alone, Confirm has a transition from active to active too.
+  LifeStep Confirm(const LifeClass& entry, const std::string& official, const std::string& reason,
+                   std::int64_t now_ns, LifeRecord& life) const;
+  LifeStep Reject(const LifeClass& entry, const std::string& official, const std::string& reason,
+                  std::int64_t now_ns, LifeRecord& life) const;
+  /// All that the vehicle said is taken back: the odds are as if it had said nothing, and a hazard
+  /// that no other vehicle saw is gone, one that too few others saw a candidate again. What an
+  /// official confirmed stays. The transition, with `why` as its reason, may lead to the same
+  /// state; none where the vehicle has no voice, or the hazard is gone.
+  LifeStep Withdraw(const LifeClass& entry, std::uint64_t vehicle, const std::string& why,
+                    std::int64_t now_ns, LifeRecord& life) const;
+
+  /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
+  double Presence(const LifeClass& entry, const LifeRecord& life, std::int64_t now_ns) const;
+  /// When Advance will do something if nobody speaks before; kNever if it will not. To be asked
+  /// again after every step. While the class is learned this may come early or late; Advance then
+  /// decides by what is known at its own time.
+  std::int64_t NextChangeNs(const LifeClass& entry, const LifeRecord& life) const;
+
+  const Config& config() const { return config_; }
+
+ private:
+  void MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const;
+  double LogRatio(const LifeClass& entry, const Evidence& evidence, double ended_since) const;
+  bool Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
+  bool HearUnasked(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
+  double MaxVoice(const Evidence& evidence) const;
+  void Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life, LifeStep& step) const;
+  double ActiveAbove(const LifeClass& entry) const;
+  double VerifyBelow(const LifeClass& entry) const;
+  std::optional<LifeTransition> Decide(const LifeClass& entry, const LifeRecord& life) const;
+  bool IsDeniedAway(const LifeRecord& life) const;
+  std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;
+  std::optional<LifeTransition> DecideRejected(const LifeRecord& life) const;
+
+  // Officials: hazard_officials.cpp.
+  void TakeBack(const LifeClass& entry, const Voice& taken, LifeRecord& life) const;
+  void Demote(const LifeClass& entry, const Voice& taken, std::int64_t now_ns,
+              LifeRecord& life) const;
+
+  // Verdicts: hazard_verdicts.cpp.
+  double WrongYes(const LifeClass& entry) const;
+  double WrongNo(const LifeClass& entry) const;
+  void JudgeSeen(const LifeClass& entry, const Evidence& seen, LifeRecord& life,
+                 LifeStep& step) const;
+  void JudgeDeniedAway(const LifeClass& entry, const LifeRecord& life, LifeStep& step) const;
+  void JudgeOfficially(const LifeClass& entry, bool there, const LifeRecord& life,
+                       LifeStep& step) const;
+
+  Config config_;
+  double max_log_odds_;  // Of presence, by `surest`.
+  double max_voice_;     // Of one vehicle, by `hostile_share`.
+};
+
+}  // namespace livemap

@@ -1,0 +1,112 @@
+#include "zone/belief/vehicle_trust.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/checks.h"
+#include "common/number_text.h"
+#include "common/time.h"
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMaxVouchersBytes = 200;
+
+}  // namespace
+
+VehicleTrust::VehicleTrust(const Config& config) : config_(config) {
+  CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
+  CheckRange("trust_memory_s", config.memory_s, 60, 1e10);
+  CheckRange("most_suspicion", config.most_suspicion, 0.1, 20);
+  CheckRange("max_vehicles", static_cast<double>(config.max_vehicles), 1, 1e9);
+  prior_log_odds_ = std::log(config.hostile_share / (1 - config.hostile_share));
+}
+
+double VehicleTrust::Faded(const TrustRecord& record, std::int64_t now_ns) const {
+  const double age_s = std::max(0.0, Seconds(now_ns) - Seconds(record.at_ns));
+  return record.suspicion * std::exp(-age_s / config_.memory_s);
+}
+
+double VehicleTrust::Hostile(std::uint64_t vehicle, std::int64_t now_ns) const {
+  const auto found = records_.find(vehicle);
+  const double suspicion = found == records_.end() ? 0 : Faded(found->second, now_ns);
+  return 1 / (1 + std::exp(-prior_log_odds_ - suspicion));
+}
+
+TrustRecord& VehicleTrust::Find(std::uint64_t vehicle, std::int64_t now_ns) {
+  const auto found = records_.find(vehicle);
+  if (found != records_.end()) return found->second;
+  if (records_.size() >= config_.max_vehicles) {
+    records_.erase(
+        std::min_element(records_.begin(), records_.end(), [&](const auto& a, const auto& b) {
+          return Faded(a.second, now_ns) < Faded(b.second, now_ns);
+        }));
+  }
+  return records_[vehicle];
+}
+
+void VehicleTrust::Judge(const Verdict& verdict, std::int64_t now_ns) {
+  if (verdict.vehicle == 0 || !std::isfinite(verdict.log_ratio)) return;
+  // Nothing is held against it, and more trust than a newcomer's there is not.
+  if (verdict.log_ratio <= 0 && records_.count(verdict.vehicle) == 0) return;
+  TrustRecord& record = Find(verdict.vehicle, now_ns);
+  record.suspicion = Faded(record, now_ns);
+  record.at_ns = std::max(record.at_ns, now_ns);
+  if (verdict.log_ratio < 0 && verdict.voucher != 0) {
+    auto& vouchers = record.vouchers;
+    if (std::find(vouchers.begin(), vouchers.end(), verdict.voucher) != vouchers.end()) return;
+    vouchers[record.next] = verdict.voucher;
+    record.next = static_cast<std::uint8_t>((record.next + 1) % vouchers.size());
+  }
+  record.suspicion = std::clamp(record.suspicion + verdict.log_ratio, 0.0, config_.most_suspicion);
+}
+
+void VehicleTrust::Distrust(std::uint64_t vehicle, std::int64_t now_ns) {
+  if (vehicle == 0) return;
+  TrustRecord& record = Find(vehicle, now_ns);
+  record.suspicion = config_.most_suspicion;
+  record.at_ns = std::max(record.at_ns, now_ns);
+}
+
+TrustRecord VehicleTrust::Get(std::uint64_t vehicle) const {
+  const auto found = records_.find(vehicle);
+  return found == records_.end() ? TrustRecord{} : found->second;
+}
+
+std::size_t VehicleTrust::Count(double hostile_above, std::int64_t now_ns) const {
+  return static_cast<std::size_t>(std::count_if(
+      records_.begin(), records_.end(),
+      [&](const auto& record) { return Hostile(record.first, now_ns) >= hostile_above; }));
+}
+
+bool VehicleTrust::Restore(std::uint64_t vehicle, const TrustRecord& record) {
+  const bool sound = vehicle != 0 && record.suspicion >= 0 && record.suspicion <= 100 &&
+                     record.at_ns >= 0 && record.next < record.vouchers.size();
+  if (!sound) return false;
+  TrustRecord taken = record;
+  taken.suspicion = std::min(taken.suspicion, config_.most_suspicion);
+  Find(vehicle, record.at_ns) = taken;
+  return true;
+}
+
+std::string PackVouchers(const TrustRecord& record) {
+  std::string line;
+  AppendNumber(line, static_cast<unsigned>(record.next));
+  for (const std::uint64_t voucher : record.vouchers) AppendNumber(line, voucher);
+  return line;
+}
+
+bool UnpackVouchers(const std::string& text, TrustRecord& record) {
+  if (text.size() > kMaxVouchersBytes) return false;
+  NumberReader reader(text);
+  unsigned next = 0;
+  auto vouchers = record.vouchers;
+  reader.Read(next);
+  for (std::uint64_t& voucher : vouchers) reader.Read(voucher);
+  if (!reader.good() || !reader.done() || next >= vouchers.size()) return false;
+  record.next = static_cast<std::uint8_t>(next);
+  record.vouchers = vouchers;
+  return true;
+}
+
+}  // namespace livemap

@@ -1,0 +1,183 @@
+#include "zone/offload/offload_intake.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/sha256.h"
+#include "placement/hazard_placement.h"
+#include "placement/road_ground_contact.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kEndlessM = 1e4;  // The projection's own limit; max_range_m is ours.
+
+std::uint8_t HexDigit(char digit) {
+  return static_cast<std::uint8_t>(digit <= '9' ? digit - '0' : digit - 'a' + 10);
+}
+
+}  // namespace
+
+Uuid CandidateReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
+                         const std::string& class_name, const Box& box) {
+  const auto tenths = [](float px) {
+    return "\n" + std::to_string(std::llround(static_cast<double>(px) * 10));
+  };
+  // Lines: no vehicle id and no class name holds a line end.
+  const std::string digest =
+      Sha256Hex("candidate\n" + vehicle_id + "\n" + std::to_string(stamp_ns) + "\n" + class_name +
+                tenths(box.x_min) + tenths(box.y_min) + tenths(box.x_max) + tenths(box.y_max));
+  Uuid uuid;
+  for (std::size_t i = 0; i < uuid.bytes.size(); ++i) {
+    uuid.bytes[i] =
+        static_cast<std::uint8_t>(HexDigit(digest[2 * i]) << 4 | HexDigit(digest[2 * i + 1]));
+  }
+  uuid.bytes[6] = static_cast<std::uint8_t>((uuid.bytes[6] & 0x0fU) | 0x80U);
+  uuid.bytes[8] = static_cast<std::uint8_t>((uuid.bytes[8] & 0x3fU) | 0x80U);
+  return uuid;
+}
+
+std::string CandidateIntake::Add(Candidate frame, std::int64_t now_ns) {
+  ++counters_.frames;
+  counters_.bytes += frame.image.size();
+  // The allowance first: refusing must not be free of charge.
+  if (!allowance_.Take(frame.vehicle_id, frame.image.size(), now_ns)) {
+    ++counters_.over_allowance;
+    return "vehicle has sent more than its allowance";
+  }
+  if (const auto why = WhyCandidateRefused(frame, config_.limits, now_ns)) {
+    ++counters_.refused;
+    return why->sentence;
+  }
+  if (!Remember(frame)) {
+    ++counters_.repeated;
+    return "frame came before";
+  }
+  waiting_bytes_ += frame.image.size();
+  waiting_.push_back(std::move(frame));
+  while (waiting_.size() > static_cast<std::size_t>(config_.max_waiting) ||
+         static_cast<double>(waiting_bytes_) > config_.max_waiting_bytes) {
+    waiting_bytes_ -= waiting_.front().image.size();
+    waiting_.pop_front();
+    ++counters_.displaced;
+  }
+  return {};
+}
+
+bool CandidateIntake::Remember(const Candidate& frame) {
+  const Key key(frame.vehicle_id, frame.stamp_ns);
+  if (!remembered_.insert(key).second) return false;
+  remembered_order_.push_back(key);
+  if (remembered_order_.size() > static_cast<std::size_t>(config_.max_remembered)) {
+    remembered_.erase(remembered_order_.front());
+    remembered_order_.pop_front();
+  }
+  return true;
+}
+
+const CandidateIntake::Job* CandidateIntake::Next(std::int64_t now_ns, double steady_s) {
+  if (waiting_.empty() || in_flight_.size() >= static_cast<std::size_t>(config_.max_in_flight)) {
+    return nullptr;
+  }
+  newest_internal_ns_ = std::max(now_ns, newest_internal_ns_ + 1);
+  InFlight next;
+  next.job.internal_ns = newest_internal_ns_;
+  next.job.frame = std::move(waiting_.front());
+  next.since_s = steady_s;
+  waiting_.pop_front();
+  waiting_bytes_ -= next.job.frame.image.size();
+  return &in_flight_.emplace(newest_internal_ns_, std::move(next)).first->second.job;
+}
+
+void CandidateIntake::Abandon(std::int64_t internal_ns) {
+  if (in_flight_.erase(internal_ns) != 0) ++counters_.undecodable;
+}
+
+std::vector<std::int64_t> CandidateIntake::Expire(double steady_s) {
+  std::vector<std::int64_t> lost;
+  for (auto entry = in_flight_.begin(); entry != in_flight_.end();) {
+    if (steady_s - entry->second.since_s < config_.detection_timeout_s) {
+      ++entry;
+      continue;
+    }
+    lost.push_back(entry->first);
+    ++counters_.lost_by_detector;
+    entry = in_flight_.erase(entry);
+  }
+  return lost;
+}
+
+std::vector<Report> CandidateIntake::Finish(std::int64_t internal_ns, const SightingFrame& answer) {
+  const auto found = in_flight_.find(internal_ns);
+  if (found == in_flight_.end()) return {};
+  const Candidate frame = std::move(found->second.job.frame);
+  in_flight_.erase(found);
+  ++counters_.detected;
+  counters_.sightings += answer.sightings.size();
+  if (answer.sightings.empty()) ++counters_.empty;
+  std::vector<Report> reports;
+  for (const Sighting& sighting : answer.sightings) {
+    if (!IsUsable(sighting)) continue;
+    const auto ground = PlaceOnRoad(frame, sighting);
+    if (ground) reports.push_back(ReportOf(frame, sighting, *ground));
+  }
+  counters_.reports += reports.size();
+  return reports;
+}
+
+bool CandidateIntake::IsUsable(const Sighting& sighting) {
+  if (!IsWellFormed(sighting)) {
+    ++counters_.invalid_sightings;
+    return false;
+  }
+  if (sighting.confidence < config_.min_confidence) {
+    ++counters_.below_confidence;
+    return false;
+  }
+  return true;
+}
+
+std::optional<GroundPoint> CandidateIntake::PlaceOnRoad(const Candidate& frame,
+                                                        const Sighting& sighting) {
+  if (IsCutBySide(sighting.box, frame.intrinsics.width)) {
+    ++counters_.cut_by_side;
+    return std::nullopt;
+  }
+  GroundProjectionNoise noise = config_.projection;
+  noise.max_range_m = kEndlessM;
+  auto ground =
+      ProjectToGround(FootPixel(sighting.box), frame.intrinsics, frame.base_from_optical, noise);
+  if (!ground) {
+    ++counters_.not_on_ground;
+    return std::nullopt;
+  }
+  const double heading_variance_rad2 = frame.fused ? frame.base.course_variance_rad2 : 0.0;
+  if (!IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
+                    config_.max_ground_sigma_m)) {
+    ++counters_.too_far;
+    return std::nullopt;
+  }
+  return ground;
+}
+
+Report CandidateIntake::ReportOf(const Candidate& frame, const Sighting& sighting,
+                                 const GroundPoint& ground) {
+  const PlacedHazard place = PlaceHazard(frame.base, Eigen::Vector2d::Zero(), ground);
+  Report report;
+  report.uuid =
+      CandidateReportUuid(frame.vehicle_id, frame.stamp_ns, sighting.class_name, sighting.box);
+  report.vehicle_id = frame.vehicle_id;
+  report.drive_id = frame.drive_id;
+  report.stamp_ns = frame.stamp_ns;
+  report.class_name = sighting.class_name;
+  report.confidence = sighting.confidence;
+  report.box = sighting.box;
+  report.position = place.position;
+  report.covariance_m2 = place.covariance_m2;
+  report.image_width = static_cast<std::uint32_t>(frame.intrinsics.width);
+  report.image_height = static_cast<std::uint32_t>(frame.intrinsics.height);
+  report.image_frame_id = frame.image_frame_id;
+  return report;
+}
+
+}  // namespace livemap

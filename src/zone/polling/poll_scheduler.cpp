@@ -1,0 +1,412 @@
+#include "zone/polling/poll_scheduler.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+#include "common/time.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kHourS = 3600;
+constexpr double kMinMovingMps = 1;     // Below it a course says little of where a vehicle goes.
+constexpr double kStandingReachM = 60;  // How far ahead a standing vehicle sees.
+constexpr double kNearestM = 8;         // Nearer it has passed before it can look.
+constexpr double kLongestS = 1e8;       // Nothing is planned further ahead, about three years.
+constexpr double kMetresPerDegree = 111320;
+// What waits around a vehicle is sought again after this part of its lookahead, a turn by this, or
+// this time: a poll may have become worth its bytes meanwhile.
+constexpr double kLookAgainShare = 0.1;
+constexpr double kLookAgainRad = 0.2;
+constexpr double kLookAgainS = 5;
+// After a long silence a million hazards are due at once; the zone has more to do than to ask.
+constexpr std::size_t kMostPerTick = 20000;
+// Log odds that evidence moves, and rounding does not.
+constexpr double kMovedOdds = 1e-3;
+
+/// Metres north and east, for places some hundred metres apart.
+std::pair<double, double> Offset(const GeoPoint& from, const GeoPoint& to) {
+  const double east_deg = std::remainder(to.longitude_deg - from.longitude_deg, 360.0);
+  return {(to.latitude_deg - from.latitude_deg) * kMetresPerDegree,
+          east_deg * kMetresPerDegree * std::cos(from.latitude_deg * kRadiansPerDegree)};
+}
+
+double ProbabilityOf(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
+
+void CheckPositive(const char* name, double value) {
+  if (value > 0 && value <= 1e12) return;
+  throw Error(std::string(name) + " is " + std::to_string(value) + ", accepted is above 0 to 1e12");
+}
+
+/// Edge of the grids' cells; what is out of range is refused later, by its name.
+double CellM(double lookahead_m) {
+  return lookahead_m >= 10 && lookahead_m <= 5000 ? lookahead_m : 10;
+}
+
+}  // namespace
+
+PollScheduler::PollScheduler(const Config& config, std::uint64_t hash_seed)
+    : config_(config),
+      waiting_(CellM(config.lookahead_m), hash_seed),
+      rider_grid_(CellM(config.lookahead_m), hash_seed) {
+  CheckPositive("price_s", config.price_s);
+  CheckPositive("bytes_per_hour", config.bytes_per_hour);
+  CheckPositive("poll_bytes", config.poll_bytes);
+  CheckPositive("lookahead_s", config.lookahead_s);
+  CheckPositive("answer_timeout_s", config.answer_timeout_s);
+  CheckPositive("same_vehicle_gap_s", config.same_vehicle_gap_s);
+  CheckPositive("vehicle_silence_s", config.vehicle_silence_s);
+  CheckPositive("corridor_m", config.corridor_m);
+  CheckPositive("max_vehicles", static_cast<double>(config.max_vehicles));
+  if (!(config.lookahead_m >= 10 && config.lookahead_m <= 5000)) {
+    throw Error("lookahead_m is " + std::to_string(config.lookahead_m) +
+                ", accepted is 10 to 5000 m");
+  }
+  if (!(config.picture_bytes >= 0) || !(config.corridor_slope >= 0)) {
+    throw Error("picture_bytes and corridor_slope must not be negative");
+  }
+  bucket_bytes_ = config.bytes_per_hour;
+}
+
+double PollScheduler::DebtS(const Target& target, std::int64_t now_ns) const {
+  const double dt_s = Seconds(std::max<std::int64_t>(0, now_ns - target.at_ns));
+  const double age_s = Seconds(std::max<std::int64_t>(0, target.at_ns - target.first_seen_ns));
+  const double there_s =
+      ProbabilityOf(target.log_odds) * target.survival.ExpectedTimeStanding(age_s, dt_s);
+  return target.debt_s + (IsTold(target.state) ? dt_s - there_s : there_s);
+}
+
+double PollScheduler::PriceS() const {
+  const double fill = std::clamp(bucket_bytes_ / config_.bytes_per_hour, 1e-3, 1.0);
+  return config_.price_s / (fill * fill);
+}
+
+std::int64_t PollScheduler::DueNs(const Target& target, double price_s) const {
+  const auto at = [&](double dt_s) { return target.at_ns + Nanoseconds(dt_s); };
+  if (target.debt_s >= price_s) return target.at_ns;
+  if (DebtS(target, at(kLongestS)) < price_s) return kNever;
+  // The debt grows with time, by at most one second per second.
+  double early_s = price_s - target.debt_s;
+  double late_s = kLongestS;
+  while (late_s - early_s > 0.5 + 1e-3 * early_s) {
+    // Geometric, because a minute and a month are both usual.
+    const double middle_s = std::sqrt(early_s * late_s);
+    (DebtS(target, at(middle_s)) < price_s ? early_s : late_s) = middle_s;
+  }
+  return at(late_s);
+}
+
+void PollScheduler::SetHazard(std::uint64_t hazard, const GeoPoint& position,
+                              const LifeClass& entry, const LifeRecord& life,
+                              std::int64_t picture_ns, std::int64_t now_ns) {
+  if (!IsOnMap(life.state) || !IsValid(position)) return RemoveHazard(hazard);
+  const auto [place, is_new] = hazards_.try_emplace(hazard);
+  Target& target = place->second;
+  double debt_s = 0;
+  if (!is_new) {
+    const double there = ProbabilityOf(target.log_odds);
+    const double dt_s = Seconds(std::max<std::int64_t>(0, life.at_ns - target.at_ns));
+    const double age_s = Seconds(std::max<std::int64_t>(0, target.at_ns - target.first_seen_ns));
+    const double expected = there * target.survival.Survival(age_s, dt_s);
+    const double moved = life.log_odds - std::log(expected / (1 - expected));
+    const bool told = IsTold(life.state);
+    debt_s = DebtS(target, life.at_ns);
+    // A word that bears the map out settles the debt; one against it is worth a question at once.
+    if (told ? moved > kMovedOdds : moved < -kMovedOdds) debt_s = 0;
+    if (told && moved < -kMovedOdds) debt_s = std::max(debt_s, config_.price_s);
+    // Told now: what was owed was owed for not telling.
+    if (told != IsTold(target.state)) debt_s = 0;
+    // At the bound of what counts as sure a yes moves nothing.
+    if (told && life.last_yes_ns > target.last_yes_ns) debt_s = 0;
+    StopWaiting(hazard, target);
+  }
+  target.position = position;
+  target.survival = entry.survival;
+  target.at_ns = life.at_ns;
+  target.first_seen_ns = life.first_seen_ns;
+  target.last_yes_ns = life.last_yes_ns;
+  target.picture_ns = picture_ns;
+  target.log_odds = life.log_odds;
+  target.debt_s = debt_s;
+  target.state = life.state;
+  for (const Voice& voice : life.voices) {
+    const std::int64_t at_ns = std::int64_t{voice.at_s} * 1'000'000'000;
+    if (voice.vehicle != 0 && Seconds(now_ns - at_ns) < config_.same_vehicle_gap_s) {
+      NoteAsked(hazard, voice.vehicle, at_ns);
+    }
+  }
+  Schedule(hazard, target, now_ns);
+}
+
+void PollScheduler::Schedule(std::uint64_t hazard, Target& target, std::int64_t now_ns) {
+  ++target.version;
+  const std::int64_t due_ns = DueNs(target, config_.price_s);
+  if (due_ns == kNever) return;
+  heap_.push_back({std::max(due_ns, now_ns), hazard, target.version});
+  std::push_heap(heap_.begin(), heap_.end());
+  CompactHeap();
+}
+
+void PollScheduler::CompactHeap() {
+  if (heap_.size() < 2 * hazards_.size() + 1024) return;
+  const auto is_stale = [this](const Due& due) {
+    const auto found = hazards_.find(due.hazard);
+    return found == hazards_.end() || found->second.version != due.version;
+  };
+  heap_.erase(std::remove_if(heap_.begin(), heap_.end(), is_stale), heap_.end());
+  std::make_heap(heap_.begin(), heap_.end());
+}
+
+void PollScheduler::StopWaiting(std::uint64_t hazard, Target& target) {
+  if (!target.waiting) return;
+  waiting_.Erase(target.position, hazard);
+  target.waiting = false;
+}
+
+void PollScheduler::RemoveHazard(std::uint64_t hazard) {
+  const auto found = hazards_.find(hazard);
+  if (found == hazards_.end()) return;
+  StopWaiting(hazard, found->second);
+  hazards_.erase(found);
+  asked_.erase(hazard);
+}
+
+void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& point) {
+  if (!IsValid(point.position)) return;
+  auto known = riders_by_id_.find(vehicle_id);
+  if (known == riders_by_id_.end()) {
+    if (riders_by_id_.size() >= config_.max_vehicles) ForgetRider(riders_.begin());
+    Rider rider;
+    rider.id = vehicle_id;
+    rider.key = VehicleKey(vehicle_id);
+    riders_.push_back(rider);
+    known = riders_by_id_.emplace(vehicle_id, std::prev(riders_.end())).first;
+    riders_by_key_[rider.key] = known->second;
+  } else {
+    rider_grid_.Erase(known->second->point.position, known->second->key);
+    riders_.splice(riders_.end(), riders_, known->second);
+  }
+  Rider& rider = *known->second;
+  rider.point = point;
+  rider_grid_.Insert(point.position, rider.key);
+  if (rider.moved || !SeesOtherPlaces(rider)) return;
+  moved_.push_back(rider.key);
+  rider.moved = true;
+}
+
+bool PollScheduler::SeesOtherPlaces(const Rider& rider) const {
+  if (!rider.looked_from) return true;
+  const TrackPoint& from = *rider.looked_from;
+  const auto [north_m, east_m] = Offset(from.position, rider.point.position);
+  // A course that is not a number is always another one.
+  const double turn_rad = std::remainder(rider.point.course_rad - from.course_rad, 2 * M_PI);
+  return Seconds(rider.point.stamp_ns - from.stamp_ns) >= kLookAgainS ||
+         std::hypot(north_m, east_m) > kLookAgainShare * config_.lookahead_m ||
+         !(std::abs(turn_rad) < kLookAgainRad) ||
+         rider.point.speed_mps > from.speed_mps + kMinMovingMps;
+}
+
+void PollScheduler::ForgetRider(RiderPlace rider) {
+  rider_grid_.Erase(rider->point.position, rider->key);
+  riders_by_key_.erase(rider->key);
+  riders_by_id_.erase(rider->id);
+  riders_.erase(rider);
+}
+
+std::vector<PollChoice> PollScheduler::TakeDue(std::int64_t now_ns) {
+  std::vector<PollChoice> choices;
+  Refill(now_ns);
+  while (!riders_.empty() &&
+         Seconds(now_ns - riders_.front().point.stamp_ns) > config_.vehicle_silence_s) {
+    ForgetRider(riders_.begin());
+  }
+  ExpirePolls(now_ns);
+  ForgetAsked(now_ns);
+  TakeFallenDue(now_ns);
+  // What fell due or is free again asks the vehicles around it...
+  std::vector<std::uint64_t> hazards;
+  hazards.swap(look_around_);
+  for (const std::uint64_t hazard : hazards) LookAround(hazard, now_ns, choices);
+  // ...and vehicles that moved meet what waits around them.
+  std::vector<std::uint64_t> moved;
+  moved.swap(moved_);
+  for (const std::uint64_t key : moved) {
+    const auto found = riders_by_key_.find(key);
+    if (found == riders_by_key_.end()) continue;
+    Rider& rider = *found->second;
+    rider.moved = false;
+    rider.looked_from = rider.point;
+    for (const auto& near : waiting_.Within(rider.point.position, config_.lookahead_m)) {
+      TryAsk(near.id, rider, now_ns, choices);
+    }
+  }
+  return choices;
+}
+
+void PollScheduler::Refill(std::int64_t now_ns) {
+  if (filled_ns_ != 0 && now_ns > filled_ns_) {
+    bucket_bytes_ += Seconds(now_ns - filled_ns_) / kHourS * config_.bytes_per_hour;
+    bucket_bytes_ = std::min(bucket_bytes_, config_.bytes_per_hour);
+  }
+  filled_ns_ = std::max(filled_ns_, now_ns);
+}
+
+void PollScheduler::TakeFallenDue(std::int64_t now_ns) {
+  const double price_s = PriceS();
+  for (std::size_t i = 0; i < kMostPerTick && !heap_.empty() && heap_.front().at_ns <= now_ns;
+       ++i) {
+    const Due due = heap_.front();
+    std::pop_heap(heap_.begin(), heap_.end());
+    heap_.pop_back();
+    const auto found = hazards_.find(due.hazard);
+    if (found == hazards_.end() || found->second.version != due.version) continue;
+    Target& target = found->second;
+    const std::int64_t due_ns = DueNs(target, price_s);
+    if (due_ns > now_ns) {
+      // Bytes are short and the price has risen; it may have fallen again within the quarter hour.
+      const std::int64_t again_ns = now_ns + Nanoseconds(kHourS / 4);
+      heap_.push_back({std::min(due_ns, again_ns), due.hazard, due.version});
+      std::push_heap(heap_.begin(), heap_.end());
+      continue;
+    }
+    waiting_.Insert(target.position, due.hazard);
+    target.waiting = true;
+    look_around_.push_back(due.hazard);
+  }
+}
+
+void PollScheduler::LookAround(std::uint64_t hazard, std::int64_t now_ns,
+                               std::vector<PollChoice>& choices) {
+  const auto found = hazards_.find(hazard);
+  if (found == hazards_.end() || !found->second.waiting) return;
+  auto near = rider_grid_.Within(found->second.position, config_.lookahead_m);
+  // The nearest first: its answer comes soonest.
+  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) {
+    return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.id < b.id;
+  });
+  for (const auto& neighbour : near) {
+    const auto rider = riders_by_key_.find(neighbour.id);
+    if (rider != riders_by_key_.end()) TryAsk(hazard, *rider->second, now_ns, choices);
+  }
+}
+
+void PollScheduler::TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_ns,
+                           std::vector<PollChoice>& choices) {
+  const auto found = hazards_.find(hazard);
+  if (found == hazards_.end()) return;
+  Target& target = found->second;
+  if (target.open >= config_.max_open_per_hazard || rider.open >= config_.max_open_per_vehicle) {
+    return;
+  }
+  if (Seconds(now_ns - rider.point.stamp_ns) > config_.vehicle_silence_s) return;
+  if (!Passes(rider.point, target.position) || WasAsked(hazard, rider.key, now_ns)) return;
+  if (bucket_bytes_ < config_.poll_bytes || DebtS(target, now_ns) < PriceS()) return;
+  PollChoice choice{hazard, rider.id, false, now_ns + Nanoseconds(config_.answer_timeout_s)};
+  double bytes = config_.poll_bytes;
+  const bool picture_old = Seconds(now_ns - target.picture_ns) > config_.picture_age_s;
+  const bool plenty =
+      bucket_bytes_ > config_.picture_share * config_.bytes_per_hour + config_.picture_bytes;
+  if (config_.picture_bytes > 0 && picture_old && plenty) {
+    choice.picture_wanted = true;
+    bytes += config_.picture_bytes;
+  }
+  bucket_bytes_ -= bytes;
+  bytes_ += bytes;
+  ++target.open;
+  ++rider.open;
+  ++open_count_;
+  NoteAsked(hazard, rider.key, now_ns);
+  open_.push_back({hazard, rider.id, choice.expires_ns, bytes});
+  choices.push_back(std::move(choice));
+}
+
+bool PollScheduler::Passes(const TrackPoint& point, const GeoPoint& place) const {
+  if (!std::isfinite(point.course_rad) || !std::isfinite(point.speed_mps)) return false;
+  const auto [north_m, east_m] = Offset(point.position, place);
+  const double sine = std::sin(point.course_rad);
+  const double cosine = std::cos(point.course_rad);
+  const double ahead_m = east_m * sine + north_m * cosine;
+  const double aside_m = std::abs(east_m * cosine - north_m * sine);
+  const double reach_m = point.speed_mps < kMinMovingMps
+                             ? kStandingReachM
+                             : std::max(kStandingReachM, point.speed_mps * config_.lookahead_s);
+  return ahead_m >= kNearestM && ahead_m <= std::min(reach_m, config_.lookahead_m) &&
+         aside_m <= config_.corridor_m + config_.corridor_slope * ahead_m;
+}
+
+void PollScheduler::NoteAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns) {
+  Asked& asked = asked_[hazard];
+  const auto known = std::find(asked.vehicle.begin(), asked.vehicle.end(), vehicle);
+  if (known != asked.vehicle.end()) {
+    auto& noted_ns = asked.at_ns[static_cast<std::size_t>(known - asked.vehicle.begin())];
+    if (noted_ns >= at_ns) return;
+    noted_ns = at_ns;
+  } else {
+    asked.vehicle[asked.next] = vehicle;
+    asked.at_ns[asked.next] = at_ns;
+    asked.next = (asked.next + 1) % asked.vehicle.size();
+  }
+  asked_order_.emplace_back(at_ns, hazard);
+}
+
+bool PollScheduler::WasAsked(std::uint64_t hazard, std::uint64_t vehicle,
+                             std::int64_t now_ns) const {
+  const auto found = asked_.find(hazard);
+  if (found == asked_.end()) return false;
+  const Asked& asked = found->second;
+  for (std::size_t i = 0; i < asked.vehicle.size(); ++i) {
+    if (asked.vehicle[i] != vehicle) continue;
+    return Seconds(now_ns - asked.at_ns[i]) < config_.same_vehicle_gap_s;
+  }
+  return false;
+}
+
+void PollScheduler::ForgetAsked(std::int64_t now_ns) {
+  // Nearly in order of time; an entry behind a later one only stays a little longer.
+  while (!asked_order_.empty() &&
+         Seconds(now_ns - asked_order_.front().first) > config_.same_vehicle_gap_s) {
+    const auto found = asked_.find(asked_order_.front().second);
+    asked_order_.pop_front();
+    if (found == asked_.end()) continue;
+    const auto& at_ns = found->second.at_ns;
+    const std::int64_t newest_ns = *std::max_element(at_ns.begin(), at_ns.end());
+    if (Seconds(now_ns - newest_ns) > config_.same_vehicle_gap_s) asked_.erase(found);
+  }
+}
+
+void PollScheduler::ExpirePolls(std::int64_t now_ns) {
+  while (!open_.empty() && (open_.front().closed || open_.front().expires_ns <= now_ns)) {
+    Close(open_.front());
+    open_.pop_front();
+  }
+}
+
+void PollScheduler::Close(Open& poll) {
+  if (poll.closed) return;
+  poll.closed = true;
+  --open_count_;
+  const auto hazard = hazards_.find(poll.hazard);
+  if (hazard != hazards_.end() && hazard->second.open > 0) {
+    --hazard->second.open;
+    look_around_.push_back(poll.hazard);
+  }
+  const auto rider = riders_by_id_.find(poll.vehicle_id);
+  if (rider != riders_by_id_.end() && rider->second->open > 0) --rider->second->open;
+}
+
+bool PollScheduler::Answered(std::uint64_t hazard, const std::string& vehicle_id, double bytes,
+                             std::int64_t now_ns) {
+  const auto found = std::find_if(open_.begin(), open_.end(), [&](const Open& poll) {
+    return !poll.closed && poll.hazard == hazard && poll.vehicle_id == vehicle_id;
+  });
+  if (found == open_.end() || found->expires_ns <= now_ns) return false;
+  if (bytes >= 0 && std::isfinite(bytes)) {
+    bucket_bytes_ = std::min(config_.bytes_per_hour, bucket_bytes_ + found->bytes - bytes);
+    bytes_ += bytes - found->bytes;
+  }
+  Close(*found);
+  return true;
+}
+
+}  // namespace livemap

@@ -1,0 +1,137 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "geo/geo_box.h"
+#include "geo/spatial_grid.h"
+#include "protocol/hazard_catalogue.h"
+#include "protocol/report.h"
+#include "zone/belief/hazard_fusion.h"
+#include "zone/model/hazard.h"
+#include "zone/registry/hazard_record.h"
+#include "zone/registry/uuid_index.h"
+
+namespace livemap {
+
+/// A stored picture by content; both empty without one.
+struct PictureName {
+  std::string sha256;
+  std::string format;
+};
+
+/// All hazards of the zone in memory: which known hazard a report belongs to, and what changed
+/// since when. Knows no clock, no store and no threads; the same calls give the same state.
+///
+/// Changes between Begin and Commit can be taken back with Rollback, so that memory and store stay
+/// the same when a commit fails. Without Begin every change is final.
+class HazardRegistry {
+ public:
+  /// A hazard's place in memory; slots count from 0 in the order of arrival.
+  using Slot = std::uint32_t;
+
+  /// Radii come from the catalogue. `hash_seed`: see SpatialGrid.
+  HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule = {});
+
+  /// Takes in a hazard as the store kept it under `id`; in ascending order of sequence. The life's
+  /// state counts, the hazard's presence too. Throws Error when its uuid or sequence is not new.
+  void Restore(const Hazard& hazard, const LifeRecord& life, std::uint32_t id);
+  /// New hazards get ids above `id`: the store has rows up to there.
+  void SkipIdsTo(std::uint32_t id) { last_id_ = std::max(last_id_, id); }
+
+  /// The nearest hazard of this class that is not gone within the class's radius (geodesic), the
+  /// older one among equals. `position` must be valid.
+  std::optional<Slot> FindMatch(const std::string& class_name, const GeoPoint& position) const;
+
+  /// Puts in a new hazard; SetLife gives it its life.
+  Slot Add(const Report& report, const PictureName& picture, const Uuid& uuid,
+           std::uint64_t sequence, std::int64_t now_ns);
+  /// Counts the report as a sighting of `slot`; the newer image's picture stays.
+  void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
+             std::int64_t now_ns);
+  /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
+  void SetLife(Slot slot, const LifeRecord& life, double presence, std::uint64_t sequence,
+               std::int64_t now_ns);
+  /// A newer picture.
+  void SetPicture(Slot slot, const PictureName& picture);
+  /// Drivers are told of the hazard as it is now.
+  void MarkAnnounced(Slot slot);
+
+  Hazard Get(Slot slot) const;
+  const HazardRecord& Record(Slot slot) const { return records_[slot]; }
+  const std::string& ClassName(Slot slot) const {
+    return classes_[records_[slot].hazard_class].name;
+  }
+  HazardState State(Slot slot) const { return records_[slot].life.state; }
+  std::optional<Slot> Find(const Uuid& uuid) const;
+  std::size_t size() const { return records_.size(); }
+  /// How many are in each state, by HazardState.
+  const std::array<std::size_t, kHazardStates>& counts() const { return counts_; }
+  /// On the officials' map.
+  std::size_t on_map_count() const;
+
+  /// As ZoneService::Query.
+  std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
+                            std::size_t limit, const HazardStates& states = {}) const;
+  /// Those that are not gone and of which the vehicle (VehicleKey) has said something.
+  std::vector<Slot> SpokenOfBy(std::uint64_t vehicle) const;
+  /// As ZoneService::QueryNear.
+  std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
+
+  /// As ZoneService::ChangedAround.
+  std::vector<Hazard> ChangedAround(const GeoPoint& centre, double radius_m,
+                                    std::uint64_t since_sequence, std::size_t limit) const;
+
+  void Begin();
+  void Commit();
+  void Rollback();
+
+ private:
+  struct Change {
+    std::uint64_t sequence = 0;
+    Slot slot = 0;
+  };
+  struct Undo {
+    Slot slot = 0;
+    bool is_new = false;
+    HazardRecord before;  ///< Unless it is new.
+  };
+  struct Class {
+    std::string name;
+    double radius_m;
+    SpatialGrid grid;  ///< All that are not gone.
+  };
+
+  std::uint32_t ClassOf(const std::string& class_name);
+  Slot Append(const HazardRecord& record);
+  void PutOnGrid(Slot slot);
+  void TakeFromGrid(Slot slot);
+  void RememberForUndo(Slot slot);
+  void NoteChange(Slot slot);
+  void CompactChanges();
+  void TakeBack(const Undo& undo);
+  std::vector<Change>::const_iterator ChangesSince(std::uint64_t sequence) const;
+
+  HazardCatalogue catalogue_;
+  std::uint64_t hash_seed_;
+  FusionRule rule_;
+  HazardRecords records_;  ///< By slot.
+  UuidIndex slots_;
+  std::vector<Class> classes_;
+  std::unordered_map<std::string, std::uint32_t> class_places_;  ///< By name, in classes_.
+  std::uint32_t last_id_ = 0;
+  /// In ascending order of sequence; an entry is stale once its hazard has a newer sequence.
+  std::vector<Change> changes_;
+  std::array<std::size_t, kHazardStates> counts_{};
+  bool in_transaction_ = false;
+  std::size_t changes_at_begin_ = 0;
+  std::vector<Undo> undo_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,61 @@
+#include "zone/registry/vehicle_table.h"
+
+#include <algorithm>
+
+namespace livemap {
+namespace {
+
+constexpr std::size_t kMostPlaces = 240;
+constexpr std::int64_t kTrackNs = 120'000'000'000;
+
+}  // namespace
+
+VehicleTable::VehicleTable(double retention_s, std::size_t max_vehicles)
+    : retention_ns_(static_cast<std::int64_t>(retention_s * 1e9)), max_vehicles_(max_vehicles) {}
+
+void VehicleTable::Update(const VehicleState& vehicle) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto known = vehicles_.find(vehicle.vehicle_id);
+  if (known == vehicles_.end()) {
+    MakeRoom(vehicle.heard_ns);
+    known = vehicles_.emplace(vehicle.vehicle_id, Vehicle{}).first;
+  }
+  known->second.state = vehicle;
+  std::deque<TrackPoint>& track = known->second.track;
+  // The zone's clock may be set back; a track is in order.
+  if (!track.empty() && vehicle.heard_ns < track.back().stamp_ns) track.clear();
+  track.push_back({vehicle.heard_ns, vehicle.position, vehicle.course_rad, vehicle.speed_mps});
+  while (track.size() > kMostPlaces || vehicle.heard_ns - track.front().stamp_ns > kTrackNs) {
+    track.pop_front();
+  }
+}
+
+void VehicleTable::MakeRoom(std::int64_t now_ns) {
+  for (auto other = vehicles_.begin(); other != vehicles_.end();) {
+    const bool forgotten = now_ns - other->second.state.heard_ns > retention_ns_;
+    other = forgotten ? vehicles_.erase(other) : std::next(other);
+  }
+  if (vehicles_.size() < max_vehicles_) return;
+  vehicles_.erase(
+      std::min_element(vehicles_.begin(), vehicles_.end(), [](const auto& a, const auto& b) {
+        return a.second.state.heard_ns < b.second.state.heard_ns;
+      }));
+}
+
+std::vector<VehicleState> VehicleTable::List(std::int64_t now_ns) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<VehicleState> result;
+  for (const auto& [id, vehicle] : vehicles_) {
+    if (now_ns - vehicle.state.heard_ns <= retention_ns_) result.push_back(vehicle.state);
+  }
+  return result;
+}
+
+std::vector<TrackPoint> VehicleTable::Track(const std::string& vehicle_id) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto known = vehicles_.find(vehicle_id);
+  if (known == vehicles_.end()) return {};
+  return {known->second.track.begin(), known->second.track.end()};
+}
+
+}  // namespace livemap

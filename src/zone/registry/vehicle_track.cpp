@@ -1,0 +1,76 @@
+#include "zone/registry/vehicle_track.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "common/time.h"
+
+namespace livemap {
+namespace {
+
+constexpr double kStepM = 5;        // Between looks along a straight piece of way.
+constexpr double kMaxSteps = 1000;  // A track from outside may jump.
+constexpr double kMinTravelM = 2;   // Less says nothing of the direction.
+
+struct Look {
+  Eigen::Vector2d offset_m;  // From the vehicle to the place, east and north.
+  double course_rad;         // NaN: it may look anywhere.
+};
+
+bool Sees(const Look& look, const SightRule& rule) {
+  const double distance_m = look.offset_m.norm();
+  if (distance_m <= rule.position_slack_m) return true;
+  if (!(distance_m <= rule.range_m + rule.position_slack_m)) return false;
+  if (std::isnan(look.course_rad)) return true;
+  const Eigen::Vector2d ahead(std::sin(look.course_rad), std::cos(look.course_rad));
+  const double cosine = std::clamp(ahead.dot(look.offset_m) / distance_m, -1.0, 1.0);
+  const double slack_rad = std::asin(rule.position_slack_m / distance_m);
+  return std::acos(cosine) <= rule.half_angle_rad + slack_rad;
+}
+
+/// The way from `a` to `b`, as far as it lies within `from_s` and `to_s` of the track's time.
+bool SeesOnTheWay(const TrackPoint& a, const TrackPoint& b, const Eigen::Vector2d& a_m,
+                  const Eigen::Vector2d& b_m, double begin, double end, const SightRule& rule) {
+  const Eigen::Vector2d travel_m = b_m - a_m;
+  const double length_m = travel_m.norm();
+  const bool moved = length_m > kMinTravelM;
+  const double course_rad = moved ? std::atan2(travel_m.x(), travel_m.y())
+                                  : (std::isnan(a.course_rad) ? b.course_rad : a.course_rad);
+  const double steps = std::clamp(std::ceil(length_m * (end - begin) / kStepM), 1.0, kMaxSteps);
+  for (double i = 0; i <= steps; i += 1) {
+    const Eigen::Vector2d at_m = a_m + travel_m * (begin + (end - begin) * i / steps);
+    if (Sees({-at_m, course_rad}, rule)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns, const GeoPoint& place,
+              const SightRule& rule) {
+  if (!IsValid(place)) return false;
+  const LocalFrame frame(place);
+  const auto offset_s = [&](const TrackPoint& point) { return Seconds(point.stamp_ns - stamp_ns); };
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const TrackPoint& point = track[i];
+    if (!IsValid(point.position)) continue;
+    const Eigen::Vector2d at_m = frame.ToEnu(point.position);
+    if (std::abs(offset_s(point)) <= rule.window_s && Sees({-at_m, point.course_rad}, rule)) {
+      return true;
+    }
+    if (i == 0 || !IsValid(track[i - 1].position)) continue;
+    const double from_s = offset_s(track[i - 1]);
+    const double gap_s = offset_s(point) - from_s;
+    if (!(gap_s > 0 && gap_s <= 2 * rule.window_s)) continue;
+    // The part of this piece that lies within the window, as shares of its time.
+    const double begin = std::max(0.0, (-rule.window_s - from_s) / gap_s);
+    const double end = std::min(1.0, (rule.window_s - from_s) / gap_s);
+    if (begin > end) continue;
+    const Eigen::Vector2d before_m = frame.ToEnu(track[i - 1].position);
+    if (SeesOnTheWay(track[i - 1], point, before_m, at_m, begin, end, rule)) return true;
+  }
+  return false;
+}
+
+}  // namespace livemap

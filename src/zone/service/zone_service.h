@@ -1,0 +1,224 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/sqlite.h"
+#include "geo/geo_box.h"
+#include "protocol/hazard_catalogue.h"
+#include "protocol/map_change_report.h"
+#include "protocol/poll.h"
+#include "protocol/report.h"
+#include "zone/admission/report_validation.h"
+#include "zone/admission/speed_rule.h"
+#include "zone/admission/vehicle_allowance.h"
+#include "zone/belief/hazard_lifecycle.h"
+#include "zone/belief/survival_model.h"
+#include "zone/belief/vehicle_trust.h"
+#include "zone/model/hazard.h"
+#include "zone/model/map_change.h"
+#include "zone/model/poll_answer.h"
+#include "zone/model/store_damage.h"
+#include "zone/model/vehicle_state.h"
+#include "zone/polling/poll_scheduler.h"
+#include "zone/registry/map_change_registry.h"
+#include "zone/registry/vehicle_track.h"
+
+namespace livemap {
+
+/// One message of the zone's stream: exactly one of the three is set.
+struct ZoneEvent {
+  std::optional<HazardEvent> hazard;
+  std::optional<MapChangeEvent> map_change;
+  std::optional<VehicleState> vehicle;
+};
+
+/// The zone asks one vehicle whether a hazard is still there.
+struct PollOrder {
+  Uuid poll;
+  Uuid hazard;
+  std::string vehicle_id;  ///< Addressee.
+  std::string class_name;
+  GeoPoint position;
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
+  std::int64_t expires_ns = 0;  ///< Zone clock (UTC); later answers do not count.
+  PollPicture picture = PollPicture::kNone;
+  std::uint32_t max_picture_bytes = 0;
+};
+
+/// What became of the reports, vehicle positions and polls since start.
+struct ZoneStatistics {
+  std::uint64_t added = 0;     ///< Reports that became a new hazard.
+  std::uint64_t merged = 0;    ///< Reports counted as a sighting of a known hazard.
+  std::uint64_t repeated = 0;  ///< Reports whose uuid was committed before.
+  std::uint64_t refused = 0;   ///< For good; all kinds together.
+  /// Of those, by RefusalKind.
+  std::array<std::uint64_t, kRefusalKinds> refused_by_kind{};
+  std::uint64_t not_now = 0;  ///< Beyond a vehicle's hourly cap: not answered, sent again later.
+  std::uint64_t store_errors = 0;  ///< Batches and decisions that the store could not keep.
+  std::uint64_t vehicle_positions = 0;
+  std::uint64_t vehicle_positions_refused = 0;
+  std::uint64_t polls = 0;    ///< Asked.
+  std::uint64_t answers = 0;  ///< Counted.
+  std::uint64_t answers_refused =
+      0;                           ///< Unknown, expired, another's, or from where nobody sees it.
+  std::size_t active_hazards = 0;  ///< On the map: candidate, active or verifying.
+  std::array<std::size_t, kHazardStates> hazards_by_state{};  ///< By HazardState.
+  std::uint64_t image_bytes = 0;                              ///< On disk.
+  std::size_t suspect_vehicles = 0;  ///< Too often contradicted: they do not count as vehicles.
+  MapChangeStatistics map_changes;
+  StoreDamage store_damage;  ///< What was found broken in the store at start.
+};
+
+/// The zone's state behind one thread-safe door: registry, store, pictures, vehicles, event stream.
+///
+/// Promises: a COMMITTED receipt is returned only after the report, its hazard and its event are in
+/// the database with synchronous=FULL; a report's uuid counts once, also across restarts; a reader
+/// never sees what is not committed; events reach subscribers after their commit, in the order of
+/// their sequence.
+class ZoneService {
+ public:
+  struct Config {
+    std::string directory;              ///< Holds zone.sqlite3 and images/; made when missing.
+    double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
+    double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
+    std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
+    std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
+    PollPicture poll_picture = PollPicture::kCrop;  ///< What polls ask for, where they want one.
+    ReportLimits limits;
+    SpeedRule speed;
+    VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
+    HazardLife::Config life;
+    SurvivalModel::Config survival;
+    VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
+    PollScheduler::Config polls;
+    MapChangeRegistry::Rule map_changes;
+    double map_changes_per_hour = 240;  ///< Of one vehicle, >= 1; further ones must wait.
+    SightRule sight;                    ///< Whose answer to a poll counts.
+    /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
+    /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
+    bool replay = false;
+    HazardCatalogue catalogue;
+  };
+  using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
+  using Subscriber = std::function<void(const ZoneEvent&)>;
+
+  /// Opens or makes the store and loads it; rows of impossible values are left out, left alone and
+  /// counted. `uuid_seed` seeds the ids of new hazards: a test gives
+  /// a number, a node gives entropy. Throws Error for a bad setting, StoreError for a store that
+  /// cannot be used: not writable, corrupt, or of a newer schema.
+  ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed);
+  ~ZoneService();
+  ZoneService(const ZoneService&) = delete;
+  ZoneService& operator=(const ZoneService&) = delete;
+
+  /// Validates, registers or merges, commits; idempotent by uuid. Throws StoreError when the store
+  /// fails: then nothing of the report counts, and the vehicle sends it again. Throws Error when
+  /// the vehicle's hourly cap is reached: HandleBatch just leaves such a report unanswered.
+  Receipt Handle(const Report& report);
+  /// The same for many in one transaction, in order; one receipt per report in the order of the
+  /// reports, but none for a report that is not taken now (see Config::allowance): its
+  /// vehicle sends it again. All or nothing when the store fails.
+  std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
+
+  /// What vehicles tell of map changes: as HandleBatch, with their own hourly cap
+  /// (Config::map_changes_per_hour) and without a rule about speed. A receipt's hazard_uuid is that
+  /// of the feature.
+  std::vector<Receipt> HandleMapChanges(const std::vector<MapChangeReport>& reports);
+  /// Features whose last event is newer than `since_sequence`, in the order of that sequence, at
+  /// most `limit`: open ones, with `since_sequence` > 0 the others too. With `states` exactly those
+  /// in one of them. Sequences are those of hazards' events, too.
+  std::vector<MapChangeFeature> QueryMapChanges(const std::optional<GeoBox>& box,
+                                                std::uint64_t since_sequence, std::size_t limit,
+                                                const MapChangeStates& states = {}) const;
+  std::optional<MapChangeFeature> FindMapChange(const Uuid& uuid) const;
+  /// As Events.
+  std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit) const;
+  /// An official's decisions, as Confirm and Reject below. False when there is no such feature, or
+  /// none to decide about (MapChangeRegistry::Decide).
+  bool ConfirmMapChange(const Uuid& uuid, const std::string& official,
+                        const std::string& reason = "");
+  bool DismissMapChange(const Uuid& uuid, const std::string& official, const std::string& reason);
+
+  /// Hazards whose last event is newer than `since_sequence`, in the order of that sequence, at
+  /// most `limit`. Those on the officials' map; gone and rejected ones too when `since_sequence`
+  /// > 0, so that a view catches up after a gap. With `states` exactly those in one of them.
+  std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
+                            std::size_t limit, const HazardStates& states = {}) const;
+  /// Hazards that drivers are told of within `radius_m` of `centre`, nearest first, at most
+  /// `limit`.
+  std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
+  /// What a vehicle that knows all announcements up to `since_sequence` must hear: hazards within
+  /// `radius_m` of `centre` that were announced since, in the order of their last announcement, at
+  /// most `limit`. Those that drivers are no longer told of too (IsTold(state) is false), unless
+  /// `since_sequence` is 0.
+  std::vector<Hazard> ChangedAround(const GeoPoint& centre, double radius_m,
+                                    std::uint64_t since_sequence, std::size_t limit) const;
+  /// Also one that is gone or rejected.
+  std::optional<Hazard> Find(const Uuid& uuid) const;
+  /// The newest `limit` events of a hazard, oldest of them first; empty for an unknown one. Throws
+  /// StoreError.
+  std::vector<StoredEvent> Events(const Uuid& hazard, std::size_t limit) const;
+
+  /// An official's decisions. Each is committed with its event, whose reason names the official
+  /// (printable UTF-8 of at most 64 bytes) and gives `reason` as far as 200 bytes go. False when no
+  /// hazard of that uuid is on the map (Confirm: or it is rejected, which it revokes). Throw Error
+  /// for an unacceptable name, StoreError when the store fails.
+  bool Reject(const Uuid& hazard, const std::string& official, const std::string& reason);
+  bool Confirm(const Uuid& hazard, const std::string& official, const std::string& reason = "");
+  /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
+  /// suspicion does, and all that it said is taken back from the hazards that are not gone
+  /// (HazardLife::Withdraw), each with an event whose reason names vehicle and official as far as
+  /// 200 bytes go. Returns how many hazards that were; none when the zone has never heard of the
+  /// vehicle. A few thousand hazards are committed at a time: when it throws StoreError those
+  /// before stay changed, and another call does the rest. Throws Error as Reject does.
+  std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
+                                      const std::string& reason);
+  /// Takes a hazard off the map for good. False when none of that uuid is on the map.
+  bool Remove(const Uuid& hazard, const std::string& reason);
+
+  /// Polls to be sent now; each is remembered until it is answered or expires. They are not stored:
+  /// after a restart the zone asks anew.
+  std::vector<PollOrder> TakeDuePolls();
+  /// Counts the answer and commits what follows. False, and counted, when the answer is not
+  /// acceptable: the poll is unknown, expired or another vehicle's, its stamp is off, or that
+  /// vehicle cannot have seen the place by the positions that the zone knows. Throws StoreError:
+  /// then the poll stays open.
+  bool HandleAnswer(const PollAnswer& answer);
+  /// Time passes: commits the transitions that are due. To be called about once a second. Throws
+  /// StoreError: then nothing has changed.
+  void Advance();
+
+  /// File of a stored picture; only 64 lower-case hex digits name one.
+  std::optional<std::string> ImagePath(const std::string& sha256) const;
+
+  /// Remembers where a vehicle is and tells subscribers. False, and counted, when the position or
+  /// the ids are not acceptable.
+  bool UpdateVehicle(const VehicleState& vehicle);
+  /// Vehicles heard of within the retention time, by id.
+  std::vector<VehicleState> Vehicles() const;
+
+  /// `subscriber` is called from whichever thread commits, one call at a time. It may read from
+  /// this service but must neither write to it nor (un)subscribe.
+  int Subscribe(Subscriber subscriber);
+  /// When this returns the subscriber is not running and will not be called again.
+  void Unsubscribe(int id);
+
+  /// Of the newest event; 0 when nothing ever happened.
+  std::uint64_t Sequence() const;
+  /// Of the newest event that drivers were told; 0 without one.
+  std::uint64_t AnnouncedSequence() const;
+  ZoneStatistics Statistics() const;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace livemap

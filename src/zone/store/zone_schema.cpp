@@ -1,0 +1,259 @@
+#include "zone/store/zone_schema.h"
+
+#include <array>
+#include <vector>
+
+#include "common/sqlite.h"
+
+namespace livemap {
+namespace {
+
+using Statements = std::vector<const char*>;
+
+// Step i brings schema version i to i + 1. Never edited once released. Plain SQL that other
+// databases understand: times are ns since 1970 (UTC), positions WGS84 degrees, covariances m^2 in
+// east-north axes, uuids their usual text.
+
+const Statements& ToVersion1() {
+  static const Statements kStatements{
+      R"(CREATE TABLE hazards (
+           uuid VARCHAR(36) PRIMARY KEY,
+           class_name TEXT NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL,
+           sightings BIGINT NOT NULL,
+           first_seen_ns BIGINT NOT NULL,
+           last_seen_ns BIGINT NOT NULL,
+           updated_ns BIGINT NOT NULL,
+           sequence BIGINT NOT NULL UNIQUE,
+           image_sha256 VARCHAR(64) NOT NULL,
+           image_format VARCHAR(8) NOT NULL,
+           active INTEGER NOT NULL))",
+      R"(CREATE TABLE reports (
+           uuid VARCHAR(36) PRIMARY KEY,
+           hazard_uuid VARCHAR(36) NOT NULL REFERENCES hazards (uuid),
+           vehicle_id TEXT NOT NULL,
+           drive_id TEXT NOT NULL,
+           stamp_ns BIGINT NOT NULL,
+           received_ns BIGINT NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL,
+           image_sha256 VARCHAR(64) NOT NULL))",
+      "CREATE INDEX reports_by_hazard ON reports (hazard_uuid)",
+      R"(CREATE TABLE events (
+           sequence BIGINT PRIMARY KEY,
+           hazard_uuid VARCHAR(36) NOT NULL REFERENCES hazards (uuid),
+           action INTEGER NOT NULL,
+           reason TEXT NOT NULL,
+           at_ns BIGINT NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (1)"};
+  return kStatements;
+}
+
+/// Hazards get a life, events their states. Rows refer to hazards by a small rising number, and
+/// only the uuids of reports are indexed: what a commit touches at random places is what it costs.
+/// All that version 1 had on its map was told to drivers.
+const Statements& ToVersion2() {
+  static const Statements kStatements{"ALTER TABLE hazards RENAME TO hazards_1",
+                                      "ALTER TABLE reports RENAME TO reports_1",
+                                      "ALTER TABLE events RENAME TO events_1",
+                                      R"(CREATE TABLE hazards (
+           id INTEGER PRIMARY KEY,
+           uuid VARCHAR(36) NOT NULL,
+           class_name TEXT NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL,
+           sightings BIGINT NOT NULL,
+           first_seen_ns BIGINT NOT NULL,
+           last_seen_ns BIGINT NOT NULL,
+           updated_ns BIGINT NOT NULL,
+           sequence BIGINT NOT NULL,
+           announced_sequence BIGINT NOT NULL,
+           image_sha256 VARCHAR(64) NOT NULL,
+           image_format VARCHAR(8) NOT NULL,
+           state INTEGER NOT NULL,
+           presence DOUBLE PRECISION NOT NULL,
+           vehicles INTEGER NOT NULL,
+           life TEXT NOT NULL))",
+                                      R"(INSERT INTO hazards
+           SELECT ROW_NUMBER() OVER (ORDER BY h.sequence), h.uuid, h.class_name, h.confidence,
+                  h.latitude, h.longitude, h.covariance_ee, h.covariance_en, h.covariance_nn,
+                  h.sightings, h.first_seen_ns, h.last_seen_ns, h.updated_ns, h.sequence,
+                  h.sequence, h.image_sha256, h.image_format,
+                  CASE WHEN h.active <> 0 THEN 1 ELSE 3 END,
+                  CASE WHEN h.active <> 0 THEN 0.9 ELSE 0 END,
+                  (SELECT count(DISTINCT r.vehicle_id) FROM reports_1 r
+                    WHERE r.hazard_uuid = h.uuid), ''
+             FROM hazards_1 h)",
+                                      R"(CREATE TABLE reports (
+           uuid VARCHAR(36) PRIMARY KEY,
+           hazard_id INTEGER NOT NULL REFERENCES hazards (id),
+           vehicle_id TEXT NOT NULL,
+           drive_id TEXT NOT NULL,
+           stamp_ns BIGINT NOT NULL,
+           received_ns BIGINT NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL,
+           image_sha256 VARCHAR(64) NOT NULL))",
+                                      "CREATE UNIQUE INDEX hazards_1_ids ON hazards (uuid)",
+                                      R"(INSERT INTO reports
+           SELECT r.uuid, h.id, r.vehicle_id, r.drive_id, r.stamp_ns, r.received_ns, r.confidence,
+                  r.latitude, r.longitude, r.covariance_ee, r.covariance_en, r.covariance_nn,
+                  r.image_sha256
+             FROM reports_1 r JOIN hazards h ON h.uuid = r.hazard_uuid ORDER BY r.received_ns)",
+                                      R"(CREATE TABLE events (
+           sequence INTEGER PRIMARY KEY,
+           hazard_id INTEGER NOT NULL REFERENCES hazards (id),
+           previous_sequence BIGINT NOT NULL,
+           action INTEGER NOT NULL,
+           from_state INTEGER,
+           to_state INTEGER NOT NULL,
+           announced INTEGER NOT NULL,
+           reason TEXT NOT NULL,
+           at_ns BIGINT NOT NULL))",
+                                      R"(INSERT INTO events
+           SELECT e.sequence, h.id,
+                  LAG(e.sequence, 1, 0) OVER (PARTITION BY e.hazard_uuid ORDER BY e.sequence),
+                  e.action, CASE WHEN e.action = 0 THEN NULL ELSE 1 END,
+                  CASE WHEN e.action = 2 THEN 3 ELSE 1 END, 1, e.reason, e.at_ns
+             FROM events_1 e JOIN hazards h ON h.uuid = e.hazard_uuid ORDER BY e.sequence)",
+                                      "DROP INDEX hazards_1_ids",
+                                      "DROP TABLE events_1",
+                                      "DROP TABLE reports_1",
+                                      "DROP TABLE hazards_1",
+                                      R"(CREATE TABLE answers (
+           poll_uuid VARCHAR(36) PRIMARY KEY,
+           hazard_id INTEGER NOT NULL REFERENCES hazards (id),
+           vehicle_id TEXT NOT NULL,
+           answer INTEGER NOT NULL,
+           reason TEXT NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           stamp_ns BIGINT NOT NULL,
+           received_ns BIGINT NOT NULL))",
+                                      R"(CREATE TABLE lives (
+           class_name TEXT PRIMARY KEY,
+           ended DOUBLE PRECISION NOT NULL,
+           stood_s DOUBLE PRECISION NOT NULL))",
+                                      R"(CREATE TABLE last_reports (
+           vehicle_id TEXT PRIMARY KEY,
+           stamp_ns BIGINT NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           sigma_m DOUBLE PRECISION NOT NULL))",
+                                      "INSERT INTO livemap_schema (version) VALUES (2)"};
+  return kStatements;
+}
+
+/// What is held against vehicles, by VehicleKey as a signed number.
+const Statements& ToVersion3() {
+  static const Statements kStatements{
+      R"(CREATE TABLE trust (
+           vehicle_key BIGINT PRIMARY KEY,
+           suspicion DOUBLE PRECISION NOT NULL,
+           at_ns BIGINT NOT NULL,
+           vouchers TEXT NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (3)"};
+  return kStatements;
+}
+
+/// Map changes. A report names its feature by uuid: it is kept when the feature is forgotten.
+const Statements& ToVersion4() {
+  static const Statements kStatements{
+      R"(CREATE TABLE map_changes (
+           id INTEGER PRIMARY KEY,
+           uuid VARCHAR(36) NOT NULL,
+           class_name TEXT NOT NULL,
+           vanished INTEGER NOT NULL,
+           state INTEGER NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL,
+           reports BIGINT NOT NULL,
+           drives BIGINT NOT NULL,
+           vehicles INTEGER NOT NULL,
+           first_seen_ns BIGINT NOT NULL,
+           last_seen_ns BIGINT NOT NULL,
+           denied_ns BIGINT NOT NULL,
+           updated_ns BIGINT NOT NULL,
+           sequence BIGINT NOT NULL,
+           witnesses TEXT NOT NULL))",
+      R"(CREATE TABLE map_change_reports (
+           uuid VARCHAR(36) PRIMARY KEY,
+           change_uuid VARCHAR(36) NOT NULL,
+           vehicle_id TEXT NOT NULL,
+           drive_id TEXT NOT NULL,
+           stamp_ns BIGINT NOT NULL,
+           earlier_stamp_ns BIGINT NOT NULL,
+           received_ns BIGINT NOT NULL,
+           class_name TEXT NOT NULL,
+           vanished INTEGER NOT NULL,
+           confidence DOUBLE PRECISION NOT NULL,
+           seen BIGINT NOT NULL,
+           missed BIGINT NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           covariance_ee DOUBLE PRECISION NOT NULL,
+           covariance_en DOUBLE PRECISION NOT NULL,
+           covariance_nn DOUBLE PRECISION NOT NULL))",
+      R"(CREATE TABLE map_change_events (
+           sequence INTEGER PRIMARY KEY,
+           change_id INTEGER NOT NULL,
+           previous_sequence BIGINT NOT NULL,
+           from_state INTEGER,
+           to_state INTEGER NOT NULL,
+           reason TEXT NOT NULL,
+           at_ns BIGINT NOT NULL))",
+      "CREATE INDEX map_change_events_by_change ON map_change_events (change_id)",
+      "INSERT INTO livemap_schema (version) VALUES (4)"};
+  return kStatements;
+}
+
+int Version(soci::session& session) {
+  session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
+  int version = 0;
+  session << "SELECT coalesce(max(version), 0) FROM livemap_schema", soci::into(version);
+  return version;
+}
+
+}  // namespace
+
+void MigrateZoneStore(soci::session& session, const std::string& path) {
+  const int version = Version(session);
+  if (version > kZoneSchemaVersion) {
+    throw StoreError("store: database '" + path + "' has schema version " +
+                     std::to_string(version) + ", this program knows versions up to " +
+                     std::to_string(kZoneSchemaVersion));
+  }
+  if (version < 0) {
+    throw StoreError("store: database '" + path + "' has schema version " +
+                     std::to_string(version) + ", which no program wrote");
+  }
+  const std::array<const Statements*, kZoneSchemaVersion> steps{&ToVersion1(), &ToVersion2(),
+                                                                &ToVersion3(), &ToVersion4()};
+  for (int step = version; step < kZoneSchemaVersion; ++step) {
+    soci::transaction transaction(session);
+    for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;
+    transaction.commit();
+  }
+}
+
+}  // namespace livemap

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/map_change_report.h"
+#include "protocol/report.h"
+#include "zone/admission/speed_rule.h"
+#include "zone/belief/hazard_lifecycle.h"
+#include "zone/belief/survival_model.h"
+#include "zone/belief/vehicle_trust.h"
+#include "zone/model/hazard.h"
+#include "zone/model/map_change.h"
+#include "zone/model/store_damage.h"
+
+namespace livemap {
+
+struct PollAnswer;
+
+/// The zone's database: hazards as they are, every accepted report and answer, every event, what
+/// was learned of classes and of vehicles, where each vehicle's last report lies, and the same of
+/// map changes. SQLite in WAL mode with synchronous=FULL, through SOCI. Not thread-safe: one writer
+/// owns it.
+///
+/// Every function throws StoreError with the database's own words when it fails.
+class ZoneStore {
+ public:
+  /// Opens or makes the database file and brings its schema up to date. Refuses files that are
+  /// damaged, no database at all, or of a newer schema than this program knows.
+  explicit ZoneStore(const std::string& path);
+  ~ZoneStore();
+  ZoneStore(const ZoneStore&) = delete;
+  ZoneStore& operator=(const ZoneStore&) = delete;
+
+  /// A hazard with its life; `id` numbers the rows, from 1.
+  struct HazardRow {
+    std::uint64_t id = 0;
+    Hazard hazard;
+    LifeRecord life;
+  };
+  /// Every hazard, in ascending order of sequence. One of an older schema gets a life that says
+  /// what that schema knew. What the three Load functions give to `take` is sound; a row that the
+  /// program cannot have written, or for which `take` throws Error, is left out and told.
+  StoreDamage LoadHazards(const std::function<void(HazardRow)>& take);
+  StoreDamage LoadLives(const std::function<void(const std::string&, LearnedLife)>& take);
+  StoreDamage LoadTrust(const std::function<void(std::uint64_t, const TrustRecord&)>& take);
+  /// The greatest id that a row of a hazard has, sound or not; 0 without rows. What lies beyond the
+  /// ids that hazards can have is passed over.
+  std::uint64_t LastHazardId();
+  /// Of the newest event of a hazard or a map change; 0 without events.
+  std::uint64_t LastSequence();
+  struct KnownReport {
+    Uuid hazard;  ///< What it became or was merged into; nil when its hazard's row is broken.
+    std::string vehicle_id;
+  };
+  /// A committed report.
+  std::optional<KnownReport> FindReport(const Uuid& report_uuid);
+  /// Where the vehicle's last accepted report lies; none too where the row is broken.
+  std::optional<ReportedFix> FindLastReport(const std::string& vehicle_id);
+  /// The newest `limit` events of a hazard whose newest one is `sequence`, oldest first; broken
+  /// rows are left out.
+  std::vector<StoredEvent> LoadEvents(const Uuid& hazard, std::uint64_t sequence,
+                                      std::size_t limit);
+
+  /// Map changes: as the functions above.
+  struct MapChangeRow {
+    std::uint64_t id = 0;
+    MapChangeFeature feature;
+  };
+  StoreDamage LoadMapChanges(const std::function<void(MapChangeRow)>& take);
+  std::uint64_t LastMapChangeId();
+  struct KnownMapChangeReport {
+    Uuid change;  ///< The feature that it was about; the row of that may be gone.
+    std::string vehicle_id;
+  };
+  std::optional<KnownMapChangeReport> FindMapChangeReport(const Uuid& report_uuid);
+  /// The newest `limit` events of a feature whose newest one is `sequence`, oldest first.
+  std::vector<StoredMapChangeEvent> LoadMapChangeEvents(std::uint64_t sequence, std::size_t limit);
+
+  /// Writes happen between Begin and Commit; Commit returns when they are on disk.
+  void Begin();
+  void Commit();
+  /// Never throws: after a full disk the database may have rolled back by itself.
+  void Rollback() noexcept;
+
+  /// Adds the hazard, or replaces the row of the same id.
+  void WriteHazard(const HazardRow& row);
+  void WriteReport(const Report& report, std::uint64_t hazard_id, const std::string& image_sha256,
+                   std::int64_t received_ns);
+  /// `previous_sequence`: of the hazard's event before; 0 without one.
+  void WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
+                  std::uint64_t previous_sequence);
+  void WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id, std::int64_t received_ns);
+  void WriteLife(const std::string& class_name, const LearnedLife& learned);
+  void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
+  void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
+  void WriteMapChange(const MapChangeRow& row);
+  /// Forgets a feature and its history; what vehicles told of it stays, so that they are answered.
+  void DropMapChange(std::uint64_t id);
+  void WriteMapChangeReport(const MapChangeReport& report, const Uuid& change,
+                            std::int64_t received_ns);
+  void WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t id);
+
+  /// The schema that this program writes.
+  static int SchemaVersion();
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace livemap

@@ -1,0 +1,185 @@
+#include "evaluation/detection/labelled_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/error.h"
+
+namespace livemap {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+LabelledFolderOptions Options(std::vector<std::string> label_classes = {}, std::string split = "") {
+  return {std::move(label_classes), {"pothole", "traffic_cone"}, std::move(split)};
+}
+
+class LabelledFolderTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = std::filesystem::path(::testing::TempDir()) /
+            (std::string("labelled_folder_") +
+             ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(root_);
+    std::filesystem::create_directories(root_);
+  }
+  void TearDown() override { std::filesystem::remove_all(root_); }
+
+  void Write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((root_ / name).parent_path());
+    std::ofstream(root_ / name) << text;
+  }
+  std::string Path(const std::string& name) const { return (root_ / name).string(); }
+
+  LabelledFolder Read(const std::string& name, const LabelledFolderOptions& options = Options()) {
+    deduced_.reset();
+    return ReadLabelledFolder(Path(name), options, &deduced_);
+  }
+  std::string ErrorOf(const std::string& name, const LabelledFolderOptions& options = Options()) {
+    try {
+      Read(name, options);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  std::filesystem::path root_;
+  std::optional<std::string> deduced_;
+};
+
+TEST_F(LabelledFolderTest, ImagesAreReadInTheOrderOfTheirNamesWithTheirLabels) {
+  Write("set/images/b.jpg", "");
+  Write("set/images/a.PNG", "");
+  Write("set/images/readme.txt", "");
+  Write("set/labels/b.txt", "1 0.5 0.5 0.2 0.4\n\n0 0.25 0.25 0.5 0.5\n");
+  const LabelledFolder folder = Read("set", Options({"pothole", "deer"}));
+  EXPECT_FALSE(folder.is_drive);
+  EXPECT_THAT(folder.classes, ElementsAre("pothole", "deer"));
+  ASSERT_EQ(folder.frames.size(), 2U);
+  EXPECT_TRUE(folder.frames[0].labels.empty()) << "no label file, nothing in the image";
+  ASSERT_EQ(folder.frames[1].labels.size(), 2U);
+  EXPECT_EQ(folder.frames[1].labels[0].class_name, "deer");
+  EXPECT_DOUBLE_EQ(folder.frames[1].labels[0].box.x, 0.4);
+  EXPECT_DOUBLE_EQ(folder.frames[1].labels[0].box.height, 0.4);
+}
+
+TEST_F(LabelledFolderTest, ADriveIsReadInDrivingOrder) {
+  Write("drive/frames.csv", "frame,chainage_m,potholes\r\nx,30.5,1\r\ny,10,0\r\n");
+  Write("drive/images/x.jpg", "");
+  Write("drive/images/y.jpg", "");
+  Write("drive/labels/x.txt", "0 0.5 0.5 0.2 0.4\n");
+  const LabelledFolder folder = Read("drive");
+  EXPECT_TRUE(folder.is_drive);
+  EXPECT_THAT(folder.classes, ElementsAre("pothole"));
+  EXPECT_THAT(deduced_.value_or(""), HasSubstr("as pothole"));
+  ASSERT_EQ(folder.frames.size(), 2U);
+  EXPECT_EQ(folder.frames[0].chainage_m, 10);
+  EXPECT_EQ(folder.frames[1].chainage_m, 30.5);
+  EXPECT_EQ(folder.frames[1].labels.size(), 1U);
+}
+
+TEST_F(LabelledFolderTest, SplitsAreReadByFlagOrByPath) {
+  Write("traffic_cones/images/val/a.jpg", "");
+  Write("traffic_cones/labels/val/a.txt", "0 0.5 0.5 0.2 0.4\n");
+  Write("traffic_cones/images/train/b.jpg", "");
+  Write("traffic_cones/labels/train/b.txt", "");
+  EXPECT_EQ(Read("traffic_cones", Options({}, "val")).frames[0].labels.size(), 1U);
+  EXPECT_EQ(Read("traffic_cones/images/val").frames[0].labels.size(), 1U);
+  EXPECT_EQ(Read("traffic_cones/images/val/").frames[0].labels[0].class_name, "traffic_cone");
+  EXPECT_THAT(ErrorOf("traffic_cones"), AllOf(HasSubstr("--split"), HasSubstr("train, val")));
+  EXPECT_THAT(ErrorOf("traffic_cones", Options({}, "test")),
+              AllOf(HasSubstr("images/test"), HasSubstr("train, val")));
+}
+
+TEST_F(LabelledFolderTest, DifficultObjectsAreReadBesideTheLabels) {
+  Write("pothole/images/val/a.jpg", "");
+  Write("pothole/labels/val/a.txt", "");
+  Write("pothole/difficult/val/a.txt", "0 0.5 0.5 0.2 0.4\n");
+  const LabelledFolder folder = Read("pothole", Options({}, "val"));
+  ASSERT_EQ(folder.frames.size(), 1U);
+  EXPECT_TRUE(folder.frames[0].labels.empty());
+  ASSERT_EQ(folder.frames[0].difficult.size(), 1U);
+  EXPECT_DOUBLE_EQ(folder.frames[0].difficult[0].box.width, 0.2);
+  Write("pothole/difficult/val/a.txt", "0 0.5\n");
+  EXPECT_THAT(ErrorOf("pothole/images/val"), HasSubstr("difficult/val/a.txt"));
+}
+
+TEST_F(LabelledFolderTest, TheFoldersOwnNameSaysWhatClassZeroIs) {
+  Write("deer/pothole_closeups/images/a.jpg", "");
+  Write("deer/pothole_closeups/labels/a.txt", "");
+  EXPECT_THAT(Read("deer/pothole_closeups").classes, ElementsAre("pothole"));
+  EXPECT_THAT(deduced_.value_or(""), HasSubstr("as pothole"));
+}
+
+TEST_F(LabelledFolderTest, ClassesTxtAndTheFlagComeBeforeTheName) {
+  Write("pothole/images/a.jpg", "");
+  Write("pothole/labels/a.txt", "");
+  Write("pothole/classes.txt", "traffic_cone\r\ndeer\n\n");
+  EXPECT_THAT(Read("pothole").classes, ElementsAre("traffic_cone", "deer"));
+  EXPECT_FALSE(deduced_.has_value());
+  EXPECT_THAT(Read("pothole", Options({"debris"})).classes, ElementsAre("debris"));
+}
+
+TEST_F(LabelledFolderTest, AFolderThatDoesNotSayWhatClassZeroIsNeedsTheFlag) {
+  Write("photos/images/a.jpg", "");
+  Write("photos/labels/a.txt", "");
+  EXPECT_THAT(ErrorOf("photos"), HasSubstr("--label-classes"));
+}
+
+TEST_F(LabelledFolderTest, FoldersOfAnotherLayoutAreRefused) {
+  EXPECT_THAT(ErrorOf("nowhere"), HasSubstr("nowhere"));
+  Write("no_images/labels/a.txt", "");
+  EXPECT_THAT(ErrorOf("no_images"), HasSubstr("images/"));
+  Write("no_labels/images/a.jpg", "");
+  EXPECT_THAT(ErrorOf("no_labels"), HasSubstr("labels"));
+  std::filesystem::create_directories(root_ / "empty/images");
+  std::filesystem::create_directories(root_ / "empty/labels");
+  EXPECT_THAT(ErrorOf("empty"), HasSubstr("no image"));
+}
+
+TEST_F(LabelledFolderTest, ABadDriveTableIsRefusedNamingTheLine) {
+  Write("pothole/images/x.jpg", "");
+  Write("pothole/labels/x.txt", "");
+  for (const auto& [table, expected] : std::vector<std::pair<std::string, std::string>>{
+           {"frame,metres\nx,1\n", "'frame,metres'"},
+           {"frame,chainage_m\nx\n", "line 2"},
+           {"frame,chainage_m\nx,nan\n", "'nan'"},
+           {"frame,chainage_m\nx,1e999\n", "1e999"},
+           {"frame,chainage_m\nx,1m\n", "'1m'"},
+           {"frame,chainage_m\nother,1\n", "'other'"}}) {
+    Write("pothole/frames.csv", table);
+    EXPECT_THAT(ErrorOf("pothole"), AllOf(HasSubstr("frames.csv"), HasSubstr(expected))) << table;
+  }
+}
+
+TEST(YoloLabels, BadLinesAreRefusedNamingTheLine) {
+  for (const std::string bad :
+       {"0 0.5 0.5 0.1", "0 0.5 0.5 0.1 0.1 0.9", "1 0.5 0.5 0.1 0.1", "-1 0.5 0.5 0.1 0.1",
+        "0.5 0.5 0.5 0.1 0.1", "nan 0.5 0.5 0.1 0.1", "0 nan 0.5 0.1 0.1", "0 inf 0.5 0.1 0.1",
+        "0 320 200 10 10", "0 0.5 0.5 0 0.1", "0 0.5 0.5 -0.1 0.1", "0 -0.4 0.5 0.1 0.1",
+        "a 0.5 0.5 0.1 0.1", "0 0.5 0.5 0.1 0.1x"}) {
+    try {
+      ParseYoloLabels("0 0.5 0.5 0.1 0.1\n" + bad + "\n", {"pothole"}, "l.txt");
+      FAIL() << "accepted: " << bad;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("l.txt"), HasSubstr("line 2"))) << bad;
+    }
+  }
+}
+
+TEST(YoloLabels, BoxesAreCutToTheImage) {
+  const auto labels = ParseYoloLabels("0 0 0.5 0.2 1.2\n", {"pothole"}, "l.txt");
+  ASSERT_EQ(labels.size(), 1U);
+  EXPECT_NEAR(labels[0].box.x, 0, 1e-12);
+  EXPECT_NEAR(labels[0].box.width, 0.1, 1e-12);
+  EXPECT_NEAR(labels[0].box.height, 1, 1e-12);
+}
+
+}  // namespace
+}  // namespace livemap

@@ -1,0 +1,298 @@
+#!/usr/bin/python3
+"""The MQTT bridge between two ROS masters over a real mosquitto: rostest's master is the zone's, a
+second one the vehicle's."""
+
+import os
+import shutil
+import struct
+import sys
+import unittest
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
+
+import rostest  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from livemap.msg import (  # noqa: E402
+    HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange, ReportReceipt, VehiclePosition)
+from mqtt_bridge_fixture import (  # noqa: E402
+    Bridge, Broker, Master, Peer, envelope, eventually, serialise)
+
+ZONE_TOPICS = {
+    "sub:/hazard/report": HazardReport,
+    "sub:/vehicle/position": VehiclePosition,
+    "pub:/hazard/receipt": ReportReceipt,
+    "pub:/hazard/notice": HazardNotice,
+    "pub:/hazard/vehicle_notice": HazardNotice,
+    "pub:/hazard/poll": HazardPoll,
+    "sub:/hazard/poll_answer": HazardPollAnswer,
+    "sub:/change/map_change": MapChange,
+    "pub:/change/receipt": ReportReceipt,
+    "sub:/diagnostics": DiagnosticArray,
+}
+VEHICLE_TOPICS = {
+    "pub:/hazard/report": HazardReport,
+    "pub:/stranger/hazard/report": HazardReport,
+    "pub:/counted/hazard/report": HazardReport,
+    "pub:/vehicle/position": VehiclePosition,
+    "sub:/hazard/receipt": ReportReceipt,
+    "sub:/hazard/notice": HazardNotice,
+    "sub:/hazard/poll": HazardPoll,
+    "pub:/hazard/poll_answer": HazardPollAnswer,
+    "pub:/change/map_change": MapChange,
+    "sub:/change/receipt": ReportReceipt,
+    "sub:/diagnostics": DiagnosticArray,
+}
+
+
+def report(drive_id):
+    """A report that the tests tell apart by its drive."""
+    message = HazardReport(schema_version=HazardReport.SCHEMA_VERSION, drive_id=drive_id,
+                           class_name="pothole", confidence=0.75, latitude=-27.5, longitude=-48.5)
+    message.uuid = bytes(range(16))
+    message.image.format = "jpeg"
+    message.image.data = bytes(range(256)) * 100
+    return message
+
+
+# Of HazardReport.msg before it had the fields that are now its last 16 bytes.
+MD5_OF_VERSION_1 = "6c9f383b83ba26551f53b42caa304fa7"
+
+
+class MqttBridgeTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.broker = Broker()
+        cls.broker.start()
+        cls.zone_master = Master(os.environ["ROS_MASTER_URI"])
+        cls.vehicle_master = Master()
+        cls.zone_peer = Peer(cls.zone_master, ZONE_TOPICS)
+        cls.vehicle_peer = Peer(cls.vehicle_master, VEHICLE_TOPICS)
+        common = {"zone": "test", "port": cls.broker.port, "diagnostics_period_s": 0.2,
+                  "reconnect_min_s": 0.1, "reconnect_max_s": 1.0}
+        cls.common = common
+        cls.zone = Bridge(cls.zone_master, "zone", "zone_bridge", **common,
+                          password_file=cls.broker.password_file("zone"))
+        cls.vehicle = Bridge(cls.vehicle_master, "vehicle", "car_bridge", **common, user="car-1",
+                             password_file=cls.broker.password_file("car-1"))
+        try:
+            cls.wait_connected()
+        except AssertionError as error:
+            raise AssertionError(cls.zone.output() + cls.vehicle.output()) from error
+
+    @classmethod
+    def tearDownClass(cls):
+        for part in (cls.zone, cls.vehicle, cls.zone_peer, cls.vehicle_peer, cls.vehicle_master):
+            part.stop()
+        cls.broker.kill()
+        shutil.rmtree(cls.broker.directory, ignore_errors=True)
+
+    @classmethod
+    def wait_connected(cls):
+        eventually(lambda: cls.zone_peer.diagnostics("zone_bridge").get("connected") == "True",
+                   "the zone's bridge connects")
+        eventually(lambda: cls.vehicle_peer.diagnostics("car_bridge").get("connected") == "True",
+                   "the vehicle's bridge connects")
+
+    def zone_count(self, key):
+        return int(self.zone_peer.diagnostics("zone_bridge").get(key, "0"))
+
+    def vehicle_count(self, bridge, key):
+        return int(self.vehicle_peer.diagnostics(bridge).get(key, "0"))
+
+    def another_bridge(self, name, **parameters):
+        """A connected bridge of car-3 whose ROS topics stand below its name."""
+        bridge = Bridge(self.vehicle_master, "vehicle", name, prefix=f"/{name}/", user="car-3",
+                        password_file=self.broker.password_file("car-3"),
+                        **dict(self.common, **parameters))
+        eventually(lambda: self.vehicle_peer.diagnostics(name).get("connected") == "True",
+                   name + " connects")
+        return bridge
+
+    def reports_of(self, drive_id):
+        return [r for r in self.zone_peer.received("/hazard/report") if r.drive_id == drive_id]
+
+    def test_zone_receives_report_under_the_identity_of_the_connection(self):
+        sent = report("identity")
+        sent.vehicle_id = "car-2"
+        self.vehicle_peer.publish("/hazard/report", sent)
+        received = eventually(lambda: self.reports_of("identity"), "the report arrives")[0]
+        self.assertEqual(received.vehicle_id, "car-1")
+        sent.vehicle_id = "car-1"
+        self.assertEqual(serialise(received), serialise(sent))
+
+    def test_zone_receives_position_under_the_identity_of_the_connection(self):
+        self.vehicle_peer.publish("/vehicle/position", VehiclePosition(
+            vehicle_id="mayor", drive_id="p", latitude=1.5, course=float("nan")))
+        received = eventually(lambda: self.zone_peer.received("/vehicle/position"),
+                              "the position arrives")[0]
+        self.assertEqual((received.vehicle_id, received.latitude), ("car-1", 1.5))
+
+    def test_receipt_reaches_its_addressee_alone_and_notices_reach_all(self):
+        for vehicle in ("car-2", "car-1"):
+            self.zone_peer.publish("/hazard/receipt",
+                                   ReportReceipt(vehicle_id=vehicle, reason="for " + vehicle))
+        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=7, class_name="pothole"))
+        eventually(lambda: self.vehicle_peer.received("/hazard/notice"), "the notice arrives")
+        receipts = eventually(lambda: self.vehicle_peer.received("/hazard/receipt"),
+                              "the receipt arrives")
+        self.assertEqual([r.reason for r in receipts], ["for car-1"])
+
+    def test_polls_and_what_one_vehicle_is_told_reach_that_vehicle_alone(self):
+        for vehicle in ("car-2", "car-1"):
+            self.zone_peer.publish("/hazard/poll", HazardPoll(vehicle_id=vehicle, class_name="for " + vehicle))
+            self.zone_peer.publish("/hazard/vehicle_notice",
+                                   HazardNotice(vehicle_id=vehicle, class_name="for " + vehicle, sequence=70))
+        polls = eventually(lambda: self.vehicle_peer.received("/hazard/poll"), "the poll arrives")
+        self.assertEqual([p.class_name for p in polls], ["for car-1"])
+        own = eventually(lambda: [n for n in self.vehicle_peer.received("/hazard/notice") if n.vehicle_id],
+                         "the notice arrives where all notices do")
+        self.assertEqual([n.class_name for n in own], ["for car-1"])
+
+    def test_zone_receives_a_poll_answer_under_the_identity_of_the_connection(self):
+        sent = HazardPollAnswer(vehicle_id="mayor", drive_id="p", confidence=0.5)
+        sent.image.data = bytes(50000)
+        self.vehicle_peer.publish("/hazard/poll_answer", sent)
+        received = eventually(lambda: self.zone_peer.received("/hazard/poll_answer"), "the answer arrives")[0]
+        self.assertEqual((received.vehicle_id, len(received.image.data)), ("car-1", 50000))
+
+    def test_a_map_change_comes_under_the_identity_of_the_connection_and_its_receipt_goes_back(self):
+        self.vehicle_peer.publish("/change/map_change", MapChange(vehicle_id="mayor", class_name="barrier"))
+        received = eventually(lambda: self.zone_peer.received("/change/map_change"), "the map change arrives")[0]
+        self.assertEqual((received.vehicle_id, received.class_name), ("car-1", "barrier"))
+        for vehicle in ("car-2", "car-1"):
+            self.zone_peer.publish("/change/receipt", ReportReceipt(vehicle_id=vehicle, reason="for " + vehicle))
+        receipts = eventually(lambda: self.vehicle_peer.received("/change/receipt"), "the receipt arrives")
+        self.assertEqual([r.reason for r in receipts], ["for car-1"])
+
+    def test_receipt_without_a_possible_addressee_is_refused_and_counted(self):
+        before = self.zone_count("receipts_refused")
+        for addressee in ("", "+", "#", "car-1/notice"):
+            self.zone_peer.publish("/hazard/receipt", ReportReceipt(vehicle_id=addressee))
+        eventually(lambda: self.zone_count("receipts_refused") == before + 4, "four are refused")
+
+    def test_hostile_payloads_are_refused_and_counted_and_a_good_one_still_passes(self):
+        good = report("raw")
+        body = serialise(good)
+        huge_length = bytearray(body)
+        huge_length[18:22] = struct.pack("<I", 0xFFFFFFFF)  # the length of vehicle_id
+        hostile = [
+            b"",
+            b"LMAP",
+            b"\x00" * 1000,
+            os.urandom(5000),
+            envelope(good, version=2),
+            envelope(good, type_name="livemap/VehiclePosition"),
+            envelope(good, type_name="livemap/<script>"),
+            envelope(good, md5="0" * 32),
+            envelope(good, payload=bytes(huge_length)),
+            envelope(good, payload=body[:-1]),
+            envelope(good, payload=body + b"\x00"),
+            envelope(good, payload=b""),
+            envelope(good, md5=MD5_OF_VERSION_1),
+            envelope(good, md5=MD5_OF_VERSION_1, payload=body[:-17]),
+            envelope(VehiclePosition()),
+            envelope(good)[:-100],
+        ]
+        before = self.zone_count("reports_refused")
+        topic = "livemap/v1/test/vehicle/car-2/report"
+        for payload in hostile:
+            self.assertEqual(self.broker.publish_raw("car-2", topic, payload), 0)
+        good.vehicle_id = "car-1"
+        self.assertEqual(self.broker.publish_raw("car-2", topic, envelope(good)), 0)
+        received = eventually(lambda: self.reports_of("raw"), "the good report arrives")
+        self.assertEqual([r.vehicle_id for r in received], ["car-2"])
+        eventually(lambda: self.zone_count("reports_refused") == before + len(hostile),
+                   "every hostile payload is counted")
+        self.assertTrue(self.zone.alive())
+        self.assertIn("refused a message of topic 'reports': from 'car-2'", self.zone.output())
+
+    def test_a_report_of_a_vehicle_that_knows_the_definition_of_version_1_arrives(self):
+        old = report("of version 1")
+        old.schema_version = 1
+        old.shown_width = 77
+        self.broker.publish_raw("car-2", "livemap/v1/test/vehicle/car-2/report",
+                                envelope(old, md5=MD5_OF_VERSION_1, payload=serialise(old)[:-16]))
+        received = eventually(lambda: self.reports_of("of version 1"), "it arrives")[0]
+        self.assertEqual((received.schema_version, received.vehicle_id), (1, "car-2"))
+        self.assertEqual(bytes(received.image.data), bytes(old.image.data))
+        self.assertEqual((received.shown_x, received.shown_y, received.shown_width, received.shown_height),
+                         (0, 0, 0, 0))
+
+    def test_broker_keeps_a_vehicle_from_another_vehicles_topic(self):
+        forged = envelope(report("forged"))
+        self.broker.publish_raw("car-2", "livemap/v1/test/vehicle/car-1/report", forged)
+        self.broker.publish_raw("car-2", "livemap/v1/test/vehicle/car-2/report",
+                                envelope(report("after the forged one")))
+        eventually(lambda: self.reports_of("after the forged one"), "the allowed report arrives")
+        self.assertEqual(self.reports_of("forged"), [])
+
+    def test_publication_that_the_broker_refuses_is_counted_and_said(self):
+        stranger = self.another_bridge("stranger", zone="elsewhere")
+        try:
+            self.vehicle_peer.publish("/stranger/hazard/report", report("elsewhere"))
+            eventually(lambda: self.vehicle_count("stranger", "reports_refused") == 1,
+                       "the refusal is counted")
+            self.assertEqual(self.vehicle_count("stranger", "reports_out"), 0)
+            self.assertIn("Not authorized (MQTT reason 135)", stranger.output())
+        finally:
+            stranger.stop()
+
+    def test_uplink_bytes_are_payload_and_topic_of_what_was_published(self):
+        counted = self.another_bridge("counted")
+        try:
+            message = report("bytes")
+            self.vehicle_peer.publish("/counted/hazard/report", message)
+            eventually(lambda: self.vehicle_count("counted", "reports_out") == 1,
+                       "the report is counted")
+            topic = "livemap/v1/test/vehicle/car-3/report"
+            self.assertEqual(self.vehicle_count("counted", "uplink_bytes"),
+                             len(topic) + len(envelope(message)))
+        finally:
+            counted.stop()
+
+    def test_flow_resumes_after_the_broker_was_killed_and_lost_its_state(self):
+        self.broker.kill()
+        eventually(lambda: self.vehicle_peer.diagnostics("car_bridge")["connected"] == "False",
+                   "the vehicle's bridge notices")
+        dropped = self.vehicle_count("car_bridge", "reports_dropped")
+        self.vehicle_peer.publish("/hazard/report", report("into the void"))
+        eventually(lambda: self.vehicle_count("car_bridge", "reports_dropped") == dropped + 1,
+                   "the report is dropped and counted")
+        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=1000))
+        shutil.rmtree(os.path.join(self.broker.directory, "data"))
+        self.broker.start()
+        self.wait_connected()
+        self.vehicle_peer.publish("/hazard/report", report("resumed"))
+        eventually(lambda: self.reports_of("resumed"), "the next report arrives")
+        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=1001))
+        eventually(lambda: 1001 in [n.sequence for n in
+                                    self.vehicle_peer.received("/hazard/notice")],
+                   "the next notice arrives")
+
+    def test_bad_parameters_are_one_clear_sentence_and_a_failed_load(self):
+        cases = [
+            ({"role": "mayor"}, "accepted is one of: vehicle, zone"),
+            ({"zone": "a/b"}, "parameter 'zone' of the bridge is 'a/b'"),
+            ({"keepalive": 3}, "unknown parameter"),
+            ({"topics": []}, "parameter 'topics' of the bridge is no list"),
+            ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/Nothing",
+                          "direction": "out", "mqtt_topic": "x"}]},
+             "'livemap/Nothing' is not known"),
+            ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/HazardNotice",
+                          "direction": "sideways", "mqtt_topic": "x"}]}, "accepted is in or out"),
+            ({"password_file": "/nowhere", "password_wait_s": 0.0}, "/nowhere"),
+            ({"ca_file": "/nowhere", "certificate_file": "/nowhere"}, "parameter 'key_file' of the bridge is missing"),
+            ({"ca_file": "/nowhere", "certificate_file": "/nowhere", "key_file": "/nowhere"},
+             "MQTT ca_file is '/nowhere', accepted is a PEM file that can be read"),
+        ]
+        for number, (spoiled, sentence) in enumerate(cases):
+            with self.subTest(sentence):
+                parameters = dict(self.common, user="car-3", **{"password_file": ""})
+                parameters.update(spoiled)
+                bridge = Bridge(self.vehicle_master, "vehicle", f"bad_{number}", **parameters)
+                self.assertEqual(bridge.process.wait(timeout=120), 255, "refused, not crashed")
+                self.assertIn(sentence, bridge.output())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("livemap", "mqtt_bridge", MqttBridgeTest)

@@ -1,0 +1,286 @@
+#include "odometry/edge/edge_odometry.h"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "common/error.h"
+#include "test/odometry/synthetic_scene.h"
+
+namespace livemap {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr std::int64_t kStepNs = 33'333'333;
+
+std::int64_t Stamp(int frame) { return 1'000'000'000 + frame * kStepNs; }
+
+/// A hand that sways before the wall; the first pose is the identity.
+Eigen::Isometry3d Sway(int frame) {
+  const double t = frame * 0.033;
+  return Pose(0.12 * std::sin(1.1 * t), 0.08 * std::sin(1.7 * t), 0.1 * std::sin(0.7 * t),
+              0.04 * std::sin(1.3 * t), 0.05 * std::sin(0.9 * t), 0.08 * std::sin(t));
+}
+
+double ErrorM(const VoResult& result, int frame) {
+  return (result.world_from_camera.translation() - Sway(frame).translation()).norm();
+}
+
+class EdgeOdometryOf : public ::testing::TestWithParam<EdgeSource> {};
+
+TEST_P(EdgeOdometryOf, FollowsASwayingHandWithinMillimetres) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry::Config config;
+  config.edge_source = GetParam();
+  EdgeOdometry odometry(config, kWallCamera);
+  for (int i = 0; i < 90; ++i) {
+    const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i)));
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+    ASSERT_LT(ErrorM(result, i), 0.004) << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(EdgesOf, EdgeOdometryOf,
+                         ::testing::Values(EdgeSource::kKeyframe, EdgeSource::kNewImage));
+
+TEST(EdgeOdometry, FollowsByRandomPixelsAndWithoutConstantMotion) {
+  const SyntheticWall wall(kWallCamera);
+  for (const PixelChoice choice : {PixelChoice::kRandomEdges, PixelChoice::kRandomPixels}) {
+    EdgeOdometry::Config config;
+    config.points.choice = choice;
+    config.points.share = 0.5;
+    config.constant_motion = false;
+    EdgeOdometry odometry(config, kWallCamera);
+    for (int i = 0; i < 30; ++i) {
+      const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i)));
+      ASSERT_EQ(result.state, VoState::kTracking) << i;
+      ASSERT_LT(ErrorM(result, i), 0.01) << i;
+    }
+  }
+}
+
+TEST(EdgeOdometry, AnotherSeedDrawsOtherPixels) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry::Config config;
+  config.points.choice = PixelChoice::kRandomEdges;
+  config.points.share = 0.2;
+  const auto last = [&](std::uint32_t seed) {
+    config.points.seed = seed;
+    EdgeOdometry odometry(config, kWallCamera);
+    odometry.Track(wall.See(Stamp(0), Sway(0)));
+    return odometry.Track(wall.See(Stamp(1), Sway(1))).world_from_camera.matrix();
+  };
+  EXPECT_EQ(last(1), last(1));
+  EXPECT_NE(last(1), last(2));
+}
+
+TEST(EdgeOdometry, SixteenBitAndFloatDepthAgree) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry with_float({}, kWallCamera), with_units({}, kWallCamera);
+  for (int i = 0; i < 10; ++i) {
+    RgbdFrame frame = wall.See(Stamp(i), Sway(i));
+    const VoResult expected = with_float.Track(frame);
+    frame.depth.convertTo(frame.depth, CV_16U, 5000);
+    frame.depth_units_per_m = 5000;
+    const VoResult result = with_units.Track(frame);
+    EXPECT_LT(
+        (result.world_from_camera.translation() - expected.world_from_camera.translation()).norm(),
+        2e-4);
+  }
+}
+
+TEST(EdgeOdometry, TheSameFramesGiveTheSameBits) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry first({}, kWallCamera), second({}, kWallCamera);
+  for (int i = 0; i < 20; ++i) {
+    const RgbdFrame frame = wall.See(Stamp(i), Sway(i));
+    EXPECT_EQ(first.Track(frame).world_from_camera.matrix(),
+              second.Track(frame).world_from_camera.matrix())
+        << i;
+  }
+}
+
+TEST(EdgeOdometry, FlickeringLightDoesNotBreakTracking) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  for (int i = 0; i < 60; ++i) {
+    const double gain = 1 + 0.3 * std::sin(0.6 * i), bias = 15 * std::cos(0.4 * i);
+    const VoResult result = odometry.Track(wall.See(Stamp(i), Sway(i), gain, bias));
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+    ASSERT_LT(ErrorM(result, i), 0.006) << i;
+  }
+}
+
+TEST(EdgeOdometry, AFastCameraKeepsItsKeyframeForSomeSteps) {
+  const SyntheticWall wall(kWallCamera);
+  // 7 px a step, at 2 m: more than keyframe_motion.
+  const auto pose = [](int i) { return Pose(0.05 * i, 0, 0, 0, 0, 0); };
+  const auto count_keyframes = [&](double keyframe_steps) {
+    EdgeOdometry::Config config;
+    config.keyframe_steps = keyframe_steps;
+    EdgeOdometry odometry(config, kWallCamera);
+    int keyframes = 0;
+    VoResult result;
+    for (int i = 0; i < 13; ++i) {
+      result = odometry.Track(wall.See(Stamp(i), pose(i)));
+      EXPECT_EQ(result.state, VoState::kTracking) << i;
+      keyframes += result.new_keyframe ? 1 : 0;
+    }
+    EXPECT_LT((result.world_from_camera.translation() - pose(12).translation()).norm(), 0.006);
+    return keyframes;
+  };
+  EXPECT_EQ(count_keyframes(0), 12);
+  EXPECT_LE(count_keyframes(2.5), 6);
+}
+
+TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  VoResult result;
+  for (int i = 0; i < 5; ++i) {
+    result = odometry.Track(wall.See(Stamp(i), Pose(0.003 * i, 0, 0, 0, 0, 0)));
+  }
+  ASSERT_TRUE(result.twist);
+  EXPECT_NEAR((*result.twist)[0], 0.003 / (kStepNs * 1e-9), 0.01);
+  EXPECT_NEAR(result.twist->tail<5>().norm(), 0, 0.02);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(result.twist_covariance);
+  EXPECT_GT(axes.eigenvalues().minCoeff(), 0) << "no direction is known without error";
+  EXPECT_LT(std::sqrt(result.twist_covariance(0, 0)), 0.1) << "m/s";
+}
+
+TEST(EdgeOdometry, BlackFramesHoldThePoseWithGrowingUncertaintyAndTrackingComesBack) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  VoResult held;
+  int frame = 0;
+  for (; frame < 20; ++frame) held = odometry.Track(wall.See(Stamp(frame), Sway(frame)));
+  double variance = held.covariance.trace();
+  for (; frame < 40; ++frame) {
+    RgbdFrame black = wall.See(Stamp(frame), Sway(frame));
+    black.grey.setTo(0);
+    const VoResult result = odometry.Track(black);
+    EXPECT_EQ(result.state, VoState::kLost) << frame;
+    EXPECT_EQ(result.world_from_camera.matrix(), held.world_from_camera.matrix()) << frame;
+    EXPECT_FALSE(result.twist);
+    EXPECT_GT(result.covariance.trace(), variance);
+    variance = result.covariance.trace();
+  }
+  for (; frame < 60; ++frame) {
+    const VoResult result = odometry.Track(wall.See(Stamp(frame), Sway(frame)));
+    ASSERT_EQ(result.state, VoState::kTracking) << frame;
+    ASSERT_LT(ErrorM(result, frame), 0.006) << frame;
+    EXPECT_LT(result.covariance.trace(), variance);
+  }
+}
+
+TEST(EdgeOdometry, LostForLongItGoesOnFromTheHeldPose) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry::Config config;
+  config.give_up_s = 0.5;
+  EdgeOdometry odometry(config, kWallCamera);
+  VoResult held;
+  int frame = 0;
+  for (; frame < 10; ++frame) held = odometry.Track(wall.See(Stamp(frame), Sway(frame)));
+  for (; frame < 30; ++frame) {
+    RgbdFrame black = wall.See(Stamp(frame), Sway(frame));
+    black.grey.setTo(0);
+    odometry.Track(black);
+  }
+  // Another part of the wall, which no keyframe shows.
+  const Eigen::Isometry3d elsewhere = Pose(1.9, 1.3, -0.4, 0.2, 0.1, 1.1);
+  VoResult result;
+  for (int i = 0; i < 5; ++i, ++frame) result = odometry.Track(wall.See(Stamp(frame), elsewhere));
+  EXPECT_EQ(result.state, VoState::kTracking);
+  EXPECT_LT((result.world_from_camera.translation() - held.world_from_camera.translation()).norm(),
+            0.01)
+      << "not at the origin, not anywhere else";
+  EXPECT_GT(result.covariance(0, 0), 0.1) << "it does not know how far it went meanwhile";
+}
+
+TEST(EdgeOdometry, AFrameWithoutDepthIsTrackedButBecomesNoKeyframe) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry::Config config;
+  config.keyframe_every = 1;
+  EdgeOdometry odometry(config, kWallCamera);
+  odometry.Track(wall.See(Stamp(0), Sway(0)));
+  for (int i = 1; i < 5; ++i) {
+    RgbdFrame frame = wall.See(Stamp(i), Sway(i));
+    frame.depth.release();
+    const VoResult result = odometry.Track(frame);
+    EXPECT_EQ(result.state, VoState::kTracking);
+    EXPECT_FALSE(result.new_keyframe);
+    EXPECT_LT(ErrorM(result, i), 0.004);
+  }
+}
+
+TEST(EdgeOdometry, ResetMakesTheNextFrameTheOrigin) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  for (int i = 0; i < 30; ++i) odometry.Track(wall.See(Stamp(i), Sway(i)));
+  odometry.Reset();
+  const VoResult result = odometry.Track(wall.See(Stamp(3), Sway(30)));
+  EXPECT_EQ(result.state, VoState::kTracking);
+  EXPECT_TRUE(result.world_from_camera.isApprox(Eigen::Isometry3d::Identity()));
+}
+
+TEST(EdgeOdometry, NothingToSeeAtTheStartIsWaitedFor) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  RgbdFrame empty = wall.See(Stamp(0), Sway(0));
+  empty.grey.setTo(90);
+  EXPECT_EQ(odometry.Track(empty).state, VoState::kInitialising);
+  RgbdFrame blind = wall.See(Stamp(1), Sway(0));
+  blind.depth.setTo(std::numeric_limits<float>::quiet_NaN());
+  EXPECT_EQ(odometry.Track(blind).state, VoState::kInitialising);
+  EXPECT_EQ(odometry.Track(wall.See(Stamp(2), Sway(0))).state, VoState::kTracking);
+}
+
+TEST(EdgeOdometry, WhatCannotBeAFrameIsRefusedInASentenceAndChangesNothing) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  odometry.Track(wall.See(Stamp(0), Sway(0)));
+  RgbdFrame small = wall.See(Stamp(1), Sway(1));
+  small.grey = cv::Mat(1, 1, CV_8UC1, cv::Scalar(0));
+  EXPECT_THAT([&] { odometry.Track(small); }, ThrowsMessage<Error>(HasSubstr("1x1")));
+  RgbdFrame colour = wall.See(Stamp(1), Sway(1));
+  colour.grey = cv::Mat(240, 320, CV_8UC3);
+  EXPECT_THAT([&] { odometry.Track(colour); }, ThrowsMessage<Error>(HasSubstr("8-bit grey")));
+  RgbdFrame other = wall.See(Stamp(1), Sway(1));
+  other.depth = cv::Mat(120, 160, CV_16UC1);
+  EXPECT_THAT([&] { odometry.Track(other); }, ThrowsMessage<Error>(HasSubstr("160x120")));
+  RgbdFrame strange = wall.See(Stamp(1), Sway(1));
+  strange.depth = cv::Mat(240, 320, CV_64FC1);
+  EXPECT_THAT([&] { odometry.Track(strange); }, ThrowsMessage<Error>(HasSubstr("16UC1")));
+  EXPECT_THAT([&] { odometry.Track(wall.See(Stamp(0), Sway(1))); },
+              ThrowsMessage<Error>(HasSubstr("not later")));
+  EXPECT_EQ(odometry.Track(wall.See(Stamp(1), Sway(1))).state, VoState::kTracking);
+}
+
+TEST(EdgeOdometry, ACameraWithoutCalibrationIsRefusedInASentence) {
+  const auto make = [](CameraIntrinsics camera) { return [camera] { EdgeOdometry({}, camera); }; };
+  EXPECT_THAT(make({0, 0, 0, 0, 320, 240}), ThrowsMessage<Error>(HasSubstr("calibration")));
+  EXPECT_THAT(make({std::nan(""), 260, 160, 120, 320, 240}),
+              ThrowsMessage<Error>(HasSubstr("calibration")));
+  EXPECT_THAT(make({260, 260, 160, 120, 1, 1}), ThrowsMessage<Error>(HasSubstr("1x1")));
+}
+
+TEST(EdgeOdometry, StraightEdgesAllOneWayDoNotFixThePose) {
+  RgbdFrame stripes;
+  stripes.grey.create(240, 320, CV_8UC1);
+  for (int x = 0; x < 320; ++x) stripes.grey.col(x).setTo(x / 16 % 2 == 0 ? 60 : 190);
+  stripes.depth = cv::Mat(240, 320, CV_32FC1, cv::Scalar(2));
+  EdgeOdometry odometry({}, kWallCamera);
+  for (int i = 0; i < 5; ++i) {
+    stripes.stamp_ns = Stamp(i);
+    const VoResult result = odometry.Track(stripes);
+    EXPECT_TRUE(result.covariance.allFinite());
+    EXPECT_LT(result.world_from_camera.translation().norm(), 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace livemap

@@ -1,0 +1,104 @@
+// Every model that ships must answer in this build as it answered where it was trained.
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "perception/inference/inference_engine.h"
+
+namespace livemap {
+namespace {
+
+/// Paths of the models/NAME.yaml that have a NAME.golden.yaml beside them; those of other kinds are
+/// tested by their own rooms.
+std::vector<std::string> ShippedManifests() {
+  std::vector<std::string> paths;
+  const std::string suffix = ".golden.yaml";
+  for (const auto& entry : std::filesystem::directory_iterator(LIVEMAP_SOURCE_DIR "/models")) {
+    const std::string path = entry.path().string();
+    if (path.size() > suffix.size() &&
+        path.compare(path.size() - suffix.size(), suffix.size(), suffix) == 0) {
+      const std::string manifest = path.substr(0, path.size() - suffix.size()) + ".yaml";
+      if (!YAML::LoadFile(manifest)["kind"].IsDefined()) paths.push_back(manifest);
+    }
+  }
+  return paths;
+}
+
+/// The image that models/README.md defines by a formula, as the normalised input tensor.
+cv::Mat FormulaImage(const ModelManifest& manifest) {
+  const int shape[] = {1, 3, manifest.input.height, manifest.input.width};
+  cv::Mat images(4, shape, CV_32F);
+  for (int plane = 0; plane < 3; ++plane) {
+    const int channel = manifest.input.channels == ChannelOrder::kRgb ? plane : 2 - plane;
+    const auto index = static_cast<std::size_t>(plane);
+    float* pixel = images.ptr<float>(0, plane);
+    for (int y = 0; y < manifest.input.height; ++y) {
+      for (int x = 0; x < manifest.input.width; ++x) {
+        const int value = (x * (channel + 1) + 2 * y + x * y / 64) % 256;
+        *pixel++ = (static_cast<float>(value) - manifest.normalisation.mean[index]) /
+                   manifest.normalisation.std[index];
+      }
+    }
+  }
+  return images;
+}
+
+using Parameters = std::tuple<std::string, EngineKind>;
+class GoldenTest : public ::testing::TestWithParam<Parameters> {};
+
+TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
+  const auto& [path, kind] = GetParam();
+  const std::string golden_path =
+      path.substr(0, path.size() - std::string("yaml").size()) + "golden.yaml";
+  const YAML::Node golden = YAML::LoadFile(golden_path);
+  const ModelManifest manifest = ReadModelManifest(path);
+  if (kind == EngineKind::kTorch && !HasTorchEngine()) GTEST_SKIP() << "skipped, no libtorch";
+  if (kind == EngineKind::kTorch && manifest.torch_file.empty()) {
+    GTEST_SKIP() << "skipped, '" << path << "' has no torch_file";
+  }
+  const std::unique_ptr<InferenceEngine> engine = MakeInferenceEngine(manifest, 0, kind);
+  ASSERT_EQ(engine->Kind(), kind);
+  const cv::Mat output = engine->Run(FormulaImage(manifest));
+  const auto tolerance = golden["tolerance"].as<double>();
+  ASSERT_LE(tolerance, 1e-3);
+  ASSERT_GT(golden["rows"].size(), 0U);
+  // A head of scores has one row.
+  const int columns = output.size[output.dims - 1];
+  const int rows = static_cast<int>(output.total()) / columns;
+  for (const YAML::Node& row : golden["rows"]) {
+    const int index = row["index"].as<int>();
+    const auto values = row["values"].as<std::vector<double>>();
+    ASSERT_TRUE(index >= 0 && index < rows) << index;
+    ASSERT_EQ(values.size(), static_cast<std::size_t>(columns));
+    for (std::size_t column = 0; column < values.size(); ++column) {
+      EXPECT_NEAR(output.ptr<float>()[index * columns + static_cast<int>(column)], values[column],
+                  tolerance)
+          << "row " << index << ", column " << column;
+    }
+  }
+}
+
+std::string NameOfModel(const ::testing::TestParamInfo<Parameters>& parameters) {
+  std::string name = std::filesystem::path(std::get<0>(parameters.param)).stem().string() + "_" +
+                     NameOf(std::get<1>(parameters.param));
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest,
+                         ::testing::Combine(::testing::ValuesIn(ShippedManifests()),
+                                            ::testing::Values(EngineKind::kOpenCv,
+                                                              EngineKind::kTorch)),
+                         NameOfModel);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenTest);
+
+}  // namespace
+}  // namespace livemap

@@ -1,0 +1,200 @@
+#!/usr/bin/python3
+"""The programs that make bags, run as a user runs them, on folders that this test makes."""
+import json
+import math
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import cv2
+import numpy as np
+import rosbag
+import rostest
+
+WIDTH, HEIGHT = 640, 400
+
+
+def run(tool, *arguments):
+    return subprocess.run(["rosrun", "livemap", f"livemap_bag_{tool}", *map(str, arguments)],
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=200)
+
+
+def messages(path, topic):
+    with rosbag.Bag(path) as bag:
+        return [message for _, message, _ in bag.read_messages(topic)]
+
+
+def write(path, text):
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    with open(path, "w") as file:
+        file.write(text)
+
+
+def write_image(path, width=WIDTH, height=HEIGHT, seed=0):
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    pixels = np.random.RandomState(seed).randint(0, 255, (height, width, 3), np.uint8)
+    cv2.imwrite(path, pixels)
+
+
+class BagToolsTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="livemap_bags_")
+        self.bag = os.path.join(self.folder, "out.bag")
+
+    def tearDown(self):
+        shutil.rmtree(self.folder)
+
+    def path(self, *parts):
+        return os.path.join(self.folder, *parts)
+
+    def survey(self):
+        frames = [("a", 100, 1), ("b", 105, 0), ("c", 110, 0), ("d", 1110, 0)]
+        write(self.path("road", "frames.csv"), "frame,chainage_m,potholes\n" + "".join(
+            f"{name},{chainage},{potholes}\n" for name, chainage, potholes in frames))
+        for i, (name, _, _) in enumerate(frames):
+            write_image(self.path("road", "images", f"{name}.jpg"), seed=i)
+        write(self.path("road", "labels", "a.txt"), "0 0.5 0.75 0.25 0.1\n")
+        return self.path("road")
+
+    def assert_refused(self, result, *words):
+        self.assertEqual(result.returncode, 2, result.stderr)
+        lines = [line for line in result.stderr.splitlines() if not line.startswith("frame ")]
+        self.assertEqual(len(lines), 1, result.stderr)
+        for word in words:
+            self.assertIn(word, lines[0])
+        self.assertFalse([name for name in os.listdir(self.folder) if name.startswith("out.bag")])
+
+    def test_survey_bag_holds_the_jpegs_as_they_are_at_times_of_chainage_over_speed(self):
+        road = self.survey()
+        result = run("from_survey", road, self.bag, "--speed-mps", 20, "--start", "-23.5,-46.25",
+                     "--bearing", 0, "--fix-noise-m", 0)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        images = messages(self.bag, "/camera/image_raw/compressed")
+        with open(os.path.join(road, "images", "b.jpg"), "rb") as file:
+            self.assertEqual(bytes(images[1].data), file.read())
+        times = [image.header.stamp.to_sec() - images[0].header.stamp.to_sec() for image in images]
+        np.testing.assert_allclose(times, [0, 0.25, 0.5, 50.5], atol=1e-6)
+        boxes = messages(self.bag, "/ground_truth/boxes")
+        self.assertEqual([len(array.detections) for array in boxes], [1, 0, 0, 0])
+        box = boxes[0].detections[0]
+        self.assertEqual((box.class_name, boxes[0].model), ("pothole", "ground_truth"))
+        np.testing.assert_allclose([box.x_min, box.y_min, box.x_max, box.y_max],
+                                   [240, 280, 400, 320], atol=1e-3)
+        infos = messages(self.bag, "/camera/camera_info")
+        self.assertEqual([i.header.stamp for i in infos], [i.header.stamp for i in images])
+        # 1010 m to the north of the start, where a degree has 110.77 km.
+        fixes = {fix.header.stamp: fix for fix in messages(self.bag, "/fix")}
+        last = fixes[images[3].header.stamp]
+        self.assertAlmostEqual((last.latitude + 23.5) * 110770, 1010, delta=1)
+        self.assertAlmostEqual(last.longitude, -46.25, places=9)
+        transforms = messages(self.bag, "/tf_static")[0].transforms
+        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in transforms],
+                         [("base_link", "camera_link"), ("camera_link", "camera_optical_frame")])
+
+    def test_long_gaps_are_cut_with_the_speed_kept(self):
+        self.assertEqual(run("from_survey", self.survey(), self.bag, "--speed-mps", 20,
+                             "--max-gap-s", 2).returncode, 0)
+        images = messages(self.bag, "/camera/image_raw/compressed")
+        self.assertAlmostEqual((images[3].header.stamp - images[0].header.stamp).to_sec(), 2.5)
+        truth = messages(self.bag, "/ground_truth/fix")
+        for earlier, later in zip(truth, truth[1:]):
+            north = (later.latitude - earlier.latitude) * 111000
+            east = (later.longitude - earlier.longitude) * 111320 * math.cos(
+                math.radians(later.latitude))
+            self.assertAlmostEqual(math.hypot(north, east), 2.0, delta=0.02)
+
+    def test_same_seed_same_bytes(self):
+        road, other = self.survey(), self.path("other.bag")
+        run("from_survey", road, self.bag, "--seed", 5, "--fix-bias-m", 1)
+        run("from_survey", road, other, "--seed", 5, "--fix-bias-m", 1)
+        with open(self.bag, "rb") as a, open(other, "rb") as b:
+            self.assertEqual(a.read(), b.read())
+
+    def test_mistakes_are_one_sentence_and_leave_no_bag(self):
+        road = self.survey()
+        self.assert_refused(run("from_survey", self.path("nowhere"), self.bag), "nowhere")
+        self.assert_refused(run("from_survey", road, self.bag, "--sped", 3), "--sped")
+        self.assert_refused(run("from_survey", road, self.bag, "--speed-mps", "fast"), "fast")
+        self.assert_refused(run("from_survey", road, self.bag, "--start", "91,0"), "91,0")
+        route = self.path("route.geojson")
+        write(route, json.dumps({"type": "LineString", "coordinates": [[0, 0], [0, 0.001]]}))
+        self.assert_refused(run("from_survey", road, self.bag, "--route", route), "110.6 m",
+                            "needs 1010.0 m")
+        with open(os.path.join(road, "images", "c.jpg"), "wb") as file:
+            file.write(b"\xff\xd8 no picture")
+        self.assert_refused(run("from_survey", road, self.bag), "c.jpg")
+        os.remove(os.path.join(road, "images", "c.jpg"))
+        self.assert_refused(run("from_survey", road, self.bag), "c.jpg", "missing")
+
+    def test_tum_bag_holds_colour_depth_in_metres_and_poses(self):
+        write_image(self.path("tum", "rgb", "1.png"), 64, 48)
+        os.makedirs(self.path("tum", "depth"))
+        depth = np.full((48, 64), 5000, np.uint16)
+        depth[0, 0] = 0
+        cv2.imwrite(self.path("tum", "depth", "1.png"), depth)
+        write(self.path("tum", "associations.txt"), "1000.5 rgb/1.png 1000.625 depth/1.png\n")
+        write(self.path("tum", "groundtruth.txt"), "# truth\n1000.5 1 2 3 0 0 0 1\n")
+        write(self.path("tum", "camera.yaml"),
+              "width: 64\nheight: 48\nfx: 50\nfy: 51\ncx: 31\ncy: 23\ndepth_scale: 2500\n")
+        result = run("from_tum", self.path("tum"), self.bag)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        image = messages(self.bag, "/camera/depth/image_raw")[0]
+        metres = np.frombuffer(image.data, np.float32).reshape(48, 64)
+        self.assertEqual((image.encoding, metres[1, 1]), ("32FC1", 2.0))
+        self.assertTrue(math.isnan(metres[0, 0]))
+        self.assertEqual(image.header.stamp.to_sec(), 1000.625)
+        self.assertEqual(messages(self.bag, "/ground_truth/pose")[0].pose.position.z, 3)
+        self.assertEqual(messages(self.bag, "/camera/camera_info")[0].K[4], 51)
+        os.remove(self.bag)
+        write(self.path("tum", "groundtruth.txt"), "1000.5 1 2 3 0 0 nan 1\n")
+        self.assert_refused(run("from_tum", self.path("tum"), self.bag), "line 1", "groundtruth.txt")
+
+    def test_kitti_bag_holds_images_and_poses(self):
+        for i in range(2):
+            write_image(self.path("kitti", "images", f"{i:06}.png"), 80, 40, i)
+        write(self.path("kitti", "calib.txt"), "P0: 70 0 40 0 0 70 20 0 0 0 1 0\n")
+        write(self.path("kitti", "poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 4 0 1 0 5 0 0 1 6\n")
+        result = run("from_kitti", self.path("kitti"), self.bag, "--rate-hz", 5)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        images = messages(self.bag, "/camera/image_raw")
+        self.assertAlmostEqual((images[1].header.stamp - images[0].header.stamp).to_sec(), 0.2)
+        self.assertEqual(messages(self.bag, "/ground_truth/pose")[1].pose.position.y, 5)
+
+    def test_kitti_bag_holds_the_right_eye_with_its_baseline(self):
+        for side, eye in enumerate(("image_2", "image_3")):
+            for i in range(2):
+                write_image(self.path("pair", eye, f"{i:06}.png"), 80, 40, 2 * i + side)
+        projections = [f"P{i}: 70 0 40 {shift} 0 70 20 0 0 0 1 0\n" for i, shift in enumerate((0, -14, 7, -28))]
+        write(self.path("pair", "calib.txt"), "".join(projections))
+        result = run("from_kitti", self.path("pair"), self.bag)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        lefts, rights = (messages(self.bag, f"/{eye}/image_raw") for eye in ("camera", "camera_right"))
+        infos = messages(self.bag, "/camera_right/camera_info")
+        for one in (rights, infos):
+            self.assertEqual([(m.header.stamp, m.header.frame_id) for m in one],
+                             [(m.header.stamp, m.header.frame_id) for m in lefts])
+        self.assertNotEqual(rights[0].data, lefts[0].data)
+        self.assertAlmostEqual(infos[0].P[3], -35, msg="from P2 to P3")
+        os.remove(self.bag)
+        projections[3] = projections[3].replace("-28", "28")
+        write(self.path("pair", "calib.txt"), "".join(projections))
+        self.assert_refused(run("from_kitti", self.path("pair"), self.bag), "lines 3 and 4", "calib.txt")
+        write(self.path("pair", "calib.txt"), projections[0])
+        self.assertEqual(run("from_kitti", self.path("pair"), self.bag).returncode, 0)
+        self.assertEqual(messages(self.bag, "/camera_right/image_raw"), [])
+
+    def test_real_survey_section_becomes_a_bag(self):
+        data = os.environ.get("LIVEMAP_DATA_DIR", os.path.join(
+            os.path.dirname(os.path.realpath(__file__)), "..", "..", "..", "shared", "data"))
+        road = os.path.join(data, "road_survey", "386RS191729")
+        if not os.path.isdir(road):
+            self.skipTest("skipped, no data")
+        result = run("from_survey", road, self.bag)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(len(messages(self.bag, "/camera/image_raw/compressed")), 104)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("livemap", "bag_tools", BagToolsTest)

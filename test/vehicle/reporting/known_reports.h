@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "common/sqlite.h"
+#include "protocol/notice.h"
+#include "protocol/report.h"
+
+namespace livemap {
+
+// Reports and notices of hazards along a street, told apart by a number: for tests.
+
+constexpr GeoPoint kStreet{40.4433, -79.9436};
+constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+
+inline GeoPoint East(double distance_m) {
+  return GeodesicDestination(kStreet, M_PI / 2, distance_m);
+}
+
+inline Uuid Id(int number) {
+  Uuid id;
+  id.bytes[0] = 1;
+  id.bytes[14] = static_cast<std::uint8_t>(number / 256);
+  id.bytes[15] = static_cast<std::uint8_t>(number % 256);
+  return id;
+}
+
+inline Report MakeReport(int number, const GeoPoint& position,
+                         const std::string& name = "pothole") {
+  Report report;
+  report.uuid = Id(number);
+  report.drive_id = "drive-1";
+  report.stamp_ns = kNowNs + number;
+  report.class_name = name;
+  report.confidence = 0.75F;
+  report.box = {1, 2, 30, 40};
+  report.position = position;
+  report.covariance_m2 << 2.0, 0.25, 0.25, 1.5;
+  report.image_width = 640;
+  report.image_height = 400;
+  report.image_frame_id = "camera_optical_frame";
+  report.image_format = "jpeg";
+  report.image = {0xff, 0xd8, 0x00, 0x01};
+  return report;
+}
+
+inline Notice MakeNotice(Notice::Action action, int hazard, const GeoPoint& position,
+                         std::uint64_t sequence) {
+  Notice notice;
+  notice.action = action;
+  notice.sequence = sequence;
+  notice.hazard_uuid = Id(hazard);
+  notice.stamp_ns = kNowNs + static_cast<std::int64_t>(sequence);
+  notice.class_name = "pothole";
+  notice.confidence = 0.5F;
+  notice.position = position;
+  return notice;
+}
+
+/// Gives an outbox the shape that it had before pictures showed a part of the image and reports
+/// were held.
+inline void MakeOlder(const std::string& path) {
+  SqliteDatabase database(path, /*durable=*/true);
+  for (const char* column :
+       {"shown_x", "shown_y", "shown_width", "shown_height", "hold_until_ns"}) {
+    database.Execute(std::string("ALTER TABLE pending DROP COLUMN ") + column);
+  }
+  database.Execute("PRAGMA user_version=2");
+}
+
+}  // namespace livemap

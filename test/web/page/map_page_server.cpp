@@ -1,0 +1,213 @@
+// A real zone and its real web server for the browser tests and for pictures of the page. It takes
+// one JSON command per line on standard input and answers each with one line of JSON:
+//
+//   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
+//                                                                       -> {"id", "status",
+//                                                                       "reason"}
+//   {"do": "change", "class": C, "lat": D, "lon": D, "vanished": false, "vehicle": V} -> {"id"}
+//   {"do": "remove", "id": UUID}                                        -> {"removed"}
+//   {"do": "confirm", "id": UUID}           as an official              -> {"confirmed"}
+//   {"do": "pass", "seconds": S}            the zone's clock goes on    -> {"passed"}
+//   {"do": "close_decisions"}               the server starts anew without a token file
+//   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
+//   {"do": "vehicle", "id": V, "lat": D, "lon": D, "course": RAD, "speed": MPS} -> {"accepted"}
+//   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
+//   {"do": "connections"}                                               -> {"connections"}
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/error.h"
+#include "test/web/zone_fixture.h"
+
+namespace {
+
+using livemap::GeoPoint;
+using Json = nlohmann::json;
+
+/// A drawn road with a drawn hazard and its box, as a detector would annotate it.
+std::vector<std::uint8_t> DrawnPicture(const std::string& class_name) {
+  cv::Mat picture(360, 540, CV_8UC3, cv::Scalar(214, 190, 160));
+  for (int y = 0; y < 170; ++y) {
+    picture.row(y).setTo(cv::Scalar(236 - y / 8, 205 - y / 6, 165 - y / 5));
+  }
+  picture.rowRange(170, 360).setTo(cv::Scalar(96, 128, 118));
+  const std::vector<cv::Point> road{{245, 170}, {295, 170}, {520, 360}, {20, 360}};
+  cv::fillConvexPoly(picture, road, cv::Scalar(92, 88, 86), cv::LINE_AA);
+  for (int i = 0; i < 5; ++i) {
+    const int y = 180 + i * i * 9;
+    cv::line(picture, {270, y}, {270, y + 4 + 5 * i}, cv::Scalar(230, 235, 238), 2 + i / 2,
+             cv::LINE_AA);
+  }
+  const cv::Point centre(206, 270);
+  cv::ellipse(picture, centre, {38, 13}, 4, 0, 360, cv::Scalar(52, 50, 50), -1, cv::LINE_AA);
+  cv::ellipse(picture, centre + cv::Point(3, 3), {30, 8}, 4, 0, 360, cv::Scalar(34, 32, 33), -1,
+              cv::LINE_AA);
+  const cv::Scalar red(43, 50, 224);
+  cv::rectangle(picture, {160, 248}, {252, 292}, red, 2, cv::LINE_AA);
+  const std::string text = class_name.substr(0, 18) + " 0.87";
+  cv::rectangle(picture, {160, 228}, {160 + 9 * static_cast<int>(text.size()), 248}, red, -1);
+  cv::putText(picture, text, {164, 243}, cv::FONT_HERSHEY_SIMPLEX, 0.45, cv::Scalar::all(255), 1,
+              cv::LINE_AA);
+  std::vector<std::uint8_t> file;
+  cv::imencode(".jpg", picture, file, {cv::IMWRITE_JPEG_QUALITY, 88});
+  return file;
+}
+
+class Session {
+ public:
+  Session() {
+    options_ = livemap::TestOptions();
+    options_.token_file = tokens_.path();
+    Start();
+  }
+
+  int port() const { return options_.port; }
+
+  Json Do(const Json& command) {
+    const std::string verb = command.at("do");
+    if (verb == "report") return AddReport(command);
+    if (verb == "change") return AddMapChange(command);
+    if (verb == "remove") return Remove(command);
+    if (verb == "confirm") return Confirm(command);
+    if (verb == "pass") return Pass(command);
+    if (verb == "close_decisions") return CloseDecisions();
+    if (verb == "fill") return Fill(command);
+    if (verb == "vehicle") return MoveVehicle(command);
+    if (verb == "start") return Start();
+    if (verb == "connections") return {{"connections", server_->connections()}};
+    if (verb != "stop") throw livemap::Error("unknown command '" + verb + "'");
+    server_.reset();
+    return {{"running", false}};
+  }
+
+ private:
+  Json Start() {
+    server_ = std::make_unique<livemap::WebServer>(options_, *fixture_.zone, fixture_.catalogue);
+    options_.port = server_->port();
+    return {{"running", true}};
+  }
+
+  void Tick() { fixture_.now_ns = livemap::UtcNowNs() + ahead_ns_; }
+
+  Json Pass(const Json& command) {
+    ahead_ns_ += static_cast<std::int64_t>(command.at("seconds").get<double>() * 1e9);
+    Tick();
+    fixture_.zone->Advance();
+    return {{"passed", true}};
+  }
+
+  Json CloseDecisions() {
+    server_.reset();
+    options_.token_file.clear();
+    return Start();
+  }
+
+  Json Confirm(const Json& command) {
+    Tick();
+    const auto uuid = livemap::Uuid::Parse(command.at("id"));
+    const std::string official = livemap::TokenFile::official();
+    return {{"confirmed", uuid && fixture_.zone->Confirm(*uuid, official)}};
+  }
+
+  Json AddReport(const Json& command) {
+    Tick();
+    auto report = fixture_.MakeReport(command.at("class"), {command.at("lat"), command.at("lon")});
+    report.vehicle_id = command.value("vehicle", report.vehicle_id);
+    if (command.value("picture", true)) {
+      report.image_format = "jpeg";
+      report.image = DrawnPicture(report.class_name);
+    }
+    const livemap::Receipt receipt = fixture_.zone->Handle(report);
+    const bool committed = receipt.status == livemap::Receipt::Status::kCommitted;
+    return {{"id", receipt.hazard_uuid.ToString()},
+            {"status", committed ? "committed" : "refused"},
+            {"reason", receipt.reason}};
+  }
+
+  Json AddMapChange(const Json& command) {
+    Tick();
+    auto report =
+        fixture_.MakeMapChange(command.at("class"), {command.at("lat"), command.at("lon")});
+    report.vehicle_id = command.value("vehicle", report.vehicle_id);
+    report.vanished = command.value("vanished", false);
+    const livemap::Receipt receipt = fixture_.zone->HandleMapChanges({report}).at(0);
+    if (!receipt.reason.empty()) throw livemap::Error(receipt.reason);
+    return {{"id", receipt.hazard_uuid.ToString()}};
+  }
+
+  Json Remove(const Json& command) {
+    Tick();
+    const auto uuid = livemap::Uuid::Parse(command.at("id"));
+    return {{"removed", uuid && fixture_.zone->Remove(*uuid, "test")}};
+  }
+
+  /// Hazards along a lattice of streets about 150 m apart.
+  Json Fill(const Json& command) {
+    Tick();
+    const GeoPoint corner{command.at("lat"), command.at("lon")};
+    const std::vector<const char*> classes{"pothole", "pothole",        "pothole", "traffic_cone",
+                                           "debris",  "road_work_sign", "barrier"};
+    std::mt19937 random(11);
+    const std::size_t count = command.at("count");
+    // Streets cross, so some of these merge: goes on until there are as many as asked for.
+    for (int i = 0; fixture_.zone->Statistics().active_hazards < count;) {
+      const std::size_t missing = count - fixture_.zone->Statistics().active_hazards;
+      std::vector<livemap::Report> reports;
+      for (std::size_t k = 0; k < missing; ++k, ++i) {
+        const double along = 0.00011 * (i / 60) + 1e-5 * std::uniform_real_distribution<>()(random);
+        const double across = 0.0018 * (i % 30);
+        const bool east = i % 60 < 30;
+        const GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
+                                corner.longitude_deg + (east ? along * 1.31 : across)};
+        auto report = fixture_.MakeReport(classes[random() % classes.size()], position);
+        report.confidence = 0.5F + 0.49F * std::uniform_real_distribution<float>()(random);
+        reports.push_back(report);
+      }
+      fixture_.zone->HandleBatch(reports);
+    }
+    return {{"hazards", fixture_.zone->Statistics().active_hazards}};
+  }
+
+  Json MoveVehicle(const Json& command) {
+    Tick();
+    livemap::VehicleState vehicle;
+    vehicle.vehicle_id = command.at("id");
+    vehicle.position = {command.at("lat"), command.at("lon")};
+    vehicle.course_rad = command.at("course");
+    vehicle.speed_mps = command.at("speed");
+    vehicle.stamp_ns = fixture_.now_ns;
+    return {{"accepted", fixture_.zone->UpdateVehicle(vehicle)}};
+  }
+
+  livemap::TokenFile tokens_;
+  livemap::ZoneFixture fixture_;
+  std::int64_t ahead_ns_ = 0;  ///< Of the zone's clock before the system's.
+  livemap::WebOptions options_;
+  std::unique_ptr<livemap::WebServer> server_;
+};
+
+}  // namespace
+
+int main() {
+  try {
+    Session session;
+    std::cout << Json{{"port", session.port()}, {"token", livemap::TokenFile::token()}}
+              << std::endl;
+    std::string line;
+    while (std::getline(std::cin, line)) {
+      std::cout << session.Do(Json::parse(line)) << std::endl;
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "map_page_server: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

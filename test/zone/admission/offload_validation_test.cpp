@@ -1,0 +1,88 @@
+#include "zone/admission/offload_validation.h"
+
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <limits>
+
+#include "test/zone/offload/offloaded_frames.h"
+
+namespace livemap {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+std::string WhyNot(const Candidate& candidate) {
+  const auto why = WhyCandidateRefused(candidate, CandidateLimits(), test::kZoneNowNs);
+  return why ? why->sentence : "taken";
+}
+
+TEST(CandidateValidation, AnHonestFrameIsTaken) {
+  EXPECT_EQ(WhyNot(test::CandidateAt(0)), "taken");
+}
+
+struct Broken {
+  std::string name;
+  std::function<void(Candidate&)> change;
+  std::string said;
+};
+
+class BrokenCandidate : public ::testing::TestWithParam<Broken> {};
+
+TEST_P(BrokenCandidate, IsRefusedAndToldWhy) {
+  Candidate candidate = test::CandidateAt(0);
+  GetParam().change(candidate);
+  EXPECT_THAT(WhyNot(candidate), HasSubstr(GetParam().said));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Candidates, BrokenCandidate,
+    ::testing::Values(
+        Broken{"no_vehicle", [](Candidate& c) { c.vehicle_id.clear(); }, "vehicle_id"},
+        Broken{"line_end", [](Candidate& c) { c.drive_id = "a\nb"; }, "drive_id"},
+        Broken{"score_nan", [](Candidate& c) { c.score = std::nanf(""); }, "confidence"},
+        Broken{"latitude_nan", [](Candidate& c) { c.base.position.latitude_deg = kNan; },
+               "position"},
+        Broken{"covariance_nan", [](Candidate& c) { c.base.covariance_m2(0, 0) = kNan; },
+               "covariance"},
+        Broken{"covariance_none", [](Candidate& c) { c.base.covariance_m2.setZero(); },
+               "positive definite"},
+        Broken{"course_nan", [](Candidate& c) { c.base.course_rad = kNan; }, "course"},
+        Broken{"course_variance", [](Candidate& c) { c.base.course_variance_rad2 = -1e-9; },
+               "variance of the course"},
+        Broken{"correlation", [](Candidate& c) { c.base.position_course << 1, 0; },
+               "position and course"},
+        Broken{"correlation_nan", [](Candidate& c) { c.base.position_course << kNan, 0; },
+               "position and course"},
+        Broken{"focal_zero", [](Candidate& c) { c.intrinsics.fx = 0; }, "focal"},
+        Broken{"focal_nan", [](Candidate& c) { c.intrinsics.fy = kNan; }, "focal"},
+        Broken{"principal_point", [](Candidate& c) { c.intrinsics.cx = kNan; }, "principal"},
+        Broken{"no_width", [](Candidate& c) { c.intrinsics.width = -1; }, "image size"},
+        Broken{"other_size", [](Candidate& c) { c.intrinsics.width = 641; }, "intrinsics are of"},
+        Broken{"far_camera", [](Candidate& c) { c.base_from_optical.translation().x() = 1e6; },
+               "camera is not"},
+        Broken{"camera_nan", [](Candidate& c) { c.base_from_optical.translation().z() = kNan; },
+               "camera is not"},
+        Broken{"mirror", [](Candidate& c) { c.base_from_optical.linear() *= -1; }, "rotation"},
+        Broken{"rotation_nan", [](Candidate& c) { c.base_from_optical.linear()(0, 0) = kNan; },
+               "rotation"},
+        Broken{"future", [](Candidate& c) { c.stamp_ns += 3600'000'000'000; }, "future"},
+        Broken{"never_set", [](Candidate& c) { c.stamp_ns = -1; }, "stamp"},
+        Broken{"frame_id", [](Candidate& c) { c.image_frame_id.assign(65, 'x'); }, "frame_id"},
+        Broken{"no_picture", [](Candidate& c) { c.image.clear(); }, "no JPEG"},
+        Broken{"cut_off", [](Candidate& c) { c.image.resize(c.image.size() / 2); }, "cut off"},
+        Broken{"large", [](Candidate& c) { c.image.resize(2 << 20); }, "at most"}),
+    [](const auto& broken) { return broken.param.name; });
+
+TEST(CandidateValidation, APngIsNoJpeg) {
+  Candidate candidate = test::CandidateAt(0);
+  candidate.image = {0x89, 'P',  'N', 'G', '\r', '\n', 0x1a, '\n', 0,    0, 0,
+                     13,   'I',  'H', 'D', 'R',  0,    0,    2,    0x80, 0, 0,
+                     1,    0x90, 8,   2,   0,    0,    0,    0,    0,    0, 0};
+  EXPECT_THAT(WhyNot(candidate), HasSubstr("no JPEG"));
+}
+
+}  // namespace
+}  // namespace livemap

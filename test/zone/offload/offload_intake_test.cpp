@@ -1,0 +1,188 @@
+#include "zone/offload/offload_intake.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "test/zone/offload/offloaded_frames.h"
+#include "zone/admission/report_validation.h"
+
+namespace livemap {
+namespace {
+
+using test::AnswerOf;
+using test::CandidateAt;
+using test::kZoneNowNs;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class CandidateIntakeTest : public ::testing::Test {
+ protected:
+  CandidateIntakeTest() { config_.max_ground_sigma_m = 100; }
+
+  CandidateIntake Intake() const { return CandidateIntake(config_); }
+
+  CandidateIntake::Config config_;
+};
+
+TEST_F(CandidateIntakeTest, AHazardIsPlacedByThePoseOfItsFrame) {
+  CandidateIntake intake = Intake();
+  EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "");
+  const CandidateIntake::Job* job = intake.Next(kZoneNowNs, 0);
+  ASSERT_NE(job, nullptr);
+  const auto reports = intake.Finish(job->internal_ns, AnswerOf(job->internal_ns, 12, -1.5));
+  ASSERT_THAT(reports, SizeIs(1));
+  const Report& report = reports[0];
+  const Candidate frame = CandidateAt(0);
+  const GeoPoint ahead = GeodesicDestination(frame.base.position, M_PI / 4, 12);
+  const GeoPoint expected = GeodesicDestination(ahead, M_PI / 4 + M_PI / 2, 1.5);
+  EXPECT_LT(GeodesicDistanceM(report.position, expected), 0.01);
+  EXPECT_EQ(report.vehicle_id, "car-1");
+  EXPECT_EQ(report.drive_id, "drive-1");
+  EXPECT_EQ(report.stamp_ns, frame.stamp_ns) << "the vehicle's, not the zone's own";
+  EXPECT_EQ(report.class_name, "pothole");
+  EXPECT_EQ(report.image_frame_id, "camera_optical_frame");
+  EXPECT_FALSE(WhyRefused(report, ReportLimits(), kZoneNowNs)) << "as the zone takes reports";
+  EXPECT_EQ(intake.counters().reports, 1U);
+  EXPECT_EQ(intake.in_flight(), 0U);
+}
+
+TEST_F(CandidateIntakeTest, EqualStampsOfTwoVehiclesStayApart) {
+  CandidateIntake intake = Intake();
+  intake.Add(CandidateAt(0, "car-1"), kZoneNowNs);
+  intake.Add(CandidateAt(0, "car-2"), kZoneNowNs);
+  const std::int64_t first = intake.Next(kZoneNowNs, 0)->internal_ns;
+  const std::int64_t second = intake.Next(kZoneNowNs, 0)->internal_ns;
+  ASSERT_LT(first, second);
+  const auto of_second = intake.Finish(second, AnswerOf(second, 10, 0));
+  const auto of_first = intake.Finish(first, AnswerOf(first, 10, 0));
+  ASSERT_THAT(of_first, SizeIs(1));
+  ASSERT_THAT(of_second, SizeIs(1));
+  EXPECT_EQ(of_first[0].vehicle_id, "car-1");
+  EXPECT_EQ(of_second[0].vehicle_id, "car-2");
+  EXPECT_NE(of_first[0].uuid, of_second[0].uuid);
+}
+
+TEST_F(CandidateIntakeTest, AFrameThatComesTwiceIsDetectedOnce) {
+  CandidateIntake intake = Intake();
+  EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "");
+  EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "frame came before");
+  EXPECT_EQ(intake.counters().repeated, 1U);
+  EXPECT_EQ(intake.waiting(), 1U);
+}
+
+TEST_F(CandidateIntakeTest, TheSameBoxInTheSameFrameIsTheSameReportAfterARestartToo) {
+  const auto uuid_now = [this] {
+    CandidateIntake intake = Intake();
+    intake.Add(CandidateAt(0), kZoneNowNs);
+    const std::int64_t stamp = intake.Next(kZoneNowNs, 0)->internal_ns;
+    return intake.Finish(stamp, AnswerOf(stamp, 10, 0)).at(0).uuid;
+  };
+  const Uuid uuid = uuid_now();
+  EXPECT_EQ(uuid, uuid_now());
+  EXPECT_EQ(uuid.bytes[6] >> 4, 8) << "a version 8 UUID";
+  EXPECT_EQ(uuid.bytes[8] >> 6, 2);
+}
+
+TEST(CandidateReportUuid, EveryPartOfItsNameCounts) {
+  const Box box{1, 2, 3, 4};
+  const Uuid uuid = CandidateReportUuid("car-1", 5, "pothole", box);
+  EXPECT_NE(uuid, CandidateReportUuid("car-2", 5, "pothole", box));
+  EXPECT_NE(uuid, CandidateReportUuid("car-1", 6, "pothole", box));
+  EXPECT_NE(uuid, CandidateReportUuid("car-1", 5, "deer", box));
+  EXPECT_NE(uuid, CandidateReportUuid("car-1", 5, "pothole", {1, 2, 3.2F, 4}));
+  EXPECT_EQ(uuid, CandidateReportUuid("car-1", 5, "pothole", {1.01F, 2, 3, 4}));
+}
+
+TEST_F(CandidateIntakeTest, WhatIsTooFarOrNotOnTheRoadIsNotReported) {
+  CandidateIntake intake = Intake();
+  intake.Add(CandidateAt(0), kZoneNowNs);
+  const std::int64_t stamp = intake.Next(kZoneNowNs, 0)->internal_ns;
+  SightingFrame answer = AnswerOf(stamp, 31, 0);
+  answer.sightings.push_back({"deer", 0.9F, {100, 10, 200, 100}});  // Ends above the horizon.
+  answer.sightings.push_back({"deer", 0.9F, {100, 10, std::nanf(""), 100}});
+  answer.sightings.push_back({"deer", 0.9F, {0, 200, 100, 390}});  // Its foot may be out of view.
+  EXPECT_THAT(intake.Finish(stamp, answer), IsEmpty());
+  EXPECT_EQ(intake.counters().cut_by_side, 1U);
+  EXPECT_EQ(intake.counters().too_far, 1U);
+  EXPECT_EQ(intake.counters().not_on_ground, 1U);
+  EXPECT_EQ(intake.counters().invalid_sightings, 1U);
+}
+
+TEST_F(CandidateIntakeTest, TheDetectorHasNeverMoreThanItTakes) {
+  config_.max_in_flight = 2;
+  CandidateIntake intake = Intake();
+  for (int i = 0; i < 5; ++i) intake.Add(CandidateAt(0.3 * i), kZoneNowNs);
+  const CandidateIntake::Job* first = intake.Next(kZoneNowNs, 0);
+  ASSERT_NE(first, nullptr);
+  ASSERT_NE(intake.Next(kZoneNowNs, 0), nullptr);
+  EXPECT_EQ(intake.Next(kZoneNowNs, 0), nullptr);
+  intake.Finish(first->internal_ns, {});
+  EXPECT_NE(intake.Next(kZoneNowNs, 0), nullptr);
+  EXPECT_EQ(intake.counters().empty, 1U);
+}
+
+TEST_F(CandidateIntakeTest, AFrameThatTheDetectorLostMakesRoomAfterItsTime) {
+  config_.max_in_flight = 1;
+  CandidateIntake intake = Intake();
+  intake.Add(CandidateAt(0), kZoneNowNs);
+  intake.Add(CandidateAt(1), kZoneNowNs);
+  const std::int64_t lost = intake.Next(kZoneNowNs, 100)->internal_ns;
+  EXPECT_THAT(intake.Expire(109), IsEmpty());
+  EXPECT_THAT(intake.Expire(110), ::testing::ElementsAre(lost));
+  EXPECT_NE(intake.Next(kZoneNowNs, 110), nullptr);
+  EXPECT_THAT(intake.Finish(lost, AnswerOf(lost, 10, 0)), IsEmpty()) << "too late";
+  EXPECT_EQ(intake.counters().lost_by_detector, 1U);
+}
+
+TEST_F(CandidateIntakeTest, WhenTheDetectorIsBehindTheOldestFramesGoAndAreCounted) {
+  config_.max_waiting = 3;
+  CandidateIntake intake = Intake();
+  for (int i = 0; i < 10; ++i) intake.Add(CandidateAt(i), kZoneNowNs);
+  EXPECT_EQ(intake.waiting(), 3U);
+  EXPECT_EQ(intake.counters().displaced, 7U);
+  EXPECT_EQ(intake.Next(kZoneNowNs, 0)->frame.stamp_ns, CandidateAt(7).stamp_ns);
+}
+
+TEST_F(CandidateIntakeTest, PicturesThatWaitAreBoundedInBytes) {
+  config_.max_waiting_bytes = 2.5 * static_cast<double>(CandidateAt(0).image.size());
+  CandidateIntake intake = Intake();
+  for (int i = 0; i < 10; ++i) intake.Add(CandidateAt(i), kZoneNowNs);
+  EXPECT_EQ(intake.waiting(), 2U);
+}
+
+TEST_F(CandidateIntakeTest, AVehicleBeyondItsAllowanceIsNotHeardOthersAre) {
+  config_.allowance.frames_per_minute = 3;
+  CandidateIntake intake = Intake();
+  for (int i = 0; i < 10; ++i) intake.Add(CandidateAt(i), kZoneNowNs);
+  EXPECT_EQ(intake.counters().over_allowance, 7U);
+  EXPECT_EQ(intake.Add(CandidateAt(0, "car-2"), kZoneNowNs), "");
+}
+
+TEST_F(CandidateIntakeTest, BrokenFramesAreCountedAndEveryFrameIsAccountedFor) {
+  CandidateIntake intake = Intake();
+  Candidate broken = CandidateAt(0);
+  broken.base.course_rad = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(intake.Add(broken, kZoneNowNs), "");
+  intake.Add(CandidateAt(1), kZoneNowNs);
+  intake.Add(CandidateAt(2), kZoneNowNs);
+  intake.Abandon(intake.Next(kZoneNowNs, 0)->internal_ns);
+  const auto& counters = intake.counters();
+  EXPECT_EQ(counters.refused, 1U);
+  EXPECT_EQ(counters.undecodable, 1U);
+  EXPECT_EQ(counters.frames, counters.refused + counters.over_allowance + counters.repeated +
+                                 counters.displaced + counters.undecodable +
+                                 counters.lost_by_detector + counters.detected + intake.waiting() +
+                                 intake.in_flight());
+}
+
+TEST_F(CandidateIntakeTest, InternalStampsRiseWhateverTheClockDoes) {
+  CandidateIntake intake = Intake();
+  intake.Add(CandidateAt(0), kZoneNowNs);
+  intake.Add(CandidateAt(1), kZoneNowNs);
+  const std::int64_t first = intake.Next(kZoneNowNs, 0)->internal_ns;
+  EXPECT_GT(intake.Next(kZoneNowNs - 1'000'000'000, 0)->internal_ns, first);
+}
+
+}  // namespace
+}  // namespace livemap

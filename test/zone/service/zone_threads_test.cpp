@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "test/zone/zone_fixture.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap {
+namespace {
+
+using ZoneThreadsTest = ZoneTest;
+
+TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
+  ZoneService zone(Config(), Clock(), 1);
+  std::vector<std::uint64_t> sequences;
+  const int id = zone.Subscribe([&](const ZoneEvent& event) {
+    if (event.hazard) sequences.push_back(event.hazard->hazard.sequence);
+  });
+  std::vector<std::vector<Report>> work(2);
+  for (int i = 0; i < 300; ++i) {
+    Report report = MakeReport({40 + 0.001 * (i % 40), 8});
+    if (i % 7 == 0) report.image = MakeJpeg(64, 48, 50, static_cast<std::uint8_t>(i));
+    work[static_cast<std::size_t>(i % 2)].push_back(report);
+  }
+  std::atomic<bool> done{false};
+  std::vector<std::thread> readers;
+  for (int reader = 0; reader < 2; ++reader) {
+    readers.emplace_back([&] {
+      std::uint64_t newest = 0;
+      while (!done) {
+        const std::uint64_t sequence = zone.Sequence();
+        EXPECT_GE(sequence, newest);
+        newest = sequence;
+        std::uint64_t sightings = 0;
+        for (const Hazard& hazard : zone.Query(std::nullopt, 0, 1000)) {
+          sightings += hazard.sightings;
+          zone.ImagePath(hazard.image_sha256);
+        }
+        // Every report is one event: the map is never between two of them.
+        EXPECT_GE(sightings, sequence);
+        zone.Vehicles();
+        zone.Statistics();
+      }
+    });
+  }
+  std::vector<std::thread> writers;
+  for (const std::vector<Report>& reports : work) {
+    writers.emplace_back([&zone, &reports] {
+      for (std::size_t i = 0; i < reports.size(); i += 3) {
+        zone.HandleBatch({reports[i], reports[i + 1], reports[i + 2]});
+        zone.UpdateVehicle({"car-1", "", reports[i].position, 0, 0, kNowNs});
+      }
+    });
+  }
+  for (std::thread& writer : writers) writer.join();
+  const int late = zone.Subscribe([](const ZoneEvent&) {});
+  zone.Unsubscribe(late);
+  done = true;
+  for (std::thread& reader : readers) reader.join();
+  zone.Unsubscribe(id);
+
+  ASSERT_EQ(sequences.size(), 300U);
+  for (std::size_t i = 0; i < sequences.size(); ++i) EXPECT_EQ(sequences[i], i + 1);
+  EXPECT_EQ(zone.Query(std::nullopt, 0, 1000).size(), 40U);
+}
+
+/// Comes from the south towards `place` and passes it.
+void PassBy(ZoneService& zone, const std::string& vehicle, const GeoPoint& place,
+            std::atomic<std::int64_t>& now_ns) {
+  for (int metres = -200; metres <= -15; metres += 15) {
+    now_ns += 1'000'000'000;
+    const GeoPoint at{place.latitude_deg + metres / 111000.0, place.longitude_deg};
+    zone.UpdateVehicle({vehicle, "", at, 0.0, 15.0, now_ns});
+  }
+}
+
+TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnEvent) {
+  std::atomic<std::int64_t> now_ns{kNowNs};
+  ZoneService zone(
+      Config(), [&] { return now_ns.load(); }, 1);
+  std::vector<HazardEvent> events;
+  const int id = zone.Subscribe([&](const ZoneEvent& event) {
+    if (event.hazard) events.push_back(*event.hazard);
+  });
+  const auto place = [](int i) { return GeoPoint{40 + 0.01 * i, 8}; };
+  std::vector<Report> first;
+  for (int i = 0; i < 20; ++i) first.push_back(MakeReport(place(i)));
+  zone.HandleBatch(first);
+  now_ns += 12 * 3600'000'000'000;
+
+  std::atomic<int> working{3};
+  std::thread reporter([&] {
+    for (int i = 0; i < 100; ++i) {
+      Report report = MakeReport(place(i % 20));
+      report.vehicle_id = "car-" + std::to_string(i);
+      report.stamp_ns = now_ns;
+      zone.Handle(report);
+    }
+    --working;
+  });
+  std::thread official([&] {
+    for (int i = 0; i < 40; ++i) {
+      for (const Hazard& hazard : zone.Query(std::nullopt, 0, 5)) {
+        if (i % 2 == 0) zone.Reject(hazard.uuid, "Anna", "");
+        zone.Confirm(hazard.uuid, "Anna");
+        EXPECT_FALSE(zone.Events(hazard.uuid, 10).empty());
+      }
+      zone.Distrust("car-" + std::to_string(2 * i), "Anna", "");
+      zone.ChangedAround(place(3), 5000, zone.AnnouncedSequence() / 2, 100);
+    }
+    --working;
+  });
+  std::atomic<std::uint64_t> accepted{0};
+  std::thread passer([&] {
+    for (int i = 0; i < 20; ++i) {
+      PassBy(zone, "poll-" + std::to_string(i), place(i), now_ns);
+      for (const PollOrder& order : zone.TakeDuePolls()) {
+        PollAnswer answer;
+        answer.poll = order.poll;
+        answer.hazard = order.hazard;
+        answer.vehicle_id = order.vehicle_id;
+        answer.answer = PollAnswer::Answer::kNo;
+        answer.stamp_ns = now_ns;
+        if (zone.HandleAnswer(answer)) ++accepted;
+      }
+    }
+    --working;
+  });
+  std::thread clock([&] {
+    while (working > 0) {
+      zone.Advance();
+      zone.Statistics();
+      std::this_thread::yield();
+    }
+  });
+  for (std::thread* thread : {&reporter, &official, &passer, &clock}) thread->join();
+  zone.Unsubscribe(id);
+
+  ASSERT_EQ(events.size(), zone.Sequence());
+  std::uint64_t announced = 0;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    EXPECT_EQ(events[i].hazard.sequence, i + 1);
+    EXPECT_EQ(events[i].previous_announced, announced);
+    if (events[i].announced) announced = i + 1;
+  }
+  EXPECT_EQ(zone.AnnouncedSequence(), announced);
+  EXPECT_EQ(zone.Statistics().answers, accepted);
+  EXPECT_EQ(zone.Statistics().added + zone.Statistics().merged, 120U);
+}
+
+}  // namespace
+}  // namespace livemap

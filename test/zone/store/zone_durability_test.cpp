@@ -1,0 +1,179 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <set>
+
+#include "common/sqlite.h"
+#include "test/zone/zone_fixture.h"
+#include "zone/service/zone_service.h"
+#include "zone/store/zone_store.h"
+
+namespace livemap {
+namespace {
+
+using testing::HasSubstr;
+
+class ZoneDurabilityTest : public ZoneTest {
+ protected:
+  std::string WhyNotOpened() const {
+    try {
+      ZoneService(Config(), Clock(), 1);
+    } catch (const StoreError& error) {
+      return error.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(ZoneDurabilityTest, ARefusedCommitLeavesMapAndStoreAsTheyWere) {
+  ZoneService zone(Config(), Clock(), 1);
+  const Uuid known = zone.Handle(MakeReport({1, 1})).hazard_uuid;
+  const Hazard before = *zone.Find(known);
+  int events = 0;
+  const int id = zone.Subscribe([&](const ZoneEvent&) { ++events; });
+  SqliteDatabase saboteur(DatabasePath(), true);
+  // Fails on the second event, when hazards and reports have been written.
+  saboteur.Execute(
+      "CREATE TRIGGER no_space BEFORE INSERT ON events WHEN NEW.sequence = 3 "
+      "BEGIN SELECT RAISE(ABORT, 'no space left'); END");
+  const std::vector<Report> batch{MakeReport({1, 1}), MakeReport({2, 2})};
+  try {
+    zone.HandleBatch(batch);
+    FAIL() << "the commit was sabotaged";
+  } catch (const StoreError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no space left"));
+  }
+  EXPECT_TRUE(SameHazard(*zone.Find(known), before));
+  EXPECT_EQ(zone.Query(std::nullopt, 0, 10).size(), 1U);
+  EXPECT_EQ(zone.Sequence(), 1U);
+  EXPECT_EQ(events, 0);
+
+  saboteur.Execute("DROP TRIGGER no_space");
+  for (const Receipt& receipt : zone.HandleBatch(batch)) {
+    EXPECT_EQ(receipt.status, Receipt::Status::kCommitted);
+  }
+  EXPECT_EQ(zone.Find(known)->sightings, 2U);
+  EXPECT_EQ(zone.Sequence(), 3U);
+  EXPECT_EQ(events, 2);
+  zone.Unsubscribe(id);
+}
+
+/// Commits reports one after the other, spread over 200 hazards, and writes each uuid to `pipe`
+/// once its receipt is there, until it is killed.
+[[noreturn]] void CommitUntilKilled(const ZoneService::Config& config, int round, int pipe) {
+  ZoneService zone(
+      config, [] { return kNowNs; }, static_cast<std::uint64_t>(round));
+  std::mt19937_64 generator(static_cast<std::uint64_t>(round) + 1000);
+  while (true) {
+    Report report = MakeReport({40.0 + 0.001 * static_cast<double>(generator() % 200), 8.0});
+    report.uuid = Uuid::Random(generator);
+    zone.Handle(report);
+    if (write(pipe, report.uuid.bytes.data(), 16) != 16) _exit(1);
+  }
+}
+
+TEST_F(ZoneDurabilityTest, NothingCommittedIsLostOrDoubledWhenTheProcessIsKilled) {
+  std::size_t acknowledged = 0;
+  for (int round = 0; round < 5; ++round) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) CommitUntilKilled(Config(), round, ends[1]);
+    close(ends[1]);
+    Uuid uuid;
+    std::vector<Uuid> uuids;
+    // Kill at a different depth each round, in the middle of whatever it then does.
+    while (uuids.size() < 40U + 17U * static_cast<unsigned>(round) &&
+           read(ends[0], uuid.bytes.data(), 16) == 16) {
+      uuids.push_back(uuid);
+    }
+    kill(child, SIGKILL);
+    while (read(ends[0], uuid.bytes.data(), 16) == 16) uuids.push_back(uuid);
+    close(ends[0]);
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+
+    ZoneStore store(DatabasePath());
+    for (const Uuid& committed : uuids) EXPECT_TRUE(store.FindReport(committed));
+    acknowledged += uuids.size();
+    SqliteDatabase database(DatabasePath(), true);
+    SqliteStatement sum = database.Prepare(
+        "SELECT (SELECT sum(sightings) FROM hazards), (SELECT count(*) FROM reports), "
+        "(SELECT count(*) FROM events)");
+    ASSERT_TRUE(sum.Step());
+    EXPECT_EQ(sum.Int(0), sum.Int(1));
+    EXPECT_EQ(sum.Int(1), sum.Int(2));
+    // At most one report per kill was committed without anybody hearing of it.
+    EXPECT_LE(sum.Int(1), static_cast<std::int64_t>(acknowledged) + round + 1);
+  }
+  ZoneService zone(Config(), Clock(), 77);
+  EXPECT_EQ(zone.Handle(MakeReport({40.0, 8.0})).status, Receipt::Status::kCommitted);
+}
+
+TEST_F(ZoneDurabilityTest, RefusesAFileThatIsNoDatabase) {
+  std::filesystem::create_directories(directory_ + "/zone");
+  std::ofstream(DatabasePath()) << std::string(5000, 'x');
+  EXPECT_THAT(WhyNotOpened(), testing::AllOf(HasSubstr(DatabasePath()), HasSubstr("database")));
+}
+
+TEST_F(ZoneDurabilityTest, RefusesADamagedDatabase) {
+  {
+    ZoneService zone(Config(), Clock(), 1);
+    std::vector<Report> reports;
+    for (int i = 0; i < 300; ++i) reports.push_back(MakeReport({1 + 0.01 * i, 1}));
+    zone.HandleBatch(reports);
+  }
+  std::fstream file(DatabasePath(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(4096 * 5);
+  file << std::string(4096 * 6, '\xa5');
+  file.close();
+  EXPECT_THAT(WhyNotOpened(), HasSubstr(DatabasePath()));
+}
+
+TEST_F(ZoneDurabilityTest, RefusesASchemaNewerThanItself) {
+  { ZoneService zone(Config(), Clock(), 1); }
+  SqliteDatabase(DatabasePath(), true).Execute("INSERT INTO livemap_schema VALUES (99)");
+  EXPECT_THAT(WhyNotOpened(), testing::AllOf(HasSubstr("99"), HasSubstr("version")));
+}
+
+TEST_F(ZoneDurabilityTest, RefusesADirectoryThatAnotherZoneUses) {
+  ZoneService zone(Config(), Clock(), 1);
+  EXPECT_THAT(WhyNotOpened(), HasSubstr("in use"));
+}
+
+TEST_F(ZoneDurabilityTest, RefusesADirectoryThatCannotBeMade) {
+  std::ofstream(directory_ + "/zone") << "a file";
+  EXPECT_THAT(WhyNotOpened(), HasSubstr("cannot be made"));
+}
+
+TEST_F(ZoneDurabilityTest, WorksInADirectoryWithBlanksAndQuotes) {
+  ZoneService::Config config = Config();
+  config.directory = directory_ + "/a zone's; directory=x";
+  { ZoneService(config, Clock(), 1).Handle(MakeReport()); }
+  EXPECT_EQ(ZoneService(config, Clock(), 1).Query(std::nullopt, 0, 10).size(), 1U);
+  EXPECT_TRUE(std::filesystem::exists(config.directory + "/zone.sqlite3"));
+}
+
+TEST_F(ZoneDurabilityTest, HostileTextIsDataNotSql) {
+  ZoneService zone(Config(), Clock(), 1);
+  Report report = MakeReport();
+  report.class_name = "x'); DROP TABLE hazards; --";
+  report.vehicle_id = "' OR '1'='1";
+  report.drive_id = ":uuid ? $1";
+  EXPECT_EQ(zone.Handle(report).status, Receipt::Status::kCommitted);
+  const auto hazards = zone.Query(std::nullopt, 0, 10);
+  ASSERT_EQ(hazards.size(), 1U);
+  EXPECT_EQ(hazards[0].class_name, report.class_name);
+  EXPECT_TRUE(zone.Remove(hazards[0].uuid, "'); DROP TABLE events; --"));
+}
+
+}  // namespace
+}  // namespace livemap
