@@ -140,7 +140,7 @@ class PairsInTurn {
 };
 
 WarpedPicture RegisteredByEdges(const SmallPair& pair) {
-  const Registration found = RegisterByEdges(pair.before, pair.after, RegistrationOptions());
+  const Registration found = RegisterByEdges(pair.before, pair.after, RegistrationConfig());
   return WarpByHomography(pair.before, found.after_from_before);
 }
 
@@ -157,7 +157,7 @@ void RegisterByItsFeatures(benchmark::State& state) {
     const SmallPair& pair = pairs.Next();
     const Registration found = RegisterByHomography(
         {pair.before.size(), ExtractFeatures(pair.before)},
-        {pair.after.size(), ExtractFeatures(pair.after)}, RegistrationOptions(), 1);
+        {pair.after.size(), ExtractFeatures(pair.after)}, RegistrationConfig(), 1);
     benchmark::DoNotOptimize(WarpByHomography(pair.before, found.after_from_before).picture.data);
   }
 }

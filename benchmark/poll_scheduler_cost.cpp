@@ -74,8 +74,8 @@ struct Cost {
   double bytes_per_hazard = 0;
 };
 
-LifeRecord ToldSince(std::int64_t stamp_ns) {
-  LifeRecord life;
+PresenceRecord ToldSince(std::int64_t stamp_ns) {
+  PresenceRecord life;
   life.state = HazardState::kActive;
   life.since_ns = life.first_seen_ns = life.last_yes_ns = life.at_ns = stamp_ns;
   life.log_odds = 3;
@@ -84,8 +84,8 @@ LifeRecord ToldSince(std::int64_t stamp_ns) {
 
 Cost MeasureTicks(std::size_t hazards) {
   const auto side = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(hazards))));
-  const LifeClass entry;
-  const LifeRecord life = ToldSince(kStartNs);
+  const ClassModel entry;
+  const PresenceRecord life = ToldSince(kStartNs);
   Cost cost;
   const double before = AllocatedBytes();
   PollScheduler scheduler(PollScheduler::Config(), 5);

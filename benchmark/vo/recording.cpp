@@ -27,12 +27,12 @@ std::vector<std::optional<Eigen::Isometry3d>> PairWithTruth(const Sequence& sequ
 }  // namespace
 
 Recording::Recording(const std::string& directory, const std::string& camera_file,
-                     std::size_t most_frames)
+                     std::size_t max_frames)
     : sequence_(ReadTumSequence(directory, camera_file)) {
   for (const SequenceFrame& frame : sequence_.frames) {
     if (frame.depth_path.empty()) throw Error("the sequence '" + directory + "' has no depth");
   }
-  sequence_.frames.resize(std::min(sequence_.frames.size(), most_frames));
+  sequence_.frames.resize(std::min(sequence_.frames.size(), max_frames));
   camera_ = IntrinsicsOf(sequence_);
   truth_at_ = PairWithTruth(sequence_);
 }

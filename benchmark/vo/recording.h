@@ -17,9 +17,9 @@ namespace livemap {
 /// is timed.
 class Recording {
  public:
-  /// Reads the lists of a TUM folder and keeps the first `most_frames` frames; `camera_file` as
+  /// Reads the lists of a TUM folder and keeps the first `max_frames` frames; `camera_file` as
   /// ReadTumSequence's. Throws Error, also when there is no depth.
-  Recording(const std::string& directory, const std::string& camera_file, std::size_t most_frames);
+  Recording(const std::string& directory, const std::string& camera_file, std::size_t max_frames);
 
   std::size_t size() const { return sequence_.frames.size(); }
   const CameraIntrinsics& camera() const { return camera_; }

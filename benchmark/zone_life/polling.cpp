@@ -12,8 +12,8 @@ Polling::Polling(const PollingRule& rule) : rule_(rule) {
   scheduler_ = std::make_unique<PollScheduler>(config_, 1);
 }
 
-void Polling::SetHazard(std::uint64_t hazard, const GeoPoint& place, const LifeClass& entry,
-                        const LifeRecord& life, bool denied, std::int64_t now_ns) {
+void Polling::SetHazard(std::uint64_t hazard, const GeoPoint& place, const ClassModel& entry,
+                        const PresenceRecord& life, bool denied, std::int64_t now_ns) {
   if (scheduler_) return scheduler_->SetHazard(hazard, place, entry, life, now_ns, now_ns);
   if (rule_.kind == PollingRule::Kind::kNobody) return;
   if (!IsOnMap(life.state)) {

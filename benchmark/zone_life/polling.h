@@ -30,8 +30,8 @@ class Polling {
  public:
   explicit Polling(const PollingRule& rule);
 
-  void SetHazard(std::uint64_t hazard, const GeoPoint& place, const LifeClass& entry,
-                 const LifeRecord& life, bool denied, std::int64_t now_ns);
+  void SetHazard(std::uint64_t hazard, const GeoPoint& place, const ClassModel& entry,
+                 const PresenceRecord& life, bool denied, std::int64_t now_ns);
   struct Question {
     std::uint64_t hazard;
     std::string vehicle;

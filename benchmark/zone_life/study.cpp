@@ -31,7 +31,7 @@ Study::Study(const StudyConfig& config, const HazardCatalogue& catalogue)
   }
   for (std::size_t i = 0; i < kClasses; ++i) {
     const HazardClass entry = catalogue_.Get(kNature[i].name);
-    classes_[i] = LifeClassOf(entry, survival_.Of(entry.name));
+    classes_[i] = ClassModelOf(entry, survival_.Of(entry.name));
     ClassFigures& figures = figures_.classes[entry.name];
     figures.prior_life_s = entry.expected_life_s;
     figures.true_life_s = kNature[i].mean_life_s;
@@ -119,7 +119,7 @@ void Study::Handle(const Event& event) {
     case Happening::kAdvances: {
       Item& item = items_[event.a];
       if (item.version != event.version || !IsOnMap(item.life.state)) return;
-      const LifeStep step =
+      const LifecycleUpdate step =
           rules_.Advance(ClassOf(things_[item.thing]), Stamp(event.at_s), item.life);
       return Follow(event.a, step, false, event.at_s);
     }

@@ -11,7 +11,7 @@ namespace livemap {
 
 /// What decides that drivers are told.
 enum class TellingRule {
-  kLife,   ///< HazardLife.
+  kLife,   ///< HazardLifecycle.
   kCount,  ///< The naive one: messages for it less messages against it, whoever sent them.
 };
 

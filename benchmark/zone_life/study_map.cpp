@@ -12,11 +12,11 @@ void Study::Tell(std::size_t vehicle, std::size_t index, EvidenceKind kind, doub
     return;
   }
   Thing& thing = things_[index];
-  const LifeClass entry = ClassOf(thing);
+  const ClassModel entry = ClassOf(thing);
   Evidence evidence{kind, keys_[vehicle], now_ns};
   if (config_.trust) evidence.hostile = trust_.Hostile(evidence.vehicle, now_ns);
   const bool against = kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
-  LifeStep step;
+  LifecycleUpdate step;
   if (thing.item == kNone) {
     if (against) return;
     thing.item = items_.size();
@@ -40,22 +40,22 @@ void Study::Tell(std::size_t vehicle, std::size_t index, EvidenceKind kind, doub
   Follow(thing.item, step, against, t);
 }
 
-void Study::Count(Item& item, EvidenceKind kind, LifeStep& step, double t) {
-  constexpr int kMostScore = 5;
+void Study::Count(Item& item, EvidenceKind kind, LifecycleUpdate& step, double t) {
+  constexpr int kMaxScore = 5;
   const bool against = kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
-  const LifeClass entry = ClassOf(things_[item.thing]);
-  item.score = std::min(kMostScore, item.score + (against ? -1 : 1));
+  const ClassModel entry = ClassOf(things_[item.thing]);
+  item.score = std::min(kMaxScore, item.score + (against ? -1 : 1));
   if (!against) item.life.last_yes_ns = Stamp(t);
   HazardState to = item.life.state;
   if (item.score >= static_cast<int>(entry.confirmations)) to = HazardState::kActive;
   if (item.score <= 0) to = HazardState::kGone;
   step.transition.reset();
   if (to == item.life.state) return;
-  step.transition = LifeTransition{item.life.state, to, "counted"};
+  step.transition = LifecycleTransition{item.life.state, to, "counted"};
   item.life.state = to;
 }
 
-void Study::Follow(std::size_t index, const LifeStep& step, bool denied, double t) {
+void Study::Follow(std::size_t index, const LifecycleUpdate& step, bool denied, double t) {
   Item& item = items_[index];
   Thing& thing = things_[item.thing];
   const char* name = kNature[thing.kind].name;
@@ -84,7 +84,7 @@ void Study::Follow(std::size_t index, const LifeStep& step, bool denied, double 
   Push(std::max(t, next_s), Happening::kAdvances, index, 0, item.version);
 }
 
-void Study::Enter(Item& item, const LifeTransition& transition, double t) {
+void Study::Enter(Item& item, const LifecycleTransition& transition, double t) {
   Thing& thing = things_[item.thing];
   ClassFigures& figures = FiguresOf(thing);
   const bool was_told = transition.from && IsTold(*transition.from);

@@ -42,7 +42,7 @@ struct Thing {
 // What the zone has on its map.
 struct Item {
   std::size_t thing = 0;
-  LifeRecord life;
+  PresenceRecord life;
   int score = 0;  // Of the naive rule.
   double told_s = -1;
   std::uint32_t version = 0;
@@ -88,7 +88,7 @@ class Study {
             std::uint32_t version = 0, Town::Lane lane = {});
   bool Measured(double t) const { return t >= begin_s_ && t < end_s_; }
   bool Hostile(std::size_t vehicle) const { return hostile_[vehicle]; }
-  LifeClass ClassOf(const Thing& thing) const { return classes_[thing.kind]; }
+  ClassModel ClassOf(const Thing& thing) const { return classes_[thing.kind]; }
   ClassFigures& FiguresOf(const Thing& thing) { return figures_.classes[kNature[thing.kind].name]; }
   GeoPoint PlaceOf(const Thing& thing) const { return town_.At(thing.road, thing.offset_m); }
 
@@ -107,9 +107,9 @@ class Study {
   void Answer(const Event& event);
   void Tell(std::size_t vehicle, std::size_t thing, EvidenceKind kind, double t);
   // What the zone makes of it: study_map.cpp.
-  void Follow(std::size_t item, const LifeStep& step, bool denied, double t);
-  void Count(Item& item, EvidenceKind kind, LifeStep& step, double t);
-  void Enter(Item& item, const LifeTransition& transition, double t);
+  void Follow(std::size_t item, const LifecycleUpdate& step, bool denied, double t);
+  void Count(Item& item, EvidenceKind kind, LifecycleUpdate& step, double t);
+  void Enter(Item& item, const LifecycleTransition& transition, double t);
   void StopTelling(Item& item, Thing& thing, double t);
   void Finish();
 
@@ -119,7 +119,7 @@ class Study {
   Town town_;
   Fleet fleet_;
   SurvivalModel survival_;
-  HazardLife rules_;
+  HazardLifecycle rules_;
   VehicleAllowance allowance_;
   VehicleTrust trust_;
   Polling polling_;
@@ -127,7 +127,7 @@ class Study {
   std::vector<std::string> names_;
   std::vector<std::uint64_t> keys_;
   std::map<std::string, std::size_t> vehicle_of_name_;
-  std::array<LifeClass, kClasses> classes_;
+  std::array<ClassModel, kClasses> classes_;
   std::vector<Thing> things_;
   std::vector<Item> items_;
   std::vector<std::vector<std::size_t>> things_on_;  // By road: those that stand or are on the map.

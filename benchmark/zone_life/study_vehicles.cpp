@@ -65,7 +65,7 @@ void Study::Approach(const Event& event) {
 }
 
 void Study::Pass(std::size_t vehicle, Thing& thing, std::size_t index, double t) {
-  const LifeClass entry = ClassOf(thing);
+  const ClassModel entry = ClassOf(thing);
   if (!thing.Stands(t) || senses_.Uniform() > entry.hit_rate) return;
   thing.honest.insert(vehicle);
   const bool told = thing.item != kNone && IsTold(items_[thing.item].life.state);
@@ -96,7 +96,7 @@ void Study::Answer(const Event& event) {
   if (!IsOnMap(item.life.state)) return;
   const std::size_t index = item.thing;
   const bool stands = things_[index].Stands(event.at_s);
-  const LifeClass entry = ClassOf(things_[index]);
+  const ClassModel entry = ClassOf(things_[index]);
   if (Hostile(vehicle)) {
     Tell(vehicle, index, stands ? EvidenceKind::kAnswerNo : EvidenceKind::kAnswerYes, event.at_s);
     return;

@@ -103,7 +103,7 @@ Fleet::~Fleet() {
 std::unique_ptr<MqttClient> Fleet::Connect(
     const std::string& id, const std::string& topic,
     std::function<void(const MqttMessage&)> on_message) const {
-  MqttOptions options;
+  MqttConfig options;
   options.host = config_.host;
   options.port = config_.port;
   options.client_id = options.user = id;

@@ -17,13 +17,13 @@ void Check(int code, sqlite3* database, const std::string& doing) {
 
 }  // namespace
 
-bool TellsCorruption(const StoreError& error) {
+bool IsCorruption(const StoreError& error) {
   const std::string sentence = error.what();
   return sentence.find("malformed") != std::string::npos ||
          sentence.find("not a database") != std::string::npos;
 }
 
-std::string SetAsideDatabase(const std::string& path, std::int64_t now_ns) {
+std::string QuarantineDatabase(const std::string& path, std::int64_t now_ns) {
   std::string target = path + ".corrupt-" + std::to_string(now_ns);
   for (const char* companion : {"", "-wal", "-shm"}) {
     std::error_code error;

@@ -21,10 +21,10 @@ class StoreError : public Error {
 };
 
 /// Whether these are SQLite's words for a damaged file.
-bool TellsCorruption(const StoreError& error);
+bool IsCorruption(const StoreError& error);
 /// Renames a corrupt database and the files beside it to `<path>.corrupt-<now_ns>`, and returns
 /// that name. Throws StoreError.
-std::string SetAsideDatabase(const std::string& path, std::int64_t now_ns);
+std::string QuarantineDatabase(const std::string& path, std::int64_t now_ns);
 
 /// One prepared statement. Bind indexes start at 1 and columns at 0, as in SQLite. Not thread-safe.
 class SqliteStatement {
@@ -63,7 +63,7 @@ class SqliteDatabase {
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
-  /// Reads all pages; throws StoreError, which TellsCorruption, when one is damaged.
+  /// Reads all pages; throws StoreError, which IsCorruption, when one is damaged.
   void CheckPages();
   void Execute(const std::string& sql);
   SqliteStatement Prepare(const std::string& sql);

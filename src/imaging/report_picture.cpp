@@ -12,7 +12,7 @@ constexpr int kLowestQuality = 30;  // Below it a box is no longer legible: make
 constexpr int kQualityStep = 20;
 constexpr int kSmallestSidePx = 64;
 constexpr double kCropAspect = 1.5;
-constexpr double kLeastContext = 1.5;
+constexpr double kMinContext = 1.5;
 constexpr double kContextStep = 0.7;
 constexpr double kScaleStep = 0.84;
 
@@ -28,11 +28,11 @@ cv::Rect2d InsideImage(const Box& box, const cv::Size& image) {
   return {left, top, right - left, bottom - top};
 }
 
-/// 3 to 2 around the box, at least `least_px` wide, moved into the image and cut where it is
+/// 3 to 2 around the box, at least `min_px` wide, moved into the image and cut where it is
 /// larger.
-cv::Rect CropAround(const cv::Rect2d& box, double context, double least_px, const cv::Size& image) {
+cv::Rect CropAround(const cv::Rect2d& box, double context, double min_px, const cv::Size& image) {
   const double width =
-      std::max({context * box.width, context * box.height * kCropAspect, least_px});
+      std::max({context * box.width, context * box.height * kCropAspect, min_px});
   const cv::Size size(std::min(image.width, cvCeil(width)),
                       std::min(image.height, cvCeil(width / kCropAspect)));
   const auto start = [](double middle, int length, int available) {
@@ -42,7 +42,7 @@ cv::Rect CropAround(const cv::Rect2d& box, double context, double least_px, cons
           start(box.y + box.height / 2, size.height, image.height), size.width, size.height};
 }
 
-double Widest(const CropConfig& config) { return std::max(config.context, kLeastContext); }
+double Widest(const CropConfig& config) { return std::max(config.context, kMinContext); }
 
 bool EncodeAt(const cv::Mat& image, int quality, std::size_t max_bytes, CroppedPicture& cropped) {
   if (!cv::imencode(".jpg", image, cropped.jpeg, {cv::IMWRITE_JPEG_QUALITY, quality})) return false;
@@ -50,12 +50,12 @@ bool EncodeAt(const cv::Mat& image, int quality, std::size_t max_bytes, CroppedP
   return cropped.jpeg.size() <= max_bytes;
 }
 
-/// The best of the part within the bytes whose scale is not below `least_scale`; false: there is
+/// The best of the part within the bytes whose scale is not below `min_scale`; false: there is
 /// none.
-bool EncodeLegibly(const cv::Mat& part, double least_scale, const CropConfig& config,
+bool EncodeLegibly(const cv::Mat& part, double min_scale, const CropConfig& config,
                    CroppedPicture& cropped) {
   const int worst = std::min(config.quality, kLegibleQuality);
-  for (double scale = 1;; scale = std::max(least_scale, scale * kScaleStep)) {
+  for (double scale = 1;; scale = std::max(min_scale, scale * kScaleStep)) {
     cv::Mat image = part;
     if (scale < 1) {
       const cv::Size size(std::max(1, cvRound(part.cols * scale)),
@@ -69,7 +69,7 @@ bool EncodeLegibly(const cv::Mat& part, double least_scale, const CropConfig& co
       }
       return EncodeAt(image, worst, config.max_bytes, cropped);
     }
-    if (scale <= least_scale) return false;
+    if (scale <= min_scale) return false;
   }
 }
 
@@ -117,7 +117,7 @@ PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& 
   const cv::Size image(width, height);
   const cv::Rect2d inside = InsideImage(box, image);
   if (inside.empty() || config.context <= 0) return {};
-  return ToRegion(CropAround(inside, Widest(config), kLeastCropPx, image));
+  return ToRegion(CropAround(inside, Widest(config), kMinCropPx, image));
 }
 
 CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config) {
@@ -128,17 +128,17 @@ CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropCon
   const bool whole = inside.empty() || config.context <= 0;
   const double side =
       inside.empty() ? std::min(image.width, image.height) : std::min(inside.width, inside.height);
-  const double least_scale = std::min(1.0, kLegibleSidePx / std::max(side, 1.0));
+  const double min_scale = std::min(1.0, kLegibleSidePx / std::max(side, 1.0));
   cv::Rect part({}, image);
   const double widest = Widest(config);
   double context = widest;
   while (true) {
-    if (!whole) part = CropAround(inside, context, kLeastCropPx * context / widest, image);
+    if (!whole) part = CropAround(inside, context, kMinCropPx * context / widest, image);
     cropped.shown = ToRegion(part);
-    cropped.legible = EncodeLegibly(picture.bgr(part), least_scale, config, cropped);
+    cropped.legible = EncodeLegibly(picture.bgr(part), min_scale, config, cropped);
     if (cropped.legible) return cropped;
-    if (whole || context <= kLeastContext) break;
-    context = std::max(kLeastContext, context * kContextStep);
+    if (whole || context <= kMinContext) break;
+    context = std::max(kMinContext, context * kContextStep);
   }
   cropped.jpeg = EncodeJpeg({picture.bgr(part), nullptr}, kLegibleQuality, config.max_bytes);
   cropped.quality = 0;

@@ -21,7 +21,7 @@ bool Contains(const PixelRegion& outer, const PixelRegion& inner);
 PixelRegion Union(const PixelRegion& a, const PixelRegion& b);
 
 /// An image of which a picture is wanted.
-struct PictureWish {
+struct PictureRequirements {
   std::int64_t stamp_ns = 0;
   PixelRegion part;  ///< What of it has to be clear.
 };
@@ -35,7 +35,7 @@ std::vector<std::uint8_t> EncodeJpeg(const Picture& picture, int quality, std::s
 struct CropConfig {
   std::size_t max_bytes = 12000;  ///< Of the JPEG.
   int quality = 80;               ///< 1..100; lowered to kLegibleQuality where the bytes want it.
-  /// The picture shows this many times the box's sides around it, at least kLeastCropPx; 0: the
+  /// The picture shows this many times the box's sides around it, at least kMinCropPx; 0: the
   /// whole image.
   double context = 3.0;
 };
@@ -44,7 +44,7 @@ struct CropConfig {
 constexpr int kLegibleSidePx = 32;
 /// ...and no lower JPEG quality than this.
 constexpr int kLegibleQuality = 40;
-constexpr int kLeastCropPx = 240;  ///< Width of the part that is shown, with all its surroundings.
+constexpr int kMinCropPx = 240;  ///< Width of the part that is shown, with all its surroundings.
 
 /// A hazard's picture and what of the original image it shows.
 struct CroppedPicture {

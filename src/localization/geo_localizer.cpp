@@ -186,15 +186,15 @@ std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix
   const Eigen::Matrix2d turn = Rotation2(MeridianConvergence(*frame_, fix.position));
   covariance_m2 = turn * covariance_m2 * turn.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance_m2);
-  const double believed_m = config_.receiver.least_sigma_m;
+  const double believed_m = config_.receiver.min_sigma_m;
   if (believed_m > 0) {
     covariance_m2 = axes.eigenvectors() *
                     axes.eigenvalues().cwiseMax(believed_m * believed_m).asDiagonal() *
                     axes.eigenvectors().transpose();
   }
-  const double least_variance = std::max(axes.eigenvalues().minCoeff(), believed_m * believed_m);
+  const double min_variance = std::max(axes.eigenvalues().minCoeff(), believed_m * believed_m);
   measurement.shared_m = std::min(config_.receiver.shared_sigma_m,
-                                  kMaxShare * std::sqrt(std::max(0.0, least_variance)));
+                                  kMaxShare * std::sqrt(std::max(0.0, min_variance)));
   const Eigen::Matrix2d white_m2 =
       covariance_m2 - measurement.shared_m * measurement.shared_m * Eigen::Matrix2d::Identity();
   measurement.root_information = white_m2.inverse().llt().matrixU();

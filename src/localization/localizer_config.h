@@ -21,7 +21,7 @@ struct ReceiverModel {
   double default_sigma_m = 2.0;
   /// No fix is believed to be better than this per axis, whatever it states, m: a receiver does not
   /// see its reflections.
-  double least_sigma_m = 0;
+  double min_sigma_m = 0;
   /// The shared part, standard deviation per axis, m; at most 0.8 of what the fix states.
   double shared_sigma_m = 1.0;
   /// After this time the shared part still correlates by 1/e, s.

@@ -77,8 +77,8 @@ double Widening(std::vector<double> squared_distances) {
 }
 
 std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, double gate,
-                                         std::size_t least_pairs) {
-  if (pairs.size() < std::max<std::size_t>(least_pairs, 2)) return std::nullopt;
+                                         std::size_t min_pairs) {
+  if (pairs.size() < std::max<std::size_t>(min_pairs, 2)) return std::nullopt;
   TrackAlignment best;
   double least_doubt = std::numeric_limits<double>::infinity();
   std::vector<double> doubts;
@@ -103,7 +103,7 @@ std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, do
       best.agrees[i] = Doubt(pairs[i], best.map_from_track) <= gate * best.widening * best.widening;
       agreeing += best.agrees[i] ? 1 : 0;
     }
-    if (agreeing < least_pairs || 2 * agreeing <= pairs.size()) return std::nullopt;
+    if (agreeing < min_pairs || 2 * agreeing <= pairs.size()) return std::nullopt;
     if (!Refine(pairs, best)) return std::nullopt;
   }
   return best;

@@ -28,12 +28,12 @@ struct TrackAlignment {
 };
 
 /// The turn and shift that bring a track onto the fixes, though some of these are far off. None
-/// when less than `least_pairs` or half of the pairs agree (squared distance over widened variance
+/// when less than `min_pairs` or half of the pairs agree (squared distance over widened variance
 /// at most `gate`), or all lie in one place. The same input gives the same answer.
 ///
 /// By the least median of squares, P. J. Rousseeuw, J. Am. Stat. Assoc. 79 (1984): right while less
 /// than half of the fixes are wrong, whatever they state.
 std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, double gate,
-                                         std::size_t least_pairs);
+                                         std::size_t min_pairs);
 
 }  // namespace livemap

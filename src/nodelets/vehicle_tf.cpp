@@ -11,14 +11,14 @@
 
 namespace livemap {
 
-VehicleFrames::VehicleFrames(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
+VehicleTf::VehicleTf(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
                              std::string base_frame)
     : nodelet_name_(std::move(nodelet_name)),
       map_frame_(std::move(map_frame)),
       base_frame_(std::move(base_frame)),
       listener_(buffer_, node) {}
 
-std::optional<TrackPose> VehicleFrames::FusedPose(const nav_msgs::Odometry& message) const {
+std::optional<TrackPose> VehicleTf::FusedPose(const nav_msgs::Odometry& message) const {
   if (message.header.frame_id != map_frame_ || message.child_frame_id != base_frame_) {
     ROS_WARN_THROTTLE(kSayAgainS,
                       "%s: dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s'",
@@ -40,7 +40,7 @@ std::optional<TrackPose> VehicleFrames::FusedPose(const nav_msgs::Odometry& mess
   return std::nullopt;
 }
 
-std::optional<Eigen::Isometry3d> VehicleFrames::Mounting(const std::string& optical_frame) const {
+std::optional<Eigen::Isometry3d> VehicleTf::Mounting(const std::string& optical_frame) const {
   try {
     return Eigen::Isometry3d(
         tf2::transformToEigen(buffer_.lookupTransform(base_frame_, optical_frame, ros::Time(0))));

@@ -15,9 +15,9 @@ namespace livemap {
 
 /// What tf knows of a vehicle's frames (REP 105), for nodelets that place images. What is not known
 /// is warned of, under the nodelet's name, once a while. Any thread.
-class VehicleFrames {
+class VehicleTf {
  public:
-  VehicleFrames(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
+  VehicleTf(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
                 std::string base_frame);
 
   /// A fused pose of base_link in the map frame, whose datum is that of its owner: tf earth -> map.

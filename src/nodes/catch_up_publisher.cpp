@@ -10,16 +10,16 @@ namespace {
 
 constexpr std::size_t kPortion = 200;
 /// Pictures made for one portion: the thread that tells commits reports, too.
-constexpr int kMostMade = 2;
+constexpr int kMaxMade = 2;
 
 }  // namespace
 
-VehicleTeller::VehicleTeller(const ZoneService& zone, NoticePictures& pictures,
+CatchUpPublisher::CatchUpPublisher(const ZoneService& zone, NoticePictures& pictures,
                              const ros::Publisher& publisher, const Config& config)
     : zone_(zone), pictures_(pictures), publisher_(publisher), config_(config) {}
 
 /// All that drivers are told of around the place: the nearest, and the radius that those fill.
-void VehicleTeller::CollectAll(Telling& telling) const {
+void CatchUpPublisher::CollectAll(CatchUp& telling) const {
   CatchUpOrder& order = telling.order;
   order.since = 0;
   telling.hazards = zone_.QueryNear(order.centre, config_.radius_m, config_.max_hazards);
@@ -30,8 +30,8 @@ void VehicleTeller::CollectAll(Telling& telling) const {
           : GeodesicDistanceM(order.centre, telling.hazards.back().position) * (1 - 1e-6);
 }
 
-void VehicleTeller::Begin() {
-  Telling telling;
+void CatchUpPublisher::Begin() {
+  CatchUp telling;
   telling.order = std::move(orders_.front());
   orders_.pop_front();
   telling.radius_m = config_.radius_m;
@@ -48,7 +48,7 @@ void VehicleTeller::Begin() {
 }
 
 /// Publishes the next hazard; false when its picture is to be made in the next portion.
-bool VehicleTeller::Tell(Telling& telling, int& made) {
+bool CatchUpPublisher::Tell(CatchUp& telling, int& made) {
   const CatchUpOrder& order = telling.order;
   const Hazard& hazard = telling.hazards[telling.told];
   const HazardAction there = order.since == 0 ? HazardAction::kAdded : HazardAction::kUpdated;
@@ -56,7 +56,7 @@ bool VehicleTeller::Tell(Telling& telling, int& made) {
   HazardNotice notice = ToVehicleMessage(hazard, action, order.vehicle_id);
   const bool is_new = action != HazardAction::kRemoved && telling.picture_bytes > 0;
   if (is_new && telling.picture_bytes >= pictures_.max_bytes()) {
-    if (!pictures_.IsReady(hazard.image_sha256) && ++made > kMostMade) return false;
+    if (!pictures_.IsReady(hazard.image_sha256) && ++made > kMaxMade) return false;
     notice.image.data = pictures_.Get(hazard.image_sha256);
     telling.picture_bytes -= notice.image.data.size();
     if (!notice.image.data.empty()) notice.image.format = "jpeg";
@@ -67,12 +67,12 @@ bool VehicleTeller::Tell(Telling& telling, int& made) {
   return true;
 }
 
-std::optional<std::string> VehicleTeller::TellPortion(std::int64_t now_ns) {
+std::optional<std::string> CatchUpPublisher::PublishBatch(std::int64_t now_ns) {
   if (!current_) {
     if (orders_.empty()) return std::nullopt;
     Begin();
   }
-  Telling& telling = *current_;
+  CatchUp& telling = *current_;
   const CatchUpOrder& order = telling.order;
   const std::size_t end = std::min(telling.told + kPortion, telling.hazards.size());
   int made = 0;

@@ -16,7 +16,7 @@ namespace livemap {
 /// Tells single vehicles what they missed or have around them, in portions, so that notices of new
 /// hazards are not held up and nobody's queue overflows. The first hazards that are new to the
 /// vehicle come with their small pictures, as far as the bytes of one telling go. Not thread-safe.
-class VehicleTeller {
+class CatchUpPublisher {
  public:
   struct Config {
     double radius_m = 5000;
@@ -25,17 +25,17 @@ class VehicleTeller {
   };
 
   /// `zone` and `pictures` outlive it.
-  VehicleTeller(const ZoneService& zone, NoticePictures& pictures, const ros::Publisher& publisher,
+  CatchUpPublisher(const ZoneService& zone, NoticePictures& pictures, const ros::Publisher& publisher,
                 const Config& config);
 
   void Add(CatchUpOrder order) { orders_.push_back(std::move(order)); }
   bool busy() const { return current_.has_value() || !orders_.empty(); }
   /// Publishes the next portion. Returns the vehicle that has been told everything, if one has.
-  std::optional<std::string> TellPortion(std::int64_t now_ns);
+  std::optional<std::string> PublishBatch(std::int64_t now_ns);
   std::uint64_t notices() const { return notices_; }
 
  private:
-  struct Telling {
+  struct CatchUp {
     CatchUpOrder order;
     std::uint64_t up_to = 0;
     double radius_m = 0;
@@ -45,15 +45,15 @@ class VehicleTeller {
   };
 
   void Begin();
-  void CollectAll(Telling& telling) const;
-  bool Tell(Telling& telling, int& made);
+  void CollectAll(CatchUp& telling) const;
+  bool Tell(CatchUp& telling, int& made);
 
   const ZoneService& zone_;
   NoticePictures& pictures_;
   const ros::Publisher publisher_;
   const Config config_;
   std::deque<CatchUpOrder> orders_;
-  std::optional<Telling> current_;
+  std::optional<CatchUp> current_;
   std::uint64_t notices_ = 0;
 };
 

@@ -18,13 +18,13 @@ constexpr std::size_t kMaxWaiting = 10000;
 
 }  // namespace
 
-MapChangeDesk::MapChangeDesk(ros::NodeHandle node, ZoneService& zone, std::size_t batch)
+MapChangeReceiver::MapChangeReceiver(ros::NodeHandle node, ZoneService& zone, std::size_t batch)
     : zone_(zone), batch_(batch) {
   receipt_publisher_ = node.advertise<ReportReceipt>("change/receipt", 20000);
-  subscriber_ = node.subscribe("change/map_change", 1000, &MapChangeDesk::OnMapChange, this);
+  subscriber_ = node.subscribe("change/map_change", 1000, &MapChangeReceiver::OnMapChange, this);
 }
 
-void MapChangeDesk::OnMapChange(const MapChange& message) {
+void MapChangeReceiver::OnMapChange(const MapChange& message) {
   try {
     MapChangeReport report = FromMessage(message);
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -51,7 +51,7 @@ void MapChangeDesk::OnMapChange(const MapChange& message) {
   }
 }
 
-bool MapChangeDesk::CommitWaiting() {
+bool MapChangeReceiver::CommitWaiting() {
   std::vector<MapChangeReport> reports;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -71,7 +71,7 @@ bool MapChangeDesk::CommitWaiting() {
   return true;
 }
 
-MapChangeDesk::Counters MapChangeDesk::counters() const {
+MapChangeReceiver::Counters MapChangeReceiver::counters() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   Counters counters = counters_;
   counters.waiting = waiting_.size();

@@ -17,7 +17,7 @@ namespace livemap {
 
 /// Where vehicles tell the zone of map changes: `change/map_change` in, `change/receipt` out. The
 /// callbacks' thread queues, the node's worker commits.
-class MapChangeDesk {
+class MapChangeReceiver {
  public:
   struct Counters {
     std::uint64_t received = 0;
@@ -27,7 +27,7 @@ class MapChangeDesk {
   };
 
   /// `zone` outlives it. At most `batch` are committed at once.
-  MapChangeDesk(ros::NodeHandle node, ZoneService& zone, std::size_t batch);
+  MapChangeReceiver(ros::NodeHandle node, ZoneService& zone, std::size_t batch);
   /// Nothing is taken any more; what waits can still be committed.
   void Close() { subscriber_.shutdown(); }
 

@@ -26,7 +26,7 @@ std::vector<std::uint8_t> NoticePictures::Get(const std::string& sha256) {
   const std::lock_guard<std::mutex> lock(mutex_);
   kept_[sha256] = *picture;
   order_.push_back(sha256);
-  if (order_.size() > kMostKept) {
+  if (order_.size() > kMaxKept) {
     kept_.erase(order_.front());
     order_.pop_front();
   }

@@ -32,7 +32,7 @@ class NoticePictures {
   std::uint64_t failed() const { return failed_; }
 
  private:
-  static constexpr std::size_t kMostKept = 4096;
+  static constexpr std::size_t kMaxKept = 4096;
 
   std::optional<std::vector<std::uint8_t>> Make(const std::string& sha256);
 

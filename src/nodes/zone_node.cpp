@@ -52,11 +52,11 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   poll_publisher_ = node.advertise<HazardPoll>("hazard/poll", 1000);
   notices_ = std::make_unique<NoticeSender>(pictures_,
                                             node.advertise<HazardNotice>("hazard/notice", 20000));
-  VehicleTeller::Config telling;
+  CatchUpPublisher::Config telling;
   telling.radius_m = config_.catch_up.radius_m;
   telling.max_hazards = static_cast<std::size_t>(config_.join_max_hazards);
   telling.picture_bytes = static_cast<std::size_t>(config_.join_picture_bytes);
-  teller_ = std::make_unique<VehicleTeller>(
+  teller_ = std::make_unique<CatchUpPublisher>(
       zone_, pictures_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000), telling);
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (config_.web) {
@@ -142,7 +142,7 @@ void ZoneNode::OnReport(const HazardReportConstPtr& message) {
 void ZoneNode::OnPosition(const VehiclePosition& message) {
   try {
     const VehicleState vehicle = FromMessage(message);
-    if (zone_.UpdateVehicle(vehicle)) NoteNews(vehicle, message.map_sequence);
+    if (zone_.UpdateVehicle(vehicle)) RecordNewReports(vehicle, message.map_sequence);
   } catch (const Error& error) {
     Count([](ZoneCloudletCounters& counters) { ++counters.positions_malformed; });
     ROS_WARN_THROTTLE(kSayAgainS, "vehicle position dropped: %s", error.what());
@@ -167,7 +167,7 @@ void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
 }
 
 /// A vehicle that is new, moved far or missed announcements: the worker tells it.
-void ZoneNode::NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence) {
+void ZoneNode::RecordNewReports(const VehicleState& vehicle, std::uint64_t map_sequence) {
   const std::uint64_t announced = zone_.AnnouncedSequence();
   const std::lock_guard<std::mutex> lock(mutex_);
   auto order =
@@ -251,7 +251,7 @@ bool ZoneNode::TellVehicles() {
     for (CatchUpOrder& order : orders_) teller_->Add(std::move(order));
     orders_.clear();
   }
-  const auto told = teller_->TellPortion(NowNs());
+  const auto told = teller_->PublishBatch(NowNs());
   const std::lock_guard<std::mutex> lock(mutex_);
   if (told) catch_up_.Told(*told, SteadyNs());
   counters_.vehicle_notices_sent = teller_->notices();
@@ -334,7 +334,7 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     counters = counters_;
   }
   counters.reports_waiting = queue_.size();
-  const MapChangeDesk::Counters changes = map_changes_.counters();
+  const MapChangeReceiver::Counters changes = map_changes_.counters();
   counters.map_changes_received = changes.received;
   counters.map_changes_malformed = changes.malformed;
   counters.map_changes_not_queued = changes.not_queued;

@@ -61,7 +61,7 @@ class ZoneNode {
   void CommitMapChanges();
   void NoteCommit();
   void NoteFailedCommit(const Error& error);
-  void NoteNews(const VehicleState& vehicle, std::uint64_t map_sequence);
+  void RecordNewReports(const VehicleState& vehicle, std::uint64_t map_sequence);
   bool TellVehicles();
   void HandleAnswers();
   void LetTimePass();
@@ -80,9 +80,9 @@ class ZoneNode {
   std::deque<CatchUpOrder> orders_;  ///< Not yet the worker's.
   std::deque<PollAnswer> answers_;
 
-  MapChangeDesk map_changes_;
+  MapChangeReceiver map_changes_;
   NoticePictures pictures_;
-  std::unique_ptr<VehicleTeller> teller_;  ///< The worker's.
+  std::unique_ptr<CatchUpPublisher> teller_;  ///< The worker's.
   std::int64_t advanced_ns_ = 0;           ///< The worker's: when time last passed, steady.
   std::unique_ptr<NoticeSender> notices_;
   std::atomic<bool> view_changed_{true};

@@ -91,7 +91,7 @@ bool Fits(const DepthImage& image, const Box& box, const CameraIntrinsics& camer
 
 }  // namespace
 
-std::optional<GroundPoint> FootByDepth(const DepthImage& image, const Box& box,
+std::optional<GroundPoint> ContactByDepth(const DepthImage& image, const Box& box,
                                        const CameraIntrinsics& intrinsics,
                                        const Eigen::Isometry3d& base_from_optical,
                                        const GroundProjectionNoise& noise,
@@ -100,7 +100,7 @@ std::optional<GroundPoint> FootByDepth(const DepthImage& image, const Box& box,
   const auto foot = MeasureFoot(image, box, depth_noise);
   if (!foot) return std::nullopt;
   const double depth_m = foot->depth.median_m;
-  const Eigen::Vector2d pixel = FootPixel(box);
+  const Eigen::Vector2d pixel = ContactPixel(box);
   const Eigen::Matrix3d rotation = base_from_optical.linear();
   const Eigen::Vector3d direction =
       rotation * Eigen::Vector3d((pixel.x() - intrinsics.cx) / intrinsics.fx,

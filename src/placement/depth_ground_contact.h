@@ -33,7 +33,7 @@ struct DepthNoise {
 /// (half sky, half post), the point lies nowhere near the road, or the image is none of this
 /// camera's. The covariance holds the scatter over the foot, what the box's lower edge (noise's
 /// pixels) changes where the depth changes from row to row, the shared error, and pitch.
-std::optional<GroundPoint> FootByDepth(const DepthImage& image, const Box& box,
+std::optional<GroundPoint> ContactByDepth(const DepthImage& image, const Box& box,
                                        const CameraIntrinsics& intrinsics,
                                        const Eigen::Isometry3d& base_from_optical,
                                        const GroundProjectionNoise& noise,

@@ -42,10 +42,10 @@ bool IsInside(double pixel, double sigma_px, int size, double margin_share) {
 
 }  // namespace
 
-PlaceView ViewPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
+ProjectedPlace ProjectPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
                     const PlacedCamera& camera, const GroundProjectionNoise& noise,
                     double margin_share) {
-  PlaceView view;
+  ProjectedPlace view;
   const Eigen::Vector2d place_m = LocalFrame(camera.base.position).ToEnu(place);
   view.distance_m = place_m.norm();
   const auto pixel = Project(place_m, camera);
@@ -64,15 +64,15 @@ PlaceView ViewPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
                                camera.intrinsics.width, margin_share) &&
                       IsInside(pixel->y(), std::sqrt(view.covariance_px2(1, 1)),
                                camera.intrinsics.height, margin_share);
-  view.visibility = inside ? PlaceView::Visibility::kInside : PlaceView::Visibility::kOutside;
+  view.visibility = inside ? ProjectedPlace::Visibility::kInside : ProjectedPlace::Visibility::kOutside;
   return view;
 }
 
-bool IsAtPlace(const Box& box, const GeoPoint& place, const PlaceView& view,
+bool IsAtPlace(const Box& box, const GeoPoint& place, const ProjectedPlace& view,
                const PlacedCamera& camera, const GroundProjectionNoise& noise, double gate_sigma,
                double radius_m) {
-  if (view.visibility == PlaceView::Visibility::kBehind) return false;
-  const Eigen::Vector2d foot = FootPixel(box);
+  if (view.visibility == ProjectedPlace::Visibility::kBehind) return false;
+  const Eigen::Vector2d foot = ContactPixel(box);
   const auto ground = ProjectToGround(foot, camera.intrinsics, camera.base_from_optical, noise);
   // Far away a few pixels are many metres: it could be another one behind or before the place.
   if (!ground || LargestSigmaM(ground->covariance_m2) > radius_m / 2) return false;

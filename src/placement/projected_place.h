@@ -17,7 +17,7 @@ struct PlacedCamera {
 };
 
 /// How a place on the road appears to a camera.
-struct PlaceView {
+struct ProjectedPlace {
   enum class Visibility {
     kInside,   ///< In the image, with the region in which it may lie.
     kOutside,  ///< Before the camera, but beside, above or below the image.
@@ -33,7 +33,7 @@ struct PlaceView {
 /// Projects a place on the road, known with `covariance_m2` (east-north, m^2), into the image. It
 /// is kInside when the pixel and two standard deviations around it keep `margin_share` of the
 /// image's sides away from its edges. The road is the plane z = 0 of base_link.
-PlaceView ViewPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
+ProjectedPlace ProjectPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
                     const PlacedCamera& camera, const GroundProjectionNoise& noise,
                     double margin_share);
 
@@ -41,7 +41,7 @@ PlaceView ViewPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
 /// bottom edge lies within `gate_sigma` standard deviations of the place's pixel, or its own place
 /// on the road within `radius_m` of `place`. Never one whose place on the road, seen from the
 /// vehicle, is less certain than half that radius (standard deviation).
-bool IsAtPlace(const Box& box, const GeoPoint& place, const PlaceView& view,
+bool IsAtPlace(const Box& box, const GeoPoint& place, const ProjectedPlace& view,
                const PlacedCamera& camera, const GroundProjectionNoise& noise, double gate_sigma,
                double radius_m);
 

@@ -21,7 +21,7 @@ bool IsWellFormed(const Sighting& sighting) {
          sighting.class_name.size() <= kMaxClassNameBytes;
 }
 
-Eigen::Vector2d FootPixel(const Box& box) {
+Eigen::Vector2d ContactPixel(const Box& box) {
   return {0.5 * (static_cast<double>(box.x_min) + static_cast<double>(box.x_max)) - 0.5,
           static_cast<double>(box.y_max) - 0.5};
 }

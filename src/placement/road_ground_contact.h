@@ -12,7 +12,7 @@ bool IsWellFormed(const Sighting& sighting);
 
 /// Bottom centre of a box as a camera model counts pixels: its edges count from the first pixel's
 /// outer corner, the model from that pixel's centre.
-Eigen::Vector2d FootPixel(const Box& box);
+Eigen::Vector2d ContactPixel(const Box& box);
 
 /// The image's left or right side cuts the box: what it shows may end above the foot, which would
 /// then be placed too far away.

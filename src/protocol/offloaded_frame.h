@@ -12,7 +12,7 @@ namespace livemap {
 
 /// One picture that a small vehicle holds worth the zone's detector (CandidateFrame.msg without
 /// ROS), with all that places what is seen in it.
-struct Candidate {
+struct OffloadedFrame {
   std::string vehicle_id;  ///< Empty on the vehicle; the zone's bridge writes the proven identity.
   std::string drive_id;
   std::int64_t stamp_ns = 0;  ///< Of the image, vehicle clock (UTC), ns since 1970.

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/error.h"
+#include "protocol/report.h"
 
 namespace livemap {
 namespace {

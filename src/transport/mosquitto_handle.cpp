@@ -31,7 +31,7 @@ void InitializeLibraryOnce() {
   std::call_once(once, [] { mosquitto_lib_init(); });
 }
 
-void CheckTlsOptions(const MqttTlsOptions& tls) {
+void CheckTlsOptions(const MqttTlsConfig& tls) {
   for (const auto& [name, path] : {std::pair{"ca_file", tls.ca_file},
                                    {"certificate_file", tls.certificate_file},
                                    {"key_file", tls.key_file}}) {
@@ -41,7 +41,7 @@ void CheckTlsOptions(const MqttTlsOptions& tls) {
   }
 }
 
-void SetTls(mosquitto* handle, const MqttTlsOptions& tls) {
+void SetTls(mosquitto* handle, const MqttTlsConfig& tls) {
   RequireSuccess(mosquitto_tls_set(handle, tls.ca_file.c_str(), nullptr,
                                    tls.certificate_file.c_str(), tls.key_file.c_str(), nullptr),
                  "cannot use the TLS files '" + tls.ca_file + "', '" + tls.certificate_file +
@@ -53,7 +53,7 @@ void SetTls(mosquitto* handle, const MqttTlsOptions& tls) {
 
 }  // namespace
 
-void CheckMqttOptions(const MqttOptions& options) {
+void CheckMqttOptions(const MqttConfig& options) {
   Require(!options.host.empty(), "host", options.host, "a host name or an address");
   Require(options.port > 0 && options.port <= 65535, "port", std::to_string(options.port),
           "1 to 65535");
@@ -69,7 +69,7 @@ void CheckMqttOptions(const MqttOptions& options) {
   if (options.tls) CheckTlsOptions(*options.tls);
 }
 
-MosquittoHandle MakeMosquittoHandle(const MqttOptions& options, void* user_data) {
+MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data) {
   InitializeLibraryOnce();
   MosquittoHandle handle(mosquitto_new(options.client_id.c_str(), options.clean_start, user_data));
   if (!handle) throw Error("cannot create an MQTT client with id '" + options.client_id + "'");
@@ -88,7 +88,7 @@ MosquittoHandle MakeMosquittoHandle(const MqttOptions& options, void* user_data)
   return handle;
 }
 
-int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::string& address) {
+int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const std::string& address) {
   // The certificate is checked against the name that was asked for, so TLS resolves it again.
   const std::string& host = options.tls ? options.host : address;
   mosquitto_property* properties = nullptr;
@@ -115,7 +115,7 @@ std::string DescribeMosquittoError(int code) {
   return words;
 }
 
-std::string UnreadableTlsFile(const MqttTlsOptions& tls) {
+std::string UnreadableTlsFile(const MqttTlsConfig& tls) {
   for (const auto& [name, path] : {std::pair{"ca_file", tls.ca_file},
                                    {"certificate_file", tls.certificate_file},
                                    {"key_file", tls.key_file}}) {

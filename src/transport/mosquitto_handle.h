@@ -15,18 +15,18 @@ struct MosquittoDeleter {
 using MosquittoHandle = std::unique_ptr<mosquitto, MosquittoDeleter>;
 
 /// Throws Error naming the first option that is out of range.
-void CheckMqttOptions(const MqttOptions& options);
+void CheckMqttOptions(const MqttConfig& options);
 
 /// "cannot read FILE, the bridge's key_file: No such file or directory" for the first TLS file that
 /// cannot be read now; empty when all can. The library's own words do not name the file.
-std::string UnreadableTlsFile(const MqttTlsOptions& tls);
+std::string UnreadableTlsFile(const MqttTlsConfig& tls);
 
 /// A library handle that speaks MQTT v5 with the login and TLS of `options` and hands `user_data`
 /// to its callbacks. Throws Error when the library refuses an option or a TLS file.
-MosquittoHandle MakeMosquittoHandle(const MqttOptions& options, void* user_data);
+MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data);
 
 /// One blocking connection attempt to an address that was just seen to answer; 0 or a library code.
-int ConnectMosquitto(mosquitto* handle, const MqttOptions& options, const std::string& address);
+int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const std::string& address);
 
 /// The library's result code in words without a full stop, with the system's own error where that
 /// is the cause.

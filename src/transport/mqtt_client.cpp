@@ -53,7 +53,7 @@ int ReasonOfLibraryError(int code) {
 /// Everything behind the header. Members below `thread side` belong to the network thread.
 class MqttClient::Connection {
  public:
-  Connection(const MqttOptions& options, std::vector<MqttSubscription> subscriptions,
+  Connection(const MqttConfig& options, std::vector<MqttSubscription> subscriptions,
              MqttCallbacks callbacks)
       : options_(options),
         subscriptions_(std::move(subscriptions)),
@@ -340,7 +340,7 @@ class MqttClient::Connection {
     });
   }
 
-  const MqttOptions options_;
+  const MqttConfig options_;
   const std::vector<MqttSubscription> subscriptions_;
   const MqttCallbacks callbacks_;
   OutgoingQueue queue_;
@@ -362,7 +362,7 @@ class MqttClient::Connection {
   std::thread thread_;  // Last: it uses everything above.
 };
 
-MqttClient::MqttClient(const MqttOptions& options, std::vector<MqttSubscription> subscriptions,
+MqttClient::MqttClient(const MqttConfig& options, std::vector<MqttSubscription> subscriptions,
                        MqttCallbacks callbacks)
     : connection_(
           std::make_unique<Connection>(options, std::move(subscriptions), std::move(callbacks))) {}

@@ -14,15 +14,15 @@
 namespace livemap {
 
 /// Mutual TLS 1.3: the broker must show a certificate that `ca_file` signed, for the name in
-/// MqttOptions::host; the client shows its own. PEM files, all three required.
-struct MqttTlsOptions {
+/// MqttConfig::host; the client shows its own. PEM files, all three required.
+struct MqttTlsConfig {
   std::string ca_file;
   std::string certificate_file;
   std::string key_file;
 };
 
 /// How to reach a broker and how much to hold back. Every connection speaks MQTT v5.
-struct MqttOptions {
+struct MqttConfig {
   std::string host = "127.0.0.1";
   int port = 1883;
   std::string client_id;  ///< Required. The broker may replace it by the user name.
@@ -39,7 +39,7 @@ struct MqttOptions {
   std::size_t queue_messages = 1000;         ///< Waiting messages, beyond which Publish refuses.
   std::size_t queue_bytes = 64 << 20;        ///< The same in bytes of payload and topic.
   std::uint32_t max_packet_bytes = 2 << 20;  ///< Told to the broker: it sends nothing larger.
-  std::optional<MqttTlsOptions> tls;         ///< Empty: plain TCP.
+  std::optional<MqttTlsConfig> tls;         ///< Empty: plain TCP.
 };
 
 struct MqttSubscription {
@@ -105,7 +105,7 @@ struct MqttStatistics {
 class MqttClient {
  public:
   /// Checks the options and starts the network thread. Throws Error naming a bad option.
-  MqttClient(const MqttOptions& options, std::vector<MqttSubscription> subscriptions,
+  MqttClient(const MqttConfig& options, std::vector<MqttSubscription> subscriptions,
              MqttCallbacks callbacks);
   /// Says goodbye to the broker and joins the thread: at once, or after connect_timeout_s at worst
   /// (a host name that must be resolved can add the resolver's own timeout).

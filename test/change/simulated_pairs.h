@@ -59,7 +59,7 @@ inline std::vector<SimulatedPair> MakePairs(const SimulatedPairOptions& options)
   second.left_m = options.left_m;
   const PassDrive first_drive(first_street, first, mounting, 0);
   const PassDrive second_drive(second_street, second, mounting, 0);
-  RenderOptions render;
+  RenderConfig render;
   render.smooth_edges = false;
   StreetRenderer first_renderer(first_street, PairCamera(),
                                 MakeLighting(Condition::kDay, options.seed), render);

@@ -51,9 +51,9 @@ class Bytes {
 
 /// Numbers in the order of the message; an honest one where the first byte's bit is not set, so
 /// that the rest is reached.
-Candidate Read(Bytes& bytes) {
+OffloadedFrame Read(Bytes& bytes) {
   const auto broken = bytes.Take<std::uint8_t>();
-  Candidate candidate;
+  OffloadedFrame candidate;
   candidate.vehicle_id = (broken & 1U) != 0 ? bytes.TakeText(80) : "car-1";
   candidate.drive_id = bytes.TakeText(80);
   candidate.image_frame_id = bytes.TakeText(80);
@@ -87,16 +87,16 @@ Candidate Read(Bytes& bytes) {
 
 void FuzzCandidate(const std::uint8_t* data, std::size_t size) {
   Bytes bytes(data, size);
-  Candidate candidate = Read(bytes);
+  OffloadedFrame candidate = Read(bytes);
   Sighting sighting;
   sighting.class_name = bytes.TakeText(80);
   sighting.confidence = bytes.Take<float>();
   sighting.box = {bytes.Take<float>(), bytes.Take<float>(), bytes.Take<float>(),
                   bytes.Take<float>()};
   candidate.image = bytes.Rest();
-  CandidateIntake intake{CandidateIntake::Config()};
+  OffloadIntake intake{OffloadIntake::Config()};
   const std::string why = intake.Add(candidate, kNowNs);
-  const CandidateIntake::Job* job = intake.Next(kNowNs, 0);
+  const OffloadIntake::Job* job = intake.Next(kNowNs, 0);
   Require(why.empty() == (job != nullptr));
   Require(why.size() < 400);
   if (job == nullptr) return;

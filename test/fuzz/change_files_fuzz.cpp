@@ -19,7 +19,7 @@ void Require(bool holds) {
 void FuzzRecord(const std::string& bytes) {
   const PlaceRecord record = ParsePlaceRecord(bytes, "fuzz");
   CheckPlaceFrame(record.frame);
-  Require(record.features.points.size() <= kMostRecordFeatures);
+  Require(record.features.points.size() <= kMaxRecordFeatures);
   Require(static_cast<std::size_t>(record.features.descriptors.rows) ==
           record.features.points.size());
   const double quality = PlaceQuality(record.frame, record.features);

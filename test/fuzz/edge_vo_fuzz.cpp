@@ -60,7 +60,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((flags & 1U) != 0) camera.fx = bytes.Take<double>();
   if ((flags & 2U) != 0) camera.cy = bytes.Take<double>();
   livemap::EdgeOdometry::Config config;
-  config.least_points = 10;
+  config.min_points = 10;
   config.edge_source =
       (flags & 4U) != 0 ? livemap::EdgeSource::kNewImage : livemap::EdgeSource::kKeyframe;
   config.edges.kind = static_cast<livemap::EdgeKind>((flags >> 3U) % 3);

@@ -16,7 +16,7 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostUnpacked = 1 << 16;
+constexpr std::size_t kMaxUnpacked = 1 << 16;
 
 void Require(bool holds) {
   if (!holds) std::abort();
@@ -55,8 +55,8 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
   const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
     if (data[0] == 'z') {
-      Require(Unpacked(std::string(rest), "fuzz", kMostUnpacked).size() <=
-              std::max(kMostUnpacked, rest.size()));
+      Require(Unpacked(std::string(rest), "fuzz", kMaxUnpacked).size() <=
+              std::max(kMaxUnpacked, rest.size()));
     } else if (data[0] == 'o') {
       ReadOnnxInputs(rest);
     } else if (data[0] == 'c') {

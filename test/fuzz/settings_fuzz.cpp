@@ -35,8 +35,8 @@ void FuzzTokens(const std::string& text) {
     Require(!official.name.empty() && official.token_sha256.size() == 64);
   }
   // The file itself is no token of it.
-  OfficialGate gate(officials);
-  Require(gate.Check("Bearer " + text, "client", 0).verdict != OfficialGate::Verdict::kClosed);
+  OfficialAuthenticator gate(officials);
+  Require(gate.Check("Bearer " + text, "client", 0).verdict != OfficialAuthenticator::Verdict::kClosed);
 }
 
 void FuzzLabels(const std::string& text) {

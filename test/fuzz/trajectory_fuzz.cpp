@@ -12,7 +12,7 @@ namespace {
 
 void Evaluate(const std::vector<livemap::StampedPose>& truth,
               const std::vector<livemap::StampedPose>& estimate, livemap::AlignmentKind kind) {
-  livemap::TrajectoryOptions options;
+  livemap::TrajectoryConfig options;
   options.alignment = kind;
   options.rpe_delta_frames = 2;
   try {

@@ -61,8 +61,8 @@ void CheckDecision(const std::string& text) {
   } catch (const livemap::BadRequest& mistake) {
     Require(std::string(mistake.what()).find("accepted is") != std::string::npos);
   }
-  static livemap::OfficialGate gate({{"miller", std::string(64, 'a')}});
-  Require(gate.Check(text, "client", 0).verdict != livemap::OfficialGate::Verdict::kAllowed);
+  static livemap::OfficialAuthenticator gate({{"miller", std::string(64, 'a')}});
+  Require(gate.Check(text, "client", 0).verdict != livemap::OfficialAuthenticator::Verdict::kAllowed);
   for (const auto decision : {livemap::Decision::kConfirm, livemap::Decision::kReject}) {
     try {
       const std::string reason = livemap::ParseDecisionBody(decision, text);

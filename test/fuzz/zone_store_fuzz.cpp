@@ -109,7 +109,7 @@ void RequireSound(const Hazard& hazard) {
   Require(hazard.first_seen_ns >= 0 && hazard.first_seen_ns <= hazard.last_seen_ns);
   Require(hazard.sequence > 0 && hazard.announced_sequence <= hazard.sequence);
   Require(hazard.image_sha256.empty() || hazard.image_sha256.size() == 64);
-  Require(hazard.sightings > 0 && hazard.vehicles <= kMaxVoices);
+  Require(hazard.sightings > 0 && hazard.vehicles <= kMaxEvidencePerHazard);
 }
 
 void RequireSound(const MapChangeFeature& feature) {

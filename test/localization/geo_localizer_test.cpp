@@ -199,7 +199,7 @@ TEST(GeoLocalizer, BelievesNoFixToBeBetterThanItMayBe) {
   };
   LocalizerConfig config = ConfigOf(drive);
   const Outcome believing = Drive(drive, config);
-  config.receiver.least_sigma_m = 1.5;
+  config.receiver.min_sigma_m = 1.5;
   config.receiver.shared_sigma_m = 1;
   config.receiver.shared_time_s = 5;
   const Outcome careful = Drive(drive, config);

@@ -45,10 +45,10 @@ Box FlatThingAt(double ahead_of_camera_m, float height_px = 20) {
 }
 
 std::optional<GroundPoint> Foot(const DepthImage& image, const Box& box, double pitch_rad = 0) {
-  return FootByDepth(image, box, Intrinsics(), PitchedMounting(pitch_rad), {}, {});
+  return ContactByDepth(image, box, Intrinsics(), PitchedMounting(pitch_rad), {}, {});
 }
 
-TEST(FootByDepth, AgreesWithTheRoadsPlaneOnALevelRoad) {
+TEST(ContactByDepth, AgreesWithTheRoadsPlaneOnALevelRoad) {
   for (const double ahead_m : {5.0, 10.0, 20.0}) {
     const auto foot = Foot(LevelRoad(), FlatThingAt(ahead_m));
     ASSERT_TRUE(foot);
@@ -58,7 +58,7 @@ TEST(FootByDepth, AgreesWithTheRoadsPlaneOnALevelRoad) {
   }
 }
 
-TEST(FootByDepth, DoesNotMindAPitchThatThePlaneTakesForDistance) {
+TEST(ContactByDepth, DoesNotMindAPitchThatThePlaneTakesForDistance) {
   // The vehicle nods by 0.02 rad, which the mounting does not know.
   const Box box = FlatThingAt(14);
   const Eigen::Vector2d pixel(319.5, box.y_max - 0.5);
@@ -69,7 +69,7 @@ TEST(FootByDepth, DoesNotMindAPitchThatThePlaneTakesForDistance) {
   EXPECT_LT(std::abs(foot->position_m.x() - kForwardM - 14), 0.6);
 }
 
-TEST(FootByDepth, AStandingThingIsAsFarAsItsSurfaceWhateverIsBehindIt) {
+TEST(ContactByDepth, AStandingThingIsAsFarAsItsSurfaceWhateverIsBehindIt) {
   DepthImage image = LevelRoad();
   const Box box = FlatThingAt(12, 60);
   image.depth(cv::Rect(305, static_cast<int>(box.y_min), 30, 60)) = 11.5F;
@@ -83,7 +83,7 @@ TEST(FootByDepth, AStandingThingIsAsFarAsItsSurfaceWhateverIsBehindIt) {
   EXPECT_LT(std::sqrt(foot->covariance_m2(0, 0)), 0.15);
 }
 
-TEST(FootByDepth, OnTheRoadTheBoxesEdgeWeighsAsInThePlane) {
+TEST(ContactByDepth, OnTheRoadTheBoxesEdgeWeighsAsInThePlane) {
   const auto foot = Foot(LevelRoad(), FlatThingAt(12));
   const auto plane =
       ProjectToGround({319.5, RowOf(12)}, Intrinsics(), PitchedMounting(), {3, 0, 0, 60});
@@ -93,7 +93,7 @@ TEST(FootByDepth, OnTheRoadTheBoxesEdgeWeighsAsInThePlane) {
   EXPECT_LT(ratio, 1.5);
 }
 
-TEST(FootByDepth, CovarianceHoldsTheNoiseOfTheDepth) {
+TEST(ContactByDepth, CovarianceHoldsTheNoiseOfTheDepth) {
   std::mt19937_64 random(7);
   std::normal_distribution<float> noise(0, 0.25F);
   const Box box = FlatThingAt(12, 60);
@@ -112,7 +112,7 @@ TEST(FootByDepth, CovarianceHoldsTheNoiseOfTheDepth) {
   EXPECT_LT(squared / count, 1.5) << "never surer than it is";
 }
 
-TEST(FootByDepth, SixteenBitDepthIsInItsUnits) {
+TEST(ContactByDepth, SixteenBitDepthIsInItsUnits) {
   DepthImage image = LevelRoad();
   cv::Mat millimetres;
   cv::patchNaNs(image.depth, 0);
@@ -123,7 +123,7 @@ TEST(FootByDepth, SixteenBitDepthIsInItsUnits) {
   EXPECT_NEAR(foot->position_m.x(), kForwardM + 10, 0.6);
 }
 
-TEST(FootByDepth, UnknownDepthGivesNothing) {
+TEST(ContactByDepth, UnknownDepthGivesNothing) {
   const Box box = FlatThingAt(12, 60);
   DepthImage unknown = LevelRoad();
   unknown.depth.setTo(kNanF);
@@ -148,7 +148,7 @@ TEST(FootByDepth, UnknownDepthGivesNothing) {
   EXPECT_FALSE(Foot(wall, FlatThingAt(6))) << "far below the road";
 }
 
-TEST(FootByDepth, ImagesAndBoxesThatCannotBeGiveNothing) {
+TEST(ContactByDepth, ImagesAndBoxesThatCannotBeGiveNothing) {
   const Box box = FlatThingAt(12);
   DepthImage image = LevelRoad();
   image.depth = image.depth(cv::Rect(0, 0, 320, 400)).clone();

@@ -65,8 +65,8 @@ class Log {
   std::vector<std::string> losses_;
 };
 
-MqttOptions Login(const BrokerProcess& broker, const std::string& user) {
-  MqttOptions options;
+MqttConfig Login(const BrokerProcess& broker, const std::string& user) {
+  MqttConfig options;
   options.port = broker.port();
   options.client_id = user;
   options.user = user;
@@ -131,7 +131,7 @@ TEST_F(MqttClientTest, NeverReceivesAnotherVehiclesMessages) {
 }
 
 TEST_F(MqttClientTest, SaysThatTheLoginWasRefusedAndKeepsTrying) {
-  MqttOptions options = Login(broker_, "car-1");
+  MqttConfig options = Login(broker_, "car-1");
   options.password = "wrong";
   const MqttClient car(options, {}, car_log_.Callbacks());
   ASSERT_TRUE(Eventually([&] { return car.statistics().connection_failures >= 2; }));
@@ -180,7 +180,7 @@ TEST_F(MqttClientTest, ReconnectsAndResumesAfterTheBrokerWasKilled) {
 
 TEST_F(MqttClientTest, SendsWhatWasQueuedWhileTheBrokerWasAway) {
   broker_.Kill();
-  MqttOptions options = Login(broker_, "car-1");
+  MqttConfig options = Login(broker_, "car-1");
   options.queue_messages = 3;
   MqttClient car(options, {}, car_log_.Callbacks());
   for (int i = 0; i < 3; ++i) {
@@ -270,7 +270,7 @@ TEST_F(MqttClientTest, ForgetsItsSessionOnACleanStart) {
   MqttClient car(Login(broker_, "car-1"), {}, car_log_.Callbacks());
   car.Publish(kReport, Bytes("missed"), 1, 0);
   ASSERT_TRUE(Eventually([&] { return car_log_.outcomes().size() == 1; }));
-  MqttOptions options = Login(broker_, "zone");
+  MqttConfig options = Login(broker_, "zone");
   options.clean_start = true;
   const MqttClient zone(options, {{kReports, 1}}, zone_log_.Callbacks());
   ASSERT_TRUE(Subscribed(zone));
@@ -300,7 +300,7 @@ TEST(MqttClientStop, DoesNotWaitForASilentBroker) {
   ASSERT_EQ(bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
   ASSERT_EQ(listen(listener, 16), 0);
   ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  MqttOptions options;
+  MqttConfig options;
   options.port = ntohs(address.sin_port);
   options.client_id = "car-1";
   { const MqttClient car(options, {}, {}); }  // A hang here is the failure.
@@ -308,20 +308,20 @@ TEST(MqttClientStop, DoesNotWaitForASilentBroker) {
 }
 
 TEST(MqttClientOptions, RefusesValuesThatItCannotKeep) {
-  const auto refuses = [](const std::function<void(MqttOptions&)>& spoil) {
-    MqttOptions options;
+  const auto refuses = [](const std::function<void(MqttConfig&)>& spoil) {
+    MqttConfig options;
     options.client_id = "car-1";
     options.port = 1;
     spoil(options);
     EXPECT_THROW(MqttClient(options, {}, {}), Error);
   };
-  refuses([](MqttOptions& options) { options.client_id.clear(); });
-  refuses([](MqttOptions& options) { options.port = 70000; });
-  refuses([](MqttOptions& options) { options.keepalive_s = 1; });
-  refuses([](MqttOptions& options) { options.max_inflight = 0; });
-  refuses([](MqttOptions& options) { options.reconnect_min_s = 0; });
-  refuses([](MqttOptions& options) { options.reconnect_max_s = 0.1; });
-  refuses([](MqttOptions& options) { options.tls = MqttTlsOptions{"/no/ca.pem", "", ""}; });
+  refuses([](MqttConfig& options) { options.client_id.clear(); });
+  refuses([](MqttConfig& options) { options.port = 70000; });
+  refuses([](MqttConfig& options) { options.keepalive_s = 1; });
+  refuses([](MqttConfig& options) { options.max_inflight = 0; });
+  refuses([](MqttConfig& options) { options.reconnect_min_s = 0; });
+  refuses([](MqttConfig& options) { options.reconnect_max_s = 0.1; });
+  refuses([](MqttConfig& options) { options.tls = MqttTlsConfig{"/no/ca.pem", "", ""}; });
 }
 
 }  // namespace

@@ -60,13 +60,13 @@ class MqttTlsTest : public ::testing::Test {
 
   std::string File(const std::string& name) const { return directory_.path() + "/" + name; }
 
-  MqttOptions Options(const std::string& name, const std::string& authority) const {
-    MqttOptions options;
+  MqttConfig Options(const std::string& name, const std::string& authority) const {
+    MqttConfig options;
     options.port = port_;
     options.client_id = name;
     options.reconnect_min_s = 0.05;
     options.reconnect_max_s = 0.5;
-    options.tls = MqttTlsOptions{File(authority), File(name + ".pem"), File(name + ".key")};
+    options.tls = MqttTlsConfig{File(authority), File(name + ".pem"), File(name + ".key")};
     return options;
   }
 
@@ -100,7 +100,7 @@ TEST_F(MqttTlsTest, DoesNotTrustABrokerOfAnotherAuthority) {
 }
 
 TEST_F(MqttTlsTest, DoesNotTrustABrokerUnderAnotherName) {
-  MqttOptions options = Options("car-1", "ca.pem");
+  MqttConfig options = Options("car-1", "ca.pem");
   options.host = "localhost";  // The certificate is for 127.0.0.1.
   const MqttClient car(options, {}, {});
   EXPECT_TRUE(Eventually([&] { return car.statistics().connection_failures >= 2; }));
@@ -108,12 +108,12 @@ TEST_F(MqttTlsTest, DoesNotTrustABrokerUnderAnotherName) {
 }
 
 TEST_F(MqttTlsTest, NamesTheFileThatCannotBeRead) {
-  for (auto [name, member] : {std::pair{"ca_file", &MqttTlsOptions::ca_file},
-                              {"certificate_file", &MqttTlsOptions::certificate_file},
-                              {"key_file", &MqttTlsOptions::key_file}}) {
+  for (auto [name, member] : {std::pair{"ca_file", &MqttTlsConfig::ca_file},
+                              {"certificate_file", &MqttTlsConfig::certificate_file},
+                              {"key_file", &MqttTlsConfig::key_file}}) {
     for (const std::string& path :
          {std::string("/nowhere.pem"), directory_.path(), std::string()}) {
-      MqttOptions options = Options("car-1", "ca.pem");
+      MqttConfig options = Options("car-1", "ca.pem");
       (*options.tls).*member = path;
       try {
         const MqttClient car(options, {}, {});
@@ -126,7 +126,7 @@ TEST_F(MqttTlsTest, NamesTheFileThatCannotBeRead) {
 }
 
 TEST_F(MqttTlsTest, NamesAFileThatWentAwayAfterTheStartAndGoesOnWhenItIsBack) {
-  const MqttOptions options = Options("car-1", "ca.pem");
+  const MqttConfig options = Options("car-1", "ca.pem");
   const MqttClient car(options, {}, {});
   ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
   const std::string& key = options.tls->key_file;
@@ -141,7 +141,7 @@ TEST_F(MqttTlsTest, NamesAFileThatWentAwayAfterTheStartAndGoesOnWhenItIsBack) {
 }
 
 TEST_F(MqttTlsTest, DoesNotConnectWithTheKeyOfAnotherCertificate) {
-  MqttOptions options = Options("car-1", "ca.pem");
+  MqttConfig options = Options("car-1", "ca.pem");
   options.tls->key_file = File("stranger.key");  // Of another certificate.
   const MqttClient car(options, {}, {});
   EXPECT_TRUE(Eventually([&] { return Says(car, "TLS: key values mismatch"); }))
@@ -171,15 +171,15 @@ class ZoneIdentityTest : public ::testing::Test {
     ASSERT_EQ(std::system(command.c_str()), 0) << ReadFile(log, 1 << 20);
   }
 
-  MqttOptions Options(const std::string& vehicle) const {
+  MqttConfig Options(const std::string& vehicle) const {
     const std::string folder = directory_.path() + "/" + vehicle;
-    MqttOptions options;
+    MqttConfig options;
     options.port = port_;
     options.client_id = vehicle;
     options.reconnect_min_s = 0.05;
     options.reconnect_max_s = 0.5;
     options.tls =
-        MqttTlsOptions{folder + "/ca.pem", folder + "/certificate.pem", folder + "/key.pem"};
+        MqttTlsConfig{folder + "/ca.pem", folder + "/certificate.pem", folder + "/key.pem"};
     return options;
   }
 

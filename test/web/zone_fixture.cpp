@@ -82,8 +82,8 @@ void ZoneFixture::AddRow(const std::string& class_name, const GeoPoint& start, s
   zone->HandleBatch(reports);
 }
 
-WebOptions TestOptions() {
-  WebOptions options;
+WebConfig TestOptions() {
+  WebConfig options;
   options.port = 0;
   options.web_root = LIVEMAP_SOURCE_DIR "/web";
   return options;

@@ -72,6 +72,6 @@ class ZoneFixture {
 };
 
 /// Options that serve the source tree's page on any free port of the loopback.
-WebOptions TestOptions();
+WebConfig TestOptions();
 
 }  // namespace livemap

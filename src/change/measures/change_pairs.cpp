@@ -17,11 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostPictureBytes = 64U << 20U;
-constexpr std::int64_t kMostPicturePixels = 64000000;
-constexpr std::size_t kMostPairs = 1000000;
+constexpr std::size_t kMaxPictureBytes = 64U << 20U;
+constexpr std::int64_t kMaxPicturePixels = 64000000;
+constexpr std::size_t kMaxPairs = 1000000;
 constexpr std::array<std::uint8_t, 3> kMiscellaneousRgb{255, 242, 0};
-constexpr double kMostUnknownColours = 0.01;
+constexpr double kMaxUnknownColours = 0.01;
 
 bool IsPicture(const fs::path& path) {
   const std::string extension = path.extension().string();
@@ -132,7 +132,7 @@ ChangeMask DecodeColours(const cv::Mat& image, const std::string& path) {
     }
   }
   if (static_cast<double>(mask.unknown_colour_pixels) >
-      kMostUnknownColours * static_cast<double>(image.total())) {
+      kMaxUnknownColours * static_cast<double>(image.total())) {
     throw Error("mask '" + path + "' has " + std::to_string(mask.unknown_colour_pixels) + " of " +
                 std::to_string(image.total()) +
                 " pixels in colours of no class, accepted is up to one in a hundred");
@@ -180,9 +180,9 @@ std::vector<ChangePairFiles> FindChangePairs(const std::string& directory) {
   } else {
     AddSequences(folder, pairs);
   }
-  if (pairs.empty() || pairs.size() > kMostPairs) {
+  if (pairs.empty() || pairs.size() > kMaxPairs) {
     throw Error("folder '" + directory + "' has " + std::to_string(pairs.size()) +
-                " pairs, accepted are 1 to " + std::to_string(kMostPairs) +
+                " pairs, accepted are 1 to " + std::to_string(kMaxPairs) +
                 " as raw/NNN/RGB/1_II.png, 2_II.png and raw/NNN/GT/gtII.png, or as t0/, t1/ and "
                 "mask/");
   }
@@ -220,13 +220,13 @@ std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& dir
 }
 
 cv::Mat ReadPicture(const std::string& path, int flags) {
-  const std::string bytes = ReadFile(path, kMostPictureBytes);
+  const std::string bytes = ReadFile(path, kMaxPictureBytes);
   const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
   const auto header = ReadImageHeader(data, bytes.size());
   if (!header || header->format == ImageHeader::Format::kWebp) {
     throw Error("'" + path + "' is no JPEG or PNG picture");
   }
-  if (std::int64_t{header->width} * header->height > kMostPicturePixels) {
+  if (std::int64_t{header->width} * header->height > kMaxPicturePixels) {
     throw Error("picture '" + path + "' is " + std::to_string(header->width) + "x" +
                 std::to_string(header->height) + ", accepted are up to 64 megapixels");
   }

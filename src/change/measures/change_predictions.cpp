@@ -13,8 +13,8 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostNpyBytes = std::size_t{1} << 30U;
-constexpr std::uint64_t kMostSide = 16384;
+constexpr std::size_t kMaxNpyBytes = std::size_t{1} << 30U;
+constexpr std::uint64_t kMaxSide = 16384;
 
 [[noreturn]] void RefuseNpy(const std::string& path, const std::string& why) {
   throw Error("prediction '" + path + "' " + why + ", accepted is a numpy array of " +
@@ -86,8 +86,8 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
   if (!header.floats && text.compare(*type, 5, "'|u1'") != 0) RefuseNpy(path, "has another type");
   if (text.compare(*order, 5, "False") != 0) RefuseNpy(path, "is in Fortran's order");
   const auto shape = ReadShape(text, *shape_at);
-  if (!shape || (*shape)[0] != kChangeClasses || (*shape)[1] < 1 || (*shape)[1] > kMostSide ||
-      (*shape)[2] < 1 || (*shape)[2] > kMostSide) {
+  if (!shape || (*shape)[0] != kChangeClasses || (*shape)[1] < 1 || (*shape)[1] > kMaxSide ||
+      (*shape)[2] < 1 || (*shape)[2] > kMaxSide) {
     RefuseNpy(path, "has another shape");
   }
   header.shape = *shape;
@@ -96,7 +96,7 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
 }
 
 /// What rounding to 255ths of ten classes may cost, and some.
-constexpr double kMostSumError = 0.05;
+constexpr double kMaxSumError = 0.05;
 
 void CheckSumIsOne(const ChangeProbabilities& probabilities, const std::string& path) {
   cv::Mat sum = probabilities.of_class.at(0).clone();
@@ -104,7 +104,7 @@ void CheckSumIsOne(const ChangeProbabilities& probabilities, const std::string& 
   double least = 0;
   double most = 0;
   cv::minMaxLoc(sum, &least, &most);
-  if (least < 1 - kMostSumError || most > 1 + kMostSumError) {
+  if (least < 1 - kMaxSumError || most > 1 + kMaxSumError) {
     throw Error("prediction '" + path + "' holds probabilities of which those of a pixel sum to " +
                 std::to_string(least) + " to " + std::to_string(most) + ", accepted is 1");
   }
@@ -159,7 +159,7 @@ ChangeProbabilities ReadPrediction(const std::string& folder, const std::string&
   std::string path = stem + ".npy";
   std::error_code ignored;
   if (std::filesystem::is_regular_file(path, ignored)) {
-    probabilities = ParseNpyProbabilities(ReadFile(path, kMostNpyBytes), path);
+    probabilities = ParseNpyProbabilities(ReadFile(path, kMaxNpyBytes), path);
   } else {
     path = stem + ".png";
     if (!std::filesystem::is_regular_file(path, ignored)) {

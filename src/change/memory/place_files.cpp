@@ -126,7 +126,7 @@ std::string PlaceFiles::Put(const std::string& bytes) {
 
 std::string PlaceFiles::Read(const std::string& sha256) const {
   const std::string path = Path(sha256);
-  std::string bytes = ReadFile(path, kMostRecordBytes);
+  std::string bytes = ReadFile(path, kMaxRecordBytes);
   if (Sha256Hex(bytes) != sha256) {
     throw Error("'" + path + "' is corrupt: its content is not what its name says");
   }

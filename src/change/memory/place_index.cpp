@@ -8,7 +8,7 @@ namespace livemap {
 namespace {
 
 constexpr double kFullTurn = 6.283185307179586;
-constexpr double kLeastCellM = 5;
+constexpr double kMinCellM = 5;
 
 /// 0 to pi.
 double HeadingDifference(double a, double b) { return std::abs(std::remainder(a - b, kFullTurn)); }
@@ -16,7 +16,7 @@ double HeadingDifference(double a, double b) { return std::abs(std::remainder(a 
 }  // namespace
 
 PlaceIndex::PlaceIndex(const PlaceReach& reach)
-    : reach_(reach), grid_(std::max(2 * reach.most_distance_m, kLeastCellM)) {}
+    : reach_(reach), grid_(std::max(2 * reach.max_distance_m, kMinCellM)) {}
 
 void PlaceIndex::Insert(std::int64_t id, const GeoPoint& position, double heading_rad,
                         const std::string& drive_id) {
@@ -31,22 +31,22 @@ void PlaceIndex::Erase(std::int64_t id) {
   places_.erase(found);
 }
 
-std::vector<PlaceCandidate> PlaceIndex::Nearest(const PlaceQuery& query) const {
-  std::vector<PlaceCandidate> candidates;
+std::vector<PlaceMatch> PlaceIndex::Nearest(const PlaceQuery& query) const {
+  std::vector<PlaceMatch> candidates;
   if (!IsValid(query.position) || !std::isfinite(query.heading_rad)) return candidates;
   const auto drive = drives_.find(query.exclude_drive);
-  for (const auto& near : grid_.Within(query.position, reach_.most_distance_m)) {
+  for (const auto& near : grid_.Within(query.position, reach_.max_distance_m)) {
     const auto id = static_cast<std::int64_t>(near.id);
     const Place& place = places_.at(id);
     if (drive != drives_.end() && place.drive == drive->second) continue;
     const double difference =
         HeadingDifference(static_cast<double>(place.heading_rad), query.heading_rad);
-    if (difference > reach_.most_heading_difference_rad) continue;
+    if (difference > reach_.max_heading_difference_rad) continue;
     candidates.push_back({id, near.distance_m, difference});
   }
   const std::size_t count = std::min(reach_.candidates, candidates.size());
   std::partial_sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count),
-                    candidates.end(), [](const PlaceCandidate& a, const PlaceCandidate& b) {
+                    candidates.end(), [](const PlaceMatch& a, const PlaceMatch& b) {
                       return std::tie(a.distance_m, a.id) < std::tie(b.distance_m, b.id);
                     });
   candidates.resize(count);

@@ -18,7 +18,7 @@ struct PlaceQuery {
 };
 
 /// A frame that was taken near by.
-struct PlaceCandidate {
+struct PlaceMatch {
   std::int64_t id = 0;
   double distance_m = 0;              ///< Geodesic.
   double heading_difference_rad = 0;  ///< 0 to pi.
@@ -27,8 +27,8 @@ struct PlaceCandidate {
 /// What counts as near.
 struct PlaceReach {
   std::size_t candidates = 15;  ///< At most so many (thesis 4.3).
-  double most_distance_m = 15;
-  double most_heading_difference_rad = 0.5235987755982988;  ///< 30 degrees.
+  double max_distance_m = 15;
+  double max_heading_difference_rad = 0.5235987755982988;  ///< 30 degrees.
 };
 
 /// Frames by place and heading, in memory. The cost of a question does not grow with the number of
@@ -44,7 +44,7 @@ class PlaceIndex {
   void Erase(std::int64_t id);
   /// The nearest frames within reach, the nearest first; exact by geodesic distance, the lower id
   /// among equals. None for an invalid query.
-  std::vector<PlaceCandidate> Nearest(const PlaceQuery& query) const;
+  std::vector<PlaceMatch> Nearest(const PlaceQuery& query) const;
 
   std::size_t size() const { return places_.size(); }
 

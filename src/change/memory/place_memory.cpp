@@ -41,15 +41,15 @@ void CheckWithin(double value, double least, double most, const char* name) {
 PlaceMemory::Config Checked(const PlaceMemory::Config& config) {
   CheckWithin(config.cell_m, 2, 1000, "cell_m");
   CheckWithin(config.heading_sectors, 1, 64, "heading_sectors");
-  CheckWithin(config.most_cell_bytes, 1e4, 1e12, "most_cell_bytes");
+  CheckWithin(config.max_cell_bytes, 1e4, 1e12, "most_cell_bytes");
   CheckWithin(config.half_life_days, 0.001, 1e6, "half_life_days");
-  CheckWithin(config.most_bytes, config.most_cell_bytes, 1e15, "most_bytes");
+  CheckWithin(config.max_bytes, config.max_cell_bytes, 1e15, "most_bytes");
   CheckWithin(static_cast<double>(config.reach.candidates), 1, 1000, "candidates");
-  CheckWithin(config.reach.most_distance_m, 0.1, 1000, "most_distance_m");
-  CheckWithin(config.reach.most_heading_difference_rad, 0, kTurn / 2,
+  CheckWithin(config.reach.max_distance_m, 0.1, 1000, "most_distance_m");
+  CheckWithin(config.reach.max_heading_difference_rad, 0, kTurn / 2,
               "most_heading_difference_rad");
   CheckWithin(config.match_ratio, 0.1, 1, "match_ratio");
-  CheckWithin(config.most_cached_bytes, 0, 1e12, "most_cached_bytes");
+  CheckWithin(config.max_cached_bytes, 0, 1e12, "most_cached_bytes");
   return config;
 }
 
@@ -60,9 +60,9 @@ PlaceMemory::PlaceMemory(const Config& config, std::int64_t now_ns)
   try {
     Open();
   } catch (const StoreError& error) {
-    if (!TellsCorruption(error)) throw;
+    if (!IsCorruption(error)) throw;
     database_.reset();
-    recovery_.set_aside = SetAsideDatabase(IndexPath(), now_ns);
+    recovery_.set_aside = QuarantineDatabase(IndexPath(), now_ns);
     Open();
   }
   SqliteStatement state = database_->Prepare("SELECT complete FROM state");
@@ -115,7 +115,7 @@ void PlaceMemory::LoadIndex() {
     const std::int64_t bytes = rows.Int(6);
     const bool sound = IsValid(frame.position) && frame.heading_rad >= 0 &&
                        frame.heading_rad < kTurn && rows.Text(1).size() == 64 && bytes > 0 &&
-                       bytes <= static_cast<std::int64_t>(kMostRecordBytes);
+                       bytes <= static_cast<std::int64_t>(kMaxRecordBytes);
     if (!sound) {
       throw StoreError("place memory '" + IndexPath() + "' is malformed: row " +
                        std::to_string(rows.Int(0)) + " holds no frame");
@@ -203,7 +203,7 @@ std::vector<std::int64_t> PlaceMemory::CellVictims(std::int64_t cell) {
     total += frames.back().bytes;
   }
   std::vector<std::int64_t> victims;
-  if (total <= config_.most_cell_bytes) return victims;
+  if (total <= config_.max_cell_bytes) return victims;
   const auto newest = std::max_element(frames.begin(), frames.end(), [](auto& a, auto& b) {
     return std::pair(a.stamp_ns, a.id) < std::pair(b.stamp_ns, b.id);
   });
@@ -217,7 +217,7 @@ std::vector<std::int64_t> PlaceMemory::CellVictims(std::int64_t cell) {
     return std::pair(a.worth, a.id) < std::pair(b.worth, b.id);
   });
   for (const Frame& frame : frames) {
-    if (total <= config_.most_cell_bytes) break;
+    if (total <= config_.max_cell_bytes) break;
     if (frame.id == newest_id) continue;
     victims.push_back(frame.id);
     total -= frame.bytes;
@@ -245,10 +245,10 @@ void PlaceMemory::DeleteRows(const std::vector<std::int64_t>& ids) {
 std::optional<std::int64_t> PlaceMemory::Add(const PlaceRecord& record) {
   const std::string bytes = SerialisePlaceRecord(record);
   const auto size = static_cast<double>(bytes.size());
-  if (size > config_.most_cell_bytes) {
+  if (size > config_.max_cell_bytes) {
     throw Error("a frame to remember has " + std::to_string(bytes.size()) +
                 " bytes, accepted is what a cell may hold, " +
-                std::to_string(static_cast<std::int64_t>(config_.most_cell_bytes)));
+                std::to_string(static_cast<std::int64_t>(config_.max_cell_bytes)));
   }
   const std::string sha256 = files_.Put(bytes);
   {
@@ -268,7 +268,7 @@ std::optional<std::int64_t> PlaceMemory::Add(const PlaceRecord& record) {
         freed += victim == id ? size : static_cast<double>(entries_.at(victim).bytes);
       }
       const std::vector<std::int64_t> more =
-          OverallVictims(bytes_ + size - freed - config_.most_bytes, id);
+          OverallVictims(bytes_ + size - freed - config_.max_bytes, id);
       DeleteRows(more);
       victims.insert(victims.end(), more.begin(), more.end());
     });

@@ -32,13 +32,13 @@ class PlaceMemory {
     int heading_sectors = 8;
     /// Bytes of frames per cell. Beyond it frames go, those with the least `quality * 0.5 ^ (age /
     /// half_life_days)` first; age counts from the cell's newest frame, which always stays.
-    double most_cell_bytes = 3e6;
+    double max_cell_bytes = 3e6;
     double half_life_days = 60;
     /// Bytes of frames altogether; beyond it the oldest go, wherever they are.
-    double most_bytes = 20e9;
+    double max_bytes = 20e9;
     PlaceReach reach;                 ///< Of Nearest.
     double match_ratio = 0.8;         ///< Of Rank's ratio test.
-    double most_cached_bytes = 64e6;  ///< Of features kept in memory.
+    double max_cached_bytes = 64e6;  ///< Of features kept in memory.
   };
 
   /// What opening had to mend.
@@ -51,7 +51,7 @@ class PlaceMemory {
   };
 
   struct Ranked {
-    PlaceCandidate candidate;
+    PlaceMatch candidate;
     std::size_t matches = 0;  ///< Of SIFT features.
   };
 
@@ -74,14 +74,14 @@ class PlaceMemory {
   std::optional<std::int64_t> Add(const PlaceRecord& record);
 
   /// See PlaceIndex.
-  std::vector<PlaceCandidate> Nearest(const PlaceQuery& query) const {
+  std::vector<PlaceMatch> Nearest(const PlaceQuery& query) const {
     return index_.Nearest(query);
   }
 
   /// The candidates by how many of their features match `features`, most first; reads the features
   /// of those that are not cached. What cannot be read is left out and set aside.
   std::vector<Ranked> Rank(const ImageFeatures& features,
-                           const std::vector<PlaceCandidate>& candidates);
+                           const std::vector<PlaceMatch>& candidates);
 
   /// The whole frame; none when it is gone or was just found damaged (then it is set aside).
   std::optional<PlaceRecord> Load(std::int64_t id);

@@ -17,8 +17,8 @@ constexpr char kMark[] = "LMPLACE1";
 constexpr std::size_t kMarkBytes = 8;
 constexpr std::size_t kFooterBytes = kMarkBytes + 4;
 constexpr std::size_t kDescriptorColumns = 128;
-constexpr std::size_t kMostDriveIdBytes = 64;
-constexpr int kMostPictureSide = 16384;
+constexpr std::size_t kMaxDriveIdBytes = 64;
+constexpr int kMaxPictureSide = 16384;
 constexpr double kTwoPi = 6.283185307179586;
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "records are written in little endian");
@@ -85,12 +85,12 @@ void CheckPicture(const PlaceRecord& record) {
 void CheckFeatures(const ImageFeatures& features) {
   const std::size_t count = features.points.size();
   const cv::Mat& descriptors = features.descriptors;
-  if (count > kMostRecordFeatures || static_cast<std::size_t>(descriptors.rows) != count ||
+  if (count > kMaxRecordFeatures || static_cast<std::size_t>(descriptors.rows) != count ||
       (count > 0 && (descriptors.type() != CV_8UC1 || descriptors.cols != int{kDescriptorColumns} ||
                      !descriptors.isContinuous()))) {
     throw Error("a remembered frame has " + std::to_string(count) + " features with " +
                 std::to_string(descriptors.rows) + " descriptors, accepted are up to " +
-                std::to_string(kMostRecordFeatures) + " with one of 128 bytes each");
+                std::to_string(kMaxRecordFeatures) + " with one of 128 bytes each");
   }
   for (const cv::Point2f& point : features.points) {
     if (std::isfinite(point.x) && std::isfinite(point.y)) continue;
@@ -101,7 +101,7 @@ void CheckFeatures(const ImageFeatures& features) {
 }  // namespace
 
 void CheckPlaceFrame(const PlaceFrame& frame) {
-  if (frame.drive_id.empty() || frame.drive_id.size() > kMostDriveIdBytes) {
+  if (frame.drive_id.empty() || frame.drive_id.size() > kMaxDriveIdBytes) {
     throw Error("a remembered frame's drive id has " + std::to_string(frame.drive_id.size()) +
                 " bytes, accepted are 1 to 64");
   }
@@ -112,9 +112,9 @@ void CheckPlaceFrame(const PlaceFrame& frame) {
           "0 to 2 pi");
   Require(frame.stamp_ns > 0, "stamp_ns", static_cast<double>(frame.stamp_ns), "positive");
   const CameraIntrinsics& camera = frame.camera;
-  Require(camera.width >= 1 && camera.width <= kMostPictureSide, "width", camera.width,
+  Require(camera.width >= 1 && camera.width <= kMaxPictureSide, "width", camera.width,
           "1 to 16384");
-  Require(camera.height >= 1 && camera.height <= kMostPictureSide, "height", camera.height,
+  Require(camera.height >= 1 && camera.height <= kMaxPictureSide, "height", camera.height,
           "1 to 16384");
   for (const auto& [name, value] : {std::pair("fx", camera.fx), {"fy", camera.fy}}) {
     Require(value > 0 && value <= 1e6, name, value, "above 0, up to 1e6");
@@ -151,15 +151,15 @@ std::string SerialisePlaceRecord(const PlaceRecord& record) {
                   record.features.points.size() * kDescriptorColumns);
   writer.Put(static_cast<std::uint32_t>(bytes.size() - begin));
   writer.PutBytes(kMark, kMarkBytes);
-  if (bytes.size() > kMostRecordBytes) {
+  if (bytes.size() > kMaxRecordBytes) {
     throw Error("a remembered frame has " + std::to_string(bytes.size()) +
-                " bytes, accepted are up to " + std::to_string(kMostRecordBytes));
+                " bytes, accepted are up to " + std::to_string(kMaxRecordBytes));
   }
   return bytes;
 }
 
 PlaceRecord ParsePlaceRecord(const std::string& bytes, const std::string& name) {
-  if (bytes.size() < kFooterBytes || bytes.size() > kMostRecordBytes ||
+  if (bytes.size() < kFooterBytes || bytes.size() > kMaxRecordBytes ||
       bytes.compare(bytes.size() - kMarkBytes, kMarkBytes, kMark) != 0) {
     throw Error("'" + name + "' is no place record");
   }
@@ -181,7 +181,7 @@ PlaceRecord ParsePlaceRecord(const std::string& bytes, const std::string& name) 
   frame.camera.width = reader.Take<std::int32_t>();
   frame.camera.height = reader.Take<std::int32_t>();
   const auto count = reader.Take<std::uint32_t>();
-  if (count > kMostRecordFeatures ||
+  if (count > kMaxRecordFeatures ||
       reader.left() != count * (kDescriptorColumns + 2 * sizeof(float))) {
     throw Error("place record '" + name + "' has " + std::to_string(reader.left()) +
                 " bytes for its " + std::to_string(count) + " features");

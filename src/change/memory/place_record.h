@@ -28,15 +28,15 @@ struct PlaceRecord {
   ImageFeatures features;
 };
 
-constexpr std::size_t kMostRecordBytes = 32U << 20U;
-constexpr std::size_t kMostRecordFeatures = 8192;
+constexpr std::size_t kMaxRecordBytes = 32U << 20U;
+constexpr std::size_t kMaxRecordFeatures = 8192;
 
 /// Throws Error naming the field, its value and what is accepted.
 void CheckPlaceFrame(const PlaceFrame& frame);
 
 /// The picture, then the features and the frame in little endian, then their length and a mark:
 /// whatever shows pictures shows the file. Throws Error when a field is not as it must be or the
-/// whole exceeds kMostRecordBytes.
+/// whole exceeds kMaxRecordBytes.
 std::string SerialisePlaceRecord(const PlaceRecord& record);
 /// The inverse. Throws Error, with `name` in it, for anything that SerialisePlaceRecord would not
 /// write; the picture is looked at up to its header.

@@ -7,9 +7,9 @@
 
 namespace livemap {
 std::vector<PlaceMemory::Ranked> PlaceMemory::Rank(const ImageFeatures& features,
-                                                   const std::vector<PlaceCandidate>& candidates) {
+                                                   const std::vector<PlaceMatch>& candidates) {
   std::vector<Ranked> ranked;
-  for (const PlaceCandidate& candidate : candidates) {
+  for (const PlaceMatch& candidate : candidates) {
     const auto remembered = Features(candidate.id);
     if (remembered == nullptr) continue;
     ranked.push_back({candidate, MatchFeatures(*remembered, features, config_.match_ratio).size()});
@@ -55,7 +55,7 @@ void PlaceMemory::Cache(std::int64_t id, std::shared_ptr<const ImageFeatures> fe
   cached_bytes_ += static_cast<double>(features->Bytes());
   cache_.push_front({id, std::move(features)});
   cached_[id] = cache_.begin();
-  while (cached_bytes_ > config_.most_cached_bytes && !cache_.empty()) Uncache(cache_.back().id);
+  while (cached_bytes_ > config_.max_cached_bytes && !cache_.empty()) Uncache(cache_.back().id);
 }
 
 void PlaceMemory::Uncache(std::int64_t id) {

@@ -12,7 +12,7 @@ namespace livemap {
 namespace {
 
 /// Names of features are told apart by one digit.
-constexpr int kMostLevels = 10;
+constexpr int kMaxLevels = 10;
 
 ChangeManifest::Graph ReadGraph(const ManifestSection& graphs, const std::string& part,
                                 const std::filesystem::path& directory) {
@@ -41,9 +41,9 @@ double Threshold(const ManifestSection& thresholds, const std::string& key) {
 
 ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& origin,
                                    const std::string& directory) {
-  if (yaml.size() > kMostManifestBytes) {
+  if (yaml.size() > kMaxManifestBytes) {
     throw Error("model manifest '" + origin + "' has " + std::to_string(yaml.size()) +
-                " bytes, at most " + std::to_string(kMostManifestBytes) + " are accepted");
+                " bytes, at most " + std::to_string(kMaxManifestBytes) + " are accepted");
   }
   try {
     const YAML::Node file = YAML::Load(yaml);
@@ -69,7 +69,7 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
     manifest.normalisation = ReadManifestNormalisation(root);
     const ManifestSection head = root.Sub("head", {"type", "levels", "output"});
     head.Choice("type", {"change"});
-    manifest.levels = head.Integer("levels", 1, kMostLevels);
+    manifest.levels = head.Integer("levels", 1, kMaxLevels);
     manifest.output = head.Text("output");
     const ManifestSection thresholds =
         root.Sub("thresholds", {"changed", "changed_at_fpr_0.01", "changed_at_fpr_0.10"});
@@ -83,7 +83,7 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
 }
 
 ChangeManifest ReadChangeManifest(const std::string& path) {
-  const std::string yaml = ReadFile(path, kMostManifestBytes);
+  const std::string yaml = ReadFile(path, kMaxManifestBytes);
   return ParseChangeManifest(yaml, path, std::filesystem::path(path).parent_path().string());
 }
 

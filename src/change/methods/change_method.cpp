@@ -29,7 +29,7 @@ cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& 
   return filled;
 }
 
-void SayNothingOfUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities) {
+void MaskUnobserved(const cv::Mat& valid, ChangeProbabilities& probabilities) {
   CheckValidity(valid, probabilities.of_class[0].size());
   const cv::Mat unseen = valid == 0;
   for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
@@ -39,7 +39,7 @@ void SayNothingOfUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities
 
 ChangeProbabilities ChangeMethod::Run(const AlignedPair& pair) {
   ChangeProbabilities probabilities = Estimate(pair);
-  SayNothingOfUnseen(pair.valid, probabilities);
+  MaskUnobserved(pair.valid, probabilities);
   return probabilities;
 }
 

@@ -22,7 +22,7 @@ void CheckValidity(const cv::Mat& valid, cv::Size size);
 cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& valid);
 
 /// Makes no change certain where `valid` is 0: a map must not hear of what was never seen.
-void SayNothingOfUnseen(const cv::Mat& valid, ChangeProbabilities& probabilities);
+void MaskUnobserved(const cv::Mat& valid, ChangeProbabilities& probabilities);
 
 /// Says what changed between two pictures. Not thread-safe.
 class ChangeMethod {

@@ -133,7 +133,7 @@ ChangeProbabilities ChangeNetwork::Compare(const ChangeFeatures& before,
   const std::vector<cv::Mat> answers =
       head_.Run(HeadInputs(before.levels, after.levels, Validity(valid)));
   ChangeProbabilities probabilities = Enlarged(answers[0], valid.size());
-  SayNothingOfUnseen(valid, probabilities);
+  MaskUnobserved(valid, probabilities);
   return probabilities;
 }
 

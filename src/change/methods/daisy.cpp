@@ -9,7 +9,7 @@
 namespace livemap {
 namespace {
 
-constexpr float kLeastGradient = 1e-3F;
+constexpr float kMinGradient = 1e-3F;
 
 /// Gradient's positive part in each direction: how steeply grey values rise that way.
 std::vector<cv::Mat> OrientationMaps(const cv::Mat& grey, int orientations) {
@@ -31,7 +31,7 @@ std::vector<cv::Mat> OrientationMaps(const cv::Mat& grey, int orientations) {
 
 }  // namespace
 
-Daisy::Daisy(const cv::Mat& grey, const DaisyOptions& options) : options_(options) {
+Daisy::Daisy(const cv::Mat& grey, const DaisyConfig& options) : options_(options) {
   if (grey.type() != CV_8UC1 || grey.empty()) throw Error("DAISY wants an 8-bit grey image");
   std::vector<cv::Mat> maps = OrientationMaps(grey, options.orientations);
   double blurred = 0;
@@ -75,7 +75,7 @@ void Daisy::AddHistogram(const std::vector<cv::Mat>& maps, float column, float r
   }
   const float length = std::sqrt(square);
   // What is flat has no direction; noise must not become one.
-  const float scale = length > kLeastGradient ? 1 / length : 0;
+  const float scale = length > kMinGradient ? 1 / length : 0;
   for (std::size_t i = 0; i < maps.size(); ++i) histogram[i] *= scale;
 }
 

@@ -6,7 +6,7 @@
 namespace livemap {
 
 /// Parameters of DAISY, the authors' for wide baselines.
-struct DaisyOptions {
+struct DaisyConfig {
   int rings = 3;
   int ring_points = 8;   ///< Histograms on each ring.
   int orientations = 8;  ///< Bins of a histogram.
@@ -21,7 +21,7 @@ struct DaisyOptions {
 class Daisy {
  public:
   /// `grey`: CV_8UC1. Costs orientations x (rings + 1) blurred images.
-  explicit Daisy(const cv::Mat& grey, const DaisyOptions& options = {});
+  explicit Daisy(const cv::Mat& grey, const DaisyConfig& options = {});
 
   /// Values of a descriptor: (rings * ring_points + 1) * orientations.
   int size() const;
@@ -33,7 +33,7 @@ class Daisy {
   void AddHistogram(const std::vector<cv::Mat>& maps, float column, float row,
                     float* histogram) const;
 
-  DaisyOptions options_;
+  DaisyConfig options_;
   /// By blur, from the centre outwards, then by orientation; CV_32FC1.
   std::vector<std::vector<cv::Mat>> maps_;
   std::vector<cv::Point2f> places_;  ///< Of the ring's histograms, from the centre, ring by ring.

@@ -91,7 +91,7 @@ class DaisyDifference : public ChangeMethod {
     std::vector<float> a(size);
     std::vector<float> b(size);
     // As many histograms of length 1 as a descriptor has.
-    const double most = std::sqrt(2.0 * static_cast<double>(size) / DaisyOptions().orientations);
+    const double most = std::sqrt(2.0 * static_cast<double>(size) / DaisyConfig().orientations);
     cv::Mat scores(grid, CV_32FC1);
     for (int row = 0; row < grid.height; ++row) {
       for (int column = 0; column < grid.width; ++column) {

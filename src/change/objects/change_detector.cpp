@@ -26,7 +26,7 @@ double WrappedHeading(double heading_rad) {
   return positive < 2 * M_PI ? positive : 0;
 }
 
-void CheckPicture(const WatchedPicture& picture) {
+void CheckPicture(const ChangeDetectorFrame& picture) {
   const CameraIntrinsics& camera = picture.camera;
   if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3 ||
       picture.bgr.size() != cv::Size(camera.width, camera.height)) {
@@ -45,7 +45,7 @@ void CheckPicture(const WatchedPicture& picture) {
 
 }  // namespace
 
-ChangeWatch::ChangeWatch(const Config& config, std::unique_ptr<ChangeMethod> method,
+ChangeDetector::ChangeDetector(const Config& config, std::unique_ptr<ChangeMethod> method,
                          std::int64_t now_ns)
     : config_(config),
       method_(std::move(method)),
@@ -57,7 +57,7 @@ ChangeWatch::ChangeWatch(const Config& config, std::unique_ptr<ChangeMethod> met
   }
 }
 
-PlaceFrame ChangeWatch::FrameOf(const WatchedPicture& picture) const {
+PlaceFrame ChangeDetector::FrameOf(const ChangeDetectorFrame& picture) const {
   PlaceFrame frame;
   frame.drive_id = config_.drive_id;
   frame.stamp_ns = picture.stamp_ns;
@@ -71,13 +71,13 @@ PlaceFrame ChangeWatch::FrameOf(const WatchedPicture& picture) const {
   return frame;
 }
 
-ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
+ChangeDetector::Answer ChangeDetector::Look(const ChangeDetectorFrame& picture) {
   CheckPicture(picture);
   Answer answer;
   if (picture.stamp_ns < last_stamp_ns_) Restart();
   last_stamp_ns_ = picture.stamp_ns;
   const PlaceFrame frame = FrameOf(picture);
-  if (frame.position_sigma_m > config_.most_position_sigma_m) {
+  if (frame.position_sigma_m > config_.max_position_sigma_m) {
     answer.outcome = Outcome::kUncertain;
     return answer;
   }
@@ -92,8 +92,8 @@ ChangeWatch::Answer ChangeWatch::Look(const WatchedPicture& picture) {
   return answer;
 }
 
-std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& frame,
-                                                             const WatchedPicture& picture,
+std::optional<ChangeDetector::Partner> ChangeDetector::FindPartner(const PlaceFrame& frame,
+                                                             const ChangeDetectorFrame& picture,
                                                              const FeaturedView& view,
                                                              Answer& answer) {
   const auto near = memory_.Nearest({frame.position, frame.heading_rad, config_.drive_id});
@@ -109,11 +109,11 @@ std::optional<ChangeWatch::Partner> ChangeWatch::FindPartner(const PlaceFrame& f
   return std::nullopt;
 }
 
-std::optional<ChangeWatch::Partner> ChangeWatch::Register(const PlaceRecord& record,
-                                                          const WatchedPicture& picture,
+std::optional<ChangeDetector::Partner> ChangeDetector::Register(const PlaceRecord& record,
+                                                          const ChangeDetectorFrame& picture,
                                                           const FeaturedView& view,
                                                           std::string& why) const {
-  const RegistrationOptions& options = config_.registration;
+  const RegistrationConfig& options = config_.registration;
   const FeaturedView before{cv::Size(record.frame.camera.width, record.frame.camera.height),
                             record.features};
   const cv::Mat earlier = cv::imdecode(record.picture, cv::IMREAD_COLOR);
@@ -146,7 +146,7 @@ std::optional<ChangeWatch::Partner> ChangeWatch::Register(const PlaceRecord& rec
   return std::nullopt;
 }
 
-void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
+void ChangeDetector::Compare(const ChangeDetectorFrame& picture, const Partner& partner,
                           const Eigen::Isometry3d& map_from_base, Answer& answer) {
   answer.outcome = Outcome::kCompared;
   answer.earlier = partner.frame;
@@ -157,7 +157,7 @@ void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
             cv::BORDER_CONSTANT, cv::Scalar(255));
   answer.pair = {FillUnknown(partner.warped.picture, picture.bgr, valid), picture.bgr, valid};
   const ChangeProbabilities probabilities = method_->Run(answer.pair);
-  answer.classes = ChangedClasses(probabilities, config_.regions.least_confidence);
+  answer.classes = ChangedClasses(probabilities, config_.regions.min_confidence);
   answer.classes.setTo(kLeftOutPixel, answer.pair.valid == 0);
   answer.regions =
       FindChangeRegions(probabilities, answer.pair.before, answer.pair.after, config_.regions);
@@ -173,24 +173,24 @@ void ChangeWatch::Compare(const WatchedPicture& picture, const Partner& partner,
   Place(tracker_.Confirmed(), answer.objects);
 }
 
-void ChangeWatch::Place(const std::vector<ChangeEvent>& events,
+void ChangeDetector::Place(const std::vector<ChangedObject>& events,
                         std::vector<PlacedChange>& placed) const {
-  for (const ChangeEvent& event : events) {
+  for (const ChangedObject& event : events) {
     placed.push_back({event, map_->ToGeo(event.position_m), event.covariance_m2 + covariance_m2_});
   }
 }
 
-void ChangeWatch::Restart() {
-  const std::vector<ChangeEvent> untold = tracker_.Restart();
+void ChangeDetector::Restart() {
+  const std::vector<ChangedObject> untold = tracker_.Restart();
   if (map_) Place(untold, passed_);
 }
 
-std::vector<PlacedChange> ChangeWatch::EndDrive() {
+std::vector<PlacedChange> ChangeDetector::EndDrive() {
   Restart();
   return std::exchange(passed_, {});
 }
 
-void ChangeWatch::Remember(const WatchedPicture& picture, const PlaceFrame& frame,
+void ChangeDetector::Remember(const ChangeDetectorFrame& picture, const PlaceFrame& frame,
                            const ImageFeatures& features, Answer& answer) {
   if (last_remembered_ &&
       GeodesicDistanceM(*last_remembered_, frame.position) < config_.remember_spacing_m) {
@@ -208,7 +208,7 @@ void ChangeWatch::Remember(const WatchedPicture& picture, const PlaceFrame& fram
   }
 }
 
-Eigen::Isometry3d ChangeWatch::MapFromBase(const WatchedPicture& picture) {
+Eigen::Isometry3d ChangeDetector::MapFromBase(const ChangeDetectorFrame& picture) {
   if (!map_ || GeodesicDistanceM(map_->datum(), picture.position) > kMapRadiusM) {
     Restart();
     map_.emplace(picture.position);

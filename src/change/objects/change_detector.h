@@ -17,7 +17,7 @@
 namespace livemap {
 
 /// A picture of the present drive and where it was taken.
-struct WatchedPicture {
+struct ChangeDetectorFrame {
   std::int64_t stamp_ns = 0;
   cv::Mat bgr;              ///< CV_8UC3, rectified, of the camera's size.
   cv::Mat depth;            ///< Empty, or CV_32FC1 of its size: m ahead; 0 and NaN are unknown.
@@ -30,7 +30,7 @@ struct WatchedPicture {
 
 /// An object that changed, on the earth.
 struct PlacedChange {
-  ChangeEvent event;  ///< Its position_m is relative to a place that only the watch knows.
+  ChangedObject event;  ///< Its position_m is relative to a place that only the watch knows.
   GeoPoint position;
   /// East-north axes; with the position of the vehicle, which all its pictures share.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
@@ -40,17 +40,17 @@ struct PlacedChange {
 /// 4.3): the nearest earlier pictures by position and heading, the best of them by matches,
 /// registration, the method, regions, objects on the ground. Not
 /// thread-safe.
-class ChangeWatch {
+class ChangeDetector {
  public:
   struct Config {
     std::string drive_id;  ///< Of the present drive: its own pictures are not compared with.
     PlaceMemory::Config memory;
-    FeatureOptions features;
-    RegistrationOptions registration;
-    ChangeRegionOptions regions;
+    FeatureConfig features;
+    RegistrationConfig registration;
+    ChangeRegionConfig regions;
     ChangeTracker::Config tracker;
     double remember_spacing_m = 2;     ///< Between two pictures that are remembered.
-    double most_position_sigma_m = 5;  ///< Per axis; a picture placed worse is not used at all.
+    double max_position_sigma_m = 5;  ///< Per axis; a picture placed worse is not used at all.
     std::size_t partners = 2;          ///< Earlier pictures that are tried, the best one first.
     int jpeg_quality = 90;             ///< Of remembered pictures, 1 to 100.
     std::uint64_t seed = 1;            ///< Of registration.
@@ -89,11 +89,11 @@ class ChangeWatch {
 
   /// Opens the memory; throws as PlaceMemory does, and Error for a drive id that is none. `now_ns`
   /// names a corrupt index that is set aside.
-  ChangeWatch(const Config& config, std::unique_ptr<ChangeMethod> method, std::int64_t now_ns);
+  ChangeDetector(const Config& config, std::unique_ptr<ChangeMethod> method, std::int64_t now_ns);
 
   /// Compares and remembers one picture. A stamp that goes back begins the objects anew. Throws
-  /// Error for a picture that is not as WatchedPicture says, or when the method fails.
-  Answer Look(const WatchedPicture& picture);
+  /// Error for a picture that is not as ChangeDetectorFrame says, or when the method fails.
+  Answer Look(const ChangeDetectorFrame& picture);
 
   /// The drive is over: all confirmed objects that no answer told as passed.
   std::vector<PlacedChange> EndDrive();
@@ -108,21 +108,21 @@ class ChangeWatch {
   };
 
   /// Where the camera was and looked.
-  PlaceFrame FrameOf(const WatchedPicture& picture) const;
-  std::optional<Partner> FindPartner(const PlaceFrame& frame, const WatchedPicture& picture,
+  PlaceFrame FrameOf(const ChangeDetectorFrame& picture) const;
+  std::optional<Partner> FindPartner(const PlaceFrame& frame, const ChangeDetectorFrame& picture,
                                      const FeaturedView& view, Answer& answer);
   /// By depth where there is one, else by edges, else by features; none with the reasons in `why`.
-  std::optional<Partner> Register(const PlaceRecord& record, const WatchedPicture& picture,
+  std::optional<Partner> Register(const PlaceRecord& record, const ChangeDetectorFrame& picture,
                                   const FeaturedView& view, std::string& why) const;
-  void Compare(const WatchedPicture& picture, const Partner& partner,
+  void Compare(const ChangeDetectorFrame& picture, const Partner& partner,
                const Eigen::Isometry3d& map_from_base, Answer& answer);
-  void Remember(const WatchedPicture& picture, const PlaceFrame& frame,
+  void Remember(const ChangeDetectorFrame& picture, const PlaceFrame& frame,
                 const ImageFeatures& features, Answer& answer);
   /// Where base_link is in the map, which begins anew far from the old one.
-  Eigen::Isometry3d MapFromBase(const WatchedPicture& picture);
+  Eigen::Isometry3d MapFromBase(const ChangeDetectorFrame& picture);
   /// Begins the objects anew; those that nobody was told of are told with the next answer.
   void Restart();
-  void Place(const std::vector<ChangeEvent>& events, std::vector<PlacedChange>& placed) const;
+  void Place(const std::vector<ChangedObject>& events, std::vector<PlacedChange>& placed) const;
 
   Config config_;
   std::unique_ptr<ChangeMethod> method_;
@@ -136,7 +136,7 @@ class ChangeWatch {
 };
 
 /// `bgr` with the changed classes in their colours, regions boxed with class and direction, and
-/// darker where nothing earlier is known. `classes` as in ChangeWatch::Answer.
+/// darker where nothing earlier is known. `classes` as in ChangeDetector::Answer.
 cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
                     const std::vector<ChangeRegion>& regions);
 

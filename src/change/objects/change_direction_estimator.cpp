@@ -12,15 +12,15 @@ namespace {
 constexpr double kDirectionReferenceWidth = 320;
 constexpr int kGapPx = 2;   // Between a region and what lies around it, of a picture 320 wide,
 constexpr int kRingPx = 7;  // and where that ends.
-constexpr int kLeastRingPixels = 30;
+constexpr int kMinRingPixels = 30;
 constexpr int kColourBins = 12;
 
 // The weights of a logistic regression on 228 regions of simulated validation streets; 0.5 is
 // where one in ten regions is judged wrongly (docs/change.md).
 constexpr double kColourWeight = 4.0;
 constexpr double kOutlineWeight = 1.5;
-constexpr double kLeastEvidence = 0.5;
-constexpr double kLeastDifference = 0.05;  // Of colours; a smaller one is noise.
+constexpr double kMinEvidence = 0.5;
+constexpr double kMinDifference = 0.05;  // Of colours; a smaller one is noise.
 
 /// Strength of grey edges, CV_32FC1, as multiples of their mean.
 cv::Mat RelativeEdges(const cv::Mat& bgr) {
@@ -62,7 +62,7 @@ double Difference(const cv::Mat& channel, const cv::Mat& inside, const cv::Mat& 
 
 }  // namespace
 
-struct DirectionJudge::Picture {
+struct ChangeDirectionEstimator::Picture {
   explicit Picture(const cv::Mat& bgr) : edges(RelativeEdges(bgr)) {
     cv::Mat lab;
     cv::GaussianBlur(bgr, lab, cv::Size(), 1);
@@ -73,19 +73,19 @@ struct DirectionJudge::Picture {
   double ColoursDiffer(const cv::Rect& where, const cv::Mat& inside, const cv::Mat& around) const {
     double difference = 0;
     for (const cv::Mat& channel : colours) difference += Difference(channel(where), inside, around);
-    return std::max(difference, kLeastDifference);
+    return std::max(difference, kMinDifference);
   }
 
   cv::Mat edges;
   std::vector<cv::Mat> colours;
 };
 
-DirectionJudge::DirectionJudge(const cv::Mat& before, const cv::Mat& after)
+ChangeDirectionEstimator::ChangeDirectionEstimator(const cv::Mat& before, const cv::Mat& after)
     : before_(std::make_unique<Picture>(before)), after_(std::make_unique<Picture>(after)) {}
 
-DirectionJudge::~DirectionJudge() = default;
+ChangeDirectionEstimator::~ChangeDirectionEstimator() = default;
 
-ChangeDirection DirectionJudge::Of(const cv::Mat& region, const cv::Rect& box) const {
+ChangeDirection ChangeDirectionEstimator::Of(const cv::Mat& region, const cv::Rect& box) const {
   const double scale = region.cols / kDirectionReferenceWidth;
   const auto pixels = [scale](int px) { return std::max(1, static_cast<int>(px * scale)); };
   const cv::Point margin(pixels(kRingPx) + 1, pixels(kRingPx) + 1);
@@ -99,13 +99,13 @@ ChangeDirection DirectionJudge::Of(const cv::Mat& region, const cv::Rect& box) c
   const double outlines = std::log((cv::mean(after_->edges(where), outline)[0] + 1e-6) /
                                    (cv::mean(before_->edges(where), outline)[0] + 1e-6));
   double colours = 0;
-  if (cv::countNonZero(around) >= kLeastRingPixels * scale * scale) {
+  if (cv::countNonZero(around) >= kMinRingPixels * scale * scale) {
     colours = std::log(after_->ColoursDiffer(where, inside, around) /
                        before_->ColoursDiffer(where, inside, around));
   }
   const double evidence = kColourWeight * colours + kOutlineWeight * outlines;
-  if (evidence > kLeastEvidence) return ChangeDirection::kAppeared;
-  if (evidence < -kLeastEvidence) return ChangeDirection::kVanished;
+  if (evidence > kMinEvidence) return ChangeDirection::kAppeared;
+  if (evidence < -kMinEvidence) return ChangeDirection::kVanished;
   return ChangeDirection::kUnknown;
 }
 

@@ -10,11 +10,11 @@ namespace livemap {
 /// Tells which of two aligned pictures has what changed. Where a thing stands its colours differ
 /// from those around it and its outline is an edge; where it is gone what lies around it goes on.
 /// Light and season change both pictures as a whole, hence only ratios within one count.
-class DirectionJudge {
+class ChangeDirectionEstimator {
  public:
   /// CV_8UC3, BGR, of one size.
-  DirectionJudge(const cv::Mat& before, const cv::Mat& after);
-  ~DirectionJudge();
+  ChangeDirectionEstimator(const cv::Mat& before, const cv::Mat& after);
+  ~ChangeDirectionEstimator();
 
   /// `region`: CV_8UC1 of the pictures' size, 255 on the region, which lies within `box`.
   ChangeDirection Of(const cv::Mat& region, const cv::Rect& box) const;

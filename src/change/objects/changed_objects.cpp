@@ -25,8 +25,8 @@ Eigen::Vector2d PlanarPlace(const Eigen::Isometry3d& pose) { return pose.transla
 }  // namespace
 
 ChangeTracker::ChangeTracker(const Config& config) : config_(config) {
-  if (config.least_seen < 2) {
-    throw Error("a change's least_seen is " + std::to_string(config.least_seen) +
+  if (config.min_seen < 2) {
+    throw Error("a change's least_seen is " + std::to_string(config.min_seen) +
                 ", accepted are 2 and more: nothing is said from one picture");
   }
 }
@@ -39,7 +39,7 @@ std::optional<ChangeTracker::Sight> ChangeTracker::Place(const ChangeFrame& fram
   if (box.y + box.height >= frame.camera.height) return std::nullopt;
   const Eigen::Vector2d foot(box.x + (box.width - 1) / 2.0, box.y + box.height - 1);
   GroundProjectionNoise noise = config_.ground;
-  noise.max_range_m = std::min(noise.max_range_m, config_.most_range_m);
+  noise.max_range_m = std::min(noise.max_range_m, config_.max_range_m);
   const auto ground = ProjectToGround(foot, frame.camera, frame.base_from_optical, noise);
   if (!ground) return std::nullopt;
   const Eigen::Matrix2d turn = PlanarTurn(frame.map_from_base);
@@ -55,24 +55,24 @@ std::optional<ChangeTracker::Sight> ChangeTracker::Place(const ChangeFrame& fram
 
 ChangeTracker::Track* ChangeTracker::Nearest(const Sight& sight, const std::vector<bool>& taken) {
   Track* nearest = nullptr;
-  double least_m = config_.most_gate_m;
+  double min_m = config_.max_gate_m;
   for (std::size_t i = 0; i < taken.size(); ++i) {
     Track& track = tracks_[i];
     if (taken[i]) continue;
     const Eigen::Vector2d apart = sight.position_m - track.event.position_m;
     const double distance_m = apart.norm();
-    if (distance_m > least_m) continue;
+    if (distance_m > min_m) continue;
     const Eigen::Matrix2d covariance = sight.covariance_m2 + track.event.covariance_m2;
     const double sigmas = std::sqrt(apart.dot(covariance.inverse() * apart));
-    if (distance_m > config_.least_gate_m && !(sigmas <= config_.gate_sigmas)) continue;
-    least_m = distance_m;
+    if (distance_m > config_.min_gate_m && !(sigmas <= config_.gate_sigmas)) continue;
+    min_m = distance_m;
     nearest = &track;
   }
   return nearest;
 }
 
 void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& frame) const {
-  ChangeEvent& event = track.event;
+  ChangedObject& event = track.event;
   const ChangeRegion& region = *sight.region;
   const Eigen::Vector2d from_m = PlanarPlace(frame.map_from_base);
   if (event.seen == 0) {
@@ -100,9 +100,9 @@ void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& 
   event.change_class = static_cast<ChangeClass>(heaviest - track.class_weight.begin());
   const double known = track.appeared + track.vanished;
   event.direction = ChangeDirection::kUnknown;
-  if (known > 0 && track.appeared >= config_.least_direction_share * known) {
+  if (known > 0 && track.appeared >= config_.min_direction_share * known) {
     event.direction = ChangeDirection::kAppeared;
-  } else if (known > 0 && track.vanished >= config_.least_direction_share * known) {
+  } else if (known > 0 && track.vanished >= config_.min_direction_share * known) {
     event.direction = ChangeDirection::kVanished;
   }
 }
@@ -112,7 +112,7 @@ bool ChangeTracker::IsMissed(const Track& track, const ChangeFrame& frame,
   const Eigen::Vector2d ahead_m = PlanarTurn(frame.map_from_base).transpose() *
                                   (track.event.position_m - PlanarPlace(frame.map_from_base));
   const double range_m = ahead_m.norm();
-  if (range_m > config_.most_range_m || range_m < config_.least_missed_m) return false;
+  if (range_m > config_.max_range_m || range_m < config_.min_missed_m) return false;
   const Eigen::Vector3d point =
       frame.base_from_optical.inverse() * Eigen::Vector3d(ahead_m.x(), ahead_m.y(), 0);
   if (point.z() < 1) return false;
@@ -130,23 +130,23 @@ bool ChangeTracker::IsMissed(const Track& track, const ChangeFrame& frame,
 }
 
 bool ChangeTracker::IsConfirmed(const Track& track) const {
-  const ChangeEvent& event = track.event;
+  const ChangedObject& event = track.event;
   const double looked = event.seen + event.missed;
-  return event.seen >= config_.least_seen && track.travel_m >= config_.least_travel_m &&
-         event.seen >= config_.least_share * looked;
+  return event.seen >= config_.min_seen && track.travel_m >= config_.min_travel_m &&
+         event.seen >= config_.min_share * looked;
 }
 
 void ChangeTracker::LimitTracks() {
-  while (tracks_.size() > config_.most_tracks) {
+  while (tracks_.size() > config_.max_tracks) {
     tracks_.erase(std::min_element(tracks_.begin(), tracks_.end(), [](auto& a, auto& b) {
       return std::tie(a.event.seen, a.event.last_ns) < std::tie(b.event.seen, b.event.last_ns);
     }));
   }
 }
 
-std::vector<ChangeEvent> ChangeTracker::Add(const ChangeFrame& frame,
+std::vector<ChangedObject> ChangeTracker::Add(const ChangeFrame& frame,
                                             const std::vector<ChangeRegion>& regions) {
-  std::vector<ChangeEvent> confirmed;
+  std::vector<ChangedObject> confirmed;
   if (frame.stamp_ns <= last_stamp_ns_) return confirmed;
   if (frame.valid.type() != CV_8UC1 ||
       frame.valid.size() != cv::Size(frame.camera.width, frame.camera.height)) {
@@ -177,7 +177,7 @@ std::vector<ChangeEvent> ChangeTracker::Add(const ChangeFrame& frame,
     tracks_.push_back(track);
   }
   for (Track& track : tracks_) {
-    ChangeEvent& event = track.event;
+    ChangedObject& event = track.event;
     // Their mean, times the share of the pictures that show it.
     event.confidence = track.confidence_sum / (event.seen + event.missed);
     if (track.confirmed || !IsConfirmed(track)) continue;
@@ -188,9 +188,9 @@ std::vector<ChangeEvent> ChangeTracker::Add(const ChangeFrame& frame,
   return confirmed;
 }
 
-std::vector<ChangeEvent> ChangeTracker::LeaveBehind(const Eigen::Isometry3d& map_from_base) {
+std::vector<ChangedObject> ChangeTracker::LeaveBehind(const Eigen::Isometry3d& map_from_base) {
   const Eigen::Matrix2d base_from_map = PlanarTurn(map_from_base).transpose();
-  std::vector<ChangeEvent> passed;
+  std::vector<ChangedObject> passed;
   std::vector<Track> near;
   for (Track& track : tracks_) {
     const Eigen::Vector2d ahead_m =
@@ -206,8 +206,8 @@ std::vector<ChangeEvent> ChangeTracker::LeaveBehind(const Eigen::Isometry3d& map
   return passed;
 }
 
-std::vector<ChangeEvent> ChangeTracker::Restart() {
-  std::vector<ChangeEvent> untold;
+std::vector<ChangedObject> ChangeTracker::Restart() {
+  std::vector<ChangedObject> untold;
   for (const Track& track : tracks_) {
     if (track.confirmed && !track.told_passed) untold.push_back(track.event);
   }
@@ -216,13 +216,13 @@ std::vector<ChangeEvent> ChangeTracker::Restart() {
   return untold;
 }
 
-std::vector<ChangeEvent> ChangeTracker::Confirmed() const {
-  std::vector<ChangeEvent> events;
+std::vector<ChangedObject> ChangeTracker::Confirmed() const {
+  std::vector<ChangedObject> events;
   for (const Track& track : tracks_) {
     if (track.confirmed) events.push_back(track.event);
   }
   std::sort(events.begin(), events.end(),
-            [](const ChangeEvent& a, const ChangeEvent& b) { return a.id < b.id; });
+            [](const ChangedObject& a, const ChangedObject& b) { return a.id < b.id; });
   return events;
 }
 

@@ -25,29 +25,29 @@ struct ChangeRegion {
 };
 
 /// What counts as a region.
-struct ChangeRegionOptions {
-  int least_pixels = 60;          ///< Smaller pieces are noise; of a picture 320 wide.
-  double least_confidence = 0.5;  ///< Of a pixel that makes a region.
-  /// Of a pixel that a region takes in besides, as a share of least_confidence: a network is unsure
+struct ChangeRegionConfig {
+  int min_pixels = 60;          ///< Smaller pieces are noise; of a picture 320 wide.
+  double min_confidence = 0.5;  ///< Of a pixel that makes a region.
+  /// Of a pixel that a region takes in besides, as a share of min_confidence: a network is unsure
   /// at outlines, and where an object meets the ground is what says where it stands.
   double rim_share = 0.5;
   int rim_px = 8;  ///< How far from a pixel that makes the region; of a picture 320 wide.
 };
 
-/// CV_8UC1: where the probability of change is at least `least_confidence` the likeliest class of
+/// CV_8UC1: where the probability of change is at least `min_confidence` the likeliest class of
 /// change (of probabilities without classes kOtherObjects), elsewhere kNoChange.
-cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_confidence);
+cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double min_confidence);
 
 /// Connected regions of change, the largest first: the pixels of ChangedClasses, joined over eight
 /// neighbours whatever their class, with their rim; a region has the class of most of the pixels
 /// that make it, and their confidence. `before` and `after` are the aligned pictures (CV_8UC3,
-/// BGR); a region's direction is DirectionJudge's. Throws Error when the sizes differ.
+/// BGR); a region's direction is ChangeDirectionEstimator's. Throws Error when the sizes differ.
 std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabilities,
                                             const cv::Mat& before, const cv::Mat& after,
-                                            const ChangeRegionOptions& options = {});
+                                            const ChangeRegionConfig& options = {});
 
 /// An object that several pictures agree on.
-struct ChangeEvent {
+struct ChangedObject {
   std::uint64_t id = 0;  ///< Rising from 1; of one tracker.
   ChangeClass change_class = ChangeClass::kNoChange;
   ChangeDirection direction = ChangeDirection::kUnknown;
@@ -77,19 +77,19 @@ struct ChangeFrame {
 class ChangeTracker {
  public:
   struct Config {
-    int least_seen = 3;            ///< Pictures.
-    double least_travel_m = 2;     ///< Between the first and the last of them.
-    double least_share = 0.5;      ///< Seen of seen and missed.
+    int min_seen = 3;            ///< Pictures.
+    double min_travel_m = 2;     ///< Between the first and the last of them.
+    double min_share = 0.5;      ///< Seen of seen and missed.
     double gate_sigmas = 3;        ///< Regions this near, in standard deviations, are one object,
-    double least_gate_m = 1.5;     ///< and in any case those nearer than this,
-    double most_gate_m = 6;        ///< and in no case those further than this.
+    double min_gate_m = 1.5;     ///< and in any case those nearer than this,
+    double max_gate_m = 6;        ///< and in no case those further than this.
     double process_sigma_m = 0.5;  ///< Added to each sight's position: pose and foot are not exact.
-    double most_range_m = 40;      ///< Further away nothing is placed or missed.
-    double least_missed_m = 10;    ///< Nearer than this nothing is missed: it may be out of view.
-    double least_direction_share = 0.6;  ///< Of the sights that know a direction.
+    double max_range_m = 40;      ///< Further away nothing is placed or missed.
+    double min_missed_m = 10;    ///< Nearer than this nothing is missed: it may be out of view.
+    double min_direction_share = 0.6;  ///< Of the sights that know a direction.
     double passed_m = 5;                 ///< Behind the vehicle by this, an object is passed,
     double forget_m = 60;                ///< and this far from it, it is forgotten.
-    std::size_t most_tracks = 256;       ///< The least seen, longest unseen goes first.
+    std::size_t max_tracks = 256;       ///< The least seen, longest unseen goes first.
     GroundProjectionNoise ground;
   };
 
@@ -97,21 +97,21 @@ class ChangeTracker {
 
   /// Takes one picture's regions in; returns the objects that it confirmed. Stamps must rise: an
   /// older picture is ignored.
-  std::vector<ChangeEvent> Add(const ChangeFrame& frame, const std::vector<ChangeRegion>& regions);
+  std::vector<ChangedObject> Add(const ChangeFrame& frame, const std::vector<ChangeRegion>& regions);
   /// The confirmed objects that the vehicle has passed, now that it is here: each once, with its
   /// last figures. Those it is far from are forgotten.
-  std::vector<ChangeEvent> LeaveBehind(const Eigen::Isometry3d& map_from_base);
+  std::vector<ChangedObject> LeaveBehind(const Eigen::Isometry3d& map_from_base);
   /// Forgets all objects; the next picture may have any stamp, and ids go on rising. Returns the
   /// confirmed ones that LeaveBehind has not told.
-  std::vector<ChangeEvent> Restart();
+  std::vector<ChangedObject> Restart();
   /// All confirmed objects with their present figures, by id, until they are forgotten.
-  std::vector<ChangeEvent> Confirmed() const;
+  std::vector<ChangedObject> Confirmed() const;
 
   std::size_t tracks() const { return tracks_.size(); }
 
  private:
   struct Track {
-    ChangeEvent event;
+    ChangedObject event;
     std::vector<double> class_weight;  ///< By class: sum of confidences.
     double confidence_sum = 0;
     int appeared = 0;

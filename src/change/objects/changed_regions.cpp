@@ -38,7 +38,7 @@ void GrowInto(const cv::Mat& rim, int rings, cv::Mat& labels) {
 
 }  // namespace
 
-cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_confidence) {
+cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double min_confidence) {
   const cv::Mat& no_change = probabilities.of_class[0];
   cv::Mat classes(no_change.size(), CV_8UC1,
                   cv::Scalar(static_cast<double>(ChangeClass::kOtherObjects)));
@@ -51,13 +51,13 @@ cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double least_co
       cv::max(most, probability, most);
     }
   }
-  classes.setTo(0, no_change > 1 - least_confidence);
+  classes.setTo(0, no_change > 1 - min_confidence);
   return classes;
 }
 
 std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabilities,
                                             const cv::Mat& before, const cv::Mat& after,
-                                            const ChangeRegionOptions& options) {
+                                            const ChangeRegionConfig& options) {
   if (before.type() != CV_8UC3 || after.type() != CV_8UC3 || before.size() != after.size() ||
       probabilities.of_class[0].size() != after.size()) {
     throw Error(
@@ -66,7 +66,7 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
         std::to_string(before.cols) + "x" + std::to_string(before.rows) + " and " +
         std::to_string(after.cols) + "x" + std::to_string(after.rows));
   }
-  const cv::Mat classes = ChangedClasses(probabilities, options.least_confidence);
+  const cv::Mat classes = ChangedClasses(probabilities, options.min_confidence);
   cv::Mat score;
   cv::subtract(1.0, probabilities.of_class[0], score);
   const cv::Mat changed = classes > 0;
@@ -79,14 +79,14 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
   const double scale = after.cols / kRegionReferenceWidth;
   cv::Mat grown;
   labels.convertTo(grown, CV_16U);
-  GrowInto(score >= options.rim_share * options.least_confidence,
+  GrowInto(score >= options.rim_share * options.min_confidence,
            static_cast<int>(std::lround(options.rim_px * scale)), grown);
-  std::optional<DirectionJudge> judge;  // Most pictures have nothing to judge.
+  std::optional<ChangeDirectionEstimator> judge;  // Most pictures have nothing to judge.
   std::vector<ChangeRegion> regions;
   for (int i = 1; i < count; ++i) {
     ChangeRegion region;
     region.pixels = stats.at<int>(i, cv::CC_STAT_AREA);
-    if (region.pixels < options.least_pixels * scale * scale) continue;
+    if (region.pixels < options.min_pixels * scale * scale) continue;
     const cv::Mat sure = labels == i;
     const cv::Mat whole = grown == i;
     region.box = cv::boundingRect(whole);

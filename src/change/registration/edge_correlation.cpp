@@ -19,7 +19,7 @@ constexpr double kSmoothingPx = 0.8;
 const cv::Size kNeighbourhood(17, 17);  // Pixels within which an edge is measured by the others.
 constexpr double kPlainGradient = 20;   // Grey levels: what is weaker everywhere is no edge.
 constexpr int kLeadCells = 3;
-constexpr double kLeastEnergy = 1e-3;
+constexpr double kMinEnergy = 1e-3;
 constexpr int kBlockCells = 32;
 constexpr int kParallaxCells = 5;
 
@@ -99,7 +99,7 @@ cv::Mat Correlations(const cv::Mat& before, double scale, const cv::Mat& after_p
       const cv::Rect overlap = (filled + shift) & cv::Rect(cv::Point(), before.size());
       const double energy = before_energy.In(overlap - shift) * after_energy.In(overlap);
       correlations.at<float>(row, column) /=
-          static_cast<float>(std::sqrt(std::max(energy, kLeastEnergy)));
+          static_cast<float>(std::sqrt(std::max(energy, kMinEnergy)));
     }
   }
   return correlations;
@@ -166,9 +166,9 @@ cv::Vec3d Refined(const std::vector<cv::Mat>& correlations, const Peak& peak) {
   return refined;
 }
 
-/// The index-th of `search.scales` that rise from one over most_scale to most_scale by one ratio.
+/// The index-th of `search.scales` that rise from one over max_scale to max_scale by one ratio.
 double ScaleAt(double index, const EdgeSearch& search) {
-  return std::pow(search.most_scale, 2 * index / (search.scales - 1) - 1);
+  return std::pow(search.max_scale, 2 * index / (search.scales - 1) - 1);
 }
 
 void CheckAlike(const EdgeCells& before, const EdgeCells& after) {
@@ -180,9 +180,9 @@ void CheckAlike(const EdgeCells& before, const EdgeCells& after) {
 }  // namespace
 
 bool HasEdgeCells(cv::Size picture) {
-  constexpr int kLeastSide = 32;
+  constexpr int kMinSide = 32;
   const int shorter = std::min(picture.width, picture.height);
-  return shorter >= kLeastSide && std::max(picture.width, picture.height) / 4.0 <= shorter;
+  return shorter >= kMinSide && std::max(picture.width, picture.height) / 4.0 <= shorter;
 }
 
 EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
@@ -221,8 +221,8 @@ EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
                            const EdgeSearch& search) {
   CheckAlike(before, after);
   const cv::Size size = after.cells.size();
-  const cv::Point most(static_cast<int>(search.most_shift_x * size.width),
-                       static_cast<int>(search.most_shift_y * size.height));
+  const cv::Point most(static_cast<int>(search.max_shift_x * size.width),
+                       static_cast<int>(search.max_shift_y * size.height));
   cv::Mat padded;
   cv::copyMakeBorder(after.cells, padded, most.y, most.y, most.x, most.x, cv::BORDER_CONSTANT);
   const Energy after_energy(after.cells);
@@ -265,7 +265,7 @@ double EdgeAgreement(const EdgeCells& before, const EdgeCells& after) {
       const cv::Rect block(i % columns * kBlockCells, i / columns * kBlockCells, kBlockCells,
                            kBlockCells);
       const double weight = cv::norm(after.cells(block));
-      if (weight * weight < kLeastEnergy) continue;
+      if (weight * weight < kMinEnergy) continue;
       const cv::Point margin(kParallaxCells, kParallaxCells);
       const cv::Rect near = cv::Rect(block.tl() - margin, block.br() + margin) & all;
       cv::Mat correlations;

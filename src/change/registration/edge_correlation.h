@@ -24,9 +24,9 @@ EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail);
 
 /// What AlignByEdges looks through.
 struct EdgeSearch {
-  double most_shift_x = 0.2;   ///< Share of the width, to either side.
-  double most_shift_y = 0.15;  ///< Share of the height.
-  double most_scale = 1.3;     ///< And its inverse.
+  double max_shift_x = 0.2;   ///< Share of the width, to either side.
+  double max_shift_y = 0.15;  ///< Share of the height.
+  double max_scale = 1.3;     ///< And its inverse.
   int scales = 9;              ///< From one to the other, at least 3.
 };
 

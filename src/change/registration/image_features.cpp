@@ -62,7 +62,7 @@ cv::Mat SquaredDistances(const cv::Mat& a, const cv::Mat& b) {
 
 }  // namespace
 
-ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureOptions& options) {
+ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureConfig& options) {
   if (image.empty() || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) {
     throw Error("features are looked for in a picture that is empty or not 8 bit grey or colour");
   }
@@ -70,7 +70,7 @@ ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureOptions& option
   if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   std::vector<cv::KeyPoint> keypoints;
   ImageFeatures features;
-  cv::SIFT::create(options.most_features, 3, options.contrast_threshold, options.edge_threshold,
+  cv::SIFT::create(options.max_features, 3, options.contrast_threshold, options.edge_threshold,
                    1.6, CV_8U)
       ->detectAndCompute(grey, cv::noArray(), keypoints, features.descriptors);
   for (const cv::KeyPoint& keypoint : keypoints) features.points.push_back(keypoint.pt);

@@ -17,14 +17,14 @@ struct ImageFeatures {
 };
 
 /// What is looked for in a picture.
-struct FeatureOptions {
-  int most_features = 600;  ///< The ones with the strongest contrast are kept.
+struct FeatureConfig {
+  int max_features = 600;  ///< The ones with the strongest contrast are kept.
   double contrast_threshold = 0.02;
   double edge_threshold = 10;
 };
 
 /// `image`: CV_8UC1 or CV_8UC3 (BGR); Error otherwise. A picture without texture has no features.
-ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureOptions& options = {});
+ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureConfig& options = {});
 
 /// Indices of features that match: the nearest of the other picture, nearer than `ratio` times the
 /// second nearest (Lowe 2004, 7.1), and that in both directions.

@@ -58,25 +58,25 @@ LocalShape ShapeAt(const cv::Matx33d& h, double x, double y) {
 }
 
 /// What is wrong with a homography for two drives down one road; empty when nothing is.
-std::string WhyDegenerate(const cv::Matx33d& h, cv::Size size, const RegistrationOptions& options) {
+std::string WhyDegenerate(const cv::Matx33d& h, cv::Size size, const RegistrationConfig& options) {
   const double right = size.width - 1;
   const double low = size.height - 1;
   for (const auto& [x, y] :
        {std::pair(0.0, 0.0), {right, 0.0}, {0.0, low}, {right, low}, {right / 2, low / 2}}) {
     const LocalShape shape = ShapeAt(h, x, y);
     if (!shape.in_front || shape.determinant <= 0) return "the warp mirrors a part of the picture";
-    if (shape.greatest > options.most_scale || shape.least * options.most_scale < 1) {
+    if (shape.greatest > options.max_scale || shape.least * options.max_scale < 1) {
       return "the warp scales by " + Figure(shape.least) + " to " + Figure(shape.greatest) +
-             ", accepted is up to " + Figure(options.most_scale) + " and its inverse";
+             ", accepted is up to " + Figure(options.max_scale) + " and its inverse";
     }
-    if (shape.greatest > options.most_shear * shape.least) {
+    if (shape.greatest > options.max_shear * shape.least) {
       return "the warp shears by " + Figure(shape.greatest / shape.least) + ", accepted is up to " +
-             Figure(options.most_shear);
+             Figure(options.max_shear);
     }
     const double turn_deg = std::abs(shape.turn_rad) * 180 / CV_PI;
-    if (turn_deg > options.most_turn_deg) {
+    if (turn_deg > options.max_turn_deg) {
       return "the warp turns the picture by " + Figure(turn_deg) + " degrees, accepted are up to " +
-             Figure(options.most_turn_deg);
+             Figure(options.max_turn_deg);
     }
   }
   return "";
@@ -99,15 +99,15 @@ struct MatchedPoints {
 
 /// The checks that both registrations begin with.
 MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
-                    const RegistrationOptions& options, Registration& registration) {
+                    const RegistrationConfig& options, Registration& registration) {
   MatchedPoints points;
   CheckSizes(before.size, after.size, registration);
   if (!registration.accepted()) return points;
   const std::size_t fewer = std::min(before.features.points.size(), after.features.points.size());
-  if (fewer < static_cast<std::size_t>(options.least_features)) {
+  if (fewer < static_cast<std::size_t>(options.min_features)) {
     Refuse(RegistrationRefusal::kTexture,
            "a picture has " + std::to_string(fewer) + " features, accepted are " +
-               std::to_string(options.least_features) + " and more",
+               std::to_string(options.min_features) + " and more",
            registration);
     return points;
   }
@@ -116,10 +116,10 @@ MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
     points.after.emplace_back(after.features.points[static_cast<std::size_t>(b)]);
   }
   registration.matches = points.before.size();
-  if (points.before.size() < static_cast<std::size_t>(options.least_matches)) {
+  if (points.before.size() < static_cast<std::size_t>(options.min_matches)) {
     Refuse(RegistrationRefusal::kMatches,
            std::to_string(points.before.size()) + " features match, accepted are " +
-               std::to_string(options.least_matches) + " and more",
+               std::to_string(options.min_matches) + " and more",
            registration);
   }
   return points;
@@ -127,16 +127,16 @@ MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
 
 /// Are there enough inliers, do they lie apart, and do they fit?
 void CheckInliers(const std::vector<cv::Point2d>& after, const RobustFit& fit, cv::Size size,
-                  const RegistrationOptions& options, Registration& registration) {
+                  const RegistrationConfig& options, Registration& registration) {
   registration.inliers = fit.inliers.size();
   registration.error_px = fit.error_px;
   const auto inliers = static_cast<double>(fit.inliers.size());
-  if (inliers < options.least_inliers ||
-      inliers < options.least_inlier_share * static_cast<double>(registration.matches)) {
+  if (inliers < options.min_inliers ||
+      inliers < options.min_inlier_share * static_cast<double>(registration.matches)) {
     Refuse(RegistrationRefusal::kInliers,
            std::to_string(fit.inliers.size()) + " of " + std::to_string(registration.matches) +
-               " matches agree, accepted are " + std::to_string(options.least_inliers) +
-               " and more, and a share of " + Figure(options.least_inlier_share),
+               " matches agree, accepted are " + std::to_string(options.min_inliers) +
+               " and more, and a share of " + Figure(options.min_inlier_share),
            registration);
     return;
   }
@@ -145,18 +145,18 @@ void CheckInliers(const std::vector<cv::Point2d>& after, const RobustFit& fit, c
   std::vector<cv::Point2f> hull;
   cv::convexHull(agreeing, hull);
   const double spread = cv::contourArea(hull) / size.area();
-  if (spread < options.least_spread) {
+  if (spread < options.min_spread) {
     Refuse(RegistrationRefusal::kSpread,
            "the matches that agree cover a share of " + Figure(spread) +
-               " of the picture, accepted is " + Figure(options.least_spread) + " and more",
+               " of the picture, accepted is " + Figure(options.min_spread) + " and more",
            registration);
     return;
   }
-  const double most_error_px = options.most_error_px * size.width / kReferenceWidth;
-  if (fit.error_px > most_error_px) {
+  const double max_error_px = options.max_error_px * size.width / kReferenceWidth;
+  if (fit.error_px > max_error_px) {
     Refuse(RegistrationRefusal::kReprojection,
            "the matches that agree are off by " + Figure(fit.error_px) + " px, accepted is up to " +
-               Figure(most_error_px),
+               Figure(max_error_px),
            registration);
   }
 }
@@ -215,13 +215,13 @@ const char* RegistrationRefusalName(RegistrationRefusal refusal) {
 }
 
 Registration RegisterByHomography(const FeaturedView& before, const FeaturedView& after,
-                                  const RegistrationOptions& options, std::uint64_t seed) {
+                                  const RegistrationConfig& options, std::uint64_t seed) {
   Registration registration;
   const MatchedPoints points = Match(before, after, options, registration);
   if (!registration.accepted()) return registration;
   const double inlier_px = options.inlier_px * after.size.width / kReferenceWidth;
   const HomographyFit fit =
-      FitHomography(points.before, points.after, inlier_px, options.most_tries, seed);
+      FitHomography(points.before, points.after, inlier_px, options.max_tries, seed);
   CheckInliers(points.after, fit.fit, after.size, options, registration);
   if (!registration.accepted()) return registration;
   registration.after_from_before = fit.after_from_before;
@@ -236,7 +236,7 @@ Registration RegisterByHomography(const FeaturedView& before, const FeaturedView
 }
 
 Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
-                             const RegistrationOptions& options) {
+                             const RegistrationConfig& options) {
   Registration registration;
   CheckSizes(before.size(), after.size(), registration);
   if (!registration.accepted()) return registration;
@@ -260,12 +260,12 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
                       cv::BORDER_REPLICATE);
   const double agreement = EdgeAgreement(ExtractEdgeCells(aligned, EdgeDetail::kFine), after_fine);
   registration.edge_evidence = alignment.correlation + alignment.lead + agreement;
-  if (registration.edge_evidence < options.least_edge_evidence) {
+  if (registration.edge_evidence < options.min_edge_evidence) {
     Refuse(RegistrationRefusal::kEdges,
            "the edges correlate by " + Figure(alignment.correlation) + ", " +
                Figure(alignment.lead) + " above any other place, and agree by " +
                Figure(agreement) + " in detail, accepted is a sum of " +
-               Figure(options.least_edge_evidence) + " and more",
+               Figure(options.min_edge_evidence) + " and more",
            registration);
     return registration;
   }
@@ -277,7 +277,7 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
 
 Registration RegisterByDepth(const FeaturedView& before, const CameraIntrinsics& before_camera,
                              const FeaturedView& after, const CameraIntrinsics& after_camera,
-                             const cv::Mat& after_depth, const RegistrationOptions& options,
+                             const cv::Mat& after_depth, const RegistrationConfig& options,
                              std::uint64_t seed) {
   CheckDepth(after_depth, after.size);
   Registration registration;
@@ -296,39 +296,39 @@ Registration RegisterByDepth(const FeaturedView& before, const CameraIntrinsics&
     at.push_back(pixel);
   }
   registration.matches = places.size();
-  if (places.size() < static_cast<std::size_t>(options.least_matches)) {
+  if (places.size() < static_cast<std::size_t>(options.min_matches)) {
     Refuse(RegistrationRefusal::kMatches,
            std::to_string(places.size()) + " features with depth match, accepted are " +
-               std::to_string(options.least_matches) + " and more",
+               std::to_string(options.min_matches) + " and more",
            registration);
     return registration;
   }
   const double inlier_px = options.inlier_px * after.size.width / kReferenceWidth;
-  const PoseFit fit = FitPose(places, seen, before_camera, inlier_px, options.most_tries, seed);
+  const PoseFit fit = FitPose(places, seen, before_camera, inlier_px, options.max_tries, seed);
   CheckInliers(at, fit.fit, after.size, options, registration);
   if (!registration.accepted()) return registration;
   registration.before_from_after = fit.camera_from_world;
   const double baseline_m = fit.camera_from_world.translation().norm();
   const double rotation_deg =
       Eigen::AngleAxisd(fit.camera_from_world.linear()).angle() * 180 / CV_PI;
-  if (baseline_m > options.most_baseline_m || rotation_deg > options.most_rotation_deg) {
+  if (baseline_m > options.max_baseline_m || rotation_deg > options.max_rotation_deg) {
     Refuse(RegistrationRefusal::kDegenerate,
            "the cameras are " + Figure(baseline_m) + " m and " + Figure(rotation_deg) +
-               " degrees apart, accepted are up to " + Figure(options.most_baseline_m) + " and " +
-               Figure(options.most_rotation_deg),
+               " degrees apart, accepted are up to " + Figure(options.max_baseline_m) + " and " +
+               Figure(options.max_rotation_deg),
            registration);
   }
   return registration;
 }
 
-void CheckOverlap(const WarpedPicture& warped, const RegistrationOptions& options,
+void CheckOverlap(const WarpedPicture& warped, const RegistrationConfig& options,
                   Registration& registration) {
   if (!registration.accepted()) return;
   registration.overlap = warped.ValidShare();
-  if (registration.overlap >= options.least_overlap) return;
+  if (registration.overlap >= options.min_overlap) return;
   Refuse(RegistrationRefusal::kOverlap,
          "the earlier picture covers a share of " + Figure(registration.overlap) +
-             " of the later one, accepted is " + Figure(options.least_overlap) + " and more",
+             " of the later one, accepted is " + Figure(options.min_overlap) + " and more",
          registration);
 }
 

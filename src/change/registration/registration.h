@@ -14,26 +14,26 @@ namespace livemap {
 
 /// When two pictures count as showing one place. Pixels are those of a picture 640 wide; for other
 /// widths they are scaled.
-struct RegistrationOptions {
+struct RegistrationConfig {
   double ratio = 0.8;                ///< Of the ratio test between features.
   double inlier_px = 6.0;            ///< A match agrees when it lies nearer than this to its place.
-  int most_tries = 2000;             ///< Of RANSAC; fewer when the agreement is good.
-  int least_features = 40;           ///< In each picture; fewer: no texture.
-  int least_matches = 15;            ///< That pass the ratio test.
-  int least_inliers = 10;            ///< Matches that agree.
-  double least_inlier_share = 0.25;  ///< Of the matches.
-  double least_spread = 0.1;         ///< Area of the agreeing matches' hull, share of the picture.
-  double least_overlap = 0.5;        ///< Share of the later picture that the earlier one covers.
-  double most_error_px = 4.0;        ///< Root mean square of the agreeing matches.
-  double most_scale = 1.6;        ///< Local magnification, or its inverse, anywhere in the picture.
-  double most_shear = 1.8;        ///< Ratio of the greatest to the least local magnification.
-  double most_turn_deg = 15;      ///< In the picture: vehicles stand upright.
-  double most_baseline_m = 10;    ///< Between the two cameras, when there is depth.
-  double most_rotation_deg = 30;  ///< The same.
+  int max_tries = 2000;             ///< Of RANSAC; fewer when the agreement is good.
+  int min_features = 40;           ///< In each picture; fewer: no texture.
+  int min_matches = 15;            ///< That pass the ratio test.
+  int min_inliers = 10;            ///< Matches that agree.
+  double min_inlier_share = 0.25;  ///< Of the matches.
+  double min_spread = 0.1;         ///< Area of the agreeing matches' hull, share of the picture.
+  double min_overlap = 0.5;        ///< Share of the later picture that the earlier one covers.
+  double max_error_px = 4.0;        ///< Root mean square of the agreeing matches.
+  double max_scale = 1.6;        ///< Local magnification, or its inverse, anywhere in the picture.
+  double max_shear = 1.8;        ///< Ratio of the greatest to the least local magnification.
+  double max_turn_deg = 15;      ///< In the picture: vehicles stand upright.
+  double max_baseline_m = 10;    ///< Between the two cameras, when there is depth.
+  double max_rotation_deg = 30;  ///< The same.
   EdgeSearch edges;               ///< What RegisterByEdges looks through.
   /// Of the edges' correlation, its lead over all other places, and the fine edges' agreement
   /// together. Right pairs have all three, wrong ones at most one of them.
-  double least_edge_evidence = 0.82;
+  double min_edge_evidence = 0.82;
 };
 
 /// Why a pair was refused.
@@ -61,7 +61,7 @@ struct Registration {
   std::size_t inliers = 0;
   double error_px = 0;       ///< Root mean square of the inliers, real pixels.
   double overlap = 0;        ///< Share of the later picture.
-  double edge_evidence = 0;  ///< The sum that least_edge_evidence limits.
+  double edge_evidence = 0;  ///< The sum that min_edge_evidence limits.
   /// Pixel of the earlier picture to pixel of the later one; of RegisterByHomography and
   /// RegisterByEdges.
   cv::Matx33d after_from_before = cv::Matx33d::eye();
@@ -81,7 +81,7 @@ struct FeaturedView {
 /// RANSAC over four of them, least squares over those that agree. The same `seed` gives the same
 /// result. `overlap` is computed from the warp of the picture's frame.
 Registration RegisterByHomography(const FeaturedView& before, const FeaturedView& after,
-                                  const RegistrationOptions& options, std::uint64_t seed);
+                                  const RegistrationConfig& options, std::uint64_t seed);
 
 /// Finds the scale and the shift by which the earlier picture's edges fit the later one's. It needs
 /// no feature to look the same, and so works across seasons where RegisterByHomography does not; it
@@ -89,7 +89,7 @@ Registration RegisterByHomography(const FeaturedView& before, const FeaturedView
 /// a road by little. Pictures: 8 bit, grey or BGR; Error otherwise. Sizes without HasEdgeCells are
 /// refused.
 Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
-                             const RegistrationOptions& options);
+                             const RegistrationConfig& options);
 
 /// Finds the pose of the earlier camera from matches whose place in the later picture has a depth:
 /// RANSAC over a perspective-three-point solver, then Levenberg-Marquardt. `after_depth` is
@@ -98,7 +98,7 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
 /// CheckOverlap.
 Registration RegisterByDepth(const FeaturedView& before, const CameraIntrinsics& before_camera,
                              const FeaturedView& after, const CameraIntrinsics& after_camera,
-                             const cv::Mat& after_depth, const RegistrationOptions& options,
+                             const cv::Mat& after_depth, const RegistrationConfig& options,
                              std::uint64_t seed);
 
 /// The earlier picture in the later one's view.
@@ -113,7 +113,7 @@ struct WarpedPicture {
 WarpedPicture WarpByHomography(const cv::Mat& before, const cv::Matx33d& after_from_before);
 
 /// Limits of WarpByDepth.
-struct DepthWarpOptions {
+struct DepthWarpConfig {
   /// What lies this much further than the nearest thing on the same ray is hidden: share of the
   /// distance, and metres.
   double occlusion_share = 0.04;
@@ -126,10 +126,10 @@ struct DepthWarpOptions {
 WarpedPicture WarpByDepth(const cv::Mat& before, const CameraIntrinsics& before_camera,
                           const cv::Mat& after_depth, const CameraIntrinsics& after_camera,
                           const Eigen::Isometry3d& before_from_after,
-                          const DepthWarpOptions& options = {});
+                          const DepthWarpConfig& options = {});
 
 /// Refuses an accepted registration whose warp covers too little.
-void CheckOverlap(const WarpedPicture& warped, const RegistrationOptions& options,
+void CheckOverlap(const WarpedPicture& warped, const RegistrationConfig& options,
                   Registration& registration);
 
 }  // namespace livemap

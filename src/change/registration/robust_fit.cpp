@@ -19,7 +19,7 @@ constexpr std::size_t kSample = 4;
 constexpr double kConfidence = 0.999;
 constexpr int kRefinements = 10;
 constexpr double kMedianToSigma = 1.4826;
-constexpr double kLeastScalePx = 0.05;
+constexpr double kMinScalePx = 0.05;
 constexpr double kFar = 1e9;  // Squared pixels: agrees with nothing.
 
 using Sample = std::array<std::size_t, kSample>;
@@ -146,7 +146,7 @@ double ScaleOf(const std::vector<double>& errors, const std::vector<std::size_t>
   for (const std::size_t i : inliers) kept.push_back(errors[i]);
   const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 2);
   std::nth_element(kept.begin(), middle, kept.end());
-  return std::max(kMedianToSigma * std::sqrt(*middle), kLeastScalePx);
+  return std::max(kMedianToSigma * std::sqrt(*middle), kMinScalePx);
 }
 
 /// Fits the inliers and takes in what then agrees, as long as none is lost.
@@ -216,12 +216,12 @@ CameraPose PoseOfSample(const Sample& sample, const std::vector<cv::Point3d>& pl
 }  // namespace
 
 HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
-                            const std::vector<cv::Point2d>& after, double inlier_px, int most_tries,
+                            const std::vector<cv::Point2d>& after, double inlier_px, int max_tries,
                             std::uint64_t seed) {
   HomographyFit best;
   if (before.size() < kSample) return best;
   std::mt19937_64 random(seed);
-  int wanted = most_tries;
+  int wanted = max_tries;
   for (int i = 0; i < wanted; ++i) {
     const cv::Matx33d h = HomographyOf(DrawSample(before.size(), random), before, after);
     if (h(2, 2) == 0) continue;
@@ -230,20 +230,20 @@ HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
     best = {fit, h};
     // A sample of four carries their noise; refined it also finds the inliers it missed.
     RefineHomography(before, after, inlier_px, best);
-    wanted = TriesWanted(best.fit.inliers.size(), before.size(), most_tries);
+    wanted = TriesWanted(best.fit.inliers.size(), before.size(), max_tries);
   }
   return best;
 }
 
 PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Point2d>& seen,
-                const CameraIntrinsics& camera, double inlier_px, int most_tries,
+                const CameraIntrinsics& camera, double inlier_px, int max_tries,
                 std::uint64_t seed) {
   PoseFit best;
   if (places.size() < kSample) return best;
   const cv::Matx33d matrix = MatrixOf(camera);
   std::mt19937_64 random(seed);
   CameraPose pose;
-  int wanted = most_tries;
+  int wanted = max_tries;
   for (int i = 0; i < wanted; ++i) {
     const CameraPose tried = PoseOfSample(DrawSample(places.size(), random), places, seen, matrix);
     if (!tried.found) continue;
@@ -252,7 +252,7 @@ PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Po
     if (fit.inliers.size() < kSample || fit.cost >= best.fit.cost) continue;
     best = {fit, transform};
     pose = tried;
-    wanted = TriesWanted(fit.inliers.size(), places.size(), most_tries);
+    wanted = TriesWanted(fit.inliers.size(), places.size(), max_tries);
   }
   for (int i = 0; i < kRefinements && best.fit.inliers.size() > kSample; ++i) {
     std::vector<cv::Point3d> points;

@@ -30,7 +30,7 @@ struct HomographyFit {
 /// `seed` gives the same result. Without any agreement there are no inliers. Source: M. A.
 /// Fischler, R. C. Bolles, "Random Sample Consensus", CACM 24(6), 1981.
 HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
-                            const std::vector<cv::Point2d>& after, double inlier_px, int most_tries,
+                            const std::vector<cv::Point2d>& after, double inlier_px, int max_tries,
                             std::uint64_t seed);
 
 struct PoseFit {
@@ -40,7 +40,7 @@ struct PoseFit {
 
 /// The pose of a camera that sees `places` (metres) at the pixels `seen`; as FitHomography.
 PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Point2d>& seen,
-                const CameraIntrinsics& camera, double inlier_px, int most_tries,
+                const CameraIntrinsics& camera, double inlier_px, int max_tries,
                 std::uint64_t seed);
 
 /// Throws Error when a depth image is not CV_32FC1 of `size`.

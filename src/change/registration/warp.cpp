@@ -90,7 +90,7 @@ WarpedPicture WarpByHomography(const cv::Mat& before, const cv::Matx33d& after_f
 WarpedPicture WarpByDepth(const cv::Mat& before, const CameraIntrinsics& before_camera,
                           const cv::Mat& after_depth, const CameraIntrinsics& after_camera,
                           const Eigen::Isometry3d& before_from_after,
-                          const DepthWarpOptions& options) {
+                          const DepthWarpConfig& options) {
   CheckDepth(after_depth, cv::Size(after_camera.width, after_camera.height));
   const Places places = PlacesInBefore(after_depth, after_camera, before_camera, before_from_after);
   const cv::Mat buffer = DepthBuffer(places, before.size());

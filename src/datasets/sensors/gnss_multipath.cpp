@@ -8,9 +8,9 @@
 
 namespace livemap {
 
-double StreetSky::HiddenShare() const { return (left_rad + right_rad) / M_PI; }
+double SkyVisibility::HiddenShare() const { return (left_rad + right_rad) / M_PI; }
 
-double StreetSky::LeftSurplus() const { return (left_rad - right_rad) / M_PI; }
+double SkyVisibility::LeftSurplus() const { return (left_rad - right_rad) / M_PI; }
 
 Multipath::Multipath(double sigma_m, std::uint64_t seed) : sigma_m_(sigma_m), random_(seed) {
   if (std::isfinite(sigma_m) && sigma_m >= 0 && sigma_m < 1e6) return;
@@ -19,7 +19,7 @@ Multipath::Multipath(double sigma_m, std::uint64_t seed) : sigma_m_(sigma_m), ra
 }
 
 Eigen::Vector2d Multipath::ErrorAt(double time_s, double driven_m, double heading_rad,
-                                   const StreetSky& sky) {
+                                   const SkyVisibility& sky) {
   if (!started_) {
     started_ = true;
     unit_ = random_.Normal();

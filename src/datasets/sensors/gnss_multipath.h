@@ -9,7 +9,7 @@ namespace livemap {
 
 /// What hides the sky from a receiver in a street: how high the houses' upper edges stand over it
 /// on either side, seen across the street, radians over the horizon; 0: open.
-struct StreetSky {
+struct SkyVisibility {
   double left_rad = 0;
   double right_rad = 0;
 
@@ -42,7 +42,7 @@ class Multipath {
 
   /// East and north, metres, at `time_s` (not decreasing) after `driven_m` metres of driving (not
   /// decreasing) in a street of direction `heading_rad` (counter-clockwise from east).
-  Eigen::Vector2d ErrorAt(double time_s, double driven_m, double heading_rad, const StreetSky& sky);
+  Eigen::Vector2d ErrorAt(double time_s, double driven_m, double heading_rad, const SkyVisibility& sky);
 
  private:
   const double sigma_m_;

@@ -60,15 +60,15 @@ std::vector<FalseReport> FindFalseReports(const ScoredDrive& drive, double thres
         frame.chainage_m - drive[reports.back().frame].chainage_m <= kEventGapM) {
       continue;
     }
-    const ScoredBox* surest = nullptr;
+    const ScoredBox* max_presence = nullptr;
     for (const ScoredBox& detection : frame.detections) {
       if (detection.score < threshold || !IsFalse(detection, frame, 0.5)) continue;
-      if (surest == nullptr || detection.score > surest->score) surest = &detection;
+      if (max_presence == nullptr || detection.score > max_presence->score) max_presence = &detection;
     }
-    if (surest == nullptr) continue;
-    const bool about_label = BestOverlap(*surest, frame.labels) >= kMisplacedIou;
+    if (max_presence == nullptr) continue;
+    const bool about_label = BestOverlap(*max_presence, frame.labels) >= kMisplacedIou;
     reports.push_back(
-        {index, *surest, about_label ? FalseCause::kMisplaced : FalseCause::kBackground});
+        {index, *max_presence, about_label ? FalseCause::kMisplaced : FalseCause::kBackground});
   }
   return reports;
 }

@@ -33,7 +33,7 @@ enum class FalseCause {
 /// A false report, at the frame where it begins.
 struct FalseReport {
   std::size_t frame = 0;
-  ScoredBox detection;  ///< The surest false one there.
+  ScoredBox detection;  ///< The max_presence false one there.
   FalseCause cause = FalseCause::kBackground;
 };
 

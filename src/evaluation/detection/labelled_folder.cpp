@@ -17,8 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostTextBytes = std::size_t{16} * 1024 * 1024;
-constexpr std::size_t kMostFrames = 1000000;
+constexpr std::size_t kMaxTextBytes = std::size_t{16} * 1024 * 1024;
+constexpr std::size_t kMaxFrames = 1000000;
 
 /// Where the images and the labels of a folder are.
 struct Layout {
@@ -42,8 +42,8 @@ std::vector<fs::path> ImagesIn(const fs::path& folder) {
   std::vector<fs::path> images;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file() && IsImage(entry.path())) images.push_back(entry.path());
-    if (images.size() > kMostFrames) {
-      throw Error("folder '" + folder.string() + "' has more than " + std::to_string(kMostFrames) +
+    if (images.size() > kMaxFrames) {
+      throw Error("folder '" + folder.string() + "' has more than " + std::to_string(kMaxFrames) +
                   " images, accepted are fewer");
     }
   }
@@ -140,7 +140,7 @@ std::vector<std::string> SplitCommas(const std::string& line) {
 }
 
 FramesTable ReadFramesTable(const fs::path& path) {
-  std::istringstream lines(ReadFile(path.string(), kMostTextBytes));
+  std::istringstream lines(ReadFile(path.string(), kMaxTextBytes));
   std::string line;
   std::getline(lines, line);
   const std::vector<std::string> header = SplitCommas(line);
@@ -171,7 +171,7 @@ FramesTable ReadFramesTable(const fs::path& path) {
 }
 
 std::vector<std::string> ReadLines(const fs::path& path) {
-  std::istringstream stream(ReadFile(path.string(), kMostTextBytes));
+  std::istringstream stream(ReadFile(path.string(), kMaxTextBytes));
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);) {
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back())) != 0) {
@@ -193,7 +193,7 @@ std::string Letters(const std::string& text) {
 }
 
 std::vector<std::string> FindClasses(const std::string& text, const Layout& layout,
-                                     const LabelledFolderOptions& options, bool counts_potholes,
+                                     const LabelledFolderConfig& options, bool counts_potholes,
                                      std::optional<std::string>* deduced) {
   if (!options.label_classes.empty()) return options.label_classes;
   for (const fs::path& folder : {layout.root, layout.labels}) {
@@ -223,7 +223,7 @@ std::vector<std::string> FindClasses(const std::string& text, const Layout& layo
 std::vector<LabelledFrame::Label> ReadLabels(const fs::path& path,
                                              const std::vector<std::string>& classes) {
   if (!fs::exists(path)) return {};
-  return ParseYoloLabels(ReadFile(path.string(), kMostTextBytes), classes, path.string());
+  return ParseYoloLabels(ReadFile(path.string(), kMaxTextBytes), classes, path.string());
 }
 
 LabelledFrame ReadFrame(const fs::path& image, const Layout& layout,
@@ -276,7 +276,7 @@ std::vector<LabelledFrame::Label> ParseYoloLabels(const std::string& text,
   return labels;
 }
 
-LabelledFolder ReadLabelledFolder(const std::string& path, const LabelledFolderOptions& options,
+LabelledFolder ReadLabelledFolder(const std::string& path, const LabelledFolderConfig& options,
                                   std::optional<std::string>* deduced) {
   const Layout layout = FindLayout(path, options.split);
   const std::vector<fs::path> images = ImagesIn(layout.images);

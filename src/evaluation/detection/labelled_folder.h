@@ -30,7 +30,7 @@ struct LabelledFolder {
 };
 
 /// How to read a folder.
-struct LabelledFolderOptions {
+struct LabelledFolderConfig {
   /// Class names by the label files' ids; empty: the folder's classes.txt, else deduced.
   std::vector<std::string> label_classes;
   /// Names that may be deduced: those of the model.
@@ -50,7 +50,7 @@ struct LabelledFolderOptions {
 /// pothole in a drive whose frames.csv has the column "potholes", and otherwise as the model's
 /// class whose letters stand in the folder's name ("traffic_cones" is traffic_cone); `deduced` then
 /// receives a sentence that says so. Throws Error naming the file, its value and what is accepted.
-LabelledFolder ReadLabelledFolder(const std::string& path, const LabelledFolderOptions& options,
+LabelledFolder ReadLabelledFolder(const std::string& path, const LabelledFolderConfig& options,
                                   std::optional<std::string>* deduced);
 
 /// Labels of one file's text; `origin` names it in errors. Boxes are cut to the image.

@@ -9,10 +9,10 @@ namespace livemap {
 
 TrackerFrame ToTrackerFrame(std::vector<HazardDetection> detections, cv::Size image_size,
                             double chainage_m, std::int64_t last_ns,
-                            const TrackedDriveOptions& options) {
-  constexpr std::int64_t kLeastStepNs = 1'000'000;  // frames may share a rounded chainage
+                            const TrackedDriveConfig& options) {
+  constexpr std::int64_t kMinStepNs = 1'000'000;  // frames may share a rounded chainage
   TrackerFrame frame;
-  frame.stamp_ns = std::max(last_ns + kLeastStepNs,
+  frame.stamp_ns = std::max(last_ns + kMinStepNs,
                             std::int64_t{std::llround(chainage_m / options.speed_mps * 1e9)});
   frame.image_size = image_size;
   frame.detections = std::move(detections);

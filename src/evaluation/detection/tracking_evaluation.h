@@ -11,7 +11,7 @@
 namespace livemap {
 
 /// How a labelled drive is played to the tracker.
-struct TrackedDriveOptions {
+struct TrackedDriveConfig {
   /// None: the tracker knows no motion.
   std::optional<CameraFile> camera;
   double speed_mps = 16;  ///< Makes stamps of chainage.
@@ -21,7 +21,7 @@ struct TrackedDriveOptions {
 /// chainage. `last_ns` is the stamp of the frame before, which this one is always after.
 TrackerFrame ToTrackerFrame(std::vector<HazardDetection> detections, cv::Size image_size,
                             double chainage_m, std::int64_t last_ns,
-                            const TrackedDriveOptions& options);
+                            const TrackedDriveConfig& options);
 
 /// The drive with the tracker's events of one class, at their best views and scored by their
 /// evidence, in place of its detections. `frames` are those of `labelled`, one for one.

@@ -64,7 +64,7 @@ std::vector<std::int64_t> StampsOf(const std::vector<StampedPose>& poses,
 
 TrajectoryPairs Associate(const std::vector<StampedPose>& truth,
                           const std::vector<StampedPose>& estimate,
-                          const AssociationOptions& options) {
+                          const AssociationConfig& options) {
   TrajectoryPairs pairs;
   const std::int64_t offset_ns = std::llround(options.offset_s * 1e9);
   for (const auto& [true_index, index] :

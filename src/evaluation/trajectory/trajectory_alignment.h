@@ -11,7 +11,7 @@ namespace livemap {
 /// Which true pose belongs to which estimated one, and where the estimate's world lies in the true
 /// one. Trajectories are in the order of their stamps, each stamp once.
 
-struct AssociationOptions {
+struct AssociationConfig {
   double max_difference_s = 0.02;  ///< Stamps nearer than this may belong together.
   double offset_s = 0;             ///< Added to the estimate's stamps first.
 };
@@ -28,7 +28,7 @@ std::vector<std::int64_t> StampsOf(const std::vector<StampedPose>& poses, std::i
 /// PairNearestStamps over the true stamps and the estimate's.
 TrajectoryPairs Associate(const std::vector<StampedPose>& truth,
                           const std::vector<StampedPose>& estimate,
-                          const AssociationOptions& options);
+                          const AssociationConfig& options);
 
 /// What an estimate is freed of before its positions are compared.
 enum class AlignmentKind {

@@ -67,7 +67,7 @@ double Angle(const Eigen::Isometry3d& motion) { return Eigen::AngleAxisd(motion.
 RelativeErrors CompareMotions(const std::vector<StampedPose>& truth,
                               const std::vector<StampedPose>& estimate,
                               const std::vector<std::int64_t>& keys, std::int64_t delta,
-                              const RelativeOptions& options) {
+                              const RelativeErrorConfig& options) {
   RelativeErrors errors;
   if (truth.empty() || estimate.empty()) return errors;
   const std::vector<std::int64_t> true_stamps = StampsOf(truth, 0);
@@ -116,7 +116,7 @@ std::string Span(const std::vector<StampedPose>& poses) {
 
 TrajectoryPairs AssociateOrThrow(const std::vector<StampedPose>& truth,
                                  const std::vector<StampedPose>& estimate,
-                                 const AssociationOptions& options) {
+                                 const AssociationConfig& options) {
   TrajectoryPairs pairs = Associate(truth, estimate, options);
   if (pairs.truth.size() >= 2) return pairs;
   std::ostringstream sentence;
@@ -163,14 +163,14 @@ std::vector<double> AbsoluteErrors(const TrajectoryPairs& pairs, const Alignment
 
 RelativeErrors RelativeErrorsOverTime(const std::vector<StampedPose>& truth,
                                       const std::vector<StampedPose>& estimate, double delta_s,
-                                      const RelativeOptions& options) {
+                                      const RelativeErrorConfig& options) {
   return CompareMotions(truth, estimate, StampsOf(estimate, 0), std::llround(delta_s * 1e9),
                         options);
 }
 
 RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,
                                         const std::vector<StampedPose>& estimate,
-                                        std::size_t delta_frames, const RelativeOptions& options) {
+                                        std::size_t delta_frames, const RelativeErrorConfig& options) {
   std::vector<std::int64_t> indices(estimate.size());
   std::iota(indices.begin(), indices.end(), 0);
   return CompareMotions(truth, estimate, indices, static_cast<std::int64_t>(delta_frames), options);
@@ -224,7 +224,7 @@ std::optional<SegmentErrors> ShortSegmentErrors(const TrajectoryPairs& pairs, do
 
 TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
                                      const std::vector<StampedPose>& estimate,
-                                     const TrajectoryOptions& options) {
+                                     const TrajectoryConfig& options) {
   const TrajectoryPairs pairs = AssociateOrThrow(truth, estimate, options.association);
   const Alignment alignment = Align(pairs, options.alignment);
   TrajectoryFigures figures;
@@ -242,7 +242,7 @@ TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
   figures.scale = alignment.scale;
   figures.ate_m = Summarise(AbsoluteErrors(pairs, alignment));
 
-  const RelativeOptions relative{options.association.offset_s, alignment.scale};
+  const RelativeErrorConfig relative{options.association.offset_s, alignment.scale};
   figures.rpe_delta_s = options.rpe_delta_s;
   const RelativeErrors over_time =
       RelativeErrorsOverTime(truth, estimate, options.rpe_delta_s, relative);

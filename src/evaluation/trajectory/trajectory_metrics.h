@@ -37,7 +37,7 @@ struct RelativeErrors {
   std::vector<double> rotation_rad;  ///< 0..pi
 };
 
-struct RelativeOptions {
+struct RelativeErrorConfig {
   double offset_s = 0;  ///< Added to the estimate's stamps.
   double scale = 1;     ///< Of the estimate's translations.
 };
@@ -50,13 +50,13 @@ struct RelativeOptions {
 /// `delta_s`, or the pose itself with no error. Empty when there is no such pair.
 RelativeErrors RelativeErrorsOverTime(const std::vector<StampedPose>& truth,
                                       const std::vector<StampedPose>& estimate, double delta_s,
-                                      const RelativeOptions& options);
+                                      const RelativeErrorConfig& options);
 
 /// The same between each pose and the one `delta_frames` later in the estimate (delta unit "f"),
 /// again without pairs that end at the last pose.
 RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,
                                         const std::vector<StampedPose>& estimate,
-                                        std::size_t delta_frames, const RelativeOptions& options);
+                                        std::size_t delta_frames, const RelativeErrorConfig& options);
 
 /// Means over segments of the true path, their error relative to their length.
 struct SegmentErrors {
@@ -73,8 +73,8 @@ std::optional<SegmentErrors> KittiSegmentErrors(const TrajectoryPairs& pairs, do
 /// 50 m. None when the true path is not longer than 10 m.
 std::optional<SegmentErrors> ShortSegmentErrors(const TrajectoryPairs& pairs, double scale);
 
-struct TrajectoryOptions {
-  AssociationOptions association;
+struct TrajectoryConfig {
+  AssociationConfig association;
   AlignmentKind alignment = AlignmentKind::kSe3;
   double rpe_delta_s = 1;
   std::size_t rpe_delta_frames = 0;  ///< 0: no relative errors over frames.
@@ -108,6 +108,6 @@ struct TrajectoryFigures {
 /// pairs are found, and as Align() does.
 TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
                                      const std::vector<StampedPose>& estimate,
-                                     const TrajectoryOptions& options);
+                                     const TrajectoryConfig& options);
 
 }  // namespace livemap

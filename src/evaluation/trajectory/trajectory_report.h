@@ -17,7 +17,7 @@ std::optional<AlignmentKind> ParseAlignmentKind(const std::string& name);
 /// errors over time are divided by their delta: m/s and deg/s.
 nlohmann::ordered_json ToJson(const TrajectoryFigures& figures);
 
-/// The keys of TrajectoryOptions' defaults without figures: all of them null.
+/// The keys of TrajectoryConfig' defaults without figures: all of them null.
 nlohmann::ordered_json NullFigures();
 
 /// A table for people.

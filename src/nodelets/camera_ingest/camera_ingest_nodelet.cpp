@@ -200,7 +200,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   }
 
   IngestConfig config_;
-  CalibrationBook calibrations_;
+  CalibrationCache calibrations_;
   std::unique_ptr<FrameQueue<IngestFrame>> queue_;
   std::unique_ptr<FrameProcessor> processor_;  ///< The worker's.
   image_transport::CameraPublisher publisher_;

@@ -60,7 +60,7 @@ bool NeedsConversion(const std::string& encoding) {
 
 }  // namespace
 
-void CalibrationBook::Put(const sensor_msgs::CameraInfoConstPtr& info) {
+void CalibrationCache::Put(const sensor_msgs::CameraInfoConstPtr& info) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (by_frame_id_.size() >= kMaxCameras && by_frame_id_.count(info->header.frame_id) == 0)
@@ -70,7 +70,7 @@ void CalibrationBook::Put(const sensor_msgs::CameraInfoConstPtr& info) {
   arrived_.notify_all();
 }
 
-sensor_msgs::CameraInfoConstPtr CalibrationBook::Find(const std::string& frame_id, double wait_s) {
+sensor_msgs::CameraInfoConstPtr CalibrationCache::Find(const std::string& frame_id, double wait_s) {
   std::unique_lock<std::mutex> lock(mutex_);
   arrived_.wait_for(lock, std::chrono::duration<double>(wait_s),
                     [&] { return closed_ || by_frame_id_.count(frame_id) > 0; });
@@ -81,7 +81,7 @@ sensor_msgs::CameraInfoConstPtr CalibrationBook::Find(const std::string& frame_i
   return found->second;
 }
 
-void CalibrationBook::Close() {
+void CalibrationCache::Close() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     closed_ = true;

@@ -29,7 +29,7 @@ struct ProcessedFrame {
 };
 
 /// The newest calibration of each camera, by frame_id. Thread-safe.
-class CalibrationBook {
+class CalibrationCache {
  public:
   void Put(const sensor_msgs::CameraInfoConstPtr& info);
   /// Waits up to `wait_s` when there is none yet: the first camera_info may come just behind the

@@ -147,7 +147,7 @@ void IngestStereo::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   if (missing_ > missing_said_) status.mergeSummary(Level::WARN, "right images are missing");
   bad_said_ = bad_;
   missing_said_ = missing_;
-  const RightImages::Counters rights = rights_.counters();
+  const StereoPairBuffer::Counters rights = rights_.counters();
   const auto middle = milliseconds_.begin() + static_cast<std::ptrdiff_t>(milliseconds_.size() / 2);
   std::nth_element(milliseconds_.begin(), middle, milliseconds_.end());
   status.add("right_in", rights.in);

@@ -51,8 +51,8 @@ class IngestStereo {
   image_transport::CameraPublisher publisher_;
   ros::Subscriber image_subscriber_;
   ros::Subscriber info_subscriber_;
-  CalibrationBook calibrations_;
-  RightImages rights_;
+  CalibrationCache calibrations_;
+  StereoPairBuffer rights_;
   FrameQueue<ProcessedFrame> queue_;
 
   FrameProcessor processor_;  // These three are the worker's.

@@ -10,7 +10,7 @@ ros::Duration Between(ros::Time a, ros::Time b) { return a < b ? b - a : a - b; 
 
 }  // namespace
 
-void RightImages::Put(IngestFrame frame) {
+void StereoPairBuffer::Put(IngestFrame frame) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++counters_.in;
@@ -24,7 +24,7 @@ void RightImages::Put(IngestFrame frame) {
   arrived_.notify_all();
 }
 
-std::optional<IngestFrame> RightImages::Take(ros::Time stamp) {
+std::optional<IngestFrame> StereoPairBuffer::Take(ros::Time stamp) {
   std::unique_lock<std::mutex> lock(mutex_);
   const auto decided = [&] {
     return closed_ || (!frames_.empty() && frames_.back().header().stamp + tolerance_ >= stamp);
@@ -45,7 +45,7 @@ std::optional<IngestFrame> RightImages::Take(ros::Time stamp) {
   return partner;
 }
 
-void RightImages::Close() {
+void StereoPairBuffer::Close() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     closed_ = true;
@@ -53,12 +53,12 @@ void RightImages::Close() {
   arrived_.notify_all();
 }
 
-RightImages::Counters RightImages::counters() const {
+StereoPairBuffer::Counters StereoPairBuffer::counters() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return counters_;
 }
 
-void RightImages::Forget(std::size_t count) {
+void StereoPairBuffer::Forget(std::size_t count) {
   counters_.unpaired += count;
   frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(count));
 }

@@ -15,7 +15,7 @@ namespace livemap {
 
 /// The second eye's images, kept until the left image of the same moment asks for its own.
 /// Thread-safe.
-class RightImages {
+class StereoPairBuffer {
  public:
   struct Counters {
     std::uint64_t in = 0;
@@ -24,7 +24,7 @@ class RightImages {
 
   /// `tolerance_s`: how far the stamps of a pair may differ, 0: not at all; `wait_s`: how long a
   /// left image waits for its partner; `capacity`: how many are kept, the oldest goes.
-  RightImages(double tolerance_s, double wait_s, std::size_t capacity)
+  StereoPairBuffer(double tolerance_s, double wait_s, std::size_t capacity)
       : tolerance_(tolerance_s), wait_s_(wait_s), capacity_(capacity) {}
 
   /// Images come in the order of their stamps; one whose stamp goes back begins anew.

@@ -45,7 +45,7 @@ std::vector<HazardDetection> ToDetections(const SightingFrame& answer) {
 
 }  // namespace
 
-/// The zone's door for small vehicles: CandidateIntake with topics and clocks. Frames come from the
+/// The zone's door for small vehicles: OffloadIntake with topics and clocks. Frames come from the
 /// bridge, which has written who sent them; their pictures go to an unchanged hazard_detection
 /// nodelet under stamps of the zone's own; its answers become reports on the topic of all reports.
 /// All callbacks run one at a time, in the nodelet's own queue.
@@ -59,7 +59,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     using Self = CandidateIntakeNodelet;
     ParameterReader parameters(getPrivateNodeHandle());
     config_ = ReadCandidateIntakeConfig(parameters);
-    intake_ = std::make_unique<CandidateIntake>(config_.intake);
+    intake_ = std::make_unique<OffloadIntake>(config_.intake);
     ros::NodeHandle& node = getNodeHandle();
     image_publisher_ = node.advertise<sensor_msgs::Image>("candidate/image", 100);
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 1000);
@@ -103,10 +103,10 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   void Work() {
     // Without a detector a frame would be spent.
     if (image_publisher_.getNumSubscribers() == 0) return;
-    while (const CandidateIntake::Job* job = intake_->Next(NowNs(), SteadyS())) HandOn(*job);
+    while (const OffloadIntake::Job* job = intake_->Next(NowNs(), SteadyS())) DeliverResult(*job);
   }
 
-  void HandOn(const CandidateIntake::Job& job) {
+  void DeliverResult(const OffloadIntake::Job& job) {
     const std::int64_t internal_ns = job.internal_ns;
     cv::Mat decoded;
     try {
@@ -168,7 +168,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    const CandidateIntake::Counters& counters = intake_->counters();
+    const OffloadIntake::Counters& counters = intake_->counters();
     const std::uint64_t lost = counters.displaced + counters.lost_by_detector;
     if (image_publisher_.getNumSubscribers() == 0) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no detector listens");
@@ -199,8 +199,8 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     status.add("reports", counters.reports);
   }
 
-  CandidateIntakeConfig config_;
-  std::unique_ptr<CandidateIntake> intake_;
+  OffloadIntakeConfig config_;
+  std::unique_ptr<OffloadIntake> intake_;
   std::map<std::int64_t, sensor_msgs::ImageConstPtr> pictures_;  // At the detector, by stamp.
   std::uint64_t unreadable_ = 0;  // Frames whose message the conversion refused.
   std::uint64_t lost_said_ = 0;

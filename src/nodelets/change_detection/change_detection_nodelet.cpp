@@ -40,7 +40,7 @@ constexpr double kPickPeriodS = 0.02;
 
 }  // namespace
 
-/// Change detection on board: ChangeWatch with topics, tf and clocks. One worker thread compares
+/// Change detection on board: ChangeDetector with topics, tf and clocks. One worker thread compares
 /// and remembers; all else runs in the nodelet's own queue. An image whose turn comes while the
 /// worker is busy is skipped and counted: what the CPU allows sets the rate, `spacing_m` bounds it.
 class ChangeDetectionNodelet : public nodelet::Nodelet {
@@ -56,16 +56,16 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
  private:
   using Clock = std::chrono::steady_clock;
   struct Job {
-    ChangeFrames::Posed posed;
+    PosedFrameQueue::Posed posed;
     CameraIntrinsics camera;
     Eigen::Isometry3d base_from_optical;
   };
   using Queue = FrameQueue<Job>;
 
-  /// Of the worker; `outcomes` by ChangeWatch::Outcome.
+  /// Of the worker; `outcomes` by ChangeDetector::Outcome.
   struct Figures {
     std::array<std::uint64_t, 4> outcomes{};
-    std::array<std::uint64_t, 3> registered{};  ///< By ChangeWatch::RegisteredBy.
+    std::array<std::uint64_t, 3> registered{};  ///< By ChangeDetector::RegisteredBy.
     std::uint64_t depths_unusable = 0;
     std::uint64_t remembered = 0;
     std::uint64_t store_errors = 0;
@@ -87,18 +87,18 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     config_ = ReadChangeDetectionConfig(parameters, now_ns);
     ConfiguredChangeMethod method = MakeConfiguredMethod(config_);
     method_name_ = method.name;
-    config_.watch.regions.least_confidence = method.threshold;
-    watch_ = std::make_unique<ChangeWatch>(config_.watch, std::move(method.method), now_ns);
+    config_.watch.regions.min_confidence = method.threshold;
+    watch_ = std::make_unique<ChangeDetector>(config_.watch, std::move(method.method), now_ns);
     SayRecovery(watch_->memory().recovery());
     figures_.places = watch_->memory().size();
-    frames_ = std::make_unique<ChangeFrames>(ChangeFrames::Config{
+    frames_ = std::make_unique<PosedFrameQueue>(PosedFrameQueue::Config{
         config_.spacing_m, static_cast<std::size_t>(config_.max_waiting_frames),
         config_.use_depth ? config_.depth_wait_s : 0, config_.pose});
     queue_ = std::make_unique<Queue>(1);
     if (config_.tell_zone) {
       MapChangeSender::Config sender;
       sender.drive_id = config_.watch.drive_id;
-      sender.least_confidence = config_.tell_confidence;
+      sender.min_confidence = config_.tell_confidence;
       sender.outbox.path = config_.watch.memory.directory + "/map_changes.sqlite3";
       sender_ = std::make_unique<MapChangeSender>(sender, getNodeHandle(), now_ns);
     }
@@ -124,7 +124,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     mask_publisher_ = node.advertise<sensor_msgs::Image>("change/mask", 2);
     overlay_publisher_ = node.advertise<sensor_msgs::Image>("change/overlay", 2);
     vehicle_frames_ =
-        std::make_unique<VehicleFrames>(node, getName(), config_.map_frame, config_.base_frame);
+        std::make_unique<VehicleTf>(node, getName(), config_.map_frame, config_.base_frame);
     subscribers_ = {
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
@@ -148,7 +148,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     image_transport::ImageTransport transport(node);
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
                                                 getPrivateNodeHandle());
-    // No bound of ROS's, which would lose frames without a word: ChangeFrames has one, and counts.
+    // No bound of ROS's, which would lose frames without a word: PosedFrameQueue has one, and counts.
     image_subscriber_ = transport.subscribe(
         "camera_rect/image", 0,
         boost::function<void(const sensor_msgs::ImageConstPtr&)>(
@@ -226,7 +226,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
 
   void LookAt(const Job& job) {
     const Clock::time_point start = Clock::now();
-    const ChangeWatch::Answer answer = watch_->Look(ToPicture(job));
+    const ChangeDetector::Answer answer = watch_->Look(ToPicture(job));
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     if (!answer.store_error.empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "a place is not remembered: %s",
@@ -236,7 +236,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     if (sender_) sender_->Tell(answer.passed);
     const std::lock_guard<std::mutex> lock(mutex_);
     ++figures_.outcomes[static_cast<std::size_t>(answer.outcome)];
-    if (answer.outcome == ChangeWatch::Outcome::kCompared) {
+    if (answer.outcome == ChangeDetector::Outcome::kCompared) {
       ++figures_.registered[static_cast<std::size_t>(answer.registered_by)];
     }
     figures_.remembered += answer.remembered ? 1 : 0;
@@ -249,7 +249,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     figures_.ms_in_window += ms;
   }
 
-  WatchedPicture ToPicture(const Job& job) {
+  ChangeDetectorFrame ToPicture(const Job& job) {
     const auto shared = cv_bridge::toCvShare(job.posed.image, sensor_msgs::image_encodings::BGR8);
     const cv::Mat& bgr = shared->image;
     if (bgr.cols != job.camera.width || bgr.rows != job.camera.height) {
@@ -257,7 +257,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
                   ", its camera_info accepts " + std::to_string(job.camera.width) + "x" +
                   std::to_string(job.camera.height));
     }
-    WatchedPicture picture;
+    ChangeDetectorFrame picture;
     picture.stamp_ns = FromRosTime(job.posed.image->header.stamp);
     picture.bgr = bgr;
     if (bgr.cols > config_.width_px) {
@@ -290,8 +290,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     }
   }
 
-  void Publish(const ChangeWatch::Answer& answer, const std_msgs::Header& header) {
-    const bool compared = answer.outcome == ChangeWatch::Outcome::kCompared;
+  void Publish(const ChangeDetector::Answer& answer, const std_msgs::Header& header) {
+    const bool compared = answer.outcome == ChangeDetector::Outcome::kCompared;
     if (compared && mask_publisher_.getNumSubscribers() > 0) {
       mask_publisher_.publish(ToImageMessage(answer.classes, header));
     }
@@ -306,10 +306,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    using Outcome = ChangeWatch::Outcome;
+    using Outcome = ChangeDetector::Outcome;
     const Queue::Counters queue = queue_->counters();
     const std::lock_guard<std::mutex> lock(mutex_);
-    const ChangeFrames::Counters& frames = frames_->counters();
+    const PosedFrameQueue::Counters& frames = frames_->counters();
     const auto outcome = [this](Outcome which) {
       return figures_.outcomes[static_cast<std::size_t>(which)];
     };
@@ -352,7 +352,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     const auto looked = static_cast<double>(figures_.looked_in_window);
     status.add("looking_ms", looked > 0 ? figures_.ms_in_window / looked : 0.0);
     status.add("method", method_name_);
-    status.add("threshold", config_.watch.regions.least_confidence);
+    status.add("threshold", config_.watch.regions.min_confidence);
     if (sender_) sender_->Diagnose(status);
     figures_.looked_in_window = 0;
     figures_.ms_in_window = 0;
@@ -360,10 +360,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
 
   ChangeDetectionConfig config_;
   std::string method_name_;
-  std::unique_ptr<ChangeWatch> watch_;       // The worker's, once it runs.
+  std::unique_ptr<ChangeDetector> watch_;       // The worker's, once it runs.
   std::unique_ptr<MapChangeSender> sender_;  // None: nothing is told to the zone.
   std::unique_ptr<Queue> queue_;
-  std::unique_ptr<VehicleFrames> vehicle_frames_;
+  std::unique_ptr<VehicleTf> vehicle_frames_;
   ros::Publisher report_publisher_, mask_publisher_, overlay_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   image_transport::Subscriber image_subscriber_;
@@ -375,7 +375,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   std::thread worker_;
 
   std::mutex mutex_;  ///< Guards the rest.
-  std::unique_ptr<ChangeFrames> frames_;
+  std::unique_ptr<PosedFrameQueue> frames_;
   std::optional<CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;  ///< By frame id.
   std::uint64_t no_camera_ = 0;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kChangeTickS = 0.2;
 /// At most so many a tick: a full outbox must not crowd out the reports of hazards.
-constexpr std::size_t kMostChangesPerTick = 20;
+constexpr std::size_t kMaxChangesPerTick = 20;
 
 }  // namespace
 
@@ -31,7 +31,7 @@ void MapChangeSender::Tell(const std::vector<PlacedChange>& passed) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const PlacedChange& change : passed) {
     const auto report = ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
-    if (!report || report->confidence < config_.least_confidence) {
+    if (!report || report->confidence < config_.min_confidence) {
       ++unsure_;
       continue;
     }
@@ -61,7 +61,7 @@ void MapChangeSender::OnReceipt(const ReportReceipt& message) {
 void MapChangeSender::OnTick(const ros::SteadyTimerEvent&) {
   if (publisher_.getNumSubscribers() == 0) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMostChangesPerTick)) {
+  for (const MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMaxChangesPerTick)) {
     publisher_.publish(ToMessage(report));
   }
 }

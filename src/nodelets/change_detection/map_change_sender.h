@@ -20,7 +20,7 @@ class MapChangeSender {
  public:
   struct Config {
     std::string drive_id;
-    double least_confidence = 0.5;  ///< Less sure objects are not told.
+    double min_confidence = 0.5;  ///< Less sure objects are not told.
     MapChangeOutbox::Config outbox;
   };
 

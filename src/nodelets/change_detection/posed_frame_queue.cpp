@@ -4,29 +4,29 @@
 
 namespace livemap {
 
-void ChangeFrames::AddImage(const sensor_msgs::ImageConstPtr& image, double now_s) {
+void PosedFrameQueue::AddImage(const sensor_msgs::ImageConstPtr& image, double now_s) {
   ++counters_.frames;
-  if (waiting_.size() == config_.most_waiting) {
+  if (waiting_.size() == config_.max_waiting) {
     waiting_.pop_front();
     ++counters_.displaced;
   }
   waiting_.push_back({image, now_s});
 }
 
-void ChangeFrames::AddDepth(const sensor_msgs::ImageConstPtr& depth) {
+void PosedFrameQueue::AddDepth(const sensor_msgs::ImageConstPtr& depth) {
   depths_[FromRosTime(depth->header.stamp)] = depth;
-  if (depths_.size() > config_.most_waiting) depths_.erase(depths_.begin());
+  if (depths_.size() > config_.max_waiting) depths_.erase(depths_.begin());
 }
 
-std::optional<ChangeFrames::Posed> ChangeFrames::Next(double now_s) {
+std::optional<PosedFrameQueue::Posed> PosedFrameQueue::Next(double now_s) {
   while (!waiting_.empty()) {
     const Waiting& waiting = waiting_.front();
     const std::int64_t stamp_ns = FromRosTime(waiting.image->header.stamp);
     const double waited_s = now_s - waiting.arrival_s;
-    const BasePoseSource::Lookup lookup = pose_.At(stamp_ns, waited_s);
+    const VehiclePoseLookup::Lookup lookup = pose_.At(stamp_ns, waited_s);
     // In their order: those behind it wait too.
-    if (lookup.answer == BasePoseSource::Answer::kWait) return std::nullopt;
-    const bool hopeless = lookup.answer == BasePoseSource::Answer::kHopeless;
+    if (lookup.answer == VehiclePoseLookup::Answer::kWait) return std::nullopt;
+    const bool hopeless = lookup.answer == VehiclePoseLookup::Answer::kHopeless;
     const bool near = !hopeless && last_taken_ &&
                       GeodesicDistanceM(*last_taken_, lookup.base.position) < config_.spacing_m;
     const auto depth = depths_.find(stamp_ns);

@@ -14,13 +14,13 @@ namespace livemap {
 
 /// Images that wait for the position of their moment, and which of them are looked at: one per
 /// `spacing_m` of road. `now_s` is the clock of ros::Time. Not thread-safe.
-class ChangeFrames {
+class PosedFrameQueue {
  public:
   struct Config {
     double spacing_m = 1;           ///< Between two images that are looked at.
-    std::size_t most_waiting = 30;  ///< Then the oldest goes; as many depth images are kept.
+    std::size_t max_waiting = 30;  ///< Then the oldest goes; as many depth images are kept.
     double depth_wait_s = 0;        ///< How long an image waits for its depth image; 0: none comes.
-    BasePoseSource::Config pose;
+    VehiclePoseLookup::Config pose;
   };
 
   /// frames = waiting + displaced + no_pose + near + those that Next gave.
@@ -37,7 +37,7 @@ class ChangeFrames {
     TrackPose base;                    ///< Of base_link.
   };
 
-  explicit ChangeFrames(const Config& config) : config_(config), pose_(config.pose) {}
+  explicit PosedFrameQueue(const Config& config) : config_(config), pose_(config.pose) {}
 
   void AddFix(const Fix& fix) { pose_.AddFix(fix); }
   void AddPose(std::int64_t stamp_ns, const TrackPose& pose) { pose_.AddPose(stamp_ns, pose); }
@@ -60,7 +60,7 @@ class ChangeFrames {
   };
 
   Config config_;
-  BasePoseSource pose_;
+  VehiclePoseLookup pose_;
   std::deque<Waiting> waiting_;
   std::map<std::int64_t, sensor_msgs::ImageConstPtr> depths_;  ///< By stamp, ns.
   std::optional<GeoPoint> last_taken_;

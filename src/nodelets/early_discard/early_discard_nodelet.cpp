@@ -36,7 +36,7 @@ constexpr double kSendPeriodS = 0.05;
 
 }  // namespace
 
-/// The small vehicle's eye (thesis, section 3.2.4): EarlyDiscard and CandidateSender with topics,
+/// The small vehicle's eye (thesis, section 3.2.4): EarlyDiscard and OffloadSender with topics,
 /// tf and clocks. One worker thread classifies; all else runs in the nodelet's own queue, one
 /// callback at a time: what is worth sending is masked, encoded and published there once its pose
 /// is known.
@@ -65,7 +65,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     threshold_ =
         config_.threshold < 0 ? discard_->threshold() : static_cast<float>(config_.threshold);
     if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
-    sender_ = std::make_unique<CandidateSender>(config_.sender);
+    sender_ = std::make_unique<OffloadSender>(config_.sender);
     queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
     Connect();
     worker_ = std::thread([this] { Work(); });
@@ -76,7 +76,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     ros::NodeHandle& node = getNodeHandle();
     publisher_ = node.advertise<CandidateFrame>("candidate/frame", 100);
     vehicle_frames_ =
-        std::make_unique<VehicleFrames>(node, getName(), config_.map_frame, config_.base_frame);
+        std::make_unique<VehicleTf>(node, getName(), config_.map_frame, config_.base_frame);
     subscribers_ = {
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
@@ -174,7 +174,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const auto encode = [this](const Picture& picture, std::size_t max_bytes) {
       return MaskedJpeg(picture, max_bytes);
     };
-    for (const Candidate& candidate : sender_->TakeReady(ros::Time::now().toSec(), encode)) {
+    for (const OffloadedFrame& candidate : sender_->TakeReady(ros::Time::now().toSec(), encode)) {
       publisher_.publish(boost::make_shared<CandidateFrame>(ToMessage(candidate)));
     }
   }
@@ -200,7 +200,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     const Queue::Counters queue = queue_->counters();
     const std::lock_guard<std::mutex> lock(mutex_);
-    const CandidateSender::Counters& counters = sender_->counters();
+    const OffloadSender::Counters& counters = sender_->counters();
     if (counters.withheld > withheld_said_) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "frames are withheld: no mask");
     } else if (queue.dropped > dropped_said_) {
@@ -242,7 +242,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::unique_ptr<EarlyDiscard> discard_;  // The worker's.
   std::unique_ptr<PrivacyMask> mask_;      // The send timer's; none: privacy is off.
   std::unique_ptr<Queue> queue_;
-  std::unique_ptr<VehicleFrames> vehicle_frames_;
+  std::unique_ptr<VehicleTf> vehicle_frames_;
   ros::Publisher publisher_;
   std::vector<ros::Subscriber> subscribers_;
   image_transport::Subscriber image_subscriber_;
@@ -253,7 +253,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::thread worker_;
 
   std::mutex mutex_;  ///< Guards the rest.
-  std::unique_ptr<CandidateSender> sender_;
+  std::unique_ptr<OffloadSender> sender_;
   std::uint64_t frame_ = 0;  ///< The camera's, for the mask's memory.
   std::uint64_t masked_regions_ = 0;
   std::uint64_t judged_in_window_ = 0;

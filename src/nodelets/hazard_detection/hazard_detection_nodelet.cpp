@@ -51,7 +51,7 @@ struct HazardDetectionConfig {
 /// queue, which would lose frames without a word, never fills: it has no bound. The bound is
 /// queue_size, where the oldest frame goes and is counted: frames_in = frames_processed +
 /// frames_dropped + frames_waiting, at any moment. The engines of a pool take from the queue, and
-/// HandOn gets their results in the order of the frames, on a thread of its own.
+/// DeliverResult gets their results in the order of the frames, on a thread of its own.
 class HazardDetectionNodelet : public nodelet::Nodelet {
  public:
   ~HazardDetectionNodelet() override {
@@ -162,7 +162,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     pool_ = std::make_unique<Pool>(std::move(engines), static_cast<std::size_t>(config_.queue_size),
                                    [this](const Pool::Outcome& outcome) {
                                      if (outcome.result) {
-                                       HandOn(*outcome.result, outcome.item->header);
+                                       DeliverResult(*outcome.result, outcome.item->header);
                                      } else {
                                        Drop(outcome.error);
                                      }
@@ -177,7 +177,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   /// Called image after image in the order in which they came.
-  void HandOn(const Seen& seen, const std_msgs::Header& header) {
+  void DeliverResult(const Seen& seen, const std_msgs::Header& header) {
     const cv::Mat& bgr = seen.bgr->image;
     std::vector<HazardDetection> found = seen.found;
     found.erase(std::remove_if(found.begin(), found.end(),
@@ -386,7 +386,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   HazardDetectionConfig config_;
   std::vector<std::unique_ptr<HazardDetector>> detectors_;  ///< Each its engine's thread's own.
   std::vector<float> thresholds_;                           ///< The model's, by class index.
-  // HandOn's and AnswerPicture's, which run at once:
+  // DeliverResult's and AnswerPicture's, which run at once:
   std::mutex pictures_mutex_;                 ///< Guards tracking_ and recent_.
   std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
   std::unique_ptr<Recent> recent_;

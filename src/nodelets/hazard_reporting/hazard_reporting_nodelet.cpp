@@ -287,7 +287,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void Work() {
-    reporter_->ExpectPictures(picture_subscriber_.getNumPublishers() > 0 ||
+    reporter_->SetPictureSourceAvailable(picture_subscriber_.getNumPublishers() > 0 ||
                               part_subscriber_.getNumPublishers() > 0);
     reporter_->Process(ros::Time::now().toSec(), SteadyS());
     if (!reporter_->store_error().empty()) {
@@ -299,7 +299,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
     placed_by_fixes_ = by_fixes;
     AnswerPolls();
-    for (const PictureWish& wish : reporter_->TakePictureRequests()) RequestPicture(wish);
+    for (const PictureRequirements& wish : reporter_->TakePictureRequests()) RequestPicture(wish);
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
     for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
@@ -324,7 +324,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     WatchImages();
   }
 
-  void RequestPicture(const PictureWish& wish) {
+  void RequestPicture(const PictureRequirements& wish) {
     PictureRequest request;
     request.stamp = ToRosTime(wish.stamp_ns);
     request.part.x_offset = wish.part.x;

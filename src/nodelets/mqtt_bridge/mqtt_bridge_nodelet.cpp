@@ -129,9 +129,9 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
 
   /// Each reason once a minute: a connection may end without one, and the next attempt have it.
   void SayLoss(const std::string& reason) {
-    constexpr std::size_t kMostReasons = 10;
+    constexpr std::size_t kMaxReasons = 10;
     if (say_losses_again_.Due()) said_losses_.clear();
-    if (said_losses_.size() >= kMostReasons || !said_losses_.insert(reason).second) return;
+    if (said_losses_.size() >= kMaxReasons || !said_losses_.insert(reason).second) return;
     NODELET_WARN("%s; trying again", reason.c_str());
   }
 

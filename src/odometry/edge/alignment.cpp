@@ -9,12 +9,12 @@ namespace livemap {
 namespace {
 
 constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays stay in the cache.
-constexpr double kLeastVisibleShare = 0.1;
+constexpr double kMinVisibleShare = 0.1;
 constexpr double kMadToSigma = 1.4826;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
 constexpr float kNearestM = 0.01F;
-constexpr double kLeastGain = 0.25;  // A black image must not explain everything.
+constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 
 using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
 using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
@@ -115,13 +115,13 @@ double Aligner::RobustSigma(const Residuals& residuals) const {
   std::size_t seen = 0, bin = 0;
   while (bin < histogram.size() && 2 * (seen += histogram[bin]) < residuals.count) ++bin;
   const double median = (static_cast<double>(bin) + 0.5) / static_cast<double>(kBinsPerLevel);
-  return std::max(config_.least_sigma, kMadToSigma * median);
+  return std::max(config_.min_sigma, kMadToSigma * median);
 }
 
 /// Mean of Huber's rho over the visible points, equation (3).
 double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
   if (static_cast<double>(residuals.count) <
-      kLeastVisibleShare * static_cast<double>(residuals.value.size())) {
+      kMinVisibleShare * static_cast<double>(residuals.value.size())) {
     return std::numeric_limits<double>::infinity();
   }
   const auto k = static_cast<float>(config_.huber_k * sigma);
@@ -201,7 +201,7 @@ bool Aligner::Solve(double damping, Step& step) const {
 AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) const {
   AlignmentState moved = state;
   moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / state.gain);
-  moved.gain = std::clamp(state.gain + step[6], kLeastGain, 1 / kLeastGain);
+  moved.gain = std::clamp(state.gain + step[6], kMinGain, 1 / kMinGain);
   moved.bias += step[7];
   return moved;
 }

@@ -23,7 +23,7 @@ struct AlignmentState {
 struct AlignmentConfig {
   int max_iterations = 12;   ///< Per level.
   double huber_k = 2.0;      ///< In standard deviations of the residuals.
-  double least_sigma = 1.5;  ///< Noise below which no residual counts as an outlier, grey levels.
+  double min_sigma = 1.5;  ///< Noise below which no residual counts as an outlier, grey levels.
   double grey_sigma = 2.0;   ///< Of residuals whose depth is exact, against those where it is not.
   double converged_px = 0.03;  ///< A step that moves points less than this is the last.
   bool estimate_illumination = true;

@@ -76,9 +76,9 @@ cv::Mat View(cv::Mat& memory, cv::Size size, int type) {
 }  // namespace
 
 const cv::Mat& CannyDetector::Extract(const cv::Mat& grey, double strong_share,
-                                      double least_gradient) {
+                                      double min_gradient) {
   Differentiate(grey);
-  const int strong = StrongThreshold(strong_share, least_gradient);
+  const int strong = StrongThreshold(strong_share, min_gradient);
   ThinAbove(static_cast<int>(kWeakOfStrong * strong), strong);
   FollowEdges();
   return edges_;
@@ -124,7 +124,7 @@ void CannyDetector::Differentiate(const cv::Mat& grey) {
   }
 }
 
-int CannyDetector::StrongThreshold(double strong_share, double least_gradient) const {
+int CannyDetector::StrongThreshold(double strong_share, double min_gradient) const {
   constexpr std::size_t kBins = 512;
   constexpr int kBinWidth = 4;  // Sobel's L1 norm reaches 2040.
   std::array<int, kBins> histogram{};
@@ -139,7 +139,7 @@ int CannyDetector::StrongThreshold(double strong_share, double least_gradient) c
   int strong = static_cast<int>(strong_share * total);
   std::size_t bin = kBins - 1;
   while (bin > 0 && (strong -= histogram[bin]) > 0) --bin;
-  return std::max(static_cast<int>(least_gradient * kSobelGain), static_cast<int>(bin) * kBinWidth);
+  return std::max(static_cast<int>(min_gradient * kSobelGain), static_cast<int>(bin) * kBinWidth);
 }
 
 /// Marks ridges above the weak threshold and lists those above the strong one.

@@ -14,9 +14,9 @@ class CannyDetector {
   static constexpr double kWeakOfStrong = 0.4;  ///< Ratio of the two thresholds.
 
   /// CV_8UC1 of the image's size, 255 at edges; valid until the next call. The `strong_share` of
-  /// the pixels with the largest gradients start an edge, unless these are below `least_gradient`
+  /// the pixels with the largest gradients start an edge, unless these are below `min_gradient`
   /// (grey levels per px); pixels of at least kWeakOfStrong of that gradient continue it.
-  const cv::Mat& Extract(const cv::Mat& grey, double strong_share, double least_gradient);
+  const cv::Mat& Extract(const cv::Mat& grey, double strong_share, double min_gradient);
   /// Memory for images up to this size.
   void Reserve(cv::Size size);
   /// The same with given thresholds, L1 norm of Sobel's response.
@@ -26,7 +26,7 @@ class CannyDetector {
   const cv::Mat& dx() const { return dx_; }
   const cv::Mat& dy() const { return dy_; }
   /// L1 norm that the share exceeds, at least `least`; of a sixteenth of the pixels.
-  int StrongThreshold(double strong_share, double least_gradient) const;
+  int StrongThreshold(double strong_share, double min_gradient) const;
   /// The gradients alone.
   void Differentiate(const cv::Mat& grey);
 

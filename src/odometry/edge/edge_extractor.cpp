@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kNarrowSigmaPx = 1.0;
 constexpr double kWideSigmaPx = 1.6;  // At this ratio the difference is nearest to a Laplacian.
-constexpr float kLeastLikelihood = 0.1F;
+constexpr float kMinLikelihood = 0.1F;
 
 int GradientL1(const cv::Mat& dx, const cv::Mat& dy, int y, int x) {
   return std::abs(dx.ptr<short>(y)[x]) + std::abs(dy.ptr<short>(y)[x]);
@@ -64,7 +64,7 @@ EdgeExtractor& EdgeExtractor::operator=(EdgeExtractor&&) noexcept = default;
 const cv::Mat& EdgeExtractor::Extract(const cv::Mat& grey) {
   switch (config_.kind) {
     case EdgeKind::kCanny:
-      return canny_.Extract(grey, config_.strong_share, config_.least_gradient);
+      return canny_.Extract(grey, config_.strong_share, config_.min_gradient);
     case EdgeKind::kLaplacianOfGaussian:
       ExtractLaplacian(grey);
       break;
@@ -80,7 +80,7 @@ const cv::Mat& EdgeExtractor::Extract(const cv::Mat& grey) {
 
 void EdgeExtractor::ExtractSobel(const cv::Mat& grey) {
   canny_.Differentiate(grey);
-  const int threshold = canny_.StrongThreshold(config_.strong_share, config_.least_gradient);
+  const int threshold = canny_.StrongThreshold(config_.strong_share, config_.min_gradient);
   edges_.create(grey.size(), CV_8UC1);
   for (int y = 0; y < grey.rows; ++y) {
     std::uint8_t* row = edges_.ptr(y);
@@ -94,7 +94,7 @@ void EdgeExtractor::ExtractLaplacian(const cv::Mat& grey) {
   canny_.Differentiate(grey);
   const auto threshold =
       static_cast<int>(CannyDetector::kWeakOfStrong *
-                       canny_.StrongThreshold(config_.strong_share, config_.least_gradient));
+                       canny_.StrongThreshold(config_.strong_share, config_.min_gradient));
   cv::GaussianBlur(grey, narrow_, {}, kNarrowSigmaPx);
   cv::GaussianBlur(grey, wide_, {}, kWideSigmaPx);
   edges_.create(grey.size(), CV_8UC1);
@@ -119,7 +119,7 @@ void EdgeExtractor::ExtractStructured(const cv::Mat& grey) {
   forest_->detectEdges(colour_float_, likelihood_);
   forest_->computeOrientation(likelihood_, orientation_);
   forest_->edgesNms(likelihood_, orientation_, thinned_);
-  cv::compare(thinned_, kLeastLikelihood, edges_, cv::CMP_GT);
+  cv::compare(thinned_, kMinLikelihood, edges_, cv::CMP_GT);
 }
 
 }  // namespace livemap

@@ -32,7 +32,7 @@ class EdgeExtractor {
     /// strong.
     double strong_share = 0.08;
     /// Gradients below this are noise, grey levels per px.
-    double least_gradient = 4.0;
+    double min_gradient = 4.0;
     /// Model of kStructured (OpenCV's model.yml.gz).
     std::string structured_model;
   };

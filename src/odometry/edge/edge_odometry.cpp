@@ -14,9 +14,9 @@ namespace {
 /// A motion is carried on only over a short pause, s.
 constexpr double kMaxPredictionS = 0.5;
 /// Below this reciprocal condition number the information matrix says nothing about some direction.
-constexpr double kLeastCondition = 1e-12;
+constexpr double kMinCondition = 1e-12;
 /// Light that fades further than this, or grows, between two images is a covered lens.
-constexpr double kLeastBelievedGain = 0.3;
+constexpr double kMinBelievedGain = 0.3;
 
 AlignmentConfig RotationOnly(AlignmentConfig config) {
   config.rotation_only = true;
@@ -197,7 +197,7 @@ bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
   }
   selector_.SelectAll(keyframe.images.thumbnail(), cameras_[static_cast<std::size_t>(levels_)],
                       keyframe.thumbnail_points);
-  return keyframe.points[0].size() >= static_cast<std::size_t>(config_.least_points);
+  return keyframe.points[0].size() >= static_cast<std::size_t>(config_.min_points);
 }
 
 const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
@@ -297,10 +297,10 @@ bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
   return std::isfinite(result.cost) && result.state.new_from_reference.matrix().allFinite() &&
-         determined.info() == Eigen::Success && determined.rcond() > kLeastCondition &&
-         result.visible >= static_cast<std::size_t>(config_.least_points) &&
-         result.Overlap() >= config_.least_overlap && result.sigma <= config_.lost_sigma &&
-         result.state.gain > kLeastBelievedGain && result.state.gain < 1 / kLeastBelievedGain;
+         determined.info() == Eigen::Success && determined.rcond() > kMinCondition &&
+         result.visible >= static_cast<std::size_t>(config_.min_points) &&
+         result.Overlap() >= config_.min_overlap && result.sigma <= config_.lost_sigma &&
+         result.state.gain > kMinBelievedGain && result.state.gain < 1 / kMinBelievedGain;
 }
 
 bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,

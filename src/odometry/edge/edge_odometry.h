@@ -73,9 +73,9 @@ class EdgeOdometry {
     double keyframe_sigma_ratio = 1.6;
 
     /// Tracking is lost with fewer points in view than this,
-    int least_points = 150;
+    int min_points = 150;
     /// a smaller share of them,
-    double least_overlap = 0.25;
+    double min_overlap = 0.25;
     /// or residuals of this standard deviation, grey levels.
     double lost_sigma = 30;
     /// Keyframes that are kept to find back, and how far apart: motion as above.

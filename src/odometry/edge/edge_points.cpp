@@ -38,7 +38,7 @@ bool IsUsable(const ReferenceLevel& reference, const Pixel& pixel,
               const PointSelection& selection) {
   const Gradient gradient = GradientAt(reference.grey, pixel.x, pixel.y);
   return gradient.x * gradient.x + gradient.y * gradient.y >=
-             selection.least_gradient * selection.least_gradient &&
+             selection.min_gradient * selection.min_gradient &&
          !IsBehindAnEdge(reference.depth_m, pixel.x, pixel.y, selection.occlusion_ratio);
 }
 
@@ -160,7 +160,7 @@ void PointSelector::SelectAtRandom(const ReferenceLevel& reference, const Camera
       }
     }
     PointSelection any_gradient = selection;
-    any_gradient.least_gradient = 0;
+    any_gradient.min_gradient = 0;
     forget_useless(any_gradient);
   }
   const std::size_t count = candidates_.size();

@@ -48,7 +48,7 @@ struct PointSelection {
   double share = 1;  ///< Of the random choices; kRandomPixels may take more than the edges are.
   std::uint32_t seed = 1;  ///< Of the random choices, read by whoever makes the PointSelector.
   /// Grey levels per px; less says nothing about motion. Not asked of kRandomPixels.
-  float least_gradient = 2.0F;
+  float min_gradient = 2.0F;
   /// A pixel whose 5x5 neighbourhood holds a depth nearer than its own by this factor lies behind
   /// an occluding edge: its depth is not the edge's.
   float occlusion_ratio = 1.08F;

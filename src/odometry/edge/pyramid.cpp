@@ -92,8 +92,8 @@ void Smooth(const cv::Mat& grey, std::vector<std::uint16_t>& across, cv::Mat& sm
 
 int CountLevels(cv::Size size) {
   int levels = 1;
-  while (levels < kMaxLevels && (size.width >> levels) >= kLeastLevelWidth &&
-         (size.height >> levels) >= kLeastLevelHeight) {
+  while (levels < kMaxLevels && (size.width >> levels) >= kMinLevelWidth &&
+         (size.height >> levels) >= kMinLevelHeight) {
     ++levels;
   }
   return levels;

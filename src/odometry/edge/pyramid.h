@@ -10,8 +10,8 @@
 namespace livemap {
 
 /// Edges alias on coarser images than this (thesis, section 5.2.4); no level goes below.
-constexpr int kLeastLevelWidth = 160;
-constexpr int kLeastLevelHeight = 120;
+constexpr int kMinLevelWidth = 160;
+constexpr int kMinLevelHeight = 120;
 constexpr int kMaxLevels = 3;
 
 /// Levels of an image of this size, 1..kMaxLevels; level 0 is the image itself.

@@ -8,7 +8,7 @@ namespace livemap {
 namespace {
 
 constexpr int kPatternReach = 2;
-constexpr float kLeastScale = 0.2F;  // Of the point's distance to the other view, against this one.
+constexpr float kMinScale = 0.2F;  // Of the point's distance to the other view, against this one.
 constexpr int kRefinements = 4;
 /// Candidates this close to the best one, in steps of about a pixel, are the same minimum.
 constexpr int kSameMinimum = 3;
@@ -46,7 +46,7 @@ EpipolarSearch::EpipolarSearch(const cv::Mat& keyframe, const cv::Mat& other,
 Eigen::Vector2f EpipolarSearch::Project(const Eigen::Vector3f& at_infinity,
                                         float inverse_depth) const {
   const Eigen::Vector3f seen = at_infinity + inverse_depth * epipole_;
-  if (!(seen.z() > kLeastScale)) return {-1, -1};
+  if (!(seen.z() > kMinScale)) return {-1, -1};
   return seen.head<2>() / seen.z();
 }
 
@@ -89,7 +89,7 @@ bool EpipolarSearch::Place(const Pattern& pattern, float inverse_depth, Places& 
   places.u = (pattern.x + inverse_depth * epipole_.x()) / places.z;
   places.v = (pattern.y + inverse_depth * epipole_.y()) / places.z;
   // Written so that NaN is outside.
-  return places.z.minCoeff() > kLeastScale && places.u.minCoeff() >= 1 &&
+  return places.z.minCoeff() > kMinScale && places.u.minCoeff() >= 1 &&
          places.v.minCoeff() >= 1 && places.u.maxCoeff() < static_cast<float>(other_.cols - 2) &&
          places.v.maxCoeff() < static_cast<float>(other_.rows - 2);
 }
@@ -134,7 +134,7 @@ bool EpipolarSearch::CrossesLine(int u, int v, const Eigen::Vector2f& line) cons
   const Eigen::Vector2f gradient(
       static_cast<float>(row[u + 1] - row[u - 1]),
       static_cast<float>(keyframe_.ptr(v + 1)[u] - keyframe_.ptr(v - 1)[u]));
-  return std::abs(gradient.dot(line)) >= config_.least_cosine * gradient.norm() * line.norm();
+  return std::abs(gradient.dot(line)) >= config_.min_cosine * gradient.norm() * line.norm();
 }
 
 /// The best of places about a pixel apart.

@@ -29,7 +29,7 @@ struct EpipolarConfig {
   /// How far the line lies beside its true place, because the motion is not known exactly, px.
   float line_sigma_px = 0.3F;
   /// Edges whose gradient makes a wider angle with the line slide along it: least cosine.
-  float least_cosine = 0.25F;
+  float min_cosine = 0.25F;
   /// A match that is not determined along the line better than this says nothing, px.
   float worst_sigma_px = 1.0F;
 };

@@ -131,14 +131,14 @@ void InverseDepthMap::MeasureOne(EdgeDepth& edge, const EpipolarSearch& search) 
   const float reach = config_.search_sigmas * std::sqrt(edge.variance);
   const float low = std::max(1 / config_.max_depth_m, edge.inverse_depth - reach);
   const float high = std::min(1 / config_.min_depth_m, edge.inverse_depth + reach);
-  if (!(low < high) || search.LineLength(edge.u, edge.v, low, high) < config_.least_line_px) return;
+  if (!(low < high) || search.LineLength(edge.u, edge.v, low, high) < config_.min_line_px) return;
   const auto match = search.Find(edge.u, edge.v, low, high, false);
   if (!match) return;
   if (Agree(edge.inverse_depth, edge.variance, match->inverse_depth, match->variance,
             config_.gate_sigmas)) {
     Fuse(edge, match->inverse_depth, match->variance);
     edge.misses = 0;
-  } else if (++edge.misses >= config_.most_misses) {
+  } else if (++edge.misses >= config_.max_misses) {
     edge.known = false;
   }
 }

@@ -38,11 +38,11 @@ class InverseDepthMap {
     /// A known depth is searched so many standard deviations around,
     float search_sigmas = 2.5F;
     /// and only when they move it further than this, px: else the view has nothing to add.
-    float least_line_px = 0.3F;
+    float min_line_px = 0.3F;
     /// A measurement this many standard deviations off contradicts what is known.
     float gate_sigmas = 3.0F;
     /// So many contradictions in a row make a depth unknown.
-    int most_misses = 2;
+    int max_misses = 2;
     /// Growth of the standard deviation from keyframe to keyframe, a share of it.
     float growth = 0.2F;
     /// The depths of one keyframe err together, by the error of its pose. Handed out, their

@@ -31,7 +31,7 @@ void MetricScale::Measure(double metres, double sigma_m, double units) {
   const double innovation = std::log(metres / units) - log_scale_;
   const double gate = config_.gate_sigmas * std::sqrt(variance_ + variance);
   const bool contradicts = known_ && std::abs(innovation) > gate;
-  if (contradicts && ++refused_ < config_.most_refused) return;
+  if (contradicts && ++refused_ < config_.max_refused) return;
   refused_ = 0;
   if (!known_ || contradicts) {
     known_ = true;

@@ -16,7 +16,7 @@ class MetricScale {
     /// A measurement this many standard deviations off is refused,
     double gate_sigmas = 4.0;
     /// unless so many in a row are.
-    int most_refused = 5;
+    int max_refused = 5;
   };
 
   explicit MetricScale(const Config& config) : config_(config) {}

@@ -188,7 +188,7 @@ void MonocularOdometry::LearnDepths(const Eigen::Isometry3d& world_from_camera) 
 void MonocularOdometry::MeasureScale(const Eigen::Isometry3d& world_from_camera) {
   way_units_ += (last_unscaled_.inverse() * world_from_camera).translation().norm();
   if (config_.scale_source != ScaleSource::kSpeed || way_m_ < kScaleWayM) return;
-  if (way_m_ >= config_.least_speed_mps * way_s_) {
+  if (way_m_ >= config_.min_speed_mps * way_s_) {
     scale_.Measure(way_m_, config_.speed_sigma_mps * way_s_, way_units_);
   }
   way_m_ = way_s_ = way_units_ = 0;

@@ -40,7 +40,7 @@ class MonocularOdometry {
     MetricScale::Config scale;
     ScaleSource scale_source = ScaleSource::kSpeed;
     double speed_sigma_mps = 0.2;  ///< Standard deviation of MonocularFrame::speed_mps.
-    double least_speed_mps = 1.0;  ///< Slower than that, a speed says nothing about the scale.
+    double min_speed_mps = 1.0;  ///< Slower than that, a speed says nothing about the scale.
     double camera_height_m = 1.6;  ///< Of kCameraHeight: over the road.
     double camera_pitch_rad = 0;   ///< Of kCameraHeight: positive looks down.
     /// Keyframes that a new one's depths are measured against.

@@ -8,11 +8,11 @@ namespace livemap {
 namespace {
 
 constexpr int kTrials = 200;
-constexpr std::size_t kLeastEdges = 60;
-constexpr double kLeastShare = 0.3;    // Of the edges in the wedge.
-constexpr double kLeastSlope = 0.06;   // Rays that come down less steeply end too far away.
+constexpr std::size_t kMinEdges = 60;
+constexpr double kMinShare = 0.3;    // Of the edges in the wedge.
+constexpr double kMinSlope = 0.06;   // Rays that come down less steeply end too far away.
 constexpr double kWidestRatio = 2.0;   // Half width of the wedge, against the height.
-constexpr double kMostTiltRad = 0.06;  // Of the plane against the wheels'.
+constexpr double kMaxTiltRad = 0.06;  // Of the plane against the wheels'.
 constexpr double kNearPlane = 0.03;    // Against the height.
 constexpr double kWorstRelativeSigma = 0.1;
 
@@ -27,7 +27,7 @@ std::vector<Eigen::Vector3d> PointsAhead(const std::vector<EdgeDepth>& edges,
     const Eigen::Vector3d ray((edge.u - camera.cx) / camera.fx, (edge.v - camera.cy) / camera.fy,
                               1);
     const double slope = ray.dot(down);
-    if (slope < kLeastSlope || std::abs(ray.x()) > kWidestRatio * slope) continue;
+    if (slope < kMinSlope || std::abs(ray.x()) > kWidestRatio * slope) continue;
     points.push_back(ray / static_cast<double>(edge.inverse_depth));
   }
   return points;
@@ -39,7 +39,7 @@ std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
                                  const CameraIntrinsics& camera, double pitch_rad) {
   const Eigen::Vector3d down(0, std::cos(pitch_rad), std::sin(pitch_rad));
   const std::vector<Eigen::Vector3d> points = PointsAhead(edges, camera, down);
-  if (points.size() < kLeastEdges) return std::nullopt;
+  if (points.size() < kMinEdges) return std::nullopt;
   std::mt19937 random(1);  // The same edges give the same answer.
   std::uniform_int_distribution<std::size_t> any(0, points.size() - 1);
   std::size_t most = 0;
@@ -52,7 +52,7 @@ std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
     if (!(normal.norm() > 1e-9)) continue;
     normal.normalize();
     if (normal.dot(down) < 0) normal = -normal;
-    if (normal.dot(down) < std::cos(kMostTiltRad)) continue;
+    if (normal.dot(down) < std::cos(kMaxTiltRad)) continue;
     const double height = normal.dot(a);
     if (height <= 0) continue;
     std::size_t near = 0;
@@ -64,7 +64,7 @@ std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
     best_normal = normal;
     best_height = height;
   }
-  if (static_cast<double>(most) < kLeastShare * static_cast<double>(points.size())) {
+  if (static_cast<double>(most) < kMinShare * static_cast<double>(points.size())) {
     return std::nullopt;
   }
   // The mean of those on it.

@@ -48,13 +48,13 @@ std::optional<Eigen::Isometry3d> TwoViewStart::Follow(const cv::Mat& grey) {
     }
     KeepFollowed(now, found);
   }
-  if (end_.size() < static_cast<std::size_t>(config_.least_corners)) {
+  if (end_.size() < static_cast<std::size_t>(config_.min_corners)) {
     Begin(grey);
     return std::nullopt;
   }
   grey.copyTo(last_);
   just_begun_ = false;
-  if (MedianWayPx() < config_.least_way * camera_.width) return std::nullopt;
+  if (MedianWayPx() < config_.min_way * camera_.width) return std::nullopt;
   std::optional<Eigen::Isometry3d> motion = Motion();
   if (!motion && MedianWayPx() > config_.longest_way * camera_.width) Begin(grey);
   return motion;
@@ -92,8 +92,8 @@ std::optional<Eigen::Isometry3d> TwoViewStart::Motion() const {
   cv::Matx33d rotation;
   cv::Vec3d translation;
   const int agree = cv::recoverPose(essential, begin_, end_, k, rotation, translation, inliers);
-  if (agree < config_.least_corners ||
-      agree < config_.least_inliers * static_cast<double>(begin_.size())) {
+  if (agree < config_.min_corners ||
+      agree < config_.min_inliers * static_cast<double>(begin_.size())) {
     return std::nullopt;
   }
   Eigen::Isometry3d new_from_first = Eigen::Isometry3d::Identity();

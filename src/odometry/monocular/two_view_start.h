@@ -19,10 +19,10 @@ class TwoViewStart {
   struct Config {
     int corners = 1000;
     /// The corners' median way before a motion is looked for, share of the image's width.
-    double least_way = 0.015;
+    double min_way = 0.015;
     /// Corners that must be left, and their share that must agree.
-    int least_corners = 60;
-    double least_inliers = 0.6;
+    int min_corners = 60;
+    double min_inliers = 0.6;
     /// Corners that went this far without a motion that they agree on: it begins anew, share of the
     /// image's width.
     double longest_way = 0.2;

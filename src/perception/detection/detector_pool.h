@@ -52,7 +52,7 @@ class DetectorPool {
   DetectorPool(std::vector<Engine> engines, std::size_t queue_size, OnOutcome on_outcome)
       : engines_(std::move(engines)),
         queue_size_(queue_size),
-        most_in_flight_(engines_.size() + queue_size),
+        max_in_flight_(engines_.size() + queue_size),
         on_outcome_(std::move(on_outcome)) {
     try {
       threads_.emplace_back([this] { Deliver(); });
@@ -111,7 +111,7 @@ class DetectorPool {
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
       work_.wait(lock,
-                 [this] { return closed_ || (!queue_.empty() && in_flight_ < most_in_flight_); });
+                 [this] { return closed_ || (!queue_.empty() && in_flight_ < max_in_flight_); });
       if (closed_) return;
       const std::uint64_t number = taken_++;
       Outcome outcome{std::move(queue_.front()), std::nullopt, ""};
@@ -162,7 +162,7 @@ class DetectorPool {
 
   std::vector<Engine> engines_;
   const std::size_t queue_size_;
-  const std::size_t most_in_flight_;  ///< In work, or finished and not handed on.
+  const std::size_t max_in_flight_;  ///< In work, or finished and not handed on.
   const OnOutcome on_outcome_;
 
   mutable std::mutex mutex_;

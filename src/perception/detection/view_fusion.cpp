@@ -75,7 +75,7 @@ std::vector<HazardDetection> FuseViews(const DetectionsOfViews& views, float iou
   for (std::size_t view = 0; view < views.size(); ++view) {
     std::map<int, std::size_t> counts;
     for (const HazardDetection& detection : views[view]) {
-      if (counts[detection.class_index]++ < kMostFused) {
+      if (counts[detection.class_index]++ < kMaxFused) {
         by_class[detection.class_index].push_back({&detection, view});
       }
     }

@@ -16,9 +16,9 @@ using DetectionsOfViews = std::vector<std::vector<HazardDetection>>;
 /// overlaps. Going down in confidence, a detection takes up those of its class that it overlaps by
 /// at least `iou_limit` (above 0). Its box becomes the mean of each view's best one, weighted by
 /// confidence, its confidence the mean of theirs, 0 for a view that has none: what only one view
-/// shows is doubted. At most `kMostFused` of each class and view, the most confident, are looked
+/// shows is doubted. At most `kMaxFused` of each class and view, the most confident, are looked
 /// at. Returns descending confidence.
 std::vector<HazardDetection> FuseViews(const DetectionsOfViews& views, float iou_limit);
-constexpr std::size_t kMostFused = 300;
+constexpr std::size_t kMaxFused = 300;
 
 }  // namespace livemap

@@ -23,13 +23,13 @@ double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
 namespace {
 
 /// exp() of more than this is wider than any image; the limit keeps the arithmetic finite.
-constexpr float kMostLogSize = 8.0F;
+constexpr float kMaxLogSize = 8.0F;
 
 /// Of two views' boxes, from which on they are of one object.
 constexpr float kFusionIou = 0.5F;
 
 /// Confidence from which on a box of one view is compared with those of the others.
-constexpr float kLeastOfView = 0.05F;
+constexpr float kMinOfView = 0.05F;
 
 /// Rows of one level of the output, in image pixels.
 struct Cell {
@@ -42,8 +42,8 @@ cv::Rect2f DecodeBox(const float* values, Cell cell, double scale, cv::Size imag
   const double stride = cell.stride / scale;
   const double centre_x = (static_cast<double>(values[0]) + cell.column) * stride;
   const double centre_y = (static_cast<double>(values[1]) + cell.row) * stride;
-  const double half_width = 0.5 * std::exp(std::min(values[2], kMostLogSize)) * stride;
-  const double half_height = 0.5 * std::exp(std::min(values[3], kMostLogSize)) * stride;
+  const double half_width = 0.5 * std::exp(std::min(values[2], kMaxLogSize)) * stride;
+  const double half_height = 0.5 * std::exp(std::min(values[3], kMaxLogSize)) * stride;
   const auto cut = [](double value, int limit) {
     return static_cast<float>(std::clamp(value, 0.0, static_cast<double>(limit)));
   };
@@ -155,7 +155,7 @@ void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
 std::vector<float> ThresholdsOfViews(const ModelManifest& manifest) {
   std::vector<float> thresholds = manifest.thresholds;
   if (manifest.head.views == 1 && !manifest.head.mirrored) return thresholds;
-  for (float& threshold : thresholds) threshold = std::min(threshold, kLeastOfView);
+  for (float& threshold : thresholds) threshold = std::min(threshold, kMinOfView);
   return thresholds;
 }
 
@@ -184,7 +184,7 @@ std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candi
   for (const std::size_t candidate : order) {
     const auto index = static_cast<std::size_t>(candidates[candidate].class_index);
     if (by_class.size() <= index) by_class.resize(index + 1);
-    if (by_class[index].size() < kMostCandidates) by_class[index].push_back(candidate);
+    if (by_class[index].size() < kMaxCandidates) by_class[index].push_back(candidate);
   }
   std::vector<bool> keep(candidates.size(), false);
   for (const std::vector<std::size_t>& of_class : by_class) {

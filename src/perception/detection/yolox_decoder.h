@@ -23,7 +23,7 @@ std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const Model
                                          double scale, cv::Size image_size);
 
 /// The first half of DecodeYolox: the detections of each view, suppressed, in descending
-/// confidence. Of a network that looks more than once they reach down to `kLeastOfView`.
+/// confidence. Of a network that looks more than once they reach down to `kMinOfView`.
 DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& manifest,
                               double scale, cv::Size image_size);
 
@@ -36,12 +36,12 @@ std::vector<HazardDetection> JoinViews(DetectionsOfViews views, const ModelManif
 DetectionsOfViews Mirrored(DetectionsOfViews views, int width);
 
 /// Greedy non-maximum suppression within each class: going down in confidence, a box that overlaps
-/// a kept one of its class by more than `iou_limit` goes. At most `kMostCandidates` of each class,
+/// a kept one of its class by more than `iou_limit` goes. At most `kMaxCandidates` of each class,
 /// the most confident, are looked at, which bounds the time that a wild output can cost; boxes are
 /// compared with near ones only. Returns the kept detections, descending confidence.
 std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candidates,
                                               float iou_limit);
-constexpr std::size_t kMostCandidates = 3000;
+constexpr std::size_t kMaxCandidates = 3000;
 
 /// Intersection over union of two boxes, 0 when both are empty.
 double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b);

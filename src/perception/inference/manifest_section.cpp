@@ -12,7 +12,7 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostModelBytes = std::size_t{256} * 1024 * 1024;
+constexpr std::size_t kMaxModelBytes = std::size_t{256} * 1024 * 1024;
 
 /// A value as text for an error message: short, whatever the file holds.
 std::string Shown(const YAML::Node& node) {
@@ -152,13 +152,13 @@ ModelManifest::Normalisation ReadManifestNormalisation(const ManifestSection& ro
 
 std::string ReadHashedFile(const std::string& name, const std::string& file,
                            const std::string& sha256) {
-  std::string bytes = ReadFile(file, kMostModelBytes);
+  std::string bytes = ReadFile(file, kMaxModelBytes);
   const std::string found = Sha256Hex(bytes);
   if (found != sha256) {
     throw Error("model file '" + file + "' has SHA-256 " + found + ", the manifest of '" + name +
                 "' accepts " + sha256);
   }
-  return Unpacked(std::move(bytes), file, kMostModelBytes);
+  return Unpacked(std::move(bytes), file, kMaxModelBytes);
 }
 
 }  // namespace livemap

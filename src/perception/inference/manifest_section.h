@@ -10,7 +10,7 @@
 
 namespace livemap {
 
-constexpr std::size_t kMostManifestBytes = std::size_t{64} * 1024;
+constexpr std::size_t kMaxManifestBytes = std::size_t{64} * 1024;
 constexpr int kLargestInputSide = 4096;  ///< px
 
 /// One map of a model's manifest, read key by key: what all kinds of manifests are read with.

@@ -10,8 +10,8 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostClasses = 1000;
-constexpr int kMostViews = 4;
+constexpr std::size_t kMaxClasses = 1000;
+constexpr int kMaxViews = 4;
 
 void ReadFiles(const ManifestSection& root, const std::filesystem::path& directory,
                ModelManifest& manifest) {
@@ -35,7 +35,7 @@ void ReadFiles(const ManifestSection& root, const std::filesystem::path& directo
 
 void ReadNames(const ManifestSection& root, ModelManifest& manifest) {
   manifest.name = root.Text("name");
-  manifest.classes = root.DistinctTexts("classes", kMostClasses);
+  manifest.classes = root.DistinctTexts("classes", kMaxClasses);
 }
 
 void ReadInput(const ManifestSection& root, ModelManifest& manifest) {
@@ -80,7 +80,7 @@ void ReadYoloxHead(const ManifestSection& root, ModelManifest& manifest) {
         }
         return stride;
       });
-  if (head.Has("views")) manifest.head.views = head.Integer("views", 1, kMostViews);
+  if (head.Has("views")) manifest.head.views = head.Integer("views", 1, kMaxViews);
   if (manifest.head.strides.size() % static_cast<std::size_t>(manifest.head.views) != 0) {
     head.Refuse("views", "a divisor of the number of strides, " +
                              std::to_string(manifest.head.strides.size()));
@@ -109,10 +109,10 @@ std::vector<std::int64_t> ModelManifest::OutputShape() const {
 
 ModelManifest ParseModelManifest(const std::string& yaml, const std::string& origin,
                                  const std::string& directory) {
-  if (yaml.size() > kMostManifestBytes) {
+  if (yaml.size() > kMaxManifestBytes) {
     throw Error("model manifest '" + origin + "' has " + std::to_string(yaml.size()) +
                 " bytes, accepted is a manifest (models/NAME.yaml) of at most " +
-                std::to_string(kMostManifestBytes));
+                std::to_string(kMaxManifestBytes));
   }
   try {
     const YAML::Node file = YAML::Load(yaml);
@@ -134,7 +134,7 @@ ModelManifest ParseModelManifest(const std::string& yaml, const std::string& ori
 }
 
 ModelManifest ReadModelManifest(const std::string& path) {
-  const std::string yaml = ReadFile(path, kMostManifestBytes);
+  const std::string yaml = ReadFile(path, kMaxManifestBytes);
   return ParseModelManifest(yaml, path, std::filesystem::path(path).parent_path().string());
 }
 

@@ -24,7 +24,7 @@ struct Search {
 // two neighbours, 58 with one, and nothing on twelve roads without plates.
 constexpr Search kFaceSearch{1.2, 1};
 constexpr Search kPlateSearch{1.1, 1};
-constexpr float kLeastFaceScore = 0.5F;
+constexpr float kMinFaceScore = 0.5F;
 
 /// Width of a plate that is `side` high, European or American, at least.
 constexpr int kPlateAspect = 2;
@@ -77,7 +77,7 @@ class YuNet {
       throw Error("face_model is '" + file + "', which is no file");
     }
     try {
-      network_ = cv::FaceDetectorYN::create(file, "", {320, 320}, kLeastFaceScore);
+      network_ = cv::FaceDetectorYN::create(file, "", {320, 320}, kMinFaceScore);
     } catch (const cv::Exception&) {
       throw Error("face_model '" + file + "' cannot be loaded, accepted is a YuNet model in ONNX");
     }

@@ -46,12 +46,12 @@ sensor_msgs::CameraInfo ToMessage(const CameraCalibration& calibration,
 }
 
 CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info) {
-  constexpr std::uint32_t kMostPixels = 16384;
+  constexpr std::uint32_t kMaxPixels = 16384;
   CameraIntrinsics intrinsics{info.P[0], info.P[5], info.P[2], info.P[6], 0, 0};
   const bool finite = std::isfinite(intrinsics.cx) && std::isfinite(intrinsics.cy) &&
                       std::isfinite(intrinsics.fx) && std::isfinite(intrinsics.fy);
   if (!finite || !(intrinsics.fx > 0 && intrinsics.fy > 0) || info.width == 0 || info.height == 0 ||
-      info.width > kMostPixels || info.height > kMostPixels) {
+      info.width > kMaxPixels || info.height > kMaxPixels) {
     throw Error("camera_info of '" + info.header.frame_id + "' is no calibration: its P has fx " +
                 std::to_string(intrinsics.fx) + " and fy " + std::to_string(intrinsics.fy) +
                 " for " + std::to_string(info.width) + "x" + std::to_string(info.height) +

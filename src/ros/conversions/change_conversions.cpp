@@ -20,22 +20,22 @@ std::uint8_t ToMessage(ChangeDirection direction) {
   return ChangedObject::UNKNOWN;
 }
 
-std::uint8_t ToMessage(ChangeWatch::Outcome outcome) {
+std::uint8_t ToMessage(ChangeDetector::Outcome outcome) {
   switch (outcome) {
-    case ChangeWatch::Outcome::kCompared:
+    case ChangeDetector::Outcome::kCompared:
       return ChangedObjects::COMPARED;
-    case ChangeWatch::Outcome::kNothingEarlier:
+    case ChangeDetector::Outcome::kNothingEarlier:
       return ChangedObjects::NOTHING_EARLIER;
-    case ChangeWatch::Outcome::kRefused:
+    case ChangeDetector::Outcome::kRefused:
       return ChangedObjects::REFUSED;
-    case ChangeWatch::Outcome::kUncertain:
+    case ChangeDetector::Outcome::kUncertain:
       break;
   }
   return ChangedObjects::UNCERTAIN;
 }
 
 ChangedObject ToMessage(const PlacedChange& change) {
-  const ChangeEvent& event = change.event;
+  const ChangedObject& event = change.event;
   ChangedObject message;
   message.id = static_cast<std::uint32_t>(event.id);
   message.class_name = ChangeClassName(event.change_class);
@@ -54,15 +54,15 @@ ChangedObject ToMessage(const PlacedChange& change) {
 
 }  // namespace
 
-ChangedObjects ToMessage(const ChangeWatch::Answer& answer, const std_msgs::Header& header,
+ChangedObjects ToMessage(const ChangeDetector::Answer& answer, const std_msgs::Header& header,
                          const std::string& drive_id, const std::string& method) {
   ChangedObjects message;
   message.header = header;
   message.drive_id = drive_id;
   message.method = method;
   message.outcome = ToMessage(answer.outcome);
-  if (answer.outcome == ChangeWatch::Outcome::kRefused) message.why = answer.why;
-  if (answer.outcome != ChangeWatch::Outcome::kCompared) return message;
+  if (answer.outcome == ChangeDetector::Outcome::kRefused) message.why = answer.why;
+  if (answer.outcome != ChangeDetector::Outcome::kCompared) return message;
   message.earlier_drive_id = answer.earlier.drive_id;
   message.earlier_stamp = ToRosTime(answer.earlier.stamp_ns);
   message.known_share = static_cast<float>(cv::mean(answer.pair.valid)[0] / 255);

@@ -13,7 +13,7 @@ namespace livemap {
 
 /// What a picture that was looked at tells. `header` is the image's, `method` the name of what
 /// compared.
-ChangedObjects ToMessage(const ChangeWatch::Answer& answer, const std_msgs::Header& header,
+ChangedObjects ToMessage(const ChangeDetector::Answer& answer, const std_msgs::Header& header,
                          const std::string& drive_id, const std::string& method);
 
 /// A mono8 message of `classes`, or a bgr8 one of a colour picture, with the image's header.

@@ -48,7 +48,7 @@ MapChangeReport FromMessage(const MapChange& message) {
 
 std::optional<MapChangeReport> ToMapChangeReport(const PlacedChange& change,
                                                  const std::string& drive_id, const Uuid& uuid) {
-  const ChangeEvent& event = change.event;
+  const ChangedObject& event = change.event;
   if (event.direction == ChangeDirection::kUnknown) return std::nullopt;
   MapChangeReport report;
   report.uuid = uuid;

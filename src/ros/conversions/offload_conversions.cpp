@@ -38,7 +38,7 @@ Eigen::Isometry3d ToMounting(const geometry_msgs::Transform& message) {
 
 }  // namespace
 
-CandidateFrame ToMessage(const Candidate& candidate) {
+CandidateFrame ToMessage(const OffloadedFrame& candidate) {
   CandidateFrame message;
   message.schema_version = CandidateFrame::SCHEMA_VERSION;
   message.vehicle_id = candidate.vehicle_id;
@@ -74,9 +74,9 @@ CandidateFrame ToMessage(const Candidate& candidate) {
   return message;
 }
 
-Candidate FromMessage(const CandidateFrame& message) {
+OffloadedFrame FromMessage(const CandidateFrame& message) {
   CheckVersion(message, "candidate frame");
-  Candidate candidate;
+  OffloadedFrame candidate;
   candidate.vehicle_id = message.vehicle_id;
   candidate.drive_id = message.drive_id;
   candidate.stamp_ns = FromRosTime(message.stamp);

@@ -6,10 +6,10 @@
 
 namespace livemap {
 
-CandidateFrame ToMessage(const Candidate& candidate);
+CandidateFrame ToMessage(const OffloadedFrame& candidate);
 /// Throws Error, with one sentence that says why, for a schema version that this program does not
 /// know, an image side beyond what an int holds, or a mounting that is no rotation and translation;
-/// other ranges of values are the receiver's business (WhyCandidateRefused).
-Candidate FromMessage(const CandidateFrame& message);
+/// other ranges of values are the receiver's business (WhyOffloadRefused).
+OffloadedFrame FromMessage(const CandidateFrame& message);
 
 }  // namespace livemap

@@ -138,7 +138,7 @@ std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
   return topics;
 }
 
-void ReadMqttOptions(ParameterReader& parameters, MqttOptions& mqtt) {
+void ReadMqttOptions(ParameterReader& parameters, MqttConfig& mqtt) {
   parameters.Read("host", mqtt.host);
   parameters.Read("port", mqtt.port, {1, 65535});
   parameters.Read("clean_start", mqtt.clean_start);
@@ -159,8 +159,8 @@ void ReadMqttOptions(ParameterReader& parameters, MqttOptions& mqtt) {
 }
 
 /// The three TLS files, or none of them.
-std::optional<MqttTlsOptions> ReadTlsOptions(ParameterReader& parameters) {
-  MqttTlsOptions tls;
+std::optional<MqttTlsConfig> ReadTlsOptions(ParameterReader& parameters) {
+  MqttTlsConfig tls;
   const std::pair<const char*, std::string*> files[] = {{"ca_file", &tls.ca_file},
                                                         {"certificate_file", &tls.certificate_file},
                                                         {"key_file", &tls.key_file}};

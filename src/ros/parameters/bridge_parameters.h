@@ -36,7 +36,7 @@ struct BridgeConfig {
   std::string password_file;    ///< Its first line is the password; empty: no password.
   double password_wait_s = 10;  ///< For a broker that writes the file while we start.
   double diagnostics_period_s = 1;
-  MqttOptions mqtt;
+  MqttConfig mqtt;
   std::vector<BridgeTopic> topics;
 };
 

@@ -17,38 +17,38 @@ void ReadMemory(ParameterReader& parameters, PlaceMemory::Config& memory) {
   }
   parameters.Read("cell_m", memory.cell_m, {2, 1000});
   parameters.Read("heading_sectors", memory.heading_sectors, {1, 64});
-  double cell_mb = memory.most_cell_bytes / kMegabyte;
-  double all_mb = memory.most_bytes / kMegabyte;
-  double cached_mb = memory.most_cached_bytes / kMegabyte;
+  double cell_mb = memory.max_cell_bytes / kMegabyte;
+  double all_mb = memory.max_bytes / kMegabyte;
+  double cached_mb = memory.max_cached_bytes / kMegabyte;
   parameters.Read("most_cell_mb", cell_mb, {0.01, 1000});
   parameters.Read("most_mb", all_mb, {1, 1e7});
   parameters.Read("most_cached_mb", cached_mb, {0, 1e5});
-  memory.most_cell_bytes = cell_mb * kMegabyte;
-  memory.most_bytes = all_mb * kMegabyte;
-  memory.most_cached_bytes = cached_mb * kMegabyte;
+  memory.max_cell_bytes = cell_mb * kMegabyte;
+  memory.max_bytes = all_mb * kMegabyte;
+  memory.max_cached_bytes = cached_mb * kMegabyte;
   parameters.Read("half_life_days", memory.half_life_days, {0.01, 1e5});
   int candidates = 5;
   parameters.Read("candidates", candidates, {1, 100});
   memory.reach.candidates = static_cast<std::size_t>(candidates);
-  parameters.Read("most_distance_m", memory.reach.most_distance_m, {0.1, 100});
-  parameters.Read("most_heading_difference_rad", memory.reach.most_heading_difference_rad,
+  parameters.Read("most_distance_m", memory.reach.max_distance_m, {0.1, 100});
+  parameters.Read("most_heading_difference_rad", memory.reach.max_heading_difference_rad,
                   {0.01, 3.15});
 }
 
-void ReadWatch(ParameterReader& parameters, ChangeWatch::Config& watch) {
+void ReadWatch(ParameterReader& parameters, ChangeDetector::Config& watch) {
   parameters.Read("remember_spacing_m", watch.remember_spacing_m, {0.1, 1000});
-  parameters.Read("most_position_sigma_m", watch.most_position_sigma_m, {0.01, 100});
+  parameters.Read("most_position_sigma_m", watch.max_position_sigma_m, {0.01, 100});
   int partners = static_cast<int>(watch.partners);
   parameters.Read("partners", partners, {1, 100});
   watch.partners = static_cast<std::size_t>(partners);
   parameters.Read("jpeg_quality", watch.jpeg_quality, {1, 100});
-  parameters.Read("features", watch.features.most_features, {50, 8192});
-  parameters.Read("least_region_px", watch.regions.least_pixels, {1, 1e6});
+  parameters.Read("features", watch.features.max_features, {50, 8192});
+  parameters.Read("least_region_px", watch.regions.min_pixels, {1, 1e6});
   ChangeTracker::Config& tracker = watch.tracker;
-  parameters.Read("least_seen", tracker.least_seen, {2, 100});
-  parameters.Read("least_travel_m", tracker.least_travel_m, {0, 100});
-  parameters.Read("least_share", tracker.least_share, {0, 1});
-  parameters.Read("most_range_m", tracker.most_range_m, {1, 200});
+  parameters.Read("least_seen", tracker.min_seen, {2, 100});
+  parameters.Read("least_travel_m", tracker.min_travel_m, {0, 100});
+  parameters.Read("least_share", tracker.min_share, {0, 1});
+  parameters.Read("most_range_m", tracker.max_range_m, {1, 200});
   parameters.Read("pixel_sigma_px", tracker.ground.pixel_sigma_px, {0, 100});
   parameters.Read("pitch_sigma_rad", tracker.ground.pitch_sigma_rad, {0, 0.5});
   parameters.Read("height_sigma_m", tracker.ground.height_sigma_m, {0, 2});

@@ -27,8 +27,8 @@ struct ChangeDetectionConfig {
   bool tell_zone = true;            ///< Objects that were passed, as MapChange.
   double tell_confidence = 0.5;     ///< Least, of these.
   double diagnostics_period_s = 1.0;
-  ChangeWatch::Config watch;
-  BasePoseSource::Config pose;
+  ChangeDetector::Config watch;
+  VehiclePoseLookup::Config pose;
 };
 
 /// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.

@@ -9,7 +9,7 @@ void ReadOdometry(ParameterReader& parameters, EdgeOdometry::Config& odometry) {
   odometry.edges.kind = ParseEdgeKind(edges);
   parameters.Read("structured_model", odometry.edges.structured_model);
   parameters.Read("strong_share", odometry.edges.strong_share, {0.001, 0.9});
-  parameters.Read("least_gradient", odometry.edges.least_gradient, {0, 255});
+  parameters.Read("least_gradient", odometry.edges.min_gradient, {0, 255});
   std::string source = "keyframe";
   parameters.ReadChoice("edge_source", source, {"keyframe", "new_image"});
   odometry.edge_source = source == "keyframe" ? EdgeSource::kKeyframe : EdgeSource::kNewImage;

@@ -13,7 +13,7 @@ void ReadReceiver(ParameterReader& parameters, ReceiverModel& receiver) {
   parameters.Read("latency_s", receiver.latency_s);
   parameters.Read("latency_sigma_s", receiver.latency_sigma_s);
   parameters.Read("default_sigma_m", receiver.default_sigma_m);
-  parameters.Read("least_sigma_m", receiver.least_sigma_m);
+  parameters.Read("least_sigma_m", receiver.min_sigma_m);
   parameters.Read("shared_sigma_m", receiver.shared_sigma_m);
   parameters.Read("shared_time_s", receiver.shared_time_s);
 }

@@ -5,7 +5,7 @@
 namespace livemap {
 namespace {
 
-void ReadSender(ParameterReader& parameters, CandidateSender::Config& sender) {
+void ReadSender(ParameterReader& parameters, OffloadSender::Config& sender) {
   parameters.Read("rate_hz", sender.rate_hz, {0.1, 60});
   parameters.Read("min_spacing_m", sender.min_spacing_m, {0, 1000});
   parameters.Read("max_bytes_per_s", sender.max_bytes_per_s, {1000, 10e6});
@@ -43,9 +43,9 @@ EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int6
   return config;
 }
 
-CandidateIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters) {
-  CandidateIntakeConfig config;
-  CandidateIntake::Config& intake = config.intake;
+OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters) {
+  OffloadIntakeConfig config;
+  OffloadIntake::Config& intake = config.intake;
   ReportLimits& limits = intake.limits.report;
   int max_frame_bytes = 200000;
   int max_frame_side_px = 4096;

@@ -16,7 +16,7 @@ struct EarlyDiscardConfig {
   double threshold = -1;  ///< Least score that is sent; below 0: the manifest's.
   int threads = 1;        ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
   int queue_size = 2;     ///< Frames that may wait for the classifier.
-  CandidateSender::Config sender;
+  OffloadSender::Config sender;
   int jpeg_quality = 75;  ///< 1..100; lowered where the bytes do not suffice.
   bool privacy = true;    ///< Mask faces and number plates.
   PrivacyMask::Config mask;
@@ -29,14 +29,14 @@ struct EarlyDiscardConfig {
 EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int64_t now_ns);
 
 /// Defaults of the zone's candidate_intake nodelet; config/candidate_intake.yaml explains each.
-struct CandidateIntakeConfig {
-  CandidateIntake::Config intake;
+struct OffloadIntakeConfig {
+  OffloadIntake::Config intake;
   int jpeg_quality = 80;         ///< 1..100, of a report's picture.
   int max_image_bytes = 100000;  ///< Of a report's picture.
   double diagnostics_period_s = 1.0;
 };
 
 /// Reads and checks all of them; throws Error.
-CandidateIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters);
+OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters);
 
 }  // namespace livemap

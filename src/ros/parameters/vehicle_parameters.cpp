@@ -41,7 +41,7 @@ void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track) {
   parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
 }
 
-void ReadBasePoseSource(ParameterReader& parameters, BasePoseSource::Config& pose) {
+void ReadBasePoseSource(ParameterReader& parameters, VehiclePoseLookup::Config& pose) {
   std::string source = "gps";
   parameters.ReadChoice("position_source", source, {"gps", "fused"});
   pose.use_fused = source == "fused";

@@ -18,6 +18,6 @@ std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns);
 void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track);
 
 /// Whose word counts for where the vehicle is: that, the fused poses, and how long is waited.
-void ReadBasePoseSource(ParameterReader& parameters, BasePoseSource::Config& pose);
+void ReadBasePoseSource(ParameterReader& parameters, VehiclePoseLookup::Config& pose);
 
 }  // namespace livemap

@@ -82,14 +82,14 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
 }
 
 void ReadLife(ParameterReader& parameters, ZoneService::Config& zone) {
-  HazardLife::Config& life = zone.life;
+  HazardLifecycle::Config& life = zone.life;
   parameters.Read("prior_presence", life.prior_presence, {0.01, 0.99});
   parameters.Read("active_above", life.active_above, {0.01, 0.99});
   parameters.Read("active_alone_above", life.active_alone_above, {0.01, 0.99});
   parameters.Read("verify_below", life.verify_below, {0.01, 0.99});
-  parameters.Read("sure_above", life.sure_above, {0.01, 0.99});
+  parameters.Read("sure_above", life.settled_above, {0.01, 0.99});
   parameters.Read("gone_below", life.gone_below, {0.001, 0.5});
-  parameters.Read("surest_presence", life.surest, {0.5, 0.9999});
+  parameters.Read("surest_presence", life.max_presence, {0.5, 0.9999});
   parameters.Read("hostile_share", life.hostile_share, {0, 0.5});
   parameters.Read("suspect_above", life.suspect_above, {0.01, 1});
   parameters.Read("trust_memory_s", zone.trust.memory_s, {60, 1e10});
@@ -126,7 +126,7 @@ void ReadPolls(ParameterReader& parameters, ZoneService::Config& zone) {
 
 void ReadWeb(ParameterReader& parameters, const std::string& package_path,
              ZoneCloudletConfig& config) {
-  WebOptions& web = config.web_options;
+  WebConfig& web = config.web_options;
   web.web_root = package_path + "/web";
   parameters.Read("web", config.web);
   parameters.Read("web_address", web.address);

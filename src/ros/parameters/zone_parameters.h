@@ -29,7 +29,7 @@ struct ZoneCloudletConfig {
   int max_markers = 20000;            ///< Hazards shown in rviz.
   double diagnostics_period_s = 1.0;
   bool web = true;  ///< Serve the live map.
-  WebOptions web_options;
+  WebConfig web_options;
 };
 
 /// Reads and checks every private parameter; `package_path` completes the defaults that name files

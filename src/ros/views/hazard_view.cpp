@@ -169,7 +169,7 @@ void DescribePollResponder(const PollResponder& responder,
 }
 
 std::string DescribeBrokenRows(const std::string& path, const LocalHazardMap& map) {
-  const BrokenRows& broken = map.broken_rows();
+  const InvalidRows& broken = map.broken_rows();
   return "the local hazard map '" + path +
          "' holds values that this program did not write: " + std::to_string(broken.known) +
          " rows of what the zone told are taken out, " + std::to_string(broken.reports) +

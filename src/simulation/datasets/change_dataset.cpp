@@ -83,7 +83,7 @@ void ChangeDatasetWriter::Add(const PassPicture& first, const PassPicture& secon
   }
   poses_ << "\n";
   for (const auto& [instance, pixels] : view.pixels) {
-    if (pixels >= kLeastPixels) ++frames_seen_[instance];
+    if (pixels >= kMinPixels) ++frames_seen_[instance];
   }
   ++pairs_;
 }

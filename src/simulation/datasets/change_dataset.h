@@ -28,14 +28,14 @@ struct PassPicture {
 class ChangeDatasetWriter {
  public:
   static constexpr std::size_t kPairsPerSequence = 100;
-  static constexpr std::size_t kMostPairs = 1000 * kPairsPerSequence;
+  static constexpr std::size_t kMaxPairs = 1000 * kPairsPerSequence;
   /// A change is seen in a picture when it decides at least so many pixels of the mask.
-  static constexpr int kLeastPixels = 24;
+  static constexpr int kMinPixels = 24;
 
   /// Makes the folder; throws Error when it exists and is not empty.
   ChangeDatasetWriter(const std::string& directory, const SimulatedCamera& camera);
 
-  /// The next pair, at most kMostPairs in all; `view` is the truth from the second picture's pose.
+  /// The next pair, at most kMaxPairs in all; `view` is the truth from the second picture's pose.
   void Add(const PassPicture& first, const PassPicture& second, const ChangeView& view);
   /// Writes `changes` as GeoJSON points (RFC 7946) and closes the files. `street` is that of either
   /// pass, `datum` the world's origin.

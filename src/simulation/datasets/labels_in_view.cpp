@@ -48,8 +48,8 @@ std::vector<HazardInView> FindHazards(const cv::Mat& instances, const OutlinePix
     hazard.box = cv::Rect(extent.left, extent.top, extent.right - extent.left + 1,
                           extent.bottom - extent.top + 1);
     hazard.visible_pixels = extent.pixels;
-    if (extent.pixels >= limits.least_pixels && hazard.box.width >= limits.least_width &&
-        hazard.box.height >= limits.least_height) {
+    if (extent.pixels >= limits.min_pixels && hazard.box.width >= limits.min_width &&
+        hazard.box.height >= limits.min_height) {
       hazard.difficult = IsDifficult(hazard, outlines, limits);
       hazards.push_back(hazard);
     }

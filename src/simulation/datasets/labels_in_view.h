@@ -22,9 +22,9 @@ struct HazardInView {
 
 /// What must be seen of a hazard before it is labelled.
 struct LabelLimits {
-  int least_pixels = 24;  ///< Visible.
-  int least_width = 6;    ///< Of the box, pixels.
-  int least_height = 3;
+  int min_pixels = 24;  ///< Visible.
+  int min_width = 6;    ///< Of the box, pixels.
+  int min_height = 3;
 
   /// Of the box, pixels each way; below, a label is difficult. Of the boxes that people drew into
   /// the survey drives 95 % are as large (at 640x400).

@@ -30,12 +30,12 @@ double Curvature(const Street& street, double along) {
 
 /// Lowers speeds so that they can be reached from their neighbours.
 void BoundAcceleration(std::vector<double>& squared) {
-  constexpr double kMostPerStep = 2 * kLongitudinalMps2 * kStepM;
+  constexpr double kMaxPerStep = 2 * kLongitudinalMps2 * kStepM;
   for (std::size_t i = 1; i < squared.size(); ++i) {
-    squared[i] = std::min(squared[i], squared[i - 1] + kMostPerStep);
+    squared[i] = std::min(squared[i], squared[i - 1] + kMaxPerStep);
   }
   for (std::size_t i = squared.size() - 1; i > 0; --i) {
-    squared[i - 1] = std::min(squared[i - 1], squared[i] + kMostPerStep);
+    squared[i - 1] = std::min(squared[i - 1], squared[i] + kMaxPerStep);
   }
 }
 

@@ -161,7 +161,7 @@ class StreetRenderer::Exposure {
 };
 
 StreetRenderer::StreetRenderer(const Street& street, const SimulatedCamera& camera,
-                               const Lighting& lighting, const RenderOptions& options)
+                               const Lighting& lighting, const RenderConfig& options)
     : street_(street), camera_(camera), lighting_(lighting), options_(options), scene_(street) {
   for (int row = 0; row < camera.intrinsics.height; ++row) {
     for (int column = 0; column < camera.intrinsics.width; ++column) {

@@ -32,7 +32,7 @@ struct CameraExposure {
   double along_m = 0;  ///< Along the road, which part of the street is needed.
 };
 
-struct RenderOptions {
+struct RenderConfig {
   int threads = 2;
   bool smooth_edges = true;  ///< More rays where neighbouring pixels differ.
 };
@@ -43,7 +43,7 @@ class StreetRenderer {
  public:
   /// `street` must outlive the renderer.
   StreetRenderer(const Street& street, const SimulatedCamera& camera, const Lighting& lighting,
-                 const RenderOptions& options);
+                 const RenderConfig& options);
   ~StreetRenderer();
 
   SimulatedFrame Render(const CameraExposure& motion, std::uint32_t frame_number);
@@ -54,7 +54,7 @@ class StreetRenderer {
   const Street& street_;
   SimulatedCamera camera_;
   Lighting lighting_;
-  RenderOptions options_;
+  RenderConfig options_;
   StreetScene scene_;
   std::vector<Vec3> rays_;  ///< Optical frame, z = 1, row by row.
 };

@@ -41,8 +41,8 @@ Row RowAt(const Street& street, double along_m) {
 
 }  // namespace
 
-StreetSky SkyOver(const Street& street, double along_m, double left_m) {
-  StreetSky sky;
+SkyVisibility SkyOver(const Street& street, double along_m, double left_m) {
+  SkyVisibility sky;
   if (!street.description().buildings) return sky;
   const double pavement_m = static_cast<double>(street.profile().half_road_m() + kKerbWidthM) +
                             street.description().pavement_width_m;

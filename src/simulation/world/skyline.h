@@ -13,6 +13,6 @@ constexpr double kAntennaHeightM = 1.5;
 /// street's plan has houses: not in parks, not at crossings, thinner between gardens; the elevation
 /// is the mean over 20 m of road before and behind, as satellites along the street see no front.
 /// Trees do not count. A pure function that renders nothing.
-StreetSky SkyOver(const Street& street, double along_m, double left_m);
+SkyVisibility SkyOver(const Street& street, double along_m, double left_m);
 
 }  // namespace livemap

@@ -12,8 +12,8 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostBytes = 1U << 20U;
-constexpr std::size_t kMostItems = 10000;
+constexpr std::size_t kMaxBytes = 1U << 20U;
+constexpr std::size_t kMaxItems = 10000;
 constexpr double kSteepest = 0.15;
 constexpr double kLongestRoadM = 1e6;
 
@@ -76,8 +76,8 @@ class Reader {
 
   void CheckList(const YAML::Node& list, const std::string& what) const {
     if (!list.IsSequence()) Refuse(list, what + " must be a list");
-    if (list.size() > kMostItems) {
-      Refuse(list, what + " has more than " + std::to_string(kMostItems) + " entries");
+    if (list.size() > kMaxItems) {
+      Refuse(list, what + " has more than " + std::to_string(kMaxItems) + " entries");
     }
   }
 
@@ -208,7 +208,7 @@ WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name
 }
 
 WorldDescription ReadWorldFile(const std::string& path, RoadSource source) {
-  return ParseWorldFile(ReadFile(path, kMostBytes), path, source);
+  return ParseWorldFile(ReadFile(path, kMaxBytes), path, source);
 }
 
 }  // namespace livemap

@@ -28,12 +28,12 @@ std::string JoinNames(const std::vector<std::string>& names) {
 }
 
 cv::Mat ReadImage(const std::string& path) {
-  constexpr std::size_t kMostBytes = std::size_t{64} * 1024 * 1024;
-  constexpr std::int64_t kMostPixels = 100'000'000;
-  const std::string bytes = ReadFile(path, kMostBytes);
+  constexpr std::size_t kMaxBytes = std::size_t{64} * 1024 * 1024;
+  constexpr std::int64_t kMaxPixels = 100'000'000;
+  const std::string bytes = ReadFile(path, kMaxBytes);
   try {
     cv::Mat image =
-        DecodeImage(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), kMostPixels);
+        DecodeImage(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), kMaxPixels);
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
     return image;
   } catch (const Error& error) {

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 const cv::Size kTile(320, 240);
 constexpr int kColumns = 4;
 /// Of the picture's width, what a crop shows at least, so that the road around is seen.
-constexpr float kLeastShare = 0.3F;
+constexpr float kMinShare = 0.3F;
 constexpr float kContext = 3;  // of the box's longer side
 
 const cv::Scalar kLabelColour(60, 220, 60);
@@ -40,7 +40,7 @@ class Tile {
  public:
   Tile(const cv::Mat& picture, const cv::Rect2f& around) {
     const float width = std::max(kContext * std::max(around.width, around.height),
-                                 kLeastShare * static_cast<float>(picture.cols));
+                                 kMinShare * static_cast<float>(picture.cols));
     const float height = width * static_cast<float>(kTile.height) / static_cast<float>(kTile.width);
     const cv::Point2f centre = (around.tl() + around.br()) * 0.5F;
     scale_ = static_cast<float>(kTile.width) / width;

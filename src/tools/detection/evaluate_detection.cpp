@@ -31,12 +31,12 @@ struct Options {
   bool sweep = false;
   bool tracking = false;
   std::string errors;
-  TrackedDriveOptions tracked;
+  TrackedDriveConfig tracked;
   ObjectTracker::Config tracker;
   double lowest_score = 0.01;
   int threads = 0;
   std::optional<EngineKind> engine;
-  LabelledFolderOptions labels;
+  LabelledFolderConfig labels;
 };
 
 /// None when --help was asked for and printed.
@@ -263,7 +263,7 @@ void RefuseRepeated(const std::vector<std::string>& folders) {
 
 /// All folders, read before the long work, so that a mistake in the last one shows at once.
 std::vector<LabelledFolder> ReadFolders(const Options& options, const ModelManifest& manifest) {
-  LabelledFolderOptions reading = options.labels;
+  LabelledFolderConfig reading = options.labels;
   reading.model_classes = manifest.classes;
   std::vector<LabelledFolder> folders;
   RefuseRepeated(options.folders);

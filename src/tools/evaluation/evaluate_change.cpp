@@ -33,7 +33,7 @@ struct Options {
   std::string write;
   std::uint64_t seed = 1;
   std::string registration;  ///< "none", "edges", "homography" or "both".
-  double least_changed = 0;  ///< Share of the pixels that count; pairs below are left out.
+  double min_changed = 0;  ///< Share of the pixels that count; pairs below are left out.
   bool json = false;
   bool curves = false;
 };
@@ -108,7 +108,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (options.method.empty() && options.model.empty() && options.predictions.empty()) {
     options.model = ShippedModel("change-small");
   }
-  options.least_changed = line.Number("least-changed", 0, 0, 1);
+  options.min_changed = line.Number("least-changed", 0, 0, 1);
   options.json = line.Has("json");
   options.curves = line.Has("curves");
   return options;
@@ -146,7 +146,7 @@ class Evaluation {
     } else {
       auto network = MakeChangeNetwork(options.model);
       report_.method = network->manifest().name;
-      regions_.least_confidence = network->manifest().changed;
+      regions_.min_confidence = network->manifest().changed;
       method_ = std::move(network);
     }
     report_.has_reversed = true;
@@ -154,7 +154,7 @@ class Evaluation {
 
   void Add(const ChangePairFiles& files) {
     const ChangePair pair = LoadChangePair(files);
-    if (ChangedShare(pair.truth) < options_.least_changed) {
+    if (ChangedShare(pair.truth) < options_.min_changed) {
       ++report_.hardly_changed;
       return;
     }
@@ -187,10 +187,10 @@ class Evaluation {
     for (const cv::Mat& of_class : measured.of_class) {
       probabilities.of_class.push_back(of_class.clone());
     }
-    SayNothingOfUnseen(aligned_.valid, probabilities);
+    MaskUnobserved(aligned_.valid, probabilities);
     if (!report_.directions) report_.directions.emplace();
     CountDirections(FindChangeRegions(probabilities, before, aligned_.after, regions_),
-                    ChangedClasses(probabilities, regions_.least_confidence), pair.direction,
+                    ChangedClasses(probabilities, regions_.min_confidence), pair.direction,
                     *report_.directions);
   }
 
@@ -226,13 +226,13 @@ class Evaluation {
   Registration Register(const ChangePair& pair) const {
     Registration by_edges;
     if (options_.registration != "homography") {
-      by_edges = RegisterByEdges(pair.before, pair.after, RegistrationOptions());
+      by_edges = RegisterByEdges(pair.before, pair.after, RegistrationConfig());
       if (by_edges.accepted() || options_.registration == "edges") return by_edges;
     }
     const FeaturedView before{pair.before.size(), ExtractFeatures(pair.before)};
     const FeaturedView after{pair.after.size(), ExtractFeatures(pair.after)};
     Registration by_features =
-        RegisterByHomography(before, after, RegistrationOptions(), options_.seed);
+        RegisterByHomography(before, after, RegistrationConfig(), options_.seed);
     if (!by_features.accepted() && !by_edges.why.empty()) {
       by_features.why = by_edges.why + "; " + by_features.why;
     }
@@ -260,7 +260,7 @@ class Evaluation {
 
   const Options& options_;
   std::unique_ptr<ChangeMethod> method_;
-  ChangeRegionOptions regions_;
+  ChangeRegionConfig regions_;
   AlignedPair aligned_;      ///< Of the pair that was added last.
   bool registered_ = false;  ///< It was not refused.
   std::vector<double> method_ms_;
@@ -293,7 +293,7 @@ int Run(int argc, char** argv) {
   }
   if (report.forward.community.pairs().empty()) {
     throw Error("none of " + std::to_string(pairs.size()) + " pairs has changed by the share of " +
-                std::to_string(options->least_changed) + " that --least-changed accepts");
+                std::to_string(options->min_changed) + " that --least-changed accepts");
   }
   if (!options->write.empty()) WriteOrigin(options->write, report.method, report.directories);
   std::cout << (options->json ? ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"

@@ -17,7 +17,7 @@ struct Options {
   std::string estimate_path;
   bool json = false;
   double kitti_rate_hz = 10;
-  TrajectoryOptions evaluation;
+  TrajectoryConfig evaluation;
 };
 
 AlignmentKind ChosenAlignment(const CommandLine& line) {
@@ -63,7 +63,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.estimate_path = line.Positional(1);
   options.json = line.Has("json");
   options.kitti_rate_hz = line.Number("rate", options.kitti_rate_hz, 0.01, 10000);
-  AssociationOptions& association = options.evaluation.association;
+  AssociationConfig& association = options.evaluation.association;
   association.max_difference_s =
       line.Number("max-difference", association.max_difference_s, 1e-6, 1000);
   association.offset_s = line.Number("offset", 0, -4e9, 4e9);

@@ -89,7 +89,7 @@ int Run(int argc, char** argv) {
   const double seconds = style.seconds;
   const double rate_hz = line.Number("rate", 10, 0.1, 100);
   SimulationSetup setup = ReadSimulationSetup(line);
-  RenderOptions options;
+  RenderConfig options;
   options.threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   options.smooth_edges = !line.Has("one-ray");
   const WorldDescription world = ReadSimulatedWorld(line, setup);

@@ -39,7 +39,7 @@ struct ChangeRun {
   double length_m = 0;  ///< Of the road that both passes may need.
   WorldDescription world;
   SimulationSetup setup;
-  RenderOptions options;
+  RenderConfig options;
   std::string preview;
 };
 
@@ -60,9 +60,9 @@ ChangeRun ReadRun(const CommandLine& line) {
   run.seconds = line.Number("seconds", 20, 0.1, 7200);
   run.pairs =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(run.seconds * run.rate_hz)));
-  if (run.pairs > ChangeDatasetWriter::kMostPairs) {
+  if (run.pairs > ChangeDatasetWriter::kMaxPairs) {
     throw Error("--seconds times --rate is " + std::to_string(run.pairs) +
-                " pairs, accepted are up to " + std::to_string(ChangeDatasetWriter::kMostPairs));
+                " pairs, accepted are up to " + std::to_string(ChangeDatasetWriter::kMaxPairs));
   }
   run.length_m = run.seconds * run.speed_mps * 1.4 + 320;
   run.setup = ReadSimulationSetup(line);

@@ -16,7 +16,7 @@
 namespace livemap {
 
 /// What a person may decide about a simulated drive's bag.
-struct SimulationBagOptions {
+struct SimulationBagConfig {
   ReceiverNoise noise;
   double fix_rate_hz = 10;
   double multipath_m = 2;  ///< See Multipath; 0: none.
@@ -30,7 +30,7 @@ struct SimulationBagOptions {
 class SimulationBag {
  public:
   struct Setup {
-    SimulationBagOptions options;
+    SimulationBagConfig options;
     CameraFile camera;
     double baseline_m = 0;  ///< Of the second eye to the right; 0: none.
     GeoPoint datum;         ///< Of the world's origin.

@@ -24,13 +24,13 @@ std::vector<Flag> SimulationBagFlags() {
   };
 }
 
-SimulationBagOptions ReadBagOptions(const CommandLine& line) {
+SimulationBagConfig ReadBagOptions(const CommandLine& line) {
   for (const Flag& flag : SimulationBagFlags()) {
     if (line.Has(flag.name) && !line.Has("bag")) {
       throw Error("--" + flag.name + " needs --bag, which writes what it makes");
     }
   }
-  SimulationBagOptions options;
+  SimulationBagConfig options;
   options.depth = line.Has("bag-depth");
   options.jpeg_quality =
       static_cast<int>(line.Number("jpeg-quality", options.jpeg_quality, 1, 100));

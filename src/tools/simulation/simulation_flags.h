@@ -12,7 +12,7 @@ namespace livemap {
 /// The flags that ReadBagOptions reads; all but --bag itself need --bag.
 std::vector<Flag> SimulationBagFlags();
 /// Throws Error naming the flag.
-SimulationBagOptions ReadBagOptions(const CommandLine& line);
+SimulationBagConfig ReadBagOptions(const CommandLine& line);
 
 /// The world that --world and --route describe. A route's first point becomes `setup.datum`. Throws
 /// what the readers throw, and Error when --start is given beside --route.

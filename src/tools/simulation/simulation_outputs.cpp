@@ -13,7 +13,7 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostPreviews = 12;
+constexpr std::size_t kMaxPreviews = 12;
 constexpr double kPreviewWidth = 480;
 /// Of depth as a stereo camera gives it, when the drive has no second eye.
 constexpr double kDefaultBaselineM = 0.25;
@@ -115,7 +115,7 @@ void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
   if (yolo_) yolo_->Add(along_m, frame, hazards);
   along_m_ = along_m;
   // Evenly over the whole drive.
-  const std::size_t moment = index * kMostPreviews / frames_;
+  const std::size_t moment = index * kMaxPreviews / frames_;
   if (moment >= preview_moments_) {
     preview_moments_ = moment + 1;
     AddToSheets(frame, hazards);

@@ -80,9 +80,9 @@ MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, s
   try {
     Open();
   } catch (const StoreError& error) {
-    if (!TellsCorruption(error)) throw;
+    if (!IsCorruption(error)) throw;
     database_.reset();
-    set_aside_ = SetAsideDatabase(config_.path, now_ns);
+    set_aside_ = QuarantineDatabase(config_.path, now_ns);
     Open();
   }
   Load(steady_s);

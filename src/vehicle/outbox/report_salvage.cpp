@@ -116,7 +116,7 @@ Salvage ReadRows(SqliteDatabase& database, const std::function<void(const Stored
     } catch (const StoreError&) {
     }
     if (stored && IsSound(stored->report)) {
-      DropBrokenPicture(stored->report);
+      DropInvalidPicture(stored->report);
       accept(*stored);
       ++salvage.reports;
     } else if (row <= rows.last_listed) {

@@ -83,7 +83,7 @@ bool IsSound(const Report& report) {
          report.class_name.size() <= kMaxClassNameBytes && report.drive_id.size() <= kMaxIdBytes;
 }
 
-void DropBrokenPicture(Report& report) {
+void DropInvalidPicture(Report& report) {
   const std::uint8_t* data = report.image.data();
   const auto header = ReadImageHeader(data, report.image.size());
   if (header && HasImageEnd(data, report.image.size(), header->format)) return;
@@ -91,8 +91,8 @@ void DropBrokenPicture(Report& report) {
   report.image_format.clear();
 }
 
-BrokenRows MendRows(SqliteDatabase& database) {
-  BrokenRows broken;
+InvalidRows RepairTables(SqliteDatabase& database) {
+  InvalidRows broken;
   database.Transaction([&] {
     broken.known = TakeOut(database, "known", kBrokenKnown) +
                    TakeOut(database, "gone", kBrokenGone) + MendZone(database);

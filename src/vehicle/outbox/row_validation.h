@@ -21,10 +21,10 @@ bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2);
 /// else wrote, must not become one: the zone would refuse it, or never answer.
 bool IsSound(const Report& report);
 /// A report counts without its picture; a broken picture would have it refused for good.
-void DropBrokenPicture(Report& report);
+void DropInvalidPicture(Report& report);
 
 /// What was found in a sound store that the program cannot have written.
-struct BrokenRows {
+struct InvalidRows {
   std::size_t known = 0;      ///< Of what the zone told, taken out: the zone tells it again.
   std::size_t reports = 0;    ///< Unfinished reports, left where they are and never sent.
   std::set<Uuid> unsendable;  ///< Those of them that have a uuid.
@@ -34,7 +34,7 @@ struct BrokenRows {
 
 /// Looks through the tables of a LocalHazardMap and takes out of those that the zone's next telling
 /// fills again what the program cannot have written. Throws StoreError.
-BrokenRows MendRows(SqliteDatabase& database);
+InvalidRows RepairTables(SqliteDatabase& database);
 
 /// SQL's condition for a row of `pending` whose values have types and sizes that can be fetched.
 extern const char* const kFetchableReport;

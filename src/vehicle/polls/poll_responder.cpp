@@ -13,13 +13,13 @@ constexpr std::size_t kMaxAnsweredKept = 1000;
 constexpr std::size_t kMaxPollFrames = 50;
 constexpr std::size_t kMaxPollPictures = 24;  // Full images: about a second of them.
 constexpr int kLuminanceGridPx = 64;
-constexpr double kLeastPlacePx = 32;
+constexpr double kMinPlacePx = 32;
 
 /// Where a place lies in an image: two standard deviations around its pixel.
-Box BoxOf(const PlaceView& view) {
+Box BoxOf(const ProjectedPlace& view) {
   const auto half = [&view](int axis) {
     return static_cast<float>(
-        std::max(kLeastPlacePx / 2, 2 * std::sqrt(view.covariance_px2(axis, axis))));
+        std::max(kMinPlacePx / 2, 2 * std::sqrt(view.covariance_px2(axis, axis))));
   };
   const auto u = static_cast<float>(view.pixel.x());
   const auto v = static_cast<float>(view.pixel.y());
@@ -168,7 +168,7 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
 /// One image's word on one poll.
 void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const PlacedCamera& camera,
                          double steady_s, const Vehicle& vehicle) {
-  const PlaceView view = ViewPlace(open.poll.position, open.poll.covariance_m2, camera,
+  const ProjectedPlace view = ProjectPlace(open.poll.position, open.poll.covariance_m2, camera,
                                    config_.projection, config_.margin_share);
   if (const Sighting* match = Match(open, frame, view, camera)) {
     open.matched_s = steady_s;
@@ -191,7 +191,7 @@ void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const Place
 
 /// A match counts wherever the detector sees it, also beyond the range of a no.
 const Sighting* PollResponder::Match(const OpenPoll& open, const SightingFrame& frame,
-                                     const PlaceView& view, const PlacedCamera& camera) const {
+                                     const ProjectedPlace& view, const PlacedCamera& camera) const {
   const double radius_m = catalogue_.DuplicateRadiusM(open.poll.class_name);
   const Sighting* best = nullptr;
   for (const Sighting& sighting : frame.sightings) {
@@ -206,12 +206,12 @@ const Sighting* PollResponder::Match(const OpenPoll& open, const SightingFrame& 
   return best;
 }
 
-std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(const PlaceView& view,
+std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(const ProjectedPlace& view,
                                                                  const SightingFrame& frame,
                                                                  const Vehicle& vehicle) const {
-  if (view.visibility == PlaceView::Visibility::kBehind) return Trouble::kOutside;
+  if (view.visibility == ProjectedPlace::Visibility::kBehind) return Trouble::kOutside;
   if (view.distance_m > config_.max_range_m) return Trouble::kTooFar;
-  if (view.visibility == PlaceView::Visibility::kOutside) return Trouble::kOutside;
+  if (view.visibility == ProjectedPlace::Visibility::kOutside) return Trouble::kOutside;
   const auto luminance = luminances_.find(frame.stamp_ns);
   if (luminance != luminances_.end() && luminance->second < config_.dark_luminance) {
     return Trouble::kDark;
@@ -222,7 +222,7 @@ std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(const PlaceView
   return std::nullopt;
 }
 
-void PollResponder::CountView(OpenPoll& open, const SightingFrame& frame, const PlaceView& view,
+void PollResponder::CountView(OpenPoll& open, const SightingFrame& frame, const ProjectedPlace& view,
                               const TrackPose& base) {
   if (open.last_view &&
       GeodesicDistanceM(*open.last_view, base.position) < config_.view_spacing_m) {

@@ -142,11 +142,11 @@ class PollResponder {
   bool Work(WaitingFrame& waiting, double now_s, double steady_s, const Vehicle& vehicle);
   void Look(OpenPoll& open, const SightingFrame& frame, const PlacedCamera& camera, double steady_s,
             const Vehicle& vehicle);
-  std::optional<Trouble> WhyNotClear(const PlaceView& view, const SightingFrame& frame,
+  std::optional<Trouble> WhyNotClear(const ProjectedPlace& view, const SightingFrame& frame,
                                      const Vehicle& vehicle) const;
-  const Sighting* Match(const OpenPoll& open, const SightingFrame& frame, const PlaceView& view,
+  const Sighting* Match(const OpenPoll& open, const SightingFrame& frame, const ProjectedPlace& view,
                         const PlacedCamera& camera) const;
-  void CountView(OpenPoll& open, const SightingFrame& frame, const PlaceView& view,
+  void CountView(OpenPoll& open, const SightingFrame& frame, const ProjectedPlace& view,
                  const TrackPose& base);
   bool IsReady(OpenPoll& open, double steady_s);
   /// Whether views and changes make a no.

@@ -6,10 +6,10 @@
 
 namespace livemap {
 
-BasePoseSource::BasePoseSource(const Config& config)
+VehiclePoseLookup::VehiclePoseLookup(const Config& config)
     : config_(config), fixes_(config.fixes), poses_(config.poses) {}
 
-BasePoseSource::Lookup BasePoseSource::At(std::int64_t stamp_ns, double waited_s) const {
+VehiclePoseLookup::Lookup VehiclePoseLookup::At(std::int64_t stamp_ns, double waited_s) const {
   if (config_.use_fused) {
     const FixTrack::Lookup fused = poses_.At(stamp_ns);
     if (fused.answer == FixTrack::Answer::kReady) return {Answer::kReady, fused.pose, true};
@@ -31,7 +31,7 @@ BasePoseSource::Lookup BasePoseSource::At(std::int64_t stamp_ns, double waited_s
   return {Answer::kHopeless, {}, false};
 }
 
-TrackPose BasePoseSource::BaseOf(const TrackPose& antenna) const {
+TrackPose VehiclePoseLookup::BaseOf(const TrackPose& antenna) const {
   const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
   const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
   const PlacedHazard placed = PlaceHazard(antenna, antenna_m, origin);

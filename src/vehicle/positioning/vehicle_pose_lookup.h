@@ -10,7 +10,7 @@ namespace livemap {
 /// Where base_link was at the moment of an image, by the tracks that HazardReporter uses and with
 /// its patience: the fused pose, else the fixes, which are carried on only when none comes after
 /// the image. Not thread-safe.
-class BasePoseSource {
+class VehiclePoseLookup {
  public:
   struct Config {
     bool use_fused = false;       ///< Fused poses count; the fixes where those do not come.
@@ -35,7 +35,7 @@ class BasePoseSource {
     bool fused = false;  ///< Valid for kReady.
   };
 
-  explicit BasePoseSource(const Config& config);
+  explicit VehiclePoseLookup(const Config& config);
 
   FixTrack::Verdict AddFix(const Fix& fix) { return fixes_.Add(fix); }
   /// A fused pose of base_link; false when it is refused.

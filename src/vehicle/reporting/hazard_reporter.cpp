@@ -150,24 +150,24 @@ void HazardReporter::Process(double now_s, double steady_s) {
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
   // All of them, so that none waits for its picture only after the one before it has waited.
   for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
-    if (IsPlaced(*waiting, now_s) && HasNews(*waiting) && !IsForetold(waiting)) {
+    if (IsPlaced(*waiting, now_s) && HasUnknownHazard(*waiting) && !IsCoveredByEarlierFrame(waiting)) {
       AskForPicture(*waiting, now_s);
     }
   }
 }
 
 /// Whether the frames before it will have reported all that it shows.
-bool HazardReporter::IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const {
-  const auto is_same = [this](const Candidate& one, const Candidate& other) {
+bool HazardReporter::IsCoveredByEarlierFrame(std::deque<WaitingFrame>::const_iterator waiting) const {
+  const auto is_same = [this](const PlacedSighting& one, const PlacedSighting& other) {
     const std::string& name = one.sighting.class_name;
     return name == other.sighting.class_name &&
            GeodesicDistanceM(one.place.position, other.place.position) <=
                catalogue_.Get(name).duplicate_radius_m;
   };
-  const auto will_be_known = [&](const Candidate& candidate) {
+  const auto will_be_known = [&](const PlacedSighting& candidate) {
     return std::any_of(waiting_.begin(), waiting, [&](const WaitingFrame& earlier) {
       return std::any_of(earlier.candidates.begin(), earlier.candidates.end(),
-                         [&](const Candidate& other) { return is_same(candidate, other); });
+                         [&](const PlacedSighting& other) { return is_same(candidate, other); });
     });
   };
   return std::all_of(waiting->candidates.begin(), waiting->candidates.end(), will_be_known);
@@ -179,9 +179,9 @@ bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {
   return waiting.placed || Place(waiting, now_s - waiting.arrival_s);
 }
 
-bool HazardReporter::HasNews(const WaitingFrame& waiting) const {
+bool HazardReporter::HasUnknownHazard(const WaitingFrame& waiting) const {
   return std::any_of(waiting.candidates.begin(), waiting.candidates.end(),
-                     [this](const Candidate& candidate) {
+                     [this](const PlacedSighting& candidate) {
                        return !map_.Find(candidate.sighting.class_name, candidate.place.position);
                      });
 }
@@ -189,7 +189,7 @@ bool HazardReporter::HasNews(const WaitingFrame& waiting) const {
 /// True when the frame is done, whatever became of it.
 bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_s) {
   if (!IsPlaced(waiting, now_s)) return false;
-  if (HasNews(waiting) && WaitsForPicture(waiting, now_s)) return false;
+  if (HasUnknownHazard(waiting) && WaitsForPicture(waiting, now_s)) return false;
   ReportCandidates(waiting, steady_s);
   return true;
 }
@@ -200,14 +200,14 @@ void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
   waiting.asked_s = config_.pictures_on_demand ? now_s : waiting.arrival_s;
   ++counters_.pictures_requested;
   if (!config_.pictures_on_demand) return;
-  waiting.wanted = ShownIn(waiting);
+  waiting.wanted = VisibleRegion(waiting);
   picture_requests_.push_back({waiting.frame.stamp_ns, waiting.wanted});
 }
 
 /// What the pictures of its reports may show of the image.
-PixelRegion HazardReporter::ShownIn(const WaitingFrame& waiting) const {
+PixelRegion HazardReporter::VisibleRegion(const WaitingFrame& waiting) const {
   std::optional<PixelRegion> shown;
-  for (const Candidate& candidate : waiting.candidates) {
+  for (const PlacedSighting& candidate : waiting.candidates) {
     const PixelRegion crop =
         WidestCrop(candidate.sighting.box, static_cast<int>(waiting.frame.image_width),
                    static_cast<int>(waiting.frame.image_height), config_.picture);
@@ -224,7 +224,7 @@ bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
   return now_s - *waiting.asked_s < config_.picture_wait_s;
 }
 
-std::vector<PictureWish> HazardReporter::TakePictureRequests() {
+std::vector<PictureRequirements> HazardReporter::TakePictureRequests() {
   return std::exchange(picture_requests_, {});
 }
 
@@ -284,7 +284,7 @@ std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& fram
   const auto depth = depths_.find(frame.stamp_ns);
   if (config_.use_depth && depth != depths_.end()) {
     ground =
-        FootByDepth(depth->second, box, *intrinsics_, mounting, config_.projection, config_.depth);
+        ContactByDepth(depth->second, box, *intrinsics_, mounting, config_.projection, config_.depth);
     if (ground) ++counters_.distances_by_depth;
   }
   if (!ground && IsCutBySide(box, intrinsics_->width)) {
@@ -292,7 +292,7 @@ std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& fram
     return std::nullopt;
   }
   if (!ground) {
-    ground = ProjectToGround(FootPixel(box), *intrinsics_, mounting, config_.projection);
+    ground = ProjectToGround(ContactPixel(box), *intrinsics_, mounting, config_.projection);
   }
   if (!ground) {
     ++counters_.not_on_ground;

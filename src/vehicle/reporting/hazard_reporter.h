@@ -148,9 +148,9 @@ class HazardReporter {
   /// `part` is what of the image it shows clearly.
   void AddPicture(std::int64_t stamp_ns, const Picture& picture, const PixelRegion& part = {});
   /// Whether there is anyone to give pictures, as there is at first; else no frame waits for one.
-  void ExpectPictures(bool expected) { expects_pictures_ = expected; }
+  void SetPictureSourceAvailable(bool expected) { expects_pictures_ = expected; }
   /// The images whose pictures are wanted now, each once.
-  std::vector<PictureWish> TakePictureRequests();
+  std::vector<PictureRequirements> TakePictureRequests();
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const Notice& notice);
   void AddReceipt(const Receipt& receipt);
@@ -183,7 +183,7 @@ class HazardReporter {
   const std::string& store_error() const { return store_error_; }
 
  private:
-  struct Candidate {
+  struct PlacedSighting {
     Sighting sighting;
     PlacedHazard place;
   };
@@ -194,16 +194,16 @@ class HazardReporter {
     bool placed = false;
     std::optional<double> asked_s;      // When its picture began to be missed...
     PixelRegion wanted;                 // ...and what of it.
-    std::vector<Candidate> candidates;  // Once placed.
+    std::vector<PlacedSighting> candidates;  // Once placed.
     Picture picture;
   };
 
   bool IsUsable(const Sighting& sighting);
   bool IsPlaced(WaitingFrame& waiting, double now_s);
-  bool HasNews(const WaitingFrame& waiting) const;
-  bool IsForetold(std::deque<WaitingFrame>::const_iterator waiting) const;
+  bool HasUnknownHazard(const WaitingFrame& waiting) const;
+  bool IsCoveredByEarlierFrame(std::deque<WaitingFrame>::const_iterator waiting) const;
   void AskForPicture(WaitingFrame& waiting, double now_s);
-  PixelRegion ShownIn(const WaitingFrame& waiting) const;
+  PixelRegion VisibleRegion(const WaitingFrame& waiting) const;
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
   bool FitsCamera(const SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
@@ -214,7 +214,7 @@ class HazardReporter {
                                          double heading_variance_rad2);
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);
-  Report MakeReport(const WaitingFrame& waiting, const Candidate& candidate);
+  Report MakeReport(const WaitingFrame& waiting, const PlacedSighting& candidate);
   void AttachPicture(const WaitingFrame& waiting, Report& report);
   double HoldS(int urgency) const;
   bool IsCheap(double steady_s) const;
@@ -235,7 +235,7 @@ class HazardReporter {
   std::deque<WaitingFrame> waiting_;
   std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
   std::map<std::int64_t, DepthImage> depths_;       // By stamp.
-  std::vector<PictureWish> picture_requests_;
+  std::vector<PictureRequirements> picture_requests_;
   bool expects_pictures_ = true;
   LinkCost link_ = LinkCost::kUnknown;
   bool held_at_start_ = false;

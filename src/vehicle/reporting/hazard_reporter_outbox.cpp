@@ -72,7 +72,7 @@ std::int64_t HazardReporter::UtcNs(double steady_s) const {
   return start_ns_ + Nanoseconds(steady_s - start_steady_s_);
 }
 
-Report HazardReporter::MakeReport(const WaitingFrame& waiting, const Candidate& candidate) {
+Report HazardReporter::MakeReport(const WaitingFrame& waiting, const PlacedSighting& candidate) {
   Report report;
   report.uuid = Uuid::Random(random_);
   report.drive_id = config_.drive_id;
@@ -103,7 +103,7 @@ void HazardReporter::AttachPicture(const WaitingFrame& waiting, Report& report) 
 }
 
 void HazardReporter::ReportCandidates(const WaitingFrame& waiting, double steady_s) {
-  for (const Candidate& candidate : waiting.candidates) {
+  for (const PlacedSighting& candidate : waiting.candidates) {
     if (map_.Find(candidate.sighting.class_name, candidate.place.position)) {
       ++counters_.duplicates_suppressed;
       continue;

@@ -39,9 +39,9 @@ LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& cata
   try {
     Open();
   } catch (const StoreError& error) {
-    if (!TellsCorruption(error)) throw;
+    if (!IsCorruption(error)) throw;
     database_.reset();
-    set_aside_ = SetAsideDatabase(config_.path, now_ns);
+    set_aside_ = QuarantineDatabase(config_.path, now_ns);
     Open();
     RecoverFromSetAside();
   }
@@ -51,7 +51,7 @@ void LocalHazardMap::Open() {
   database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
   database_->CheckPages();
   database_->Migrate(Migrations());
-  broken_rows_ = MendRows(*database_);
+  broken_rows_ = RepairTables(*database_);
   LoadFilter();
 }
 
@@ -77,7 +77,7 @@ void LocalHazardMap::LoadFilter() {
     filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), {rows.Real(2), rows.Real(3)});
   }
   SqliteStatement zone = database_->Prepare("SELECT map_sequence FROM zone");
-  if (zone.Step()) chain_ = AnnouncementChain(static_cast<std::uint64_t>(zone.Int(0)));
+  if (zone.Step()) chain_ = NoticeSequenceTracker(static_cast<std::uint64_t>(zone.Int(0)));
   CountPending();
 }
 

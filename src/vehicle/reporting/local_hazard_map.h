@@ -73,7 +73,7 @@ class LocalHazardMap {
   /// What became of the reports in it.
   const Salvage& salvage() const { return salvage_; }
   /// What was found that the program cannot have written.
-  const BrokenRows& broken_rows() const { return broken_rows_; }
+  const InvalidRows& broken_rows() const { return broken_rows_; }
 
   /// The known hazard that a sighting duplicates.
   std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
@@ -130,7 +130,7 @@ class LocalHazardMap {
   void InsertKnown(const Report& report);
   bool IsNews(const Notice& notice) const;
   void StoreNotice(const Notice& notice);
-  bool CatchUp(const Notice& notice, const std::set<Uuid>& told, AnnouncementChain& chain,
+  bool CatchUp(const Notice& notice, const std::set<Uuid>& told, NoticeSequenceTracker& chain,
                std::vector<Change>& changes);
   std::vector<Uuid> NotTold(const Notice& notice, const std::set<Uuid>& told) const;
   void Forget(const Uuid& id, std::vector<Change>& changes);
@@ -141,10 +141,10 @@ class LocalHazardMap {
   HazardCatalogue catalogue_;
   std::string set_aside_;
   Salvage salvage_;
-  BrokenRows broken_rows_;
+  InvalidRows broken_rows_;
   std::unique_ptr<SqliteDatabase> database_;
   DuplicateFilter filter_;
-  AnnouncementChain chain_;
+  NoticeSequenceTracker chain_;
   std::set<Uuid> told_;  // To this vehicle alone, since the last kCaughtUp.
   std::size_t pending_count_ = 0;
   std::size_t pending_bytes_ = 0;

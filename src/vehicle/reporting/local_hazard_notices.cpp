@@ -28,7 +28,7 @@ bool IsUsable(const Notice& notice) {
 
 std::size_t LocalHazardMap::Apply(const std::vector<Notice>& notices) {
   std::vector<Change> changes;
-  AnnouncementChain chain = chain_;
+  NoticeSequenceTracker chain = chain_;
   std::set<Uuid> told = told_;
   std::size_t unusable = 0;
   database_->Transaction([&] {
@@ -68,7 +68,7 @@ std::size_t LocalHazardMap::Apply(const std::vector<Notice>& notices) {
 /// Takes away what the zone no longer has and closes the gap; false when some of what belongs to
 /// this kCaughtUp did not come: then the gap stays open, and the zone tells again.
 bool LocalHazardMap::CatchUp(const Notice& notice, const std::set<Uuid>& told,
-                             AnnouncementChain& chain, std::vector<Change>& changes) {
+                             NoticeSequenceTracker& chain, std::vector<Change>& changes) {
   const bool began_anew = notice.previous_sequence > notice.sequence;
   if (told.size() < notice.told) return false;
   if (notice.previous_sequence > chain.known() && !began_anew) return false;
@@ -76,7 +76,7 @@ bool LocalHazardMap::CatchUp(const Notice& notice, const std::set<Uuid>& told,
     for (const Uuid& id : NotTold(notice, told)) Forget(id, changes);
   }
   if (began_anew) {
-    chain = AnnouncementChain(notice.sequence);
+    chain = NoticeSequenceTracker(notice.sequence);
   } else {
     chain.CloseTo(notice.sequence);
   }

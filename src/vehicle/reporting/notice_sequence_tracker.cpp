@@ -4,7 +4,7 @@
 
 namespace livemap {
 
-bool AnnouncementChain::Add(std::uint64_t previous, std::uint64_t sequence) {
+bool NoticeSequenceTracker::Add(std::uint64_t previous, std::uint64_t sequence) {
   if (previous <= known_) {
     CloseTo(sequence);
     return true;
@@ -15,7 +15,7 @@ bool AnnouncementChain::Add(std::uint64_t previous, std::uint64_t sequence) {
   return false;
 }
 
-void AnnouncementChain::CloseTo(std::uint64_t sequence) {
+void NoticeSequenceTracker::CloseTo(std::uint64_t sequence) {
   known_ = std::max(known_, sequence);
   while (!ahead_.empty() && ahead_.begin()->first <= known_) {
     known_ = std::max(known_, ahead_.begin()->second);

@@ -9,9 +9,9 @@ namespace livemap {
 /// Up to which of the zone's announcements a vehicle knows all. Every announcement names the one
 /// before it: when that is not known, something was missed, and those that came ahead wait until
 /// the gap is closed. Not thread-safe.
-class AnnouncementChain {
+class NoticeSequenceTracker {
  public:
-  explicit AnnouncementChain(std::uint64_t known = 0) : known_(known) {}
+  explicit NoticeSequenceTracker(std::uint64_t known = 0) : known_(known) {}
 
   /// An announcement came, `previous` is the one before it. False when there is a gap before it.
   bool Add(std::uint64_t previous, std::uint64_t sequence);

@@ -15,15 +15,15 @@ constexpr double kSetBackS = 1.0;
 
 }  // namespace
 
-CandidateSender::CandidateSender(const Config& config)
+OffloadSender::OffloadSender(const Config& config)
     : config_(config), pose_(config.pose), budget_bytes_(config.max_bytes_per_s * config.burst_s) {}
 
-void CandidateSender::SetMounting(const std::string& frame_id,
+void OffloadSender::SetMounting(const std::string& frame_id,
                                   const Eigen::Isometry3d& base_from_optical) {
   mountings_[frame_id] = base_from_optical;
 }
 
-bool CandidateSender::Takes(std::int64_t stamp_ns) {
+bool OffloadSender::Takes(std::int64_t stamp_ns) {
   ++counters_.frames;
   if (newest_ns_ && Seconds(*newest_ns_ - stamp_ns) > kSetBackS) due_ns_.reset();
   newest_ns_ = stamp_ns;
@@ -39,7 +39,7 @@ bool CandidateSender::Takes(std::int64_t stamp_ns) {
   return true;
 }
 
-void CandidateSender::AddJudged(std::int64_t stamp_ns, const std::string& frame_id, float score,
+void OffloadSender::AddJudged(std::int64_t stamp_ns, const std::string& frame_id, float score,
                                 bool is_candidate, const Picture& picture, double now_s) {
   if (!is_candidate) {
     ++counters_.discarded;
@@ -53,20 +53,20 @@ void CandidateSender::AddJudged(std::int64_t stamp_ns, const std::string& frame_
   }
 }
 
-std::vector<Candidate> CandidateSender::TakeReady(double now_s, const Encode& encode) {
-  std::vector<Candidate> ready;
+std::vector<OffloadedFrame> OffloadSender::TakeReady(double now_s, const Encode& encode) {
+  std::vector<OffloadedFrame> ready;
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, encode, ready)) waiting_.pop_front();
   return ready;
 }
 
-bool CandidateSender::FitsCamera(const Waiting& waiting) const {
+bool OffloadSender::FitsCamera(const Waiting& waiting) const {
   return intrinsics_ && HasMounting(waiting.frame_id) &&
          intrinsics_->width == waiting.picture.bgr.cols &&
          intrinsics_->height == waiting.picture.bgr.rows;
 }
 
-bool CandidateSender::Advance(Waiting& waiting, double now_s, const Encode& encode,
-                              std::vector<Candidate>& ready) {
+bool OffloadSender::Advance(Waiting& waiting, double now_s, const Encode& encode,
+                              std::vector<OffloadedFrame>& ready) {
   // A clock that was set back must not make a frame wait for ever.
   waiting.arrival_s = std::min(waiting.arrival_s, now_s);
   const double waited_s = now_s - waiting.arrival_s;
@@ -75,9 +75,9 @@ bool CandidateSender::Advance(Waiting& waiting, double now_s, const Encode& enco
     ++counters_.no_camera;
     return true;
   }
-  const BasePoseSource::Lookup lookup = pose_.At(waiting.stamp_ns, waited_s);
-  if (lookup.answer == BasePoseSource::Answer::kWait) return false;
-  if (lookup.answer == BasePoseSource::Answer::kHopeless) {
+  const VehiclePoseLookup::Lookup lookup = pose_.At(waiting.stamp_ns, waited_s);
+  if (lookup.answer == VehiclePoseLookup::Answer::kWait) return false;
+  if (lookup.answer == VehiclePoseLookup::Answer::kHopeless) {
     ++counters_.no_pose;
     return true;
   }
@@ -94,8 +94,8 @@ bool CandidateSender::Advance(Waiting& waiting, double now_s, const Encode& enco
   return true;
 }
 
-std::optional<Candidate> CandidateSender::Encoded(const Waiting& waiting,
-                                                  const BasePoseSource::Lookup& lookup,
+std::optional<OffloadedFrame> OffloadSender::Encoded(const Waiting& waiting,
+                                                  const VehiclePoseLookup::Lookup& lookup,
                                                   const Encode& encode) {
   Refill(waiting.stamp_ns);
   if (budget_bytes_ < config_.min_image_bytes) {
@@ -103,7 +103,7 @@ std::optional<Candidate> CandidateSender::Encoded(const Waiting& waiting,
     return std::nullopt;
   }
   const double most = std::min(budget_bytes_, static_cast<double>(config_.max_image_bytes));
-  Candidate frame;
+  OffloadedFrame frame;
   frame.image = encode(waiting.picture, static_cast<std::size_t>(most));
   const auto header = ReadImageHeader(frame.image.data(), frame.image.size());
   if (!header || header->format != ImageHeader::Format::kJpeg) {
@@ -122,7 +122,7 @@ std::optional<Candidate> CandidateSender::Encoded(const Waiting& waiting,
   return frame;
 }
 
-void CandidateSender::Refill(std::int64_t stamp_ns) {
+void OffloadSender::Refill(std::int64_t stamp_ns) {
   const double full = config_.max_bytes_per_s * config_.burst_s;
   const double passed_s = refilled_ns_ ? std::max(0.0, Seconds(stamp_ns - *refilled_ns_)) : 0.0;
   budget_bytes_ = std::min(full, budget_bytes_ + passed_s * config_.max_bytes_per_s);

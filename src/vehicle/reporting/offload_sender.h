@@ -19,7 +19,7 @@ namespace livemap {
 /// The small vehicle's outlet: of the frames that the classifier holds worth sending it sends those
 /// that show another place than the last one sent, each with the pose of its moment, within a
 /// budget of bytes. `now_s` is the clock of the stamps. Not thread-safe.
-class CandidateSender {
+class OffloadSender {
  public:
   struct Config {
     std::string drive_id;
@@ -34,7 +34,7 @@ class CandidateSender {
     /// A frame for which the budget leaves less than this is dropped, bytes.
     int min_image_bytes = 12000;
     int max_waiting_frames = 16;  ///< Frames that wait for their pose; then the oldest goes.
-    BasePoseSource::Config pose;
+    VehiclePoseLookup::Config pose;
   };
 
   /// Since the start. frames = rate_skipped + taken.
@@ -59,7 +59,7 @@ class CandidateSender {
   using Encode =
       std::function<std::vector<std::uint8_t>(const Picture& picture, std::size_t max_bytes)>;
 
-  explicit CandidateSender(const Config& config);
+  explicit OffloadSender(const Config& config);
 
   void SetIntrinsics(const CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
   /// Pose of the camera's optical frame in base_link.
@@ -79,7 +79,7 @@ class CandidateSender {
                  const Picture& picture, double now_s);
 
   /// The frames that can go now, in their order.
-  std::vector<Candidate> TakeReady(double now_s, const Encode& encode);
+  std::vector<OffloadedFrame> TakeReady(double now_s, const Encode& encode);
 
   const Counters& counters() const { return counters_; }
   std::size_t waiting() const { return waiting_.size(); }
@@ -94,14 +94,14 @@ class CandidateSender {
   };
 
   /// True when the frame is done, whatever became of it.
-  bool Advance(Waiting& waiting, double now_s, const Encode& encode, std::vector<Candidate>& ready);
+  bool Advance(Waiting& waiting, double now_s, const Encode& encode, std::vector<OffloadedFrame>& ready);
   bool FitsCamera(const Waiting& waiting) const;
-  std::optional<Candidate> Encoded(const Waiting& waiting, const BasePoseSource::Lookup& lookup,
+  std::optional<OffloadedFrame> Encoded(const Waiting& waiting, const VehiclePoseLookup::Lookup& lookup,
                                    const Encode& encode);
   void Refill(std::int64_t stamp_ns);
 
   Config config_;
-  BasePoseSource pose_;
+  VehiclePoseLookup pose_;
   std::optional<CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<Waiting> waiting_;

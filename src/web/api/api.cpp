@@ -29,13 +29,13 @@ bool EndsWith(std::string_view text, std::string_view end) {
   return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
 }
 
-HttpAnswer PostOnly() {
-  HttpAnswer answer = MakeErrorAnswer(405, "the method is not allowed, accepted is POST");
+HttpResponse PostOnly() {
+  HttpResponse answer = MakeErrorAnswer(405, "the method is not allowed, accepted is POST");
   answer.headers.emplace_back("Allow", "POST");
   return answer;
 }
 
-PictureLimits LimitsOf(const WebOptions& options) {
+PictureLimits LimitsOf(const WebConfig& options) {
   PictureLimits limits;
   limits.longest_side_px = options.picture_side_px;
   return limits;
@@ -47,9 +47,9 @@ HazardAction ActionFor(const Hazard& hazard, const HazardQuery& query) {
 }
 
 /// 304 where the client already has this very content.
-HttpAnswer CacheableAnswer(StaticFile file, const char* cache_control,
-                           const HttpQuestion& question) {
-  HttpAnswer answer;
+HttpResponse CacheableAnswer(StaticFile file, const char* cache_control,
+                           const HttpRequest& question) {
+  HttpResponse answer;
   answer.headers.emplace_back("ETag", file.etag);
   answer.headers.emplace_back("Cache-Control", cache_control);
   answer.content_type = std::move(file.content_type);
@@ -63,7 +63,7 @@ HttpAnswer CacheableAnswer(StaticFile file, const char* cache_control,
 
 }  // namespace
 
-Api::Api(const WebOptions& options, ZoneService& zone, const HazardCatalogue& catalogue,
+Api::Api(const WebConfig& options, ZoneService& zone, const HazardCatalogue& catalogue,
          const VehicleTrails& trails)
     : options_(options),
       zone_(zone),
@@ -76,8 +76,8 @@ Api::Api(const WebOptions& options, ZoneService& zone, const HazardCatalogue& ca
       leaflet_(options.leaflet_root + "/leaflet"),
       page_policy_(PagePolicy(TileSource(options.tile_url))) {}
 
-HttpAnswer Api::Answer(const HttpQuestion& question) {
-  HttpAnswer answer;
+HttpResponse Api::Answer(const HttpRequest& question) {
+  HttpResponse answer;
   try {
     const bool is_read = question.method == "GET" || question.method == "HEAD";
     answer = is_read ? Route(ParseTarget(question.target), question) : AnswerPost(question);
@@ -99,12 +99,12 @@ HttpAnswer Api::Answer(const HttpQuestion& question) {
   return answer;
 }
 
-HttpAnswer Api::ErrorAnswer(int status, const std::string& sentence) const {
+HttpResponse Api::ErrorAnswer(int status, const std::string& sentence) const {
   return MakeErrorAnswer(status, sentence);
 }
 
 /// Any method but GET and HEAD.
-HttpAnswer Api::AnswerPost(const HttpQuestion& question) {
+HttpResponse Api::AnswerPost(const HttpRequest& question) {
   const RequestTarget target = ParseTarget(question.target);
   const auto decision = ParseDecisionTarget(target.path);
   if (decision && question.method == "POST") {
@@ -112,13 +112,13 @@ HttpAnswer Api::AnswerPost(const HttpQuestion& question) {
     return officials_.Decide(*decision, question);
   }
   const char* accepted = decision ? "POST" : "GET, HEAD";
-  HttpAnswer answer =
+  HttpResponse answer =
       ErrorAnswer(405, std::string("the method is not allowed, accepted is ") + accepted);
   answer.headers.emplace_back("Allow", accepted);
   return answer;
 }
 
-HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question) {
+HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question) {
   const std::string& path = target.path;
   if (StartsWith(path, "/api/")) return RouteApi(target);
   if (StartsWith(path, kImagePrefix)) return Picture(path.substr(kImagePrefix.size()), question);
@@ -126,7 +126,7 @@ HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question)
     return JsonAnswer({{"status", "ok"}, {"sequence", zone_.Sequence()}});
   }
   if (path == "/ws") {
-    HttpAnswer answer = ErrorAnswer(426, "this address speaks WebSocket only");
+    HttpResponse answer = ErrorAnswer(426, "this address speaks WebSocket only");
     answer.headers.emplace_back("Upgrade", "websocket");
     return answer;
   }
@@ -137,7 +137,7 @@ HttpAnswer Api::Route(const RequestTarget& target, const HttpQuestion& question)
   return File(page_, std::string_view(path).substr(1), question);
 }
 
-HttpAnswer Api::RouteApi(const RequestTarget& target) const {
+HttpResponse Api::RouteApi(const RequestTarget& target) const {
   const std::string& path = target.path;
   if (path == "/api/v1/hazards") return Hazards(ParseHazardQuery(target));
   if (StartsWith(path, kHazardPrefix) && EndsWith(path, kEventsEnding)) {
@@ -155,7 +155,7 @@ HttpAnswer Api::RouteApi(const RequestTarget& target) const {
   return ErrorAnswer(404, "there is nothing at this address");
 }
 
-HttpAnswer Api::Hazards(const HazardQuery& query) const {
+HttpResponse Api::Hazards(const HazardQuery& query) const {
   // Read before the list: an event that comes between the two is in the list and told again.
   std::uint64_t sequence = zone_.Sequence();
   // Since a sequence all that changed is looked at: what left the selection is told too.
@@ -180,7 +180,7 @@ HttpAnswer Api::Hazards(const HazardQuery& query) const {
   return JsonAnswer(collection, "application/geo+json");
 }
 
-HttpAnswer Api::OneHazard(const std::string& id) const {
+HttpResponse Api::OneHazard(const std::string& id) const {
   const auto uuid = Uuid::Parse(id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   const auto hazard = zone_.Find(*uuid);
@@ -190,7 +190,7 @@ HttpAnswer Api::OneHazard(const std::string& id) const {
   return JsonAnswer(feature, "application/geo+json");
 }
 
-HttpAnswer Api::Events(const std::string& id, std::size_t limit) const {
+HttpResponse Api::Events(const std::string& id, std::size_t limit) const {
   const auto uuid = Uuid::Parse(id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   if (!zone_.Find(*uuid)) return ErrorAnswer(404, "the zone knows no hazard with this id");
@@ -202,7 +202,7 @@ HttpAnswer Api::Events(const std::string& id, std::size_t limit) const {
   return JsonAnswer(answer);
 }
 
-HttpAnswer Api::Vehicles() const {
+HttpResponse Api::Vehicles() const {
   Json features = Json::array();
   for (const VehicleState& vehicle : zone_.Vehicles()) {
     features.push_back(VehicleFeature(vehicle, trails_.Get(vehicle.vehicle_id)));
@@ -213,7 +213,7 @@ HttpAnswer Api::Vehicles() const {
   return JsonAnswer(collection, "application/geo+json");
 }
 
-HttpAnswer Api::PageConfig() const {
+HttpResponse Api::PageConfig() const {
   Json config;
   config["title"] = options_.title;
   config["tile_url"] = options_.tile_url.empty() ? Json(nullptr) : Json(options_.tile_url);
@@ -224,7 +224,7 @@ HttpAnswer Api::PageConfig() const {
 }
 
 /// A vehicle's file itself never leaves the zone.
-HttpAnswer Api::Picture(const std::string& sha256, const HttpQuestion& question) {
+HttpResponse Api::Picture(const std::string& sha256, const HttpRequest& question) {
   const auto path = zone_.ImagePath(sha256);
   const ServedPictures::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
   if (!picture) return ErrorAnswer(404, "the zone has no picture of this name");
@@ -232,15 +232,15 @@ HttpAnswer Api::Picture(const std::string& sha256, const HttpQuestion& question)
   file.content.assign(picture->begin(), picture->end());
   file.content_type = "image/jpeg";
   file.etag = '"' + sha256 + '-' + std::to_string(options_.picture_side_px) + '"';
-  HttpAnswer answer =
+  HttpResponse answer =
       CacheableAnswer(std::move(file), "public, max-age=31536000, immutable", question);
   // Even opened on its own it may do nothing.
   answer.headers.emplace_back("Content-Security-Policy", "default-src 'none'; sandbox");
   return answer;
 }
 
-HttpAnswer Api::File(const StaticFiles& files, std::string_view name,
-                     const HttpQuestion& question) const {
+HttpResponse Api::File(const StaticFiles& files, std::string_view name,
+                     const HttpRequest& question) const {
   auto file = files.Find(name);
   if (!file) return ErrorAnswer(404, "there is nothing at this address");
   return CacheableAnswer(*std::move(file), "no-cache", question);

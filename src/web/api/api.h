@@ -21,28 +21,28 @@ namespace livemap {
 class Api {
  public:
   /// Keeps references to all but `options`. Throws Error when the token file is not accepted.
-  Api(const WebOptions& options, ZoneService& zone, const HazardCatalogue& catalogue,
+  Api(const WebConfig& options, ZoneService& zone, const HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
-  HttpAnswer Answer(const HttpQuestion& question);
+  HttpResponse Answer(const HttpRequest& question);
 
   /// A JSON answer `{"error": sentence}` with the server's security headers.
-  HttpAnswer ErrorAnswer(int status, const std::string& sentence) const;
+  HttpResponse ErrorAnswer(int status, const std::string& sentence) const;
 
  private:
-  HttpAnswer AnswerPost(const HttpQuestion& question);
-  HttpAnswer Route(const RequestTarget& target, const HttpQuestion& question);
-  HttpAnswer RouteApi(const RequestTarget& target) const;
-  HttpAnswer Hazards(const HazardQuery& query) const;
-  HttpAnswer OneHazard(const std::string& id) const;
-  HttpAnswer Events(const std::string& id, std::size_t limit) const;
-  HttpAnswer Vehicles() const;
-  HttpAnswer PageConfig() const;
-  HttpAnswer Picture(const std::string& sha256, const HttpQuestion& question);
-  HttpAnswer File(const StaticFiles& files, std::string_view name,
-                  const HttpQuestion& question) const;
+  HttpResponse AnswerPost(const HttpRequest& question);
+  HttpResponse Route(const RequestTarget& target, const HttpRequest& question);
+  HttpResponse RouteApi(const RequestTarget& target) const;
+  HttpResponse Hazards(const HazardQuery& query) const;
+  HttpResponse OneHazard(const std::string& id) const;
+  HttpResponse Events(const std::string& id, std::size_t limit) const;
+  HttpResponse Vehicles() const;
+  HttpResponse PageConfig() const;
+  HttpResponse Picture(const std::string& sha256, const HttpRequest& question);
+  HttpResponse File(const StaticFiles& files, std::string_view name,
+                  const HttpRequest& question) const;
 
-  const WebOptions options_;
+  const WebConfig options_;
   ZoneService& zone_;
   const HazardCatalogue& catalogue_;
   const VehicleTrails& trails_;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kHistoryEnding = "/events";
 
-HttpAnswer UnknownMapChange() {
+HttpResponse UnknownMapChange() {
   return MakeErrorAnswer(404, "the zone knows no map change with this id");
 }
 
@@ -21,7 +21,7 @@ Uuid ParseMapChangeId(const std::string& id) {
 
 }  // namespace
 
-HttpAnswer MapChangeApi::Answer(const RequestTarget& target) const {
+HttpResponse MapChangeApi::Answer(const RequestTarget& target) const {
   const std::string rest = target.path.substr(std::string_view(kMapChangeAddress).size());
   if (rest.empty()) return List(ParseMapChangeQuery(target));
   if (rest.front() != '/') return MakeErrorAnswer(404, "there is nothing at this address");
@@ -36,7 +36,7 @@ HttpAnswer MapChangeApi::Answer(const RequestTarget& target) const {
   return One(id);
 }
 
-HttpAnswer MapChangeApi::List(const MapChangeQuery& query) const {
+HttpResponse MapChangeApi::List(const MapChangeQuery& query) const {
   // Read before the list: an event that comes between the two is in the list and told again.
   std::uint64_t sequence = zone_.Sequence();
   // Since a sequence all that changed is looked at: what left the selection is told too.
@@ -66,13 +66,13 @@ HttpAnswer MapChangeApi::List(const MapChangeQuery& query) const {
   return JsonAnswer(collection, "application/geo+json");
 }
 
-HttpAnswer MapChangeApi::One(const std::string& id) const {
+HttpResponse MapChangeApi::One(const std::string& id) const {
   const auto feature = zone_.FindMapChange(ParseMapChangeId(id));
   return feature ? JsonAnswer(MapChangeGeoJson(*feature), "application/geo+json")
                  : UnknownMapChange();
 }
 
-HttpAnswer MapChangeApi::Events(const std::string& id, std::size_t limit) const {
+HttpResponse MapChangeApi::Events(const std::string& id, std::size_t limit) const {
   const Uuid uuid = ParseMapChangeId(id);
   if (!zone_.FindMapChange(uuid)) return UnknownMapChange();
   Json events = Json::array();

@@ -19,12 +19,12 @@ class MapChangeApi {
   explicit MapChangeApi(ZoneService& zone) : zone_(zone) {}
 
   /// `target.path` starts with kMapChangeAddress.
-  HttpAnswer Answer(const RequestTarget& target) const;
+  HttpResponse Answer(const RequestTarget& target) const;
 
  private:
-  HttpAnswer List(const MapChangeQuery& query) const;
-  HttpAnswer One(const std::string& id) const;
-  HttpAnswer Events(const std::string& id, std::size_t limit) const;
+  HttpResponse List(const MapChangeQuery& query) const;
+  HttpResponse One(const std::string& id) const;
+  HttpResponse Events(const std::string& id, std::size_t limit) const;
 
   ZoneService& zone_;
 };

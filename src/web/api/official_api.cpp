@@ -22,7 +22,7 @@ bool IsJsonType(const std::string& content_type) {
 
 }  // namespace
 
-OfficialApi::OfficialApi(const WebOptions& options, ZoneService& zone,
+OfficialApi::OfficialApi(const WebConfig& options, ZoneService& zone,
                          const HazardCatalogue& catalogue)
     : options_(options),
       zone_(zone),
@@ -30,28 +30,28 @@ OfficialApi::OfficialApi(const WebOptions& options, ZoneService& zone,
       gate_(options.token_file.empty() ? std::vector<Official>()
                                        : ReadTokenFile(options.token_file)) {}
 
-std::optional<HttpAnswer> OfficialApi::WhyNotAllowed(const HttpQuestion& question,
+std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& question,
                                                      std::string& official) {
   if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
     return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
-  OfficialGate::Answer answer =
+  OfficialAuthenticator::Answer answer =
       gate_.Check(question.authorization, question.client, SteadySeconds());
-  std::optional<HttpAnswer> refusal;
+  std::optional<HttpResponse> refusal;
   switch (answer.verdict) {
-    case OfficialGate::Verdict::kAllowed:
+    case OfficialAuthenticator::Verdict::kAllowed:
       official = std::move(answer.official);
       return std::nullopt;
-    case OfficialGate::Verdict::kClosed:
+    case OfficialAuthenticator::Verdict::kClosed:
       return MakeErrorAnswer(
           403, "nobody may decide anything here: the server was started without a token file");
-    case OfficialGate::Verdict::kNoToken:
+    case OfficialAuthenticator::Verdict::kNoToken:
       refusal = MakeErrorAnswer(401, "a token is needed: Authorization: Bearer TOKEN");
       break;
-    case OfficialGate::Verdict::kWrongToken:
+    case OfficialAuthenticator::Verdict::kWrongToken:
       refusal = MakeErrorAnswer(401, "the token is wrong");
       break;
-    case OfficialGate::Verdict::kTooManyWrong:
+    case OfficialAuthenticator::Verdict::kTooManyWrong:
       refusal = MakeErrorAnswer(
           429, "too many wrong tokens came from your address, try again in a minute");
       refusal->headers.emplace_back("Retry-After", "60");
@@ -61,7 +61,7 @@ std::optional<HttpAnswer> OfficialApi::WhyNotAllowed(const HttpQuestion& questio
   return refusal;
 }
 
-HttpAnswer OfficialApi::Decide(const DecisionTarget& target, const HttpQuestion& question) {
+HttpResponse OfficialApi::Decide(const DecisionTarget& target, const HttpRequest& question) {
   std::string official;
   if (auto refusal = WhyNotAllowed(question, official)) return *std::move(refusal);
   if (!question.body.empty() && !IsJsonType(question.content_type)) {
@@ -75,7 +75,7 @@ HttpAnswer OfficialApi::Decide(const DecisionTarget& target, const HttpQuestion&
   return DecideHazard(target, official, reason);
 }
 
-HttpAnswer OfficialApi::DecideHazard(const DecisionTarget& target, const std::string& official,
+HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::string& official,
                                      const std::string& reason) {
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
@@ -92,7 +92,7 @@ HttpAnswer OfficialApi::DecideHazard(const DecisionTarget& target, const std::st
   return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), "application/geo+json");
 }
 
-HttpAnswer OfficialApi::DecideMapChange(const DecisionTarget& target, const std::string& official,
+HttpResponse OfficialApi::DecideMapChange(const DecisionTarget& target, const std::string& official,
                                         const std::string& body) {
   const MapChangeDecision decision = ParseMapChangeDecision(body);
   const auto uuid = Uuid::Parse(target.id);
@@ -109,7 +109,7 @@ HttpAnswer OfficialApi::DecideMapChange(const DecisionTarget& target, const std:
   return JsonAnswer(MapChangeGeoJson(*zone_.FindMapChange(*uuid)), "application/geo+json");
 }
 
-HttpAnswer OfficialApi::Distrust(const std::string& vehicle, const std::string& official,
+HttpResponse OfficialApi::Distrust(const std::string& vehicle, const std::string& official,
                                  const std::string& reason) {
   const auto withdrawn = zone_.Distrust(vehicle, official, reason);
   if (!withdrawn) return MakeErrorAnswer(404, "the zone has never heard of a vehicle of this name");

@@ -16,26 +16,26 @@ namespace livemap {
 class OfficialApi {
  public:
   /// Keeps references. Reads the token file of the options; throws Error when it is not accepted.
-  OfficialApi(const WebOptions& options, ZoneService& zone, const HazardCatalogue& catalogue);
+  OfficialApi(const WebConfig& options, ZoneService& zone, const HazardCatalogue& catalogue);
 
   /// Whether anybody may decide at all.
   bool is_open() const { return gate_.is_open(); }
   /// Answers a POST to a decision's address.
-  HttpAnswer Decide(const DecisionTarget& target, const HttpQuestion& question);
+  HttpResponse Decide(const DecisionTarget& target, const HttpRequest& question);
 
  private:
-  HttpAnswer DecideHazard(const DecisionTarget& target, const std::string& official,
+  HttpResponse DecideHazard(const DecisionTarget& target, const std::string& official,
                           const std::string& reason);
-  HttpAnswer DecideMapChange(const DecisionTarget& target, const std::string& official,
+  HttpResponse DecideMapChange(const DecisionTarget& target, const std::string& official,
                              const std::string& body);
-  HttpAnswer Distrust(const std::string& vehicle, const std::string& official,
+  HttpResponse Distrust(const std::string& vehicle, const std::string& official,
                       const std::string& reason);
-  std::optional<HttpAnswer> WhyNotAllowed(const HttpQuestion& question, std::string& official);
+  std::optional<HttpResponse> WhyNotAllowed(const HttpRequest& question, std::string& official);
 
-  const WebOptions& options_;
+  const WebConfig& options_;
   ZoneService& zone_;
   const HazardCatalogue& catalogue_;
-  OfficialGate gate_;
+  OfficialAuthenticator gate_;
 };
 
 }  // namespace livemap

@@ -110,7 +110,7 @@ std::vector<Official> ReadTokenFile(const std::string& path) {
   return ParseTokenFile(ReadFile(path, kMaxTokenFileBytes), path);
 }
 
-OfficialGate::Answer OfficialGate::Check(const std::string& authorization,
+OfficialAuthenticator::Answer OfficialAuthenticator::Check(const std::string& authorization,
                                          const std::string& client, double now_s) {
   if (officials_.empty()) return {Verdict::kClosed, ""};
   const std::string token = BearerToken(authorization);
@@ -123,7 +123,7 @@ OfficialGate::Answer OfficialGate::Check(const std::string& authorization,
 }
 
 /// Compares hashes, which tell nothing of how much of a token was right, with every official's.
-std::optional<std::string> OfficialGate::NameOf(const std::string& token) const {
+std::optional<std::string> OfficialAuthenticator::NameOf(const std::string& token) const {
   const std::string hash = Sha256Hex(token);
   const Official* found = nullptr;
   for (const Official& official : officials_) {
@@ -132,15 +132,15 @@ std::optional<std::string> OfficialGate::NameOf(const std::string& token) const 
   return found == nullptr ? std::nullopt : std::optional<std::string>(found->name);
 }
 
-bool OfficialGate::MayTry(const std::string& client, double now_s) {
+bool OfficialAuthenticator::MayTry(const std::string& client, double now_s) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto found = mistakes_.find(client);
   if (found == mistakes_.end()) return true;
   const double healed = (now_s - found->second.at_s) / kSecondsPerWrong;
-  return found->second.wrong - healed <= kMostWrong - 1;
+  return found->second.wrong - healed <= kMaxWrong - 1;
 }
 
-void OfficialGate::CountMistake(const std::string& client, double now_s) {
+void OfficialAuthenticator::CountMistake(const std::string& client, double now_s) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto found = mistakes_.find(client);
   double wrong = 1;

@@ -29,7 +29,7 @@ std::vector<Official> ReadTokenFile(const std::string& path);
 
 /// Lets officials in by the bearer token of their request. Wrong tokens are counted against the
 /// client that sends them: after a few, nothing of it is looked at for a while. Thread-safe.
-class OfficialGate {
+class OfficialAuthenticator {
  public:
   enum class Verdict {
     kAllowed,
@@ -44,10 +44,10 @@ class OfficialGate {
   };
 
   /// A client may be wrong so often at once, and again each time so long has passed.
-  static constexpr int kMostWrong = 10;
+  static constexpr int kMaxWrong = 10;
   static constexpr double kSecondsPerWrong = 30;
 
-  explicit OfficialGate(std::vector<Official> officials) : officials_(std::move(officials)) {}
+  explicit OfficialAuthenticator(std::vector<Official> officials) : officials_(std::move(officials)) {}
 
   bool is_open() const { return !officials_.empty(); }
   /// `authorization` is the header's value, `now_s` a clock that never goes back. Takes the same

@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// What the router needs to know of an HTTP request. Header values are empty where absent.
-struct HttpQuestion {
+struct HttpRequest {
   std::string method;
   std::string target;  ///< As it stands in the request line.
   std::string if_none_match;
@@ -25,7 +25,7 @@ struct HttpQuestion {
 constexpr std::size_t kMaxBodyBytes = 4096;
 
 /// An HTTP answer before it goes onto the wire. The content of an answer to HEAD is dropped there.
-struct HttpAnswer {
+struct HttpResponse {
   int status = 200;
   std::string content_type;
   std::string content;
@@ -33,8 +33,8 @@ struct HttpAnswer {
 };
 
 /// Status 200, not to be cached.
-inline HttpAnswer JsonAnswer(const Json& json, const char* type = "application/json") {
-  HttpAnswer answer;
+inline HttpResponse JsonAnswer(const Json& json, const char* type = "application/json") {
+  HttpResponse answer;
   answer.content_type = type;
   answer.content = ToText(json);
   answer.headers.emplace_back("Cache-Control", "no-store");
@@ -42,8 +42,8 @@ inline HttpAnswer JsonAnswer(const Json& json, const char* type = "application/j
 }
 
 /// `{"error": sentence}`.
-inline HttpAnswer MakeErrorAnswer(int status, const std::string& sentence) {
-  HttpAnswer answer = JsonAnswer({{"error", sentence}});
+inline HttpResponse MakeErrorAnswer(int status, const std::string& sentence) {
+  HttpResponse answer = JsonAnswer({{"error", sentence}});
   answer.status = status;
   return answer;
 }

@@ -40,7 +40,7 @@ std::string TileSource(const std::string& tile_url) {
   return parts[1].str() + (parts[2].matched ? "*." : "") + parts[3].str();
 }
 
-void Validate(const WebOptions& options) {
+void Validate(const WebConfig& options) {
   if (options.port < 0 || options.port > 65535) {
     throw Error("port is " + std::to_string(options.port) + ", accepted is 0 to 65535");
   }

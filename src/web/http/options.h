@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// Settings of the zone's web server, with their defaults.
-struct WebOptions {
+struct WebConfig {
   std::string address = "127.0.0.1";  ///< Where to listen; "0.0.0.0" serves the whole network.
   int port = 8080;                    ///< 0 takes any free port.
   std::string web_root;               ///< Folder of the page (index.html).
@@ -38,7 +38,7 @@ struct WebOptions {
 };
 
 /// Throws Error naming the first option that cannot be served, its value and what is accepted.
-void Validate(const WebOptions& options);
+void Validate(const WebConfig& options);
 
 /// The source expression of a Content-Security-Policy that admits the tiles' host, e.g.
 /// "https://*.tiles.example" for "https://{s}.tiles.example/{z}/{x}/{y}.png"; empty for no tiles or

@@ -13,7 +13,7 @@ namespace livemap {
 
 /// What all connections share; outlives them.
 struct WebContext {
-  const WebOptions& options;
+  const WebConfig& options;
   ZoneService& zone;
   const HazardCatalogue& catalogue;
   Api& api;

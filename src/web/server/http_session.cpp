@@ -102,7 +102,7 @@ void HttpSession::ReadBody() {
 
 void HttpSession::AnswerRequest() {
   const Request& request = parser_->get();
-  HttpQuestion question;
+  HttpRequest question;
   question.method = std::string(request.method_string());
   question.target = std::string(request.target());
   question.if_none_match = Field(request, http::field::if_none_match);
@@ -112,14 +112,14 @@ void HttpSession::AnswerRequest() {
   question.host = Field(request, http::field::host);
   question.client = client_;
   question.body = request.body();
-  HttpAnswer answer = slot_.context().api.Answer(question);
+  HttpResponse answer = slot_.context().api.Answer(question);
   Write(std::move(answer), request.keep_alive(), question.method == "HEAD");
 }
 
 bool HttpSession::UpgradeToStream(const Request& request) {
   if (!beast::websocket::is_upgrade(request)) return false;
   WebContext& context = slot_.context();
-  HttpAnswer refusal;
+  HttpResponse refusal;
   try {
     const RequestTarget target = ParseTarget(std::string(request.target()));
     if (target.path != "/ws") return false;
@@ -139,7 +139,7 @@ bool HttpSession::UpgradeToStream(const Request& request) {
   return true;
 }
 
-void HttpSession::Write(HttpAnswer answer, bool keep_alive, bool head_only) {
+void HttpSession::Write(HttpResponse answer, bool keep_alive, bool head_only) {
   response_ = Response(static_cast<http::status>(answer.status), 11);
   for (const auto& [name, value] : answer.headers) response_.set(name, value);
   if (!answer.content_type.empty()) response_.set(http::field::content_type, answer.content_type);

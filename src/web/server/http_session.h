@@ -30,7 +30,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void AnswerUnreadable(boost::beast::error_code failure);
   /// True when the request was for the live stream and the connection has left this session.
   bool UpgradeToStream(const Request& request);
-  void Write(HttpAnswer answer, bool keep_alive, bool head_only);
+  void Write(HttpResponse answer, bool keep_alive, bool head_only);
   void Close();
 
   boost::beast::tcp_stream stream_;

@@ -12,7 +12,7 @@ namespace livemap {
 /// Plain HTTP: in front of a public network stands a proxy that speaks TLS and asks who is there.
 class WebServer {
  public:
-  using Options = WebOptions;
+  using Options = WebConfig;
 
   /// Listens and serves from its own threads when it returns. Keeps references to `zone` and
   /// `catalogue`. Throws Error when an option is not accepted or the port cannot be opened.

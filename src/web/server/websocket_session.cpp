@@ -108,7 +108,7 @@ void WebSocketSession::Deliver(const LiveMessage& message) {
 
 void WebSocketSession::OnMessage(const LiveMessage& message) {
   if (state_ == State::kClosing) return;
-  const WebOptions& options = slot_.context().options;
+  const WebConfig& options = slot_.context().options;
   const bool is_vehicle = message.sequence == 0;
   if (is_vehicle) {
     // A position is soon followed by the next: it never fills a queue that hazards need.

@@ -12,14 +12,14 @@ constexpr double kMinuteS = 60;
 
 }  // namespace
 
-CandidateAllowance::CandidateAllowance(const Config& config) : config_(config) {
+OffloadAllowance::OffloadAllowance(const Config& config) : config_(config) {
   if (!(config_.frames_per_minute >= 1) || !(config_.bytes_per_minute >= 1) ||
       config_.max_vehicles < 1) {
     throw Error("frames, bytes and vehicles of a candidate allowance must be at least 1");
   }
 }
 
-bool CandidateAllowance::Take(const std::string& vehicle_id, std::size_t bytes,
+bool OffloadAllowance::Take(const std::string& vehicle_id, std::size_t bytes,
                               std::int64_t now_ns) {
   Bucket* bucket = Find(vehicle_id, now_ns);
   if (bucket == nullptr) return false;
@@ -37,7 +37,7 @@ bool CandidateAllowance::Take(const std::string& vehicle_id, std::size_t bytes,
   return true;
 }
 
-CandidateAllowance::Bucket* CandidateAllowance::Find(const std::string& vehicle_id,
+OffloadAllowance::Bucket* OffloadAllowance::Find(const std::string& vehicle_id,
                                                      std::int64_t now_ns) {
   const auto found = buckets_.find(vehicle_id);
   if (found != buckets_.end()) return &found->second;

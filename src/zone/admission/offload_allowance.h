@@ -11,7 +11,7 @@ namespace livemap {
 /// How many candidate frames and bytes of them the zone takes from each vehicle: two buckets that
 /// refill evenly over a minute. Memory is bounded: a vehicle silent for a minute has full buckets
 /// and is forgotten; when there is no such one, new ids are refused. Not thread-safe.
-class CandidateAllowance {
+class OffloadAllowance {
  public:
   struct Config {
     double frames_per_minute =
@@ -21,7 +21,7 @@ class CandidateAllowance {
   };
 
   /// Throws Error for a cap below 1.
-  explicit CandidateAllowance(const Config& config);
+  explicit OffloadAllowance(const Config& config);
 
   /// Takes the place of one frame of `bytes`; false, and nothing is taken, when the vehicle has
   /// none left now. `now_ns` is the zone's clock; a step back of it takes nothing away.

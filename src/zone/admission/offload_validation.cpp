@@ -15,7 +15,7 @@ using Why = std::optional<Refusal>;
 Refusal Unusable(std::string sentence) { return {RefusalKind::kMalformed, std::move(sentence)}; }
 
 /// The parts that a candidate shares with a report, as the smallest report that has them.
-Report SharedParts(const Candidate& frame) {
+Report SharedParts(const OffloadedFrame& frame) {
   Report report;
   report.uuid.bytes[0] = 1;
   report.vehicle_id = frame.vehicle_id;
@@ -31,7 +31,7 @@ Report SharedParts(const Candidate& frame) {
   return report;
 }
 
-Why WhyPoseRefused(const TrackPose& base, const CandidateLimits& limits) {
+Why WhyPoseRefused(const TrackPose& base, const OffloadLimits& limits) {
   if (!(std::abs(base.course_rad) <= 4 * M_PI)) {
     return Unusable("course " + NumberText(base.course_rad) + " rad is not within +-4 pi");
   }
@@ -51,7 +51,7 @@ Why WhyPoseRefused(const TrackPose& base, const CandidateLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyCameraRefused(const Candidate& frame, const CandidateLimits& limits) {
+Why WhyCameraRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
   const CameraIntrinsics& camera = frame.intrinsics;
   const auto is_focal_length = [](double f) { return f >= 1 && f <= 1e5; };
   if (!is_focal_length(camera.fx) || !is_focal_length(camera.fy)) {
@@ -74,7 +74,7 @@ Why WhyCameraRefused(const Candidate& frame, const CandidateLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyJpegRefused(const Candidate& frame, const CandidateLimits& limits) {
+Why WhyJpegRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
   if (auto why = WhyPictureRefused(frame.image, limits.report)) return why;
   const auto header = ReadImageHeader(frame.image.data(), frame.image.size());
   if (!header || header->format != ImageHeader::Format::kJpeg) {
@@ -94,7 +94,7 @@ Why WhyJpegRefused(const Candidate& frame, const CandidateLimits& limits) {
 
 }  // namespace
 
-std::optional<Refusal> WhyCandidateRefused(const Candidate& frame, const CandidateLimits& limits,
+std::optional<Refusal> WhyOffloadRefused(const OffloadedFrame& frame, const OffloadLimits& limits,
                                            std::int64_t now_ns) {
   if (auto why = WhyRefused(SharedParts(frame), limits.report, now_ns)) return why;
   if (auto why = WhyPoseRefused(frame.base, limits)) return why;

@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// What a candidate frame must keep to.
-struct CandidateLimits {
+struct OffloadLimits {
   /// Position, covariance, stamp, texts and picture, as for a report; a candidate's picture may
   /// have fewer bytes and pixels.
   ReportLimits report;
@@ -20,7 +20,7 @@ struct CandidateLimits {
 /// Why the zone refuses `frame`; none when it is acceptable: everything is finite and in its range,
 /// the picture is a whole JPEG whose header has the size that the intrinsics say. Decodes nothing.
 /// `now_ns` is the zone's clock.
-std::optional<Refusal> WhyCandidateRefused(const Candidate& frame, const CandidateLimits& limits,
+std::optional<Refusal> WhyOffloadRefused(const OffloadedFrame& frame, const OffloadLimits& limits,
                                            std::int64_t now_ns);
 
 }  // namespace livemap

@@ -33,8 +33,8 @@ std::optional<std::uint32_t> TakeCodePoint(std::string_view& text) {
     if ((byte(i) & 0xc0) != 0x80) return std::nullopt;
     code_point = code_point << 6 | (byte(i) & 0x3fU);
   }
-  constexpr std::array<std::uint32_t, 5> kLeastOfLength{0, 0, 0x80, 0x800, 0x10000};
-  if (code_point < kLeastOfLength[length] || code_point > 0x10ffff) return std::nullopt;
+  constexpr std::array<std::uint32_t, 5> kMinOfLength{0, 0, 0x80, 0x800, 0x10000};
+  if (code_point < kMinOfLength[length] || code_point > 0x10ffff) return std::nullopt;
   if (code_point >= 0xd800 && code_point <= 0xdfff) return std::nullopt;
   text.remove_prefix(length);
   return code_point;

@@ -39,11 +39,11 @@ std::string DurationText(double seconds) {
   return text;
 }
 
-double AgeS(const LifeRecord& life, std::int64_t at_ns) {
+double AgeS(const PresenceRecord& life, std::int64_t at_ns) {
   return Seconds(std::max<std::int64_t>(0, at_ns - life.first_seen_ns));
 }
 
-double Faded(const LifeClass& entry, double log_odds, const LifeRecord& life, double dt_s) {
+double Faded(const ClassModel& entry, double log_odds, const PresenceRecord& life, double dt_s) {
   const double standing =
       Probability(log_odds) * entry.survival.Survival(AgeS(life, life.at_ns), dt_s);
   return LogOdds(standing);
@@ -52,37 +52,37 @@ double Faded(const LifeClass& entry, double log_odds, const LifeRecord& life, do
 /// The vehicle's place among the voices: its own, a free one, or that of the longest silent, if it
 /// has been silent since before `at_s`. One that does not count goes before one that does, and
 /// drives none away that does.
-Voice* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s, LifeRecord& life) {
-  const auto keeps = [](const Voice& voice) { return std::make_pair(voice.Counts(), voice.at_s); };
-  Voice* place = nullptr;
-  for (Voice& voice : life.voices) {
+VehicleEvidence* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s, PresenceRecord& life) {
+  const auto keeps = [](const VehicleEvidence& voice) { return std::make_pair(voice.Counts(), voice.at_s); };
+  VehicleEvidence* place = nullptr;
+  for (VehicleEvidence& voice : life.voices) {
     if (voice.vehicle == vehicle) return &voice;
     if (place == nullptr || keeps(voice) < keeps(*place)) place = &voice;
   }
   if (place->Counts() && (suspect || place->at_s >= at_s)) return nullptr;
   if (place->vehicle != 0 && suspect && place->at_s >= at_s) return nullptr;
-  *place = Voice{vehicle, 0, 0, false, suspect};
+  *place = VehicleEvidence{vehicle, 0, 0, false, suspect};
   return place;
 }
 
-void NoteNo(std::int64_t stamp_ns, LifeRecord& life) {
+void NoteNo(std::int64_t stamp_ns, PresenceRecord& life) {
   if (stamp_ns <= life.last_yes_ns) return;
   life.first_no_ns = life.first_no_ns == 0 ? stamp_ns : std::min(life.first_no_ns, stamp_ns);
 }
 
 }  // namespace
 
-LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival) {
-  LifeClass result;
+ClassModel ClassModelOf(const HazardClass& entry, const ClassSurvival& survival) {
+  ClassModel result;
   result.confirmations =
-      static_cast<std::uint32_t>(std::clamp(entry.confirmations, 1, static_cast<int>(kMaxVoices)));
+      static_cast<std::uint32_t>(std::clamp(entry.confirmations, 1, static_cast<int>(kMaxEvidencePerHazard)));
   result.hit_rate = entry.hit_rate;
   result.false_rate = entry.false_rate;
   result.survival = survival;
   return result;
 }
 
-void HazardLife::MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const {
+void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns, PresenceRecord& life) const {
   if (to_ns <= life.at_ns) return;
   if (life.state != HazardState::kRejected) {
     const double dt_s = Seconds(to_ns - life.at_ns);
@@ -95,7 +95,7 @@ void HazardLife::MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& 
   life.at_ns = to_ns;
 }
 
-double HazardLife::LogRatio(const LifeClass& entry, const Evidence& evidence,
+double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& evidence,
                             double ended_since) const {
   const EvidenceKind kind = evidence.kind;
   const bool change = kind == EvidenceKind::kVanished;
@@ -111,24 +111,24 @@ double HazardLife::LogRatio(const LifeClass& entry, const Evidence& evidence,
   absent = ended_since * there + (1 - ended_since) * absent;
   const double h = std::clamp(evidence.hostile, config_.hostile_share, 1.0);
   const double ratio = std::log(((1 - h) * there + h) / ((1 - h) * absent + h));
-  const double bound = MaxVoice(evidence);
+  const double bound = MaxLogOddsPerVehicle(evidence);
   return std::clamp(ratio, -bound, bound);
 }
 
 /// Half hostile is worth nothing; who is more so must not be believed the other way round.
-double HazardLife::MaxVoice(const Evidence& evidence) const {
+double HazardLifecycle::MaxLogOddsPerVehicle(const Evidence& evidence) const {
   if (!(evidence.hostile > config_.hostile_share)) return max_voice_;
   return std::max(0.0, -LogOdds(std::min(evidence.hostile, 0.5)));
 }
 
-bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const {
+bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const {
   const bool against = SpeaksAgainst(evidence.kind);
   if (evidence.kind == EvidenceKind::kVanished && IsTold(life.state)) {
-    return HearUnasked(entry, evidence, life);
+    return ApplyUnsolicited(entry, evidence, life);
   }
   const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
   const bool suspect = evidence.hostile >= config_.suspect_above;
-  Voice* voice = PlaceOf(evidence.vehicle, suspect, at_s, life);
+  VehicleEvidence* voice = PlaceOf(evidence.vehicle, suspect, at_s, life);
   if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
   const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
   const double ended_since = 1 - entry.survival.Survival(AgeS(life, evidence.stamp_ns), late_s);
@@ -140,7 +140,7 @@ bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeReco
     before *= std::exp(-static_cast<double>(at_s - voice->at_s) / entry.survival.MeanLifeS());
   }
   // The nearer a voice is to its bound, the less a further word adds; factors commute.
-  const double bound = MaxVoice(evidence);
+  const double bound = MaxLogOddsPerVehicle(evidence);
   const double room = ratio > 0 ? bound - before : bound + before;
   double after = before + ratio * (bound > 0 ? std::clamp(room / bound, 0.0, 1.0) : 0.0);
   // What the odds' own bound cuts off was not said: it must not be taken back later.
@@ -158,37 +158,37 @@ bool HazardLife::Hear(const LifeClass& entry, const Evidence& evidence, LifeReco
     life.SetJudged(static_cast<std::size_t>(voice - life.voices.data()), false);
   }
   if (suspect) return true;
-  against ? NoteNo(evidence.stamp_ns, life) : NoteYes(evidence.stamp_ns, life);
+  against ? NoteNo(evidence.stamp_ns, life) : RecordConfirmation(evidence.stamp_ns, life);
   return true;
 }
 
-bool HazardLife::HearUnasked(const LifeClass& entry, const Evidence& evidence,
-                             LifeRecord& life) const {
-  const double least = LogOdds(config_.sure_above);
+bool HazardLifecycle::ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence,
+                             PresenceRecord& life) const {
+  const double least = LogOdds(config_.settled_above);
   if (life.log_odds <= least) return false;
   const double ratio = LogRatio(entry, evidence, 0);
   life.log_odds = std::max(least, life.log_odds + ratio);
   return true;
 }
 
-LifeStep HazardLife::Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
-                           LifeRecord& life) const {
-  life = LifeRecord();
+LifecycleUpdate HazardLifecycle::Begin(const ClassModel& entry, const Evidence& sighting, std::int64_t now_ns,
+                           PresenceRecord& life) const {
+  life = PresenceRecord();
   life.since_ns = now_ns;
   life.at_ns = std::min(sighting.stamp_ns, now_ns);
   life.first_seen_ns = life.last_yes_ns = life.at_ns;
   life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
-  LifeStep step = Apply(entry, sighting, now_ns, life);
+  LifecycleUpdate step = Apply(entry, sighting, now_ns, life);
   if (!step.transition) {
-    step.transition = LifeTransition{std::nullopt, life.state, "first seen by 1 vehicle"};
+    step.transition = LifecycleTransition{std::nullopt, life.state, "first seen by 1 vehicle"};
   }
   step.transition->from.reset();
   return step;
 }
 
-LifeStep HazardLife::Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
-                           LifeRecord& life) const {
-  LifeStep step;
+LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& evidence, std::int64_t now_ns,
+                           PresenceRecord& life) const {
+  LifecycleUpdate step;
   if (life.state == HazardState::kGone || evidence.kind == EvidenceKind::kCantSee ||
       evidence.vehicle == 0) {
     return step;
@@ -201,21 +201,21 @@ LifeStep HazardLife::Apply(const LifeClass& entry, const Evidence& evidence, std
   const bool told = IsTold(life.state);
   const std::int64_t stood_until_ns = life.last_yes_ns;
   MoveTo(entry, word.stamp_ns, life);
-  step.counted = Hear(entry, word, life);
+  step.counted = ApplyEvidence(entry, word, life);
   if (step.counted && !SpeaksAgainst(word.kind)) JudgeSeen(entry, word, life, step);
   Settle(entry, now_ns, life, step);
   if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
   return step;
 }
 
-LifeStep HazardLife::Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const {
-  LifeStep step;
+LifecycleUpdate HazardLifecycle::Advance(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life) const {
+  LifecycleUpdate step;
   if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
   return step;
 }
 
-void HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life,
-                        LifeStep& step) const {
+void HazardLifecycle::Settle(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life,
+                        LifecycleUpdate& step) const {
   MoveTo(entry, now_ns, life);
   step.transition = Decide(entry, life);
   if (!step.transition) return;
@@ -238,17 +238,17 @@ void HazardLife::Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord&
 
 /// One newcomer's word alone brings a hazard just to active_above. Were that asked of a class that
 /// one vehicle confirms, a vehicle that was contradicted once would be believed nothing any more.
-double HazardLife::ActiveAbove(const LifeClass& entry) const {
+double HazardLifecycle::ActiveAbove(const ClassModel& entry) const {
   return entry.confirmations > 1 ? config_.active_above : config_.active_alone_above;
 }
 
-double HazardLife::VerifyBelow(const LifeClass& entry) const {
+double HazardLifecycle::VerifyBelow(const ClassModel& entry) const {
   return entry.confirmations > 1 ? config_.verify_below
                                  : std::min(config_.verify_below, config_.active_alone_above);
 }
 
-std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
-                                                 const LifeRecord& life) const {
+std::optional<LifecycleTransition> HazardLifecycle::Decide(const ClassModel& entry,
+                                                 const PresenceRecord& life) const {
   if (life.state == HazardState::kRejected) return DecideRejected(life);
   if (auto gone = DecideGone(life)) return gone;
   const double presence = Probability(life.log_odds);
@@ -268,7 +268,7 @@ std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
                    ? ": denied by " + VehiclesText(opponents)
                    : ": not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns))));
     case HazardState::kVerifying:
-      if (presence < config_.sure_above) return std::nullopt;
+      if (presence < config_.settled_above) return std::nullopt;
       return Transition(
           life, HazardState::kActive,
           "still there by " + VehiclesText(supporters) + ", " + PresenceText(life.log_odds));
@@ -277,11 +277,11 @@ std::optional<LifeTransition> HazardLife::Decide(const LifeClass& entry,
   }
 }
 
-bool HazardLife::IsDeniedAway(const LifeRecord& life) const {
+bool HazardLifecycle::IsDeniedAway(const PresenceRecord& life) const {
   return Opponents(life) >= config_.denials && Probability(life.log_odds) < config_.gone_below;
 }
 
-std::optional<LifeTransition> HazardLife::DecideGone(const LifeRecord& life) const {
+std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRecord& life) const {
   if (IsDeniedAway(life)) {
     return Transition(
         life, HazardState::kGone,
@@ -293,7 +293,7 @@ std::optional<LifeTransition> HazardLife::DecideGone(const LifeRecord& life) con
                         PresenceText(life.undenied_log_odds));
 }
 
-std::optional<LifeTransition> HazardLife::DecideRejected(const LifeRecord& life) const {
+std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(const PresenceRecord& life) const {
   const std::uint32_t supporters = Supporters(life);
   if (supporters >= config_.reopen_vehicles && Probability(life.log_odds) >= config_.active_above) {
     return Transition(life, HazardState::kActive,
@@ -305,7 +305,7 @@ std::optional<LifeTransition> HazardLife::DecideRejected(const LifeRecord& life)
                     "rejected, and not seen for " + DurationText(Seconds(life.at_ns - heard_ns)));
 }
 
-double HazardLife::Presence(const LifeClass& entry, const LifeRecord& life,
+double HazardLifecycle::Presence(const ClassModel& entry, const PresenceRecord& life,
                             std::int64_t now_ns) const {
   if (life.state == HazardState::kRejected || now_ns <= life.at_ns) {
     return Probability(life.log_odds);
@@ -313,7 +313,7 @@ double HazardLife::Presence(const LifeClass& entry, const LifeRecord& life,
   return Probability(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
 }
 
-std::int64_t HazardLife::NextChangeNs(const LifeClass& entry, const LifeRecord& life) const {
+std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry, const PresenceRecord& life) const {
   if (life.state == HazardState::kGone) return kNever;
   if (life.state == HazardState::kRejected) {
     return std::max(life.since_ns, life.last_yes_ns) + Nanoseconds(config_.rejected_keep_s);

@@ -31,31 +31,31 @@ struct Evidence {
   double hostile = 0;
 };
 
-/// What HazardLife knows of a hazard's class; made by LifeClassOf, cheap to copy.
-struct LifeClass {
-  std::uint32_t confirmations = 2;  ///< Distinct vehicles before drivers are told, 1 to kMaxVoices.
+/// What HazardLifecycle knows of a hazard's class; made by ClassModelOf, cheap to copy.
+struct ClassModel {
+  std::uint32_t confirmations = 2;  ///< Distinct vehicles before drivers are told, 1 to kMaxEvidencePerHazard.
   double hit_rate = 0.85;           ///< P(a vehicle that looks says yes | it is there).
   double false_rate = 0.03;         ///< P(the same | it is not there).
   ClassSurvival survival;
 };
-LifeClass LifeClassOf(const HazardClass& entry, const ClassSurvival& survival);
+ClassModel ClassModelOf(const HazardClass& entry, const ClassSurvival& survival);
 
 /// "`done` by `official`: `reason`", without the colon where there is no reason; at most 200 bytes.
 std::string DecisionText(const std::string& done, const std::string& official,
                          const std::string& reason);
 
 /// A step from one state to another.
-struct LifeTransition {
+struct LifecycleTransition {
   std::optional<HazardState> from;  ///< None: the hazard is new.
   HazardState to = HazardState::kCandidate;
   std::string reason;  ///< One sentence of at most 200 bytes without full stop.
 };
 
 /// What came of one call.
-struct LifeStep {
-  std::optional<LifeTransition> transition;
+struct LifecycleUpdate {
+  std::optional<LifecycleTransition> transition;
   bool counted = false;           ///< The evidence moved the odds.
-  LifeLesson lesson;              ///< For SurvivalModel::Learn, when the step is committed.
+  LifetimeObservation lesson;              ///< For SurvivalModel::Learn, when the step is committed.
   std::vector<Verdict> verdicts;  ///< For VehicleTrust::Judge, likewise.
 };
 
@@ -75,7 +75,7 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// order. A voice for the hazard fades with the class's life, as what it said ages. Drivers are
 /// told when `confirmations` distinct vehicles more speak for a hazard than against it, or an
 /// official. What nobody asked for is chosen by its sender, so change evidence against a told
-/// hazard lowers p to `sure_above` at most: it makes the zone ask, and the answers decide. It is
+/// hazard lowers p to `settled_above` at most: it makes the zone ask, and the answers decide. It is
 /// gone when two distinct vehicles speak against it and p is small, or by time alone: one vehicle
 /// can neither confirm nor remove, nor hasten the removal. See docs/life.md.
 ///
@@ -86,7 +86,7 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// contradicts every voice against it: what is gone does not come back. One that is denied away
 /// bears out its opponents, and contradicts its supporters as far as it is likely that they saw
 /// nothing, rather than something that ended since. An official's word settles all.
-class HazardLife {
+class HazardLifecycle {
  public:
   struct Config {
     double prior_presence = 0.2;        ///< Before the first vehicle speaks.
@@ -94,14 +94,14 @@ class HazardLife {
     double active_alone_above = 0.5;    ///< and of classes that one vehicle confirms from this one.
     double verify_below = 0.7;          ///< An active hazard is verified below this presence (of
                                         ///< classes that one vehicle confirms: active_alone_above)
-    double sure_above = 0.85;           ///< ...and active again from this one on.
+    double settled_above = 0.85;           ///< ...and active again from this one on.
     double gone_below = 0.1;            ///< Off the map.
-    double surest = 0.995;              ///< Presence never counts as more certain than this.
+    double max_presence = 0.995;              ///< Presence never counts as more certain than this.
     double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
     double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
     double vanished_false_rate = 0.05;  ///< P(the same | it is there).
     double suspect_above = 0.5;         ///< A vehicle this likely hostile is not counted as one.
-    double most_against = 1;            ///< No one verdict weighs more, log odds; an official's
+    double max_trust_step = 1;            ///< No one verdict weighs more, log odds; an official's
     double official_weight = 2;         ///< ...weighs this many times as much as a vehicle's.
     std::uint32_t denials = 2;          ///< Distinct vehicles against it before it is gone.
     double quarantine_s = 86400;        ///< A rejected hazard takes no support for this long.
@@ -110,72 +110,72 @@ class HazardLife {
         90 * 86400.0;  ///< Without support for this long it is forgotten (gone).
   };
 
-  HazardLife();
+  HazardLifecycle();
   /// Throws Error naming the first value that is out of range, and what is accepted.
-  explicit HazardLife(const Config& config);
+  explicit HazardLifecycle(const Config& config);
 
   /// A new hazard's first report. The transition has no `from`; its `to` is active at once where
   /// one vehicle confirms the class.
-  LifeStep Begin(const LifeClass& entry, const Evidence& sighting, std::int64_t now_ns,
-                 LifeRecord& life) const;
+  LifecycleUpdate Begin(const ClassModel& entry, const Evidence& sighting, std::int64_t now_ns,
+                 PresenceRecord& life) const;
   /// A further word, in any order of stamps. Does nothing to a hazard that is gone.
-  LifeStep Apply(const LifeClass& entry, const Evidence& evidence, std::int64_t now_ns,
-                 LifeRecord& life) const;
+  LifecycleUpdate Apply(const ClassModel& entry, const Evidence& evidence, std::int64_t now_ns,
+                 PresenceRecord& life) const;
   /// Time passes. Cheap; nothing happens before NextChangeNs.
-  LifeStep Advance(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life) const;
+  LifecycleUpdate Advance(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life) const;
   /// An official says that it is there (also revokes a rejection), or that it is not and never was;
   /// `reason` may be empty. Nothing happens to a hazard that is gone; Reject leaves one that is off
   /// the map alone, Confirm has a transition from active to active too.
-  LifeStep Confirm(const LifeClass& entry, const std::string& official, const std::string& reason,
-                   std::int64_t now_ns, LifeRecord& life) const;
-  LifeStep Reject(const LifeClass& entry, const std::string& official, const std::string& reason,
-                  std::int64_t now_ns, LifeRecord& life) const;
+  LifecycleUpdate Confirm(const ClassModel& entry, const std::string& official, const std::string& reason,
+                   std::int64_t now_ns, PresenceRecord& life) const;
+  LifecycleUpdate Reject(const ClassModel& entry, const std::string& official, const std::string& reason,
+                  std::int64_t now_ns, PresenceRecord& life) const;
   /// All that the vehicle said is taken back: the odds are as if it had said nothing, and a hazard
   /// that no other vehicle saw is gone, one that too few others saw a candidate again. What an
   /// official confirmed stays. The transition, with `why` as its reason, may lead to the same
   /// state; none where the vehicle has no voice, or the hazard is gone.
-  LifeStep Withdraw(const LifeClass& entry, std::uint64_t vehicle, const std::string& why,
-                    std::int64_t now_ns, LifeRecord& life) const;
+  LifecycleUpdate Withdraw(const ClassModel& entry, std::uint64_t vehicle, const std::string& why,
+                    std::int64_t now_ns, PresenceRecord& life) const;
 
   /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
-  double Presence(const LifeClass& entry, const LifeRecord& life, std::int64_t now_ns) const;
+  double Presence(const ClassModel& entry, const PresenceRecord& life, std::int64_t now_ns) const;
   /// When Advance will do something if nobody speaks before; kNever if it will not. To be asked
   /// again after every step. While the class is learned this may come early or late; Advance then
   /// decides by what is known at its own time.
-  std::int64_t NextChangeNs(const LifeClass& entry, const LifeRecord& life) const;
+  std::int64_t NextChangeNs(const ClassModel& entry, const PresenceRecord& life) const;
 
   const Config& config() const { return config_; }
 
  private:
-  void MoveTo(const LifeClass& entry, std::int64_t to_ns, LifeRecord& life) const;
-  double LogRatio(const LifeClass& entry, const Evidence& evidence, double ended_since) const;
-  bool Hear(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
-  bool HearUnasked(const LifeClass& entry, const Evidence& evidence, LifeRecord& life) const;
-  double MaxVoice(const Evidence& evidence) const;
-  void Settle(const LifeClass& entry, std::int64_t now_ns, LifeRecord& life, LifeStep& step) const;
-  double ActiveAbove(const LifeClass& entry) const;
-  double VerifyBelow(const LifeClass& entry) const;
-  std::optional<LifeTransition> Decide(const LifeClass& entry, const LifeRecord& life) const;
-  bool IsDeniedAway(const LifeRecord& life) const;
-  std::optional<LifeTransition> DecideGone(const LifeRecord& life) const;
-  std::optional<LifeTransition> DecideRejected(const LifeRecord& life) const;
+  void MoveTo(const ClassModel& entry, std::int64_t to_ns, PresenceRecord& life) const;
+  double LogRatio(const ClassModel& entry, const Evidence& evidence, double ended_since) const;
+  bool ApplyEvidence(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const;
+  bool ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const;
+  double MaxLogOddsPerVehicle(const Evidence& evidence) const;
+  void Settle(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life, LifecycleUpdate& step) const;
+  double ActiveAbove(const ClassModel& entry) const;
+  double VerifyBelow(const ClassModel& entry) const;
+  std::optional<LifecycleTransition> Decide(const ClassModel& entry, const PresenceRecord& life) const;
+  bool IsDeniedAway(const PresenceRecord& life) const;
+  std::optional<LifecycleTransition> DecideGone(const PresenceRecord& life) const;
+  std::optional<LifecycleTransition> DecideRejected(const PresenceRecord& life) const;
 
   // Officials: hazard_officials.cpp.
-  void TakeBack(const LifeClass& entry, const Voice& taken, LifeRecord& life) const;
-  void Demote(const LifeClass& entry, const Voice& taken, std::int64_t now_ns,
-              LifeRecord& life) const;
+  void TakeBack(const ClassModel& entry, const VehicleEvidence& taken, PresenceRecord& life) const;
+  void Demote(const ClassModel& entry, const VehicleEvidence& taken, std::int64_t now_ns,
+              PresenceRecord& life) const;
 
   // Verdicts: hazard_verdicts.cpp.
-  double WrongYes(const LifeClass& entry) const;
-  double WrongNo(const LifeClass& entry) const;
-  void JudgeSeen(const LifeClass& entry, const Evidence& seen, LifeRecord& life,
-                 LifeStep& step) const;
-  void JudgeDeniedAway(const LifeClass& entry, const LifeRecord& life, LifeStep& step) const;
-  void JudgeOfficially(const LifeClass& entry, bool there, const LifeRecord& life,
-                       LifeStep& step) const;
+  double WrongYes(const ClassModel& entry) const;
+  double WrongNo(const ClassModel& entry) const;
+  void JudgeSeen(const ClassModel& entry, const Evidence& seen, PresenceRecord& life,
+                 LifecycleUpdate& step) const;
+  void JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life, LifecycleUpdate& step) const;
+  void JudgeOfficially(const ClassModel& entry, bool there, const PresenceRecord& life,
+                       LifecycleUpdate& step) const;
 
   Config config_;
-  double max_log_odds_;  // Of presence, by `surest`.
+  double max_log_odds_;  // Of presence, by `max_presence`.
   double max_voice_;     // Of one vehicle, by `hostile_share`.
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the sources of HazardLife share; nobody else includes this.
+// What the sources of HazardLifecycle share; nobody else includes this.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -15,7 +15,7 @@ inline double Probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)
 inline double LogOdds(double probability) { return std::log(probability / (1 - probability)); }
 
 /// Cut where a character begins.
-inline std::string AsReason(std::string text) {
+inline std::string ReasonText(std::string text) {
   constexpr std::size_t kMaxBytes = 200;
   if (text.size() <= kMaxBytes) return text;
   std::size_t size = kMaxBytes;
@@ -24,16 +24,16 @@ inline std::string AsReason(std::string text) {
   return text;
 }
 
-inline LifeTransition Transition(const LifeRecord& life, HazardState to, std::string reason) {
-  return {life.state, to, AsReason(std::move(reason))};
+inline LifecycleTransition Transition(const PresenceRecord& life, HazardState to, std::string reason) {
+  return {life.state, to, ReasonText(std::move(reason))};
 }
 
-inline void Enter(HazardState state, std::int64_t now_ns, LifeRecord& life) {
+inline void Enter(HazardState state, std::int64_t now_ns, PresenceRecord& life) {
   life.state = state;
   life.since_ns = now_ns;
 }
 
-inline void NoteYes(std::int64_t stamp_ns, LifeRecord& life) {
+inline void RecordConfirmation(std::int64_t stamp_ns, PresenceRecord& life) {
   life.first_seen_ns = life.first_seen_ns == 0 ? stamp_ns : std::min(life.first_seen_ns, stamp_ns);
   life.last_yes_ns = std::max(life.last_yes_ns, stamp_ns);
   if (life.first_no_ns <= life.last_yes_ns) life.first_no_ns = 0;

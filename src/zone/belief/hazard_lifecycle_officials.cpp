@@ -1,4 +1,4 @@
-// What officials do with a hazard: the part of HazardLife that no vehicle has a say in.
+// What officials do with a hazard: the part of HazardLifecycle that no vehicle has a say in.
 #include <algorithm>
 #include <cmath>
 
@@ -9,21 +9,21 @@ namespace livemap {
 namespace {
 
 /// The newest stamp of a vehicle that counts and speaks for the hazard; 0 without one.
-std::uint32_t NewestYesS(const LifeRecord& life) {
+std::uint32_t NewestYesS(const PresenceRecord& life) {
   std::uint32_t newest_s = 0;
-  for (const Voice& voice : life.voices) {
+  for (const VehicleEvidence& voice : life.voices) {
     if (voice.Counts() && !voice.against) newest_s = std::max(newest_s, voice.at_s);
   }
   return newest_s;
 }
 
-bool AnyAgainst(const LifeRecord& life) {
+bool AnyAgainst(const PresenceRecord& life) {
   return std::any_of(life.voices.begin(), life.voices.end(),
-                     [](const Voice& voice) { return voice.Counts() && voice.against; });
+                     [](const VehicleEvidence& voice) { return voice.Counts() && voice.against; });
 }
 
 /// What the hazard remembers of times, had the vehicle not spoken.
-void ForgetStamps(const Voice& taken, LifeRecord& life) {
+void ForgetStamps(const VehicleEvidence& taken, PresenceRecord& life) {
   if (taken.against) {
     if (!AnyAgainst(life)) life.first_no_ns = 0;
     return;
@@ -36,22 +36,22 @@ void ForgetStamps(const Voice& taken, LifeRecord& life) {
 
 std::string DecisionText(const std::string& done, const std::string& official,
                          const std::string& reason) {
-  return AsReason(done + " by " + official + (reason.empty() ? "" : ": " + reason));
+  return ReasonText(done + " by " + official + (reason.empty() ? "" : ": " + reason));
 }
 
-LifeStep HazardLife::Confirm(const LifeClass& entry, const std::string& official,
+LifecycleUpdate HazardLifecycle::Confirm(const ClassModel& entry, const std::string& official,
                              const std::string& reason, std::int64_t now_ns,
-                             LifeRecord& life) const {
-  LifeStep step;
+                             PresenceRecord& life) const {
+  LifecycleUpdate step;
   if (life.state == HazardState::kGone) return step;
   const bool told = IsTold(life.state);
   MoveTo(entry, now_ns, life);
   const std::int64_t stood_until_ns = told ? life.last_yes_ns : life.first_seen_ns;
   JudgeOfficially(entry, true, life, step);
-  for (Voice& voice : life.voices) {
-    if (voice.against) voice = Voice();
+  for (VehicleEvidence& voice : life.voices) {
+    if (voice.against) voice = VehicleEvidence();
   }
-  NoteYes(now_ns, life);
+  RecordConfirmation(now_ns, life);
   life.official = true;
   life.log_odds = life.undenied_log_odds = max_log_odds_;
   step.counted = true;
@@ -63,10 +63,10 @@ LifeStep HazardLife::Confirm(const LifeClass& entry, const std::string& official
   return step;
 }
 
-LifeStep HazardLife::Reject(const LifeClass& entry, const std::string& official,
+LifecycleUpdate HazardLifecycle::Reject(const ClassModel& entry, const std::string& official,
                             const std::string& reason, std::int64_t now_ns,
-                            LifeRecord& life) const {
-  LifeStep step;
+                            PresenceRecord& life) const {
+  LifecycleUpdate step;
   if (!IsOnMap(life.state)) return step;
   JudgeOfficially(entry, false, life, step);
   step.transition =
@@ -82,15 +82,15 @@ LifeStep HazardLife::Reject(const LifeClass& entry, const std::string& official,
   return step;
 }
 
-LifeStep HazardLife::Withdraw(const LifeClass& entry, std::uint64_t vehicle, const std::string& why,
-                              std::int64_t now_ns, LifeRecord& life) const {
-  LifeStep step;
+LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t vehicle, const std::string& why,
+                              std::int64_t now_ns, PresenceRecord& life) const {
+  LifecycleUpdate step;
   const auto voice = std::find_if(life.voices.begin(), life.voices.end(),
-                                  [&](const Voice& one) { return one.vehicle == vehicle; });
+                                  [&](const VehicleEvidence& one) { return one.vehicle == vehicle; });
   if (vehicle == 0 || life.state == HazardState::kGone || voice == life.voices.end()) return step;
   MoveTo(entry, now_ns, life);
-  const Voice taken = *voice;
-  *voice = Voice();
+  const VehicleEvidence taken = *voice;
+  *voice = VehicleEvidence();
   life.SetJudged(static_cast<std::size_t>(voice - life.voices.begin()), false);
   step.counted = true;
   const HazardState from = life.state;
@@ -100,12 +100,12 @@ LifeStep HazardLife::Withdraw(const LifeClass& entry, std::uint64_t vehicle, con
     Demote(entry, taken, now_ns, life);
   }
   if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
-  step.transition = LifeTransition{from, life.state, AsReason(why)};
+  step.transition = LifecycleTransition{from, life.state, ReasonText(why)};
   return step;
 }
 
 /// The odds as if the vehicle had said nothing.
-void HazardLife::TakeBack(const LifeClass& entry, const Voice& taken, LifeRecord& life) const {
+void HazardLifecycle::TakeBack(const ClassModel& entry, const VehicleEvidence& taken, PresenceRecord& life) const {
   double weight = 1e-3 * taken.weight_1000;
   // A voice for the hazard has faded with the odds.
   const double age_s = std::max(0.0, Seconds(life.at_ns) - taken.at_s);
@@ -120,8 +120,8 @@ void HazardLife::TakeBack(const LifeClass& entry, const Voice& taken, LifeRecord
 
 /// A hazard that stood on the withdrawn words alone is gone; one that too few others have seen is a
 /// candidate again.
-void HazardLife::Demote(const LifeClass& entry, const Voice& taken, std::int64_t now_ns,
-                        LifeRecord& life) const {
+void HazardLifecycle::Demote(const ClassModel& entry, const VehicleEvidence& taken, std::int64_t now_ns,
+                        PresenceRecord& life) const {
   if (taken.against || !IsOnMap(life.state)) return;
   const std::uint32_t supporters = Supporters(life);
   if (supporters == 0) {

@@ -1,4 +1,4 @@
-// What becomes of vehicles' words: the part of HazardLife that teaches VehicleTrust.
+// What becomes of vehicles' words: the part of HazardLifecycle that teaches VehicleTrust.
 #include <algorithm>
 #include <cmath>
 
@@ -14,13 +14,13 @@ constexpr double kAnyWord = 0.5;
 double ChanceOf(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 double OddsOf(double probability) { return std::log(probability / (1 - probability)); }
 
-double RightYes(const LifeClass& entry) { return std::log(kAnyWord / entry.hit_rate); }
-double RightNo(const LifeClass& entry) { return std::log(kAnyWord / (1 - entry.false_rate)); }
+double RightYes(const ClassModel& entry) { return std::log(kAnyWord / entry.hit_rate); }
+double RightNo(const ClassModel& entry) { return std::log(kAnyWord / (1 - entry.false_rate)); }
 
 /// The odds that the hazard was ever there, from what was said for it alone.
-double OddsOfSupport(const LifeRecord& life, double prior) {
+double OddsOfSupport(const PresenceRecord& life, double prior) {
   double log_odds = OddsOf(prior);
-  for (const Voice& voice : life.voices) {
+  for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle != 0 && !voice.against)
       log_odds += 1e-3 * std::max<int>(0, voice.weight_1000);
   }
@@ -29,24 +29,24 @@ double OddsOfSupport(const LifeRecord& life, double prior) {
 
 }  // namespace
 
-double HazardLife::WrongYes(const LifeClass& entry) const {
-  return std::clamp(std::log(kAnyWord / entry.false_rate), 0.0, config_.most_against);
+double HazardLifecycle::WrongYes(const ClassModel& entry) const {
+  return std::clamp(std::log(kAnyWord / entry.false_rate), 0.0, config_.max_trust_step);
 }
 
-double HazardLife::WrongNo(const LifeClass& entry) const {
-  return std::clamp(std::log(kAnyWord / (1 - entry.hit_rate)), 0.0, config_.most_against);
+double HazardLifecycle::WrongNo(const ClassModel& entry) const {
+  return std::clamp(std::log(kAnyWord / (1 - entry.hit_rate)), 0.0, config_.max_trust_step);
 }
 
 /// `seen` is a word for the hazard. The voices of before are judged by what all others say: nobody
 /// bears out its own word.
-void HazardLife::JudgeSeen(const LifeClass& entry, const Evidence& seen, LifeRecord& life,
-                           LifeStep& step) const {
+void HazardLifecycle::JudgeSeen(const ClassModel& entry, const Evidence& seen, PresenceRecord& life,
+                           LifecycleUpdate& step) const {
   if (seen.hostile >= config_.suspect_above) return;
-  for (std::size_t i = 0; i < kMaxVoices; ++i) {
-    const Voice& voice = life.voices[i];
+  for (std::size_t i = 0; i < kMaxEvidencePerHazard; ++i) {
+    const VehicleEvidence& voice = life.voices[i];
     if (voice.vehicle == 0 || voice.vehicle == seen.vehicle || life.IsJudged(i)) continue;
     if (Seconds(seen.stamp_ns) <= voice.at_s) continue;
-    if (ChanceOf(life.log_odds - 1e-3 * voice.weight_1000) < config_.sure_above) continue;
+    if (ChanceOf(life.log_odds - 1e-3 * voice.weight_1000) < config_.settled_above) continue;
     life.SetJudged(i, true);
     step.verdicts.push_back(
         {voice.vehicle, voice.against ? WrongNo(entry) : RightYes(entry), seen.vehicle});
@@ -55,23 +55,23 @@ void HazardLife::JudgeSeen(const LifeClass& entry, const Evidence& seen, LifeRec
 
 /// Three things may have happened: there never was anything; it ended between the last word for it
 /// and the first against it; or it stands and every opponent missed it.
-void HazardLife::JudgeDeniedAway(const LifeClass& entry, const LifeRecord& life,
-                                 LifeStep& step) const {
+void HazardLifecycle::JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life,
+                                 LifecycleUpdate& step) const {
   const double real = life.official ? 1 : ChanceOf(OddsOfSupport(life, config_.prior_presence));
   const double gap_s = std::max(0.0, Seconds(life.first_no_ns - life.last_yes_ns));
   const double age_s = std::max(0.0, Seconds(life.last_yes_ns - life.first_seen_ns));
   const double stands = entry.survival.Survival(age_s, gap_s);
   double missed = 1;
   std::uint64_t opponent = 0;
-  for (const Voice& voice : life.voices) {
+  for (const VehicleEvidence& voice : life.voices) {
     if (!voice.Counts() || !voice.against) continue;
     missed *= (1 - entry.hit_rate) / (1 - entry.false_rate);
     opponent = voice.vehicle;
   }
   const double invented = (1 - real) / (1 - real + real * (1 - stands + stands * missed));
   std::uint64_t other_opponent = opponent;
-  for (std::size_t i = 0; i < kMaxVoices; ++i) {
-    const Voice& voice = life.voices[i];
+  for (std::size_t i = 0; i < kMaxEvidencePerHazard; ++i) {
+    const VehicleEvidence& voice = life.voices[i];
     if (voice.vehicle == 0 || life.IsJudged(i)) continue;
     if (!voice.against) {
       step.verdicts.push_back({voice.vehicle, invented * WrongYes(entry), opponent});
@@ -85,9 +85,9 @@ void HazardLife::JudgeDeniedAway(const LifeClass& entry, const LifeRecord& life,
   }
 }
 
-void HazardLife::JudgeOfficially(const LifeClass& entry, bool there, const LifeRecord& life,
-                                 LifeStep& step) const {
-  for (const Voice& voice : life.voices) {
+void HazardLifecycle::JudgeOfficially(const ClassModel& entry, bool there, const PresenceRecord& life,
+                                 LifecycleUpdate& step) const {
+  for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle == 0) continue;
     const double wrong = voice.against ? WrongNo(entry) : WrongYes(entry);
     const double right = voice.against ? RightNo(entry) : RightYes(entry);

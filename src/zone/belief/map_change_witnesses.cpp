@@ -45,24 +45,24 @@ std::optional<MapChangeWitness> ReadWitness(NumberReader& reader) {
 
 }  // namespace
 
-WitnessNews NoteWitness(std::vector<MapChangeWitness>& witnesses, std::uint64_t vehicle,
+WitnessUpdate RecordWitness(std::vector<MapChangeWitness>& witnesses, std::uint64_t vehicle,
                         std::uint64_t drive, bool against) {
   const auto known =
       std::find_if(witnesses.begin(), witnesses.end(), [&](const MapChangeWitness& one) {
         return one.vehicle == vehicle && one.against == against;
       });
   if (known != witnesses.end()) {
-    if (HasDrive(*known, drive)) return WitnessNews::kSameDrive;
+    if (HasDrive(*known, drive)) return WitnessUpdate::kSameDrive;
     AddDrive(*known, drive);
-    return WitnessNews::kNewDrive;
+    return WitnessUpdate::kNewDrive;
   }
-  if (CountSide(witnesses, against) >= kMaxWitnesses) return WitnessNews::kTooMany;
+  if (CountSide(witnesses, against) >= kMaxWitnesses) return WitnessUpdate::kTooMany;
   MapChangeWitness witness;
   witness.vehicle = vehicle;
   witness.against = against;
   AddDrive(witness, drive);
   witnesses.push_back(witness);
-  return WitnessNews::kNewVehicle;
+  return WitnessUpdate::kNewVehicle;
 }
 
 std::string PackWitnesses(const std::vector<MapChangeWitness>& witnesses) {

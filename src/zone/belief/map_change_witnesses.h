@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// What a further word of a vehicle adds to those that spoke.
-enum class WitnessNews {
+enum class WitnessUpdate {
   kNewVehicle,
   kNewDrive,   ///< Of a vehicle that spoke before.
   kSameDrive,  ///< Counts for no more.
@@ -17,7 +17,7 @@ enum class WitnessNews {
 };
 
 /// Notes that a drive of a vehicle spoke for the change, or against it. Both keys by VehicleKey.
-WitnessNews NoteWitness(std::vector<MapChangeWitness>& witnesses, std::uint64_t vehicle,
+WitnessUpdate RecordWitness(std::vector<MapChangeWitness>& witnesses, std::uint64_t vehicle,
                         std::uint64_t drive, bool against);
 
 /// The witnesses as one line of numbers, and back; none when the text is no such line.

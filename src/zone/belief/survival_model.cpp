@@ -47,7 +47,7 @@ SurvivalModel::SurvivalModel(HazardCatalogue catalogue, Config config)
   }
 }
 
-void SurvivalModel::Restore(const std::string& class_name, const LearnedLife& learned) {
+void SurvivalModel::Restore(const std::string& class_name, const LearnedLifetime& learned) {
   if (!IsAmount(learned.ended) || !IsAmount(learned.stood_s)) {
     throw Error("what was learned of the lives of class '" + class_name +
                 "' is not two finite numbers from 0 on");
@@ -55,9 +55,9 @@ void SurvivalModel::Restore(const std::string& class_name, const LearnedLife& le
   learned_[class_name] = learned;
 }
 
-void SurvivalModel::Learn(const std::string& class_name, const LifeLesson& lesson) {
+void SurvivalModel::Learn(const std::string& class_name, const LifetimeObservation& lesson) {
   if (!IsAmount(lesson.stood_s) || (lesson.stood_s == 0 && !lesson.ended)) return;
-  LearnedLife& learned = learned_[class_name];
+  LearnedLifetime& learned = learned_[class_name];
   learned.stood_s += lesson.stood_s;
   learned.ended += lesson.ended ? 1 : 0;
   // Both fade together, so that their ratio, the rate, stays.

@@ -27,13 +27,13 @@ struct ClassSurvival {
 
 /// What one hazard's history teaches of its class: that it stood for `stood_s` more seconds, and
 /// whether it ended then. Nothing by default.
-struct LifeLesson {
+struct LifetimeObservation {
   double stood_s = 0;
   bool ended = false;
 };
 
 /// What was learned of one class: the only state of SurvivalModel, to be stored as it is.
-struct LearnedLife {
+struct LearnedLifetime {
   double ended = 0;    ///< Lives that ended, old ones counted less; >= 0, finite.
   double stood_s = 0;  ///< Time that hazards stood, those that still stand included; the same.
 };
@@ -64,20 +64,20 @@ class SurvivalModel {
 
   /// Takes in what the store kept. Throws Error naming the class unless both numbers are finite and
   /// not negative.
-  void Restore(const std::string& class_name, const LearnedLife& learned);
-  /// Learns from a step of a hazard's life (see HazardLife); ignores what is not finite or
+  void Restore(const std::string& class_name, const LearnedLifetime& learned);
+  /// Learns from a step of a hazard's life (see HazardLifecycle); ignores what is not finite or
   /// negative.
-  void Learn(const std::string& class_name, const LifeLesson& lesson);
+  void Learn(const std::string& class_name, const LifetimeObservation& lesson);
   /// The class's survival as known now; of the catalogue's expected life as long as nothing was
   /// learned: then its mean is exactly `expected_life_s`.
   ClassSurvival Of(const std::string& class_name) const;
   /// What was learned, by class, to be stored.
-  const std::map<std::string, LearnedLife>& learned() const { return learned_; }
+  const std::map<std::string, LearnedLifetime>& learned() const { return learned_; }
 
  private:
   HazardCatalogue catalogue_;
   Config config_;
-  std::map<std::string, LearnedLife> learned_;
+  std::map<std::string, LearnedLifetime> learned_;
 };
 
 }  // namespace livemap

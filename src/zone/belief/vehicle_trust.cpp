@@ -17,7 +17,7 @@ constexpr std::size_t kMaxVouchersBytes = 200;
 VehicleTrust::VehicleTrust(const Config& config) : config_(config) {
   CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
   CheckRange("trust_memory_s", config.memory_s, 60, 1e10);
-  CheckRange("most_suspicion", config.most_suspicion, 0.1, 20);
+  CheckRange("most_suspicion", config.max_suspicion, 0.1, 20);
   CheckRange("max_vehicles", static_cast<double>(config.max_vehicles), 1, 1e9);
   prior_log_odds_ = std::log(config.hostile_share / (1 - config.hostile_share));
 }
@@ -58,13 +58,13 @@ void VehicleTrust::Judge(const Verdict& verdict, std::int64_t now_ns) {
     vouchers[record.next] = verdict.voucher;
     record.next = static_cast<std::uint8_t>((record.next + 1) % vouchers.size());
   }
-  record.suspicion = std::clamp(record.suspicion + verdict.log_ratio, 0.0, config_.most_suspicion);
+  record.suspicion = std::clamp(record.suspicion + verdict.log_ratio, 0.0, config_.max_suspicion);
 }
 
 void VehicleTrust::Distrust(std::uint64_t vehicle, std::int64_t now_ns) {
   if (vehicle == 0) return;
   TrustRecord& record = Find(vehicle, now_ns);
-  record.suspicion = config_.most_suspicion;
+  record.suspicion = config_.max_suspicion;
   record.at_ns = std::max(record.at_ns, now_ns);
 }
 
@@ -84,7 +84,7 @@ bool VehicleTrust::Restore(std::uint64_t vehicle, const TrustRecord& record) {
                      record.at_ns >= 0 && record.next < record.vouchers.size();
   if (!sound) return false;
   TrustRecord taken = record;
-  taken.suspicion = std::min(taken.suspicion, config_.most_suspicion);
+  taken.suspicion = std::min(taken.suspicion, config_.max_suspicion);
   Find(vehicle, record.at_ns) = taken;
   return true;
 }

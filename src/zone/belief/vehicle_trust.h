@@ -9,7 +9,7 @@
 namespace livemap {
 
 /// What became of one word that a vehicle said of a hazard, once others have settled the matter;
-/// made by HazardLife.
+/// made by HazardLifecycle.
 struct Verdict {
   std::uint64_t vehicle = 0;  ///< VehicleKey of who said it.
   /// ln(P(word | a vehicle that says what it likes) / P(word | an honest one)): > 0 the word was
@@ -44,7 +44,7 @@ class VehicleTrust {
   struct Config {
     double hostile_share = 0.05;       ///< h: of vehicles that say what they like; above 0, < 0.5.
     double memory_s = 10 * 86400.0;    ///< Suspicion fades to 1/e in this time; > 0.
-    double most_suspicion = 6;         ///< Log odds; more is not held against anybody; > 0.
+    double max_suspicion = 6;         ///< Log odds; more is not held against anybody; > 0.
     std::size_t max_vehicles = 50000;  ///< Beyond it the least suspected one is forgotten.
   };
 

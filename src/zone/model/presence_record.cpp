@@ -20,16 +20,16 @@ constexpr unsigned kAgainst = 1;
 constexpr unsigned kJudged = 2;
 constexpr unsigned kSuspect = 4;
 
-bool IsSound(const LifeRecord& life) {
+bool IsSound(const PresenceRecord& life) {
   return IsStamp(life.since_ns) && IsStamp(life.first_seen_ns) && IsStamp(life.last_yes_ns) &&
          IsStamp(life.first_no_ns) && IsStamp(life.at_ns) &&
          std::abs(life.log_odds) <= kMaxLogOdds && std::abs(life.undenied_log_odds) <= kMaxLogOdds;
 }
 
-bool ReadVoices(NumberReader& reader, LifeRecord& life) {
+bool ReadVoices(NumberReader& reader, PresenceRecord& life) {
   for (std::size_t i = 0; !reader.done(); ++i) {
-    if (i == kMaxVoices) return false;
-    Voice& voice = life.voices[i];
+    if (i == kMaxEvidencePerHazard) return false;
+    VehicleEvidence& voice = life.voices[i];
     unsigned flags = ~0U;
     reader.Read(voice.vehicle);
     reader.Read(voice.at_s);
@@ -58,7 +58,7 @@ std::uint64_t VehicleKey(const std::string& vehicle_id) {
   return std::max<std::uint64_t>(key, 1);
 }
 
-std::string PackLife(const LifeRecord& life) {
+std::string PackPresence(const PresenceRecord& life) {
   std::string line;
   AppendNumber(line, static_cast<unsigned>(life.state));
   AppendNumber(line, life.official ? 1U : 0U);
@@ -68,8 +68,8 @@ std::string PackLife(const LifeRecord& life) {
   }
   AppendNumber(line, life.log_odds);
   AppendNumber(line, life.undenied_log_odds);
-  for (std::size_t i = 0; i < kMaxVoices; ++i) {
-    const Voice& voice = life.voices[i];
+  for (std::size_t i = 0; i < kMaxEvidencePerHazard; ++i) {
+    const VehicleEvidence& voice = life.voices[i];
     if (voice.vehicle == 0) continue;
     AppendNumber(line, voice.vehicle);
     AppendNumber(line, voice.at_s);
@@ -80,10 +80,10 @@ std::string PackLife(const LifeRecord& life) {
   return line;
 }
 
-std::optional<LifeRecord> UnpackLife(const std::string& text) {
+std::optional<PresenceRecord> UnpackPresence(const std::string& text) {
   if (text.size() > kMaxPackedBytes) return std::nullopt;
   NumberReader reader(text);
-  LifeRecord life;
+  PresenceRecord life;
   unsigned state = kHazardStates;
   unsigned official = 2;
   reader.Read(state);
@@ -101,18 +101,18 @@ std::optional<LifeRecord> UnpackLife(const std::string& text) {
   return life;
 }
 
-std::uint32_t Supporters(const LifeRecord& life) {
+std::uint32_t Supporters(const PresenceRecord& life) {
   return static_cast<std::uint32_t>(
       std::count_if(life.voices.begin(), life.voices.end(),
-                    [](const Voice& voice) { return voice.Counts() && !voice.against; }));
+                    [](const VehicleEvidence& voice) { return voice.Counts() && !voice.against; }));
 }
 
-std::uint32_t Opponents(const LifeRecord& life) {
+std::uint32_t Opponents(const PresenceRecord& life) {
   std::uint32_t opponents = 0;
-  for (const Voice& voice : life.voices) {
+  for (const VehicleEvidence& voice : life.voices) {
     if (!voice.Counts() || !voice.against) continue;
     const auto answers =
-        std::count_if(life.voices.begin(), life.voices.end(), [&voice](const Voice& other) {
+        std::count_if(life.voices.begin(), life.voices.end(), [&voice](const VehicleEvidence& other) {
           return other.Counts() && !other.against && other.at_s > voice.at_s;
         });
     if (answers < kAnswersToOpponent) ++opponents;

@@ -15,7 +15,7 @@ namespace livemap {
 std::uint64_t VehicleKey(const std::string& vehicle_id);
 
 /// What one vehicle said of one hazard so far.
-struct Voice {
+struct VehicleEvidence {
   std::uint64_t vehicle = 0;  ///< VehicleKey; 0: nobody.
   std::uint32_t at_s = 0;     ///< Newest stamp that counted, UTC seconds since 1970.
   /// How much the vehicle moves the hazard's log odds, thousandths; > 0 towards there.
@@ -28,11 +28,11 @@ struct Voice {
 };
 
 /// Vehicles that a hazard remembers; a further one takes the place of the longest silent.
-constexpr std::size_t kMaxVoices = 6;
+constexpr std::size_t kMaxEvidencePerHazard = 6;
 
-/// The life of one hazard: plain data of 160 bytes, changed by HazardLife only. Times are UTC, ns
+/// The life of one hazard: plain data of 160 bytes, changed by HazardLifecycle only. Times are UTC, ns
 /// since 1970.
-struct LifeRecord {
+struct PresenceRecord {
   HazardState state = HazardState::kCandidate;
   bool official = false;           ///< Confirmed by an official: needs no further vehicle.
   std::uint8_t judged = 0;         ///< Bit i: the newest word of voice i had its verdict.
@@ -43,7 +43,7 @@ struct LifeRecord {
   std::int64_t at_ns = 0;          ///< The odds are of this moment.
   double log_odds = 0;             ///< ln(p / (1 - p)) of its being there.
   double undenied_log_odds = 0;    ///< The same had nobody spoken against it.
-  std::array<Voice, kMaxVoices> voices{};
+  std::array<VehicleEvidence, kMaxEvidencePerHazard> voices{};
 
   bool IsJudged(std::size_t voice) const { return (judged >> voice & 1U) != 0; }
   void SetJudged(std::size_t voice, bool is_judged) {
@@ -53,14 +53,14 @@ struct LifeRecord {
 };
 
 /// One line of plain numbers with spaces between, at most 500 bytes, to be stored; exact.
-std::string PackLife(const LifeRecord& life);
-/// Inverse of PackLife; none when `text` is anything else.
-std::optional<LifeRecord> UnpackLife(const std::string& text);
+std::string PackPresence(const PresenceRecord& life);
+/// Inverse of PackPresence; none when `text` is anything else.
+std::optional<PresenceRecord> UnpackPresence(const std::string& text);
 
-/// Vehicles that count whose newest word is for the hazard; at most kMaxVoices.
-std::uint32_t Supporters(const LifeRecord& life);
+/// Vehicles that count whose newest word is for the hazard; at most kMaxEvidencePerHazard.
+std::uint32_t Supporters(const PresenceRecord& life);
 /// Vehicles that count whose newest word is against it, and has not been answered by two others
 /// since, that spoke for it.
-std::uint32_t Opponents(const LifeRecord& life);
+std::uint32_t Opponents(const PresenceRecord& life);
 
 }  // namespace livemap

@@ -18,7 +18,7 @@ std::uint8_t HexDigit(char digit) {
 
 }  // namespace
 
-Uuid CandidateReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
+Uuid OffloadReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
                          const std::string& class_name, const Box& box) {
   const auto tenths = [](float px) {
     return "\n" + std::to_string(std::llround(static_cast<double>(px) * 10));
@@ -37,7 +37,7 @@ Uuid CandidateReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
   return uuid;
 }
 
-std::string CandidateIntake::Add(Candidate frame, std::int64_t now_ns) {
+std::string OffloadIntake::Add(OffloadedFrame frame, std::int64_t now_ns) {
   ++counters_.frames;
   counters_.bytes += frame.image.size();
   // The allowance first: refusing must not be free of charge.
@@ -45,7 +45,7 @@ std::string CandidateIntake::Add(Candidate frame, std::int64_t now_ns) {
     ++counters_.over_allowance;
     return "vehicle has sent more than its allowance";
   }
-  if (const auto why = WhyCandidateRefused(frame, config_.limits, now_ns)) {
+  if (const auto why = WhyOffloadRefused(frame, config_.limits, now_ns)) {
     ++counters_.refused;
     return why->sentence;
   }
@@ -64,7 +64,7 @@ std::string CandidateIntake::Add(Candidate frame, std::int64_t now_ns) {
   return {};
 }
 
-bool CandidateIntake::Remember(const Candidate& frame) {
+bool OffloadIntake::Remember(const OffloadedFrame& frame) {
   const Key key(frame.vehicle_id, frame.stamp_ns);
   if (!remembered_.insert(key).second) return false;
   remembered_order_.push_back(key);
@@ -75,7 +75,7 @@ bool CandidateIntake::Remember(const Candidate& frame) {
   return true;
 }
 
-const CandidateIntake::Job* CandidateIntake::Next(std::int64_t now_ns, double steady_s) {
+const OffloadIntake::Job* OffloadIntake::Next(std::int64_t now_ns, double steady_s) {
   if (waiting_.empty() || in_flight_.size() >= static_cast<std::size_t>(config_.max_in_flight)) {
     return nullptr;
   }
@@ -89,11 +89,11 @@ const CandidateIntake::Job* CandidateIntake::Next(std::int64_t now_ns, double st
   return &in_flight_.emplace(newest_internal_ns_, std::move(next)).first->second.job;
 }
 
-void CandidateIntake::Abandon(std::int64_t internal_ns) {
+void OffloadIntake::Abandon(std::int64_t internal_ns) {
   if (in_flight_.erase(internal_ns) != 0) ++counters_.undecodable;
 }
 
-std::vector<std::int64_t> CandidateIntake::Expire(double steady_s) {
+std::vector<std::int64_t> OffloadIntake::Expire(double steady_s) {
   std::vector<std::int64_t> lost;
   for (auto entry = in_flight_.begin(); entry != in_flight_.end();) {
     if (steady_s - entry->second.since_s < config_.detection_timeout_s) {
@@ -107,10 +107,10 @@ std::vector<std::int64_t> CandidateIntake::Expire(double steady_s) {
   return lost;
 }
 
-std::vector<Report> CandidateIntake::Finish(std::int64_t internal_ns, const SightingFrame& answer) {
+std::vector<Report> OffloadIntake::Finish(std::int64_t internal_ns, const SightingFrame& answer) {
   const auto found = in_flight_.find(internal_ns);
   if (found == in_flight_.end()) return {};
-  const Candidate frame = std::move(found->second.job.frame);
+  const OffloadedFrame frame = std::move(found->second.job.frame);
   in_flight_.erase(found);
   ++counters_.detected;
   counters_.sightings += answer.sightings.size();
@@ -125,7 +125,7 @@ std::vector<Report> CandidateIntake::Finish(std::int64_t internal_ns, const Sigh
   return reports;
 }
 
-bool CandidateIntake::IsUsable(const Sighting& sighting) {
+bool OffloadIntake::IsUsable(const Sighting& sighting) {
   if (!IsWellFormed(sighting)) {
     ++counters_.invalid_sightings;
     return false;
@@ -137,7 +137,7 @@ bool CandidateIntake::IsUsable(const Sighting& sighting) {
   return true;
 }
 
-std::optional<GroundPoint> CandidateIntake::PlaceOnRoad(const Candidate& frame,
+std::optional<GroundPoint> OffloadIntake::PlaceOnRoad(const OffloadedFrame& frame,
                                                         const Sighting& sighting) {
   if (IsCutBySide(sighting.box, frame.intrinsics.width)) {
     ++counters_.cut_by_side;
@@ -146,7 +146,7 @@ std::optional<GroundPoint> CandidateIntake::PlaceOnRoad(const Candidate& frame,
   GroundProjectionNoise noise = config_.projection;
   noise.max_range_m = kEndlessM;
   auto ground =
-      ProjectToGround(FootPixel(sighting.box), frame.intrinsics, frame.base_from_optical, noise);
+      ProjectToGround(ContactPixel(sighting.box), frame.intrinsics, frame.base_from_optical, noise);
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
@@ -160,12 +160,12 @@ std::optional<GroundPoint> CandidateIntake::PlaceOnRoad(const Candidate& frame,
   return ground;
 }
 
-Report CandidateIntake::ReportOf(const Candidate& frame, const Sighting& sighting,
+Report OffloadIntake::ReportOf(const OffloadedFrame& frame, const Sighting& sighting,
                                  const GroundPoint& ground) {
   const PlacedHazard place = PlaceHazard(frame.base, Eigen::Vector2d::Zero(), ground);
   Report report;
   report.uuid =
-      CandidateReportUuid(frame.vehicle_id, frame.stamp_ns, sighting.class_name, sighting.box);
+      OffloadReportUuid(frame.vehicle_id, frame.stamp_ns, sighting.class_name, sighting.box);
   report.vehicle_id = frame.vehicle_id;
   report.drive_id = frame.drive_id;
   report.stamp_ns = frame.stamp_ns;

@@ -23,11 +23,11 @@ namespace livemap {
 /// at a time under stamps of the zone's own (those of two vehicles may be equal), and turns what
 /// the detector says into reports, placed by the pose that came with the frame. Trusts no vehicle:
 /// every frame is checked, each vehicle has an allowance, all memory is bounded. Not thread-safe.
-class CandidateIntake {
+class OffloadIntake {
  public:
   struct Config {
-    CandidateLimits limits;
-    CandidateAllowance::Config allowance;
+    OffloadLimits limits;
+    OffloadAllowance::Config allowance;
     int max_waiting = 200;            ///< Frames that wait for the detector; then the oldest goes.
     double max_waiting_bytes = 32e6;  ///< Of their pictures.
     int max_in_flight = 4;            ///< Frames at the detector, so that it never drops one.
@@ -46,7 +46,7 @@ class CandidateIntake {
   struct Counters {
     std::uint64_t frames = 0;
     std::uint64_t bytes = 0;             ///< Of all pictures that came.
-    std::uint64_t refused = 0;           ///< Broken, see WhyCandidateRefused.
+    std::uint64_t refused = 0;           ///< Broken, see WhyOffloadRefused.
     std::uint64_t over_allowance = 0;    ///< More than the vehicle may send.
     std::uint64_t repeated = 0;          ///< Known already.
     std::uint64_t displaced = 0;         ///< The detector was too far behind.
@@ -66,13 +66,13 @@ class CandidateIntake {
   /// A frame at the detector.
   struct Job {
     std::int64_t internal_ns = 0;  ///< Its stamp within the zone: unique, ascending.
-    Candidate frame;
+    OffloadedFrame frame;
   };
 
-  explicit CandidateIntake(const Config& config) : config_(config), allowance_(config.allowance) {}
+  explicit OffloadIntake(const Config& config) : config_(config), allowance_(config.allowance) {}
 
   /// Why the frame is not taken, in one sentence; empty when it is. `now_ns` is the zone's clock.
-  std::string Add(Candidate frame, std::int64_t now_ns);
+  std::string Add(OffloadedFrame frame, std::int64_t now_ns);
 
   /// The next frame for the detector, or null when it has enough to do or none waits. Valid until
   /// Finish or Abandon of it, or Expire. `steady_s` never pauses.
@@ -97,13 +97,13 @@ class CandidateIntake {
   using Key = std::pair<std::string, std::int64_t>;  // Vehicle and stamp.
 
   bool IsUsable(const Sighting& sighting);
-  std::optional<GroundPoint> PlaceOnRoad(const Candidate& frame, const Sighting& sighting);
-  Report ReportOf(const Candidate& frame, const Sighting& sighting, const GroundPoint& ground);
-  bool Remember(const Candidate& frame);
+  std::optional<GroundPoint> PlaceOnRoad(const OffloadedFrame& frame, const Sighting& sighting);
+  Report ReportOf(const OffloadedFrame& frame, const Sighting& sighting, const GroundPoint& ground);
+  bool Remember(const OffloadedFrame& frame);
 
   Config config_;
-  CandidateAllowance allowance_;
-  std::deque<Candidate> waiting_;
+  OffloadAllowance allowance_;
+  std::deque<OffloadedFrame> waiting_;
   std::size_t waiting_bytes_ = 0;
   std::map<std::int64_t, InFlight> in_flight_;  // By internal stamp.
   std::int64_t newest_internal_ns_ = 0;
@@ -115,7 +115,7 @@ class CandidateIntake {
 /// Of a hazard seen in a candidate frame: always the same for the same vehicle, stamp, class and
 /// box (to a tenth of a pixel), so that a frame that comes twice is one report. RFC 9562 version 8,
 /// by SHA-256.
-Uuid CandidateReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
+Uuid OffloadReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
                          const std::string& class_name, const Box& box);
 
 }  // namespace livemap

@@ -17,8 +17,8 @@ namespace {
 // Encoders write about ten for a progressive picture.
 constexpr int kMaxScans = 32;
 // A view of fewer pixels shows nothing of the surroundings, a smaller frame is lost to the coding.
-constexpr int kLeastViewPx = 96;
-constexpr int kLeastFramePx = 10;
+constexpr int kMinViewPx = 96;
+constexpr int kMinFramePx = 10;
 constexpr double kViewPerBox = 2.5;
 constexpr int kThumbnailQuality = 75;
 
@@ -109,7 +109,7 @@ cv::Size ThumbnailSize(const cv::Size& view, int width_px) {
 /// The part of the image that a thumbnail shows: 3 to 2, around the box, within the image.
 cv::Rect View(const cv::Rect2d& box, const cv::Size& image) {
   const double width =
-      std::max({kViewPerBox * box.width, 1.5 * kViewPerBox * box.height, 1.0 * kLeastViewPx});
+      std::max({kViewPerBox * box.width, 1.5 * kViewPerBox * box.height, 1.0 * kMinViewPx});
   const cv::Size size(std::min(image.width, static_cast<int>(std::ceil(width))),
                       std::min(image.height, static_cast<int>(std::ceil(width / 1.5))));
   const auto start = [](double middle, int length, int available) {
@@ -141,7 +141,7 @@ cv::Rect2d ScaledBox(const Box& box, const PixelRegion& shown, const cv::Size& c
 /// First and last pixel of a frame around [begin, begin + length), inside an image of `available`.
 std::pair<int, int> FrameEdges(double begin, double length, int available) {
   const double middle = begin + length / 2;
-  const double half = std::max(length, 1.0 * kLeastFramePx) / 2;
+  const double half = std::max(length, 1.0 * kMinFramePx) / 2;
   const int first = std::clamp(static_cast<int>(std::floor(middle - half)), 0, available - 1);
   const int last = std::clamp(static_cast<int>(std::ceil(middle + half)), first, available - 1);
   return {first, last};

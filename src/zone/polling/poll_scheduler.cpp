@@ -21,7 +21,7 @@ constexpr double kLookAgainShare = 0.1;
 constexpr double kLookAgainRad = 0.2;
 constexpr double kLookAgainS = 5;
 // After a long silence a million hazards are due at once; the zone has more to do than to ask.
-constexpr std::size_t kMostPerTick = 20000;
+constexpr std::size_t kMaxPerTick = 20000;
 // Log odds that evidence moves, and rounding does not.
 constexpr double kMovedOdds = 1e-3;
 
@@ -98,7 +98,7 @@ std::int64_t PollScheduler::DueNs(const Target& target, double price_s) const {
 }
 
 void PollScheduler::SetHazard(std::uint64_t hazard, const GeoPoint& position,
-                              const LifeClass& entry, const LifeRecord& life,
+                              const ClassModel& entry, const PresenceRecord& life,
                               std::int64_t picture_ns, std::int64_t now_ns) {
   if (!IsOnMap(life.state) || !IsValid(position)) return RemoveHazard(hazard);
   const auto [place, is_new] = hazards_.try_emplace(hazard);
@@ -130,10 +130,10 @@ void PollScheduler::SetHazard(std::uint64_t hazard, const GeoPoint& position,
   target.log_odds = life.log_odds;
   target.debt_s = debt_s;
   target.state = life.state;
-  for (const Voice& voice : life.voices) {
+  for (const VehicleEvidence& voice : life.voices) {
     const std::int64_t at_ns = std::int64_t{voice.at_s} * 1'000'000'000;
     if (voice.vehicle != 0 && Seconds(now_ns - at_ns) < config_.same_vehicle_gap_s) {
-      NoteAsked(hazard, voice.vehicle, at_ns);
+      RecordPoll(hazard, voice.vehicle, at_ns);
     }
   }
   Schedule(hazard, target, now_ns);
@@ -177,7 +177,7 @@ void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& 
   auto known = riders_by_id_.find(vehicle_id);
   if (known == riders_by_id_.end()) {
     if (riders_by_id_.size() >= config_.max_vehicles) ForgetRider(riders_.begin());
-    Rider rider;
+    TrackedVehicle rider;
     rider.id = vehicle_id;
     rider.key = VehicleKey(vehicle_id);
     riders_.push_back(rider);
@@ -187,7 +187,7 @@ void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& 
     rider_grid_.Erase(known->second->point.position, known->second->key);
     riders_.splice(riders_.end(), riders_, known->second);
   }
-  Rider& rider = *known->second;
+  TrackedVehicle& rider = *known->second;
   rider.point = point;
   rider_grid_.Insert(point.position, rider.key);
   if (rider.moved || !SeesOtherPlaces(rider)) return;
@@ -195,9 +195,9 @@ void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& 
   rider.moved = true;
 }
 
-bool PollScheduler::SeesOtherPlaces(const Rider& rider) const {
-  if (!rider.looked_from) return true;
-  const TrackPoint& from = *rider.looked_from;
+bool PollScheduler::SeesOtherPlaces(const TrackedVehicle& rider) const {
+  if (!rider.last_scanned_at) return true;
+  const TrackPoint& from = *rider.last_scanned_at;
   const auto [north_m, east_m] = Offset(from.position, rider.point.position);
   // A course that is not a number is always another one.
   const double turn_rad = std::remainder(rider.point.course_rad - from.course_rad, 2 * M_PI);
@@ -234,9 +234,9 @@ std::vector<PollChoice> PollScheduler::TakeDue(std::int64_t now_ns) {
   for (const std::uint64_t key : moved) {
     const auto found = riders_by_key_.find(key);
     if (found == riders_by_key_.end()) continue;
-    Rider& rider = *found->second;
+    TrackedVehicle& rider = *found->second;
     rider.moved = false;
-    rider.looked_from = rider.point;
+    rider.last_scanned_at = rider.point;
     for (const auto& near : waiting_.Within(rider.point.position, config_.lookahead_m)) {
       TryAsk(near.id, rider, now_ns, choices);
     }
@@ -254,7 +254,7 @@ void PollScheduler::Refill(std::int64_t now_ns) {
 
 void PollScheduler::TakeFallenDue(std::int64_t now_ns) {
   const double price_s = PriceS();
-  for (std::size_t i = 0; i < kMostPerTick && !heap_.empty() && heap_.front().at_ns <= now_ns;
+  for (std::size_t i = 0; i < kMaxPerTick && !heap_.empty() && heap_.front().at_ns <= now_ns;
        ++i) {
     const Due due = heap_.front();
     std::pop_heap(heap_.begin(), heap_.end());
@@ -291,7 +291,7 @@ void PollScheduler::LookAround(std::uint64_t hazard, std::int64_t now_ns,
   }
 }
 
-void PollScheduler::TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_ns,
+void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int64_t now_ns,
                            std::vector<PollChoice>& choices) {
   const auto found = hazards_.find(hazard);
   if (found == hazards_.end()) return;
@@ -316,7 +316,7 @@ void PollScheduler::TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_
   ++target.open;
   ++rider.open;
   ++open_count_;
-  NoteAsked(hazard, rider.key, now_ns);
+  RecordPoll(hazard, rider.key, now_ns);
   open_.push_back({hazard, rider.id, choice.expires_ns, bytes});
   choices.push_back(std::move(choice));
 }
@@ -335,7 +335,7 @@ bool PollScheduler::Passes(const TrackPoint& point, const GeoPoint& place) const
          aside_m <= config_.corridor_m + config_.corridor_slope * ahead_m;
 }
 
-void PollScheduler::NoteAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns) {
+void PollScheduler::RecordPoll(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns) {
   Asked& asked = asked_[hazard];
   const auto known = std::find(asked.vehicle.begin(), asked.vehicle.end(), vehicle);
   if (known != asked.vehicle.end()) {

@@ -77,8 +77,8 @@ class PollScheduler {
 
   /// The hazard as it is now: after every step of its life, a new position or a new picture. One
   /// that is not on the map is forgotten. `picture_ns`: stamp of its newest picture, 0 without one.
-  void SetHazard(std::uint64_t hazard, const GeoPoint& position, const LifeClass& entry,
-                 const LifeRecord& life, std::int64_t picture_ns, std::int64_t now_ns);
+  void SetHazard(std::uint64_t hazard, const GeoPoint& position, const ClassModel& entry,
+                 const PresenceRecord& life, std::int64_t picture_ns, std::int64_t now_ns);
   void RemoveHazard(std::uint64_t hazard);
   /// Where a vehicle is now. `point.stamp_ns` is when the zone heard it.
   void SetVehicle(const std::string& vehicle_id, const TrackPoint& point);
@@ -116,15 +116,15 @@ class PollScheduler {
     std::array<std::int64_t, 8> at_ns{};
     std::size_t next = 0;
   };
-  struct Rider {
+  struct TrackedVehicle {
     std::string id;
     std::uint64_t key = 0;
     TrackPoint point;
     std::size_t open = 0;
     bool moved = false;
-    std::optional<TrackPoint> looked_from;  ///< When what waits was last sought around it.
+    std::optional<TrackPoint> last_scanned_at;  ///< When what waits was last sought around it.
   };
-  using RiderPlace = std::list<Rider>::iterator;
+  using RiderPlace = std::list<TrackedVehicle>::iterator;
   struct Due {
     std::int64_t at_ns;
     std::uint64_t hazard;
@@ -146,16 +146,16 @@ class PollScheduler {
   void Schedule(std::uint64_t hazard, Target& target, std::int64_t now_ns);
   void ForgetRider(RiderPlace rider);
   void StopWaiting(std::uint64_t hazard, Target& target);
-  void NoteAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns);
+  void RecordPoll(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns);
   bool WasAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t now_ns) const;
   void ForgetAsked(std::int64_t now_ns);
   void ExpirePolls(std::int64_t now_ns);
   void TakeFallenDue(std::int64_t now_ns);
   void LookAround(std::uint64_t hazard, std::int64_t now_ns, std::vector<PollChoice>& choices);
-  void TryAsk(std::uint64_t hazard, Rider& rider, std::int64_t now_ns,
+  void TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int64_t now_ns,
               std::vector<PollChoice>& choices);
   bool Passes(const TrackPoint& point, const GeoPoint& place) const;
-  bool SeesOtherPlaces(const Rider& rider) const;
+  bool SeesOtherPlaces(const TrackedVehicle& rider) const;
   void Close(Open& poll);
   void CompactHeap();
 
@@ -166,7 +166,7 @@ class PollScheduler {
   std::vector<std::uint64_t> look_around_;  // Due since the last tick, or free to be asked again.
   std::unordered_map<std::uint64_t, Asked> asked_;
   std::deque<std::pair<std::int64_t, std::uint64_t>> asked_order_;  // When noted, hazard.
-  std::list<Rider> riders_;                                         // Longest silent first.
+  std::list<TrackedVehicle> riders_;                                         // Longest silent first.
   std::unordered_map<std::string, RiderPlace> riders_by_id_;
   std::unordered_map<std::uint64_t, RiderPlace> riders_by_key_;
   SpatialGrid rider_grid_;

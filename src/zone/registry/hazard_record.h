@@ -41,7 +41,7 @@ struct HazardRecord {
   std::uint32_t hazard_class = 0;  ///< Place in the registry's list of classes.
   float presence = 1;
   PackedPicture picture;
-  LifeRecord life;  ///< With the state.
+  PresenceRecord life;  ///< With the state.
 };
 
 /// Records by slot, in blocks that never move: growth costs one block, not a copy of everything.

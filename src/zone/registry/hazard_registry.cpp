@@ -49,7 +49,7 @@ std::size_t HazardRegistry::on_map_count() const {
          counts_[static_cast<std::size_t>(HazardState::kRejected)];
 }
 
-void HazardRegistry::Restore(const Hazard& hazard, const LifeRecord& life, std::uint32_t id) {
+void HazardRegistry::Restore(const Hazard& hazard, const PresenceRecord& life, std::uint32_t id) {
   if (Find(hazard.uuid)) {
     throw Error("hazard '" + hazard.uuid.ToString() + "' stands twice in the store");
   }
@@ -121,7 +121,7 @@ void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& p
   NoteChange(slot);
 }
 
-void HazardRegistry::SetLife(Slot slot, const LifeRecord& life, double presence,
+void HazardRegistry::SetLife(Slot slot, const PresenceRecord& life, double presence,
                              std::uint64_t sequence, std::int64_t now_ns) {
   RememberForUndo(slot);
   HazardRecord& record = records_[slot];
@@ -203,13 +203,13 @@ std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
   return result;
 }
 
-std::vector<HazardRegistry::Slot> HazardRegistry::SpokenOfBy(std::uint64_t vehicle) const {
+std::vector<HazardRegistry::Slot> HazardRegistry::HazardsWithEvidenceFrom(std::uint64_t vehicle) const {
   std::vector<Slot> slots;
   for (Slot slot = 0; slot < records_.size(); ++slot) {
-    const LifeRecord& life = records_[slot].life;
+    const PresenceRecord& life = records_[slot].life;
     if (life.state == HazardState::kGone) continue;
     const bool spoke = std::any_of(life.voices.begin(), life.voices.end(),
-                                   [&](const Voice& voice) { return voice.vehicle == vehicle; });
+                                   [&](const VehicleEvidence& voice) { return voice.vehicle == vehicle; });
     if (spoke) slots.push_back(slot);
   }
   return slots;
@@ -221,7 +221,7 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
   const double max_latitude_difference = radius_m / 110574.0;
   const double poleward_deg =
       std::min(90.0, std::abs(centre.latitude_deg) + max_latitude_difference);
-  const double least_m_per_degree = 111319.0 * std::cos(poleward_deg * kRadiansPerDegree);
+  const double min_m_per_degree = 111319.0 * std::cos(poleward_deg * kRadiansPerDegree);
   std::vector<std::pair<double, Slot>> found;
   for (Slot slot = 0; slot < records_.size(); ++slot) {
     if (!IsTold(State(slot))) continue;
@@ -229,7 +229,7 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
     if (std::abs(position.latitude_deg - centre.latitude_deg) > max_latitude_difference) continue;
     double east_deg = std::abs(position.longitude_deg - centre.longitude_deg);
     east_deg = std::min(east_deg, 360.0 - east_deg);
-    if (east_deg * least_m_per_degree > radius_m) continue;
+    if (east_deg * min_m_per_degree > radius_m) continue;
     const double distance_m = GeodesicDistanceM(centre, position);
     if (distance_m <= radius_m) found.emplace_back(distance_m, slot);
   }

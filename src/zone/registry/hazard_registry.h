@@ -41,7 +41,7 @@ class HazardRegistry {
 
   /// Takes in a hazard as the store kept it under `id`; in ascending order of sequence. The life's
   /// state counts, the hazard's presence too. Throws Error when its uuid or sequence is not new.
-  void Restore(const Hazard& hazard, const LifeRecord& life, std::uint32_t id);
+  void Restore(const Hazard& hazard, const PresenceRecord& life, std::uint32_t id);
   /// New hazards get ids above `id`: the store has rows up to there.
   void SkipIdsTo(std::uint32_t id) { last_id_ = std::max(last_id_, id); }
 
@@ -56,7 +56,7 @@ class HazardRegistry {
   void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
              std::int64_t now_ns);
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
-  void SetLife(Slot slot, const LifeRecord& life, double presence, std::uint64_t sequence,
+  void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);
   /// A newer picture.
   void SetPicture(Slot slot, const PictureName& picture);
@@ -80,7 +80,7 @@ class HazardRegistry {
   std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit, const HazardStates& states = {}) const;
   /// Those that are not gone and of which the vehicle (VehicleKey) has said something.
-  std::vector<Slot> SpokenOfBy(std::uint64_t vehicle) const;
+  std::vector<Slot> HazardsWithEvidenceFrom(std::uint64_t vehicle) const;
   /// As ZoneService::QueryNear.
   std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
 

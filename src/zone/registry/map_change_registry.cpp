@@ -27,8 +27,8 @@ Report SightingOf(const MapChangeReport& told) {
   return report;
 }
 
-WitnessNews Note(MapChangeFeature& feature, const MapChangeReport& report, bool against) {
-  return NoteWitness(feature.witnesses, VehicleKey(report.vehicle_id), VehicleKey(report.drive_id),
+WitnessUpdate Note(MapChangeFeature& feature, const MapChangeReport& report, bool against) {
+  return RecordWitness(feature.witnesses, VehicleKey(report.vehicle_id), VehicleKey(report.drive_id),
                      against);
 }
 
@@ -40,15 +40,15 @@ void ForgetDenials(MapChangeFeature& feature) {
   feature.denied_ns = 0;
 }
 
-const char* ReasonFor(WitnessNews news) {
+const char* ReasonFor(WitnessUpdate news) {
   switch (news) {
-    case WitnessNews::kNewVehicle:
+    case WitnessUpdate::kNewVehicle:
       return "told by another vehicle";
-    case WitnessNews::kNewDrive:
+    case WitnessUpdate::kNewDrive:
       return "told by another drive of a vehicle";
-    case WitnessNews::kSameDrive:
+    case WitnessUpdate::kSameDrive:
       return "told again by the same drive";
-    case WitnessNews::kTooMany:
+    case WitnessUpdate::kTooMany:
       return "told by one more vehicle than are counted";
   }
   return "told again";
@@ -130,8 +130,8 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Tell(const MapChange
 MapChangeRegistry::Effect MapChangeRegistry::Support(Id id, const MapChangeReport& report,
                                                      const Stamp& stamp) {
   MapChangeFeature feature = features_.at(id);
-  const WitnessNews news = Note(feature, report, false);
-  if (news == WitnessNews::kNewVehicle || news == WitnessNews::kNewDrive) {
+  const WitnessUpdate news = Note(feature, report, false);
+  if (news == WitnessUpdate::kNewVehicle || news == WitnessUpdate::kNewDrive) {
     FuseInto(feature, report);
     ++feature.drives;
   } else {

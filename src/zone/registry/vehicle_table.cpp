@@ -5,7 +5,7 @@
 namespace livemap {
 namespace {
 
-constexpr std::size_t kMostPlaces = 240;
+constexpr std::size_t kMaxPlaces = 240;
 constexpr std::int64_t kTrackNs = 120'000'000'000;
 
 }  // namespace
@@ -25,7 +25,7 @@ void VehicleTable::Update(const VehicleState& vehicle) {
   // The zone's clock may be set back; a track is in order.
   if (!track.empty() && vehicle.heard_ns < track.back().stamp_ns) track.clear();
   track.push_back({vehicle.heard_ns, vehicle.position, vehicle.course_rad, vehicle.speed_mps});
-  while (track.size() > kMostPlaces || vehicle.heard_ns - track.front().stamp_ns > kTrackNs) {
+  while (track.size() > kMaxPlaces || vehicle.heard_ns - track.front().stamp_ns > kTrackNs) {
     track.pop_front();
   }
 }

@@ -70,7 +70,7 @@ std::mt19937_64 ZoneService::Implementation::MakeGenerator(std::uint64_t seed,
 
 void ZoneService::Implementation::Load() {
   StoreDamage& damage = statistics_.store_damage;
-  damage += store_.LoadLives([this](const std::string& class_name, LearnedLife learned) {
+  damage += store_.LoadLives([this](const std::string& class_name, LearnedLifetime learned) {
     survival_.Restore(class_name, learned);
   });
   damage += store_.LoadTrust([this](std::uint64_t vehicle, const TrustRecord& record) {
@@ -159,7 +159,7 @@ void ZoneService::Implementation::Settle(const Change& change) {
 /// When time changes the hazard next, and when vehicles are to be asked about it.
 void ZoneService::Implementation::Schedule(Slot slot, std::int64_t now_ns) {
   const HazardRecord& record = registry_.Record(slot);
-  const LifeClass entry = ClassOf(slot);
+  const ClassModel entry = ClassOf(slot);
   due_.Set(slot, life_.NextChangeNs(entry, record.life));
   const std::int64_t picture_ns = record.picture.empty() ? 0 : record.estimate.last_seen_ns;
   const std::lock_guard<std::mutex> lock(polls_mutex_);

@@ -94,7 +94,7 @@ class ZoneService {
     ReportLimits limits;
     SpeedRule speed;
     VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
-    HazardLife::Config life;
+    HazardLifecycle::Config life;
     SurvivalModel::Config survival;
     VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
     PollScheduler::Config polls;
@@ -174,7 +174,7 @@ class ZoneService {
   bool Confirm(const Uuid& hazard, const std::string& official, const std::string& reason = "");
   /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
   /// suspicion does, and all that it said is taken back from the hazards that are not gone
-  /// (HazardLife::Withdraw), each with an event whose reason names vehicle and official as far as
+  /// (HazardLifecycle::Withdraw), each with an event whose reason names vehicle and official as far as
   /// 200 bytes go. Returns how many hazards that were; none when the zone has never heard of the
   /// vehicle. A few thousand hazards are committed at a time: when it throws StoreError those
   /// before stay changed, and another call does the rest. Throws Error as Reject does.

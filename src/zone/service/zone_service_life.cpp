@@ -34,9 +34,9 @@ std::string CheckedReason(const std::string& official, const std::string& reason
   return why;
 }
 
-LifeClass ZoneService::Implementation::ClassOf(Slot slot) const {
+ClassModel ZoneService::Implementation::ClassOf(Slot slot) const {
   const std::string& name = registry_.ClassName(slot);
-  return LifeClassOf(config_.catalogue.Get(name), survival_.Of(name));
+  return ClassModelOf(config_.catalogue.Get(name), survival_.Of(name));
 }
 
 ZoneService::Implementation::Before ZoneService::Implementation::BeforeOf(Slot slot) const {
@@ -44,13 +44,13 @@ ZoneService::Implementation::Before ZoneService::Implementation::BeforeOf(Slot s
   return {record.life.state, record.sequence, record.picture};
 }
 
-void ZoneService::Implementation::Learn(const std::string& class_name, const LifeLesson& lesson,
+void ZoneService::Implementation::Learn(const std::string& class_name, const LifetimeObservation& lesson,
                                         Change& change) {
   if (!(lesson.stood_s >= 0) || (lesson.stood_s == 0 && !lesson.ended)) return;
   const auto known = survival_.learned().find(class_name);
   // The first time only: a failed transaction takes back all of them.
   change.learned_before.emplace(class_name,
-                                known == survival_.learned().end() ? LearnedLife{} : known->second);
+                                known == survival_.learned().end() ? LearnedLifetime{} : known->second);
   survival_.Learn(class_name, lesson);
 }
 
@@ -61,7 +61,7 @@ Evidence ZoneService::Implementation::EvidenceOf(EvidenceKind kind, const std::s
   return evidence;
 }
 
-void ZoneService::Implementation::Judge(const LifeStep& step, Change& change) {
+void ZoneService::Implementation::Judge(const LifecycleUpdate& step, Change& change) {
   for (const Verdict& verdict : step.verdicts) {
     // The first time only: a failed transaction takes back all of them.
     change.trust_before.emplace(verdict.vehicle, trust_.Get(verdict.vehicle));
@@ -79,24 +79,24 @@ std::optional<ZoneService::Implementation::Slot> ZoneService::Implementation::Ma
 }
 
 bool ZoneService::Implementation::PassTime(Slot slot, Change& change) {
-  LifeRecord life = registry_.Record(slot).life;
-  const LifeStep step = life_.Advance(ClassOf(slot), change.now_ns, life);
+  PresenceRecord life = registry_.Record(slot).life;
+  const LifecycleUpdate step = life_.Advance(ClassOf(slot), change.now_ns, life);
   if (!step.transition) return false;
   Step(slot, life, step, step.transition->reason, BeforeOf(slot), change);
   return true;
 }
 
-void ZoneService::Implementation::Step(Slot slot, const LifeRecord& life, const LifeStep& step,
+void ZoneService::Implementation::Step(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step,
                                        const std::string& reason, const Before& before,
                                        Change& change) {
   Learn(registry_.ClassName(slot), step.lesson, change);
   Judge(step, change);
   registry_.SetLife(slot, life, life_.Presence(ClassOf(slot), life, change.now_ns),
                     ++change.sequence, change.now_ns);
-  NoteEvent(slot, before, reason, false, change);
+  RecordEvent(slot, before, reason, false, change);
 }
 
-void ZoneService::Implementation::NoteEvent(Slot slot, const std::optional<Before>& before,
+void ZoneService::Implementation::RecordEvent(Slot slot, const std::optional<Before>& before,
                                             std::string reason, bool tells, Change& change) {
   const HazardState state = registry_.State(slot);
   const bool was_on_map = before && IsOnMap(before->state);
@@ -124,7 +124,7 @@ void ZoneService::Implementation::NoteEvent(Slot slot, const std::optional<Befor
 bool ZoneService::Implementation::Reject(const Uuid& uuid, const std::string& official,
                                          const std::string& reason) {
   const std::string why = CheckedReason(official, reason, config_.limits.max_text_bytes);
-  return Decide(uuid, [&](Slot slot, LifeRecord& life) {
+  return Decide(uuid, [&](Slot slot, PresenceRecord& life) {
     return life_.Reject(ClassOf(slot), official, why, now_ns_(), life);
   });
 }
@@ -132,16 +132,16 @@ bool ZoneService::Implementation::Reject(const Uuid& uuid, const std::string& of
 bool ZoneService::Implementation::Confirm(const Uuid& uuid, const std::string& official,
                                           const std::string& reason) {
   const std::string why = CheckedReason(official, reason, config_.limits.max_text_bytes);
-  return Decide(uuid, [&](Slot slot, LifeRecord& life) {
+  return Decide(uuid, [&](Slot slot, PresenceRecord& life) {
     return life_.Confirm(ClassOf(slot), official, why, now_ns_(), life);
   });
 }
 
 bool ZoneService::Implementation::Remove(const Uuid& uuid, const std::string& reason) {
-  return Decide(uuid, [&](Slot, LifeRecord& life) -> LifeStep {
+  return Decide(uuid, [&](Slot, PresenceRecord& life) -> LifecycleUpdate {
     if (!IsOnMap(life.state)) return {};
-    LifeStep step;
-    step.transition = LifeTransition{life.state, HazardState::kGone, Shortened(reason)};
+    LifecycleUpdate step;
+    step.transition = LifecycleTransition{life.state, HazardState::kGone, Shortened(reason)};
     life.state = HazardState::kGone;
     life.since_ns = now_ns_();
     return step;
@@ -156,8 +156,8 @@ bool ZoneService::Implementation::Decide(const Uuid& uuid, const Decision& decis
     const std::unique_lock<std::shared_mutex> lock(data_mutex_);
     const auto slot = registry_.Find(uuid);
     if (!slot) return false;
-    LifeRecord life = registry_.Record(*slot).life;
-    const LifeStep step = decision(*slot, life);
+    PresenceRecord life = registry_.Record(*slot).life;
+    const LifecycleUpdate step = decision(*slot, life);
     if (!step.transition) return false;
     change = NewChange();
     InTransaction(
@@ -176,7 +176,7 @@ std::optional<std::size_t> ZoneService::Implementation::Distrust(const std::stri
                                                                  const std::string& official,
                                                                  const std::string& reason) {
   // Reports wait while a portion is committed.
-  constexpr std::size_t kMostAtOnce = 2000;
+  constexpr std::size_t kMaxAtOnce = 2000;
   const std::size_t max_bytes = config_.limits.max_text_bytes;
   const std::string given = CheckedReason(official, reason, max_bytes);
   if (!IsPrintableText(vehicle_id, max_bytes)) return std::nullopt;
@@ -185,10 +185,10 @@ std::optional<std::size_t> ZoneService::Implementation::Distrust(const std::stri
   std::size_t withdrawn = 0;
   for (bool first = true;; first = false) {
     const std::lock_guard<std::mutex> writer(writer_mutex_);
-    std::vector<Slot> slots = registry_.SpokenOfBy(vehicle);
+    std::vector<Slot> slots = registry_.HazardsWithEvidenceFrom(vehicle);
     if (first && slots.empty() && !HasHeardOf(vehicle_id)) return std::nullopt;
-    const bool last = slots.size() <= kMostAtOnce;
-    slots.resize(std::min(slots.size(), kMostAtOnce));
+    const bool last = slots.size() <= kMaxAtOnce;
+    slots.resize(std::min(slots.size(), kMaxAtOnce));
     Change change = NewChange();
     {
       const std::unique_lock<std::shared_mutex> lock(data_mutex_);
@@ -207,16 +207,16 @@ std::optional<std::size_t> ZoneService::Implementation::Distrust(const std::stri
 /// All that the vehicle said of the hazard.
 void ZoneService::Implementation::Withdraw(Slot slot, std::uint64_t vehicle, const std::string& why,
                                            Change& change) {
-  LifeRecord life = registry_.Record(slot).life;
-  const LifeStep step = life_.Withdraw(ClassOf(slot), vehicle, why, change.now_ns, life);
+  PresenceRecord life = registry_.Record(slot).life;
+  const LifecycleUpdate step = life_.Withdraw(ClassOf(slot), vehicle, why, change.now_ns, life);
   if (step.transition) Step(slot, life, step, why, BeforeOf(slot), change);
 }
 
 void ZoneService::Implementation::Advance() {
-  constexpr std::size_t kMostAtOnce = 2000;
+  constexpr std::size_t kMaxAtOnce = 2000;
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   Change change = NewChange();
-  const std::vector<Slot> due = due_.Take(change.now_ns, kMostAtOnce);
+  const std::vector<Slot> due = due_.Take(change.now_ns, kMaxAtOnce);
   if (due.empty()) return;
   try {
     const std::unique_lock<std::shared_mutex> lock(data_mutex_);

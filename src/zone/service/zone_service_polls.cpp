@@ -115,10 +115,10 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
     change.answer = &answer;
     change.answered_id = registry_.Record(slot).id;
     PassTime(slot, change);
-    LifeRecord life = registry_.Record(slot).life;
+    PresenceRecord life = registry_.Record(slot).life;
     const Evidence evidence =
         EvidenceOf(KindOf(answer.answer), answer.vehicle_id, answer.stamp_ns, change.now_ns);
-    const LifeStep step = life_.Apply(ClassOf(slot), evidence, change.now_ns, life);
+    const LifecycleUpdate step = life_.Apply(ClassOf(slot), evidence, change.now_ns, life);
     if (!step.counted && !step.transition) return;
     const Before before = BeforeOf(slot);
     if (!picture.sha256.empty()) registry_.SetPicture(slot, picture);

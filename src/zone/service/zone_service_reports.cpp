@@ -43,7 +43,7 @@ void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Bat
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const Report& report = reports[i];
     if (!Examine(report, i, batch)) continue;
-    Candidate candidate{i, {}};
+    PendingReport candidate{i, {}};
     if (!report.image.empty()) {
       candidate.picture.format =
           FormatName(ReadImageHeader(report.image.data(), report.image.size())->format);
@@ -121,7 +121,7 @@ void ZoneService::Implementation::Refuse(const Report& report, const Refusal& re
 }
 
 void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Batch& batch) {
-  for (const Candidate& candidate : batch.candidates) {
+  for (const PendingReport& candidate : batch.candidates) {
     const Report& report = reports[candidate.index];
     const auto earlier = batch.hazard_of_report.find(report.uuid);
     if (earlier != batch.hazard_of_report.end()) {
@@ -160,16 +160,16 @@ ZoneService::Implementation::Slot ZoneService::Implementation::Register(const Re
   Uuid uuid = Uuid::Random(generator_);
   while (registry_.Find(uuid)) uuid = Uuid::Random(generator_);
   const Slot slot = registry_.Add(report, picture, uuid, ++change.sequence, change.now_ns);
-  const LifeClass entry = ClassOf(slot);
-  LifeRecord life;
+  const ClassModel entry = ClassOf(slot);
+  PresenceRecord life;
   const Evidence evidence =
       EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, change.now_ns);
-  const LifeStep step = life_.Begin(entry, evidence, change.now_ns, life);
+  const LifecycleUpdate step = life_.Begin(entry, evidence, change.now_ns, life);
   Learn(report.class_name, step.lesson, change);
   Judge(step, change);
   registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
                     change.now_ns);
-  NoteEvent(slot, std::nullopt, step.transition ? step.transition->reason : "report", true, change);
+  RecordEvent(slot, std::nullopt, step.transition ? step.transition->reason : "report", true, change);
   return slot;
 }
 
@@ -179,18 +179,18 @@ void ZoneService::Implementation::Sight(Slot slot, const Report& report, const P
   registry_.Merge(slot, report, picture, ++change.sequence, change.now_ns);
   std::string reason = "sighting that counts for no more: too many from this vehicle";
   if (allowance_.TakeEvidence(report.vehicle_id, change.now_ns)) {
-    const LifeClass entry = ClassOf(slot);
-    LifeRecord life = registry_.Record(slot).life;
+    const ClassModel entry = ClassOf(slot);
+    PresenceRecord life = registry_.Record(slot).life;
     const Evidence evidence =
         EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, change.now_ns);
-    const LifeStep step = life_.Apply(entry, evidence, change.now_ns, life);
+    const LifecycleUpdate step = life_.Apply(entry, evidence, change.now_ns, life);
     Learn(report.class_name, step.lesson, change);
     Judge(step, change);
     registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
                       change.now_ns);
     reason = step.transition ? step.transition->reason : "sighting";
   }
-  NoteEvent(slot, before, std::move(reason), true, change);
+  RecordEvent(slot, before, std::move(reason), true, change);
 }
 
 void ZoneService::Implementation::Count(const ZoneStatistics& counted) {

@@ -56,7 +56,7 @@ class ZoneService::Implementation {
   const Config config_;
   const Clock now_ns_;
   const OwnedDirectory directory_;
-  const HazardLife life_;
+  const HazardLifecycle life_;
 
   /// One writer at a time: owns what follows up to the vehicles, and the right to change what
   /// data_mutex_ guards.
@@ -121,7 +121,7 @@ class ZoneService::Implementation {
     std::vector<EventPlace> places;                             ///< Of each event.
     std::vector<std::pair<std::string, std::string>> pictures;  ///< Before and after.
     std::vector<Slot> touched;                                  ///< Hazards to write; may repeat.
-    std::map<std::string, LearnedLife> learned_before;          ///< By class.
+    std::map<std::string, LearnedLifetime> learned_before;          ///< By class.
     std::map<std::uint64_t, TrustRecord> trust_before;          ///< By vehicle.
     std::vector<AcceptedReport> reports;
     const PollAnswer* answer = nullptr;
@@ -130,7 +130,7 @@ class ZoneService::Implementation {
     std::vector<std::pair<const MapChangeReport*, Uuid>> map_change_reports;  ///< And the feature.
   };
   /// A report that may change the map.
-  struct Candidate {
+  struct PendingReport {
     std::size_t index = 0;  ///< In the batch.
     PictureName picture;
   };
@@ -138,7 +138,7 @@ class ZoneService::Implementation {
   struct Batch {
     Change change;
     std::vector<std::optional<Receipt>> receipts;  ///< None: not taken now.
-    std::vector<Candidate> candidates;
+    std::vector<PendingReport> candidates;
     std::unordered_map<Uuid, Uuid> hazard_of_report;
     std::map<std::string, ReportTrack> tracks;  ///< As they will be.
     ZoneStatistics counted;
@@ -161,22 +161,22 @@ class ZoneService::Implementation {
   void Count(const ZoneStatistics& counted);
 
   // One step of a hazard's life, in a running transaction: zone_service_life.cpp.
-  LifeClass ClassOf(Slot slot) const;
+  ClassModel ClassOf(Slot slot) const;
   Before BeforeOf(Slot slot) const;
   /// The map's hazard that the report is a sighting of, after time has done what is due to it.
   std::optional<Slot> MatchNow(const Report& report, Change& change);
   /// Does what time has made due; false when that was nothing.
   bool PassTime(Slot slot, Change& change);
   /// `life` is what `step` made of the hazard's life. Gives the event its own sequence.
-  void Step(Slot slot, const LifeRecord& life, const LifeStep& step, const std::string& reason,
+  void Step(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step, const std::string& reason,
             const Before& before, Change& change);
   /// The event of what happened to `slot` since `before` (none: it is new); its sequence is the
   /// change's. `tells`: drivers hear of it even when the state stays.
-  void NoteEvent(Slot slot, const std::optional<Before>& before, std::string reason, bool tells,
+  void RecordEvent(Slot slot, const std::optional<Before>& before, std::string reason, bool tells,
                  Change& change);
-  void Learn(const std::string& class_name, const LifeLesson& lesson, Change& change);
+  void Learn(const std::string& class_name, const LifetimeObservation& lesson, Change& change);
   /// What the step teaches of vehicles.
-  void Judge(const LifeStep& step, Change& change);
+  void Judge(const LifecycleUpdate& step, Change& change);
   /// What a vehicle says of a hazard, with how far it is believed.
   Evidence EvidenceOf(EvidenceKind kind, const std::string& vehicle_id, std::int64_t stamp_ns,
                       std::int64_t now_ns) const;

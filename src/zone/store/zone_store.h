@@ -40,13 +40,13 @@ class ZoneStore {
   struct HazardRow {
     std::uint64_t id = 0;
     Hazard hazard;
-    LifeRecord life;
+    PresenceRecord life;
   };
   /// Every hazard, in ascending order of sequence. One of an older schema gets a life that says
   /// what that schema knew. What the three Load functions give to `take` is sound; a row that the
   /// program cannot have written, or for which `take` throws Error, is left out and told.
   StoreDamage LoadHazards(const std::function<void(HazardRow)>& take);
-  StoreDamage LoadLives(const std::function<void(const std::string&, LearnedLife)>& take);
+  StoreDamage LoadLives(const std::function<void(const std::string&, LearnedLifetime)>& take);
   StoreDamage LoadTrust(const std::function<void(std::uint64_t, const TrustRecord&)>& take);
   /// The greatest id that a row of a hazard has, sound or not; 0 without rows. What lies beyond the
   /// ids that hazards can have is passed over.
@@ -95,7 +95,7 @@ class ZoneStore {
   void WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
                   std::uint64_t previous_sequence);
   void WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id, std::int64_t received_ns);
-  void WriteLife(const std::string& class_name, const LearnedLife& learned);
+  void WriteLife(const std::string& class_name, const LearnedLifetime& learned);
   void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
   void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
   void WriteMapChange(const MapChangeRow& row);

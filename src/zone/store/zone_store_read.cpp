@@ -81,8 +81,8 @@ const char* WhyNoHazard(const Row& row, const Hazard& hazard) {
 }
 
 /// What schema 1 knew of a life: drivers were told, nobody asked. LoadHazards adds who reported.
-LifeRecord LifeOf(const Hazard& hazard) {
-  LifeRecord life;
+PresenceRecord LifeOf(const Hazard& hazard) {
+  PresenceRecord life;
   life.state = hazard.state;
   life.since_ns = hazard.updated_ns;
   life.first_seen_ns = hazard.first_seen_ns;
@@ -119,7 +119,7 @@ ZoneStore::HazardRow ZoneStore::Implementation::ToHazard(const Row& row) {
   const std::string name = "hazard " + std::to_string(row.id);
   if (const char* why = WhyNoHazard(row, hazard)) throw Error(name + " has " + why);
   hazard.state = static_cast<HazardState>(row.state);
-  const auto life = row.life.empty() ? LifeOf(hazard) : UnpackLife(row.life);
+  const auto life = row.life.empty() ? LifeOf(hazard) : UnpackPresence(row.life);
   if (!life || life->state != hazard.state) throw Error(name + " has no life that can be read");
   result.life = *life;
   return result;
@@ -172,9 +172,9 @@ StoreDamage ZoneStore::Implementation::LoadRows(const std::string& table, soci::
 
 /// Who reported the hazards on the map that schema 1 left without a life, by hazard. No index leads
 /// from a hazard to its reports, so this is one walk over all, as long as there are such hazards.
-std::map<long long, std::vector<Voice>> ZoneStore::Implementation::VoicesOfReports() {
+std::map<long long, std::vector<VehicleEvidence>> ZoneStore::Implementation::VoicesOfReports() {
   constexpr char kLifeless[] = "FROM hazards WHERE life = '' AND state IN (1, 2)";
-  std::map<long long, std::vector<Voice>> voices;
+  std::map<long long, std::vector<VehicleEvidence>> voices;
   long long lifeless = 0;
   session_ << "SELECT count(*) " << kLifeless, soci::into(lifeless);
   if (lifeless == 0) return voices;
@@ -188,9 +188,9 @@ std::map<long long, std::vector<Voice>> ZoneStore::Implementation::VoicesOfRepor
        soci::into(row.id), soci::into(row.vehicle_id), soci::into(row.stamp_ns));
   query.execute();
   while (query.fetch()) {
-    std::vector<Voice>& of_hazard = voices[row.id];
-    if (of_hazard.size() == kMaxVoices || !IsStamp(row.stamp_ns)) continue;
-    Voice voice;
+    std::vector<VehicleEvidence>& of_hazard = voices[row.id];
+    if (of_hazard.size() == kMaxEvidencePerHazard || !IsStamp(row.stamp_ns)) continue;
+    VehicleEvidence voice;
     voice.vehicle = VehicleKey(row.vehicle_id);
     voice.at_s = static_cast<std::uint32_t>(Seconds(row.stamp_ns));
     voice.weight_1000 = kReporterWeight1000;
@@ -228,7 +228,7 @@ StoreDamage ZoneStore::LoadHazards(const std::function<void(HazardRow)>& take) {
   });
 }
 
-StoreDamage ZoneStore::LoadLives(const std::function<void(const std::string&, LearnedLife)>& take) {
+StoreDamage ZoneStore::LoadLives(const std::function<void(const std::string&, LearnedLifetime)>& take) {
   return ExplainStore("loading what was learned of classes", [&] {
     Implementation::Row row;
     soci::statement query =

@@ -51,7 +51,7 @@ class ZoneStore::Implementation {
   /// Throw Error for a row of impossible values.
   static MapChangeRow ToMapChange(const ChangeRow& row);
   static HazardRow ToHazard(const Row& row);
-  std::map<long long, std::vector<Voice>> VoicesOfReports();
+  std::map<long long, std::vector<VehicleEvidence>> VoicesOfReports();
   /// Calls `take_row` for every row of a prepared query; what it throws as Error is told. The
   /// query finds those rows of `table` only whose values are of the right type and size.
   StoreDamage LoadRows(const std::string& table, soci::statement& query,

@@ -115,7 +115,7 @@ void ZoneStore::WriteHazard(const HazardRow& written) {
     row.state = static_cast<int>(hazard.state);
     row.presence = static_cast<double>(hazard.presence);
     row.vehicles = static_cast<int>(hazard.vehicles);
-    row.life = PackLife(written.life);
+    row.life = PackPresence(written.life);
     implementation_->write_hazard_->execute(true);
   });
 }
@@ -175,7 +175,7 @@ void ZoneStore::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
   });
 }
 
-void ZoneStore::WriteLife(const std::string& class_name, const LearnedLife& learned) {
+void ZoneStore::WriteLife(const std::string& class_name, const LearnedLifetime& learned) {
   ExplainStore("writing what was learned of a class", [&] {
     Implementation::Row& row = implementation_->row_;
     row.class_name = class_name;

@@ -41,7 +41,7 @@ class PlaceMemoryTest : public testing::Test {
     }
     return files;
   }
-  static std::vector<std::int64_t> Ids(const std::vector<PlaceCandidate>& candidates) {
+  static std::vector<std::int64_t> Ids(const std::vector<PlaceMatch>& candidates) {
     std::vector<std::int64_t> ids;
     for (const auto& candidate : candidates) ids.push_back(candidate.id);
     return ids;
@@ -79,7 +79,7 @@ TEST_F(PlaceMemoryTest, HeadingsMeetAcrossNorth) {
 
 TEST_F(PlaceMemoryTest, AgreesWithASearchThroughAllOfThem) {
   PlaceMemory::Config config = Config();
-  config.reach.most_distance_m = 30;
+  config.reach.max_distance_m = 30;
   PlaceMemory memory(config, 1);
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> place(-60, 60);
@@ -98,7 +98,7 @@ TEST_F(PlaceMemoryTest, AgreesWithASearchThroughAllOfThem) {
       const double distance_m = GeodesicDistanceM(remembered.position, query.position);
       const double turn = std::abs(
           std::remainder(remembered.heading_rad - query.heading_rad, 2 * 3.14159265358979323846));
-      if (distance_m <= 30 && turn <= config.reach.most_heading_difference_rad) {
+      if (distance_m <= 30 && turn <= config.reach.max_heading_difference_rad) {
         expected.emplace_back(distance_m, id);
       }
     }
@@ -142,21 +142,21 @@ TEST_F(PlaceMemoryTest, RanksByTheNumberOfMatches) {
 
 TEST_F(PlaceMemoryTest, CachedFeaturesStayWithinTheirBound) {
   PlaceMemory::Config config = Config();
-  config.most_cached_bytes = 3.5 * static_cast<double>(MakePlace(kHere, 0).features.Bytes());
+  config.max_cached_bytes = 3.5 * static_cast<double>(MakePlace(kHere, 0).features.Bytes());
   PlaceMemory memory(config, 1);
   for (int i = 0; i < 8; ++i) memory.Add(MakePlace(East(i), i));
   const ImageFeatures features = MakePlace(kHere, 3).features;
   const auto nearest = memory.Nearest({kHere, 1.0, ""});
   EXPECT_EQ(memory.Rank(features, nearest).size(), 8U);
-  EXPECT_LE(memory.cached_bytes(), config.most_cached_bytes);
-  EXPECT_GT(memory.cached_bytes(), 0.5 * config.most_cached_bytes);
+  EXPECT_LE(memory.cached_bytes(), config.max_cached_bytes);
+  EXPECT_GT(memory.cached_bytes(), 0.5 * config.max_cached_bytes);
   EXPECT_EQ(memory.Rank(features, nearest)[0].matches, features.points.size());
 }
 
 TEST_F(PlaceMemoryTest, ACellKeepsItsNewestAndItsBest) {
   PlaceMemory::Config config = Config();
   const auto bytes = static_cast<double>(SerialisePlaceRecord(MakePlace(kHere, 0)).size());
-  config.most_cell_bytes = 3.3 * std::max(bytes, 10000.0 / 3.3);
+  config.max_cell_bytes = 3.3 * std::max(bytes, 10000.0 / 3.3);
   ASSERT_GT(bytes, 3100) << "the fixture's frames are too small for this test";
   config.cell_m = 1000;
   PlaceMemory memory(config, 1);
@@ -188,7 +188,7 @@ TEST_F(PlaceMemoryTest, ACellKeepsItsNewestAndItsBest) {
   EXPECT_THAT(Ids(memory.Nearest({kHere, 1.0, ""})),
               testing::ElementsAre(*best_id, *good_id, *later_id));
   EXPECT_EQ(Files().size(), 3U);
-  EXPECT_LE(memory.bytes(), config.most_cell_bytes);
+  EXPECT_LE(memory.bytes(), config.max_cell_bytes);
   // Another way of looking is another cell.
   ASSERT_TRUE(memory.Add(MakePlace(kHere, 6, 4.0)));
   EXPECT_EQ(memory.size(), 4U);
@@ -196,13 +196,13 @@ TEST_F(PlaceMemoryTest, ACellKeepsItsNewestAndItsBest) {
 
 TEST_F(PlaceMemoryTest, TheOldestGoWhenTheWholeIsFull) {
   PlaceMemory::Config config = Config();
-  config.most_cell_bytes = 2e4;
-  config.most_bytes = 4e4;
+  config.max_cell_bytes = 2e4;
+  config.max_bytes = 4e4;
   config.cell_m = 5;
   PlaceMemory memory(config, 1);
   for (int i = 0; i < 40; ++i) memory.Add(MakePlace(East(10.0 * i), i));
-  EXPECT_LE(memory.bytes(), config.most_bytes);
-  EXPECT_GT(memory.bytes(), 0.7 * config.most_bytes);
+  EXPECT_LE(memory.bytes(), config.max_bytes);
+  EXPECT_GT(memory.bytes(), 0.7 * config.max_bytes);
   EXPECT_EQ(memory.Nearest({East(390), 1.0, ""}).size(), 2U);
   EXPECT_TRUE(memory.Nearest({East(0), 1.0, ""}).empty());
   EXPECT_EQ(Files().size(), memory.size());
@@ -210,7 +210,7 @@ TEST_F(PlaceMemoryTest, TheOldestGoWhenTheWholeIsFull) {
 
 TEST_F(PlaceMemoryTest, AFrameThatNoCellHoldsIsRefused) {
   PlaceMemory::Config config = Config();
-  config.most_cell_bytes = 1e4;
+  config.max_cell_bytes = 1e4;
   PlaceMemory memory(config, 1);
   PlaceRecord large = MakePlace(kHere, 1);
   large.features.descriptors = cv::Mat::zeros(100, 128, CV_8UC1);
@@ -347,7 +347,7 @@ TEST_F(PlaceMemoryTest, AFrameWhoseRowCannotBeWrittenLeavesNoFile) {
 
 TEST_F(PlaceMemoryTest, SurvivesBeingKilledAtAnyMoment) {
   PlaceMemory::Config config = Config();
-  config.most_cell_bytes = 6e4;
+  config.max_cell_bytes = 6e4;
   int next = 0;
   for (int round = 0; round < 12; ++round) {
     int ends[2];

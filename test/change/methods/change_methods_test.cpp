@@ -110,7 +110,7 @@ TEST(Daisy, ARampPointsOneWayInEveryHistogram) {
   }
 }
 
-TEST(SayNothingOfUnseen, MakesNoChangeCertainThereAndLeavesTheRest) {
+TEST(MaskUnobserved, MakesNoChangeCertainThereAndLeavesTheRest) {
   const cv::Size size(4, 2);
   cv::Mat valid(size, CV_8UC1, cv::Scalar(255));
   valid.at<uchar>(1, 3) = 0;
@@ -118,7 +118,7 @@ TEST(SayNothingOfUnseen, MakesNoChangeCertainThereAndLeavesTheRest) {
     ChangeProbabilities probabilities = NothingChanged(size, tells_classes);
     probabilities.of_class[0].setTo(0.25);
     probabilities.of_class[1].setTo(0.75);
-    SayNothingOfUnseen(valid, probabilities);
+    MaskUnobserved(valid, probabilities);
     EXPECT_EQ(probabilities.of_class[0].at<float>(1, 3), 1);
     EXPECT_EQ(probabilities.of_class[1].at<float>(1, 3), 0);
     EXPECT_EQ(probabilities.of_class[0].at<float>(0, 3), 0.25F);

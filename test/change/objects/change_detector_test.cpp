@@ -39,10 +39,10 @@ class Drive {
         renderer_(street_, Camera(), MakeLighting(Condition::kDay, kSeed), Options()),
         first_ns_(first_ns) {}
 
-  WatchedPicture Picture(std::size_t frame) {
+  ChangeDetectorFrame Picture(std::size_t frame) {
     const SimulatedFrame seen =
         renderer_.Render(drive_.Camera(frame), static_cast<std::uint32_t>(frame));
-    WatchedPicture picture;
+    ChangeDetectorFrame picture;
     picture.stamp_ns = first_ns_ + static_cast<std::int64_t>(frame) * 100'000'000;
     picture.bgr = seen.bgr;
     depth_ = seen.depth;
@@ -57,8 +57,8 @@ class Drive {
   }
 
   /// The same with its depth.
-  WatchedPicture PictureWithDepth(std::size_t frame) {
-    WatchedPicture picture = Picture(frame);
+  ChangeDetectorFrame PictureWithDepth(std::size_t frame) {
+    ChangeDetectorFrame picture = Picture(frame);
     picture.depth = depth_;
     return picture;
   }
@@ -95,8 +95,8 @@ class Drive {
     camera.intrinsics = {260, 260, 159.5, 127.5, 320, 256};
     return camera;
   }
-  static RenderOptions Options() {
-    RenderOptions options;
+  static RenderConfig Options() {
+    RenderConfig options;
     options.smooth_edges = false;
     return options;
   }
@@ -123,17 +123,17 @@ const std::vector<PlacedHazard>& After() {
 
 constexpr std::size_t kFrames = 70;  // Of 0.8 m.
 
-class ChangeWatchTest : public ::testing::Test {
+class ChangeDetectorTest : public ::testing::Test {
  protected:
   void SetUp() override { std::filesystem::remove_all(directory_); }
   void TearDown() override { std::filesystem::remove_all(directory_); }
 
-  std::unique_ptr<ChangeWatch> Watch(const std::string& drive) const {
-    ChangeWatch::Config config;
+  std::unique_ptr<ChangeDetector> Watch(const std::string& drive) const {
+    ChangeDetector::Config config;
     config.drive_id = drive;
     config.memory.directory = directory_;
-    config.regions.least_confidence = 0.3;
-    return std::make_unique<ChangeWatch>(config, MakeChangeMethod("daisy"), kFirstNs);
+    config.regions.min_confidence = 0.3;
+    return std::make_unique<ChangeDetector>(config, MakeChangeMethod("daisy"), kFirstNs);
   }
 
   /// Drives the first pass.
@@ -142,7 +142,7 @@ class ChangeWatchTest : public ::testing::Test {
     Drive drive(Before(), 8, kFirstNs);
     for (std::size_t frame = 0; frame < kFrames; ++frame) {
       const auto answer = watch->Look(drive.Picture(frame));
-      ASSERT_EQ(answer.outcome, ChangeWatch::Outcome::kNothingEarlier);
+      ASSERT_EQ(answer.outcome, ChangeDetector::Outcome::kNothingEarlier);
       ASSERT_EQ(answer.store_error, "");
     }
     // Of 56 m a picture each 2 m or a little more.
@@ -153,7 +153,7 @@ class ChangeWatchTest : public ::testing::Test {
   std::string directory_ = ::testing::TempDir() + "change_watch_test";
 };
 
-TEST_F(ChangeWatchTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
+TEST_F(ChangeDetectorTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
   Remember();
   {
     const auto watch = Watch("tuesday");
@@ -162,7 +162,7 @@ TEST_F(ChangeWatchTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
     std::vector<PlacedChange> passed;
     for (std::size_t frame = 0; frame < kFrames; frame += 3) {
       const auto answer = watch->Look(drive.Picture(frame));
-      ASSERT_EQ(answer.outcome, ChangeWatch::Outcome::kCompared) << answer.why;
+      ASSERT_EQ(answer.outcome, ChangeDetector::Outcome::kCompared) << answer.why;
       EXPECT_EQ(answer.earlier.drive_id, "monday");
       EXPECT_EQ(answer.classes.size(), answer.pair.after.size());
       EXPECT_TRUE(frame >= 6 || answer.objects.empty()) << "said from " << frame / 3 + 1;
@@ -201,7 +201,7 @@ TEST_F(ChangeWatchTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
   }
 }
 
-TEST_F(ChangeWatchTest, DepthLaysTheEarlierPictureOnWhereItIsKnownAndEdgesDoWhereItIsNot) {
+TEST_F(ChangeDetectorTest, DepthLaysTheEarlierPictureOnWhereItIsKnownAndEdgesDoWhereItIsNot) {
   Remember();
   const auto with_depth = Watch("tuesday");
   Drive drive(Before(), 8.9, kFirstNs + kDayNs);
@@ -215,64 +215,64 @@ TEST_F(ChangeWatchTest, DepthLaysTheEarlierPictureOnWhereItIsKnownAndEdgesDoWher
     return mean[0] + mean[1] + mean[2];
   };
   for (std::size_t frame = 10; frame < 50; frame += 10) {
-    WatchedPicture picture = drive.PictureWithDepth(frame);
+    ChangeDetectorFrame picture = drive.PictureWithDepth(frame);
     const auto answer = with_depth->Look(picture);
-    ASSERT_EQ(answer.outcome, ChangeWatch::Outcome::kCompared) << answer.why;
-    by_depth += answer.registered_by == ChangeWatch::RegisteredBy::kDepth ? 1 : 0;
+    ASSERT_EQ(answer.outcome, ChangeDetector::Outcome::kCompared) << answer.why;
+    by_depth += answer.registered_by == ChangeDetector::RegisteredBy::kDepth ? 1 : 0;
     depth_error += error(answer.pair);
     picture.depth.setTo(0);
     ++picture.stamp_ns;
     const auto without = with_depth->Look(picture);
-    ASSERT_EQ(without.outcome, ChangeWatch::Outcome::kCompared) << without.why;
-    EXPECT_NE(without.registered_by, ChangeWatch::RegisteredBy::kDepth);
+    ASSERT_EQ(without.outcome, ChangeDetector::Outcome::kCompared) << without.why;
+    EXPECT_NE(without.registered_by, ChangeDetector::RegisteredBy::kDepth);
     edges_error += error(without.pair);
   }
   EXPECT_GE(by_depth, 3);
   EXPECT_LT(depth_error, edges_error);
-  WatchedPicture wrong = drive.PictureWithDepth(60);
+  ChangeDetectorFrame wrong = drive.PictureWithDepth(60);
   wrong.depth = cv::Mat(10, 10, CV_32FC1, cv::Scalar(5));
   EXPECT_THROW(with_depth->Look(wrong), Error);
 }
 
-TEST_F(ChangeWatchTest, NeverComparesWithItsOwnDriveNorWithAnotherPlace) {
+TEST_F(ChangeDetectorTest, NeverComparesWithItsOwnDriveNorWithAnotherPlace) {
   const auto watch = Watch("monday");
   Drive drive(Before(), 8, kFirstNs);
-  const WatchedPicture first = drive.Picture(0);
+  const ChangeDetectorFrame first = drive.Picture(0);
   EXPECT_TRUE(watch->Look(first).remembered);
-  WatchedPicture again = first;
+  ChangeDetectorFrame again = first;
   again.stamp_ns += 1;
   const auto same_drive = watch->Look(again);
-  EXPECT_EQ(same_drive.outcome, ChangeWatch::Outcome::kNothingEarlier);
+  EXPECT_EQ(same_drive.outcome, ChangeDetector::Outcome::kNothingEarlier);
   EXPECT_FALSE(same_drive.remembered) << "the vehicle stands";
 }
 
-TEST_F(ChangeWatchTest, AWrongPlaceIsRefusedWithAReasonAndTellsNoChange) {
+TEST_F(ChangeDetectorTest, AWrongPlaceIsRefusedWithAReasonAndTellsNoChange) {
   { Watch("monday")->Look(Drive(Before(), 8, kFirstNs).Picture(0)); }
   const auto watch = Watch("tuesday");
-  WatchedPicture elsewhere = Drive({}, 200, kFirstNs + kDayNs).Picture(0);
-  const WatchedPicture there = Drive(Before(), 8, kFirstNs).Picture(0);
+  ChangeDetectorFrame elsewhere = Drive({}, 200, kFirstNs + kDayNs).Picture(0);
+  const ChangeDetectorFrame there = Drive(Before(), 8, kFirstNs).Picture(0);
   elsewhere.position = there.position;
   elsewhere.heading_rad = there.heading_rad;
   const auto answer = watch->Look(elsewhere);
-  EXPECT_EQ(answer.outcome, ChangeWatch::Outcome::kRefused);
+  EXPECT_EQ(answer.outcome, ChangeDetector::Outcome::kRefused);
   EXPECT_THAT(answer.why, HasSubstr("accepted"));
   EXPECT_TRUE(answer.regions.empty());
 }
 
-TEST_F(ChangeWatchTest, AnUncertainPlaceIsNeitherComparedNorRemembered) {
+TEST_F(ChangeDetectorTest, AnUncertainPlaceIsNeitherComparedNorRemembered) {
   const auto watch = Watch("monday");
-  WatchedPicture picture = Drive(Before(), 8, kFirstNs).Picture(0);
+  ChangeDetectorFrame picture = Drive(Before(), 8, kFirstNs).Picture(0);
   picture.covariance_m2 = 100 * Eigen::Matrix2d::Identity();
   const auto answer = watch->Look(picture);
-  EXPECT_EQ(answer.outcome, ChangeWatch::Outcome::kUncertain);
+  EXPECT_EQ(answer.outcome, ChangeDetector::Outcome::kUncertain);
   EXPECT_FALSE(answer.remembered);
   EXPECT_EQ(watch->memory().size(), 0U);
 }
 
-TEST_F(ChangeWatchTest, PicturesThatAreNoneAndDrivesWithoutNameAreRefused) {
+TEST_F(ChangeDetectorTest, PicturesThatAreNoneAndDrivesWithoutNameAreRefused) {
   EXPECT_THROW(Watch(""), Error);
   const auto watch = Watch("monday");
-  WatchedPicture picture = Drive(Before(), 8, kFirstNs).Picture(0);
+  ChangeDetectorFrame picture = Drive(Before(), 8, kFirstNs).Picture(0);
   picture.camera.width = 640;
   EXPECT_THROW(watch->Look(picture), Error);
   picture.camera.width = 320;

@@ -48,7 +48,7 @@ ChangeRegion SeenAt(const ChangeFrame& frame, double along_m, double left_m,
 
 TEST(ChangeTracker, ConfirmsWhatSeveralPicturesShowWhereItStands) {
   ChangeTracker tracker{ChangeTracker::Config()};
-  std::vector<ChangeEvent> confirmed;
+  std::vector<ChangedObject> confirmed;
   for (int i = 0; i < 6; ++i) {
     const ChangeFrame frame = FrameAt(2.0 * i, i + 1);
     const auto events = tracker.Add(frame, {SeenAt(frame, 22, -2)});
@@ -77,7 +77,7 @@ TEST(ChangeTracker, SaysNothingFromOnePictureNorFromOnePlace) {
   }
   EXPECT_EQ(tracker.tracks(), 1U);
   ChangeTracker::Config hasty;
-  hasty.least_seen = 1;
+  hasty.min_seen = 1;
   EXPECT_THROW(ChangeTracker{hasty}, Error);
 }
 
@@ -139,7 +139,7 @@ TEST(ChangeTracker, IgnoresOldPicturesAndWhatHasNoFootOnTheRoad) {
 
 TEST(ChangeTracker, ForgetsWhatLiesFarBehindAndStaysSmall) {
   ChangeTracker::Config config;
-  config.most_tracks = 3;
+  config.max_tracks = 3;
   ChangeTracker tracker(config);
   const ChangeFrame frame = FrameAt(0, 1);
   tracker.Add(frame, {SeenAt(frame, 12, 3), SeenAt(frame, 12, -3), SeenAt(frame, 20, 3),
@@ -206,8 +206,8 @@ TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
   const cv::Mat image = Background();
   EXPECT_TRUE(
       FindChangeRegions(OneRegion({10, 10, 7, 8}, ChangeClass::kBin), image, image).empty());
-  ChangeRegionOptions strict;
-  strict.least_confidence = 0.95;
+  ChangeRegionConfig strict;
+  strict.min_confidence = 0.95;
   EXPECT_TRUE(
       FindChangeRegions(OneRegion({10, 10, 50, 50}, ChangeClass::kBin), image, image, strict)
           .empty());
@@ -232,7 +232,7 @@ TEST(FindChangeRegions, TakeInTheUnsureRimAroundThemDownToTheFoot) {
   EXPECT_EQ(regions[0].box, cv::Rect(100, 80, 30, 48)) << "rows 120 to 127: the rim is 8 px";
   EXPECT_EQ(regions[0].pixels, box.area());
   EXPECT_NEAR(regions[0].confidence, 0.9, 1e-5);
-  ChangeRegionOptions without_rim;
+  ChangeRegionConfig without_rim;
   without_rim.rim_px = 0;
   EXPECT_EQ(FindChangeRegions(probabilities, image, image, without_rim)[0].box, box);
 }
@@ -257,8 +257,8 @@ TEST(FindChangeRegions, OfProbabilitiesWithoutClassesAreOtherObjects) {
   probabilities.of_class[0](box).setTo(0.6);
   probabilities.of_class[1](box).setTo(0.4);
   EXPECT_TRUE(FindChangeRegions(probabilities, image, image).empty());
-  ChangeRegionOptions sensitive;
-  sensitive.least_confidence = 0.35;
+  ChangeRegionConfig sensitive;
+  sensitive.min_confidence = 0.35;
   const auto regions = FindChangeRegions(probabilities, image, image, sensitive);
   ASSERT_EQ(regions.size(), 1U);
   EXPECT_EQ(regions[0].change_class, ChangeClass::kOtherObjects);
@@ -280,7 +280,7 @@ TEST(ChangeTracker, BeganAnewForgetsObjectsButNotTheirIds) {
     std::uint64_t id = 0;
     for (int i = 0; i < 4; ++i) {
       const ChangeFrame frame = FrameAt(2.0 * i, i + 1);
-      for (const ChangeEvent& event : tracker.Add(frame, {SeenAt(frame, 22, -2)})) id = event.id;
+      for (const ChangedObject& event : tracker.Add(frame, {SeenAt(frame, 22, -2)})) id = event.id;
     }
     return id;
   };
@@ -301,7 +301,7 @@ TEST(ChangeTracker, TellsOfAConfirmedObjectOnceWhenTheVehicleHasPassedIt) {
     if (along_m < 18) regions.push_back(SeenAt(frame, 22, -2));
     if (along_m == 4) regions.push_back(SeenAt(frame, 34, 3));  // Once: never confirmed.
     tracker.Add(frame, regions);
-    for (const ChangeEvent& event : tracker.LeaveBehind(frame.map_from_base)) {
+    for (const ChangedObject& event : tracker.LeaveBehind(frame.map_from_base)) {
       told_at_m.push_back(along_m);
       EXPECT_EQ(event.seen, 9);
       EXPECT_NEAR(event.position_m.x(), 22, 0.5);

@@ -19,7 +19,7 @@ const std::vector<SimulatedPair>& PairsOfTwoDays() {
 }
 
 Registration ByEdges(const cv::Mat& before, const cv::Mat& after) {
-  return RegisterByEdges(before, after, RegistrationOptions());
+  return RegisterByEdges(before, after, RegistrationConfig());
 }
 
 /// The greatest distance between where two warps take the corners of the inner half of a picture.

@@ -19,7 +19,7 @@ FeaturedView View(const cv::Mat& bgr) { return {bgr.size(), ExtractFeatures(bgr)
 
 Registration Register(const SimulatedFrame& before, const SimulatedFrame& after,
                       std::uint64_t seed = 1) {
-  return RegisterByHomography(View(before.bgr), View(after.bgr), RegistrationOptions(), seed);
+  return RegisterByHomography(View(before.bgr), View(after.bgr), RegistrationConfig(), seed);
 }
 
 const CameraIntrinsics& Camera() {
@@ -29,7 +29,7 @@ const CameraIntrinsics& Camera() {
 
 Registration RegisterWithDepth(const SimulatedPair& pair, const cv::Mat& depth) {
   return RegisterByDepth(View(pair.before.bgr), Camera(), View(pair.after.bgr), Camera(), depth,
-                         RegistrationOptions(), 1);
+                         RegistrationConfig(), 1);
 }
 
 const std::vector<SimulatedPair>& DayPairs() {
@@ -103,8 +103,8 @@ TEST(RegistrationByHomography, IsTheSameForTheSameSeed) {
   const SimulatedPair& pair = DayPairs()[0];
   const FeaturedView before = View(pair.before.bgr);
   const FeaturedView after = View(pair.after.bgr);
-  const auto once = RegisterByHomography(before, after, RegistrationOptions(), 5);
-  const auto again = RegisterByHomography(before, after, RegistrationOptions(), 5);
+  const auto once = RegisterByHomography(before, after, RegistrationConfig(), 5);
+  const auto again = RegisterByHomography(before, after, RegistrationConfig(), 5);
   EXPECT_EQ(once.after_from_before, again.after_from_before);
   EXPECT_EQ(once.inliers, again.inliers);
 }
@@ -115,7 +115,7 @@ TEST(RegistrationByHomography, FindsAKnownHomographyToATenthOfAPixel) {
   cv::Mat warped;
   cv::warpPerspective(image, warped, truth, image.size());
   const Registration registration =
-      RegisterByHomography(View(image), View(warped), RegistrationOptions(), 1);
+      RegisterByHomography(View(image), View(warped), RegistrationConfig(), 1);
   ASSERT_TRUE(registration.accepted()) << registration.why;
   for (const cv::Vec3d& corner :
        {cv::Vec3d(60, 60, 1), {450, 60, 1}, {60, 320, 1}, {450, 320, 1}}) {
@@ -145,7 +145,7 @@ TEST(RegistrationByHomography, RefusesOtherPlaces) {
 TEST(RegistrationByHomography, RefusesPicturesWithoutTexture) {
   const cv::Mat grey(384, 512, CV_8UC3, cv::Scalar::all(128));
   const Registration registration =
-      RegisterByHomography(View(grey), View(DayPairs()[0].after.bgr), RegistrationOptions(), 1);
+      RegisterByHomography(View(grey), View(DayPairs()[0].after.bgr), RegistrationConfig(), 1);
   EXPECT_EQ(registration.refusal, RegistrationRefusal::kTexture);
   EXPECT_THAT(registration.why, testing::HasSubstr("0 features"));
 }
@@ -155,7 +155,7 @@ TEST(RegistrationByHomography, RefusesAPictureOfAnotherSize) {
   cv::Mat smaller;
   cv::resize(image, smaller, cv::Size(480, 360));
   const Registration registration =
-      RegisterByHomography(View(smaller), View(image), RegistrationOptions(), 1);
+      RegisterByHomography(View(smaller), View(image), RegistrationConfig(), 1);
   EXPECT_EQ(registration.refusal, RegistrationRefusal::kSize);
   EXPECT_THAT(registration.why,
               testing::AllOf(testing::HasSubstr("480x360"), testing::HasSubstr("512x384")));
@@ -166,11 +166,11 @@ TEST(RegistrationByHomography, RefusesMirroredTurnedAndMagnifiedPictures) {
   cv::Mat mirrored;
   cv::flip(image, mirrored, 1);
   EXPECT_FALSE(
-      RegisterByHomography(View(image), View(mirrored), RegistrationOptions(), 1).accepted());
+      RegisterByHomography(View(image), View(mirrored), RegistrationConfig(), 1).accepted());
   const auto after = [&](const cv::Matx33d& h) {
     cv::Mat warped;
     cv::warpPerspective(image, warped, h, image.size());
-    return RegisterByHomography(View(image), View(warped), RegistrationOptions(), 1);
+    return RegisterByHomography(View(image), View(warped), RegistrationConfig(), 1);
   };
   const Registration turned = after({0.85, -0.52, 120, 0.52, 0.85, -90, 0, 0, 1});
   EXPECT_EQ(turned.refusal, RegistrationRefusal::kDegenerate) << turned.why;
@@ -188,7 +188,7 @@ TEST(RegistrationByHomography, RefusesMirroredTurnedAndMagnifiedPictures) {
                                                      image(part).copyTo(mixed(part));
                                                      return mixed;
                                                    }()),
-                                                   RegistrationOptions(), 1);
+                                                   RegistrationConfig(), 1);
   EXPECT_FALSE(corner.accepted());
 }
 

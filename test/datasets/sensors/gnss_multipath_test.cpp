@@ -14,9 +14,9 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr StreetSky kCanyon{M_PI / 4, M_PI / 4};
-constexpr StreetSky kHousesLeft{M_PI / 4, 0};
-constexpr StreetSky kPark{0, 0};
+constexpr SkyVisibility kCanyon{M_PI / 4, M_PI / 4};
+constexpr SkyVisibility kHousesLeft{M_PI / 4, 0};
+constexpr SkyVisibility kPark{0, 0};
 
 struct Errors {
   std::vector<double> east;
@@ -24,7 +24,7 @@ struct Errors {
 };
 
 /// Fixes every `step_m` metres and `step_s` seconds in a street that runs east.
-Errors Drive(double sigma_m, const StreetSky& sky, int count, double step_m, double step_s) {
+Errors Drive(double sigma_m, const SkyVisibility& sky, int count, double step_m, double step_s) {
   Multipath multipath(sigma_m, 5);
   Errors errors;
   for (int i = 0; i < count; ++i) {
@@ -52,9 +52,9 @@ TEST(Multipath, WallsToBothSidesHideTheirWedgesOfTheSky) {
   EXPECT_DOUBLE_EQ(kPark.HiddenShare(), 0);
   EXPECT_DOUBLE_EQ(kHousesLeft.HiddenShare(), 0.25);
   EXPECT_DOUBLE_EQ(kCanyon.HiddenShare(), 0.5);
-  EXPECT_DOUBLE_EQ((StreetSky{M_PI / 2, M_PI / 2}).HiddenShare(), 1);
+  EXPECT_DOUBLE_EQ((SkyVisibility{M_PI / 2, M_PI / 2}).HiddenShare(), 1);
   EXPECT_DOUBLE_EQ(kHousesLeft.LeftSurplus(), 0.25);
-  EXPECT_DOUBLE_EQ((StreetSky{0, M_PI / 4}).LeftSurplus(), -0.25);
+  EXPECT_DOUBLE_EQ((SkyVisibility{0, M_PI / 4}).LeftSurplus(), -0.25);
 }
 
 TEST(Multipath, CanyonHasTheStatedSigmasAndNoPush) {

@@ -15,7 +15,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-LabelledFolderOptions Options(std::vector<std::string> label_classes = {}, std::string split = "") {
+LabelledFolderConfig Options(std::vector<std::string> label_classes = {}, std::string split = "") {
   return {std::move(label_classes), {"pothole", "traffic_cone"}, std::move(split)};
 }
 
@@ -36,11 +36,11 @@ class LabelledFolderTest : public ::testing::Test {
   }
   std::string Path(const std::string& name) const { return (root_ / name).string(); }
 
-  LabelledFolder Read(const std::string& name, const LabelledFolderOptions& options = Options()) {
+  LabelledFolder Read(const std::string& name, const LabelledFolderConfig& options = Options()) {
     deduced_.reset();
     return ReadLabelledFolder(Path(name), options, &deduced_);
   }
-  std::string ErrorOf(const std::string& name, const LabelledFolderOptions& options = Options()) {
+  std::string ErrorOf(const std::string& name, const LabelledFolderConfig& options = Options()) {
     try {
       Read(name, options);
     } catch (const Error& error) {

@@ -6,7 +6,7 @@ namespace livemap {
 namespace {
 
 TEST(TrackingEvaluation, StampsFollowTheChainageAndNeverStandStill) {
-  const TrackedDriveOptions options;
+  const TrackedDriveConfig options;
   const TrackerFrame first = ToTrackerFrame({}, {640, 400}, 32, 0, options);
   EXPECT_EQ(first.stamp_ns, 2'000'000'000);
   EXPECT_GT(ToTrackerFrame({}, {640, 400}, 32, first.stamp_ns, options).stamp_ns, first.stamp_ns);
@@ -14,7 +14,7 @@ TEST(TrackingEvaluation, StampsFollowTheChainageAndNeverStandStill) {
 }
 
 TEST(TrackingEvaluation, RepeatedSightsBecomeOneDetectionOfTheDrive) {
-  const TrackedDriveOptions options;
+  const TrackedDriveConfig options;
   const cv::Rect2f box(300, 200, 40, 20);
   ScoredDrive labelled(3);
   std::vector<TrackerFrame> frames;

@@ -69,7 +69,7 @@ std::vector<StampedPose> AtStamps(const std::vector<double>& stamps_s) {
 /// "true-estimated" stamps in ms of the pairs.
 std::vector<std::string> PairsOf(const std::vector<double>& truth_s,
                                  const std::vector<double>& estimate_s,
-                                 const AssociationOptions& options = {}) {
+                                 const AssociationConfig& options = {}) {
   const TrajectoryPairs pairs = Associate(AtStamps(truth_s), AtStamps(estimate_s), options);
   std::vector<std::string> text;
   for (std::size_t i = 0; i < pairs.truth.size(); ++i) {
@@ -82,7 +82,7 @@ std::vector<std::string> PairsOf(const std::vector<double>& truth_s,
 TrajectoryFigures Evaluate(const std::vector<StampedPose>& truth,
                            const std::vector<StampedPose>& estimate,
                            AlignmentKind alignment = AlignmentKind::kSe3) {
-  TrajectoryOptions options;
+  TrajectoryConfig options;
   options.alignment = alignment;
   options.rpe_delta_frames = 5;
   return EvaluateTrajectory(truth, estimate, options);
@@ -178,7 +178,7 @@ TEST(TrajectoryFigures, OfAConstantDriftAreItsRates) {
 }
 
 TEST(TrajectoryFigures, RelativeErrorsPerSecondAreThoseOfTheDeltaDividedByIt) {
-  TrajectoryOptions options;
+  TrajectoryConfig options;
   options.rpe_delta_s = 4;
   const auto json =
       ToJson(EvaluateTrajectory(Straight(300, 1), Straight(300, 1.03, 0.02), options));
@@ -240,7 +240,7 @@ TEST(TrajectoryFigures, WithoutTwoPairsAreRefusedWithTheSpansOfBoth) {
                                              "than 0.02 s")));
   EXPECT_THAT([&] { Evaluate(drive, later); }, ThrowsMessage<Error>(HasSubstr("1100.000 to")));
   EXPECT_THROW(Evaluate({}, drive), Error);
-  TrajectoryOptions options;
+  TrajectoryConfig options;
   options.association.offset_s = -1000;
   EXPECT_LT(EvaluateTrajectory(drive, later, options).ate_m.max, 1e-9);
 }
@@ -253,7 +253,7 @@ TEST(TrajectoryFigures, ScaleOfAnEstimateThatStandsStillIsRefused) {
 }
 
 TEST(TrajectoryFigures, AreNullWhereNoTwoPosesAreADeltaApart) {
-  TrajectoryOptions options;
+  TrajectoryConfig options;
   options.rpe_delta_s = 60;
   const TrajectoryFigures figures = EvaluateTrajectory(Drive(20), Drive(20), options);
   EXPECT_EQ(figures.rpe_m.n, 0U);

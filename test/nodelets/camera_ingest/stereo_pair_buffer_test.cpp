@@ -18,14 +18,14 @@ IngestFrame Frame(int milliseconds) {
 }
 
 /// Stamp of the partner, milliseconds as above; -1 without one.
-int Partner(RightImages& rights, int milliseconds) {
+int Partner(StereoPairBuffer& rights, int milliseconds) {
   const std::optional<IngestFrame> partner = rights.Take(At(milliseconds));
   if (!partner) return -1;
   return static_cast<int>((partner->header().stamp - ros::Time(10)).toNSec() / 1000000);
 }
 
-TEST(RightImages, PairsEqualStampsOnlyWithoutTolerance) {
-  RightImages rights(0, 0, 10);
+TEST(StereoPairBuffer, PairsEqualStampsOnlyWithoutTolerance) {
+  StereoPairBuffer rights(0, 0, 10);
   for (const int stamp : {0, 100, 201, 300}) rights.Put(Frame(stamp));
   EXPECT_EQ(Partner(rights, 100), 100);
   EXPECT_EQ(Partner(rights, 200), -1);
@@ -34,32 +34,32 @@ TEST(RightImages, PairsEqualStampsOnlyWithoutTolerance) {
   EXPECT_EQ(rights.counters().unpaired, 2U) << "0 and 201";
 }
 
-TEST(RightImages, PairsTheNearestWithinTheTolerance) {
-  RightImages rights(0.010, 0, 10);
+TEST(StereoPairBuffer, PairsTheNearestWithinTheTolerance) {
+  StereoPairBuffer rights(0.010, 0, 10);
   for (const int stamp : {92, 97, 104, 191, 211}) rights.Put(Frame(stamp));
   EXPECT_EQ(Partner(rights, 100), 97);
   EXPECT_EQ(Partner(rights, 200), 191);
   EXPECT_EQ(Partner(rights, 222), -1);
 }
 
-TEST(RightImages, KeepsAsManyAsItMay) {
-  RightImages rights(0, 0, 2);
+TEST(StereoPairBuffer, KeepsAsManyAsItMay) {
+  StereoPairBuffer rights(0, 0, 2);
   for (const int stamp : {0, 100, 200}) rights.Put(Frame(stamp));
   EXPECT_EQ(Partner(rights, 0), -1);
   EXPECT_EQ(Partner(rights, 100), 100);
   EXPECT_EQ(rights.counters().unpaired, 1U);
 }
 
-TEST(RightImages, BeginAnewWhenStampsGoBack) {
-  RightImages rights(0, 0, 10);
+TEST(StereoPairBuffer, BeginAnewWhenStampsGoBack) {
+  StereoPairBuffer rights(0, 0, 10);
   for (const int stamp : {500, 600, 0}) rights.Put(Frame(stamp));
   EXPECT_EQ(Partner(rights, 0), 0);
   EXPECT_EQ(rights.counters().unpaired, 2U);
 }
 
-TEST(RightImages, AreWaitedForAndTheWaitEndsWhenOneIsTooLate) {
+TEST(StereoPairBuffer, AreWaitedForAndTheWaitEndsWhenOneIsTooLate) {
   constexpr double kForeverS = 1e6;
-  RightImages rights(0, kForeverS, 10);
+  StereoPairBuffer rights(0, kForeverS, 10);
   std::thread eye([&] { rights.Put(Frame(100)); });
   EXPECT_EQ(Partner(rights, 100), 100);
   eye.join();

@@ -10,10 +10,10 @@ namespace {
 constexpr double kMetresPerDegree = 111195;  // Of latitude, near enough.
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 
-ChangeFrames::Config Config() {
-  ChangeFrames::Config config;
+PosedFrameQueue::Config Config() {
+  PosedFrameQueue::Config config;
   config.spacing_m = 16;
-  config.most_waiting = 3;
+  config.max_waiting = 3;
   return config;
 }
 
@@ -33,8 +33,8 @@ sensor_msgs::ImageConstPtr ImageAt(double seconds) {
   return image;
 }
 
-TEST(ChangeFrames, GivesAnImageOnceItsPositionIsKnownAndTheRoadWasDriven) {
-  ChangeFrames frames(Config());
+TEST(PosedFrameQueue, GivesAnImageOnceItsPositionIsKnownAndTheRoadWasDriven) {
+  PosedFrameQueue frames(Config());
   for (double seconds = 0; seconds < 2; seconds += 0.5) frames.AddFix(FixAt(seconds));
   frames.AddImage(ImageAt(1.7), 50);
   EXPECT_FALSE(frames.Next(50.01)) << "the fix after it may come";
@@ -52,8 +52,8 @@ TEST(ChangeFrames, GivesAnImageOnceItsPositionIsKnownAndTheRoadWasDriven) {
   EXPECT_EQ(frames.counters().near, 1U);
 }
 
-TEST(ChangeFrames, AnImageThatWasNotTakenDoesNotCountAsLookedAt) {
-  ChangeFrames frames(Config());
+TEST(PosedFrameQueue, AnImageThatWasNotTakenDoesNotCountAsLookedAt) {
+  PosedFrameQueue frames(Config());
   for (double seconds = 0; seconds < 9; seconds += 0.5) frames.AddFix(FixAt(seconds));
   frames.AddImage(ImageAt(2.0), 50);
   ASSERT_TRUE(frames.Next(50));
@@ -61,10 +61,10 @@ TEST(ChangeFrames, AnImageThatWasNotTakenDoesNotCountAsLookedAt) {
   EXPECT_TRUE(frames.Next(50.1)) << "the first one was skipped: this one is as good";
 }
 
-TEST(ChangeFrames, AnImageWaitsForItsDepthButNotForEver) {
-  ChangeFrames::Config config = Config();
+TEST(PosedFrameQueue, AnImageWaitsForItsDepthButNotForEver) {
+  PosedFrameQueue::Config config = Config();
   config.depth_wait_s = 0.3;
-  ChangeFrames frames(config);
+  PosedFrameQueue frames(config);
   for (double seconds = 0; seconds < 20; seconds += 0.5) frames.AddFix(FixAt(seconds));
   frames.AddDepth(ImageAt(2.0));
   frames.AddImage(ImageAt(2.0), 50);
@@ -95,8 +95,8 @@ TEST(ChangeFrames, AnImageWaitsForItsDepthButNotForEver) {
   EXPECT_TRUE(next->depth);
 }
 
-TEST(ChangeFrames, WithoutPositionsTheOldestGoAndTheOthersAreGivenUp) {
-  ChangeFrames frames(Config());
+TEST(PosedFrameQueue, WithoutPositionsTheOldestGoAndTheOthersAreGivenUp) {
+  PosedFrameQueue frames(Config());
   for (int i = 0; i < 5; ++i) frames.AddImage(ImageAt(i), 50);
   EXPECT_EQ(frames.waiting(), 3U);
   EXPECT_EQ(frames.counters().displaced, 2U);

@@ -69,7 +69,7 @@ TEST(PointSelector, ThinsEvenlyToTheAllowedNumber) {
   const cv::Mat all(frame.grey.size(), CV_8UC1, cv::Scalar(255));
   PointSelection selection;
   selection.max_points = 1000;
-  selection.least_gradient = 0;
+  selection.min_gradient = 0;
   PointSelector selector;
   EdgePoints points;
   selector.Select({frame.grey, frame.depth, kExact}, all, kWallCamera, selection, points);

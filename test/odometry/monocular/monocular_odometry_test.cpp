@@ -56,7 +56,7 @@ MonocularOdometry::Config Slow() {
   MonocularOdometry::Config config;
   config.depth.min_depth_m = 0.3F;
   config.depth.max_depth_m = 20.0F;
-  config.least_speed_mps = 0.1;
+  config.min_speed_mps = 0.1;
   config.speed_sigma_mps = 0.02;
   return config;
 }

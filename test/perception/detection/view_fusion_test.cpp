@@ -54,7 +54,7 @@ TEST(FuseViews, OfCountlessBoxesTheMostConfidentAreFused) {
            {static_cast<float>(20 * (i % 50)), static_cast<float>(20 * (i / 50)), 9, 9}));
   }
   const auto fused = FuseViews({many, many}, kIou);
-  ASSERT_EQ(fused.size(), kMostFused);
+  ASSERT_EQ(fused.size(), kMaxFused);
   EXPECT_FLOAT_EQ(fused[0].confidence, 1);
 }
 

@@ -159,13 +159,13 @@ TEST(Suppression, ASuppressedBoxSuppressesNoOther) {
 
 TEST(Suppression, OnlyTheMostConfidentCandidatesAreLookedAt) {
   std::vector<HazardDetection> candidates;
-  for (std::size_t i = 0; i < kMostCandidates + 10; ++i) {
+  for (std::size_t i = 0; i < kMaxCandidates + 10; ++i) {
     const auto x = static_cast<float>(i);
     candidates.push_back(Candidate(0, 0.5F + 1e-5F * x, {20 * x, 0, 10, 10}));
   }
   const std::vector<HazardDetection> kept = SuppressOverlaps(candidates, 0.5F);
-  ASSERT_EQ(kept.size(), kMostCandidates);
-  EXPECT_FLOAT_EQ(kept.front().box.x, 20.0F * (kMostCandidates + 9));
+  ASSERT_EQ(kept.size(), kMaxCandidates);
+  EXPECT_FLOAT_EQ(kept.front().box.x, 20.0F * (kMaxCandidates + 9));
 }
 
 /// Suppression as it is defined, every candidate against every kept one.

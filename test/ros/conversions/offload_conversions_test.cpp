@@ -13,8 +13,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-Candidate Example() {
-  Candidate candidate;
+OffloadedFrame Example() {
+  OffloadedFrame candidate;
   candidate.vehicle_id = "car-1";
   candidate.drive_id = "drive-1";
   candidate.stamp_ns = 1'700'000'000'123'456'789;
@@ -37,11 +37,11 @@ Candidate Example() {
 }
 
 TEST(CandidateConversions, ACandidateSurvivesTheWayThroughItsMessage) {
-  const Candidate candidate = Example();
+  const OffloadedFrame candidate = Example();
   const CandidateFrame message = ToMessage(candidate);
   EXPECT_EQ(message.image.header.stamp, message.stamp) << "the image's stamp is the frame's";
   EXPECT_EQ(message.covariance[1], 0.25) << "row-major";
-  const Candidate back = FromMessage(message);
+  const OffloadedFrame back = FromMessage(message);
   EXPECT_EQ(back.vehicle_id, candidate.vehicle_id);
   EXPECT_EQ(back.drive_id, candidate.drive_id);
   EXPECT_EQ(back.stamp_ns, candidate.stamp_ns);

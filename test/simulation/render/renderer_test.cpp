@@ -34,7 +34,7 @@ CameraExposure ViewAt(const Street& street, double time_s) {
 
 SimulatedFrame Picture(const Street& street, const SimulatedCamera& camera, int threads,
                        double time_s, Condition condition = Condition::kDay) {
-  RenderOptions options;
+  RenderConfig options;
   options.threads = threads;
   StreetRenderer renderer(street, camera, MakeLighting(condition, street.seed()), options);
   return renderer.Render(ViewAt(street, time_s), 3);
@@ -59,7 +59,7 @@ TEST_F(Renderer, GivesTheSameBytesForOneAndTwoThreadsInEveryWeather) {
 }
 
 TEST_F(Renderer, DoesNotDependOnWhatWasRenderedBefore) {
-  RenderOptions options;
+  RenderConfig options;
   StreetRenderer renderer(street_, StreetCamera(), MakeLighting(Condition::kDay, 3), options);
   renderer.Render(ViewAt(street_, 0), 0);
   renderer.Render(ViewAt(street_, 6), 60);

@@ -212,7 +212,7 @@ TEST(ChangeTruth, MasksAreTheDifferenceOfTheRenderedInstances) {
   const Street before = MakeStreet(StreetPass::Which::kFirst, false);
   const Street after = MakeStreet(StreetPass::Which::kSecond, false);
   const Lighting light = MakeLighting(Condition::kSnow, 5);
-  RenderOptions options;
+  RenderConfig options;
   options.smooth_edges = false;
   StreetRenderer old_renderer(before, PassCamera(), light, options);
   StreetRenderer new_renderer(after, PassCamera(), light, options);

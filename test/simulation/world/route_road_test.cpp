@@ -69,7 +69,7 @@ TEST(RouteRoad, DenselyDrawnBendIsFollowedClosely) {
 }
 
 TEST(RouteRoad, DepartsAtACornerByWhatItsCurveStates) {
-  for (const auto& [degrees, most_m] :
+  for (const auto& [degrees, max_m] :
        {std::pair{5.0, 0.1}, {10.0, 0.25}, {30.0, 2.0}, {60.0, 8.5}, {90.0, 23.0}}) {
     const double turn = degrees * M_PI / 180;
     const std::vector<Eigen::Vector2d> line = {
@@ -79,7 +79,7 @@ TEST(RouteRoad, DepartsAtACornerByWhatItsCurveStates) {
     const RouteRoad laid = LayRoad(Line(line), "corner");
     const RoadLine road(laid.bearing_deg, laid.pieces);
     const double departure_m = TightestCurve(turn).departure_m;
-    EXPECT_LT(departure_m, most_m) << degrees;
+    EXPECT_LT(departure_m, max_m) << degrees;
     double nearest = 1e9;
     double sharpest = 0;
     for (double along = 0; along < road.length_m(); along += 0.5) {

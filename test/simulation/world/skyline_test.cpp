@@ -44,7 +44,7 @@ TEST(Skyline, AgreesOnTheWholeWithWhatRaysAcrossTheStreetMeet) {
     const Vec3 eye = (place - scene.origin()).cast<float>();
     seen_left += SeenElevation(scene, eye, 1);
     seen_right += SeenElevation(scene, eye, -1);
-    const StreetSky sky = SkyOver(street, along, left_m);
+    const SkyVisibility sky = SkyOver(street, along, left_m);
     stated_left += sky.left_rad;
     stated_right += sky.right_rad;
   }
@@ -100,7 +100,7 @@ TEST(Skyline, MultipathIsLargerBetweenHousesThanInAPark) {
   int houses = 0;
   int parks = 0;
   for (double along = 0; along < 20000; along += 5) {
-    const StreetSky sky = SkyOver(street, along, street.lane_left_m());
+    const SkyVisibility sky = SkyOver(street, along, street.lane_left_m());
     const double squared = multipath.ErrorAt(along / 8, along, 0, sky).squaredNorm();
     if (sky.HiddenShare() > 0.4) between_houses += squared, ++houses;
     if (sky.HiddenShare() < 0.05) in_park += squared, ++parks;

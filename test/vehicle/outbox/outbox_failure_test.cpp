@@ -166,7 +166,7 @@ struct Damage {
   const char* name;
   double from_share;       ///< Of the file.
   std::size_t bytes;       ///< Overwritten; 0: the file ends there.
-  std::size_t least_left;  ///< Reports of 200 that must come back.
+  std::size_t min_left;  ///< Reports of 200 that must come back.
   bool older = false;      ///< The file is of an older LiveMap.
 };
 
@@ -201,7 +201,7 @@ TEST_P(DamagedOutbox, StartsAnewWithTheReportsThatCanStillBeRead) {
   LocalHazardMap map = OpenStore(path);
   ASSERT_NE(map.set_aside(), "");
   EXPECT_EQ(map.salvage().error, "");
-  EXPECT_GE(map.pending_count(), GetParam().least_left);
+  EXPECT_GE(map.pending_count(), GetParam().min_left);
   EXPECT_EQ(map.salvage().reports, map.pending_count());
   std::size_t sent = 0;
   for (const auto& pending : map.Pending()) {

@@ -182,7 +182,7 @@ TEST_F(HazardReporterTest, WaitsForThePictureThenGoesWithout) {
 
 TEST_F(HazardReporterTest, WaitsForNoPictureWhereNobodyGivesAny) {
   DriveFixes(0, 4);
-  reporter_->ExpectPictures(false);
+  reporter_->SetPictureSourceAvailable(false);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
   EXPECT_THAT(TakeDue(), SizeIs(1));
@@ -196,7 +196,7 @@ TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
     reporter_->Process(seconds, steady_s_);
   };
   look(3.0, BoxAt(12, 0));
-  const std::vector<PictureWish> wishes = reporter_->TakePictureRequests();
+  const std::vector<PictureRequirements> wishes = reporter_->TakePictureRequests();
   ASSERT_THAT(wishes, SizeIs(1));
   EXPECT_EQ(wishes[0].stamp_ns, StampNs(3.0));
   reporter_->Process(3.1, steady_s_);
@@ -213,7 +213,7 @@ TEST_F(HazardReporterTest, APictureOfAnotherPartDoesNotDo) {
   DriveFixes(0, 4);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
-  const std::vector<PictureWish> wishes = reporter_->TakePictureRequests();
+  const std::vector<PictureRequirements> wishes = reporter_->TakePictureRequests();
   ASSERT_THAT(wishes, SizeIs(1));
   const PixelRegion part = wishes[0].part;
   ASSERT_FALSE(part.IsWholeImage());

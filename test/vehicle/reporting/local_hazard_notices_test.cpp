@@ -12,8 +12,8 @@ constexpr Notice::Action kAdded = Notice::Action::kAdded;
 constexpr Notice::Action kUpdated = Notice::Action::kUpdated;
 constexpr Notice::Action kRemoved = Notice::Action::kRemoved;
 
-TEST(AnnouncementChain, KnowsAllUpToTheFirstGapAndGoesOnOnceItIsClosed) {
-  AnnouncementChain chain(4);
+TEST(NoticeSequenceTracker, KnowsAllUpToTheFirstGapAndGoesOnOnceItIsClosed) {
+  NoticeSequenceTracker chain(4);
   EXPECT_TRUE(chain.Add(4, 7)) << "sequences need not be neighbours";
   EXPECT_FALSE(chain.Add(9, 12));
   EXPECT_FALSE(chain.Add(12, 13));
@@ -26,8 +26,8 @@ TEST(AnnouncementChain, KnowsAllUpToTheFirstGapAndGoesOnOnceItIsClosed) {
   EXPECT_EQ(chain.known(), 13u);
 }
 
-TEST(AnnouncementChain, AManyTimesBrokenStreamStaysBounded) {
-  AnnouncementChain chain(1);
+TEST(NoticeSequenceTracker, AManyTimesBrokenStreamStaysBounded) {
+  NoticeSequenceTracker chain(1);
   for (std::uint64_t i = 0; i < 50000; ++i) chain.Add(3 + 2 * i, 4 + 2 * i);
   EXPECT_EQ(chain.known(), 1u);
   chain.CloseTo(200000);

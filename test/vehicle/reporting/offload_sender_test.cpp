@@ -26,7 +26,7 @@ class CandidateSenderTest : public ::testing::Test {
   }
 
   void Restart() {
-    sender_ = std::make_unique<CandidateSender>(config_);
+    sender_ = std::make_unique<OffloadSender>(config_);
     sender_->SetIntrinsics(Intrinsics());
     sender_->SetMounting(kOptical, Mounting());
   }
@@ -38,22 +38,22 @@ class CandidateSenderTest : public ::testing::Test {
   }
 
   /// A candidate of this moment that arrives at once; what can go then.
-  std::vector<Candidate> See(double seconds) {
+  std::vector<OffloadedFrame> See(double seconds) {
     sender_->AddJudged(StampNs(seconds), kOptical, 0.8F, true, GreyPicture(), seconds);
     return sender_->TakeReady(seconds, PlainJpeg);
   }
 
-  const CandidateSender::Counters& counters() const { return sender_->counters(); }
+  const OffloadSender::Counters& counters() const { return sender_->counters(); }
 
-  CandidateSender::Config config_;
-  std::unique_ptr<CandidateSender> sender_;
+  OffloadSender::Config config_;
+  std::unique_ptr<OffloadSender> sender_;
 };
 
 TEST_F(CandidateSenderTest, AFrameGoesWithThePoseOfItsMomentAndItsCamera) {
   DriveFixes(0, 4);
   const auto sent = See(3.1);
   ASSERT_THAT(sent, SizeIs(1));
-  const Candidate& candidate = sent[0];
+  const OffloadedFrame& candidate = sent[0];
   EXPECT_LT(GeodesicDistanceM(candidate.base.position, VehicleAt(3.1)), 0.01);
   EXPECT_NEAR(candidate.base.course_rad, kBearingRad, 0.01);
   EXPECT_GT(candidate.base.covariance_m2.determinant(), 0);

@@ -283,7 +283,7 @@ TEST_F(ApiTest, RefusesOtherMethodsBodiesAndOversizedHeaders) {
 }
 
 TEST_F(ApiTest, ConnectionsBeyondTheLimitAreAnswered503) {
-  WebOptions options = TestOptions();
+  WebConfig options = TestOptions();
   options.max_connections = 1;
   const WebServer small(options, *fixture_.zone, fixture_.catalogue);
   const StreamClient holds_the_only_one(small.port());
@@ -291,7 +291,7 @@ TEST_F(ApiTest, ConnectionsBeyondTheLimitAreAnswered503) {
 }
 
 TEST_F(ApiTest, SilentConnectionsAreClosed) {
-  WebOptions options = TestOptions();
+  WebConfig options = TestOptions();
   options.request_timeout_s = 0.05;
   const WebServer hasty(options, *fixture_.zone, fixture_.catalogue);
   boost::asio::io_context io;
@@ -305,7 +305,7 @@ TEST_F(ApiTest, SilentConnectionsAreClosed) {
 }
 
 TEST_F(ApiTest, ATakenPortIsAClearError) {
-  WebOptions options = TestOptions();
+  WebConfig options = TestOptions();
   options.port = port();
   try {
     const WebServer second(options, *fixture_.zone, fixture_.catalogue);

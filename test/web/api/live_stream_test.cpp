@@ -115,7 +115,7 @@ TEST_F(LiveStreamTest, ListAndStreamTogetherHaveNoGapAndNoDuplicate) {
 }
 
 TEST_F(LiveStreamTest, AClientThatReadsNothingIsClosedAndCatchesUp) {
-  WebOptions options = TestOptions();
+  WebConfig options = TestOptions();
   options.max_queued_messages = 50;
   options.socket_send_buffer_bytes = 4096;
   const WebServer tight(options, *fixture_.zone, fixture_.catalogue);
@@ -178,7 +178,7 @@ TEST_F(LiveStreamTest, AClientThatTalksTooMuchIsClosed) {
 }
 
 TEST_F(LiveStreamTest, AQuietStreamBeats) {
-  WebOptions options = TestOptions();
+  WebConfig options = TestOptions();
   options.heartbeat_s = 0.02;
   const WebServer lively(options, *fixture_.zone, fixture_.catalogue);
   StreamClient client(lively.port());

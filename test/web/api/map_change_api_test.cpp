@@ -19,7 +19,7 @@ const GeoPoint kCrossing{40.4433, -79.9436};
 class MapChangeApiTest : public testing::Test {
  protected:
   MapChangeApiTest() {
-    WebOptions options = TestOptions();
+    WebConfig options = TestOptions();
     options.token_file = tokens_.path();
     server_ = std::make_unique<WebServer>(options, *fixture_.zone, fixture_.catalogue);
   }

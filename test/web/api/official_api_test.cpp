@@ -20,7 +20,7 @@ constexpr char kReason[] = R"({"reason": "filled yesterday"})";
 class OfficialApiTest : public testing::Test {
  protected:
   OfficialApiTest() {
-    WebOptions options = TestOptions();
+    WebConfig options = TestOptions();
     options.token_file = tokens_.path();
     server_ = std::make_unique<WebServer>(options, *fixture_.zone, fixture_.catalogue);
   }
@@ -158,7 +158,7 @@ TEST_F(OfficialApiTest, WithoutATokenFileNobodyMayDecide) {
 TEST_F(OfficialApiTest, GuessersAreKeptOut) {
   const std::string id = Add();
   int status = 0;
-  for (int i = 0; i <= OfficialGate::kMostWrong; ++i) {
+  for (int i = 0; i <= OfficialAuthenticator::kMaxWrong; ++i) {
     status = Post(id, "reject", kReason, "guess" + std::to_string(i)).status;
   }
   EXPECT_EQ(status, 429);
@@ -236,7 +236,7 @@ TEST_F(OfficialApiTest, DecisionsAreOnlyPosted) {
 }
 
 TEST_F(OfficialApiTest, ATokenFileThatIsNotAcceptedStopsTheServer) {
-  WebOptions options = TestOptions();
+  WebConfig options = TestOptions();
   options.token_file = "/nowhere/tokens";
   try {
     const WebServer server(options, *fixture_.zone, fixture_.catalogue);

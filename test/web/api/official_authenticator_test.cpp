@@ -13,7 +13,7 @@
 namespace livemap {
 namespace {
 
-using Verdict = OfficialGate::Verdict;
+using Verdict = OfficialAuthenticator::Verdict;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
@@ -77,7 +77,7 @@ class OfficialGateTest : public testing::Test {
     return gate_.Check("Bearer " + token, client, now_s).verdict;
   }
 
-  OfficialGate gate_{ParseTokenFile("miller " + kToken + "\nsmith " + kOther, "tokens")};
+  OfficialAuthenticator gate_{ParseTokenFile("miller " + kToken + "\nsmith " + kOther, "tokens")};
 };
 
 TEST_F(OfficialGateTest, KnowsWhoseTokenItIs) {
@@ -96,23 +96,23 @@ TEST_F(OfficialGateTest, RefusesOtherTokensAndForms) {
 }
 
 TEST_F(OfficialGateTest, WithoutOfficialsItStaysClosed) {
-  OfficialGate nobody({});
+  OfficialAuthenticator nobody({});
   EXPECT_EQ(nobody.Check("Bearer " + kToken, "a", 0).verdict, Verdict::kClosed);
   EXPECT_FALSE(nobody.is_open());
 }
 
 TEST_F(OfficialGateTest, AfterTooManyWrongTokensNotEvenTheRightOneIsLookedAtForAWhile) {
-  for (int i = 0; i < OfficialGate::kMostWrong; ++i) EXPECT_EQ(Try("wrong"), Verdict::kWrongToken);
+  for (int i = 0; i < OfficialAuthenticator::kMaxWrong; ++i) EXPECT_EQ(Try("wrong"), Verdict::kWrongToken);
   EXPECT_EQ(Try("wrong"), Verdict::kTooManyWrong);
   EXPECT_EQ(Try(kToken), Verdict::kTooManyWrong);
   EXPECT_EQ(Try(kToken, 0, "10.0.0.2"), Verdict::kAllowed) << "another client is kept out too";
-  EXPECT_EQ(Try(kToken, OfficialGate::kSecondsPerWrong + 1), Verdict::kAllowed);
-  EXPECT_EQ(Try("wrong", OfficialGate::kSecondsPerWrong + 1), Verdict::kWrongToken);
-  EXPECT_EQ(Try("wrong", OfficialGate::kSecondsPerWrong + 1), Verdict::kTooManyWrong);
+  EXPECT_EQ(Try(kToken, OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kAllowed);
+  EXPECT_EQ(Try("wrong", OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kWrongToken);
+  EXPECT_EQ(Try("wrong", OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kTooManyWrong);
 }
 
 TEST_F(OfficialGateTest, ManyClientsDoNotFillTheMemoryNorFreeTheOneThatGoesOn) {
-  for (int i = 0; i < OfficialGate::kMostWrong; ++i) Try("wrong", 0, "guesser");
+  for (int i = 0; i < OfficialAuthenticator::kMaxWrong; ++i) Try("wrong", 0, "guesser");
   for (int i = 0; i < 4000; ++i) Try("wrong", 0, std::to_string(i));
   EXPECT_EQ(Try("wrong", 0, "guesser"), Verdict::kTooManyWrong);
   for (int i = 0; i < 20000; ++i) Try("wrong", 0, std::to_string(i));

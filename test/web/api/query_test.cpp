@@ -125,7 +125,7 @@ TEST(StaticFiles, FindsOnlyFilesOfTheFolder) {
 }
 
 TEST(Validate, NamesTheBadOption) {
-  WebOptions options;
+  WebConfig options;
   options.web_root = "/nowhere";
   try {
     Validate(options);

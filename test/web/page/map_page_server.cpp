@@ -190,7 +190,7 @@ class Session {
   livemap::TokenFile tokens_;
   livemap::ZoneFixture fixture_;
   std::int64_t ahead_ns_ = 0;  ///< Of the zone's clock before the system's.
-  livemap::WebOptions options_;
+  livemap::WebConfig options_;
   std::unique_ptr<livemap::WebServer> server_;
 };
 

@@ -9,38 +9,38 @@ namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 
-CandidateAllowance::Config Small() {
-  CandidateAllowance::Config config;
+OffloadAllowance::Config Small() {
+  OffloadAllowance::Config config;
   config.frames_per_minute = 6;
   config.bytes_per_minute = 600;
   config.max_vehicles = 2;
   return config;
 }
 
-TEST(CandidateAllowance, FramesRefillEvenlyOverAMinute) {
-  CandidateAllowance allowance(Small());
+TEST(OffloadAllowance, FramesRefillEvenlyOverAMinute) {
+  OffloadAllowance allowance(Small());
   for (int i = 0; i < 6; ++i) EXPECT_TRUE(allowance.Take("car-1", 1, 0));
   EXPECT_FALSE(allowance.Take("car-1", 1, 0));
   EXPECT_FALSE(allowance.Take("car-1", 1, 9 * kSecondNs));
   EXPECT_TRUE(allowance.Take("car-1", 1, 11 * kSecondNs));
 }
 
-TEST(CandidateAllowance, BytesAreLimitedToo) {
-  CandidateAllowance allowance(Small());
+TEST(OffloadAllowance, BytesAreLimitedToo) {
+  OffloadAllowance allowance(Small());
   EXPECT_FALSE(allowance.Take("car-1", 601, 0));
   EXPECT_TRUE(allowance.Take("car-1", 600, 0)) << "a refused frame takes nothing";
   EXPECT_FALSE(allowance.Take("car-1", 100, 5 * kSecondNs));
   EXPECT_TRUE(allowance.Take("car-1", 100, 11 * kSecondNs));
 }
 
-TEST(CandidateAllowance, OneVehicleTakesNothingFromAnother) {
-  CandidateAllowance allowance(Small());
+TEST(OffloadAllowance, OneVehicleTakesNothingFromAnother) {
+  OffloadAllowance allowance(Small());
   for (int i = 0; i < 100; ++i) allowance.Take("car-1", 100, 0);
   EXPECT_TRUE(allowance.Take("car-2", 100, 0));
 }
 
-TEST(CandidateAllowance, ManyIdsDoNotGrowItAndSilentOnesMakeRoom) {
-  CandidateAllowance allowance(Small());
+TEST(OffloadAllowance, ManyIdsDoNotGrowItAndSilentOnesMakeRoom) {
+  OffloadAllowance allowance(Small());
   EXPECT_TRUE(allowance.Take("car-1", 1, 0));
   EXPECT_TRUE(allowance.Take("car-2", 1, 30 * kSecondNs));
   EXPECT_FALSE(allowance.Take("car-3", 1, 31 * kSecondNs));
@@ -48,17 +48,17 @@ TEST(CandidateAllowance, ManyIdsDoNotGrowItAndSilentOnesMakeRoom) {
   EXPECT_EQ(allowance.vehicles(), 2U);
 }
 
-TEST(CandidateAllowance, AClockThatIsSetBackTakesNothingAway) {
-  CandidateAllowance allowance(Small());
+TEST(OffloadAllowance, AClockThatIsSetBackTakesNothingAway) {
+  OffloadAllowance allowance(Small());
   EXPECT_TRUE(allowance.Take("car-1", 1, 100 * kSecondNs));
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(allowance.Take("car-1", 1, 0));
   EXPECT_FALSE(allowance.Take("car-1", 1, 0));
 }
 
-TEST(CandidateAllowance, CapsBelowOneAreRefused) {
-  CandidateAllowance::Config config = Small();
+TEST(OffloadAllowance, CapsBelowOneAreRefused) {
+  OffloadAllowance::Config config = Small();
   config.frames_per_minute = 0;
-  EXPECT_THROW(CandidateAllowance{config}, Error);
+  EXPECT_THROW(OffloadAllowance{config}, Error);
 }
 
 }  // namespace

@@ -16,16 +16,16 @@ class HazardLifeTest : public ::testing::Test {
   static Evidence Word(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
     return {kind, vehicle, at_ns};
   }
-  LifeStep Begin(std::uint64_t vehicle, std::int64_t at_ns = kStart) {
+  LifecycleUpdate Begin(std::uint64_t vehicle, std::int64_t at_ns = kStart) {
     return rules_.Begin(cone_, Word(EvidenceKind::kSighting, vehicle, at_ns), at_ns, life_);
   }
-  LifeStep Say(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
+  LifecycleUpdate Say(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
     return rules_.Apply(cone_, Word(kind, vehicle, at_ns), at_ns, life_);
   }
-  LifeStep See(std::uint64_t vehicle, std::int64_t at_ns) {
+  LifecycleUpdate See(std::uint64_t vehicle, std::int64_t at_ns) {
     return Say(EvidenceKind::kSighting, vehicle, at_ns);
   }
-  LifeStep Deny(std::uint64_t vehicle, std::int64_t at_ns) {
+  LifecycleUpdate Deny(std::uint64_t vehicle, std::int64_t at_ns) {
     return Say(EvidenceKind::kAnswerNo, vehicle, at_ns);
   }
   /// Told to drivers by vehicles 1 and 2.
@@ -36,9 +36,9 @@ class HazardLifeTest : public ::testing::Test {
   }
   double Presence(std::int64_t at_ns) const { return rules_.Presence(cone_, life_, at_ns); }
 
-  HazardLife rules_;
-  LifeClass cone_;
-  LifeRecord life_;
+  HazardLifecycle rules_;
+  ClassModel cone_;
+  PresenceRecord life_;
 };
 
 }  // namespace livemap

@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST_F(HazardLifeTest, TheFirstReportMakesACandidate) {
-  const LifeStep step = Begin(1);
+  const LifecycleUpdate step = Begin(1);
   ASSERT_TRUE(step.transition);
   EXPECT_FALSE(step.transition->from);
   EXPECT_EQ(step.transition->to, HazardState::kCandidate);
@@ -27,7 +27,7 @@ TEST_F(HazardLifeTest, TheFirstReportMakesACandidate) {
 
 TEST_F(HazardLifeTest, DriversAreToldWhenASecondVehicleSeesIt) {
   Begin(1);
-  const LifeStep step = See(2, kStart + kHour);
+  const LifecycleUpdate step = See(2, kStart + kHour);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->from, HazardState::kCandidate);
   EXPECT_EQ(step.transition->to, HazardState::kActive);
@@ -37,7 +37,7 @@ TEST_F(HazardLifeTest, DriversAreToldWhenASecondVehicleSeesIt) {
 
 TEST_F(HazardLifeTest, OneVehicleSufficesWhereTheClassSaysSo) {
   cone_.confirmations = 1;
-  const LifeStep step = Begin(1);
+  const LifecycleUpdate step = Begin(1);
   ASSERT_TRUE(step.transition);
   EXPECT_FALSE(step.transition->from);
   EXPECT_EQ(step.transition->to, HazardState::kActive);
@@ -45,11 +45,11 @@ TEST_F(HazardLifeTest, OneVehicleSufficesWhereTheClassSaysSo) {
 
 TEST_F(HazardLifeTest, AnOfficialSuffices) {
   Begin(1);
-  const LifeStep step = rules_.Confirm(cone_, "Ada", "", kStart + kSecond, life_);
+  const LifecycleUpdate step = rules_.Confirm(cone_, "Ada", "", kStart + kSecond, life_);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kActive);
   EXPECT_EQ(step.transition->reason, "confirmed by Ada");
-  const LifeStep again = rules_.Confirm(cone_, "Bob", "still there", kStart + kSecond, life_);
+  const LifecycleUpdate again = rules_.Confirm(cone_, "Bob", "still there", kStart + kSecond, life_);
   ASSERT_TRUE(again.transition);
   EXPECT_EQ(again.transition->from, HazardState::kActive);
   EXPECT_EQ(again.transition->to, HazardState::kActive);
@@ -70,7 +70,7 @@ TEST_F(HazardLifeTest, OneVehicleCannotConfirmHoweverMuchItSays) {
 
 TEST_F(HazardLifeTest, OneVehicleCannotRemoveHoweverMuchItSays) {
   MakeActive();
-  LifeRecord left_alone = life_;
+  PresenceRecord left_alone = life_;
   std::mt19937_64 generator(6);
   std::int64_t now_ns = kStart + kSecond;
   while (left_alone.state != HazardState::kGone) {
@@ -120,7 +120,7 @@ TEST_F(HazardLifeTest, FurtherWordsOfOneVehicleAddLessAndLess) {
 
 TEST_F(HazardLifeTest, SeveralVehiclesThatDenyItRemoveItWithTheReason) {
   MakeActive();
-  LifeStep step = Deny(3, kStart + kHour);
+  LifecycleUpdate step = Deny(3, kStart + kHour);
   EXPECT_TRUE(IsTold(life_.state));
   std::uint64_t vehicle = 4;
   while (IsTold(life_.state) && vehicle < 9) {
@@ -157,7 +157,7 @@ TEST_F(HazardLifeTest, ADenialStartsTheVerificationAndASightingEndsIt) {
   Deny(4, kStart + kHour + kSecond);
   EXPECT_EQ(life_.state, HazardState::kVerifying);
   See(5, kStart + kHour + 2 * kSecond);
-  const LifeStep step = See(6, kStart + kHour + 3 * kSecond);
+  const LifecycleUpdate step = See(6, kStart + kHour + 3 * kSecond);
   EXPECT_EQ(life_.state, HazardState::kActive);
   EXPECT_EQ(Opponents(life_), 0u) << "two vehicles have answered the denials";
   ASSERT_TRUE(step.transition || life_.state == HazardState::kActive);
@@ -165,9 +165,9 @@ TEST_F(HazardLifeTest, ADenialStartsTheVerificationAndASightingEndsIt) {
 
 TEST_F(HazardLifeTest, CantSeeCountsNothing) {
   MakeActive();
-  const std::string before = PackLife(life_);
+  const std::string before = PackPresence(life_);
   EXPECT_FALSE(Say(EvidenceKind::kCantSee, 3, kStart + kHour).counted);
-  EXPECT_EQ(PackLife(life_), before);
+  EXPECT_EQ(PackPresence(life_), before);
 }
 
 TEST_F(HazardLifeTest, TimeAloneTakesItThroughVerifyingToGoneWhenSaid) {
@@ -175,10 +175,10 @@ TEST_F(HazardLifeTest, TimeAloneTakesItThroughVerifyingToGoneWhenSaid) {
   std::vector<HazardState> states;
   for (int i = 0; i < 10 && life_.state != HazardState::kGone; ++i) {
     const std::int64_t change_ns = rules_.NextChangeNs(cone_, life_);
-    LifeRecord earlier = life_;
+    PresenceRecord earlier = life_;
     const std::int64_t shortly_before = change_ns - (change_ns - life_.at_ns) / 100 - kSecond;
     EXPECT_FALSE(rules_.Advance(cone_, shortly_before, earlier).transition);
-    const LifeStep step = rules_.Advance(cone_, change_ns, life_);
+    const LifecycleUpdate step = rules_.Advance(cone_, change_ns, life_);
     ASSERT_TRUE(step.transition);
     states.push_back(step.transition->to);
   }
@@ -201,7 +201,7 @@ TEST_F(HazardLifeTest, NextChangeIsKeptWithoutEmptyRoundsForEveryLength) {
 
 TEST_F(HazardLifeTest, ACandidateThatNobodyElseSeesGoesByTime) {
   Begin(1);
-  const LifeStep step = rules_.Advance(cone_, rules_.NextChangeNs(cone_, life_), life_);
+  const LifecycleUpdate step = rules_.Advance(cone_, rules_.NextChangeNs(cone_, life_), life_);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kGone);
   EXPECT_FALSE(step.lesson.ended) << "nobody knows that it was ever there";
@@ -216,7 +216,7 @@ TEST_F(HazardLifeTest, PresenceFallsByTheClassesSurvival) {
 
 TEST_F(HazardLifeTest, AdvancingOftenGivesWhatAdvancingOnceGives) {
   MakeActive();
-  LifeRecord once = life_;
+  PresenceRecord once = life_;
   const std::int64_t end_ns = kStart + 6 * kHour;
   for (std::int64_t t = kStart + kHour; t <= end_ns; t += kSecond * 7) {
     rules_.Advance(cone_, t, life_);
@@ -228,11 +228,11 @@ TEST_F(HazardLifeTest, AdvancingOftenGivesWhatAdvancingOnceGives) {
 
 TEST_F(HazardLifeTest, TheOrderInWhichVehiclesWordsArriveDoesNotMatter) {
   // One moment, distinct vehicles, odds short of their bounds.
-  HazardLife::Config config;
-  config.surest = 0.9999;
+  HazardLifecycle::Config config;
+  config.max_presence = 0.9999;
   config.gone_below = 0.01;
   config.denials = 5;
-  const HazardLife rules(config);
+  const HazardLifecycle rules(config);
   const std::vector<Evidence> words = {
       Word(EvidenceKind::kAnswerNo, 3, kStart), Word(EvidenceKind::kSighting, 4, kStart),
       Word(EvidenceKind::kStillThere, 5, kStart), Word(EvidenceKind::kAnswerYes, 6, kStart),
@@ -241,7 +241,7 @@ TEST_F(HazardLifeTest, TheOrderInWhichVehiclesWordsArriveDoesNotMatter) {
   std::optional<double> expected;
   int orders = 0;
   do {
-    LifeRecord life;
+    PresenceRecord life;
     rules.Begin(cone_, Word(EvidenceKind::kSighting, 1, kStart), kStart, life);
     for (const std::size_t i : order) rules.Apply(cone_, words[i], kStart, life);
     ASSERT_NE(life.state, HazardState::kGone);
@@ -254,7 +254,7 @@ TEST_F(HazardLifeTest, TheOrderInWhichVehiclesWordsArriveDoesNotMatter) {
 
 TEST_F(HazardLifeTest, ALateWordCountsLessThanAFreshOne) {
   MakeActive();
-  LifeRecord late = life_;
+  PresenceRecord late = life_;
   const std::int64_t now_ns = kStart + kDay;
   rules_.Apply(cone_, Word(EvidenceKind::kAnswerNo, 9, now_ns), now_ns, life_);
   rules_.Advance(cone_, now_ns, late);
@@ -282,10 +282,10 @@ TEST_F(HazardLifeTest, FutureStampsCountAsNow) {
 TEST_F(HazardLifeTest, TheFilterIsRightAsOftenAsItSays) {
   // Hazards that live as the class says, and honest vehicles with the class's rates: of all moments
   // at which it says p, a share p has the hazard there.
-  HazardLife::Config config;
+  HazardLifecycle::Config config;
   config.hostile_share = 0.001;
-  config.surest = 0.999;
-  const HazardLife rules(config);
+  config.max_presence = 0.999;
+  const HazardLifecycle rules(config);
   std::mt19937_64 generator(11);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::array<double, 10> there{};
@@ -295,7 +295,7 @@ TEST_F(HazardLifeTest, TheFilterIsRightAsOftenAsItSays) {
     const double rate = std::gamma_distribution<double>(cone_.survival.shape,
                                                         1 / cone_.survival.scale_s)(generator);
     const double end_s = std::exponential_distribution<double>(rate)(generator);
-    LifeRecord life;
+    PresenceRecord life;
     rules.Begin(cone_, {EvidenceKind::kSighting, 1, kStart}, kStart, life);
     life.log_odds = life.undenied_log_odds = 6;  // It is known to be there.
     for (int i = 1; i < 12; ++i) {

@@ -1,4 +1,4 @@
-// What becomes of words: the verdicts of HazardLife, and what they do to vehicles.
+// What becomes of words: the verdicts of HazardLifecycle, and what they do to vehicles.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -13,18 +13,18 @@ namespace {
 class HazardVerdictsTest : public HazardLifeTest {
  protected:
   /// Judges what the step teaches, and says how far `vehicle` is believed then.
-  void Learn(const LifeStep& step) {
+  void Learn(const LifecycleUpdate& step) {
     for (const Verdict& verdict : step.verdicts) trust_.Judge(verdict, life_.at_ns);
   }
   double Hostile(std::uint64_t vehicle) const { return trust_.Hostile(vehicle, life_.at_ns); }
-  LifeStep Speak(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
+  LifecycleUpdate Speak(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
     Evidence word = Word(kind, vehicle, at_ns);
     word.hostile = Hostile(vehicle);
-    const LifeStep step = rules_.Apply(cone_, word, at_ns, life_);
+    const LifecycleUpdate step = rules_.Apply(cone_, word, at_ns, life_);
     Learn(step);
     return step;
   }
-  static double RatioOf(const LifeStep& step, std::uint64_t vehicle) {
+  static double RatioOf(const LifecycleUpdate& step, std::uint64_t vehicle) {
     const auto found =
         std::find_if(step.verdicts.begin(), step.verdicts.end(),
                      [&](const Verdict& verdict) { return verdict.vehicle == vehicle; });
@@ -38,7 +38,7 @@ TEST_F(HazardVerdictsTest, WhoInventsAndIsDeniedAtOnceIsBelievedLess) {
   Begin(1);
   Speak(EvidenceKind::kAnswerNo, 2, kStart + 60 * kSecond);
   EXPECT_NEAR(Hostile(1), 0.05, 1e-9) << "one word against another says nothing";
-  const LifeStep step = Speak(EvidenceKind::kAnswerNo, 3, kStart + 120 * kSecond);
+  const LifecycleUpdate step = Speak(EvidenceKind::kAnswerNo, 3, kStart + 120 * kSecond);
   ASSERT_EQ(life_.state, HazardState::kGone);
   EXPECT_GT(RatioOf(step, 1), 0.8);
   EXPECT_GT(Hostile(1), 0.1);
@@ -67,7 +67,7 @@ TEST_F(HazardVerdictsTest, WhatMayHaveEndedMeanwhileIsHeldAgainstNobody) {
   cone_.survival = {5, 4 * 600.0};  // Ten minutes.
   Begin(1);
   Speak(EvidenceKind::kAnswerNo, 2, kStart + kHour);
-  const LifeStep step = Speak(EvidenceKind::kAnswerNo, 3, kStart + kHour + kSecond);
+  const LifecycleUpdate step = Speak(EvidenceKind::kAnswerNo, 3, kStart + kHour + kSecond);
   ASSERT_EQ(life_.state, HazardState::kGone);
   EXPECT_LT(RatioOf(step, 1), 0.6) << "a quarter of first reports is false anyway";
 }
@@ -78,7 +78,7 @@ TEST_F(HazardVerdictsTest, WhatSeveralSawAndThenEndedIsHeldAgainstNobody) {
   See(4, kStart + 2 * kHour);
   See(5, kStart + 3 * kHour);
   const std::int64_t ended_ns = kStart + 20 * kHour;
-  LifeStep step;
+  LifecycleUpdate step;
   for (std::uint64_t vehicle = 20; life_.state != HazardState::kGone; ++vehicle) {
     step = Deny(vehicle, ended_ns + static_cast<std::int64_t>(vehicle) * kSecond);
   }
@@ -89,7 +89,7 @@ TEST_F(HazardVerdictsTest, WhoDeniesWhatOthersSeeAfterwardsIsBelievedLess) {
   MakeActive();
   Speak(EvidenceKind::kAnswerNo, 9, kStart + kHour);
   Speak(EvidenceKind::kAnswerYes, 3, kStart + 2 * kHour);
-  const LifeStep step = Speak(EvidenceKind::kAnswerYes, 4, kStart + 3 * kHour);
+  const LifecycleUpdate step = Speak(EvidenceKind::kAnswerYes, 4, kStart + 3 * kHour);
   EXPECT_GT(Hostile(9), 0.11);
   EXPECT_NEAR(Hostile(3), 0.05, 1e-9);
   // Judged once.
@@ -98,7 +98,7 @@ TEST_F(HazardVerdictsTest, WhoDeniesWhatOthersSeeAfterwardsIsBelievedLess) {
 
 TEST_F(HazardVerdictsTest, SightingsOfOthersBearOutTheEarlierOnes) {
   MakeActive();
-  const LifeStep step = Speak(EvidenceKind::kAnswerYes, 3, kStart + kHour);
+  const LifecycleUpdate step = Speak(EvidenceKind::kAnswerYes, 3, kStart + kHour);
   EXPECT_LT(RatioOf(step, 1), 0);
   EXPECT_LT(RatioOf(step, 2), 0);
   EXPECT_EQ(RatioOf(step, 3), 0) << "nobody bears out its own word";
@@ -107,7 +107,7 @@ TEST_F(HazardVerdictsTest, SightingsOfOthersBearOutTheEarlierOnes) {
 
 TEST_F(HazardVerdictsTest, TwoThatAgreeBearNobodyOut) {
   Begin(1);
-  const LifeStep step = Speak(EvidenceKind::kSighting, 2, kStart + kSecond);
+  const LifecycleUpdate step = Speak(EvidenceKind::kSighting, 2, kStart + kSecond);
   EXPECT_EQ(life_.state, HazardState::kActive);
   EXPECT_TRUE(step.verdicts.empty()) << "it takes two others to be sure of a word";
 }
@@ -115,11 +115,11 @@ TEST_F(HazardVerdictsTest, TwoThatAgreeBearNobodyOut) {
 TEST_F(HazardVerdictsTest, AnOfficialsWordWeighsMost) {
   MakeActive();
   Deny(9, kStart + kHour);
-  LifeRecord rejected = life_;
-  const LifeStep no = rules_.Reject(cone_, "Anna", "", kStart + 2 * kHour, rejected);
+  PresenceRecord rejected = life_;
+  const LifecycleUpdate no = rules_.Reject(cone_, "Anna", "", kStart + 2 * kHour, rejected);
   EXPECT_NEAR(RatioOf(no, 1), 2, 1e-9);
   EXPECT_LT(RatioOf(no, 9), -1);
-  const LifeStep yes = rules_.Confirm(cone_, "Anna", "", kStart + 2 * kHour, life_);
+  const LifecycleUpdate yes = rules_.Confirm(cone_, "Anna", "", kStart + 2 * kHour, life_);
   EXPECT_LT(RatioOf(yes, 1), -1);
   EXPECT_GT(RatioOf(yes, 9), 1.9);
 }
@@ -171,9 +171,9 @@ TEST_F(HazardVerdictsTest, WhatWasJudgedIsStoredWithTheVoice) {
   Evidence word = Word(EvidenceKind::kSighting, 6, kStart + 3 * kHour);
   word.hostile = 0.6;
   rules_.Apply(cone_, word, kStart + 3 * kHour, life_);
-  const auto unpacked = UnpackLife(PackLife(life_));
+  const auto unpacked = UnpackPresence(PackPresence(life_));
   ASSERT_TRUE(unpacked);
-  EXPECT_EQ(PackLife(*unpacked), PackLife(life_));
+  EXPECT_EQ(PackPresence(*unpacked), PackPresence(life_));
   EXPECT_EQ(unpacked->judged, life_.judged);
   EXPECT_NE(life_.judged, 0);
   EXPECT_EQ(Supporters(*unpacked), 3U);

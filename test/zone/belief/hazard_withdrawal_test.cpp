@@ -11,14 +11,14 @@ constexpr char kWhy[] = "words of car-9 withdrawn by Ada: stolen";
 
 class HazardWithdrawalTest : public HazardLifeTest {
  protected:
-  LifeStep Withdraw(std::uint64_t vehicle, std::int64_t at_ns) {
+  LifecycleUpdate Withdraw(std::uint64_t vehicle, std::int64_t at_ns) {
     return rules_.Withdraw(cone_, vehicle, kWhy, at_ns, life_);
   }
 };
 
 TEST_F(HazardWithdrawalTest, WhatOnlyThatVehicleSawIsGone) {
   Begin(9);
-  const LifeStep step = Withdraw(9, kStart + kHour);
+  const LifecycleUpdate step = Withdraw(9, kStart + kHour);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->from, HazardState::kCandidate);
   EXPECT_EQ(step.transition->to, HazardState::kGone);
@@ -29,7 +29,7 @@ TEST_F(HazardWithdrawalTest, WhatOnlyThatVehicleSawIsGone) {
 
 TEST_F(HazardWithdrawalTest, WhatTooFewOthersSawIsACandidateAgain) {
   MakeActive();
-  const LifeStep step = Withdraw(2, kStart + kHour);
+  const LifecycleUpdate step = Withdraw(2, kStart + kHour);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->from, HazardState::kActive);
   EXPECT_EQ(step.transition->to, HazardState::kCandidate);
@@ -41,7 +41,7 @@ TEST_F(HazardWithdrawalTest, WhatTooFewOthersSawIsACandidateAgain) {
 TEST_F(HazardWithdrawalTest, WhatEnoughOthersSawStays) {
   MakeActive();
   See(3, kStart + 2 * kSecond);
-  const LifeStep step = Withdraw(3, kStart + kHour);
+  const LifecycleUpdate step = Withdraw(3, kStart + kHour);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kActive);
   EXPECT_EQ(Supporters(life_), 2U);
@@ -49,7 +49,7 @@ TEST_F(HazardWithdrawalTest, WhatEnoughOthersSawStays) {
 
 TEST_F(HazardWithdrawalTest, TheOddsAreAsIfItHadSaidNothing) {
   MakeActive();
-  const LifeRecord before = life_;
+  const PresenceRecord before = life_;
   Deny(9, kStart + 2 * kSecond);
   ASSERT_LT(life_.log_odds, before.log_odds);
   Withdraw(9, kStart + 2 * kSecond);
@@ -58,7 +58,7 @@ TEST_F(HazardWithdrawalTest, TheOddsAreAsIfItHadSaidNothing) {
   EXPECT_EQ(life_.first_no_ns, 0);
   EXPECT_EQ(Opponents(life_), 0U);
 
-  LifeRecord unseen = life_;
+  PresenceRecord unseen = life_;
   rules_.Advance(cone_, kStart + kHour, unseen);
   See(9, kStart + kHour);
   Withdraw(9, kStart + kHour);
@@ -98,10 +98,10 @@ TEST_F(HazardWithdrawalTest, ARejectedHazardStaysRejected) {
 
 TEST_F(HazardWithdrawalTest, NothingHappensWhereItSaidNothing) {
   MakeActive();
-  const std::string before = PackLife(life_);
+  const std::string before = PackPresence(life_);
   EXPECT_FALSE(Withdraw(9, kStart + kHour).transition);
   EXPECT_FALSE(Withdraw(0, kStart + kHour).transition);
-  EXPECT_EQ(PackLife(life_), before);
+  EXPECT_EQ(PackPresence(life_), before);
   Begin(9);
   Withdraw(9, kStart + kHour);
   ASSERT_EQ(life_.state, HazardState::kGone);

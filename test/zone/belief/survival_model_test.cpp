@@ -107,8 +107,8 @@ TEST(SurvivalModel, RestoredGivesTheSameSurvival) {
 TEST(SurvivalModel, RefusesStoredNumbersThatCannotBe) {
   SurvivalModel model(LivesCatalogue());
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const LearnedLife& learned :
-       {LearnedLife{-1, 0}, LearnedLife{nan, 0}, LearnedLife{1, nan}, LearnedLife{0, -5}}) {
+  for (const LearnedLifetime& learned :
+       {LearnedLifetime{-1, 0}, LearnedLifetime{nan, 0}, LearnedLifetime{1, nan}, LearnedLifetime{0, -5}}) {
     EXPECT_THAT([&] { model.Restore("cone", learned); }, ThrowsMessage<Error>(HasSubstr("'cone'")));
   }
 }

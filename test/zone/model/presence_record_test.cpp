@@ -15,7 +15,7 @@ using ::testing::ThrowsMessage;
 
 TEST_F(HazardLifeTest, ARejectedHazardIsOffTheMapAndSightingsDoNotReopenItInQuarantine) {
   MakeActive();
-  const LifeStep step = rules_.Reject(cone_, "Ada", "a manhole cover", kStart + kHour, life_);
+  const LifecycleUpdate step = rules_.Reject(cone_, "Ada", "a manhole cover", kStart + kHour, life_);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kRejected);
   EXPECT_EQ(step.transition->reason, "rejected by Ada: a manhole cover");
@@ -31,7 +31,7 @@ TEST_F(HazardLifeTest, AfterQuarantineTwoFurtherVehiclesReopenARejectedHazardAnd
   const std::int64_t later = kStart + kHour + kDay + kSecond;
   for (int i = 0; i < 100; ++i) See(1, later + i * kSecond);
   EXPECT_EQ(life_.state, HazardState::kRejected);
-  const LifeStep step = See(2, later + kHour);
+  const LifecycleUpdate step = See(2, later + kHour);
   EXPECT_EQ(life_.state, HazardState::kActive);
   ASSERT_TRUE(step.transition);
   EXPECT_THAT(step.transition->reason, HasSubstr("after its rejection"));
@@ -56,18 +56,18 @@ TEST_F(HazardLifeTest, NothingHappensToWhatIsGone) {
   Begin(1);
   rules_.Advance(cone_, kStart + 1000 * kDay, life_);
   ASSERT_EQ(life_.state, HazardState::kGone);
-  const std::string before = PackLife(life_);
+  const std::string before = PackPresence(life_);
   See(2, kStart + 1001 * kDay);
   rules_.Confirm(cone_, "Ada", "", kStart + 1001 * kDay, life_);
   rules_.Reject(cone_, "Ada", "", kStart + 1001 * kDay, life_);
   rules_.Advance(cone_, kStart + 1002 * kDay, life_);
-  EXPECT_EQ(PackLife(life_), before);
+  EXPECT_EQ(PackPresence(life_), before);
 }
 
 TEST_F(HazardLifeTest, TeachesHowLongItStoodAndThatItEnded) {
   MakeActive();
-  LifeLesson sum;
-  const auto learn = [&sum](const LifeStep& step) {
+  LifetimeObservation sum;
+  const auto learn = [&sum](const LifecycleUpdate& step) {
     sum.stood_s += step.lesson.stood_s;
     sum.ended = sum.ended || step.lesson.ended;
   };
@@ -88,45 +88,45 @@ TEST_F(HazardLifeTest, PackedAndUnpackedItIsTheSame) {
         kStart + kHour + static_cast<std::int64_t>(vehicle) * kSecond / 3);
   }
   Deny(VehicleKey("x"), kStart + kDay);
-  const std::string packed = PackLife(life_);
+  const std::string packed = PackPresence(life_);
   EXPECT_LE(packed.size(), 500u);
-  const auto unpacked = UnpackLife(packed);
+  const auto unpacked = UnpackPresence(packed);
   ASSERT_TRUE(unpacked);
-  EXPECT_EQ(PackLife(*unpacked), packed);
+  EXPECT_EQ(PackPresence(*unpacked), packed);
   EXPECT_EQ(unpacked->log_odds, life_.log_odds);
   EXPECT_EQ(rules_.NextChangeNs(cone_, *unpacked), rules_.NextChangeNs(cone_, life_));
 }
 
 TEST_F(HazardLifeTest, WhatIsNoPackedLifeIsRefused) {
   MakeActive();
-  const std::string packed = PackLife(life_);
-  EXPECT_TRUE(UnpackLife(packed));
+  const std::string packed = PackPresence(life_);
+  EXPECT_TRUE(UnpackPresence(packed));
   for (std::size_t size = 0; size < packed.size(); ++size) {
-    const auto cut = UnpackLife(packed.substr(0, size));
+    const auto cut = UnpackPresence(packed.substr(0, size));
     if (cut) {
-      EXPECT_LT(PackLife(*cut).size(), packed.size());
+      EXPECT_LT(PackPresence(*cut).size(), packed.size());
     }
   }
-  EXPECT_FALSE(UnpackLife(packed + " "));
-  EXPECT_FALSE(UnpackLife(packed + " 7"));
-  EXPECT_FALSE(UnpackLife("9" + packed.substr(1))) << "no such state";
-  EXPECT_FALSE(UnpackLife("1 0 1 1 1 0 1 nan 0"));
-  EXPECT_FALSE(UnpackLife("1 0 1 1 1 0 1 1e300 0"));
-  EXPECT_FALSE(UnpackLife("1 0 -1 1 1 0 1 1 0"));
-  EXPECT_FALSE(UnpackLife("1 0 1 1 1 0 1 1 0 5 1 1 0 5 1 1 0")) << "a vehicle twice";
-  EXPECT_FALSE(UnpackLife(std::string(10000, '1')));
+  EXPECT_FALSE(UnpackPresence(packed + " "));
+  EXPECT_FALSE(UnpackPresence(packed + " 7"));
+  EXPECT_FALSE(UnpackPresence("9" + packed.substr(1))) << "no such state";
+  EXPECT_FALSE(UnpackPresence("1 0 1 1 1 0 1 nan 0"));
+  EXPECT_FALSE(UnpackPresence("1 0 1 1 1 0 1 1e300 0"));
+  EXPECT_FALSE(UnpackPresence("1 0 -1 1 1 0 1 1 0"));
+  EXPECT_FALSE(UnpackPresence("1 0 1 1 1 0 1 1 0 5 1 1 0 5 1 1 0")) << "a vehicle twice";
+  EXPECT_FALSE(UnpackPresence(std::string(10000, '1')));
 }
 
 TEST(HazardLifeConfig, RefusesWhatIsOutOfRangeAndNamesIt) {
-  HazardLife::Config config;
+  HazardLifecycle::Config config;
   config.denials = 1;
-  EXPECT_THAT([&] { HazardLife{config}; }, ThrowsMessage<Error>(HasSubstr("denials")));
+  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("denials")));
   config = {};
   config.hostile_share = std::nan("");
-  EXPECT_THAT([&] { HazardLife{config}; }, ThrowsMessage<Error>(HasSubstr("hostile_share")));
+  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("hostile_share")));
   config = {};
-  config.sure_above = 0.3;
-  EXPECT_THAT([&] { HazardLife{config}; }, ThrowsMessage<Error>(HasSubstr("sure_above")));
+  config.settled_above = 0.3;
+  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("sure_above")));
 }
 
 TEST(VehicleKeys, AreStableAndNeverNobody) {

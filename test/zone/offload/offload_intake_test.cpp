@@ -20,20 +20,20 @@ class CandidateIntakeTest : public ::testing::Test {
  protected:
   CandidateIntakeTest() { config_.max_ground_sigma_m = 100; }
 
-  CandidateIntake Intake() const { return CandidateIntake(config_); }
+  OffloadIntake Intake() const { return OffloadIntake(config_); }
 
-  CandidateIntake::Config config_;
+  OffloadIntake::Config config_;
 };
 
 TEST_F(CandidateIntakeTest, AHazardIsPlacedByThePoseOfItsFrame) {
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "");
-  const CandidateIntake::Job* job = intake.Next(kZoneNowNs, 0);
+  const OffloadIntake::Job* job = intake.Next(kZoneNowNs, 0);
   ASSERT_NE(job, nullptr);
   const auto reports = intake.Finish(job->internal_ns, AnswerOf(job->internal_ns, 12, -1.5));
   ASSERT_THAT(reports, SizeIs(1));
   const Report& report = reports[0];
-  const Candidate frame = CandidateAt(0);
+  const OffloadedFrame frame = CandidateAt(0);
   const GeoPoint ahead = GeodesicDestination(frame.base.position, M_PI / 4, 12);
   const GeoPoint expected = GeodesicDestination(ahead, M_PI / 4 + M_PI / 2, 1.5);
   EXPECT_LT(GeodesicDistanceM(report.position, expected), 0.01);
@@ -48,7 +48,7 @@ TEST_F(CandidateIntakeTest, AHazardIsPlacedByThePoseOfItsFrame) {
 }
 
 TEST_F(CandidateIntakeTest, EqualStampsOfTwoVehiclesStayApart) {
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   intake.Add(CandidateAt(0, "car-1"), kZoneNowNs);
   intake.Add(CandidateAt(0, "car-2"), kZoneNowNs);
   const std::int64_t first = intake.Next(kZoneNowNs, 0)->internal_ns;
@@ -64,7 +64,7 @@ TEST_F(CandidateIntakeTest, EqualStampsOfTwoVehiclesStayApart) {
 }
 
 TEST_F(CandidateIntakeTest, AFrameThatComesTwiceIsDetectedOnce) {
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "");
   EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "frame came before");
   EXPECT_EQ(intake.counters().repeated, 1U);
@@ -73,7 +73,7 @@ TEST_F(CandidateIntakeTest, AFrameThatComesTwiceIsDetectedOnce) {
 
 TEST_F(CandidateIntakeTest, TheSameBoxInTheSameFrameIsTheSameReportAfterARestartToo) {
   const auto uuid_now = [this] {
-    CandidateIntake intake = Intake();
+    OffloadIntake intake = Intake();
     intake.Add(CandidateAt(0), kZoneNowNs);
     const std::int64_t stamp = intake.Next(kZoneNowNs, 0)->internal_ns;
     return intake.Finish(stamp, AnswerOf(stamp, 10, 0)).at(0).uuid;
@@ -84,18 +84,18 @@ TEST_F(CandidateIntakeTest, TheSameBoxInTheSameFrameIsTheSameReportAfterARestart
   EXPECT_EQ(uuid.bytes[8] >> 6, 2);
 }
 
-TEST(CandidateReportUuid, EveryPartOfItsNameCounts) {
+TEST(OffloadReportUuid, EveryPartOfItsNameCounts) {
   const Box box{1, 2, 3, 4};
-  const Uuid uuid = CandidateReportUuid("car-1", 5, "pothole", box);
-  EXPECT_NE(uuid, CandidateReportUuid("car-2", 5, "pothole", box));
-  EXPECT_NE(uuid, CandidateReportUuid("car-1", 6, "pothole", box));
-  EXPECT_NE(uuid, CandidateReportUuid("car-1", 5, "deer", box));
-  EXPECT_NE(uuid, CandidateReportUuid("car-1", 5, "pothole", {1, 2, 3.2F, 4}));
-  EXPECT_EQ(uuid, CandidateReportUuid("car-1", 5, "pothole", {1.01F, 2, 3, 4}));
+  const Uuid uuid = OffloadReportUuid("car-1", 5, "pothole", box);
+  EXPECT_NE(uuid, OffloadReportUuid("car-2", 5, "pothole", box));
+  EXPECT_NE(uuid, OffloadReportUuid("car-1", 6, "pothole", box));
+  EXPECT_NE(uuid, OffloadReportUuid("car-1", 5, "deer", box));
+  EXPECT_NE(uuid, OffloadReportUuid("car-1", 5, "pothole", {1, 2, 3.2F, 4}));
+  EXPECT_EQ(uuid, OffloadReportUuid("car-1", 5, "pothole", {1.01F, 2, 3, 4}));
 }
 
 TEST_F(CandidateIntakeTest, WhatIsTooFarOrNotOnTheRoadIsNotReported) {
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   intake.Add(CandidateAt(0), kZoneNowNs);
   const std::int64_t stamp = intake.Next(kZoneNowNs, 0)->internal_ns;
   SightingFrame answer = AnswerOf(stamp, 31, 0);
@@ -111,9 +111,9 @@ TEST_F(CandidateIntakeTest, WhatIsTooFarOrNotOnTheRoadIsNotReported) {
 
 TEST_F(CandidateIntakeTest, TheDetectorHasNeverMoreThanItTakes) {
   config_.max_in_flight = 2;
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   for (int i = 0; i < 5; ++i) intake.Add(CandidateAt(0.3 * i), kZoneNowNs);
-  const CandidateIntake::Job* first = intake.Next(kZoneNowNs, 0);
+  const OffloadIntake::Job* first = intake.Next(kZoneNowNs, 0);
   ASSERT_NE(first, nullptr);
   ASSERT_NE(intake.Next(kZoneNowNs, 0), nullptr);
   EXPECT_EQ(intake.Next(kZoneNowNs, 0), nullptr);
@@ -124,7 +124,7 @@ TEST_F(CandidateIntakeTest, TheDetectorHasNeverMoreThanItTakes) {
 
 TEST_F(CandidateIntakeTest, AFrameThatTheDetectorLostMakesRoomAfterItsTime) {
   config_.max_in_flight = 1;
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   intake.Add(CandidateAt(0), kZoneNowNs);
   intake.Add(CandidateAt(1), kZoneNowNs);
   const std::int64_t lost = intake.Next(kZoneNowNs, 100)->internal_ns;
@@ -137,7 +137,7 @@ TEST_F(CandidateIntakeTest, AFrameThatTheDetectorLostMakesRoomAfterItsTime) {
 
 TEST_F(CandidateIntakeTest, WhenTheDetectorIsBehindTheOldestFramesGoAndAreCounted) {
   config_.max_waiting = 3;
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   for (int i = 0; i < 10; ++i) intake.Add(CandidateAt(i), kZoneNowNs);
   EXPECT_EQ(intake.waiting(), 3U);
   EXPECT_EQ(intake.counters().displaced, 7U);
@@ -146,22 +146,22 @@ TEST_F(CandidateIntakeTest, WhenTheDetectorIsBehindTheOldestFramesGoAndAreCounte
 
 TEST_F(CandidateIntakeTest, PicturesThatWaitAreBoundedInBytes) {
   config_.max_waiting_bytes = 2.5 * static_cast<double>(CandidateAt(0).image.size());
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   for (int i = 0; i < 10; ++i) intake.Add(CandidateAt(i), kZoneNowNs);
   EXPECT_EQ(intake.waiting(), 2U);
 }
 
 TEST_F(CandidateIntakeTest, AVehicleBeyondItsAllowanceIsNotHeardOthersAre) {
   config_.allowance.frames_per_minute = 3;
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   for (int i = 0; i < 10; ++i) intake.Add(CandidateAt(i), kZoneNowNs);
   EXPECT_EQ(intake.counters().over_allowance, 7U);
   EXPECT_EQ(intake.Add(CandidateAt(0, "car-2"), kZoneNowNs), "");
 }
 
 TEST_F(CandidateIntakeTest, BrokenFramesAreCountedAndEveryFrameIsAccountedFor) {
-  CandidateIntake intake = Intake();
-  Candidate broken = CandidateAt(0);
+  OffloadIntake intake = Intake();
+  OffloadedFrame broken = CandidateAt(0);
   broken.base.course_rad = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(intake.Add(broken, kZoneNowNs), "");
   intake.Add(CandidateAt(1), kZoneNowNs);
@@ -177,7 +177,7 @@ TEST_F(CandidateIntakeTest, BrokenFramesAreCountedAndEveryFrameIsAccountedFor) {
 }
 
 TEST_F(CandidateIntakeTest, InternalStampsRiseWhateverTheClockDoes) {
-  CandidateIntake intake = Intake();
+  OffloadIntake intake = Intake();
   intake.Add(CandidateAt(0), kZoneNowNs);
   intake.Add(CandidateAt(1), kZoneNowNs);
   const std::int64_t first = intake.Next(kZoneNowNs, 0)->internal_ns;

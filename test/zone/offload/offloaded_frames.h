@@ -24,8 +24,8 @@ inline Eigen::Isometry3d CandidateMounting() {
 }
 
 /// A frame of a vehicle that looks to the north-east; `seconds` after kZoneNowNs.
-inline Candidate CandidateAt(double seconds, const std::string& vehicle_id = "car-1") {
-  Candidate candidate;
+inline OffloadedFrame CandidateAt(double seconds, const std::string& vehicle_id = "car-1") {
+  OffloadedFrame candidate;
   candidate.vehicle_id = vehicle_id;
   candidate.drive_id = "drive-1";
   candidate.stamp_ns = kZoneNowNs + std::llround(seconds * 1e9);

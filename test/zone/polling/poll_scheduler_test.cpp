@@ -26,15 +26,15 @@ class PollSchedulerTest : public ::testing::Test {
   void Rebuild() { scheduler_ = std::make_unique<PollScheduler>(config_, 1); }
 
   /// A hazard that two vehicles have just seen.
-  LifeRecord Active(double life_s, std::int64_t now_ns) {
+  PresenceRecord Active(double life_s, std::int64_t now_ns) {
     entry_.survival = {5, 4 * life_s};
-    LifeRecord life;
+    PresenceRecord life;
     rules_.Begin(entry_, {EvidenceKind::kSighting, 1, now_ns}, now_ns, life);
     rules_.Apply(entry_, {EvidenceKind::kSighting, 2, now_ns}, now_ns, life);
     EXPECT_EQ(life.state, HazardState::kActive);
     return life;
   }
-  void Set(std::uint64_t id, const LifeRecord& life, std::int64_t now_ns,
+  void Set(std::uint64_t id, const PresenceRecord& life, std::int64_t now_ns,
            const GeoPoint& place = kPlace) {
     scheduler_->SetHazard(id, place, entry_, life, now_ns, now_ns);
   }
@@ -61,8 +61,8 @@ class PollSchedulerTest : public ::testing::Test {
   }
 
   PollScheduler::Config config_;
-  HazardLife rules_;
-  LifeClass entry_;
+  HazardLifecycle rules_;
+  ClassModel entry_;
   std::unique_ptr<PollScheduler> scheduler_;
 };
 
@@ -109,7 +109,7 @@ TEST_F(PollSchedulerTest, AHazardThatFallsDueFindsTheVehicleThatIsThereAlready) 
 TEST_F(PollSchedulerTest, AVehicleThatStandsIsAskedTheRestWhenItHasAnswered) {
   config_.max_open_per_vehicle = 1;
   Rebuild();
-  const LifeRecord life = Active(5400, kStart);
+  const PresenceRecord life = Active(5400, kStart);
   Set(1, life, kStart);
   Set(2, life, kStart, GeodesicDestination(kPlace, 0, 5));
   std::vector<std::uint64_t> asked;
@@ -137,7 +137,7 @@ TEST_F(PollSchedulerTest, AllOfManyThatFallDueTogetherAreAskedInTheEnd) {
   config_.bytes_per_hour = 1e9;
   config_.max_open_per_vehicle = 1000;
   Rebuild();
-  const LifeRecord life = Active(5400, kStart);
+  const PresenceRecord life = Active(5400, kStart);
   // Far more than one tick takes, and one of them before a vehicle.
   for (std::uint64_t i = 0; i < 50000; ++i) {
     Set(i, life, kStart, {10 + static_cast<double>(i) * 1e-3, 20});
@@ -164,7 +164,7 @@ TEST_F(PollSchedulerTest, ShortLivesAreAskedSoonerByTheRootOfTheirRate) {
 TEST_F(PollSchedulerTest, ANoIsFollowedByTheNextVehicleAtOnceAndAYesIsNot) {
   for (const bool yes : {false, true}) {
     Rebuild();
-    LifeRecord life = Active(5400, kStart);
+    PresenceRecord life = Active(5400, kStart);
     Set(1, life, kStart);
     const std::int64_t later = kStart + 2 * kHour / 3;
     Approach("a", later);
@@ -221,7 +221,7 @@ TEST_F(PollSchedulerTest, NeverTwoOpenPollsToOneVehicleForOneHazardAndEachVehicl
 
 TEST_F(PollSchedulerTest, TheReporterOfACandidateIsNotAskedAboutItButOthersAre) {
   entry_.survival = {5, 4 * 86400.0};
-  LifeRecord life;
+  PresenceRecord life;
   rules_.Begin(entry_, {EvidenceKind::kSighting, VehicleKey("a"), kStart}, kStart, life);
   ASSERT_EQ(life.state, HazardState::kCandidate);
   Set(1, life, kStart);
@@ -233,7 +233,7 @@ TEST_F(PollSchedulerTest, TheReporterOfACandidateIsNotAskedAboutItButOthersAre) 
 }
 
 TEST_F(PollSchedulerTest, WhatIsGoneIsNotAskedAbout) {
-  LifeRecord life = Active(5400, kStart);
+  PresenceRecord life = Active(5400, kStart);
   Set(1, life, kStart);
   life.state = HazardState::kGone;
   Set(1, life, kStart + kSecond);
@@ -243,7 +243,7 @@ TEST_F(PollSchedulerTest, WhatIsGoneIsNotAskedAbout) {
 }
 
 TEST_F(PollSchedulerTest, AHazardThatMovedIsAskedAboutAtItsNewPlace) {
-  const LifeRecord life = Active(5400, kStart);
+  const PresenceRecord life = Active(5400, kStart);
   Set(1, life, kStart);
   const std::int64_t later = kStart + 2 * kHour;
   EXPECT_TRUE(Asked(later).empty());
@@ -254,7 +254,7 @@ TEST_F(PollSchedulerTest, AHazardThatMovedIsAskedAboutAtItsNewPlace) {
 }
 
 TEST_F(PollSchedulerTest, AsksForAPictureWhenTheOneItHasIsOld) {
-  const LifeRecord life = Active(5400, kStart);
+  const PresenceRecord life = Active(5400, kStart);
   const std::int64_t later = kStart + 2 * kHour;
   for (const bool old : {false, true}) {
     Rebuild();
@@ -269,7 +269,7 @@ TEST_F(PollSchedulerTest, AsksForAPictureWhenTheOneItHasIsOld) {
 TEST_F(PollSchedulerTest, KeepsItsByteBudget) {
   config_.bytes_per_hour = 6000;
   Rebuild();
-  const LifeRecord life = Active(300, kStart);
+  const PresenceRecord life = Active(300, kStart);
   for (std::uint64_t id = 0; id < 40; ++id) Set(id, life, kStart);
   for (std::int64_t t = kStart; t < kStart + 10 * kHour; t += 5 * kSecond) {
     for (int v = 0; v < 3; ++v) {
@@ -296,7 +296,7 @@ TEST_F(PollSchedulerTest, AFullHeapOfVehiclesForgetsTheLongestSilent) {
 TEST_F(PollSchedulerTest, HazardsThatAreNotDueAreMetByNoVehicle) {
   std::mt19937_64 generator(3);
   std::uniform_real_distribution<double> offset(-0.2, 0.2);
-  const LifeRecord life = Active(5184000, kStart);
+  const PresenceRecord life = Active(5184000, kStart);
   for (std::uint64_t id = 0; id < 30000; ++id) {
     Set(id, life, kStart,
         {kPlace.latitude_deg + offset(generator), kPlace.longitude_deg + offset(generator)});

@@ -21,7 +21,7 @@ class RegistryTest : public testing::Test {
     return slot;
   }
   void SetState(HazardRegistry::Slot slot, HazardState state) {
-    LifeRecord life = registry_.Record(slot).life;
+    PresenceRecord life = registry_.Record(slot).life;
     life.state = state;
     registry_.SetLife(slot, life, 0.5, sequence_, kNowNs);
   }

@@ -263,7 +263,7 @@ TEST(MapChangeWitnesses, SurviveTheWayToTheStoreAndBack) {
   std::vector<MapChangeWitness> witnesses;
   for (std::uint64_t vehicle = 1; vehicle <= 40; ++vehicle) {
     for (std::uint64_t drive = 1; drive <= 6; ++drive) {
-      NoteWitness(witnesses, ~vehicle, ~(100 * vehicle + drive), vehicle % 2 == 0);
+      RecordWitness(witnesses, ~vehicle, ~(100 * vehicle + drive), vehicle % 2 == 0);
     }
   }
   EXPECT_EQ(witnesses.size(), 2 * kMaxWitnesses);
