@@ -23,10 +23,10 @@
 #include "test/change/simulated_pairs.h"
 #include "tools/common/shipped_model.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
-constexpr GeoPoint kTown{40.4433, -79.9436};
+constexpr geo::GeoPoint kTown{40.4433, -79.9436};
 constexpr double kBlockM = 100;     // Between streets that run north, and those that run east.
 constexpr double kFrameEveryM = 2;  // Of each drive.
 constexpr int kDrives = 4;          // Down every street, two each way.
@@ -35,8 +35,8 @@ constexpr double kQuarterTurn = 1.5707963267948966;
 
 /// A town's streets, driven down and up, and questions from on its streets.
 struct Town {
-  explicit Town(std::int64_t frames) : index(PlaceReach()) {
-    const LocalFrame local(kTown);
+  explicit Town(std::int64_t frames) : index(change::PlaceReach()) {
+    const geo::LocalFrame local(kTown);
     std::mt19937_64 random(42);
     const double share = static_cast<double>(frames) / kDrives;
     // A square of `side` blocks has 2 side (side + 1) sides of blocks.
@@ -54,19 +54,19 @@ struct Town {
     };
     for (std::int64_t i = 0; i < frames; ++i) {
       double heading_rad = 0;
-      const GeoPoint place = draw(heading_rad);
+      const geo::GeoPoint place = draw(heading_rad);
       index.Insert(i, place, heading_rad, std::to_string(random() % kDrives));
     }
     for (std::size_t i = 0; i < kQuestions; ++i) {
-      PlaceQuery query;
+      change::PlaceQuery query;
       query.position = draw(query.heading_rad);
       query.exclude_drive = "today";
       questions.push_back(query);
     }
   }
 
-  PlaceIndex index;
-  std::vector<PlaceQuery> questions;
+  change::PlaceIndex index;
+  std::vector<change::PlaceQuery> questions;
 };
 
 Town& TownOf(std::int64_t frames) {
@@ -84,8 +84,8 @@ void NearestFifteen(benchmark::State& state) {
   state.counters["found"] = static_cast<double>(found) / static_cast<double>(state.iterations());
 }
 
-ImageFeatures RandomFeatures(std::uint64_t seed, int count) {
-  ImageFeatures features;
+change::ImageFeatures RandomFeatures(std::uint64_t seed, int count) {
+  change::ImageFeatures features;
   cv::RNG random(seed);
   features.descriptors = cv::Mat(count, 128, CV_8UC1);
   random.fill(features.descriptors, cv::RNG::UNIFORM, 0, 100);
@@ -96,12 +96,12 @@ ImageFeatures RandomFeatures(std::uint64_t seed, int count) {
 /// Of one picture with 15 others, all features at hand.
 void MatchFifteen(benchmark::State& state) {
   const int count = static_cast<int>(state.range(0));
-  const ImageFeatures now = RandomFeatures(1, count);
-  std::vector<ImageFeatures> others;
+  const change::ImageFeatures now = RandomFeatures(1, count);
+  std::vector<change::ImageFeatures> others;
   for (std::uint64_t i = 0; i < 15; ++i) others.push_back(RandomFeatures(2 + i, count));
   for (auto _ : state) {
-    for (const ImageFeatures& other : others) {
-      benchmark::DoNotOptimize(MatchFeatures(other, now, 0.8).size());
+    for (const change::ImageFeatures& other : others) {
+      benchmark::DoNotOptimize(change::MatchFeatures(other, now, 0.8).size());
     }
   }
 }
@@ -117,7 +117,7 @@ struct SmallPair {
 const std::vector<SmallPair>& SmallPairs() {
   static const std::vector<SmallPair> pairs = [] {
     std::vector<SmallPair> made;
-    for (const SimulatedPair& pair : MakePairs({})) {
+    for (const change::SimulatedPair& pair : change::MakePairs({})) {
       SmallPair small;
       cv::resize(pair.before.bgr, small.before, cv::Size(320, 256), 0, 0, cv::INTER_AREA);
       cv::resize(pair.after.bgr, small.after, cv::Size(320, 256), 0, 0, cv::INTER_AREA);
@@ -139,9 +139,10 @@ class PairsInTurn {
   std::size_t next_ = 0;
 };
 
-WarpedPicture RegisteredByEdges(const SmallPair& pair) {
-  const Registration found = RegisterByEdges(pair.before, pair.after, RegistrationConfig());
-  return WarpByHomography(pair.before, found.after_from_before);
+change::WarpedPicture RegisteredByEdges(const SmallPair& pair) {
+  const change::Registration found =
+      change::RegisterByEdges(pair.before, pair.after, change::RegistrationConfig());
+  return change::WarpByHomography(pair.before, found.after_from_before);
 }
 
 void RegisterByItsEdges(benchmark::State& state) {
@@ -155,22 +156,24 @@ void RegisterByItsFeatures(benchmark::State& state) {
   PairsInTurn pairs;
   for (auto _ : state) {
     const SmallPair& pair = pairs.Next();
-    const Registration found = RegisterByHomography(
-        {pair.before.size(), ExtractFeatures(pair.before)},
-        {pair.after.size(), ExtractFeatures(pair.after)}, RegistrationConfig(), 1);
-    benchmark::DoNotOptimize(WarpByHomography(pair.before, found.after_from_before).picture.data);
+    const change::Registration found = change::RegisterByHomography(
+        {pair.before.size(), change::ExtractFeatures(pair.before)},
+        {pair.after.size(), change::ExtractFeatures(pair.after)}, change::RegistrationConfig(), 1);
+    benchmark::DoNotOptimize(
+        change::WarpByHomography(pair.before, found.after_from_before).picture.data);
   }
 }
 
 /// The network that ships; with its registration when the argument is 1.
 void ComparePair(benchmark::State& state) {
-  const auto network = MakeChangeNetwork(ShippedModel("change-small"), kThreads);
+  const auto network = change::MakeChangeNetwork(tools::ShippedModel("change-small"), kThreads);
   const cv::Mat everywhere(256, 320, CV_8UC1, cv::Scalar(255));
   PairsInTurn pairs;
   for (auto _ : state) {
     const SmallPair& pair = pairs.Next();
-    const WarpedPicture warped =
-        state.range(0) == 1 ? RegisteredByEdges(pair) : WarpedPicture{pair.before, everywhere};
+    const change::WarpedPicture warped = state.range(0) == 1
+                                             ? RegisteredByEdges(pair)
+                                             : change::WarpedPicture{pair.before, everywhere};
     const auto found = network->Run({warped.picture, pair.after, warped.valid});
     benchmark::DoNotOptimize(found.of_class[0].data);
   }
@@ -208,11 +211,11 @@ class GrowthReporter : public benchmark::ConsoleReporter {
 };
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  livemap::GrowthReporter reporter;
-  const int status = livemap::RunBenchmarks(
+  livemap::bench::GrowthReporter reporter;
+  const int status = livemap::bench::RunBenchmarks(
       argc, argv, "livemap_change_benchmark",
       "Cost of comparing a pair of 320x256 on two threads, with and without its registration; of\n"
       "finding the pictures of a place among 1e3 to 1e6, and of matching 15 of them.",

@@ -32,12 +32,12 @@
 #include "test/change/simulated_pairs.h"
 #include "tools/common/shipped_model.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 std::string ModelPath() {
   const char* path = std::getenv("LIVEMAP_MODEL");
-  return path != nullptr ? path : ShippedModel(kDefaultDetector);
+  return path != nullptr ? path : tools::ShippedModel(tools::kDefaultDetector);
 }
 
 int Threads() {
@@ -46,9 +46,9 @@ int Threads() {
   return static_cast<int>(std::clamp(std::strtol(threads, nullptr, 10), 0L, 256L));
 }
 
-std::optional<EngineKind> Engine() {
+std::optional<perception::EngineKind> Engine() {
   const char* engine = std::getenv("LIVEMAP_ENGINE");
-  return ParseEngineChoice(engine != nullptr ? engine : "auto", "LIVEMAP_ENGINE");
+  return perception::ParseEngineChoice(engine != nullptr ? engine : "auto", "LIVEMAP_ENGINE");
 }
 
 /// Memory of this process that is in RAM, MiB.
@@ -69,7 +69,7 @@ cv::Mat NoiseFrame(int width, int height) {
 }
 
 /// A head's output with `candidates` boxes above the threshold, at random cells.
-cv::Mat Predictions(const ModelManifest& manifest, int candidates) {
+cv::Mat Predictions(const perception::ModelManifest& manifest, int candidates) {
   const int columns = 5 + static_cast<int>(manifest.classes.size());
   const int shape[] = {1, manifest.AnchorCount(), columns};
   cv::Mat predictions(3, shape, CV_32F, cv::Scalar(0));
@@ -90,8 +90,8 @@ cv::Mat Predictions(const ModelManifest& manifest, int candidates) {
   return predictions;
 }
 
-ModelManifest CandidateManifest() {
-  ModelManifest manifest;
+perception::ModelManifest CandidateManifest() {
+  perception::ModelManifest manifest;
   manifest.classes = {"pothole", "traffic_cone"};
   manifest.input.width = 640;
   manifest.input.height = 400;
@@ -102,11 +102,12 @@ ModelManifest CandidateManifest() {
 
 void BM_FrameToDetections(benchmark::State& state) {
   try {
-    HazardDetector detector(ReadModelManifest(ModelPath()), Threads(), Engine());
+    perception::HazardDetector detector(perception::ReadModelManifest(ModelPath()), Threads(),
+                                        Engine());
     const cv::Mat frame =
         NoiseFrame(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
     for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(detector.Detect(frame));
-    state.SetLabel(detector.manifest().name + ", " + NameOf(detector.Engine()));
+    state.SetLabel(detector.manifest().name + ", " + perception::NameOf(detector.Engine()));
     state.SetItemsProcessed(state.iterations());
   } catch (const Error& error) {
     state.SkipWithError(error.what());
@@ -121,16 +122,17 @@ BENCHMARK(BM_FrameToDetections)
 
 /// Frames of 640 x 400 through a pool: engine (0 OpenCV, 1 torch), number of engines, threads each.
 void BM_Pool(benchmark::State& state) {
-  const EngineKind kind = state.range(0) == 0 ? EngineKind::kOpenCv : EngineKind::kTorch;
+  const perception::EngineKind kind =
+      state.range(0) == 0 ? perception::EngineKind::kOpenCv : perception::EngineKind::kTorch;
   const auto threads = static_cast<int>(state.range(2));
   constexpr int kFrames = 16;
   try {
-    const ModelManifest manifest = ReadModelManifest(ModelPath());
+    const perception::ModelManifest manifest = perception::ReadModelManifest(ModelPath());
     const double before_mib = ResidentMib();
-    using Pool = DetectorPool<cv::Mat, std::vector<HazardDetection>>;
+    using Pool = perception::DetectorPool<cv::Mat, std::vector<perception::HazardDetection>>;
     std::vector<Pool::Engine> engines;
     for (int i = 0; i < state.range(1); ++i) {
-      const auto detector = std::make_shared<HazardDetector>(manifest, threads, kind);
+      const auto detector = std::make_shared<perception::HazardDetector>(manifest, threads, kind);
       engines.emplace_back([detector](const cv::Mat& frame) { return detector->Detect(frame); });
     }
     Pool pool(std::move(engines), kFrames, [](const Pool::Outcome&) {});
@@ -144,7 +146,7 @@ void BM_Pool(benchmark::State& state) {
     if (pool.counters().dropped > 0) throw Error("the pool dropped frames");
     state.counters["pool_mib"] = ResidentMib() - before_mib;
     state.SetItemsProcessed(state.iterations() * kFrames);
-    state.SetLabel(NameOf(kind));
+    state.SetLabel(perception::NameOf(kind));
   } catch (const Error& error) {
     state.SkipWithError(error.what());
   }
@@ -159,12 +161,12 @@ BENCHMARK(BM_Pool)
 /// shows.
 void BM_Mask(benchmark::State& state) {
   std::vector<cv::Mat> streets;
-  for (const SimulatedPair& pair : MakePairs({})) {
+  for (const change::SimulatedPair& pair : change::MakePairs({})) {
     cv::resize(pair.after.bgr, streets.emplace_back(), {640, 400}, 0, 0, cv::INTER_AREA);
   }
   const cv::Rect part =
       state.range(0) == 0 ? cv::Rect(0, 0, 640, 400) : cv::Rect(200, 220, 240, 160);
-  PrivacyMask mask({});
+  perception::PrivacyMask mask({});
   std::uint64_t frame = 0;
   for ([[maybe_unused]] auto _ : state) {
     cv::Mat picture = streets[frame % streets.size()].clone();
@@ -175,10 +177,10 @@ void BM_Mask(benchmark::State& state) {
 BENCHMARK(BM_Mask)->ArgName("part")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 /// Boxes of one class all over an image.
-std::vector<HazardDetection> Candidates(int count) {
+std::vector<perception::HazardDetection> Candidates(int count) {
   std::mt19937 generator(1);
   std::uniform_real_distribution<float> unit(0, 1);
-  std::vector<HazardDetection> candidates;
+  std::vector<perception::HazardDetection> candidates;
   for (int i = 0; i < count; ++i) {
     candidates.push_back({"pothole",
                           0,
@@ -190,24 +192,26 @@ std::vector<HazardDetection> Candidates(int count) {
 }
 
 void BM_Suppress(benchmark::State& state) {
-  const std::vector<HazardDetection> candidates = Candidates(static_cast<int>(state.range(0)));
+  const std::vector<perception::HazardDetection> candidates =
+      Candidates(static_cast<int>(state.range(0)));
   for ([[maybe_unused]] auto _ : state) {
-    benchmark::DoNotOptimize(SuppressOverlaps(candidates, 0.5F));
+    benchmark::DoNotOptimize(perception::SuppressOverlaps(candidates, 0.5F));
   }
 }
 BENCHMARK(BM_Suppress)->Arg(100)->Arg(1000)->Arg(3000)->Unit(benchmark::kMicrosecond);
 
 /// What suppression costs when every candidate is compared with every kept one.
 void BM_SuppressAllWithAll(benchmark::State& state) {
-  const std::vector<HazardDetection> candidates = Candidates(static_cast<int>(state.range(0)));
+  const std::vector<perception::HazardDetection> candidates =
+      Candidates(static_cast<int>(state.range(0)));
   for ([[maybe_unused]] auto _ : state) {
-    std::vector<HazardDetection> sorted = candidates;
+    std::vector<perception::HazardDetection> sorted = candidates;
     std::stable_sort(sorted.begin(), sorted.end(),
                      [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
-    std::vector<HazardDetection> kept;
-    for (HazardDetection& candidate : sorted) {
+    std::vector<perception::HazardDetection> kept;
+    for (perception::HazardDetection& candidate : sorted) {
       const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const auto& better) {
-        return IntersectionOverUnion(better.box, candidate.box) > 0.5F;
+        return perception::IntersectionOverUnion(better.box, candidate.box) > 0.5F;
       });
       if (!overlaps) kept.push_back(std::move(candidate));
     }
@@ -217,11 +221,11 @@ void BM_SuppressAllWithAll(benchmark::State& state) {
 BENCHMARK(BM_SuppressAllWithAll)->Arg(100)->Arg(1000)->Arg(3000)->Unit(benchmark::kMicrosecond);
 
 void BM_DecodeAndSuppress(benchmark::State& state) {
-  const ModelManifest manifest = CandidateManifest();
+  const perception::ModelManifest manifest = CandidateManifest();
   const cv::Mat predictions = Predictions(manifest, static_cast<int>(state.range(0)));
   std::size_t kept = 0;
   for ([[maybe_unused]] auto _ : state) {
-    const auto found = DecodeYolox(predictions, manifest, 1.0, {640, 400});
+    const auto found = perception::DecodeYolox(predictions, manifest, 1.0, {640, 400});
     kept = found.size();
     benchmark::DoNotOptimize(found.data());
   }
@@ -238,20 +242,21 @@ BENCHMARK(BM_DecodeAndSuppress)
 
 void BM_Annotate(benchmark::State& state) {
   const cv::Mat frame = NoiseFrame(640, 400);
-  const std::vector<HazardDetection> found(static_cast<std::size_t>(state.range(0)),
-                                           {"pothole", 0, 0.83F, {300, 200, 80, 60}});
+  const std::vector<perception::HazardDetection> found(static_cast<std::size_t>(state.range(0)),
+                                                       {"pothole", 0, 0.83F, {300, 200, 80, 60}});
   for ([[maybe_unused]] auto _ : state) {
     cv::Mat copy = frame.clone();
-    AnnotateImage(copy, found);
+    perception::AnnotateImage(copy, found);
     benchmark::DoNotOptimize(copy.data);
   }
 }
 BENCHMARK(BM_Annotate)->Arg(1)->Arg(10)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  return livemap::RunBenchmarks(argc, argv, "livemap_detector_benchmark",
-                                "The parts of a frame's detection, from decoding to annotation.");
+  return livemap::bench::RunBenchmarks(
+      argc, argv, "livemap_detector_benchmark",
+      "The parts of a frame's detection, from decoding to annotation.");
 }

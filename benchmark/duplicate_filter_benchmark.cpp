@@ -15,10 +15,10 @@
 #include "run_benchmarks.h"
 #include "vehicle/reporting/duplicate_filter.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
-constexpr GeoPoint kZone{40.4433, -79.9436};
+constexpr geo::GeoPoint kZone{40.4433, -79.9436};
 constexpr double kSpacingM = 30.0;  // One hazard per 30 m x 30 m: a dense city.
 constexpr std::size_t kQuestions = 1 << 16;
 
@@ -30,8 +30,8 @@ Uuid Id(std::uint64_t number) {
 
 /// A zone full of hazards and questions about it, made once per number of hazards.
 struct World {
-  explicit World(std::int64_t hazards) : filter{HazardCatalogue()} {
-    const LocalFrame frame(kZone);
+  explicit World(std::int64_t hazards) : filter{protocol::HazardCatalogue()} {
+    const geo::LocalFrame frame(kZone);
     std::mt19937_64 random(42);
     const double side_m = kSpacingM * std::sqrt(static_cast<double>(hazards));
     std::uniform_real_distribution<double> place(-side_m / 2, side_m / 2);
@@ -48,9 +48,9 @@ struct World {
     }
   }
 
-  DuplicateFilter filter;
-  std::vector<GeoPoint> anywhere;  // Mostly new.
-  std::vector<GeoPoint> at_known;  // All known.
+  vehicle::DuplicateFilter filter;
+  std::vector<geo::GeoPoint> anywhere;  // Mostly new.
+  std::vector<geo::GeoPoint> at_known;  // All known.
 };
 
 World& WorldOf(std::int64_t hazards) {
@@ -60,12 +60,12 @@ World& WorldOf(std::int64_t hazards) {
   return *world;
 }
 
-void Ask(benchmark::State& state, std::vector<GeoPoint> World::*questions) {
+void Ask(benchmark::State& state, std::vector<geo::GeoPoint> World::*questions) {
   World& world = WorldOf(state.range(0));
   std::size_t next = 0;
   std::size_t known = 0;
   for (auto _ : state) {
-    const GeoPoint& position = (world.*questions)[next++ % kQuestions];
+    const geo::GeoPoint& position = (world.*questions)[next++ % kQuestions];
     known += world.filter.Find("pothole", position) ? 1 : 0;
   }
   state.counters["known_share"] =
@@ -113,11 +113,11 @@ class GrowthReporter : public benchmark::ConsoleReporter {
 };
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  livemap::GrowthReporter reporter;
-  const int status = livemap::RunBenchmarks(
+  livemap::bench::GrowthReporter reporter;
+  const int status = livemap::bench::RunBenchmarks(
       argc, argv, "livemap_duplicate_filter_benchmark",
       "Cost of a question to the vehicle's duplicate filter at 1e3 to 1e6 known hazards.",
       &reporter);

@@ -11,25 +11,26 @@
 #include "simulation/room/room.h"
 #include "tools/odometry/vo_method.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr int kFrames = 6;
 
-const CameraIntrinsics& Camera() {
-  static const CameraIntrinsics camera = SimulatedCamera().intrinsics;
+const geo::CameraIntrinsics& Camera() {
+  static const geo::CameraIntrinsics camera = simulation::SimulatedCamera().intrinsics;
   return camera;
 }
 
-const std::vector<RgbdFrame>& Frames() {
-  static const std::vector<RgbdFrame> frames = [] {
+const std::vector<odometry::RgbdFrame>& Frames() {
+  static const std::vector<odometry::RgbdFrame> frames = [] {
     cv::setNumThreads(1);
-    const SimulatedRoom room(1);
-    std::vector<RgbdFrame> made;
+    const simulation::SimulatedRoom room(1);
+    std::vector<odometry::RgbdFrame> made;
     for (int i = 0; i < kFrames; ++i) {
-      const SimulatedFrame seen = room.Render(SimulatedCamera(), room.WorldFromOptical(i / 30.0, 1),
-                                              static_cast<std::uint32_t>(i), 1.3F, 1, 2);
-      RgbdFrame frame;
+      const simulation::SimulatedFrame seen =
+          room.Render(simulation::SimulatedCamera(), room.WorldFromOptical(i / 30.0, 1),
+                      static_cast<std::uint32_t>(i), 1.3F, 1, 2);
+      odometry::RgbdFrame frame;
       cv::cvtColor(seen.bgr, frame.grey, cv::COLOR_BGR2GRAY);
       seen.depth.convertTo(frame.depth, CV_16U, 5000);
       frame.depth_units_per_m = 5000;
@@ -41,12 +42,12 @@ const std::vector<RgbdFrame>& Frames() {
 }
 
 /// Forwards and backwards through the frames, so that the motion stays that of a hand.
-void TrackFrames(benchmark::State& state, VoMethod& method) {
-  const std::vector<RgbdFrame>& frames = Frames();
+void TrackFrames(benchmark::State& state, tools::VoMethod& method) {
+  const std::vector<odometry::RgbdFrame>& frames = Frames();
   std::int64_t stamp_ns = 0;
   int at = 0, step = 1;
   for (auto _ : state) {
-    RgbdFrame frame = frames[static_cast<std::size_t>(at)];
+    odometry::RgbdFrame frame = frames[static_cast<std::size_t>(at)];
     frame.stamp_ns = stamp_ns += 33'333'333;
     benchmark::DoNotOptimize(method.Track(frame));
     if (at + step < 0 || at + step >= kFrames) step = -step;
@@ -55,23 +56,23 @@ void TrackFrames(benchmark::State& state, VoMethod& method) {
 }
 
 void BM_TrackFrame(benchmark::State& state) {
-  EdgeOdometry::Config config;
+  odometry::EdgeOdometry::Config config;
   config.keyframe_motion = 1;
-  TrackFrames(state, *MakeVoMethod("edge", config, Camera()));
+  TrackFrames(state, *tools::MakeVoMethod("edge", config, Camera()));
 }
 
 void BM_TrackFrameThatBecomesAKeyframe(benchmark::State& state) {
-  EdgeOdometry::Config config;
+  odometry::EdgeOdometry::Config config;
   config.keyframe_every = 1;
-  TrackFrames(state, *MakeVoMethod("edge", config, Camera()));
+  TrackFrames(state, *tools::MakeVoMethod("edge", config, Camera()));
 }
 
 void BM_OpenCvRgbdOdometry(benchmark::State& state) {
-  TrackFrames(state, *MakeVoMethod("rgbd", {}, Camera()));
+  TrackFrames(state, *tools::MakeVoMethod("rgbd", {}, Camera()));
 }
 
 void BM_CannyDetector(benchmark::State& state) {
-  CannyDetector canny;
+  odometry::CannyDetector canny;
   const cv::Mat& grey = Frames().front().grey;
   for (auto _ : state) benchmark::DoNotOptimize(canny.ExtractAbove(grey, 40, 100).data);
 }
@@ -92,10 +93,11 @@ BENCHMARK(BM_CannyDetector)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_OpenCvCanny)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  return livemap::RunBenchmarks(argc, argv, "livemap_edge_vo_benchmark",
-                                "A 640x480 frame that is tracked, one that becomes a keyframe, "
-                                "OpenCV's RgbdOdometry, Canny.");
+  return livemap::bench::RunBenchmarks(
+      argc, argv, "livemap_edge_vo_benchmark",
+      "A 640x480 frame that is tracked, one that becomes a keyframe, "
+      "OpenCV's RgbdOdometry, Canny.");
 }

@@ -8,18 +8,18 @@
 #include "localization/geo_localizer.h"
 #include "run_benchmarks.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr std::int64_t kStepNs = 10'000'000;  // Of the odometry.
-constexpr GeoPoint kDatum{48.1, 11.5};
+constexpr geo::GeoPoint kDatum{48.1, 11.5};
 
 /// A vehicle that drives a wavy road at changing speed.
 class Drive {
  public:
   Drive() : localizer_(Config()) {}
 
-  const GeoLocalizer& localizer() const { return localizer_; }
+  const localization::GeoLocalizer& localizer() const { return localizer_; }
   std::int64_t now_ns() const { return now_ns_; }
 
   void StepOdometry() {
@@ -34,27 +34,27 @@ class Drive {
     localizer_.AddOdometry(now_ns_, pose);
   }
 
-  PositionFix Fix() {
+  localization::PositionFix Fix() {
     // Errors without a random generator: the same in every run.
     const double turn = 2.4 * static_cast<double>(++fixes_);
-    PositionFix fix;
+    localization::PositionFix fix;
     fix.stamp_ns = now_ns_;
     fix.position = frame_.ToGeo(place_m_ + 0.7 * Eigen::Vector2d(std::cos(turn), std::sin(turn)));
     fix.covariance_m2 = 0.5 * Eigen::Matrix2d::Identity();
     return fix;
   }
 
-  void AddFix(const PositionFix& fix) { localizer_.AddFix(fix); }
+  void AddFix(const localization::PositionFix& fix) { localizer_.AddFix(fix); }
 
  private:
-  static LocalizerConfig Config() {
-    LocalizerConfig config;
+  static localization::LocalizerConfig Config() {
+    localization::LocalizerConfig config;
     config.datum = kDatum;
     return config;
   }
 
-  const LocalFrame frame_{kDatum};
-  GeoLocalizer localizer_;
+  const geo::LocalFrame frame_{kDatum};
+  localization::GeoLocalizer localizer_;
   std::int64_t now_ns_ = 1'000'000'000;
   std::uint64_t fixes_ = 0;
   Eigen::Vector2d place_m_ = Eigen::Vector2d::Zero();
@@ -75,7 +75,7 @@ void AddFix(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     for (int step = 0; step < steps_per_fix; ++step) drive.StepOdometry();
-    const PositionFix fix = drive.Fix();
+    const localization::PositionFix fix = drive.Fix();
     state.ResumeTiming();
     drive.AddFix(fix);
   }
@@ -94,10 +94,10 @@ BENCHMARK(AddFix)->Arg(1)->Arg(10)->Arg(20)->Unit(benchmark::kMillisecond);
 BENCHMARK(AskFused)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  return livemap::RunBenchmarks(
+  return livemap::bench::RunBenchmarks(
       argc, argv, "livemap_localization_benchmark",
       "Cost of a fix at 1, 10 and 20 fixes per second, and of asking for the fused pose.");
 }

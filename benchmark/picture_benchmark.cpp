@@ -10,7 +10,7 @@
 #include "run_benchmarks.h"
 #include "zone/pictures/picture_recoder.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 /// Blurred noise: about as hard to code as a street.
@@ -34,7 +34,7 @@ const std::vector<std::uint8_t>& Picture(benchmark::State& state) {
 
 void Recode(benchmark::State& state) {
   const std::vector<std::uint8_t>& file = Picture(state);
-  for (auto _ : state) benchmark::DoNotOptimize(RecodePicture(file));
+  for (auto _ : state) benchmark::DoNotOptimize(zone::RecodePicture(file));
 }
 
 void Thumbnail(benchmark::State& state) {
@@ -43,8 +43,9 @@ void Thumbnail(benchmark::State& state) {
   const auto height = static_cast<std::uint32_t>(state.range(1));
   const auto x = static_cast<float>(width);
   const auto y = static_cast<float>(height);
-  const Box box{x * 0.4F, y * 0.5F, x * 0.55F, y * 0.65F};
-  for (auto _ : state) benchmark::DoNotOptimize(SmallPicture(file, box, {0, 0, width, height}));
+  const imaging::Box box{x * 0.4F, y * 0.5F, x * 0.55F, y * 0.65F};
+  for (auto _ : state)
+    benchmark::DoNotOptimize(zone::SmallPicture(file, box, {0, 0, width, height}));
 }
 
 void Sizes(benchmark::internal::Benchmark* benchmark) {
@@ -55,11 +56,12 @@ BENCHMARK(Recode)->Apply(Sizes);
 BENCHMARK(Thumbnail)->Apply(Sizes);
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
   cv::setNumThreads(1);
-  return livemap::RunBenchmarks(argc, argv, "livemap_picture_benchmark",
-                                "What it costs to encode a vehicle's picture anew for people, and "
-                                "to make a thumbnail of it for drivers.");
+  return livemap::bench::RunBenchmarks(
+      argc, argv, "livemap_picture_benchmark",
+      "What it costs to encode a vehicle's picture anew for people, and "
+      "to make a thumbnail of it for drivers.");
 }

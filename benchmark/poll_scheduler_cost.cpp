@@ -13,7 +13,7 @@
 
 #include "zone/polling/poll_scheduler.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr std::size_t kVehicles = 10000;
@@ -22,7 +22,7 @@ constexpr double kSpeedMps = 13.9;
 constexpr int kTicks = 20;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kStartNs = 1'700'000'000 * kSecondNs;
-constexpr GeoPoint kCorner{40.0, -80.0};
+constexpr geo::GeoPoint kCorner{40.0, -80.0};
 constexpr double kMetresPerDegree = 111320;
 
 double ThreadSeconds() {
@@ -36,8 +36,8 @@ double AllocatedBytes() {
   return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
 }
 
-GeoPoint Place(double east_m, double north_m) {
-  const double cosine = std::cos(kCorner.latitude_deg * kRadiansPerDegree);
+geo::GeoPoint Place(double east_m, double north_m) {
+  const double cosine = std::cos(kCorner.latitude_deg * geo::kRadiansPerDegree);
   return {kCorner.latitude_deg + north_m / kMetresPerDegree,
           kCorner.longitude_deg + east_m / (kMetresPerDegree * cosine)};
 }
@@ -52,7 +52,7 @@ class Traffic {
       north_m_.push_back(kSpacingM * std::floor(along(random) / kSpacingM) + 3);
     }
   }
-  void Drive(std::int64_t now_ns, PollScheduler& scheduler) {
+  void Drive(std::int64_t now_ns, zone::PollScheduler& scheduler) {
     for (std::size_t i = 0; i < kVehicles; ++i) {
       east_m_[i] = std::fmod(east_m_[i] + kSpeedMps, side_m_);
       scheduler.SetVehicle("car-" + std::to_string(i),
@@ -74,9 +74,9 @@ struct Cost {
   double bytes_per_hazard = 0;
 };
 
-PresenceRecord ToldSince(std::int64_t stamp_ns) {
-  PresenceRecord life;
-  life.state = HazardState::kActive;
+zone::PresenceRecord ToldSince(std::int64_t stamp_ns) {
+  zone::PresenceRecord life;
+  life.state = zone::HazardState::kActive;
   life.since_ns = life.first_seen_ns = life.last_yes_ns = life.at_ns = stamp_ns;
   life.log_odds = 3;
   return life;
@@ -84,14 +84,14 @@ PresenceRecord ToldSince(std::int64_t stamp_ns) {
 
 Cost MeasureTicks(std::size_t hazards) {
   const auto side = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(hazards))));
-  const ClassModel entry;
-  const PresenceRecord life = ToldSince(kStartNs);
+  const zone::ClassModel entry;
+  const zone::PresenceRecord life = ToldSince(kStartNs);
   Cost cost;
   const double before = AllocatedBytes();
-  PollScheduler scheduler(PollScheduler::Config(), 5);
+  zone::PollScheduler scheduler(zone::PollScheduler::Config(), 5);
   for (std::size_t i = 0; i < hazards; ++i) {
     const std::size_t row = i / side;
-    const GeoPoint place =
+    const geo::GeoPoint place =
         Place(kSpacingM * static_cast<double>(i % side), kSpacingM * static_cast<double>(row));
     scheduler.SetHazard(i, place, entry, life, kStartNs, kStartNs);
   }
@@ -129,4 +129,4 @@ void PrintPollScheduler(std::size_t max_hazards) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

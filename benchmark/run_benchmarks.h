@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-namespace livemap {
+namespace livemap::bench {
 
 /// What a benchmark program does: --help, Google Benchmark's own options, a sentence and exit
 /// status 2 for any other. `about` says what is measured, one or more lines.
@@ -32,4 +32,4 @@ inline int RunBenchmarks(int argc, char** argv, const char* program, const char*
   return 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

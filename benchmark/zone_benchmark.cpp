@@ -18,7 +18,7 @@
 #include "zone/registry/hazard_registry.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr char kUsage[] =
@@ -30,7 +30,7 @@ constexpr char kUsage[] =
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
 constexpr double kSpacingM = 12.0;
-constexpr GeoPoint kCorner{40.44, -79.94};
+constexpr geo::GeoPoint kCorner{40.44, -79.94};
 constexpr double kMetresPerDegree = 111000.0;
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -51,13 +51,13 @@ class Town {
       : hazards_(hazards),
         side_(static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(hazards))))) {}
 
-  GeoPoint Place(double column, double row) const {
-    const double cosine = std::cos(kCorner.latitude_deg * kRadiansPerDegree);
+  geo::GeoPoint Place(double column, double row) const {
+    const double cosine = std::cos(kCorner.latitude_deg * geo::kRadiansPerDegree);
     return {kCorner.latitude_deg + row * kSpacingM / kMetresPerDegree,
             kCorner.longitude_deg + column * kSpacingM / (kMetresPerDegree * cosine)};
   }
-  Report At(const GeoPoint& position) {
-    Report report;
+  protocol::Report At(const geo::GeoPoint& position) {
+    protocol::Report report;
     report.uuid = Uuid::Random(generator_);
     report.vehicle_id = "car-" + std::to_string(generator_() % 1000);
     report.drive_id = "drive-1";
@@ -71,16 +71,16 @@ class Town {
     report.image_height = 480;
     return report;
   }
-  Report OfHazard(std::size_t i) { return At(Place(Column(i), Row(i))); }
+  protocol::Report OfHazard(std::size_t i) { return At(Place(Column(i), Row(i))); }
   /// Within 2 m of a random hazard.
-  Report Sighting() {
+  protocol::Report Sighting() {
     std::uniform_int_distribution<std::size_t> any(0, hazards_ - 1);
     std::uniform_real_distribution<double> offset(-0.1, 0.1);
     const std::size_t i = any(generator_);
     return At(Place(Column(i) + offset(generator_), Row(i) + offset(generator_)));
   }
   /// In the middle between four hazards, 8.5 m from each.
-  Report News() {
+  protocol::Report News() {
     std::uniform_int_distribution<std::size_t> any(0, hazards_ - 1);
     const std::size_t i = any(generator_);
     return At(Place(Column(i) + 0.5, Row(i) + 0.5));
@@ -106,11 +106,12 @@ struct Cost {
 
 /// Registers `reports` inside a transaction that is then taken back, so that the size stays.
 /// Returns processor seconds of the registration alone.
-double RegisterAndTakeBack(HazardRegistry& registry, const std::vector<Report>& reports, Town& town,
+double RegisterAndTakeBack(zone::HazardRegistry& registry,
+                           const std::vector<protocol::Report>& reports, Town& town,
                            std::uint64_t sequence) {
   registry.Begin();
   const double start = ThreadSeconds();
-  for (const Report& report : reports) {
+  for (const protocol::Report& report : reports) {
     const auto match = registry.FindMatch(report.class_name, report.position);
     if (match) {
       registry.Merge(*match, report, {}, ++sequence, kNowNs);
@@ -132,7 +133,7 @@ double Median(std::vector<double> values) {
 
 Cost MeasureRegistry(std::size_t hazards) {
   Town town(hazards);
-  HazardRegistry registry(HazardCatalogue(), 5);
+  zone::HazardRegistry registry(protocol::HazardCatalogue(), 5);
   std::uint64_t sequence = 0;
   for (std::size_t i = 0; i < hazards; ++i) {
     registry.Add(town.OfHazard(i), {}, town.NextUuid(), ++sequence, kNowNs);
@@ -143,8 +144,8 @@ Cost MeasureRegistry(std::size_t hazards) {
   std::vector<double> sighting_ns;
   // The first round warms up and is not counted.
   for (int batch = 0; batch <= kBatches; ++batch) {
-    std::vector<Report> news;
-    std::vector<Report> sightings;
+    std::vector<protocol::Report> news;
+    std::vector<protocol::Report> sightings;
     for (int i = 0; i < kBatchReports; ++i) {
       news.push_back(town.News());
       sightings.push_back(town.Sighting());
@@ -189,18 +190,18 @@ void PrintStore(std::size_t batch_reports, std::size_t picture_bytes, double sec
   double spent_s = 0;
   std::size_t count = 0;
   {
-    ZoneService::Config config;
+    zone::ZoneService::Config config;
     config.directory = directory;
     // The reports of a whole fleet come under few names here.
     config.speed.max_speed_mps = 1e9;
     config.allowance.reports_per_hour = 1e9;
     config.allowance.evidence_per_hour = 1e9;
-    ZoneService zone(
+    zone::ZoneService zone(
         config, [] { return kNowNs; }, 1);
     Town town(100000);
     std::mt19937 generator(2);
     while (spent_s < seconds) {
-      std::vector<Report> reports;
+      std::vector<protocol::Report> reports;
       for (std::size_t i = 0; i < batch_reports; ++i) {
         reports.push_back(i % 2 == 0 ? town.News() : town.Sighting());
         if (picture_bytes > 0) reports.back().image = MakePicture(picture_bytes, generator);
@@ -253,11 +254,11 @@ int Run(const std::vector<std::string>& arguments) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
   try {
-    return livemap::Run(std::vector<std::string>(argv + 1, argv + argc));
+    return livemap::bench::Run(std::vector<std::string>(argv + 1, argv + argc));
   } catch (const std::exception& error) {
     std::cerr << "livemap_zone_benchmark: " << error.what() << "\n";
     return 2;

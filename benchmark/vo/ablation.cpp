@@ -5,7 +5,7 @@
 #include "thread_time.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 /// A run of EdgeOdometry that also says how many points it used and what a keyframe took.
@@ -17,8 +17,8 @@ struct PointRun {
 };
 
 /// No limit on the points but the pixels of each level.
-EdgeOdometry::Config UnlimitedPoints(const CameraIntrinsics& camera) {
-  EdgeOdometry::Config config;
+odometry::EdgeOdometry::Config UnlimitedPoints(const geo::CameraIntrinsics& camera) {
+  odometry::EdgeOdometry::Config config;
   int pixels = camera.width * camera.height;
   for (int& most : config.max_points) {
     most = pixels;
@@ -27,17 +27,17 @@ EdgeOdometry::Config UnlimitedPoints(const CameraIntrinsics& camera) {
   return config;
 }
 
-PointRun Follow(const std::vector<RgbdFrame>& frames, const EdgeOdometry::Config& config,
-                const CameraIntrinsics& camera) {
-  EdgeOdometry odometry(config, camera);
+PointRun Follow(const std::vector<odometry::RgbdFrame>& frames,
+                const odometry::EdgeOdometry::Config& config, const geo::CameraIntrinsics& camera) {
+  odometry::EdgeOdometry odometry(config, camera);
   PointRun run;
-  for (const RgbdFrame& frame : frames) {
+  for (const odometry::RgbdFrame& frame : frames) {
     const double start_ms = ThreadTimeMs();
-    const VoResult result = odometry.Track(frame);
+    const odometry::VoResult result = odometry.Track(frame);
     const double took_ms = ThreadTimeMs() - start_ms;
     run.all.trajectory.push_back({frame.stamp_ns, result.world_from_camera});
     run.all.milliseconds.push_back(took_ms);
-    run.all.lost += result.state == VoState::kLost ? 1U : 0U;
+    run.all.lost += result.state == odometry::VoState::kLost ? 1U : 0U;
     run.all.keyframes += result.new_keyframe ? 1U : 0U;
     if (result.points == 0) continue;  // The first frame, or a lost one.
     run.points.push_back(static_cast<double>(result.points));
@@ -48,7 +48,7 @@ PointRun Follow(const std::vector<RgbdFrame>& frames, const EdgeOdometry::Config
 
 nlohmann::ordered_json MedianOf(const std::vector<double>& values) {
   if (values.empty()) return nullptr;
-  return Quantile(values, 0.5);
+  return evaluation::Quantile(values, 0.5);
 }
 
 nlohmann::ordered_json RowOf(const Recording& recording, const PointRun& run) {
@@ -59,22 +59,23 @@ nlohmann::ordered_json RowOf(const Recording& recording, const PointRun& run) {
   return row;
 }
 
-const char* NameOf(PixelChoice choice) {
-  return choice == PixelChoice::kRandomPixels ? "random" : "edges";
+const char* NameOf(odometry::PixelChoice choice) {
+  return choice == odometry::PixelChoice::kRandomPixels ? "random" : "edges";
 }
 
 }  // namespace
 
 nlohmann::ordered_json MeasureAblation(const Recording& recording, std::size_t runs) {
-  const std::vector<RgbdFrame> frames = recording.ReadAll();
+  const std::vector<odometry::RgbdFrame> frames = recording.ReadAll();
   const std::vector<double> shares = {0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
   nlohmann::ordered_json json = DescriptionOf(recording);
-  Progress progress("ablation", runs * shares.size() * 2);
+  tools::Progress progress("ablation", runs * shares.size() * 2);
   std::size_t done = 0;
   for (std::size_t run = 0; run < runs; ++run) {
     for (const double share : shares) {
-      for (const PixelChoice choice : {PixelChoice::kRandomEdges, PixelChoice::kRandomPixels}) {
-        EdgeOdometry::Config config = UnlimitedPoints(recording.camera());
+      for (const odometry::PixelChoice choice :
+           {odometry::PixelChoice::kRandomEdges, odometry::PixelChoice::kRandomPixels}) {
+        odometry::EdgeOdometry::Config config = UnlimitedPoints(recording.camera());
         config.constant_motion = false;
         config.points.choice = choice;
         config.points.share = share;
@@ -91,15 +92,15 @@ nlohmann::ordered_json MeasureAblation(const Recording& recording, std::size_t r
 }
 
 nlohmann::ordered_json MeasurePixels(const Recording& recording) {
-  const std::vector<RgbdFrame> frames = recording.ReadAll();
+  const std::vector<odometry::RgbdFrame> frames = recording.ReadAll();
   nlohmann::ordered_json json = DescriptionOf(recording);
   // Shares of the edge pixels; the last is more than any image has.
   const std::vector<double> of_edges = {0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
   const std::vector<double> of_all = {1, 2, 4, 8, 1000};
-  Progress progress("pixels", of_edges.size() + of_all.size());
+  tools::Progress progress("pixels", of_edges.size() + of_all.size());
   std::size_t done = 0;
-  const auto measure = [&](PixelChoice choice, double share) {
-    EdgeOdometry::Config config = UnlimitedPoints(recording.camera());
+  const auto measure = [&](odometry::PixelChoice choice, double share) {
+    odometry::EdgeOdometry::Config config = UnlimitedPoints(recording.camera());
     config.points.choice = choice;
     config.points.share = share;
     nlohmann::ordered_json row = {{"pixels", NameOf(choice)}, {"share", share}};
@@ -107,9 +108,9 @@ nlohmann::ordered_json MeasurePixels(const Recording& recording) {
     json["rows"].push_back(row);
     progress.At(++done);
   };
-  for (const double share : of_edges) measure(PixelChoice::kRandomEdges, share);
-  for (const double share : of_all) measure(PixelChoice::kRandomPixels, share);
+  for (const double share : of_edges) measure(odometry::PixelChoice::kRandomEdges, share);
+  for (const double share : of_all) measure(odometry::PixelChoice::kRandomPixels, share);
   return json;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

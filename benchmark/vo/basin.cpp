@@ -9,7 +9,7 @@
 #include "pair_alignment.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 /// How wrong the guesses of one row are.
@@ -43,9 +43,10 @@ class Directions {
 
 Eigen::Isometry3d Moved(const Eigen::Isometry3d& truth, const Offset& offset,
                         const Eigen::Vector3d& direction) {
-  Vector6d twist;
-  twist << offset.translation_m * direction, offset.rotation_deg * kRadiansPerDegree * direction;
-  return truth * Se3Exp(twist);
+  odometry::Vector6d twist;
+  twist << offset.translation_m * direction,
+      offset.rotation_deg * geo::kRadiansPerDegree * direction;
+  return truth * odometry::Se3Exp(twist);
 }
 
 bool IsNear(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
@@ -53,7 +54,7 @@ bool IsNear(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
   const Eigen::Isometry3d error = truth.inverse() * found;
   const double angle = Eigen::AngleAxisd(error.linear()).angle();
   return error.translation().norm() <= options.bound_m &&
-         std::abs(angle) <= options.bound_deg * kRadiansPerDegree;
+         std::abs(angle) <= options.bound_deg * geo::kRadiansPerDegree;
 }
 
 /// First frames of pairs, spread evenly, both of whose frames have a true pose.
@@ -77,10 +78,10 @@ nlohmann::ordered_json MeasureBasin(const Recording& recording, const BasinOptio
   const std::vector<Offset> offsets = Offsets();
   std::vector<std::vector<int>> converged(offsets.size(), std::vector<int>(methods.size(), 0));
   Directions directions(options.seed);
-  Progress progress("basin", pairs.size());
+  tools::Progress progress("basin", pairs.size());
   for (std::size_t pair = 0; pair < pairs.size(); ++pair) {
     const std::size_t first = pairs[pair];
-    const RgbdFrame reference = recording.Read(first), image = recording.Read(first + 1);
+    const odometry::RgbdFrame reference = recording.Read(first), image = recording.Read(first + 1);
     const Eigen::Isometry3d truth =
         recording.TruthAt(first + 1)->inverse() * *recording.TruthAt(first);
     for (const auto& method : methods) method->Take(reference, image);
@@ -108,4 +109,4 @@ nlohmann::ordered_json MeasureBasin(const Recording& recording, const BasinOptio
   return json;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

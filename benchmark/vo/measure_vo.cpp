@@ -7,11 +7,11 @@
 #include "measurements.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 nlohmann::ordered_json Measure(const std::string& what, const Recording& recording,
-                               const CommandLine& line) {
+                               const tools::CommandLine& line) {
   if (what == "tables") return MeasureTables(recording, line.Text("edge-model", ""));
   if (what == "ablation") {
     return MeasureAblation(recording, static_cast<std::size_t>(line.Number("runs", 5, 1, 1000)));
@@ -23,7 +23,7 @@ nlohmann::ordered_json Measure(const std::string& what, const Recording& recordi
 }
 
 int Run(int argc, char** argv) {
-  CommandLine line(
+  tools::CommandLine line(
       "livemap_measure_vo [FLAGS] tables|ablation|pixels|basin SEQ",
       "Measures visual odometry on an RGB-D sequence in TUM layout, one thread, and "
       "prints one line of JSON.\n"
@@ -52,8 +52,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_measure_vo", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_measure_vo", argc, argv, livemap::bench::Run);
 }

@@ -7,7 +7,7 @@
 
 #include "recording.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 /// Every kind of edges, source of edges and rule for keyframes, and OpenCV's two methods, side by
 /// side: each frame is given to one after the other, in an order that rotates, so that what else
@@ -36,4 +36,4 @@ struct BasinOptions {
 /// same ones for our method and OpenCV's. OpenCV's own limits on the motion are lifted.
 nlohmann::ordered_json MeasureBasin(const Recording& recording, const BasinOptions& options);
 
-}  // namespace livemap
+}  // namespace livemap::bench

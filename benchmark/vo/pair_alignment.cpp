@@ -5,30 +5,30 @@
 
 #include "tools/odometry/opencv_odometry.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 class EdgePairAlignment : public PairAlignment {
  public:
-  explicit EdgePairAlignment(const CameraIntrinsics& camera)
+  explicit EdgePairAlignment(const geo::CameraIntrinsics& camera)
       : extractor_(config_.edges),
         aligner_(config_.alignment),
-        levels_(CountLevels({camera.width, camera.height})) {
+        levels_(odometry::CountLevels({camera.width, camera.height})) {
     cameras_[0] = camera;
     for (std::size_t level = 1; level < cameras_.size(); ++level) {
-      cameras_[level] = HalvedIntrinsics(cameras_[level - 1]);
+      cameras_[level] = odometry::HalvedIntrinsics(cameras_[level - 1]);
     }
   }
 
   std::string name() const override { return "edge"; }
 
-  void Take(const RgbdFrame& reference, const RgbdFrame& image) override {
+  void Take(const odometry::RgbdFrame& reference, const odometry::RgbdFrame& image) override {
     reference_.Build(reference.grey);
     image_.Build(image.grey);
     depths_.Build(reference.depth, reference.depth_units_per_m, config_.depth_range, levels_);
     for (int level = 0; level < levels_; ++level) {
       const auto index = static_cast<std::size_t>(level);
-      PointSelection selection = config_.points;
+      odometry::PointSelection selection = config_.points;
       selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
       const cv::Mat& grey = reference_[level];
       selector_.Select({grey, depths_[level], exact_}, extractor_.Extract(grey), cameras_[index],
@@ -37,7 +37,7 @@ class EdgePairAlignment : public PairAlignment {
   }
 
   std::optional<Eigen::Isometry3d> Align(const Eigen::Isometry3d& guess) override {
-    AlignmentState state;
+    odometry::AlignmentState state;
     state.new_from_reference = guess;
     for (int level = levels_ - 1; level >= 0; --level) {
       const auto index = static_cast<std::size_t>(level);
@@ -47,16 +47,16 @@ class EdgePairAlignment : public PairAlignment {
   }
 
  private:
-  EdgeOdometry::Config config_;
+  odometry::EdgeOdometry::Config config_;
   const cv::Mat exact_;  // No uncertainty of the depths.
-  EdgeExtractor extractor_;
-  PointSelector selector_;
-  Aligner aligner_;
+  odometry::EdgeExtractor extractor_;
+  odometry::PointSelector selector_;
+  odometry::Aligner aligner_;
   int levels_;
-  std::array<CameraIntrinsics, kMaxLevels> cameras_;
-  ImagePyramid reference_, image_;
-  DepthPyramid depths_;
-  std::array<EdgePoints, kMaxLevels> points_;
+  std::array<geo::CameraIntrinsics, odometry::kMaxLevels> cameras_;
+  odometry::ImagePyramid reference_, image_;
+  odometry::DepthPyramid depths_;
+  std::array<odometry::EdgePoints, odometry::kMaxLevels> points_;
 };
 
 class OpenCvPairAlignment : public PairAlignment {
@@ -66,15 +66,16 @@ class OpenCvPairAlignment : public PairAlignment {
 
   std::string name() const override { return name_; }
 
-  void Take(const RgbdFrame& reference, const RgbdFrame& image) override {
-    reference_ = PrepareOpenCvFrame(*odometry_, reference);
-    image_ = PrepareOpenCvFrame(*odometry_, image);
+  void Take(const odometry::RgbdFrame& reference, const odometry::RgbdFrame& image) override {
+    reference_ = tools::PrepareOpenCvFrame(*odometry_, reference);
+    image_ = tools::PrepareOpenCvFrame(*odometry_, image);
   }
 
   std::optional<Eigen::Isometry3d> Align(const Eigen::Isometry3d& guess) override {
     cv::Mat motion;
-    if (!odometry_->compute(reference_, image_, motion, MatrixOf(guess))) return std::nullopt;
-    return PoseOf(motion);
+    if (!odometry_->compute(reference_, image_, motion, tools::MatrixOf(guess)))
+      return std::nullopt;
+    return tools::PoseOf(motion);
   }
 
  private:
@@ -85,8 +86,8 @@ class OpenCvPairAlignment : public PairAlignment {
 
 template <typename Kind>
 std::unique_ptr<PairAlignment> WithoutLimits(const std::string& name, const std::string& type,
-                                             const CameraIntrinsics& camera) {
-  const cv::Ptr<Kind> odometry = MakeOpenCvOdometry(type, camera).dynamicCast<Kind>();
+                                             const geo::CameraIntrinsics& camera) {
+  const cv::Ptr<Kind> odometry = tools::MakeOpenCvOdometry(type, camera).dynamicCast<Kind>();
   odometry->setMaxTranslation(1000);  // m
   odometry->setMaxRotation(360);      // degrees
   return std::make_unique<OpenCvPairAlignment>(name, odometry);
@@ -94,7 +95,8 @@ std::unique_ptr<PairAlignment> WithoutLimits(const std::string& name, const std:
 
 }  // namespace
 
-std::vector<std::unique_ptr<PairAlignment>> MakePairAlignments(const CameraIntrinsics& camera) {
+std::vector<std::unique_ptr<PairAlignment>> MakePairAlignments(
+    const geo::CameraIntrinsics& camera) {
   std::vector<std::unique_ptr<PairAlignment>> methods;
   methods.push_back(std::make_unique<EdgePairAlignment>(camera));
   methods.push_back(WithoutLimits<cv::rgbd::RgbdOdometry>("rgbd", "RgbdOdometry", camera));
@@ -103,4 +105,4 @@ std::vector<std::unique_ptr<PairAlignment>> MakePairAlignments(const CameraIntri
   return methods;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

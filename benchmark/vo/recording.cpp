@@ -10,15 +10,16 @@
 #include "evaluation/trajectory/trajectory_report.h"
 #include "tools/odometry/sequence_pictures.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
-std::vector<std::optional<Eigen::Isometry3d>> PairWithTruth(const Sequence& sequence) {
+std::vector<std::optional<Eigen::Isometry3d>> PairWithTruth(const datasets::Sequence& sequence) {
   std::vector<std::int64_t> frames, poses;
-  for (const SequenceFrame& frame : sequence.frames) frames.push_back(frame.stamp_ns);
-  for (const StampedPose& pose : sequence.poses) poses.push_back(pose.stamp_ns);
+  for (const datasets::SequenceFrame& frame : sequence.frames) frames.push_back(frame.stamp_ns);
+  for (const datasets::StampedPose& pose : sequence.poses) poses.push_back(pose.stamp_ns);
   std::vector<std::optional<Eigen::Isometry3d>> truth(frames.size());
-  for (const auto& [frame, pose] : PairNearestStamps(frames, poses, kMaxDepthDifferenceNs)) {
+  for (const auto& [frame, pose] :
+       datasets::PairNearestStamps(frames, poses, datasets::kMaxDepthDifferenceNs)) {
     truth[frame] = sequence.poses[pose].world_from_camera;
   }
   return truth;
@@ -28,36 +29,36 @@ std::vector<std::optional<Eigen::Isometry3d>> PairWithTruth(const Sequence& sequ
 
 Recording::Recording(const std::string& directory, const std::string& camera_file,
                      std::size_t max_frames)
-    : sequence_(ReadTumSequence(directory, camera_file)) {
-  for (const SequenceFrame& frame : sequence_.frames) {
+    : sequence_(datasets::ReadTumSequence(directory, camera_file)) {
+  for (const datasets::SequenceFrame& frame : sequence_.frames) {
     if (frame.depth_path.empty()) throw Error("the sequence '" + directory + "' has no depth");
   }
   sequence_.frames.resize(std::min(sequence_.frames.size(), max_frames));
-  camera_ = IntrinsicsOf(sequence_);
+  camera_ = tools::IntrinsicsOf(sequence_);
   truth_at_ = PairWithTruth(sequence_);
 }
 
 cv::Mat Recording::ReadColour(std::size_t index) const {
-  return ReadPicture(sequence_.frames[index].image_path, camera_, cv::IMREAD_COLOR);
+  return tools::ReadPicture(sequence_.frames[index].image_path, camera_, cv::IMREAD_COLOR);
 }
 
-RgbdFrame Recording::ReadDepth(std::size_t index) const {
-  const SequenceFrame& source = sequence_.frames[index];
-  RgbdFrame frame;
+odometry::RgbdFrame Recording::ReadDepth(std::size_t index) const {
+  const datasets::SequenceFrame& source = sequence_.frames[index];
+  odometry::RgbdFrame frame;
   frame.stamp_ns = source.stamp_ns;
-  frame.depth = ReadPicture(source.depth_path, camera_, cv::IMREAD_UNCHANGED);
+  frame.depth = tools::ReadPicture(source.depth_path, camera_, cv::IMREAD_UNCHANGED);
   frame.depth_units_per_m = sequence_.depth_scale;
   return frame;
 }
 
-RgbdFrame Recording::Read(std::size_t index) const {
-  RgbdFrame frame = ReadDepth(index);
+odometry::RgbdFrame Recording::Read(std::size_t index) const {
+  odometry::RgbdFrame frame = ReadDepth(index);
   cv::cvtColor(ReadColour(index), frame.grey, cv::COLOR_BGR2GRAY);
   return frame;
 }
 
-std::vector<RgbdFrame> Recording::ReadAll() const {
-  std::vector<RgbdFrame> frames;
+std::vector<odometry::RgbdFrame> Recording::ReadAll() const {
+  std::vector<odometry::RgbdFrame> frames;
   for (std::size_t i = 0; i < size(); ++i) frames.push_back(Read(i));
   return frames;
 }
@@ -66,10 +67,11 @@ std::optional<Eigen::Isometry3d> Recording::TruthAt(std::size_t index) const {
   return truth_at_[index];
 }
 
-nlohmann::ordered_json FiguresOf(const std::vector<StampedPose>& truth, const MethodRun& run) {
+nlohmann::ordered_json FiguresOf(const std::vector<datasets::StampedPose>& truth,
+                                 const MethodRun& run) {
   nlohmann::ordered_json all;
   try {
-    all = ToJson(EvaluateTrajectory(truth, run.trajectory, {}));
+    all = evaluation::ToJson(evaluation::EvaluateTrajectory(truth, run.trajectory, {}));
   } catch (const Error&) {
     // No truth, or fewer than two poses of it: its figures stay null.
   }
@@ -78,8 +80,8 @@ nlohmann::ordered_json FiguresOf(const std::vector<StampedPose>& truth, const Me
        {"ate_rmse_m", "rpe_rmse_m_per_s", "rpe_rmse_deg_per_s", "kitti_translation_percent"}) {
     figures[key] = all.contains(key) ? all[key] : nullptr;
   }
-  figures["median_ms"] = Quantile(run.milliseconds, 0.5);
-  figures["p95_ms"] = Quantile(run.milliseconds, 0.95);
+  figures["median_ms"] = evaluation::Quantile(run.milliseconds, 0.5);
+  figures["p95_ms"] = evaluation::Quantile(run.milliseconds, 0.95);
   figures["lost"] = run.lost;
   figures["keyframes"] = run.keyframes;
   return figures;
@@ -105,4 +107,4 @@ nlohmann::ordered_json DescriptionOf(const Recording& recording) {
   return description;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -2,7 +2,7 @@
 
 #include <ctime>
 
-namespace livemap {
+namespace livemap::bench {
 
 /// Time that this thread has spent on a processor so far, ms: what a call of one thread takes on a
 /// machine with nothing else to do, whatever else a shared one does.
@@ -12,4 +12,4 @@ inline double ThreadTimeMs() {
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

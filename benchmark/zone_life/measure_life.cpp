@@ -7,7 +7,7 @@
 #include "tools/common/command_line.h"
 #include "zone_life/study.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 void PrintClass(const std::string& name, const ClassFigures& figures, bool last) {
@@ -61,18 +61,19 @@ PollingRule::Kind KindOf(const std::string& name) {
 }
 
 int Run(int argc, char** argv) {
-  CommandLine line("livemap_measure_life CATALOGUE [FLAGS]",
-                   "Simulates the life of a town's hazards on the zone's map; prints JSON.", 1,
-                   {{"seed", "N", "of world, traffic and cameras (1)"},
-                    {"days", "DAYS", "simulated, the first 7 and the last 2 not counted (35)"},
-                    {"vehicles", "N", "of the fleet (400)"},
-                    {"polls", "RULE", "worth, interval, life, insist or never (worth)"},
-                    {"value", "X", "price or interval in seconds, or share of a life (120)"},
-                    {"bytes-per-hour", "BYTES", "budget of polls by worth (1e9)"},
-                    {"hostile", "SHARE", "of the vehicles, 0 to 1 (0)"},
-                    {"telling", "RULE",
-                     "life, alike (as life, but every vehicle is believed alike) or "
-                     "count (life)"}});
+  tools::CommandLine line(
+      "livemap_measure_life CATALOGUE [FLAGS]",
+      "Simulates the life of a town's hazards on the zone's map; prints JSON.", 1,
+      {{"seed", "N", "of world, traffic and cameras (1)"},
+       {"days", "DAYS", "simulated, the first 7 and the last 2 not counted (35)"},
+       {"vehicles", "N", "of the fleet (400)"},
+       {"polls", "RULE", "worth, interval, life, insist or never (worth)"},
+       {"value", "X", "price or interval in seconds, or share of a life (120)"},
+       {"bytes-per-hour", "BYTES", "budget of polls by worth (1e9)"},
+       {"hostile", "SHARE", "of the vehicles, 0 to 1 (0)"},
+       {"telling", "RULE",
+        "life, alike (as life, but every vehicle is believed alike) or "
+        "count (life)"}});
   if (!line.Parse(argc, argv)) return 0;
   StudyConfig config;
   config.seed = line.Seed("seed", 1);
@@ -88,16 +89,16 @@ int Run(int argc, char** argv) {
   }
   config.telling = telling == "count" ? TellingRule::kCount : TellingRule::kLife;
   config.trust = telling == "life";
-  Print(config, RunStudy(config, HazardCatalogue::Load(line.Positional(0))));
+  Print(config, RunStudy(config, protocol::HazardCatalogue::Load(line.Positional(0))));
   return 0;
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
   try {
-    return livemap::Run(argc, argv);
+    return livemap::bench::Run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "livemap_measure_life: %s\n", error.what());
     return 2;

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::bench {
 
-double DrawLife(const Nature& nature, SeededRandom& random) {
+double DrawLife(const Nature& nature, datasets::SeededRandom& random) {
   constexpr double kSigma = 0.8;
   constexpr double kWeibullShape = 1.5;
   switch (nature.form) {
@@ -19,4 +19,4 @@ double DrawLife(const Nature& nature, SeededRandom& random) {
   return 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

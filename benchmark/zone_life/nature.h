@@ -6,7 +6,7 @@
 #include "datasets/seeded_random.h"
 #include "zone_life/town.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 enum class LifeForm { kExponential, kLogNormal, kWeibull };
 
@@ -30,6 +30,6 @@ constexpr Nature kNature[] = {
 constexpr std::size_t kClasses = std::size(kNature);
 
 /// How long one hazard of that kind lives, seconds.
-double DrawLife(const Nature& nature, SeededRandom& random);
+double DrawLife(const Nature& nature, datasets::SeededRandom& random);
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -2,21 +2,22 @@
 
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 Polling::Polling(const PollingRule& rule) : rule_(rule) {
   config_.picture_bytes = 0;
   config_.bytes_per_hour = rule.bytes_per_hour;
   if (rule.kind != PollingRule::Kind::kWorth) return;
   config_.price_s = rule.value;
-  scheduler_ = std::make_unique<PollScheduler>(config_, 1);
+  scheduler_ = std::make_unique<zone::PollScheduler>(config_, 1);
 }
 
-void Polling::SetHazard(std::uint64_t hazard, const GeoPoint& place, const ClassModel& entry,
-                        const PresenceRecord& life, bool denied, std::int64_t now_ns) {
+void Polling::SetHazard(std::uint64_t hazard, const geo::GeoPoint& place,
+                        const zone::ClassModel& entry, const zone::PresenceRecord& life,
+                        bool denied, std::int64_t now_ns) {
   if (scheduler_) return scheduler_->SetHazard(hazard, place, entry, life, now_ns, now_ns);
   if (rule_.kind == PollingRule::Kind::kNobody) return;
-  if (!IsOnMap(life.state)) {
+  if (!zone::IsOnMap(life.state)) {
     timers_.erase(hazard);
     return;
   }
@@ -29,12 +30,12 @@ void Polling::SetHazard(std::uint64_t hazard, const GeoPoint& place, const Class
 }
 
 std::vector<Polling::Question> Polling::Approach(std::uint64_t hazard, const std::string& vehicle,
-                                                 const TrackPoint& point) {
+                                                 const zone::TrackPoint& point) {
   const std::int64_t now_ns = point.stamp_ns;
   std::vector<Question> questions;
   if (scheduler_) {
     scheduler_->SetVehicle(vehicle, point);
-    for (const PollChoice& choice : scheduler_->TakeDue(now_ns)) {
+    for (const zone::PollChoice& choice : scheduler_->TakeDue(now_ns)) {
       questions.push_back({choice.hazard, choice.vehicle_id});
     }
     polls_ += questions.size();
@@ -68,4 +69,4 @@ void Polling::Answered(std::uint64_t hazard, const std::string& vehicle, std::in
 
 double Polling::bytes() const { return static_cast<double>(polls_) * config_.poll_bytes; }
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -8,7 +8,7 @@
 
 #include "zone/polling/poll_scheduler.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 /// How often vehicles are asked: what the study compares.
 struct PollingRule {
@@ -30,15 +30,15 @@ class Polling {
  public:
   explicit Polling(const PollingRule& rule);
 
-  void SetHazard(std::uint64_t hazard, const GeoPoint& place, const ClassModel& entry,
-                 const PresenceRecord& life, bool denied, std::int64_t now_ns);
+  void SetHazard(std::uint64_t hazard, const geo::GeoPoint& place, const zone::ClassModel& entry,
+                 const zone::PresenceRecord& life, bool denied, std::int64_t now_ns);
   struct Question {
     std::uint64_t hazard;
     std::string vehicle;
   };
   /// `vehicle` is about to pass `hazard`; the polls that go out now, to whomever.
   std::vector<Question> Approach(std::uint64_t hazard, const std::string& vehicle,
-                                 const TrackPoint& point);
+                                 const zone::TrackPoint& point);
   /// The vehicle has answered, whatever it was.
   void Answered(std::uint64_t hazard, const std::string& vehicle, std::int64_t now_ns);
 
@@ -54,10 +54,10 @@ class Polling {
   };
 
   PollingRule rule_;
-  PollScheduler::Config config_;
-  std::unique_ptr<PollScheduler> scheduler_;
+  zone::PollScheduler::Config config_;
+  std::unique_ptr<zone::PollScheduler> scheduler_;
   std::unordered_map<std::uint64_t, Timer> timers_;
   std::uint64_t polls_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::bench

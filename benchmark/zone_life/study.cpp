@@ -5,9 +5,9 @@
 
 #include "zone_life/study_state.h"
 
-namespace livemap {
+namespace livemap::bench {
 
-Study::Study(const StudyConfig& config, const HazardCatalogue& catalogue)
+Study::Study(const StudyConfig& config, const protocol::HazardCatalogue& catalogue)
     : config_(config),
       catalogue_(catalogue),
       world_(config.seed * 7919 + 1),
@@ -16,7 +16,7 @@ Study::Study(const StudyConfig& config, const HazardCatalogue& catalogue)
       malice_(config.seed * 7919 + 4),
       fleet_(town_, config.vehicles, traffic_),
       survival_(catalogue),
-      allowance_(VehicleAllowance::Config()),
+      allowance_(zone::VehicleAllowance::Config()),
       polling_(config.polling),
       hostile_(config.vehicles),
       things_on_(town_.roads()),
@@ -26,12 +26,12 @@ Study::Study(const StudyConfig& config, const HazardCatalogue& catalogue)
   for (std::size_t i = 0; i < config.vehicles; ++i) {
     hostile_[i] = malice_.Uniform() < config.hostile_share;
     names_.push_back("v" + std::to_string(i));
-    keys_.push_back(VehicleKey(names_.back()));
+    keys_.push_back(zone::VehicleKey(names_.back()));
     vehicle_of_name_[names_.back()] = i;
   }
   for (std::size_t i = 0; i < kClasses; ++i) {
-    const HazardClass entry = catalogue_.Get(kNature[i].name);
-    classes_[i] = ClassModelOf(entry, survival_.Of(entry.name));
+    const protocol::HazardClass entry = catalogue_.Get(kNature[i].name);
+    classes_[i] = zone::ClassModelOf(entry, survival_.Of(entry.name));
     ClassFigures& figures = figures_.classes[entry.name];
     figures.prior_life_s = entry.expected_life_s;
     figures.true_life_s = kNature[i].mean_life_s;
@@ -101,7 +101,7 @@ void Study::Handle(const Event& event) {
     }
     case Happening::kEnds: {
       Thing& thing = things_[event.a];
-      const bool told = thing.item != kNone && IsTold(items_[thing.item].life.state);
+      const bool told = thing.item != kNone && zone::IsTold(items_[thing.item].life.state);
       if (!told && thing.noticeable_s >= 0) thing.missing_s += event.at_s - thing.noticeable_s;
       // From now on its telling is wrong.
       if (told) items_[thing.item].told_s = event.at_s;
@@ -118,8 +118,8 @@ void Study::Handle(const Event& event) {
       return Answer(event);
     case Happening::kAdvances: {
       Item& item = items_[event.a];
-      if (item.version != event.version || !IsOnMap(item.life.state)) return;
-      const LifecycleUpdate step =
+      if (item.version != event.version || !zone::IsOnMap(item.life.state)) return;
+      const zone::LifecycleUpdate step =
           rules_.Advance(ClassOf(things_[item.thing]), Stamp(event.at_s), item.life);
       return Follow(event.a, step, false, event.at_s);
     }
@@ -141,8 +141,8 @@ void Study::BeginDay(int day) {
   }
 }
 
-StudyFigures RunStudy(const StudyConfig& config, const HazardCatalogue& catalogue) {
+StudyFigures RunStudy(const StudyConfig& config, const protocol::HazardCatalogue& catalogue) {
   return Study(config, catalogue).Run();
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -7,7 +7,7 @@
 
 #include "zone_life/polling.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 /// What decides that drivers are told.
 enum class TellingRule {
@@ -56,6 +56,6 @@ struct StudyFigures {
 };
 
 /// Simulates the weeks. `catalogue`: config/hazards.yaml.
-StudyFigures RunStudy(const StudyConfig& config, const HazardCatalogue& catalogue);
+StudyFigures RunStudy(const StudyConfig& config, const protocol::HazardCatalogue& catalogue);
 
-}  // namespace livemap
+}  // namespace livemap::bench

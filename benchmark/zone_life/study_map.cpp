@@ -3,20 +3,21 @@
 
 #include "zone_life/study_state.h"
 
-namespace livemap {
+namespace livemap::bench {
 
-void Study::Tell(std::size_t vehicle, std::size_t index, EvidenceKind kind, double t) {
+void Study::Tell(std::size_t vehicle, std::size_t index, zone::EvidenceKind kind, double t) {
   const std::int64_t now_ns = Stamp(t);
   if (!allowance_.TakeEvidence(names_[vehicle], now_ns)) {
     ++figures_.refused_by_allowance;
     return;
   }
   Thing& thing = things_[index];
-  const ClassModel entry = ClassOf(thing);
-  Evidence evidence{kind, keys_[vehicle], now_ns};
+  const zone::ClassModel entry = ClassOf(thing);
+  zone::Evidence evidence{kind, keys_[vehicle], now_ns};
   if (config_.trust) evidence.hostile = trust_.Hostile(evidence.vehicle, now_ns);
-  const bool against = kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
-  LifecycleUpdate step;
+  const bool against =
+      kind == zone::EvidenceKind::kAnswerNo || kind == zone::EvidenceKind::kVanished;
+  zone::LifecycleUpdate step;
   if (thing.item == kNone) {
     if (against) return;
     thing.item = items_.size();
@@ -25,7 +26,7 @@ void Study::Tell(std::size_t vehicle, std::size_t index, EvidenceKind kind, doub
     items_.back().reporters.insert(vehicle);
     step = rules_.Begin(entry, evidence, now_ns, items_.back().life);
     if (config_.telling == TellingRule::kCount) {
-      items_.back().life.state = HazardState::kCandidate;
+      items_.back().life.state = zone::HazardState::kCandidate;
       Count(items_.back(), kind, step, t);
     }
   } else {
@@ -40,22 +41,23 @@ void Study::Tell(std::size_t vehicle, std::size_t index, EvidenceKind kind, doub
   Follow(thing.item, step, against, t);
 }
 
-void Study::Count(Item& item, EvidenceKind kind, LifecycleUpdate& step, double t) {
+void Study::Count(Item& item, zone::EvidenceKind kind, zone::LifecycleUpdate& step, double t) {
   constexpr int kMaxScore = 5;
-  const bool against = kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
-  const ClassModel entry = ClassOf(things_[item.thing]);
+  const bool against =
+      kind == zone::EvidenceKind::kAnswerNo || kind == zone::EvidenceKind::kVanished;
+  const zone::ClassModel entry = ClassOf(things_[item.thing]);
   item.score = std::min(kMaxScore, item.score + (against ? -1 : 1));
   if (!against) item.life.last_yes_ns = Stamp(t);
-  HazardState to = item.life.state;
-  if (item.score >= static_cast<int>(entry.confirmations)) to = HazardState::kActive;
-  if (item.score <= 0) to = HazardState::kGone;
+  zone::HazardState to = item.life.state;
+  if (item.score >= static_cast<int>(entry.confirmations)) to = zone::HazardState::kActive;
+  if (item.score <= 0) to = zone::HazardState::kGone;
   step.transition.reset();
   if (to == item.life.state) return;
-  step.transition = LifecycleTransition{item.life.state, to, "counted"};
+  step.transition = zone::LifecycleTransition{item.life.state, to, "counted"};
   item.life.state = to;
 }
 
-void Study::Follow(std::size_t index, const LifecycleUpdate& step, bool denied, double t) {
+void Study::Follow(std::size_t index, const zone::LifecycleUpdate& step, bool denied, double t) {
   Item& item = items_[index];
   Thing& thing = things_[item.thing];
   const char* name = kNature[thing.kind].name;
@@ -63,11 +65,11 @@ void Study::Follow(std::size_t index, const LifecycleUpdate& step, bool denied, 
     survival_.Learn(name, step.lesson);
     classes_[thing.kind].survival = survival_.Of(name);
   }
-  for (const Verdict& verdict : step.verdicts) trust_.Judge(verdict, Stamp(t));
+  for (const zone::Verdict& verdict : step.verdicts) trust_.Judge(verdict, Stamp(t));
   if (step.transition) Enter(item, *step.transition, t);
   polling_.SetHazard(index, PlaceOf(thing), ClassOf(thing), item.life, denied, Stamp(t));
   ++item.version;
-  if (!IsOnMap(item.life.state)) return;
+  if (!zone::IsOnMap(item.life.state)) return;
   double next_s = 0;
   if (config_.telling == TellingRule::kLife) {
     next_s = Seconds(rules_.NextChangeNs(ClassOf(thing), item.life) - kEpochNs);
@@ -75,8 +77,8 @@ void Study::Follow(std::size_t index, const LifecycleUpdate& step, bool denied, 
     // Not heard of for three expected lives the naive rule forgets it.
     next_s = Seconds(item.life.last_yes_ns - kEpochNs) + 3 * catalogue_.Get(name).expected_life_s;
     if (t + 1 >= next_s) {
-      Enter(item, {item.life.state, HazardState::kGone, "old"}, t);
-      item.life.state = HazardState::kGone;
+      Enter(item, {item.life.state, zone::HazardState::kGone, "old"}, t);
+      item.life.state = zone::HazardState::kGone;
       polling_.SetHazard(index, PlaceOf(thing), ClassOf(thing), item.life, denied, Stamp(t));
       return;
     }
@@ -84,12 +86,12 @@ void Study::Follow(std::size_t index, const LifecycleUpdate& step, bool denied, 
   Push(std::max(t, next_s), Happening::kAdvances, index, 0, item.version);
 }
 
-void Study::Enter(Item& item, const LifecycleTransition& transition, double t) {
+void Study::Enter(Item& item, const zone::LifecycleTransition& transition, double t) {
   Thing& thing = things_[item.thing];
   ClassFigures& figures = FiguresOf(thing);
-  const bool was_told = transition.from && IsTold(*transition.from);
+  const bool was_told = transition.from && zone::IsTold(*transition.from);
   const bool stands = thing.Stands(t);
-  if (!was_told && IsTold(transition.to)) {
+  if (!was_told && zone::IsTold(transition.to)) {
     item.told_s = t;
     if (!stands && Measured(t) && !thing.false_counted) {
       ++figures.false_told;
@@ -104,7 +106,7 @@ void Study::Enter(Item& item, const LifecycleTransition& transition, double t) {
       thing.noticeable_s = -1;
     }
   }
-  if (transition.to != HazardState::kGone) return;
+  if (transition.to != zone::HazardState::kGone) return;
   if (was_told) StopTelling(item, thing, t);
   thing.item = kNone;
 }
@@ -126,7 +128,7 @@ void Study::Finish() {
   for (Thing& thing : things_) {
     ClassFigures& figures = FiguresOf(thing);
     const bool on_map = thing.item != kNone;
-    if (on_map && IsTold(items_[thing.item].life.state) && !thing.Stands(last_s_)) {
+    if (on_map && zone::IsTold(items_[thing.item].life.state) && !thing.Stands(last_s_)) {
       StopTelling(items_[thing.item], thing, last_s_);
     }
     if (!thing.real || !Measured(thing.begins_s)) continue;
@@ -148,4 +150,4 @@ void Study::Finish() {
   figures_.measured_days = (end_s_ - begin_s_) / kDayS;
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -16,7 +16,7 @@
 #include "zone_life/study.h"
 #include "zone_life/town.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 constexpr std::size_t kNone = ~std::size_t{0};
 
@@ -42,7 +42,7 @@ struct Thing {
 // What the zone has on its map.
 struct Item {
   std::size_t thing = 0;
-  PresenceRecord life;
+  zone::PresenceRecord life;
   int score = 0;  // Of the naive rule.
   double told_s = -1;
   std::uint32_t version = 0;
@@ -77,7 +77,7 @@ struct Event {
 /// What stands behind RunStudy; only its own sources include this.
 class Study {
  public:
-  Study(const StudyConfig& config, const HazardCatalogue& catalogue);
+  Study(const StudyConfig& config, const protocol::HazardCatalogue& catalogue);
   StudyFigures Run();
 
  private:
@@ -88,9 +88,9 @@ class Study {
             std::uint32_t version = 0, Town::Lane lane = {});
   bool Measured(double t) const { return t >= begin_s_ && t < end_s_; }
   bool Hostile(std::size_t vehicle) const { return hostile_[vehicle]; }
-  ClassModel ClassOf(const Thing& thing) const { return classes_[thing.kind]; }
+  zone::ClassModel ClassOf(const Thing& thing) const { return classes_[thing.kind]; }
   ClassFigures& FiguresOf(const Thing& thing) { return figures_.classes[kNature[thing.kind].name]; }
-  GeoPoint PlaceOf(const Thing& thing) const { return town_.At(thing.road, thing.offset_m); }
+  geo::GeoPoint PlaceOf(const Thing& thing) const { return town_.At(thing.road, thing.offset_m); }
 
   // What there is: study.cpp.
   void PlanHazards();
@@ -105,29 +105,29 @@ class Study {
   void Pass(std::size_t vehicle, Thing& thing, std::size_t index, double t);
   void PassHostile(std::size_t vehicle, Thing& thing, std::size_t index, double t);
   void Answer(const Event& event);
-  void Tell(std::size_t vehicle, std::size_t thing, EvidenceKind kind, double t);
+  void Tell(std::size_t vehicle, std::size_t thing, zone::EvidenceKind kind, double t);
   // What the zone makes of it: study_map.cpp.
-  void Follow(std::size_t item, const LifecycleUpdate& step, bool denied, double t);
-  void Count(Item& item, EvidenceKind kind, LifecycleUpdate& step, double t);
-  void Enter(Item& item, const LifecycleTransition& transition, double t);
+  void Follow(std::size_t item, const zone::LifecycleUpdate& step, bool denied, double t);
+  void Count(Item& item, zone::EvidenceKind kind, zone::LifecycleUpdate& step, double t);
+  void Enter(Item& item, const zone::LifecycleTransition& transition, double t);
   void StopTelling(Item& item, Thing& thing, double t);
   void Finish();
 
   StudyConfig config_;
-  HazardCatalogue catalogue_;
-  SeededRandom world_, traffic_, senses_, malice_;
+  protocol::HazardCatalogue catalogue_;
+  datasets::SeededRandom world_, traffic_, senses_, malice_;
   Town town_;
   Fleet fleet_;
-  SurvivalModel survival_;
-  HazardLifecycle rules_;
-  VehicleAllowance allowance_;
-  VehicleTrust trust_;
+  zone::SurvivalModel survival_;
+  zone::HazardLifecycle rules_;
+  zone::VehicleAllowance allowance_;
+  zone::VehicleTrust trust_;
   Polling polling_;
   std::vector<bool> hostile_;
   std::vector<std::string> names_;
   std::vector<std::uint64_t> keys_;
   std::map<std::string, std::size_t> vehicle_of_name_;
-  std::array<ClassModel, kClasses> classes_;
+  std::array<zone::ClassModel, kClasses> classes_;
   std::vector<Thing> things_;
   std::vector<Item> items_;
   std::vector<std::vector<std::size_t>> things_on_;  // By road: those that stand or are on the map.
@@ -137,4 +137,4 @@ class Study {
   StudyFigures figures_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::bench

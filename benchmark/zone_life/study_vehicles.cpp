@@ -4,7 +4,7 @@
 #include "zone/registry/vehicle_track.h"
 #include "zone_life/study_state.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr double kApproachS = 8;         // Before the passage a vehicle is near enough to be asked.
@@ -23,7 +23,8 @@ void Study::Invent(std::size_t vehicle, double t, const Town::Lane& lane) {
   const std::size_t thing = AddThing(kind, false, t, kDayS, lane.road, offset_m);
   things_[thing].inventor = vehicle;
   things_on_[lane.road].push_back(thing);
-  for (int i = 0; i < kHostileRepeats; ++i) Tell(vehicle, thing, EvidenceKind::kSighting, t + i);
+  for (int i = 0; i < kHostileRepeats; ++i)
+    Tell(vehicle, thing, zone::EvidenceKind::kSighting, t + i);
 }
 
 void Study::Traverse(const Event& event) {
@@ -37,7 +38,7 @@ void Study::Traverse(const Event& event) {
     const std::size_t thing = AddThing(kind, false, event.at_s, 0, event.lane.road,
                                        Town::kBlockM * (0.15 + 0.7 * senses_.Uniform()));
     things_on_[event.lane.road].push_back(thing);
-    Tell(vehicle, thing, EvidenceKind::kSighting, event.at_s);
+    Tell(vehicle, thing, zone::EvidenceKind::kSighting, event.at_s);
   }
   for (const std::size_t index : things_on_[event.lane.road]) {
     const Thing& thing = things_[index];
@@ -56,8 +57,8 @@ void Study::Approach(const Event& event) {
   if (thing.item == kNone) return;
   const double speed_mps = town_.SpeedMps(thing.road);
   const double back_m = kApproachS * speed_mps * (event.lane.forward ? -1 : 1);
-  const TrackPoint point{Stamp(event.at_s), town_.At(thing.road, thing.offset_m + back_m),
-                         town_.CourseRad(event.lane), speed_mps};
+  const zone::TrackPoint point{Stamp(event.at_s), town_.At(thing.road, thing.offset_m + back_m),
+                               town_.CourseRad(event.lane), speed_mps};
   for (const auto& question : polling_.Approach(thing.item, names_[event.a], point)) {
     Push(event.at_s + kApproachS, Happening::kAnswers, vehicle_of_name_[question.vehicle],
          question.hazard);
@@ -65,26 +66,26 @@ void Study::Approach(const Event& event) {
 }
 
 void Study::Pass(std::size_t vehicle, Thing& thing, std::size_t index, double t) {
-  const ClassModel entry = ClassOf(thing);
+  const zone::ClassModel entry = ClassOf(thing);
   if (!thing.Stands(t) || senses_.Uniform() > entry.hit_rate) return;
   thing.honest.insert(vehicle);
-  const bool told = thing.item != kNone && IsTold(items_[thing.item].life.state);
+  const bool told = thing.item != kNone && zone::IsTold(items_[thing.item].life.state);
   if (thing.noticeable_s < 0 && thing.honest.size() >= entry.confirmations) thing.noticeable_s = t;
   // A vehicle reports what it has not been told of, once.
   if (told) return;
   if (thing.item != kNone && items_[thing.item].reporters.count(vehicle) > 0) return;
-  Tell(vehicle, index, EvidenceKind::kSighting, t);
+  Tell(vehicle, index, zone::EvidenceKind::kSighting, t);
 }
 
 void Study::PassHostile(std::size_t vehicle, Thing& thing, std::size_t index, double t) {
   const bool on_map = thing.item != kNone;
   const bool replay = thing.real && t >= thing.ends_s && on_map;
   // An invention is supported by its inventor, and by all of them once drivers hear of it.
-  const bool heard_of = on_map && IsTold(items_[thing.item].life.state);
+  const bool heard_of = on_map && zone::IsTold(items_[thing.item].life.state);
   const bool invented = !thing.real && t < thing.ends_s && (heard_of || thing.inventor == vehicle);
   for (int i = 0; i < kHostileRepeats; ++i) {
-    if (replay || invented) Tell(vehicle, index, EvidenceKind::kSighting, t + i);
-    if (thing.Stands(t) && on_map) Tell(vehicle, index, EvidenceKind::kVanished, t + i);
+    if (replay || invented) Tell(vehicle, index, zone::EvidenceKind::kSighting, t + i);
+    if (thing.Stands(t) && on_map) Tell(vehicle, index, zone::EvidenceKind::kVanished, t + i);
   }
 }
 
@@ -93,22 +94,24 @@ void Study::Answer(const Event& event) {
   const std::int64_t now_ns = Stamp(event.at_s);
   polling_.Answered(event.b, names_[vehicle], now_ns);
   Item& item = items_[event.b];
-  if (!IsOnMap(item.life.state)) return;
+  if (!zone::IsOnMap(item.life.state)) return;
   const std::size_t index = item.thing;
   const bool stands = things_[index].Stands(event.at_s);
-  const ClassModel entry = ClassOf(things_[index]);
+  const zone::ClassModel entry = ClassOf(things_[index]);
   if (Hostile(vehicle)) {
-    Tell(vehicle, index, stands ? EvidenceKind::kAnswerNo : EvidenceKind::kAnswerYes, event.at_s);
+    Tell(vehicle, index, stands ? zone::EvidenceKind::kAnswerNo : zone::EvidenceKind::kAnswerYes,
+         event.at_s);
     return;
   }
   // The zone checks that the vehicle could see the place, by the positions that it has.
-  const GeoPoint place = PlaceOf(things_[index]);
-  if (!CouldSee({{now_ns, place, 0, 10}}, now_ns, place)) return;
+  const geo::GeoPoint place = PlaceOf(things_[index]);
+  if (!zone::CouldSee({{now_ns, place, 0, 10}}, now_ns, place)) return;
   if (senses_.Uniform() < kCantSee) return;
   const double yes_rate = stands ? entry.hit_rate : entry.false_rate;
   const bool yes = senses_.Uniform() < yes_rate;
   if (yes && stands) things_[index].honest.insert(vehicle);
-  Tell(vehicle, index, yes ? EvidenceKind::kAnswerYes : EvidenceKind::kAnswerNo, event.at_s);
+  Tell(vehicle, index, yes ? zone::EvidenceKind::kAnswerYes : zone::EvidenceKind::kAnswerNo,
+       event.at_s);
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -4,20 +4,20 @@
 #include <cmath>
 #include <limits>
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr double kHourS = 3600;
 constexpr std::size_t kJunctions = Town::kSide * Town::kSide;
 constexpr double kMetresPerDegree = 111320;
-const GeoPoint kCorner{40.42, -79.98};
+const geo::GeoPoint kCorner{40.42, -79.98};
 
-std::size_t AnyJunction(SeededRandom& random) {
+std::size_t AnyJunction(datasets::SeededRandom& random) {
   return std::min(kJunctions - 1, static_cast<std::size_t>(random.Uniform() * kJunctions));
 }
 
 /// When people drive who need not be at work: most around noon and in the evening.
-double LeisureHour(SeededRandom& random) {
+double LeisureHour(datasets::SeededRandom& random) {
   return std::clamp(14.5 + 3.5 * random.Normal().x(), 6.0, 23.5);
 }
 
@@ -71,23 +71,23 @@ std::vector<Town::Lane> Town::Route(std::size_t from, std::size_t to) const {
   return route;
 }
 
-GeoPoint Town::At(std::size_t road, double offset_m) const {
+geo::GeoPoint Town::At(std::size_t road, double offset_m) const {
   const Road& r = roads_[road];
   const std::size_t column = r.from % kSide;
   const std::size_t row = r.from / kSide;
   const double east_m = kBlockM * static_cast<double>(column) + (r.north ? 0 : offset_m);
   const double north_m = kBlockM * static_cast<double>(row) + (r.north ? offset_m : 0);
   return {kCorner.latitude_deg + north_m / kMetresPerDegree,
-          kCorner.longitude_deg +
-              east_m / (kMetresPerDegree * std::cos(kCorner.latitude_deg * kRadiansPerDegree))};
+          kCorner.longitude_deg + east_m / (kMetresPerDegree * std::cos(kCorner.latitude_deg *
+                                                                        geo::kRadiansPerDegree))};
 }
 
 double Town::CourseRad(const Lane& lane) const {
   const double course_deg = roads_[lane.road].north ? 0 : 90;
-  return (course_deg + (lane.forward ? 0 : 180)) * kRadiansPerDegree;
+  return (course_deg + (lane.forward ? 0 : 180)) * geo::kRadiansPerDegree;
 }
 
-Fleet::Fleet(const Town& town, std::size_t vehicles, SeededRandom& random)
+Fleet::Fleet(const Town& town, std::size_t vehicles, datasets::SeededRandom& random)
     : town_(town), members_(vehicles) {
   for (Member& member : members_) {
     const double kind = random.Uniform();
@@ -98,7 +98,7 @@ Fleet::Fleet(const Town& town, std::size_t vehicles, SeededRandom& random)
   }
 }
 
-std::vector<Traversal> Fleet::Day(int day, SeededRandom& random) const {
+std::vector<Traversal> Fleet::Day(int day, datasets::SeededRandom& random) const {
   std::vector<Traversal> traversals;
   for (std::size_t vehicle = 0; vehicle < members_.size(); ++vehicle) {
     DriveMember(vehicle, day % 7, day * kDayS, random, traversals);
@@ -109,7 +109,7 @@ std::vector<Traversal> Fleet::Day(int day, SeededRandom& random) const {
 }
 
 void Fleet::DriveMember(std::size_t vehicle, int day_of_week, double midnight_s,
-                        SeededRandom& random, std::vector<Traversal>& day) const {
+                        datasets::SeededRandom& random, std::vector<Traversal>& day) const {
   const Member& member = members_[vehicle];
   const auto at = [&](double hour) { return midnight_s + hour * kHourS; };
   if (member.habit == Habit::kProfessional) {
@@ -143,4 +143,4 @@ void Fleet::Drive(std::size_t vehicle, std::size_t from, std::size_t to, double 
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

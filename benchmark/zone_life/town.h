@@ -6,7 +6,7 @@
 #include "datasets/seeded_random.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 constexpr double kDayS = 86400;
 
@@ -31,7 +31,7 @@ class Town {
   std::vector<Lane> Route(std::size_t from, std::size_t to) const;
   double SpeedMps(std::size_t road) const { return roads_[road].artery ? kArteryMps : kStreetMps; }
   /// A place on a road; `offset_m` from its southern or western end.
-  GeoPoint At(std::size_t road, double offset_m) const;
+  geo::GeoPoint At(std::size_t road, double offset_m) const;
   /// Clockwise from true north.
   double CourseRad(const Lane& lane) const;
 
@@ -56,11 +56,11 @@ struct Traversal {
 /// Vehicles with habits: seven in ten commute, one in ten drives all day, the rest now and then.
 class Fleet {
  public:
-  Fleet(const Town& town, std::size_t vehicles, SeededRandom& random);
+  Fleet(const Town& town, std::size_t vehicles, datasets::SeededRandom& random);
 
   std::size_t size() const { return members_.size(); }
   /// All traversals of a day (0: a Monday), in order of time; seconds since the first midnight.
-  std::vector<Traversal> Day(int day, SeededRandom& random) const;
+  std::vector<Traversal> Day(int day, datasets::SeededRandom& random) const;
 
  private:
   enum class Habit { kCommuter, kProfessional, kOccasional };
@@ -72,11 +72,11 @@ class Fleet {
 
   void Drive(std::size_t vehicle, std::size_t from, std::size_t to, double at_s,
              std::vector<Traversal>& day) const;
-  void DriveMember(std::size_t vehicle, int day_of_week, double midnight_s, SeededRandom& random,
-                   std::vector<Traversal>& day) const;
+  void DriveMember(std::size_t vehicle, int day_of_week, double midnight_s,
+                   datasets::SeededRandom& random, std::vector<Traversal>& day) const;
 
   const Town& town_;
   std::vector<Member> members_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -15,7 +15,7 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "transport/envelope.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 constexpr std::chrono::seconds kPatience{10};
@@ -34,21 +34,21 @@ std::vector<std::uint8_t> Enclose(const Message& message) {
   std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
   ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
   ros::serialization::serialize(stream, message);
-  return EncodeEnvelope({ros::message_traits::datatype<Message>(),
-                         *ParseMd5(ros::message_traits::md5sum<Message>()),
-                         {bytes.data(), bytes.size()}});
+  return transport::EncodeEnvelope({ros::message_traits::datatype<Message>(),
+                                    *transport::ParseMd5(ros::message_traits::md5sum<Message>()),
+                                    {bytes.data(), bytes.size()}});
 }
 
 /// The zone is ours: what it sends is trusted but for its type.
 template <typename Message>
-Message Open(const MqttMessage& message) {
-  const DecodedEnvelope decoded = DecodeEnvelope(message.payload, kMaxBytes);
+Message Open(const transport::MqttMessage& message) {
+  const transport::DecodedEnvelope decoded = transport::DecodeEnvelope(message.payload, kMaxBytes);
   if (!decoded.envelope) throw Error("message of the zone: " + decoded.reason);
-  if (decoded.envelope->md5 != *ParseMd5(ros::message_traits::md5sum<Message>())) {
+  if (decoded.envelope->md5 != *transport::ParseMd5(ros::message_traits::md5sum<Message>())) {
     throw Error("the zone's messages are of another version than this program's");
   }
   Message content;
-  const ByteView payload = decoded.envelope->payload;
+  const transport::ByteView payload = decoded.envelope->payload;
   // The stream wants a writable pointer and only reads.
   ros::serialization::IStream stream(const_cast<std::uint8_t*>(payload.data),
                                      static_cast<std::uint32_t>(payload.size));
@@ -74,18 +74,19 @@ Fleet::Fleet(const Config& config)
     : config_(config), street_(config.vehicles, NowNs() - kFirstStampAgeNs) {
   const std::string base = "livemap/v1/" + config_.zone;
   listener_ = Connect("listener", base + "/notice",
-                      [this](const MqttMessage& message) { OnNotice(message); });
+                      [this](const transport::MqttMessage& message) { OnNotice(message); });
   for (std::uint32_t i = 0; i < config_.vehicles; ++i) {
     vehicles_.push_back(std::make_unique<Vehicle>());
     Vehicle& vehicle = *vehicles_.back();
     vehicle.id = "car-" + std::to_string(i);
     vehicle.random.seed(std::random_device{}());
     vehicle.next_step = config_.first_step;
-    vehicle.client = Connect(vehicle.id, base + "/vehicle/" + vehicle.id + "/receipt",
-                             [this, i](const MqttMessage& message) { OnReceipt(i, message); });
+    vehicle.client =
+        Connect(vehicle.id, base + "/vehicle/" + vehicle.id + "/receipt",
+                [this, i](const transport::MqttMessage& message) { OnReceipt(i, message); });
   }
   const auto deadline = Clock::now() + kPatience;
-  const auto is_ready = [](const MqttClient& client) {
+  const auto is_ready = [](const transport::MqttClient& client) {
     return client.statistics().subscriptions_granted > 0;
   };
   while (!is_ready(*listener_) || !std::all_of(vehicles_.begin(), vehicles_.end(),
@@ -100,20 +101,20 @@ Fleet::~Fleet() {
   for (const auto& vehicle : vehicles_) vehicle->client.reset();
 }
 
-std::unique_ptr<MqttClient> Fleet::Connect(
+std::unique_ptr<transport::MqttClient> Fleet::Connect(
     const std::string& id, const std::string& topic,
-    std::function<void(const MqttMessage&)> on_message) const {
-  MqttConfig options;
+    std::function<void(const transport::MqttMessage&)> on_message) const {
+  transport::MqttConfig options;
   options.host = config_.host;
   options.port = config_.port;
   options.client_id = options.user = id;
   options.password = PasswordOf(config_.credentials + "/" + id);
   options.clean_start = true;
   options.max_inflight = static_cast<int>(config_.window);
-  MqttCallbacks callbacks;
+  transport::MqttCallbacks callbacks;
   callbacks.on_message = std::move(on_message);
-  return std::make_unique<MqttClient>(options, std::vector<MqttSubscription>{{topic, 1}},
-                                      std::move(callbacks));
+  return std::make_unique<transport::MqttClient>(
+      options, std::vector<transport::MqttSubscription>{{topic, 1}}, std::move(callbacks));
 }
 
 /// False when the vehicle's window is full.
@@ -138,14 +139,14 @@ bool Fleet::SendNext(std::uint32_t index) {
 }
 
 void Fleet::Send(Vehicle& vehicle, std::uint32_t index, const Uuid& uuid, std::uint32_t step) {
-  Report report = street_.ReportOf(index, step);
+  protocol::Report report = street_.ReportOf(index, step);
   report.uuid = uuid;
   vehicle.client->Publish("livemap/v1/" + config_.zone + "/vehicle/" + vehicle.id + "/report",
-                          Enclose(ToMessage(report)), 1, 0);
+                          Enclose(ros_io::ToMessage(report)), 1, 0);
 }
 
-void Fleet::OnReceipt(std::uint32_t index, const MqttMessage& message) {
-  const Receipt receipt = FromMessage(Open<ReportReceipt>(message));
+void Fleet::OnReceipt(std::uint32_t index, const transport::MqttMessage& message) {
+  const protocol::Receipt receipt = ros_io::FromMessage(Open<ReportReceipt>(message));
   answered_ = true;
   Vehicle& vehicle = *vehicles_[index];
   {
@@ -154,7 +155,8 @@ void Fleet::OnReceipt(std::uint32_t index, const MqttMessage& message) {
     if (waiting == vehicle.waiting.end()) return;  // A second receipt, for a resend.
     if (counting_) {
       const std::lock_guard<std::mutex> result_lock(result_mutex_);
-      ++(receipt.status == Receipt::Status::kCommitted ? result_.committed : result_.refused);
+      ++(receipt.status == protocol::Receipt::Status::kCommitted ? result_.committed
+                                                                 : result_.refused);
       result_.receipt_ms.push_back(MillisecondsSince(waiting->second.first_sent));
     }
     vehicle.waiting.erase(waiting);
@@ -162,8 +164,8 @@ void Fleet::OnReceipt(std::uint32_t index, const MqttMessage& message) {
   if (config_.rate == 0) SendNext(index);
 }
 
-void Fleet::OnNotice(const MqttMessage& message) {
-  const Notice notice = FromMessage(Open<HazardNotice>(message));
+void Fleet::OnNotice(const transport::MqttMessage& message) {
+  const protocol::Notice notice = ros_io::FromMessage(Open<HazardNotice>(message));
   if (notice.sightings != 2) return;  // Of a first report, or said again.
   const auto place = street_.PlaceAt(notice.position);
   if (!place) return;
@@ -248,4 +250,4 @@ Fleet::Result Fleet::Run(double warm_up_s, double seconds) {
   return std::move(result_);
 }
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -15,7 +15,7 @@
 #include "transport/mqtt_client.h"
 #include "zone_load/report_street.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 /// Vehicles that send reports to a zone over its broker, each with a login of its own, and one that
 /// hears the zone's notices.
@@ -61,19 +61,20 @@ class Fleet {
   };
   struct Vehicle {
     std::string id;
-    std::unique_ptr<MqttClient> client;
+    std::unique_ptr<transport::MqttClient> client;
     std::mutex mutex;  ///< Guards the rest.
     std::unordered_map<Uuid, Waiting> waiting;
     std::mt19937_64 random;
     std::uint32_t next_step = 0;
   };
 
-  std::unique_ptr<MqttClient> Connect(const std::string& id, const std::string& topic,
-                                      std::function<void(const MqttMessage&)> on_message) const;
+  std::unique_ptr<transport::MqttClient> Connect(
+      const std::string& id, const std::string& topic,
+      std::function<void(const transport::MqttMessage&)> on_message) const;
   bool SendNext(std::uint32_t index);
   void Send(Vehicle& vehicle, std::uint32_t index, const Uuid& uuid, std::uint32_t step);
-  void OnReceipt(std::uint32_t index, const MqttMessage& message);
-  void OnNotice(const MqttMessage& message);
+  void OnReceipt(std::uint32_t index, const transport::MqttMessage& message);
+  void OnNotice(const transport::MqttMessage& message);
   void Pace(Clock::time_point until);
   void WaitForZone();
   void ResendOverdue(Clock::duration patience);
@@ -81,7 +82,7 @@ class Fleet {
   const Config config_;
   const ReportStreet street_;
   std::vector<std::unique_ptr<Vehicle>> vehicles_;
-  std::unique_ptr<MqttClient> listener_;
+  std::unique_ptr<transport::MqttClient> listener_;
   std::atomic<bool> sending_{true};
   std::atomic<bool> counting_{false};
   std::atomic<bool> answered_{false};  ///< At least one report.
@@ -91,4 +92,4 @@ class Fleet {
   std::unordered_map<std::uint64_t, Clock::time_point> confirmed_;  ///< By place, when sent.
 };
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -8,7 +8,7 @@
 #include "geo/wgs84.h"
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::bench {
 
 /// Which reports a fleet sends: every hazard is reported by two vehicles, first by its own, then by
 /// the next one. Vehicles drive north beside each other, one lane each, a hazard per step.
@@ -30,9 +30,9 @@ class ReportStreet {
     return {step / 2, confirms ? (vehicle + vehicles_ - 1) % vehicles_ : vehicle};
   }
   /// Without uuid and vehicle.
-  Report ReportOf(std::uint32_t vehicle, std::uint32_t step) const {
+  protocol::Report ReportOf(std::uint32_t vehicle, std::uint32_t step) const {
     const Place place = PlaceOf(vehicle, step);
-    Report report;
+    protocol::Report report;
     report.drive_id = "load";
     report.stamp_ns = first_ns_ + std::int64_t{step} * kStepNs;
     report.class_name = "pothole";
@@ -46,7 +46,7 @@ class ReportStreet {
     return report;
   }
   /// Of the hazard at this position; none when it is not one of ours.
-  std::optional<Place> PlaceAt(const GeoPoint& position) const {
+  std::optional<Place> PlaceAt(const geo::GeoPoint& position) const {
     const double row = std::round((position.latitude_deg - kCorner.latitude_deg) / kDegreesNorth);
     const double lane = std::round((position.longitude_deg - kCorner.longitude_deg) / kDegreesEast);
     if (!(row >= 0 && row < 1e9 && lane >= 0 && lane < vehicles_)) return std::nullopt;
@@ -54,7 +54,7 @@ class ReportStreet {
   }
 
  private:
-  static constexpr GeoPoint kCorner{40.0, -80.0};
+  static constexpr geo::GeoPoint kCorner{40.0, -80.0};
   // About 12 m each: more than the radius within which two reports are of one hazard.
   static constexpr double kDegreesNorth = 12.0 / 111000.0;
   static constexpr double kDegreesEast = 12.0 / 85000.0;
@@ -65,4 +65,4 @@ class ReportStreet {
   std::int64_t first_ns_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::bench

@@ -10,7 +10,7 @@
 #include "tools/common/command_line.h"
 #include "zone_load/fleet.h"
 
-namespace livemap {
+namespace livemap::bench {
 namespace {
 
 void PrintQuantiles(const char* name, std::vector<double> values) {
@@ -18,7 +18,8 @@ void PrintQuantiles(const char* name, std::vector<double> values) {
     if (values.empty()) {
       std::printf("\"%s_ms_p%d\":null,", name, percent);
     } else {
-      std::printf("\"%s_ms_p%d\":%.2f,", name, percent, Quantile(values, percent / 100.0));
+      std::printf("\"%s_ms_p%d\":%.2f,", name, percent,
+                  evaluation::Quantile(values, percent / 100.0));
     }
   }
 }
@@ -41,7 +42,7 @@ void PrintJson(const Fleet::Config& config, Fleet::Result result) {
 }
 
 int Run(int argc, char** argv) {
-  CommandLine line(
+  tools::CommandLine line(
       "livemap_zone_load --zone ZONE --port PORT --credentials DIR [FLAGS]",
       "Sends reports as many vehicles to a running zone over its broker and prints one "
       "line of JSON. The broker knows the logins car-0, car-1, ... and listener.",
@@ -74,11 +75,11 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::bench
 
 int main(int argc, char** argv) {
   try {
-    return livemap::Run(argc, argv);
+    return livemap::bench::Run(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "livemap_zone_load: " << error.what() << "\n";
     return 2;

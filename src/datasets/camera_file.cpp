@@ -9,7 +9,7 @@
 #include "datasets/text_parsing.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 constexpr std::size_t kMaxCameraFileBytes = 1U << 16U;
@@ -72,9 +72,9 @@ Eigen::Isometry3d CameraFromOptical() {
 }
 
 Eigen::Isometry3d CameraMounting::BaseFromCamera() const {
-  const Eigen::AngleAxisd yaw(yaw_deg * kRadiansPerDegree, Eigen::Vector3d::UnitZ());
-  const Eigen::AngleAxisd pitch(pitch_deg * kRadiansPerDegree, Eigen::Vector3d::UnitY());
-  const Eigen::AngleAxisd roll(roll_deg * kRadiansPerDegree, Eigen::Vector3d::UnitX());
+  const Eigen::AngleAxisd yaw(yaw_deg * geo::kRadiansPerDegree, Eigen::Vector3d::UnitZ());
+  const Eigen::AngleAxisd pitch(pitch_deg * geo::kRadiansPerDegree, Eigen::Vector3d::UnitY());
+  const Eigen::AngleAxisd roll(roll_deg * geo::kRadiansPerDegree, Eigen::Vector3d::UnitX());
   return Eigen::Translation3d(forward_m, left_m, height_m) * yaw * pitch * roll;
 }
 
@@ -96,4 +96,4 @@ CameraFile ReadCameraFile(const std::string& path) {
   return ParseCameraFile(ReadFile(path, kMaxCameraFileBytes), path);
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -5,7 +5,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// Where a camera sits on the vehicle: base_link (x forward, y left, z up, on the road) to camera.
 struct CameraMounting {
@@ -28,7 +28,7 @@ Eigen::Isometry3d CameraFromOptical();
 /// A camera as config/cameras/*.yaml states it: an ideal pinhole and its place on the vehicle.
 struct CameraFile {
   std::string name;
-  CameraIntrinsics intrinsics;
+  geo::CameraIntrinsics intrinsics;
   CameraMounting mounting;
 };
 
@@ -36,4 +36,4 @@ struct CameraFile {
 CameraFile ReadCameraFile(const std::string& path);
 CameraFile ParseCameraFile(const std::string& yaml, const std::string& name);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

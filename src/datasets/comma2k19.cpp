@@ -8,7 +8,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -71,7 +71,7 @@ std::vector<RecordedFix> ParseRecordedFixes(const std::string& text, const std::
   for (std::size_t i = 0; i < table.rows(); ++i) {
     const std::vector<double> row = table.Row(i, stamp_ns);
     fixes[i] = {stamp_ns, {row[1], row[2]}};
-    if (!IsValid(fixes[i].position)) {
+    if (!geo::IsValid(fixes[i].position)) {
       table.Refuse(i, "latitudes from -90 to 90 and longitudes from -180 to 180");
     }
   }
@@ -121,4 +121,4 @@ PositionDrive ReadComma2k19(const std::string& directory) {
   return drive;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -7,12 +7,12 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// A satellite receiver's fix of a recorded drive.
 struct RecordedFix {
   std::int64_t stamp_ns = 0;
-  GeoPoint position;
+  geo::GeoPoint position;
 };
 
 /// The vehicle's true pose.
@@ -44,4 +44,4 @@ std::vector<RecordedSpeed> ParseRecordedSpeeds(const std::string& text, const st
 /// Reads the folder that holds them; throws Error when a table is missing, wrong or without rows.
 PositionDrive ReadComma2k19(const std::string& directory);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

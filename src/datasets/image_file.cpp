@@ -3,7 +3,7 @@
 #include "common/error.h"
 #include "imaging/decode.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 constexpr std::size_t kMaxImageFileBytes = 64U << 20U;
@@ -16,11 +16,11 @@ ImageFile ReadImageFile(const std::string& path, int width, int height) {
   ImageFile file;
   file.bytes.assign(text.begin(), text.end());
   try {
-    DecodeImage(file.bytes.data(), file.bytes.size(), kMaxPixels);
+    imaging::DecodeImage(file.bytes.data(), file.bytes.size(), kMaxPixels);
   } catch (const Error& error) {
     throw Error("'" + path + "': " + error.what());
   }
-  file.header = *ReadImageHeader(file.bytes.data(), file.bytes.size());
+  file.header = *imaging::ReadImageHeader(file.bytes.data(), file.bytes.size());
   if ((width > 0 && file.header.width != width) || (height > 0 && file.header.height != height)) {
     throw Error("'" + path + "' is " + std::to_string(file.header.width) + "x" +
                 std::to_string(file.header.height) + ", the camera's calibration is for " +
@@ -29,4 +29,4 @@ ImageFile ReadImageFile(const std::string& path, int width, int height) {
   return file;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -6,12 +6,12 @@
 
 #include "imaging/image_header.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// An image file's bytes as they are, checked.
 struct ImageFile {
   std::vector<std::uint8_t> bytes;
-  ImageHeader header;
+  imaging::ImageHeader header;
 };
 
 /// Reads a JPEG or PNG and decodes it once to know that it is whole. Throws Error naming the file
@@ -19,4 +19,4 @@ struct ImageFile {
 /// `height` when those are positive.
 ImageFile ReadImageFile(const std::string& path, int width, int height);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

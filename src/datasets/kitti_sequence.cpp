@@ -7,7 +7,7 @@
 #include "datasets/sequences.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -176,4 +176,4 @@ Sequence ReadKittiSequence(const std::string& directory, double rate_hz) {
   return sequence;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

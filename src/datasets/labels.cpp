@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 constexpr std::size_t kMaxBoxes = 10000;
@@ -40,4 +40,4 @@ std::vector<LabelledBox> ParseYoloLabels(const std::string& text, const std::str
   return boxes;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

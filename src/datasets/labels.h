@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// A labelled box of an image as YOLO writes it: centre and size in fractions of the image.
 struct LabelledBox {
@@ -18,4 +18,4 @@ struct LabelledBox {
 /// Error naming the line when it is malformed, a number lies outside 0..1 or the box is empty.
 std::vector<LabelledBox> ParseYoloLabels(const std::string& text, const std::string& name);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

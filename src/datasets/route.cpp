@@ -9,7 +9,7 @@
 #include "common/error.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 using nlohmann::json;
@@ -18,12 +18,12 @@ constexpr std::size_t kMaxRouteBytes = 16U << 20U;
 constexpr std::size_t kMaxPoints = 1000000;
 constexpr int kMaxDepth = 32;
 
-double BearingRad(const GeoPoint& from, const GeoPoint& to) {
+double BearingRad(const geo::GeoPoint& from, const geo::GeoPoint& to) {
   double forward_deg = 0;
   double arrival_deg = 0;
   GeographicLib::Geodesic::WGS84().Inverse(from.latitude_deg, from.longitude_deg, to.latitude_deg,
                                            to.longitude_deg, forward_deg, arrival_deg);
-  return forward_deg * kRadiansPerDegree;
+  return forward_deg * geo::kRadiansPerDegree;
 }
 
 std::string KindOf(const json& object) {
@@ -53,13 +53,13 @@ json FindGeometry(const json& root, const std::string& name) {
   return object;
 }
 
-GeoPoint ParsePosition(const json& position, std::size_t index, const std::string& name) {
+geo::GeoPoint ParsePosition(const json& position, std::size_t index, const std::string& name) {
   const bool numbers = position.is_array() && (position.size() == 2 || position.size() == 3) &&
                        std::all_of(position.begin(), position.end(),
                                    [](const json& value) { return value.is_number(); });
-  GeoPoint point;
+  geo::GeoPoint point;
   if (numbers) point = {position[1].get<double>(), position[0].get<double>()};
-  if (!numbers || !IsValid(point)) {
+  if (!numbers || !geo::IsValid(point)) {
     throw Error("position " + std::to_string(index) + " of the route '" + name + "' is " +
                 position.dump().substr(0, 60) + ", accepted is [longitude, latitude] in degrees");
   }
@@ -81,8 +81,8 @@ json ParseJson(const std::string& text, const std::string& name) {
 
 }  // namespace
 
-Route Route::Straight(const GeoPoint& start, double bearing_rad) {
-  if (!IsValid(start)) {
+Route Route::Straight(const geo::GeoPoint& start, double bearing_rad) {
+  if (!geo::IsValid(start)) {
     throw Error("the start is " + std::to_string(start.latitude_deg) + "," +
                 std::to_string(start.longitude_deg) + ", accepted is LAT,LON in degrees");
   }
@@ -92,11 +92,11 @@ Route Route::Straight(const GeoPoint& start, double bearing_rad) {
   return route;
 }
 
-Route Route::Through(const std::vector<GeoPoint>& points) {
+Route Route::Through(const std::vector<geo::GeoPoint>& points) {
   Route route;
   double at_m = 0;
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const double length_m = GeodesicDistanceM(points[i], points[i + 1]);
+    const double length_m = geo::GeodesicDistanceM(points[i], points[i + 1]);
     if (length_m == 0) continue;
     route.pieces_.push_back(
         {points[i], BearingRad(points[i], points[i + 1]), at_m, at_m + length_m});
@@ -115,14 +115,14 @@ RoutePose Route::At(double distance_m) const {
   const Piece& piece = after == pieces_.begin() ? *after : *std::prev(after);
   const double along_m = distance_m - piece.start_m;
   RoutePose pose;
-  pose.position = GeodesicDestination(piece.start, piece.bearing_rad, along_m);
+  pose.position = geo::GeodesicDestination(piece.start, piece.bearing_rad, along_m);
   // A geodesic's bearing drifts with the meridians: take it where the vehicle is.
-  pose.bearing_rad =
-      BearingRad(pose.position, GeodesicDestination(piece.start, piece.bearing_rad, along_m + 10));
+  pose.bearing_rad = BearingRad(
+      pose.position, geo::GeodesicDestination(piece.start, piece.bearing_rad, along_m + 10));
   return pose;
 }
 
-std::vector<GeoPoint> ParseRoutePoints(const std::string& geojson, const std::string& name) {
+std::vector<geo::GeoPoint> ParseRoutePoints(const std::string& geojson, const std::string& name) {
   if (geojson.size() > kMaxRouteBytes) {
     throw Error("the route '" + name + "' has " + std::to_string(geojson.size()) +
                 " bytes, accepted are " + std::to_string(kMaxRouteBytes));
@@ -134,7 +134,7 @@ std::vector<GeoPoint> ParseRoutePoints(const std::string& geojson, const std::st
     throw Error("the route '" + name + "' needs 2 to " + std::to_string(kMaxPoints) +
                 " positions in 'coordinates'");
   }
-  std::vector<GeoPoint> points;
+  std::vector<geo::GeoPoint> points;
   points.reserve(coordinates->size());
   for (std::size_t i = 0; i < coordinates->size(); ++i) {
     points.push_back(ParsePosition((*coordinates)[i], i + 1, name));
@@ -143,7 +143,7 @@ std::vector<GeoPoint> ParseRoutePoints(const std::string& geojson, const std::st
 }
 
 Route ParseRoute(const std::string& geojson, const std::string& name) {
-  const std::vector<GeoPoint> points = ParseRoutePoints(geojson, name);
+  const std::vector<geo::GeoPoint> points = ParseRoutePoints(geojson, name);
   try {
     return Route::Through(points);
   } catch (const Error& error) {
@@ -151,7 +151,7 @@ Route ParseRoute(const std::string& geojson, const std::string& name) {
   }
 }
 
-std::vector<GeoPoint> ReadRoutePoints(const std::string& path) {
+std::vector<geo::GeoPoint> ReadRoutePoints(const std::string& path) {
   return ParseRoutePoints(ReadFile(path, kMaxRouteBytes), path);
 }
 
@@ -159,4 +159,4 @@ Route ReadRoute(const std::string& path) {
   return ParseRoute(ReadFile(path, kMaxRouteBytes), path);
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

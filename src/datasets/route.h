@@ -5,11 +5,11 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// Where a vehicle is on its route.
 struct RoutePose {
-  GeoPoint position;
+  geo::GeoPoint position;
   double bearing_rad = 0;  ///< Of motion, clockwise from true north.
 };
 
@@ -17,9 +17,9 @@ struct RoutePose {
 class Route {
  public:
   /// A geodesic without end. Throws Error when `start` or `bearing_rad` is not valid.
-  static Route Straight(const GeoPoint& start, double bearing_rad);
+  static Route Straight(const geo::GeoPoint& start, double bearing_rad);
   /// Geodesic pieces between at least two points that are not all equal. Throws Error.
-  static Route Through(const std::vector<GeoPoint>& points);
+  static Route Through(const std::vector<geo::GeoPoint>& points);
 
   /// Infinite for a straight route.
   double length_m() const;
@@ -28,7 +28,7 @@ class Route {
 
  private:
   struct Piece {
-    GeoPoint start;
+    geo::GeoPoint start;
     double bearing_rad;
     double start_m;
     double end_m;
@@ -40,12 +40,12 @@ class Route {
 /// the first feature of a FeatureCollection. Coordinates are [longitude, latitude(, altitude)].
 /// Throws Error naming the problem: too large (16 MiB), not JSON, not a LineString, a position out
 /// of range.
-std::vector<GeoPoint> ParseRoutePoints(const std::string& geojson, const std::string& name);
+std::vector<geo::GeoPoint> ParseRoutePoints(const std::string& geojson, const std::string& name);
 /// The route through them.
 Route ParseRoute(const std::string& geojson, const std::string& name);
 
 /// Read and parse a file.
-std::vector<GeoPoint> ReadRoutePoints(const std::string& path);
+std::vector<geo::GeoPoint> ReadRoutePoints(const std::string& path);
 Route ReadRoute(const std::string& path);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <random>
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// Random numbers of sensors' errors, one after the other: the same seed gives the same numbers on
 /// every platform, which the library's distributions do not. Not thread-safe.
@@ -33,4 +33,4 @@ class SeededRandom {
   std::mt19937_64 generator_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -8,7 +8,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// A pose with its time.
 struct StampedPose {
@@ -27,8 +27,8 @@ struct SequenceFrame {
 
 /// A folder in TUM RGB-D or KITTI odometry layout, paths checked, images not opened yet.
 struct Sequence {
-  CameraIntrinsics intrinsics;  ///< Width and height zero: as the images.
-  double depth_scale = 1;       ///< Depth units per metre.
+  geo::CameraIntrinsics intrinsics;  ///< Width and height zero: as the images.
+  double depth_scale = 1;            ///< Depth units per metre.
   double baseline_m = 0;  ///< From the left eye to the right one; 0: no second eye, or unknown.
   std::vector<SequenceFrame> frames;
   std::vector<StampedPose> poses;
@@ -64,7 +64,7 @@ std::vector<SequenceFrame> AssociateDepth(const std::vector<SequenceFrame>& pict
 /// The calibration that TUM publishes for its cameras fr1, fr2 and fr3 (ideal pinhole; the
 /// distortion of fr1 and fr2 is left aside), which of them by the folder's name: it holds
 /// "freiburg1" or "fr1" and so on. None for any other name.
-std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory);
+std::optional<geo::CameraIntrinsics> PublishedTumCamera(const std::string& directory);
 
 /// KITTI odometry layout: images/ (or image_0, image_2) with numbered pictures, calib.txt ("P0: 12
 /// numbers" or 12 bare numbers per line, the first line counts), poses.txt (3x4 rows, camera to
@@ -78,4 +78,4 @@ std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const s
 std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name);
 std::vector<Eigen::Isometry3d> ParseKittiPoses(const std::string& text, const std::string& name);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

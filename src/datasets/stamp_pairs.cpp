@@ -6,7 +6,7 @@
 #include <queue>
 #include <tuple>
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 /// Which elements of a row are still free, next to a place; elements are taken one by one.
@@ -106,4 +106,4 @@ std::vector<std::pair<std::size_t, std::size_t>> PairNearestStamps(
   return StampPairing(first, second, max_difference_ns).Run();
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// As the TUM benchmark's associate.py: of all pairs of a stamp of the first list and one of the
 /// second that are less than `max_difference_ns` apart, the nearest pair first, and every stamp
@@ -15,4 +15,4 @@ std::vector<std::pair<std::size_t, std::size_t>> PairNearestStamps(
     const std::vector<std::int64_t>& first, const std::vector<std::int64_t>& second,
     std::int64_t max_difference_ns);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

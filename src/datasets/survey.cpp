@@ -7,7 +7,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,4 +87,4 @@ std::vector<FramePlace> PlaceFrames(const SurveyDrive& drive, double speed_mps, 
   return places;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

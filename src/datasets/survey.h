@@ -5,7 +5,7 @@
 
 #include "datasets/labels.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// One frame of a road survey.
 struct SurveyFrame {
@@ -47,4 +47,4 @@ struct FramePlace {
 /// at the same speed, so that fixes stay plausible and frames that are metres apart stay so.
 std::vector<FramePlace> PlaceFrames(const SurveyDrive& drive, double speed_mps, double max_gap_s);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

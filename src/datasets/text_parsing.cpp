@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 constexpr char kBlanks[] = " \t\r";
@@ -56,4 +56,4 @@ std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// Longer tables of a data set (one line per frame) are refused.
 constexpr std::size_t kMaxTableBytes = 64U << 20U;
@@ -25,4 +25,4 @@ std::vector<std::string> SplitBlanks(const std::string& line);
 /// Lines without their ends ("\n" or "\r\n"); a last empty line does not count.
 std::vector<std::string> Lines(const std::string& text);
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -10,7 +10,7 @@
 #include "datasets/stamp_pairs.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -71,7 +71,7 @@ void FindCamera(const fs::path& root, const std::string& camera_file, Sequence& 
     ReadCamera(camera_file.empty() ? beside.string() : camera_file, sequence);
     return;
   }
-  const std::optional<CameraIntrinsics> published = PublishedTumCamera(root.string());
+  const std::optional<geo::CameraIntrinsics> published = PublishedTumCamera(root.string());
   if (!published) {
     throw Error("'" + root.string() +
                 "' has no camera.yaml, and its name is not one of TUM's (freiburg1, freiburg2, "
@@ -235,7 +235,7 @@ std::vector<SequenceFrame> AssociateDepth(const std::vector<SequenceFrame>& pict
   return frames;
 }
 
-std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory) {
+std::optional<geo::CameraIntrinsics> PublishedTumCamera(const std::string& directory) {
   const fs::path whole = fs::absolute(directory).lexically_normal();
   // "fr1/" has no last name but an empty one.
   const std::string name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
@@ -243,9 +243,9 @@ std::optional<CameraIntrinsics> PublishedTumCamera(const std::string& directory)
     return name.find("freiburg" + number) != std::string::npos ||
            name.find("fr" + number) != std::string::npos;
   };
-  if (holds("1")) return CameraIntrinsics{517.3, 516.5, 318.6, 255.3, 640, 480};
-  if (holds("2")) return CameraIntrinsics{520.9, 521.0, 325.1, 249.7, 640, 480};
-  if (holds("3")) return CameraIntrinsics{535.4, 539.2, 320.1, 247.6, 640, 480};
+  if (holds("1")) return geo::CameraIntrinsics{517.3, 516.5, 318.6, 255.3, 640, 480};
+  if (holds("2")) return geo::CameraIntrinsics{520.9, 521.0, 325.1, 249.7, 640, 480};
+  if (holds("3")) return geo::CameraIntrinsics{535.4, 539.2, 320.1, 247.6, 640, 480};
   return std::nullopt;
 }
 
@@ -275,4 +275,4 @@ Sequence ReadTumSequence(const std::string& directory, const std::string& camera
   return sequence;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace livemap {
+namespace livemap::evaluation {
 
 double Quantile(std::vector<double> values, double fraction) {
   if (values.empty()) return 0;
@@ -14,4 +14,4 @@ double Quantile(std::vector<double> values, double fraction) {
   return values[std::min(index, values.size() - 1)];
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

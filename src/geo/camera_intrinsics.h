@@ -1,6 +1,6 @@
 #pragma once
 
-namespace livemap {
+namespace livemap::geo {
 
 /// Rectified pinhole camera, pixels: u = fx x/z + cx, v = fy y/z + cy in the optical frame (x
 /// right, y down, z forward); (0, 0) is the centre of the first pixel, as in
@@ -14,4 +14,4 @@ struct CameraIntrinsics {
   int height = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 constexpr double kMaxShiftM = 0.01;
@@ -38,4 +38,4 @@ double MeridianConvergence(const LocalFrame& frame, const GeoPoint& at) {
   return std::atan2(-north.x(), north.y());
 }
 
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -4,7 +4,7 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::geo {
 
 /// Datum of a map frame whose pose in the earth frame is given: the inverse of LocalFrame::InEarth.
 /// Throws Error when the map is not an east-north-up frame that touches the ellipsoid (to a
@@ -15,4 +15,4 @@ GeoPoint DatumOf(const Eigen::Isometry3d& earth_from_map);
 /// meridians converge.
 double MeridianConvergence(const LocalFrame& frame, const GeoPoint& at);
 
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::geo {
 
 bool IsFixCovariance(const Eigen::Matrix2d& covariance_m2) {
   const double trace = covariance_m2.trace();
@@ -13,4 +13,4 @@ bool IsFixCovariance(const Eigen::Matrix2d& covariance_m2) {
          std::abs(covariance_m2(0, 1) - covariance_m2(1, 0)) <= 1e-6 * trace;
 }
 
-}  // namespace livemap
+}  // namespace livemap::geo

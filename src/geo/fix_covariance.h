@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-namespace livemap {
+namespace livemap::geo {
 
 /// A fix or pose less certain than this, per axis, is none.
 constexpr double kMaxFixSigmaM = 1000.0;
@@ -11,4 +11,4 @@ constexpr double kMaxFixSigmaM = 1000.0;
 /// finite, symmetric, positive semidefinite but for rounding, and not above kMaxFixSigmaM.
 bool IsFixCovariance(const Eigen::Matrix2d& covariance_m2);
 
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -2,7 +2,7 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::geo {
 
 /// A latitude-longitude rectangle, edges included. It crosses the antimeridian when its western
 /// longitude exceeds its eastern one.
@@ -20,4 +20,4 @@ struct GeoBox {
   }
 };
 
-}  // namespace livemap
+}  // namespace livemap::geo

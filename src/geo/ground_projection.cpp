@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 /// Derivative of the ground point by a change `direction_change` of the ray's direction.
@@ -57,4 +57,4 @@ std::optional<GroundPoint> ProjectToGround(const Eigen::Vector2d& pixel,
   return point;
 }
 
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -6,7 +6,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::geo {
 
 /// What makes a projected point uncertain: independent, zero-mean, standard deviations.
 struct GroundProjectionNoise {
@@ -37,4 +37,4 @@ std::optional<GroundPoint> ProjectToGround(const Eigen::Vector2d& pixel,
                                            const Eigen::Isometry3d& base_from_optical,
                                            const GroundProjectionNoise& noise);
 
-}  // namespace livemap
+}  // namespace livemap::geo

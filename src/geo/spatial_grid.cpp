@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 /// Earth-centred position of a place on the ellipsoid, metres.
@@ -252,4 +252,4 @@ void SpatialGrid::Grow() {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::geo

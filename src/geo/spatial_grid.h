@@ -10,7 +10,7 @@
 #include "common/huge_pages.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::geo {
 
 /// Places on the earth, found by distance at a cost that does not grow with their number.
 ///
@@ -96,4 +96,4 @@ class SpatialGrid {
   std::vector<Entry, HugePageAllocator<Entry>> entries_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::geo

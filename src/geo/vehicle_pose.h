@@ -6,7 +6,7 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::geo {
 
 /// One answer of the satellite receiver.
 struct Fix {
@@ -28,4 +28,4 @@ struct TrackPose {
   Eigen::Vector2d position_course = Eigen::Vector2d::Zero();
 };
 
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
@@ -80,4 +80,4 @@ Eigen::Isometry3d LocalFrame::InEarth() const {
   return pose;
 }
 
-}  // namespace livemap
+}  // namespace livemap::geo

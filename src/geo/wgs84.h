@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <GeographicLib/LocalCartesian.hpp>
 
-namespace livemap {
+namespace livemap::geo {
 
 constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
@@ -44,4 +44,4 @@ class LocalFrame {
   GeographicLib::LocalCartesian cartesian_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::geo

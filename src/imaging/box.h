@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace livemap {
+namespace livemap::imaging {
 
 /// A rectangle in an image: edges in pixels, x to the right and y down, (0, 0) the outer corner of
 /// the first pixel, min < max.
@@ -23,4 +23,4 @@ struct PixelRegion {
   bool IsWholeImage() const { return width == 0 && height == 0; }
 };
 
-}  // namespace livemap
+}  // namespace livemap::imaging

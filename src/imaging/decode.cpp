@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "imaging/image_header.h"
 
-namespace livemap {
+namespace livemap::imaging {
 
 cv::Mat DecodeImage(const std::uint8_t* bytes, std::size_t size, std::int64_t max_pixels) {
   const std::optional<ImageHeader> header = ReadImageHeader(bytes, size);
@@ -36,4 +36,4 @@ cv::Mat DecodeImage(const std::uint8_t* bytes, std::size_t size, std::int64_t ma
   return image;
 }
 
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 namespace fs = std::filesystem;
@@ -116,4 +116,4 @@ std::unique_ptr<FrameSource> OpenDevice(const std::string& device) {
   return std::make_unique<CaptureSource>(device, std::stoi(number));
 }
 
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::imaging {
 
 /// One frame of a source that is no ROS topic: either still encoded or decoded already.
 struct SourceFrame {
@@ -39,4 +39,4 @@ std::unique_ptr<FrameSource> OpenVideo(const std::string& path);
 /// A V4L2 device: "/dev/videoN" or "N". Throws Error when it cannot be opened.
 std::unique_ptr<FrameSource> OpenDevice(const std::string& device);
 
-}  // namespace livemap
+}  // namespace livemap::imaging

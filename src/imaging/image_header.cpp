@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string_view>
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 using Format = ImageHeader::Format;
@@ -138,4 +138,4 @@ bool HasImageEnd(const std::uint8_t* data, std::size_t size, Format format) {
   return end.find(marker) != std::string_view::npos;
 }
 
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace livemap {
+namespace livemap::imaging {
 
 /// What a compressed picture says about itself before anything decodes it.
 struct ImageHeader {
@@ -29,4 +29,4 @@ std::optional<ImageHeader> ReadImageHeader(const std::uint8_t* data, std::size_t
 /// header of a WebP announces are there.
 bool HasImageEnd(const std::uint8_t* data, std::size_t size, ImageHeader::Format format);
 
-}  // namespace livemap
+}  // namespace livemap::imaging

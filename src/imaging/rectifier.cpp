@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 template <int kRows, int kColumns>
@@ -148,4 +148,4 @@ cv::Mat Rectifier::Apply(const cv::Mat& image) const {
   return resized;
 }
 
-}  // namespace livemap
+}  // namespace livemap::imaging

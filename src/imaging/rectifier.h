@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::imaging {
 
 /// A camera's calibration as sensor_msgs/CameraInfo states it: raw pixel = distort(K, D), rectified
 /// pixel = P applied to the ray turned by R. Pixels, (0, 0) the centre of the first pixel.
@@ -62,4 +62,4 @@ class Rectifier {
   cv::Mat map_fraction_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::imaging

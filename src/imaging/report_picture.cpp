@@ -5,7 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 constexpr int kLowestQuality = 30;  // Below it a box is no longer legible: make it smaller instead.
@@ -31,8 +31,7 @@ cv::Rect2d InsideImage(const Box& box, const cv::Size& image) {
 /// 3 to 2 around the box, at least `min_px` wide, moved into the image and cut where it is
 /// larger.
 cv::Rect CropAround(const cv::Rect2d& box, double context, double min_px, const cv::Size& image) {
-  const double width =
-      std::max({context * box.width, context * box.height * kCropAspect, min_px});
+  const double width = std::max({context * box.width, context * box.height * kCropAspect, min_px});
   const cv::Size size(std::min(image.width, cvCeil(width)),
                       std::min(image.height, cvCeil(width / kCropAspect)));
   const auto start = [](double middle, int length, int available) {
@@ -146,4 +145,4 @@ CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropCon
   return cropped;
 }
 
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "imaging/box.h"
-namespace livemap {
+namespace livemap::imaging {
 
 /// An image that others own: `owner` keeps the pixels alive, so that nothing is copied.
 struct Picture {
@@ -66,4 +66,4 @@ PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& 
 /// picture, as for EncodeJpeg. A box that does not meet the image shows the whole of it.
 CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config);
 
-}  // namespace livemap
+}  // namespace livemap::imaging

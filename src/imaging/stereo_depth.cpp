@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 /// What StereoSGBM returns is in sixteenths of a pixel.
@@ -181,4 +181,4 @@ cv::Mat StereoDepth::Compute(const cv::Mat& left, const cv::Mat& right) {
   return depth;
 }
 
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -5,7 +5,7 @@
 
 #include "imaging/rectifier.h"
 
-namespace livemap {
+namespace livemap::imaging {
 
 /// How depth is found from two eyes. Pixels are those of the images that are matched: with `scale`
 /// 2 one of them is two of the camera's.
@@ -72,4 +72,4 @@ class StereoDepth {
   cv::Mat grey_, small_, left_, right_, found_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::imaging

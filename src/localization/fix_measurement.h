@@ -5,7 +5,7 @@
 
 #include "localization/odometry_track.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// A fix as the window sees it, tied to the node before it.
 struct FixMeasurement {
@@ -23,4 +23,4 @@ struct FixMeasurement {
   bool used = true;
 };
 
-}  // namespace livemap
+}  // namespace livemap::localization

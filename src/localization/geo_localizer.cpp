@@ -13,7 +13,7 @@
 #include "localization/sliding_window.h"
 #include "localization/track_alignment.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 constexpr double kMinSigmaM = 1e-3;  // No receiver is better; keeps covariances invertible.
@@ -169,12 +169,12 @@ std::int64_t GeoLocalizer::MomentOf(const FixMeasurement& fix) const {
 }
 
 std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix) {
-  if (fix.stamp_ns <= 0 || !IsValid(fix.position)) return std::nullopt;
+  if (fix.stamp_ns <= 0 || !geo::IsValid(fix.position)) return std::nullopt;
   const double default_variance =
       config_.receiver.default_sigma_m * config_.receiver.default_sigma_m;
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity() * default_variance;
   if (fix.covariance_m2) {
-    if (!IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
+    if (!geo::IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
     covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   }
   if (!frame_) frame_.emplace(fix.position);
@@ -182,8 +182,9 @@ std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix
   measurement.stamp_ns = fix.stamp_ns;
   measurement.place_m = frame_->ToEnu(fix.position);
   // The plane cannot tell the other side of the earth.
-  if (GeodesicDistanceM(frame_->datum(), fix.position) > config_.max_range_m) return std::nullopt;
-  const Eigen::Matrix2d turn = Rotation2(MeridianConvergence(*frame_, fix.position));
+  if (geo::GeodesicDistanceM(frame_->datum(), fix.position) > config_.max_range_m)
+    return std::nullopt;
+  const Eigen::Matrix2d turn = Rotation2(geo::MeridianConvergence(*frame_, fix.position));
   covariance_m2 = turn * covariance_m2 * turn.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance_m2);
   const double believed_m = config_.receiver.min_sigma_m;
@@ -193,8 +194,8 @@ std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix
                     axes.eigenvectors().transpose();
   }
   const double min_variance = std::max(axes.eigenvalues().minCoeff(), believed_m * believed_m);
-  measurement.shared_m = std::min(config_.receiver.shared_sigma_m,
-                                  kMaxShare * std::sqrt(std::max(0.0, min_variance)));
+  measurement.shared_m =
+      std::min(config_.receiver.shared_sigma_m, kMaxShare * std::sqrt(std::max(0.0, min_variance)));
   const Eigen::Matrix2d white_m2 =
       covariance_m2 - measurement.shared_m * measurement.shared_m * Eigen::Matrix2d::Identity();
   measurement.root_information = white_m2.inverse().llt().matrixU();
@@ -312,7 +313,7 @@ std::optional<FusedPose> GeoLocalizer::Fused(std::int64_t stamp_ns) const {
   fused.state = StateAt(stamp_ns);
   fused.map_from_base = {now.node.head<2>(), now.node[2]};
   fused.position = frame_->ToGeo(fused.map_from_base.position_m);
-  const double convergence_rad = MeridianConvergence(*frame_, fused.position);
+  const double convergence_rad = geo::MeridianConvergence(*frame_, fused.position);
   const Eigen::Matrix2d turn = Rotation2(-convergence_rad);
   fused.covariance_m2 = turn * now.covariance.topLeftCorner<2, 2>() * turn.transpose();
   constexpr double kQuarterTurn = 1.57079632679489661923;
@@ -340,7 +341,7 @@ std::optional<FusedPose> GeoLocalizer::PositionOnly(std::int64_t stamp_ns) const
   FusedPose fused;
   fused.map_from_base.position_m = {TakeMedian(east_m), TakeMedian(north_m)};
   fused.position = frame_->ToGeo(fused.map_from_base.position_m);
-  const double convergence_rad = MeridianConvergence(*frame_, fused.position);
+  const double convergence_rad = geo::MeridianConvergence(*frame_, fused.position);
   const Eigen::Matrix2d turn = Rotation2(-convergence_rad);
   const Eigen::Matrix2d white_m2 =
       (newest.root_information.transpose() * newest.root_information).inverse();
@@ -365,7 +366,7 @@ std::optional<Eigen::Isometry3d> GeoLocalizer::MapFromOdom() const {
   return pose;
 }
 
-std::optional<GeoPoint> GeoLocalizer::datum() const {
+std::optional<geo::GeoPoint> GeoLocalizer::datum() const {
   if (!frame_) return std::nullopt;
   return frame_->datum();
 }
@@ -381,4 +382,4 @@ LatencyEstimate GeoLocalizer::latency() const {
   return estimate;
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

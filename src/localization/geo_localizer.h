@@ -13,15 +13,15 @@
 #include "localization/localizer_config.h"
 #include "localization/odometry_track.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 class SlidingWindow;
 
 /// One answer of the satellite receiver.
 struct PositionFix {
   std::int64_t stamp_ns = 0;
-  bool has_fix = true;  ///< False: the receiver itself says that it has none.
-  GeoPoint position;    ///< Of the antenna.
+  bool has_fix = true;     ///< False: the receiver itself says that it has none.
+  geo::GeoPoint position;  ///< Of the antenna.
   /// Of the horizontal position, east-north axes there, m^2; nothing when the receiver gives none.
   std::optional<Eigen::Matrix2d> covariance_m2;
 };
@@ -35,7 +35,7 @@ enum class LocalizerState {
 /// Where the vehicle is and which way it looks.
 struct FusedPose {
   LocalizerState state = LocalizerState::kUninitialised;
-  GeoPoint position;  ///< Of base_link; of the antenna while uninitialised.
+  geo::GeoPoint position;  ///< Of base_link; of the antenna while uninitialised.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north axes there.
   /// Clockwise from true north; NaN while uninitialised.
   double heading_rad = std::numeric_limits<double>::quiet_NaN();
@@ -106,7 +106,7 @@ class GeoLocalizer {
   std::optional<Eigen::Isometry3d> MapFromOdom() const;
   /// Of the newest odometry.
   LocalizerState state() const;
-  std::optional<GeoPoint> datum() const;
+  std::optional<geo::GeoPoint> datum() const;
   LatencyEstimate latency() const;
   /// True over reported way, as estimated.
   double odometry_scale() const;
@@ -135,7 +135,7 @@ class GeoLocalizer {
   std::optional<FusedPose> PositionOnly(std::int64_t stamp_ns) const;
 
   const LocalizerConfig config_;
-  std::optional<LocalFrame> frame_;
+  std::optional<geo::LocalFrame> frame_;
   OdometryTrack track_;
   const std::unique_ptr<SlidingWindow> window_;
   std::deque<FixMeasurement> waiting_;  // For odometry.
@@ -145,4 +145,4 @@ class GeoLocalizer {
   LocalizerCounters counters_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::localization

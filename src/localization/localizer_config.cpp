@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 void Accept(const char* name, double value, double min, double max) {
@@ -45,7 +45,7 @@ void Check(const OdometryModel& odometry) {
 }  // namespace
 
 void Check(const LocalizerConfig& config) {
-  if (config.datum) LocalFrame{*config.datum};  // Throws by itself.
+  if (config.datum) geo::LocalFrame{*config.datum};  // Throws by itself.
   Accept("max_range_m", config.max_range_m, 1, 300e3);
   Accept("window_s", config.window_s, 2, 300);
   Accept("node_spacing_s", config.node_spacing_s, 0.05, 5);
@@ -62,4 +62,4 @@ void Check(const LocalizerConfig& config) {
   Check(config.odometry);
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

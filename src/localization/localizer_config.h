@@ -6,7 +6,7 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// What is known of the satellite receiver. The error of a fix is taken as a part that neighbouring
 /// fixes share and that wanders slowly, and a part that is new at every fix.
@@ -58,7 +58,7 @@ struct OdometryModel {
 /// Parameters of the localisation, with their defaults.
 struct LocalizerConfig {
   /// Where the map's plane touches the ellipsoid; none: at the first fix.
-  std::optional<GeoPoint> datum;
+  std::optional<geo::GeoPoint> datum;
   /// Fixes further than this from the datum are not believed: the plane ends there, m.
   double max_range_m = 100e3;
   /// Length of the window, s.
@@ -91,4 +91,4 @@ struct LocalizerConfig {
 /// Throws Error naming the first value that is out of its range.
 void Check(const LocalizerConfig& config);
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -5,7 +5,7 @@
 
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 /// More never waits: the oldest is handed over.
@@ -94,4 +94,4 @@ void LocalizerFeed::Hand(const OdometrySample& sample) {
   if (verdict == Verdict::kAccepted || verdict == Verdict::kReset) on_odometry_(sample);
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -9,7 +9,7 @@
 
 #include "localization/geo_localizer.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// One answer of the odometry.
 struct OdometrySample {
@@ -70,4 +70,4 @@ class LocalizerFeed {
   std::int64_t newest_odometry_ns_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace livemap {
+namespace livemap::localization {
 
 /// The middle one of the values (the upper of two), which must not be empty; reorders them.
 inline double TakeMedian(std::vector<double>& values) {
@@ -13,4 +13,4 @@ inline double TakeMedian(std::vector<double>& values) {
   return *middle;
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

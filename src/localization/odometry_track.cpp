@@ -6,7 +6,7 @@
 
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 constexpr double kMaxAccelerationMps2 = 12;  // Of a vehicle, both axes.
@@ -224,4 +224,4 @@ void OdometryTrack::Clear() {
   yaw_rate_rps_ = 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

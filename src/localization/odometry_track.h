@@ -9,7 +9,7 @@
 #include "localization/localizer_config.h"
 #include "localization/planar.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// How the odometry moved between two moments, in the vehicle's frame at the first of them.
 struct PlanarMotion {
@@ -87,4 +87,4 @@ class OdometryTrack {
   bool moving_known_ = false;
 };
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::localization {
 
 /// To [-pi, pi).
 inline double WrapAngle(double angle_rad) {
@@ -33,4 +33,4 @@ struct PlanarPose {
   PlanarPose Inverse() const { return {-(Rotation2(-yaw_rad) * position_m), -yaw_rad}; }
 };
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -6,7 +6,7 @@
 #include "common/time.h"
 #include "localization/track_alignment.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 // The prior of a new window: so wide that the fixes decide.
@@ -319,4 +319,4 @@ Belief SlidingWindow::CarryOn(const Belief& belief, const PlanarMotion& motion) 
   return later;
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -10,7 +10,7 @@
 #include "localization/state_information.h"
 #include "localization/window_factors.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// What is believed of a moment: the node's state and the calibration, with their covariance.
 struct Belief {
@@ -107,4 +107,4 @@ class SlidingWindow {
   PriorCost prior_;  // Looks at the two above.
 };
 
-}  // namespace livemap
+}  // namespace livemap::localization

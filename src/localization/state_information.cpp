@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <array>
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 template <int kRows, int kColumns>
@@ -88,4 +88,4 @@ StateMatrix RootInformation(const StateMatrix& covariance) {
   return Decompose(0.5 * (information + information.transpose())).matrixU();
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

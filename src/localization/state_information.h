@@ -2,7 +2,7 @@
 
 #include "localization/window_factors.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// Gauss-Newton information about a node and the calibration around their present values: the cost
 /// is d^T H d / 2 + b^T d for a small change d.
@@ -25,4 +25,4 @@ struct StateInformation {
 /// Root S of an information matrix, S^T S = covariance^-1.
 StateMatrix RootInformation(const StateMatrix& covariance);
 
-}  // namespace livemap
+}  // namespace livemap::localization

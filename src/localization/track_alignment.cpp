@@ -6,7 +6,7 @@
 
 #include "localization/median.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 constexpr std::size_t kTriedEnds = 24;  // Pairs of so many evenly chosen places are tried.
@@ -109,4 +109,4 @@ std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, do
   return best;
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

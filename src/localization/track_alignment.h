@@ -6,7 +6,7 @@
 
 #include "localization/planar.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// The same place in the odometry's track and by a fix on the map.
 struct TrackPair {
@@ -36,4 +36,4 @@ struct TrackAlignment {
 std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, double gate,
                                          std::size_t min_pairs);
 
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -8,7 +8,7 @@
 #include "localization/fix_measurement.h"
 #include "localization/odometry_track.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// Of the vehicle at one moment: east, north (m), yaw from east to north (rad), and the receiver's
 /// shared error, east and north, in units of its standard deviation.
@@ -116,4 +116,4 @@ struct PriorFactor {
 };
 using PriorCost = ceres::AutoDiffCostFunction<PriorFactor, kStateSize, kNodeSize, kCalibrationSize>;
 
-}  // namespace livemap
+}  // namespace livemap::localization

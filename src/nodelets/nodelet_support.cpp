@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 double SteadyS() { return ros::SteadyTime::now().toSec(); }
 
@@ -18,4 +18,4 @@ void InitializeOrExplain(const std::string& nodelet_name, const std::function<vo
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// A warning that still holds is said again after this time.
 constexpr double kSayAgainS = 60;
@@ -15,4 +15,4 @@ double SteadyS();
 /// rethrown, so that the manager reports a failed load and lives on.
 void InitializeOrExplain(const std::string& nodelet_name, const std::function<void()>& initialize);
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -9,16 +9,16 @@
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/localization_conversions.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 VehicleTf::VehicleTf(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
-                             std::string base_frame)
+                     std::string base_frame)
     : nodelet_name_(std::move(nodelet_name)),
       map_frame_(std::move(map_frame)),
       base_frame_(std::move(base_frame)),
       listener_(buffer_, node) {}
 
-std::optional<TrackPose> VehicleTf::FusedPose(const nav_msgs::Odometry& message) const {
+std::optional<geo::TrackPose> VehicleTf::FusedPose(const nav_msgs::Odometry& message) const {
   if (message.header.frame_id != map_frame_ || message.child_frame_id != base_frame_) {
     ROS_WARN_THROTTLE(kSayAgainS,
                       "%s: dropped a fused pose of '%s' in '%s': wanted is '%s' in '%s'",
@@ -28,8 +28,8 @@ std::optional<TrackPose> VehicleTf::FusedPose(const nav_msgs::Odometry& message)
   }
   try {
     const auto transform = buffer_.lookupTransform("earth", map_frame_, ros::Time(0));
-    const LocalFrame map(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
-    return ToTrackPose(message, map);
+    const geo::LocalFrame map(geo::DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
+    return ros_io::ToTrackPose(message, map);
   } catch (const tf2::TransformException& error) {
     ROS_WARN_THROTTLE(kSayAgainS, "%s: dropped a fused pose: %s", nodelet_name_.c_str(),
                       error.what());
@@ -51,4 +51,4 @@ std::optional<Eigen::Isometry3d> VehicleTf::Mounting(const std::string& optical_
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

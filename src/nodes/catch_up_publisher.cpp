@@ -5,7 +5,7 @@
 
 #include "ros/conversions/hazard_conversions.h"
 
-namespace livemap {
+namespace livemap::nodes {
 namespace {
 
 constexpr std::size_t kPortion = 200;
@@ -14,20 +14,20 @@ constexpr int kMaxMade = 2;
 
 }  // namespace
 
-CatchUpPublisher::CatchUpPublisher(const ZoneService& zone, NoticePictures& pictures,
-                             const ros::Publisher& publisher, const Config& config)
+CatchUpPublisher::CatchUpPublisher(const zone::ZoneService& zone, NoticePictures& pictures,
+                                   const ros::Publisher& publisher, const Config& config)
     : zone_(zone), pictures_(pictures), publisher_(publisher), config_(config) {}
 
 /// All that drivers are told of around the place: the nearest, and the radius that those fill.
 void CatchUpPublisher::CollectAll(CatchUp& telling) const {
-  CatchUpOrder& order = telling.order;
+  zone::CatchUpOrder& order = telling.order;
   order.since = 0;
   telling.hazards = zone_.QueryNear(order.centre, config_.radius_m, config_.max_hazards);
   if (telling.hazards.size() < config_.max_hazards) return;
   telling.radius_m =
       telling.hazards.empty()
           ? 0
-          : GeodesicDistanceM(order.centre, telling.hazards.back().position) * (1 - 1e-6);
+          : geo::GeodesicDistanceM(order.centre, telling.hazards.back().position) * (1 - 1e-6);
 }
 
 void CatchUpPublisher::Begin() {
@@ -38,7 +38,7 @@ void CatchUpPublisher::Begin() {
   telling.picture_bytes = config_.picture_bytes;
   // Before the hazards: what is announced in between is told twice rather than not at all.
   telling.up_to = zone_.AnnouncedSequence();
-  const CatchUpOrder& order = telling.order;
+  const zone::CatchUpOrder& order = telling.order;
   if (order.since > 0) {
     telling.hazards =
         zone_.ChangedAround(order.centre, config_.radius_m, order.since, config_.max_hazards + 1);
@@ -49,12 +49,14 @@ void CatchUpPublisher::Begin() {
 
 /// Publishes the next hazard; false when its picture is to be made in the next portion.
 bool CatchUpPublisher::Tell(CatchUp& telling, int& made) {
-  const CatchUpOrder& order = telling.order;
-  const Hazard& hazard = telling.hazards[telling.told];
-  const HazardAction there = order.since == 0 ? HazardAction::kAdded : HazardAction::kUpdated;
-  const HazardAction action = IsTold(hazard.state) ? there : HazardAction::kRemoved;
-  HazardNotice notice = ToVehicleMessage(hazard, action, order.vehicle_id);
-  const bool is_new = action != HazardAction::kRemoved && telling.picture_bytes > 0;
+  const zone::CatchUpOrder& order = telling.order;
+  const zone::Hazard& hazard = telling.hazards[telling.told];
+  const zone::HazardAction there =
+      order.since == 0 ? zone::HazardAction::kAdded : zone::HazardAction::kUpdated;
+  const zone::HazardAction action =
+      zone::IsTold(hazard.state) ? there : zone::HazardAction::kRemoved;
+  HazardNotice notice = ros_io::ToVehicleMessage(hazard, action, order.vehicle_id);
+  const bool is_new = action != zone::HazardAction::kRemoved && telling.picture_bytes > 0;
   if (is_new && telling.picture_bytes >= pictures_.max_bytes()) {
     if (!pictures_.IsReady(hazard.image_sha256) && ++made > kMaxMade) return false;
     notice.image.data = pictures_.Get(hazard.image_sha256);
@@ -73,14 +75,14 @@ std::optional<std::string> CatchUpPublisher::PublishBatch(std::int64_t now_ns) {
     Begin();
   }
   CatchUp& telling = *current_;
-  const CatchUpOrder& order = telling.order;
+  const zone::CatchUpOrder& order = telling.order;
   const std::size_t end = std::min(telling.told + kPortion, telling.hazards.size());
   int made = 0;
   while (telling.told < end && Tell(telling, made)) {
   }
   if (telling.told < telling.hazards.size()) return std::nullopt;
-  Notice done;
-  done.action = Notice::Action::kCaughtUp;
+  protocol::Notice done;
+  done.action = protocol::Notice::Action::kCaughtUp;
   done.vehicle_id = order.vehicle_id;
   done.sequence = telling.up_to;
   done.previous_sequence = order.known > telling.up_to ? order.known : order.since;
@@ -88,11 +90,11 @@ std::optional<std::string> CatchUpPublisher::PublishBatch(std::int64_t now_ns) {
   done.radius_m = telling.radius_m;
   done.told = static_cast<std::uint32_t>(telling.hazards.size());
   done.stamp_ns = now_ns;
-  publisher_.publish(ToMessage(done));
+  publisher_.publish(ros_io::ToMessage(done));
   ++notices_;
   std::string vehicle = order.vehicle_id;
   current_.reset();
   return vehicle;
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodes

@@ -11,7 +11,7 @@
 #include "zone/service/catch_up.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::nodes {
 
 /// Tells single vehicles what they missed or have around them, in portions, so that notices of new
 /// hazards are not held up and nobody's queue overflows. The first hazards that are new to the
@@ -25,10 +25,10 @@ class CatchUpPublisher {
   };
 
   /// `zone` and `pictures` outlive it.
-  CatchUpPublisher(const ZoneService& zone, NoticePictures& pictures, const ros::Publisher& publisher,
-                const Config& config);
+  CatchUpPublisher(const zone::ZoneService& zone, NoticePictures& pictures,
+                   const ros::Publisher& publisher, const Config& config);
 
-  void Add(CatchUpOrder order) { orders_.push_back(std::move(order)); }
+  void Add(zone::CatchUpOrder order) { orders_.push_back(std::move(order)); }
   bool busy() const { return current_.has_value() || !orders_.empty(); }
   /// Publishes the next portion. Returns the vehicle that has been told everything, if one has.
   std::optional<std::string> PublishBatch(std::int64_t now_ns);
@@ -36,10 +36,10 @@ class CatchUpPublisher {
 
  private:
   struct CatchUp {
-    CatchUpOrder order;
+    zone::CatchUpOrder order;
     std::uint64_t up_to = 0;
     double radius_m = 0;
-    std::vector<Hazard> hazards;
+    std::vector<zone::Hazard> hazards;
     std::size_t told = 0;
     std::size_t picture_bytes = 0;  ///< What is left of them.
   };
@@ -48,13 +48,13 @@ class CatchUpPublisher {
   void CollectAll(CatchUp& telling) const;
   bool Tell(CatchUp& telling, int& made);
 
-  const ZoneService& zone_;
+  const zone::ZoneService& zone_;
   NoticePictures& pictures_;
   const ros::Publisher publisher_;
   const Config config_;
-  std::deque<CatchUpOrder> orders_;
+  std::deque<zone::CatchUpOrder> orders_;
   std::optional<CatchUp> current_;
   std::uint64_t notices_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodes

@@ -10,7 +10,7 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/map_change_conversions.h"
 
-namespace livemap {
+namespace livemap::nodes {
 namespace {
 
 constexpr double kRepeatS = 60.0;
@@ -18,7 +18,8 @@ constexpr std::size_t kMaxWaiting = 10000;
 
 }  // namespace
 
-MapChangeReceiver::MapChangeReceiver(ros::NodeHandle node, ZoneService& zone, std::size_t batch)
+MapChangeReceiver::MapChangeReceiver(ros::NodeHandle node, zone::ZoneService& zone,
+                                     std::size_t batch)
     : zone_(zone), batch_(batch) {
   receipt_publisher_ = node.advertise<ReportReceipt>("change/receipt", 20000);
   subscriber_ = node.subscribe("change/map_change", 1000, &MapChangeReceiver::OnMapChange, this);
@@ -26,7 +27,7 @@ MapChangeReceiver::MapChangeReceiver(ros::NodeHandle node, ZoneService& zone, st
 
 void MapChangeReceiver::OnMapChange(const MapChange& message) {
   try {
-    MapChangeReport report = FromMessage(message);
+    protocol::MapChangeReport report = ros_io::FromMessage(message);
     const std::lock_guard<std::mutex> lock(mutex_);
     ++counters_.received;
     if (waiting_.size() < kMaxWaiting) {
@@ -52,7 +53,7 @@ void MapChangeReceiver::OnMapChange(const MapChange& message) {
 }
 
 bool MapChangeReceiver::CommitWaiting() {
-  std::vector<MapChangeReport> reports;
+  std::vector<protocol::MapChangeReport> reports;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     while (!waiting_.empty() && reports.size() < batch_) {
@@ -61,12 +62,12 @@ bool MapChangeReceiver::CommitWaiting() {
     }
   }
   if (reports.empty()) return false;
-  for (const Receipt& receipt : zone_.HandleMapChanges(reports)) {
-    if (receipt.status == Receipt::Status::kRefused) {
+  for (const protocol::Receipt& receipt : zone_.HandleMapChanges(reports)) {
+    if (receipt.status == protocol::Receipt::Status::kRefused) {
       ROS_WARN_THROTTLE(kRepeatS, "map change of '%.64s' refused: %s", receipt.vehicle_id.c_str(),
                         receipt.reason.c_str());
     }
-    receipt_publisher_.publish(ToMessage(receipt));
+    receipt_publisher_.publish(ros_io::ToMessage(receipt));
   }
   return true;
 }
@@ -78,4 +79,4 @@ MapChangeReceiver::Counters MapChangeReceiver::counters() const {
   return counters;
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodes

@@ -13,7 +13,7 @@
 #include "protocol/map_change_report.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::nodes {
 
 /// Where vehicles tell the zone of map changes: `change/map_change` in, `change/receipt` out. The
 /// callbacks' thread queues, the node's worker commits.
@@ -27,7 +27,7 @@ class MapChangeReceiver {
   };
 
   /// `zone` outlives it. At most `batch` are committed at once.
-  MapChangeReceiver(ros::NodeHandle node, ZoneService& zone, std::size_t batch);
+  MapChangeReceiver(ros::NodeHandle node, zone::ZoneService& zone, std::size_t batch);
   /// Nothing is taken any more; what waits can still be committed.
   void Close() { subscriber_.shutdown(); }
 
@@ -39,13 +39,13 @@ class MapChangeReceiver {
  private:
   void OnMapChange(const MapChange& message);
 
-  ZoneService& zone_;
+  zone::ZoneService& zone_;
   const std::size_t batch_;
   mutable std::mutex mutex_;  ///< Guards the next two.
-  std::deque<MapChangeReport> waiting_;
+  std::deque<protocol::MapChangeReport> waiting_;
   Counters counters_;
   ros::Publisher receipt_publisher_;
   ros::Subscriber subscriber_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodes

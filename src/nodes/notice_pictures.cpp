@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "zone/pictures/picture_recoder.h"
 
-namespace livemap {
+namespace livemap::nodes {
 
 bool NoticePictures::IsReady(const std::string& sha256) const {
   if (max_bytes_ == 0 || sha256.empty()) return true;
@@ -38,7 +38,7 @@ std::vector<std::uint8_t> NoticePictures::Get(const std::string& sha256) {
 std::optional<std::vector<std::uint8_t>> NoticePictures::Make(const std::string& sha256) {
   const auto path = zone_.ImagePath(sha256);
   if (!path) return std::nullopt;
-  SmallPictureLimits limits;
+  zone::SmallPictureLimits limits;
   limits.max_bytes = max_bytes_;
   std::string content;
   try {
@@ -47,11 +47,11 @@ std::optional<std::vector<std::uint8_t>> NoticePictures::Make(const std::string&
     return std::nullopt;
   }
   try {
-    return SmallPicture({content.begin(), content.end()}, limits);
+    return zone::SmallPicture({content.begin(), content.end()}, limits);
   } catch (const Error&) {
     ++failed_;
     return std::vector<std::uint8_t>{};
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodes

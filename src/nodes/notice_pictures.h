@@ -12,14 +12,14 @@
 
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::nodes {
 
 /// The small pictures of notices, each made once and kept while it is among the newest.
 /// Thread-safe.
 class NoticePictures {
  public:
   /// `max_bytes` of one picture; 0: there are none.
-  NoticePictures(const ZoneService& zone, std::size_t max_bytes)
+  NoticePictures(const zone::ZoneService& zone, std::size_t max_bytes)
       : zone_(zone), max_bytes_(max_bytes) {}
 
   /// The picture of this content hash as a small JPEG; empty when there is none or it is not
@@ -36,7 +36,7 @@ class NoticePictures {
 
   std::optional<std::vector<std::uint8_t>> Make(const std::string& sha256);
 
-  const ZoneService& zone_;
+  const zone::ZoneService& zone_;
   const std::size_t max_bytes_;
   std::atomic<std::uint64_t> failed_{0};
   std::mutex making_;         ///< One picture is decoded at a time: taken before `mutex_`.
@@ -45,4 +45,4 @@ class NoticePictures {
   std::deque<std::string> order_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodes

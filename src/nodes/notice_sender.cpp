@@ -4,7 +4,7 @@
 
 #include "ros/conversions/hazard_conversions.h"
 
-namespace livemap {
+namespace livemap::nodes {
 namespace {
 
 /// While more wait, notices go without pictures: drivers must know soon.
@@ -26,7 +26,7 @@ NoticeSender::~NoticeSender() {
   thread_.join();
 }
 
-void NoticeSender::Push(const HazardEvent& event) {
+void NoticeSender::Push(const zone::HazardEvent& event) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     events_.push_back(event);
@@ -39,7 +39,7 @@ void NoticeSender::Work() {
   while (true) {
     changed_.wait(lock, [this] { return closing_ || !events_.empty(); });
     if (events_.empty()) return;
-    const HazardEvent event = std::move(events_.front());
+    const zone::HazardEvent event = std::move(events_.front());
     events_.pop_front();
     const bool with_picture = !closing_ && events_.size() < kMaxWaitingForPictures;
     lock.unlock();
@@ -48,8 +48,8 @@ void NoticeSender::Work() {
   }
 }
 
-void NoticeSender::Send(const HazardEvent& event, bool with_picture) {
-  HazardNotice notice = ToMessage(event);
+void NoticeSender::Send(const zone::HazardEvent& event, bool with_picture) {
+  HazardNotice notice = ros_io::ToMessage(event);
   if (with_picture && notice.action == HazardNotice::ADDED) {
     notice.image.data = all_pictures_.Get(event.hazard.image_sha256);
     if (!notice.image.data.empty()) {
@@ -61,4 +61,4 @@ void NoticeSender::Send(const HazardEvent& event, bool with_picture) {
   ++sent_;
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodes

@@ -12,7 +12,7 @@
 #include "nodes/notice_pictures.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::nodes {
 
 /// Tells every vehicle what the zone announces: from a thread of its own, since a small picture of
 /// a new hazard takes milliseconds, in the order of the announcements.
@@ -25,24 +25,24 @@ class NoticeSender {
   NoticeSender(const NoticeSender&) = delete;
   NoticeSender& operator=(const NoticeSender&) = delete;
 
-  void Push(const HazardEvent& event);
+  void Push(const zone::HazardEvent& event);
 
   std::uint64_t sent() const { return sent_; }
   std::uint64_t pictures() const { return pictures_; }
 
  private:
   void Work();
-  void Send(const HazardEvent& event, bool with_picture);
+  void Send(const zone::HazardEvent& event, bool with_picture);
 
   NoticePictures& all_pictures_;
   const ros::Publisher publisher_;
   std::atomic<std::uint64_t> sent_{0};
   std::atomic<std::uint64_t> pictures_{0};
   std::mutex mutex_;  ///< Guards the next two.
-  std::deque<HazardEvent> events_;
+  std::deque<zone::HazardEvent> events_;
   bool closing_ = false;
   std::condition_variable changed_;
   std::thread thread_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodes

@@ -34,10 +34,10 @@ int main(int argc, char** argv) {
   try {
     ros::NodeHandle node;
     ros::NodeHandle private_node("~");
-    livemap::ParameterReader parameters(private_node);
-    livemap::ZoneNode zone(
+    livemap::ros_io::ParameterReader parameters(private_node);
+    livemap::nodes::ZoneNode zone(
         node, private_node,
-        livemap::ReadZoneCloudletConfig(parameters, ros::package::getPath("livemap")));
+        livemap::ros_io::ReadZoneCloudletConfig(parameters, ros::package::getPath("livemap")));
     ros::spin();
   } catch (const std::exception& error) {
     std::cerr << "zone_cloudlet: " << error.what() << "\n";

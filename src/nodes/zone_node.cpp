@@ -11,7 +11,7 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
 
-namespace livemap {
+namespace livemap::nodes {
 namespace {
 
 constexpr double kSayAgainS = 60.0;
@@ -38,7 +38,7 @@ std::int64_t SteadyNs() {
 }  // namespace
 
 ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
-                   ZoneCloudletConfig config)
+                   ros_io::ZoneCloudletConfig config)
     : config_(std::move(config)),
       zone_(config_.zone, NowNs, EntropySeededGenerator()()),
       queue_(static_cast<std::size_t>(config_.queue_reports),
@@ -60,10 +60,10 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       zone_, pictures_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000), telling);
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (config_.web) {
-    web_ = std::make_unique<WebServer>(config_.web_options, zone_, config_.zone.catalogue);
+    web_ = std::make_unique<web::WebServer>(config_.web_options, zone_, config_.zone.catalogue);
     private_node.setParam("/livemap/web_port", web_->port());
   }
-  subscription_ = zone_.Subscribe([this](const ZoneEvent& event) { OnEvent(event); });
+  subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { OnEvent(event); });
   worker_ = std::thread([this] { WorkUntilClosed(); });
   updater_.setHardwareID("zone_cloudlet");
   updater_.add("zone", this, &ZoneNode::Diagnose);
@@ -77,7 +77,7 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       node.subscribe("hazard/poll_answer", 1000, &ZoneNode::OnAnswer, this),
   };
   SayReady();
-  const StoreDamage damage = zone_.Statistics().store_damage;
+  const zone::StoreDamage damage = zone_.Statistics().store_damage;
   if (damage.rows > 0) {
     ROS_ERROR(
         "the store in '%s' holds %zu rows that this program did not write; they are left "
@@ -115,12 +115,12 @@ void ZoneNode::Count(const Change& change) {
 }
 
 void ZoneNode::OnReport(const HazardReportConstPtr& message) {
-  Count([](ZoneCloudletCounters& counters) { ++counters.reports_received; });
-  Report report;
+  Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.reports_received; });
+  protocol::Report report;
   try {
-    report = FromMessage(*message);
+    report = ros_io::FromMessage(*message);
   } catch (const Error& error) {
-    Count([](ZoneCloudletCounters& counters) { ++counters.reports_malformed; });
+    Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.reports_malformed; });
     ReportReceipt receipt;
     receipt.schema_version = ReportReceipt::SCHEMA_VERSION;
     receipt.status = ReportReceipt::REFUSED;
@@ -132,7 +132,7 @@ void ZoneNode::OnReport(const HazardReportConstPtr& message) {
     return;
   }
   if (queue_.Push(std::move(report))) return;
-  Count([](ZoneCloudletCounters& counters) { ++counters.reports_not_queued; });
+  Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.reports_not_queued; });
   ROS_WARN_THROTTLE(kSayAgainS,
                     "%zu reports wait for a commit: further ones are not taken until "
                     "their vehicles send them again",
@@ -141,17 +141,17 @@ void ZoneNode::OnReport(const HazardReportConstPtr& message) {
 
 void ZoneNode::OnPosition(const VehiclePosition& message) {
   try {
-    const VehicleState vehicle = FromMessage(message);
+    const zone::VehicleState vehicle = ros_io::FromMessage(message);
     if (zone_.UpdateVehicle(vehicle)) RecordNewReports(vehicle, message.map_sequence);
   } catch (const Error& error) {
-    Count([](ZoneCloudletCounters& counters) { ++counters.positions_malformed; });
+    Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.positions_malformed; });
     ROS_WARN_THROTTLE(kSayAgainS, "vehicle position dropped: %s", error.what());
   }
 }
 
 void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
   try {
-    PollAnswer answer = ToPollAnswer(message);
+    zone::PollAnswer answer = ros_io::ToPollAnswer(message);
     const std::lock_guard<std::mutex> lock(mutex_);
     answers_.push_back(std::move(answer));
     // The oldest have waited longest: their polls expire first.
@@ -160,14 +160,14 @@ void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
       ++counters_.answers_dropped;
     }
   } catch (const Error& error) {
-    Count([](ZoneCloudletCounters& counters) { ++counters.answers_malformed; });
+    Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.answers_malformed; });
     ROS_WARN_THROTTLE(kSayAgainS, "poll answer of '%.64s' dropped: %s", message.vehicle_id.c_str(),
                       error.what());
   }
 }
 
 /// A vehicle that is new, moved far or missed announcements: the worker tells it.
-void ZoneNode::RecordNewReports(const VehicleState& vehicle, std::uint64_t map_sequence) {
+void ZoneNode::RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence) {
   const std::uint64_t announced = zone_.AnnouncedSequence();
   const std::lock_guard<std::mutex> lock(mutex_);
   auto order =
@@ -177,11 +177,12 @@ void ZoneNode::RecordNewReports(const VehicleState& vehicle, std::uint64_t map_s
   orders_.push_back(std::move(*order));
 }
 
-void ZoneNode::OnEvent(const ZoneEvent& event) {
+void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
   // Not shown in rviz, and no vehicle is told.
   if (event.map_change) return;
   view_changed_ = true;
-  const GeoPoint place = event.hazard ? event.hazard->hazard.position : event.vehicle->position;
+  const geo::GeoPoint place =
+      event.hazard ? event.hazard->hazard.position : event.vehicle->position;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!map_) SetMap(place);
@@ -197,22 +198,22 @@ void ZoneNode::WorkUntilClosed() {
     HandleAnswers();
     LetTimePass();
     CommitMapChanges();
-    const std::vector<Report> reports = queue_.Take(static_cast<std::size_t>(config_.batch_reports),
-                                                    telling ? kTellPause : kPatience);
+    const std::vector<protocol::Report> reports = queue_.Take(
+        static_cast<std::size_t>(config_.batch_reports), telling ? kTellPause : kPatience);
     if (!reports.empty()) CommitBatch(reports);
     // Closed before the queue was found empty: nothing can have come since.
     if (closing && reports.empty()) return;
   }
 }
 
-void ZoneNode::CommitBatch(const std::vector<Report>& reports) {
+void ZoneNode::CommitBatch(const std::vector<protocol::Report>& reports) {
   try {
-    for (const Receipt& receipt : zone_.HandleBatch(reports)) {
-      if (receipt.status == Receipt::Status::kRefused) {
+    for (const protocol::Receipt& receipt : zone_.HandleBatch(reports)) {
+      if (receipt.status == protocol::Receipt::Status::kRefused) {
         ROS_WARN_THROTTLE(kSayAgainS, "report of '%.64s' refused: %s", receipt.vehicle_id.c_str(),
                           receipt.reason.c_str());
       }
-      receipt_publisher_.publish(ToMessage(receipt));
+      receipt_publisher_.publish(ros_io::ToMessage(receipt));
     }
     NoteCommit();
   } catch (const Error& error) {
@@ -229,14 +230,14 @@ void ZoneNode::CommitMapChanges() {
 }
 
 void ZoneNode::NoteCommit() {
-  Count([](ZoneCloudletCounters& counters) {
+  Count([](ros_io::ZoneCloudletCounters& counters) {
     ++counters.commits;
     counters.store_error.clear();
   });
 }
 
 void ZoneNode::NoteFailedCommit(const Error& error) {
-  Count([&error](ZoneCloudletCounters& counters) {
+  Count([&error](ros_io::ZoneCloudletCounters& counters) {
     ++counters.store_errors;
     counters.store_error = error.what();
   });
@@ -248,7 +249,7 @@ void ZoneNode::NoteFailedCommit(const Error& error) {
 bool ZoneNode::TellVehicles() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    for (CatchUpOrder& order : orders_) teller_->Add(std::move(order));
+    for (zone::CatchUpOrder& order : orders_) teller_->Add(std::move(order));
     orders_.clear();
   }
   const auto told = teller_->PublishBatch(NowNs());
@@ -259,12 +260,12 @@ bool ZoneNode::TellVehicles() {
 }
 
 void ZoneNode::HandleAnswers() {
-  std::deque<PollAnswer> answers;
+  std::deque<zone::PollAnswer> answers;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     answers.swap(answers_);
   }
-  for (const PollAnswer& answer : answers) {
+  for (const zone::PollAnswer& answer : answers) {
     try {
       zone_.HandleAnswer(answer);
     } catch (const Error& error) {
@@ -282,15 +283,15 @@ void ZoneNode::LetTimePass() {
   advanced_ns_ = now_ns;
   try {
     zone_.Advance();
-    for (const PollOrder& order : zone_.TakeDuePolls()) {
-      poll_publisher_.publish(ToMessage(order, NowNs()));
+    for (const zone::PollOrder& order : zone_.TakeDuePolls()) {
+      poll_publisher_.publish(ros_io::ToMessage(order, NowNs()));
     }
   } catch (const Error& error) {
     ROS_ERROR_THROTTLE(kSayAgainS, "hazards do not age: %s", error.what());
   }
 }
 
-void ZoneNode::SetMap(const GeoPoint& datum) {
+void ZoneNode::SetMap(const geo::GeoPoint& datum) {
   map_.emplace(datum);
   const Eigen::Isometry3d pose = map_->InEarth();
   const Eigen::Quaterniond rotation(pose.linear());
@@ -319,8 +320,8 @@ void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
     if (!map_ && hazards.empty()) return;
     if (!map_) SetMap(hazards.front().position);
     paths_.KeepOnly(vehicles);
-    markers = ZoneMarkers(hazards, vehicles, paths_, config_.zone.catalogue, *map_,
-                          config_.map_frame, ros::Time::now());
+    markers = ros_io::ZoneMarkers(hazards, vehicles, paths_, config_.zone.catalogue, *map_,
+                                  config_.map_frame, ros::Time::now());
   }
   marker_publisher_.publish(markers);
 }
@@ -328,7 +329,7 @@ void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
 void ZoneNode::OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_.force_update(); }
 
 void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  ZoneCloudletCounters counters;
+  ros_io::ZoneCloudletCounters counters;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     counters = counters_;
@@ -342,7 +343,7 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   counters.notices_sent = notices_->sent();
   counters.notice_pictures = notices_->pictures();
   counters.notice_pictures_failed = pictures_.failed();
-  DescribeZone(counters, zone_.Statistics(), status);
+  ros_io::DescribeZone(counters, zone_.Statistics(), status);
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodes

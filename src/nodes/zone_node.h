@@ -28,7 +28,7 @@
 #include "zone/service/report_queue.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::nodes {
 
 /// The zone cloudlet as a ROS node. The callbacks' thread queues reports, map changes and poll
 /// answers and takes
@@ -38,7 +38,8 @@ namespace livemap {
 class ZoneNode {
  public:
   /// Opens the store, starts the web server and subscribes. Throws Error with one sentence.
-  ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node, ZoneCloudletConfig config);
+  ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
+           ros_io::ZoneCloudletConfig config);
   /// Commits what is queued and stops.
   ~ZoneNode();
   ZoneNode(const ZoneNode&) = delete;
@@ -48,42 +49,42 @@ class ZoneNode {
   void OnReport(const HazardReportConstPtr& message);
   void OnPosition(const VehiclePosition& message);
   void OnAnswer(const HazardPollAnswer& message);
-  void OnEvent(const ZoneEvent& event);
+  void OnEvent(const zone::ZoneEvent& event);
   void OnMarkerTimer(const ros::SteadyTimerEvent&);
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&);
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   /// Makes `datum` the origin of the map frame; mutex_ is held or no other thread runs yet.
-  void SetMap(const GeoPoint& datum);
+  void SetMap(const geo::GeoPoint& datum);
   void SayReady() const;
   void WorkUntilClosed();
-  void CommitBatch(const std::vector<Report>& reports);
+  void CommitBatch(const std::vector<protocol::Report>& reports);
   void CommitMapChanges();
   void NoteCommit();
   void NoteFailedCommit(const Error& error);
-  void RecordNewReports(const VehicleState& vehicle, std::uint64_t map_sequence);
+  void RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence);
   bool TellVehicles();
   void HandleAnswers();
   void LetTimePass();
   template <typename Change>
   void Count(const Change& change);
 
-  const ZoneCloudletConfig config_;
-  ZoneService zone_;
-  ReportQueue queue_;
+  const ros_io::ZoneCloudletConfig config_;
+  zone::ZoneService zone_;
+  zone::ReportQueue queue_;
 
   std::mutex mutex_;  ///< Guards the next six.
-  ZoneCloudletCounters counters_;
-  VehiclePaths paths_;
-  std::optional<LocalFrame> map_;
-  CatchUpPlanner catch_up_;
-  std::deque<CatchUpOrder> orders_;  ///< Not yet the worker's.
-  std::deque<PollAnswer> answers_;
+  ros_io::ZoneCloudletCounters counters_;
+  ros_io::VehiclePaths paths_;
+  std::optional<geo::LocalFrame> map_;
+  zone::CatchUpPlanner catch_up_;
+  std::deque<zone::CatchUpOrder> orders_;  ///< Not yet the worker's.
+  std::deque<zone::PollAnswer> answers_;
 
   MapChangeReceiver map_changes_;
   NoticePictures pictures_;
   std::unique_ptr<CatchUpPublisher> teller_;  ///< The worker's.
-  std::int64_t advanced_ns_ = 0;           ///< The worker's: when time last passed, steady.
+  std::int64_t advanced_ns_ = 0;              ///< The worker's: when time last passed, steady.
   std::unique_ptr<NoticeSender> notices_;
   std::atomic<bool> view_changed_{true};
   ros::Publisher receipt_publisher_;
@@ -94,8 +95,8 @@ class ZoneNode {
   std::vector<ros::SteadyTimer> timers_;
   diagnostic_updater::Updater updater_;
   int subscription_ = 0;
-  std::unique_ptr<WebServer> web_;
+  std::unique_ptr<web::WebServer> web_;
   std::thread worker_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodes

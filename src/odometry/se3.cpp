@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr double kSmallAngleRad = 1e-4;  // Below it the series' first omitted term is under 1e-17.
@@ -71,4 +71,4 @@ Eigen::Isometry3d Renormalised(const Eigen::Isometry3d& transform) {
   return result;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// Twist of SE(3): translation part first (m), then rotation part (rad).
 using Vector6d = Eigen::Matrix<double, 6, 1>;
@@ -23,4 +23,4 @@ Matrix6d Se3Adjoint(const Eigen::Isometry3d& transform);
 /// The nearest rotation, so that products of thousands of poses stay poses.
 Eigen::Isometry3d Renormalised(const Eigen::Isometry3d& transform);
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -7,7 +7,7 @@
 
 #include "placement/road_ground_contact.h"
 
-namespace livemap {
+namespace livemap::placement {
 namespace {
 
 constexpr double kBandShare = 0.15;  // Of the box's height that is its foot.
@@ -62,7 +62,8 @@ struct Foot {
   double slope_m_per_px = 0;  // How the depth changes from row to row.
 };
 
-std::optional<Foot> MeasureFoot(const DepthImage& image, const Box& box, const DepthNoise& noise) {
+std::optional<Foot> MeasureFoot(const DepthImage& image, const imaging::Box& box,
+                                const DepthNoise& noise) {
   // Box edges count from the first pixel's outer corner.
   const int left = static_cast<int>(std::floor(0.75 * box.x_min + 0.25 * box.x_max));
   const int right = static_cast<int>(std::ceil(0.25 * box.x_min + 0.75 * box.x_max));
@@ -79,7 +80,7 @@ std::optional<Foot> MeasureFoot(const DepthImage& image, const Box& box, const D
   return foot;
 }
 
-bool Fits(const DepthImage& image, const Box& box, const CameraIntrinsics& camera) {
+bool Fits(const DepthImage& image, const imaging::Box& box, const geo::CameraIntrinsics& camera) {
   const bool is_depth = image.depth.type() == CV_32FC1 || image.depth.type() == CV_16UC1;
   // A box may hang over the image's edge, but not by more than its size.
   const double most = 2.0 * std::max(image.depth.cols, image.depth.rows);
@@ -91,11 +92,11 @@ bool Fits(const DepthImage& image, const Box& box, const CameraIntrinsics& camer
 
 }  // namespace
 
-std::optional<GroundPoint> ContactByDepth(const DepthImage& image, const Box& box,
-                                       const CameraIntrinsics& intrinsics,
-                                       const Eigen::Isometry3d& base_from_optical,
-                                       const GroundProjectionNoise& noise,
-                                       const DepthNoise& depth_noise) {
+std::optional<geo::GroundPoint> ContactByDepth(const DepthImage& image, const imaging::Box& box,
+                                               const geo::CameraIntrinsics& intrinsics,
+                                               const Eigen::Isometry3d& base_from_optical,
+                                               const geo::GroundProjectionNoise& noise,
+                                               const DepthNoise& depth_noise) {
   if (!Fits(image, box, intrinsics) || !base_from_optical.matrix().allFinite()) return std::nullopt;
   const auto foot = MeasureFoot(image, box, depth_noise);
   if (!foot) return std::nullopt;
@@ -118,10 +119,10 @@ std::optional<GroundPoint> ContactByDepth(const DepthImage& image, const Box& bo
   weighted.col(0) = rotation.col(0).head<2>() * (depth_m / intrinsics.fx * noise.pixel_sigma_px);
   weighted.col(1) = direction.head<2>() * depth_sigma_m;
   weighted.col(2) = Eigen::Vector3d::UnitY().cross(from_camera_m).head<2>() * noise.pitch_sigma_rad;
-  GroundPoint point;
+  geo::GroundPoint point;
   point.position_m = point_m.head<2>();
   point.covariance_m2 = weighted * weighted.transpose();
   return point;
 }
 
-}  // namespace livemap
+}  // namespace livemap::placement

@@ -8,7 +8,7 @@
 #include "geo/ground_projection.h"
 #include "imaging/box.h"
 
-namespace livemap {
+namespace livemap::placement {
 
 /// Distance along the camera's optical axis, pixel by pixel, registered to the rectified image.
 struct DepthImage {
@@ -33,10 +33,10 @@ struct DepthNoise {
 /// (half sky, half post), the point lies nowhere near the road, or the image is none of this
 /// camera's. The covariance holds the scatter over the foot, what the box's lower edge (noise's
 /// pixels) changes where the depth changes from row to row, the shared error, and pitch.
-std::optional<GroundPoint> ContactByDepth(const DepthImage& image, const Box& box,
-                                       const CameraIntrinsics& intrinsics,
-                                       const Eigen::Isometry3d& base_from_optical,
-                                       const GroundProjectionNoise& noise,
-                                       const DepthNoise& depth_noise);
+std::optional<geo::GroundPoint> ContactByDepth(const DepthImage& image, const imaging::Box& box,
+                                               const geo::CameraIntrinsics& intrinsics,
+                                               const Eigen::Isometry3d& base_from_optical,
+                                               const geo::GroundProjectionNoise& noise,
+                                               const DepthNoise& depth_noise);
 
-}  // namespace livemap
+}  // namespace livemap::placement

@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::placement {
 
-PlacedHazard PlaceHazard(const TrackPose& antenna, const Eigen::Vector2d& antenna_in_base_m,
-                         const GroundPoint& ground) {
+PlacedHazard PlaceHazard(const geo::TrackPose& antenna, const Eigen::Vector2d& antenna_in_base_m,
+                         const geo::GroundPoint& ground) {
   const double sine = std::sin(antenna.course_rad);
   const double cosine = std::cos(antenna.course_rad);
   // Columns: base_link's forward and left axes in east-north coordinates.
@@ -16,7 +16,7 @@ PlacedHazard PlaceHazard(const TrackPose& antenna, const Eigen::Vector2d& antenn
   const Eigen::Vector2d swing_m(from_antenna_m.y(), -from_antenna_m.x());
 
   PlacedHazard placed;
-  placed.position = LocalFrame(antenna.position).ToGeo(from_antenna_m);
+  placed.position = geo::LocalFrame(antenna.position).ToGeo(from_antenna_m);
   placed.covariance_m2 =
       antenna.covariance_m2 + enu_from_base * ground.covariance_m2 * enu_from_base.transpose() +
       antenna.course_variance_rad2 * swing_m * swing_m.transpose() +
@@ -24,4 +24,4 @@ PlacedHazard PlaceHazard(const TrackPose& antenna, const Eigen::Vector2d& antenn
   return placed;
 }
 
-}  // namespace livemap
+}  // namespace livemap::placement

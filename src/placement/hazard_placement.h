@@ -6,11 +6,11 @@
 #include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::placement {
 
 /// A place on the map with its uncertainty.
 struct PlacedHazard {
-  GeoPoint position;
+  geo::GeoPoint position;
   Eigen::Matrix2d covariance_m2;  ///< East-north axes, m^2.
 };
 
@@ -20,7 +20,7 @@ struct PlacedHazard {
 /// antenna's place in base_link (x forward, y left, metres) and `ground` the point in base_link.
 /// The covariance sums those of the fix and of the projection and what the course's error does at
 /// that distance, to first order. Assumes that the vehicle drives the way it points.
-PlacedHazard PlaceHazard(const TrackPose& antenna, const Eigen::Vector2d& antenna_in_base_m,
-                         const GroundPoint& ground);
+PlacedHazard PlaceHazard(const geo::TrackPose& antenna, const Eigen::Vector2d& antenna_in_base_m,
+                         const geo::GroundPoint& ground);
 
-}  // namespace livemap
+}  // namespace livemap::placement

@@ -6,7 +6,7 @@
 #include "placement/hazard_placement.h"
 #include "placement/road_ground_contact.h"
 
-namespace livemap {
+namespace livemap::placement {
 namespace {
 
 constexpr double kNearestM = 0.5;      // Along the optical axis; nearer counts as behind.
@@ -22,14 +22,14 @@ std::optional<Eigen::Vector2d> Project(const Eigen::Vector2d& east_north_m,
                                   -cosine * east_north_m.x() + sine * east_north_m.y(), 0.0);
   const Eigen::Vector3d optical_m = camera.base_from_optical.inverse() * in_base_m;
   if (!(optical_m.z() > kNearestM)) return std::nullopt;
-  const CameraIntrinsics& k = camera.intrinsics;
+  const geo::CameraIntrinsics& k = camera.intrinsics;
   return Eigen::Vector2d(k.fx * optical_m.x() / optical_m.z() + k.cx,
                          k.fy * optical_m.y() / optical_m.z() + k.cy);
 }
 
 /// Of the place seen from base_link: its own, the position's and what the heading does to it.
 Eigen::Matrix2d RelativeCovariance(const Eigen::Vector2d& east_north_m,
-                                   const Eigen::Matrix2d& place_m2, const TrackPose& base) {
+                                   const Eigen::Matrix2d& place_m2, const geo::TrackPose& base) {
   const Eigen::Vector2d swing_m(east_north_m.y(), -east_north_m.x());
   return place_m2 + base.covariance_m2 + base.course_variance_rad2 * swing_m * swing_m.transpose() +
          swing_m * base.position_course.transpose() + base.position_course * swing_m.transpose();
@@ -42,11 +42,11 @@ bool IsInside(double pixel, double sigma_px, int size, double margin_share) {
 
 }  // namespace
 
-ProjectedPlace ProjectPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
-                    const PlacedCamera& camera, const GroundProjectionNoise& noise,
-                    double margin_share) {
+ProjectedPlace ProjectPlace(const geo::GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
+                            const PlacedCamera& camera, const geo::GroundProjectionNoise& noise,
+                            double margin_share) {
   ProjectedPlace view;
-  const Eigen::Vector2d place_m = LocalFrame(camera.base.position).ToEnu(place);
+  const Eigen::Vector2d place_m = geo::LocalFrame(camera.base.position).ToEnu(place);
   view.distance_m = place_m.norm();
   const auto pixel = Project(place_m, camera);
   const auto east = Project(place_m + Eigen::Vector2d(kStepM, 0), camera);
@@ -64,16 +64,18 @@ ProjectedPlace ProjectPlace(const GeoPoint& place, const Eigen::Matrix2d& covari
                                camera.intrinsics.width, margin_share) &&
                       IsInside(pixel->y(), std::sqrt(view.covariance_px2(1, 1)),
                                camera.intrinsics.height, margin_share);
-  view.visibility = inside ? ProjectedPlace::Visibility::kInside : ProjectedPlace::Visibility::kOutside;
+  view.visibility =
+      inside ? ProjectedPlace::Visibility::kInside : ProjectedPlace::Visibility::kOutside;
   return view;
 }
 
-bool IsAtPlace(const Box& box, const GeoPoint& place, const ProjectedPlace& view,
-               const PlacedCamera& camera, const GroundProjectionNoise& noise, double gate_sigma,
-               double radius_m) {
+bool IsAtPlace(const imaging::Box& box, const geo::GeoPoint& place, const ProjectedPlace& view,
+               const PlacedCamera& camera, const geo::GroundProjectionNoise& noise,
+               double gate_sigma, double radius_m) {
   if (view.visibility == ProjectedPlace::Visibility::kBehind) return false;
   const Eigen::Vector2d foot = ContactPixel(box);
-  const auto ground = ProjectToGround(foot, camera.intrinsics, camera.base_from_optical, noise);
+  const auto ground =
+      geo::ProjectToGround(foot, camera.intrinsics, camera.base_from_optical, noise);
   // Far away a few pixels are many metres: it could be another one behind or before the place.
   if (!ground || LargestSigmaM(ground->covariance_m2) > radius_m / 2) return false;
   const Eigen::Vector2d apart_px = foot - view.pixel;
@@ -81,7 +83,7 @@ bool IsAtPlace(const Box& box, const GeoPoint& place, const ProjectedPlace& view
     return true;
   }
   const PlacedHazard placed = PlaceHazard(camera.base, Eigen::Vector2d::Zero(), *ground);
-  return GeodesicDistanceM(placed.position, place) <= radius_m;
+  return geo::GeodesicDistanceM(placed.position, place) <= radius_m;
 }
 
-}  // namespace livemap
+}  // namespace livemap::placement

@@ -7,12 +7,12 @@
 #include "geo/vehicle_pose.h"
 #include "imaging/box.h"
 
-namespace livemap {
+namespace livemap::placement {
 
 /// A camera on a vehicle at the moment of one image.
 struct PlacedCamera {
-  TrackPose base;  ///< Of base_link; its course is the heading.
-  CameraIntrinsics intrinsics;
+  geo::TrackPose base;  ///< Of base_link; its course is the heading.
+  geo::CameraIntrinsics intrinsics;
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
 };
 
@@ -33,16 +33,16 @@ struct ProjectedPlace {
 /// Projects a place on the road, known with `covariance_m2` (east-north, m^2), into the image. It
 /// is kInside when the pixel and two standard deviations around it keep `margin_share` of the
 /// image's sides away from its edges. The road is the plane z = 0 of base_link.
-ProjectedPlace ProjectPlace(const GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
-                    const PlacedCamera& camera, const GroundProjectionNoise& noise,
-                    double margin_share);
+ProjectedPlace ProjectPlace(const geo::GeoPoint& place, const Eigen::Matrix2d& covariance_m2,
+                            const PlacedCamera& camera, const geo::GroundProjectionNoise& noise,
+                            double margin_share);
 
 /// Whether a detection's box can be the thing at the place that `view` shows: the middle of its
 /// bottom edge lies within `gate_sigma` standard deviations of the place's pixel, or its own place
 /// on the road within `radius_m` of `place`. Never one whose place on the road, seen from the
 /// vehicle, is less certain than half that radius (standard deviation).
-bool IsAtPlace(const Box& box, const GeoPoint& place, const ProjectedPlace& view,
-               const PlacedCamera& camera, const GroundProjectionNoise& noise, double gate_sigma,
-               double radius_m);
+bool IsAtPlace(const imaging::Box& box, const geo::GeoPoint& place, const ProjectedPlace& view,
+               const PlacedCamera& camera, const geo::GroundProjectionNoise& noise,
+               double gate_sigma, double radius_m);
 
-}  // namespace livemap
+}  // namespace livemap::placement

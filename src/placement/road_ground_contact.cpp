@@ -5,7 +5,7 @@
 
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::placement {
 namespace {
 
 constexpr double kSidePx = 1.5;  // A detector's box ends within so many pixels of the side.
@@ -13,20 +13,20 @@ constexpr double kSidePx = 1.5;  // A detector's box ends within so many pixels 
 }  // namespace
 
 bool IsWellFormed(const Sighting& sighting) {
-  const Box& box = sighting.box;
+  const imaging::Box& box = sighting.box;
   const bool finite = std::isfinite(box.x_min) && std::isfinite(box.y_min) &&
                       std::isfinite(box.x_max) && std::isfinite(box.y_max);
   return finite && box.x_min < box.x_max && box.y_min < box.y_max && sighting.confidence >= 0 &&
          sighting.confidence <= 1 && !sighting.class_name.empty() &&
-         sighting.class_name.size() <= kMaxClassNameBytes;
+         sighting.class_name.size() <= protocol::kMaxClassNameBytes;
 }
 
-Eigen::Vector2d ContactPixel(const Box& box) {
+Eigen::Vector2d ContactPixel(const imaging::Box& box) {
   return {0.5 * (static_cast<double>(box.x_min) + static_cast<double>(box.x_max)) - 0.5,
           static_cast<double>(box.y_max) - 0.5};
 }
 
-bool IsCutBySide(const Box& box, double image_width) {
+bool IsCutBySide(const imaging::Box& box, double image_width) {
   return static_cast<double>(box.x_min) < kSidePx ||
          static_cast<double>(box.x_max) > image_width - kSidePx;
 }
@@ -36,7 +36,7 @@ double LargestSigmaM(const Eigen::Matrix2d& covariance_m2) {
   return std::sqrt(axes.eigenvalues().maxCoeff());
 }
 
-bool IsNearEnough(const GroundPoint& foot, double heading_variance_rad2, double max_range_m,
+bool IsNearEnough(const geo::GroundPoint& foot, double heading_variance_rad2, double max_range_m,
                   double max_sigma_m) {
   const Eigen::Vector2d swing_m(foot.position_m.y(), -foot.position_m.x());
   const Eigen::Matrix2d seen_from_vehicle_m2 =
@@ -45,4 +45,4 @@ bool IsNearEnough(const GroundPoint& foot, double heading_variance_rad2, double 
          LargestSigmaM(seen_from_vehicle_m2) <= max_sigma_m;
 }
 
-}  // namespace livemap
+}  // namespace livemap::placement

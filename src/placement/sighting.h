@@ -5,13 +5,13 @@
 #include <vector>
 
 #include "imaging/box.h"
-namespace livemap {
+namespace livemap::placement {
 
 /// One thing that the detector saw in an image.
 struct Sighting {
   std::string class_name;
   float confidence = 0;
-  Box box;
+  imaging::Box box;
 };
 
 /// What the detector saw in one image.
@@ -23,4 +23,4 @@ struct SightingFrame {
   std::vector<Sighting> sightings;
 };
 
-}  // namespace livemap
+}  // namespace livemap::placement

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-namespace livemap {
+namespace livemap::protocol {
 namespace {
 
 struct ChangeClassDescription {
@@ -32,4 +32,4 @@ std::array<std::uint8_t, 3> ChangeClassColour(ChangeClass change_class) {
   return kChangeClassDescriptions[static_cast<std::size_t>(change_class)].rgb;
 }
 
-}  // namespace livemap
+}  // namespace livemap::protocol

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-namespace livemap {
+namespace livemap::protocol {
 
 /// What changed between two drives down one street, the ten classes of VL-CMU-CD. The values are
 /// those of the masks and the order is that of the channels of a prediction.
@@ -31,4 +31,4 @@ const char* ChangeClassName(ChangeClass change_class);
 /// Red, green, blue as the published ground truth paints it, white for no change.
 std::array<std::uint8_t, 3> ChangeClassColour(ChangeClass change_class);
 
-}  // namespace livemap
+}  // namespace livemap::protocol

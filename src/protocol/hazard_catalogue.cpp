@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::protocol {
 namespace {
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
@@ -192,4 +192,4 @@ double HazardCatalogue::MaxDuplicateRadiusM() const {
   return radius_m;
 }
 
-}  // namespace livemap
+}  // namespace livemap::protocol

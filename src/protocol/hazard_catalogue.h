@@ -3,7 +3,7 @@
 #include <map>
 #include <string>
 
-namespace livemap {
+namespace livemap::protocol {
 
 /// What LiveMap knows about one class of hazards. The defaults serve classes that the catalogue
 /// does not name.
@@ -46,4 +46,4 @@ class HazardCatalogue {
   std::map<std::string, HazardClass> classes_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::protocol

@@ -7,7 +7,7 @@
 #include "common/uuid.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::protocol {
 
 /// One object that one vehicle found changed since an earlier drive: msg/MapChange.msg.
 struct MapChangeReport {
@@ -21,8 +21,8 @@ struct MapChangeReport {
   float confidence = 0;               ///< 0..1.
   std::uint32_t seen = 0;             ///< Images that show it,
   std::uint32_t missed = 0;           ///< and that should, but do not.
-  GeoPoint position;                  ///< Of its foot on the road.
+  geo::GeoPoint position;             ///< Of its foot on the road.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< East-north axes.
 };
 
-}  // namespace livemap
+}  // namespace livemap::protocol

@@ -8,7 +8,7 @@
 #include "common/uuid.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::protocol {
 
 /// The zone tells vehicles what changed on its map (HazardNotice.msg without ROS).
 struct Notice {
@@ -22,8 +22,8 @@ struct Notice {
   Uuid hazard_uuid;           ///< Nil with kCaughtUp.
   std::int64_t stamp_ns = 0;  ///< When the zone decided, zone clock (UTC).
   std::string class_name;
-  float confidence = 0;  ///< 0..1.
-  GeoPoint position;     ///< With kCaughtUp: the middle of what was told.
+  float confidence = 0;    ///< 0..1.
+  geo::GeoPoint position;  ///< With kCaughtUp: the middle of what was told.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
   std::uint32_t sightings = 0;                              ///< Reports merged so far.
   std::int64_t first_seen_ns = 0;                           ///< Image stamp of the first report.
@@ -34,4 +34,4 @@ struct Notice {
   std::vector<std::uint8_t> image;  ///< Small annotated picture; may be empty.
 };
 
-}  // namespace livemap
+}  // namespace livemap::protocol

@@ -8,7 +8,7 @@
 #include "common/uuid.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::protocol {
 
 /// What picture an answer to a poll shall bring.
 enum class PollPicture {
@@ -25,7 +25,7 @@ struct Poll {
   std::int64_t stamp_ns = 0;    ///< When the zone asked, zone clock (UTC).
   std::int64_t expires_ns = 0;  ///< An answer after this counts no more, zone clock.
   std::string class_name;
-  GeoPoint position;                                        ///< Of the hazard.
+  geo::GeoPoint position;                                   ///< Of the hazard.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
   PollPicture picture = PollPicture::kNone;
   std::uint32_t max_picture_bytes = 0;
@@ -40,12 +40,12 @@ struct PollReply {
   std::string drive_id;
   std::int64_t stamp_ns = 0;  ///< Of the image that decided, vehicle clock (UTC).
   Answer answer = Answer::kCantSee;
-  std::string reason;         ///< One sentence, why kCantSee; else empty.
-  float confidence = 0;       ///< 0..1, of kYes and kNo.
-  GeoPoint vehicle_position;  ///< At `stamp_ns`.
-  double course_rad = 0;      ///< Clockwise from true north; NaN when standing.
-  std::string image_format;   ///< "jpeg", or empty when there is no picture.
+  std::string reason;              ///< One sentence, why kCantSee; else empty.
+  float confidence = 0;            ///< 0..1, of kYes and kNo.
+  geo::GeoPoint vehicle_position;  ///< At `stamp_ns`.
+  double course_rad = 0;           ///< Clockwise from true north; NaN when standing.
+  std::string image_format;        ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;
 };
 
-}  // namespace livemap
+}  // namespace livemap::protocol

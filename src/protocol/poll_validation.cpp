@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::protocol {
 namespace {
 
 constexpr std::size_t kMaxReasonBytes = 64;
@@ -18,8 +18,8 @@ void RequireIds(const Uuid& poll, const Uuid& hazard, const std::string& name) {
               ", accepted is the uuid of one");
 }
 
-void RequirePosition(const GeoPoint& position, const std::string& name) {
-  if (IsValid(position)) return;
+void RequirePosition(const geo::GeoPoint& position, const std::string& name) {
+  if (geo::IsValid(position)) return;
   throw Error(name + " has position " + std::to_string(position.latitude_deg) + ", " +
               std::to_string(position.longitude_deg) + ", accepted are WGS84 degrees");
 }
@@ -72,4 +72,4 @@ void CheckReply(const PollReply& reply) {
   RequireShort(reply.image_format, kMaxNameBytes, "image format of a poll answer");
 }
 
-}  // namespace livemap
+}  // namespace livemap::protocol

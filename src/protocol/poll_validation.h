@@ -2,7 +2,7 @@
 
 #include "protocol/poll.h"
 
-namespace livemap {
+namespace livemap::protocol {
 
 // What came from outside is a poll, or an answer to one. Both throw Error with one sentence that
 // names the value and what is accepted: no nil ids, no numbers that are not finite or out of range,
@@ -14,4 +14,4 @@ void CheckPoll(const Poll& poll);
 /// ZoneService::HandleAnswer.
 void CheckReply(const PollReply& reply);
 
-}  // namespace livemap
+}  // namespace livemap::protocol

@@ -9,7 +9,7 @@
 #include "geo/wgs84.h"
 #include "imaging/box.h"
 
-namespace livemap {
+namespace livemap::protocol {
 
 /// Class names of detectors and of the zone may be this long.
 constexpr std::size_t kMaxClassNameBytes = 64;
@@ -22,9 +22,9 @@ struct Report {
   std::string drive_id;
   std::int64_t stamp_ns = 0;  ///< Of the image, vehicle clock (UTC), ns since 1970.
   std::string class_name;
-  float confidence = 0;  ///< 0..1.
-  Box box;               ///< In the original image.
-  GeoPoint position;     ///< Of the hazard itself on the ground.
+  float confidence = 0;    ///< 0..1.
+  imaging::Box box;        ///< In the original image.
+  geo::GeoPoint position;  ///< Of the hazard itself on the ground.
   /// Of the horizontal position, local east-north axes, m^2; symmetric, positive definite.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
   std::uint32_t image_width = 0;  ///< Of the original image, pixels.
@@ -32,7 +32,7 @@ struct Report {
   std::string image_frame_id;       ///< Optical frame of the original image.
   std::string image_format;         ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;  ///< Annotated picture as a compressed file; may be empty.
-  PixelRegion shown;                ///< What of the original image the picture shows.
+  imaging::PixelRegion shown;       ///< What of the original image the picture shows.
 };
 
 /// The zone's answer to one report.
@@ -48,4 +48,4 @@ struct Receipt {
   std::string reason;      ///< One sentence, empty when committed.
 };
 
-}  // namespace livemap
+}  // namespace livemap::protocol

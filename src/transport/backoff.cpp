@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 Backoff::Backoff(double min_s, double max_s, std::uint64_t seed)
     : min_s_(min_s), max_s_(max_s), current_s_(min_s), generator_(seed) {
@@ -22,4 +22,4 @@ double Backoff::NextDelayS() {
   return delay_s;
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

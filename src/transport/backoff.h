@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <random>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// Waiting times between attempts: doubling from `min_s` to `max_s`, each shortened at random by
 /// up to a half so that a whole fleet does not knock at the same moment.
@@ -24,4 +24,4 @@ class Backoff {
   std::mt19937_64 generator_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// Bytes that somebody else owns and keeps alive.
 struct ByteView {
@@ -11,4 +11,4 @@ struct ByteView {
   std::size_t size = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

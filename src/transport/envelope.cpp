@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'L', 'M', 'A', 'P'};
@@ -124,4 +124,4 @@ DecodedEnvelope DecodeEnvelope(ByteView bytes, std::size_t max_payload_bytes) {
   return {envelope, ""};
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -9,7 +9,7 @@
 
 #include "transport/byte_view.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 /// The wire version that this program writes, and the only one that it reads.
 inline constexpr std::uint16_t kEnvelopeVersion = 1;
@@ -44,4 +44,4 @@ struct DecodedEnvelope {
 /// what is really there, and payloads over `max_payload_bytes` are refused.
 DecodedEnvelope DecodeEnvelope(ByteView bytes, std::size_t max_payload_bytes);
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 EventFd::EventFd() : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (fd_ < 0) {
@@ -28,4 +28,4 @@ void EventFd::Clear() {
   (void)eventfd_read(fd_, &count);  // Fails only when nothing was signalled.
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace livemap {
+namespace livemap::transport {
 
 /// A flag that wakes a poll(): readable from Signal() until Clear(). Thread-safe.
 class EventFd {
@@ -19,4 +19,4 @@ class EventFd {
   int fd_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 // Far above any real message; bounds what a broken definition can make us compute.
@@ -96,4 +96,4 @@ MessageDefinition ParseMessageDefinition(const std::string& type, const std::str
   return parsed;
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

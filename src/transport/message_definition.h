@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// One field of a .msg text; constants are left out, they do not travel.
 struct DefinedField {
@@ -30,4 +30,4 @@ std::optional<std::size_t> PrimitiveBytes(const std::string& type);
 /// Error naming the line that cannot be read.
 MessageDefinition ParseMessageDefinition(const std::string& type, const std::string& definition);
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "transport/message_definition.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 constexpr std::size_t kMaxDepth = 16;
@@ -199,4 +199,4 @@ std::optional<std::string> MessageLayout::Check(ByteView payload) const {
   return walker.fault();
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -9,7 +9,7 @@
 
 #include "transport/byte_view.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 /// How long a string and how many elements a variable array of an untrusted message may have.
 struct LayoutLimits {
@@ -62,4 +62,4 @@ class MessageLayout {
   std::vector<std::size_t> roots_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

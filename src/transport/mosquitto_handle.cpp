@@ -10,7 +10,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 constexpr int kMinKeepaliveS = 5;  // libmosquitto refuses less.
@@ -136,4 +136,4 @@ std::string DescribeReason(int reason_code) {
          std::to_string(reason_code) + ")";
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -7,7 +7,7 @@
 
 #include "transport/mqtt_client.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 struct MosquittoDeleter {
   void operator()(mosquitto* handle) const { mosquitto_destroy(handle); }
@@ -39,4 +39,4 @@ std::string TlsErrorIn(const std::string& log_line);
 /// "Not authorized (MQTT reason 135)".
 std::string DescribeReason(int reason_code);
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -19,7 +19,7 @@
 #include "transport/outgoing_queue.h"
 #include "transport/tcp_probe.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 // libmosquitto's keepalive clock needs to be looked at about this often.
@@ -378,4 +378,4 @@ bool MqttClient::connected() const { return connection_->connected(); }
 
 MqttStatistics MqttClient::statistics() const { return connection_->statistics(); }
 
-}  // namespace livemap
+}  // namespace livemap::transport

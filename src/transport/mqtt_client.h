@@ -11,7 +11,7 @@
 
 #include "transport/byte_view.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 /// Mutual TLS 1.3: the broker must show a certificate that `ca_file` signed, for the name in
 /// MqttConfig::host; the client shows its own. PEM files, all three required.
@@ -39,7 +39,7 @@ struct MqttConfig {
   std::size_t queue_messages = 1000;         ///< Waiting messages, beyond which Publish refuses.
   std::size_t queue_bytes = 64 << 20;        ///< The same in bytes of payload and topic.
   std::uint32_t max_packet_bytes = 2 << 20;  ///< Told to the broker: it sends nothing larger.
-  std::optional<MqttTlsConfig> tls;         ///< Empty: plain TCP.
+  std::optional<MqttTlsConfig> tls;          ///< Empty: plain TCP.
 };
 
 struct MqttSubscription {
@@ -126,4 +126,4 @@ class MqttClient {
   std::unique_ptr<Connection> connection_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// One message on its way to the broker.
 struct OutgoingMessage {
@@ -55,4 +55,4 @@ class OutgoingQueue {
   std::size_t bytes_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -12,7 +12,7 @@
 #include <memory>
 #include <system_error>
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 std::string SystemMessage(int error) { return std::generic_category().message(error); }
@@ -70,4 +70,4 @@ TcpProbeResult ProbeTcp(const std::string& host, int port, double timeout_s, int
   return {"", "cannot reach broker " + place + ": " + SystemMessage(last_error)};
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

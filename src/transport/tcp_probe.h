@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// What a probe found: the numeric address that accepted a connection, or why there is none.
 struct TcpProbeResult {
@@ -15,4 +15,4 @@ struct TcpProbeResult {
 /// the C library alone can take longer, by its own timeout.
 TcpProbeResult ProbeTcp(const std::string& host, int port, double timeout_s, int cancel_fd);
 
-}  // namespace livemap
+}  // namespace livemap::transport

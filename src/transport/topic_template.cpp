@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 constexpr std::size_t kMaxIdBytes = 64;
@@ -110,4 +110,4 @@ std::optional<TopicNames> TopicTemplate::Match(std::string_view topic) const {
   return names;
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// True for 1 to 64 characters of [A-Za-z0-9._-] other than "." and "..": what may stand as a zone
 /// or vehicle id in an MQTT topic, as a user of the broker, and as a file name.
@@ -49,4 +49,4 @@ class TopicTemplate {
   bool has_vehicle_ = false;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

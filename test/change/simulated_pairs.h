@@ -10,12 +10,12 @@
 #include "simulation/render/lighting.h"
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Two pictures of one place from two drives, with the truth about both.
 struct SimulatedPair {
-  SimulatedFrame before;
-  SimulatedFrame after;
+  simulation::SimulatedFrame before;
+  simulation::SimulatedFrame after;
 
   /// Optical frames.
   Eigen::Isometry3d BeforeFromAfter() const {
@@ -28,43 +28,46 @@ struct SimulatedPairOptions {
   std::uint64_t seed = 3;
   std::size_t pairs = 4;
   double left_m = 0.5;  ///< The second drive beside the first one.
-  Condition second = Condition::kDay;
+  simulation::Condition second = simulation::Condition::kDay;
   double changes = 0;
   double every_m = 12;    ///< Along the street.
   double behind_m = 0.2;  ///< The first drive's camera stands this much further back.
 };
 
-inline SimulatedCamera PairCamera() {
-  SimulatedCamera camera;
-  camera.intrinsics = CameraIntrinsics{400, 400, 255.5, 191.5, 512, 384};
+inline simulation::SimulatedCamera PairCamera() {
+  simulation::SimulatedCamera camera;
+  camera.intrinsics = geo::CameraIntrinsics{400, 400, 255.5, 191.5, 512, 384};
   return camera;
 }
 
 inline std::vector<SimulatedPair> MakePairs(const SimulatedPairOptions& options) {
   constexpr double kSpeedMps = 8;
   const double length_m = 420 + options.every_m * static_cast<double>(options.pairs);
-  const auto street = [&](StreetPass::Which which) {
-    return Street(WorldDescription(), options.seed, length_m, options.second != Condition::kSnow,
-                  {which, options.changes});
+  const auto street = [&](simulation::StreetPass::Which which) {
+    return simulation::Street(simulation::WorldDescription(), options.seed, length_m,
+                              options.second != simulation::Condition::kSnow,
+                              {which, options.changes});
   };
-  const Street first_street = street(StreetPass::Which::kFirst);
-  const Street second_street = street(StreetPass::Which::kSecond);
-  CameraMounting mounting;
+  const simulation::Street first_street = street(simulation::StreetPass::Which::kFirst);
+  const simulation::Street second_street = street(simulation::StreetPass::Which::kSecond);
+  datasets::CameraMounting mounting;
   mounting.height_m = 1.4;
-  PassManner first;
+  simulation::PassManner first;
   first.speed_mps = kSpeedMps;
   first.seconds = 60;
   first.rate_hz = 50;
-  PassManner second = first;
+  simulation::PassManner second = first;
   second.left_m = options.left_m;
-  const PassDrive first_drive(first_street, first, mounting, 0);
-  const PassDrive second_drive(second_street, second, mounting, 0);
-  RenderConfig render;
+  const simulation::PassDrive first_drive(first_street, first, mounting, 0);
+  const simulation::PassDrive second_drive(second_street, second, mounting, 0);
+  simulation::RenderConfig render;
   render.smooth_edges = false;
-  StreetRenderer first_renderer(first_street, PairCamera(),
-                                MakeLighting(Condition::kDay, options.seed), render);
-  StreetRenderer second_renderer(second_street, PairCamera(),
-                                 MakeLighting(options.second, options.seed + 17), render);
+  simulation::StreetRenderer first_renderer(
+      first_street, PairCamera(),
+      simulation::MakeLighting(simulation::Condition::kDay, options.seed), render);
+  simulation::StreetRenderer second_renderer(
+      second_street, PairCamera(), simulation::MakeLighting(options.second, options.seed + 17),
+      render);
   std::vector<SimulatedPair> pairs;
   for (std::size_t i = 0; i < options.pairs; ++i) {
     const double along_m = 20 + options.every_m * static_cast<double>(i);
@@ -79,8 +82,8 @@ inline std::vector<SimulatedPair> MakePairs(const SimulatedPairOptions& options)
 
 /// Where the truth says that a pixel of the later picture lies in the earlier one; NaN without
 /// depth or behind the camera.
-inline cv::Point2d TruePlace(const SimulatedPair& pair, const CameraIntrinsics& camera, int column,
-                             int row) {
+inline cv::Point2d TruePlace(const SimulatedPair& pair, const geo::CameraIntrinsics& camera,
+                             int column, int row) {
   const auto z = static_cast<double>(pair.after.depth.at<float>(row, column));
   if (z <= 0) return {std::nan(""), std::nan("")};
   const Eigen::Vector3d point =
@@ -91,4 +94,4 @@ inline cv::Point2d TruePlace(const SimulatedPair& pair, const CameraIntrinsics& 
           camera.fy * point.y() / point.z() + camera.cy};
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 using ::testing::HasSubstr;
@@ -47,4 +47,4 @@ TEST(Comma2k19, NamesTheLineThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 using ::testing::HasSubstr;
@@ -19,7 +19,7 @@ TEST(Route, StraightRouteLeavesAtItsBearingWithoutEnd) {
   const Route route = Route::Straight({-23.5, -46.6}, kPi / 2);
   EXPECT_TRUE(std::isinf(route.length_m()));
   const RoutePose pose = route.At(500);
-  EXPECT_NEAR(GeodesicDistanceM({-23.5, -46.6}, pose.position), 500, 1e-6);
+  EXPECT_NEAR(geo::GeodesicDistanceM({-23.5, -46.6}, pose.position), 500, 1e-6);
   EXPECT_GT(pose.position.longitude_deg, -46.6);
   EXPECT_NEAR(pose.bearing_rad, kPi / 2, 1e-4);
   EXPECT_LT(route.At(-5).position.longitude_deg, -46.6);
@@ -30,8 +30,8 @@ TEST(Route, FollowsItsPiecesByDrivenDistance) {
       "properties":null,"geometry":{"type":"LineString",
       "coordinates":[[8,50],[8,50.001],[8,50.001],[8.002,50.001,120]]}}]})";
   const Route route = ParseRoute(text, "r.geojson");
-  const double first_m = GeodesicDistanceM({50, 8}, {50.001, 8});
-  const double second_m = GeodesicDistanceM({50.001, 8}, {50.001, 8.002});
+  const double first_m = geo::GeodesicDistanceM({50, 8}, {50.001, 8});
+  const double second_m = geo::GeodesicDistanceM({50.001, 8}, {50.001, 8.002});
   EXPECT_NEAR(route.length_m(), first_m + second_m, 1e-6);
   EXPECT_NEAR(route.At(first_m / 2).bearing_rad, 0, 1e-6);
   EXPECT_NEAR(route.At(first_m / 2).position.latitude_deg, 50.0005, 1e-7);
@@ -69,4 +69,4 @@ TEST(Route, RefusesAStartOffTheEarth) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

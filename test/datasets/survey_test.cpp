@@ -11,7 +11,7 @@
 #include "datasets/image_file.h"
 #include "datasets/sequences.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 using ::testing::HasSubstr;
@@ -147,4 +147,4 @@ TEST(RealData, SurveySectionsAndSequencesAreRead) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

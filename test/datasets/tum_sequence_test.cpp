@@ -9,7 +9,7 @@
 #include "datasets/sequences.h"
 #include "datasets/stamp_pairs.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -151,4 +151,4 @@ TEST(StampPairs, AreLessThanTheMaximumApart) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

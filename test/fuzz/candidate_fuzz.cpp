@@ -9,7 +9,7 @@
 
 #include "zone/offload/offload_intake.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
@@ -51,9 +51,9 @@ class Bytes {
 
 /// Numbers in the order of the message; an honest one where the first byte's bit is not set, so
 /// that the rest is reached.
-OffloadedFrame Read(Bytes& bytes) {
+protocol::OffloadedFrame Read(Bytes& bytes) {
   const auto broken = bytes.Take<std::uint8_t>();
-  OffloadedFrame candidate;
+  protocol::OffloadedFrame candidate;
   candidate.vehicle_id = (broken & 1U) != 0 ? bytes.TakeText(80) : "car-1";
   candidate.drive_id = bytes.TakeText(80);
   candidate.image_frame_id = bytes.TakeText(80);
@@ -87,26 +87,26 @@ OffloadedFrame Read(Bytes& bytes) {
 
 void FuzzCandidate(const std::uint8_t* data, std::size_t size) {
   Bytes bytes(data, size);
-  OffloadedFrame candidate = Read(bytes);
-  Sighting sighting;
+  protocol::OffloadedFrame candidate = Read(bytes);
+  placement::Sighting sighting;
   sighting.class_name = bytes.TakeText(80);
   sighting.confidence = bytes.Take<float>();
   sighting.box = {bytes.Take<float>(), bytes.Take<float>(), bytes.Take<float>(),
                   bytes.Take<float>()};
   candidate.image = bytes.Rest();
-  OffloadIntake intake{OffloadIntake::Config()};
+  zone::OffloadIntake intake{zone::OffloadIntake::Config()};
   const std::string why = intake.Add(candidate, kNowNs);
-  const OffloadIntake::Job* job = intake.Next(kNowNs, 0);
+  const zone::OffloadIntake::Job* job = intake.Next(kNowNs, 0);
   Require(why.empty() == (job != nullptr));
   Require(why.size() < 400);
   if (job == nullptr) return;
   Require(std::isfinite(candidate.base.course_rad) && candidate.base.covariance_m2.allFinite());
   Require(candidate.intrinsics.width > 0 && candidate.intrinsics.height > 0);
   const std::int64_t stamp_ns = job->internal_ns;
-  SightingFrame answer;
+  placement::SightingFrame answer;
   answer.stamp_ns = stamp_ns;
   answer.sightings = {sighting};
-  for (const Report& report : intake.Finish(stamp_ns, answer)) {
+  for (const protocol::Report& report : intake.Finish(stamp_ns, answer)) {
     Require(!report.uuid.IsNil() && report.vehicle_id == candidate.vehicle_id);
     Require(std::isfinite(report.position.latitude_deg));
     Require(std::isfinite(report.position.longitude_deg));
@@ -116,9 +116,9 @@ void FuzzCandidate(const std::uint8_t* data, std::size_t size) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzCandidate(data, size);
+  livemap::fuzz::FuzzCandidate(data, size);
   return 0;
 }

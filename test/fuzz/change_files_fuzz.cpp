@@ -9,7 +9,7 @@
 #include "change/memory/place_record.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 void Require(bool holds) {
@@ -17,21 +17,21 @@ void Require(bool holds) {
 }
 
 void FuzzRecord(const std::string& bytes) {
-  const PlaceRecord record = ParsePlaceRecord(bytes, "fuzz");
-  CheckPlaceFrame(record.frame);
-  Require(record.features.points.size() <= kMaxRecordFeatures);
+  const change::PlaceRecord record = change::ParsePlaceRecord(bytes, "fuzz");
+  change::CheckPlaceFrame(record.frame);
+  Require(record.features.points.size() <= change::kMaxRecordFeatures);
   Require(static_cast<std::size_t>(record.features.descriptors.rows) ==
           record.features.points.size());
-  const double quality = PlaceQuality(record.frame, record.features);
+  const double quality = change::PlaceQuality(record.frame, record.features);
   Require(quality >= 0 && quality <= 1);
-  Require(SerialisePlaceRecord(record) == bytes);
+  Require(change::SerialisePlaceRecord(record) == bytes);
 }
 
 void FuzzPrediction(const std::string& bytes) {
-  const ChangeProbabilities probabilities = ParseNpyProbabilities(bytes, "fuzz");
+  const change::ChangeProbabilities probabilities = change::ParseNpyProbabilities(bytes, "fuzz");
   Require(probabilities.tells_classes());
-  CheckProbabilities(probabilities, probabilities.of_class[0].size(), "fuzz");
-  Require(MostLikely(probabilities).size() == probabilities.of_class[0].size());
+  change::CheckProbabilities(probabilities, probabilities.of_class[0].size(), "fuzz");
+  Require(change::MostLikely(probabilities).size() == probabilities.of_class[0].size());
 }
 
 void FuzzOne(const std::uint8_t* data, std::size_t size) {
@@ -49,9 +49,9 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzOne(data, size);
+  livemap::fuzz::FuzzOne(data, size);
   return 0;
 }

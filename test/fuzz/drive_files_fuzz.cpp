@@ -17,14 +17,15 @@
 
 namespace {
 
-void PairWithItself(const std::vector<livemap::SequenceFrame>& list) {
-  std::vector<livemap::SequenceFrame> pictures, depths;
+void PairWithItself(const std::vector<livemap::datasets::SequenceFrame>& list) {
+  std::vector<livemap::datasets::SequenceFrame> pictures, depths;
   for (std::size_t i = 0; i < list.size(); ++i) (i % 2 == 0 ? pictures : depths).push_back(list[i]);
-  const std::vector<livemap::SequenceFrame> paired = livemap::AssociateDepth(pictures, depths);
+  const std::vector<livemap::datasets::SequenceFrame> paired =
+      livemap::datasets::AssociateDepth(pictures, depths);
   if (paired.size() > std::min(pictures.size(), depths.size())) __builtin_trap();
-  for (const livemap::SequenceFrame& frame : paired) {
+  for (const livemap::datasets::SequenceFrame& frame : paired) {
     const std::int64_t apart = frame.stamp_ns - frame.depth_stamp_ns;
-    if (std::abs(apart) >= livemap::kMaxDepthDifferenceNs) __builtin_trap();
+    if (std::abs(apart) >= livemap::datasets::kMaxDepthDifferenceNs) __builtin_trap();
   }
 }
 
@@ -36,28 +37,28 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     switch (data[0] % 8) {
       case 0:
-        livemap::ParseSurveyTable(text, "input");
+        livemap::datasets::ParseSurveyTable(text, "input");
         break;
       case 1:
-        livemap::ParseYoloLabels(text, "input");
+        livemap::datasets::ParseYoloLabels(text, "input");
         break;
       case 2:
-        livemap::ParseRoute(text, "input");
+        livemap::datasets::ParseRoute(text, "input");
         break;
       case 3:
-        PairWithItself(livemap::ParseTumAssociations(text, "input"));
+        PairWithItself(livemap::datasets::ParseTumAssociations(text, "input"));
         break;
       case 4:
-        livemap::ParseTumTrajectory(text, "input");
+        livemap::datasets::ParseTumTrajectory(text, "input");
         break;
       case 5:
-        livemap::ParseKittiPoses(text, "input");
+        livemap::datasets::ParseKittiPoses(text, "input");
         break;
       case 6:
-        livemap::ParseCameraFile(text, "input");
+        livemap::datasets::ParseCameraFile(text, "input");
         break;
       default:
-        livemap::ReadImageHeader(data + 1, size - 1);
+        livemap::imaging::ReadImageHeader(data + 1, size - 1);
     }
   } catch (const livemap::Error&) {
     // Refused by a sentence: what the readers promise.

@@ -43,7 +43,7 @@ cv::Mat TakeImage(Bytes& bytes, const int (&types)[3]) {
   return image;
 }
 
-void CheckFinite(const livemap::VoResult& result) {
+void CheckFinite(const livemap::odometry::VoResult& result) {
   const bool finite = result.world_from_camera.matrix().allFinite() &&
                       result.covariance.allFinite() && result.twist_covariance.allFinite() &&
                       (!result.twist || result.twist->allFinite());
@@ -55,20 +55,20 @@ void CheckFinite(const livemap::VoResult& result) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Bytes bytes(data, size);
-  livemap::CameraIntrinsics camera{50, 50, 31.5, 23.5, 64, 48};
+  livemap::geo::CameraIntrinsics camera{50, 50, 31.5, 23.5, 64, 48};
   const auto flags = bytes.Take<std::uint8_t>();
   if ((flags & 1U) != 0) camera.fx = bytes.Take<double>();
   if ((flags & 2U) != 0) camera.cy = bytes.Take<double>();
-  livemap::EdgeOdometry::Config config;
+  livemap::odometry::EdgeOdometry::Config config;
   config.min_points = 10;
-  config.edge_source =
-      (flags & 4U) != 0 ? livemap::EdgeSource::kNewImage : livemap::EdgeSource::kKeyframe;
-  config.edges.kind = static_cast<livemap::EdgeKind>((flags >> 3U) % 3);
+  config.edge_source = (flags & 4U) != 0 ? livemap::odometry::EdgeSource::kNewImage
+                                         : livemap::odometry::EdgeSource::kKeyframe;
+  config.edges.kind = static_cast<livemap::odometry::EdgeKind>((flags >> 3U) % 3);
   try {
-    livemap::EdgeOdometry odometry(config, camera);
+    livemap::odometry::EdgeOdometry odometry(config, camera);
     for (std::int64_t stamp_ns = 1; !bytes.empty();) {
       stamp_ns += bytes.Take<std::int32_t>();
-      livemap::RgbdFrame frame;
+      livemap::odometry::RgbdFrame frame;
       frame.stamp_ns = stamp_ns;
       frame.grey = TakeImage(bytes, {CV_8UC1, CV_8UC1, CV_8UC3});
       frame.depth = TakeImage(bytes, {CV_32FC1, CV_16UC1, CV_8UC1});

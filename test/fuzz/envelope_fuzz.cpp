@@ -10,7 +10,7 @@
 #include "transport/message_layout.h"
 #include "transport/topic_template.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 constexpr std::size_t kMaxPayloadBytes = 4096;
@@ -57,27 +57,28 @@ time stamp
 string frame_id
 )";
 
-const MessageLayout& LayoutOf(std::string_view type) {
-  static const MessageLayout kAll("fuzz/Everything", kEverything, {64, 8, {{"data", 256}}});
-  static const MessageLayout kReport(
+const transport::MessageLayout& LayoutOf(std::string_view type) {
+  static const transport::MessageLayout kAll("fuzz/Everything", kEverything,
+                                             {64, 8, {{"data", 256}}});
+  static const transport::MessageLayout kReport(
       "livemap/HazardReport",
       ReadFile(std::string(LIVEMAP_SOURCE_DIR) + "/msg/HazardReport.msg", 1 << 20) + kImageTypes,
       {1024, 1024, {{"image.data", kMaxPayloadBytes}}});
   return type == "livemap/HazardReport" ? kReport : kAll;
 }
 
-void CheckEnvelope(ByteView bytes) {
-  const DecodedEnvelope decoded = DecodeEnvelope(bytes, kMaxPayloadBytes);
+void CheckEnvelope(transport::ByteView bytes) {
+  const transport::DecodedEnvelope decoded = transport::DecodeEnvelope(bytes, kMaxPayloadBytes);
   Require(decoded.envelope.has_value() == decoded.reason.empty());
   if (!decoded.envelope) return;
-  const std::vector<std::uint8_t> again = EncodeEnvelope(*decoded.envelope);
+  const std::vector<std::uint8_t> again = transport::EncodeEnvelope(*decoded.envelope);
   Require(again == std::vector<std::uint8_t>(bytes.data, bytes.data + bytes.size));
   LayoutOf(decoded.envelope->type).Check(decoded.envelope->payload);
 }
 
 /// The layout alone, so that the fuzzer need not find its way through the envelope first. What
 /// passes must not pass any more when its last byte is missing.
-void CheckLayout(ByteView bytes) {
+void CheckLayout(transport::ByteView bytes) {
   for (const char* type : {"fuzz/Everything", "livemap/HazardReport"}) {
     if (LayoutOf(type).Check(bytes)) continue;
     Require(bytes.size > 0);
@@ -86,17 +87,17 @@ void CheckLayout(ByteView bytes) {
 }
 
 void CheckTopic(const std::string& topic) {
-  static const TopicTemplate kTemplate("livemap/v1/{zone}/vehicle/{vehicle}/report");
-  const std::optional<TopicNames> names = kTemplate.Match(topic);
+  static const transport::TopicTemplate kTemplate("livemap/v1/{zone}/vehicle/{vehicle}/report");
+  const std::optional<transport::TopicNames> names = kTemplate.Match(topic);
   if (names) Require(kTemplate.Expand(*names) == topic);
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::CheckEnvelope({data, size});
-  livemap::CheckLayout({data, size});
-  livemap::CheckTopic(std::string(reinterpret_cast<const char*>(data), size));
+  livemap::fuzz::CheckEnvelope({data, size});
+  livemap::fuzz::CheckLayout({data, size});
+  livemap::fuzz::CheckTopic(std::string(reinterpret_cast<const char*>(data), size));
   return 0;
 }

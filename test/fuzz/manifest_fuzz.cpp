@@ -13,7 +13,7 @@
 #include "perception/inference/onnx_inputs.h"
 #include "perception/inference/unpack.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 constexpr std::size_t kMaxUnpacked = 1 << 16;
@@ -23,7 +23,7 @@ void Require(bool holds) {
 }
 
 /// What is accepted must hold what the header promises.
-void CheckManifest(const ModelManifest& manifest) {
+void CheckManifest(const perception::ModelManifest& manifest) {
   Require(!manifest.name.empty() && manifest.sha256.size() == 64);
   Require(!manifest.classes.empty());
   Require(manifest.thresholds.size() == manifest.classes.size());
@@ -37,7 +37,7 @@ void CheckManifest(const ModelManifest& manifest) {
   }
 }
 
-void CheckChangeManifest(const ChangeManifest& manifest) {
+void CheckChangeManifest(const change::ChangeManifest& manifest) {
   Require(!manifest.name.empty() && !manifest.output.empty());
   for (const auto& graph : {manifest.whole, manifest.encoder, manifest.head}) {
     Require(!graph.file.empty() && graph.sha256.size() == 64);
@@ -55,14 +55,14 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
   const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
     if (data[0] == 'z') {
-      Require(Unpacked(std::string(rest), "fuzz", kMaxUnpacked).size() <=
+      Require(perception::Unpacked(std::string(rest), "fuzz", kMaxUnpacked).size() <=
               std::max(kMaxUnpacked, rest.size()));
     } else if (data[0] == 'o') {
-      ReadOnnxInputs(rest);
+      perception::ReadOnnxInputs(rest);
     } else if (data[0] == 'c') {
-      CheckChangeManifest(ParseChangeManifest(std::string(rest), "fuzz", "models"));
+      CheckChangeManifest(change::ParseChangeManifest(std::string(rest), "fuzz", "models"));
     } else {
-      CheckManifest(ParseModelManifest(std::string(rest), "fuzz", "models"));
+      CheckManifest(perception::ParseModelManifest(std::string(rest), "fuzz", "models"));
     }
   } catch (const Error& error) {
     Require(error.what()[0] != '\0');
@@ -70,9 +70,9 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzOne(data, size);
+  livemap::fuzz::FuzzOne(data, size);
   return 0;
 }

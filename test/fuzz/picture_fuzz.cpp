@@ -10,7 +10,7 @@
 #include "imaging/image_header.h"
 #include "zone/pictures/picture_recoder.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 constexpr int kMaxPixels = 1 << 18;
@@ -23,27 +23,27 @@ void Require(bool holds) {
 
 /// Whatever came in, what goes out is a plain, whole JPEG of a bounded size.
 void CheckServed(const std::vector<std::uint8_t>& served, int longest_side_px) {
-  const auto header = ReadImageHeader(served.data(), served.size());
-  Require(header && header->format == ImageHeader::Format::kJpeg);
+  const auto header = imaging::ReadImageHeader(served.data(), served.size());
+  Require(header && header->format == imaging::ImageHeader::Format::kJpeg);
   Require(header->width <= longest_side_px && header->height <= longest_side_px);
-  Require(!WhyNoWholeJpeg(served, 1));
+  Require(!zone::WhyNoWholeJpeg(served, 1));
   Require(served[served.size() - 2] == 0xff && served.back() == 0xd9);
 }
 
-PictureLimits Limits() {
-  PictureLimits limits;
+zone::PictureLimits Limits() {
+  zone::PictureLimits limits;
   limits.max_pixels = kMaxPixels;
   limits.longest_side_px = kLongestSidePx;
   return limits;
 }
 
 void FuzzThumbnail(const std::vector<std::uint8_t>& file, std::uint8_t x, std::uint8_t y) {
-  SmallPictureLimits limits;
+  zone::SmallPictureLimits limits;
   limits.picture = Limits();
   limits.max_bytes = kSmallBytes;
-  const Box box{x * 1.0F - 20, y * 1.0F - 20, x * 1.0F, y * 2.0F};
+  const imaging::Box box{x * 1.0F - 20, y * 1.0F - 20, x * 1.0F, y * 2.0F};
   const std::vector<std::uint8_t> small =
-      SmallPicture(file, box, {x % 7U, y % 5U, 200, 150}, limits);
+      zone::SmallPicture(file, box, {x % 7U, y % 5U, 200, 150}, limits);
   Require(small.size() <= kSmallBytes);
   if (!small.empty()) CheckServed(small, limits.width_px);
 }
@@ -54,16 +54,16 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
   try {
     switch (data[0] % 4) {
       case 0:
-        CheckServed(RecodePicture(file, Limits()), kLongestSidePx);
+        CheckServed(zone::RecodePicture(file, Limits()), kLongestSidePx);
         break;
       case 1:
         FuzzThumbnail(file, data[1], data[2]);
         break;
       case 2:
-        WhyNoWholeJpeg(file, data[1]);
+        zone::WhyNoWholeJpeg(file, data[1]);
         break;
       default:
-        Require(!DecodeImage(file.data(), file.size(), kMaxPixels).empty());
+        Require(!imaging::DecodeImage(file.data(), file.size(), kMaxPixels).empty());
     }
   } catch (const Error& error) {
     Require(error.what()[0] != '\0');
@@ -71,9 +71,9 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzOne(data, size);
+  livemap::fuzz::FuzzOne(data, size);
   return 0;
 }

@@ -12,7 +12,7 @@
 #include "test/fuzz/store_script.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 void Require(bool holds) {
@@ -29,7 +29,7 @@ double Number(FuzzBytes& bytes, double usual) {
 }
 
 void FuzzPoll(FuzzBytes& bytes) {
-  Poll poll;
+  protocol::Poll poll;
   Fill(poll.poll, bytes);
   Fill(poll.hazard, bytes);
   poll.stamp_ns = bytes.Any<std::int64_t>();
@@ -39,19 +39,19 @@ void FuzzPoll(FuzzBytes& bytes) {
   const double covariance = Number(bytes, 0);
   poll.covariance_m2 << Number(bytes, 1), covariance, covariance, Number(bytes, 1);
   try {
-    CheckPoll(poll);
+    protocol::CheckPoll(poll);
   } catch (const Error& error) {
     Require(std::string(error.what()).size() < 900);
     return;
   }
-  Require(!poll.poll.IsNil() && !poll.hazard.IsNil() && IsValid(poll.position));
-  Require(!poll.class_name.empty() && poll.class_name.size() <= kMaxClassNameBytes);
+  Require(!poll.poll.IsNil() && !poll.hazard.IsNil() && geo::IsValid(poll.position));
+  Require(!poll.class_name.empty() && poll.class_name.size() <= protocol::kMaxClassNameBytes);
   Require(poll.expires_ns > poll.stamp_ns && poll.covariance_m2.allFinite());
   Require(poll.covariance_m2(0, 0) > 0 && poll.covariance_m2(1, 1) > 0);
 }
 
 void FuzzReply(FuzzBytes& bytes) {
-  PollReply reply;
+  protocol::PollReply reply;
   Fill(reply.poll, bytes);
   Fill(reply.hazard, bytes);
   reply.confidence = static_cast<float>(Number(bytes, 0.5));
@@ -61,13 +61,13 @@ void FuzzReply(FuzzBytes& bytes) {
   reply.drive_id = bytes.Text();
   reply.image_format = bytes.Text();
   try {
-    CheckReply(reply);
+    protocol::CheckReply(reply);
   } catch (const Error& error) {
     Require(std::string(error.what()).size() < 900);
     return;
   }
   Require(!reply.poll.IsNil() && reply.confidence >= 0 && reply.confidence <= 1);
-  Require(IsValid(reply.vehicle_position) && !std::isinf(reply.course_rad));
+  Require(geo::IsValid(reply.vehicle_position) && !std::isinf(reply.course_rad));
   Require(reply.reason.size() <= 64 && reply.drive_id.size() <= 64);
 }
 
@@ -75,11 +75,11 @@ void FuzzReply(FuzzBytes& bytes) {
 class AskingZone {
  public:
   AskingZone() {
-    ZoneService::Config config;
+    zone::ZoneService::Config config;
     config.directory = folder_ + "/zone";
     config.polls.bytes_per_hour = 1e12;
     config.allowance.evidence_per_hour = 1e9;
-    zone_ = std::make_unique<ZoneService>(
+    zone_ = std::make_unique<zone::ZoneService>(
         config, [this] { return now_ns_; }, 1);
   }
   ~AskingZone() {
@@ -88,9 +88,9 @@ class AskingZone {
   }
 
   /// A poll about a hazard of its own, to a vehicle that drives up to it.
-  PollOrder Ask() {
+  zone::PollOrder Ask() {
     now_ns_ += std::int64_t{3600} * 1'000'000'000;
-    Report report;
+    protocol::Report report;
     report.uuid.bytes[0] = 1;
     report.uuid.bytes[15] = static_cast<std::uint8_t>(count_);
     report.uuid.bytes[14] = static_cast<std::uint8_t>(count_ >> 8);
@@ -108,13 +108,13 @@ class AskingZone {
     // 50 m south of it, northwards.
     zone_->UpdateVehicle(
         {vehicle, "", {report.position.latitude_deg - 0.00045, 8}, 0, 10, now_ns_, 0});
-    for (PollOrder& order : zone_->TakeDuePolls()) {
+    for (zone::PollOrder& order : zone_->TakeDuePolls()) {
       if (order.vehicle_id == vehicle) return order;
     }
     std::abort();
   }
 
-  ZoneService& zone() { return *zone_; }
+  zone::ZoneService& zone() { return *zone_; }
   std::int64_t now_ns() const { return now_ns_; }
   int count() const { return count_; }
 
@@ -122,21 +122,21 @@ class AskingZone {
   const std::string folder_ = FuzzFolder("poll_fuzz");
   std::int64_t now_ns_ = 1'700'000'000'000'000'000;
   int count_ = 0;
-  std::unique_ptr<ZoneService> zone_;
+  std::unique_ptr<zone::ZoneService> zone_;
 };
 
 void FuzzAnswer(FuzzBytes& bytes) {
   static std::unique_ptr<AskingZone> asking;
   if (!asking || asking->count() >= 200) asking = std::make_unique<AskingZone>();
-  const PollOrder order = asking->Ask();
-  PollAnswer answer;
+  const zone::PollOrder order = asking->Ask();
+  zone::PollAnswer answer;
   answer.poll = order.poll;
   answer.hazard = order.hazard;
   answer.vehicle_id = order.vehicle_id;
   if (bytes.Below(16) == 0) Fill(answer.poll, bytes);
   if (bytes.Below(16) == 0) Fill(answer.hazard, bytes);
   if (bytes.Below(16) == 0) answer.vehicle_id = bytes.Text();
-  answer.answer = static_cast<PollAnswer::Answer>(bytes.Below(3));
+  answer.answer = static_cast<zone::PollAnswer::Answer>(bytes.Below(3));
   answer.stamp_ns = bytes.Below(3) == 0 ? bytes.Any<std::int64_t>() : asking->now_ns();
   answer.confidence = Number(bytes, 0.5);
   answer.vehicle_position = {Number(bytes, 40), Number(bytes, 8)};
@@ -144,9 +144,9 @@ void FuzzAnswer(FuzzBytes& bytes) {
   answer.image_format = bytes.Text();
   const std::string image = bytes.Below(2) == 0 ? bytes.Text() : "";
   answer.image.assign(image.begin(), image.end());
-  const ZoneStatistics before = asking->zone().Statistics();
+  const zone::ZoneStatistics before = asking->zone().Statistics();
   const bool counted = asking->zone().HandleAnswer(answer);
-  const ZoneStatistics after = asking->zone().Statistics();
+  const zone::ZoneStatistics after = asking->zone().Statistics();
   Require(after.answers == before.answers + (counted ? 1 : 0));
   Require(after.answers_refused == before.answers_refused + (counted ? 0 : 1));
   if (counted) {
@@ -159,12 +159,12 @@ void FuzzAnswer(FuzzBytes& bytes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzBytes bytes(data, size);
-  livemap::FuzzPoll(bytes);
-  livemap::FuzzReply(bytes);
-  livemap::FuzzAnswer(bytes);
+  livemap::fuzz::FuzzBytes bytes(data, size);
+  livemap::fuzz::FuzzPoll(bytes);
+  livemap::fuzz::FuzzReply(bytes);
+  livemap::fuzz::FuzzAnswer(bytes);
   return 0;
 }

@@ -11,13 +11,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     switch (data[0] % 3) {
       case 0:
-        livemap::ParseRecordedFixes(text, "input");
+        livemap::datasets::ParseRecordedFixes(text, "input");
         break;
       case 1:
-        livemap::ParseRecordedPoses(text, "input");
+        livemap::datasets::ParseRecordedPoses(text, "input");
         break;
       default:
-        livemap::ParseRecordedSpeeds(text, "input");
+        livemap::datasets::ParseRecordedSpeeds(text, "input");
     }
   } catch (const livemap::Error&) {
     // Refused by a sentence: what the readers promise.

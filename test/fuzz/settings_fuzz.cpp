@@ -10,7 +10,7 @@
 #include "protocol/hazard_catalogue.h"
 #include "web/api/official_authenticator.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 void Require(bool holds) {
@@ -18,7 +18,7 @@ void Require(bool holds) {
 }
 
 void FuzzCatalogue(const std::string& text) {
-  const HazardCatalogue catalogue = HazardCatalogue::Parse(text, "input");
+  const protocol::HazardCatalogue catalogue = protocol::HazardCatalogue::Parse(text, "input");
   for (const auto& [name, hazard_class] : catalogue.classes()) {
     Require(!name.empty() && name.size() <= 64);
     Require(std::isfinite(hazard_class.duplicate_radius_m) && hazard_class.duplicate_radius_m > 0);
@@ -29,18 +29,19 @@ void FuzzCatalogue(const std::string& text) {
 }
 
 void FuzzTokens(const std::string& text) {
-  const auto officials = ParseTokenFile(text, "input");
+  const auto officials = web::ParseTokenFile(text, "input");
   Require(!officials.empty());
-  for (const Official& official : officials) {
+  for (const web::Official& official : officials) {
     Require(!official.name.empty() && official.token_sha256.size() == 64);
   }
   // The file itself is no token of it.
-  OfficialAuthenticator gate(officials);
-  Require(gate.Check("Bearer " + text, "client", 0).verdict != OfficialAuthenticator::Verdict::kClosed);
+  web::OfficialAuthenticator gate(officials);
+  Require(gate.Check("Bearer " + text, "client", 0).verdict !=
+          web::OfficialAuthenticator::Verdict::kClosed);
 }
 
 void FuzzLabels(const std::string& text) {
-  for (const auto& label : ParseYoloLabels(text, {"pothole", "deer"}, "input")) {
+  for (const auto& label : evaluation::ParseYoloLabels(text, {"pothole", "deer"}, "input")) {
     Require(label.box.width >= 0 && label.box.height >= 0);
     Require(label.box.x >= 0 && label.box.x + label.box.width <= 1 + 1e-9);
     Require(label.box.y >= 0 && label.box.y + label.box.height <= 1 + 1e-9);
@@ -48,7 +49,7 @@ void FuzzLabels(const std::string& text) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
@@ -56,16 +57,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     switch (data[0] % 3) {
       case 0:
-        livemap::FuzzCatalogue(text);
+        livemap::fuzz::FuzzCatalogue(text);
         break;
       case 1:
-        livemap::FuzzTokens(text);
+        livemap::fuzz::FuzzTokens(text);
         break;
       default:
-        livemap::FuzzLabels(text);
+        livemap::fuzz::FuzzLabels(text);
     }
   } catch (const livemap::Error& error) {
-    livemap::Require(error.what()[0] != '\0');
+    livemap::fuzz::Require(error.what()[0] != '\0');
   }
   return 0;
 }

@@ -8,7 +8,7 @@
 
 #include "common/sqlite.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 
 /// The fuzzer's input, taken bit by bit; zeros when it is used up.
 class FuzzBytes {
@@ -138,4 +138,4 @@ inline void RunStoreScript(SqliteDatabase& database, const std::vector<FuzzTable
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::fuzz

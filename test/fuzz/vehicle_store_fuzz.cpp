@@ -8,7 +8,7 @@
 #include "test/fuzz/store_script.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
@@ -24,8 +24,8 @@ Uuid MakeUuid(std::uint8_t number) {
   return uuid;
 }
 
-Report MakeReport(std::uint8_t number) {
-  Report report;
+protocol::Report MakeReport(std::uint8_t number) {
+  protocol::Report report;
   report.uuid = MakeUuid(number);
   report.drive_id = "drive";
   report.stamp_ns = kNowNs;
@@ -40,9 +40,10 @@ Report MakeReport(std::uint8_t number) {
   return report;
 }
 
-Notice MakeNotice(std::uint8_t number) {
-  Notice notice;
-  notice.action = number == 23 ? Notice::Action::kRemoved : Notice::Action::kAdded;
+protocol::Notice MakeNotice(std::uint8_t number) {
+  protocol::Notice notice;
+  notice.action =
+      number == 23 ? protocol::Notice::Action::kRemoved : protocol::Notice::Action::kAdded;
   notice.sequence = number;
   notice.previous_sequence = number == 20 ? 0 : number - 1U;
   notice.hazard_uuid = MakeUuid(number);
@@ -53,8 +54,8 @@ Notice MakeNotice(std::uint8_t number) {
   return notice;
 }
 
-LocalHazardMap::Config ConfigOf(const std::string& path) {
-  LocalHazardMap::Config config;
+vehicle::LocalHazardMap::Config ConfigOf(const std::string& path) {
+  vehicle::LocalHazardMap::Config config;
   config.path = path;
   config.max_known = 8;
   return config;
@@ -65,7 +66,7 @@ struct Template {
   Template() {
     const std::string path = folder + "/made.sqlite3";
     {
-      LocalHazardMap map(ConfigOf(path), HazardCatalogue(), kNowNs);
+      vehicle::LocalHazardMap map(ConfigOf(path), protocol::HazardCatalogue(), kNowNs);
       for (std::uint8_t i = 1; i < 5; ++i) map.Add(MakeReport(i));
       map.MarkSent(MakeUuid(2));
       map.Apply({MakeNotice(20), MakeNotice(21), MakeNotice(22), MakeNotice(23)});
@@ -90,24 +91,25 @@ struct Template {
   std::vector<FuzzTable> tables;
 };
 
-void RequireSound(const LocalHazardMap& map) {
+void RequireSound(const vehicle::LocalHazardMap& map) {
   Require(map.set_aside().empty());
   const auto pending = map.Pending();
   Require(pending.size() == map.pending_count());
   for (const auto& waiting : pending) {
     const auto report = map.LoadPending(waiting.uuid);
-    Require(report && IsSound(*report) && report->image.size() <= kMaxStoredImageBytes);
+    Require(report && vehicle::IsSound(*report) &&
+            report->image.size() <= vehicle::kMaxStoredImageBytes);
   }
   const auto known = map.Known(1000);
   Require(known.size() == map.known_count());
-  for (const KnownHazard& hazard : known) {
-    Require(!hazard.id.IsNil() && IsValid(hazard.position) && hazard.confidence >= 0);
-    Require(hazard.confidence <= 1 && hazard.class_name.size() <= kMaxClassNameBytes);
+  for (const vehicle::KnownHazard& hazard : known) {
+    Require(!hazard.id.IsNil() && geo::IsValid(hazard.position) && hazard.confidence >= 0);
+    Require(hazard.confidence <= 1 && hazard.class_name.size() <= protocol::kMaxClassNameBytes);
   }
   Require(map.map_sequence() < (1ULL << 60));
 }
 
-void RequireSpared(const LocalHazardMap& map) {
+void RequireSpared(const vehicle::LocalHazardMap& map) {
   const auto report = map.LoadPending(MakeUuid(1));
   Require(report && report->position.latitude_deg == MakeReport(1).position.latitude_deg);
 }
@@ -126,32 +128,33 @@ void FuzzStore(const std::uint8_t* data, std::size_t size) {
     RunStoreScript(database, made.tables, bytes);
   }
   {
-    LocalHazardMap map(ConfigOf(path), HazardCatalogue(), kNowNs);
+    vehicle::LocalHazardMap map(ConfigOf(path), protocol::HazardCatalogue(), kNowNs);
     RequireSound(map);
     RequireSpared(map);
     const auto known = map.Known(1000);
-    Require(std::any_of(known.begin(), known.end(),
-                        [](const KnownHazard& hazard) { return hazard.id == MakeUuid(20); }));
-    Require(map.Add(MakeReport(100)) == LocalHazardMap::AddResult::kAdded);
+    Require(std::any_of(known.begin(), known.end(), [](const vehicle::KnownHazard& hazard) {
+      return hazard.id == MakeUuid(20);
+    }));
+    Require(map.Add(MakeReport(100)) == vehicle::LocalHazardMap::AddResult::kAdded);
     map.Apply({MakeNotice(24)});
     for (const auto& waiting : map.Pending()) map.MarkSent(waiting.uuid);
     map.ForgetUnannounced(kNowNs + 1);
-    Receipt receipt;
-    receipt.status = Receipt::Status::kCommitted;
+    protocol::Receipt receipt;
+    receipt.status = protocol::Receipt::Status::kCommitted;
     receipt.report_uuid = MakeUuid(2);
     receipt.hazard_uuid = MakeUuid(20);
     map.Apply(receipt);
   }
-  const LocalHazardMap map(ConfigOf(path), HazardCatalogue(), kNowNs);
+  const vehicle::LocalHazardMap map(ConfigOf(path), protocol::HazardCatalogue(), kNowNs);
   RequireSound(map);
   RequireSpared(map);
   Require(map.LoadPending(MakeUuid(100)).has_value());
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzStore(data, size);
+  livemap::fuzz::FuzzStore(data, size);
   return 0;
 }

@@ -8,10 +8,10 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    const livemap::WorldDescription world =
-        livemap::ParseWorldFile(std::string(reinterpret_cast<const char*>(data), size), "input");
+    const livemap::simulation::WorldDescription world = livemap::simulation::ParseWorldFile(
+        std::string(reinterpret_cast<const char*>(data), size), "input");
     // What the reader accepts, a road can be made of.
-    if (!world.pieces.empty()) livemap::RoadLine(world.bearing_deg, world.pieces);
+    if (!world.pieces.empty()) livemap::simulation::RoadLine(world.bearing_deg, world.pieces);
   } catch (const livemap::Error&) {
     // Refused by a sentence: what the reader promises.
   }

@@ -11,7 +11,7 @@
 #include "zone/admission/report_validation.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::fuzz {
 namespace {
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
@@ -20,8 +20,8 @@ void Require(bool holds) {
   if (!holds) std::abort();
 }
 
-Report MakeReport(std::uint8_t number, const std::string& vehicle, double latitude_deg) {
-  Report report;
+protocol::Report MakeReport(std::uint8_t number, const std::string& vehicle, double latitude_deg) {
+  protocol::Report report;
   report.uuid.bytes[0] = number;
   report.uuid.bytes[15] = 1;
   report.vehicle_id = vehicle;
@@ -36,9 +36,9 @@ Report MakeReport(std::uint8_t number, const std::string& vehicle, double latitu
   return report;
 }
 
-MapChangeReport MakeMapChange(std::uint8_t number, const std::string& vehicle,
-                              double latitude_deg) {
-  MapChangeReport report;
+protocol::MapChangeReport MakeMapChange(std::uint8_t number, const std::string& vehicle,
+                                        double latitude_deg) {
+  protocol::MapChangeReport report;
   report.uuid.bytes[0] = number;
   report.uuid.bytes[15] = 2;
   report.vehicle_id = vehicle;
@@ -52,8 +52,8 @@ MapChangeReport MakeMapChange(std::uint8_t number, const std::string& vehicle,
   return report;
 }
 
-ZoneService::Config ConfigOf(const std::string& directory) {
-  ZoneService::Config config;
+zone::ZoneService::Config ConfigOf(const std::string& directory) {
+  zone::ZoneService::Config config;
   config.directory = directory;
   config.speed.max_speed_mps = 1e9;
   return config;
@@ -66,10 +66,10 @@ struct Template {
   Template() {
     const std::string made = folder + "/made";
     {
-      ZoneService zone(ConfigOf(made), Now, 1);
+      zone::ZoneService zone(ConfigOf(made), Now, 1);
       for (std::uint8_t i = 2; i < 6; ++i) {
         zone.Handle(MakeReport(i, "car-1", 40 + i));
-        Report second = MakeReport(static_cast<std::uint8_t>(i + 100), "car-2", 40 + i);
+        protocol::Report second = MakeReport(static_cast<std::uint8_t>(i + 100), "car-2", 40 + i);
         zone.Handle(second);
       }
       spared = zone.Query(std::nullopt, 0, 1).at(0);
@@ -95,52 +95,52 @@ struct Template {
   ~Template() { std::filesystem::remove_all(folder); }
 
   const std::string folder = FuzzFolder("zone_store_fuzz");
-  Hazard spared;
+  zone::Hazard spared;
   std::string database;
   std::vector<FuzzTable> tables;
 };
 
-void RequireSound(const Hazard& hazard) {
-  Require(!hazard.uuid.IsNil() && IsPrintableText(hazard.class_name, 64));
+void RequireSound(const zone::Hazard& hazard) {
+  Require(!hazard.uuid.IsNil() && zone::IsPrintableText(hazard.class_name, 64));
   Require(hazard.confidence >= 0 && hazard.confidence <= 1);
   Require(hazard.presence >= 0 && hazard.presence <= 1);
-  Require(IsValid(hazard.position) && hazard.covariance_m2.allFinite());
+  Require(geo::IsValid(hazard.position) && hazard.covariance_m2.allFinite());
   Require(hazard.covariance_m2.determinant() > 0 && hazard.covariance_m2(0, 0) > 0);
   Require(hazard.first_seen_ns >= 0 && hazard.first_seen_ns <= hazard.last_seen_ns);
   Require(hazard.sequence > 0 && hazard.announced_sequence <= hazard.sequence);
   Require(hazard.image_sha256.empty() || hazard.image_sha256.size() == 64);
-  Require(hazard.sightings > 0 && hazard.vehicles <= kMaxEvidencePerHazard);
+  Require(hazard.sightings > 0 && hazard.vehicles <= zone::kMaxEvidencePerHazard);
 }
 
-void RequireSound(const MapChangeFeature& feature) {
-  Require(!feature.uuid.IsNil() && IsPrintableText(feature.class_name, 64));
+void RequireSound(const zone::MapChangeFeature& feature) {
+  Require(!feature.uuid.IsNil() && zone::IsPrintableText(feature.class_name, 64));
   Require(feature.confidence >= 0 && feature.confidence <= 1);
-  Require(IsValid(feature.position) && feature.covariance_m2.allFinite());
+  Require(geo::IsValid(feature.position) && feature.covariance_m2.allFinite());
   Require(feature.covariance_m2.determinant() > 0 && feature.covariance_m2(0, 0) > 0);
   Require(feature.first_seen_ns >= 0 && feature.first_seen_ns <= feature.last_seen_ns);
-  Require(feature.sequence > 0 && feature.witnesses.size() <= 2 * kMaxWitnesses);
+  Require(feature.sequence > 0 && feature.witnesses.size() <= 2 * zone::kMaxWitnesses);
 }
 
-void RequireWorking(ZoneService& zone, const Template& made) {
+void RequireWorking(zone::ZoneService& zone, const Template& made) {
   const auto spared = zone.Find(made.spared.uuid);
   Require(spared && spared->position.latitude_deg == made.spared.position.latitude_deg);
   Require(spared->sightings >= made.spared.sightings && spared->state == made.spared.state);
-  for (const Hazard& hazard : zone.Query(std::nullopt, 1, 1000)) {
+  for (const zone::Hazard& hazard : zone.Query(std::nullopt, 1, 1000)) {
     RequireSound(hazard);
-    for (const StoredEvent& event : zone.Events(hazard.uuid, 100)) {
+    for (const zone::StoredEvent& event : zone.Events(hazard.uuid, 100)) {
       Require(event.reason.size() <= 200 && event.at_ns >= 0);
     }
   }
-  for (const Hazard& hazard : zone.QueryNear({42, 8}, 1e6, 100)) RequireSound(hazard);
-  for (const MapChangeFeature& feature : zone.QueryMapChanges(std::nullopt, 1, 1000)) {
+  for (const zone::Hazard& hazard : zone.QueryNear({42, 8}, 1e6, 100)) RequireSound(hazard);
+  for (const zone::MapChangeFeature& feature : zone.QueryMapChanges(std::nullopt, 1, 1000)) {
     RequireSound(feature);
-    for (const StoredMapChangeEvent& event : zone.MapChangeEvents(feature.uuid, 100)) {
+    for (const zone::StoredMapChangeEvent& event : zone.MapChangeEvents(feature.uuid, 100)) {
       Require(event.reason.size() <= 200 && event.at_ns >= 0);
     }
   }
   zone.HandleMapChanges({MakeMapChange(3, "car-1", 51), MakeMapChange(4, "car-3", 50)});
   // What was committed is committed still, and what is new is taken.
-  Require(zone.Handle(MakeReport(3, "car-1", 43)).status == Receipt::Status::kCommitted ||
+  Require(zone.Handle(MakeReport(3, "car-1", 43)).status == protocol::Receipt::Status::kCommitted ||
           zone.Statistics().refused > 0);
   zone.UpdateVehicle({"car-3", "", {42, 8}, 0, 10, kNowNs, 0});
   zone.TakeDuePolls();
@@ -163,10 +163,10 @@ void FuzzStore(const std::uint8_t* data, std::size_t size) {
     RunStoreScript(database, made.tables, bytes);
   }
   try {
-    ZoneService zone(ConfigOf(directory), Now, 2);
+    zone::ZoneService zone(ConfigOf(directory), Now, 2);
     RequireWorking(zone, made);
-    const Receipt receipt = zone.Handle(MakeReport(200, "car-9", 60));
-    Require(receipt.status == Receipt::Status::kCommitted);
+    const protocol::Receipt receipt = zone.Handle(MakeReport(200, "car-9", 60));
+    Require(receipt.status == protocol::Receipt::Status::kCommitted);
   } catch (const StoreError& error) {
     // Another schema's version; everything else must have been passed over.
     const std::string why = error.what();
@@ -175,14 +175,14 @@ void FuzzStore(const std::uint8_t* data, std::size_t size) {
             why.find("opening '") != std::string::npos);
     return;
   }
-  ZoneService zone(ConfigOf(directory), Now, 3);
+  zone::ZoneService zone(ConfigOf(directory), Now, 3);
   RequireWorking(zone, made);
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  livemap::FuzzStore(data, size);
+  livemap::fuzz::FuzzStore(data, size);
   return 0;
 }

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 TEST(DatumOf, IsTheInverseOfTheFramesPose) {
@@ -40,4 +40,4 @@ TEST(MeridianConvergence, GrowsToTheEastAndWithTheLatitude) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::geo

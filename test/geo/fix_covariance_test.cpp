@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 Eigen::Matrix2d Matrix(double east, double cross, double north) {
@@ -32,4 +32,4 @@ TEST(FixCovariance, WhatSaysNothingOfThePositionIsRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 constexpr CameraIntrinsics kCamera{500, 520, 320, 240, 640, 480};
@@ -111,4 +111,4 @@ TEST(ProjectToGround, CovarianceEqualsTheSpreadOfNoisyProjections) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::geo

@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 struct Place {
@@ -174,4 +174,4 @@ TEST(SpatialGrid, RefusesImpossiblePlacesAndCells) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::geo

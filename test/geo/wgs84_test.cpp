@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::geo {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -77,4 +77,4 @@ TEST(LocalFrame, AgreesWithGeodesicsNearTheDatum) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::geo

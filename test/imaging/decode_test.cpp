@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 using ::testing::HasSubstr;
@@ -72,4 +72,4 @@ TEST(DecodeImage, RefusesWhatIsNoImage) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::imaging

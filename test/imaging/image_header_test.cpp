@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -104,4 +104,4 @@ TEST(HasImageEnd, TellsWholeFilesFromCutOnes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -11,7 +11,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 using ::testing::HasSubstr;
@@ -132,4 +132,4 @@ TEST(Rectifier, RefusesUnusableCalibrationsByName) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 /// Noise: what JPEG compresses worst.
@@ -218,4 +218,4 @@ TEST(CropPicture, EveryPotholeOfARealRoadIsLegibleInTwelveKilobytes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -12,7 +12,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::imaging {
 namespace {
 
 using ::testing::HasSubstr;
@@ -273,4 +273,4 @@ TEST(StereoDepth, RefusesParametersAndImagesThatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::imaging

@@ -8,7 +8,7 @@
 #include "common/error.h"
 #include "test/localization/simulated_drive.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 using ::testing::HasSubstr;
@@ -282,21 +282,22 @@ TEST(GeoLocalizer, IsHonestAboutItsErrors) {
 }
 
 TEST(GeoLocalizer, WorksAcrossTheAntimeridianAndNearThePole) {
-  for (const GeoPoint datum : {GeoPoint{-17, 179.9999}, GeoPoint{89.9995, 20}, GeoPoint{0, 0}}) {
+  for (const geo::GeoPoint datum :
+       {geo::GeoPoint{-17, 179.9999}, geo::GeoPoint{89.9995, 20}, geo::GeoPoint{0, 0}}) {
     SimulatedDrive drive;
     drive.datum = datum;
     GeoLocalizer localizer(ConfigOf(drive));
-    const LocalFrame frame(datum);
+    const geo::LocalFrame frame(datum);
     Simulate(drive, localizer, [&](double time_s, std::int64_t stamp_ns, const PlanarPose& truth) {
       if (time_s < 20) return;
       const auto fused = localizer.Fused(stamp_ns);
       ASSERT_TRUE(fused);
-      const GeoPoint here = frame.ToGeo(truth.position_m);
-      EXPECT_LT(GeodesicDistanceM(fused->position, here), 1.0);
+      const geo::GeoPoint here = frame.ToGeo(truth.position_m);
+      EXPECT_LT(geo::GeodesicDistanceM(fused->position, here), 1.0);
       // Heading is against true north here, not at the datum.
-      const GeoPoint ahead = frame.ToGeo((truth * PlanarPose{{20, 0}, 0}).position_m);
-      const GeoPoint by_heading = GeodesicDestination(here, fused->heading_rad, 20);
-      EXPECT_LT(GeodesicDistanceM(ahead, by_heading), 0.5);
+      const geo::GeoPoint ahead = frame.ToGeo((truth * PlanarPose{{20, 0}, 0}).position_m);
+      const geo::GeoPoint by_heading = geo::GeodesicDestination(here, fused->heading_rad, 20);
+      EXPECT_LT(geo::GeodesicDistanceM(ahead, by_heading), 0.5);
     });
   }
 }
@@ -332,8 +333,9 @@ TEST(GeoLocalizer, RefusesWhatCannotBe) {
   EXPECT_EQ(localizer.AddOdometry(12 * kSecond_ns, Eigen::Isometry3d::Identity(),
                                   Eigen::Matrix3d(-Eigen::Matrix3d::Identity())),
             Odometry::kInvalid);
-  for (const GeoPoint bad : {GeoPoint{kNan, 11}, GeoPoint{48, 181}, GeoPoint{1e300, 11},
-                             GeoPoint{48, std::numeric_limits<double>::infinity()}}) {
+  for (const geo::GeoPoint bad :
+       {geo::GeoPoint{kNan, 11}, geo::GeoPoint{48, 181}, geo::GeoPoint{1e300, 11},
+        geo::GeoPoint{48, std::numeric_limits<double>::infinity()}}) {
     PositionFix broken = fix;
     broken.position = bad;
     EXPECT_EQ(localizer.AddFix(broken), Fix::kInvalid);
@@ -387,4 +389,4 @@ TEST(LocalizerConfig, NamesTheValueThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -7,7 +7,7 @@
 
 #include "test/localization/simulated_drive.h"
 
-namespace livemap {
+namespace livemap::localization {
 namespace {
 
 using ::testing::IsEmpty;
@@ -15,7 +15,7 @@ using ::testing::Not;
 using Verdict = GeoLocalizer::FixVerdict;
 
 constexpr std::int64_t kBeginNs = 1'700'000'000'000'000'000;
-const GeoPoint kDatum{48.1, 11.5};
+const geo::GeoPoint kDatum{48.1, 11.5};
 
 /// What arrives at a moment of the steady clock.
 struct Arrival {
@@ -28,7 +28,7 @@ PositionFix FixAt(double time_s) {
   const double wobble_m = 0.3 * std::sin(7 * time_s);
   PositionFix fix;
   fix.stamp_ns = kBeginNs + Nanoseconds(time_s);
-  fix.position = LocalFrame(kDatum).ToGeo({10 * time_s + wobble_m, wobble_m});
+  fix.position = geo::LocalFrame(kDatum).ToGeo({10 * time_s + wobble_m, wobble_m});
   fix.covariance_m2 = 0.25 * Eigen::Matrix2d::Identity();
   return fix;
 }
@@ -174,4 +174,4 @@ TEST(LocalizerFeed, WhatHasNoStampIsCountedAndLeftOut) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::localization

@@ -12,7 +12,7 @@
 #include "localization/geo_localizer.h"
 #include "localization/planar.h"
 
-namespace livemap {
+namespace livemap::localization {
 
 /// Speed and turn of a simulated vehicle after a time.
 struct SimulatedMotion {
@@ -21,7 +21,7 @@ struct SimulatedMotion {
 };
 
 struct SimulatedDrive {
-  GeoPoint datum{48.1, 11.5};
+  geo::GeoPoint datum{48.1, 11.5};
   double length_s = 40;
   double start_yaw_rad = 0.7;
   std::function<SimulatedMotion(double)> motion = [](double) { return SimulatedMotion{10, 0}; };
@@ -78,7 +78,7 @@ inline void Simulate(const SimulatedDrive& drive, GeoLocalizer& localizer,
                      const std::function<void(double, std::int64_t, const PlanarPose&)>& watch) {
   constexpr double kStepS = 0.02;
   constexpr std::int64_t kBegin_ns = 1'700'000'000'000'000'000;
-  const LocalFrame frame(drive.datum);
+  const geo::LocalFrame frame(drive.datum);
   TestNoise noise(drive.seed);
   PlanarPose truth;
   truth.yaw_rad = drive.start_yaw_rad;
@@ -120,4 +120,4 @@ inline void Simulate(const SimulatedDrive& drive, GeoLocalizer& localizer,
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::localization

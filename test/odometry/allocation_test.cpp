@@ -49,7 +49,7 @@ int posix_memalign(void** memory, std::size_t alignment, std::size_t size) noexc
 }
 }
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 int AllocationsOf(EdgeOdometry& odometry, const RgbdFrame& frame, VoResult& result) {
@@ -61,7 +61,7 @@ int AllocationsOf(EdgeOdometry& odometry, const RgbdFrame& frame, VoResult& resu
 }
 
 TEST(EdgeOdometryMemory, NoFrameAfterTheFirstAllocates) {
-  const CameraIntrinsics camera{520, 520, 319.5, 239.5, 640, 480};
+  const geo::CameraIntrinsics camera{520, 520, 319.5, 239.5, 640, 480};
   const SyntheticWall wall(camera);
   EdgeOdometry odometry({}, camera);
   VoResult result;
@@ -84,4 +84,4 @@ TEST(EdgeOdometryMemory, NoFrameAfterTheFirstAllocates) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -5,7 +5,7 @@
 #include <random>
 #include <unsupported/Eigen/MatrixFunctions>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 Vector6d RandomTwist(std::mt19937_64& random, double scale) {
@@ -61,4 +61,4 @@ TEST(Se3, RenormalisingMendsARotationThatIsNoLongerOne) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

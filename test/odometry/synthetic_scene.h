@@ -8,19 +8,20 @@
 #include "odometry/edge/edge_odometry.h"
 #include "simulation/room/patterned_wall.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// Looks at the wall in most tests.
-inline constexpr CameraIntrinsics kWallCamera{260, 260, 159.5, 119.5, 320, 240};
+inline constexpr geo::CameraIntrinsics kWallCamera{260, 260, 159.5, 119.5, 320, 240};
 
 /// The simulator's patterned wall as frames for odometry.
 class SyntheticWall {
  public:
-  explicit SyntheticWall(const CameraIntrinsics& camera) : camera_(camera) {}
+  explicit SyntheticWall(const geo::CameraIntrinsics& camera) : camera_(camera) {}
 
   RgbdFrame See(std::int64_t stamp_ns, const Eigen::Isometry3d& world_from_camera, double gain = 1,
                 double bias = 0) const {
-    const PatternedWall::View view = PatternedWall::See(camera_, world_from_camera, gain, bias);
+    const simulation::PatternedWall::View view =
+        simulation::PatternedWall::See(camera_, world_from_camera, gain, bias);
     RgbdFrame frame;
     frame.stamp_ns = stamp_ns;
     frame.grey = view.grey;
@@ -29,7 +30,7 @@ class SyntheticWall {
   }
 
  private:
-  CameraIntrinsics camera_;
+  geo::CameraIntrinsics camera_;
 };
 
 inline Eigen::Isometry3d Pose(double x, double y, double z, double roll, double pitch, double yaw) {
@@ -42,4 +43,4 @@ inline Eigen::Isometry3d Pose(double x, double y, double z, double roll, double 
   return pose;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

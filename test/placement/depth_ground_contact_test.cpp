@@ -10,7 +10,7 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::placement {
 namespace {
 
 constexpr float kNanF = std::numeric_limits<float>::quiet_NaN();
@@ -39,13 +39,14 @@ DepthImage LevelRoad() {
 }
 
 /// A flat thing so far ahead, with its lower edge there.
-Box FlatThingAt(double ahead_of_camera_m, float height_px = 20) {
+imaging::Box FlatThingAt(double ahead_of_camera_m, float height_px = 20) {
   const auto bottom = static_cast<float>(RowOf(ahead_of_camera_m) + 0.5);
   return {305, bottom - height_px, 335, bottom};
 }
 
-std::optional<GroundPoint> Foot(const DepthImage& image, const Box& box, double pitch_rad = 0) {
-  return ContactByDepth(image, box, Intrinsics(), PitchedMounting(pitch_rad), {}, {});
+std::optional<geo::GroundPoint> Foot(const DepthImage& image, const imaging::Box& box,
+                                     double pitch_rad = 0) {
+  return ContactByDepth(image, box, vehicle::Intrinsics(), PitchedMounting(pitch_rad), {}, {});
 }
 
 TEST(ContactByDepth, AgreesWithTheRoadsPlaneOnALevelRoad) {
@@ -60,9 +61,9 @@ TEST(ContactByDepth, AgreesWithTheRoadsPlaneOnALevelRoad) {
 
 TEST(ContactByDepth, DoesNotMindAPitchThatThePlaneTakesForDistance) {
   // The vehicle nods by 0.02 rad, which the mounting does not know.
-  const Box box = FlatThingAt(14);
+  const imaging::Box box = FlatThingAt(14);
   const Eigen::Vector2d pixel(319.5, box.y_max - 0.5);
-  const auto plane = ProjectToGround(pixel, Intrinsics(), PitchedMounting(0.02), {});
+  const auto plane = geo::ProjectToGround(pixel, vehicle::Intrinsics(), PitchedMounting(0.02), {});
   const auto foot = Foot(LevelRoad(), box, 0.02);
   ASSERT_TRUE(plane && foot);
   EXPECT_GT(std::abs(plane->position_m.x() - kForwardM - 14), 2.0);
@@ -71,7 +72,7 @@ TEST(ContactByDepth, DoesNotMindAPitchThatThePlaneTakesForDistance) {
 
 TEST(ContactByDepth, AStandingThingIsAsFarAsItsSurfaceWhateverIsBehindIt) {
   DepthImage image = LevelRoad();
-  const Box box = FlatThingAt(12, 60);
+  const imaging::Box box = FlatThingAt(12, 60);
   image.depth(cv::Rect(305, static_cast<int>(box.y_min), 30, 60)) = 11.5F;
   // A hole, and a distant pixel row.
   image.depth(cv::Rect(310, static_cast<int>(box.y_max) - 4, 6, 4)) = kNanF;
@@ -85,8 +86,8 @@ TEST(ContactByDepth, AStandingThingIsAsFarAsItsSurfaceWhateverIsBehindIt) {
 
 TEST(ContactByDepth, OnTheRoadTheBoxesEdgeWeighsAsInThePlane) {
   const auto foot = Foot(LevelRoad(), FlatThingAt(12));
-  const auto plane =
-      ProjectToGround({319.5, RowOf(12)}, Intrinsics(), PitchedMounting(), {3, 0, 0, 60});
+  const auto plane = geo::ProjectToGround({319.5, RowOf(12)}, vehicle::Intrinsics(),
+                                          PitchedMounting(), {3, 0, 0, 60});
   ASSERT_TRUE(foot && plane);
   const double ratio = std::sqrt(foot->covariance_m2(0, 0) / plane->covariance_m2(0, 0));
   EXPECT_GT(ratio, 0.7);
@@ -96,7 +97,7 @@ TEST(ContactByDepth, OnTheRoadTheBoxesEdgeWeighsAsInThePlane) {
 TEST(ContactByDepth, CovarianceHoldsTheNoiseOfTheDepth) {
   std::mt19937_64 random(7);
   std::normal_distribution<float> noise(0, 0.25F);
-  const Box box = FlatThingAt(12, 60);
+  const imaging::Box box = FlatThingAt(12, 60);
   double squared = 0;
   int count = 0;
   for (int trial = 0; trial < 50; ++trial) {
@@ -124,7 +125,7 @@ TEST(ContactByDepth, SixteenBitDepthIsInItsUnits) {
 }
 
 TEST(ContactByDepth, UnknownDepthGivesNothing) {
-  const Box box = FlatThingAt(12, 60);
+  const imaging::Box box = FlatThingAt(12, 60);
   DepthImage unknown = LevelRoad();
   unknown.depth.setTo(kNanF);
   EXPECT_FALSE(Foot(unknown, box));
@@ -149,7 +150,7 @@ TEST(ContactByDepth, UnknownDepthGivesNothing) {
 }
 
 TEST(ContactByDepth, ImagesAndBoxesThatCannotBeGiveNothing) {
-  const Box box = FlatThingAt(12);
+  const imaging::Box box = FlatThingAt(12);
   DepthImage image = LevelRoad();
   image.depth = image.depth(cv::Rect(0, 0, 320, 400)).clone();
   EXPECT_FALSE(Foot(image, box)) << "another size";
@@ -166,4 +167,4 @@ TEST(ContactByDepth, ImagesAndBoxesThatCannotBeGiveNothing) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::placement

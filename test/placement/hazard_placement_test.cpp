@@ -6,13 +6,13 @@
 #include <cmath>
 #include <random>
 
-namespace livemap {
+namespace livemap::placement {
 namespace {
 
-constexpr GeoPoint kAntenna{40.4433, -79.9436};
+constexpr geo::GeoPoint kAntenna{40.4433, -79.9436};
 
-TrackPose Pose(double course_rad) {
-  TrackPose pose;
+geo::TrackPose Pose(double course_rad) {
+  geo::TrackPose pose;
   pose.position = kAntenna;
   pose.course_rad = course_rad;
   return pose;
@@ -21,9 +21,12 @@ TrackPose Pose(double course_rad) {
 TEST(PlaceHazard, AheadLiesAlongTheCourseAndLeftLiesToItsLeft) {
   for (const double course : {0.0, 0.8, M_PI / 2, 3.0, -2.0}) {
     const auto ahead = PlaceHazard(Pose(course), {0, 0}, {{20.0, 0.0}, Eigen::Matrix2d::Zero()});
-    EXPECT_LT(GeodesicDistanceM(ahead.position, GeodesicDestination(kAntenna, course, 20)), 1e-3);
+    EXPECT_LT(
+        geo::GeodesicDistanceM(ahead.position, geo::GeodesicDestination(kAntenna, course, 20)),
+        1e-3);
     const auto left = PlaceHazard(Pose(course), {0, 0}, {{0.0, 5.0}, Eigen::Matrix2d::Zero()});
-    EXPECT_LT(GeodesicDistanceM(left.position, GeodesicDestination(kAntenna, course - M_PI / 2, 5)),
+    EXPECT_LT(geo::GeodesicDistanceM(left.position,
+                                     geo::GeodesicDestination(kAntenna, course - M_PI / 2, 5)),
               1e-3);
   }
 }
@@ -32,16 +35,16 @@ TEST(PlaceHazard, AntennaOfTheVehicleIsTakenIntoAccount) {
   // Antenna 1.5 m behind base_link's origin and 0.4 m to the right; vehicle drives east.
   const auto placed =
       PlaceHazard(Pose(M_PI / 2), {-1.5, -0.4}, {{10.0, 0.0}, Eigen::Matrix2d::Zero()});
-  const Eigen::Vector2d offset_m = LocalFrame(kAntenna).ToEnu(placed.position);
+  const Eigen::Vector2d offset_m = geo::LocalFrame(kAntenna).ToEnu(placed.position);
   EXPECT_NEAR(offset_m.x(), 11.5, 1e-6);
   EXPECT_NEAR(offset_m.y(), 0.4, 1e-6);
 }
 
 TEST(PlaceHazard, CovarianceIsThatOfManyNoisyPlacements) {
-  TrackPose pose = Pose(0.6);
+  geo::TrackPose pose = Pose(0.6);
   pose.covariance_m2 << 0.5, 0.1, 0.1, 0.3;
   pose.course_variance_rad2 = 0.03 * 0.03;
-  GroundPoint ground{{18.0, -2.0}, Eigen::Matrix2d::Zero()};
+  geo::GroundPoint ground{{18.0, -2.0}, Eigen::Matrix2d::Zero()};
   ground.covariance_m2 << 1.2, -0.1, -0.1, 0.05;
   const auto placed = PlaceHazard(pose, {1.0, 0.2}, ground);
 
@@ -52,15 +55,15 @@ TEST(PlaceHazard, CovarianceIsThatOfManyNoisyPlacements) {
     const double first = unit(random);
     return Eigen::Vector2d(root * Eigen::Vector2d(first, unit(random)));
   };
-  const LocalFrame frame(kAntenna);
+  const geo::LocalFrame frame(kAntenna);
   const Eigen::Vector2d mean_m = frame.ToEnu(placed.position);
   Eigen::Matrix2d sampled = Eigen::Matrix2d::Zero();
   constexpr int kDraws = 40000;
   for (int i = 0; i < kDraws; ++i) {
-    TrackPose noisy_pose = pose;
+    geo::TrackPose noisy_pose = pose;
     noisy_pose.position = frame.ToGeo(draw(pose.covariance_m2));
     noisy_pose.course_rad += 0.03 * unit(random);
-    GroundPoint noisy_ground = ground;
+    geo::GroundPoint noisy_ground = ground;
     noisy_ground.position_m += draw(ground.covariance_m2);
     const Eigen::Vector2d error_m =
         frame.ToEnu(PlaceHazard(noisy_pose, {1.0, 0.2}, noisy_ground).position) - mean_m;
@@ -70,4 +73,4 @@ TEST(PlaceHazard, CovarianceIsThatOfManyNoisyPlacements) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::placement

@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::protocol {
 namespace {
 
 using ::testing::AllOf;
@@ -109,4 +109,4 @@ TEST(HazardCatalogue, MissingFileIsNamed) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::protocol

@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-namespace livemap {
+namespace livemap::test {
 
 /// Runs `body` in a process of its own, which may change its limits, rights and mounts, and returns
 /// what it returned: a sentence about what went wrong, empty when all went well.
@@ -41,4 +41,4 @@ inline std::string RunInChild(const std::function<std::string()>& body) {
   return sentence;
 }
 
-}  // namespace livemap
+}  // namespace livemap::test

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace livemap {
+namespace livemap::test {
 
 /// A fresh directory that goes with the object.
 class TemporaryDirectory {
@@ -23,4 +23,4 @@ class TemporaryDirectory {
   std::string path_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::test

@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 TEST(Backoff, DoublesUpToTheMaximumWithJitterBelow) {
@@ -34,4 +34,4 @@ TEST(Backoff, RefusesDelaysThatWouldHammerOrShrink) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

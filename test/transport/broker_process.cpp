@@ -19,7 +19,7 @@
 #include "transport/event_fd.h"
 #include "transport/tcp_probe.h"
 
-namespace livemap {
+namespace livemap::transport {
 
 int FreePort() {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
@@ -103,4 +103,4 @@ std::string BrokerProcess::Password(const std::string& user) const {
   return password;
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

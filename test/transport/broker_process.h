@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// A TCP port that was free a moment ago.
 int FreePort();
@@ -62,4 +62,4 @@ class BrokerProcess {
   ChildProcess process_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 using ::testing::HasSubstr;
@@ -112,4 +112,4 @@ TEST(ParseMd5, AcceptsThirtyTwoHexadecimalDigits) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 using ::testing::HasSubstr;
@@ -171,4 +171,4 @@ TEST(MessageLayout, RefusesALimitOnAFieldThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -15,7 +15,7 @@
 #include "test/transport/broker_process.h"
 #include "test/transport/waiting.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 using ::testing::HasSubstr;
@@ -325,4 +325,4 @@ TEST(MqttClientOptions, RefusesValuesThatItCannotKeep) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -14,7 +14,7 @@
 #include "test/transport/waiting.h"
 #include "transport/mqtt_client.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 using ::testing::HasSubstr;
@@ -229,4 +229,4 @@ TEST_F(ZoneIdentityTest, ARevokedVehicleIsThrownOutAndToldThatItIsRevoked) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 OutgoingMessage Message(std::size_t bytes, std::uint64_t tag = 0) {
@@ -39,4 +39,4 @@ TEST(OutgoingQueue, RefusesMoreBytesThanItsBoundAndCountsTopics) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

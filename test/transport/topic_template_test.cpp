@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::transport {
 namespace {
 
 const char kReport[] = "livemap/v1/{zone}/vehicle/{vehicle}/report";
@@ -64,4 +64,4 @@ TEST(TopicTemplate, KnowsWhetherItNamesAVehicle) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <thread>
 
-namespace livemap {
+namespace livemap::transport {
 
 /// Waits for a condition of another thread; the limit only keeps a broken test from hanging.
 template <typename Condition>
@@ -16,4 +16,4 @@ bool Eventually(Condition condition) {
   return true;
 }
 
-}  // namespace livemap
+}  // namespace livemap::transport

@@ -7,7 +7,7 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::web {
 
 TokenFile::TokenFile() {
   std::ofstream(path()) << official() << " " << token() << "\n";
@@ -28,19 +28,20 @@ std::int64_t UtcNowNs() {
 }
 
 ZoneFixture::ZoneFixture() {
-  catalogue = HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
-  ZoneService::Config config;
+  catalogue = protocol::HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
+  zone::ZoneService::Config config;
   config.speed.max_speed_mps = 1e9;  // Reports of one vehicle lie all over the town.
   config.allowance.reports_per_hour = 1e9;
   config.map_changes_per_hour = 1e9;
   config.directory = folder_.path();
   config.catalogue = catalogue;
-  zone = std::make_unique<ZoneService>(
+  zone = std::make_unique<zone::ZoneService>(
       config, [this] { return now_ns.load(); }, 1);
 }
 
-Report ZoneFixture::MakeReport(const std::string& class_name, const GeoPoint& position) {
-  Report report;
+protocol::Report ZoneFixture::MakeReport(const std::string& class_name,
+                                         const geo::GeoPoint& position) {
+  protocol::Report report;
   report.uuid = Uuid::Random(generator_);
   report.vehicle_id = "car-1";
   report.drive_id = "drive-1";
@@ -55,9 +56,9 @@ Report ZoneFixture::MakeReport(const std::string& class_name, const GeoPoint& po
   return report;
 }
 
-MapChangeReport ZoneFixture::MakeMapChange(const std::string& class_name,
-                                           const GeoPoint& position) {
-  MapChangeReport report;
+protocol::MapChangeReport ZoneFixture::MakeMapChange(const std::string& class_name,
+                                                     const geo::GeoPoint& position) {
+  protocol::MapChangeReport report;
   report.uuid = Uuid::Random(generator_);
   report.vehicle_id = "car-1";
   report.drive_id = "drive-1";
@@ -72,8 +73,9 @@ MapChangeReport ZoneFixture::MakeMapChange(const std::string& class_name,
   return report;
 }
 
-void ZoneFixture::AddRow(const std::string& class_name, const GeoPoint& start, std::size_t count) {
-  std::vector<Report> reports;
+void ZoneFixture::AddRow(const std::string& class_name, const geo::GeoPoint& start,
+                         std::size_t count) {
+  std::vector<protocol::Report> reports;
   reports.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double step_deg = 0.00018 * static_cast<double>(i);
@@ -89,4 +91,4 @@ WebConfig TestOptions() {
   return options;
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -11,7 +11,7 @@
 #include "web/server/server.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// A folder of its own that goes away with the object.
 class TemporaryFolder {
@@ -56,15 +56,16 @@ class ZoneFixture {
   ZoneFixture();
 
   /// A report that the zone accepts, without a picture.
-  Report MakeReport(const std::string& class_name, const GeoPoint& position);
+  protocol::Report MakeReport(const std::string& class_name, const geo::GeoPoint& position);
   /// A word of an object that appeared, which the zone accepts.
-  MapChangeReport MakeMapChange(const std::string& class_name, const GeoPoint& position);
+  protocol::MapChangeReport MakeMapChange(const std::string& class_name,
+                                          const geo::GeoPoint& position);
   /// Adds `count` hazards of `class_name` about 20 m apart, going north from `start`.
-  void AddRow(const std::string& class_name, const GeoPoint& start, std::size_t count);
+  void AddRow(const std::string& class_name, const geo::GeoPoint& start, std::size_t count);
 
-  HazardCatalogue catalogue;
+  protocol::HazardCatalogue catalogue;
   std::atomic<std::int64_t> now_ns{kStartNs};
-  std::unique_ptr<ZoneService> zone;
+  std::unique_ptr<zone::ZoneService> zone;
 
  private:
   TemporaryFolder folder_;
@@ -74,4 +75,4 @@ class ZoneFixture {
 /// Options that serve the source tree's page on any free port of the loopback.
 WebConfig TestOptions();
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -7,17 +7,17 @@
 #include "geo/wgs84.h"
 #include "protocol/map_change_report.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 constexpr std::int64_t kChangeNowNs = 1'700'000'000'000'000'000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr GeoPoint kChangePlace{40.44, -79.94};
+constexpr geo::GeoPoint kChangePlace{40.44, -79.94};
 
 /// An acceptable word of a barrier that appeared, one metre of sigma, with a uuid of its own.
-inline MapChangeReport MakeMapChange(const std::string& vehicle = "car-1",
-                                     const std::string& drive = "drive-1") {
+inline protocol::MapChangeReport MakeMapChange(const std::string& vehicle = "car-1",
+                                               const std::string& drive = "drive-1") {
   static std::mt19937_64 generator(2);
-  MapChangeReport report;
+  protocol::MapChangeReport report;
   report.uuid = Uuid::Random(generator);
   report.vehicle_id = vehicle;
   report.drive_id = drive;
@@ -33,8 +33,8 @@ inline MapChangeReport MakeMapChange(const std::string& vehicle = "car-1",
 }
 
 /// The place so many metres to the east of kChangePlace.
-inline GeoPoint EastOf(double metres) {
-  return LocalFrame(kChangePlace).ToGeo(Eigen::Vector2d(metres, 0));
+inline geo::GeoPoint EastOf(double metres) {
+  return geo::LocalFrame(kChangePlace).ToGeo(Eigen::Vector2d(metres, 0));
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -13,7 +13,7 @@
 #include "protocol/report.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -36,8 +36,8 @@ class ZoneTest : public testing::Test {
     return config;
   }
   /// Drivers are told at once: most tests are not about confirmation.
-  static HazardCatalogue OneVehicleSuffices() {
-    return HazardCatalogue::Parse("defaults: {confirmations: 1}\nclasses: {}\n", "test");
+  static protocol::HazardCatalogue OneVehicleSuffices() {
+    return protocol::HazardCatalogue::Parse("defaults: {confirmations: 1}\nclasses: {}\n", "test");
   }
   std::string DatabasePath() const { return directory_ + "/zone/zone.sqlite3"; }
   /// A clock that stands still.
@@ -49,9 +49,9 @@ class ZoneTest : public testing::Test {
 };
 
 /// An acceptable report of a pothole, without a picture, with a uuid of its own.
-inline Report MakeReport(const GeoPoint& position = {40.44, -79.94}) {
+inline protocol::Report MakeReport(const geo::GeoPoint& position = {40.44, -79.94}) {
   static std::mt19937_64 generator(1);
-  Report report;
+  protocol::Report report;
   report.uuid = Uuid::Random(generator);
   report.vehicle_id = "car-1";
   report.drive_id = "drive-1";
@@ -90,4 +90,4 @@ inline bool SameHazard(const Hazard& a, const Hazard& b) {
          a.announced_sequence == b.announced_sequence;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

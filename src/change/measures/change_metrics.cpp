@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 std::optional<double> Share(std::uint64_t part, std::uint64_t whole) {
@@ -142,7 +142,7 @@ std::vector<ScoreHistogram::CurvePoint> ScoreHistogram::Curve(std::size_t points
   return curve;
 }
 
-PooledChangeScores::PooledChangeScores() : of_class_(kChangeClasses) {}
+PooledChangeScores::PooledChangeScores() : of_class_(protocol::kChangeClasses) {}
 
 void PooledChangeScores::Add(const ChangeProbabilities& probabilities, const cv::Mat& truth,
                              bool with_classes) {
@@ -159,7 +159,7 @@ void PooledChangeScores::Add(const ChangeProbabilities& probabilities, const cv:
     const auto* taken = most_likely.ptr<std::uint8_t>(row);
     const auto* no_change = probabilities.of_class[0].ptr<float>(row);
     for (int column = 0; column < truth.cols; ++column) {
-      if (is[column] >= kChangeClasses) {
+      if (is[column] >= protocol::kChangeClasses) {
         ++left_out_;
         continue;
       }
@@ -167,7 +167,7 @@ void PooledChangeScores::Add(const ChangeProbabilities& probabilities, const cv:
       Count(taken[column] != 0, is[column] != 0, at_most_likely_);
       if (!classes) continue;
       ++confusion_[is[column]][taken[column]];
-      for (std::size_t i = 0; i < kChangeClasses; ++i) {
+      for (std::size_t i = 0; i < protocol::kChangeClasses; ++i) {
         of_class_[i].Add(probabilities.of_class[i].ptr<float>(row)[column], is[column] == i);
       }
     }
@@ -178,9 +178,10 @@ std::optional<double> PooledChangeScores::MultiClassAccuracy() const {
   if (!tells_classes()) return std::nullopt;
   std::uint64_t right = 0;
   std::uint64_t found = 0;
-  for (std::size_t is = 1; is < kChangeClasses; ++is) {
+  for (std::size_t is = 1; is < protocol::kChangeClasses; ++is) {
     right += confusion_[is][is];
-    for (std::size_t taken = 1; taken < kChangeClasses; ++taken) found += confusion_[is][taken];
+    for (std::size_t taken = 1; taken < protocol::kChangeClasses; ++taken)
+      found += confusion_[is][taken];
   }
   return Share(right, found);
 }
@@ -201,7 +202,7 @@ void CommunityChangeScores::Add(const std::string& name, const ChangeProbabiliti
     const auto* is = truth_resized.ptr<std::uint8_t>(row);
     const auto* taken = most_likely.ptr<std::uint8_t>(row);
     for (int column = 0; column < kSide; ++column) {
-      if (is[column] < kChangeClasses) Count(taken[column] != 0, is[column] != 0, counts);
+      if (is[column] < protocol::kChangeClasses) Count(taken[column] != 0, is[column] != 0, counts);
     }
   }
   pairs_.emplace_back(name, counts);
@@ -232,4 +233,4 @@ std::optional<double> CommunityChangeScores::MeanF1WithChange() const {
   return sum / static_cast<double>(count);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -13,7 +13,7 @@
 #include "change/methods/change_probabilities.h"
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Two outcomes, counted over pixels.
 struct BinaryCounts {
@@ -81,7 +81,8 @@ class ScoreHistogram {
 };
 
 /// Pixels by what they are (row) and what they are most likely taken for (column).
-using ChangeConfusion = std::array<std::array<std::uint64_t, kChangeClasses>, kChangeClasses>;
+using ChangeConfusion =
+    std::array<std::array<std::uint64_t, protocol::kChangeClasses>, protocol::kChangeClasses>;
 
 /// The thesis's protocol (4.5), pooled over all pixels of all pairs.
 class PooledChangeScores {
@@ -101,7 +102,7 @@ class PooledChangeScores {
   /// Score: 1 - probability of no change.
   const ScoreHistogram& change() const { return change_; }
   /// One class against the rest, by its probability.
-  const ScoreHistogram& of_class(ChangeClass change_class) const {
+  const ScoreHistogram& of_class(protocol::ChangeClass change_class) const {
     return of_class_[static_cast<std::size_t>(change_class)];
   }
   /// Change is where no change is not the most likely.
@@ -142,4 +143,4 @@ class CommunityChangeScores {
   std::vector<std::pair<std::string, BinaryCounts>> pairs_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

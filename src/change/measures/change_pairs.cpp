@@ -12,7 +12,7 @@
 #include "imaging/image_header.h"
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,10 +104,11 @@ void AddFlat(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
 
 /// The class that a published colour stands for; none for a colour of no class.
 std::optional<std::uint8_t> ClassOfColour(const std::array<std::uint8_t, 3>& rgb) {
-  for (int i = 0; i < kChangeClasses; ++i) {
-    if (ChangeClassColour(static_cast<ChangeClass>(i)) == rgb) return static_cast<std::uint8_t>(i);
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
+    if (protocol::ChangeClassColour(static_cast<protocol::ChangeClass>(i)) == rgb)
+      return static_cast<std::uint8_t>(i);
   }
-  if (rgb == kMiscellaneousRgb) return static_cast<std::uint8_t>(ChangeClass::kRubbish);
+  if (rgb == kMiscellaneousRgb) return static_cast<std::uint8_t>(protocol::ChangeClass::kRubbish);
   if (rgb == std::array<std::uint8_t, 3>{0, 0, 0}) return kLeftOutPixel;
   return std::nullopt;
 }
@@ -147,13 +148,13 @@ ChangeMask DecodeIndices(const cv::Mat& image, const std::string& path) {
     const auto* values = image.ptr<std::uint8_t>(row);
     for (int column = 0; column < image.cols; ++column) ++counts[values[column]];
   }
-  for (std::size_t value = kChangeClasses; value < kLeftOutPixel; ++value) {
+  for (std::size_t value = protocol::kChangeClasses; value < kLeftOutPixel; ++value) {
     if (counts[value] == 0) continue;
     throw Error("mask '" + path + "' has the value " + std::to_string(value) +
                 ", accepted are 0 to 9 and 255 (classes), or 0 and 255 (change or not)");
   }
-  const bool some_class =
-      std::any_of(counts.begin() + 1, counts.begin() + kChangeClasses, [](auto n) { return n; });
+  const bool some_class = std::any_of(counts.begin() + 1, counts.begin() + protocol::kChangeClasses,
+                                      [](auto n) { return n; });
   mask.classes = image.clone();
   if (counts[kLeftOutPixel] != 0 && !some_class) {
     mask.with_classes = false;
@@ -222,8 +223,8 @@ std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& dir
 cv::Mat ReadPicture(const std::string& path, int flags) {
   const std::string bytes = ReadFile(path, kMaxPictureBytes);
   const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
-  const auto header = ReadImageHeader(data, bytes.size());
-  if (!header || header->format == ImageHeader::Format::kWebp) {
+  const auto header = imaging::ReadImageHeader(data, bytes.size());
+  if (!header || header->format == imaging::ImageHeader::Format::kWebp) {
     throw Error("'" + path + "' is no JPEG or PNG picture");
   }
   if (std::int64_t{header->width} * header->height > kMaxPicturePixels) {
@@ -231,7 +232,7 @@ cv::Mat ReadPicture(const std::string& path, int flags) {
                 std::to_string(header->height) + ", accepted are up to 64 megapixels");
   }
   cv::Mat image;
-  if (HasImageEnd(data, bytes.size(), header->format)) {
+  if (imaging::HasImageEnd(data, bytes.size(), header->format)) {
     try {
       image = cv::imdecode(
           cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<std::uint8_t*>(data)),
@@ -273,7 +274,7 @@ ChangePair LoadChangePair(const ChangePairFiles& files) {
   pair.direction = ReadPicture(files.direction, cv::IMREAD_UNCHANGED);
   check(pair.direction, files.direction);
   if (pair.direction.type() != CV_8UC1 ||
-      cv::countNonZero(pair.direction > int{kVanishedPixel}) > 0) {
+      cv::countNonZero(pair.direction > int{protocol::kVanishedPixel}) > 0) {
     throw Error("mask '" + files.direction +
                 "' is no mask of direction, accepted are 8 bits of one channel with 0, 1 "
                 "(appeared) and 2 (vanished)");
@@ -281,4 +282,4 @@ ChangePair LoadChangePair(const ChangePairFiles& files) {
   return pair;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::change {
 
 /// The files of one pair.
 struct ChangePairFiles {
@@ -65,4 +65,4 @@ ChangeMask DecodeChangeMask(const cv::Mat& image, const std::string& path);
 /// Error naming the path.
 cv::Mat ReadPicture(const std::string& path, int flags);
 
-}  // namespace livemap
+}  // namespace livemap::change

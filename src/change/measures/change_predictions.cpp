@@ -10,7 +10,7 @@
 #include "change/measures/change_pairs.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr std::size_t kMaxNpyBytes = std::size_t{1} << 30U;
@@ -18,7 +18,7 @@ constexpr std::uint64_t kMaxSide = 16384;
 
 [[noreturn]] void RefuseNpy(const std::string& path, const std::string& why) {
   throw Error("prediction '" + path + "' " + why + ", accepted is a numpy array of " +
-              std::to_string(kChangeClasses) +
+              std::to_string(protocol::kChangeClasses) +
               " x height x width in C order, float32 or uint8 in little endian");
 }
 
@@ -86,8 +86,8 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
   if (!header.floats && text.compare(*type, 5, "'|u1'") != 0) RefuseNpy(path, "has another type");
   if (text.compare(*order, 5, "False") != 0) RefuseNpy(path, "is in Fortran's order");
   const auto shape = ReadShape(text, *shape_at);
-  if (!shape || (*shape)[0] != kChangeClasses || (*shape)[1] < 1 || (*shape)[1] > kMaxSide ||
-      (*shape)[2] < 1 || (*shape)[2] > kMaxSide) {
+  if (!shape || (*shape)[0] != protocol::kChangeClasses || (*shape)[1] < 1 ||
+      (*shape)[1] > kMaxSide || (*shape)[2] < 1 || (*shape)[2] > kMaxSide) {
     RefuseNpy(path, "has another shape");
   }
   header.shape = *shape;
@@ -100,7 +100,7 @@ constexpr double kMaxSumError = 0.05;
 
 void CheckSumIsOne(const ChangeProbabilities& probabilities, const std::string& path) {
   cv::Mat sum = probabilities.of_class.at(0).clone();
-  for (std::size_t i = 1; i < kChangeClasses; ++i) sum += probabilities.of_class[i];
+  for (std::size_t i = 1; i < protocol::kChangeClasses; ++i) sum += probabilities.of_class[i];
   double least = 0;
   double most = 0;
   cv::minMaxLoc(sum, &least, &most);
@@ -134,14 +134,14 @@ void WritePicture(const std::string& path, const cv::Mat& image) {
 ChangeProbabilities ParseNpyProbabilities(const std::string& bytes, const std::string& path) {
   const NpyHeader header = ReadNpyHeader(bytes, path);
   const std::size_t pixels = header.shape[1] * header.shape[2];
-  const std::size_t wanted = kChangeClasses * pixels * (header.floats ? 4 : 1);
+  const std::size_t wanted = protocol::kChangeClasses * pixels * (header.floats ? 4 : 1);
   if (bytes.size() - header.data_at != wanted) {
     RefuseNpy(path, "has " + std::to_string(bytes.size() - header.data_at) +
                         " bytes of data where its shape wants " + std::to_string(wanted));
   }
   ChangeProbabilities probabilities;
   const char* data = bytes.data() + header.data_at;
-  for (std::size_t i = 0; i < kChangeClasses; ++i) {
+  for (std::size_t i = 0; i < protocol::kChangeClasses; ++i) {
     cv::Mat image(static_cast<int>(header.shape[1]), static_cast<int>(header.shape[2]),
                   header.floats ? CV_32FC1 : CV_8UC1);
     const std::size_t size = pixels * image.elemSize();
@@ -175,7 +175,7 @@ ChangeProbabilities ReadPrediction(const std::string& folder, const std::string&
     probabilities = FromScore(score);
   }
   CheckProbabilities(probabilities, size, path);
-  if (probabilities.of_class.size() == kChangeClasses) CheckSumIsOne(probabilities, path);
+  if (probabilities.of_class.size() == protocol::kChangeClasses) CheckSumIsOne(probabilities, path);
   return probabilities;
 }
 
@@ -191,4 +191,4 @@ void WriteClassPicture(const std::string& path, const cv::Mat& classes) {
   WritePicture(path, classes);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -5,7 +5,7 @@
 
 #include "change/measures/change_metrics.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// The prediction of the pair `name` in a folder: `NAME.npy` (numpy, C order, float32, or uint8 for
 /// 255ths; kChangeClasses x height x width, probabilities in the order of ChangeClass) or
@@ -23,4 +23,4 @@ void WriteScorePicture(const std::string& path, const ChangeProbabilities& proba
 /// Change or not, 8 bits: MostLikely's classes, as one channel. Throws Error naming the path.
 void WriteClassPicture(const std::string& path, const cv::Mat& classes);
 
-}  // namespace livemap
+}  // namespace livemap::change

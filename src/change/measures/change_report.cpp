@@ -8,7 +8,7 @@
 
 #include "change/measures/change_pairs.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -65,15 +65,15 @@ Json CurveJson(const ScoreHistogram& scores, std::size_t points) {
 
 Json ClassesJson(const PooledChangeScores& pooled, std::size_t curve_points) {
   Json json;
-  for (int i = 1; i < kChangeClasses; ++i) {
-    const auto change_class = static_cast<ChangeClass>(i);
+  for (int i = 1; i < protocol::kChangeClasses; ++i) {
+    const auto change_class = static_cast<protocol::ChangeClass>(i);
     const ScoreHistogram& scores = pooled.of_class(change_class);
     Json entry;
     entry["pixels"] = scores.positives();
     entry["ap"] = FigureOrNull(scores.AveragePrecision());
     entry["at_fpr"] = OperationsJson(scores);
     if (curve_points > 0) entry["curve"] = CurveJson(scores, curve_points);
-    json[ChangeClassName(change_class)] = entry;
+    json[protocol::ChangeClassName(change_class)] = entry;
   }
   return json;
 }
@@ -140,12 +140,12 @@ std::string FiguresText(const ChangeFigures& figures) {
           Column(figures.community.MeanF1()) + ", of pairs with a change" +
           Column(figures.community.MeanF1WithChange()) + "\n";
   if (!pooled.tells_classes()) return text;
-  for (int i = 1; i < kChangeClasses; ++i) {
-    const auto change_class = static_cast<ChangeClass>(i);
+  for (int i = 1; i < protocol::kChangeClasses; ++i) {
+    const auto change_class = static_cast<protocol::ChangeClass>(i);
     const ScoreHistogram& scores = pooled.of_class(change_class);
     char line[96];
     std::snprintf(line, sizeof(line), "  %-16s %10llu pixels, average precision",
-                  ChangeClassName(change_class),
+                  protocol::ChangeClassName(change_class),
                   static_cast<unsigned long long>(scores.positives()));
     text += line + Column(scores.AveragePrecision()) + "\n";
   }
@@ -159,8 +159,10 @@ void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& cl
   const cv::Mat changed = classes > 0;
   for (const ChangeRegion& region : regions) {
     const cv::Mat here = changed(region.box);
-    const int appeared = cv::countNonZero((truth(region.box) == int{kAppearedPixel}) & here);
-    const int vanished = cv::countNonZero((truth(region.box) == int{kVanishedPixel}) & here);
+    const int appeared =
+        cv::countNonZero((truth(region.box) == int{protocol::kAppearedPixel}) & here);
+    const int vanished =
+        cv::countNonZero((truth(region.box) == int{protocol::kVanishedPixel}) & here);
     const int true_pixels = appeared + vanished;
     if (true_pixels < 0.4 * cv::countNonZero(here)) continue;
     if (std::max(appeared, vanished) < 0.75 * true_pixels) continue;
@@ -215,4 +217,4 @@ std::string ToText(const ChangeReport& report) {
   return text;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -9,7 +9,7 @@
 #include "change/measures/change_metrics.h"
 #include "change/objects/changed_objects.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Figures of one order of the two pictures.
 struct ChangeFigures {
@@ -54,4 +54,4 @@ nlohmann::ordered_json ToJson(const ChangeReport& report, std::size_t curve_poin
 /// A table for people.
 std::string ToText(const ChangeReport& report);
 
-}  // namespace livemap
+}  // namespace livemap::change

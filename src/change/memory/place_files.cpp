@@ -14,7 +14,7 @@
 #include "common/sha256.h"
 #include "common/sqlite.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 namespace fs = std::filesystem;
@@ -155,4 +155,4 @@ std::vector<std::string> PlaceFiles::List() const {
   return names;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::change {
 
 /// Files under the hash of their content, `<directory>/frames/<first two digits>/<sha256>.jpg`, in
 /// a directory that one process has for itself while this object lives. A name always has its whole
@@ -36,4 +36,4 @@ class PlaceFiles {
   int lock_file_ = -1;
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr double kFullTurn = 6.283185307179586;
@@ -18,7 +18,7 @@ double HeadingDifference(double a, double b) { return std::abs(std::remainder(a 
 PlaceIndex::PlaceIndex(const PlaceReach& reach)
     : reach_(reach), grid_(std::max(2 * reach.max_distance_m, kMinCellM)) {}
 
-void PlaceIndex::Insert(std::int64_t id, const GeoPoint& position, double heading_rad,
+void PlaceIndex::Insert(std::int64_t id, const geo::GeoPoint& position, double heading_rad,
                         const std::string& drive_id) {
   const auto drive = drives_.emplace(drive_id, static_cast<std::uint32_t>(drives_.size()));
   grid_.Insert(position, static_cast<std::uint64_t>(id));
@@ -33,7 +33,7 @@ void PlaceIndex::Erase(std::int64_t id) {
 
 std::vector<PlaceMatch> PlaceIndex::Nearest(const PlaceQuery& query) const {
   std::vector<PlaceMatch> candidates;
-  if (!IsValid(query.position) || !std::isfinite(query.heading_rad)) return candidates;
+  if (!geo::IsValid(query.position) || !std::isfinite(query.heading_rad)) return candidates;
   const auto drive = drives_.find(query.exclude_drive);
   for (const auto& near : grid_.Within(query.position, reach_.max_distance_m)) {
     const auto id = static_cast<std::int64_t>(near.id);
@@ -53,4 +53,4 @@ std::vector<PlaceMatch> PlaceIndex::Nearest(const PlaceQuery& query) const {
   return candidates;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

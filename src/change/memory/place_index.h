@@ -8,11 +8,11 @@
 
 #include "geo/spatial_grid.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Where and how somebody looks now.
 struct PlaceQuery {
-  GeoPoint position;
+  geo::GeoPoint position;
   double heading_rad = 0;     ///< Of the view, clockwise from true north.
   std::string exclude_drive;  ///< Frames of this drive do not count; empty: all do.
 };
@@ -38,7 +38,7 @@ class PlaceIndex {
   explicit PlaceIndex(const PlaceReach& reach);
 
   /// `position` valid, `id` new.
-  void Insert(std::int64_t id, const GeoPoint& position, double heading_rad,
+  void Insert(std::int64_t id, const geo::GeoPoint& position, double heading_rad,
               const std::string& drive_id);
   /// `id` must be there.
   void Erase(std::int64_t id);
@@ -50,15 +50,15 @@ class PlaceIndex {
 
  private:
   struct Place {
-    GeoPoint position;
+    geo::GeoPoint position;
     float heading_rad;
     std::uint32_t drive;  ///< Number of its id.
   };
 
   PlaceReach reach_;
-  SpatialGrid grid_;
+  geo::SpatialGrid grid_;
   std::unordered_map<std::int64_t, Place> places_;
   std::unordered_map<std::string, std::uint32_t> drives_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

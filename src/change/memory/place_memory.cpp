@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr double kMetresPerDegree = 111319.49;  // Of latitude; cells need no more than that.
@@ -46,8 +46,7 @@ PlaceMemory::Config Checked(const PlaceMemory::Config& config) {
   CheckWithin(config.max_bytes, config.max_cell_bytes, 1e15, "most_bytes");
   CheckWithin(static_cast<double>(config.reach.candidates), 1, 1000, "candidates");
   CheckWithin(config.reach.max_distance_m, 0.1, 1000, "most_distance_m");
-  CheckWithin(config.reach.max_heading_difference_rad, 0, kTurn / 2,
-              "most_heading_difference_rad");
+  CheckWithin(config.reach.max_heading_difference_rad, 0, kTurn / 2, "most_heading_difference_rad");
   CheckWithin(config.match_ratio, 0.1, 1, "match_ratio");
   CheckWithin(config.max_cached_bytes, 0, 1e12, "most_cached_bytes");
   return config;
@@ -113,7 +112,7 @@ void PlaceMemory::LoadIndex() {
     frame.position = {rows.Real(3), rows.Real(4)};
     frame.heading_rad = rows.Real(5);
     const std::int64_t bytes = rows.Int(6);
-    const bool sound = IsValid(frame.position) && frame.heading_rad >= 0 &&
+    const bool sound = geo::IsValid(frame.position) && frame.heading_rad >= 0 &&
                        frame.heading_rad < kTurn && rows.Text(1).size() == 64 && bytes > 0 &&
                        bytes <= static_cast<std::int64_t>(kMaxRecordBytes);
     if (!sound) {
@@ -154,7 +153,7 @@ std::int64_t PlaceMemory::CellOf(const PlaceFrame& frame) const {
   // A row's width is that of its lower edge, so that a cell does not depend on who is in it.
   const double latitude_deg = static_cast<double>(row) * config_.cell_m / kMetresPerDegree - 90;
   const double metres_per_degree =
-      kMetresPerDegree * std::max(0.0, std::cos(latitude_deg * kRadiansPerDegree));
+      kMetresPerDegree * std::max(0.0, std::cos(latitude_deg * geo::kRadiansPerDegree));
   const auto column = static_cast<std::int64_t>(
       std::floor((frame.position.longitude_deg + 180) * metres_per_degree / config_.cell_m));
   const auto sector = std::min<std::int64_t>(
@@ -302,4 +301,4 @@ void PlaceMemory::Hide(std::int64_t id) {
   Uncache(id);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -14,7 +14,7 @@
 #include "change/memory/place_record.h"
 #include "common/sqlite.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Remembers pictures of earlier drives by where they were taken, and finds the one that shows the
 /// present place best (thesis 4.3).
@@ -36,8 +36,8 @@ class PlaceMemory {
     double half_life_days = 60;
     /// Bytes of frames altogether; beyond it the oldest go, wherever they are.
     double max_bytes = 20e9;
-    PlaceReach reach;                 ///< Of Nearest.
-    double match_ratio = 0.8;         ///< Of Rank's ratio test.
+    PlaceReach reach;                ///< Of Nearest.
+    double match_ratio = 0.8;        ///< Of Rank's ratio test.
     double max_cached_bytes = 64e6;  ///< Of features kept in memory.
   };
 
@@ -74,9 +74,7 @@ class PlaceMemory {
   std::optional<std::int64_t> Add(const PlaceRecord& record);
 
   /// See PlaceIndex.
-  std::vector<PlaceMatch> Nearest(const PlaceQuery& query) const {
-    return index_.Nearest(query);
-  }
+  std::vector<PlaceMatch> Nearest(const PlaceQuery& query) const { return index_.Nearest(query); }
 
   /// The candidates by how many of their features match `features`, most first; reads the features
   /// of those that are not cached. What cannot be read is left out and set aside.
@@ -126,4 +124,4 @@ class PlaceMemory {
   double cached_bytes_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

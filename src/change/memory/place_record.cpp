@@ -10,7 +10,7 @@
 #include "common/error.h"
 #include "imaging/image_header.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr char kMark[] = "LMPLACE1";
@@ -70,12 +70,12 @@ void Require(bool holds, const char* field, double value, const char* accepted) 
 }
 
 void CheckPicture(const PlaceRecord& record) {
-  const auto header = ReadImageHeader(record.picture.data(), record.picture.size());
-  if (!header || header->format == ImageHeader::Format::kWebp ||
-      !HasImageEnd(record.picture.data(), record.picture.size(), header->format)) {
+  const auto header = imaging::ReadImageHeader(record.picture.data(), record.picture.size());
+  if (!header || header->format == imaging::ImageHeader::Format::kWebp ||
+      !imaging::HasImageEnd(record.picture.data(), record.picture.size(), header->format)) {
     throw Error("a remembered frame's picture is no whole JPEG or PNG");
   }
-  const CameraIntrinsics& camera = record.frame.camera;
+  const geo::CameraIntrinsics& camera = record.frame.camera;
   if (header->width == camera.width && header->height == camera.height) return;
   throw Error("a remembered frame's picture is " + std::to_string(header->width) + "x" +
               std::to_string(header->height) + ", accepted is the camera's size, " +
@@ -105,13 +105,14 @@ void CheckPlaceFrame(const PlaceFrame& frame) {
     throw Error("a remembered frame's drive id has " + std::to_string(frame.drive_id.size()) +
                 " bytes, accepted are 1 to 64");
   }
-  if (!IsValid(frame.position)) throw Error("a remembered frame's position is no place on earth");
+  if (!geo::IsValid(frame.position))
+    throw Error("a remembered frame's position is no place on earth");
   Require(frame.position_sigma_m >= 0 && frame.position_sigma_m <= 1e6, "position_sigma_m",
           frame.position_sigma_m, "0 to 1e6");
   Require(frame.heading_rad >= 0 && frame.heading_rad < kTwoPi, "heading_rad", frame.heading_rad,
           "0 to 2 pi");
   Require(frame.stamp_ns > 0, "stamp_ns", static_cast<double>(frame.stamp_ns), "positive");
-  const CameraIntrinsics& camera = frame.camera;
+  const geo::CameraIntrinsics& camera = frame.camera;
   Require(camera.width >= 1 && camera.width <= kMaxPictureSide, "width", camera.width,
           "1 to 16384");
   Require(camera.height >= 1 && camera.height <= kMaxPictureSide, "height", camera.height,
@@ -217,4 +218,4 @@ double PlaceQuality(const PlaceFrame& frame, const ImageFeatures& features) {
   return share / (1 + frame.position_sigma_m / kHalfAtSigmaM);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

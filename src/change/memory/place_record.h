@@ -9,16 +9,16 @@
 #include "geo/camera_intrinsics.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// What is known about a picture of an earlier drive.
 struct PlaceFrame {
-  std::string drive_id;         ///< 1 to 64 bytes.
-  std::int64_t stamp_ns = 0;    ///< Since 1970, UTC; the image's stamp.
-  GeoPoint position;            ///< Fused, of the camera.
-  double position_sigma_m = 0;  ///< Standard deviation per axis, 0 to 1e6.
-  double heading_rad = 0;       ///< Of the view, clockwise from true north, [0, 2 pi).
-  CameraIntrinsics camera;      ///< Rectified; width and height are those of the picture.
+  std::string drive_id;          ///< 1 to 64 bytes.
+  std::int64_t stamp_ns = 0;     ///< Since 1970, UTC; the image's stamp.
+  geo::GeoPoint position;        ///< Fused, of the camera.
+  double position_sigma_m = 0;   ///< Standard deviation per axis, 0 to 1e6.
+  double heading_rad = 0;        ///< Of the view, clockwise from true north, [0, 2 pi).
+  geo::CameraIntrinsics camera;  ///< Rectified; width and height are those of the picture.
 };
 
 /// A remembered frame: everything about it in one, so that a file of it can stand alone.
@@ -46,4 +46,4 @@ PlaceRecord ParsePlaceRecord(const std::string& bytes, const std::string& name);
 /// feature, less for a position that is uncertain (half at a sigma of 3 m).
 double PlaceQuality(const PlaceFrame& frame, const ImageFeatures& features);
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -5,7 +5,7 @@
 #include "change/memory/place_memory.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 std::vector<PlaceMemory::Ranked> PlaceMemory::Rank(const ImageFeatures& features,
                                                    const std::vector<PlaceMatch>& candidates) {
   std::vector<Ranked> ranked;
@@ -66,4 +66,4 @@ void PlaceMemory::Uncache(std::int64_t id) {
   cached_.erase(found);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -8,32 +8,32 @@
 #include "perception/inference/manifest_section.h"
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 /// Names of features are told apart by one digit.
 constexpr int kMaxLevels = 10;
 
-ChangeManifest::Graph ReadGraph(const ManifestSection& graphs, const std::string& part,
+ChangeManifest::Graph ReadGraph(const perception::ManifestSection& graphs, const std::string& part,
                                 const std::filesystem::path& directory) {
-  const ManifestSection graph = graphs.Sub(part, {"file", "sha256"});
+  const perception::ManifestSection graph = graphs.Sub(part, {"file", "sha256"});
   return {(directory / graph.Text("file")).string(), graph.Hash("sha256")};
 }
 
 /// Their order is that of the channels of the answer, so it must be the program's.
-void CheckClasses(const ManifestSection& root) {
+void CheckClasses(const perception::ManifestSection& root) {
   const std::vector<std::string> classes = root.DistinctTexts("classes", 1000);
   std::string accepted;
-  bool same = classes.size() == static_cast<std::size_t>(kChangeClasses);
-  for (int i = 0; i < kChangeClasses; ++i) {
-    const std::string name = ChangeClassName(static_cast<ChangeClass>(i));
+  bool same = classes.size() == static_cast<std::size_t>(protocol::kChangeClasses);
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
+    const std::string name = protocol::ChangeClassName(static_cast<protocol::ChangeClass>(i));
     accepted += (accepted.empty() ? "" : ", ") + name;
     same = same && classes[static_cast<std::size_t>(i)] == name;
   }
   if (!same) root.Refuse("classes", "in this order " + accepted);
 }
 
-double Threshold(const ManifestSection& thresholds, const std::string& key) {
+double Threshold(const perception::ManifestSection& thresholds, const std::string& key) {
   return static_cast<double>(thresholds.Number(key, 1e-6, 1));
 }
 
@@ -41,9 +41,9 @@ double Threshold(const ManifestSection& thresholds, const std::string& key) {
 
 ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& origin,
                                    const std::string& directory) {
-  if (yaml.size() > kMaxManifestBytes) {
+  if (yaml.size() > perception::kMaxManifestBytes) {
     throw Error("model manifest '" + origin + "' has " + std::to_string(yaml.size()) +
-                " bytes, at most " + std::to_string(kMaxManifestBytes) + " are accepted");
+                " bytes, at most " + std::to_string(perception::kMaxManifestBytes) + " are accepted");
   }
   try {
     const YAML::Node file = YAML::Load(yaml);
@@ -51,27 +51,27 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
       throw Error("model manifest '" + origin +
                   "' has no key 'kind', accepted is a network of change: kind: change");
     }
-    const ManifestSection root(
+    const perception::ManifestSection root(
         file, origin, "",
         {"name", "kind", "graphs", "classes", "input", "normalisation", "head", "thresholds"});
     root.Choice("kind", {"change"});
     ChangeManifest manifest;
     manifest.name = root.Text("name");
     CheckClasses(root);
-    const ManifestSection graphs = root.Sub("graphs", {"whole", "encoder", "head"});
+    const perception::ManifestSection graphs = root.Sub("graphs", {"whole", "encoder", "head"});
     manifest.whole = ReadGraph(graphs, "whole", directory);
     manifest.encoder = ReadGraph(graphs, "encoder", directory);
     manifest.head = ReadGraph(graphs, "head", directory);
-    const ManifestSection input =
+    const perception::ManifestSection input =
         root.Sub("input", {"width", "height", "channels", "resize", "pad_value", "invalid"});
-    manifest.input = ReadManifestInput(input);
+    manifest.input = perception::ReadManifestInput(input);
     input.Choice("invalid", {"other_picture"});
-    manifest.normalisation = ReadManifestNormalisation(root);
-    const ManifestSection head = root.Sub("head", {"type", "levels", "output"});
+    manifest.normalisation = perception::ReadManifestNormalisation(root);
+    const perception::ManifestSection head = root.Sub("head", {"type", "levels", "output"});
     head.Choice("type", {"change"});
     manifest.levels = head.Integer("levels", 1, kMaxLevels);
     manifest.output = head.Text("output");
-    const ManifestSection thresholds =
+    const perception::ManifestSection thresholds =
         root.Sub("thresholds", {"changed", "changed_at_fpr_0.01", "changed_at_fpr_0.10"});
     manifest.changed = Threshold(thresholds, "changed");
     manifest.changed_at_fpr_001 = Threshold(thresholds, "changed_at_fpr_0.01");
@@ -83,8 +83,8 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
 }
 
 ChangeManifest ReadChangeManifest(const std::string& path) {
-  const std::string yaml = ReadFile(path, kMaxManifestBytes);
+  const std::string yaml = ReadFile(path, perception::kMaxManifestBytes);
   return ParseChangeManifest(yaml, path, std::filesystem::path(path).parent_path().string());
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -4,7 +4,7 @@
 
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Everything that must be known about a network of change to run it: the content of
 /// models/NAME.yaml of `kind: change`, checked. docs/training.md ("The exported model") describes
@@ -20,8 +20,8 @@ struct ChangeManifest {
   Graph whole;    ///< Two pictures and validity to probabilities.
   Graph encoder;  ///< One picture to its features.
   Graph head;     ///< Features of both and validity to probabilities.
-  ModelManifest::Input input;
-  ModelManifest::Normalisation normalisation;
+  perception::ModelManifest::Input input;
+  perception::ModelManifest::Normalisation normalisation;
   int levels = 0;      ///< Of features, 1 to 10.
   std::string output;  ///< Name of the probabilities.
   /// Least 1 - probability of no change at which a pixel counts as changed, (0, 1); the others have
@@ -40,4 +40,4 @@ ChangeManifest ReadChangeManifest(const std::string& path);
 ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& origin,
                                    const std::string& directory);
 
-}  // namespace livemap
+}  // namespace livemap::change

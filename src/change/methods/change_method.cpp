@@ -4,11 +4,11 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 
 ChangeProbabilities NothingChanged(cv::Size size, bool tells_classes) {
   ChangeProbabilities probabilities;
-  for (int i = 0; i < (tells_classes ? kChangeClasses : 2); ++i) {
+  for (int i = 0; i < (tells_classes ? protocol::kChangeClasses : 2); ++i) {
     probabilities.of_class.emplace_back(size, CV_32FC1, cv::Scalar(i == 0 ? 1 : 0));
   }
   return probabilities;
@@ -63,4 +63,4 @@ std::unique_ptr<ChangeMethod> MakeChangeMethod(const std::string& name) {
   throw Error("method '" + name + "' is unknown, accepted are dense-sift and daisy");
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

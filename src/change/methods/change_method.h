@@ -7,7 +7,7 @@
 
 #include "change/methods/change_probabilities.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Two pictures of one place, the earlier one warped into the later one's view.
 struct AlignedPair {
@@ -56,4 +56,4 @@ std::vector<std::string> ChangeMethodNames();
 /// Throws Error naming what is accepted.
 std::unique_ptr<ChangeMethod> MakeChangeMethod(const std::string& name);
 
-}  // namespace livemap
+}  // namespace livemap::change

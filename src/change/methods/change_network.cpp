@@ -7,14 +7,15 @@
 #include "perception/inference/engines.h"
 #include "perception/inference/manifest_section.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 /// Of a probability beyond [0, 1]: sums of float32 are not exact.
 constexpr double kRounding = 1e-3;
 
-OnnxGraph LoadGraph(const ChangeManifest& manifest, const ChangeManifest::Graph& graph) {
-  return {graph.file, ReadHashedFile(manifest.name, graph.file, graph.sha256)};
+perception::OnnxGraph LoadGraph(const ChangeManifest& manifest,
+                                const ChangeManifest::Graph& graph) {
+  return {graph.file, perception::ReadHashedFile(manifest.name, graph.file, graph.sha256)};
 }
 
 cv::Mat Zeros(const std::vector<std::int64_t>& shape) {
@@ -22,11 +23,11 @@ cv::Mat Zeros(const std::vector<std::int64_t>& shape) {
   return {sizes, CV_32F, cv::Scalar(0)};
 }
 
-std::vector<std::int64_t> PictureShape(const ModelManifest::Input& input) {
+std::vector<std::int64_t> PictureShape(const perception::ModelManifest::Input& input) {
   return {1, 3, input.height, input.width};
 }
 
-std::vector<std::int64_t> ValidityShape(const ModelManifest::Input& input) {
+std::vector<std::int64_t> ValidityShape(const perception::ModelManifest::Input& input) {
   return {1, 1, input.height, input.width};
 }
 
@@ -73,26 +74,28 @@ void ChangeNetwork::CheckParts() {
   }
   const std::vector<cv::Mat> features = RunEncoder(Zeros(PictureShape(manifest_.input)));
   for (std::size_t level = 0; level < levels; ++level) {
-    head_.RequireInput("first_" + std::to_string(level), ShapeOf(features[level]));
-    head_.RequireInput("second_" + std::to_string(level), ShapeOf(features[level]));
+    head_.RequireInput("first_" + std::to_string(level), perception::ShapeOf(features[level]));
+    head_.RequireInput("second_" + std::to_string(level), perception::ShapeOf(features[level]));
   }
   head_.RequireInput("validity", ValidityShape(manifest_.input));
   CheckAnswer(head_,
               head_.Run(HeadInputs(features, features, Zeros(ValidityShape(manifest_.input)))));
 }
 
-void ChangeNetwork::CheckAnswer(const OnnxGraph& graph, const std::vector<cv::Mat>& answers) const {
+void ChangeNetwork::CheckAnswer(const perception::OnnxGraph& graph,
+                                const std::vector<cv::Mat>& answers) const {
   const std::vector<std::string>& names = graph.outputs();
   if (names.size() != 1 || names[0] != manifest_.output) {
     throw Error("model file '" + graph.file() + "' has " + std::to_string(names.size()) +
                 " outputs, the first named '" + (names.empty() ? "" : names[0]) +
                 "', its manifest accepts one named '" + manifest_.output + "'");
   }
-  const std::vector<std::int64_t> shape = {1, kChangeClasses, manifest_.input.height,
+  const std::vector<std::int64_t> shape = {1, protocol::kChangeClasses, manifest_.input.height,
                                            manifest_.input.width};
-  if (answers[0].type() != CV_32F || ShapeOf(answers[0]) != shape) {
+  if (answers[0].type() != CV_32F || perception::ShapeOf(answers[0]) != shape) {
     throw Error("model file '" + graph.file() + "' answers with a tensor of " +
-                ShapeText(ShapeOf(answers[0])) + ", its manifest accepts " + ShapeText(shape));
+                perception::ShapeText(perception::ShapeOf(answers[0])) + ", its manifest accepts " +
+                perception::ShapeText(shape));
   }
 }
 
@@ -160,12 +163,12 @@ cv::Mat ChangeNetwork::Validity(const cv::Mat& valid) const {
 ChangeProbabilities ChangeNetwork::Enlarged(const cv::Mat& answer, cv::Size size) const {
   const cv::Rect shown(cv::Point(), after_letterbox_.Fitted(size));
   ChangeProbabilities probabilities;
-  for (int i = 0; i < kChangeClasses; ++i) {
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
     const cv::Mat plane(manifest_.input.height, manifest_.input.width, CV_32FC1,
                         const_cast<float*>(answer.ptr<float>(0, i)));
     if (!cv::checkRange(plane, true, nullptr, -kRounding, 1 + kRounding)) {
       throw Error("model '" + manifest_.name + "' gives class " +
-                  ChangeClassName(static_cast<ChangeClass>(i)) +
+                  protocol::ChangeClassName(static_cast<protocol::ChangeClass>(i)) +
                   " a value that is no probability, accepted is 0 to 1");
     }
     cv::Mat enlarged;
@@ -181,4 +184,4 @@ std::unique_ptr<ChangeNetwork> MakeChangeNetwork(const std::string& path, int th
   return std::make_unique<ChangeNetwork>(ReadChangeManifest(path), threads);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -12,7 +12,7 @@
 #include "perception/inference/letterbox.h"
 #include "perception/inference/onnx_graph.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// What the network's encoder makes of one picture; depends on that picture alone, so that those of
 /// remembered pictures can be kept. Continuous float32, finest first.
@@ -53,7 +53,7 @@ class ChangeNetwork final : public ChangeMethod {
   void CheckWhole();
   void CheckParts();
   /// Throws Error unless it is what the manifest says of the probabilities.
-  void CheckAnswer(const OnnxGraph& graph, const std::vector<cv::Mat>& answers) const;
+  void CheckAnswer(const perception::OnnxGraph& graph, const std::vector<cv::Mat>& answers) const;
   std::vector<cv::Mat> RunEncoder(const cv::Mat& image);
   static NamedTensors HeadInputs(const std::vector<cv::Mat>& first,
                                  const std::vector<cv::Mat>& second, const cv::Mat& validity);
@@ -64,14 +64,14 @@ class ChangeNetwork final : public ChangeMethod {
   ChangeProbabilities Enlarged(const cv::Mat& answer, cv::Size size) const;
 
   ChangeManifest manifest_;
-  Letterbox before_letterbox_;
-  Letterbox after_letterbox_;
-  OnnxGraph whole_;
-  OnnxGraph encoder_;
-  OnnxGraph head_;
+  perception::Letterbox before_letterbox_;
+  perception::Letterbox after_letterbox_;
+  perception::OnnxGraph whole_;
+  perception::OnnxGraph encoder_;
+  perception::OnnxGraph head_;
 };
 
 /// Reads `path` and makes the network. Throws Error as ReadChangeManifest and ChangeNetwork do.
 std::unique_ptr<ChangeNetwork> MakeChangeNetwork(const std::string& path, int threads = 0);
 
-}  // namespace livemap
+}  // namespace livemap::change

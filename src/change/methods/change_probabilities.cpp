@@ -2,7 +2,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 std::string SizeText(cv::Size size) {
@@ -14,9 +14,9 @@ std::string SizeText(cv::Size size) {
 void CheckProbabilities(const ChangeProbabilities& probabilities, cv::Size size,
                         const std::string& name) {
   const std::size_t count = probabilities.of_class.size();
-  if (count != 2 && count != kChangeClasses) {
+  if (count != 2 && count != protocol::kChangeClasses) {
     throw Error("prediction '" + name + "' has " + std::to_string(count) +
-                " classes, accepted are 2 and " + std::to_string(kChangeClasses));
+                " classes, accepted are 2 and " + std::to_string(protocol::kChangeClasses));
   }
   for (const cv::Mat& image : probabilities.of_class) {
     if (image.type() != CV_32FC1 || image.size() != size) {
@@ -48,4 +48,4 @@ cv::Mat MostLikely(const ChangeProbabilities& probabilities) {
   return classes;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

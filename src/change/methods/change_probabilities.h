@@ -7,7 +7,7 @@
 
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// In masks of the truth: nobody says what this pixel shows.
 constexpr std::uint8_t kLeftOutPixel = 255;
@@ -17,7 +17,7 @@ constexpr std::uint8_t kLeftOutPixel = 255;
 struct ChangeProbabilities {
   std::vector<cv::Mat> of_class;
 
-  bool tells_classes() const { return of_class.size() == kChangeClasses; }
+  bool tells_classes() const { return of_class.size() == protocol::kChangeClasses; }
 };
 
 /// Throws Error, with `name` in it, when the images are not two or ten, not of `size`, not
@@ -28,4 +28,4 @@ void CheckProbabilities(const ChangeProbabilities& probabilities, cv::Size size,
 /// equals.
 cv::Mat MostLikely(const ChangeProbabilities& probabilities);
 
-}  // namespace livemap
+}  // namespace livemap::change

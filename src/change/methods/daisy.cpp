@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr float kMinGradient = 1e-3F;
@@ -90,4 +90,4 @@ void Daisy::Describe(int column, int row, float* descriptor) const {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-namespace livemap {
+namespace livemap::change {
 
 /// Parameters of DAISY, the authors' for wide baselines.
 struct DaisyConfig {
@@ -39,4 +39,4 @@ class Daisy {
   std::vector<cv::Point2f> places_;  ///< Of the ring's histograms, from the centre, ring by ring.
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -7,7 +7,7 @@
 #include "change/methods/change_method.h"
 #include "change/methods/daisy.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr int kStride = 2;           // Pixels between descriptors.
@@ -117,4 +117,4 @@ std::unique_ptr<ChangeMethod> MakeDenseSiftDifference() {
 
 std::unique_ptr<ChangeMethod> MakeDaisyDifference() { return std::make_unique<DaisyDifference>(); }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -9,7 +9,7 @@
 #include "change/registration/robust_fit.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 /// Of a map frame's datum: beyond it north is no longer the map's north to a milliradian.
@@ -27,7 +27,7 @@ double WrappedHeading(double heading_rad) {
 }
 
 void CheckPicture(const ChangeDetectorFrame& picture) {
-  const CameraIntrinsics& camera = picture.camera;
+  const geo::CameraIntrinsics& camera = picture.camera;
   if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3 ||
       picture.bgr.size() != cv::Size(camera.width, camera.height)) {
     throw Error("a picture to compare is " + std::to_string(picture.bgr.cols) + "x" +
@@ -35,7 +35,7 @@ void CheckPicture(const ChangeDetectorFrame& picture) {
                 "camera's " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
   }
   if (!picture.depth.empty()) CheckDepth(picture.depth, picture.bgr.size());
-  if (!IsValid(picture.position) || !picture.covariance_m2.allFinite() ||
+  if (!geo::IsValid(picture.position) || !picture.covariance_m2.allFinite() ||
       !std::isfinite(picture.heading_rad)) {
     throw Error(
         "a picture to compare has a pose that is not finite, accepted is WGS84 degrees and "
@@ -46,7 +46,7 @@ void CheckPicture(const ChangeDetectorFrame& picture) {
 }  // namespace
 
 ChangeDetector::ChangeDetector(const Config& config, std::unique_ptr<ChangeMethod> method,
-                         std::int64_t now_ns)
+                               std::int64_t now_ns)
     : config_(config),
       method_(std::move(method)),
       memory_(config.memory, now_ns),
@@ -63,7 +63,7 @@ PlaceFrame ChangeDetector::FrameOf(const ChangeDetectorFrame& picture) const {
   frame.stamp_ns = picture.stamp_ns;
   const Eigen::Rotation2Dd turn(YawOf(picture.heading_rad));
   const Eigen::Vector2d camera_m = turn * picture.base_from_optical.translation().head<2>();
-  frame.position = LocalFrame(picture.position).ToGeo(camera_m);
+  frame.position = geo::LocalFrame(picture.position).ToGeo(camera_m);
   frame.position_sigma_m = std::sqrt(std::max(0.0, picture.covariance_m2.trace() / 2));
   const Eigen::Vector3d view = picture.base_from_optical.linear().col(2);
   frame.heading_rad = WrappedHeading(picture.heading_rad - std::atan2(view.y(), view.x()));
@@ -92,10 +92,9 @@ ChangeDetector::Answer ChangeDetector::Look(const ChangeDetectorFrame& picture) 
   return answer;
 }
 
-std::optional<ChangeDetector::Partner> ChangeDetector::FindPartner(const PlaceFrame& frame,
-                                                             const ChangeDetectorFrame& picture,
-                                                             const FeaturedView& view,
-                                                             Answer& answer) {
+std::optional<ChangeDetector::Partner> ChangeDetector::FindPartner(
+    const PlaceFrame& frame, const ChangeDetectorFrame& picture, const FeaturedView& view,
+    Answer& answer) {
   const auto near = memory_.Nearest({frame.position, frame.heading_rad, config_.drive_id});
   answer.outcome = near.empty() ? Outcome::kNothingEarlier : Outcome::kRefused;
   const auto ranked = memory_.Rank(view.features, near);
@@ -110,9 +109,9 @@ std::optional<ChangeDetector::Partner> ChangeDetector::FindPartner(const PlaceFr
 }
 
 std::optional<ChangeDetector::Partner> ChangeDetector::Register(const PlaceRecord& record,
-                                                          const ChangeDetectorFrame& picture,
-                                                          const FeaturedView& view,
-                                                          std::string& why) const {
+                                                                const ChangeDetectorFrame& picture,
+                                                                const FeaturedView& view,
+                                                                std::string& why) const {
   const RegistrationConfig& options = config_.registration;
   const FeaturedView before{cv::Size(record.frame.camera.width, record.frame.camera.height),
                             record.features};
@@ -147,7 +146,7 @@ std::optional<ChangeDetector::Partner> ChangeDetector::Register(const PlaceRecor
 }
 
 void ChangeDetector::Compare(const ChangeDetectorFrame& picture, const Partner& partner,
-                          const Eigen::Isometry3d& map_from_base, Answer& answer) {
+                             const Eigen::Isometry3d& map_from_base, Answer& answer) {
   answer.outcome = Outcome::kCompared;
   answer.earlier = partner.frame;
   answer.registered_by = partner.registered_by;
@@ -174,7 +173,7 @@ void ChangeDetector::Compare(const ChangeDetectorFrame& picture, const Partner& 
 }
 
 void ChangeDetector::Place(const std::vector<ChangedObject>& events,
-                        std::vector<PlacedChange>& placed) const {
+                           std::vector<PlacedChange>& placed) const {
   for (const ChangedObject& event : events) {
     placed.push_back({event, map_->ToGeo(event.position_m), event.covariance_m2 + covariance_m2_});
   }
@@ -191,9 +190,9 @@ std::vector<PlacedChange> ChangeDetector::EndDrive() {
 }
 
 void ChangeDetector::Remember(const ChangeDetectorFrame& picture, const PlaceFrame& frame,
-                           const ImageFeatures& features, Answer& answer) {
+                              const ImageFeatures& features, Answer& answer) {
   if (last_remembered_ &&
-      GeodesicDistanceM(*last_remembered_, frame.position) < config_.remember_spacing_m) {
+      geo::GeodesicDistanceM(*last_remembered_, frame.position) < config_.remember_spacing_m) {
     return;
   }
   PlaceRecord record{frame, {}, features};
@@ -209,7 +208,7 @@ void ChangeDetector::Remember(const ChangeDetectorFrame& picture, const PlaceFra
 }
 
 Eigen::Isometry3d ChangeDetector::MapFromBase(const ChangeDetectorFrame& picture) {
-  if (!map_ || GeodesicDistanceM(map_->datum(), picture.position) > kMapRadiusM) {
+  if (!map_ || geo::GeodesicDistanceM(map_->datum(), picture.position) > kMapRadiusM) {
     Restart();
     map_.emplace(picture.position);
   }
@@ -220,4 +219,4 @@ Eigen::Isometry3d ChangeDetector::MapFromBase(const ChangeDetectorFrame& picture
   return map_from_base;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

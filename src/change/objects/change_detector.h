@@ -14,16 +14,16 @@
 #include "change/objects/changed_objects.h"
 #include "change/registration/registration.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// A picture of the present drive and where it was taken.
 struct ChangeDetectorFrame {
   std::int64_t stamp_ns = 0;
-  cv::Mat bgr;              ///< CV_8UC3, rectified, of the camera's size.
-  cv::Mat depth;            ///< Empty, or CV_32FC1 of its size: m ahead; 0 and NaN are unknown.
-  CameraIntrinsics camera;  ///< Of this picture.
+  cv::Mat bgr;    ///< CV_8UC3, rectified, of the camera's size.
+  cv::Mat depth;  ///< Empty, or CV_32FC1 of its size: m ahead; 0 and NaN are unknown.
+  geo::CameraIntrinsics camera;  ///< Of this picture.
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
-  GeoPoint position;                                        ///< Of base_link.
+  geo::GeoPoint position;                                   ///< Of base_link.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< Of position, east-north axes.
   double heading_rad = 0;  ///< Of base_link's x axis, clockwise from true north.
 };
@@ -31,7 +31,7 @@ struct ChangeDetectorFrame {
 /// An object that changed, on the earth.
 struct PlacedChange {
   ChangedObject event;  ///< Its position_m is relative to a place that only the watch knows.
-  GeoPoint position;
+  geo::GeoPoint position;
   /// East-north axes; with the position of the vehicle, which all its pictures share.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
 };
@@ -49,11 +49,11 @@ class ChangeDetector {
     RegistrationConfig registration;
     ChangeRegionConfig regions;
     ChangeTracker::Config tracker;
-    double remember_spacing_m = 2;     ///< Between two pictures that are remembered.
+    double remember_spacing_m = 2;    ///< Between two pictures that are remembered.
     double max_position_sigma_m = 5;  ///< Per axis; a picture placed worse is not used at all.
-    std::size_t partners = 2;          ///< Earlier pictures that are tried, the best one first.
-    int jpeg_quality = 90;             ///< Of remembered pictures, 1 to 100.
-    std::uint64_t seed = 1;            ///< Of registration.
+    std::size_t partners = 2;         ///< Earlier pictures that are tried, the best one first.
+    int jpeg_quality = 90;            ///< Of remembered pictures, 1 to 100.
+    std::uint64_t seed = 1;           ///< Of registration.
   };
 
   /// What laid the earlier picture onto the present one.
@@ -128,10 +128,10 @@ class ChangeDetector {
   std::unique_ptr<ChangeMethod> method_;
   PlaceMemory memory_;
   ChangeTracker tracker_;
-  std::optional<LocalFrame> map_;  ///< East and north, in which objects are followed.
+  std::optional<geo::LocalFrame> map_;  ///< East and north, in which objects are followed.
   Eigen::Matrix2d covariance_m2_ = Eigen::Matrix2d::Zero();  ///< Of the vehicle, as last known.
   std::vector<PlacedChange> passed_;                         ///< To be told with the next answer.
-  std::optional<GeoPoint> last_remembered_;
+  std::optional<geo::GeoPoint> last_remembered_;
   std::int64_t last_stamp_ns_ = 0;
 };
 
@@ -140,4 +140,4 @@ class ChangeDetector {
 cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
                     const std::vector<ChangeRegion>& regions);
 
-}  // namespace livemap
+}  // namespace livemap::change

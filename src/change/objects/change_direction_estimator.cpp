@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr double kDirectionReferenceWidth = 320;
@@ -109,4 +109,4 @@ ChangeDirection ChangeDirectionEstimator::Of(const cv::Mat& region, const cv::Re
   return ChangeDirection::kUnknown;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -5,7 +5,7 @@
 
 #include "change/objects/changed_objects.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Tells which of two aligned pictures has what changed. Where a thing stands its colours differ
 /// from those around it and its outline is an edge; where it is gone what lies around it goes on.
@@ -25,4 +25,4 @@ class ChangeDirectionEstimator {
   std::unique_ptr<Picture> after_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

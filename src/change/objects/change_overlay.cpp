@@ -4,15 +4,15 @@
 #include "change/objects/change_detector.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr double kColourShare = 0.5;
 constexpr double kUnknownLight = 0.4;
 constexpr double kTextHeight = 0.4;
 
-cv::Scalar BgrOf(ChangeClass change_class) {
-  const auto rgb = ChangeClassColour(change_class);
+cv::Scalar BgrOf(protocol::ChangeClass change_class) {
+  const auto rgb = protocol::ChangeClassColour(change_class);
   return {static_cast<double>(rgb[2]), static_cast<double>(rgb[1]), static_cast<double>(rgb[0])};
 }
 
@@ -20,7 +20,7 @@ std::string LabelOf(const ChangeRegion& region) {
   const char* sign = region.direction == ChangeDirection::kAppeared   ? "+ "
                      : region.direction == ChangeDirection::kVanished ? "- "
                                                                       : "";
-  return std::string(sign) + ChangeClassName(region.change_class);
+  return std::string(sign) + protocol::ChangeClassName(region.change_class);
 }
 
 }  // namespace
@@ -36,9 +36,9 @@ cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
   cv::Mat dark;
   bgr.convertTo(dark, -1, kUnknownLight);
   dark.copyTo(drawn, classes == kLeftOutPixel);
-  for (int i = 1; i < kChangeClasses; ++i) {
+  for (int i = 1; i < protocol::kChangeClasses; ++i) {
     const cv::Mat here = classes == i;
-    const cv::Mat colour(bgr.size(), CV_8UC3, BgrOf(static_cast<ChangeClass>(i)));
+    const cv::Mat colour(bgr.size(), CV_8UC3, BgrOf(static_cast<protocol::ChangeClass>(i)));
     cv::Mat blended;
     cv::addWeighted(bgr, 1 - kColourShare, colour, kColourShare, 0, blended);
     blended.copyTo(drawn, here);
@@ -52,4 +52,4 @@ cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
   return drawn;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

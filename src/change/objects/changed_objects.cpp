@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 Eigen::Matrix2d PlanarTurn(const Eigen::Isometry3d& pose) {
@@ -38,9 +38,9 @@ std::optional<ChangeTracker::Sight> ChangeTracker::Place(const ChangeFrame& fram
   const cv::Rect& box = region.box;
   if (box.y + box.height >= frame.camera.height) return std::nullopt;
   const Eigen::Vector2d foot(box.x + (box.width - 1) / 2.0, box.y + box.height - 1);
-  GroundProjectionNoise noise = config_.ground;
+  geo::GroundProjectionNoise noise = config_.ground;
   noise.max_range_m = std::min(noise.max_range_m, config_.max_range_m);
-  const auto ground = ProjectToGround(foot, frame.camera, frame.base_from_optical, noise);
+  const auto ground = geo::ProjectToGround(foot, frame.camera, frame.base_from_optical, noise);
   if (!ground) return std::nullopt;
   const Eigen::Matrix2d turn = PlanarTurn(frame.map_from_base);
   Sight sight;
@@ -80,7 +80,7 @@ void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& 
     event.covariance_m2 = sight.covariance_m2;
     event.first_ns = frame.stamp_ns;
     track.first_seen_from_m = from_m;
-    track.class_weight.assign(kChangeClasses, 0);
+    track.class_weight.assign(protocol::kChangeClasses, 0);
   } else {
     // Two estimates of one place, weighted by what each knows.
     const Eigen::Matrix2d gain =
@@ -97,7 +97,7 @@ void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& 
   track.appeared += region.direction == ChangeDirection::kAppeared ? 1 : 0;
   track.vanished += region.direction == ChangeDirection::kVanished ? 1 : 0;
   const auto heaviest = std::max_element(track.class_weight.begin(), track.class_weight.end());
-  event.change_class = static_cast<ChangeClass>(heaviest - track.class_weight.begin());
+  event.change_class = static_cast<protocol::ChangeClass>(heaviest - track.class_weight.begin());
   const double known = track.appeared + track.vanished;
   event.direction = ChangeDirection::kUnknown;
   if (known > 0 && track.appeared >= config_.min_direction_share * known) {
@@ -145,7 +145,7 @@ void ChangeTracker::LimitTracks() {
 }
 
 std::vector<ChangedObject> ChangeTracker::Add(const ChangeFrame& frame,
-                                            const std::vector<ChangeRegion>& regions) {
+                                              const std::vector<ChangeRegion>& regions) {
   std::vector<ChangedObject> confirmed;
   if (frame.stamp_ns <= last_stamp_ns_) return confirmed;
   if (frame.valid.type() != CV_8UC1 ||
@@ -226,4 +226,4 @@ std::vector<ChangedObject> ChangeTracker::Confirmed() const {
   return events;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

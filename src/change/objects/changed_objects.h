@@ -10,14 +10,14 @@
 #include "geo/ground_projection.h"
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Whether the earlier or the later drive has what changed.
 enum class ChangeDirection { kUnknown, kAppeared, kVanished };
 
 /// A connected piece of one picture that changed.
 struct ChangeRegion {
-  ChangeClass change_class = ChangeClass::kNoChange;
+  protocol::ChangeClass change_class = protocol::ChangeClass::kNoChange;
   cv::Rect box;  ///< Pixels.
   int pixels = 0;
   double confidence = 0;  ///< Mean probability that its pixels changed, 0 to 1.
@@ -49,7 +49,7 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
 /// An object that several pictures agree on.
 struct ChangedObject {
   std::uint64_t id = 0;  ///< Rising from 1; of one tracker.
-  ChangeClass change_class = ChangeClass::kNoChange;
+  protocol::ChangeClass change_class = protocol::ChangeClass::kNoChange;
   ChangeDirection direction = ChangeDirection::kUnknown;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Map frame: east, north.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
@@ -67,7 +67,7 @@ struct ChangeFrame {
   std::int64_t earlier_ns = 0;  ///< Of the picture it was compared with.
   Eigen::Isometry3d map_from_base = Eigen::Isometry3d::Identity();  ///< map: ENU; base: REP 105.
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
-  CameraIntrinsics camera;
+  geo::CameraIntrinsics camera;
   cv::Mat valid;  ///< CV_8UC1: 255 where the earlier picture is known; as AlignedPair's.
 };
 
@@ -77,27 +77,28 @@ struct ChangeFrame {
 class ChangeTracker {
  public:
   struct Config {
-    int min_seen = 3;            ///< Pictures.
-    double min_travel_m = 2;     ///< Between the first and the last of them.
-    double min_share = 0.5;      ///< Seen of seen and missed.
+    int min_seen = 3;              ///< Pictures.
+    double min_travel_m = 2;       ///< Between the first and the last of them.
+    double min_share = 0.5;        ///< Seen of seen and missed.
     double gate_sigmas = 3;        ///< Regions this near, in standard deviations, are one object,
-    double min_gate_m = 1.5;     ///< and in any case those nearer than this,
-    double max_gate_m = 6;        ///< and in no case those further than this.
+    double min_gate_m = 1.5;       ///< and in any case those nearer than this,
+    double max_gate_m = 6;         ///< and in no case those further than this.
     double process_sigma_m = 0.5;  ///< Added to each sight's position: pose and foot are not exact.
-    double max_range_m = 40;      ///< Further away nothing is placed or missed.
-    double min_missed_m = 10;    ///< Nearer than this nothing is missed: it may be out of view.
+    double max_range_m = 40;       ///< Further away nothing is placed or missed.
+    double min_missed_m = 10;      ///< Nearer than this nothing is missed: it may be out of view.
     double min_direction_share = 0.6;  ///< Of the sights that know a direction.
-    double passed_m = 5;                 ///< Behind the vehicle by this, an object is passed,
-    double forget_m = 60;                ///< and this far from it, it is forgotten.
-    std::size_t max_tracks = 256;       ///< The least seen, longest unseen goes first.
-    GroundProjectionNoise ground;
+    double passed_m = 5;               ///< Behind the vehicle by this, an object is passed,
+    double forget_m = 60;              ///< and this far from it, it is forgotten.
+    std::size_t max_tracks = 256;      ///< The least seen, longest unseen goes first.
+    geo::GroundProjectionNoise ground;
   };
 
   explicit ChangeTracker(const Config& config);
 
   /// Takes one picture's regions in; returns the objects that it confirmed. Stamps must rise: an
   /// older picture is ignored.
-  std::vector<ChangedObject> Add(const ChangeFrame& frame, const std::vector<ChangeRegion>& regions);
+  std::vector<ChangedObject> Add(const ChangeFrame& frame,
+                                 const std::vector<ChangeRegion>& regions);
   /// The confirmed objects that the vehicle has passed, now that it is here: each once, with its
   /// last figures. Those it is far from are forgotten.
   std::vector<ChangedObject> LeaveBehind(const Eigen::Isometry3d& map_from_base);
@@ -142,4 +143,4 @@ class ChangeTracker {
   std::int64_t last_stamp_ns_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -9,13 +9,13 @@
 #include "change/objects/changed_objects.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr double kRegionReferenceWidth = 320;
 
-ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
-  std::array<int, kChangeClasses> counts{};
+protocol::ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
+  std::array<int, protocol::kChangeClasses> counts{};
   for (int row = 0; row < region.rows; ++row) {
     for (int column = 0; column < region.cols; ++column) {
       if (region.at<std::uint8_t>(row, column) == 0) continue;
@@ -23,7 +23,7 @@ ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
     }
   }
   const auto most = std::max_element(counts.begin() + 1, counts.end());
-  return static_cast<ChangeClass>(most - counts.begin());
+  return static_cast<protocol::ChangeClass>(most - counts.begin());
 }
 
 /// Lets each labelled region take in pixels of `rim` that no region has, a ring at a time; where
@@ -41,11 +41,11 @@ void GrowInto(const cv::Mat& rim, int rings, cv::Mat& labels) {
 cv::Mat ChangedClasses(const ChangeProbabilities& probabilities, double min_confidence) {
   const cv::Mat& no_change = probabilities.of_class[0];
   cv::Mat classes(no_change.size(), CV_8UC1,
-                  cv::Scalar(static_cast<double>(ChangeClass::kOtherObjects)));
+                  cv::Scalar(static_cast<double>(protocol::ChangeClass::kOtherObjects)));
   if (probabilities.tells_classes()) {
     cv::Mat most = probabilities.of_class[1].clone();
     classes.setTo(1);
-    for (int i = 2; i < kChangeClasses; ++i) {
+    for (int i = 2; i < protocol::kChangeClasses; ++i) {
       const cv::Mat& probability = probabilities.of_class[static_cast<std::size_t>(i)];
       classes.setTo(i, probability > most);
       cv::max(most, probability, most);
@@ -102,4 +102,4 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
   return regions;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -10,7 +10,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr int kOrientations = 4;
@@ -279,4 +279,4 @@ double EdgeAgreement(const EdgeCells& before, const EdgeCells& after) {
   return sum[1] > 0 ? sum[0] / sum[1] : 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

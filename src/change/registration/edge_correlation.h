@@ -2,7 +2,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace livemap {
+namespace livemap::change {
 
 /// How strong the edges of a picture are and how they run, in coarse cells: what a street shows by
 /// day, at dusk, in rain and in snow alike. Four orientations, each edge measured by the edges
@@ -27,7 +27,7 @@ struct EdgeSearch {
   double max_shift_x = 0.2;   ///< Share of the width, to either side.
   double max_shift_y = 0.15;  ///< Share of the height.
   double max_scale = 1.3;     ///< And its inverse.
-  int scales = 9;              ///< From one to the other, at least 3.
+  int scales = 9;             ///< From one to the other, at least 3.
 };
 
 /// The best of all shifts and scales.
@@ -49,4 +49,4 @@ EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
 /// streets of one shape align; their windows and lamps do not agree.
 double EdgeAgreement(const EdgeCells& before, const EdgeCells& after);
 
-}  // namespace livemap
+}  // namespace livemap::change

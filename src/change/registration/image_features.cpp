@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr int kDescriptorBytes = 128;
@@ -70,8 +70,8 @@ ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureConfig& options
   if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   std::vector<cv::KeyPoint> keypoints;
   ImageFeatures features;
-  cv::SIFT::create(options.max_features, 3, options.contrast_threshold, options.edge_threshold,
-                   1.6, CV_8U)
+  cv::SIFT::create(options.max_features, 3, options.contrast_threshold, options.edge_threshold, 1.6,
+                   CV_8U)
       ->detectAndCompute(grey, cv::noArray(), keypoints, features.descriptors);
   for (const cv::KeyPoint& keypoint : keypoints) features.points.push_back(keypoint.pt);
   if (keypoints.empty()) features.descriptors = cv::Mat(0, kDescriptorBytes, CV_8UC1);
@@ -92,4 +92,4 @@ std::vector<std::pair<int, int>> MatchFeatures(const ImageFeatures& a, const Ima
   return matches;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::change {
 
 /// SIFT features of one picture. Source: D. G. Lowe, "Distinctive Image Features from
 /// Scale-Invariant Keypoints", IJCV 60(2), 2004.
@@ -31,4 +31,4 @@ ImageFeatures ExtractFeatures(const cv::Mat& image, const FeatureConfig& options
 std::vector<std::pair<int, int>> MatchFeatures(const ImageFeatures& a, const ImageFeatures& b,
                                                double ratio);
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -11,7 +11,7 @@
 
 #include "change/registration/robust_fit.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr double kReferenceWidth = 640;
@@ -275,8 +275,8 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
   return registration;
 }
 
-Registration RegisterByDepth(const FeaturedView& before, const CameraIntrinsics& before_camera,
-                             const FeaturedView& after, const CameraIntrinsics& after_camera,
+Registration RegisterByDepth(const FeaturedView& before, const geo::CameraIntrinsics& before_camera,
+                             const FeaturedView& after, const geo::CameraIntrinsics& after_camera,
                              const cv::Mat& after_depth, const RegistrationConfig& options,
                              std::uint64_t seed) {
   CheckDepth(after_depth, after.size);
@@ -332,4 +332,4 @@ void CheckOverlap(const WarpedPicture& warped, const RegistrationConfig& options
          registration);
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

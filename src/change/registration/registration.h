@@ -10,27 +10,27 @@
 #include "change/registration/image_features.h"
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// When two pictures count as showing one place. Pixels are those of a picture 640 wide; for other
 /// widths they are scaled.
 struct RegistrationConfig {
-  double ratio = 0.8;                ///< Of the ratio test between features.
-  double inlier_px = 6.0;            ///< A match agrees when it lies nearer than this to its place.
-  int max_tries = 2000;             ///< Of RANSAC; fewer when the agreement is good.
+  double ratio = 0.8;              ///< Of the ratio test between features.
+  double inlier_px = 6.0;          ///< A match agrees when it lies nearer than this to its place.
+  int max_tries = 2000;            ///< Of RANSAC; fewer when the agreement is good.
   int min_features = 40;           ///< In each picture; fewer: no texture.
   int min_matches = 15;            ///< That pass the ratio test.
   int min_inliers = 10;            ///< Matches that agree.
   double min_inlier_share = 0.25;  ///< Of the matches.
   double min_spread = 0.1;         ///< Area of the agreeing matches' hull, share of the picture.
   double min_overlap = 0.5;        ///< Share of the later picture that the earlier one covers.
-  double max_error_px = 4.0;        ///< Root mean square of the agreeing matches.
+  double max_error_px = 4.0;       ///< Root mean square of the agreeing matches.
   double max_scale = 1.6;        ///< Local magnification, or its inverse, anywhere in the picture.
   double max_shear = 1.8;        ///< Ratio of the greatest to the least local magnification.
   double max_turn_deg = 15;      ///< In the picture: vehicles stand upright.
   double max_baseline_m = 10;    ///< Between the two cameras, when there is depth.
   double max_rotation_deg = 30;  ///< The same.
-  EdgeSearch edges;               ///< What RegisterByEdges looks through.
+  EdgeSearch edges;              ///< What RegisterByEdges looks through.
   /// Of the edges' correlation, its lead over all other places, and the fine edges' agreement
   /// together. Right pairs have all three, wrong ones at most one of them.
   double min_edge_evidence = 0.82;
@@ -96,8 +96,8 @@ Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
 /// CV_32FC1, metres along the optical axis, 0 or NaN: unknown; Error when it has not the size of
 /// `after`. Both cameras are rectified. `overlap` stays to be filled from WarpByDepth's mask, see
 /// CheckOverlap.
-Registration RegisterByDepth(const FeaturedView& before, const CameraIntrinsics& before_camera,
-                             const FeaturedView& after, const CameraIntrinsics& after_camera,
+Registration RegisterByDepth(const FeaturedView& before, const geo::CameraIntrinsics& before_camera,
+                             const FeaturedView& after, const geo::CameraIntrinsics& after_camera,
                              const cv::Mat& after_depth, const RegistrationConfig& options,
                              std::uint64_t seed);
 
@@ -123,8 +123,8 @@ struct DepthWarpConfig {
 /// Each pixel of the later view is placed by its depth, seen from the earlier camera and taken from
 /// there; a z-buffer of the earlier view says what was hidden from it. Not valid are pixels without
 /// depth, beyond the earlier picture, or hidden. Sizes as in RegisterByDepth; Error otherwise.
-WarpedPicture WarpByDepth(const cv::Mat& before, const CameraIntrinsics& before_camera,
-                          const cv::Mat& after_depth, const CameraIntrinsics& after_camera,
+WarpedPicture WarpByDepth(const cv::Mat& before, const geo::CameraIntrinsics& before_camera,
+                          const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
                           const Eigen::Isometry3d& before_from_after,
                           const DepthWarpConfig& options = {});
 
@@ -132,4 +132,4 @@ WarpedPicture WarpByDepth(const cv::Mat& before, const CameraIntrinsics& before_
 void CheckOverlap(const WarpedPicture& warped, const RegistrationConfig& options,
                   Registration& registration);
 
-}  // namespace livemap
+}  // namespace livemap::change

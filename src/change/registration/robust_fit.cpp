@@ -12,7 +12,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr std::size_t kSample = 4;
@@ -162,7 +162,7 @@ void RefineHomography(const std::vector<cv::Point2d>& before, const std::vector<
   }
 }
 
-cv::Matx33d MatrixOf(const CameraIntrinsics& camera) {
+cv::Matx33d MatrixOf(const geo::CameraIntrinsics& camera) {
   return {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
 }
 
@@ -180,7 +180,7 @@ Eigen::Isometry3d PoseOf(const cv::Vec3d& rotation, const cv::Vec3d& translation
 std::vector<double> PoseErrors(const Eigen::Isometry3d& pose,
                                const std::vector<cv::Point3d>& places,
                                const std::vector<cv::Point2d>& seen,
-                               const CameraIntrinsics& camera) {
+                               const geo::CameraIntrinsics& camera) {
   std::vector<double> errors(places.size(), kFar);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Eigen::Vector3d point = pose * Eigen::Vector3d(places[i].x, places[i].y, places[i].z);
@@ -236,7 +236,7 @@ HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
 }
 
 PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Point2d>& seen,
-                const CameraIntrinsics& camera, double inlier_px, int max_tries,
+                const geo::CameraIntrinsics& camera, double inlier_px, int max_tries,
                 std::uint64_t seed) {
   PoseFit best;
   if (places.size() < kSample) return best;
@@ -277,4 +277,4 @@ void CheckDepth(const cv::Mat& depth, cv::Size size) {
               std::to_string(size.width) + "x" + std::to_string(size.height));
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -9,7 +9,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::change {
 
 /// Which points agree with a model, and how well.
 struct RobustFit {
@@ -40,10 +40,10 @@ struct PoseFit {
 
 /// The pose of a camera that sees `places` (metres) at the pixels `seen`; as FitHomography.
 PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Point2d>& seen,
-                const CameraIntrinsics& camera, double inlier_px, int max_tries,
+                const geo::CameraIntrinsics& camera, double inlier_px, int max_tries,
                 std::uint64_t seed);
 
 /// Throws Error when a depth image is not CV_32FC1 of `size`.
 void CheckDepth(const cv::Mat& depth, cv::Size size);
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -7,7 +7,7 @@
 #include "change/registration/registration.h"
 #include "change/registration/robust_fit.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 /// Places of the later view's pixels in the earlier one.
@@ -17,8 +17,8 @@ struct Places {
   cv::Mat distance;  ///< Along the earlier camera's axis, metres.
 };
 
-Places PlacesInBefore(const cv::Mat& after_depth, const CameraIntrinsics& after_camera,
-                      const CameraIntrinsics& before_camera,
+Places PlacesInBefore(const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
+                      const geo::CameraIntrinsics& before_camera,
                       const Eigen::Isometry3d& before_from_after) {
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   Places places;
@@ -87,8 +87,8 @@ WarpedPicture WarpByHomography(const cv::Mat& before, const cv::Matx33d& after_f
   return warped;
 }
 
-WarpedPicture WarpByDepth(const cv::Mat& before, const CameraIntrinsics& before_camera,
-                          const cv::Mat& after_depth, const CameraIntrinsics& after_camera,
+WarpedPicture WarpByDepth(const cv::Mat& before, const geo::CameraIntrinsics& before_camera,
+                          const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
                           const Eigen::Isometry3d& before_from_after,
                           const DepthWarpConfig& options) {
   CheckDepth(after_depth, cv::Size(after_camera.width, after_camera.height));
@@ -117,4 +117,4 @@ WarpedPicture WarpByDepth(const cv::Mat& before, const CameraIntrinsics& before_
   return warped;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 double SkyVisibility::HiddenShare() const { return (left_rad + right_rad) / M_PI; }
 
@@ -37,4 +37,4 @@ Eigen::Vector2d Multipath::ErrorAt(double time_s, double driven_m, double headin
   return {c * along - s * left, s * along + c * left};
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -5,7 +5,7 @@
 
 #include "datasets/seeded_random.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// What hides the sky from a receiver in a street: how high the houses' upper edges stand over it
 /// on either side, seen across the street, radians over the horizon; 0: open.
@@ -42,7 +42,8 @@ class Multipath {
 
   /// East and north, metres, at `time_s` (not decreasing) after `driven_m` metres of driving (not
   /// decreasing) in a street of direction `heading_rad` (counter-clockwise from east).
-  Eigen::Vector2d ErrorAt(double time_s, double driven_m, double heading_rad, const SkyVisibility& sky);
+  Eigen::Vector2d ErrorAt(double time_s, double driven_m, double heading_rad,
+                          const SkyVisibility& sky);
 
  private:
   const double sigma_m_;
@@ -53,4 +54,4 @@ class Multipath {
   double driven_m_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 void CheckValue(const char* name, double value, bool may_be_zero) {
@@ -58,4 +58,4 @@ std::optional<Eigen::Vector2d> ReceiverSimulator::ErrorAt(double time_s) {
   return error_m;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

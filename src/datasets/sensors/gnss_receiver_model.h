@@ -6,7 +6,7 @@
 
 #include "datasets/seeded_random.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// What a satellite receiver does to a position. Errors are horizontal, equal and independent in
 /// east and north.
@@ -44,4 +44,4 @@ class ReceiverSimulator {
   double dropout_end_s_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::datasets

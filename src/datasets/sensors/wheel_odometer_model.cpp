@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 /// Below this speed the wheel's sensor gives no pulses.
@@ -32,4 +32,4 @@ WheelTwist Odometer::Measure(double speed_mps, double yaw_rate_radps) {
   return twist;
 }
 
-}  // namespace livemap
+}  // namespace livemap::datasets

@@ -4,7 +4,7 @@
 
 #include "datasets/seeded_random.h"
 
-namespace livemap {
+namespace livemap::datasets {
 
 /// What a vehicle's bus says of its motion.
 struct WheelTwist {
@@ -38,4 +38,4 @@ class Odometer {
   double scale_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::datasets

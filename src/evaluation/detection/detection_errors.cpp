@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 float LargestLabel(const ScoredFrame& frame) {
@@ -63,7 +63,8 @@ std::vector<FalseReport> FindFalseReports(const ScoredDrive& drive, double thres
     const ScoredBox* max_presence = nullptr;
     for (const ScoredBox& detection : frame.detections) {
       if (detection.score < threshold || !IsFalse(detection, frame, 0.5)) continue;
-      if (max_presence == nullptr || detection.score > max_presence->score) max_presence = &detection;
+      if (max_presence == nullptr || detection.score > max_presence->score)
+        max_presence = &detection;
     }
     if (max_presence == nullptr) continue;
     const bool about_label = BestOverlap(*max_presence, frame.labels) >= kMisplacedIou;
@@ -89,4 +90,4 @@ const char* CauseName(FalseCause cause) {
   return cause == FalseCause::kMisplaced ? "misplaced" : "background";
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -4,7 +4,7 @@
 
 #include "evaluation/detection/detection_metrics.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// Overlap with a label from which on a detection that overlaps it by less than IoU 0.5 is about
 /// that label all the same.
@@ -47,4 +47,4 @@ const char* CauseName(MissCause cause);
 /// "misplaced", "background".
 const char* CauseName(FalseCause cause);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -5,7 +5,7 @@
 
 #include "perception/detection/yolox_decoder.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 struct ScoredMatch {
@@ -37,7 +37,7 @@ void MatchFrame(const ScoredFrame& frame, double iou, std::vector<ScoredMatch>& 
     std::size_t best = frame.labels.size();
     for (std::size_t label = 0; label < frame.labels.size(); ++label) {
       if (taken[label]) continue;
-      const double overlap = IntersectionOverUnion(detection->box, frame.labels[label]);
+      const double overlap = perception::IntersectionOverUnion(detection->box, frame.labels[label]);
       if (overlap > best_overlap) {
         best_overlap = overlap;
         best = label;
@@ -160,7 +160,7 @@ std::vector<std::vector<std::size_t>> FindEvents(const ScoredDrive& drive) {
 double BestOverlap(const ScoredBox& detection, const std::vector<cv::Rect2f>& labels) {
   double best = 0;
   for (const cv::Rect2f& label : labels) {
-    best = std::max(best, IntersectionOverUnion(detection.box, label));
+    best = std::max(best, perception::IntersectionOverUnion(detection.box, label));
   }
   return best;
 }
@@ -235,4 +235,4 @@ std::vector<ClassFigures> SweepThresholds(const std::vector<ScoredDrive>& drives
   return sweep;
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

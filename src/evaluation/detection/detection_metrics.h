@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// Figures of a detector on labelled frames. docs/evaluation.md defines them; everything here is
 /// about one class.
@@ -109,4 +109,4 @@ std::vector<ClassFigures> SweepThresholds(const std::vector<ScoredDrive>& drives
                                           const std::vector<ScoredFrame>& photos,
                                           const std::vector<double>& thresholds);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

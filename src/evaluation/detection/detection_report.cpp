@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 nlohmann::ordered_json OrNull(const std::optional<double>& value) {
@@ -123,4 +123,4 @@ std::string ToText(const DetectionReport& report) {
   return text;
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -7,7 +7,7 @@
 
 #include "evaluation/detection/detection_metrics.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// The figures of one class as they are printed.
 struct ClassReport {
@@ -37,4 +37,4 @@ nlohmann::ordered_json ToJson(const DetectionReport& report);
 /// A table for people.
 std::string ToText(const DetectionReport& report);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

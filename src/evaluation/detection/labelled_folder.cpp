@@ -12,7 +12,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 namespace fs = std::filesystem;
@@ -313,4 +313,4 @@ LabelledFolder ReadLabelledFolder(const std::string& path, const LabelledFolderC
   return folder;
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

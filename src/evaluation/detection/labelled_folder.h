@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// One labelled image, not yet decoded.
 struct LabelledFrame {
@@ -58,4 +58,4 @@ std::vector<LabelledFrame::Label> ParseYoloLabels(const std::string& text,
                                                   const std::vector<std::string>& classes,
                                                   const std::string& origin);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -16,7 +16,7 @@
 #include "evaluation/quantile.h"
 #include "localization/geo_localizer.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 constexpr double kTwoPi = 6.28318530717958647693;
@@ -24,11 +24,11 @@ constexpr double kTwoPi = 6.28318530717958647693;
 /// A true pose on a plane.
 struct TruePose {
   std::int64_t stamp_ns;
-  PlanarPose pose;
+  localization::PlanarPose pose;
 };
 
-GeoPoint ToGeo(const Eigen::Vector3d& earth_m) {
-  GeoPoint point;
+geo::GeoPoint ToGeo(const Eigen::Vector3d& earth_m) {
+  geo::GeoPoint point;
   double height_m = 0;
   GeographicLib::Geocentric::WGS84().Reverse(earth_m.x(), earth_m.y(), earth_m.z(),
                                              point.latitude_deg, point.longitude_deg, height_m);
@@ -36,16 +36,16 @@ GeoPoint ToGeo(const Eigen::Vector3d& earth_m) {
 }
 
 /// Truth on the plane of `frame`, the heading continuous.
-std::vector<TruePose> Truth(const PositionDrive& drive, const LocalFrame& frame) {
+std::vector<TruePose> Truth(const datasets::PositionDrive& drive, const geo::LocalFrame& frame) {
   const Eigen::Matrix3d east_north_up = frame.InEarth().linear().transpose();
   std::vector<TruePose> truth;
-  for (const RecordedPose& pose : drive.poses) {
+  for (const datasets::RecordedPose& pose : drive.poses) {
     const Eigen::Vector3d ahead =
         east_north_up * (pose.earth_from_vehicle * Eigen::Vector3d::UnitX());
     double yaw_rad = std::atan2(ahead.y(), ahead.x());
     if (!truth.empty()) {
       const double before_rad = truth.back().pose.yaw_rad;
-      yaw_rad = before_rad + WrapAngle(yaw_rad - before_rad);
+      yaw_rad = before_rad + localization::WrapAngle(yaw_rad - before_rad);
     }
     truth.push_back({pose.stamp_ns, {frame.ToEnu(ToGeo(pose.earth_m)), yaw_rad}});
   }
@@ -53,7 +53,8 @@ std::vector<TruePose> Truth(const PositionDrive& drive, const LocalFrame& frame)
 }
 
 /// Between two true poses; none outside of them.
-std::optional<PlanarPose> TrueAt(const std::vector<TruePose>& truth, std::int64_t stamp_ns) {
+std::optional<localization::PlanarPose> TrueAt(const std::vector<TruePose>& truth,
+                                               std::int64_t stamp_ns) {
   const auto after = std::lower_bound(
       truth.begin(), truth.end(), stamp_ns,
       [](const TruePose& pose, std::int64_t moment_ns) { return pose.stamp_ns < moment_ns; });
@@ -63,20 +64,21 @@ std::optional<PlanarPose> TrueAt(const std::vector<TruePose>& truth, std::int64_
   const TruePose& before = *std::prev(after);
   const double share =
       Seconds(stamp_ns - before.stamp_ns) / Seconds(after->stamp_ns - before.stamp_ns);
-  return PlanarPose{
+  return localization::PlanarPose{
       before.pose.position_m + share * (after->pose.position_m - before.pose.position_m),
       before.pose.yaw_rad + share * (after->pose.yaw_rad - before.pose.yaw_rad)};
 }
 
 /// Wheel speed along a heading that has a gyro's errors: poses in the odometry's frame.
-std::vector<TruePose> Odometry(const PositionDrive& drive, const std::vector<TruePose>& truth,
-                               const LocalizationTrial& trial, SeededRandom& random) {
+std::vector<TruePose> Odometry(const datasets::PositionDrive& drive,
+                               const std::vector<TruePose>& truth, const LocalizationTrial& trial,
+                               datasets::SeededRandom& random) {
   const double bias_rps = trial.gyro_bias_sigma_rps * random.Normal().x();
   std::vector<TruePose> odometry;
   double error_rad = 0;
   double heading_before_rad = 0;
   double speed_before_mps = 0;
-  for (const RecordedSpeed& speed : drive.speeds) {
+  for (const datasets::RecordedSpeed& speed : drive.speeds) {
     const auto true_pose = TrueAt(truth, speed.stamp_ns);
     if (!true_pose) continue;
     if (odometry.empty()) {
@@ -87,10 +89,10 @@ std::vector<TruePose> Odometry(const PositionDrive& drive, const std::vector<Tru
       const double time_s = Seconds(speed.stamp_ns - odometry.back().stamp_ns);
       error_rad = bias_rps * time_s + trial.gyro_walk_rad * std::sqrt(time_s) * random.Normal().x();
       const double turn_rad = true_pose->yaw_rad - heading_before_rad + error_rad;
-      const PlanarPose& before = odometry.back().pose;
+      const localization::PlanarPose& before = odometry.back().pose;
       const double way_m = 0.5 * (speed.speed_mps + speed_before_mps) * time_s;
       const Eigen::Vector2d step_m =
-          Rotation2(before.yaw_rad + 0.5 * turn_rad) * Eigen::Vector2d(way_m, 0);
+          localization::Rotation2(before.yaw_rad + 0.5 * turn_rad) * Eigen::Vector2d(way_m, 0);
       odometry.push_back({speed.stamp_ns, {before.position_m + step_m, before.yaw_rad + turn_rad}});
       heading_before_rad = true_pose->yaw_rad;
     }
@@ -100,15 +102,15 @@ std::vector<TruePose> Odometry(const PositionDrive& drive, const std::vector<Tru
 }
 
 struct TrialFix {
-  PositionFix fix;
+  localization::PositionFix fix;
   bool outlier = false;
 };
 
-std::vector<TrialFix> Fixes(const PositionDrive& drive, const LocalizationTrial& trial,
-                            SeededRandom& random) {
+std::vector<TrialFix> Fixes(const datasets::PositionDrive& drive, const LocalizationTrial& trial,
+                            datasets::SeededRandom& random) {
   std::vector<TrialFix> fixes;
   const double stated_m = std::hypot(trial.fix_sigma_m, trial.states_noise ? trial.noise_m : 0);
-  for (const RecordedFix& recorded : drive.fixes) {
+  for (const datasets::RecordedFix& recorded : drive.fixes) {
     TrialFix fix;
     Eigen::Vector2d error_m = trial.noise_m * random.Normal();
     fix.outlier = random.Uniform() < trial.outlier_share;
@@ -120,7 +122,7 @@ std::vector<TrialFix> Fixes(const PositionDrive& drive, const LocalizationTrial&
     fix.fix.stamp_ns = recorded.stamp_ns;
     fix.fix.position = recorded.position;
     if (error_m != Eigen::Vector2d::Zero()) {
-      fix.fix.position = LocalFrame(recorded.position).ToGeo(error_m);
+      fix.fix.position = geo::LocalFrame(recorded.position).ToGeo(error_m);
     }
     fix.fix.covariance_m2 = stated_m * stated_m * Eigen::Matrix2d::Identity();
     fixes.push_back(fix);
@@ -138,18 +140,18 @@ struct Run {
   double fix_square_sum = 0;
   std::size_t compared_fixes = 0;
   std::size_t outliers_added = 0;
-  LocalizerCounters counters;
-  LatencyEstimate latency;
+  localization::LocalizerCounters counters;
+  localization::LatencyEstimate latency;
   double odometry_scale = 1;
 };
 
 class Runner {
  public:
-  Runner(const PositionDrive& drive, const LocalizationTrial& trial)
+  Runner(const datasets::PositionDrive& drive, const LocalizationTrial& trial)
       : drive_(drive), trial_(trial), frame_(ToGeo(drive.poses.front().earth_m)) {
     truth_ = Truth(drive, frame_);
     // One seed for both, so that a drop-out changes no noise.
-    SeededRandom random(trial.seed);
+    datasets::SeededRandom random(trial.seed);
     odometry_ = Odometry(drive, truth_, trial, random);
     fixes_ = Fixes(drive, trial, random);
     if (odometry_.size() < 2) throw Error("the drive's wheel speed and poses share no time");
@@ -162,8 +164,8 @@ class Runner {
     return after_s >= trial_.dropout_start_s && after_s < trial_.dropout_start_s + trial_.dropout_s;
   }
 
-  Run Drive(const LocalizerConfig& config, bool with_dropout) const {
-    GeoLocalizer localizer(config);
+  Run Drive(const localization::LocalizerConfig& config, bool with_dropout) const {
+    localization::GeoLocalizer localizer(config);
     Run run;
     std::size_t next_odometry = 0;
     std::size_t next_fix = 0;
@@ -190,14 +192,15 @@ class Runner {
   }
 
  private:
-  static void AddOdometry(GeoLocalizer& localizer, const TruePose& odometry) {
+  static void AddOdometry(localization::GeoLocalizer& localizer, const TruePose& odometry) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear().topLeftCorner<2, 2>() = Rotation2(odometry.pose.yaw_rad);
+    pose.linear().topLeftCorner<2, 2>() = localization::Rotation2(odometry.pose.yaw_rad);
     pose.translation().head<2>() = odometry.pose.position_m;
     localizer.AddOdometry(odometry.stamp_ns, pose);
   }
 
-  void AddFix(GeoLocalizer& localizer, const TrialFix& fix, bool with_dropout, Run& run) const {
+  void AddFix(localization::GeoLocalizer& localizer, const TrialFix& fix, bool with_dropout,
+              Run& run) const {
     if (with_dropout && InDropout(fix.fix.stamp_ns)) return;
     const auto start = std::chrono::steady_clock::now();
     localizer.AddFix(fix.fix);
@@ -212,9 +215,10 @@ class Runner {
     }
   }
 
-  void Compare(const GeoLocalizer& localizer, const TruePose& true_pose, Run& run) const {
+  void Compare(const localization::GeoLocalizer& localizer, const TruePose& true_pose,
+               Run& run) const {
     const auto fused = localizer.Fused(true_pose.stamp_ns);
-    if (!fused || fused->state == LocalizerState::kUninitialised) return;
+    if (!fused || fused->state == localization::LocalizerState::kUninitialised) return;
     const Eigen::Vector2d fused_m = frame_.ToEnu(fused->position);
     const Eigen::Vector2d error_m = fused_m - true_pose.pose.position_m;
     run.fused_m[true_pose.stamp_ns] = fused_m;
@@ -222,9 +226,9 @@ class Runner {
     run.nees_sum += error_m.dot(fused->covariance_m2.inverse() * error_m);
   }
 
-  const PositionDrive& drive_;
+  const datasets::PositionDrive& drive_;
   const LocalizationTrial& trial_;
-  const LocalFrame frame_;
+  const geo::LocalFrame frame_;
   std::vector<TruePose> truth_;
   std::vector<TruePose> odometry_;
   std::vector<TrialFix> fixes_;
@@ -252,7 +256,8 @@ void AddDropout(const Runner& runner, const Run& with, const Run& without,
 
 }  // namespace
 
-LocalizationReport EvaluateLocalization(const PositionDrive& drive, const LocalizerConfig& config,
+LocalizationReport EvaluateLocalization(const datasets::PositionDrive& drive,
+                                        const localization::LocalizerConfig& config,
                                         const LocalizationTrial& trial) {
   const Runner runner(drive, trial);
   const bool with_dropout = trial.dropout_s > 0;
@@ -327,4 +332,4 @@ std::string ToText(const LocalizationReport& report) {
   return text;
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -8,7 +8,7 @@
 #include "datasets/comma2k19.h"
 #include "localization/localizer_config.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// What is done to a recorded drive before the localisation sees it.
 struct LocalizationTrial {
@@ -52,10 +52,11 @@ struct LocalizationReport {
 
 /// Drives the localisation through a recorded drive as it would have run on board: what has a stamp
 /// is handed over at it, and each true pose is compared with what was known at its moment.
-LocalizationReport EvaluateLocalization(const PositionDrive& drive, const LocalizerConfig& config,
+LocalizationReport EvaluateLocalization(const datasets::PositionDrive& drive,
+                                        const localization::LocalizerConfig& config,
                                         const LocalizationTrial& trial);
 
 nlohmann::ordered_json ToJson(const LocalizationReport& report);
 std::string ToText(const LocalizationReport& report);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

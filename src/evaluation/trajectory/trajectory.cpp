@@ -7,7 +7,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 constexpr std::size_t kMaxBytes = 256U << 20U;
@@ -23,7 +23,7 @@ FirstLine FindFirstLine(const std::string& text) {
   FirstLine first;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::vector<std::string> parts = SplitBlanks(text.substr(begin, end - begin));
+    const std::vector<std::string> parts = datasets::SplitBlanks(text.substr(begin, end - begin));
     ++first.number;
     if (!parts.empty() && parts[0][0] != '#') {
       first.columns = parts.size();
@@ -36,34 +36,34 @@ FirstLine FindFirstLine(const std::string& text) {
 
 }  // namespace
 
-std::vector<StampedPose> ParseTrajectory(const std::string& text, const std::string& name,
-                                         double kitti_rate_hz) {
+std::vector<datasets::StampedPose> ParseTrajectory(const std::string& text, const std::string& name,
+                                                   double kitti_rate_hz) {
   if (std::count(text.begin(), text.end(), '\n') > kMaxLines) {
     throw Error("trajectory file '" + name + "' has more than " + std::to_string(kMaxLines) +
                 " lines, which is the most that is accepted");
   }
   const FirstLine first = FindFirstLine(text);
   if (first.columns == 0) throw Error("trajectory file '" + name + "' has no pose");
-  if (first.columns == 8) return ParseTumTrajectory(text, name);
+  if (first.columns == 8) return datasets::ParseTumTrajectory(text, name);
   if (first.columns != 12) {
     throw Error("line " + std::to_string(first.number) + " of '" + name + "' has " +
                 std::to_string(first.columns) +
                 " columns, accepted are 8 (TUM: stamp tx ty tz qx qy qz qw) or 12 (KITTI: a 3x4 "
                 "pose row by row)");
   }
-  std::vector<StampedPose> poses;
-  for (const Eigen::Isometry3d& pose : ParseKittiPoses(text, name)) {
+  std::vector<datasets::StampedPose> poses;
+  for (const Eigen::Isometry3d& pose : datasets::ParseKittiPoses(text, name)) {
     const double seconds = static_cast<double>(poses.size()) / kitti_rate_hz;
     poses.push_back({std::llround(seconds * 1e9), pose});
   }
   return poses;
 }
 
-std::vector<StampedPose> ReadTrajectory(const std::string& path, double kitti_rate_hz) {
+std::vector<datasets::StampedPose> ReadTrajectory(const std::string& path, double kitti_rate_hz) {
   if (std::filesystem::is_directory(path)) {
     throw Error("'" + path + "' is a folder, wanted is a trajectory file");
   }
   return ParseTrajectory(ReadFile(path, kMaxBytes), path, kitti_rate_hz);
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -5,7 +5,7 @@
 
 #include "datasets/sequences.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// Trajectory files: where a camera was, as a benchmark's truth or an odometry's estimate.
 ///
@@ -18,10 +18,10 @@ namespace livemap {
 /// The whole file, at least one pose. Throws Error naming file, line and what is accepted: other
 /// numbers of columns, what is no finite number or no rotation, stamps that do not increase, more
 /// than 256 MiB or a million lines.
-std::vector<StampedPose> ReadTrajectory(const std::string& path, double kitti_rate_hz);
+std::vector<datasets::StampedPose> ReadTrajectory(const std::string& path, double kitti_rate_hz);
 
 /// The same for a file's text; `name` is for messages.
-std::vector<StampedPose> ParseTrajectory(const std::string& text, const std::string& name,
-                                         double kitti_rate_hz);
+std::vector<datasets::StampedPose> ParseTrajectory(const std::string& text, const std::string& name,
+                                                   double kitti_rate_hz);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -7,13 +7,13 @@
 #include "common/error.h"
 #include "datasets/stamp_pairs.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
-Eigen::Matrix3Xd Positions(const std::vector<StampedPose>& poses) {
+Eigen::Matrix3Xd Positions(const std::vector<datasets::StampedPose>& poses) {
   Eigen::Matrix3Xd positions(3, static_cast<Eigen::Index>(poses.size()));
   Eigen::Index column = 0;
-  for (const StampedPose& pose : poses) {
+  for (const datasets::StampedPose& pose : poses) {
     positions.col(column++) = pose.world_from_camera.translation();
   }
   return positions;
@@ -54,22 +54,22 @@ Alignment AlignAll(const TrajectoryPairs& pairs, bool with_scale) {
 
 }  // namespace
 
-std::vector<std::int64_t> StampsOf(const std::vector<StampedPose>& poses,
+std::vector<std::int64_t> StampsOf(const std::vector<datasets::StampedPose>& poses,
                                    std::int64_t moved_by_ns) {
   std::vector<std::int64_t> stamps;
   stamps.reserve(poses.size());
-  for (const StampedPose& pose : poses) stamps.push_back(pose.stamp_ns + moved_by_ns);
+  for (const datasets::StampedPose& pose : poses) stamps.push_back(pose.stamp_ns + moved_by_ns);
   return stamps;
 }
 
-TrajectoryPairs Associate(const std::vector<StampedPose>& truth,
-                          const std::vector<StampedPose>& estimate,
+TrajectoryPairs Associate(const std::vector<datasets::StampedPose>& truth,
+                          const std::vector<datasets::StampedPose>& estimate,
                           const AssociationConfig& options) {
   TrajectoryPairs pairs;
   const std::int64_t offset_ns = std::llround(options.offset_s * 1e9);
   for (const auto& [true_index, index] :
-       PairNearestStamps(StampsOf(truth, -offset_ns), StampsOf(estimate, 0),
-                         std::llround(options.max_difference_s * 1e9))) {
+       datasets::PairNearestStamps(StampsOf(truth, -offset_ns), StampsOf(estimate, 0),
+                                   std::llround(options.max_difference_s * 1e9))) {
     pairs.truth.push_back(truth[true_index]);
     pairs.estimate.push_back(estimate[index]);
   }
@@ -91,4 +91,4 @@ Alignment Align(const TrajectoryPairs& pairs, AlignmentKind kind) {
   return {};
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -6,7 +6,7 @@
 
 #include "datasets/sequences.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// Which true pose belongs to which estimated one, and where the estimate's world lies in the true
 /// one. Trajectories are in the order of their stamps, each stamp once.
@@ -18,16 +18,17 @@ struct AssociationConfig {
 
 /// Poses that belong together: truth[i] and estimate[i], in the order of the true stamps.
 struct TrajectoryPairs {
-  std::vector<StampedPose> truth;
-  std::vector<StampedPose> estimate;  ///< Stamps as in the file, without the offset.
+  std::vector<datasets::StampedPose> truth;
+  std::vector<datasets::StampedPose> estimate;  ///< Stamps as in the file, without the offset.
 };
 
 /// The poses' stamps in nanoseconds, each later by `moved_by_ns`.
-std::vector<std::int64_t> StampsOf(const std::vector<StampedPose>& poses, std::int64_t moved_by_ns);
+std::vector<std::int64_t> StampsOf(const std::vector<datasets::StampedPose>& poses,
+                                   std::int64_t moved_by_ns);
 
 /// PairNearestStamps over the true stamps and the estimate's.
-TrajectoryPairs Associate(const std::vector<StampedPose>& truth,
-                          const std::vector<StampedPose>& estimate,
+TrajectoryPairs Associate(const std::vector<datasets::StampedPose>& truth,
+                          const std::vector<datasets::StampedPose>& estimate,
                           const AssociationConfig& options);
 
 /// What an estimate is freed of before its positions are compared.
@@ -54,4 +55,4 @@ struct Alignment {
 /// Error without pairs, and for a scale when the estimate does not move.
 Alignment Align(const TrajectoryPairs& pairs, AlignmentKind kind);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

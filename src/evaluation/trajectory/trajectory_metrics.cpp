@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 constexpr std::array<double, 8> kKittiLengthsM = {100, 200, 300, 400, 500, 600, 700, 800};
@@ -64,8 +64,8 @@ Eigen::Isometry3d Scaled(Eigen::Isometry3d motion, double scale) {
 double Angle(const Eigen::Isometry3d& motion) { return Eigen::AngleAxisd(motion.linear()).angle(); }
 
 /// `keys` are what the delta counts in, one per pose of the estimate, ascending: stamps or indices.
-RelativeErrors CompareMotions(const std::vector<StampedPose>& truth,
-                              const std::vector<StampedPose>& estimate,
+RelativeErrors CompareMotions(const std::vector<datasets::StampedPose>& truth,
+                              const std::vector<datasets::StampedPose>& estimate,
                               const std::vector<std::int64_t>& keys, std::int64_t delta,
                               const RelativeErrorConfig& options) {
   RelativeErrors errors;
@@ -105,7 +105,7 @@ std::vector<double> PathLengths(const TrajectoryPairs& pairs) {
 }
 
 /// "1305031102.160 to 1305031128.576"
-std::string Span(const std::vector<StampedPose>& poses) {
+std::string Span(const std::vector<datasets::StampedPose>& poses) {
   if (poses.empty()) return "nowhere";
   std::ostringstream text;
   text.precision(3);
@@ -114,8 +114,8 @@ std::string Span(const std::vector<StampedPose>& poses) {
   return text.str();
 }
 
-TrajectoryPairs AssociateOrThrow(const std::vector<StampedPose>& truth,
-                                 const std::vector<StampedPose>& estimate,
+TrajectoryPairs AssociateOrThrow(const std::vector<datasets::StampedPose>& truth,
+                                 const std::vector<datasets::StampedPose>& estimate,
                                  const AssociationConfig& options) {
   TrajectoryPairs pairs = Associate(truth, estimate, options);
   if (pairs.truth.size() >= 2) return pairs;
@@ -161,16 +161,17 @@ std::vector<double> AbsoluteErrors(const TrajectoryPairs& pairs, const Alignment
   return errors_m;
 }
 
-RelativeErrors RelativeErrorsOverTime(const std::vector<StampedPose>& truth,
-                                      const std::vector<StampedPose>& estimate, double delta_s,
-                                      const RelativeErrorConfig& options) {
+RelativeErrors RelativeErrorsOverTime(const std::vector<datasets::StampedPose>& truth,
+                                      const std::vector<datasets::StampedPose>& estimate,
+                                      double delta_s, const RelativeErrorConfig& options) {
   return CompareMotions(truth, estimate, StampsOf(estimate, 0), std::llround(delta_s * 1e9),
                         options);
 }
 
-RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,
-                                        const std::vector<StampedPose>& estimate,
-                                        std::size_t delta_frames, const RelativeErrorConfig& options) {
+RelativeErrors RelativeErrorsOverFrames(const std::vector<datasets::StampedPose>& truth,
+                                        const std::vector<datasets::StampedPose>& estimate,
+                                        std::size_t delta_frames,
+                                        const RelativeErrorConfig& options) {
   std::vector<std::int64_t> indices(estimate.size());
   std::iota(indices.begin(), indices.end(), 0);
   return CompareMotions(truth, estimate, indices, static_cast<std::int64_t>(delta_frames), options);
@@ -222,8 +223,8 @@ std::optional<SegmentErrors> ShortSegmentErrors(const TrajectoryPairs& pairs, do
   return MeanSegmentErrors(pairs, scale, kShortLengthsM, 1);
 }
 
-TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
-                                     const std::vector<StampedPose>& estimate,
+TrajectoryFigures EvaluateTrajectory(const std::vector<datasets::StampedPose>& truth,
+                                     const std::vector<datasets::StampedPose>& estimate,
                                      const TrajectoryConfig& options) {
   const TrajectoryPairs pairs = AssociateOrThrow(truth, estimate, options.association);
   const Alignment alignment = Align(pairs, options.alignment);
@@ -264,4 +265,4 @@ TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
   return figures;
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -7,7 +7,7 @@
 #include "datasets/sequences.h"
 #include "evaluation/trajectory/trajectory_alignment.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// Figures of an estimated trajectory against the true one, as the TUM RGB-D benchmark's
 /// evaluate_ate.py and evaluate_rpe.py and the KITTI odometry devkit define them;
@@ -48,15 +48,16 @@ struct RelativeErrorConfig {
 /// left out when one of them is farther than twice the median interval of the true stamps. As in
 /// the script, after a gap in the estimate the nearest pose may be another time away than
 /// `delta_s`, or the pose itself with no error. Empty when there is no such pair.
-RelativeErrors RelativeErrorsOverTime(const std::vector<StampedPose>& truth,
-                                      const std::vector<StampedPose>& estimate, double delta_s,
-                                      const RelativeErrorConfig& options);
+RelativeErrors RelativeErrorsOverTime(const std::vector<datasets::StampedPose>& truth,
+                                      const std::vector<datasets::StampedPose>& estimate,
+                                      double delta_s, const RelativeErrorConfig& options);
 
 /// The same between each pose and the one `delta_frames` later in the estimate (delta unit "f"),
 /// again without pairs that end at the last pose.
-RelativeErrors RelativeErrorsOverFrames(const std::vector<StampedPose>& truth,
-                                        const std::vector<StampedPose>& estimate,
-                                        std::size_t delta_frames, const RelativeErrorConfig& options);
+RelativeErrors RelativeErrorsOverFrames(const std::vector<datasets::StampedPose>& truth,
+                                        const std::vector<datasets::StampedPose>& estimate,
+                                        std::size_t delta_frames,
+                                        const RelativeErrorConfig& options);
 
 /// Means over segments of the true path, their error relative to their length.
 struct SegmentErrors {
@@ -106,8 +107,8 @@ struct TrajectoryFigures {
 /// ATE and KITTI's errors are of the associated pairs, RPE of all poses of the estimate that have a
 /// true one. The scale found with kSim3 is applied everywhere. Throws Error when fewer than two
 /// pairs are found, and as Align() does.
-TrajectoryFigures EvaluateTrajectory(const std::vector<StampedPose>& truth,
-                                     const std::vector<StampedPose>& estimate,
+TrajectoryFigures EvaluateTrajectory(const std::vector<datasets::StampedPose>& truth,
+                                     const std::vector<datasets::StampedPose>& estimate,
                                      const TrajectoryConfig& options);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

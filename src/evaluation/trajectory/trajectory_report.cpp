@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdio>
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 constexpr double kDegreesPerRadian = 180 / 3.14159265358979323846;
@@ -149,4 +149,4 @@ std::string ToText(const TrajectoryFigures& figures) {
          " deg/100 m, n " + std::to_string(figures.kitti->n) + "\n";
 }
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -5,7 +5,7 @@
 
 #include "evaluation/trajectory/trajectory_metrics.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 
 /// "none", "se3", "sim3" or "origin".
 std::string AlignmentName(AlignmentKind kind);
@@ -23,4 +23,4 @@ nlohmann::ordered_json NullFigures();
 /// A table for people.
 std::string ToText(const TrajectoryFigures& figures);
 
-}  // namespace livemap
+}  // namespace livemap::evaluation

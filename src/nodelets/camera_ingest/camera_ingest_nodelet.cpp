@@ -18,7 +18,7 @@
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/parameters/ingest_parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// The vehicle's eyes: takes images from a topic, device, video file or folder, takes the lens
 /// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`; with
@@ -44,14 +44,14 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   }
 
   void Initialize() {
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadIngestConfig(parameters);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadIngestConfig(parameters);
     queue_ =
         std::make_unique<FrameQueue<IngestFrame>>(static_cast<std::size_t>(config_.queue_size));
-    processor_ =
-        std::make_unique<FrameProcessor>(OutputSize{config_.output_width, config_.output_height},
-                                         static_cast<std::int64_t>(config_.max_megapixels * 1e6));
-    std::unique_ptr<FrameSource> source = OpenSource(config_);
+    processor_ = std::make_unique<FrameProcessor>(
+        imaging::OutputSize{config_.output_width, config_.output_height},
+        static_cast<std::int64_t>(config_.max_megapixels * 1e6));
+    std::unique_ptr<imaging::FrameSource> source = OpenSource(config_);
     image_transport::ImageTransport transport(getNodeHandle());
     publisher_ = transport.advertiseCamera("camera_rect/image", 10);
     if (config_.stereo) {
@@ -93,7 +93,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
         ros::VoidConstPtr(), hints);
   }
 
-  void StartReader(std::unique_ptr<FrameSource> source) {
+  void StartReader(std::unique_ptr<imaging::FrameSource> source) {
     // Its set_camera_info service lets a calibrator replace the calibration while this runs.
     info_manager_ = std::make_unique<camera_info_manager::CameraInfoManager>(
         ros::NodeHandle(getNodeHandle(), "camera"), config_.frame_id);
@@ -199,7 +199,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     if (stereo_) stereo_->Diagnose(status);
   }
 
-  IngestConfig config_;
+  ros_io::IngestConfig config_;
   CalibrationCache calibrations_;
   std::unique_ptr<FrameQueue<IngestFrame>> queue_;
   std::unique_ptr<FrameProcessor> processor_;  ///< The worker's.
@@ -223,6 +223,6 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   double rate_hz_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::CameraIngestNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::CameraIngestNodelet, nodelet::Nodelet)

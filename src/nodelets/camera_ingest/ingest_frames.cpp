@@ -10,7 +10,7 @@
 #include "imaging/decode.h"
 #include "ros/conversions/camera_info_conversions.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
@@ -25,10 +25,10 @@ std::string Size(std::int64_t width, std::int64_t height) {
 void CheckRaw(const sensor_msgs::Image& image, std::int64_t max_pixels) {
   if (image.width == 0 || image.height == 0) throw Error("the image is empty");
   const std::string size = Size(image.width, image.height);
-  if (image.width > Rectifier::kMaxSide || image.height > Rectifier::kMaxSide ||
+  if (image.width > imaging::Rectifier::kMaxSide || image.height > imaging::Rectifier::kMaxSide ||
       static_cast<std::int64_t>(image.width) * image.height > max_pixels) {
     throw Error("the image is " + size + ", accepted are " + std::to_string(max_pixels) +
-                " pixels and " + std::to_string(Rectifier::kMaxSide) + " per side");
+                " pixels and " + std::to_string(imaging::Rectifier::kMaxSide) + " per side");
   }
   int bits = 0;
   int channels = 0;
@@ -48,7 +48,8 @@ void CheckRaw(const sensor_msgs::Image& image, std::int64_t max_pixels) {
   }
 }
 
-void CheckSize(std::int64_t width, std::int64_t height, const CameraCalibration& calibration) {
+void CheckSize(std::int64_t width, std::int64_t height,
+               const imaging::CameraCalibration& calibration) {
   if (width == calibration.width && height == calibration.height) return;
   throw Error("the image is " + Size(width, height) + " but its calibration is for " +
               Size(calibration.width, calibration.height));
@@ -89,17 +90,17 @@ void CalibrationCache::Close() {
   arrived_.notify_all();
 }
 
-const Rectifier& FrameProcessor::RectifierFor(const sensor_msgs::CameraInfo& info) {
-  const CameraCalibration calibration = FromMessage(info);
+const imaging::Rectifier& FrameProcessor::RectifierFor(const sensor_msgs::CameraInfo& info) {
+  const imaging::CameraCalibration calibration = ros_io::FromMessage(info);
   if (!rectifier_ || rectifier_->input() != calibration) {
-    rectifier_ = std::make_unique<Rectifier>(calibration, output_size_);
+    rectifier_ = std::make_unique<imaging::Rectifier>(calibration, output_size_);
   }
   return *rectifier_;
 }
 
 ProcessedFrame FrameProcessor::Process(const IngestFrame& frame,
                                        const sensor_msgs::CameraInfoConstPtr& info) {
-  const Rectifier& rectifier = RectifierFor(*info);
+  const imaging::Rectifier& rectifier = RectifierFor(*info);
   ProcessedFrame result;
   cv_bridge::CvImage rectified;
   rectified.header = frame.header();
@@ -115,16 +116,16 @@ ProcessedFrame FrameProcessor::Process(const IngestFrame& frame,
       rectified.image = rectifier.Apply(shared->image);
     }
   } else {
-    const cv::Mat decoded =
-        DecodeImage(frame.compressed->data.data(), frame.compressed->data.size(), max_pixels_);
+    const cv::Mat decoded = imaging::DecodeImage(frame.compressed->data.data(),
+                                                 frame.compressed->data.size(), max_pixels_);
     CheckSize(decoded.cols, decoded.rows, rectifier.input());
     rectified.encoding = decoded.channels() == 1 ? encodings::MONO8 : encodings::BGR8;
     rectified.image = rectifier.Apply(decoded);
   }
   if (!result.image) result.image = rectified.toImageMsg();
-  result.info =
-      boost::make_shared<sensor_msgs::CameraInfo>(ToMessage(rectifier.output(), frame.header()));
+  result.info = boost::make_shared<sensor_msgs::CameraInfo>(
+      ros_io::ToMessage(rectifier.output(), frame.header()));
   return result;
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

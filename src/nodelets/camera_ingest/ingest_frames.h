@@ -13,7 +13,7 @@
 
 #include "imaging/rectifier.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// A frame as it came in; exactly one pointer is set.
 struct IngestFrame {
@@ -48,18 +48,18 @@ class CalibrationCache {
 /// Checks, decodes, rectifies and resizes one frame after the other. Not thread-safe.
 class FrameProcessor {
  public:
-  FrameProcessor(OutputSize output_size, std::int64_t max_pixels)
+  FrameProcessor(imaging::OutputSize output_size, std::int64_t max_pixels)
       : output_size_(output_size), max_pixels_(max_pixels) {}
 
   /// Throws Error saying what is wrong with the frame or its calibration.
   ProcessedFrame Process(const IngestFrame& frame, const sensor_msgs::CameraInfoConstPtr& info);
 
  private:
-  const Rectifier& RectifierFor(const sensor_msgs::CameraInfo& info);
+  const imaging::Rectifier& RectifierFor(const sensor_msgs::CameraInfo& info);
 
-  const OutputSize output_size_;
+  const imaging::OutputSize output_size_;
   const std::int64_t max_pixels_;
-  std::unique_ptr<Rectifier> rectifier_;
+  std::unique_ptr<imaging::Rectifier> rectifier_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

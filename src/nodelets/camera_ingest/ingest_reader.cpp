@@ -7,28 +7,29 @@
 #include <algorithm>
 #include <chrono>
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kReopenAfterS = 1.0;
 
 }  // namespace
 
-std::unique_ptr<FrameSource> OpenSource(const IngestConfig& config) {
+std::unique_ptr<imaging::FrameSource> OpenSource(const ros_io::IngestConfig& config) {
   switch (config.source) {
-    case IngestSource::kDevice:
-      return OpenDevice(config.uri);
-    case IngestSource::kVideo:
-      return OpenVideo(config.uri);
-    case IngestSource::kFolder:
-      return OpenFolder(config.uri, static_cast<std::size_t>(config.max_megapixels * 8e6));
-    case IngestSource::kTopic:
+    case ros_io::IngestSource::kDevice:
+      return imaging::OpenDevice(config.uri);
+    case ros_io::IngestSource::kVideo:
+      return imaging::OpenVideo(config.uri);
+    case ros_io::IngestSource::kFolder:
+      return imaging::OpenFolder(config.uri, static_cast<std::size_t>(config.max_megapixels * 8e6));
+    case ros_io::IngestSource::kTopic:
       break;
   }
   return nullptr;
 }
 
-IngestReader::IngestReader(const IngestConfig& config, std::unique_ptr<FrameSource> source,
+IngestReader::IngestReader(const ros_io::IngestConfig& config,
+                           std::unique_ptr<imaging::FrameSource> source,
                            std::function<void(IngestFrame)> take,
                            std::function<void(const std::string&)> miss)
     : config_(config),
@@ -54,18 +55,18 @@ bool IngestReader::SleepUntil(ros::WallTime wanted) {
 }
 
 bool IngestReader::GoOn() {
-  if (config_.source == IngestSource::kDevice) {
+  if (config_.source == ros_io::IngestSource::kDevice) {
     miss_("the camera device '" + config_.uri + "' gives no image");
     return SleepUntil(ros::WallTime::now() + ros::WallDuration(kReopenAfterS));
   }
-  if (config_.at_end == IngestAtEnd::kLoop) return true;
+  if (config_.at_end == ros_io::IngestAtEnd::kLoop) return true;
   ended_ = true;
   // The whole manager: what it still holds is published first, as ROS shuts down in order.
-  if (config_.at_end == IngestAtEnd::kShutdown) ros::requestShutdown();
+  if (config_.at_end == ros_io::IngestAtEnd::kShutdown) ros::requestShutdown();
   return false;
 }
 
-IngestFrame IngestReader::Wrap(SourceFrame frame, ros::Time stamp) const {
+IngestFrame IngestReader::Wrap(imaging::SourceFrame frame, ros::Time stamp) const {
   std_msgs::Header header;
   header.stamp = stamp;
   header.frame_id = config_.frame_id;
@@ -81,7 +82,7 @@ IngestFrame IngestReader::Wrap(SourceFrame frame, ros::Time stamp) const {
 }
 
 void IngestReader::Run() {
-  const bool live = config_.source == IngestSource::kDevice;
+  const bool live = config_.source == ros_io::IngestSource::kDevice;
   const double rate_hz = source_->rate_hz() > 0 ? source_->rate_hz() : config_.rate_hz;
   const ros::Duration period(1 / rate_hz);
   const ros::Time first_stamp = ros::Time::now();
@@ -89,7 +90,7 @@ void IngestReader::Run() {
   for (std::int64_t number = 0;;) {
     if (!SleepUntil(live ? ros::WallTime::now() : next)) return;
     try {
-      std::optional<SourceFrame> frame = source_->Next();
+      std::optional<imaging::SourceFrame> frame = source_->Next();
       if (!frame) {
         if (!GoOn()) return;
         source_->Rewind();
@@ -107,4 +108,4 @@ void IngestReader::Run() {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

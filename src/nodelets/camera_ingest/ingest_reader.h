@@ -14,17 +14,17 @@
 #include "nodelets/camera_ingest/ingest_frames.h"
 #include "ros/parameters/ingest_parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// None when the configuration names a topic. Throws Error when the source cannot be opened.
-std::unique_ptr<FrameSource> OpenSource(const IngestConfig& config);
+std::unique_ptr<imaging::FrameSource> OpenSource(const ros_io::IngestConfig& config);
 
 /// Reads a device, video or folder on its own thread at its rate and stamps the frames. Like a
 /// camera it does not wait for whoever takes them. The destructor stops it.
 class IngestReader {
  public:
   /// `take` gets every frame; `miss` the reason why one could not be read.
-  IngestReader(const IngestConfig& config, std::unique_ptr<FrameSource> source,
+  IngestReader(const ros_io::IngestConfig& config, std::unique_ptr<imaging::FrameSource> source,
                std::function<void(IngestFrame)> take, std::function<void(const std::string&)> miss);
   ~IngestReader();
 
@@ -35,12 +35,12 @@ class IngestReader {
   void Run();
   /// At the end of the frames: false when reading is over.
   bool GoOn();
-  IngestFrame Wrap(SourceFrame frame, ros::Time stamp) const;
+  IngestFrame Wrap(imaging::SourceFrame frame, ros::Time stamp) const;
   /// False when stopped while sleeping.
   bool SleepUntil(ros::WallTime wanted);
 
-  const IngestConfig config_;
-  const std::unique_ptr<FrameSource> source_;
+  const ros_io::IngestConfig config_;
+  const std::unique_ptr<imaging::FrameSource> source_;
   const std::function<void(IngestFrame)> take_;
   const std::function<void(const std::string&)> miss_;
   std::mutex mutex_;
@@ -50,4 +50,4 @@ class IngestReader {
   std::thread thread_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -12,22 +12,23 @@
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/camera_info_conversions.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 /// All left images that wait may still ask for theirs.
-std::size_t RightsKept(const IngestConfig& config) {
+std::size_t RightsKept(const ros_io::IngestConfig& config) {
   return 2 * static_cast<std::size_t>(config.queue_size) + 8;
 }
 
 }  // namespace
 
-IngestStereo::IngestStereo(const IngestConfig& config, ros::NodeHandle& node, std::string name)
+IngestStereo::IngestStereo(const ros_io::IngestConfig& config, ros::NodeHandle& node,
+                           std::string name)
     : config_(config),
       name_(std::move(name)),
       rights_(config.stereo_sync_s, config.stereo_wait_s, RightsKept(config)),
       queue_(static_cast<std::size_t>(config.queue_size)),
-      processor_(OutputSize{config.output_width, config.output_height},
+      processor_(imaging::OutputSize{config.output_width, config.output_height},
                  static_cast<std::int64_t>(config.max_megapixels * 1e6)) {
   image_transport::ImageTransport transport(node);
   publisher_ = transport.advertiseCamera("camera_rect/depth/image_raw", 10);
@@ -98,7 +99,7 @@ bool IngestStereo::PublishDepth(const ProcessedFrame& left) {
   if (!partner) return false;
   namespace encodings = sensor_msgs::image_encodings;
   const ProcessedFrame right = RectifyRight(*partner);
-  StereoDepth& matcher = MatcherFor(*left.info, *right.info);
+  imaging::StereoDepth& matcher = MatcherFor(*left.info, *right.info);
   const auto begin = std::chrono::steady_clock::now();
   const cv::Mat depth = matcher.Compute(cv_bridge::toCvShare(left.image, encodings::MONO8)->image,
                                         cv_bridge::toCvShare(right.image, encodings::MONO8)->image);
@@ -119,12 +120,12 @@ ProcessedFrame IngestStereo::RectifyRight(const IngestFrame& right) {
   }
 }
 
-StereoDepth& IngestStereo::MatcherFor(const sensor_msgs::CameraInfo& left,
-                                      const sensor_msgs::CameraInfo& right) {
-  const CameraCalibration left_now = FromMessage(left);
-  const CameraCalibration right_now = FromMessage(right);
+imaging::StereoDepth& IngestStereo::MatcherFor(const sensor_msgs::CameraInfo& left,
+                                               const sensor_msgs::CameraInfo& right) {
+  const imaging::CameraCalibration left_now = ros_io::FromMessage(left);
+  const imaging::CameraCalibration right_now = ros_io::FromMessage(right);
   if (!matcher_ || left_ != left_now || right_ != right_now) {
-    matcher_ = std::make_unique<StereoDepth>(config_.matching, left_now, right_now);
+    matcher_ = std::make_unique<imaging::StereoDepth>(config_.matching, left_now, right_now);
     left_ = left_now;
     right_ = right_now;
   }
@@ -162,4 +163,4 @@ void IngestStereo::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   milliseconds_.clear();
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -17,7 +17,7 @@
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
 #include "ros/parameters/ingest_parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// The second eye of camera_ingest: takes `camera_right/image_raw` with `camera_right/camera_info`,
 /// pairs it with the left images and publishes `camera_rect/depth/image_raw` (32FC1, metres, NaN:
@@ -28,7 +28,7 @@ namespace livemap {
 class IngestStereo {
  public:
   /// `name` stands before what it says.
-  IngestStereo(const IngestConfig& config, ros::NodeHandle& node, std::string name);
+  IngestStereo(const ros_io::IngestConfig& config, ros::NodeHandle& node, std::string name);
   ~IngestStereo();
 
   /// A left image as it was published. Never blocks.
@@ -42,11 +42,11 @@ class IngestStereo {
   /// False when the left image has no partner.
   bool PublishDepth(const ProcessedFrame& left);
   ProcessedFrame RectifyRight(const IngestFrame& right);
-  StereoDepth& MatcherFor(const sensor_msgs::CameraInfo& left,
-                          const sensor_msgs::CameraInfo& right);
+  imaging::StereoDepth& MatcherFor(const sensor_msgs::CameraInfo& left,
+                                   const sensor_msgs::CameraInfo& right);
   void SayMissing(const std_msgs::Header& left) const;
 
-  const IngestConfig config_;
+  const ros_io::IngestConfig config_;
   const std::string name_;
   image_transport::CameraPublisher publisher_;
   ros::Subscriber image_subscriber_;
@@ -56,8 +56,8 @@ class IngestStereo {
   FrameQueue<ProcessedFrame> queue_;
 
   FrameProcessor processor_;  // These three are the worker's.
-  CameraCalibration left_, right_;
-  std::unique_ptr<StereoDepth> matcher_;
+  imaging::CameraCalibration left_, right_;
+  std::unique_ptr<imaging::StereoDepth> matcher_;
   std::thread worker_;
 
   std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
@@ -68,4 +68,4 @@ class IngestStereo {
   std::vector<double> milliseconds_;  ///< Of the matching, since the last diagnostics.
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <utility>
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 ros::Duration Between(ros::Time a, ros::Time b) { return a < b ? b - a : a - b; }
@@ -63,4 +63,4 @@ void StereoPairBuffer::Forget(std::size_t count) {
   frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -11,7 +11,7 @@
 
 #include "nodelets/camera_ingest/ingest_frames.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// The second eye's images, kept until the left image of the same moment asks for its own.
 /// Thread-safe.
@@ -51,4 +51,4 @@ class StereoPairBuffer {
   bool closed_ = false;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -24,15 +24,15 @@
 #include "ros/parameters/offload_parameters.h"
 #include "zone/offload/offload_intake.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kWorkPeriodS = 0.05;
 
-std::vector<HazardDetection> ToDetections(const SightingFrame& answer) {
-  std::vector<HazardDetection> detections;
-  for (const Sighting& sighting : answer.sightings) {
-    HazardDetection detection;
+std::vector<perception::HazardDetection> ToDetections(const placement::SightingFrame& answer) {
+  std::vector<perception::HazardDetection> detections;
+  for (const placement::Sighting& sighting : answer.sightings) {
+    perception::HazardDetection detection;
     detection.class_name = sighting.class_name;
     detection.confidence = sighting.confidence;
     detection.box = {sighting.box.x_min, sighting.box.y_min,
@@ -57,9 +57,9 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
 
   void Initialize() {
     using Self = CandidateIntakeNodelet;
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadCandidateIntakeConfig(parameters);
-    intake_ = std::make_unique<OffloadIntake>(config_.intake);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadCandidateIntakeConfig(parameters);
+    intake_ = std::make_unique<zone::OffloadIntake>(config_.intake);
     ros::NodeHandle& node = getNodeHandle();
     image_publisher_ = node.advertise<sensor_msgs::Image>("candidate/image", 100);
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 1000);
@@ -83,7 +83,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   void OnFrame(const CandidateFrame& message) {
     std::string why;
     try {
-      why = intake_->Add(FromMessage(message), NowNs());
+      why = intake_->Add(ros_io::FromMessage(message), NowNs());
     } catch (const Error& error) {
       ++unreadable_;
       why = error.what();
@@ -103,15 +103,16 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   void Work() {
     // Without a detector a frame would be spent.
     if (image_publisher_.getNumSubscribers() == 0) return;
-    while (const OffloadIntake::Job* job = intake_->Next(NowNs(), SteadyS())) DeliverResult(*job);
+    while (const zone::OffloadIntake::Job* job = intake_->Next(NowNs(), SteadyS()))
+      DeliverResult(*job);
   }
 
-  void DeliverResult(const OffloadIntake::Job& job) {
+  void DeliverResult(const zone::OffloadIntake::Job& job) {
     const std::int64_t internal_ns = job.internal_ns;
     cv::Mat decoded;
     try {
-      decoded = DecodeImage(job.frame.image.data(), job.frame.image.size(),
-                            config_.intake.limits.report.max_image_pixels);
+      decoded = imaging::DecodeImage(job.frame.image.data(), job.frame.image.size(),
+                                     config_.intake.limits.report.max_image_pixels);
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "candidate frame of '%s' dropped: %s",
                             job.frame.vehicle_id.c_str(), error.what());
@@ -122,7 +123,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     }
     const bool grey = decoded.channels() == 1;
     std_msgs::Header header;
-    header.stamp = ToRosTime(internal_ns);
+    header.stamp = ros_io::ToRosTime(internal_ns);
     header.frame_id = "candidate";
     const auto image =
         cv_bridge::CvImage(
@@ -134,30 +135,31 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   }
 
   void OnDetections(const DetectionArray& message) {
-    const SightingFrame answer = ToSightingFrame(message);
-    std::vector<Report> reports = intake_->Finish(answer.stamp_ns, answer);
+    const placement::SightingFrame answer = ros_io::ToSightingFrame(message);
+    std::vector<protocol::Report> reports = intake_->Finish(answer.stamp_ns, answer);
     const auto picture = pictures_.find(answer.stamp_ns);
     if (!reports.empty() && picture != pictures_.end()) {
       AddPicture(*picture->second, ToDetections(answer), reports);
     }
     if (picture != pictures_.end()) pictures_.erase(picture);
-    for (const Report& report : reports) {
-      report_publisher_.publish(boost::make_shared<HazardReport>(ToMessage(report)));
+    for (const protocol::Report& report : reports) {
+      report_publisher_.publish(boost::make_shared<HazardReport>(ros_io::ToMessage(report)));
     }
     Work();
   }
 
   /// The picture that a big vehicle would have sent: with all boxes of the frame.
-  void AddPicture(const sensor_msgs::Image& image, const std::vector<HazardDetection>& detections,
-                  std::vector<Report>& reports) {
+  void AddPicture(const sensor_msgs::Image& image,
+                  const std::vector<perception::HazardDetection>& detections,
+                  std::vector<protocol::Report>& reports) {
     cv::Mat bgr = cv_bridge::toCvCopy(image, sensor_msgs::image_encodings::BGR8)->image;
-    const Picture picture{bgr, nullptr};
-    AnnotateImage(bgr, detections);
-    CropConfig crop;
+    const imaging::Picture picture{bgr, nullptr};
+    perception::AnnotateImage(bgr, detections);
+    imaging::CropConfig crop;
     crop.max_bytes = static_cast<std::size_t>(config_.max_image_bytes);
     crop.quality = config_.jpeg_quality;
-    for (Report& report : reports) {
-      CroppedPicture cropped = CropPicture(picture, report.box, crop);
+    for (protocol::Report& report : reports) {
+      imaging::CroppedPicture cropped = imaging::CropPicture(picture, report.box, crop);
       if (cropped.jpeg.empty()) continue;
       report.image_format = "jpeg";
       report.image = std::move(cropped.jpeg);
@@ -168,7 +170,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    const OffloadIntake::Counters& counters = intake_->counters();
+    const zone::OffloadIntake::Counters& counters = intake_->counters();
     const std::uint64_t lost = counters.displaced + counters.lost_by_detector;
     if (image_publisher_.getNumSubscribers() == 0) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no detector listens");
@@ -199,8 +201,8 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     status.add("reports", counters.reports);
   }
 
-  OffloadIntakeConfig config_;
-  std::unique_ptr<OffloadIntake> intake_;
+  ros_io::OffloadIntakeConfig config_;
+  std::unique_ptr<zone::OffloadIntake> intake_;
   std::map<std::int64_t, sensor_msgs::ImageConstPtr> pictures_;  // At the detector, by stamp.
   std::uint64_t unreadable_ = 0;  // Frames whose message the conversion refused.
   std::uint64_t lost_said_ = 0;
@@ -210,6 +212,6 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   std::unique_ptr<diagnostic_updater::Updater> updater_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::CandidateIntakeNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::CandidateIntakeNodelet, nodelet::Nodelet)

@@ -33,7 +33,7 @@
 #include "ros/parameters/change_parameters.h"
 #include "vehicle/reporting/offload_sender.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kPickPeriodS = 0.02;
@@ -57,7 +57,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   using Clock = std::chrono::steady_clock;
   struct Job {
     PosedFrameQueue::Posed posed;
-    CameraIntrinsics camera;
+    geo::CameraIntrinsics camera;
     Eigen::Isometry3d base_from_optical;
   };
   using Queue = FrameQueue<Job>;
@@ -83,12 +83,13 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
 
   void Initialize() {
     const auto now_ns = static_cast<std::int64_t>(ros::WallTime::now().toNSec());
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadChangeDetectionConfig(parameters, now_ns);
-    ConfiguredChangeMethod method = MakeConfiguredMethod(config_);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadChangeDetectionConfig(parameters, now_ns);
+    ros_io::ConfiguredChangeMethod method = ros_io::MakeConfiguredMethod(config_);
     method_name_ = method.name;
     config_.watch.regions.min_confidence = method.threshold;
-    watch_ = std::make_unique<ChangeDetector>(config_.watch, std::move(method.method), now_ns);
+    watch_ =
+        std::make_unique<change::ChangeDetector>(config_.watch, std::move(method.method), now_ns);
     SayRecovery(watch_->memory().recovery());
     figures_.places = watch_->memory().size();
     frames_ = std::make_unique<PosedFrameQueue>(PosedFrameQueue::Config{
@@ -106,7 +107,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     worker_ = std::thread([this] { Work(); });
   }
 
-  void SayRecovery(const PlaceMemory::Recovery& recovery) {
+  void SayRecovery(const change::PlaceMemory::Recovery& recovery) {
     if (!recovery.set_aside.empty()) {
       NODELET_ERROR("the index of places was corrupt: it is now '%s', %zu places were read again",
                     recovery.set_aside.c_str(), recovery.rebuilt);
@@ -148,7 +149,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     image_transport::ImageTransport transport(node);
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
                                                 getPrivateNodeHandle());
-    // No bound of ROS's, which would lose frames without a word: PosedFrameQueue has one, and counts.
+    // No bound of ROS's, which would lose frames without a word: PosedFrameQueue has one, and
+    // counts.
     image_subscriber_ = transport.subscribe(
         "camera_rect/image", 0,
         boost::function<void(const sensor_msgs::ImageConstPtr&)>(
@@ -169,19 +171,19 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    frames_->AddFix(ToFix(message));
+    frames_->AddFix(ros_io::ToFix(message));
   }
 
   void OnPose(const nav_msgs::Odometry& message) {
-    const std::optional<TrackPose> pose = vehicle_frames_->FusedPose(message);
+    const std::optional<geo::TrackPose> pose = vehicle_frames_->FusedPose(message);
     if (!pose) return;
     const std::lock_guard<std::mutex> lock(mutex_);
-    frames_->AddPose(FromRosTime(message.header.stamp), *pose);
+    frames_->AddPose(ros_io::FromRosTime(message.header.stamp), *pose);
   }
 
   void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
     try {
-      const CameraIntrinsics intrinsics = ToRectifiedIntrinsics(message);
+      const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(message);
       const std::lock_guard<std::mutex> lock(mutex_);
       intrinsics_ = intrinsics;
     } catch (const Error& error) {
@@ -226,7 +228,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
 
   void LookAt(const Job& job) {
     const Clock::time_point start = Clock::now();
-    const ChangeDetector::Answer answer = watch_->Look(ToPicture(job));
+    const change::ChangeDetector::Answer answer = watch_->Look(ToPicture(job));
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     if (!answer.store_error.empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "a place is not remembered: %s",
@@ -236,7 +238,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     if (sender_) sender_->Tell(answer.passed);
     const std::lock_guard<std::mutex> lock(mutex_);
     ++figures_.outcomes[static_cast<std::size_t>(answer.outcome)];
-    if (answer.outcome == ChangeDetector::Outcome::kCompared) {
+    if (answer.outcome == change::ChangeDetector::Outcome::kCompared) {
       ++figures_.registered[static_cast<std::size_t>(answer.registered_by)];
     }
     figures_.remembered += answer.remembered ? 1 : 0;
@@ -249,7 +251,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     figures_.ms_in_window += ms;
   }
 
-  ChangeDetectorFrame ToPicture(const Job& job) {
+  change::ChangeDetectorFrame ToPicture(const Job& job) {
     const auto shared = cv_bridge::toCvShare(job.posed.image, sensor_msgs::image_encodings::BGR8);
     const cv::Mat& bgr = shared->image;
     if (bgr.cols != job.camera.width || bgr.rows != job.camera.height) {
@@ -257,8 +259,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
                   ", its camera_info accepts " + std::to_string(job.camera.width) + "x" +
                   std::to_string(job.camera.height));
     }
-    ChangeDetectorFrame picture;
-    picture.stamp_ns = FromRosTime(job.posed.image->header.stamp);
+    change::ChangeDetectorFrame picture;
+    picture.stamp_ns = ros_io::FromRosTime(job.posed.image->header.stamp);
     picture.bgr = bgr;
     if (bgr.cols > config_.width_px) {
       const double scale = static_cast<double>(config_.width_px) / bgr.cols;
@@ -268,7 +270,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     } else {
       picture.bgr = bgr.clone();  // The message's pixels end with it.
     }
-    picture.camera = Resized(job.camera, picture.bgr.cols, picture.bgr.rows);
+    picture.camera = vehicle::Resized(job.camera, picture.bgr.cols, picture.bgr.rows);
     picture.depth = DepthOf(job, picture.bgr.size());
     picture.base_from_optical = job.base_from_optical;
     picture.position = job.posed.base.position;
@@ -281,7 +283,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   cv::Mat DepthOf(const Job& job, cv::Size size) {
     if (!job.posed.depth) return {};
     try {
-      return ToDepthMetres(job.posed.depth, size, config_.depth_units_per_m);
+      return ros_io::ToDepthMetres(job.posed.depth, size, config_.depth_units_per_m);
     } catch (const std::exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "depth image not used: %s", error.what());
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -290,23 +292,23 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     }
   }
 
-  void Publish(const ChangeDetector::Answer& answer, const std_msgs::Header& header) {
-    const bool compared = answer.outcome == ChangeDetector::Outcome::kCompared;
+  void Publish(const change::ChangeDetector::Answer& answer, const std_msgs::Header& header) {
+    const bool compared = answer.outcome == change::ChangeDetector::Outcome::kCompared;
     if (compared && mask_publisher_.getNumSubscribers() > 0) {
-      mask_publisher_.publish(ToImageMessage(answer.classes, header));
+      mask_publisher_.publish(ros_io::ToImageMessage(answer.classes, header));
     }
     if (compared && overlay_publisher_.getNumSubscribers() > 0) {
-      const cv::Mat drawn = DrawChanges(answer.pair.after, answer.classes, answer.regions);
-      overlay_publisher_.publish(ToImageMessage(drawn, header));
+      const cv::Mat drawn = change::DrawChanges(answer.pair.after, answer.classes, answer.regions);
+      overlay_publisher_.publish(ros_io::ToImageMessage(drawn, header));
     }
     report_publisher_.publish(boost::make_shared<ChangedObjects>(
-        ToMessage(answer, header, config_.watch.drive_id, method_name_)));
+        ros_io::ToMessage(answer, header, config_.watch.drive_id, method_name_)));
   }
 
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    using Outcome = ChangeDetector::Outcome;
+    using Outcome = change::ChangeDetector::Outcome;
     const Queue::Counters queue = queue_->counters();
     const std::lock_guard<std::mutex> lock(mutex_);
     const PosedFrameQueue::Counters& frames = frames_->counters();
@@ -358,10 +360,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     figures_.ms_in_window = 0;
   }
 
-  ChangeDetectionConfig config_;
+  ros_io::ChangeDetectionConfig config_;
   std::string method_name_;
-  std::unique_ptr<ChangeDetector> watch_;       // The worker's, once it runs.
-  std::unique_ptr<MapChangeSender> sender_;  // None: nothing is told to the zone.
+  std::unique_ptr<change::ChangeDetector> watch_;  // The worker's, once it runs.
+  std::unique_ptr<MapChangeSender> sender_;        // None: nothing is told to the zone.
   std::unique_ptr<Queue> queue_;
   std::unique_ptr<VehicleTf> vehicle_frames_;
   ros::Publisher report_publisher_, mask_publisher_, overlay_publisher_;
@@ -376,13 +378,13 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
 
   std::mutex mutex_;  ///< Guards the rest.
   std::unique_ptr<PosedFrameQueue> frames_;
-  std::optional<CameraIntrinsics> intrinsics_;
+  std::optional<geo::CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;  ///< By frame id.
   std::uint64_t no_camera_ = 0;
   std::uint64_t busy_ = 0;
   Figures figures_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::ChangeDetectionNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::ChangeDetectionNodelet, nodelet::Nodelet)

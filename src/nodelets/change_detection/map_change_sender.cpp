@@ -4,7 +4,7 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/map_change_conversions.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kChangeTickS = 0.2;
@@ -27,10 +27,10 @@ MapChangeSender::MapChangeSender(const Config& config, ros::NodeHandle& node, st
   timer_ = node.createSteadyTimer(ros::WallDuration(kChangeTickS), &MapChangeSender::OnTick, this);
 }
 
-void MapChangeSender::Tell(const std::vector<PlacedChange>& passed) {
+void MapChangeSender::Tell(const std::vector<change::PlacedChange>& passed) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const PlacedChange& change : passed) {
-    const auto report = ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
+  for (const change::PlacedChange& change : passed) {
+    const auto report = ros_io::ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
     if (!report || report->confidence < config_.min_confidence) {
       ++unsure_;
       continue;
@@ -46,8 +46,8 @@ void MapChangeSender::Tell(const std::vector<PlacedChange>& passed) {
 void MapChangeSender::OnReceipt(const ReportReceipt& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    const Receipt receipt = FromMessage(message);
-    if (receipt.status == Receipt::Status::kRefused) {
+    const protocol::Receipt receipt = ros_io::FromMessage(message);
+    if (receipt.status == protocol::Receipt::Status::kRefused) {
       ROS_WARN_THROTTLE(kSayAgainS, "the zone refused a change: %s", receipt.reason.c_str());
     }
     outbox_.AddReceipt(receipt);
@@ -61,8 +61,8 @@ void MapChangeSender::OnReceipt(const ReportReceipt& message) {
 void MapChangeSender::OnTick(const ros::SteadyTimerEvent&) {
   if (publisher_.getNumSubscribers() == 0) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMaxChangesPerTick)) {
-    publisher_.publish(ToMessage(report));
+  for (const protocol::MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMaxChangesPerTick)) {
+    publisher_.publish(ros_io::ToMessage(report));
   }
 }
 
@@ -73,7 +73,7 @@ void MapChangeSender::TellStoreError(const Error& error) {
 
 void MapChangeSender::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const MapChangeOutbox::Counters& counters = outbox_.counters();
+  const vehicle::MapChangeOutbox::Counters& counters = outbox_.counters();
   status.add("changes_unsure", unsure_);
   status.add("changes_told", counters.added);
   status.add("changes_pending", outbox_.pending());
@@ -85,4 +85,4 @@ void MapChangeSender::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& stat
   status.add("changes_not_kept", store_errors_);
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

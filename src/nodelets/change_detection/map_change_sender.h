@@ -13,7 +13,7 @@
 #include "change/objects/change_detector.h"
 #include "vehicle/outbox/map_change_outbox.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// MapChangeOutbox with topics and clocks: sends change/map_change, hears change/receipt.
 class MapChangeSender {
@@ -21,14 +21,14 @@ class MapChangeSender {
   struct Config {
     std::string drive_id;
     double min_confidence = 0.5;  ///< Less sure objects are not told.
-    MapChangeOutbox::Config outbox;
+    vehicle::MapChangeOutbox::Config outbox;
   };
 
   /// Throws StoreError.
   MapChangeSender(const Config& config, ros::NodeHandle& node, std::int64_t now_ns);
 
   /// What the zone is to know of objects that the vehicle has passed. Any thread.
-  void Tell(const std::vector<PlacedChange>& passed);
+  void Tell(const std::vector<change::PlacedChange>& passed);
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
  private:
@@ -42,9 +42,9 @@ class MapChangeSender {
   ros::SteadyTimer timer_;
   mutable std::mutex mutex_;  ///< Guards the rest.
   std::mt19937_64 random_;
-  MapChangeOutbox outbox_;
+  vehicle::MapChangeOutbox outbox_;
   std::uint64_t unsure_ = 0;
   std::uint64_t store_errors_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

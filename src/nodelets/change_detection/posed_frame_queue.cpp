@@ -2,7 +2,7 @@
 
 #include "ros/conversions/hazard_conversions.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 void PosedFrameQueue::AddImage(const sensor_msgs::ImageConstPtr& image, double now_s) {
   ++counters_.frames;
@@ -14,21 +14,22 @@ void PosedFrameQueue::AddImage(const sensor_msgs::ImageConstPtr& image, double n
 }
 
 void PosedFrameQueue::AddDepth(const sensor_msgs::ImageConstPtr& depth) {
-  depths_[FromRosTime(depth->header.stamp)] = depth;
+  depths_[ros_io::FromRosTime(depth->header.stamp)] = depth;
   if (depths_.size() > config_.max_waiting) depths_.erase(depths_.begin());
 }
 
 std::optional<PosedFrameQueue::Posed> PosedFrameQueue::Next(double now_s) {
   while (!waiting_.empty()) {
     const Waiting& waiting = waiting_.front();
-    const std::int64_t stamp_ns = FromRosTime(waiting.image->header.stamp);
+    const std::int64_t stamp_ns = ros_io::FromRosTime(waiting.image->header.stamp);
     const double waited_s = now_s - waiting.arrival_s;
-    const VehiclePoseLookup::Lookup lookup = pose_.At(stamp_ns, waited_s);
+    const vehicle::VehiclePoseLookup::Lookup lookup = pose_.At(stamp_ns, waited_s);
     // In their order: those behind it wait too.
-    if (lookup.answer == VehiclePoseLookup::Answer::kWait) return std::nullopt;
-    const bool hopeless = lookup.answer == VehiclePoseLookup::Answer::kHopeless;
-    const bool near = !hopeless && last_taken_ &&
-                      GeodesicDistanceM(*last_taken_, lookup.base.position) < config_.spacing_m;
+    if (lookup.answer == vehicle::VehiclePoseLookup::Answer::kWait) return std::nullopt;
+    const bool hopeless = lookup.answer == vehicle::VehiclePoseLookup::Answer::kHopeless;
+    const bool near =
+        !hopeless && last_taken_ &&
+        geo::GeodesicDistanceM(*last_taken_, lookup.base.position) < config_.spacing_m;
     const auto depth = depths_.find(stamp_ns);
     const bool has_depth = depth != depths_.end();
     if (!hopeless && !near && !has_depth && waited_s < config_.depth_wait_s) return std::nullopt;
@@ -40,4 +41,4 @@ std::optional<PosedFrameQueue::Posed> PosedFrameQueue::Next(double now_s) {
   return std::nullopt;
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

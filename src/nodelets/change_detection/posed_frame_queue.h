@@ -10,17 +10,17 @@
 
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// Images that wait for the position of their moment, and which of them are looked at: one per
 /// `spacing_m` of road. `now_s` is the clock of ros::Time. Not thread-safe.
 class PosedFrameQueue {
  public:
   struct Config {
-    double spacing_m = 1;           ///< Between two images that are looked at.
+    double spacing_m = 1;          ///< Between two images that are looked at.
     std::size_t max_waiting = 30;  ///< Then the oldest goes; as many depth images are kept.
-    double depth_wait_s = 0;        ///< How long an image waits for its depth image; 0: none comes.
-    VehiclePoseLookup::Config pose;
+    double depth_wait_s = 0;       ///< How long an image waits for its depth image; 0: none comes.
+    vehicle::VehiclePoseLookup::Config pose;
   };
 
   /// frames = waiting + displaced + no_pose + near + those that Next gave.
@@ -34,13 +34,13 @@ class PosedFrameQueue {
   struct Posed {
     sensor_msgs::ImageConstPtr image;
     sensor_msgs::ImageConstPtr depth;  ///< Of its stamp; null when none came.
-    TrackPose base;                    ///< Of base_link.
+    geo::TrackPose base;               ///< Of base_link.
   };
 
   explicit PosedFrameQueue(const Config& config) : config_(config), pose_(config.pose) {}
 
-  void AddFix(const Fix& fix) { pose_.AddFix(fix); }
-  void AddPose(std::int64_t stamp_ns, const TrackPose& pose) { pose_.AddPose(stamp_ns, pose); }
+  void AddFix(const geo::Fix& fix) { pose_.AddFix(fix); }
+  void AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) { pose_.AddPose(stamp_ns, pose); }
   void AddImage(const sensor_msgs::ImageConstPtr& image, double now_s);
   /// Before or after its image.
   void AddDepth(const sensor_msgs::ImageConstPtr& depth);
@@ -60,11 +60,11 @@ class PosedFrameQueue {
   };
 
   Config config_;
-  VehiclePoseLookup pose_;
+  vehicle::VehiclePoseLookup pose_;
   std::deque<Waiting> waiting_;
   std::map<std::int64_t, sensor_msgs::ImageConstPtr> depths_;  ///< By stamp, ns.
-  std::optional<GeoPoint> last_taken_;
+  std::optional<geo::GeoPoint> last_taken_;
   Counters counters_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -29,7 +29,7 @@
 #include "ros/parameters/offload_parameters.h"
 #include "vehicle/reporting/offload_sender.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kSendPeriodS = 0.05;
@@ -58,14 +58,15 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   }
 
   void Initialize() {
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadEarlyDiscardConfig(parameters,
-                                     static_cast<std::int64_t>(ros::WallTime::now().toNSec()));
-    discard_ = std::make_unique<EarlyDiscard>(ReadModelManifest(config_.model), config_.threads);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadEarlyDiscardConfig(
+        parameters, static_cast<std::int64_t>(ros::WallTime::now().toNSec()));
+    discard_ = std::make_unique<perception::EarlyDiscard>(
+        perception::ReadModelManifest(config_.model), config_.threads);
     threshold_ =
         config_.threshold < 0 ? discard_->threshold() : static_cast<float>(config_.threshold);
-    if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
-    sender_ = std::make_unique<OffloadSender>(config_.sender);
+    if (config_.privacy) mask_ = std::make_unique<perception::PrivacyMask>(config_.mask);
+    sender_ = std::make_unique<vehicle::OffloadSender>(config_.sender);
     queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
     Connect();
     worker_ = std::thread([this] { Work(); });
@@ -109,24 +110,24 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++frame_;
     LearnMounting(image->header.frame_id);
-    if (sender_->Takes(FromRosTime(image->header.stamp))) queue_->Push(image);
+    if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push(image);
   }
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    sender_->AddFix(ToFix(message));
+    sender_->AddFix(ros_io::ToFix(message));
   }
 
   void OnPose(const nav_msgs::Odometry& message) {
-    const std::optional<TrackPose> pose = vehicle_frames_->FusedPose(message);
+    const std::optional<geo::TrackPose> pose = vehicle_frames_->FusedPose(message);
     if (!pose) return;
     const std::lock_guard<std::mutex> lock(mutex_);
-    sender_->AddPose(FromRosTime(message.header.stamp), *pose);
+    sender_->AddPose(ros_io::FromRosTime(message.header.stamp), *pose);
   }
 
   void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
     try {
-      const CameraIntrinsics intrinsics = ToRectifiedIntrinsics(message);
+      const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(message);
       const std::lock_guard<std::mutex> lock(mutex_);
       sender_->SetIntrinsics(intrinsics);
     } catch (const Error& error) {
@@ -161,7 +162,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
     const std::lock_guard<std::mutex> lock(mutex_);
-    sender_->AddJudged(FromRosTime(image->header.stamp), image->header.frame_id, score,
+    sender_->AddJudged(ros_io::FromRosTime(image->header.stamp), image->header.frame_id, score,
                        score >= threshold_, {shared->image, owner}, ros::Time::now().toSec());
     ++judged_in_window_;
     ms_in_window_ += ms;
@@ -171,17 +172,18 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     // Without a listener a frame would be spent, not sent.
     if (publisher_.getNumSubscribers() == 0) return;
-    const auto encode = [this](const Picture& picture, std::size_t max_bytes) {
+    const auto encode = [this](const imaging::Picture& picture, std::size_t max_bytes) {
       return MaskedJpeg(picture, max_bytes);
     };
-    for (const OffloadedFrame& candidate : sender_->TakeReady(ros::Time::now().toSec(), encode)) {
-      publisher_.publish(boost::make_shared<CandidateFrame>(ToMessage(candidate)));
+    for (const protocol::OffloadedFrame& candidate :
+         sender_->TakeReady(ros::Time::now().toSec(), encode)) {
+      publisher_.publish(boost::make_shared<CandidateFrame>(ros_io::ToMessage(candidate)));
     }
   }
 
   /// What leaves the car; empty when it cannot be masked: it fails closed.
-  std::vector<std::uint8_t> MaskedJpeg(const Picture& picture, std::size_t max_bytes) {
-    Picture masked = picture;
+  std::vector<std::uint8_t> MaskedJpeg(const imaging::Picture& picture, std::size_t max_bytes) {
+    imaging::Picture masked = picture;
     if (mask_) {
       masked.bgr = picture.bgr.clone();
       try {
@@ -192,7 +194,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
       }
       masked_regions_ += mask_->Masked().size();
     }
-    return EncodeJpeg(masked, config_.jpeg_quality, max_bytes);
+    return imaging::EncodeJpeg(masked, config_.jpeg_quality, max_bytes);
   }
 
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
@@ -200,7 +202,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     const Queue::Counters queue = queue_->counters();
     const std::lock_guard<std::mutex> lock(mutex_);
-    const OffloadSender::Counters& counters = sender_->counters();
+    const vehicle::OffloadSender::Counters& counters = sender_->counters();
     if (counters.withheld > withheld_said_) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "frames are withheld: no mask");
     } else if (queue.dropped > dropped_said_) {
@@ -237,10 +239,10 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     ms_in_window_ = 0;
   }
 
-  EarlyDiscardConfig config_;
+  ros_io::EarlyDiscardConfig config_;
   float threshold_ = 0;
-  std::unique_ptr<EarlyDiscard> discard_;  // The worker's.
-  std::unique_ptr<PrivacyMask> mask_;      // The send timer's; none: privacy is off.
+  std::unique_ptr<perception::EarlyDiscard> discard_;  // The worker's.
+  std::unique_ptr<perception::PrivacyMask> mask_;      // The send timer's; none: privacy is off.
   std::unique_ptr<Queue> queue_;
   std::unique_ptr<VehicleTf> vehicle_frames_;
   ros::Publisher publisher_;
@@ -253,13 +255,13 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::thread worker_;
 
   std::mutex mutex_;  ///< Guards the rest.
-  std::unique_ptr<OffloadSender> sender_;
+  std::unique_ptr<vehicle::OffloadSender> sender_;
   std::uint64_t frame_ = 0;  ///< The camera's, for the mask's memory.
   std::uint64_t masked_regions_ = 0;
   std::uint64_t judged_in_window_ = 0;
   double ms_in_window_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::EarlyDiscardNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::EarlyDiscardNodelet, nodelet::Nodelet)

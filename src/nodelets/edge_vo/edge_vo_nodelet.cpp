@@ -28,7 +28,7 @@
 #include "ros/conversions/odometry_conversions.h"
 #include "ros/parameters/edge_vo_parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 /// A stamp that goes back further than this is a replay that begins again.
@@ -65,10 +65,10 @@ class EdgeVoNodelet : public nodelet::Nodelet {
   }
 
   void Initialize() {
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadEdgeVoConfig(parameters);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadEdgeVoConfig(parameters);
     // A mistake in the configuration is one now, not at the first image.
-    const EdgeExtractor checked(config_.odometry.edges);
+    const odometry::EdgeExtractor checked(config_.odometry.edges);
     frames_.odom = config_.odom_frame;
     frames_.base = config_.base_frame;
     path_.header.frame_id = config_.odom_frame;
@@ -117,17 +117,17 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     try {
       Prepare(*info, image->header);
       const auto begin = std::chrono::steady_clock::now();
-      const RgbdFrame frame = ToFrame(image, depth);
-      const VoResult result = odometry_->Track(frame);
+      const odometry::RgbdFrame frame = ToFrame(image, depth);
+      const odometry::VoResult result = odometry_->Track(frame);
       figures_.milliseconds.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
               .count());
       last_ = result;
       last_stamp_ = image->header.stamp;
       ++figures_.frames;
-      figures_.lost += result.state == VoState::kLost ? 1U : 0U;
+      figures_.lost += result.state == odometry::VoState::kLost ? 1U : 0U;
       figures_.keyframes += result.new_keyframe ? 1U : 0U;
-      if (result.state != VoState::kInitialising) Publish(result, frame, image->header);
+      if (result.state != odometry::VoState::kInitialising) Publish(result, frame, image->header);
     } catch (const std::exception& error) {
       ++figures_.dropped;
       NODELET_WARN_THROTTLE(kSayAgainS, "dropped a frame: %s", error.what());
@@ -136,7 +136,7 @@ class EdgeVoNodelet : public nodelet::Nodelet {
 
   /// Calibration and mounting; a new calibration or a clock that was set back starts anew.
   void Prepare(const sensor_msgs::CameraInfo& info, const std_msgs::Header& header) {
-    const CameraIntrinsics camera = ToRectifiedIntrinsics(info);
+    const geo::CameraIntrinsics camera = ros_io::ToRectifiedIntrinsics(info);
     const bool same = odometry_ && camera.fx == camera_.fx && camera.fy == camera_.fy &&
                       camera.cx == camera_.cx && camera.cy == camera_.cy &&
                       camera.width == camera_.width && camera.height == camera_.height;
@@ -151,41 +151,44 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     frames_.base_from_optical = tf2::transformToEigen(mounting);
     camera_ = camera;
     const bool first = odometry_ == nullptr;
-    odometry_ = std::make_unique<EdgeOdometry>(config_.odometry, camera);
+    odometry_ = std::make_unique<odometry::EdgeOdometry>(config_.odometry, camera);
     if (!first) StartAnew();
   }
 
-  RgbdFrame ToFrame(const ImageConstPtr& image, const ImageConstPtr& depth) const {
-    RgbdFrame frame;
+  odometry::RgbdFrame ToFrame(const ImageConstPtr& image, const ImageConstPtr& depth) const {
+    odometry::RgbdFrame frame;
     frame.stamp_ns = static_cast<std::int64_t>(image->header.stamp.toNSec());
     frame.grey = cv_bridge::toCvShare(image, sensor_msgs::image_encodings::MONO8)->image;
-    frame.depth = ToSharedDepth(depth)->image;
+    frame.depth = ros_io::ToSharedDepth(depth)->image;
     frame.depth_units_per_m = config_.depth_units_per_m;
     return frame;
   }
 
-  void Publish(const VoResult& result, const RgbdFrame& frame, const std_msgs::Header& header) {
-    const nav_msgs::Odometry odometry = ToOdometry(result, frames_, header.stamp);
+  void Publish(const odometry::VoResult& result, const odometry::RgbdFrame& frame,
+               const std_msgs::Header& header) {
+    const nav_msgs::Odometry odometry = ros_io::ToOdometry(result, frames_, header.stamp);
     odometry_publisher_.publish(odometry);
     if (config_.publish_tf) {
       geometry_msgs::TransformStamped transform;
       transform.header = odometry.header;
       transform.child_frame_id = odometry.child_frame_id;
-      transform.transform = tf2::eigenToTransform(OdomFromBase(result, frames_)).transform;
+      transform.transform = tf2::eigenToTransform(ros_io::OdomFromBase(result, frames_)).transform;
       tf_broadcaster_.sendTransform(transform);
     }
     ExtendPath(odometry);
-    const Keyframe& keyframe = *odometry_->keyframe();
+    const odometry::Keyframe& keyframe = *odometry_->keyframe();
     if (edges_publisher_.getNumSubscribers() > 0) {
       const Eigen::Isometry3d camera_from_keyframe =
           result.world_from_camera.inverse() * keyframe.world_from_camera;
       edges_publisher_.publish(
-          cv_bridge::CvImage(header, sensor_msgs::image_encodings::BGR8,
-                             DrawEdges(frame.grey, keyframe, camera_from_keyframe, camera_))
+          cv_bridge::CvImage(
+              header, sensor_msgs::image_encodings::BGR8,
+              odometry::DrawEdges(frame.grey, keyframe, camera_from_keyframe, camera_))
               .toImageMsg());
     }
     if (result.new_keyframe && cloud_publisher_.getNumSubscribers() > 0) {
-      cloud_publisher_.publish(ToEdgeCloud(keyframe, frames_, config_.cloud_voxel_m, header.stamp));
+      cloud_publisher_.publish(
+          ros_io::ToEdgeCloud(keyframe, frames_, config_.cloud_voxel_m, header.stamp));
     }
   }
 
@@ -248,12 +251,12 @@ class EdgeVoNodelet : public nodelet::Nodelet {
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     using Level = diagnostic_msgs::DiagnosticStatus;
-    const bool tracking = last_.state == VoState::kTracking;
-    status.summary(tracking ? Level::OK : Level::WARN, VoStateName(last_.state));
+    const bool tracking = last_.state == odometry::VoState::kTracking;
+    status.summary(tracking ? Level::OK : Level::WARN, odometry::VoStateName(last_.state));
     std::vector<double>& times = figures_.milliseconds;
     const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
     std::nth_element(times.begin(), middle, times.end());
-    status.add("state", VoStateName(last_.state));
+    status.add("state", odometry::VoStateName(last_.state));
     status.add("frames", figures_.frames);
     status.add("frames_dropped", figures_.dropped);
     status.add("frames_lost", figures_.lost);
@@ -271,11 +274,11 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     times.clear();
   }
 
-  EdgeVoConfig config_;
-  OdometryFrames frames_;
-  CameraIntrinsics camera_;
-  std::unique_ptr<EdgeOdometry> odometry_;
-  VoResult last_;
+  ros_io::EdgeVoConfig config_;
+  ros_io::OdometryFrames frames_;
+  geo::CameraIntrinsics camera_;
+  std::unique_ptr<odometry::EdgeOdometry> odometry_;
+  odometry::VoResult last_;
   ros::Time last_stamp_;
   Arrivals arrivals_;
   Figures figures_;
@@ -296,6 +299,6 @@ class EdgeVoNodelet : public nodelet::Nodelet {
   std::unique_ptr<Synchronizer<Approximate>> approximate_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::EdgeVoNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::EdgeVoNodelet, nodelet::Nodelet)

@@ -18,7 +18,7 @@
 #include "ros/parameters/datum_parameter.h"
 #include "ros/parameters/geo_localization_parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kTickS = 0.02;
@@ -45,13 +45,14 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   }
 
   void Initialize() {
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadGeoLocalizationConfig(parameters);
-    localizer_ = std::make_unique<GeoLocalizer>(config_.localizer);
-    feed_ = std::make_unique<LocalizerFeed>(
-        config_.feed, *localizer_, [this](const OdometrySample& sample) { Publish(sample); },
-        [this](const PositionFix&, GeoLocalizer::FixVerdict verdict) {
-          if (verdict != GeoLocalizer::FixVerdict::kRefused) Explain(verdict);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadGeoLocalizationConfig(parameters);
+    localizer_ = std::make_unique<localization::GeoLocalizer>(config_.localizer);
+    feed_ = std::make_unique<localization::LocalizerFeed>(
+        config_.feed, *localizer_,
+        [this](const localization::OdometrySample& sample) { Publish(sample); },
+        [this](const localization::PositionFix&, localization::GeoLocalizer::FixVerdict verdict) {
+          if (verdict != localization::GeoLocalizer::FixVerdict::kRefused) Explain(verdict);
         });
     ros::NodeHandle& node = getNodeHandle();
     fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>("localization/fix", 10);
@@ -71,7 +72,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   void OnFix(const sensor_msgs::NavSatFix& message) {
     ++arrivals_.fixes;
     const Stopwatch stopwatch(figures_);
-    feed_->AddFix(ToPositionFix(message), SteadyS());
+    feed_->AddFix(ros_io::ToPositionFix(message), SteadyS());
     TellNews();
   }
 
@@ -86,9 +87,10 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
       return;
     }
     const bool by_message = config_.odometry_covariance == "message" && newest_odometry_;
-    const OdometrySample sample = ToOdometrySample(
-        *message, by_message ? std::make_optional(FromRosTime(newest_odometry_->header.stamp))
-                             : std::nullopt);
+    const localization::OdometrySample sample = ros_io::ToOdometrySample(
+        *message, by_message
+                      ? std::make_optional(ros_io::FromRosTime(newest_odometry_->header.stamp))
+                      : std::nullopt);
     // Kept until the localizer has it: its twist goes on.
     newest_odometry_ = message;
     waiting_.push_back(message);
@@ -108,14 +110,14 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   }
 
   /// An odometry that the localizer has taken.
-  void Publish(const OdometrySample& sample) {
+  void Publish(const localization::OdometrySample& sample) {
     const nav_msgs::OdometryConstPtr odometry = TakeWaiting(sample.stamp_ns);
     const auto map_from_odom = localizer_->MapFromOdom();
     const auto fused = localizer_->Fused(sample.stamp_ns);
     if (!odometry || !map_from_odom || !fused) return;
-    fix_publisher_.publish(ToFusedFix(*fused, config_.base_frame, sample.stamp_ns));
+    fix_publisher_.publish(ros_io::ToFusedFix(*fused, config_.base_frame, sample.stamp_ns));
     odometry_publisher_.publish(
-        ToFusedOdometry(*fused, *map_from_odom, sample, *odometry, config_.map_frame));
+        ros_io::ToFusedOdometry(*fused, *map_from_odom, sample, *odometry, config_.map_frame));
     ++figures_.published;
     if (!config_.publish_tf) return;
     geometry_msgs::TransformStamped transform = tf2::eigenToTransform(*map_from_odom);
@@ -128,7 +130,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   /// The message of a sample; those before it are done with.
   nav_msgs::OdometryConstPtr TakeWaiting(std::int64_t stamp_ns) {
     const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& message) {
-      return FromRosTime(message->header.stamp) == stamp_ns;
+      return ros_io::FromRosTime(message->header.stamp) == stamp_ns;
     });
     if (found == waiting_.end()) return nullptr;
     nav_msgs::OdometryConstPtr message = *found;
@@ -136,12 +138,12 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     return message;
   }
 
-  void Explain(GeoLocalizer::FixVerdict verdict) {
-    const char* reason = RefusalReason(verdict);
+  void Explain(localization::GeoLocalizer::FixVerdict verdict) {
+    const char* reason = ros_io::RefusalReason(verdict);
     if (reason == nullptr) return;
     last_refusal_ = reason;
     // The warning of silence says that better; at a start it is as it should be.
-    if (verdict == GeoLocalizer::FixVerdict::kWithoutOdometry) return;
+    if (verdict == localization::GeoLocalizer::FixVerdict::kWithoutOdometry) return;
     NODELET_WARN_THROTTLE(kSayAgainS, "refused a fix: %s", reason);
   }
 
@@ -149,12 +151,12 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   /// known; that stays while the nodelet lives.
   void TellNews() {
     const std::uint64_t refused = localizer_->counters().fixes_refused;
-    if (refused > refused_before_) Explain(GeoLocalizer::FixVerdict::kRefused);
+    if (refused > refused_before_) Explain(localization::GeoLocalizer::FixVerdict::kRefused);
     refused_before_ = refused;
     if (datum_told_ || !config_.publish_tf || !localizer_->datum()) return;
     datum_told_ = true;
     static_broadcaster_.sendTransform(
-        EarthFromMap(*localizer_->datum(), config_.map_frame, ros::Time::now()));
+        ros_io::EarthFromMap(*localizer_->datum(), config_.map_frame, ros::Time::now()));
   }
 
   bool OnReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -195,12 +197,13 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     using Level = diagnostic_msgs::DiagnosticStatus;
-    const LocalizerState state = localizer_->state();
-    const std::string name = LocalizerStateName(state);
-    status.summary(state == LocalizerState::kOk && missing_.empty() ? Level::OK : Level::WARN,
-                   missing_.empty() ? name : name + ": " + missing_);
+    const localization::LocalizerState state = localizer_->state();
+    const std::string name = ros_io::LocalizerStateName(state);
+    status.summary(
+        state == localization::LocalizerState::kOk && missing_.empty() ? Level::OK : Level::WARN,
+        missing_.empty() ? name : name + ": " + missing_);
     status.add("state", name);
-    DescribeLocalizer(*localizer_, status);
+    ros_io::DescribeLocalizer(*localizer_, status);
     const std::uint64_t used = localizer_->counters().fixes_used;
     const std::uint64_t fresh = used > figures_.used_before ? used - figures_.used_before : 0;
     status.add("last_refusal", last_refusal_);
@@ -233,9 +236,9 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
 
   static constexpr std::size_t kMaxWaiting = 2000;
 
-  GeoLocalizationConfig config_;
-  std::unique_ptr<GeoLocalizer> localizer_;
-  std::unique_ptr<LocalizerFeed> feed_;
+  ros_io::GeoLocalizationConfig config_;
+  std::unique_ptr<localization::GeoLocalizer> localizer_;
+  std::unique_ptr<localization::LocalizerFeed> feed_;
   nav_msgs::OdometryConstPtr newest_odometry_;
   std::deque<nav_msgs::OdometryConstPtr> waiting_;  // Not yet taken by the localizer.
   Arrivals arrivals_;
@@ -254,6 +257,6 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   ros::SteadyTimer tick_timer_, silence_timer_, diagnostics_timer_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::GeoLocalizationNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::GeoLocalizationNodelet, nodelet::Nodelet)

@@ -24,7 +24,7 @@
 #include "ros/conversions/detection_conversions.h"
 #include "ros/parameters/parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// Parameters of the hazard_detection nodelet; config/hazard_detection.yaml explains them.
 struct HazardDetectionConfig {
@@ -35,7 +35,7 @@ struct HazardDetectionConfig {
   int queue_size = 4;           ///< Frames that may wait.
   bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
   bool privacy = true;          ///< Mask faces and number plates in the picture.
-  PrivacyMask::Config mask;
+  perception::PrivacyMask::Config mask;
   HazardTrackingConfig tracking;
   int picture_frames = 64;          ///< Images with detections that may be asked for.
   double diagnostics_period_s = 1;  ///< s
@@ -66,17 +66,17 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   /// What an engine makes of an image.
   struct Seen {
     cv_bridge::CvImageConstPtr bgr;
-    std::vector<HazardDetection> found;
+    std::vector<perception::HazardDetection> found;
     double ms = 0;  ///< conversion and detection
   };
   /// An image that may be asked for.
   struct Kept {
     cv_bridge::CvImageConstPtr bgr;
-    std::vector<HazardDetection> found;
+    std::vector<perception::HazardDetection> found;
     std_msgs::Header header;
   };
   using Recent = RecentPictures<Kept>;
-  using Pool = DetectorPool<sensor_msgs::ImageConstPtr, Seen>;
+  using Pool = perception::DetectorPool<sensor_msgs::ImageConstPtr, Seen>;
 
   void onInit() override {
     InitializeOrExplain(getName(), [this] { Initialize(); });
@@ -84,19 +84,20 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   void Initialize() {
     ReadParameters();
-    const ModelManifest manifest = ReadModelManifest(config_.model);
-    const std::optional<EngineKind> engine = ParseEngineChoice(
+    const perception::ModelManifest manifest = perception::ReadModelManifest(config_.model);
+    const std::optional<perception::EngineKind> engine = perception::ParseEngineChoice(
         config_.engine, "parameter '" + getPrivateNodeHandle().resolveName("engine") + "'");
     thresholds_ = manifest.thresholds;
-    ModelManifest lowered = manifest;
+    perception::ModelManifest lowered = manifest;
     if (config_.tracking.tracking) {
       const auto share = static_cast<float>(config_.tracking.tracker.low_share);
       for (float& threshold : lowered.thresholds) threshold *= share;
     }
     for (int i = 0; i < config_.engines; ++i) {
-      detectors_.push_back(std::make_unique<HazardDetector>(lowered, config_.threads, engine));
+      detectors_.push_back(
+          std::make_unique<perception::HazardDetector>(lowered, config_.threads, engine));
     }
-    if (config_.privacy) mask_ = std::make_unique<PrivacyMask>(config_.mask);
+    if (config_.privacy) mask_ = std::make_unique<perception::PrivacyMask>(config_.mask);
     ros::NodeHandle& node = getNodeHandle();
     detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
     image_transport::ImageTransport transport(node);
@@ -124,7 +125,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   void ReadParameters() {
-    ParameterReader parameters(getPrivateNodeHandle());
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
     parameters.Read("model", config_.model);
     parameters.Read("engine", config_.engine);
     parameters.Read("engines", config_.engines, {1, 64});
@@ -149,7 +150,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   void StartPool() {
     std::vector<Pool::Engine> engines;
-    for (const std::unique_ptr<HazardDetector>& detector : detectors_) {
+    for (const std::unique_ptr<perception::HazardDetector>& detector : detectors_) {
       engines.emplace_back([&detector](const sensor_msgs::ImageConstPtr& image) {
         const Clock::time_point start = Clock::now();
         Seen seen;
@@ -179,10 +180,11 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   /// Called image after image in the order in which they came.
   void DeliverResult(const Seen& seen, const std_msgs::Header& header) {
     const cv::Mat& bgr = seen.bgr->image;
-    std::vector<HazardDetection> found = seen.found;
-    found.erase(std::remove_if(found.begin(), found.end(),
-                               [this](const HazardDetection& each) { return IsWeak(each); }),
-                found.end());
+    std::vector<perception::HazardDetection> found = seen.found;
+    found.erase(
+        std::remove_if(found.begin(), found.end(),
+                       [this](const perception::HazardDetection& each) { return IsWeak(each); }),
+        found.end());
     // The picture first: who reports a detection wants it at hand.
     if ((config_.annotate_empty || !found.empty()) &&
         annotated_publisher_.getNumSubscribers() > 0) {
@@ -194,8 +196,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     ++frame_;
     // The image is kept before anything is told of it: who hears of it may ask for it at once.
     const std::vector<DetectionArray> events = Keep(seen, header);
-    detections_publisher_.publish(boost::make_shared<DetectionArray>(
-        ToMessage(found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
+    detections_publisher_.publish(boost::make_shared<DetectionArray>(ros_io::ToMessage(
+        found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
     for (const DetectionArray& event : events) events_publisher_.publish(event);
     const std::lock_guard<std::mutex> lock(figures_mutex_);
     figures_.detections += found.size();
@@ -204,7 +206,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   /// Below the model's threshold: for the tracker alone.
-  bool IsWeak(const HazardDetection& found) const {
+  bool IsWeak(const perception::HazardDetection& found) const {
     return found.confidence < thresholds_[static_cast<std::size_t>(found.class_index)];
   }
 
@@ -226,7 +228,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   void AnswerPicture(const PictureRequest& request) {
     std::optional<Kept> kept;
-    std::vector<HazardDetection> shown;
+    std::vector<perception::HazardDetection> shown;
     {
       const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
       const auto stamp_ns = static_cast<std::int64_t>(request.stamp.toNSec());
@@ -238,10 +240,11 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       ++figures_.unknown_requests;
       return;
     }
-    shown.erase(std::remove_if(shown.begin(), shown.end(),
-                               [this](const HazardDetection& each) { return !IsWeak(each); }),
-                shown.end());
-    for (const HazardDetection& each : kept->found) {
+    shown.erase(
+        std::remove_if(shown.begin(), shown.end(),
+                       [this](const perception::HazardDetection& each) { return !IsWeak(each); }),
+        shown.end());
+    for (const perception::HazardDetection& each : kept->found) {
       if (!IsWeak(each)) shown.push_back(each);
     }
     const cv::Rect image({}, kept->bgr->image.size());
@@ -275,7 +278,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   /// `part` of the picture is clear. Masked first, so that the drawn boxes stay whole; a picture
   /// that cannot be masked stays here: none.
-  sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr, const std::vector<HazardDetection>& found,
+  sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr,
+                              const std::vector<perception::HazardDetection>& found,
                               const std_msgs::Header& header, const cv::Rect& part) {
     cv::Mat picture = bgr;
     std::size_t masked_regions = 0;
@@ -296,7 +300,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       const std::lock_guard<std::mutex> lock(figures_mutex_);
       figures_.masked_regions += masked_regions;
     }
-    return ToAnnotatedMessage(picture, found, header);
+    return ros_io::ToAnnotatedMessage(picture, found, header);
   }
 
   void CountPicture() {
@@ -355,13 +359,13 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     status.add("rate_hz", window_s > 0 ? in_window / window_s : 0.0);
     status.add("detection_ms", in_window > 0 ? figures.ms_in_window / in_window : 0.0);
     status.add("model", detectors_.front()->manifest().name);
-    status.add("engine", NameOf(detectors_.front()->Engine()));
+    status.add("engine", perception::NameOf(detectors_.front()->Engine()));
     status.add("engines", detectors_.size());
   }
 
   void DiagnoseTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
     const std::lock_guard<std::mutex> lock(pictures_mutex_);
-    const ObjectTracker::Counters& counters = tracking_->counters();
+    const perception::ObjectTracker::Counters& counters = tracking_->counters();
     status.add("events", counters.events);
     status.add("tracks", counters.tracks);
     status.add("tracks_forgotten", counters.forgotten);
@@ -384,14 +388,15 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   };
 
   HazardDetectionConfig config_;
-  std::vector<std::unique_ptr<HazardDetector>> detectors_;  ///< Each its engine's thread's own.
-  std::vector<float> thresholds_;                           ///< The model's, by class index.
+  std::vector<std::unique_ptr<perception::HazardDetector>>
+      detectors_;                  ///< Each its engine's thread's own.
+  std::vector<float> thresholds_;  ///< The model's, by class index.
   // DeliverResult's and AnswerPicture's, which run at once:
   std::mutex pictures_mutex_;                 ///< Guards tracking_ and recent_.
   std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
   std::unique_ptr<Recent> recent_;
-  std::mutex mask_mutex_;              ///< Guards mask_; taken before figures_mutex_.
-  std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
+  std::mutex mask_mutex_;                          ///< Guards mask_; taken before figures_mutex_.
+  std::unique_ptr<perception::PrivacyMask> mask_;  ///< None: privacy is off.
   std::atomic<std::uint64_t> frame_{0};
   image_transport::Subscriber subscriber_;
   ros::Subscriber request_subscriber_;
@@ -412,6 +417,6 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   std::unique_ptr<Pool> pool_;  ///< Last: its threads use the rest.
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::HazardDetectionNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::HazardDetectionNodelet, nodelet::Nodelet)

@@ -9,7 +9,7 @@
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/detection_conversions.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 /// Pictures of this many events are kept for who asks for them.
@@ -17,9 +17,9 @@ constexpr std::size_t kReportedViews = 32;
 
 }  // namespace
 
-HazardTrackingConfig ReadHazardTrackingConfig(ParameterReader& parameters) {
+HazardTrackingConfig ReadHazardTrackingConfig(ros_io::ParameterReader& parameters) {
   HazardTrackingConfig config;
-  ObjectTracker::Config& tracker = config.tracker;
+  perception::ObjectTracker::Config& tracker = config.tracker;
   parameters.Read("tracking", config.tracking);
   parameters.Read("track_low_share", tracker.low_share, {0.01, 1});
   parameters.Read("track_sure", tracker.sure, {0.01, 100});
@@ -52,8 +52,8 @@ HazardTrackingConfig ReadHazardTrackingConfig(ParameterReader& parameters) {
   return config;
 }
 
-HazardTracking::HazardTracking(const HazardTrackingConfig& config, const ModelManifest& manifest,
-                               ros::NodeHandle node)
+HazardTracking::HazardTracking(const HazardTrackingConfig& config,
+                               const perception::ModelManifest& manifest, ros::NodeHandle node)
     : config_(config),
       model_(manifest.name),
       tracker_(config.tracker, manifest.thresholds),
@@ -61,7 +61,7 @@ HazardTracking::HazardTracking(const HazardTrackingConfig& config, const ModelMa
   info_ = node.subscribe<sensor_msgs::CameraInfo>(
       "camera_rect/camera_info", 2, [this](const sensor_msgs::CameraInfo::ConstPtr& info) {
         try {
-          const CameraIntrinsics intrinsics = ToRectifiedIntrinsics(*info);
+          const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(*info);
           const std::lock_guard<std::mutex> lock(mutex_);
           intrinsics_ = intrinsics;
         } catch (const Error& error) {
@@ -70,28 +70,31 @@ HazardTracking::HazardTracking(const HazardTrackingConfig& config, const ModelMa
       });
 }
 
-std::vector<DetectionArray> HazardTracking::Add(const std::vector<HazardDetection>& found,
-                                                const std_msgs::Header& header, cv::Size size) {
-  TrackerFrame frame;
+std::vector<DetectionArray> HazardTracking::Add(
+    const std::vector<perception::HazardDetection>& found, const std_msgs::Header& header,
+    cv::Size size) {
+  perception::TrackerFrame frame;
   frame.stamp_ns = static_cast<std::int64_t>(header.stamp.toNSec());
   frame.image_size = size;
   frame.detections = found;
   frame.motion = MotionAt(header);
   if (frame.motion) ++frames_with_motion_;
 
-  std::map<std::int64_t, std::vector<ObjectEvent>> by_view;
-  for (const ObjectEvent& event : tracker_.Add(frame)) by_view[event.stamp_ns].push_back(event);
+  std::map<std::int64_t, std::vector<perception::ObjectEvent>> by_view;
+  for (const perception::ObjectEvent& event : tracker_.Add(frame))
+    by_view[event.stamp_ns].push_back(event);
   std::vector<DetectionArray> messages;
   for (const auto& [stamp_ns, events] : by_view) {
     std_msgs::Header view = header;
     view.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns));
-    std::vector<HazardDetection> detections;
-    for (const ObjectEvent& event : events) detections.push_back(event.detection);
-    std::stable_sort(detections.begin(), detections.end(),
-                     [](const HazardDetection& a, const HazardDetection& b) {
-                       return a.confidence > b.confidence;
-                     });
-    messages.push_back(ToMessage(detections, view, model_, events.front().image_size, 0));
+    std::vector<perception::HazardDetection> detections;
+    for (const perception::ObjectEvent& event : events) detections.push_back(event.detection);
+    std::stable_sort(
+        detections.begin(), detections.end(),
+        [](const perception::HazardDetection& a, const perception::HazardDetection& b) {
+          return a.confidence > b.confidence;
+        });
+    messages.push_back(ros_io::ToMessage(detections, view, model_, events.front().image_size, 0));
     reported_.insert(reported_.end(), events.begin(), events.end());
     while (reported_.size() > kReportedViews) reported_.pop_front();
   }
@@ -100,20 +103,20 @@ std::vector<DetectionArray> HazardTracking::Add(const std::vector<HazardDetectio
 
 std::vector<std::int64_t> HazardTracking::WantedPictures() const {
   std::vector<std::int64_t> wanted = tracker_.BestViews();
-  for (const ObjectEvent& event : reported_) wanted.push_back(event.stamp_ns);
+  for (const perception::ObjectEvent& event : reported_) wanted.push_back(event.stamp_ns);
   return wanted;
 }
 
-std::vector<HazardDetection> HazardTracking::ReportedIn(std::int64_t stamp_ns) const {
-  std::vector<HazardDetection> detections;
-  for (const ObjectEvent& event : reported_) {
+std::vector<perception::HazardDetection> HazardTracking::ReportedIn(std::int64_t stamp_ns) const {
+  std::vector<perception::HazardDetection> detections;
+  for (const perception::ObjectEvent& event : reported_) {
     if (event.stamp_ns == stamp_ns) detections.push_back(event.detection);
   }
   return detections;
 }
 
-std::optional<CameraMotion> HazardTracking::MotionAt(const std_msgs::Header& header) {
-  CameraMotion motion;
+std::optional<perception::CameraMotion> HazardTracking::MotionAt(const std_msgs::Header& header) {
+  perception::CameraMotion motion;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!intrinsics_) return std::nullopt;
@@ -150,4 +153,4 @@ std::optional<geometry_msgs::TransformStamped> HazardTracking::PoseAt(const ros:
   return std::nullopt;
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -17,52 +17,52 @@
 #include "perception/tracking/object_tracker.h"
 #include "ros/parameters/parameters.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// Parameters of tracking; config/hazard_detection.yaml explains them.
 struct HazardTrackingConfig {
   bool tracking = true;  ///< Publish hazard/events.
-  ObjectTracker::Config tracker;
+  perception::ObjectTracker::Config tracker;
   std::string motion_frame = "odom";     ///< Frame in which the road stands still.
   std::string base_frame = "base_link";  ///< Frame at road level.
   double motion_max_age_s = 0.3;  ///< Of the newest pose, where that of the image is missing.
 };
 
 /// Throws Error.
-HazardTrackingConfig ReadHazardTrackingConfig(ParameterReader& parameters);
+HazardTrackingConfig ReadHazardTrackingConfig(ros_io::ParameterReader& parameters);
 
 /// The tracker of hazard_detection, fed with the camera's motion by tf. Add, WantedPictures and
 /// Figures want one thread at a time.
 class HazardTracking {
  public:
-  HazardTracking(const HazardTrackingConfig& config, const ModelManifest& manifest,
+  HazardTracking(const HazardTrackingConfig& config, const perception::ModelManifest& manifest,
                  ros::NodeHandle node);
 
   /// Events that are to be published after this image, one message per image of a best view.
-  std::vector<DetectionArray> Add(const std::vector<HazardDetection>& found,
+  std::vector<DetectionArray> Add(const std::vector<perception::HazardDetection>& found,
                                   const std_msgs::Header& header, cv::Size size);
   /// Stamps of the images of best views, of living tracks and of the last events.
   std::vector<std::int64_t> WantedPictures() const;
   /// The last events with their best view in that image.
-  std::vector<HazardDetection> ReportedIn(std::int64_t stamp_ns) const;
-  const ObjectTracker::Counters& counters() const { return tracker_.counters(); }
+  std::vector<perception::HazardDetection> ReportedIn(std::int64_t stamp_ns) const;
+  const perception::ObjectTracker::Counters& counters() const { return tracker_.counters(); }
   /// Images whose camera motion was known.
   std::uint64_t frames_with_motion() const { return frames_with_motion_; }
 
  private:
-  std::optional<CameraMotion> MotionAt(const std_msgs::Header& header);
+  std::optional<perception::CameraMotion> MotionAt(const std_msgs::Header& header);
   std::optional<geometry_msgs::TransformStamped> PoseAt(const ros::Time& stamp);
 
   const HazardTrackingConfig config_;
   const std::string model_;
-  ObjectTracker tracker_;
-  std::deque<ObjectEvent> reported_;  ///< The last ones.
+  perception::ObjectTracker tracker_;
+  std::deque<perception::ObjectEvent> reported_;  ///< The last ones.
   std::uint64_t frames_with_motion_ = 0;
   tf2_ros::Buffer buffer_;
   tf2_ros::TransformListener listener_;
   std::mutex mutex_;
-  std::optional<CameraIntrinsics> intrinsics_;
+  std::optional<geo::CameraIntrinsics> intrinsics_;
   ros::Subscriber info_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

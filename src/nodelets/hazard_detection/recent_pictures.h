@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// The newest pictures by stamp, of which any may be asked for, and older ones that are still
 /// wanted. Not thread-safe.
@@ -43,4 +43,4 @@ class RecentPictures {
   std::map<std::int64_t, Picture> pictures_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -30,7 +30,7 @@
 #include "vehicle/polls/poll_responder.h"
 #include "vehicle/reporting/hazard_reporter.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kSendTickS = 0.05;
@@ -50,21 +50,23 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void Initialize() {
     const std::int64_t now_ns = static_cast<std::int64_t>(ros::WallTime::now().toNSec());
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadHazardReportingConfig(parameters, now_ns);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadHazardReportingConfig(parameters, now_ns);
     if (config_.catalogue.empty()) {
       config_.catalogue = ros::package::getPath("livemap") + "/config/hazards.yaml";
     }
-    catalogue_ = HazardCatalogue::Load(config_.catalogue);
+    catalogue_ = protocol::HazardCatalogue::Load(config_.catalogue);
     MakeDirectoryOf(config_.reporter.map.path);
-    reporter_ = std::make_unique<HazardReporter>(config_.reporter, catalogue_,
-                                                 EntropySeededGenerator(), now_ns, SteadyS());
-    responder_ = std::make_unique<PollResponder>(config_.polls, catalogue_);
+    reporter_ = std::make_unique<vehicle::HazardReporter>(
+        config_.reporter, catalogue_, EntropySeededGenerator(), now_ns, SteadyS());
+    responder_ = std::make_unique<vehicle::PollResponder>(config_.polls, catalogue_);
     if (!reporter_->map().set_aside().empty()) {
-      NODELET_ERROR("%s", DescribeSetAside(config_.reporter.map.path, reporter_->map()).c_str());
+      NODELET_ERROR("%s",
+                    ros_io::DescribeSetAside(config_.reporter.map.path, reporter_->map()).c_str());
     }
     if (reporter_->map().broken_rows().count() > 0) {
-      NODELET_ERROR("%s", DescribeBrokenRows(config_.reporter.map.path, reporter_->map()).c_str());
+      NODELET_ERROR(
+          "%s", ros_io::DescribeBrokenRows(config_.reporter.map.path, reporter_->map()).c_str());
     }
     Connect();
   }
@@ -126,11 +128,13 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     };
   }
 
-  bool IsFused() const { return config_.reporter.position_source == PositionSource::kFused; }
+  bool IsFused() const {
+    return config_.reporter.position_source == vehicle::PositionSource::kFused;
+  }
 
   void OnDetections(const DetectionArray& message) {
     WantMounting(message.header.frame_id);
-    const SightingFrame frame = ToSightingFrame(message);
+    const placement::SightingFrame frame = ros_io::ToSightingFrame(message);
     responder_->AddFrame(frame, ros::Time::now().toSec());
     if (!config_.use_events) reporter_->AddFrame(frame, ros::Time::now().toSec());
     Work();
@@ -139,14 +143,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   /// Objects that the tracker is sure of, at their best view.
   void OnEvents(const DetectionArray& message) {
     WantMounting(message.header.frame_id);
-    reporter_->AddFrame(ToSightingFrame(message), ros::Time::now().toSec());
+    reporter_->AddFrame(ros_io::ToSightingFrame(message), ros::Time::now().toSec());
     Work();
   }
 
   void OnPicture(const sensor_msgs::ImageConstPtr& message) {
     if (const auto picture = Shared(*message, message)) {
-      responder_->AddPicture(FromRosTime(message->header.stamp), *picture);
-      reporter_->AddPicture(FromRosTime(message->header.stamp), *picture);
+      responder_->AddPicture(ros_io::FromRosTime(message->header.stamp), *picture);
+      reporter_->AddPicture(ros_io::FromRosTime(message->header.stamp), *picture);
     }
     Work();
   }
@@ -154,7 +158,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   void OnPicturePart(const PicturePartConstPtr& message) {
     const auto& part = message->part;
     if (const auto picture = Shared(message->image, message)) {
-      reporter_->AddPicture(FromRosTime(message->image.header.stamp), *picture,
+      reporter_->AddPicture(ros_io::FromRosTime(message->image.header.stamp), *picture,
                             {part.x_offset, part.y_offset, part.width, part.height});
     }
     Work();
@@ -162,11 +166,12 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   /// Shares the pixels with the detector's message where it is bgr8 already.
   template <typename Message>
-  std::optional<Picture> Shared(const sensor_msgs::Image& image,
-                                const boost::shared_ptr<const Message>& message) {
+  std::optional<imaging::Picture> Shared(const sensor_msgs::Image& image,
+                                         const boost::shared_ptr<const Message>& message) {
     try {
       const auto shared = cv_bridge::toCvShare(image, message, sensor_msgs::image_encodings::BGR8);
-      return Picture{shared->image, std::make_shared<const cv_bridge::CvImageConstPtr>(shared)};
+      return imaging::Picture{shared->image,
+                              std::make_shared<const cv_bridge::CvImageConstPtr>(shared)};
     } catch (const cv::Exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "picture dropped: %s", error.what());
     } catch (const cv_bridge::Exception& error) {
@@ -179,8 +184,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   void OnImage(const sensor_msgs::ImageConstPtr& message) {
     try {
       const auto grey = cv_bridge::toCvShare(message, sensor_msgs::image_encodings::MONO8);
-      responder_->AddLuminance(FromRosTime(message->header.stamp),
-                               PollResponder::MeanLuminance(grey->image));
+      responder_->AddLuminance(ros_io::FromRosTime(message->header.stamp),
+                               vehicle::PollResponder::MeanLuminance(grey->image));
     } catch (const cv::Exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "image not looked at: %s", error.what());
     } catch (const cv_bridge::Exception& error) {
@@ -190,7 +195,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnLink(const LinkState& message) {
     try {
-      reporter_->SetLink(FromMessage(message));
+      reporter_->SetLink(ros_io::FromMessage(message));
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
@@ -199,9 +204,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
     const auto before_ns = reporter_->track().newest_ns();
-    reporter_->AddFix(ToFix(message));
+    reporter_->AddFix(ros_io::ToFix(message));
     const auto newest_ns = reporter_->track().newest_ns();
-    const bool by_fixes = !IsFused() || IsFusionSilent(*reporter_);
+    const bool by_fixes = !IsFused() || ros_io::IsFusionSilent(*reporter_);
     if (by_fixes && newest_ns && newest_ns != before_ns) view_->ShowFix(*newest_ns);
     Work();
   }
@@ -218,8 +223,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
                             config_.base_frame.c_str(), config_.map_frame.c_str());
       return;
     }
-    const std::int64_t stamp_ns = FromRosTime(message.header.stamp);
-    const TrackPose pose = ToTrackPose(message, *view_->map());
+    const std::int64_t stamp_ns = ros_io::FromRosTime(message.header.stamp);
+    const geo::TrackPose pose = ros_io::ToTrackPose(message, *view_->map());
     reporter_->AddPose(stamp_ns, pose);
     if (reporter_->poses().newest_ns() == stamp_ns) view_->ShowPose(pose, message.header.stamp);
     Work();
@@ -227,9 +232,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnDepth(const sensor_msgs::ImageConstPtr& message) {
     try {
-      const cv_bridge::CvImageConstPtr shared = ToSharedDepth(message);
+      const cv_bridge::CvImageConstPtr shared = ros_io::ToSharedDepth(message);
       const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
-      reporter_->AddDepth(FromRosTime(message->header.stamp),
+      reporter_->AddDepth(ros_io::FromRosTime(message->header.stamp),
                           {shared->image, config_.depth_units_per_m, owner});
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
@@ -239,7 +244,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
     try {
-      reporter_->SetIntrinsics(ToRectifiedIntrinsics(message));
+      reporter_->SetIntrinsics(ros_io::ToRectifiedIntrinsics(message));
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
     }
@@ -247,7 +252,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnNotice(const HazardNotice& message) {
     try {
-      reporter_->AddNotice(FromMessage(message));
+      reporter_->AddNotice(ros_io::FromMessage(message));
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
@@ -255,8 +260,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnReceipt(const ReportReceipt& message) {
     try {
-      const Receipt receipt = FromMessage(message);
-      if (receipt.status == Receipt::Status::kRefused) {
+      const protocol::Receipt receipt = ros_io::FromMessage(message);
+      if (receipt.status == protocol::Receipt::Status::kRefused) {
         NODELET_WARN_THROTTLE(kSayAgainS, "the zone refused report %s: %s",
                               receipt.report_uuid.ToString().c_str(), receipt.reason.c_str());
       }
@@ -268,7 +273,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void OnPoll(const HazardPoll& message) {
     try {
-      responder_->Add(FromMessage(message), SteadyS());
+      responder_->Add(ros_io::FromMessage(message), SteadyS());
       WatchImages();
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
@@ -278,7 +283,8 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   /// Has a say in what polls are answered.
   void OnChanges(const ChangedObjects& message) {
     if (message.outcome == ChangedObjects::REFUSED) responder_->AddUnregistered();
-    for (const ChangeEvidence& evidence : ToEvidence(message)) responder_->AddChange(evidence);
+    for (const vehicle::ChangeEvidence& evidence : ros_io::ToEvidence(message))
+      responder_->AddChange(evidence);
   }
 
   void OnTick(const ros::SteadyTimerEvent&) {
@@ -288,7 +294,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   void Work() {
     reporter_->SetPictureSourceAvailable(picture_subscriber_.getNumPublishers() > 0 ||
-                              part_subscriber_.getNumPublishers() > 0);
+                                         part_subscriber_.getNumPublishers() > 0);
     reporter_->Process(ros::Time::now().toSec(), SteadyS());
     if (!reporter_->store_error().empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "%s", reporter_->store_error().c_str());
@@ -299,24 +305,25 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     }
     placed_by_fixes_ = by_fixes;
     AnswerPolls();
-    for (const PictureRequirements& wish : reporter_->TakePictureRequests()) RequestPicture(wish);
+    for (const imaging::PictureRequirements& wish : reporter_->TakePictureRequests())
+      RequestPicture(wish);
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
-    for (const Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
-      report_publisher_.publish(ToMessage(report));
+    for (const protocol::Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
+      report_publisher_.publish(ros_io::ToMessage(report));
     }
   }
 
   void AnswerPolls() {
-    PollResponder::Vehicle vehicle;
+    vehicle::PollResponder::Vehicle vehicle;
     vehicle.intrinsics = reporter_->intrinsics();
     vehicle.mounting = [this](const std::string& frame_id) {
       return reporter_->Mounting(frame_id);
     };
     vehicle.pose_at = [this](std::int64_t stamp_ns) { return reporter_->BasePoseAt(stamp_ns); };
     responder_->Process(ros::Time::now().toSec(), SteadyS(), vehicle);
-    for (const PollReply& reply : responder_->TakeReplies()) {
-      answer_publisher_.publish(ToMessage(reply));
+    for (const protocol::PollReply& reply : responder_->TakeReplies()) {
+      answer_publisher_.publish(ros_io::ToMessage(reply));
     }
     for (const std::int64_t stamp_ns : responder_->TakePictureRequests()) {
       RequestPicture({stamp_ns, {}});
@@ -324,9 +331,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     WatchImages();
   }
 
-  void RequestPicture(const PictureRequirements& wish) {
+  void RequestPicture(const imaging::PictureRequirements& wish) {
     PictureRequest request;
-    request.stamp = ToRosTime(wish.stamp_ns);
+    request.stamp = ros_io::ToRosTime(wish.stamp_ns);
     request.part.x_offset = wish.part.x;
     request.part.y_offset = wish.part.y;
     request.part.width = wish.part.width;
@@ -367,14 +374,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    DescribeHazardReporter(*reporter_, SteadyS(), status);
-    DescribePollResponder(*responder_, status);
+    ros_io::DescribeHazardReporter(*reporter_, SteadyS(), status);
+    ros_io::DescribePollResponder(*responder_, status);
   }
 
-  HazardReportingConfig config_;
-  HazardCatalogue catalogue_;
-  std::unique_ptr<HazardReporter> reporter_;
-  std::unique_ptr<PollResponder> responder_;
+  ros_io::HazardReportingConfig config_;
+  protocol::HazardCatalogue catalogue_;
+  std::unique_ptr<vehicle::HazardReporter> reporter_;
+  std::unique_ptr<vehicle::PollResponder> responder_;
   std::unique_ptr<VehicleView> view_;
   std::uint64_t placed_by_fixes_ = 0;  // When it was last looked at.
   std::string wanted_frame_;           // Optical frame whose mounting is not known yet.
@@ -389,6 +396,6 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   std::vector<ros::SteadyTimer> timers_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::HazardReportingNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::HazardReportingNodelet, nodelet::Nodelet)

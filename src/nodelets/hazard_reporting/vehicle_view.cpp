@@ -14,10 +14,11 @@
 #include "ros/conversions/localization_conversions.h"
 #include "ros/views/hazard_view.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
-VehicleView::VehicleView(const HazardReportingConfig& config, const HazardReporter& reporter,
-                         const HazardCatalogue& catalogue, ros::NodeHandle& node)
+VehicleView::VehicleView(const ros_io::HazardReportingConfig& config,
+                         const vehicle::HazardReporter& reporter,
+                         const protocol::HazardCatalogue& catalogue, ros::NodeHandle& node)
     : config_(config), reporter_(reporter), catalogue_(catalogue) {
   if (config_.map_datum) map_.emplace(*config_.map_datum);
   path_.header.frame_id = config_.map_frame;
@@ -31,7 +32,7 @@ void VehicleView::LearnDatum(const tf2_ros::Buffer& buffer) {
     const auto transform =
         buffer.lookupTransform("earth", config_.map_frame, ros::Time(0)).transform;
     if (map_ && earth_from_map_ == transform) return;
-    map_.emplace(DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
+    map_.emplace(geo::DatumOf(Eigen::Isometry3d(tf2::transformToEigen(transform))));
     earth_from_map_ = transform;
     path_.poses.clear();
   } catch (const tf2::TransformException&) {
@@ -42,43 +43,43 @@ void VehicleView::LearnDatum(const tf2_ros::Buffer& buffer) {
 }
 
 void VehicleView::ShowFix(std::int64_t stamp_ns) {
-  const bool fused = reporter_.config().position_source == PositionSource::kFused;
+  const bool fused = reporter_.config().position_source == vehicle::PositionSource::kFused;
   const auto antenna = reporter_.track().Newest();
-  TellPosition(*antenna, ToRosTime(stamp_ns));
+  TellPosition(*antenna, ros_io::ToRosTime(stamp_ns));
   if (!map_ && !fused) map_.emplace(antenna->position);
   const auto at_stamp = reporter_.track().At(stamp_ns);
-  if (!map_ || at_stamp.answer != FixTrack::Answer::kReady) return;
+  if (!map_ || at_stamp.answer != vehicle::FixTrack::Answer::kReady) return;
   const Eigen::Vector2d antenna_m(config_.reporter.antenna_x_m, config_.reporter.antenna_y_m);
-  const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
-  TrackPose base = at_stamp.pose;
-  base.position = PlaceHazard(base, antenna_m, origin).position;
-  ShowVehicle(base, ToRosTime(stamp_ns));
+  const geo::GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  geo::TrackPose base = at_stamp.pose;
+  base.position = placement::PlaceHazard(base, antenna_m, origin).position;
+  ShowVehicle(base, ros_io::ToRosTime(stamp_ns));
 }
 
-void VehicleView::ShowPose(const TrackPose& base, const ros::Time& stamp) {
+void VehicleView::ShowPose(const geo::TrackPose& base, const ros::Time& stamp) {
   TellPosition(base, stamp);
   ShowVehicle(base, stamp);
 }
 
-void VehicleView::TellPosition(const TrackPose& pose, const ros::Time& stamp) {
+void VehicleView::TellPosition(const geo::TrackPose& pose, const ros::Time& stamp) {
   const bool due = !position_stamp_ || stamp < *position_stamp_ ||
                    stamp - *position_stamp_ >= ros::Duration(config_.position_period_s);
   if (!due) return;
   position_stamp_ = stamp;
-  const VehicleState vehicle{"",
-                             config_.reporter.drive_id,
-                             pose.position,
-                             pose.course_rad,
-                             pose.speed_mps,
-                             FromRosTime(stamp)};
+  const zone::VehicleState vehicle{"",
+                                   config_.reporter.drive_id,
+                                   pose.position,
+                                   pose.course_rad,
+                                   pose.speed_mps,
+                                   ros_io::FromRosTime(stamp)};
   const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
-  position_publisher_.publish(ToMessage(vehicle, sigma_m, reporter_.map().map_sequence()));
+  position_publisher_.publish(ros_io::ToMessage(vehicle, sigma_m, reporter_.map().map_sequence()));
 }
 
 /// base_link on the path, and on tf where no odometry does it.
-void VehicleView::ShowVehicle(const TrackPose& base, const ros::Time& stamp) {
+void VehicleView::ShowVehicle(const geo::TrackPose& base, const ros::Time& stamp) {
   const Eigen::Vector2d base_m = map_->ToEnu(base.position);
-  const auto pose = VehiclePose(base_m, base.course_rad, config_.map_frame, stamp);
+  const auto pose = ros_io::VehiclePose(base_m, base.course_rad, config_.map_frame, stamp);
   if (config_.publish_tf) {
     geometry_msgs::TransformStamped transform;
     transform.header = pose.header;
@@ -104,7 +105,7 @@ void VehicleView::Publish() {
   if (marker_publisher_.getNumSubscribers() == 0 || !map_) return;
   const auto known = reporter_.map().Known(static_cast<std::size_t>(config_.max_markers));
   marker_publisher_.publish(
-      HazardMarkers(known, catalogue_, *map_, config_.map_frame, ros::Time::now()));
+      ros_io::HazardMarkers(known, catalogue_, *map_, config_.map_frame, ros::Time::now()));
 }
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

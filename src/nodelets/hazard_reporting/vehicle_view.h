@@ -13,36 +13,36 @@
 #include "ros/parameters/hazard_reporting_parameters.h"
 #include "vehicle/reporting/hazard_reporter.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// Tells and shows where the vehicle is and what it knows: vehicle/position, path, tf and
 /// hazard/local_map. Not thread-safe.
 class VehicleView {
  public:
   /// Advertises its topics. `config`, `reporter` and `catalogue` outlive it.
-  VehicleView(const HazardReportingConfig& config, const HazardReporter& reporter,
-              const HazardCatalogue& catalogue, ros::NodeHandle& node);
+  VehicleView(const ros_io::HazardReportingConfig& config, const vehicle::HazardReporter& reporter,
+              const protocol::HazardCatalogue& catalogue, ros::NodeHandle& node);
 
   /// The datum of the map frame is that of its owner, the localisation: tf earth -> map.
   void LearnDatum(const tf2_ros::Buffer& buffer);
   /// The map frame's place on earth, once it is known.
-  const std::optional<LocalFrame>& map() const { return map_; }
+  const std::optional<geo::LocalFrame>& map() const { return map_; }
 
   /// Where the fix of this stamp, the newest, is.
   void ShowFix(std::int64_t stamp_ns);
   /// Where base_link is by a fused pose; the map is known.
-  void ShowPose(const TrackPose& base, const ros::Time& stamp);
+  void ShowPose(const geo::TrackPose& base, const ros::Time& stamp);
   /// Path and markers, where somebody looks at them.
   void Publish();
 
  private:
-  void TellPosition(const TrackPose& pose, const ros::Time& stamp);
-  void ShowVehicle(const TrackPose& base, const ros::Time& stamp);
+  void TellPosition(const geo::TrackPose& pose, const ros::Time& stamp);
+  void ShowVehicle(const geo::TrackPose& base, const ros::Time& stamp);
 
-  const HazardReportingConfig& config_;
-  const HazardReporter& reporter_;
-  const HazardCatalogue& catalogue_;
-  std::optional<LocalFrame> map_;
+  const ros_io::HazardReportingConfig& config_;
+  const vehicle::HazardReporter& reporter_;
+  const protocol::HazardCatalogue& catalogue_;
+  std::optional<geo::LocalFrame> map_;
   geometry_msgs::Transform earth_from_map_;  // By which map_ was made, if it was.
   std::optional<ros::Time> position_stamp_;
   nav_msgs::Path path_;
@@ -50,4 +50,4 @@ class VehicleView {
   ros::Publisher position_publisher_, marker_publisher_, path_publisher_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets

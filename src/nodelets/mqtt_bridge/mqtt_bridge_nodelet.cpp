@@ -17,7 +17,7 @@
 #include "transport/mqtt_client.h"
 #include "transport/topic_template.h"
 
-namespace livemap {
+namespace livemap::nodelets {
 
 /// The multi-master bridge: carries the listed topics between this ROS master and the zone's MQTT
 /// broker. On the zone's side it writes the vehicle whose login the broker checked (it stands in
@@ -44,14 +44,14 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   };
 
   struct Topic {
-    Topic(const BridgeTopic& topic_config)
+    Topic(const ros_io::BridgeTopic& topic_config)
         : config(topic_config),
           mqtt_topic(topic_config.mqtt_topic),
-          type(MakeBridgedType(topic_config.type,
-                               static_cast<std::size_t>(topic_config.max_bytes))) {}
-    const BridgeTopic config;
-    const TopicTemplate mqtt_topic;
-    const std::unique_ptr<BridgedType> type;
+          type(ros_io::MakeBridgedType(topic_config.type,
+                                       static_cast<std::size_t>(topic_config.max_bytes))) {}
+    const ros_io::BridgeTopic config;
+    const transport::TopicTemplate mqtt_topic;
+    const std::unique_ptr<ros_io::BridgedType> type;
     ros::Publisher publisher;
     ros::Subscriber subscriber;
     std::atomic<std::uint64_t> carried{0};  ///< Out: accepted by the broker. In: published in ROS.
@@ -82,13 +82,13 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   }
 
   void Initialize() {
-    ParameterReader parameters(getPrivateNodeHandle());
-    config_ = ReadBridgeConfig(parameters);
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadBridgeConfig(parameters);
     if (!config_.password_file.empty()) {
-      config_.mqtt.password = ReadPassword(config_.password_file, config_.password_wait_s);
+      config_.mqtt.password = ros_io::ReadPassword(config_.password_file, config_.password_wait_s);
     }
     config_.mqtt.reconnect_jitter_seed = std::random_device{}();
-    for (const BridgeTopic& topic : config_.topics) {
+    for (const ros_io::BridgeTopic& topic : config_.topics) {
       topics_.push_back(std::make_unique<Topic>(topic));
     }
     // Publishers stand before the client can call, the client before subscribers can.
@@ -97,12 +97,13 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     StartDiagnostics();
   }
 
-  std::vector<MqttSubscription> AdvertiseIncoming() {
+  std::vector<transport::MqttSubscription> AdvertiseIncoming() {
     // A zone listens to every vehicle, a vehicle to what is addressed to it.
-    const TopicNames names{config_.zone, config_.role == BridgeRole::kZone ? "" : config_.user};
-    std::vector<MqttSubscription> subscriptions;
+    const transport::TopicNames names{
+        config_.zone, config_.role == ros_io::BridgeRole::kZone ? "" : config_.user};
+    std::vector<transport::MqttSubscription> subscriptions;
     for (const auto& topic : topics_) {
-      if (topic->config.direction != BridgeDirection::kIn) continue;
+      if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
       topic->publisher =
           topic->type->Advertise(getNodeHandle(), topic->config.ros_topic,
                                  static_cast<std::uint32_t>(topic->config.ros_queue));
@@ -111,10 +112,12 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     return subscriptions;
   }
 
-  void StartClient(std::vector<MqttSubscription> subscriptions) {
-    MqttCallbacks callbacks;
-    callbacks.on_message = [this](const MqttMessage& message) { Receive(message); };
-    callbacks.on_published = [this](const MqttPublishOutcome& outcome) { CountOutcome(outcome); };
+  void StartClient(std::vector<transport::MqttSubscription> subscriptions) {
+    transport::MqttCallbacks callbacks;
+    callbacks.on_message = [this](const transport::MqttMessage& message) { Receive(message); };
+    callbacks.on_published = [this](const transport::MqttPublishOutcome& outcome) {
+      CountOutcome(outcome);
+    };
     callbacks.on_connection = [this](bool connected, const std::string& reason) {
       if (connected) {
         NODELET_INFO("connected to broker %s:%d as '%s'", config_.mqtt.host.c_str(),
@@ -123,8 +126,8 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
         SayLoss(reason);
       }
     };
-    client_ =
-        std::make_unique<MqttClient>(config_.mqtt, std::move(subscriptions), std::move(callbacks));
+    client_ = std::make_unique<transport::MqttClient>(config_.mqtt, std::move(subscriptions),
+                                                      std::move(callbacks));
   }
 
   /// Each reason once a minute: a connection may end without one, and the next attempt have it.
@@ -138,16 +141,16 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   void SubscribeOutgoing() {
     for (std::size_t i = 0; i < topics_.size(); ++i) {
       Topic& topic = *topics_[i];
-      if (topic.config.direction != BridgeDirection::kOut) continue;
+      if (topic.config.direction != ros_io::BridgeDirection::kOut) continue;
       topic.subscriber = topic.type->Subscribe(
           getNodeHandle(), topic.config.ros_topic,
           static_cast<std::uint32_t>(topic.config.ros_queue),
-          [this, i](OutgoingBridgeMessage message) { Forward(i, std::move(message)); });
+          [this, i](ros_io::OutgoingBridgeMessage message) { Forward(i, std::move(message)); });
     }
   }
 
   /// From ROS to the broker.
-  void Forward(std::size_t index, OutgoingBridgeMessage message) {
+  void Forward(std::size_t index, ros_io::OutgoingBridgeMessage message) {
     Topic& topic = *topics_[index];
     if (message.fault) return Refuse(topic, *message.fault);
     if (message.envelope.size() > static_cast<std::size_t>(topic.config.max_bytes)) {
@@ -156,8 +159,8 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
                                " are accepted");
     }
     const std::string& vehicle =
-        config_.role == BridgeRole::kZone ? message.vehicle_id : config_.user;
-    if (topic.mqtt_topic.has_vehicle() && !IsValidId(vehicle)) {
+        config_.role == ros_io::BridgeRole::kZone ? message.vehicle_id : config_.user;
+    if (topic.mqtt_topic.has_vehicle() && !transport::IsValidId(vehicle)) {
       return Refuse(topic, "the addressee '" + vehicle + "' is no vehicle id");
     }
     // A report that is dropped here is sent again by its owner until the zone's receipt comes.
@@ -165,31 +168,33 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
       ++topic.dropped;
       return;
     }
-    const MqttPublishStatus status =
+    const transport::MqttPublishStatus status =
         client_->Publish(topic.mqtt_topic.Expand({config_.zone, vehicle}),
                          std::move(message.envelope), topic.config.qos, index);
-    if (status != MqttPublishStatus::kQueued) ++topic.dropped;
+    if (status != transport::MqttPublishStatus::kQueued) ++topic.dropped;
   }
 
   /// From the broker to ROS, on the client's thread.
-  void Receive(const MqttMessage& message) {
+  void Receive(const transport::MqttMessage& message) {
     for (const auto& topic : topics_) {
-      if (topic->config.direction != BridgeDirection::kIn) continue;
-      const std::optional<TopicNames> names = topic->mqtt_topic.Match(message.topic);
+      if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
+      const std::optional<transport::TopicNames> names = topic->mqtt_topic.Match(message.topic);
       if (!names || (topic->mqtt_topic.has_zone() && names->zone != config_.zone)) continue;
       return Publish(*topic, *names, message);
     }
     ++unexpected_;
   }
 
-  void Publish(Topic& topic, const TopicNames& names, const MqttMessage& message) {
+  void Publish(Topic& topic, const transport::TopicNames& names,
+               const transport::MqttMessage& message) {
     if (message.payload.size > static_cast<std::size_t>(topic.config.max_bytes)) {
       return Refuse(topic, "from '" + names.vehicle + "': the message has " +
                                std::to_string(message.payload.size) + " bytes, at most " +
                                std::to_string(topic.config.max_bytes) + " are accepted");
     }
-    const std::optional<std::string> sender =
-        config_.role == BridgeRole::kZone ? std::make_optional(names.vehicle) : std::nullopt;
+    const std::optional<std::string> sender = config_.role == ros_io::BridgeRole::kZone
+                                                  ? std::make_optional(names.vehicle)
+                                                  : std::nullopt;
     const std::optional<std::string> fault =
         topic.type->PublishChecked(topic.publisher, message.payload, sender);
     if (fault) return Refuse(topic, "from '" + names.vehicle + "': " + *fault);
@@ -197,7 +202,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     topic.bytes += message.topic.size() + message.payload.size;
   }
 
-  void CountOutcome(const MqttPublishOutcome& outcome) {
+  void CountOutcome(const transport::MqttPublishOutcome& outcome) {
     Topic& topic = *topics_[outcome.tag];
     if (!outcome.accepted()) return Refuse(topic, "the broker: " + outcome.reason);
     ++topic.carried;
@@ -224,7 +229,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   }
 
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    const MqttStatistics mqtt = client_->statistics();
+    const transport::MqttStatistics mqtt = client_->statistics();
     if (!mqtt.connected) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
                      mqtt.last_error.empty() ? "connecting" : mqtt.last_error);
@@ -247,7 +252,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     status.add("inflight", mqtt.inflight);
     status.add("unexpected_topics", unexpected_.load());
     for (const auto& topic : topics_) {
-      const bool out = topic->config.direction == BridgeDirection::kOut;
+      const bool out = topic->config.direction == ros_io::BridgeDirection::kOut;
       status.add(topic->config.name + (out ? "_out" : "_in"), topic->carried.load());
       status.add(topic->config.name + "_bytes", topic->bytes.load());
       status.add(topic->config.name + "_refused", topic->refused.load());
@@ -255,16 +260,16 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     }
   }
 
-  BridgeConfig config_;
+  ros_io::BridgeConfig config_;
   std::vector<std::unique_ptr<Topic>> topics_;  ///< The index is the tag of a publication.
   std::atomic<std::uint64_t> unexpected_{0};    ///< Received on a topic that is not in the list.
   OnceAMinute say_losses_again_;
   std::set<std::string> said_losses_;  ///< In this minute; the client's thread's.
-  std::unique_ptr<MqttClient> client_;
+  std::unique_ptr<transport::MqttClient> client_;
   std::unique_ptr<diagnostic_updater::Updater> updater_;
   ros::WallTimer diagnostics_timer_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::nodelets
 
-PLUGINLIB_EXPORT_CLASS(livemap::MqttBridgeNodelet, nodelet::Nodelet)
+PLUGINLIB_EXPORT_CLASS(livemap::nodelets::MqttBridgeNodelet, nodelet::Nodelet)

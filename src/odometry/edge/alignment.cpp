@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays stay in the cache.
@@ -35,7 +35,7 @@ void Aligner::Reserve(std::size_t points) {
 
 /// Equation (2) of docs/odometry.md for all points.
 void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
-                       const CameraIntrinsics& camera, const AlignmentState& state,
+                       const geo::CameraIntrinsics& camera, const AlignmentState& state,
                        Residuals& residuals) const {
   const Eigen::Matrix3f rotation = state.new_from_reference.linear().cast<float>();
   const Eigen::Vector3f translation = state.new_from_reference.translation().cast<float>();
@@ -207,7 +207,7 @@ AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) con
 }
 
 AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
-                               const CameraIntrinsics& camera, const AlignmentState& start) {
+                               const geo::CameraIntrinsics& camera, const AlignmentState& start) {
   AlignmentResult result;
   result.state = start;
   result.points = points.size();
@@ -249,7 +249,8 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
 }
 
 double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
-                       const CameraIntrinsics& camera, const AlignmentState& state, double sigma) {
+                       const geo::CameraIntrinsics& camera, const AlignmentState& state,
+                       double sigma) {
   Whiten(points, state.new_from_reference);
   Evaluate(points, grey, camera, state, candidate_);
   return RobustCost(candidate_, sigma);
@@ -272,4 +273,4 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   result.information = result.state.gain * result.state.gain * pose;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -11,7 +11,7 @@
 #include "odometry/edge/edge_points.h"
 #include "odometry/se3.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// What brings the reference's points and grey values into a new image.
 struct AlignmentState {
@@ -21,10 +21,10 @@ struct AlignmentState {
 };
 
 struct AlignmentConfig {
-  int max_iterations = 12;   ///< Per level.
-  double huber_k = 2.0;      ///< In standard deviations of the residuals.
-  double min_sigma = 1.5;  ///< Noise below which no residual counts as an outlier, grey levels.
-  double grey_sigma = 2.0;   ///< Of residuals whose depth is exact, against those where it is not.
+  int max_iterations = 12;  ///< Per level.
+  double huber_k = 2.0;     ///< In standard deviations of the residuals.
+  double min_sigma = 1.5;   ///< Noise below which no residual counts as an outlier, grey levels.
+  double grey_sigma = 2.0;  ///< Of residuals whose depth is exact, against those where it is not.
   double converged_px = 0.03;  ///< A step that moves points less than this is the last.
   bool estimate_illumination = true;
   bool rotation_only = false;
@@ -59,11 +59,11 @@ class Aligner {
 
   /// Aligns on one level from `start` on.
   AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
-                        const CameraIntrinsics& camera, const AlignmentState& start);
+                        const geo::CameraIntrinsics& camera, const AlignmentState& start);
 
   /// Mean robust cost at `state` for residuals of this sigma, without optimising; infinite when
   /// less than a tenth of the points is visible.
-  double CostAt(const EdgePoints& points, const cv::Mat& grey, const CameraIntrinsics& camera,
+  double CostAt(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                 const AlignmentState& state, double sigma);
 
  private:
@@ -77,7 +77,7 @@ class Aligner {
     std::size_t count = 0;       // Visible ones.
   };
 
-  void Evaluate(const EdgePoints& points, const cv::Mat& grey, const CameraIntrinsics& camera,
+  void Evaluate(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                 const AlignmentState& state, Residuals& residuals) const;
   double RobustSigma(const Residuals& residuals) const;
   double RobustCost(const Residuals& residuals, double sigma) const;
@@ -94,4 +94,4 @@ class Aligner {
   Step gradient_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr double kSobelGain = 8;
@@ -208,4 +208,4 @@ void CannyDetector::FollowEdges() {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// Canny's edges (1986) as cv::Canny finds them with a 3x3 Sobel operator and the L1 norm, but with
 /// thresholds from the image, in about 0.6 of its time and without allocating once its buffers
@@ -40,4 +40,4 @@ class CannyDetector {
   std::vector<std::uint8_t*> open_;  // Strong pixels whose neighbours are not looked at yet.
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr double kNarrowSigmaPx = 1.0;
@@ -122,4 +122,4 @@ void EdgeExtractor::ExtractStructured(const cv::Mat& grey) {
   cv::compare(thinned_, kMinLikelihood, edges_, cv::CMP_GT);
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

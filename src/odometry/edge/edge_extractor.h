@@ -10,7 +10,7 @@ namespace cv::ximgproc {
 class StructuredEdgeDetection;
 }
 
-namespace livemap {
+namespace livemap::odometry {
 
 enum class EdgeKind {
   kCanny,                ///< Thresholds from the gradients' distribution.
@@ -62,4 +62,4 @@ class EdgeExtractor {
   cv::Ptr<cv::ximgproc::StructuredEdgeDetection> forest_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -8,7 +8,7 @@
 #include "common/error.h"
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 /// A motion is carried on only over a short pause, s.
@@ -37,7 +37,7 @@ const char* VoStateName(VoState state) {
   return "";
 }
 
-EdgeOdometry::EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics)
+EdgeOdometry::EdgeOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics)
     : config_(config),
       extractor_(config.edges),
       selector_(config.points.seed),
@@ -376,4 +376,4 @@ void GrowWhileLost(const EdgeOdometry::Config& config, double from_s, double to_
   covariance.diagonal().tail<3>().array() += growth * config.lost_turn_rps * config.lost_turn_rps;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

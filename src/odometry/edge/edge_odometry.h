@@ -12,7 +12,7 @@
 #include "odometry/edge/keyframe.h"
 #include "odometry/edge/rgbd_frame.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// Whose edges choose the pixels of the keyframe that are aligned.
 enum class EdgeSource {
@@ -93,7 +93,7 @@ class EdgeOdometry {
   };
 
   /// Throws Error naming what is wrong with the intrinsics or the configuration.
-  EdgeOdometry(const Config& config, const CameraIntrinsics& intrinsics);
+  EdgeOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics);
   ~EdgeOdometry();
 
   /// Works off the next frame. Throws Error, and changes nothing, when its size or type is wrong or
@@ -154,7 +154,7 @@ class EdgeOdometry {
   VoResult Hold(std::int64_t stamp_ns);
 
   Config config_;
-  std::array<CameraIntrinsics, kMaxLevels + 1> cameras_;  // The last one is the thumbnail's.
+  std::array<geo::CameraIntrinsics, kMaxLevels + 1> cameras_;  // The last one is the thumbnail's.
   int levels_ = 1;
   EdgeExtractor extractor_;
   PointSelector selector_;
@@ -178,4 +178,4 @@ class EdgeOdometry {
 void GrowWhileLost(const EdgeOdometry::Config& config, double from_s, double to_s,
                    Matrix6d& covariance);
 
-}  // namespace livemap
+}  // namespace livemap::odometry

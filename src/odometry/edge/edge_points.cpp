@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr int kBorderPx = 2;
@@ -42,7 +42,7 @@ bool IsUsable(const ReferenceLevel& reference, const Pixel& pixel,
          !IsBehindAnEdge(reference.depth_m, pixel.x, pixel.y, selection.occlusion_ratio);
 }
 
-void Add(const ReferenceLevel& reference, const Pixel& pixel, const CameraIntrinsics& camera,
+void Add(const ReferenceLevel& reference, const Pixel& pixel, const geo::CameraIntrinsics& camera,
          EdgePoints& points) {
   const Gradient gradient = GradientAt(reference.grey, pixel.x, pixel.y);
   points.Add(pixel.x, pixel.y, reference.depth_m.ptr<float>(pixel.y)[pixel.x],
@@ -85,7 +85,7 @@ void EdgePoints::Reserve(std::size_t count) {
 }
 
 void EdgePoints::Add(float u, float v, float depth_m, float grey, float gradient_x,
-                     float gradient_y, const CameraIntrinsics& camera) {
+                     float gradient_y, const geo::CameraIntrinsics& camera) {
   const auto fx = static_cast<float>(camera.fx);
   const auto fy = static_cast<float>(camera.fy);
   const float px = (u - static_cast<float>(camera.cx)) / fx * depth_m;
@@ -113,7 +113,7 @@ void EdgePoints::Finish() {
 }
 
 void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges,
-                           const CameraIntrinsics& camera, const PointSelection& selection,
+                           const geo::CameraIntrinsics& camera, const PointSelection& selection,
                            EdgePoints& points) {
   candidates_.clear();
   for (int y = kBorderPx; y < reference.grey.rows - kBorderPx; ++y) {
@@ -140,7 +140,8 @@ void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges
 
 /// From the pixels under the mask. Both random choices take equally many: they are counted and
 /// drawn among those that can be used.
-void PointSelector::SelectAtRandom(const ReferenceLevel& reference, const CameraIntrinsics& camera,
+void PointSelector::SelectAtRandom(const ReferenceLevel& reference,
+                                   const geo::CameraIntrinsics& camera,
                                    const PointSelection& selection, EdgePoints& points) {
   const auto forget_useless = [&](const PointSelection& asked) {
     candidates_.erase(
@@ -173,7 +174,7 @@ void PointSelector::SelectAtRandom(const ReferenceLevel& reference, const Camera
   points.Finish();
 }
 
-void PointSelector::SelectAll(const cv::Mat& grey, const CameraIntrinsics& camera,
+void PointSelector::SelectAll(const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                               EdgePoints& points) {
   points.Clear();
   for (int y = 1; y < grey.rows - 1; ++y) {
@@ -186,4 +187,4 @@ void PointSelector::SelectAll(const cv::Mat& grey, const CameraIntrinsics& camer
   points.Finish();
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -9,7 +9,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// The pixels of a reference image that take part in an alignment: one array per quantity, because
 /// the alignment's loops run over many points and few quantities.
@@ -29,7 +29,7 @@ struct EdgePoints {
   void Clear();
   void Reserve(std::size_t count);
   void Add(float u, float v, float depth_m, float grey, float gradient_x, float gradient_y,
-           const CameraIntrinsics& camera);
+           const geo::CameraIntrinsics& camera);
   /// Means over all points; called once they are complete.
   void Finish();
 };
@@ -76,17 +76,18 @@ class PointSelector {
   /// Memory for masks with so many pixels set.
   void Reserve(std::size_t pixels) { candidates_.reserve(pixels); }
   /// Points of the reference under `edges`, an image of the same size.
-  void Select(const ReferenceLevel& reference, const cv::Mat& edges, const CameraIntrinsics& camera,
-              const PointSelection& selection, EdgePoints& points);
+  void Select(const ReferenceLevel& reference, const cv::Mat& edges,
+              const geo::CameraIntrinsics& camera, const PointSelection& selection,
+              EdgePoints& points);
   /// Every pixel, as if at one metre: for rotations, which depth does not matter to.
-  void SelectAll(const cv::Mat& grey, const CameraIntrinsics& camera, EdgePoints& points);
+  void SelectAll(const cv::Mat& grey, const geo::CameraIntrinsics& camera, EdgePoints& points);
 
  private:
-  void SelectAtRandom(const ReferenceLevel& reference, const CameraIntrinsics& camera,
+  void SelectAtRandom(const ReferenceLevel& reference, const geo::CameraIntrinsics& camera,
                       const PointSelection& selection, EdgePoints& points);
 
   std::vector<Pixel> candidates_;
   std::mt19937 random_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 /// Hue from red at half the mean depth to blue at twice it.
@@ -21,7 +21,7 @@ cv::Vec3b DepthColour(double depth_m, double mean_inverse_depth) {
 
 cv::Mat DrawEdges(const cv::Mat& grey, const Keyframe& keyframe,
                   const Eigen::Isometry3d& camera_from_keyframe,
-                  const CameraIntrinsics& intrinsics) {
+                  const geo::CameraIntrinsics& intrinsics) {
   cv::Mat picture;
   cv::cvtColor(grey / 2, picture, cv::COLOR_GRAY2BGR);
   const EdgePoints& points = keyframe.points[0];
@@ -39,4 +39,4 @@ cv::Mat DrawEdges(const cv::Mat& grey, const Keyframe& keyframe,
   return picture;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -9,7 +9,7 @@
 #include "odometry/edge/pyramid.h"
 #include "odometry/se3.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// A frame with depth that later frames are aligned with. Its buffers are used again when a newer
 /// keyframe takes its place.
@@ -25,4 +25,4 @@ struct Keyframe {
   EdgePoints thumbnail_points;                ///< Every pixel of the thumbnail, for rotations.
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 template <typename Depth>
@@ -99,7 +99,7 @@ int CountLevels(cv::Size size) {
   return levels;
 }
 
-CameraIntrinsics HalvedIntrinsics(const CameraIntrinsics& intrinsics) {
+geo::CameraIntrinsics HalvedIntrinsics(const geo::CameraIntrinsics& intrinsics) {
   return {intrinsics.fx / 2,
           intrinsics.fy / 2,
           (intrinsics.cx + 0.5) / 2 - 0.5,
@@ -128,4 +128,4 @@ void DepthPyramid::Build(const cv::Mat& depth, double units_per_m, Range range, 
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -7,7 +7,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// Edges alias on coarser images than this (thesis, section 5.2.4); no level goes below.
 constexpr int kMinLevelWidth = 160;
@@ -19,7 +19,7 @@ int CountLevels(cv::Size size);
 
 /// The camera of a level whose pixels are 2x2 pixels of the level before: the centre of the first
 /// pixel moves by half a pixel.
-CameraIntrinsics HalvedIntrinsics(const CameraIntrinsics& intrinsics);
+geo::CameraIntrinsics HalvedIntrinsics(const geo::CameraIntrinsics& intrinsics);
 
 /// Grey images, CV_8UC1. The buffers are kept from frame to frame.
 class ImagePyramid {
@@ -59,4 +59,4 @@ class DepthPyramid {
   std::array<cv::Mat, kMaxLevels> depths_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 std::string SizeText(const cv::Mat& image) {
@@ -14,7 +14,7 @@ std::string SizeText(const cv::Mat& image) {
 
 }  // namespace
 
-const CameraIntrinsics& CheckedCamera(const CameraIntrinsics& camera) {
+const geo::CameraIntrinsics& CheckedCamera(const geo::CameraIntrinsics& camera) {
   const bool finite = std::isfinite(camera.fx) && std::isfinite(camera.fy) &&
                       std::isfinite(camera.cx) && std::isfinite(camera.cy);
   if (!finite || camera.fx <= 0 || camera.fy <= 0) {
@@ -29,7 +29,7 @@ const CameraIntrinsics& CheckedCamera(const CameraIntrinsics& camera) {
   return camera;
 }
 
-void CheckPictures(const RgbdFrame& frame, const CameraIntrinsics& camera) {
+void CheckPictures(const RgbdFrame& frame, const geo::CameraIntrinsics& camera) {
   const cv::Size wanted(camera.width, camera.height);
   if (frame.grey.type() != CV_8UC1 || frame.grey.size() != wanted) {
     throw Error("an image of " + SizeText(frame.grey) + " came for a camera of " +
@@ -52,4 +52,4 @@ void CheckPictures(const RgbdFrame& frame, const CameraIntrinsics& camera) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

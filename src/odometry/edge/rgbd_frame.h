@@ -5,7 +5,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// One image with its depth.
 struct RgbdFrame {
@@ -17,10 +17,10 @@ struct RgbdFrame {
 
 /// The camera itself; throws Error when its focal lengths or principal point are no usable numbers
 /// or its size is not 32x32 to 8192x8192 pixels.
-const CameraIntrinsics& CheckedCamera(const CameraIntrinsics& camera);
+const geo::CameraIntrinsics& CheckedCamera(const geo::CameraIntrinsics& camera);
 
 /// Throws Error unless the frame's image, and its depth if there is one, have the camera's size, an
 /// accepted type and, for depth, a unit.
-void CheckPictures(const RgbdFrame& frame, const CameraIntrinsics& camera);
+void CheckPictures(const RgbdFrame& frame, const geo::CameraIntrinsics& camera);
 
-}  // namespace livemap
+}  // namespace livemap::odometry

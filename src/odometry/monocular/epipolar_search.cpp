@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr int kPatternReach = 2;
@@ -30,7 +30,7 @@ float Interpolate(const cv::Mat& grey, float u, float v) {
 }  // namespace
 
 EpipolarSearch::EpipolarSearch(const cv::Mat& keyframe, const cv::Mat& other,
-                               const CameraIntrinsics& camera,
+                               const geo::CameraIntrinsics& camera,
                                const Eigen::Isometry3d& other_from_keyframe,
                                const EpipolarConfig& config)
     : keyframe_(keyframe), other_(other), config_(config) {
@@ -89,8 +89,8 @@ bool EpipolarSearch::Place(const Pattern& pattern, float inverse_depth, Places& 
   places.u = (pattern.x + inverse_depth * epipole_.x()) / places.z;
   places.v = (pattern.y + inverse_depth * epipole_.y()) / places.z;
   // Written so that NaN is outside.
-  return places.z.minCoeff() > kMinScale && places.u.minCoeff() >= 1 &&
-         places.v.minCoeff() >= 1 && places.u.maxCoeff() < static_cast<float>(other_.cols - 2) &&
+  return places.z.minCoeff() > kMinScale && places.u.minCoeff() >= 1 && places.v.minCoeff() >= 1 &&
+         places.u.maxCoeff() < static_cast<float>(other_.cols - 2) &&
          places.v.maxCoeff() < static_cast<float>(other_.rows - 2);
 }
 
@@ -220,4 +220,4 @@ std::optional<EpipolarMatch> EpipolarSearch::Find(int u, int v, float inverse_de
   return Refine(pattern, *coarse);
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

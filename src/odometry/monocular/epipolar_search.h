@@ -8,7 +8,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// What one search along an epipolar line found.
 struct EpipolarMatch {
@@ -40,7 +40,7 @@ struct EpipolarConfig {
 /// camera's size; they must outlive this object.
 class EpipolarSearch {
  public:
-  EpipolarSearch(const cv::Mat& keyframe, const cv::Mat& other, const CameraIntrinsics& camera,
+  EpipolarSearch(const cv::Mat& keyframe, const cv::Mat& other, const geo::CameraIntrinsics& camera,
                  const Eigen::Isometry3d& other_from_keyframe, const EpipolarConfig& config);
 
   /// Pixels that the point moves over in the other view between two inverse depths (1/m).
@@ -94,4 +94,4 @@ class EpipolarSearch {
   Eigen::Vector3f epipole_;              // K t
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr int kMapBorderPx = 3;
@@ -23,7 +23,7 @@ bool Agree(float one, float one_variance, float other, float other_variance, flo
 
 }  // namespace
 
-InverseDepthMap::InverseDepthMap(const Config& config, const CameraIntrinsics& camera)
+InverseDepthMap::InverseDepthMap(const Config& config, const geo::CameraIntrinsics& camera)
     : config_(config), camera_(camera) {}
 
 void InverseDepthMap::SetRange(double min_depth_m, double max_depth_m) {
@@ -245,4 +245,4 @@ std::size_t InverseDepthMap::CountKnown() const {
                                                 [](const EdgeDepth& edge) { return edge.known; }));
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

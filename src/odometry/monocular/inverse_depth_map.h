@@ -9,7 +9,7 @@
 #include "geo/camera_intrinsics.h"
 #include "odometry/monocular/epipolar_search.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// What is known of an edge pixel's distance: a Gaussian over its inverse depth (Engel, Sturm,
 /// Cremers 2013).
@@ -54,7 +54,7 @@ class InverseDepthMap {
     float worst_relative_sigma = 0.2F;
   };
 
-  InverseDepthMap(const Config& config, const CameraIntrinsics& camera);
+  InverseDepthMap(const Config& config, const geo::CameraIntrinsics& camera);
 
   /// Depths to look for from now on, m.
   void SetRange(double min_depth_m, double max_depth_m);
@@ -96,11 +96,11 @@ class InverseDepthMap {
   bool IsCertain(const EdgeDepth& edge) const;
 
   Config config_;
-  CameraIntrinsics camera_;
+  geo::CameraIntrinsics camera_;
   std::vector<EdgeDepth> edges_, last_edges_;
   cv::Mat index_;  // CV_32SC1: which of edges_ a pixel is, -1 none.
   std::vector<float> smoothed_;
   cv::Mat depth_, sigma_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::odometry {
 
 double MetricScale::metres_per_unit() const { return std::exp(log_scale_); }
 
@@ -44,4 +44,4 @@ void MetricScale::Measure(double metres, double sigma_m, double units) {
   variance_ *= 1 - gain;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

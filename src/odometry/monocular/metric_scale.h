@@ -2,7 +2,7 @@
 
 #include <optional>
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// Follows how many metres one unit of a monocular map is: the logarithm of that scale is a
 /// Gaussian that drifts with every keyframe and is measured by what is known in metres.
@@ -41,4 +41,4 @@ class MetricScale {
   int refused_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -7,7 +7,7 @@
 #include "common/time.h"
 #include "odometry/monocular/road_height.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 /// The shortest way that tells the scale: over less, errors of both sides do not average out, m.
@@ -37,7 +37,7 @@ MonocularOdometry::Config::Config() {
   odometry.points.occlusion_ratio = 2.0F;
 }
 
-MonocularOdometry::MonocularOdometry(const Config& config, const CameraIntrinsics& intrinsics)
+MonocularOdometry::MonocularOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics)
     : config_(config),
       camera_(intrinsics),
       odometry_(config.odometry, intrinsics),
@@ -222,4 +222,4 @@ VoResult MonocularOdometry::InMetres(const VoResult& unscaled) {
   return result;
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -11,7 +11,7 @@
 #include "odometry/monocular/metric_scale.h"
 #include "odometry/monocular/two_view_start.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// One image of a single camera, with what is known in metres.
 struct MonocularFrame {
@@ -40,7 +40,7 @@ class MonocularOdometry {
     MetricScale::Config scale;
     ScaleSource scale_source = ScaleSource::kSpeed;
     double speed_sigma_mps = 0.2;  ///< Standard deviation of MonocularFrame::speed_mps.
-    double min_speed_mps = 1.0;  ///< Slower than that, a speed says nothing about the scale.
+    double min_speed_mps = 1.0;    ///< Slower than that, a speed says nothing about the scale.
     double camera_height_m = 1.6;  ///< Of kCameraHeight: over the road.
     double camera_pitch_rad = 0;   ///< Of kCameraHeight: positive looks down.
     /// Keyframes that a new one's depths are measured against.
@@ -51,7 +51,7 @@ class MonocularOdometry {
   };
 
   /// Throws Error naming what is wrong with the intrinsics or the configuration.
-  MonocularOdometry(const Config& config, const CameraIntrinsics& intrinsics);
+  MonocularOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics);
 
   /// Works off the next frame: poses in metres. Initialising, with a pose that says nothing, until
   /// the camera has moved far enough to see depth. Throws as EdgeOdometry::Track().
@@ -81,7 +81,7 @@ class MonocularOdometry {
   VoResult InMetres(const VoResult& unscaled);
 
   Config config_;
-  CameraIntrinsics camera_;
+  geo::CameraIntrinsics camera_;
   EdgeOdometry odometry_;
   EdgeExtractor extractor_;
   InverseDepthMap map_;
@@ -103,4 +103,4 @@ class MonocularOdometry {
   VoResult last_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

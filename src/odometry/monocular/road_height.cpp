@@ -4,21 +4,21 @@
 #include <cmath>
 #include <random>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr int kTrials = 200;
 constexpr std::size_t kMinEdges = 60;
-constexpr double kMinShare = 0.3;    // Of the edges in the wedge.
-constexpr double kMinSlope = 0.06;   // Rays that come down less steeply end too far away.
-constexpr double kWidestRatio = 2.0;   // Half width of the wedge, against the height.
+constexpr double kMinShare = 0.3;     // Of the edges in the wedge.
+constexpr double kMinSlope = 0.06;    // Rays that come down less steeply end too far away.
+constexpr double kWidestRatio = 2.0;  // Half width of the wedge, against the height.
 constexpr double kMaxTiltRad = 0.06;  // Of the plane against the wheels'.
-constexpr double kNearPlane = 0.03;    // Against the height.
+constexpr double kNearPlane = 0.03;   // Against the height.
 constexpr double kWorstRelativeSigma = 0.1;
 
 /// Points on the part of the image that is mostly road: a wedge ahead of the car.
 std::vector<Eigen::Vector3d> PointsAhead(const std::vector<EdgeDepth>& edges,
-                                         const CameraIntrinsics& camera,
+                                         const geo::CameraIntrinsics& camera,
                                          const Eigen::Vector3d& down) {
   std::vector<Eigen::Vector3d> points;
   for (const EdgeDepth& edge : edges) {
@@ -36,7 +36,7 @@ std::vector<Eigen::Vector3d> PointsAhead(const std::vector<EdgeDepth>& edges,
 }  // namespace
 
 std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
-                                 const CameraIntrinsics& camera, double pitch_rad) {
+                                 const geo::CameraIntrinsics& camera, double pitch_rad) {
   const Eigen::Vector3d down(0, std::cos(pitch_rad), std::sin(pitch_rad));
   const std::vector<Eigen::Vector3d> points = PointsAhead(edges, camera, down);
   if (points.size() < kMinEdges) return std::nullopt;
@@ -76,4 +76,4 @@ std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
   return sum / static_cast<double>(most);
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -8,7 +8,7 @@
 
 #include "odometry/se3.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr double kCornerQuality = 0.005;
@@ -16,14 +16,14 @@ constexpr double kCornerDistancePx = 8;
 constexpr float kThereAndBackPx = 1.0F;
 constexpr double kConfidence = 0.9999;
 
-Eigen::Vector3d Ray(const cv::Point2f& pixel, const CameraIntrinsics& camera) {
+Eigen::Vector3d Ray(const cv::Point2f& pixel, const geo::CameraIntrinsics& camera) {
   return {(static_cast<double>(pixel.x) - camera.cx) / camera.fx,
           (static_cast<double>(pixel.y) - camera.cy) / camera.fy, 1};
 }
 
 }  // namespace
 
-TwoViewStart::TwoViewStart(const Config& config, const CameraIntrinsics& camera)
+TwoViewStart::TwoViewStart(const Config& config, const geo::CameraIntrinsics& camera)
     : config_(config), camera_(camera) {}
 
 void TwoViewStart::Begin(const cv::Mat& grey) {
@@ -167,4 +167,4 @@ void TwoViewStart::Refine(Eigen::Isometry3d& new_from_first) const {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::odometry

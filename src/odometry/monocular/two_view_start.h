@@ -9,7 +9,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::odometry {
 
 /// The first motion of a single camera, before any depth is known: corners followed from a first
 /// image on, and the essential matrix of their way (OpenCV: Shi-Tomasi, Lucas-Kanade, five points
@@ -29,7 +29,7 @@ class TwoViewStart {
     double inlier_px = 1.0;
   };
 
-  TwoViewStart(const Config& config, const CameraIntrinsics& camera);
+  TwoViewStart(const Config& config, const geo::CameraIntrinsics& camera);
 
   /// Begins anew with this image, CV_8UC1.
   void Begin(const cv::Mat& grey);
@@ -53,10 +53,10 @@ class TwoViewStart {
   Eigen::VectorXd SampsonErrors(const Eigen::Isometry3d& new_from_first) const;
 
   Config config_;
-  CameraIntrinsics camera_;
+  geo::CameraIntrinsics camera_;
   cv::Mat first_, last_;
   bool just_begun_ = false;
   std::vector<cv::Point2f> begin_, end_;  // The same corners in the first and the last image.
 };
 
-}  // namespace livemap
+}  // namespace livemap::odometry

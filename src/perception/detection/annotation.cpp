@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// Colours that stand out from asphalt, vegetation and sky, by class index.
@@ -68,4 +68,4 @@ void AnnotateImage(cv::Mat& bgr, const std::vector<HazardDetection>& detections)
   for (const auto& [frame, colour] : frames) cv::rectangle(bgr, frame, colour, thickness + 1);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

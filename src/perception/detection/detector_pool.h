@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Gives items (frames) to N engines, each on its own thread, and hands their results on in the
 /// order in which the items came, one at a time, from one further thread. An idle engine takes the
@@ -178,4 +178,4 @@ class DetectorPool {
   std::vector<std::thread> threads_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

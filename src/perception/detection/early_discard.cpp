@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 EarlyDiscard::EarlyDiscard(const ModelManifest& manifest, int threads)
     : EarlyDiscard(manifest, MakeInferenceEngine(manifest, threads)) {}
@@ -30,4 +30,4 @@ float EarlyDiscard::Score(const cv::Mat& bgr) {
   return score;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 #include "perception/inference/letterbox.h"
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// The small vehicle's send / don't-send decision (thesis, section 3.2.4): how likely an image is
 /// worth the zone's detector. Not thread-safe: one per thread.
@@ -33,4 +33,4 @@ class EarlyDiscard {
   Letterbox letterbox_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

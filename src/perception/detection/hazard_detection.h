@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// One hazard seen in one image. (livemap::Detection is the ROS message.)
 struct HazardDetection {
@@ -13,4 +13,4 @@ struct HazardDetection {
   cv::Rect2f box;          ///< px of the given image, inside it, never empty.
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "perception/detection/yolox_decoder.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 HazardDetector::HazardDetector(const ModelManifest& manifest, int threads,
                                std::optional<EngineKind> engine)
@@ -36,4 +36,4 @@ DetectionsOfViews HazardDetector::Views(const cv::Mat& bgr) {
   return DecodeViews(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

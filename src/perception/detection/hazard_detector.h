@@ -11,7 +11,7 @@
 #include "perception/inference/letterbox.h"
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Finds hazards in single images: letterbox, network, decoding, thresholds, suppression. Not
 /// thread-safe: one detector per thread.
@@ -41,4 +41,4 @@ class HazardDetector {
   cv::Mat mirrored_;  // Its memory serves again.
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 
 #include "perception/detection/yolox_decoder.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 struct Seen {
@@ -91,4 +91,4 @@ std::vector<HazardDetection> FuseViews(const DetectionsOfViews& views, float iou
   return fused;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

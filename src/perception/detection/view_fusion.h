@@ -4,7 +4,7 @@
 
 #include "perception/detection/hazard_detection.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// By view of an image, detections in pixels of that image.
 using DetectionsOfViews = std::vector<std::vector<HazardDetection>>;
@@ -21,4 +21,4 @@ using DetectionsOfViews = std::vector<std::vector<HazardDetection>>;
 std::vector<HazardDetection> FuseViews(const DetectionsOfViews& views, float iou_limit);
 constexpr std::size_t kMaxFused = 300;
 
-}  // namespace livemap
+}  // namespace livemap::perception

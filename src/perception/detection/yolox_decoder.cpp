@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b) {
   const double width =
       std::min(double{a.x} + a.width, double{b.x} + b.width) - std::max(double{a.x}, double{b.x});
@@ -245,4 +245,4 @@ std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const Model
   return JoinViews(DecodeViews(predictions, manifest, scale, image_size), manifest);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

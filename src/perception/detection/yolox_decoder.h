@@ -7,7 +7,7 @@
 #include "perception/detection/view_fusion.h"
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Turns the raw output of a YOLOX head into detections.
 ///
@@ -46,4 +46,4 @@ constexpr std::size_t kMaxCandidates = 3000;
 /// Intersection over union of two boxes, 0 when both are empty.
 double IntersectionOverUnion(const cv::Rect2f& a, const cv::Rect2f& b);
 
-}  // namespace livemap
+}  // namespace livemap::perception

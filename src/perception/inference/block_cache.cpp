@@ -9,7 +9,7 @@
 
 #include "common/huge_pages.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// In front of each block, as long as the alignment so that the block is aligned too.
@@ -86,4 +86,4 @@ std::byte* BlockCache::Carve(std::size_t bytes) {
   return block;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

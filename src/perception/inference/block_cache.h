@@ -5,7 +5,7 @@
 #include <mutex>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Memory for a network's activations. A network asks for the same few sizes with every image and
 /// gives them back, mostly in MiB; the C library returns such to the kernel, which then clears
@@ -49,4 +49,4 @@ class BlockCache {
   std::size_t carved_ = 0;  ///< Bytes of the last slab that are blocks.
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

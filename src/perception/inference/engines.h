@@ -8,7 +8,7 @@
 
 #include "perception/inference/inference_engine.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// The two makers behind MakeInferenceEngine; what it says of hashes, shapes, threads and errors
 /// holds for them.
@@ -29,4 +29,4 @@ void CheckOutput(InferenceEngine& engine, const ModelManifest& manifest, const s
 /// The first line of a library's message: errors here are one sentence.
 std::string FirstLine(const std::string& text);
 
-}  // namespace livemap
+}  // namespace livemap::perception

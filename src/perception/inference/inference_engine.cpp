@@ -3,7 +3,7 @@
 #include "common/error.h"
 #include "perception/inference/engines.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 std::string ShapeText(const std::vector<std::int64_t>& sizes) {
   std::string text;
@@ -52,4 +52,4 @@ std::unique_ptr<InferenceEngine> MakeInferenceEngine(const ModelManifest& manife
                                                     : MakeOpenCvEngine(manifest, threads);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Runs one network. Not thread-safe: one engine per thread.
 class InferenceEngine {
@@ -44,4 +44,4 @@ bool HasTorchEngine();
 std::unique_ptr<InferenceEngine> MakeInferenceEngine(const ModelManifest& manifest, int threads,
                                                      std::optional<EngineKind> choice = {});
 
-}  // namespace livemap
+}  // namespace livemap::perception

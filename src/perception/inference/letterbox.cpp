@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 Letterbox::Letterbox(const ModelManifest::Input& input,
                      const ModelManifest::Normalisation& normalisation)
@@ -66,4 +66,4 @@ const cv::Mat& Letterbox::Fill(const cv::Mat& bgr) {
   return tensor_;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

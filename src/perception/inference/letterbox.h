@@ -5,7 +5,7 @@
 
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Turns images of any size into the network's input tensor. Keeps its buffers between calls.
 class Letterbox {
@@ -32,4 +32,4 @@ class Letterbox {
   cv::Mat tensor_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

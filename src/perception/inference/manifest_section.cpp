@@ -9,7 +9,7 @@
 #include "common/sha256.h"
 #include "perception/inference/unpack.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr std::size_t kMaxModelBytes = std::size_t{256} * 1024 * 1024;
@@ -161,4 +161,4 @@ std::string ReadHashedFile(const std::string& name, const std::string& file,
   return Unpacked(std::move(bytes), file, kMaxModelBytes);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -8,7 +8,7 @@
 
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 constexpr std::size_t kMaxManifestBytes = std::size_t{64} * 1024;
 constexpr int kLargestInputSide = 4096;  ///< px
@@ -91,4 +91,4 @@ ModelManifest::Normalisation ReadManifestNormalisation(const ManifestSection& ro
 std::string ReadHashedFile(const std::string& name, const std::string& file,
                            const std::string& sha256);
 
-}  // namespace livemap
+}  // namespace livemap::perception

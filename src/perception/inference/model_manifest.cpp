@@ -7,7 +7,7 @@
 #include "common/error.h"
 #include "perception/inference/manifest_section.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr std::size_t kMaxClasses = 1000;
@@ -151,4 +151,4 @@ std::string ReadTorchFile(const ModelManifest& manifest) {
   return ReadHashedFile(manifest.name, manifest.torch_file, manifest.torch_sha256);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Order of the three channels in which a network wants an image.
 enum class ChannelOrder { kRgb, kBgr };
@@ -84,4 +84,4 @@ std::string ReadModelFile(const ModelManifest& manifest);
 /// The same for the TorchScript file and its hash. Throws Error also when the manifest names none.
 std::string ReadTorchFile(const ModelManifest& manifest);
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -2,7 +2,7 @@
 #include "common/error.h"
 #include "perception/inference/engines.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 bool HasTorchEngine() { return false; }
 
@@ -13,4 +13,4 @@ std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, 
       "again");
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "perception/inference/engines.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// OpenCV's messages run over several lines; errors here are one sentence.
@@ -65,4 +65,4 @@ std::vector<cv::Mat> OnnxGraph::Run(const std::vector<std::pair<std::string, cv:
   return answers;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

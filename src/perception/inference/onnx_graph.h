@@ -7,7 +7,7 @@
 
 #include "perception/inference/onnx_inputs.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// An ONNX graph with any number of inputs and outputs on OpenCV's DNN module, on the CPU. Not
 /// thread-safe.
@@ -36,4 +36,4 @@ class OnnxGraph {
   cv::dnn::Net network_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -2,7 +2,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// One field of a Protocol Buffers message: https://protobuf.dev/programming-guides/encoding/
@@ -104,4 +104,4 @@ std::vector<OnnxInput> ReadOnnxInputs(std::string_view model) {
   return inputs;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

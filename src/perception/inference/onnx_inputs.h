@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// An input tensor that an ONNX file declares.
 struct OnnxInput {
@@ -20,4 +20,4 @@ struct OnnxInput {
 /// of onnx.proto. Throws Error when the bytes are no such message.
 std::vector<OnnxInput> ReadOnnxInputs(std::string_view model);
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -4,7 +4,7 @@
 #include "perception/inference/engines.h"
 #include "perception/inference/onnx_graph.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr char kInputName[] = "images";
@@ -43,4 +43,4 @@ std::unique_ptr<InferenceEngine> MakeOpenCvEngine(const ModelManifest& manifest,
   return std::make_unique<OpenCvEngine>(manifest);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

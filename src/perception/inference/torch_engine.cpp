@@ -12,7 +12,7 @@
 #include "perception/inference/block_cache.h"
 #include "perception/inference/engines.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// The memory of all tensors of the process, on the CPU.
@@ -109,4 +109,4 @@ std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, 
   return std::make_unique<TorchEngine>(manifest, threads);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr int kGzipOnly = 15 + 16;  // inflateInit2: the largest window, and gzip's header.
@@ -64,4 +64,4 @@ std::string Unpacked(std::string bytes, const std::string& file, std::size_t mos
   return unpacked;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

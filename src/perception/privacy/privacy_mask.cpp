@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr double kSameRegionOverlap = 0.2;
@@ -92,4 +92,4 @@ std::vector<cv::Rect> PrivacyMask::Masked() const {
   return boxes;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

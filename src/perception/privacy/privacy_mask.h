@@ -7,7 +7,7 @@
 
 #include "perception/privacy/private_regions.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Makes faces and number plates unrecognisable in pictures before they leave the car. It fails
 /// closed: a picture is masked, or Apply throws and the picture must not be sent. Not thread-safe.
@@ -53,4 +53,4 @@ class PrivacyMask {
 void Pixelate(cv::Mat& bgr, const cv::Rect& region);
 constexpr int kMaskCells = 5;
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// How densely a cascade looks.
@@ -193,4 +193,4 @@ std::unique_ptr<PrivateRegionFinder> MakePrivateRegionFinder(const PrivateRegion
   return std::make_unique<Finder>(config);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

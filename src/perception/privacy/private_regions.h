@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// Finds what must not leave the car: faces and number plates. Not thread-safe.
 class PrivateRegionFinder {
@@ -28,4 +28,4 @@ struct PrivateRegionConfig {
 /// Throws Error naming the file that cannot be loaded: who has no finder sends no picture.
 std::unique_ptr<PrivateRegionFinder> MakePrivateRegionFinder(const PrivateRegionConfig& config);
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// An object nearer to the camera's plane than this is no longer seen, m.
@@ -33,7 +33,7 @@ std::optional<SeenPoint> Look(const Eigen::Vector3d& in_base, const CameraMotion
   const Eigen::Vector3d p = motion.base_from_optical.inverse() * in_base;
   // Written so that NaN is refused too.
   if (!(p.z() >= kNearestM)) return std::nullopt;
-  const CameraIntrinsics& camera = motion.intrinsics;
+  const geo::CameraIntrinsics& camera = motion.intrinsics;
   return SeenPoint{{camera.fx * p.x() / p.z() + camera.cx, camera.fy * p.y() / p.z() + camera.cy},
                    p.z()};
 }
@@ -332,4 +332,4 @@ ObjectEvent ObjectTracker::Report(Track& track) {
   return event;
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -9,14 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "geo/camera_intrinsics.h"
+#include "geo/ground_projection.h"
 #include "perception/detection/hazard_detection.h"
 
-namespace livemap {
+namespace livemap::perception {
 
 /// The camera and the vehicle's motion at one image; what lets a box be carried to the next image.
 struct CameraMotion {
-  CameraIntrinsics intrinsics;
+  geo::CameraIntrinsics intrinsics;
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
   /// Pose of base_link (on the road, z up) in any frame that stands still.
   Eigen::Isometry3d world_from_base = Eigen::Isometry3d::Identity();
@@ -163,4 +163,4 @@ class ObjectTracker {
   Counters counters_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -17,7 +17,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 template <typename Message, typename = void>
@@ -26,8 +26,8 @@ template <typename Message>
 struct HasVehicleId<Message, std::void_t<decltype(std::declval<Message&>().vehicle_id)>>
     : std::true_type {};
 
-Md5 RequireMd5(const std::string& name, const std::string& text) {
-  const std::optional<Md5> md5 = ParseMd5(text);
+transport::Md5 RequireMd5(const std::string& name, const std::string& text) {
+  const std::optional<transport::Md5> md5 = transport::ParseMd5(text);
   if (!md5) throw Error("message type '" + name + "' has no MD5 but '" + text + "'");
   return *md5;
 }
@@ -35,7 +35,7 @@ Md5 RequireMd5(const std::string& name, const std::string& text) {
 template <typename Message>
 class TypedBridge : public BridgedType {
  public:
-  TypedBridge(std::size_t max_bytes, const LayoutLimits& limits,
+  TypedBridge(std::size_t max_bytes, const transport::LayoutLimits& limits,
               const std::vector<EarlierDefinition>& earlier)
       : BridgedType(ros::message_traits::datatype<Message>(),
                     ros::message_traits::md5sum<Message>(),
@@ -71,7 +71,7 @@ class TypedBridge : public BridgedType {
     return bytes;
   }
 
-  void Publish(const ros::Publisher& publisher, ByteView serialised,
+  void Publish(const ros::Publisher& publisher, transport::ByteView serialised,
                const std::optional<std::string>& vehicle_id) const override {
     const boost::shared_ptr<Message> message = boost::make_shared<Message>();
     // The stream wants a writable pointer and only reads.
@@ -92,7 +92,7 @@ template <typename Message>
 std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk_fields = {},
                                             const std::vector<EarlierDefinition>& earlier = {}) {
   return {ros::message_traits::datatype<Message>(), [bulk_fields, earlier](std::size_t max_bytes) {
-            LayoutLimits limits;
+            transport::LayoutLimits limits;
             for (const std::string& field : bulk_fields) limits.fields[field] = max_bytes;
             return std::make_unique<TypedBridge<Message>>(max_bytes, limits, earlier);
           }};
@@ -117,7 +117,7 @@ const std::map<std::string, Factory>& Registry() {
 }  // namespace
 
 BridgedType::BridgedType(std::string name, const std::string& md5, const std::string& definition,
-                         std::size_t max_bytes, const LayoutLimits& limits,
+                         std::size_t max_bytes, const transport::LayoutLimits& limits,
                          const std::vector<EarlierDefinition>& earlier)
     : name_(std::move(name)),
       md5_(RequireMd5(name_, md5)),
@@ -129,7 +129,7 @@ BridgedType::BridgedType(std::string name, const std::string& md5, const std::st
 }
 
 /// Bytes that the present definition has more than the one of that MD5; none: it is not known.
-std::optional<std::size_t> BridgedType::AddedSince(const Md5& md5) const {
+std::optional<std::size_t> BridgedType::AddedSince(const transport::Md5& md5) const {
   if (md5 == md5_) return 0;
   for (const auto& [earlier, added_bytes] : earlier_) {
     if (earlier == md5) return added_bytes;
@@ -137,18 +137,18 @@ std::optional<std::size_t> BridgedType::AddedSince(const Md5& md5) const {
   return std::nullopt;
 }
 
-std::optional<std::string> BridgedType::Check(ByteView serialised) const {
+std::optional<std::string> BridgedType::Check(transport::ByteView serialised) const {
   return layout_.Check(serialised);
 }
 
 std::vector<std::uint8_t> BridgedType::Enclose(const std::vector<std::uint8_t>& serialised) const {
-  return EncodeEnvelope({name_, md5_, {serialised.data(), serialised.size()}});
+  return transport::EncodeEnvelope({name_, md5_, {serialised.data(), serialised.size()}});
 }
 
 std::optional<std::string> BridgedType::PublishChecked(
-    const ros::Publisher& publisher, ByteView bytes,
+    const ros::Publisher& publisher, transport::ByteView bytes,
     const std::optional<std::string>& vehicle_id) const {
-  const DecodedEnvelope decoded = DecodeEnvelope(bytes, max_bytes_);
+  const transport::DecodedEnvelope decoded = transport::DecodeEnvelope(bytes, max_bytes_);
   if (!decoded.envelope) return decoded.reason;
   if (decoded.envelope->type != name_) {
     return "the message is of type '" + std::string(decoded.envelope->type) + "', accepted is '" +
@@ -156,7 +156,7 @@ std::optional<std::string> BridgedType::PublishChecked(
   }
   const std::optional<std::size_t> added = AddedSince(decoded.envelope->md5);
   if (!added) return "the sender knows another definition of '" + name_ + "' (different MD5)";
-  ByteView payload = decoded.envelope->payload;
+  transport::ByteView payload = decoded.envelope->payload;
   std::vector<std::uint8_t> whole;
   if (*added > 0) {
     whole.reserve(payload.size + *added);
@@ -186,4 +186,4 @@ std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_
   throw Error("message type '" + name + "' is not known to the bridge, accepted are: " + accepted);
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

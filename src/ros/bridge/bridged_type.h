@@ -13,7 +13,7 @@
 #include "transport/envelope.h"
 #include "transport/message_layout.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// A message on its way from ROS to the broker.
 struct OutgoingBridgeMessage {
@@ -50,29 +50,30 @@ class BridgedType {
   /// Publishes the message in untrusted MQTT bytes: envelope, type, definition and every length are
   /// checked before anything is deserialised. When `vehicle_id` is given, the message's field
   /// becomes that, whatever the bytes say. Returns why the bytes were refused, or nothing.
-  std::optional<std::string> PublishChecked(const ros::Publisher& publisher, ByteView bytes,
+  std::optional<std::string> PublishChecked(const ros::Publisher& publisher,
+                                            transport::ByteView bytes,
                                             const std::optional<std::string>& vehicle_id) const;
 
  protected:
   BridgedType(std::string name, const std::string& md5, const std::string& definition,
-              std::size_t max_bytes, const LayoutLimits& limits,
+              std::size_t max_bytes, const transport::LayoutLimits& limits,
               const std::vector<EarlierDefinition>& earlier);
 
-  std::optional<std::string> Check(ByteView serialised) const;
+  std::optional<std::string> Check(transport::ByteView serialised) const;
   std::vector<std::uint8_t> Enclose(const std::vector<std::uint8_t>& serialised) const;
 
  private:
   /// `serialised` has passed all checks.
-  virtual void Publish(const ros::Publisher& publisher, ByteView serialised,
+  virtual void Publish(const ros::Publisher& publisher, transport::ByteView serialised,
                        const std::optional<std::string>& vehicle_id) const = 0;
 
-  std::optional<std::size_t> AddedSince(const Md5& md5) const;
+  std::optional<std::size_t> AddedSince(const transport::Md5& md5) const;
 
   std::string name_;
-  Md5 md5_;
-  std::vector<std::pair<Md5, std::size_t>> earlier_;  // And what was added since, bytes.
+  transport::Md5 md5_;
+  std::vector<std::pair<transport::Md5, std::size_t>> earlier_;  // And what was added since, bytes.
   std::size_t max_bytes_;
-  MessageLayout layout_;
+  transport::MessageLayout layout_;
 };
 
 /// The names that MakeBridgedType accepts, sorted.
@@ -82,4 +83,4 @@ std::vector<std::string> BridgedTypeNames();
 /// `max_bytes` bytes. Throws Error listing the known names for any other.
 std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_t max_bytes);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 int ToInt(std::uint32_t value) {
@@ -17,8 +17,8 @@ int ToInt(std::uint32_t value) {
 
 }  // namespace
 
-CameraCalibration FromMessage(const sensor_msgs::CameraInfo& message) {
-  CameraCalibration calibration;
+imaging::CameraCalibration FromMessage(const sensor_msgs::CameraInfo& message) {
+  imaging::CameraCalibration calibration;
   calibration.width = ToInt(message.width);
   calibration.height = ToInt(message.height);
   calibration.distortion_model = message.distortion_model;
@@ -31,7 +31,7 @@ CameraCalibration FromMessage(const sensor_msgs::CameraInfo& message) {
   return calibration;
 }
 
-sensor_msgs::CameraInfo ToMessage(const CameraCalibration& calibration,
+sensor_msgs::CameraInfo ToMessage(const imaging::CameraCalibration& calibration,
                                   const std_msgs::Header& header) {
   sensor_msgs::CameraInfo message;
   message.header = header;
@@ -45,9 +45,9 @@ sensor_msgs::CameraInfo ToMessage(const CameraCalibration& calibration,
   return message;
 }
 
-CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info) {
+geo::CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info) {
   constexpr std::uint32_t kMaxPixels = 16384;
-  CameraIntrinsics intrinsics{info.P[0], info.P[5], info.P[2], info.P[6], 0, 0};
+  geo::CameraIntrinsics intrinsics{info.P[0], info.P[5], info.P[2], info.P[6], 0, 0};
   const bool finite = std::isfinite(intrinsics.cx) && std::isfinite(intrinsics.cy) &&
                       std::isfinite(intrinsics.fx) && std::isfinite(intrinsics.fy);
   if (!finite || !(intrinsics.fx > 0 && intrinsics.fy > 0) || info.width == 0 || info.height == 0 ||
@@ -62,4 +62,4 @@ CameraIntrinsics ToRectifiedIntrinsics(const sensor_msgs::CameraInfo& info) {
   return intrinsics;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

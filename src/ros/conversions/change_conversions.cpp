@@ -5,40 +5,40 @@
 
 #include "ros/conversions/hazard_conversions.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
-std::uint8_t ToMessage(ChangeDirection direction) {
+std::uint8_t ToMessage(change::ChangeDirection direction) {
   switch (direction) {
-    case ChangeDirection::kAppeared:
+    case change::ChangeDirection::kAppeared:
       return ChangedObject::APPEARED;
-    case ChangeDirection::kVanished:
+    case change::ChangeDirection::kVanished:
       return ChangedObject::VANISHED;
-    case ChangeDirection::kUnknown:
+    case change::ChangeDirection::kUnknown:
       break;
   }
   return ChangedObject::UNKNOWN;
 }
 
-std::uint8_t ToMessage(ChangeDetector::Outcome outcome) {
+std::uint8_t ToMessage(change::ChangeDetector::Outcome outcome) {
   switch (outcome) {
-    case ChangeDetector::Outcome::kCompared:
+    case change::ChangeDetector::Outcome::kCompared:
       return ChangedObjects::COMPARED;
-    case ChangeDetector::Outcome::kNothingEarlier:
+    case change::ChangeDetector::Outcome::kNothingEarlier:
       return ChangedObjects::NOTHING_EARLIER;
-    case ChangeDetector::Outcome::kRefused:
+    case change::ChangeDetector::Outcome::kRefused:
       return ChangedObjects::REFUSED;
-    case ChangeDetector::Outcome::kUncertain:
+    case change::ChangeDetector::Outcome::kUncertain:
       break;
   }
   return ChangedObjects::UNCERTAIN;
 }
 
-ChangedObject ToMessage(const PlacedChange& change) {
+ChangedObject ToMessage(const change::PlacedChange& change) {
   const ChangedObject& event = change.event;
   ChangedObject message;
   message.id = static_cast<std::uint32_t>(event.id);
-  message.class_name = ChangeClassName(event.change_class);
+  message.class_name = protocol::ChangeClassName(event.change_class);
   message.direction = ToMessage(event.direction);
   message.latitude = change.position.latitude_deg;
   message.longitude = change.position.longitude_deg;
@@ -54,19 +54,21 @@ ChangedObject ToMessage(const PlacedChange& change) {
 
 }  // namespace
 
-ChangedObjects ToMessage(const ChangeDetector::Answer& answer, const std_msgs::Header& header,
-                         const std::string& drive_id, const std::string& method) {
+ChangedObjects ToMessage(const change::ChangeDetector::Answer& answer,
+                         const std_msgs::Header& header, const std::string& drive_id,
+                         const std::string& method) {
   ChangedObjects message;
   message.header = header;
   message.drive_id = drive_id;
   message.method = method;
   message.outcome = ToMessage(answer.outcome);
-  if (answer.outcome == ChangeDetector::Outcome::kRefused) message.why = answer.why;
-  if (answer.outcome != ChangeDetector::Outcome::kCompared) return message;
+  if (answer.outcome == change::ChangeDetector::Outcome::kRefused) message.why = answer.why;
+  if (answer.outcome != change::ChangeDetector::Outcome::kCompared) return message;
   message.earlier_drive_id = answer.earlier.drive_id;
   message.earlier_stamp = ToRosTime(answer.earlier.stamp_ns);
   message.known_share = static_cast<float>(cv::mean(answer.pair.valid)[0] / 255);
-  for (const PlacedChange& change : answer.objects) message.objects.push_back(ToMessage(change));
+  for (const change::PlacedChange& change : answer.objects)
+    message.objects.push_back(ToMessage(change));
   return message;
 }
 
@@ -76,4 +78,4 @@ sensor_msgs::ImagePtr ToImageMessage(const cv::Mat& pixels, const std_msgs::Head
   return cv_bridge::CvImage(header, encoding, pixels).toImageMsg();
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 cv_bridge::CvImageConstPtr ToSharedDepth(const sensor_msgs::ImageConstPtr& message) {
   namespace encodings = sensor_msgs::image_encodings;
@@ -42,4 +42,4 @@ cv::Mat ToDepthMetres(const sensor_msgs::ImageConstPtr& message, cv::Size size,
   return metres;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -5,7 +5,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// A depth image without a copy: CV_16UC1 (16UC1, MONO16) or CV_32FC1 in metres (32FC1; REP 118).
 /// Throws Error for another encoding, or where the data do not fill the image.
@@ -16,4 +16,4 @@ cv_bridge::CvImageConstPtr ToSharedDepth(const sensor_msgs::ImageConstPtr& messa
 /// Throws Error as ToSharedDepth does, and for another shape than that of `size`.
 cv::Mat ToDepthMetres(const sensor_msgs::ImageConstPtr& message, cv::Size size, double units_per_m);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -6,8 +6,8 @@
 
 #include "perception/detection/annotation.h"
 
-namespace livemap {
-DetectionArray ToMessage(const std::vector<HazardDetection>& detections,
+namespace livemap::ros_io {
+DetectionArray ToMessage(const std::vector<perception::HazardDetection>& detections,
                          const std_msgs::Header& header, const std::string& model,
                          cv::Size image_size, double inference_ms) {
   DetectionArray message;
@@ -29,7 +29,7 @@ DetectionArray ToMessage(const std::vector<HazardDetection>& detections,
 }
 
 sensor_msgs::ImagePtr ToAnnotatedMessage(const cv::Mat& bgr,
-                                         const std::vector<HazardDetection>& detections,
+                                         const std::vector<perception::HazardDetection>& detections,
                                          const std_msgs::Header& header) {
   auto message = boost::make_shared<sensor_msgs::Image>();
   message->header = header;
@@ -40,8 +40,8 @@ sensor_msgs::ImagePtr ToAnnotatedMessage(const cv::Mat& bgr,
   message->data.resize(std::size_t{message->step} * message->height);
   cv::Mat pixels(bgr.rows, bgr.cols, CV_8UC3, message->data.data(), message->step);
   bgr.copyTo(pixels);
-  AnnotateImage(pixels, detections);
+  perception::AnnotateImage(pixels, detections);
   return message;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

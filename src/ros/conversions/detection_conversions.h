@@ -10,18 +10,18 @@
 
 #include "perception/detection/hazard_detection.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// The message for the answer to one image. `header` is the image's, `image_size` in px,
 /// `inference_ms` the wall time that it took.
-DetectionArray ToMessage(const std::vector<HazardDetection>& detections,
+DetectionArray ToMessage(const std::vector<perception::HazardDetection>& detections,
                          const std_msgs::Header& header, const std::string& model,
                          cv::Size image_size, double inference_ms);
 
 /// A bgr8 message of `bgr` with the detections drawn in, with the image's header: one copy of the
 /// pixels.
 sensor_msgs::ImagePtr ToAnnotatedMessage(const cv::Mat& bgr,
-                                         const std::vector<HazardDetection>& detections,
+                                         const std::vector<perception::HazardDetection>& detections,
                                          const std_msgs::Header& header);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

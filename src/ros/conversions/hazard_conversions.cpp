@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "ros/conversions/message_fields.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 ros::Time ToRosTime(std::int64_t stamp_ns) {
   constexpr std::int64_t kSecond = 1'000'000'000;
@@ -16,7 +16,7 @@ ros::Time ToRosTime(std::int64_t stamp_ns) {
           static_cast<std::uint32_t>(clamped % kSecond)};
 }
 
-HazardReport ToMessage(const Report& report) {
+HazardReport ToMessage(const protocol::Report& report) {
   HazardReport message;
   message.schema_version = HazardReport::SCHEMA_VERSION;
   message.uuid = ToBytes(report.uuid);
@@ -45,10 +45,10 @@ HazardReport ToMessage(const Report& report) {
   return message;
 }
 
-Report FromMessage(const HazardReport& message) {
+protocol::Report FromMessage(const HazardReport& message) {
   constexpr std::uint16_t kWholeImages = 1;  // Has no region: its pictures show the whole image.
   CheckVersion(message, "hazard report", kWholeImages);
-  Report report;
+  protocol::Report report;
   report.uuid = ToUuid(message.uuid);
   report.vehicle_id = message.vehicle_id;
   report.drive_id = message.drive_id;
@@ -69,11 +69,12 @@ Report FromMessage(const HazardReport& message) {
   return report;
 }
 
-ReportReceipt ToMessage(const Receipt& receipt) {
+ReportReceipt ToMessage(const protocol::Receipt& receipt) {
   ReportReceipt message;
   message.schema_version = ReportReceipt::SCHEMA_VERSION;
-  message.status = receipt.status == Receipt::Status::kCommitted ? ReportReceipt::COMMITTED
-                                                                 : ReportReceipt::REFUSED;
+  message.status = receipt.status == protocol::Receipt::Status::kCommitted
+                       ? ReportReceipt::COMMITTED
+                       : ReportReceipt::REFUSED;
   message.report_uuid = ToBytes(receipt.report_uuid);
   message.hazard_uuid = ToBytes(receipt.hazard_uuid);
   message.vehicle_id = receipt.vehicle_id;
@@ -81,15 +82,15 @@ ReportReceipt ToMessage(const Receipt& receipt) {
   return message;
 }
 
-Receipt FromMessage(const ReportReceipt& message) {
+protocol::Receipt FromMessage(const ReportReceipt& message) {
   CheckVersion(message, "report receipt");
-  Receipt receipt;
+  protocol::Receipt receipt;
   switch (message.status) {
     case ReportReceipt::COMMITTED:
-      receipt.status = Receipt::Status::kCommitted;
+      receipt.status = protocol::Receipt::Status::kCommitted;
       break;
     case ReportReceipt::REFUSED:
-      receipt.status = Receipt::Status::kRefused;
+      receipt.status = protocol::Receipt::Status::kRefused;
       break;
     default:
       throw Error("report receipt has status " + std::to_string(message.status) +
@@ -104,20 +105,20 @@ Receipt FromMessage(const ReportReceipt& message) {
 
 namespace {
 
-Notice::Action ToNoticeAction(HazardAction action) {
+protocol::Notice::Action ToNoticeAction(zone::HazardAction action) {
   switch (action) {
-    case HazardAction::kAdded:
-      return Notice::Action::kAdded;
-    case HazardAction::kUpdated:
-      return Notice::Action::kUpdated;
-    case HazardAction::kRemoved:
-      return Notice::Action::kRemoved;
+    case zone::HazardAction::kAdded:
+      return protocol::Notice::Action::kAdded;
+    case zone::HazardAction::kUpdated:
+      return protocol::Notice::Action::kUpdated;
+    case zone::HazardAction::kRemoved:
+      return protocol::Notice::Action::kRemoved;
   }
-  return Notice::Action::kRemoved;
+  return protocol::Notice::Action::kRemoved;
 }
 
-Notice NoticeOf(const Hazard& hazard) {
-  Notice notice;
+protocol::Notice NoticeOf(const zone::Hazard& hazard) {
+  protocol::Notice notice;
   notice.hazard_uuid = hazard.uuid;
   notice.stamp_ns = hazard.updated_ns;
   notice.class_name = hazard.class_name;
@@ -132,39 +133,39 @@ Notice NoticeOf(const Hazard& hazard) {
 
 }  // namespace
 
-HazardNotice ToMessage(const HazardEvent& event) {
-  Notice notice = NoticeOf(event.hazard);
+HazardNotice ToMessage(const zone::HazardEvent& event) {
+  protocol::Notice notice = NoticeOf(event.hazard);
   // What drivers knew before decides: a candidate that becomes active is new to them.
   notice.action =
-      ToNoticeAction(DriversAction(event.from, event.hazard.state).value_or(event.action));
+      ToNoticeAction(zone::DriversAction(event.from, event.hazard.state).value_or(event.action));
   notice.sequence = event.hazard.sequence;
   notice.previous_sequence = event.previous_announced;
   return ToMessage(notice);
 }
 
-HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+HazardNotice ToVehicleMessage(const zone::Hazard& hazard, zone::HazardAction action,
                               const std::string& vehicle_id) {
-  Notice notice = NoticeOf(hazard);
+  protocol::Notice notice = NoticeOf(hazard);
   notice.action = ToNoticeAction(action);
   notice.sequence = hazard.announced_sequence;
   notice.vehicle_id = vehicle_id;
   return ToMessage(notice);
 }
 
-HazardNotice ToMessage(const Notice& notice) {
+HazardNotice ToMessage(const protocol::Notice& notice) {
   HazardNotice message;
   message.schema_version = HazardNotice::SCHEMA_VERSION;
   switch (notice.action) {
-    case Notice::Action::kAdded:
+    case protocol::Notice::Action::kAdded:
       message.action = HazardNotice::ADDED;
       break;
-    case Notice::Action::kUpdated:
+    case protocol::Notice::Action::kUpdated:
       message.action = HazardNotice::UPDATED;
       break;
-    case Notice::Action::kRemoved:
+    case protocol::Notice::Action::kRemoved:
       message.action = HazardNotice::REMOVED;
       break;
-    case Notice::Action::kCaughtUp:
+    case protocol::Notice::Action::kCaughtUp:
       message.action = HazardNotice::CAUGHT_UP;
       break;
   }
@@ -189,21 +190,21 @@ HazardNotice ToMessage(const Notice& notice) {
   return message;
 }
 
-Notice FromMessage(const HazardNotice& message) {
+protocol::Notice FromMessage(const HazardNotice& message) {
   CheckVersion(message, "hazard notice");
-  Notice notice;
+  protocol::Notice notice;
   switch (message.action) {
     case HazardNotice::ADDED:
-      notice.action = Notice::Action::kAdded;
+      notice.action = protocol::Notice::Action::kAdded;
       break;
     case HazardNotice::UPDATED:
-      notice.action = Notice::Action::kUpdated;
+      notice.action = protocol::Notice::Action::kUpdated;
       break;
     case HazardNotice::REMOVED:
-      notice.action = Notice::Action::kRemoved;
+      notice.action = protocol::Notice::Action::kRemoved;
       break;
     case HazardNotice::CAUGHT_UP:
-      notice.action = Notice::Action::kCaughtUp;
+      notice.action = protocol::Notice::Action::kCaughtUp;
       break;
     default:
       throw Error("hazard notice has action " + std::to_string(message.action) +
@@ -228,7 +229,7 @@ Notice FromMessage(const HazardNotice& message) {
   return notice;
 }
 
-VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
+VehiclePosition ToMessage(const zone::VehicleState& vehicle, double horizontal_sigma_m,
                           std::uint64_t map_sequence) {
   VehiclePosition message;
   message.schema_version = VehiclePosition::SCHEMA_VERSION;
@@ -244,9 +245,9 @@ VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m
   return message;
 }
 
-VehicleState FromMessage(const VehiclePosition& message) {
+zone::VehicleState FromMessage(const VehiclePosition& message) {
   CheckVersion(message, "vehicle position");
-  VehicleState vehicle;
+  zone::VehicleState vehicle;
   vehicle.vehicle_id = message.vehicle_id;
   vehicle.drive_id = message.drive_id;
   vehicle.position = {message.latitude, message.longitude};
@@ -256,24 +257,24 @@ VehicleState FromMessage(const VehiclePosition& message) {
   return vehicle;
 }
 
-LinkCost FromMessage(const LinkState& message) {
+vehicle::LinkCost FromMessage(const LinkState& message) {
   switch (message.state) {
     case LinkState::UNKNOWN:
-      return LinkCost::kUnknown;
+      return vehicle::LinkCost::kUnknown;
     case LinkState::CHEAP:
-      return LinkCost::kCheap;
+      return vehicle::LinkCost::kCheap;
     case LinkState::METERED:
-      return LinkCost::kMetered;
+      return vehicle::LinkCost::kMetered;
     case LinkState::NONE:
-      return LinkCost::kNone;
+      return vehicle::LinkCost::kNone;
     default:
       throw Error("link state is " + std::to_string(message.state) +
                   ", accepted is 0 (unknown), 1 (cheap), 2 (metered) or 3 (none)");
   }
 }
 
-SightingFrame ToSightingFrame(const DetectionArray& message) {
-  SightingFrame frame;
+placement::SightingFrame ToSightingFrame(const DetectionArray& message) {
+  placement::SightingFrame frame;
   frame.stamp_ns = FromRosTime(message.header.stamp);
   frame.frame_id = message.header.frame_id;
   frame.image_width = message.image_width;
@@ -287,8 +288,8 @@ SightingFrame ToSightingFrame(const DetectionArray& message) {
   return frame;
 }
 
-Fix ToFix(const sensor_msgs::NavSatFix& message) {
-  Fix fix;
+geo::Fix ToFix(const sensor_msgs::NavSatFix& message) {
+  geo::Fix fix;
   fix.stamp_ns = FromRosTime(message.header.stamp);
   fix.has_fix = message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX;
   fix.position = {message.latitude, message.longitude};
@@ -302,4 +303,4 @@ Fix ToFix(const sensor_msgs::NavSatFix& message) {
   return fix;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -19,7 +19,7 @@
 #include "zone/model/hazard.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 // What crosses between the core and the messages of hazards, in both directions. FromMessage throws
 // Error, with one sentence that says why, for a schema version or an enumeration value that this
@@ -31,30 +31,30 @@ inline std::int64_t FromRosTime(const ros::Time& time) {
   return static_cast<std::int64_t>(time.toNSec());
 }
 
-HazardReport ToMessage(const Report& report);
-Report FromMessage(const HazardReport& message);
+HazardReport ToMessage(const protocol::Report& report);
+protocol::Report FromMessage(const HazardReport& message);
 
-ReportReceipt ToMessage(const Receipt& receipt);
-Receipt FromMessage(const ReportReceipt& message);
+ReportReceipt ToMessage(const protocol::Receipt& receipt);
+protocol::Receipt FromMessage(const ReportReceipt& message);
 
 /// To every vehicle: what drivers hear of the event. The notice's stamp is `hazard.updated_ns`, the
 /// zone's clock at the event.
-HazardNotice ToMessage(const HazardEvent& event);
+HazardNotice ToMessage(const zone::HazardEvent& event);
 /// To one vehicle: the hazard as it is now, under the sequence of its last announcement.
-HazardNotice ToVehicleMessage(const Hazard& hazard, HazardAction action,
+HazardNotice ToVehicleMessage(const zone::Hazard& hazard, zone::HazardAction action,
                               const std::string& vehicle_id);
-HazardNotice ToMessage(const Notice& notice);
-Notice FromMessage(const HazardNotice& message);
+HazardNotice ToMessage(const protocol::Notice& notice);
+protocol::Notice FromMessage(const HazardNotice& message);
 
 /// `horizontal_sigma_m` per axis, NaN when unknown; `map_sequence` up to which the vehicle knows
 /// the zone's announcements.
-VehiclePosition ToMessage(const VehicleState& vehicle, double horizontal_sigma_m,
+VehiclePosition ToMessage(const zone::VehicleState& vehicle, double horizontal_sigma_m,
                           std::uint64_t map_sequence);
-VehicleState FromMessage(const VehiclePosition& message);
+zone::VehicleState FromMessage(const VehiclePosition& message);
 
-LinkCost FromMessage(const LinkState& message);
+vehicle::LinkCost FromMessage(const LinkState& message);
 
-SightingFrame ToSightingFrame(const DetectionArray& message);
-Fix ToFix(const sensor_msgs::NavSatFix& message);
+placement::SightingFrame ToSightingFrame(const DetectionArray& message);
+geo::Fix ToFix(const sensor_msgs::NavSatFix& message);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

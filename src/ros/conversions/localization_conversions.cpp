@@ -12,7 +12,7 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/odometry_conversions.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 constexpr double kLostVariance = 1e5;
@@ -34,14 +34,14 @@ Eigen::Matrix3d PlanarPart(const boost::array<double, 36>& covariance) {
 
 }  // namespace
 
-PositionFix ToPositionFix(const sensor_msgs::NavSatFix& message) {
-  const Fix fix = ToFix(message);
+localization::PositionFix ToPositionFix(const sensor_msgs::NavSatFix& message) {
+  const geo::Fix fix = ToFix(message);
   return {fix.stamp_ns, fix.has_fix, fix.position, fix.covariance_m2};
 }
 
-OdometrySample ToOdometrySample(const nav_msgs::Odometry& message,
-                                std::optional<std::int64_t> previous_ns) {
-  OdometrySample sample;
+localization::OdometrySample ToOdometrySample(const nav_msgs::Odometry& message,
+                                              std::optional<std::int64_t> previous_ns) {
+  localization::OdometrySample sample;
   sample.stamp_ns = FromRosTime(message.header.stamp);
   const auto& rotation = message.pose.pose.orientation;
   // Not normalised: what is no unit quaternion makes no rotation, and is refused.
@@ -59,8 +59,8 @@ OdometrySample ToOdometrySample(const nav_msgs::Odometry& message,
   return sample;
 }
 
-sensor_msgs::NavSatFix ToFusedFix(const FusedPose& fused, const std::string& base_frame,
-                                  std::int64_t stamp_ns) {
+sensor_msgs::NavSatFix ToFusedFix(const localization::FusedPose& fused,
+                                  const std::string& base_frame, std::int64_t stamp_ns) {
   sensor_msgs::NavSatFix message;
   message.header.stamp = ToRosTime(stamp_ns);
   message.header.frame_id = base_frame;
@@ -81,8 +81,10 @@ sensor_msgs::NavSatFix ToFusedFix(const FusedPose& fused, const std::string& bas
   return message;
 }
 
-nav_msgs::Odometry ToFusedOdometry(const FusedPose& fused, const Eigen::Isometry3d& map_from_odom,
-                                   const OdometrySample& sample, const nav_msgs::Odometry& odometry,
+nav_msgs::Odometry ToFusedOdometry(const localization::FusedPose& fused,
+                                   const Eigen::Isometry3d& map_from_odom,
+                                   const localization::OdometrySample& sample,
+                                   const nav_msgs::Odometry& odometry,
                                    const std::string& map_frame) {
   nav_msgs::Odometry message;
   message.header.stamp = odometry.header.stamp;
@@ -102,17 +104,17 @@ nav_msgs::Odometry ToFusedOdometry(const FusedPose& fused, const Eigen::Isometry
   return message;
 }
 
-TrackPose ToTrackPose(const nav_msgs::Odometry& message, const LocalFrame& map) {
+geo::TrackPose ToTrackPose(const nav_msgs::Odometry& message, const geo::LocalFrame& map) {
   const auto& rotation = message.pose.pose.orientation;
   const auto& place = message.pose.pose.position;
   const Eigen::Vector3d forward =
       Eigen::Quaterniond(rotation.w, rotation.x, rotation.y, rotation.z) * Eigen::Vector3d::UnitX();
-  TrackPose pose;
+  geo::TrackPose pose;
   pose.position = map.ToGeo({place.x, place.y});
-  const double convergence_rad = MeridianConvergence(map, pose.position);
+  const double convergence_rad = geo::MeridianConvergence(map, pose.position);
   // Clockwise from north, as the map's axes lie there.
   pose.course_rad = std::atan2(forward.x(), forward.y()) + convergence_rad;
-  const Eigen::Matrix2d turn = Rotation2(-convergence_rad);
+  const Eigen::Matrix2d turn = localization::Rotation2(-convergence_rad);
   const Eigen::Matrix3d covariance = PlanarPart(message.pose.covariance);
   pose.covariance_m2 = turn * covariance.topLeftCorner<2, 2>() * turn.transpose();
   pose.course_variance_rad2 = covariance(2, 2);
@@ -121,20 +123,20 @@ TrackPose ToTrackPose(const nav_msgs::Odometry& message, const LocalFrame& map) 
   return pose;
 }
 
-const char* LocalizerStateName(LocalizerState state) {
+const char* LocalizerStateName(localization::LocalizerState state) {
   switch (state) {
-    case LocalizerState::kUninitialised:
+    case localization::LocalizerState::kUninitialised:
       return "uninitialised";
-    case LocalizerState::kOk:
+    case localization::LocalizerState::kOk:
       return "ok";
-    case LocalizerState::kDeadReckoning:
+    case localization::LocalizerState::kDeadReckoning:
       return "dead reckoning";
   }
   return "?";
 }
 
-const char* RefusalReason(GeoLocalizer::FixVerdict verdict) {
-  using FixVerdict = GeoLocalizer::FixVerdict;
+const char* RefusalReason(localization::GeoLocalizer::FixVerdict verdict) {
+  using FixVerdict = localization::GeoLocalizer::FixVerdict;
   switch (verdict) {
     case FixVerdict::kRefused:
       return "it is too far from where odometry and the other fixes foretell it";
@@ -154,9 +156,9 @@ const char* RefusalReason(GeoLocalizer::FixVerdict verdict) {
   return nullptr;
 }
 
-void DescribeLocalizer(const GeoLocalizer& localizer,
+void DescribeLocalizer(const localization::GeoLocalizer& localizer,
                        diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const LocalizerCounters& counters = localizer.counters();
+  const localization::LocalizerCounters& counters = localizer.counters();
   status.add("fixes_used", counters.fixes_used);
   status.add("fixes_refused", counters.fixes_refused);
   status.add("fixes_absent", counters.fixes_absent);
@@ -169,7 +171,7 @@ void DescribeLocalizer(const GeoLocalizer& localizer,
   status.add("restarts", counters.restarts);
   status.add("window_poses", localizer.window_nodes());
   status.add("fix_scatter", localizer.widening());
-  const LatencyEstimate latency = localizer.latency();
+  const localization::LatencyEstimate latency = localizer.latency();
   status.add("latency_s", latency.value_s);
   status.add("latency_sigma_s", latency.sigma_s);
   status.add("latency_observed", latency.observed);
@@ -177,4 +179,4 @@ void DescribeLocalizer(const GeoLocalizer& localizer,
   status.add("yaw_bias_rps", localizer.yaw_bias_rps());
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -3,9 +3,9 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/message_fields.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
-MapChange ToMessage(const MapChangeReport& report) {
+MapChange ToMessage(const protocol::MapChangeReport& report) {
   MapChange message;
   message.schema_version = MapChange::SCHEMA_VERSION;
   message.uuid = ToBytes(report.uuid);
@@ -24,13 +24,13 @@ MapChange ToMessage(const MapChangeReport& report) {
   return message;
 }
 
-MapChangeReport FromMessage(const MapChange& message) {
+protocol::MapChangeReport FromMessage(const MapChange& message) {
   CheckVersion(message, "map change");
   if (message.direction != MapChange::APPEARED && message.direction != MapChange::VANISHED) {
     throw Error("map change has direction " + std::to_string(message.direction) +
                 ", accepted is 1 (appeared) or 2 (vanished)");
   }
-  MapChangeReport report;
+  protocol::MapChangeReport report;
   report.uuid = ToUuid(message.uuid);
   report.vehicle_id = message.vehicle_id;
   report.drive_id = message.drive_id;
@@ -46,17 +46,18 @@ MapChangeReport FromMessage(const MapChange& message) {
   return report;
 }
 
-std::optional<MapChangeReport> ToMapChangeReport(const PlacedChange& change,
-                                                 const std::string& drive_id, const Uuid& uuid) {
+std::optional<protocol::MapChangeReport> ToMapChangeReport(const change::PlacedChange& change,
+                                                           const std::string& drive_id,
+                                                           const Uuid& uuid) {
   const ChangedObject& event = change.event;
-  if (event.direction == ChangeDirection::kUnknown) return std::nullopt;
-  MapChangeReport report;
+  if (event.direction == change::ChangeDirection::kUnknown) return std::nullopt;
+  protocol::MapChangeReport report;
   report.uuid = uuid;
   report.drive_id = drive_id;
   report.stamp_ns = event.last_ns;
   report.earlier_stamp_ns = event.earlier_ns;
-  report.class_name = ChangeClassName(event.change_class);
-  report.vanished = event.direction == ChangeDirection::kVanished;
+  report.class_name = protocol::ChangeClassName(event.change_class);
+  report.vanished = event.direction == change::ChangeDirection::kVanished;
   report.confidence = static_cast<float>(event.confidence);
   report.seen = static_cast<std::uint32_t>(event.seen);
   report.missed = static_cast<std::uint32_t>(event.missed);
@@ -65,4 +66,4 @@ std::optional<MapChangeReport> ToMapChangeReport(const PlacedChange& change,
   return report;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

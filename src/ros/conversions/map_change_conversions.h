@@ -8,16 +8,17 @@
 #include "change/objects/change_detector.h"
 #include "protocol/map_change_report.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
-MapChange ToMessage(const MapChangeReport& report);
+MapChange ToMessage(const protocol::MapChangeReport& report);
 /// Throws Error for a schema version or a direction that is not known. What its numbers say is for
 /// the zone to check.
-MapChangeReport FromMessage(const MapChange& message);
+protocol::MapChangeReport FromMessage(const MapChange& message);
 
 /// What the zone is told of an object that the vehicle has passed; nothing when nobody knows
 /// whether it came or went.
-std::optional<MapChangeReport> ToMapChangeReport(const PlacedChange& change,
-                                                 const std::string& drive_id, const Uuid& uuid);
+std::optional<protocol::MapChangeReport> ToMapChangeReport(const change::PlacedChange& change,
+                                                           const std::string& drive_id,
+                                                           const Uuid& uuid);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

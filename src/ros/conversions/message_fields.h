@@ -9,7 +9,7 @@
 #include "common/error.h"
 #include "common/uuid.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 // Fields that several messages share. Private to the conversions of this room.
 
@@ -48,4 +48,4 @@ inline Eigen::Matrix2d ToMatrix(const boost::array<double, 4>& array) {
   return matrix;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

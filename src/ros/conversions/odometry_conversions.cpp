@@ -6,41 +6,41 @@
 #include <pcl_conversions/pcl_conversions.h>
 #include <tf2_eigen/tf2_eigen.h>
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 /// Row by row, as ROS has covariances.
-void CopyCovariance(const Matrix6d& from, boost::array<double, 36>& to) {
+void CopyCovariance(const odometry::Matrix6d& from, boost::array<double, 36>& to) {
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(to.data()) = from;
 }
 
 }  // namespace
 
-Eigen::Isometry3d OdomFromBase(const VoResult& result, const OdometryFrames& frames) {
+Eigen::Isometry3d OdomFromBase(const odometry::VoResult& result, const OdometryFrames& frames) {
   return frames.base_from_optical * result.world_from_camera * frames.base_from_optical.inverse();
 }
 
-nav_msgs::Odometry ToOdometry(const VoResult& result, const OdometryFrames& frames,
+nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFrames& frames,
                               const ros::Time& stamp) {
   const Eigen::Isometry3d odom_from_base = OdomFromBase(result, frames);
-  const Matrix6d to_base = Se3Adjoint(frames.base_from_optical);
+  const odometry::Matrix6d to_base = odometry::Se3Adjoint(frames.base_from_optical);
   nav_msgs::Odometry message;
   message.header.stamp = stamp;
   message.header.frame_id = frames.odom;
   message.child_frame_id = frames.base;
   message.pose.pose = tf2::toMsg(odom_from_base);
   // From the body's own axes, in which a right-hand perturbation is, to odom's.
-  Matrix6d turn = Matrix6d::Zero();
+  odometry::Matrix6d turn = odometry::Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = odom_from_base.linear();
   turn.bottomRightCorner<3, 3>() = odom_from_base.linear();
-  const Matrix6d pose_jacobian = turn * to_base;
+  const odometry::Matrix6d pose_jacobian = turn * to_base;
   CopyCovariance(pose_jacobian * result.covariance * pose_jacobian.transpose(),
                  message.pose.covariance);
   if (!result.twist) {
-    CopyCovariance(kUnknownVariance * Matrix6d::Identity(), message.twist.covariance);
+    CopyCovariance(kUnknownVariance * odometry::Matrix6d::Identity(), message.twist.covariance);
     return message;
   }
-  const Vector6d twist = to_base * *result.twist;
+  const odometry::Vector6d twist = to_base * *result.twist;
   message.twist.twist.linear.x = twist[0];
   message.twist.twist.linear.y = twist[1];
   message.twist.twist.linear.z = twist[2];
@@ -51,11 +51,12 @@ nav_msgs::Odometry ToOdometry(const VoResult& result, const OdometryFrames& fram
   return message;
 }
 
-sensor_msgs::PointCloud2 ToEdgeCloud(const Keyframe& keyframe, const OdometryFrames& frames,
-                                     double voxel_m, const ros::Time& stamp) {
+sensor_msgs::PointCloud2 ToEdgeCloud(const odometry::Keyframe& keyframe,
+                                     const OdometryFrames& frames, double voxel_m,
+                                     const ros::Time& stamp) {
   const Eigen::Isometry3f odom_from_keyframe =
       (frames.base_from_optical * keyframe.world_from_camera).cast<float>();
-  const EdgePoints& points = keyframe.points[0];
+  const odometry::EdgePoints& points = keyframe.points[0];
   auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZI>>();
   cloud->reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -81,4 +82,4 @@ sensor_msgs::PointCloud2 ToEdgeCloud(const Keyframe& keyframe, const OdometryFra
   return message;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -7,7 +7,7 @@
 
 #include "odometry/edge/edge_odometry.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Variance of what nobody measured, as REP 105's users write it.
 constexpr double kUnknownVariance = 1e6;
@@ -22,16 +22,17 @@ struct OdometryFrames {
 };
 
 /// Pose of base_link in odom.
-Eigen::Isometry3d OdomFromBase(const VoResult& result, const OdometryFrames& frames);
+Eigen::Isometry3d OdomFromBase(const odometry::VoResult& result, const OdometryFrames& frames);
 
 /// The message with both covariances: the pose's about odom's fixed axes, the twist's in base_link.
 /// Where there is no twist, its covariance's diagonal is 1e6: unknown.
-nav_msgs::Odometry ToOdometry(const VoResult& result, const OdometryFrames& frames,
+nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFrames& frames,
                               const ros::Time& stamp);
 
 /// The keyframe's edge points in odom with their grey values as intensity, thinned to one point per
 /// cube of `voxel_m` (0: all).
-sensor_msgs::PointCloud2 ToEdgeCloud(const Keyframe& keyframe, const OdometryFrames& frames,
-                                     double voxel_m, const ros::Time& stamp);
+sensor_msgs::PointCloud2 ToEdgeCloud(const odometry::Keyframe& keyframe,
+                                     const OdometryFrames& frames, double voxel_m,
+                                     const ros::Time& stamp);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -8,7 +8,7 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/message_fields.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 constexpr double kQuaternionNormSlack = 1e-3;
@@ -38,7 +38,7 @@ Eigen::Isometry3d ToMounting(const geometry_msgs::Transform& message) {
 
 }  // namespace
 
-CandidateFrame ToMessage(const OffloadedFrame& candidate) {
+CandidateFrame ToMessage(const protocol::OffloadedFrame& candidate) {
   CandidateFrame message;
   message.schema_version = CandidateFrame::SCHEMA_VERSION;
   message.vehicle_id = candidate.vehicle_id;
@@ -74,9 +74,9 @@ CandidateFrame ToMessage(const OffloadedFrame& candidate) {
   return message;
 }
 
-OffloadedFrame FromMessage(const CandidateFrame& message) {
+protocol::OffloadedFrame FromMessage(const CandidateFrame& message) {
   CheckVersion(message, "candidate frame");
-  OffloadedFrame candidate;
+  protocol::OffloadedFrame candidate;
   candidate.vehicle_id = message.vehicle_id;
   candidate.drive_id = message.drive_id;
   candidate.stamp_ns = FromRosTime(message.stamp);
@@ -99,4 +99,4 @@ OffloadedFrame FromMessage(const CandidateFrame& message) {
   return candidate;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -4,12 +4,12 @@
 
 #include "protocol/offloaded_frame.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
-CandidateFrame ToMessage(const OffloadedFrame& candidate);
+CandidateFrame ToMessage(const protocol::OffloadedFrame& candidate);
 /// Throws Error, with one sentence that says why, for a schema version that this program does not
 /// know, an image side beyond what an int holds, or a mounting that is no rotation and translation;
 /// other ranges of values are the receiver's business (WhyOffloadRefused).
-OffloadedFrame FromMessage(const CandidateFrame& message);
+protocol::OffloadedFrame FromMessage(const CandidateFrame& message);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

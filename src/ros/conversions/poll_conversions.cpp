@@ -6,22 +6,23 @@
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/message_fields.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 /// A message of version 1 has 0 there: a whole frame.
-PollPicture PictureOf(const HazardPoll& message) {
+protocol::PollPicture PictureOf(const HazardPoll& message) {
   if (message.picture_kind != HazardPoll::WHOLE_FRAME && message.picture_kind != HazardPoll::CROP) {
     throw Error("hazard poll wants picture " + std::to_string(message.picture_kind) +
                 ", accepted is 0 (whole frame) or 1 (crop)");
   }
-  if (message.picture_wanted == 0) return PollPicture::kNone;
-  return message.picture_kind == HazardPoll::CROP ? PollPicture::kCrop : PollPicture::kFullFrame;
+  if (message.picture_wanted == 0) return protocol::PollPicture::kNone;
+  return message.picture_kind == HazardPoll::CROP ? protocol::PollPicture::kCrop
+                                                  : protocol::PollPicture::kFullFrame;
 }
 
 }  // namespace
 
-HazardPoll ToMessage(const Poll& poll) {
+HazardPoll ToMessage(const protocol::Poll& poll) {
   HazardPoll message;
   message.schema_version = HazardPoll::SCHEMA_VERSION;
   message.poll_uuid = ToBytes(poll.poll);
@@ -33,17 +34,17 @@ HazardPoll ToMessage(const Poll& poll) {
   message.latitude = poll.position.latitude_deg;
   message.longitude = poll.position.longitude_deg;
   message.covariance = ToArray(poll.covariance_m2);
-  message.picture_wanted = poll.picture != PollPicture::kNone;
+  message.picture_wanted = poll.picture != protocol::PollPicture::kNone;
   message.picture_kind =
-      poll.picture == PollPicture::kCrop ? HazardPoll::CROP : HazardPoll::WHOLE_FRAME;
+      poll.picture == protocol::PollPicture::kCrop ? HazardPoll::CROP : HazardPoll::WHOLE_FRAME;
   message.max_picture_bytes = poll.max_picture_bytes;
   return message;
 }
 
-Poll FromMessage(const HazardPoll& message) {
+protocol::Poll FromMessage(const HazardPoll& message) {
   constexpr std::uint16_t kWholeFrames = 1;  // Knew no other pictures.
   CheckVersion(message, "hazard poll", kWholeFrames);
-  Poll poll;
+  protocol::Poll poll;
   poll.poll = ToUuid(message.poll_uuid);
   poll.hazard = ToUuid(message.hazard_uuid);
   poll.vehicle_id = message.vehicle_id;
@@ -54,12 +55,12 @@ Poll FromMessage(const HazardPoll& message) {
   poll.covariance_m2 = ToMatrix(message.covariance);
   poll.picture = PictureOf(message);
   poll.max_picture_bytes = message.max_picture_bytes;
-  CheckPoll(poll);
+  protocol::CheckPoll(poll);
   return poll;
 }
 
-HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns) {
-  Poll poll;
+HazardPoll ToMessage(const zone::PollOrder& order, std::int64_t now_ns) {
+  protocol::Poll poll;
   poll.poll = order.poll;
   poll.hazard = order.hazard;
   poll.vehicle_id = order.vehicle_id;
@@ -73,21 +74,21 @@ HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns) {
   return ToMessage(poll);
 }
 
-PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
-  const PollReply reply = FromMessage(message);
-  PollAnswer answer;
+zone::PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
+  const protocol::PollReply reply = FromMessage(message);
+  zone::PollAnswer answer;
   answer.poll = reply.poll;
   answer.hazard = reply.hazard;
   answer.vehicle_id = reply.vehicle_id;
   switch (reply.answer) {
-    case PollReply::Answer::kYes:
-      answer.answer = PollAnswer::Answer::kYes;
+    case protocol::PollReply::Answer::kYes:
+      answer.answer = zone::PollAnswer::Answer::kYes;
       break;
-    case PollReply::Answer::kNo:
-      answer.answer = PollAnswer::Answer::kNo;
+    case protocol::PollReply::Answer::kNo:
+      answer.answer = zone::PollAnswer::Answer::kNo;
       break;
-    case PollReply::Answer::kCantSee:
-      answer.answer = PollAnswer::Answer::kCantSee;
+    case protocol::PollReply::Answer::kCantSee:
+      answer.answer = zone::PollAnswer::Answer::kCantSee;
       break;
   }
   answer.reason = reply.reason;
@@ -99,14 +100,14 @@ PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
   return answer;
 }
 
-std::vector<ChangeEvidence> ToEvidence(const ChangedObjects& message) {
-  std::vector<ChangeEvidence> all;
+std::vector<vehicle::ChangeEvidence> ToEvidence(const ChangedObjects& message) {
+  std::vector<vehicle::ChangeEvidence> all;
   for (const ChangedObject& object : message.objects) {
     if (object.direction != ChangedObject::APPEARED &&
         object.direction != ChangedObject::VANISHED) {
       continue;
     }
-    ChangeEvidence evidence;
+    vehicle::ChangeEvidence evidence;
     evidence.stamp_ns = FromRosTime(object.last_seen);
     evidence.change_class = object.class_name;
     evidence.vanished = object.direction == ChangedObject::VANISHED;
@@ -119,7 +120,7 @@ std::vector<ChangeEvidence> ToEvidence(const ChangedObjects& message) {
   return all;
 }
 
-HazardPollAnswer ToMessage(const PollReply& reply) {
+HazardPollAnswer ToMessage(const protocol::PollReply& reply) {
   HazardPollAnswer message;
   message.schema_version = HazardPollAnswer::SCHEMA_VERSION;
   message.poll_uuid = ToBytes(reply.poll);
@@ -128,13 +129,13 @@ HazardPollAnswer ToMessage(const PollReply& reply) {
   message.drive_id = reply.drive_id;
   message.stamp = ToRosTime(reply.stamp_ns);
   switch (reply.answer) {
-    case PollReply::Answer::kYes:
+    case protocol::PollReply::Answer::kYes:
       message.answer = HazardPollAnswer::YES;
       break;
-    case PollReply::Answer::kNo:
+    case protocol::PollReply::Answer::kNo:
       message.answer = HazardPollAnswer::NO;
       break;
-    case PollReply::Answer::kCantSee:
+    case protocol::PollReply::Answer::kCantSee:
       message.answer = HazardPollAnswer::CANT_SEE;
       break;
   }
@@ -149,18 +150,18 @@ HazardPollAnswer ToMessage(const PollReply& reply) {
   return message;
 }
 
-PollReply FromMessage(const HazardPollAnswer& message) {
+protocol::PollReply FromMessage(const HazardPollAnswer& message) {
   CheckVersion(message, "poll answer");
-  PollReply reply;
+  protocol::PollReply reply;
   switch (message.answer) {
     case HazardPollAnswer::YES:
-      reply.answer = PollReply::Answer::kYes;
+      reply.answer = protocol::PollReply::Answer::kYes;
       break;
     case HazardPollAnswer::NO:
-      reply.answer = PollReply::Answer::kNo;
+      reply.answer = protocol::PollReply::Answer::kNo;
       break;
     case HazardPollAnswer::CANT_SEE:
-      reply.answer = PollReply::Answer::kCantSee;
+      reply.answer = protocol::PollReply::Answer::kCantSee;
       break;
     default:
       throw Error("poll answer is " + std::to_string(message.answer) +
@@ -177,8 +178,8 @@ PollReply FromMessage(const HazardPollAnswer& message) {
   reply.course_rad = static_cast<double>(message.course);
   reply.image_format = message.image.format;
   reply.image = message.image.data;
-  CheckReply(reply);
+  protocol::CheckReply(reply);
   return reply;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

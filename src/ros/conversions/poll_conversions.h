@@ -10,25 +10,25 @@
 #include "vehicle/polls/change_evidence.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 // What crosses between the core and the messages of polls, in both directions. FromMessage throws
 // Error, with one sentence that names the value and what is accepted, for an unknown schema version
 // or enumeration value, nil ids, numbers that are not finite or out of range, and overlong text.
 
-HazardPoll ToMessage(const Poll& poll);
-Poll FromMessage(const HazardPoll& message);
+HazardPoll ToMessage(const protocol::Poll& poll);
+protocol::Poll FromMessage(const HazardPoll& message);
 
 /// The zone's order as a poll that is asked at `now_ns`, zone clock.
-HazardPoll ToMessage(const PollOrder& order, std::int64_t now_ns);
+HazardPoll ToMessage(const zone::PollOrder& order, std::int64_t now_ns);
 /// The reply as the zone takes it; the vehicle_id is the one that the bridge wrote.
-PollAnswer ToPollAnswer(const HazardPollAnswer& message);
+zone::PollAnswer ToPollAnswer(const HazardPollAnswer& message);
 
 /// What change detection tells of things that surely went or came; those of unknown direction are
 /// left out.
-std::vector<ChangeEvidence> ToEvidence(const ChangedObjects& message);
+std::vector<vehicle::ChangeEvidence> ToEvidence(const ChangedObjects& message);
 
-HazardPollAnswer ToMessage(const PollReply& reply);
-PollReply FromMessage(const HazardPollAnswer& message);
+HazardPollAnswer ToMessage(const protocol::PollReply& reply);
+protocol::PollReply FromMessage(const HazardPollAnswer& message);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -5,7 +5,7 @@
 
 #include "ros/views/class_colour.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 using visualization_msgs::Marker;
@@ -47,14 +47,15 @@ Marker Begin(const Marker& base, const std::string& name_space, int id, int type
   return marker;
 }
 
-void AppendHazards(const std::vector<Hazard>& hazards, const HazardCatalogue& catalogue,
-                   const LocalFrame& map, const Marker& base, MarkerArray& array) {
+void AppendHazards(const std::vector<zone::Hazard>& hazards,
+                   const protocol::HazardCatalogue& catalogue, const geo::LocalFrame& map,
+                   const Marker& base, MarkerArray& array) {
   std::map<std::string, Marker> spheres;
   std::vector<Marker> labels;
-  for (const Hazard& hazard : hazards) {
+  for (const zone::Hazard& hazard : hazards) {
     const auto known = spheres.find(hazard.class_name);
     Marker& list = known != spheres.end() ? known->second : spheres[hazard.class_name];
-    const HazardClass entry = catalogue.Get(hazard.class_name);
+    const protocol::HazardClass entry = catalogue.Get(hazard.class_name);
     if (known == spheres.end()) {
       list = Begin(base, "hazards", static_cast<int>(spheres.size()), Marker::SPHERE_LIST,
                    kHazardDiameterM);
@@ -75,8 +76,8 @@ void AppendHazards(const std::vector<Hazard>& hazards, const HazardCatalogue& ca
   array.markers.insert(array.markers.end(), labels.begin(), labels.end());
 }
 
-void AppendVehicle(const VehicleState& vehicle, const std::deque<GeoPoint>& path, int id,
-                   const LocalFrame& map, const Marker& base, MarkerArray& array) {
+void AppendVehicle(const zone::VehicleState& vehicle, const std::deque<geo::GeoPoint>& path, int id,
+                   const geo::LocalFrame& map, const Marker& base, MarkerArray& array) {
   Marker body = Begin(base, "vehicles", id, Marker::ARROW, kVehicleWidthM);
   body.pose.position = ToPoint(map.ToEnu(vehicle.position), kVehicleWidthM / 2);
   if (std::isfinite(vehicle.course_rad)) {
@@ -92,14 +93,15 @@ void AppendVehicle(const VehicleState& vehicle, const std::deque<GeoPoint>& path
   if (path.empty()) return;
   Marker trail = Begin(base, "trails", id, Marker::SPHERE_LIST, kTrailDotM);
   trail.color = Colour(0.15F, 0.4F, 1.0F);
-  for (const GeoPoint& point : path) trail.points.push_back(ToPoint(map.ToEnu(point), 0.0));
+  for (const geo::GeoPoint& point : path) trail.points.push_back(ToPoint(map.ToEnu(point), 0.0));
   array.markers.push_back(trail);
 }
 
-void DescribeMapChanges(const ZoneCloudletCounters& counters, const MapChangeStatistics& changes,
+void DescribeMapChanges(const ZoneCloudletCounters& counters,
+                        const zone::MapChangeStatistics& changes,
                         diagnostic_updater::DiagnosticStatusWrapper& status) {
-  for (std::size_t i = 0; i < kMapChangeStates; ++i) {
-    status.add(std::string("map_changes_") + StateName(static_cast<MapChangeState>(i)),
+  for (std::size_t i = 0; i < zone::kMapChangeStates; ++i) {
+    status.add(std::string("map_changes_") + zone::StateName(static_cast<zone::MapChangeState>(i)),
                changes.by_state[i]);
   }
   status.add("map_changes_received", counters.map_changes_received);
@@ -117,24 +119,25 @@ void DescribeMapChanges(const ZoneCloudletCounters& counters, const MapChangeSta
 
 }  // namespace
 
-void VehiclePaths::Add(const VehicleState& vehicle) {
-  std::deque<GeoPoint>& path = paths_[vehicle.vehicle_id];
-  if (!path.empty() && GeodesicDistanceM(path.back(), vehicle.position) < kTrailSpacingM) return;
+void VehiclePaths::Add(const zone::VehicleState& vehicle) {
+  std::deque<geo::GeoPoint>& path = paths_[vehicle.vehicle_id];
+  if (!path.empty() && geo::GeodesicDistanceM(path.back(), vehicle.position) < kTrailSpacingM)
+    return;
   path.push_back(vehicle.position);
   if (path.size() > kMaxPoints) path.pop_front();
 }
 
-void VehiclePaths::KeepOnly(const std::vector<VehicleState>& vehicles) {
+void VehiclePaths::KeepOnly(const std::vector<zone::VehicleState>& vehicles) {
   std::set<std::string> kept;
-  for (const VehicleState& vehicle : vehicles) kept.insert(vehicle.vehicle_id);
+  for (const zone::VehicleState& vehicle : vehicles) kept.insert(vehicle.vehicle_id);
   for (auto path = paths_.begin(); path != paths_.end();) {
     path = kept.count(path->first) != 0 ? std::next(path) : paths_.erase(path);
   }
 }
 
-MarkerArray ZoneMarkers(const std::vector<Hazard>& hazards,
-                        const std::vector<VehicleState>& vehicles, const VehiclePaths& paths,
-                        const HazardCatalogue& catalogue, const LocalFrame& map,
+MarkerArray ZoneMarkers(const std::vector<zone::Hazard>& hazards,
+                        const std::vector<zone::VehicleState>& vehicles, const VehiclePaths& paths,
+                        const protocol::HazardCatalogue& catalogue, const geo::LocalFrame& map,
                         const std::string& map_frame, const ros::Time& stamp) {
   Marker base;
   base.header.frame_id = map_frame;
@@ -145,15 +148,15 @@ MarkerArray ZoneMarkers(const std::vector<Hazard>& hazards,
   array.markers.push_back(base);
   AppendHazards(hazards, catalogue, map, base, array);
   int id = 0;
-  for (const VehicleState& vehicle : vehicles) {
+  for (const zone::VehicleState& vehicle : vehicles) {
     const auto path = paths.paths().find(vehicle.vehicle_id);
-    AppendVehicle(vehicle, path == paths.paths().end() ? std::deque<GeoPoint>{} : path->second,
+    AppendVehicle(vehicle, path == paths.paths().end() ? std::deque<geo::GeoPoint>{} : path->second,
                   id++, map, base, array);
   }
   return array;
 }
 
-void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& statistics,
+void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatistics& statistics,
                   diagnostic_updater::DiagnosticStatusWrapper& status) {
   using diagnostic_msgs::DiagnosticStatus;
   if (!counters.store_error.empty()) {
@@ -166,8 +169,8 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
     status.summary(DiagnosticStatus::OK, "serving");
   }
   status.add("hazards_on_map", statistics.active_hazards);
-  for (std::size_t i = 0; i < kHazardStates; ++i) {
-    status.add(std::string("hazards_") + StateName(static_cast<HazardState>(i)),
+  for (std::size_t i = 0; i < zone::kHazardStates; ++i) {
+    status.add(std::string("hazards_") + zone::StateName(static_cast<zone::HazardState>(i)),
                statistics.hazards_by_state[i]);
   }
   status.add("store_rows_broken", statistics.store_damage.rows);
@@ -177,8 +180,8 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
   status.add("reports_merged", statistics.merged);
   status.add("reports_repeated", statistics.repeated);
   status.add("reports_refused", statistics.refused);
-  for (std::size_t i = 0; i < kRefusalKinds; ++i) {
-    status.add(std::string("refused_") + RefusalName(static_cast<RefusalKind>(i)),
+  for (std::size_t i = 0; i < zone::kRefusalKinds; ++i) {
+    status.add(std::string("refused_") + zone::RefusalName(static_cast<zone::RefusalKind>(i)),
                statistics.refused_by_kind[i]);
   }
   status.add("reports_not_now", statistics.not_now);
@@ -204,4 +207,4 @@ void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& st
   DescribeMapChanges(counters, statistics.map_changes, status);
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -14,29 +14,30 @@
 #include "protocol/hazard_catalogue.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Where each vehicle of the zone lately drove, for rviz; bounded.
 class VehiclePaths {
  public:
   /// Remembers the position unless it lies within a metre of the vehicle's last one.
-  void Add(const VehicleState& vehicle);
+  void Add(const zone::VehicleState& vehicle);
   /// Forgets all but these vehicles.
-  void KeepOnly(const std::vector<VehicleState>& vehicles);
-  const std::map<std::string, std::deque<GeoPoint>>& paths() const { return paths_; }
+  void KeepOnly(const std::vector<zone::VehicleState>& vehicles);
+  const std::map<std::string, std::deque<geo::GeoPoint>>& paths() const { return paths_; }
 
  private:
   static constexpr std::size_t kMaxPoints = 2000;
-  std::map<std::string, std::deque<GeoPoint>> paths_;
+  std::map<std::string, std::deque<geo::GeoPoint>> paths_;
 };
 
 /// The zone for rviz, in `map_frame` (x east, y north): the hazards as one list of spheres per
 /// class in its colour, a label each while there are few, every vehicle as a red arrow along its
 /// course with blue dots behind it. Replaces what was shown before.
-visualization_msgs::MarkerArray ZoneMarkers(const std::vector<Hazard>& hazards,
-                                            const std::vector<VehicleState>& vehicles,
+visualization_msgs::MarkerArray ZoneMarkers(const std::vector<zone::Hazard>& hazards,
+                                            const std::vector<zone::VehicleState>& vehicles,
                                             const VehiclePaths& paths,
-                                            const HazardCatalogue& catalogue, const LocalFrame& map,
+                                            const protocol::HazardCatalogue& catalogue,
+                                            const geo::LocalFrame& map,
                                             const std::string& map_frame, const ros::Time& stamp);
 
 /// What the node itself counts; the rest is in ZoneStatistics.
@@ -64,7 +65,7 @@ struct ZoneCloudletCounters {
 };
 
 /// Every counter under its own name; an error while the store fails.
-void DescribeZone(const ZoneCloudletCounters& counters, const ZoneStatistics& statistics,
+void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatistics& statistics,
                   diagnostic_updater::DiagnosticStatusWrapper& status);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -12,7 +12,7 @@
 #include "ros/bridge/bridged_type.h"
 #include "transport/topic_template.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 constexpr std::size_t kMaxPasswordFileBytes = 4096;
@@ -86,7 +86,8 @@ BridgeTopic ReadTopic(const XmlRpc::XmlRpcValue& entry, const std::string& place
   TopicReader reader(entry, place);
   BridgeTopic topic;
   topic.name = reader.Text("name");
-  if (!IsValidId(topic.name)) reader.Refuse("name", "1 to 64 characters of A-Z a-z 0-9 . _ -");
+  if (!transport::IsValidId(topic.name))
+    reader.Refuse("name", "1 to 64 characters of A-Z a-z 0-9 . _ -");
   topic.ros_topic = reader.Text("ros_topic");
   topic.type = reader.Text("type");
   topic.mqtt_topic = reader.Text("mqtt_topic");
@@ -104,7 +105,7 @@ BridgeTopic ReadTopic(const XmlRpc::XmlRpcValue& entry, const std::string& place
 
 /// What must hold so that no message can be attributed to the wrong vehicle.
 void CheckTopic(const BridgeTopic& topic, const BridgeConfig& config) {
-  const TopicTemplate mqtt_topic(topic.mqtt_topic);
+  const transport::TopicTemplate mqtt_topic(topic.mqtt_topic);
   const bool has_vehicle_id =
       MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes))->has_vehicle_id();
   const std::string what = "topic '" + topic.name + "' of the bridge ";
@@ -138,7 +139,7 @@ std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
   return topics;
 }
 
-void ReadMqttOptions(ParameterReader& parameters, MqttConfig& mqtt) {
+void ReadMqttOptions(ParameterReader& parameters, transport::MqttConfig& mqtt) {
   parameters.Read("host", mqtt.host);
   parameters.Read("port", mqtt.port, {1, 65535});
   parameters.Read("clean_start", mqtt.clean_start);
@@ -159,8 +160,8 @@ void ReadMqttOptions(ParameterReader& parameters, MqttConfig& mqtt) {
 }
 
 /// The three TLS files, or none of them.
-std::optional<MqttTlsConfig> ReadTlsOptions(ParameterReader& parameters) {
-  MqttTlsConfig tls;
+std::optional<transport::MqttTlsConfig> ReadTlsOptions(ParameterReader& parameters) {
+  transport::MqttTlsConfig tls;
   const std::pair<const char*, std::string*> files[] = {{"ca_file", &tls.ca_file},
                                                         {"certificate_file", &tls.certificate_file},
                                                         {"key_file", &tls.key_file}};
@@ -191,7 +192,7 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
   parameters.Read("zone", config.zone);
   parameters.Read("user", config.user);
   for (const auto& [name, value] : {std::pair{"zone", config.zone}, {"user", config.user}}) {
-    if (!IsValidId(value)) {
+    if (!transport::IsValidId(value)) {
       throw Error("parameter '" + std::string(name) + "' of the bridge is '" + value +
                   "', accepted are 1 to 64 characters of A-Z a-z 0-9 . _ -");
     }
@@ -220,4 +221,4 @@ std::string ReadPassword(const std::string& path, double wait_s) {
   return password;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

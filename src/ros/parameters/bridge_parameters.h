@@ -6,7 +6,7 @@
 #include "ros/parameters/parameters.h"
 #include "transport/mqtt_client.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 enum class BridgeRole { kVehicle, kZone };
 enum class BridgeDirection {
@@ -36,7 +36,7 @@ struct BridgeConfig {
   std::string password_file;    ///< Its first line is the password; empty: no password.
   double password_wait_s = 10;  ///< For a broker that writes the file while we start.
   double diagnostics_period_s = 1;
-  MqttConfig mqtt;
+  transport::MqttConfig mqtt;
   std::vector<BridgeTopic> topics;
 };
 
@@ -46,4 +46,4 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters);
 /// The first line of `path`, waited for up to `wait_s` seconds. Throws Error when there is none.
 std::string ReadPassword(const std::string& path, double wait_s);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

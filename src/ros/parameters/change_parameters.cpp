@@ -3,14 +3,14 @@
 #include "change/methods/change_network.h"
 #include "ros/parameters/vehicle_parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 /// Of the classical methods, whose score is a distance and no probability.
 constexpr double kClassicalThreshold = 0.3;
 constexpr double kMegabyte = 1e6;
 
-void ReadMemory(ParameterReader& parameters, PlaceMemory::Config& memory) {
+void ReadMemory(ParameterReader& parameters, change::PlaceMemory::Config& memory) {
   parameters.Read("directory", memory.directory);
   if (memory.directory.empty()) {
     throw Error("parameter 'directory' is empty, accepted is a folder for remembered places");
@@ -35,7 +35,7 @@ void ReadMemory(ParameterReader& parameters, PlaceMemory::Config& memory) {
                   {0.01, 3.15});
 }
 
-void ReadWatch(ParameterReader& parameters, ChangeDetector::Config& watch) {
+void ReadWatch(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
   parameters.Read("remember_spacing_m", watch.remember_spacing_m, {0.1, 1000});
   parameters.Read("most_position_sigma_m", watch.max_position_sigma_m, {0.01, 100});
   int partners = static_cast<int>(watch.partners);
@@ -44,7 +44,7 @@ void ReadWatch(ParameterReader& parameters, ChangeDetector::Config& watch) {
   parameters.Read("jpeg_quality", watch.jpeg_quality, {1, 100});
   parameters.Read("features", watch.features.max_features, {50, 8192});
   parameters.Read("least_region_px", watch.regions.min_pixels, {1, 1e6});
-  ChangeTracker::Config& tracker = watch.tracker;
+  change::ChangeTracker::Config& tracker = watch.tracker;
   parameters.Read("least_seen", tracker.min_seen, {2, 100});
   parameters.Read("least_travel_m", tracker.min_travel_m, {0, 100});
   parameters.Read("least_share", tracker.min_share, {0, 1});
@@ -89,13 +89,13 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
 ConfiguredChangeMethod MakeConfiguredMethod(const ChangeDetectionConfig& config) {
   ConfiguredChangeMethod made;
   if (config.method == "network") {
-    auto network = MakeChangeNetwork(config.model, config.threads);
+    auto network = change::MakeChangeNetwork(config.model, config.threads);
     made.name = network->manifest().name;
     made.threshold = network->manifest().changed;
     made.method = std::move(network);
   } else {
     if (config.threads > 0) cv::setNumThreads(config.threads);
-    made.method = MakeChangeMethod(config.method);
+    made.method = change::MakeChangeMethod(config.method);
     made.name = config.method;
     made.threshold = kClassicalThreshold;
   }
@@ -103,4 +103,4 @@ ConfiguredChangeMethod MakeConfiguredMethod(const ChangeDetectionConfig& config)
   return made;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -8,7 +8,7 @@
 #include "ros/parameters/parameters.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Defaults of the change_detection nodelet; config/change_detection.yaml explains each.
 struct ChangeDetectionConfig {
@@ -27,8 +27,8 @@ struct ChangeDetectionConfig {
   bool tell_zone = true;            ///< Objects that were passed, as MapChange.
   double tell_confidence = 0.5;     ///< Least, of these.
   double diagnostics_period_s = 1.0;
-  ChangeDetector::Config watch;
-  VehiclePoseLookup::Config pose;
+  change::ChangeDetector::Config watch;
+  vehicle::VehiclePoseLookup::Config pose;
 };
 
 /// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.
@@ -36,7 +36,7 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
 
 /// What compares, with its name, and the threshold that counts.
 struct ConfiguredChangeMethod {
-  std::unique_ptr<ChangeMethod> method;
+  std::unique_ptr<change::ChangeMethod> method;
   std::string name;
   double threshold = 0.5;
 };
@@ -44,4 +44,4 @@ struct ConfiguredChangeMethod {
 /// Throws Error, also when the network cannot be loaded.
 ConfiguredChangeMethod MakeConfiguredMethod(const ChangeDetectionConfig& config);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

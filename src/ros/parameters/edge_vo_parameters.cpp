@@ -1,18 +1,19 @@
 #include "ros/parameters/edge_vo_parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
-void ReadOdometry(ParameterReader& parameters, EdgeOdometry::Config& odometry) {
-  std::string edges = EdgeKindName(odometry.edges.kind);
+void ReadOdometry(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
+  std::string edges = odometry::EdgeKindName(odometry.edges.kind);
   parameters.ReadChoice("edges", edges, {"canny", "log", "sobel", "structured"});
-  odometry.edges.kind = ParseEdgeKind(edges);
+  odometry.edges.kind = odometry::ParseEdgeKind(edges);
   parameters.Read("structured_model", odometry.edges.structured_model);
   parameters.Read("strong_share", odometry.edges.strong_share, {0.001, 0.9});
   parameters.Read("least_gradient", odometry.edges.min_gradient, {0, 255});
   std::string source = "keyframe";
   parameters.ReadChoice("edge_source", source, {"keyframe", "new_image"});
-  odometry.edge_source = source == "keyframe" ? EdgeSource::kKeyframe : EdgeSource::kNewImage;
+  odometry.edge_source =
+      source == "keyframe" ? odometry::EdgeSource::kKeyframe : odometry::EdgeSource::kNewImage;
   parameters.Read("estimate_illumination", odometry.alignment.estimate_illumination);
   parameters.Read("max_iterations", odometry.alignment.max_iterations, {1, 100});
   parameters.Read("max_points", odometry.max_points[0], {100, 100000});
@@ -60,4 +61,4 @@ EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
   return config;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

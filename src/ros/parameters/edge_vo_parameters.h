@@ -5,11 +5,11 @@
 #include "odometry/edge/edge_odometry.h"
 #include "ros/parameters/parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Defaults of the edge_vo nodelet; config/edge_vo.yaml explains each.
 struct EdgeVoConfig {
-  EdgeOdometry::Config odometry;
+  odometry::EdgeOdometry::Config odometry;
   std::string sync = "exact";       ///< "exact" or "approximate".
   int queue_size = 10;              ///< Messages that may wait for their partners.
   double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
@@ -26,4 +26,4 @@ struct EdgeVoConfig {
 /// Reads and checks all of them; throws Error.
 EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -2,12 +2,12 @@
 
 #include "ros/parameters/datum_parameter.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 // The localizer's own check knows the ranges: Check, localization/localizer_config.h.
 
-void ReadReceiver(ParameterReader& parameters, ReceiverModel& receiver) {
+void ReadReceiver(ParameterReader& parameters, localization::ReceiverModel& receiver) {
   parameters.Read("antenna_x_m", receiver.antenna_m.x());
   parameters.Read("antenna_y_m", receiver.antenna_m.y());
   parameters.Read("latency_s", receiver.latency_s);
@@ -18,7 +18,7 @@ void ReadReceiver(ParameterReader& parameters, ReceiverModel& receiver) {
   parameters.Read("shared_time_s", receiver.shared_time_s);
 }
 
-void ReadOdometry(ParameterReader& parameters, OdometryModel& odometry) {
+void ReadOdometry(ParameterReader& parameters, localization::OdometryModel& odometry) {
   parameters.Read("way_sigma_m", odometry.way_sigma_m);
   parameters.Read("yaw_sigma_rad", odometry.yaw_sigma_rad);
   parameters.Read("scale_sigma", odometry.scale_sigma);
@@ -36,7 +36,7 @@ void ReadOdometry(ParameterReader& parameters, OdometryModel& odometry) {
 
 GeoLocalizationConfig ReadGeoLocalizationConfig(ParameterReader& parameters) {
   GeoLocalizationConfig config;
-  LocalizerConfig& localizer = config.localizer;
+  localization::LocalizerConfig& localizer = config.localizer;
   localizer.datum = ReadDatum(parameters, "the first fix");
   parameters.Read("max_range_m", localizer.max_range_m);
   parameters.Read("window_s", localizer.window_s);
@@ -64,4 +64,4 @@ GeoLocalizationConfig ReadGeoLocalizationConfig(ParameterReader& parameters) {
   return config;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

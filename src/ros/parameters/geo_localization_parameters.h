@@ -5,12 +5,12 @@
 #include "localization/localizer_feed.h"
 #include "ros/parameters/parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Defaults of the geo_localization nodelet; config/geo_localization.yaml explains each.
 struct GeoLocalizationConfig {
-  LocalizerConfig localizer;
-  LocalizerFeed::Config feed;
+  localization::LocalizerConfig localizer;
+  localization::LocalizerFeed::Config feed;
   /// Whose covariance of a step counts: "model" (the parameters) or "message" (the twist's).
   std::string odometry_covariance = "model";
   std::string map_frame = "map";
@@ -24,4 +24,4 @@ struct GeoLocalizationConfig {
 /// Reads and checks all of them; throws Error.
 GeoLocalizationConfig ReadGeoLocalizationConfig(ParameterReader& parameters);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -5,7 +5,7 @@
 #include "ros/parameters/datum_parameter.h"
 #include "ros/parameters/vehicle_parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 /// Where ROS keeps a user's files.
@@ -17,7 +17,7 @@ std::string DefaultDatabase() {
   return std::string(home != nullptr ? home : ".") + "/.ros/livemap/local_hazards.sqlite3";
 }
 
-void ReadUrgency(ParameterReader& parameters, HazardReporter::Config& reporter) {
+void ReadUrgency(ParameterReader& parameters, vehicle::HazardReporter::Config& reporter) {
   // Below the 30 days after which the zone refuses a report, with some to spare for the way.
   constexpr double kLongestHoldS = 20 * 86400.0;
   parameters.Read("hold_urgent_s", reporter.hold_s[0], {0, kLongestHoldS});
@@ -30,10 +30,10 @@ void ReadUrgency(ParameterReader& parameters, HazardReporter::Config& reporter) 
 }
 
 void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& config) {
-  HazardReporter::Config& reporter = config.reporter;
+  vehicle::HazardReporter::Config& reporter = config.reporter;
   std::string source = "gps";
   parameters.ReadChoice("position_source", source, {"gps", "fused"});
-  if (source == "fused") reporter.position_source = PositionSource::kFused;
+  if (source == "fused") reporter.position_source = vehicle::PositionSource::kFused;
   parameters.Read("fused_wait_s", reporter.fused_wait_s, {0, 60});
   parameters.Read("max_fused_gap_s", reporter.poses.max_gap_s, {0.01, 10});
   parameters.Read("use_depth", reporter.use_depth);
@@ -47,7 +47,7 @@ void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& conf
 
 /// After the reporter's own: what they share is read once.
 void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& config) {
-  PollResponder::Config& polls = config.polls;
+  vehicle::PollResponder::Config& polls = config.polls;
   polls.drive_id = config.reporter.drive_id;
   polls.min_confidence = config.reporter.min_confidence;
   polls.bracket_wait_s = config.reporter.bracket_wait_s;
@@ -73,7 +73,7 @@ void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& confi
 
 HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns) {
   HazardReportingConfig config;
-  HazardReporter::Config& reporter = config.reporter;
+  vehicle::HazardReporter::Config& reporter = config.reporter;
   reporter.drive_id = ReadDriveId(parameters, now_ns);
   parameters.Read("catalogue", config.catalogue);
   parameters.Read("database", reporter.map.path);
@@ -116,7 +116,7 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   parameters.Read("map_frame", config.map_frame);
   config.map_datum = ReadDatum(parameters, "the first fix");
   parameters.Read("publish_tf", config.publish_tf);
-  if (config.publish_tf && reporter.position_source == PositionSource::kFused) {
+  if (config.publish_tf && reporter.position_source == vehicle::PositionSource::kFused) {
     throw Error(
         "parameter 'publish_tf' is true, accepted is false with position_source fused, "
         "where tf leads from map_frame to base_frame already");
@@ -130,4 +130,4 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   return config;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -8,19 +8,19 @@
 #include "vehicle/polls/poll_responder.h"
 #include "vehicle/reporting/hazard_reporter.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Defaults of the hazard_reporting nodelet; config/hazard_reporting.yaml explains each.
 struct HazardReportingConfig {
-  HazardReporter::Config reporter;
-  PollResponder::Config polls;
+  vehicle::HazardReporter::Config reporter;
+  vehicle::PollResponder::Config polls;
   std::string catalogue;   ///< Path of hazards.yaml; empty: the package's own.
   bool use_events = true;  ///< Sightings of hazard/events; false: of hazard/detections.
   std::string base_frame = "base_link";
   std::string map_frame = "map";
-  std::optional<GeoPoint> map_datum;  ///< Of the map frame; nothing: the first fix.
-  bool publish_tf = false;            ///< map_frame -> base_frame, where no odometry does it.
-  double position_period_s = 1.0;     ///< Stamp to stamp.
+  std::optional<geo::GeoPoint> map_datum;  ///< Of the map frame; nothing: the first fix.
+  bool publish_tf = false;                 ///< map_frame -> base_frame, where no odometry does it.
+  double position_period_s = 1.0;          ///< Stamp to stamp.
   double path_spacing_m = 1.0;
   int path_max_poses = 5000;
   int max_markers = 1000;
@@ -31,4 +31,4 @@ struct HazardReportingConfig {
 /// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.
 HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -1,13 +1,13 @@
 #include "ros/parameters/ingest_parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 void ReadStereo(ParameterReader& parameters, IngestConfig& config) {
   parameters.Read("stereo", config.stereo);
   parameters.Read("stereo_sync_s", config.stereo_sync_s, {0, 1});
   parameters.Read("stereo_wait_s", config.stereo_wait_s, {0, 10});
-  StereoConfig& matching = config.matching;
+  imaging::StereoConfig& matching = config.matching;
   parameters.Read("stereo_min_depth_m", matching.min_depth_m, {0.01, 1000});
   parameters.Read("stereo_min_disparity_px", matching.min_disparity_px, {0.1, 100});
   parameters.Read("stereo_scale", matching.scale, {1, 4});
@@ -15,7 +15,7 @@ void ReadStereo(ParameterReader& parameters, IngestConfig& config) {
   parameters.Read("stereo_uniqueness_percent", matching.uniqueness_percent, {0, 100});
   parameters.Read("stereo_left_right_px", matching.left_right_px, {0, 100});
   parameters.Read("stereo_speckle_pixels", matching.speckle_pixels, {0, 100000});
-  CheckStereoConfig(matching);
+  imaging::CheckStereoConfig(matching);
 }
 
 }  // namespace
@@ -64,4 +64,4 @@ IngestConfig ReadIngestConfig(ParameterReader& parameters) {
   return config;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -5,7 +5,7 @@
 #include "imaging/stereo_depth.h"
 #include "ros/parameters/parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Where the vehicle's images come from.
 enum class IngestSource { kTopic, kDevice, kVideo, kFolder };
@@ -32,10 +32,10 @@ struct IngestConfig {
   bool stereo = false;         ///< Depth from a second eye on camera_right/.
   double stereo_sync_s = 0;    ///< How far the stamps of a pair may differ.
   double stereo_wait_s = 0.2;  ///< How long a left image's depth waits for the right one.
-  StereoConfig matching;
+  imaging::StereoConfig matching;
 };
 
 /// Reads and checks all of them; throws Error.
 IngestConfig ReadIngestConfig(ParameterReader& parameters);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -2,10 +2,10 @@
 
 #include "ros/parameters/vehicle_parameters.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
-void ReadSender(ParameterReader& parameters, OffloadSender::Config& sender) {
+void ReadSender(ParameterReader& parameters, vehicle::OffloadSender::Config& sender) {
   parameters.Read("rate_hz", sender.rate_hz, {0.1, 60});
   parameters.Read("min_spacing_m", sender.min_spacing_m, {0, 1000});
   parameters.Read("max_bytes_per_s", sender.max_bytes_per_s, {1000, 10e6});
@@ -45,8 +45,8 @@ EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int6
 
 OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters) {
   OffloadIntakeConfig config;
-  OffloadIntake::Config& intake = config.intake;
-  ReportLimits& limits = intake.limits.report;
+  zone::OffloadIntake::Config& intake = config.intake;
+  zone::ReportLimits& limits = intake.limits.report;
   int max_frame_bytes = 200000;
   int max_frame_side_px = 4096;
   parameters.Read("max_frame_bytes", max_frame_bytes, {1000, 1e6});
@@ -79,4 +79,4 @@ OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters) {
   return config;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -8,7 +8,7 @@
 #include "vehicle/reporting/offload_sender.h"
 #include "zone/offload/offload_intake.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Defaults of the small vehicle's early_discard nodelet; config/early_discard.yaml explains each.
 struct EarlyDiscardConfig {
@@ -16,10 +16,10 @@ struct EarlyDiscardConfig {
   double threshold = -1;  ///< Least score that is sent; below 0: the manifest's.
   int threads = 1;        ///< Of OpenCV, whose pool is one for the process; 0 = all cores.
   int queue_size = 2;     ///< Frames that may wait for the classifier.
-  OffloadSender::Config sender;
+  vehicle::OffloadSender::Config sender;
   int jpeg_quality = 75;  ///< 1..100; lowered where the bytes do not suffice.
   bool privacy = true;    ///< Mask faces and number plates.
-  PrivacyMask::Config mask;
+  perception::PrivacyMask::Config mask;
   std::string base_frame = "base_link";
   std::string map_frame = "map";  ///< Of fused poses.
   double diagnostics_period_s = 1.0;
@@ -30,7 +30,7 @@ EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int6
 
 /// Defaults of the zone's candidate_intake nodelet; config/candidate_intake.yaml explains each.
 struct OffloadIntakeConfig {
-  OffloadIntake::Config intake;
+  zone::OffloadIntake::Config intake;
   int jpeg_quality = 80;         ///< 1..100, of a report's picture.
   int max_image_bytes = 100000;  ///< Of a report's picture.
   double diagnostics_period_s = 1.0;
@@ -39,4 +39,4 @@ struct OffloadIntakeConfig {
 /// Reads and checks all of them; throws Error.
 OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters);
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

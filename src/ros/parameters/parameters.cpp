@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 std::string ToText(const XmlRpc::XmlRpcValue& value) {
@@ -113,4 +113,4 @@ void ParameterReader::RejectUnknown(const std::set<std::string>& foreign) const 
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 
 /// Closed interval of accepted values.
 struct ParameterRange {
@@ -53,4 +53,4 @@ class ParameterReader {
   std::set<std::string> known_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -2,7 +2,7 @@
 
 #include <ctime>
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 /// "drive-20260131T235959Z".
@@ -28,7 +28,7 @@ std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns) {
   return drive_id;
 }
 
-void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track) {
+void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track) {
   parameters.Read("max_extrapolation_s", track.max_extrapolation_s, {0, 10});
   parameters.Read("max_gap_s", track.max_gap_s, {0.01, 60});
   parameters.Read("min_baseline_m", track.min_baseline_m, {0.01, 100});
@@ -41,7 +41,7 @@ void ReadFixTrack(ParameterReader& parameters, FixTrack::Config& track) {
   parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500});
 }
 
-void ReadBasePoseSource(ParameterReader& parameters, VehiclePoseLookup::Config& pose) {
+void ReadBasePoseSource(ParameterReader& parameters, vehicle::VehiclePoseLookup::Config& pose) {
   std::string source = "gps";
   parameters.ReadChoice("position_source", source, {"gps", "fused"});
   pose.use_fused = source == "fused";
@@ -54,4 +54,4 @@ void ReadBasePoseSource(ParameterReader& parameters, VehiclePoseLookup::Config& 
   ReadFixTrack(parameters, pose.fixes);
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

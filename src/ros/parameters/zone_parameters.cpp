@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <vector>
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 /// The numbers of "A,B,..."; empty when `text` is anything else.
@@ -20,27 +20,28 @@ std::vector<double> ParseNumbers(const std::string& text, std::size_t count) {
   return numbers;
 }
 
-std::optional<GeoPoint> ReadDatum(ParameterReader& parameters) {
+std::optional<geo::GeoPoint> ReadDatum(ParameterReader& parameters) {
   std::string text;
   parameters.Read("map_datum", text);
   if (text.empty()) return std::nullopt;
   const std::vector<double> numbers = ParseNumbers(text, 2);
-  if (numbers.empty() || !IsValid({numbers[0], numbers[1]})) {
+  if (numbers.empty() || !geo::IsValid({numbers[0], numbers[1]})) {
     throw Error("parameter 'map_datum' is '" + text +
                 "', accepted is LATITUDE,LONGITUDE in degrees, or nothing for the first hazard or "
                 "vehicle");
   }
-  return GeoPoint{numbers[0], numbers[1]};
+  return geo::GeoPoint{numbers[0], numbers[1]};
 }
 
-std::optional<GeoBox> ReadBounds(ParameterReader& parameters) {
+std::optional<geo::GeoBox> ReadBounds(ParameterReader& parameters) {
   std::string text;
   parameters.Read("zone_bounds", text);
   if (text.empty()) return std::nullopt;
   const std::vector<double> numbers = ParseNumbers(text, 4);
   if (!numbers.empty()) {
-    const GeoBox box{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
-    if (IsValid(box.south_west) && IsValid(box.north_east) && numbers[0] < numbers[2]) return box;
+    const geo::GeoBox box{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
+    if (geo::IsValid(box.south_west) && geo::IsValid(box.north_east) && numbers[0] < numbers[2])
+      return box;
   }
   throw Error("parameter 'zone_bounds' is '" + text +
               "', accepted is SOUTH,WEST,NORTH,EAST in degrees, or nothing for the whole Earth");
@@ -54,7 +55,7 @@ void ReadCount(ParameterReader& parameters, const std::string& name, Integer& va
   value = static_cast<Integer>(number);
 }
 
-void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
+void ReadZone(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   parameters.Read("directory", zone.directory);
   if (zone.directory.empty()) {
     throw Error("parameter 'directory' is empty, accepted is the folder of the zone's store");
@@ -71,7 +72,7 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000});
   parameters.Read("speed_slack_m", zone.speed.slack_m, {0, 100000});
   ReadCount(parameters, "speed_recovery_reports", zone.speed.recovery_reports, {2, 1000});
-  ReportLimits& limits = zone.limits;
+  zone::ReportLimits& limits = zone.limits;
   limits.zone = ReadBounds(parameters);
   parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000});
   parameters.Read("max_future_s", limits.max_future_s, {0, 1e9});
@@ -81,8 +82,8 @@ void ReadZone(ParameterReader& parameters, ZoneService::Config& zone) {
   ReadCount(parameters, "max_image_side_px", limits.max_image_side_px, {1, 65535});
 }
 
-void ReadLife(ParameterReader& parameters, ZoneService::Config& zone) {
-  HazardLifecycle::Config& life = zone.life;
+void ReadLife(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+  zone::HazardLifecycle::Config& life = zone.life;
   parameters.Read("prior_presence", life.prior_presence, {0.01, 0.99});
   parameters.Read("active_above", life.active_above, {0.01, 0.99});
   parameters.Read("active_alone_above", life.active_alone_above, {0.01, 0.99});
@@ -103,14 +104,15 @@ void ReadLife(ParameterReader& parameters, ZoneService::Config& zone) {
   parameters.Read("life_memory", zone.survival.memory, {1, 1e6});
 }
 
-void ReadPolls(ParameterReader& parameters, ZoneService::Config& zone) {
-  PollScheduler::Config& polls = zone.polls;
+void ReadPolls(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+  zone::PollScheduler::Config& polls = zone.polls;
   parameters.Read("poll_price_s", polls.price_s, {0.01, 1e9});
   parameters.Read("poll_bytes_per_hour", polls.bytes_per_hour, {1, 1e12});
   parameters.Read("poll_picture_bytes", polls.picture_bytes, {0, 1e6});
   std::string picture = "crop";
   parameters.ReadChoice("poll_picture", picture, {"crop", "full_frame"});
-  zone.poll_picture = picture == "crop" ? PollPicture::kCrop : PollPicture::kFullFrame;
+  zone.poll_picture =
+      picture == "crop" ? protocol::PollPicture::kCrop : protocol::PollPicture::kFullFrame;
   parameters.Read("poll_picture_share", polls.picture_share, {0, 1});
   parameters.Read("poll_picture_age_s", polls.picture_age_s, {0, 1e10});
   parameters.Read("poll_lookahead_s", polls.lookahead_s, {1, 3600});
@@ -126,7 +128,7 @@ void ReadPolls(ParameterReader& parameters, ZoneService::Config& zone) {
 
 void ReadWeb(ParameterReader& parameters, const std::string& package_path,
              ZoneCloudletConfig& config) {
-  WebConfig& web = config.web_options;
+  web::WebConfig& web = config.web_options;
   web.web_root = package_path + "/web";
   parameters.Read("web", config.web);
   parameters.Read("web_address", web.address);
@@ -147,7 +149,7 @@ void ReadWeb(ParameterReader& parameters, const std::string& package_path,
 }
 
 void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
-  CatchUpPlanner::Config& catch_up = config.catch_up;
+  zone::CatchUpPlanner::Config& catch_up = config.catch_up;
   parameters.Read("join_radius_m", catch_up.radius_m, {1, 100000});
   parameters.Read("join_max_hazards", config.join_max_hazards, {1, 100000});
   parameters.Read("join_picture_bytes", config.join_picture_bytes, {0, 1e8});
@@ -167,7 +169,7 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   ZoneCloudletConfig config;
   parameters.Read("hazards", config.hazards);
   if (config.hazards.empty()) config.hazards = package_path + "/config/hazards.yaml";
-  config.zone.catalogue = HazardCatalogue::Load(config.hazards);
+  config.zone.catalogue = protocol::HazardCatalogue::Load(config.hazards);
   ReadZone(parameters, config.zone);
   ReadLife(parameters, config.zone);
   ReadPolls(parameters, config.zone);
@@ -185,4 +187,4 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   return config;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

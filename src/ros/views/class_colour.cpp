@@ -2,9 +2,9 @@
 
 #include <cstdlib>
 
-namespace livemap {
+namespace livemap::ros_io {
 
-std_msgs::ColorRGBA ClassColour(const HazardClass& entry, float alpha) {
+std_msgs::ColorRGBA ClassColour(const protocol::HazardClass& entry, float alpha) {
   const long rgb = std::strtol(entry.colour.c_str() + 1, nullptr, 16);  // "#rrggbb"
   std_msgs::ColorRGBA colour;
   colour.r = static_cast<float>((rgb >> 16) & 0xff) / 255.0F;
@@ -14,4 +14,4 @@ std_msgs::ColorRGBA ClassColour(const HazardClass& entry, float alpha) {
   return colour;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -4,7 +4,7 @@
 
 #include "ros/views/class_colour.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 constexpr double kDiameterM = 1.2;
@@ -12,15 +12,15 @@ constexpr double kHeightM = 0.4;
 constexpr double kTextM = 1.2;
 constexpr float kOwnAlpha = 0.7F;
 
-const char* LinkName(LinkCost link) {
+const char* LinkName(vehicle::LinkCost link) {
   switch (link) {
-    case LinkCost::kCheap:
+    case vehicle::LinkCost::kCheap:
       return "cheap";
-    case LinkCost::kMetered:
+    case vehicle::LinkCost::kMetered:
       return "metered";
-    case LinkCost::kNone:
+    case vehicle::LinkCost::kNone:
       return "none";
-    case LinkCost::kUnknown:
+    case vehicle::LinkCost::kUnknown:
       break;
   }
   return "unknown";
@@ -28,9 +28,10 @@ const char* LinkName(LinkCost link) {
 
 }  // namespace
 
-visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& hazards,
-                                              const HazardCatalogue& catalogue,
-                                              const LocalFrame& map, const std::string& map_frame,
+visualization_msgs::MarkerArray HazardMarkers(const std::vector<vehicle::KnownHazard>& hazards,
+                                              const protocol::HazardCatalogue& catalogue,
+                                              const geo::LocalFrame& map,
+                                              const std::string& map_frame,
                                               const ros::Time& stamp) {
   visualization_msgs::MarkerArray array;
   visualization_msgs::Marker marker;
@@ -40,8 +41,8 @@ visualization_msgs::MarkerArray HazardMarkers(const std::vector<KnownHazard>& ha
   array.markers.push_back(marker);
   marker.action = visualization_msgs::Marker::ADD;
   marker.pose.orientation.w = 1;
-  for (const KnownHazard& hazard : hazards) {
-    const HazardClass entry = catalogue.Get(hazard.class_name);
+  for (const vehicle::KnownHazard& hazard : hazards) {
+    const protocol::HazardClass entry = catalogue.Get(hazard.class_name);
     const Eigen::Vector2d place_m = map.ToEnu(hazard.position);
     ++marker.id;
     marker.ns = "hazards";
@@ -79,18 +80,18 @@ geometry_msgs::PoseStamped VehiclePose(const Eigen::Vector2d& east_north_m, doub
   return pose;
 }
 
-bool IsFusionSilent(const HazardReporter& reporter) {
+bool IsFusionSilent(const vehicle::HazardReporter& reporter) {
   constexpr std::int64_t kSilentNs = 2'000'000'000;
-  if (reporter.config().position_source != PositionSource::kFused) return false;
+  if (reporter.config().position_source != vehicle::PositionSource::kFused) return false;
   const auto newest_fix_ns = reporter.track().newest_ns();
   const auto newest_pose_ns = reporter.poses().newest_ns();
   return newest_fix_ns && (!newest_pose_ns || *newest_fix_ns - *newest_pose_ns > kSilentNs);
 }
 
-void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
+void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double steady_s,
                             diagnostic_updater::DiagnosticStatusWrapper& status) {
   using diagnostic_msgs::DiagnosticStatus;
-  const HazardReporter::Counters& counters = reporter.counters();
+  const vehicle::HazardReporter::Counters& counters = reporter.counters();
   if (!reporter.store_error().empty()) {
     status.summary(DiagnosticStatus::ERROR, reporter.store_error());
   } else if (!reporter.map().set_aside().empty()) {
@@ -151,9 +152,9 @@ void DescribeHazardReporter(const HazardReporter& reporter, double steady_s,
   status.add("distances_by_depth", counters.distances_by_depth);
 }
 
-void DescribePollResponder(const PollResponder& responder,
+void DescribePollResponder(const vehicle::PollResponder& responder,
                            diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const PollResponder::Counters& counters = responder.counters();
+  const vehicle::PollResponder::Counters& counters = responder.counters();
   status.add("polls", counters.polls);
   status.add("polls_open", responder.open());
   status.add("polls_repeated", counters.repeated);
@@ -168,16 +169,16 @@ void DescribePollResponder(const PollResponder& responder,
   status.add("poll_picture_bytes", counters.picture_bytes);
 }
 
-std::string DescribeBrokenRows(const std::string& path, const LocalHazardMap& map) {
-  const InvalidRows& broken = map.broken_rows();
+std::string DescribeBrokenRows(const std::string& path, const vehicle::LocalHazardMap& map) {
+  const vehicle::InvalidRows& broken = map.broken_rows();
   return "the local hazard map '" + path +
          "' holds values that this program did not write: " + std::to_string(broken.known) +
          " rows of what the zone told are taken out, " + std::to_string(broken.reports) +
          " unfinished reports are left there and not sent";
 }
 
-std::string DescribeSetAside(const std::string& path, const LocalHazardMap& map) {
-  const Salvage& salvage = map.salvage();
+std::string DescribeSetAside(const std::string& path, const vehicle::LocalHazardMap& map) {
+  const vehicle::Salvage& salvage = map.salvage();
   std::string sentence = "the local hazard map '" + path + "' was corrupt: moved to '" +
                          map.set_aside() + "', starting anew with ";
   if (!salvage.error.empty()) return sentence + "none of its reports (" + salvage.error + ")";
@@ -188,4 +189,4 @@ std::string DescribeSetAside(const std::string& path, const LocalHazardMap& map)
   return sentence;
 }
 
-}  // namespace livemap
+}  // namespace livemap::ros_io

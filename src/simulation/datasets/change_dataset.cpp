@@ -7,22 +7,22 @@
 
 #include "simulation/datasets/output_files.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 void WritePng(const std::string& path, const cv::Mat& image) {
   WriteImage(path, image, {cv::IMWRITE_PNG_COMPRESSION, 1});
 }
 
-cv::Vec3b Bgr(ChangeClass change_class) {
-  const auto rgb = ChangeClassColour(change_class);
+cv::Vec3b Bgr(protocol::ChangeClass change_class) {
+  const auto rgb = protocol::ChangeClassColour(change_class);
   return {rgb[2], rgb[1], rgb[0]};
 }
 
 nlohmann::json ToFeature(const StreetChange& change, int frames_seen, const Street& street,
-                         const LocalFrame& local) {
+                         const geo::LocalFrame& local) {
   const Eigen::Vector3d place = street.line().At(change.along_m, change.left_m, 0);
-  const GeoPoint position = local.ToGeo(place.head<2>());
+  const geo::GeoPoint position = local.ToGeo(place.head<2>());
   const ObjectClass object_class = ClassOfInstance(change.instance);
   return {{"type", "Feature"},
           {"geometry",
@@ -30,7 +30,7 @@ nlohmann::json ToFeature(const StreetChange& change, int frames_seen, const Stre
           {"properties",
            {{"instance", change.instance},
             {"class", ClassName(object_class)},
-            {"change_class", ChangeClassName(ChangeClassOf(object_class))},
+            {"change_class", protocol::ChangeClassName(ChangeClassOf(object_class))},
             {"change", change.appeared ? "appeared" : "vanished"},
             {"along_m", change.along_m},
             {"left_m", change.left_m},
@@ -46,8 +46,8 @@ ChangeDatasetWriter::ChangeDatasetWriter(const std::string& directory,
   WriteCamera(directory + "/camera.yaml", camera, 1);
   const std::string path = directory + "/classes.txt";
   std::ofstream classes = OpenFile(path);
-  for (int i = 0; i < kChangeClasses; ++i) {
-    classes << ChangeClassName(static_cast<ChangeClass>(i)) << "\n";
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
+    classes << protocol::ChangeClassName(static_cast<protocol::ChangeClass>(i)) << "\n";
   }
   CloseFile(classes, path);
   poses_ = OpenFile(directory + "/poses.csv");
@@ -88,10 +88,10 @@ void ChangeDatasetWriter::Add(const PassPicture& first, const PassPicture& secon
   ++pairs_;
 }
 
-void ChangeDatasetWriter::Finish(const Street& street, const GeoPoint& datum,
+void ChangeDatasetWriter::Finish(const Street& street, const geo::GeoPoint& datum,
                                  const std::map<std::uint32_t, StreetChange>& changes) {
   CloseFile(poses_, directory_ + "/poses.csv");
-  const LocalFrame local(datum);
+  const geo::LocalFrame local(datum);
   nlohmann::json features = nlohmann::json::array();
   for (const auto& [instance, change] : changes) {
     const auto seen = frames_seen_.find(instance);
@@ -109,7 +109,7 @@ cv::Mat ColourChanges(const cv::Mat& mask) {
   for (int row = 0; row < mask.rows; ++row) {
     for (int column = 0; column < mask.cols; ++column) {
       colours.at<cv::Vec3b>(row, column) =
-          Bgr(static_cast<ChangeClass>(mask.at<std::uint8_t>(row, column)));
+          Bgr(static_cast<protocol::ChangeClass>(mask.at<std::uint8_t>(row, column)));
     }
   }
   return colours;
@@ -127,4 +127,4 @@ cv::Mat OverlayChanges(const cv::Mat& bgr, const cv::Mat& mask) {
   return dim;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -11,7 +11,7 @@
 #include "simulation/datasets/change_truth.h"
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// One pass's picture of a pair.
 struct PassPicture {
@@ -39,7 +39,7 @@ class ChangeDatasetWriter {
   void Add(const PassPicture& first, const PassPicture& second, const ChangeView& view);
   /// Writes `changes` as GeoJSON points (RFC 7946) and closes the files. `street` is that of either
   /// pass, `datum` the world's origin.
-  void Finish(const Street& street, const GeoPoint& datum,
+  void Finish(const Street& street, const geo::GeoPoint& datum,
               const std::map<std::uint32_t, StreetChange>& changes);
 
   std::size_t pairs() const { return pairs_; }
@@ -58,4 +58,4 @@ cv::Mat ColourChanges(const cv::Mat& mask);
 /// A picture, grey and dim where nothing changed and in the class's colour elsewhere; CV_8UC3.
 cv::Mat OverlayChanges(const cv::Mat& bgr, const cv::Mat& mask);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

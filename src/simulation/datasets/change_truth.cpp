@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// An object whose middle lies so far behind the camera may still reach into its view.
@@ -70,7 +70,8 @@ ChangeView CompareInstances(const cv::Mat& before, const cv::Mat& after,
         const auto change = changed.find(instance);
         if (change == changed.end()) continue;
         mask[column] = static_cast<std::uint8_t>(ChangeClassOf(ClassOfInstance(instance)));
-        direction[column] = change->second.appeared ? kAppearedPixel : kVanishedPixel;
+        direction[column] =
+            change->second.appeared ? protocol::kAppearedPixel : protocol::kVanishedPixel;
         ++view.pixels[instance];
         break;
       }
@@ -98,4 +99,4 @@ ChangeView ChangeTruth::Look(const CameraExposure& motion) {
   return CompareInstances(before, after, here);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

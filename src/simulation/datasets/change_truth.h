@@ -9,7 +9,7 @@
 #include "simulation/render/sensor.h"
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Says what a camera's pixels show, without light and hence much quicker than StreetRenderer.
 class InstanceCaster {
@@ -67,4 +67,4 @@ class ChangeTruth {
   std::map<std::uint32_t, StreetChange> changes_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

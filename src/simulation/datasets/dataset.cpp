@@ -11,7 +11,7 @@
 #include "common/error.h"
 #include "simulation/datasets/output_files.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr int kJpegQuality = 90;
@@ -105,9 +105,9 @@ void YoloWriter::Add(double chainage_m, const SimulatedFrame& frame,
 
 void YoloWriter::Finish() { CloseFile(frames_, directory_ + "/frames.csv"); }
 
-std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
+std::string HazardsAsGeoJson(const Street& street, const geo::GeoPoint& datum,
                              const std::map<std::uint32_t, int>& frames_seen, double end_along_m) {
-  const LocalFrame frame(datum);
+  const geo::LocalFrame frame(datum);
   nlohmann::json features = nlohmann::json::array();
   const auto last = static_cast<int>(street.line().length_m() / kBlockM) + 1;
   for (int index = 0; index <= last; ++index) {
@@ -115,7 +115,7 @@ std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
       const auto seen = frames_seen.find(hazard.instance);
       if (seen == frames_seen.end()) continue;
       const Eigen::Vector3d place = street.line().At(hazard.along_m, hazard.left_m, 0);
-      const GeoPoint position = frame.ToGeo(place.head<2>());
+      const geo::GeoPoint position = frame.ToGeo(place.head<2>());
       features.push_back(
           {{"type", "Feature"},
            {"geometry",
@@ -172,4 +172,4 @@ void DrawHazards(const std::vector<HazardInView>& hazards, cv::Mat& bgr) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -12,7 +12,7 @@
 #include "simulation/datasets/labels_in_view.h"
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Depth units per metre in the TUM RGB-D benchmark's own files.
 constexpr double kTumDepthScale = 5000;
@@ -60,7 +60,7 @@ class YoloWriter {
 /// The true hazards that at least one frame shows, as GeoJSON points (RFC 7946). `frames_seen`
 /// counts by instance; `datum` is the world's origin; a hazard before `end_along_m`, where the
 /// drive ends, is marked as passed.
-std::string HazardsAsGeoJson(const Street& street, const GeoPoint& datum,
+std::string HazardsAsGeoJson(const Street& street, const geo::GeoPoint& datum,
                              const std::map<std::uint32_t, int>& frames_seen, double end_along_m);
 
 /// Each class in its colour, for looking at truth; CV_8UC3.
@@ -70,4 +70,4 @@ cv::Mat ColourDepth(const cv::Mat& depth);
 /// Draws boxes with class names into a picture.
 void DrawHazards(const std::vector<HazardInView>& hazards, cv::Mat& bgr);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

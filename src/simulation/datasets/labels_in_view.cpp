@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 struct Extent {
@@ -57,4 +57,4 @@ std::vector<HazardInView> FindHazards(const cv::Mat& instances, const OutlinePix
   return hazards;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -7,7 +7,7 @@
 #include "simulation/objects/object_class.h"
 #include "simulation/render/hazard_outline.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A hazard as a picture shows it.
 struct HazardInView {
@@ -38,4 +38,4 @@ struct LabelLimits {
 std::vector<HazardInView> FindHazards(const cv::Mat& instances, const OutlinePixels& outlines,
                                       const LabelLimits& limits = LabelLimits());
 
-}  // namespace livemap
+}  // namespace livemap::simulation

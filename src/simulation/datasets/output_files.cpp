@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 namespace fs = std::filesystem;
 
@@ -53,7 +53,7 @@ void WriteImage(const std::string& path, const cv::Mat& image, const std::vector
 
 void WriteCamera(const std::string& path, const SimulatedCamera& camera, double depth_scale,
                  double baseline_m) {
-  const CameraIntrinsics& k = camera.intrinsics;
+  const geo::CameraIntrinsics& k = camera.intrinsics;
   std::ofstream file = OpenFile(path);
   file.precision(10);
   file << "width: " << k.width << "\nheight: " << k.height << "\nfx: " << k.fx << "\nfy: " << k.fy
@@ -81,4 +81,4 @@ std::string FormatPose(const char* format, const Eigen::Isometry3d& pose) {
   return text;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -8,7 +8,7 @@
 
 #include "simulation/render/sensor.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 // Files of simulated drives. Every Error names the path.
 
@@ -35,4 +35,4 @@ std::string FormatNumber(const char* format, double value);
 /// tx, ty, tz (metres), qx, qy, qz, qw, each as `format` says.
 std::string FormatPose(const char* format, const Eigen::Isometry3d& pose);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

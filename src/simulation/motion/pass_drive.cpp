@@ -2,7 +2,7 @@
 
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr std::uint64_t kManner = 42;
@@ -27,8 +27,8 @@ PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz
   return manner;
 }
 
-PassDrive::PassDrive(const Street& street, const PassManner& manner, const CameraMounting& mounting,
-                     double exposure_s)
+PassDrive::PassDrive(const Street& street, const PassManner& manner,
+                     const datasets::CameraMounting& mounting, double exposure_s)
     : manner_(manner),
       base_from_optical_(mounting.BaseFromOptical()),
       exposure_s_(exposure_s),
@@ -70,4 +70,4 @@ std::size_t PassDrive::Nearest(double along_m) const {
   return low;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

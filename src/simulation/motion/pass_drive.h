@@ -7,7 +7,7 @@
 #include "simulation/motion/vehicle_motion.h"
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// How one of several drives down a lane is driven.
 struct PassManner {
@@ -26,8 +26,8 @@ PassManner DrawSecondManner(std::uint64_t seed, double speed_mps, double rate_hz
 class PassDrive {
  public:
   /// `street` must outlive the drive; `exposure_s` is the shutter's time.
-  PassDrive(const Street& street, const PassManner& manner, const CameraMounting& mounting,
-            double exposure_s);
+  PassDrive(const Street& street, const PassManner& manner,
+            const datasets::CameraMounting& mounting, double exposure_s);
 
   /// Of the picture `frame`, metres along the road's middle line; grows with `frame`.
   double AlongM(std::size_t frame) const;
@@ -45,4 +45,4 @@ class PassDrive {
   VehicleMotion motion_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

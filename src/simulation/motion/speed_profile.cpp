@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kStepM = 0.5;
@@ -177,4 +177,4 @@ double SpeedProfile::AccelerationMps2(double time_s) const {
   return (SpeedMps(time_s + kHalfS) - SpeedMps(time_s - kHalfS)) / (2 * kHalfS);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -4,7 +4,7 @@
 
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// How a driver drives.
 struct DrivingStyle {
@@ -52,4 +52,4 @@ class SpeedProfile {
   std::vector<double> along_m_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

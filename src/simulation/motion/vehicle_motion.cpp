@@ -5,7 +5,7 @@
 
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kTwoPi = 6.28318530717958647692;
@@ -66,4 +66,4 @@ VehicleKinematics VehicleMotion::StateAt(double time_s) const {
   return state;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

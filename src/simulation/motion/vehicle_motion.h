@@ -6,7 +6,7 @@
 #include "simulation/motion/speed_profile.h"
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// What a vehicle does at a moment.
 struct VehicleKinematics {
@@ -43,4 +43,4 @@ class VehicleMotion {
   const SpeedProfile profile_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

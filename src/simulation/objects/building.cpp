@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 const std::array<Vec3, 6> kBricks = {Vec3(0.36F, 0.12F, 0.075F), Vec3(0.30F, 0.10F, 0.07F),
@@ -236,4 +236,4 @@ void AddBuilding(float width_m, float depth_m, CounterRandom& random, MeshBuilde
   AddRoof(style, w, d, base, random, builder);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// The side view of a body: heights in metres at shares of the length, from the rear.
@@ -321,4 +321,4 @@ float AddCar(CounterRandom& random, float crushed, MeshBuilder& builder) {
   return body.length;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 
 float AddLampPost(MeshBuilder& builder) {
   constexpr float kHeightM = 6.4F;
@@ -252,4 +252,4 @@ void AddBicycle(CounterRandom& random, MeshBuilder& builder) {
   builder.SetFrame(frame);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

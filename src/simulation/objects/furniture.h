@@ -3,7 +3,7 @@
 #include "simulation/objects/mesh.h"
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 // Things that stand in every street, on the origin of the builder's frame.
 
@@ -25,4 +25,4 @@ void AddOtherObject(CounterRandom& random, MeshBuilder& builder);
 /// A bicycle along x that leans to y on a stand.
 void AddBicycle(CounterRandom& random, MeshBuilder& builder);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

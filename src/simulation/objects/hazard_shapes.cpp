@@ -4,7 +4,7 @@
 
 #include "simulation/objects/car.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 const Vec3 kOrange(0.78F, 0.115F, 0.015F);
@@ -232,4 +232,4 @@ void AddAccident(CounterRandom& random, MeshBuilder& builder) {
   builder.SetFrame(frame);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

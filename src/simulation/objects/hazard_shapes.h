@@ -3,7 +3,7 @@
 #include "simulation/objects/mesh.h"
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 // Bodies of hazards, on the origin of the builder's frame; their faces look to -x, where the
 // vehicle comes from.
@@ -23,4 +23,4 @@ void AddExcavator(CounterRandom& random, MeshBuilder& builder);
 /// Two cars that ran into each other, and what fell off.
 void AddAccident(CounterRandom& random, MeshBuilder& builder);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr float kPi = 3.14159265F;
@@ -152,4 +152,4 @@ void MeshBuilder::AddDisc(const Vec3& centre, const Vec3& normal, float radius, 
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

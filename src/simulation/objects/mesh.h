@@ -7,7 +7,7 @@
 #include "simulation/objects/noise.h"
 #include "simulation/objects/object_class.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// How a surface is painted at the hit point; `uv` means what the comment says.
 enum class MaterialKind : std::uint8_t {
@@ -99,4 +99,4 @@ class MeshBuilder {
   float openness_ = 1;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -7,7 +7,7 @@
 
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 using Vec2 = Eigen::Vector2f;
 using Vec3 = Eigen::Vector3f;
@@ -126,4 +126,4 @@ inline Cell CellNoise(float x, float y, std::uint32_t seed) {
   return cell;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr std::array<const char*, kObjectClasses> kNames = {"sky",
@@ -51,4 +51,4 @@ std::vector<ObjectClass> HazardClasses() {
   return classes;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

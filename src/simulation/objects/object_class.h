@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// What a pixel of a simulated picture shows. The values are those of the class image.
 enum class ObjectClass : std::uint8_t {
@@ -54,4 +54,4 @@ inline ObjectClass ClassOfInstance(std::uint32_t instance) {
   return static_cast<ObjectClass>(instance & 31U);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

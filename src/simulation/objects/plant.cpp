@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 Vec3 RandomDirection(CounterRandom& random) {
@@ -137,4 +137,4 @@ void AddHedge(float length_m, float height_m, bool leaves, CounterRandom& random
   builder.SetOpenness(1);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

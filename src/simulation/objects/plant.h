@@ -3,7 +3,7 @@
 #include "simulation/objects/mesh.h"
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A broad-leaved tree on the origin of the builder's frame; bare branches without `leaves`.
 void AddTree(float height_m, bool leaves, CounterRandom& random, MeshBuilder& builder);
@@ -12,4 +12,4 @@ void AddTree(float height_m, bool leaves, CounterRandom& random, MeshBuilder& bu
 void AddHedge(float length_m, float height_m, bool leaves, CounterRandom& random,
               MeshBuilder& builder);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Mixes the bits of a number (finaliser of MurmurHash3): equal on every machine.
 inline std::uint32_t HashBits(std::uint32_t x) {
@@ -61,4 +61,4 @@ class CounterRandom {
   std::uint64_t counter_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

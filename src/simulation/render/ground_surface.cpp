@@ -2,7 +2,7 @@
 
 #include "simulation/render/surface.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// What a pixel covers along and across the road, metres.
@@ -329,4 +329,4 @@ Surface PaintGround(const GroundPlan& plan, const SurfacePoint& point, float alo
   return GroundPainter(plan, point, along_share, lighting).Paint();
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// Nearer triangles are left out: they would reach across the whole picture and back.
@@ -65,4 +65,4 @@ OutlinePixels CountOutlinePixels(const StreetScene& scene, const SimulatedCamera
   return outlines;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

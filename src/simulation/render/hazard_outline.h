@@ -7,7 +7,7 @@
 #include "simulation/render/scene.h"
 #include "simulation/render/sensor.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// How many pixels each hazard would cover were nothing in front of it, by its instance.
 using OutlinePixels = std::map<std::uint32_t, int>;
@@ -17,4 +17,4 @@ using OutlinePixels = std::map<std::uint32_t, int>;
 OutlinePixels CountOutlinePixels(const StreetScene& scene, const SimulatedCamera& camera,
                                  const Eigen::Isometry3d& world_from_optical);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

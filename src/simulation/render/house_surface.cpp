@@ -2,7 +2,7 @@
 
 #include "simulation/render/surface.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 float MeanFootprint(const SurfacePoint& point) {
@@ -174,4 +174,4 @@ Surface PaintHouse(const Material& material, const SurfacePoint& point, const Li
   return surface;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 Vec3 SunFrom(float azimuth, float elevation) {
@@ -183,4 +183,4 @@ Vec3 SkyRadiance(const Lighting& lighting, const Vec3& direction) {
   return Blend(sky, far, skyline);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 
 #include "simulation/objects/noise.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Hour and weather of a drive.
 enum class Condition { kDay, kDusk, kRain, kSnow };
@@ -46,4 +46,4 @@ Vec3 SkyRadiance(const Lighting& lighting, const Vec3& direction);
 /// The same without fine structure, for reflections on dull surfaces.
 Vec3 SmoothSky(const Lighting& lighting, const Vec3& direction);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

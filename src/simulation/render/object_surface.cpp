@@ -2,7 +2,7 @@
 
 #include "simulation/render/surface.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// 1 within `half` of the line from `a` to `b`, soft by `footprint`.
@@ -211,4 +211,4 @@ void ApplyWeather(const SurfacePoint& point, const Lighting& lighting, Surface& 
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// A soft elliptical spot, upright, that blends towards `colour`.
@@ -31,7 +31,7 @@ void Splat(const Vec3& colour, float x, float y, float half_width, float half_he
 
 }  // namespace
 
-void AddPrecipitation(const Lighting& lighting, const CameraIntrinsics& camera,
+void AddPrecipitation(const Lighting& lighting, const geo::CameraIntrinsics& camera,
                       std::uint32_t frame_number, const cv::Mat& depth, cv::Mat& light) {
   const bool snow = lighting.condition == Condition::kSnow;
   if (!snow && lighting.condition != Condition::kRain) return;
@@ -60,4 +60,4 @@ void AddPrecipitation(const Lighting& lighting, const CameraIntrinsics& camera,
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

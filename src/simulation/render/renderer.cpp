@@ -10,7 +10,7 @@
 #include "simulation/render/precipitation.h"
 #include "simulation/render/shader.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// Neighbours whose light differs by more than this factor get more rays.
@@ -221,4 +221,4 @@ SimulatedFrame StreetRenderer::Render(const CameraExposure& motion, std::uint32_
   return frame;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

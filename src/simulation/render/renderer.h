@@ -12,7 +12,7 @@
 #include "simulation/render/sensor.h"
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A picture with the whole truth about it. All images have the camera's size; (0, 0) is the centre
 /// of the first pixel.
@@ -62,4 +62,4 @@ class StreetRenderer {
 /// Calls `work` with 0..count-1 on `threads` threads; rows are handed out as they come.
 void ForEachRow(int count, int threads, const std::function<void(int)>& work);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

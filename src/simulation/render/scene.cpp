@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kBehindM = 24;
@@ -281,4 +281,4 @@ unsigned StreetScene::BlockedOfEight(const Vec3* from, unsigned wanted, const Ve
   return blocked;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

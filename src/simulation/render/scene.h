@@ -8,7 +8,7 @@
 
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// What a ray met.
 struct SceneHit {
@@ -70,4 +70,4 @@ class StreetScene {
   std::vector<std::shared_ptr<Block>> visible_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

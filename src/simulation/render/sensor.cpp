@@ -5,7 +5,7 @@
 
 #include "simulation/objects/noise.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr int kToneSteps = 4096;
@@ -111,4 +111,4 @@ void DevelopRow(const SimulatedCamera& camera, const cv::Mat& light, int row, fl
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -7,11 +7,11 @@
 #include "geo/camera_intrinsics.h"
 #include "simulation/render/lighting.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A camera as it is built: optics and sensor.
 struct SimulatedCamera {
-  CameraIntrinsics intrinsics{500, 500, 319.5, 239.5, 640, 480};
+  geo::CameraIntrinsics intrinsics{500, 500, 319.5, 239.5, 640, 480};
   double k1 = 0;  ///< Radial distortion, as OpenCV's plumb_bob.
   double k2 = 0;
   float shot_noise = 0.010F;   ///< Standard deviation at white, as share of white.
@@ -35,4 +35,4 @@ float MeterExposure(const cv::Mat& light, float start, float key);
 void DevelopRow(const SimulatedCamera& camera, const cv::Mat& light, int row, float gain,
                 std::uint32_t noise_seed, cv::Mat& bgr);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr float kLampReachSquared = 22.0F * 22.0F;
@@ -214,4 +214,4 @@ Vec3 Shader::Radiance(const SurfacePoint& point, const Material& material, const
   return radiance + surface.glow;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -4,7 +4,7 @@
 #include "simulation/render/scene.h"
 #include "simulation/render/surface.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Lights what rays meet. Immutable after construction: any thread may ask. Positions are relative
 /// to the scene's origin.
@@ -41,4 +41,4 @@ class Shader {
   std::vector<Vec3> lamps_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

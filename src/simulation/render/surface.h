@@ -4,7 +4,7 @@
 #include "simulation/render/lighting.h"
 #include "simulation/world/ground_plan.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Where a ray met a body.
 struct SurfacePoint {
@@ -45,4 +45,4 @@ Surface PaintObject(const Material& material, const SurfacePoint& point, const L
 /// Covers what looks up with snow and darkens what is wet.
 void ApplyWeather(const SurfacePoint& point, const Lighting& lighting, Surface& surface);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

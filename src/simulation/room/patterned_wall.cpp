@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kDistanceM = 2;
@@ -16,7 +16,7 @@ double Pattern(double x, double y) {
 
 }  // namespace
 
-PatternedWall::View PatternedWall::See(const CameraIntrinsics& camera,
+PatternedWall::View PatternedWall::See(const geo::CameraIntrinsics& camera,
                                        const Eigen::Isometry3d& world_from_optical, double gain,
                                        double bias) {
   View view;
@@ -39,4 +39,4 @@ PatternedWall::View PatternedWall::See(const CameraIntrinsics& camera,
   return view;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

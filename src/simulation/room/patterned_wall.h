@@ -5,7 +5,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A wall without end with a smooth pattern of patches, 2 m before the world's origin and slanted.
 /// Its pictures follow a formula: no noise, no aliasing, grey value and depth exact at every
@@ -19,8 +19,8 @@ class PatternedWall {
 
   /// The camera must be before the wall and look at it with every pixel. Grey values are those of
   /// the wall times `gain` plus `bias`.
-  static View See(const CameraIntrinsics& camera, const Eigen::Isometry3d& world_from_optical,
+  static View See(const geo::CameraIntrinsics& camera, const Eigen::Isometry3d& world_from_optical,
                   double gain, double bias);
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 #include "simulation/objects/random.h"
 #include "simulation/render/surface.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr float kHalfLength = 2.5F, kHalfWidth = 2.0F, kHeight = 2.6F;
@@ -202,4 +202,4 @@ SimulatedFrame SimulatedRoom::Render(const SimulatedCamera& camera,
   return frame;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A furnished room of 5 x 4 x 2.6 m and a camera that somebody holds in it: the test bed of visual
 /// odometry at indoor scale, with exact truth. World frame: z up, origin in the middle of the
@@ -46,4 +46,4 @@ class SimulatedRoom {
   std::vector<Box> boxes_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 
 #include "simulation/objects/noise.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// What both kinds measure is disparity; its errors make those of depth grow with the square.
@@ -20,7 +20,7 @@ struct Model {
   float edge;  ///< Neighbours whose depth differs by this share leave a hole.
 };
 
-Model ModelOf(const CameraIntrinsics& camera, DepthSensor sensor, double baseline_m) {
+Model ModelOf(const geo::CameraIntrinsics& camera, DepthSensor sensor, double baseline_m) {
   const auto focal = static_cast<float>(camera.fx);
   if (sensor == DepthSensor::kKinect) {
     return {focal, 0.075F, 0.06F, 0.125F, 0.5F, 10, 0.06F};
@@ -73,7 +73,7 @@ std::optional<DepthSensor> ParseDepthSensor(const std::string& name) {
   return std::nullopt;
 }
 
-cv::Mat SenseDepth(const cv::Mat& depth, const CameraIntrinsics& camera, DepthSensor sensor,
+cv::Mat SenseDepth(const cv::Mat& depth, const geo::CameraIntrinsics& camera, DepthSensor sensor,
                    double baseline_m, std::uint32_t seed) {
   if (sensor == DepthSensor::kExact) return depth;
   const Model model = ModelOf(camera, sensor, baseline_m);
@@ -97,4 +97,4 @@ cv::Mat SenseDepth(const cv::Mat& depth, const CameraIntrinsics& camera, DepthSe
   return sensed;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -7,7 +7,7 @@
 
 #include "geo/camera_intrinsics.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// How depth is measured.
 enum class DepthSensor {
@@ -21,7 +21,7 @@ std::optional<DepthSensor> ParseDepthSensor(const std::string& name);
 
 /// What a sensor makes of exact `depth` (CV_32FC1 metres, 0: nothing); 0 where it sees nothing.
 /// `baseline_m` is that of kStereo. Noise of a pixel depends on `seed` and its place only.
-cv::Mat SenseDepth(const cv::Mat& depth, const CameraIntrinsics& camera, DepthSensor sensor,
+cv::Mat SenseDepth(const cv::Mat& depth, const geo::CameraIntrinsics& camera, DepthSensor sensor,
                    double baseline_m, std::uint32_t seed);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

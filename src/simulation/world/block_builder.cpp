@@ -10,7 +10,7 @@
 #include "simulation/objects/plant.h"
 #include "simulation/world/ground_mesh.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 enum BlockStream : std::uint64_t {
@@ -381,4 +381,4 @@ void BlockBuilder::AddSmallThing(std::uint32_t instance, ObjectFate fate, double
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

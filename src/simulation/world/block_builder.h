@@ -4,7 +4,7 @@
 
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Fills one block of a street with ground, houses, plants, cars, furniture and hazards.
 class BlockBuilder {
@@ -62,4 +62,4 @@ class BlockBuilder {
   District district_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

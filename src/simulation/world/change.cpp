@@ -2,7 +2,7 @@
 
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr std::uint64_t kFates = 41;
@@ -13,34 +13,34 @@ constexpr double kVanishingShare = 0.4;
 
 }  // namespace
 
-ChangeClass ChangeClassOf(ObjectClass object_class) {
+protocol::ChangeClass ChangeClassOf(ObjectClass object_class) {
   switch (object_class) {
     case ObjectClass::kBarrier:
-      return ChangeClass::kBarrier;
+      return protocol::ChangeClass::kBarrier;
     case ObjectClass::kBin:
-      return ChangeClass::kBin;
+      return protocol::ChangeClass::kBin;
     case ObjectClass::kConstructionMachine:
-      return ChangeClass::kConstruction;
+      return protocol::ChangeClass::kConstruction;
     case ObjectClass::kDebris:
     case ObjectClass::kDeer:
     case ObjectClass::kFence:
     case ObjectClass::kOtherObject:
-      return ChangeClass::kOtherObjects;
+      return protocol::ChangeClass::kOtherObjects;
     case ObjectClass::kPerson:
     case ObjectClass::kCycle:
-      return ChangeClass::kPersonCycle;
+      return protocol::ChangeClass::kPersonCycle;
     case ObjectClass::kRubbish:
-      return ChangeClass::kRubbish;
+      return protocol::ChangeClass::kRubbish;
     case ObjectClass::kSign:
     case ObjectClass::kRoadWorkSign:
-      return ChangeClass::kSign;
+      return protocol::ChangeClass::kSign;
     case ObjectClass::kTrafficCone:
-      return ChangeClass::kTrafficCone;
+      return protocol::ChangeClass::kTrafficCone;
     case ObjectClass::kVehicle:
     case ObjectClass::kStoppedAccident:
-      return ChangeClass::kVehicle;
+      return protocol::ChangeClass::kVehicle;
     default:
-      return ChangeClass::kNoChange;
+      return protocol::ChangeClass::kNoChange;
   }
 }
 
@@ -62,4 +62,4 @@ std::uint32_t SuccessorOf(std::uint32_t instance, ObjectClass object_class) {
   return MakeInstance((instance >> 5U) | kSuccessorSerial, object_class);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -5,10 +5,10 @@
 #include "protocol/change_class.h"
 #include "simulation/objects/object_class.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// kNoChange for what has no class of change: the ground and its potholes, houses, trees, poles.
-ChangeClass ChangeClassOf(ObjectClass object_class);
+protocol::ChangeClass ChangeClassOf(ObjectClass object_class);
 
 /// What becomes of an object between the first and the second pass.
 enum class ObjectFate { kStays, kAppears, kVanishes, kReplaced };
@@ -39,4 +39,4 @@ struct StreetChange {
 /// The instance of what stands where the object `instance` stood before it was replaced.
 std::uint32_t SuccessorOf(std::uint32_t instance, ObjectClass object_class);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

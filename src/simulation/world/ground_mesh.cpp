@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr int kColumns = 7;  // of one side, from the middle line outwards
@@ -223,4 +223,4 @@ float GroundHeight(const GroundPlan& plan, float along_m, float left_m) {
          (away > foot + kKerbWidthM + plan.profile.pavement_width_m ? 0.03F : 0.0F);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

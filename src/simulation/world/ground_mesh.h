@@ -4,7 +4,7 @@
 #include "simulation/world/ground_plan.h"
 #include "simulation/world/road_line.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Lays the ground from `begin_m` to `end_m` along the road: road with crown and potholes, kerbs,
 /// pavements, gardens, side roads. Positions are relative to `origin`. Uses the builder's current
@@ -15,4 +15,4 @@ void AddGround(const RoadLine& line, const GroundPlan& plan, double begin_m, dou
 /// Height of the undamaged ground over the middle line, metres.
 float GroundHeight(const GroundPlan& plan, float along_m, float left_m);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

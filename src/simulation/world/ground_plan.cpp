@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 
 float Pothole::Reach(float along, float left) const {
   const float x = along - along_m;
@@ -45,4 +45,4 @@ float GroundPlan::KerbFoot(float along, float* crossing) const {
          std::sqrt(std::max(0.0F, kCornerRadiusM * kCornerRadiusM - inward * inward));
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

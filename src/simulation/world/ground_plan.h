@@ -5,7 +5,7 @@
 
 #include "simulation/objects/noise.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// The cross-section of a street, metres; both sides are alike.
 struct StreetProfile {
@@ -70,4 +70,4 @@ struct GroundPlan {
   float KerbFoot(float along, float* crossing) const;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -4,7 +4,7 @@
 
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kSampleM = 0.5;
@@ -92,4 +92,4 @@ std::vector<RoadPiece> DrawRoad(std::uint64_t seed, double length_m) {
   return pieces;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 
 #include "simulation/world/world_file.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// The road's middle line in the world frame (ENU, metres: x east, y north, z up; it starts at the
 /// origin). Before its start and past its end it goes on straight and level. Immutable.
@@ -38,4 +38,4 @@ class RoadLine {
 /// Straights, curves and hills for at least `length_m`, a pure function of the seed.
 std::vector<RoadPiece> DrawRoad(std::uint64_t seed, double length_m);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

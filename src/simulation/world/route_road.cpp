@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kLargestTurnDeg = 120;
@@ -21,7 +21,7 @@ constexpr double kRoundingM = 1e-6;
 
 struct Vertex {
   std::size_t number = 0;  ///< In the file, from 1.
-  GeoPoint position;
+  geo::GeoPoint position;
   Eigen::Vector2d place;  ///< In the world frame, m.
   double turn_rad = 0;    ///< Left positive; 0 at both ends.
   CornerCurve curve;
@@ -38,15 +38,16 @@ std::string Name(const Vertex& vertex, const std::string& name) {
   return "the route '" + name + "', vertex " + std::to_string(vertex.number) + " " + place;
 }
 
-std::vector<Vertex> PlaceVertices(const std::vector<GeoPoint>& points, const std::string& name) {
+std::vector<Vertex> PlaceVertices(const std::vector<geo::GeoPoint>& points,
+                                  const std::string& name) {
   std::vector<Vertex> vertices;
   if (points.empty()) throw Error("the route '" + name + "' has no point");
-  const LocalFrame frame(points.front());
+  const geo::LocalFrame frame(points.front());
   for (std::size_t i = 0; i < points.size(); ++i) {
     Vertex vertex;
     vertex.number = i + 1;
     vertex.position = points[i];
-    const double distance_m = GeodesicDistanceM(points.front(), points[i]);
+    const double distance_m = geo::GeodesicDistanceM(points.front(), points[i]);
     if (distance_m > kFarthestM) {
       throw Error(Name(vertex, name) + " lies " +
                   std::to_string(static_cast<long>(distance_m / 1000)) +
@@ -153,7 +154,7 @@ CornerCurve TightestCurve(double turn_rad) {
   return CurveOfLength(turn_rad, 1.5 * std::abs(turn_rad) * kTightestRadiusM);
 }
 
-RouteRoad LayRoad(const std::vector<GeoPoint>& points, const std::string& name) {
+RouteRoad LayRoad(const std::vector<geo::GeoPoint>& points, const std::string& name) {
   std::vector<Vertex> vertices = PlaceVertices(points, name);
   BendCorners(name, vertices);
   CheckRoom(name, vertices);
@@ -174,4 +175,4 @@ RouteRoad LayRoad(const std::vector<GeoPoint>& points, const std::string& name) 
   return road;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

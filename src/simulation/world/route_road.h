@@ -6,7 +6,7 @@
 #include "geo/wgs84.h"
 #include "simulation/world/world_file.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A road along a line on the map. The world's origin is the line's first point.
 struct RouteRoad {
@@ -36,6 +36,6 @@ CornerCurve TightestCurve(double turn_rad);
 /// dense line need a mean radius of 72 m. Throws Error naming the vertex (counted from 1) with its
 /// position and what would be accepted: turns of at most 120 degrees, segments that are as long as
 /// the curves at their ends need, points within 100 km of the first, two different points.
-RouteRoad LayRoad(const std::vector<GeoPoint>& points, const std::string& name);
+RouteRoad LayRoad(const std::vector<geo::GeoPoint>& points, const std::string& name);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

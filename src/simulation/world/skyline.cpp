@@ -4,7 +4,7 @@
 
 #include "simulation/world/block_builder.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kFrontHeightM = 10;
@@ -41,8 +41,8 @@ Row RowAt(const Street& street, double along_m) {
 
 }  // namespace
 
-SkyVisibility SkyOver(const Street& street, double along_m, double left_m) {
-  SkyVisibility sky;
+datasets::SkyVisibility SkyOver(const Street& street, double along_m, double left_m) {
+  datasets::SkyVisibility sky;
   if (!street.description().buildings) return sky;
   const double pavement_m = static_cast<double>(street.profile().half_road_m() + kKerbWidthM) +
                             street.description().pavement_width_m;
@@ -59,4 +59,4 @@ SkyVisibility SkyOver(const Street& street, double along_m, double left_m) {
   return sky;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

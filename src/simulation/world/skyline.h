@@ -3,7 +3,7 @@
 #include "datasets/sensors/gnss_multipath.h"
 #include "simulation/world/street.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Of a receiver's antenna over the road.
 constexpr double kAntennaHeightM = 1.5;
@@ -13,6 +13,6 @@ constexpr double kAntennaHeightM = 1.5;
 /// street's plan has houses: not in parks, not at crossings, thinner between gardens; the elevation
 /// is the mean over 20 m of road before and behind, as satellites along the street see no front.
 /// Trees do not count. A pure function that renders nothing.
-SkyVisibility SkyOver(const Street& street, double along_m, double left_m);
+datasets::SkyVisibility SkyOver(const Street& street, double along_m, double left_m);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

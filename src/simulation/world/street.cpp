@@ -4,7 +4,7 @@
 
 #include "simulation/world/block_builder.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 /// Streams of randomness: one per kind of thing, so that none shifts another.
@@ -204,4 +204,4 @@ StreetBlock Street::Build(int index) const {
   return block;
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -10,7 +10,7 @@
 #include "simulation/world/road_line.h"
 #include "simulation/world/world_file.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A street is built block by block, so that a long drive needs no more memory than a short one.
 constexpr double kBlockM = 40;
@@ -71,4 +71,4 @@ class Street {
   StreetProfile profile_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -9,7 +9,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr std::size_t kMaxBytes = 1U << 20U;
@@ -44,7 +44,7 @@ class Reader {
 
   double Number(const YAML::Node& node, const std::string& what, double min, double max) const {
     const std::string text = node.IsScalar() ? node.Scalar() : "no number";
-    const std::optional<double> value = ParseFinite(text);
+    const std::optional<double> value = datasets::ParseFinite(text);
     if (!value || *value < min || *value > max) {
       std::ostringstream sentence;
       sentence << what << " is '" << text << "', accepted is a number from " << min << " to "
@@ -211,4 +211,4 @@ WorldDescription ReadWorldFile(const std::string& path, RoadSource source) {
   return ParseWorldFile(ReadFile(path, kMaxBytes), path, source);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

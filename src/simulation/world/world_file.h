@@ -7,7 +7,7 @@
 
 #include "simulation/objects/object_class.h"
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// A piece of road: it turns and climbs smoothly over its length.
 struct RoadPiece {
@@ -51,4 +51,4 @@ WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name
                                 RoadSource source = RoadSource::kWorldFile);
 WorldDescription ReadWorldFile(const std::string& path, RoadSource source = RoadSource::kWorldFile);
 
-}  // namespace livemap
+}  // namespace livemap::simulation

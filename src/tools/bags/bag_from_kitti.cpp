@@ -5,7 +5,7 @@
 #include "tools/bags/sequence_bag.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 int Run(int argc, char** argv) {
@@ -17,8 +17,8 @@ int Run(int argc, char** argv) {
       {{"rate-hz", "HZ", "frames per second without times.txt (10)"},
        {"start-time", "ISO8601", "stamp of time zero, UTC (2026-01-01T12:00:00Z)"}});
   if (!line.Parse(argc, argv)) return 0;
-  const Sequence sequence =
-      ReadKittiSequence(line.Positional(0), line.Number("rate-hz", 10, 0.1, 1000));
+  const datasets::Sequence sequence =
+      datasets::ReadKittiSequence(line.Positional(0), line.Number("rate-hz", 10, 0.1, 1000));
   WriteSequenceBag(sequence, line.Positional(1), ReadStartTime(line) - ros::Time(0));
   std::printf("%s: %zu frames, %zu poses\n", line.Positional(1).c_str(), sequence.frames.size(),
               sequence.poses.size());
@@ -26,8 +26,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_bag_from_kitti", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_bag_from_kitti", argc, argv, livemap::tools::Run);
 }

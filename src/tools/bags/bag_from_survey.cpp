@@ -7,13 +7,13 @@
 #include "tools/common/command_line.h"
 #include "tools/common/share_path.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
-std::vector<Detection> ToBoxes(const std::vector<LabelledBox>& labels,
-                               const CameraIntrinsics& camera) {
+std::vector<Detection> ToBoxes(const std::vector<datasets::LabelledBox>& labels,
+                               const geo::CameraIntrinsics& camera) {
   std::vector<Detection> boxes;
-  for (const LabelledBox& label : labels) {
+  for (const datasets::LabelledBox& label : labels) {
     const auto edge = [](double centre, double size, double side, int pixels) {
       return static_cast<float>(std::clamp(centre + side * size / 2, 0.0, 1.0) * pixels);
     };
@@ -42,20 +42,21 @@ int Run(int argc, char** argv) {
                    2, flags);
   if (!line.Parse(argc, argv)) return 0;
   const DriveSetup setup = ReadDriveSetup(line, SharePath("config/cameras/road_survey.yaml"), 16);
-  const SurveyDrive drive = ReadSurveyDrive(line.Positional(0));
-  const std::vector<FramePlace> places =
-      PlaceFrames(drive, setup.speed_mps, line.Number("max-gap-s", 0, 0, 1e6));
+  const datasets::SurveyDrive drive = datasets::ReadSurveyDrive(line.Positional(0));
+  const std::vector<datasets::FramePlace> places =
+      datasets::PlaceFrames(drive, setup.speed_mps, line.Number("max-gap-s", 0, 0, 1e6));
   CheckRouteLength(setup.route, places.back().distance_m);
 
   DriveBag bag(line.Positional(1), setup);
   Progress progress("frame", drive.frames.size());
   double last_s = -1;
   for (std::size_t i = 0; i < drive.frames.size(); ++i) {
-    const SurveyFrame& frame = drive.frames[i];
+    const datasets::SurveyFrame& frame = drive.frames[i];
     // Chainage is rounded to metres: two frames at one place still follow one another.
     last_s = std::max(places[i].time_s, last_s + 1e-3);
-    const CameraIntrinsics& camera = setup.camera.intrinsics;
-    const ImageFile image = ReadImageFile(frame.image_path, camera.width, camera.height);
+    const geo::CameraIntrinsics& camera = setup.camera.intrinsics;
+    const datasets::ImageFile image =
+        datasets::ReadImageFile(frame.image_path, camera.width, camera.height);
     bag.AddFrame(last_s, image.bytes, ToBoxes(frame.boxes, camera));
     progress.At(i + 1);
   }
@@ -66,8 +67,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_bag_from_survey", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_bag_from_survey", argc, argv, livemap::tools::Run);
 }

@@ -4,13 +4,14 @@
 #include "tools/bags/sequence_bag.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 /// A bag has no time zero: a sequence that begins there is moved by one second.
-ros::Duration Start(const Sequence& sequence) {
+ros::Duration Start(const datasets::Sequence& sequence) {
   bool from_zero = sequence.frames.front().stamp_ns <= 0;
-  for (const StampedPose& pose : sequence.poses) from_zero = from_zero || pose.stamp_ns <= 0;
+  for (const datasets::StampedPose& pose : sequence.poses)
+    from_zero = from_zero || pose.stamp_ns <= 0;
   return ros::Duration(from_zero ? 1 : 0);
 }
 
@@ -23,7 +24,8 @@ int Run(int argc, char** argv) {
       "one second later where it begins at zero.",
       2, {{"camera", "FILE", "the camera, laid out as camera.yaml"}});
   if (!line.Parse(argc, argv)) return 0;
-  const Sequence sequence = ReadTumSequence(line.Positional(0), line.Text("camera", ""));
+  const datasets::Sequence sequence =
+      datasets::ReadTumSequence(line.Positional(0), line.Text("camera", ""));
   WriteSequenceBag(sequence, line.Positional(1), Start(sequence));
   std::printf("%s: %zu frames, %zu poses\n", line.Positional(1).c_str(), sequence.frames.size(),
               sequence.poses.size());
@@ -31,8 +33,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_bag_from_tum", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_bag_from_tum", argc, argv, livemap::tools::Run);
 }

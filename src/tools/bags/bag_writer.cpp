@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 BagWriter::BagWriter(const std::string& path, Compression compression)
     : path_(path), unfinished_path_(path + ".unfinished-" + std::to_string(getpid())) {
@@ -44,4 +44,4 @@ void BagWriter::Finish() {
   finished_ = true;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -6,7 +6,7 @@
 #include <boost/make_shared.hpp>
 #include <string>
 
-namespace livemap {
+namespace livemap::tools {
 
 /// Frame of the camera's images in our bags (REP 103: z forward, x right, y down).
 constexpr char kOpticalFrame[] = "camera_optical_frame";
@@ -52,4 +52,4 @@ class BagWriter {
   bool finished_ = false;
 };
 
-}  // namespace livemap
+}  // namespace livemap::tools

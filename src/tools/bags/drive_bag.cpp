@@ -14,7 +14,7 @@
 #include "geo/wgs84.h"
 #include "tools/bags/bag_writer.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 geometry_msgs::TransformStamped ToTransform(const Eigen::Isometry3d& pose, const ros::Time& stamp,
@@ -34,7 +34,8 @@ geometry_msgs::TransformStamped ToTransform(const Eigen::Isometry3d& pose, const
   return transform;
 }
 
-sensor_msgs::NavSatFix ToFix(const GeoPoint& position, double sigma_m, const ros::Time& stamp) {
+sensor_msgs::NavSatFix ToFix(const geo::GeoPoint& position, double sigma_m,
+                             const ros::Time& stamp) {
   sensor_msgs::NavSatFix fix;
   fix.header.stamp = stamp;
   fix.header.frame_id = "base_link";
@@ -60,26 +61,29 @@ sensor_msgs::NavSatFix NoFix(const ros::Time& stamp) {
   return fix;
 }
 
-GeoPoint ParsePosition(const std::string& text) {
-  const std::vector<std::string> parts = Split(text, ',');
-  const std::optional<double> latitude = parts.size() == 2 ? ParseFinite(parts[0]) : std::nullopt;
-  const std::optional<double> longitude = parts.size() == 2 ? ParseFinite(parts[1]) : std::nullopt;
-  if (!latitude || !longitude || !IsValid({*latitude, *longitude})) {
+geo::GeoPoint ParsePosition(const std::string& text) {
+  const std::vector<std::string> parts = datasets::Split(text, ',');
+  const std::optional<double> latitude =
+      parts.size() == 2 ? datasets::ParseFinite(parts[0]) : std::nullopt;
+  const std::optional<double> longitude =
+      parts.size() == 2 ? datasets::ParseFinite(parts[1]) : std::nullopt;
+  if (!latitude || !longitude || !geo::IsValid({*latitude, *longitude})) {
     throw Error("--start is '" + text + "', accepted is LAT,LON in degrees, e.g. -23.55,-46.63");
   }
   return {*latitude, *longitude};
 }
 
-Route ReadDriveRoute(const CommandLine& line) {
+datasets::Route ReadDriveRoute(const CommandLine& line) {
   if (line.Has("route")) {
     if (line.Has("start") || line.Has("bearing")) {
       throw Error("give either --route or --start and --bearing, not both");
     }
-    return ReadRoute(line.Text("route", ""));
+    return datasets::ReadRoute(line.Text("route", ""));
   }
   // A quiet straight road in Pittsburgh, for a drive that may lie anywhere.
-  const GeoPoint start = ParsePosition(line.Text("start", "40.4433,-79.9436"));
-  return Route::Straight(start, line.Number("bearing", 90, -360, 360) * kRadiansPerDegree);
+  const geo::GeoPoint start = ParsePosition(line.Text("start", "40.4433,-79.9436"));
+  return datasets::Route::Straight(start,
+                                   line.Number("bearing", 90, -360, 360) * geo::kRadiansPerDegree);
 }
 
 }  // namespace
@@ -122,8 +126,8 @@ DriveSetup ReadDriveSetup(const CommandLine& line, const std::string& camera_pat
                           double default_speed_mps) {
   DriveSetup setup{ReadDriveRoute(line), 0, {}, {}, 0, 0, {}};
   setup.speed_mps = line.Number("speed-mps", default_speed_mps, 0.1, 100);
-  setup.camera = ReadCameraFile(line.Text("camera", camera_path));
-  CameraMounting& mounting = setup.camera.mounting;
+  setup.camera = datasets::ReadCameraFile(line.Text("camera", camera_path));
+  datasets::CameraMounting& mounting = setup.camera.mounting;
   mounting.height_m = line.Number("camera-height-m", mounting.height_m, 0.1, 10);
   mounting.pitch_deg = line.Number("camera-pitch-deg", mounting.pitch_deg, -30, 89);
   setup.noise.white_sigma_m = line.Number("fix-noise-m", 0.5, 0, 1000);
@@ -137,7 +141,7 @@ DriveSetup ReadDriveSetup(const CommandLine& line, const std::string& camera_pat
   return setup;
 }
 
-void CheckRouteLength(const Route& route, double needed_m) {
+void CheckRouteLength(const datasets::Route& route, double needed_m) {
   if (route.length_m() >= needed_m) return;
   std::ostringstream sentence;
   sentence.precision(1);
@@ -146,7 +150,7 @@ void CheckRouteLength(const Route& route, double needed_m) {
   throw Error(sentence.str());
 }
 
-sensor_msgs::CameraInfo PinholeCameraInfo(const CameraIntrinsics& k) {
+sensor_msgs::CameraInfo PinholeCameraInfo(const geo::CameraIntrinsics& k) {
   sensor_msgs::CameraInfo info;
   info.header.frame_id = kOpticalFrame;
   info.width = static_cast<std::uint32_t>(k.width);
@@ -173,7 +177,7 @@ void DriveBag::WriteStaticTransforms() {
   tf2_msgs::TFMessage transforms;
   transforms.transforms = {
       ToTransform(setup_.camera.mounting.BaseFromCamera(), stamp, "base_link", "camera_link"),
-      ToTransform(CameraFromOptical(), stamp, "camera_link", kOpticalFrame)};
+      ToTransform(datasets::CameraFromOptical(), stamp, "camera_link", kOpticalFrame)};
   bag_.WriteLatched("/tf_static", stamp, transforms);
 }
 
@@ -181,7 +185,7 @@ void DriveBag::AdvanceTo(double time_s) {
   for (;; ++next_fix_) {
     const double fix_s = static_cast<double>(next_fix_) / setup_.fix_rate_hz;
     if (fix_s > time_s) return;
-    const GeoPoint truth =
+    const geo::GeoPoint truth =
         setup_.place ? setup_.place(fix_s) : setup_.route.At(fix_s * setup_.speed_mps).position;
     const ros::Time stamp = Stamp(fix_s);
     bag_.Write("/ground_truth/fix", stamp, ToFix(truth, 0, stamp));
@@ -193,8 +197,8 @@ void DriveBag::AdvanceTo(double time_s) {
       continue;
     }
     *error_m += multipath_m;
-    const GeoPoint seen =
-        GeodesicDestination(truth, std::atan2(error_m->x(), error_m->y()), error_m->norm());
+    const geo::GeoPoint seen =
+        geo::GeodesicDestination(truth, std::atan2(error_m->x(), error_m->y()), error_m->norm());
     bag_.Write("/fix", stamp, ToFix(seen, receiver_.sigma_m(), stamp));
   }
 }
@@ -229,4 +233,4 @@ void DriveBag::Finish(double end_s) {
   bag_.Finish();
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

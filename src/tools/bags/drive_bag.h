@@ -16,19 +16,19 @@
 #include "tools/bags/bag_writer.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// What a drive needs beside its pictures.
 struct DriveSetup {
-  Route route;
+  datasets::Route route;
   double speed_mps;
-  CameraFile camera;
-  ReceiverNoise noise;
+  datasets::CameraFile camera;
+  datasets::ReceiverNoise noise;
   double fix_rate_hz;
   std::uint64_t seed;
   ros::Time start;  ///< Stamp of distance 0.
   /// Where the vehicle is at a time; empty: `speed_mps` along the route.
-  std::function<GeoPoint(double time_s)> place = nullptr;
+  std::function<geo::GeoPoint(double time_s)> place = nullptr;
   /// What the receiver errs beside `noise`, east and north, metres; called once per fix in order of
   /// time. Empty: nothing.
   std::function<Eigen::Vector2d(double time_s)> multipath_m = nullptr;
@@ -40,12 +40,12 @@ std::vector<Flag> DriveFlags();
 /// `needed_m` is the drive's length: a shorter route is an Error that says so.
 DriveSetup ReadDriveSetup(const CommandLine& line, const std::string& camera_path,
                           double default_speed_mps);
-void CheckRouteLength(const Route& route, double needed_m);
+void CheckRouteLength(const datasets::Route& route, double needed_m);
 /// `--start-time`, default 2026-01-01T12:00:00Z.
 ros::Time ReadStartTime(const CommandLine& line);
 
 /// A camera_info without distortion, its stamp still zero.
-sensor_msgs::CameraInfo PinholeCameraInfo(const CameraIntrinsics& intrinsics);
+sensor_msgs::CameraInfo PinholeCameraInfo(const geo::CameraIntrinsics& intrinsics);
 
 /// The topics of a real vehicle, written in time order: camera/image_raw/compressed,
 /// camera/camera_info, fix, ground_truth/boxes, ground_truth/fix and tf_static.
@@ -73,10 +73,10 @@ class DriveBag {
 
   const DriveSetup setup_;
   BagWriter bag_;
-  ReceiverSimulator receiver_;
+  datasets::ReceiverSimulator receiver_;
   sensor_msgs::CameraInfo camera_info_;
   std::int64_t next_fix_ = 0;
   std::uint32_t frame_number_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::tools

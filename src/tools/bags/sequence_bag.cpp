@@ -16,7 +16,7 @@
 #include "tools/bags/drive_bag.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 constexpr std::int64_t kMaxPixels = 64'000'000;
@@ -34,10 +34,11 @@ std_msgs::Header MakeHeader(const ros::Time& stamp) {
   return header;
 }
 
-sensor_msgs::ImagePtr ReadColour(const std::string& path, CameraIntrinsics& intrinsics,
+sensor_msgs::ImagePtr ReadColour(const std::string& path, geo::CameraIntrinsics& intrinsics,
                                  const ros::Time& stamp) {
-  const ImageFile file = ReadImageFile(path, intrinsics.width, intrinsics.height);
-  const cv::Mat image = DecodeImage(file.bytes.data(), file.bytes.size(), kMaxPixels);
+  const datasets::ImageFile file =
+      datasets::ReadImageFile(path, intrinsics.width, intrinsics.height);
+  const cv::Mat image = imaging::DecodeImage(file.bytes.data(), file.bytes.size(), kMaxPixels);
   intrinsics.width = image.cols;
   intrinsics.height = image.rows;
   const std::string encoding = image.channels() == 1 ? sensor_msgs::image_encodings::MONO8
@@ -46,9 +47,11 @@ sensor_msgs::ImagePtr ReadColour(const std::string& path, CameraIntrinsics& intr
 }
 
 /// Depth in metres, NaN where the sensor saw nothing (REP 118).
-sensor_msgs::ImagePtr ReadDepth(const SequenceFrame& frame, const CameraIntrinsics& intrinsics,
-                                double depth_scale, const ros::Time& stamp) {
-  const ImageFile file = ReadImageFile(frame.depth_path, intrinsics.width, intrinsics.height);
+sensor_msgs::ImagePtr ReadDepth(const datasets::SequenceFrame& frame,
+                                const geo::CameraIntrinsics& intrinsics, double depth_scale,
+                                const ros::Time& stamp) {
+  const datasets::ImageFile file =
+      datasets::ReadImageFile(frame.depth_path, intrinsics.width, intrinsics.height);
   const cv::Mat raw = cv::imdecode(file.bytes, cv::IMREAD_UNCHANGED);
   if (raw.type() != CV_16UC1) {
     throw Error("'" + frame.depth_path + "' must be a PNG of one channel with 16 bits");
@@ -61,8 +64,8 @@ sensor_msgs::ImagePtr ReadDepth(const SequenceFrame& frame, const CameraIntrinsi
 }
 
 /// The second eye's picture with the stamp of the first one's.
-void WriteRight(const Sequence& sequence, const SequenceFrame& frame, CameraIntrinsics& intrinsics,
-                const ros::Time& stamp, BagWriter& bag) {
+void WriteRight(const datasets::Sequence& sequence, const datasets::SequenceFrame& frame,
+                geo::CameraIntrinsics& intrinsics, const ros::Time& stamp, BagWriter& bag) {
   if (frame.right_path.empty() || !(sequence.baseline_m > 0)) return;
   const sensor_msgs::ImagePtr image = ReadColour(frame.right_path, intrinsics, stamp);
   sensor_msgs::CameraInfo info = PinholeCameraInfo(intrinsics);
@@ -72,7 +75,7 @@ void WriteRight(const Sequence& sequence, const SequenceFrame& frame, CameraIntr
   bag.Write("/camera_right/image_raw", stamp, *image);
 }
 
-void WritePose(const StampedPose& pose, const ros::Duration& start, BagWriter& bag) {
+void WritePose(const datasets::StampedPose& pose, const ros::Duration& start, BagWriter& bag) {
   const ros::Time stamp = ToStamp(pose.stamp_ns, start);
   const Eigen::Quaterniond rotation(pose.world_from_camera.linear());
   const Eigen::Vector3d position = pose.world_from_camera.translation();
@@ -102,10 +105,10 @@ void WritePose(const StampedPose& pose, const ros::Duration& start, BagWriter& b
 
 }  // namespace
 
-void WriteSequenceBag(const Sequence& sequence, const std::string& path,
+void WriteSequenceBag(const datasets::Sequence& sequence, const std::string& path,
                       const ros::Duration& start) {
   BagWriter bag(path, BagWriter::Compression::kLz4);
-  CameraIntrinsics intrinsics = sequence.intrinsics;
+  geo::CameraIntrinsics intrinsics = sequence.intrinsics;
   Progress progress("frame", sequence.frames.size());
   std::size_t next_pose = 0;
   const auto write_poses_until = [&](std::int64_t stamp_ns) {
@@ -115,7 +118,7 @@ void WriteSequenceBag(const Sequence& sequence, const std::string& path,
     }
   };
   for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
-    const SequenceFrame& frame = sequence.frames[i];
+    const datasets::SequenceFrame& frame = sequence.frames[i];
     write_poses_until(frame.stamp_ns);
     const ros::Time stamp = ToStamp(frame.stamp_ns, start);
     const sensor_msgs::ImagePtr image = ReadColour(frame.image_path, intrinsics, stamp);
@@ -137,4 +140,4 @@ void WriteSequenceBag(const Sequence& sequence, const std::string& path,
   bag.Finish();
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

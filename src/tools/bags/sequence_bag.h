@@ -6,7 +6,7 @@
 
 #include "datasets/sequences.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// Writes a recorded sequence: camera/image_raw, camera/camera_info, with depth
 /// camera/depth/image_raw (32FC1 metres) and camera/depth/camera_info, with a second eye
@@ -14,7 +14,7 @@ namespace livemap {
 /// baseline, as image_geometry wants a pair), with poses ground_truth/pose (frame world) and the
 /// transform world -> camera_optical_frame on tf. `start` is added to the sequence's stamps. Throws
 /// Error naming a picture that is missing, corrupt or of another size.
-void WriteSequenceBag(const Sequence& sequence, const std::string& path,
+void WriteSequenceBag(const datasets::Sequence& sequence, const std::string& path,
                       const ros::Duration& start);
 
-}  // namespace livemap
+}  // namespace livemap::tools

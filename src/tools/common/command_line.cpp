@@ -13,7 +13,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 [[noreturn]] void RefuseNumber(const std::string& flag, const std::string& text, const char* kind,
@@ -99,7 +99,7 @@ double CommandLine::Number(const std::string& flag, double otherwise, double min
                            double max) const {
   const auto found = values_.find(flag);
   if (found == values_.end()) return otherwise;
-  const std::optional<double> value = ParseFinite(found->second);
+  const std::optional<double> value = datasets::ParseFinite(found->second);
   if (!value || *value < min || *value > max) {
     RefuseNumber(flag, found->second, "a number", min, max);
   }
@@ -109,7 +109,7 @@ double CommandLine::Number(const std::string& flag, double otherwise, double min
 int CommandLine::Whole(const std::string& flag, int otherwise, int min, int max) const {
   const auto found = values_.find(flag);
   if (found == values_.end()) return otherwise;
-  const std::optional<double> value = ParseFinite(found->second);
+  const std::optional<double> value = datasets::ParseFinite(found->second);
   if (!value || *value < min || *value > max || *value != std::floor(*value)) {
     RefuseNumber(flag, found->second, "a whole number", min, max);
   }
@@ -172,4 +172,4 @@ int RunProgram(const char* name, int argc, char** argv, int (*body)(int, char**)
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::tools {
 
 /// A flag of a command-line program: "--name VALUE", or "--name" alone when `value` is empty.
 struct Flag {
@@ -79,4 +79,4 @@ class Progress {
 /// exception 1.
 int RunProgram(const char* name, int argc, char** argv, int (*body)(int, char**));
 
-}  // namespace livemap
+}  // namespace livemap::tools

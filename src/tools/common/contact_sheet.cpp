@@ -2,7 +2,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns) {
   if (pictures.empty()) throw Error("a contact sheet needs at least one picture");
@@ -20,4 +20,4 @@ cv::Mat ContactSheet(const std::vector<cv::Mat>& pictures, int columns) {
   return sheet;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -2,11 +2,11 @@
 
 #include <ros/package.h>
 
-namespace livemap {
+namespace livemap::tools {
 
 std::string SharePath(const std::string& path) {
   const std::string package = ros::package::getPath("livemap");
   return package.empty() ? path : package + "/" + path;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-namespace livemap {
+namespace livemap::tools {
 
 std::string ShippedModel(const std::string& name) {
   namespace fs = std::filesystem;
@@ -13,4 +13,4 @@ std::string ShippedModel(const std::string& name) {
   return LIVEMAP_SOURCE_DIR "/" + file;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

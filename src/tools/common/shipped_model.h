@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace livemap {
+namespace livemap::tools {
 
 /// The detector that vehicles and zones run unless told otherwise, and that the tools measure.
 inline constexpr char kDefaultDetector[] = "hazards-base";
@@ -11,4 +11,4 @@ inline constexpr char kDefaultDetector[] = "hazards-base";
 /// else of the source tree that this program was built from.
 std::string ShippedModel(const std::string& name);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -14,7 +14,7 @@
 #include "tools/common/shipped_model.h"
 #include "tools/detection/detection_tool_support.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 struct Options {
@@ -23,7 +23,7 @@ struct Options {
   std::string draw;
   std::optional<double> threshold;
   int threads = 0;
-  std::optional<EngineKind> engine;
+  std::optional<perception::EngineKind> engine;
 };
 
 /// Before the work: what cannot be written is refused.
@@ -58,7 +58,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   if (options.model.empty()) options.model = ShippedModel(kDefaultDetector);
   options.draw = line.Text("draw", "");
   if (line.Has("threshold")) options.threshold = line.Number("threshold", 0, 0.001, 0.999);
-  options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
+  options.engine = perception::ParseEngineChoice(line.Text("engine", "auto"), "--engine");
   options.threads = line.Whole("threads", 0, 1, 256);
   if (!options.draw.empty() && options.images.size() != 1) {
     throw Error("--draw is given with " + std::to_string(options.images.size()) +
@@ -69,12 +69,12 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 }
 
 nlohmann::ordered_json ToJson(const std::string& path, cv::Size size,
-                              const std::vector<HazardDetection>& found) {
+                              const std::vector<perception::HazardDetection>& found) {
   nlohmann::ordered_json json = {{"image", path},
                                  {"width", size.width},
                                  {"height", size.height},
                                  {"detections", nlohmann::ordered_json::array()}};
-  for (const HazardDetection& detection : found) {
+  for (const perception::HazardDetection& detection : found) {
     json["detections"].push_back(
         {{"class", detection.class_name},
          {"confidence", detection.confidence},
@@ -83,23 +83,24 @@ nlohmann::ordered_json ToJson(const std::string& path, cv::Size size,
   return json;
 }
 
-void Draw(cv::Mat image, const std::vector<HazardDetection>& found, const std::string& path) {
-  AnnotateImage(image, found);
+void Draw(cv::Mat image, const std::vector<perception::HazardDetection>& found,
+          const std::string& path) {
+  perception::AnnotateImage(image, found);
   if (!cv::imwrite(path, image)) throw Error("'" + path + "' cannot be written");
 }
 
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  ModelManifest manifest = ReadModelManifest(options->model);
+  perception::ModelManifest manifest = perception::ReadModelManifest(options->model);
   if (options->threshold) {
     std::fill(manifest.thresholds.begin(), manifest.thresholds.end(),
               static_cast<float>(*options->threshold));
   }
-  HazardDetector detector(manifest, options->threads, options->engine);
+  perception::HazardDetector detector(manifest, options->threads, options->engine);
   for (const std::string& path : options->images) {
     const cv::Mat image = ReadImage(path);
-    const std::vector<HazardDetection> found = detector.Detect(image);
+    const std::vector<perception::HazardDetection> found = detector.Detect(image);
     using Json = nlohmann::ordered_json;
     // A path need not be UTF-8: what is not is replaced.
     std::cout
@@ -111,8 +112,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_detect_image", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_detect_image", argc, argv, livemap::tools::Run);
 }

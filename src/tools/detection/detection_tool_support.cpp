@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "imaging/decode.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 std::vector<std::string> SplitNames(const std::string& flag, const std::string& text) {
   std::vector<std::string> names;
@@ -32,8 +32,8 @@ cv::Mat ReadImage(const std::string& path) {
   constexpr std::int64_t kMaxPixels = 100'000'000;
   const std::string bytes = ReadFile(path, kMaxBytes);
   try {
-    cv::Mat image =
-        DecodeImage(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), kMaxPixels);
+    cv::Mat image = imaging::DecodeImage(reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                                         bytes.size(), kMaxPixels);
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
     return image;
   } catch (const Error& error) {
@@ -41,4 +41,4 @@ cv::Mat ReadImage(const std::string& path) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::tools {
 
 /// "a,b" to its names; none from "". Throws Error naming `flag` on an empty one.
 std::vector<std::string> SplitNames(const std::string& flag, const std::string& text);
@@ -13,4 +13,4 @@ std::string JoinNames(const std::vector<std::string>& names);
 /// A JPEG or PNG file as BGR, 8 bit; throws Error naming the file. At most 100 megapixels.
 cv::Mat ReadImage(const std::string& path);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -11,7 +11,7 @@
 #include "tools/common/contact_sheet.h"
 #include "tools/detection/detection_tool_support.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 namespace fs = std::filesystem;
@@ -70,11 +70,11 @@ class Tile {
   cv::Point2f offset_;
 };
 
-cv::Mat Show(const ScoredFrame& frame, const std::string& picture, const ShownError& error,
-             double threshold) {
+cv::Mat Show(const evaluation::ScoredFrame& frame, const std::string& picture,
+             const ShownError& error, double threshold) {
   Tile tile(ReadImage(picture), error.box);
   for (const cv::Rect2f& box : frame.difficult) tile.Draw(box, kDifficultColour);
-  for (const ScoredBox& detection : frame.detections) {
+  for (const evaluation::ScoredBox& detection : frame.detections) {
     // Far below the threshold a detector has boxes everywhere.
     if (detection.score < 0.5 * threshold) continue;
     tile.Draw(detection.box, detection.score >= threshold ? kDetectionColour : kWeakColour);
@@ -86,23 +86,23 @@ cv::Mat Show(const ScoredFrame& frame, const std::string& picture, const ShownEr
   return tile.image();
 }
 
-std::vector<ShownError> Missed(const ScoredDrive& drive, double threshold) {
+std::vector<ShownError> Missed(const evaluation::ScoredDrive& drive, double threshold) {
   std::vector<ShownError> shown;
-  for (const MissedEvent& missed : FindMissedEvents(drive, threshold)) {
+  for (const evaluation::MissedEvent& missed : evaluation::FindMissedEvents(drive, threshold)) {
     const std::vector<cv::Rect2f>& labels = drive[missed.frame].labels;
     const auto largest =
         std::max_element(labels.begin(), labels.end(),
                          [](const auto& a, const auto& b) { return a.area() < b.area(); });
-    shown.push_back({missed.frame, *largest, missed.score, CauseName(missed.cause)});
+    shown.push_back({missed.frame, *largest, missed.score, evaluation::CauseName(missed.cause)});
   }
   return shown;
 }
 
-std::vector<ShownError> False(const ScoredDrive& drive, double threshold) {
+std::vector<ShownError> False(const evaluation::ScoredDrive& drive, double threshold) {
   std::vector<ShownError> shown;
-  for (const FalseReport& report : FindFalseReports(drive, threshold)) {
-    shown.push_back(
-        {report.frame, report.detection.box, report.detection.score, CauseName(report.cause)});
+  for (const evaluation::FalseReport& report : evaluation::FindFalseReports(drive, threshold)) {
+    shown.push_back({report.frame, report.detection.box, report.detection.score,
+                     evaluation::CauseName(report.cause)});
   }
   return shown;
 }
@@ -144,4 +144,4 @@ void WriteErrorSheets(const std::string& directory, const std::string& class_nam
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -6,11 +6,11 @@
 
 #include "evaluation/detection/detection_errors.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// A drive of one class with the pictures that its frames were detected in.
 struct PicturedDrive {
-  const ScoredDrive* drive = nullptr;
+  const evaluation::ScoredDrive* drive = nullptr;
   const std::vector<std::string>* pictures = nullptr;  ///< Paths, one per frame.
 };
 
@@ -21,4 +21,4 @@ struct PicturedDrive {
 void WriteErrorSheets(const std::string& directory, const std::string& class_name,
                       const std::vector<PicturedDrive>& drives, double threshold);
 
-}  // namespace livemap
+}  // namespace livemap::tools

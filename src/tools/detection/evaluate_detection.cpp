@@ -21,7 +21,7 @@
 #include "tools/detection/detection_tool_support.h"
 #include "tools/detection/error_sheets.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 struct Options {
@@ -31,12 +31,12 @@ struct Options {
   bool sweep = false;
   bool tracking = false;
   std::string errors;
-  TrackedDriveConfig tracked;
-  ObjectTracker::Config tracker;
+  evaluation::TrackedDriveConfig tracked;
+  perception::ObjectTracker::Config tracker;
   double lowest_score = 0.01;
   int threads = 0;
-  std::optional<EngineKind> engine;
-  LabelledFolderConfig labels;
+  std::optional<perception::EngineKind> engine;
+  evaluation::LabelledFolderConfig labels;
 };
 
 /// None when --help was asked for and printed.
@@ -81,11 +81,11 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
                    {"repeat-gain", options.tracking, "--tracking"},
                    {"low-share", options.tracking, "--tracking"}});
   const std::string camera = line.Text("camera", "");
-  if (!camera.empty()) options.tracked.camera = ReadCameraFile(camera);
+  if (!camera.empty()) options.tracked.camera = datasets::ReadCameraFile(camera);
   options.tracker.repeat_gain = line.Number("repeat-gain", options.tracker.repeat_gain, 0, 1);
   options.tracker.low_share = line.Number("low-share", options.tracker.low_share, 0.01, 1);
   options.lowest_score = line.Number("lowest-score", options.lowest_score, 0.001, 0.999);
-  options.engine = ParseEngineChoice(line.Text("engine", "auto"), "--engine");
+  options.engine = perception::ParseEngineChoice(line.Text("engine", "auto"), "--engine");
   options.threads = line.Whole("threads", 0, 1, 256);
   options.labels.split = line.Text("split", "");
   options.labels.label_classes = SplitNames("--label-classes", line.Text("label-classes", ""));
@@ -94,47 +94,49 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 
 /// Frames of one class: what EvaluateClass wants.
 struct ClassFrames {
-  std::vector<ScoredDrive> drives;
+  std::vector<evaluation::ScoredDrive> drives;
   std::vector<std::vector<std::string>> pictures;  ///< Paths, of the drives' frames.
-  std::vector<ScoredFrame> photos;
+  std::vector<evaluation::ScoredFrame> photos;
 };
 
 /// Runs the detector over everything and sorts labels and detections by class.
 class Evaluation {
  public:
-  Evaluation(const ModelManifest& manifest, const Options& options)
+  Evaluation(const perception::ModelManifest& manifest, const Options& options)
       : options_(options), thresholds_(manifest.thresholds) {
-    ModelManifest everything = manifest;
+    perception::ModelManifest everything = manifest;
     for (float& threshold : everything.thresholds) {
       threshold = std::min(threshold, static_cast<float>(options.lowest_score));
     }
-    detector_ = std::make_unique<HazardDetector>(everything, options.threads, options.engine);
+    detector_ =
+        std::make_unique<perception::HazardDetector>(everything, options.threads, options.engine);
   }
 
-  void Run(const std::vector<LabelledFolder>& folders) {
+  void Run(const std::vector<evaluation::LabelledFolder>& folders) {
     std::size_t total = 0;
-    for (const LabelledFolder& folder : folders) total += folder.frames.size();
+    for (const evaluation::LabelledFolder& folder : folders) total += folder.frames.size();
     Progress progress("detecting", total);
-    for (const LabelledFolder& folder : folders) RunFolder(folder, progress);
+    for (const evaluation::LabelledFolder& folder : folders) RunFolder(folder, progress);
   }
 
-  DetectionReport Report() const {
-    DetectionReport report;
+  evaluation::DetectionReport Report() const {
+    evaluation::DetectionReport report;
     report.model = detector_->manifest().name;
     report.frames = milliseconds_.size();
-    report.inference_ms_p50 = Quantile(milliseconds_, 0.5);
-    report.inference_ms_p95 = Quantile(milliseconds_, 0.95);
+    report.inference_ms_p50 = evaluation::Quantile(milliseconds_, 0.5);
+    report.inference_ms_p95 = evaluation::Quantile(milliseconds_, 0.95);
     const std::vector<std::string>& classes = detector_->manifest().classes;
     for (std::size_t i = 0; i < classes.size(); ++i) {
       const auto frames = by_class_.find(classes[i]);
       if (frames == by_class_.end()) continue;
       const auto& [drives, pictures, photos] = frames->second;
       // Through the float that the detector compares with, so that its boundary cases count alike.
-      ClassReport entry{classes[i], EvaluateClass(drives, photos, double{thresholds_[i]}), {}};
+      evaluation::ClassReport entry{
+          classes[i], evaluation::EvaluateClass(drives, photos, double{thresholds_[i]}), {}};
       if (options_.sweep) {
         std::vector<double> thresholds;
         for (int step = 1; step < 20; ++step) thresholds.push_back(0.05 * step);
-        entry.sweep = SweepThresholds(drives, photos, thresholds);
+        entry.sweep = evaluation::SweepThresholds(drives, photos, thresholds);
       }
       if (options_.tracking) AddTracking(drives, entry);
       AddCauses(drives, entry);
@@ -146,49 +148,54 @@ class Evaluation {
 
  private:
   /// What the tracker reports on the class's drives, at several degrees of certainty.
-  void AddTracking(const std::vector<ScoredDrive>& drives, ClassReport& entry) const {
+  void AddTracking(const std::vector<evaluation::ScoredDrive>& drives,
+                   evaluation::ClassReport& entry) const {
     const std::vector<std::size_t>& recordings = drive_recordings_.at(entry.class_name);
     for (int step = 5; step <= 30; ++step) {
-      ObjectTracker::Config config = options_.tracker;
+      perception::ObjectTracker::Config config = options_.tracker;
       config.sure = 0.1 * step;
-      std::vector<ScoredDrive> events;
+      std::vector<evaluation::ScoredDrive> events;
       for (std::size_t i = 0; i < drives.size(); ++i) {
-        events.push_back(EventsOfDrive(drives[i], recordings_[recordings[i]], entry.class_name,
-                                       ObjectTracker(config, thresholds_)));
+        events.push_back(evaluation::EventsOfDrive(drives[i], recordings_[recordings[i]],
+                                                   entry.class_name,
+                                                   perception::ObjectTracker(config, thresholds_)));
       }
-      entry.tracking.push_back(SweepThresholds(events, {}, {0.0}).front());
+      entry.tracking.push_back(evaluation::SweepThresholds(events, {}, {0.0}).front());
       entry.tracking.back().threshold = config.sure;
     }
   }
 
-  static void AddCauses(const std::vector<ScoredDrive>& drives, ClassReport& entry) {
-    for (const ScoredDrive& drive : drives) {
-      for (const MissedEvent& missed : FindMissedEvents(drive, entry.figures.threshold)) {
-        ++entry.missed_by_cause[CauseName(missed.cause)];
+  static void AddCauses(const std::vector<evaluation::ScoredDrive>& drives,
+                        evaluation::ClassReport& entry) {
+    for (const evaluation::ScoredDrive& drive : drives) {
+      for (const evaluation::MissedEvent& missed :
+           evaluation::FindMissedEvents(drive, entry.figures.threshold)) {
+        ++entry.missed_by_cause[evaluation::CauseName(missed.cause)];
       }
-      for (const FalseReport& report : FindFalseReports(drive, entry.figures.threshold)) {
-        ++entry.false_by_cause[CauseName(report.cause)];
+      for (const evaluation::FalseReport& report :
+           evaluation::FindFalseReports(drive, entry.figures.threshold)) {
+        ++entry.false_by_cause[evaluation::CauseName(report.cause)];
       }
     }
   }
 
-  void WriteErrors(const std::vector<ScoredDrive>& drives,
+  void WriteErrors(const std::vector<evaluation::ScoredDrive>& drives,
                    const std::vector<std::vector<std::string>>& pictures,
-                   const ClassReport& entry) const {
+                   const evaluation::ClassReport& entry) const {
     std::vector<PicturedDrive> pictured;
     for (std::size_t i = 0; i < drives.size(); ++i) pictured.push_back({&drives[i], &pictures[i]});
     WriteErrorSheets(options_.errors, entry.class_name, pictured, entry.figures.threshold);
   }
 
-  void RunFolder(const LabelledFolder& folder, Progress& progress) {
-    std::map<std::string, std::vector<ScoredFrame>> scored;
-    std::vector<TrackerFrame> recording;
+  void RunFolder(const evaluation::LabelledFolder& folder, Progress& progress) {
+    std::map<std::string, std::vector<evaluation::ScoredFrame>> scored;
+    std::vector<perception::TrackerFrame> recording;
     std::vector<std::string> pictures;
-    for (const LabelledFrame& frame : folder.frames) {
+    for (const evaluation::LabelledFrame& frame : folder.frames) {
       const cv::Mat image = ReadImage(frame.image_path);
       pictures.push_back(frame.image_path);
       const auto start = std::chrono::steady_clock::now();
-      const std::vector<HazardDetection> found = detector_->Detect(image);
+      const std::vector<perception::HazardDetection> found = detector_->Detect(image);
       milliseconds_.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
               .count());
@@ -198,8 +205,8 @@ class Evaluation {
       }
       if (options_.tracking && folder.is_drive) {
         const std::int64_t last_ns = recording.empty() ? 0 : recording.back().stamp_ns;
-        recording.push_back(
-            ToTrackerFrame(found, image.size(), frame.chainage_m, last_ns, options_.tracked));
+        recording.push_back(evaluation::ToTrackerFrame(found, image.size(), frame.chainage_m,
+                                                       last_ns, options_.tracked));
       }
       progress.At(milliseconds_.size());
     }
@@ -216,10 +223,11 @@ class Evaluation {
     recordings_.push_back(std::move(recording));
   }
 
-  static std::vector<cv::Rect2f> BoxesOf(const std::vector<LabelledFrame::Label>& labels,
-                                         cv::Size size, const std::string& class_name) {
+  static std::vector<cv::Rect2f> BoxesOf(
+      const std::vector<evaluation::LabelledFrame::Label>& labels, cv::Size size,
+      const std::string& class_name) {
     std::vector<cv::Rect2f> boxes;
-    for (const LabelledFrame::Label& label : labels) {
+    for (const evaluation::LabelledFrame::Label& label : labels) {
       if (label.class_name != class_name) continue;
       boxes.emplace_back(label.box.x * size.width, label.box.y * size.height,
                          label.box.width * size.width, label.box.height * size.height);
@@ -227,13 +235,14 @@ class Evaluation {
     return boxes;
   }
 
-  static ScoredFrame Score(const LabelledFrame& frame, const std::vector<HazardDetection>& found,
-                           cv::Size size, const std::string& class_name) {
-    ScoredFrame scored;
+  static evaluation::ScoredFrame Score(const evaluation::LabelledFrame& frame,
+                                       const std::vector<perception::HazardDetection>& found,
+                                       cv::Size size, const std::string& class_name) {
+    evaluation::ScoredFrame scored;
     scored.chainage_m = frame.chainage_m;
     scored.labels = BoxesOf(frame.labels, size, class_name);
     scored.difficult = BoxesOf(frame.difficult, size, class_name);
-    for (const HazardDetection& detection : found) {
+    for (const perception::HazardDetection& detection : found) {
       if (detection.class_name == class_name) {
         scored.detections.push_back({detection.box, detection.confidence});
       }
@@ -243,10 +252,10 @@ class Evaluation {
 
   const Options& options_;
   std::vector<float> thresholds_;
-  std::unique_ptr<HazardDetector> detector_;
+  std::unique_ptr<perception::HazardDetector> detector_;
   std::map<std::string, ClassFrames> by_class_;
   std::vector<double> milliseconds_;
-  std::vector<std::vector<TrackerFrame>> recordings_;  ///< By folder; with --tracking.
+  std::vector<std::vector<perception::TrackerFrame>> recordings_;  ///< By folder; with --tracking.
   std::map<std::string, std::vector<std::size_t>> drive_recordings_;  ///< By class, as its drives.
 };
 
@@ -262,14 +271,15 @@ void RefuseRepeated(const std::vector<std::string>& folders) {
 }
 
 /// All folders, read before the long work, so that a mistake in the last one shows at once.
-std::vector<LabelledFolder> ReadFolders(const Options& options, const ModelManifest& manifest) {
-  LabelledFolderConfig reading = options.labels;
+std::vector<evaluation::LabelledFolder> ReadFolders(const Options& options,
+                                                    const perception::ModelManifest& manifest) {
+  evaluation::LabelledFolderConfig reading = options.labels;
   reading.model_classes = manifest.classes;
-  std::vector<LabelledFolder> folders;
+  std::vector<evaluation::LabelledFolder> folders;
   RefuseRepeated(options.folders);
   for (const std::string& path : options.folders) {
     std::optional<std::string> deduced;
-    folders.push_back(ReadLabelledFolder(path, reading, &deduced));
+    folders.push_back(evaluation::ReadLabelledFolder(path, reading, &deduced));
     if (deduced) std::cerr << *deduced << "\n";
     const std::vector<std::string>& classes = folders.back().classes;
     const bool known = std::any_of(classes.begin(), classes.end(), [&](const std::string& name) {
@@ -282,7 +292,7 @@ std::vector<LabelledFolder> ReadFolders(const Options& options, const ModelManif
   }
   if (!options.errors.empty() &&
       std::none_of(folders.begin(), folders.end(),
-                   [](const LabelledFolder& folder) { return folder.is_drive; })) {
+                   [](const evaluation::LabelledFolder& folder) { return folder.is_drive; })) {
     throw Error("--errors needs a drive, a DIR with frames.csv");
   }
   return folders;
@@ -291,19 +301,20 @@ std::vector<LabelledFolder> ReadFolders(const Options& options, const ModelManif
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  const ModelManifest manifest = ReadModelManifest(options->model);
-  const std::vector<LabelledFolder> folders = ReadFolders(*options, manifest);
+  const perception::ModelManifest manifest = perception::ReadModelManifest(options->model);
+  const std::vector<evaluation::LabelledFolder> folders = ReadFolders(*options, manifest);
   Evaluation evaluation(manifest, *options);
   evaluation.Run(folders);
-  const DetectionReport report = evaluation.Report();
+  const evaluation::DetectionReport report = evaluation.Report();
   if (!options->errors.empty()) std::cerr << "errors: " << options->errors << "/errors.csv\n";
-  std::cout << (options->json ? ToJson(report).dump() + "\n" : ToText(report));
+  std::cout << (options->json ? evaluation::ToJson(report).dump() + "\n"
+                              : evaluation::ToText(report));
   return 0;
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_evaluate_detection", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_detection", argc, argv, livemap::tools::Run);
 }

@@ -16,14 +16,14 @@
 #include "tools/common/shipped_model.h"
 #include "tools/detection/detection_tool_support.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 struct Options {
   std::vector<std::string> images;
   std::string model;
   std::string output;
-  PrivacyMask::Config mask;
+  perception::PrivacyMask::Config mask;
   int threads = 0;
 };
 
@@ -49,7 +49,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.images = line.Positionals();
   options.model = line.Text("model", ShippedModel(kDefaultDetector));
   options.output = line.Text("output", "");
-  PrivateRegionConfig& regions = options.mask.regions;
+  perception::PrivateRegionConfig& regions = options.mask.regions;
   regions.cascades = line.Text("cascades", regions.cascades);
   regions.face_model = line.Text("face-model", regions.face_model);
   regions.min_side_px = line.Whole("min-side", regions.min_side_px, 8, 1000);
@@ -83,8 +83,9 @@ void Write(const Options& options, const std::string& source, const cv::Mat& mas
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  HazardDetector detector(ReadModelManifest(options->model), options->threads);
-  PrivacyMask mask(options->mask);
+  perception::HazardDetector detector(perception::ReadModelManifest(options->model),
+                                      options->threads);
+  perception::PrivacyMask mask(options->mask);
   std::vector<double> mask_ms, detection_ms, ratios;
   std::size_t with_masks = 0, masks = 0;
   // Far apart, so that no mask is kept from one photo to the next.
@@ -114,8 +115,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_evaluate_privacy", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_privacy", argc, argv, livemap::tools::Run);
 }

@@ -19,7 +19,7 @@
 #include "tools/common/command_line.h"
 #include "tools/common/shipped_model.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 constexpr std::size_t kCurvePoints = 400;
@@ -33,7 +33,7 @@ struct Options {
   std::string write;
   std::uint64_t seed = 1;
   std::string registration;  ///< "none", "edges", "homography" or "both".
-  double min_changed = 0;  ///< Share of the pixels that count; pairs below are left out.
+  double min_changed = 0;    ///< Share of the pixels that count; pairs below are left out.
   bool json = false;
   bool curves = false;
 };
@@ -128,8 +128,9 @@ double Median(std::vector<double> values) {
 
 /// Of the pixels that the truth does not leave out; 0 where it leaves all out.
 double ChangedShare(const cv::Mat& truth) {
-  const int known = cv::countNonZero(truth != kLeftOutPixel);
-  const int unchanged = cv::countNonZero(truth == static_cast<int>(ChangeClass::kNoChange));
+  const int known = cv::countNonZero(truth != change::kLeftOutPixel);
+  const int unchanged =
+      cv::countNonZero(truth == static_cast<int>(protocol::ChangeClass::kNoChange));
   return known == 0 ? 0 : 1 - static_cast<double>(unchanged) / known;
 }
 
@@ -141,10 +142,10 @@ class Evaluation {
     report_.has_reversed = !options.reversed_predictions.empty();
     if (!options.predictions.empty()) return;
     if (options.model.empty()) {
-      method_ = MakeChangeMethod(options.method);
+      method_ = change::MakeChangeMethod(options.method);
       report_.method = options.method;
     } else {
-      auto network = MakeChangeNetwork(options.model);
+      auto network = change::MakeChangeNetwork(options.model);
       report_.method = network->manifest().name;
       regions_.min_confidence = network->manifest().changed;
       method_ = std::move(network);
@@ -152,87 +153,91 @@ class Evaluation {
     report_.has_reversed = true;
   }
 
-  void Add(const ChangePairFiles& files) {
-    const ChangePair pair = LoadChangePair(files);
+  void Add(const change::ChangePairFiles& files) {
+    const change::ChangePair pair = change::LoadChangePair(files);
     if (ChangedShare(pair.truth) < options_.min_changed) {
       ++report_.hardly_changed;
       return;
     }
     report_.unknown_colour_pixels += pair.unknown_colour_pixels;
-    const ChangeProbabilities forward = Forward(files, pair);
+    const change::ChangeProbabilities forward = Forward(files, pair);
     Count(files.name, forward, pair, report_.forward);
     if (registered_ && !pair.direction.empty()) CountRegions(forward, pair);
     if (report_.has_reversed) Count(files.name, Reversed(files, pair), pair, report_.reversed);
     if (options_.write.empty()) return;
-    WriteScorePicture(options_.write + "/" + files.name + ".png", forward);
-    WriteClassPicture(options_.write + "/" + files.name + "_class.png", MostLikely(forward));
+    change::WriteScorePicture(options_.write + "/" + files.name + ".png", forward);
+    change::WriteClassPicture(options_.write + "/" + files.name + "_class.png",
+                              change::MostLikely(forward));
   }
 
-  ChangeReport Report() {
+  change::ChangeReport Report() {
     report_.method_ms_p50 = Median(method_ms_);
     report_.registration_ms_p50 = Median(registration_ms_);
     return report_;
   }
 
  private:
-  static void Count(const std::string& name, const ChangeProbabilities& probabilities,
-                    const ChangePair& pair, ChangeFigures& figures) {
+  static void Count(const std::string& name, const change::ChangeProbabilities& probabilities,
+                    const change::ChangePair& pair, change::ChangeFigures& figures) {
     figures.pooled.Add(probabilities, pair.truth, pair.with_classes);
     figures.community.Add(name, probabilities, pair.truth);
   }
 
-  void CountRegions(const ChangeProbabilities& measured, const ChangePair& pair) {
-    const cv::Mat before = FillUnknown(aligned_.before, aligned_.after, aligned_.valid);
-    ChangeProbabilities probabilities;
+  void CountRegions(const change::ChangeProbabilities& measured, const change::ChangePair& pair) {
+    const cv::Mat before = change::FillUnknown(aligned_.before, aligned_.after, aligned_.valid);
+    change::ChangeProbabilities probabilities;
     for (const cv::Mat& of_class : measured.of_class) {
       probabilities.of_class.push_back(of_class.clone());
     }
-    MaskUnobserved(aligned_.valid, probabilities);
+    change::MaskUnobserved(aligned_.valid, probabilities);
     if (!report_.directions) report_.directions.emplace();
-    CountDirections(FindChangeRegions(probabilities, before, aligned_.after, regions_),
-                    ChangedClasses(probabilities, regions_.min_confidence), pair.direction,
-                    *report_.directions);
+    change::CountDirections(
+        change::FindChangeRegions(probabilities, before, aligned_.after, regions_),
+        change::ChangedClasses(probabilities, regions_.min_confidence), pair.direction,
+        *report_.directions);
   }
 
-  ChangeProbabilities Forward(const ChangePairFiles& files, const ChangePair& pair) {
+  change::ChangeProbabilities Forward(const change::ChangePairFiles& files,
+                                      const change::ChangePair& pair) {
     if (method_ == nullptr) {
-      return ReadPrediction(options_.predictions, files.name, pair.truth.size());
+      return change::ReadPrediction(options_.predictions, files.name, pair.truth.size());
     }
     aligned_ = Align(files, pair);
     const auto start = std::chrono::steady_clock::now();
-    ChangeProbabilities probabilities = Measured(aligned_);
+    change::ChangeProbabilities probabilities = Measured(aligned_);
     if (registered_) method_ms_.push_back(MillisecondsSince(start));
     return probabilities;
   }
 
   /// After Forward of the same pair: the view stays that of the later picture, whose mask the truth
   /// is.
-  ChangeProbabilities Reversed(const ChangePairFiles& files, const ChangePair& pair) {
+  change::ChangeProbabilities Reversed(const change::ChangePairFiles& files,
+                                       const change::ChangePair& pair) {
     if (method_ == nullptr) {
-      return ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
+      return change::ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
     }
     return Measured({aligned_.after, aligned_.before, aligned_.valid});
   }
 
   /// A network's scores are probabilities, so it can say how little it knows of what was not seen;
   /// a distance can't, and says that nothing has changed.
-  ChangeProbabilities Measured(const AlignedPair& pair) {
+  change::ChangeProbabilities Measured(const change::AlignedPair& pair) {
     if (!options_.model.empty()) return method_->Estimate(pair);
     return registered_ ? method_->Run(pair)
-                       : NothingChanged(pair.after.size(), method_->tells_classes());
+                       : change::NothingChanged(pair.after.size(), method_->tells_classes());
   }
 
   /// As on board, or by one of the two ways alone.
-  Registration Register(const ChangePair& pair) const {
-    Registration by_edges;
+  change::Registration Register(const change::ChangePair& pair) const {
+    change::Registration by_edges;
     if (options_.registration != "homography") {
-      by_edges = RegisterByEdges(pair.before, pair.after, RegistrationConfig());
+      by_edges = change::RegisterByEdges(pair.before, pair.after, change::RegistrationConfig());
       if (by_edges.accepted() || options_.registration == "edges") return by_edges;
     }
-    const FeaturedView before{pair.before.size(), ExtractFeatures(pair.before)};
-    const FeaturedView after{pair.after.size(), ExtractFeatures(pair.after)};
-    Registration by_features =
-        RegisterByHomography(before, after, RegistrationConfig(), options_.seed);
+    const change::FeaturedView before{pair.before.size(), change::ExtractFeatures(pair.before)};
+    const change::FeaturedView after{pair.after.size(), change::ExtractFeatures(pair.after)};
+    change::Registration by_features =
+        change::RegisterByHomography(before, after, change::RegistrationConfig(), options_.seed);
     if (!by_features.accepted() && !by_edges.why.empty()) {
       by_features.why = by_edges.why + "; " + by_features.why;
     }
@@ -240,32 +245,33 @@ class Evaluation {
   }
 
   /// Of a refused pair nothing earlier is known.
-  AlignedPair Align(const ChangePairFiles& files, const ChangePair& pair) {
+  change::AlignedPair Align(const change::ChangePairFiles& files, const change::ChangePair& pair) {
     registered_ = true;
     if (options_.registration == "none") {
       return {pair.before, pair.after, cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255))};
     }
     const auto start = std::chrono::steady_clock::now();
-    const Registration registration = Register(pair);
+    const change::Registration registration = Register(pair);
     if (!registration.accepted()) {
       ++report_.refused;
       report_.refusals.push_back(files.name + ": " + registration.why);
       registered_ = false;
       return {pair.after, pair.after, cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(0))};
     }
-    const WarpedPicture warped = WarpByHomography(pair.before, registration.after_from_before);
+    const change::WarpedPicture warped =
+        change::WarpByHomography(pair.before, registration.after_from_before);
     registration_ms_.push_back(MillisecondsSince(start));
     return {warped.picture, pair.after, warped.valid};
   }
 
   const Options& options_;
-  std::unique_ptr<ChangeMethod> method_;
-  ChangeRegionConfig regions_;
-  AlignedPair aligned_;      ///< Of the pair that was added last.
-  bool registered_ = false;  ///< It was not refused.
+  std::unique_ptr<change::ChangeMethod> method_;
+  change::ChangeRegionConfig regions_;
+  change::AlignedPair aligned_;  ///< Of the pair that was added last.
+  bool registered_ = false;      ///< It was not refused.
   std::vector<double> method_ms_;
   std::vector<double> registration_ms_;
-  ChangeReport report_;
+  change::ChangeReport report_;
 };
 
 /// Whose scores lie in the folder, so that nobody draws them as another method's.
@@ -280,14 +286,14 @@ void WriteOrigin(const std::string& folder, const std::string& method,
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  const std::vector<ChangePairFiles> pairs = FindChangePairs(options->directories);
+  const std::vector<change::ChangePairFiles> pairs = change::FindChangePairs(options->directories);
   Evaluation evaluation(*options);
   Progress progress("comparing", pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     evaluation.Add(pairs[i]);
     progress.At(i + 1);
   }
-  ChangeReport report = evaluation.Report();
+  change::ChangeReport report = evaluation.Report();
   for (const std::string& directory : options->directories) {
     report.directories.push_back(std::filesystem::canonical(directory).string());
   }
@@ -296,14 +302,15 @@ int Run(int argc, char** argv) {
                 std::to_string(options->min_changed) + " that --least-changed accepts");
   }
   if (!options->write.empty()) WriteOrigin(options->write, report.method, report.directories);
-  std::cout << (options->json ? ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"
-                              : ToText(report));
+  std::cout << (options->json
+                    ? change::ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"
+                    : change::ToText(report));
   return 0;
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_evaluate_change", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_change", argc, argv, livemap::tools::Run);
 }

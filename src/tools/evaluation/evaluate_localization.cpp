@@ -15,20 +15,20 @@
 #include "geo/wgs84.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 struct Options {
   std::string folder;
   bool json = false;
-  LocalizationTrial trial;
-  LocalizerConfig config;
+  evaluation::LocalizationTrial trial;
+  localization::LocalizerConfig config;
 };
 
-void ReadDropout(const std::string& text, LocalizationTrial& trial) {
-  const std::vector<std::string> parts = Split(text, ',');
-  const auto start_s = parts.size() == 2 ? ParseFinite(parts[0]) : std::nullopt;
-  const auto length_s = parts.size() == 2 ? ParseFinite(parts[1]) : std::nullopt;
+void ReadDropout(const std::string& text, evaluation::LocalizationTrial& trial) {
+  const std::vector<std::string> parts = datasets::Split(text, ',');
+  const auto start_s = parts.size() == 2 ? datasets::ParseFinite(parts[0]) : std::nullopt;
+  const auto length_s = parts.size() == 2 ? datasets::ParseFinite(parts[1]) : std::nullopt;
   if (!start_s || !length_s || *start_s < 0 || *length_s <= 0 || *start_s > 1e6 ||
       *length_s > 1e6) {
     throw Error("--dropout-s is '" + text + "', accepted is START,LENGTH in seconds, e.g. 30,10");
@@ -67,18 +67,18 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
                    {"hide-noise", line.Has("noise-m"), "--noise-m, which it hides"}});
   options.folder = line.Positional(0);
   options.json = line.Has("json");
-  LocalizationTrial& trial = options.trial;
+  evaluation::LocalizationTrial& trial = options.trial;
   trial.noise_m = line.Number("noise-m", trial.noise_m, 0, 1000);
   trial.outlier_share = line.Number("outliers", trial.outlier_share, 0, 1);
   trial.outlier_m = line.Number("outlier-m", trial.outlier_m, 0, 10000);
   if (line.Has("dropout-s")) ReadDropout(line.Text("dropout-s", ""), trial);
   trial.fix_sigma_m = line.Number("fix-sigma-m", trial.fix_sigma_m, 0.01, 100);
   trial.states_noise = !line.Has("hide-noise");
-  trial.gyro_bias_sigma_rps = kRadiansPerDegree * line.Number("gyro-bias-dps", 0.05, 0, 10);
-  trial.gyro_walk_rad = kRadiansPerDegree * line.Number("gyro-walk-deg", 0.02, 0, 10);
+  trial.gyro_bias_sigma_rps = geo::kRadiansPerDegree * line.Number("gyro-bias-dps", 0.05, 0, 10);
+  trial.gyro_walk_rad = geo::kRadiansPerDegree * line.Number("gyro-walk-deg", 0.02, 0, 10);
   trial.seed = line.Seed("seed", trial.seed);
-  LocalizerConfig& config = options.config;
-  ReceiverModel& receiver = config.receiver;
+  localization::LocalizerConfig& config = options.config;
+  localization::ReceiverModel& receiver = config.receiver;
   receiver.latency_s = line.Number("latency-s", receiver.latency_s, 0, 2);
   receiver.latency_sigma_s = line.Number("latency-sigma-s", receiver.latency_sigma_s, 0, 1);
   receiver.shared_sigma_m = line.Number("shared-sigma-m", 0.4, 0, 100);
@@ -87,14 +87,15 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 }
 
 /// A drop-out that takes no fix away would change nothing.
-void CheckDropout(const PositionDrive& drive, const LocalizationTrial& trial) {
+void CheckDropout(const datasets::PositionDrive& drive,
+                  const evaluation::LocalizationTrial& trial) {
   if (trial.dropout_s <= 0) return;
-  const auto after_s = [&drive](const RecordedFix& fix) {
+  const auto after_s = [&drive](const datasets::RecordedFix& fix) {
     return Seconds(fix.stamp_ns - drive.fixes.front().stamp_ns);
   };
   const double end_s = trial.dropout_start_s + trial.dropout_s;
   const bool takes_one =
-      std::any_of(drive.fixes.begin(), drive.fixes.end(), [&](const RecordedFix& fix) {
+      std::any_of(drive.fixes.begin(), drive.fixes.end(), [&](const datasets::RecordedFix& fix) {
         return after_s(fix) >= trial.dropout_start_s && after_s(fix) < end_s;
       });
   if (takes_one) return;
@@ -108,16 +109,19 @@ void CheckDropout(const PositionDrive& drive, const LocalizationTrial& trial) {
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  const PositionDrive drive = ReadComma2k19(options->folder);
+  const datasets::PositionDrive drive = datasets::ReadComma2k19(options->folder);
   CheckDropout(drive, options->trial);
-  const LocalizationReport report = EvaluateLocalization(drive, options->config, options->trial);
-  std::cout << (options->json ? ToJson(report).dump() + "\n" : ToText(report));
+  const evaluation::LocalizationReport report =
+      evaluation::EvaluateLocalization(drive, options->config, options->trial);
+  std::cout << (options->json ? evaluation::ToJson(report).dump() + "\n"
+                              : evaluation::ToText(report));
   return 0;
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_evaluate_localization", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_localization", argc, argv,
+                                    livemap::tools::Run);
 }

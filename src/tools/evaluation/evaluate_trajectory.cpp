@@ -9,7 +9,7 @@
 #include "evaluation/trajectory/trajectory_report.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 struct Options {
@@ -17,14 +17,14 @@ struct Options {
   std::string estimate_path;
   bool json = false;
   double kitti_rate_hz = 10;
-  TrajectoryConfig evaluation;
+  evaluation::TrajectoryConfig evaluation;
 };
 
-AlignmentKind ChosenAlignment(const CommandLine& line) {
+evaluation::AlignmentKind ChosenAlignment(const CommandLine& line) {
   const std::string name = line.Text("align", line.Has("scale") ? "sim3" : "se3");
-  const std::optional<AlignmentKind> kind = ParseAlignmentKind(name);
+  const std::optional<evaluation::AlignmentKind> kind = evaluation::ParseAlignmentKind(name);
   if (!kind) throw Error("--align is '" + name + "', accepted are none, se3, sim3 and origin");
-  if (line.Has("scale") && *kind != AlignmentKind::kSim3) {
+  if (line.Has("scale") && *kind != evaluation::AlignmentKind::kSim3) {
     throw Error("--scale means --align sim3, but --align is '" + name + "'");
   }
   return *kind;
@@ -63,7 +63,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.estimate_path = line.Positional(1);
   options.json = line.Has("json");
   options.kitti_rate_hz = line.Number("rate", options.kitti_rate_hz, 0.01, 10000);
-  AssociationConfig& association = options.evaluation.association;
+  evaluation::AssociationConfig& association = options.evaluation.association;
   association.max_difference_s =
       line.Number("max-difference", association.max_difference_s, 1e-6, 1000);
   association.offset_s = line.Number("offset", 0, -4e9, 4e9);
@@ -77,18 +77,20 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 int Run(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
-  const std::vector<StampedPose> truth =
-      ReadTrajectory(options->truth_path, options->kitti_rate_hz);
-  const std::vector<StampedPose> estimate =
-      ReadTrajectory(options->estimate_path, options->kitti_rate_hz);
-  const TrajectoryFigures figures = EvaluateTrajectory(truth, estimate, options->evaluation);
-  std::cout << (options->json ? ToJson(figures).dump() + "\n" : ToText(figures));
+  const std::vector<datasets::StampedPose> truth =
+      evaluation::ReadTrajectory(options->truth_path, options->kitti_rate_hz);
+  const std::vector<datasets::StampedPose> estimate =
+      evaluation::ReadTrajectory(options->estimate_path, options->kitti_rate_hz);
+  const evaluation::TrajectoryFigures figures =
+      evaluation::EvaluateTrajectory(truth, estimate, options->evaluation);
+  std::cout << (options->json ? evaluation::ToJson(figures).dump() + "\n"
+                              : evaluation::ToText(figures));
   return 0;
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_evaluate_trajectory", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_trajectory", argc, argv, livemap::tools::Run);
 }

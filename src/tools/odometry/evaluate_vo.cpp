@@ -22,7 +22,7 @@
 #include "tools/odometry/stereo_source.h"
 #include "tools/odometry/vo_method.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 struct Options {
@@ -31,31 +31,31 @@ struct Options {
   std::string method = "edge";
   std::string out;
   bool json = false;
-  std::optional<StereoConfig> stereo;  ///< None: the sequence's own depth.
+  std::optional<imaging::StereoConfig> stereo;  ///< None: the sequence's own depth.
   int step = 1;
-  EdgeOdometry::Config odometry;
+  odometry::EdgeOdometry::Config odometry;
   bool mono = false;
   MonocularOptions monocular;
   std::string one_eye_flag;  ///< One that was given and is about one eye only, or none.
 };
 
-EdgeSource ReadEdgeSource(const CommandLine& line) {
+odometry::EdgeSource ReadEdgeSource(const CommandLine& line) {
   const std::string name = line.Text("edge-source", "keyframe");
-  if (name == "keyframe") return EdgeSource::kKeyframe;
-  if (name == "new-image" || name == "new_image") return EdgeSource::kNewImage;
+  if (name == "keyframe") return odometry::EdgeSource::kKeyframe;
+  if (name == "new-image" || name == "new_image") return odometry::EdgeSource::kNewImage;
   throw Error("--edge-source is '" + name + "'; accepted are keyframe, new-image");
 }
 
-std::optional<StereoConfig> ReadStereo(const CommandLine& line) {
+std::optional<imaging::StereoConfig> ReadStereo(const CommandLine& line) {
   if (!line.Has("stereo")) return std::nullopt;
-  StereoConfig config;
+  imaging::StereoConfig config;
   config.scale = line.Whole("stereo-scale", config.scale, 1, 4);
   return config;
 }
 
 MonocularOptions ReadMonocular(const CommandLine& line) {
   MonocularOptions options;
-  options.scale_source = ParseScaleSource(line.Text("scale", "speed"));
+  options.scale_source = odometry::ParseScaleSource(line.Text("scale", "speed"));
   options.speed_sigma_mps = line.Number("speed-sigma", 0, 0, 100);
   options.camera_height_m = line.Number("camera-height", options.camera_height_m, 0.01, 100);
   options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
@@ -63,9 +63,9 @@ MonocularOptions ReadMonocular(const CommandLine& line) {
   return options;
 }
 
-EdgeExtractor::Config ReadEdges(const CommandLine& line) {
-  EdgeExtractor::Config edges;
-  edges.kind = ParseEdgeKind(line.Text("edges", "canny"));
+odometry::EdgeExtractor::Config ReadEdges(const CommandLine& line) {
+  odometry::EdgeExtractor::Config edges;
+  edges.kind = odometry::ParseEdgeKind(line.Text("edges", "canny"));
   edges.structured_model = line.Text("edge-model", "");
   const bool has_model = std::filesystem::is_regular_file(edges.structured_model);
   if (line.Has("edge-model") && !has_model) {
@@ -152,7 +152,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 }
 
 /// In TUM's layout, or in KITTI's, which has a calib.txt.
-Sequence ReadSequence(const Options& options) {
+datasets::Sequence ReadSequence(const Options& options) {
   constexpr double kKittiRateHz = 10;
   const std::filesystem::path root(options.sequence);
   const auto has = [&root](const char* name) { return std::filesystem::exists(root / name); };
@@ -160,20 +160,21 @@ Sequence ReadSequence(const Options& options) {
     if (!options.camera_file.empty()) {
       throw Error("--camera needs TUM's layout, and '" + options.sequence + "' has a calib.txt");
     }
-    return ReadKittiSequence(options.sequence, kKittiRateHz);
+    return datasets::ReadKittiSequence(options.sequence, kKittiRateHz);
   }
   if (std::filesystem::is_directory(root) && !has("rgb.txt") && !has("associations.txt")) {
     throw Error("'" + options.sequence +
                 "' is no sequence: TUM's have rgb.txt or associations.txt, KITTI's calib.txt");
   }
   const bool wants_depth = !options.mono && !options.stereo;
-  return ReadTumSequence(options.sequence, options.camera_file,
-                         wants_depth ? DepthImages::kRead : DepthImages::kIgnored);
+  return datasets::ReadTumSequence(
+      options.sequence, options.camera_file,
+      wants_depth ? datasets::DepthImages::kRead : datasets::DepthImages::kIgnored);
 }
 
 struct Run {
-  std::vector<StampedPose> trajectory;  ///< Without the frames before the start.
-  std::vector<double> milliseconds;     ///< Of every frame.
+  std::vector<datasets::StampedPose> trajectory;  ///< Without the frames before the start.
+  std::vector<double> milliseconds;               ///< Of every frame.
   std::vector<double> stereo_milliseconds;
   std::size_t initialising = 0;
   std::size_t lost = 0;
@@ -181,7 +182,7 @@ struct Run {
 };
 
 /// Whether one eye is all there is, or all that was asked for.
-bool IsMonocular(const Sequence& sequence, const Options& options) {
+bool IsMonocular(const datasets::Sequence& sequence, const Options& options) {
   if (options.stereo) return false;
   return options.mono || sequence.frames.front().depth_path.empty();
 }
@@ -201,8 +202,8 @@ void AddStep(const VoMethod::Step& step, std::int64_t stamp_ns, Run& run) {
   run.trajectory.push_back({stamp_ns, step.world_from_camera});
 }
 
-std::unique_ptr<VoMethod> MethodFor(const Sequence& sequence, const CameraIntrinsics& camera,
-                                    const Options& options) {
+std::unique_ptr<VoMethod> MethodFor(const datasets::Sequence& sequence,
+                                    const geo::CameraIntrinsics& camera, const Options& options) {
   if (!IsMonocular(sequence, options)) {
     if (!options.one_eye_flag.empty()) {
       throw Error("--" + options.one_eye_flag +
@@ -218,8 +219,8 @@ std::unique_ptr<VoMethod> MethodFor(const Sequence& sequence, const CameraIntrin
                              static_cast<std::size_t>(options.step));
 }
 
-Run FollowSequence(const Sequence& sequence, const Options& options) {
-  const CameraIntrinsics camera = IntrinsicsOf(sequence);
+Run FollowSequence(const datasets::Sequence& sequence, const Options& options) {
+  const geo::CameraIntrinsics camera = IntrinsicsOf(sequence);
   const auto method = MethodFor(sequence, camera, options);
   const bool has_depth = !IsMonocular(sequence, options) && !options.stereo;
   Run run;
@@ -228,7 +229,7 @@ Run FollowSequence(const Sequence& sequence, const Options& options) {
   Progress progress("following", sequence.frames.size());
   cv::Mat grey, depth;
   for (std::size_t i = 0; i < sequence.frames.size(); i += static_cast<std::size_t>(options.step)) {
-    const SequenceFrame& source = sequence.frames[i];
+    const datasets::SequenceFrame& source = sequence.frames[i];
     if (has_depth && source.depth_path.empty()) {
       throw Error("'" + source.image_path + "' has no depth, but the pictures before it have");
     }
@@ -258,10 +259,11 @@ void CheckWritable(const std::string& path) {
   if (!was_there) std::filesystem::remove(path, ignored);
 }
 
-void WriteTrajectory(const std::string& path, const std::vector<StampedPose>& trajectory) {
+void WriteTrajectory(const std::string& path,
+                     const std::vector<datasets::StampedPose>& trajectory) {
   std::ofstream file(path);
   file << "# timestamp tx ty tz qx qy qz qw (camera to world)\n";
-  for (const StampedPose& pose : trajectory) {
+  for (const datasets::StampedPose& pose : trajectory) {
     const Eigen::Quaterniond q(pose.world_from_camera.linear());
     const Eigen::Vector3d t = pose.world_from_camera.translation();
     file << pose.stamp_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0')
@@ -275,7 +277,7 @@ void WriteTrajectory(const std::string& path, const std::vector<StampedPose>& tr
   if (!file) throw Error("the trajectory '" + path + "' cannot be written");
 }
 
-void SayItNeverStarted(const Sequence& sequence, const Options& options, const Run& run) {
+void SayItNeverStarted(const datasets::Sequence& sequence, const Options& options, const Run& run) {
   std::cerr << "livemap_evaluate_vo: visual odometry never started in " << run.milliseconds.size()
             << " frames: "
             << (IsMonocular(sequence, options)
@@ -284,13 +286,16 @@ void SayItNeverStarted(const Sequence& sequence, const Options& options, const R
             << "; there are no poses, and the errors are null\n";
 }
 
-nlohmann::ordered_json Report(const Sequence& sequence, const Options& options, const Run& run) {
+nlohmann::ordered_json Report(const datasets::Sequence& sequence, const Options& options,
+                              const Run& run) {
   const bool has_figures = !sequence.poses.empty() && !run.trajectory.empty();
   nlohmann::ordered_json json =
-      has_figures ? ToJson(EvaluateTrajectory(sequence.poses, run.trajectory, {})) : NullFigures();
-  json["median_ms"] = Quantile(run.milliseconds, 0.5);
-  json["p95_ms"] = Quantile(run.milliseconds, 0.95);
-  if (options.stereo) json["stereo_ms"] = Quantile(run.stereo_milliseconds, 0.5);
+      has_figures
+          ? evaluation::ToJson(evaluation::EvaluateTrajectory(sequence.poses, run.trajectory, {}))
+          : evaluation::NullFigures();
+  json["median_ms"] = evaluation::Quantile(run.milliseconds, 0.5);
+  json["p95_ms"] = evaluation::Quantile(run.milliseconds, 0.95);
+  if (options.stereo) json["stereo_ms"] = evaluation::Quantile(run.stereo_milliseconds, 0.5);
   json["frames"] = run.milliseconds.size();
   json["initialising"] = run.initialising;
   json["lost"] = run.lost;
@@ -324,7 +329,7 @@ int RunEvaluation(int argc, char** argv) {
   const std::optional<Options> options = ParseOptions(argc, argv);
   if (!options) return 0;
   cv::setNumThreads(1);
-  const Sequence sequence = ReadSequence(*options);
+  const datasets::Sequence sequence = ReadSequence(*options);
   if (!options->out.empty()) CheckWritable(options->out);
   const Run run = FollowSequence(sequence, *options);
   if (run.trajectory.empty()) SayItNeverStarted(sequence, *options, run);
@@ -339,8 +344,9 @@ int RunEvaluation(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_evaluate_vo", argc, argv, livemap::RunEvaluation);
+  return livemap::tools::RunProgram("livemap_evaluate_vo", argc, argv,
+                                    livemap::tools::RunEvaluation);
 }

@@ -8,11 +8,11 @@
 #include "odometry/monocular/monocular_odometry.h"
 #include "tools/odometry/vo_method.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// What tells a single camera metres in a recorded sequence.
 struct MonocularOptions {
-  ScaleSource scale_source = ScaleSource::kSpeed;
+  odometry::ScaleSource scale_source = odometry::ScaleSource::kSpeed;
   double speed_sigma_mps = 0;  ///< Noise added to the true speed, standard deviation.
   std::uint64_t seed = 1;      ///< Of that noise.
   double camera_height_m = 1.65;
@@ -23,8 +23,8 @@ struct MonocularOptions {
 /// The speed is that between the true poses before and after a frame, as a satellite receiver
 /// would measure it. Throws Error when the speed is asked for and there are no true poses.
 std::unique_ptr<VoMethod> MakeMonocularMethod(const MonocularOptions& options,
-                                              const EdgeOdometry::Config& config,
-                                              const CameraIntrinsics& intrinsics,
-                                              const Sequence& sequence, std::size_t step);
+                                              const odometry::EdgeOdometry::Config& config,
+                                              const geo::CameraIntrinsics& intrinsics,
+                                              const datasets::Sequence& sequence, std::size_t step);
 
-}  // namespace livemap
+}  // namespace livemap::tools

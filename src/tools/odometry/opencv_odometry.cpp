@@ -2,10 +2,10 @@
 
 #include <limits>
 
-namespace livemap {
+namespace livemap::tools {
 
 cv::Ptr<cv::rgbd::Odometry> MakeOpenCvOdometry(const std::string& type,
-                                               const CameraIntrinsics& camera) {
+                                               const geo::CameraIntrinsics& camera) {
   const cv::Ptr<cv::rgbd::Odometry> odometry = cv::rgbd::Odometry::create(type);
   const cv::Matx33f matrix(static_cast<float>(camera.fx), 0, static_cast<float>(camera.cx), 0,
                            static_cast<float>(camera.fy), static_cast<float>(camera.cy), 0, 0, 1);
@@ -14,7 +14,7 @@ cv::Ptr<cv::rgbd::Odometry> MakeOpenCvOdometry(const std::string& type,
 }
 
 cv::Ptr<cv::rgbd::OdometryFrame> PrepareOpenCvFrame(const cv::rgbd::Odometry& odometry,
-                                                    const RgbdFrame& frame) {
+                                                    const odometry::RgbdFrame& frame) {
   cv::Mat metres;
   frame.depth.convertTo(metres, CV_32F,
                         frame.depth.type() == CV_16UC1 ? 1 / frame.depth_units_per_m : 1.0);
@@ -45,4 +45,4 @@ cv::Mat MatrixOf(const Eigen::Isometry3d& pose) {
   return matrix;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -5,12 +5,12 @@
 
 #include "datasets/sequences.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// A picture of the camera's size, decoded with OpenCV's `flags`. Throws Error naming the file.
-cv::Mat ReadPicture(const std::string& path, const CameraIntrinsics& camera, int flags);
+cv::Mat ReadPicture(const std::string& path, const geo::CameraIntrinsics& camera, int flags);
 
 /// The sequence's camera; one without width and height has those of the first picture.
-CameraIntrinsics IntrinsicsOf(const Sequence& sequence);
+geo::CameraIntrinsics IntrinsicsOf(const datasets::Sequence& sequence);
 
-}  // namespace livemap
+}  // namespace livemap::tools

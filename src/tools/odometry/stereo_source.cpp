@@ -7,12 +7,12 @@
 #include "common/error.h"
 #include "datasets/image_file.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 /// A rectified eye, `right_m` beside the left one.
-CameraCalibration Eye(const CameraIntrinsics& k, double right_m) {
-  CameraCalibration eye;
+imaging::CameraCalibration Eye(const geo::CameraIntrinsics& k, double right_m) {
+  imaging::CameraCalibration eye;
   eye.width = k.width;
   eye.height = k.height;
   eye.k = {k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1};
@@ -20,11 +20,12 @@ CameraCalibration Eye(const CameraIntrinsics& k, double right_m) {
   return eye;
 }
 
-StereoDepth MakeStereo(const Sequence& sequence, const CameraIntrinsics& intrinsics,
-                       const StereoConfig& config) {
+imaging::StereoDepth MakeStereo(const datasets::Sequence& sequence,
+                                const geo::CameraIntrinsics& intrinsics,
+                                const imaging::StereoConfig& config) {
   const auto alone =
       std::find_if(sequence.frames.begin(), sequence.frames.end(),
-                   [](const SequenceFrame& frame) { return frame.right_path.empty(); });
+                   [](const datasets::SequenceFrame& frame) { return frame.right_path.empty(); });
   if (alone == sequence.frames.begin()) {
     throw Error(
         "the sequence has no right eye: --stereo wants rgb_right.txt beside rgb.txt, or image_1 "
@@ -43,12 +44,14 @@ StereoDepth MakeStereo(const Sequence& sequence, const CameraIntrinsics& intrins
 
 }  // namespace
 
-StereoSource::StereoSource(const Sequence& sequence, const CameraIntrinsics& intrinsics,
-                           const StereoConfig& config)
+StereoSource::StereoSource(const datasets::Sequence& sequence,
+                           const geo::CameraIntrinsics& intrinsics,
+                           const imaging::StereoConfig& config)
     : stereo_(MakeStereo(sequence, intrinsics, config)), intrinsics_(intrinsics) {}
 
-cv::Mat StereoSource::Depth(const SequenceFrame& frame, const cv::Mat& left) {
-  const ImageFile file = ReadImageFile(frame.right_path, intrinsics_.width, intrinsics_.height);
+cv::Mat StereoSource::Depth(const datasets::SequenceFrame& frame, const cv::Mat& left) {
+  const datasets::ImageFile file =
+      datasets::ReadImageFile(frame.right_path, intrinsics_.width, intrinsics_.height);
   const cv::Mat right = cv::imdecode(file.bytes, cv::IMREAD_COLOR);
   const auto start = std::chrono::steady_clock::now();
   cv::Mat depth = stereo_.Compute(left, right);
@@ -57,4 +60,4 @@ cv::Mat StereoSource::Depth(const SequenceFrame& frame, const cv::Mat& left) {
   return depth;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -3,28 +3,28 @@
 #include "common/error.h"
 #include "tools/odometry/opencv_odometry.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 class EdgeMethod : public VoMethod {
  public:
-  EdgeMethod(const EdgeOdometry::Config& config, const CameraIntrinsics& intrinsics)
+  EdgeMethod(const odometry::EdgeOdometry::Config& config, const geo::CameraIntrinsics& intrinsics)
       : odometry_(config, intrinsics) {}
-  Step Track(const RgbdFrame& frame) override {
-    const VoResult result = odometry_.Track(frame);
-    return {result.world_from_camera, result.state == VoState::kLost, result.new_keyframe,
-            result.state == VoState::kInitialising};
+  Step Track(const odometry::RgbdFrame& frame) override {
+    const odometry::VoResult result = odometry_.Track(frame);
+    return {result.world_from_camera, result.state == odometry::VoState::kLost, result.new_keyframe,
+            result.state == odometry::VoState::kInitialising};
   }
 
  private:
-  EdgeOdometry odometry_;
+  odometry::EdgeOdometry odometry_;
 };
 
 class OpenCvMethod : public VoMethod {
  public:
-  OpenCvMethod(const std::string& type, const CameraIntrinsics& intrinsics)
+  OpenCvMethod(const std::string& type, const geo::CameraIntrinsics& intrinsics)
       : odometry_(MakeOpenCvOdometry(type, intrinsics)) {}
-  Step Track(const RgbdFrame& frame) override {
+  Step Track(const odometry::RgbdFrame& frame) override {
     cv::Ptr<cv::rgbd::OdometryFrame> current = PrepareOpenCvFrame(*odometry_, frame);
     Step step;
     cv::Mat motion;
@@ -44,12 +44,13 @@ class OpenCvMethod : public VoMethod {
 
 }  // namespace
 
-std::unique_ptr<VoMethod> MakeVoMethod(const std::string& name, const EdgeOdometry::Config& config,
-                                       const CameraIntrinsics& intrinsics) {
+std::unique_ptr<VoMethod> MakeVoMethod(const std::string& name,
+                                       const odometry::EdgeOdometry::Config& config,
+                                       const geo::CameraIntrinsics& intrinsics) {
   if (name == "edge") return std::make_unique<EdgeMethod>(config, intrinsics);
   if (name == "rgbd") return std::make_unique<OpenCvMethod>("RgbdOdometry", intrinsics);
   if (name == "rgbd-icp") return std::make_unique<OpenCvMethod>("RgbdICPOdometry", intrinsics);
   throw Error("--method is '" + name + "'; accepted are edge, rgbd, rgbd-icp");
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -8,7 +8,7 @@
 
 #include "odometry/edge/edge_odometry.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// One way to follow a camera through a sequence.
 class VoMethod {
@@ -22,13 +22,14 @@ class VoMethod {
     std::optional<std::int64_t> origin_stamp_ns{};
   };
   virtual ~VoMethod() = default;
-  virtual Step Track(const RgbdFrame& frame) = 0;
+  virtual Step Track(const odometry::RgbdFrame& frame) = 0;
 };
 
 /// "edge" is ours with `config`; "rgbd" and "rgbd-icp" are OpenCV's RgbdOdometry and
 /// RgbdICPOdometry, frame to frame with their default settings. Throws Error naming what is
 /// accepted.
-std::unique_ptr<VoMethod> MakeVoMethod(const std::string& name, const EdgeOdometry::Config& config,
-                                       const CameraIntrinsics& intrinsics);
+std::unique_ptr<VoMethod> MakeVoMethod(const std::string& name,
+                                       const odometry::EdgeOdometry::Config& config,
+                                       const geo::CameraIntrinsics& intrinsics);
 
-}  // namespace livemap
+}  // namespace livemap::tools

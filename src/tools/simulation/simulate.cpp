@@ -11,7 +11,7 @@
 #include "tools/simulation/simulation_flags.h"
 #include "tools/simulation/simulation_outputs.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 std::vector<Flag> Flags() {
@@ -41,8 +41,8 @@ std::vector<Flag> Flags() {
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
 }
 
-DrivingStyle ReadStyle(const CommandLine& line) {
-  DrivingStyle style;
+simulation::DrivingStyle ReadStyle(const CommandLine& line) {
+  simulation::DrivingStyle style;
   style.speed_mps = line.Number("speed", style.speed_mps, 0.5, 30);
   style.seconds = line.Number("seconds", 20, 0.1, 7200);
   style.stops = line.Has("stops");
@@ -50,9 +50,10 @@ DrivingStyle ReadStyle(const CommandLine& line) {
 }
 
 /// The camera's view at a time, and where it will be when the exposure ends.
-CameraExposure ViewAt(const VehicleMotion& motion, const SimulationSetup& setup, double time_s) {
+simulation::CameraExposure ViewAt(const simulation::VehicleMotion& motion,
+                                  const SimulationSetup& setup, double time_s) {
   const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
-  CameraExposure camera;
+  simulation::CameraExposure camera;
   camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
   camera.world_from_optical_end =
       motion.WorldFromBase(time_s + setup.camera.exposure_s) * base_from_optical;
@@ -84,21 +85,22 @@ int Run(int argc, char** argv) {
   RefuseChangeFlags(line);
   RefuseNoOutput(line);
   const std::uint64_t seed = line.Seed("seed", 1);
-  const Condition condition = ReadCondition(line, "condition", "day");
-  const DrivingStyle style = ReadStyle(line);
+  const simulation::Condition condition = ReadCondition(line, "condition", "day");
+  const simulation::DrivingStyle style = ReadStyle(line);
   const double seconds = style.seconds;
   const double rate_hz = line.Number("rate", 10, 0.1, 100);
   SimulationSetup setup = ReadSimulationSetup(line);
-  RenderConfig options;
+  simulation::RenderConfig options;
   options.threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   options.smooth_edges = !line.Has("one-ray");
-  const WorldDescription world = ReadSimulatedWorld(line, setup);
+  const simulation::WorldDescription world = ReadSimulatedWorld(line, setup);
 
-  const Street street(world, seed, seconds * style.speed_mps * 1.1 + 300,
-                      condition != Condition::kSnow);
-  const VehicleMotion motion(street, style, 0);
+  const simulation::Street street(world, seed, seconds * style.speed_mps * 1.1 + 300,
+                                  condition != simulation::Condition::kSnow);
+  const simulation::VehicleMotion motion(street, style, 0);
   CheckRouteHolds(line, street.line().length_m(), motion.AlongM(seconds));
-  StreetRenderer renderer(street, setup.camera, MakeLighting(condition, seed), options);
+  simulation::StreetRenderer renderer(street, setup.camera,
+                                      simulation::MakeLighting(condition, seed), options);
   const auto frames =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(seconds * rate_hz)));
   SimulationOutputs outputs(line, setup, rate_hz, frames);
@@ -107,9 +109,9 @@ int Run(int argc, char** argv) {
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < frames; ++i) {
     const double time_s = static_cast<double>(i) / rate_hz;
-    CameraExposure camera = ViewAt(motion, setup, time_s);
+    simulation::CameraExposure camera = ViewAt(motion, setup, time_s);
     const auto number = static_cast<std::uint32_t>(i);
-    const SimulatedFrame frame = renderer.Render(camera, number);
+    const simulation::SimulatedFrame frame = renderer.Render(camera, number);
     cv::Mat right;
     if (setup.baseline_m > 0) {
       const Eigen::Translation3d beside(setup.baseline_m, 0, 0);
@@ -130,8 +132,8 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::RunProgram("livemap_simulate", argc, argv, livemap::Run);
+  return livemap::tools::RunProgram("livemap_simulate", argc, argv, livemap::tools::Run);
 }

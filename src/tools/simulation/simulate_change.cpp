@@ -17,7 +17,7 @@
 #include "tools/simulation/simulation_outputs.h"
 #include "tools/simulation/simulation_setup.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 constexpr std::uint64_t kSecondLight = 43;
@@ -29,17 +29,17 @@ constexpr double kDiagramWidth = 400;
 
 struct ChangeRun {
   std::uint64_t seed = 1;
-  Condition first = Condition::kDay;
-  Condition second = Condition::kDay;
+  simulation::Condition first = simulation::Condition::kDay;
+  simulation::Condition second = simulation::Condition::kDay;
   double changes = 0.25;
   double speed_mps = 8;
   double rate_hz = 10;
   double seconds = 20;
   std::size_t pairs = 1;
   double length_m = 0;  ///< Of the road that both passes may need.
-  WorldDescription world;
+  simulation::WorldDescription world;
   SimulationSetup setup;
-  RenderConfig options;
+  simulation::RenderConfig options;
   std::string preview;
 };
 
@@ -60,9 +60,10 @@ ChangeRun ReadRun(const CommandLine& line) {
   run.seconds = line.Number("seconds", 20, 0.1, 7200);
   run.pairs =
       std::max<std::size_t>(1, static_cast<std::size_t>(std::floor(run.seconds * run.rate_hz)));
-  if (run.pairs > ChangeDatasetWriter::kMaxPairs) {
+  if (run.pairs > simulation::ChangeDatasetWriter::kMaxPairs) {
     throw Error("--seconds times --rate is " + std::to_string(run.pairs) +
-                " pairs, accepted are up to " + std::to_string(ChangeDatasetWriter::kMaxPairs));
+                " pairs, accepted are up to " +
+                std::to_string(simulation::ChangeDatasetWriter::kMaxPairs));
   }
   run.length_m = run.seconds * run.speed_mps * 1.4 + 320;
   run.setup = ReadSimulationSetup(line);
@@ -73,23 +74,29 @@ ChangeRun ReadRun(const CommandLine& line) {
   return run;
 }
 
-Street MakeStreet(const ChangeRun& run, StreetPass::Which which) {
-  const Condition condition = which == StreetPass::Which::kFirst ? run.first : run.second;
-  return {run.world, run.seed, run.length_m, condition != Condition::kSnow, {which, run.changes}};
+simulation::Street MakeStreet(const ChangeRun& run, simulation::StreetPass::Which which) {
+  const simulation::Condition condition =
+      which == simulation::StreetPass::Which::kFirst ? run.first : run.second;
+  return {run.world,
+          run.seed,
+          run.length_m,
+          condition != simulation::Condition::kSnow,
+          {which, run.changes}};
 }
 
 /// The first pass, of which only the pictures are rendered that a pair wants.
 class FirstPass {
  public:
   explicit FirstPass(const ChangeRun& run)
-      : street_(MakeStreet(run, StreetPass::Which::kFirst)),
+      : street_(MakeStreet(run, simulation::StreetPass::Which::kFirst)),
         drive_(street_, Manner(run), run.setup.mounting, run.setup.camera.exposure_s),
-        renderer_(street_, run.setup.camera, MakeLighting(run.first, run.seed), run.options) {}
+        renderer_(street_, run.setup.camera, simulation::MakeLighting(run.first, run.seed),
+                  run.options) {}
 
-  const PassPicture& Near(double along_m) {
+  const simulation::PassPicture& Near(double along_m) {
     const std::size_t frame = drive_.Nearest(along_m);
     if (frame != rendered_) {
-      const CameraExposure camera = drive_.Camera(frame);
+      const simulation::CameraExposure camera = drive_.Camera(frame);
       picture_ = {renderer_.Render(camera, static_cast<std::uint32_t>(frame)), camera.along_m};
       rendered_ = frame;
     }
@@ -97,8 +104,8 @@ class FirstPass {
   }
 
  private:
-  static PassManner Manner(const ChangeRun& run) {
-    PassManner manner;
+  static simulation::PassManner Manner(const ChangeRun& run) {
+    simulation::PassManner manner;
     manner.speed_mps = run.speed_mps;
     manner.rate_hz = kFirstRateHz;
     // The second may be a fifth faster.
@@ -106,18 +113,18 @@ class FirstPass {
     return manner;
   }
 
-  Street street_;
-  PassDrive drive_;
-  StreetRenderer renderer_;
+  simulation::Street street_;
+  simulation::PassDrive drive_;
+  simulation::StreetRenderer renderer_;
   std::optional<std::size_t> rendered_;
-  PassPicture picture_;
+  simulation::PassPicture picture_;
 };
 
-void AddToSheet(const PassPicture& first, const PassPicture& second, const cv::Mat& mask,
-                std::vector<cv::Mat>& sheet) {
+void AddToSheet(const simulation::PassPicture& first, const simulation::PassPicture& second,
+                const cv::Mat& mask, std::vector<cv::Mat>& sheet) {
   const double scale = kDiagramWidth / second.frame.bgr.cols;
   for (const cv::Mat& picture :
-       {first.frame.bgr, second.frame.bgr, OverlayChanges(second.frame.bgr, mask)}) {
+       {first.frame.bgr, second.frame.bgr, simulation::OverlayChanges(second.frame.bgr, mask)}) {
     cv::Mat small;
     cv::resize(picture, small, cv::Size(), scale, scale, cv::INTER_AREA);
     sheet.push_back(small);
@@ -143,25 +150,28 @@ void RefuseChangeFlags(const CommandLine& line) {
 int SimulateChange(const CommandLine& line) {
   const ChangeRun run = ReadRun(line);
   FirstPass first(run);
-  const Street street = MakeStreet(run, StreetPass::Which::kSecond);
-  const PassDrive drive(street, DrawSecondManner(run.seed, run.speed_mps, run.rate_hz, run.seconds),
-                        run.setup.mounting, run.setup.camera.exposure_s);
+  const simulation::Street street = MakeStreet(run, simulation::StreetPass::Which::kSecond);
+  const simulation::PassDrive drive(
+      street, simulation::DrawSecondManner(run.seed, run.speed_mps, run.rate_hz, run.seconds),
+      run.setup.mounting, run.setup.camera.exposure_s);
   CheckRouteHolds(line, street.line().length_m(), drive.AlongM(run.pairs));
-  const std::uint64_t light = CounterRandom(run.seed, kSecondLight).Bits();
-  StreetRenderer renderer(street, run.setup.camera, MakeLighting(run.second, light), run.options);
-  ChangeTruth truth(run.world, run.seed, run.length_m, run.second != Condition::kSnow, run.changes,
-                    run.setup.camera, run.options.threads);
-  ChangeDatasetWriter writer(line.Text("change", ""), run.setup.camera);
+  const std::uint64_t light = simulation::CounterRandom(run.seed, kSecondLight).Bits();
+  simulation::StreetRenderer renderer(street, run.setup.camera,
+                                      simulation::MakeLighting(run.second, light), run.options);
+  simulation::ChangeTruth truth(run.world, run.seed, run.length_m,
+                                run.second != simulation::Condition::kSnow, run.changes,
+                                run.setup.camera, run.options.threads);
+  simulation::ChangeDatasetWriter writer(line.Text("change", ""), run.setup.camera);
   std::vector<cv::Mat> sheet;
   const std::size_t every = std::max<std::size_t>(1, run.pairs / kPreviewRows);
   Progress progress("pair", run.pairs);
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < run.pairs; ++i) {
-    const CameraExposure camera = drive.Camera(i);
+    const simulation::CameraExposure camera = drive.Camera(i);
     const auto number = static_cast<std::uint32_t>(i) + kSecondNoise;
-    const PassPicture second{renderer.Render(camera, number), camera.along_m};
-    const PassPicture& near = first.Near(camera.along_m);
-    const ChangeView view = truth.Look(camera);
+    const simulation::PassPicture second{renderer.Render(camera, number), camera.along_m};
+    const simulation::PassPicture& near = first.Near(camera.along_m);
+    const simulation::ChangeView view = truth.Look(camera);
     writer.Add(near, second, view);
     const bool shown = i % every == every / 2 && sheet.size() < 3 * kPreviewRows;
     if (!run.preview.empty() && shown) AddToSheet(near, second, view.mask, sheet);
@@ -178,4 +188,4 @@ int SimulateChange(const CommandLine& line) {
   return 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

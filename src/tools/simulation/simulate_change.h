@@ -4,7 +4,7 @@
 
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// Flags of `livemap simulate --change DIR` alone.
 std::vector<Flag> ChangeFlags();
@@ -16,4 +16,4 @@ int SimulateChange(const CommandLine& line);
 /// Throws Error when a flag of ChangeFlags() is given without --change.
 void RefuseChangeFlags(const CommandLine& line);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -14,18 +14,18 @@
 #include "tools/simulation/simulation_outputs.h"
 #include "tools/simulation/simulation_setup.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 constexpr int kPreviewPictures = 12;
 constexpr float kGain = 1.3F;
 
 /// The wall as the simulator's other pictures are: with depth, grey in all three channels.
-SimulatedFrame SeeWall(const SimulatedCamera& camera, const Eigen::Isometry3d& world_from_optical,
-                       double gain) {
-  const PatternedWall::View view =
-      PatternedWall::See(camera.intrinsics, world_from_optical, gain, 0);
-  SimulatedFrame frame;
+simulation::SimulatedFrame SeeWall(const simulation::SimulatedCamera& camera,
+                                   const Eigen::Isometry3d& world_from_optical, double gain) {
+  const simulation::PatternedWall::View view =
+      simulation::PatternedWall::See(camera.intrinsics, world_from_optical, gain, 0);
+  simulation::SimulatedFrame frame;
   cv::cvtColor(view.grey, frame.bgr, cv::COLOR_GRAY2BGR);
   frame.depth = view.depth;
   frame.world_from_optical = world_from_optical;
@@ -71,9 +71,9 @@ int SimulateRoom(const CommandLine& line) {
   const auto frames = static_cast<int>(line.Number("seconds", 5, 0.1, 600) * rate_hz);
   const std::string preview = ReadSheetPath(line, "preview");
   const SimulationSetup setup = ReadSimulationSetup(line);
-  const SimulatedRoom room(line.Seed("seed", 1));
-  TumWriter writer(line.Text("tum", ""), setup.camera,
-                   line.Number("depth-scale", kTumDepthScale, 100, 10000));
+  const simulation::SimulatedRoom room(line.Seed("seed", 1));
+  simulation::TumWriter writer(line.Text("tum", ""), setup.camera,
+                               line.Number("depth-scale", simulation::kTumDepthScale, 100, 10000));
   const Eigen::Isometry3d first_pose = room.WorldFromOptical(0, vigour);
   std::vector<cv::Mat> pictures;
   Progress progress("frame", static_cast<std::size_t>(frames));
@@ -81,11 +81,12 @@ int SimulateRoom(const CommandLine& line) {
     const double time_s = i / rate_hz;
     const double gain = 1 + flicker * std::sin(2 * M_PI * time_s);
     const Eigen::Isometry3d pose = room.WorldFromOptical(time_s, vigour);
-    SimulatedFrame frame = wall ? SeeWall(setup.camera, first_pose.inverse() * pose, gain)
-                                : room.Render(setup.camera, pose, static_cast<std::uint32_t>(i),
-                                              static_cast<float>(kGain * gain), rays, threads);
-    frame.depth = SenseDepth(frame.depth, setup.camera.intrinsics, setup.depth, setup.baseline_m,
-                             static_cast<std::uint32_t>(i));
+    simulation::SimulatedFrame frame =
+        wall ? SeeWall(setup.camera, first_pose.inverse() * pose, gain)
+             : room.Render(setup.camera, pose, static_cast<std::uint32_t>(i),
+                           static_cast<float>(kGain * gain), rays, threads);
+    frame.depth = simulation::SenseDepth(frame.depth, setup.camera.intrinsics, setup.depth,
+                                         setup.baseline_m, static_cast<std::uint32_t>(i));
     if (i * kPreviewPictures / frames != (i - 1) * kPreviewPictures / frames || i == 0) {
       pictures.push_back(frame.bgr.clone());
     }
@@ -100,4 +101,4 @@ int SimulateRoom(const CommandLine& line) {
   return 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -4,7 +4,7 @@
 
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// Flags of `livemap simulate --room` and `--wall` alone.
 std::vector<Flag> RoomFlags();
@@ -19,4 +19,4 @@ int SimulateRoom(const CommandLine& line);
 /// Throws Error when a flag of RoomFlags() is given without --room or --wall.
 void RefuseRoomFlags(const CommandLine& line);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -13,7 +13,7 @@
 #include "datasets/sensors/wheel_odometer_model.h"
 #include "tools/bags/drive_bag.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 /// 2026-01-01T12:00:00Z, as other drives begin.
@@ -23,13 +23,17 @@ constexpr double kTwistRateHz = 50;
 constexpr std::uint64_t kOdometerStream = 0x6f646f6d65746572ULL;
 
 DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
-  const LocalFrame map(setup.datum);
+  const geo::LocalFrame map(setup.datum);
   const auto place = [map, state = setup.state](double time_s) {
     return map.ToGeo(state(time_s).world_from_base.translation().head<2>());
   };
-  DriveSetup drive{
-      Route::Straight(place(0), 0), 0,          setup.camera,         setup.options.noise,
-      setup.options.fix_rate_hz,    setup.seed, ros::Time(kStartS, 0)};
+  DriveSetup drive{datasets::Route::Straight(place(0), 0),
+                   0,
+                   setup.camera,
+                   setup.options.noise,
+                   setup.options.fix_rate_hz,
+                   setup.seed,
+                   ros::Time(kStartS, 0)};
   drive.place = place;
   drive.multipath_m = setup.multipath_m;
   // Depth images are large and shrink well; pictures are compressed already.
@@ -38,12 +42,12 @@ DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
 }
 
 /// Of the hazards that a detector should find.
-std::vector<Detection> ToBoxes(const std::vector<HazardInView>& hazards) {
+std::vector<Detection> ToBoxes(const std::vector<simulation::HazardInView>& hazards) {
   std::vector<Detection> boxes;
-  for (const HazardInView& hazard : hazards) {
+  for (const simulation::HazardInView& hazard : hazards) {
     if (hazard.difficult) continue;
     Detection box;
-    box.class_name = ClassName(hazard.object_class);
+    box.class_name = simulation::ClassName(hazard.object_class);
     box.confidence = 1;
     box.x_min = static_cast<float>(hazard.box.x);
     box.y_min = static_cast<float>(hazard.box.y);
@@ -62,7 +66,8 @@ geometry_msgs::Vector3 ToVector(const Eigen::Vector3d& vector) {
   return message;
 }
 
-nav_msgs::Odometry ToOdometry(const VehicleKinematics& state, const std_msgs::Header& header) {
+nav_msgs::Odometry ToOdometry(const simulation::VehicleKinematics& state,
+                              const std_msgs::Header& header) {
   nav_msgs::Odometry odometry;
   odometry.header = header;
   odometry.header.frame_id = "map";
@@ -111,8 +116,8 @@ class RosSimulationBag : public SimulationBag {
     right_info_.P[3] = -setup.camera.intrinsics.fx * setup.baseline_m;
   }
 
-  void Add(double time_s, const SimulatedFrame& frame, const cv::Mat& depth, const cv::Mat& right,
-           const std::vector<HazardInView>& hazards) override {
+  void Add(double time_s, const simulation::SimulatedFrame& frame, const cv::Mat& depth,
+           const cv::Mat& right, const std::vector<simulation::HazardInView>& hazards) override {
     WriteTwistsUntil(time_s);
     const std_msgs::Header header = bag_.AddFrame(time_s, ToJpeg(frame.bgr), ToBoxes(hazards));
     bag_.Writer().Write("/ground_truth/odom", header.stamp,
@@ -157,8 +162,8 @@ class RosSimulationBag : public SimulationBag {
       const double twist_s = static_cast<double>(next_twist_) / kTwistRateHz;
       if (twist_s > time_s) return;
       bag_.AdvanceTo(twist_s);
-      const VehicleKinematics state = setup_.state(twist_s);
-      const WheelTwist measured =
+      const simulation::VehicleKinematics state = setup_.state(twist_s);
+      const datasets::WheelTwist measured =
           odometer_.Measure(state.velocity_mps.x(), state.turn_rate_radps.z());
       geometry_msgs::TwistWithCovarianceStamped message;
       message.header.stamp = bag_.Stamp(twist_s);
@@ -174,7 +179,7 @@ class RosSimulationBag : public SimulationBag {
 
   const Setup setup_;
   DriveBag bag_;
-  Odometer odometer_;
+  datasets::Odometer odometer_;
   std::int64_t next_twist_;
   sensor_msgs::CameraInfo info_;
   sensor_msgs::CameraInfo right_info_;
@@ -187,4 +192,4 @@ std::unique_ptr<SimulationBag> OpenSimulationBag(const std::string& path,
   return std::make_unique<RosSimulationBag>(path, setup);
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

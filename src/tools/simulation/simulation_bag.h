@@ -13,11 +13,11 @@
 #include "simulation/motion/vehicle_motion.h"
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// What a person may decide about a simulated drive's bag.
 struct SimulationBagConfig {
-  ReceiverNoise noise;
+  datasets::ReceiverNoise noise;
   double fix_rate_hz = 10;
   double multipath_m = 2;  ///< See Multipath; 0: none.
   bool depth = false;      ///< Depth images too.
@@ -31,11 +31,11 @@ class SimulationBag {
  public:
   struct Setup {
     SimulationBagConfig options;
-    CameraFile camera;
+    datasets::CameraFile camera;
     double baseline_m = 0;  ///< Of the second eye to the right; 0: none.
-    GeoPoint datum;         ///< Of the world's origin.
+    geo::GeoPoint datum;    ///< Of the world's origin.
     /// Of the vehicle in the world; also a second before and after.
-    std::function<VehicleKinematics(double time_s)> state;
+    std::function<simulation::VehicleKinematics(double time_s)> state;
     /// Error of a fix, east and north, metres; called once per fix in order of time.
     std::function<Eigen::Vector2d(double time_s)> multipath_m;
     std::uint64_t seed = 1;  ///< Of the sensors' errors.
@@ -44,8 +44,8 @@ class SimulationBag {
   virtual ~SimulationBag() = default;
   /// `depth` is what the depth sensor sees (CV_32FC1 metres, 0: nothing), `right` the second eye's
   /// picture; either is empty where the bag has none.
-  virtual void Add(double time_s, const SimulatedFrame& frame, const cv::Mat& depth,
-                   const cv::Mat& right, const std::vector<HazardInView>& hazards) = 0;
+  virtual void Add(double time_s, const simulation::SimulatedFrame& frame, const cv::Mat& depth,
+                   const cv::Mat& right, const std::vector<simulation::HazardInView>& hazards) = 0;
   /// `hazards` is the drive's truth as GeoJSON.
   virtual void Finish(double end_s, const std::string& hazards) = 0;
 };
@@ -54,4 +54,4 @@ class SimulationBag {
 std::unique_ptr<SimulationBag> OpenSimulationBag(const std::string& path,
                                                  const SimulationBag::Setup& setup);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -7,7 +7,7 @@
 #include "datasets/route.h"
 #include "simulation/world/route_road.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 std::vector<Flag> SimulationBagFlags() {
   return {
@@ -35,7 +35,7 @@ SimulationBagConfig ReadBagOptions(const CommandLine& line) {
   options.jpeg_quality =
       static_cast<int>(line.Number("jpeg-quality", options.jpeg_quality, 1, 100));
   options.fix_rate_hz = line.Number("fix-rate", options.fix_rate_hz, 1, 10);
-  ReceiverNoise& noise = options.noise;
+  datasets::ReceiverNoise& noise = options.noise;
   noise.white_sigma_m = line.Number("fix-noise-m", noise.white_sigma_m, 0, 1000);
   noise.bias_sigma_m = line.Number("fix-bias-m", noise.bias_sigma_m, 0, 1000);
   noise.bias_time_constant_s =
@@ -47,20 +47,21 @@ SimulationBagConfig ReadBagOptions(const CommandLine& line) {
   return options;
 }
 
-WorldDescription ReadSimulatedWorld(const CommandLine& line, SimulationSetup& setup) {
+simulation::WorldDescription ReadSimulatedWorld(const CommandLine& line, SimulationSetup& setup) {
   const bool route = line.Has("route");
   if (route && line.Has("start")) {
     throw Error("--route and --start exclude each other: a route begins at its first point");
   }
-  WorldDescription world;
+  simulation::WorldDescription world;
   if (line.Has("world")) {
-    world =
-        ReadWorldFile(line.Text("world", ""), route ? RoadSource::kRoute : RoadSource::kWorldFile);
+    world = simulation::ReadWorldFile(
+        line.Text("world", ""),
+        route ? simulation::RoadSource::kRoute : simulation::RoadSource::kWorldFile);
   }
   if (!route) return world;
   const std::string path = line.Text("route", "");
-  const std::vector<GeoPoint> points = ReadRoutePoints(path);
-  const RouteRoad road = LayRoad(points, path);
+  const std::vector<geo::GeoPoint> points = datasets::ReadRoutePoints(path);
+  const simulation::RouteRoad road = simulation::LayRoad(points, path);
   world.bearing_deg = road.bearing_deg;
   world.pieces = road.pieces;
   setup.datum = points.front();
@@ -77,4 +78,4 @@ void CheckRouteHolds(const CommandLine& line, double road_m, double needed_m) {
   throw Error(sentence.str());
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -7,7 +7,7 @@
 #include "tools/simulation/simulation_bag.h"
 #include "tools/simulation/simulation_setup.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// The flags that ReadBagOptions reads; all but --bag itself need --bag.
 std::vector<Flag> SimulationBagFlags();
@@ -16,8 +16,8 @@ SimulationBagConfig ReadBagOptions(const CommandLine& line);
 
 /// The world that --world and --route describe. A route's first point becomes `setup.datum`. Throws
 /// what the readers throw, and Error when --start is given beside --route.
-WorldDescription ReadSimulatedWorld(const CommandLine& line, SimulationSetup& setup);
+simulation::WorldDescription ReadSimulatedWorld(const CommandLine& line, SimulationSetup& setup);
 /// Throws Error when a drive of `needed_m` would leave the `road_m` of a --route.
 void CheckRouteHolds(const CommandLine& line, double road_m, double needed_m);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -10,7 +10,7 @@
 #include "tools/common/contact_sheet.h"
 #include "tools/simulation/simulation_flags.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 constexpr std::size_t kMaxPreviews = 12;
@@ -44,7 +44,7 @@ std::string ReadSheetPath(const CommandLine& line, const std::string& flag) {
   if (!cv::haveImageWriter(path)) {
     throw Error("the contact sheet '" + path + "' must end in .png or .jpg");
   }
-  CheckWritable(path);
+  simulation::CheckWritable(path);
   return path;
 }
 
@@ -55,23 +55,24 @@ SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSe
       truth_path_(ReadSheetPath(line, "truth-preview")),
       hazards_path_(line.Text("hazards", "")),
       frames_(frames) {
-  if (line.Has("hazards")) CheckWritable(hazards_path_);
+  if (line.Has("hazards")) simulation::CheckWritable(hazards_path_);
   if (line.Has("tum")) {
-    const double scale = line.Number("depth-scale", kTumDepthScale, 100, 10000);
-    tum_ = std::make_unique<TumWriter>(line.Text("tum", ""), setup.camera, scale, setup.baseline_m);
+    const double scale = line.Number("depth-scale", simulation::kTumDepthScale, 100, 10000);
+    tum_ = std::make_unique<simulation::TumWriter>(line.Text("tum", ""), setup.camera, scale,
+                                                   setup.baseline_m);
   }
-  if (line.Has("yolo")) yolo_ = std::make_unique<YoloWriter>(line.Text("yolo", ""));
+  if (line.Has("yolo")) yolo_ = std::make_unique<simulation::YoloWriter>(line.Text("yolo", ""));
   if (!line.Has("video")) return;
   const std::string path = line.Text("video", "");
-  const CameraIntrinsics& k = setup.camera.intrinsics;
+  const geo::CameraIntrinsics& k = setup.camera.intrinsics;
   if (!video_.open(path, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), rate_hz,
                    cv::Size(k.width, k.height))) {
     throw Error("the video '" + path + "' cannot be written, accepted is a file .mp4");
   }
 }
 
-void SimulationOutputs::OpenBag(const CommandLine& line, const Street& street,
-                                const VehicleMotion& motion) {
+void SimulationOutputs::OpenBag(const CommandLine& line, const simulation::Street& street,
+                                const simulation::VehicleMotion& motion) {
   SimulationBag::Setup setup;
   setup.options = ReadBagOptions(line);
   if (!line.Has("bag")) return;
@@ -83,30 +84,31 @@ void SimulationOutputs::OpenBag(const CommandLine& line, const Street& street,
   setup.datum = setup_.datum;
   setup.seed = street.seed();
   setup.state = [&motion](double time_s) { return motion.StateAt(time_s); };
-  const auto multipath =
-      std::make_shared<Multipath>(setup.options.multipath_m, street.seed() ^ kMultipathStream);
+  const auto multipath = std::make_shared<datasets::Multipath>(setup.options.multipath_m,
+                                                               street.seed() ^ kMultipathStream);
   setup.multipath_m = [&street, &motion, multipath](double time_s) {
     const double along = motion.AlongM(time_s);
     return multipath->ErrorAt(time_s, along, street.line().HeadingRad(along),
-                              SkyOver(street, along, street.lane_left_m()));
+                              simulation::SkyOver(street, along, street.lane_left_m()));
   };
   bag_depth_ = setup.options.depth;
   bag_ = OpenSimulationBag(line.Text("bag", ""), setup);
 }
 
-cv::Mat SimulationOutputs::Sense(std::size_t index, const SimulatedFrame& frame) const {
-  return SenseDepth(frame.depth, setup_.camera.intrinsics, setup_.depth,
-                    setup_.baseline_m > 0 ? setup_.baseline_m : kDefaultBaselineM,
-                    static_cast<std::uint32_t>(index));
+cv::Mat SimulationOutputs::Sense(std::size_t index, const simulation::SimulatedFrame& frame) const {
+  return simulation::SenseDepth(frame.depth, setup_.camera.intrinsics, setup_.depth,
+                                setup_.baseline_m > 0 ? setup_.baseline_m : kDefaultBaselineM,
+                                static_cast<std::uint32_t>(index));
 }
 
 void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
-                            const SimulatedFrame& frame, const cv::Mat& right) {
-  const std::vector<HazardInView> hazards = FindHazards(frame.instances, frame.outlines);
-  for (const HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
+                            const simulation::SimulatedFrame& frame, const cv::Mat& right) {
+  const std::vector<simulation::HazardInView> hazards =
+      simulation::FindHazards(frame.instances, frame.outlines);
+  for (const simulation::HazardInView& hazard : hazards) ++frames_seen_[hazard.instance];
   const cv::Mat depth = tum_ || bag_depth_ ? Sense(index, frame) : cv::Mat();
   if (tum_) {
-    SimulatedFrame sensed = frame;
+    simulation::SimulatedFrame sensed = frame;
     sensed.depth = depth;
     tum_->Add(time_s, sensed, right);
   }
@@ -122,8 +124,8 @@ void SimulationOutputs::Add(std::size_t index, double time_s, double along_m,
   }
 }
 
-void SimulationOutputs::AddToSheets(const SimulatedFrame& frame,
-                                    const std::vector<HazardInView>& hazards) {
+void SimulationOutputs::AddToSheets(const simulation::SimulatedFrame& frame,
+                                    const std::vector<simulation::HazardInView>& hazards) {
   if (!preview_path_.empty()) {
     const double scale = kPreviewWidth / frame.bgr.cols;
     cv::Mat small;
@@ -132,24 +134,25 @@ void SimulationOutputs::AddToSheets(const SimulatedFrame& frame,
   }
   if (!truth_path_.empty() && preview_moments_ % 3 == 1) {
     cv::Mat boxes = frame.bgr.clone();
-    DrawHazards(hazards, boxes);
+    simulation::DrawHazards(hazards, boxes);
     truth_.push_back(boxes);
-    truth_.push_back(ColourClasses(frame.classes));
-    truth_.push_back(ColourDepth(frame.depth));
+    truth_.push_back(simulation::ColourClasses(frame.classes));
+    truth_.push_back(simulation::ColourDepth(frame.depth));
   }
 }
 
-void SimulationOutputs::Finish(const Street& street, double end_s) {
-  const std::string hazards = HazardsAsGeoJson(street, setup_.datum, frames_seen_, along_m_);
+void SimulationOutputs::Finish(const simulation::Street& street, double end_s) {
+  const std::string hazards =
+      simulation::HazardsAsGeoJson(street, setup_.datum, frames_seen_, along_m_);
   if (bag_) bag_->Finish(end_s, hazards);
   if (tum_) tum_->Finish();
   if (yolo_) yolo_->Finish();
   if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
   if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
   if (hazards_path_.empty()) return;
-  std::ofstream file = OpenFile(hazards_path_);
+  std::ofstream file = simulation::OpenFile(hazards_path_);
   file << hazards;
-  CloseFile(file, hazards_path_);
+  simulation::CloseFile(file, hazards_path_);
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

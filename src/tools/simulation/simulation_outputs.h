@@ -12,7 +12,7 @@
 #include "tools/simulation/simulation_bag.h"
 #include "tools/simulation/simulation_setup.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// Throws Error when the flags ask for no output at all.
 void RefuseNoOutput(const CommandLine& line);
@@ -29,20 +29,22 @@ class SimulationOutputs {
                     std::size_t frames);
 
   /// Reads --bag and its flags; both must outlive the outputs.
-  void OpenBag(const CommandLine& line, const Street& street, const VehicleMotion& motion);
+  void OpenBag(const CommandLine& line, const simulation::Street& street,
+               const simulation::VehicleMotion& motion);
   /// The frame `index`; `right` is the second eye's picture, or empty.
-  void Add(std::size_t index, double time_s, double along_m, const SimulatedFrame& frame,
-           const cv::Mat& right);
+  void Add(std::size_t index, double time_s, double along_m,
+           const simulation::SimulatedFrame& frame, const cv::Mat& right);
   /// Writes what is written once, --hazards too, and closes every file.
-  void Finish(const Street& street, double end_s);
+  void Finish(const simulation::Street& street, double end_s);
 
   /// Hazards that were in view so far.
   std::size_t hazards() const { return frames_seen_.size(); }
 
  private:
   /// What the depth sensor of --depth sees.
-  cv::Mat Sense(std::size_t index, const SimulatedFrame& frame) const;
-  void AddToSheets(const SimulatedFrame& frame, const std::vector<HazardInView>& hazards);
+  cv::Mat Sense(std::size_t index, const simulation::SimulatedFrame& frame) const;
+  void AddToSheets(const simulation::SimulatedFrame& frame,
+                   const std::vector<simulation::HazardInView>& hazards);
 
   SimulationSetup setup_;
   bool bag_depth_ = false;
@@ -53,12 +55,12 @@ class SimulationOutputs {
   std::string hazards_path_;
   std::size_t frames_;
   std::size_t preview_moments_ = 0;
-  std::unique_ptr<TumWriter> tum_;
-  std::unique_ptr<YoloWriter> yolo_;
+  std::unique_ptr<simulation::TumWriter> tum_;
+  std::unique_ptr<simulation::YoloWriter> yolo_;
   std::vector<cv::Mat> preview_;
   std::vector<cv::Mat> truth_;
   std::map<std::uint32_t, int> frames_seen_;
   double along_m_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::tools {
 namespace {
 
 constexpr double kDefaultFieldOfViewDeg = 66;
@@ -15,10 +15,10 @@ std::pair<double, double> ReadPair(const CommandLine& line, const std::string& f
                                    const std::string& otherwise, char separator,
                                    const std::string& accepted) {
   const std::string text = line.Text(flag, otherwise);
-  const std::vector<std::string> parts = Split(text, separator);
+  const std::vector<std::string> parts = datasets::Split(text, separator);
   if (parts.size() == 2) {
-    const auto a = ParseFinite(parts[0]);
-    const auto b = ParseFinite(parts[1]);
+    const auto a = datasets::ParseFinite(parts[0]);
+    const auto b = datasets::ParseFinite(parts[1]);
     if (a && b) return {*a, *b};
   }
   throw Error("--" + flag + " is '" + text + "', accepted is " + accepted);
@@ -30,10 +30,10 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
   SimulationSetup setup;
   setup.mounting.height_m = 1.45;
   setup.mounting.pitch_deg = 4;
-  CameraIntrinsics& k = setup.camera.intrinsics;
+  geo::CameraIntrinsics& k = setup.camera.intrinsics;
   if (line.Has("camera")) {
     if (line.Has("size")) throw Error("--size and --camera exclude each other");
-    const CameraFile file = ReadCameraFile(line.Text("camera", ""));
+    const datasets::CameraFile file = datasets::ReadCameraFile(line.Text("camera", ""));
     k = file.intrinsics;
     setup.mounting = file.mounting;
   } else {
@@ -58,7 +58,8 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
   setup.camera.k1 = k1;
   setup.camera.k2 = k2;
   setup.baseline_m = line.Has("stereo") ? line.Number("stereo", 0, 0.02, 2) : 0;
-  const std::optional<DepthSensor> depth = ParseDepthSensor(line.Text("depth", "exact"));
+  const std::optional<simulation::DepthSensor> depth =
+      simulation::ParseDepthSensor(line.Text("depth", "exact"));
   if (!depth) {
     throw Error("--depth is '" + line.Text("depth", "") + "', accepted are: exact, kinect, stereo");
   }
@@ -73,20 +74,20 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
   const std::string place = "LAT,LON in degrees";
   const auto [latitude, longitude] = ReadPair(line, "start", "48.8566,9.0", ',', place);
   setup.datum = {latitude, longitude};
-  if (!IsValid(setup.datum)) {
+  if (!geo::IsValid(setup.datum)) {
     throw Error("--start is '" + line.Text("start", "") + "', accepted is " + place);
   }
   return setup;
 }
 
-Condition ReadCondition(const CommandLine& line, const std::string& flag,
-                        const std::string& otherwise) {
+simulation::Condition ReadCondition(const CommandLine& line, const std::string& flag,
+                                    const std::string& otherwise) {
   const std::string name = line.Text(flag, otherwise);
-  const std::optional<Condition> condition = ParseCondition(name);
+  const std::optional<simulation::Condition> condition = simulation::ParseCondition(name);
   if (!condition) {
     throw Error("--" + flag + " is '" + name + "', accepted are: day, dusk, rain, snow");
   }
   return *condition;
 }
 
-}  // namespace livemap
+}  // namespace livemap::tools

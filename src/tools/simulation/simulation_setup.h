@@ -7,22 +7,22 @@
 #include "simulation/sensors/depth_sensor.h"
 #include "tools/common/command_line.h"
 
-namespace livemap {
+namespace livemap::tools {
 
 /// The sensors of a simulated drive and where the world lies.
 struct SimulationSetup {
-  SimulatedCamera camera;
-  DepthSensor depth = DepthSensor::kExact;
+  simulation::SimulatedCamera camera;
+  simulation::DepthSensor depth = simulation::DepthSensor::kExact;
   double baseline_m = 0;  ///< 0: one eye.
-  CameraMounting mounting;
-  GeoPoint datum;  ///< Of the world's origin.
+  datasets::CameraMounting mounting;
+  geo::GeoPoint datum;  ///< Of the world's origin.
 };
 
 /// --camera, --size, --distortion, --stereo, --depth, --blur, --start. Throws Error naming the
 /// flag.
 SimulationSetup ReadSimulationSetup(const CommandLine& line);
 /// Value of `flag`; throws Error naming what is accepted.
-Condition ReadCondition(const CommandLine& line, const std::string& flag,
-                        const std::string& otherwise);
+simulation::Condition ReadCondition(const CommandLine& line, const std::string& flag,
+                                    const std::string& otherwise);
 
-}  // namespace livemap
+}  // namespace livemap::tools

@@ -8,7 +8,7 @@
 #include "vehicle/outbox/report_table.h"
 #include "vehicle/outbox/row_validation.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 /// All changes are as urgent as each other.
@@ -26,7 +26,7 @@ const std::vector<std::string>& ChangeMigrations() {
   return migrations;
 }
 
-void Insert(SqliteDatabase& database, const MapChangeReport& report) {
+void Insert(SqliteDatabase& database, const protocol::MapChangeReport& report) {
   SqliteStatement insert =
       database.Prepare("INSERT OR REPLACE INTO pending VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   insert.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
@@ -46,8 +46,8 @@ void Insert(SqliteDatabase& database, const MapChangeReport& report) {
   insert.Execute();
 }
 
-MapChangeReport ReadRow(const SqliteStatement& row) {
-  MapChangeReport report;
+protocol::MapChangeReport ReadRow(const SqliteStatement& row) {
+  protocol::MapChangeReport report;
   report.uuid = UuidFromBlob(row.Blob(0));
   report.drive_id = row.Text(1);
   report.stamp_ns = row.Int(2);
@@ -64,13 +64,13 @@ MapChangeReport ReadRow(const SqliteStatement& row) {
 
 }  // namespace
 
-bool IsSound(const MapChangeReport& report) {
+bool IsSound(const protocol::MapChangeReport& report) {
   const auto is_name = [](const std::string& text) {
     return !text.empty() && text.size() <= kMaxIdBytes;
   };
   return !report.uuid.IsNil() && is_name(report.drive_id) && is_name(report.class_name) &&
          IsStamp(report.stamp_ns) && IsStamp(report.earlier_stamp_ns) && report.confidence >= 0 &&
-         report.confidence <= 1 && report.seen >= 2 && IsValid(report.position) &&
+         report.confidence <= 1 && report.seen >= 2 && geo::IsValid(report.position) &&
          IsCovarianceOfReport(report.covariance_m2);
 }
 
@@ -101,7 +101,7 @@ void MapChangeOutbox::Load(double steady_s) {
       "substr(class_name, 1, 65), vanished, confidence, seen, missed, latitude, longitude, "
       "var_east, cov_east_north, var_north FROM pending");
   while (rows.Step()) {
-    const MapChangeReport report = ReadRow(rows);
+    const protocol::MapChangeReport report = ReadRow(rows);
     if (!IsSound(report)) {
       ++counters_.unsound;
       continue;
@@ -112,7 +112,7 @@ void MapChangeOutbox::Load(double steady_s) {
   Displace();
 }
 
-void MapChangeOutbox::Add(const MapChangeReport& report, double steady_s) {
+void MapChangeOutbox::Add(const protocol::MapChangeReport& report, double steady_s) {
   if (!IsSound(report)) {
     throw Error("a change of class '" + report.class_name.substr(0, kMaxIdBytes) +
                 "' has values that no zone accepts");
@@ -124,8 +124,9 @@ void MapChangeOutbox::Add(const MapChangeReport& report, double steady_s) {
   Displace();
 }
 
-std::vector<MapChangeReport> MapChangeOutbox::TakeDue(double steady_s, std::size_t limit) {
-  std::vector<MapChangeReport> reports;
+std::vector<protocol::MapChangeReport> MapChangeOutbox::TakeDue(double steady_s,
+                                                                std::size_t limit) {
+  std::vector<protocol::MapChangeReport> reports;
   for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
     Entry& entry = pending_.at(uuid);
     ++(entry.sent ? counters_.resends : counters_.sent);
@@ -135,10 +136,11 @@ std::vector<MapChangeReport> MapChangeOutbox::TakeDue(double steady_s, std::size
   return reports;
 }
 
-void MapChangeOutbox::AddReceipt(const Receipt& receipt) {
+void MapChangeOutbox::AddReceipt(const protocol::Receipt& receipt) {
   if (pending_.count(receipt.report_uuid) == 0) return;
   Erase(receipt.report_uuid);
-  ++(receipt.status == Receipt::Status::kCommitted ? counters_.committed : counters_.refused);
+  ++(receipt.status == protocol::Receipt::Status::kCommitted ? counters_.committed
+                                                             : counters_.refused);
 }
 
 void MapChangeOutbox::Erase(const Uuid& uuid) {
@@ -160,4 +162,4 @@ void MapChangeOutbox::Displace() {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -13,7 +13,7 @@
 #include "protocol/report.h"
 #include "vehicle/outbox/resend_schedule.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// What the vehicle has to tell the zone of objects that came or went: on disk until the zone has
 /// answered, sent again until then. Not thread-safe.
@@ -44,18 +44,18 @@ class MapChangeOutbox {
   const std::string& set_aside() const { return set_aside_; }
 
   /// Durable when it returns. Throws StoreError, and Error for a report that no zone would take.
-  void Add(const MapChangeReport& report, double steady_s);
+  void Add(const protocol::MapChangeReport& report, double steady_s);
   /// Reports that are to be sent now; steady seconds from any origin. They stay until answered.
-  std::vector<MapChangeReport> TakeDue(double steady_s, std::size_t limit);
+  std::vector<protocol::MapChangeReport> TakeDue(double steady_s, std::size_t limit);
   /// The zone's answer ends its report; one of another report is ignored. Throws StoreError.
-  void AddReceipt(const Receipt& receipt);
+  void AddReceipt(const protocol::Receipt& receipt);
 
   std::size_t pending() const { return pending_.size(); }
   const Counters& counters() const { return counters_; }
 
  private:
   struct Entry {
-    MapChangeReport report;
+    protocol::MapChangeReport report;
     bool sent = false;
   };
 
@@ -74,6 +74,6 @@ class MapChangeOutbox {
 
 /// Whether a vehicle can have made this report: a version 4 uuid, ids of at most 64 bytes, finite
 /// numbers within their ranges, a covariance that is one.
-bool IsSound(const MapChangeReport& report);
+bool IsSound(const protocol::MapChangeReport& report);
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -10,7 +10,7 @@
 #include "vehicle/outbox/report_table.h"
 #include "vehicle/outbox/row_validation.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr std::streamsize kPageBytes = 4096;  // SQLite's default, which every store of ours has.
@@ -159,4 +159,4 @@ Salvage SalvageReports(const std::string& path, const std::string& fresh,
   return ReadRows(*database, accept);
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -7,7 +7,7 @@
 #include "common/sqlite.h"
 #include "vehicle/outbox/report_table.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// What could be read of a damaged store.
 struct Salvage {
@@ -24,4 +24,4 @@ struct Salvage {
 Salvage SalvageReports(const std::string& path, const std::string& fresh,
                        const std::function<void(const StoredReport&)>& accept);
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

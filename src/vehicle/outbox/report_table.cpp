@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr char kSelectReport[] =
@@ -13,9 +13,9 @@ constexpr char kSelectReport[] =
     "shown_x,shown_y,shown_width,shown_height,hold_until_ns FROM pending ";
 
 /// Of a row of kSelectReport.
-Report ReadReport(const SqliteStatement& row) {
+protocol::Report ReadReport(const SqliteStatement& row) {
   const auto real = [&row](int column) { return static_cast<float>(row.Real(column)); };
-  Report report;
+  protocol::Report report;
   report.drive_id = row.Text(0);
   report.stamp_ns = row.Int(1);
   report.class_name = row.Text(2);
@@ -65,7 +65,8 @@ Uuid UuidFromBlob(const std::vector<std::uint8_t>& blob) {
   return uuid;
 }
 
-void InsertReport(SqliteDatabase& database, const Report& report, std::int64_t hold_until_ns) {
+void InsertReport(SqliteDatabase& database, const protocol::Report& report,
+                  std::int64_t hold_until_ns) {
   SqliteStatement insert = database.Prepare(
       "INSERT INTO pending(uuid,drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,"
       "latitude,longitude,variance_east,covariance_east_north,variance_north,"
@@ -99,7 +100,7 @@ void InsertReport(SqliteDatabase& database, const Report& report, std::int64_t h
       .Execute();
 }
 
-std::optional<Report> SelectReport(SqliteDatabase& database, const Uuid& uuid) {
+std::optional<protocol::Report> SelectReport(SqliteDatabase& database, const Uuid& uuid) {
   SqliteStatement row = database.Prepare(std::string(kSelectReport) + "WHERE uuid=?");
   row.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
   if (!row.Step()) return std::nullopt;
@@ -113,4 +114,4 @@ std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int
   return StoredReport{ReadReport(row), row.Int(19) != 0, row.Int(24)};
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -6,7 +6,7 @@
 #include "common/uuid.h"
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// SQL of the table `pending`: one row per unfinished report, every field of Report but the
 /// vehicle_id, which only the zone's bridge knows.
@@ -16,13 +16,14 @@ extern const char* const kCreateReportTable;
 extern const char* const kAddShownRegionAndHold;
 
 /// `hold_until_ns`: UTC by the vehicle's clock; 0: the report may go at once.
-void InsertReport(SqliteDatabase& database, const Report& report, std::int64_t hold_until_ns);
+void InsertReport(SqliteDatabase& database, const protocol::Report& report,
+                  std::int64_t hold_until_ns);
 /// Nothing when the table has no such report.
-std::optional<Report> SelectReport(SqliteDatabase& database, const Uuid& uuid);
+std::optional<protocol::Report> SelectReport(SqliteDatabase& database, const Uuid& uuid);
 
 /// A row of the table.
 struct StoredReport {
-  Report report;
+  protocol::Report report;
   bool sent = false;               ///< At least once.
   std::int64_t hold_until_ns = 0;  ///< As for InsertReport.
 };
@@ -32,4 +33,4 @@ std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int
 /// The nil UUID when the blob has not 16 bytes.
 Uuid UuidFromBlob(const std::vector<std::uint8_t>& blob);
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 /// No answer for so many first pauses is a silence: under load answers come more often.
@@ -65,4 +65,4 @@ std::vector<Uuid> ResendSchedule::TakeDue(double now_s, std::size_t limit) {
   return reports;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -8,7 +8,7 @@
 
 #include "common/uuid.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Says which unfinished reports are to be sent now: each at once, then again after a pause that
 /// doubles, with jitter so that vehicles which lost the same link do not return in step. The first
@@ -60,4 +60,4 @@ class ResendSchedule {
   std::map<Uuid, Entry> entries_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

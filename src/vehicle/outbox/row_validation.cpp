@@ -9,7 +9,7 @@
 #include "imaging/image_header.h"
 #include "vehicle/outbox/report_table.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 // The zone's numbers of its announcements lie far below 2^60, and stamps below 2106.
@@ -73,20 +73,21 @@ const char* const kFetchableReport =
     "shown_width BETWEEN 0 AND 4294967295 AND shown_height BETWEEN 0 AND 4294967295 AND "
     "typeof(hold_until_ns) = 'integer'";
 
-bool IsSound(const Report& report) {
-  const Box& box = report.box;
-  return !report.uuid.IsNil() && IsValid(report.position) && IsStamp(report.stamp_ns) &&
+bool IsSound(const protocol::Report& report) {
+  const imaging::Box& box = report.box;
+  return !report.uuid.IsNil() && geo::IsValid(report.position) && IsStamp(report.stamp_ns) &&
          IsCovarianceOfReport(report.covariance_m2) && report.confidence >= 0 &&
          report.confidence <= 1 && std::isfinite(box.x_min) && std::isfinite(box.y_min) &&
          std::isfinite(box.x_max) && std::isfinite(box.y_max) && box.x_min < box.x_max &&
          box.y_min < box.y_max && !report.class_name.empty() &&
-         report.class_name.size() <= kMaxClassNameBytes && report.drive_id.size() <= kMaxIdBytes;
+         report.class_name.size() <= protocol::kMaxClassNameBytes &&
+         report.drive_id.size() <= kMaxIdBytes;
 }
 
-void DropInvalidPicture(Report& report) {
+void DropInvalidPicture(protocol::Report& report) {
   const std::uint8_t* data = report.image.data();
-  const auto header = ReadImageHeader(data, report.image.size());
-  if (header && HasImageEnd(data, report.image.size(), header->format)) return;
+  const auto header = imaging::ReadImageHeader(data, report.image.size());
+  if (header && imaging::HasImageEnd(data, report.image.size(), header->format)) return;
   report.image.clear();
   report.image_format.clear();
 }
@@ -111,4 +112,4 @@ InvalidRows RepairTables(SqliteDatabase& database) {
   return broken;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

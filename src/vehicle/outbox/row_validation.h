@@ -7,7 +7,7 @@
 #include "common/uuid.h"
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Pictures of reports in the outbox may be this large; a larger one was not made by this program.
 constexpr std::size_t kMaxStoredImageBytes = 16 << 20;
@@ -19,9 +19,9 @@ bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2);
 
 /// Whether the program can have made this report. What a damaged page turned into, or something
 /// else wrote, must not become one: the zone would refuse it, or never answer.
-bool IsSound(const Report& report);
+bool IsSound(const protocol::Report& report);
 /// A report counts without its picture; a broken picture would have it refused for good.
-void DropInvalidPicture(Report& report);
+void DropInvalidPicture(protocol::Report& report);
 
 /// What was found in a sound store that the program cannot have written.
 struct InvalidRows {
@@ -39,4 +39,4 @@ InvalidRows RepairTables(SqliteDatabase& database);
 /// SQL's condition for a row of `pending` whose values have types and sizes that can be fetched.
 extern const char* const kFetchableReport;
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

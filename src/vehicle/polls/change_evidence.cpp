@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ClassPair = std::pair<const char*, const char*>;
@@ -26,4 +26,4 @@ bool MayBe(const std::string& change_class, const std::string& hazard_class) {
   return false;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

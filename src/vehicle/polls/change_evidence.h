@@ -7,14 +7,14 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// What change detection knows of one place: a thing went or came since an earlier drive.
 struct ChangeEvidence {
   std::int64_t stamp_ns = 0;  ///< Of the last image that shows it.
   std::string change_class;   ///< "barrier", "sign", ... as ChangeClassName has it.
   bool vanished = false;      ///< Else it appeared.
-  GeoPoint position;
+  geo::GeoPoint position;
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< East-north axes.
   float confidence = 0;                                     ///< 0..1.
 };
@@ -24,4 +24,4 @@ struct ChangeEvidence {
 /// pothole, which is no thing.
 bool MayBe(const std::string& change_class, const std::string& hazard_class);
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

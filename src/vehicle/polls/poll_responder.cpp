@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr std::size_t kMaxAnsweredKept = 1000;
@@ -16,7 +16,7 @@ constexpr int kLuminanceGridPx = 64;
 constexpr double kMinPlacePx = 32;
 
 /// Where a place lies in an image: two standard deviations around its pixel.
-Box BoxOf(const ProjectedPlace& view) {
+imaging::Box BoxOf(const placement::ProjectedPlace& view) {
   const auto half = [&view](int axis) {
     return static_cast<float>(
         std::max(kMinPlacePx / 2, 2 * std::sqrt(view.covariance_px2(axis, axis))));
@@ -35,7 +35,7 @@ double PollResponder::MeanLuminance(const cv::Mat& image) {
   return cv::mean(grid)[0];
 }
 
-void PollResponder::Add(const Poll& poll, double steady_s) {
+void PollResponder::Add(const protocol::Poll& poll, double steady_s) {
   ++counters_.polls;
   const bool known = std::find(answered_.begin(), answered_.end(), poll.poll) != answered_.end() ||
                      std::any_of(open_.begin(), open_.end(), [&poll](const OpenPoll& open) {
@@ -57,13 +57,13 @@ void PollResponder::Add(const Poll& poll, double steady_s) {
   open_.push_back(std::move(open));
 }
 
-void PollResponder::AddFrame(const SightingFrame& frame, double now_s) {
+void PollResponder::AddFrame(const placement::SightingFrame& frame, double now_s) {
   if (open_.empty()) return;
   waiting_.push_back({frame, now_s});
   if (waiting_.size() > kMaxPollFrames) waiting_.pop_front();
 }
 
-void PollResponder::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
+void PollResponder::AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture) {
   if (open_.empty() || picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return;
   AddLuminance(stamp_ns, MeanLuminance(picture.bgr));
   pictures_[stamp_ns] = picture;
@@ -72,7 +72,7 @@ void PollResponder::AddPicture(std::int64_t stamp_ns, const Picture& picture) {
        pictures_.size() > kMaxPollPictures && old != pictures_.end();) {
     const std::int64_t old_ns = old->first;
     const bool wanted = std::any_of(open_.begin(), open_.end(), [old_ns](const OpenPoll& open) {
-      return open.poll.picture != PollPicture::kNone && open.view_ns == old_ns;
+      return open.poll.picture != protocol::PollPicture::kNone && open.view_ns == old_ns;
     });
     old = wanted ? std::next(old) : pictures_.erase(old);
   }
@@ -85,7 +85,7 @@ void PollResponder::AddLuminance(std::int64_t stamp_ns, double luminance) {
 }
 
 void PollResponder::AddChange(const ChangeEvidence& evidence) {
-  if (!IsValid(evidence.position) || !evidence.covariance_m2.allFinite() ||
+  if (!geo::IsValid(evidence.position) || !evidence.covariance_m2.allFinite() ||
       !(evidence.confidence > 0 && evidence.confidence <= 1)) {
     return;
   }
@@ -95,7 +95,7 @@ void PollResponder::AddChange(const ChangeEvidence& evidence) {
         std::sqrt((evidence.covariance_m2 + open.poll.covariance_m2).trace() / 2);
     const double gate_m =
         std::max(catalogue_.DuplicateRadiusM(open.poll.class_name), config_.gate_sigma * sigma_m);
-    if (GeodesicDistanceM(evidence.position, open.poll.position) > gate_m) continue;
+    if (geo::GeodesicDistanceM(evidence.position, open.poll.position) > gate_m) continue;
     (evidence.vanished ? open.vanished : open.appeared) = evidence.confidence;
   }
 }
@@ -134,7 +134,7 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
                          const Vehicle& vehicle) {
   waiting.arrival_s = std::min(waiting.arrival_s, now_s);  // The clock was set back.
   const double waited_s = now_s - waiting.arrival_s;
-  const SightingFrame& frame = waiting.frame;
+  const placement::SightingFrame& frame = waiting.frame;
   const FixTrack::Lookup lookup = vehicle.pose_at(frame.stamp_ns);
   const bool ready =
       lookup.answer == FixTrack::Answer::kReady ||
@@ -158,7 +158,7 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
     for (OpenPoll& open : open_) ++open.troubles[Trouble::kNoCamera];
     return true;
   }
-  const PlacedCamera camera{lookup.pose, *vehicle.intrinsics, *mounting};
+  const placement::PlacedCamera camera{lookup.pose, *vehicle.intrinsics, *mounting};
   for (OpenPoll& open : open_) {
     if (!open.matched_s) Look(open, frame, camera, steady_s, vehicle);
   }
@@ -166,11 +166,13 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
 }
 
 /// One image's word on one poll.
-void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const PlacedCamera& camera,
-                         double steady_s, const Vehicle& vehicle) {
-  const ProjectedPlace view = ProjectPlace(open.poll.position, open.poll.covariance_m2, camera,
-                                   config_.projection, config_.margin_share);
-  if (const Sighting* match = Match(open, frame, view, camera)) {
+void PollResponder::Look(OpenPoll& open, const placement::SightingFrame& frame,
+                         const placement::PlacedCamera& camera, double steady_s,
+                         const Vehicle& vehicle) {
+  const placement::ProjectedPlace view =
+      placement::ProjectPlace(open.poll.position, open.poll.covariance_m2, camera,
+                              config_.projection, config_.margin_share);
+  if (const placement::Sighting* match = Match(open, frame, view, camera)) {
     open.matched_s = steady_s;
     open.match_confidence = match->confidence;
     open.view_ns = frame.stamp_ns;
@@ -190,28 +192,30 @@ void PollResponder::Look(OpenPoll& open, const SightingFrame& frame, const Place
 }
 
 /// A match counts wherever the detector sees it, also beyond the range of a no.
-const Sighting* PollResponder::Match(const OpenPoll& open, const SightingFrame& frame,
-                                     const ProjectedPlace& view, const PlacedCamera& camera) const {
+const placement::Sighting* PollResponder::Match(const OpenPoll& open,
+                                                const placement::SightingFrame& frame,
+                                                const placement::ProjectedPlace& view,
+                                                const placement::PlacedCamera& camera) const {
   const double radius_m = catalogue_.DuplicateRadiusM(open.poll.class_name);
-  const Sighting* best = nullptr;
-  for (const Sighting& sighting : frame.sightings) {
+  const placement::Sighting* best = nullptr;
+  for (const placement::Sighting& sighting : frame.sightings) {
     const bool counts = sighting.class_name == open.poll.class_name &&
                         sighting.confidence >= config_.min_confidence && sighting.confidence <= 1;
     if (!counts || (best != nullptr && best->confidence >= sighting.confidence)) continue;
-    if (IsAtPlace(sighting.box, open.poll.position, view, camera, config_.projection,
-                  config_.gate_sigma, radius_m)) {
+    if (placement::IsAtPlace(sighting.box, open.poll.position, view, camera, config_.projection,
+                             config_.gate_sigma, radius_m)) {
       best = &sighting;
     }
   }
   return best;
 }
 
-std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(const ProjectedPlace& view,
-                                                                 const SightingFrame& frame,
-                                                                 const Vehicle& vehicle) const {
-  if (view.visibility == ProjectedPlace::Visibility::kBehind) return Trouble::kOutside;
+std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(
+    const placement::ProjectedPlace& view, const placement::SightingFrame& frame,
+    const Vehicle& vehicle) const {
+  if (view.visibility == placement::ProjectedPlace::Visibility::kBehind) return Trouble::kOutside;
   if (view.distance_m > config_.max_range_m) return Trouble::kTooFar;
-  if (view.visibility == ProjectedPlace::Visibility::kOutside) return Trouble::kOutside;
+  if (view.visibility == placement::ProjectedPlace::Visibility::kOutside) return Trouble::kOutside;
   const auto luminance = luminances_.find(frame.stamp_ns);
   if (luminance != luminances_.end() && luminance->second < config_.dark_luminance) {
     return Trouble::kDark;
@@ -222,10 +226,10 @@ std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(const Projected
   return std::nullopt;
 }
 
-void PollResponder::CountView(OpenPoll& open, const SightingFrame& frame, const ProjectedPlace& view,
-                              const TrackPose& base) {
+void PollResponder::CountView(OpenPoll& open, const placement::SightingFrame& frame,
+                              const placement::ProjectedPlace& view, const geo::TrackPose& base) {
   if (open.last_view &&
-      GeodesicDistanceM(*open.last_view, base.position) < config_.view_spacing_m) {
+      geo::GeodesicDistanceM(*open.last_view, base.position) < config_.view_spacing_m) {
     return;
   }
   // The nearest view shows best that nothing is there.
@@ -248,7 +252,8 @@ bool PollResponder::IsGone(const OpenPoll& open) const {
 bool PollResponder::IsReady(OpenPoll& open, double steady_s) {
   if (!open.matched_s && steady_s < open.deadline_s) return false;
   const bool decided = open.matched_s || IsGone(open);
-  if (!decided || open.poll.picture == PollPicture::kNone || pictures_.count(open.view_ns) != 0) {
+  if (!decided || open.poll.picture == protocol::PollPicture::kNone ||
+      pictures_.count(open.view_ns) != 0) {
     return true;
   }
   if (!open.asked_s) {
@@ -265,21 +270,21 @@ void PollResponder::Answer(const OpenPoll& open) {
     ++counters_.unanswered;
     return;
   }
-  PollReply reply;
+  protocol::PollReply reply;
   reply.poll = open.poll.poll;
   reply.hazard = open.poll.hazard;
   reply.drive_id = config_.drive_id;
   const bool decided = seen || not_there;
-  const TrackPose& base = decided ? open.view_base : *newest_base_;
+  const geo::TrackPose& base = decided ? open.view_base : *newest_base_;
   reply.stamp_ns = decided ? open.view_ns : newest_ns_;
   reply.vehicle_position = base.position;
   reply.course_rad = base.course_rad;
   if (seen) {
-    reply.answer = PollReply::Answer::kYes;
+    reply.answer = protocol::PollReply::Answer::kYes;
     reply.confidence = open.match_confidence;
     ++counters_.yes;
   } else if (not_there) {
-    reply.answer = PollReply::Answer::kNo;
+    reply.answer = protocol::PollReply::Answer::kNo;
     // Both look at the same images: the surer one counts, not both together.
     const double views = 1 - std::pow(config_.miss_share, open.clear_views);
     reply.confidence =
@@ -287,7 +292,7 @@ void PollResponder::Answer(const OpenPoll& open) {
     ++counters_.no;
     if (open.clear_views < config_.no_views) ++counters_.no_by_change;
   } else {
-    reply.answer = PollReply::Answer::kCantSee;
+    reply.answer = protocol::PollReply::Answer::kCantSee;
     reply.reason = ReasonOf(open);
     ++counters_.cant_see;
     if (open.clear_views >= config_.no_views) ++counters_.disagreed;
@@ -296,17 +301,17 @@ void PollResponder::Answer(const OpenPoll& open) {
   replies_.push_back(std::move(reply));
 }
 
-void PollResponder::AttachPicture(const OpenPoll& open, PollReply& reply) {
+void PollResponder::AttachPicture(const OpenPoll& open, protocol::PollReply& reply) {
   const auto picture = pictures_.find(open.view_ns);
-  if (open.poll.picture == PollPicture::kNone || picture == pictures_.end()) return;
+  if (open.poll.picture == protocol::PollPicture::kNone || picture == pictures_.end()) return;
   const std::size_t max_bytes = open.poll.max_picture_bytes;
-  if (open.poll.picture == PollPicture::kCrop) {
-    CropConfig crop = config_.crop;
+  if (open.poll.picture == protocol::PollPicture::kCrop) {
+    imaging::CropConfig crop = config_.crop;
     crop.quality = config_.jpeg_quality;
     crop.max_bytes = std::min(crop.max_bytes, max_bytes);
-    reply.image = CropPicture(picture->second, open.view_box, crop).jpeg;
+    reply.image = imaging::CropPicture(picture->second, open.view_box, crop).jpeg;
   } else {
-    reply.image = EncodeJpeg(picture->second, config_.jpeg_quality, max_bytes);
+    reply.image = imaging::EncodeJpeg(picture->second, config_.jpeg_quality, max_bytes);
   }
   if (reply.image.empty()) return;
   reply.image_format = "jpeg";
@@ -348,6 +353,8 @@ std::string PollResponder::ReasonOf(const OpenPoll& open) {
   return "no image";
 }
 
-std::vector<PollReply> PollResponder::TakeReplies() { return std::exchange(replies_, {}); }
+std::vector<protocol::PollReply> PollResponder::TakeReplies() {
+  return std::exchange(replies_, {});
+}
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -17,7 +17,7 @@
 #include "vehicle/polls/change_evidence.h"
 #include "vehicle/positioning/fix_track.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Answers the zone's polls by what the camera sees at the places asked about (thesis, 3.1).
 ///
@@ -54,13 +54,13 @@ class PollResponder {
     double bracket_wait_s = 0.3;  ///< As in HazardReporter.
     double picture_wait_s = 0.5;  ///< A yes or no waits at most this long for its picture.
     int jpeg_quality = 70;        ///< 1..100.
-    CropConfig crop;  ///< Of a picture that shows a part; its own quality does not count.
-    GroundProjectionNoise projection;
+    imaging::CropConfig crop;  ///< Of a picture that shows a part; its own quality does not count.
+    geo::GroundProjectionNoise projection;
   };
 
   /// What answering needs to know about the vehicle.
   struct Vehicle {
-    std::optional<CameraIntrinsics> intrinsics;
+    std::optional<geo::CameraIntrinsics> intrinsics;
     /// Pose of a camera's optical frame in base_link; none: not known yet.
     std::function<std::optional<Eigen::Isometry3d>(const std::string& frame_id)> mounting;
     /// Pose of base_link at a moment.
@@ -86,14 +86,14 @@ class PollResponder {
     std::uint64_t picture_bytes = 0;
   };
 
-  PollResponder(const Config& config, const HazardCatalogue& catalogue)
+  PollResponder(const Config& config, const protocol::HazardCatalogue& catalogue)
       : config_(config), catalogue_(catalogue) {}
 
-  void Add(const Poll& poll, double steady_s);
+  void Add(const protocol::Poll& poll, double steady_s);
   /// One processed image with what the detector saw, also when that is nothing.
-  void AddFrame(const SightingFrame& frame, double now_s);
+  void AddFrame(const placement::SightingFrame& frame, double now_s);
   /// The annotated image of that stamp, before or after its frame.
-  void AddPicture(std::int64_t stamp_ns, const Picture& picture);
+  void AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture);
   /// How bright the image of that stamp is: its mean, 0..255. Best before its frame.
   void AddLuminance(std::int64_t stamp_ns, double luminance);
   /// What change detection knows of a place; told again it counts once, with its newest figures.
@@ -105,7 +105,7 @@ class PollResponder {
 
   /// Works off waiting frames and expired polls. Answers are ready for TakeReplies.
   void Process(double now_s, double steady_s, const Vehicle& vehicle);
-  std::vector<PollReply> TakeReplies();
+  std::vector<protocol::PollReply> TakeReplies();
 
   /// Mean brightness, 0 to 255, of a coarse grid of the pixels of an 8-bit grey or colour image.
   static double MeanLuminance(const cv::Mat& image);
@@ -118,15 +118,15 @@ class PollResponder {
   /// Why an image did not count.
   enum class Trouble { kNoFix, kNoCamera, kTooFar, kOutside, kHidden, kDark, kTooFew };
   struct OpenPoll {
-    Poll poll;
+    protocol::Poll poll;
     double deadline_s;  // Steady.
     std::map<Trouble, int> troubles;
     int clear_views = 0;
-    std::optional<GeoPoint> last_view;
+    std::optional<geo::GeoPoint> last_view;
     std::int64_t view_ns = 0;  // The image that speaks for the answer, and what it showed.
     double view_distance_m = 0;
-    Box view_box;  // The match's, or where the place is in that image.
-    TrackPose view_base;
+    imaging::Box view_box;  // The match's, or where the place is in that image.
+    geo::TrackPose view_base;
     float match_confidence = 0;
     float vanished = 0;  // Confidence that a thing of the class went, by change detection; or came.
     float appeared = 0;
@@ -135,38 +135,41 @@ class PollResponder {
     std::optional<double> asked_s;    // Steady; when its picture began to be missed.
   };
   struct WaitingFrame {
-    SightingFrame frame;
+    placement::SightingFrame frame;
     double arrival_s;
   };
 
   bool Work(WaitingFrame& waiting, double now_s, double steady_s, const Vehicle& vehicle);
-  void Look(OpenPoll& open, const SightingFrame& frame, const PlacedCamera& camera, double steady_s,
-            const Vehicle& vehicle);
-  std::optional<Trouble> WhyNotClear(const ProjectedPlace& view, const SightingFrame& frame,
+  void Look(OpenPoll& open, const placement::SightingFrame& frame,
+            const placement::PlacedCamera& camera, double steady_s, const Vehicle& vehicle);
+  std::optional<Trouble> WhyNotClear(const placement::ProjectedPlace& view,
+                                     const placement::SightingFrame& frame,
                                      const Vehicle& vehicle) const;
-  const Sighting* Match(const OpenPoll& open, const SightingFrame& frame, const ProjectedPlace& view,
-                        const PlacedCamera& camera) const;
-  void CountView(OpenPoll& open, const SightingFrame& frame, const ProjectedPlace& view,
-                 const TrackPose& base);
+  const placement::Sighting* Match(const OpenPoll& open, const placement::SightingFrame& frame,
+                                   const placement::ProjectedPlace& view,
+                                   const placement::PlacedCamera& camera) const;
+  void CountView(OpenPoll& open, const placement::SightingFrame& frame,
+                 const placement::ProjectedPlace& view, const geo::TrackPose& base);
   bool IsReady(OpenPoll& open, double steady_s);
   /// Whether views and changes make a no.
   bool IsGone(const OpenPoll& open) const;
   void Answer(const OpenPoll& open);
-  void AttachPicture(const OpenPoll& open, PollReply& reply);
+  void AttachPicture(const OpenPoll& open, protocol::PollReply& reply);
   static std::string ReasonOf(const OpenPoll& open);
 
   Config config_;
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   std::deque<OpenPoll> open_;
   std::deque<Uuid> answered_;  // The newest, to know repetitions.
   std::deque<WaitingFrame> waiting_;
-  std::map<std::int64_t, Picture> pictures_;  // The newest, and those that an open poll may need.
+  std::map<std::int64_t, imaging::Picture>
+      pictures_;  // The newest, and those that an open poll may need.
   std::map<std::int64_t, double> luminances_;
   std::vector<std::int64_t> picture_requests_;
-  std::vector<PollReply> replies_;
-  std::optional<TrackPose> newest_base_;
+  std::vector<protocol::PollReply> replies_;
+  std::optional<geo::TrackPose> newest_base_;
   std::int64_t newest_ns_ = 0;
   Counters counters_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

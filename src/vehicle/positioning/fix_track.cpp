@@ -9,7 +9,7 @@
 #include "common/time.h"
 #include "geo/fix_covariance.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr double kMinSigmaM = 1e-3;        // No receiver is better; keeps covariances invertible.
@@ -27,9 +27,9 @@ std::optional<std::int64_t> FixTrack::newest_ns() const {
   return points_.back().stamp_ns;
 }
 
-std::optional<TrackPose> FixTrack::Newest() const {
+std::optional<geo::TrackPose> FixTrack::Newest() const {
   if (points_.empty()) return std::nullopt;
-  TrackPose pose;
+  geo::TrackPose pose;
   pose.position = points_.back().position;
   pose.covariance_m2 = points_.back().covariance_m2;
   pose.course_rad = std::numeric_limits<double>::quiet_NaN();
@@ -44,7 +44,7 @@ std::optional<TrackPose> FixTrack::Newest() const {
   return pose;
 }
 
-FixTrack::Verdict FixTrack::Add(const Fix& fix) {
+FixTrack::Verdict FixTrack::Add(const geo::Fix& fix) {
   if (!fix.has_fix) return Verdict::kNoFix;
   const auto point = ToPoint(fix);
   if (!point) return Verdict::kInvalid;
@@ -67,12 +67,12 @@ FixTrack::Verdict FixTrack::Add(const Fix& fix) {
   return Verdict::kAccepted;
 }
 
-std::optional<FixTrack::Point> FixTrack::ToPoint(const Fix& fix) const {
-  if (!IsValid(fix.position) || fix.stamp_ns <= 0) return std::nullopt;
+std::optional<FixTrack::Point> FixTrack::ToPoint(const geo::Fix& fix) const {
+  if (!geo::IsValid(fix.position) || fix.stamp_ns <= 0) return std::nullopt;
   Eigen::Matrix2d covariance_m2 =
       Eigen::Matrix2d::Identity() * config_.default_sigma_m * config_.default_sigma_m;
   if (fix.covariance_m2) {
-    if (!IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
+    if (!geo::IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
     covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   }
   return Point{fix.stamp_ns, fix.position, covariance_m2, std::nullopt};
@@ -82,7 +82,7 @@ bool FixTrack::Reachable(const Point& from, const Point& to) const {
   const double allowance_m =
       std::min(kMaxJumpAllowanceM, 3 * (SigmaM(from.covariance_m2) + SigmaM(to.covariance_m2)));
   const double way_m = config_.max_speed_mps * Seconds(to.stamp_ns - from.stamp_ns) + allowance_m;
-  return GeodesicDistanceM(from.position, to.position) <= way_m;
+  return geo::GeodesicDistanceM(from.position, to.position) <= way_m;
 }
 
 FixTrack::Verdict FixTrack::AddSuspect(const Point& point) {
@@ -152,27 +152,27 @@ FixTrack::Lookup FixTrack::At(std::int64_t stamp_ns) const {
   return lookup;
 }
 
-TrackPose FixTrack::Interpolate(const Point& before, const Point& after,
-                                std::int64_t stamp_ns) const {
-  const LocalFrame frame(before.position);
+geo::TrackPose FixTrack::Interpolate(const Point& before, const Point& after,
+                                     std::int64_t stamp_ns) const {
+  const geo::LocalFrame frame(before.position);
   const double ahead_s = Seconds(stamp_ns - before.stamp_ns);
   const double gap_s = Seconds(after.stamp_ns - before.stamp_ns);
   const double share = ahead_s / gap_s;
   // Straight and even between the two fixes, save for what accelerating could have changed.
   const double bend_m = 0.5 * config_.acceleration_mps2 * ahead_s * (gap_s - ahead_s);
-  TrackPose pose;
+  geo::TrackPose pose;
   pose.position = frame.ToGeo(share * frame.ToEnu(after.position));
   pose.covariance_m2 = (1 - share) * before.covariance_m2 + share * after.covariance_m2 +
                        bend_m * bend_m * Eigen::Matrix2d::Identity();
   return pose;
 }
 
-TrackPose FixTrack::Extrapolate(const Point& last, const Motion& motion,
-                                std::int64_t stamp_ns) const {
+geo::TrackPose FixTrack::Extrapolate(const Point& last, const Motion& motion,
+                                     std::int64_t stamp_ns) const {
   const double ahead_s = Seconds(stamp_ns - last.stamp_ns);
   const double bend_m = 0.5 * config_.acceleration_mps2 * ahead_s * ahead_s;
-  TrackPose pose;
-  pose.position = LocalFrame(last.position).ToGeo(ahead_s * motion.velocity_mps);
+  geo::TrackPose pose;
+  pose.position = geo::LocalFrame(last.position).ToGeo(ahead_s * motion.velocity_mps);
   pose.covariance_m2 =
       last.covariance_m2 +
       (motion.variance * ahead_s * ahead_s + bend_m * bend_m) * Eigen::Matrix2d::Identity();
@@ -186,7 +186,7 @@ std::optional<FixTrack::Motion> FixTrack::MotionAt(std::int64_t stamp_ns,
   const auto middle = std::lower_bound(
       points_.begin(), end, stamp_ns,
       [](const Point& point, std::int64_t moment_ns) { return point.stamp_ns < moment_ns; });
-  const LocalFrame frame((middle == end ? *std::prev(end) : *middle).position);
+  const geo::LocalFrame frame((middle == end ? *std::prev(end) : *middle).position);
   auto older = middle;
   auto newer = middle;
   while (true) {
@@ -246,4 +246,4 @@ std::optional<FixTrack::Course> FixTrack::CourseOf(const Motion& motion) const {
   return Course{std::atan2(motion.velocity_mps.x(), motion.velocity_mps.y()), variance_rad2};
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

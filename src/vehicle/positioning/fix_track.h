@@ -10,7 +10,7 @@
 #include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// The recent fixes of one vehicle: answers where it was and which way it drove at the moment of an
 /// image. A position is interpolated between two fixes or carried on a bounded time beyond the
@@ -63,18 +63,18 @@ class FixTrack {
 
   struct Lookup {
     Answer answer = Answer::kWait;
-    TrackPose pose;  ///< Valid for kReady and kExtrapolated.
+    geo::TrackPose pose;  ///< Valid for kReady and kExtrapolated.
   };
 
   explicit FixTrack(const Config& config);
 
-  Verdict Add(const Fix& fix);
+  Verdict Add(const geo::Fix& fix);
   /// Pose at a moment (ns, the fixes' clock). Once kReady, fixes that come later do not change it.
   Lookup At(std::int64_t stamp_ns) const;
   /// The newest accepted fix's moment; nothing before the first.
   std::optional<std::int64_t> newest_ns() const;
   /// Where the vehicle was then; course NaN when it is not known or the vehicle stands.
-  std::optional<TrackPose> Newest() const;
+  std::optional<geo::TrackPose> Newest() const;
 
  private:
   struct Motion {
@@ -92,18 +92,18 @@ class FixTrack {
   };
   struct Point {
     std::int64_t stamp_ns;
-    GeoPoint position;
+    geo::GeoPoint position;
     Eigen::Matrix2d covariance_m2;
     std::optional<Course> course;  // Of the last motion up to here: a standing vehicle keeps it.
   };
   using Points = std::deque<Point>;
 
-  std::optional<Point> ToPoint(const Fix& fix) const;
+  std::optional<Point> ToPoint(const geo::Fix& fix) const;
   bool Reachable(const Point& from, const Point& to) const;
   Verdict AddSuspect(const Point& point);
   void Append(const Point& point);
-  TrackPose Interpolate(const Point& before, const Point& after, std::int64_t stamp_ns) const;
-  TrackPose Extrapolate(const Point& last, const Motion& motion, std::int64_t stamp_ns) const;
+  geo::TrackPose Interpolate(const Point& before, const Point& after, std::int64_t stamp_ns) const;
+  geo::TrackPose Extrapolate(const Point& last, const Motion& motion, std::int64_t stamp_ns) const;
   /// Motion at a moment by the fixes before `end`.
   std::optional<Motion> MotionAt(std::int64_t stamp_ns, const Points::const_iterator& end) const;
   std::optional<Course> StandingCourse(const Points::const_iterator& after) const;
@@ -115,4 +115,4 @@ class FixTrack {
   std::vector<Point> suspects_;  // Jumps that agree with each other.
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

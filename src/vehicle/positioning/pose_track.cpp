@@ -8,19 +8,19 @@
 #include "common/time.h"
 #include "geo/fix_covariance.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
-bool IsUsable(const TrackPose& pose) {
-  return IsValid(pose.position) && std::isfinite(pose.course_rad) &&
-         std::isfinite(pose.speed_mps) && IsFixCovariance(pose.covariance_m2) &&
+bool IsUsable(const geo::TrackPose& pose) {
+  return geo::IsValid(pose.position) && std::isfinite(pose.course_rad) &&
+         std::isfinite(pose.speed_mps) && geo::IsFixCovariance(pose.covariance_m2) &&
          pose.position_course.allFinite() && pose.course_variance_rad2 >= 0 &&
          pose.course_variance_rad2 <= 10;
 }
 
-TrackPose Between(const TrackPose& before, const TrackPose& after, double share) {
-  const LocalFrame frame(before.position);
-  TrackPose pose;
+geo::TrackPose Between(const geo::TrackPose& before, const geo::TrackPose& after, double share) {
+  const geo::LocalFrame frame(before.position);
+  geo::TrackPose pose;
   pose.position = frame.ToGeo(share * frame.ToEnu(after.position));
   pose.covariance_m2 = (1 - share) * before.covariance_m2 + share * after.covariance_m2;
   pose.course_rad =
@@ -34,7 +34,7 @@ TrackPose Between(const TrackPose& before, const TrackPose& after, double share)
 
 }  // namespace
 
-bool PoseTrack::Add(std::int64_t stamp_ns, const TrackPose& pose) {
+bool PoseTrack::Add(std::int64_t stamp_ns, const geo::TrackPose& pose) {
   if (stamp_ns <= 0 || !IsUsable(pose)) return false;
   if (!points_.empty() && stamp_ns <= points_.back().stamp_ns) {
     // A replay that begins again: nothing of before can be compared.
@@ -66,4 +66,4 @@ std::optional<std::int64_t> PoseTrack::newest_ns() const {
   return points_.back().stamp_ns;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

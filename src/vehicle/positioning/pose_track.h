@@ -6,7 +6,7 @@
 
 #include "vehicle/positioning/fix_track.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// The recent poses of base_link as the fusion of fixes and odometry has them: answers where the
 /// vehicle was and which way it looked at the moment of an image. A pose is interpolated between
@@ -26,7 +26,7 @@ class PoseTrack {
 
   /// The pose's position is that of base_link, its course the heading. False when it is refused:
   /// not finite, no position, no covariance, or not newer than the newest.
-  bool Add(std::int64_t stamp_ns, const TrackPose& pose);
+  bool Add(std::int64_t stamp_ns, const geo::TrackPose& pose);
   /// kReady, kWait (a later pose may tell) or kHopeless. Once kReady, poses that come later do not
   /// change it.
   FixTrack::Lookup At(std::int64_t stamp_ns) const;
@@ -36,11 +36,11 @@ class PoseTrack {
  private:
   struct Point {
     std::int64_t stamp_ns;
-    TrackPose pose;
+    geo::TrackPose pose;
   };
 
   Config config_;
   std::deque<Point> points_;  // Ascending stamps.
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

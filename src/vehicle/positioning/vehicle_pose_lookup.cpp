@@ -4,7 +4,7 @@
 
 #include "placement/hazard_placement.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 VehiclePoseLookup::VehiclePoseLookup(const Config& config)
     : config_(config), fixes_(config.fixes), poses_(config.poses) {}
@@ -31,11 +31,11 @@ VehiclePoseLookup::Lookup VehiclePoseLookup::At(std::int64_t stamp_ns, double wa
   return {Answer::kHopeless, {}, false};
 }
 
-TrackPose VehiclePoseLookup::BaseOf(const TrackPose& antenna) const {
+geo::TrackPose VehiclePoseLookup::BaseOf(const geo::TrackPose& antenna) const {
   const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
-  const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
-  const PlacedHazard placed = PlaceHazard(antenna, antenna_m, origin);
-  TrackPose base = antenna;
+  const geo::GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const placement::PlacedHazard placed = placement::PlaceHazard(antenna, antenna_m, origin);
+  geo::TrackPose base = antenna;
   base.position = placed.position;
   base.covariance_m2 = placed.covariance_m2;
   // What the course's error does to the way from the antenna, base_link's place shares with it.
@@ -47,4 +47,4 @@ TrackPose VehiclePoseLookup::BaseOf(const TrackPose& antenna) const {
   return base;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

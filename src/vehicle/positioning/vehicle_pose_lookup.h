@@ -5,7 +5,7 @@
 #include "vehicle/positioning/fix_track.h"
 #include "vehicle/positioning/pose_track.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Where base_link was at the moment of an image, by the tracks that HazardReporter uses and with
 /// its patience: the fused pose, else the fixes, which are carried on only when none comes after
@@ -31,26 +31,28 @@ class VehiclePoseLookup {
 
   struct Lookup {
     Answer answer = Answer::kWait;
-    TrackPose base;      ///< Valid for kReady: of base_link.
-    bool fused = false;  ///< Valid for kReady.
+    geo::TrackPose base;  ///< Valid for kReady: of base_link.
+    bool fused = false;   ///< Valid for kReady.
   };
 
   explicit VehiclePoseLookup(const Config& config);
 
-  FixTrack::Verdict AddFix(const Fix& fix) { return fixes_.Add(fix); }
+  FixTrack::Verdict AddFix(const geo::Fix& fix) { return fixes_.Add(fix); }
   /// A fused pose of base_link; false when it is refused.
-  bool AddPose(std::int64_t stamp_ns, const TrackPose& pose) { return poses_.Add(stamp_ns, pose); }
+  bool AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
+    return poses_.Add(stamp_ns, pose);
+  }
 
   /// For an image of `stamp_ns` that has waited `waited_s`.
   Lookup At(std::int64_t stamp_ns, double waited_s) const;
 
  private:
   /// The antenna's pose as that of base_link.
-  TrackPose BaseOf(const TrackPose& antenna) const;
+  geo::TrackPose BaseOf(const geo::TrackPose& antenna) const;
 
   Config config_;
   FixTrack fixes_;
   PoseTrack poses_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

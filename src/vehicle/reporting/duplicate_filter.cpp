@@ -4,11 +4,13 @@
 
 #include "common/error.h"
 
-namespace livemap {
-DuplicateFilter::DuplicateFilter(HazardCatalogue catalogue) : catalogue_(std::move(catalogue)) {}
+namespace livemap::vehicle {
+DuplicateFilter::DuplicateFilter(protocol::HazardCatalogue catalogue)
+    : catalogue_(std::move(catalogue)) {}
 
-void DuplicateFilter::Put(const Uuid& id, const std::string& class_name, const GeoPoint& position) {
-  if (!IsValid(position)) throw Error("hazard " + id.ToString() + " has no valid position");
+void DuplicateFilter::Put(const Uuid& id, const std::string& class_name,
+                          const geo::GeoPoint& position) {
+  if (!geo::IsValid(position)) throw Error("hazard " + id.ToString() + " has no valid position");
   Remove(id);
   std::uint64_t number = known_.size();
   if (free_numbers_.empty()) {
@@ -35,7 +37,7 @@ bool DuplicateFilter::Remove(const Uuid& id) {
 }
 
 std::optional<DuplicateFilter::Match> DuplicateFilter::Find(const std::string& class_name,
-                                                            const GeoPoint& position) const {
+                                                            const geo::GeoPoint& position) const {
   const auto found = classes_.find(class_name);
   if (found == classes_.end()) return std::nullopt;
   const auto nearest = found->second.grid.Nearest(position, found->second.radius_m);
@@ -47,7 +49,8 @@ DuplicateFilter::ClassMap::iterator DuplicateFilter::IndexOf(const std::string& 
   const auto found = classes_.find(class_name);
   if (found != classes_.end()) return found;
   const double radius_m = catalogue_.DuplicateRadiusM(class_name);
-  return classes_.emplace(class_name, ClassIndex{radius_m, SpatialGrid::ForRadius(radius_m)}).first;
+  return classes_.emplace(class_name, ClassIndex{radius_m, geo::SpatialGrid::ForRadius(radius_m)})
+      .first;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

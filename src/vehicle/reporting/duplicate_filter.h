@@ -10,7 +10,7 @@
 #include "geo/wgs84.h"
 #include "protocol/hazard_catalogue.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Knows where hazards are and says whether a sighting is one of them: the same class within the
 /// class's duplicate radius, as the geodesic measures it (thesis, section 3.1). The cost of every
@@ -22,14 +22,14 @@ class DuplicateFilter {
     double distance_m;
   };
 
-  explicit DuplicateFilter(HazardCatalogue catalogue);
+  explicit DuplicateFilter(protocol::HazardCatalogue catalogue);
 
   /// Adds a hazard, or moves the one that has this id. Throws Error for an invalid position.
-  void Put(const Uuid& id, const std::string& class_name, const GeoPoint& position);
+  void Put(const Uuid& id, const std::string& class_name, const geo::GeoPoint& position);
   /// Forgets a hazard; false when it was not known.
   bool Remove(const Uuid& id);
   /// The nearest known hazard that a sighting of this class at this place duplicates.
-  std::optional<Match> Find(const std::string& class_name, const GeoPoint& position) const;
+  std::optional<Match> Find(const std::string& class_name, const geo::GeoPoint& position) const;
 
   bool Knows(const Uuid& id) const { return numbers_.count(id) != 0; }
   std::size_t size() const { return numbers_.size(); }
@@ -37,18 +37,18 @@ class DuplicateFilter {
  private:
   struct ClassIndex {
     double radius_m;
-    SpatialGrid grid;
+    geo::SpatialGrid grid;
   };
   using ClassMap = std::map<std::string, ClassIndex>;
   struct Known {
     Uuid id;
-    GeoPoint position;
+    geo::GeoPoint position;
     ClassMap::iterator index;
   };
 
   ClassMap::iterator IndexOf(const std::string& class_name);
 
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   ClassMap classes_;  // Only classes of which a hazard is known.
   // The grid speaks of hazards by number: their place in known_; free numbers are used again.
   std::vector<Known> known_;
@@ -56,4 +56,4 @@ class DuplicateFilter {
   std::unordered_map<Uuid, std::uint64_t> numbers_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

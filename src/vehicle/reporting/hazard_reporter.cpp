@@ -7,7 +7,7 @@
 #include "common/time.h"
 #include "placement/road_ground_contact.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr std::size_t kMaxEarlyPictures = 8;
@@ -15,7 +15,7 @@ constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range
 
 }  // namespace
 
-HazardReporter::HazardReporter(const Config& config, const HazardCatalogue& catalogue,
+HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatalogue& catalogue,
                                std::mt19937_64 random, std::int64_t now_ns, double steady_s)
     : config_(config),
       catalogue_(catalogue),
@@ -58,14 +58,14 @@ FixTrack::Lookup HazardReporter::BasePoseAt(std::int64_t stamp_ns) const {
   }
   FixTrack::Lookup lookup = track_.At(stamp_ns);
   const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
-  const GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const geo::GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
   const bool known =
       lookup.answer == FixTrack::Answer::kReady || lookup.answer == FixTrack::Answer::kExtrapolated;
-  if (known) lookup.pose.position = PlaceHazard(lookup.pose, antenna_m, origin).position;
+  if (known) lookup.pose.position = placement::PlaceHazard(lookup.pose, antenna_m, origin).position;
   return lookup;
 }
 
-void HazardReporter::AddFix(const Fix& fix) {
+void HazardReporter::AddFix(const geo::Fix& fix) {
   ++counters_.fixes;
   switch (track_.Add(fix)) {
     case FixTrack::Verdict::kAccepted:
@@ -84,13 +84,13 @@ void HazardReporter::AddFix(const Fix& fix) {
   }
 }
 
-void HazardReporter::AddPose(std::int64_t stamp_ns, const TrackPose& pose) {
+void HazardReporter::AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
   ++counters_.poses;
   if (!poses_.Add(stamp_ns, pose)) ++counters_.invalid_poses;
 }
 
-bool HazardReporter::IsUsable(const Sighting& sighting) {
-  if (!IsWellFormed(sighting)) {
+bool HazardReporter::IsUsable(const placement::Sighting& sighting) {
+  if (!placement::IsWellFormed(sighting)) {
     ++counters_.invalid_detections;
     return false;
   }
@@ -101,15 +101,16 @@ bool HazardReporter::IsUsable(const Sighting& sighting) {
   return true;
 }
 
-void HazardReporter::AddFrame(const SightingFrame& frame, double now_s) {
+void HazardReporter::AddFrame(const placement::SightingFrame& frame, double now_s) {
   counters_.detections += frame.sightings.size();
   WaitingFrame waiting;
   waiting.frame = frame;
   waiting.arrival_s = now_s;
   auto& sightings = waiting.frame.sightings;
-  sightings.erase(std::remove_if(sightings.begin(), sightings.end(),
-                                 [this](const Sighting& sighting) { return !IsUsable(sighting); }),
-                  sightings.end());
+  sightings.erase(
+      std::remove_if(sightings.begin(), sightings.end(),
+                     [this](const placement::Sighting& sighting) { return !IsUsable(sighting); }),
+      sightings.end());
   const auto picture = early_pictures_.find(frame.stamp_ns);
   if (picture != early_pictures_.end()) {
     waiting.picture = picture->second;
@@ -123,20 +124,20 @@ void HazardReporter::AddFrame(const SightingFrame& frame, double now_s) {
   }
 }
 
-void HazardReporter::AddPicture(std::int64_t stamp_ns, const Picture& picture,
-                                const PixelRegion& part) {
+void HazardReporter::AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture,
+                                const imaging::PixelRegion& part) {
   bool is_known = false;
   for (WaitingFrame& waiting : waiting_) {
     if (waiting.frame.stamp_ns != stamp_ns) continue;
     is_known = true;
-    if (Contains(part, waiting.wanted)) waiting.picture = picture;
+    if (imaging::Contains(part, waiting.wanted)) waiting.picture = picture;
   }
   if (is_known || !part.IsWholeImage()) return;
   early_pictures_[stamp_ns] = picture;
   if (early_pictures_.size() > kMaxEarlyPictures) early_pictures_.erase(early_pictures_.begin());
 }
 
-void HazardReporter::AddDepth(std::int64_t stamp_ns, const DepthImage& depth) {
+void HazardReporter::AddDepth(std::int64_t stamp_ns, const placement::DepthImage& depth) {
   depths_[stamp_ns] = depth;
   if (depths_.size() <= static_cast<std::size_t>(config_.depth_images)) return;
   // The oldest, but for those of before a clock that was set back.
@@ -150,18 +151,20 @@ void HazardReporter::Process(double now_s, double steady_s) {
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
   // All of them, so that none waits for its picture only after the one before it has waited.
   for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
-    if (IsPlaced(*waiting, now_s) && HasUnknownHazard(*waiting) && !IsCoveredByEarlierFrame(waiting)) {
+    if (IsPlaced(*waiting, now_s) && HasUnknownHazard(*waiting) &&
+        !IsCoveredByEarlierFrame(waiting)) {
       AskForPicture(*waiting, now_s);
     }
   }
 }
 
 /// Whether the frames before it will have reported all that it shows.
-bool HazardReporter::IsCoveredByEarlierFrame(std::deque<WaitingFrame>::const_iterator waiting) const {
+bool HazardReporter::IsCoveredByEarlierFrame(
+    std::deque<WaitingFrame>::const_iterator waiting) const {
   const auto is_same = [this](const PlacedSighting& one, const PlacedSighting& other) {
     const std::string& name = one.sighting.class_name;
     return name == other.sighting.class_name &&
-           GeodesicDistanceM(one.place.position, other.place.position) <=
+           geo::GeodesicDistanceM(one.place.position, other.place.position) <=
                catalogue_.Get(name).duplicate_radius_m;
   };
   const auto will_be_known = [&](const PlacedSighting& candidate) {
@@ -205,15 +208,15 @@ void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
 }
 
 /// What the pictures of its reports may show of the image.
-PixelRegion HazardReporter::VisibleRegion(const WaitingFrame& waiting) const {
-  std::optional<PixelRegion> shown;
+imaging::PixelRegion HazardReporter::VisibleRegion(const WaitingFrame& waiting) const {
+  std::optional<imaging::PixelRegion> shown;
   for (const PlacedSighting& candidate : waiting.candidates) {
-    const PixelRegion crop =
-        WidestCrop(candidate.sighting.box, static_cast<int>(waiting.frame.image_width),
-                   static_cast<int>(waiting.frame.image_height), config_.picture);
-    shown = shown ? Union(*shown, crop) : crop;
+    const imaging::PixelRegion crop =
+        imaging::WidestCrop(candidate.sighting.box, static_cast<int>(waiting.frame.image_width),
+                            static_cast<int>(waiting.frame.image_height), config_.picture);
+    shown = shown ? imaging::Union(*shown, crop) : crop;
   }
-  return shown.value_or(PixelRegion{});
+  return shown.value_or(imaging::PixelRegion{});
 }
 
 bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
@@ -224,11 +227,11 @@ bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
   return now_s - *waiting.asked_s < config_.picture_wait_s;
 }
 
-std::vector<PictureRequirements> HazardReporter::TakePictureRequests() {
+std::vector<imaging::PictureRequirements> HazardReporter::TakePictureRequests() {
   return std::exchange(picture_requests_, {});
 }
 
-bool HazardReporter::FitsCamera(const SightingFrame& frame) const {
+bool HazardReporter::FitsCamera(const placement::SightingFrame& frame) const {
   return intrinsics_ && HasMounting(frame.frame_id) &&
          static_cast<std::uint32_t>(intrinsics_->width) == frame.image_width &&
          static_cast<std::uint32_t>(intrinsics_->height) == frame.image_height;
@@ -275,48 +278,49 @@ bool HazardReporter::WaitsForDepth(const WaitingFrame& waiting, double waited_s)
 }
 
 /// Where the sighting's foot stands in base_link; counted where it is not on the road or too far.
-std::optional<GroundPoint> HazardReporter::PlaceOnRoad(const SightingFrame& frame,
-                                                       const Sighting& sighting,
-                                                       double heading_variance_rad2) {
+std::optional<geo::GroundPoint> HazardReporter::PlaceOnRoad(const placement::SightingFrame& frame,
+                                                            const placement::Sighting& sighting,
+                                                            double heading_variance_rad2) {
   const Eigen::Isometry3d& mounting = mountings_.at(frame.frame_id);
-  const Box& box = sighting.box;
-  std::optional<GroundPoint> ground;
+  const imaging::Box& box = sighting.box;
+  std::optional<geo::GroundPoint> ground;
   const auto depth = depths_.find(frame.stamp_ns);
   if (config_.use_depth && depth != depths_.end()) {
-    ground =
-        ContactByDepth(depth->second, box, *intrinsics_, mounting, config_.projection, config_.depth);
+    ground = placement::ContactByDepth(depth->second, box, *intrinsics_, mounting,
+                                       config_.projection, config_.depth);
     if (ground) ++counters_.distances_by_depth;
   }
-  if (!ground && IsCutBySide(box, intrinsics_->width)) {
+  if (!ground && placement::IsCutBySide(box, intrinsics_->width)) {
     ++counters_.cut_by_side;
     return std::nullopt;
   }
   if (!ground) {
-    ground = ProjectToGround(ContactPixel(box), *intrinsics_, mounting, config_.projection);
+    ground = geo::ProjectToGround(placement::ContactPixel(box), *intrinsics_, mounting,
+                                  config_.projection);
   }
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
   }
-  if (!IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
-                    config_.max_ground_sigma_m)) {
+  if (!placement::IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
+                               config_.max_ground_sigma_m)) {
     ++counters_.too_far;
     return std::nullopt;
   }
   return ground;
 }
 
-void HazardReporter::PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused) {
+void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& pose, bool fused) {
   const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
   const Eigen::Vector2d pose_in_base_m = fused ? Eigen::Vector2d::Zero() : antenna_m;
-  for (const Sighting& sighting : waiting.frame.sightings) {
+  for (const placement::Sighting& sighting : waiting.frame.sightings) {
     const auto ground =
         PlaceOnRoad(waiting.frame, sighting, fused ? pose.course_variance_rad2 : 0.0);
     if (!ground) continue;
-    waiting.candidates.push_back({sighting, PlaceHazard(pose, pose_in_base_m, *ground)});
+    waiting.candidates.push_back({sighting, placement::PlaceHazard(pose, pose_in_base_m, *ground)});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
   waiting.placed = true;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

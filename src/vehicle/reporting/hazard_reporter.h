@@ -24,7 +24,7 @@
 #include "vehicle/positioning/pose_track.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Whose positions count.
 enum class PositionSource {
@@ -75,9 +75,9 @@ class HazardReporter {
     bool use_depth = false;
     /// A frame waits at most this long for its depth image; then the road's plane counts, s.
     double depth_wait_s = 0.3;
-    DepthNoise depth;
+    placement::DepthNoise depth;
     int depth_images = 60;  ///< So many are kept: detections come late, events later.
-    CropConfig picture;
+    imaging::CropConfig picture;
     /// How long a report of each rank of urgency may wait for a cheap link, s; rank 1 first. Below
     /// the age at which the zone refuses reports.
     std::array<double, 3> hold_s{0, 300, 21600};
@@ -87,7 +87,7 @@ class HazardReporter {
     /// the word about the link may come after us.
     double link_wait_s = 5;
     FixTrack::Config track;
-    GroundProjectionNoise projection;
+    geo::GroundProjectionNoise projection;
     ResendSchedule::Config resend;
     LocalHazardMap::Config map;
   };
@@ -130,40 +130,41 @@ class HazardReporter {
   };
 
   /// `random` makes uuids and jitter; `now_ns` (UTC) names a corrupt database's new name.
-  HazardReporter(const Config& config, const HazardCatalogue& catalogue, std::mt19937_64 random,
-                 std::int64_t now_ns, double steady_s);
+  HazardReporter(const Config& config, const protocol::HazardCatalogue& catalogue,
+                 std::mt19937_64 random, std::int64_t now_ns, double steady_s);
 
-  void SetIntrinsics(const CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
+  void SetIntrinsics(const geo::CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
   /// Pose of the camera's optical frame in base_link.
   void SetMounting(const std::string& frame_id, const Eigen::Isometry3d& base_from_optical);
   bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
 
-  void AddFix(const Fix& fix);
+  void AddFix(const geo::Fix& fix);
   /// Where base_link was then and which way it looked: fixes and odometry fused.
-  void AddPose(std::int64_t stamp_ns, const TrackPose& pose);
-  void AddFrame(const SightingFrame& frame, double now_s);
+  void AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose);
+  void AddFrame(const placement::SightingFrame& frame, double now_s);
   /// The depth image of the frame with this stamp, before or after it.
-  void AddDepth(std::int64_t stamp_ns, const DepthImage& depth);
+  void AddDepth(std::int64_t stamp_ns, const placement::DepthImage& depth);
   /// The annotated image of the frame with this stamp, before or after it.
   /// `part` is what of the image it shows clearly.
-  void AddPicture(std::int64_t stamp_ns, const Picture& picture, const PixelRegion& part = {});
+  void AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture,
+                  const imaging::PixelRegion& part = {});
   /// Whether there is anyone to give pictures, as there is at first; else no frame waits for one.
   void SetPictureSourceAvailable(bool expected) { expects_pictures_ = expected; }
   /// The images whose pictures are wanted now, each once.
-  std::vector<PictureRequirements> TakePictureRequests();
+  std::vector<imaging::PictureRequirements> TakePictureRequests();
   void SetLink(LinkCost link) { link_ = link; }
-  void AddNotice(const Notice& notice);
-  void AddReceipt(const Receipt& receipt);
+  void AddNotice(const protocol::Notice& notice);
+  void AddReceipt(const protocol::Receipt& receipt);
 
   /// Works off waiting notices and frames, in their order.
   void Process(double now_s, double steady_s);
   /// At most `limit` reports to send now.
-  std::vector<Report> TakeDue(double steady_s, std::size_t limit);
+  std::vector<protocol::Report> TakeDue(double steady_s, std::size_t limit);
 
   /// Where base_link was at a moment and which way it looked: by the source that counts, for kFused
   /// the fixes where the fusion has no word.
   FixTrack::Lookup BasePoseAt(std::int64_t stamp_ns) const;
-  const std::optional<CameraIntrinsics>& intrinsics() const { return intrinsics_; }
+  const std::optional<geo::CameraIntrinsics>& intrinsics() const { return intrinsics_; }
   std::optional<Eigen::Isometry3d> Mounting(const std::string& frame_id) const;
 
   /// Intrinsics and some camera's mounting are known.
@@ -184,38 +185,39 @@ class HazardReporter {
 
  private:
   struct PlacedSighting {
-    Sighting sighting;
-    PlacedHazard place;
+    placement::Sighting sighting;
+    placement::PlacedHazard place;
   };
   struct WaitingFrame {
-    SightingFrame frame;
+    placement::SightingFrame frame;
     double arrival_s;
     bool held_back = false;
     bool placed = false;
-    std::optional<double> asked_s;      // When its picture began to be missed...
-    PixelRegion wanted;                 // ...and what of it.
+    std::optional<double> asked_s;           // When its picture began to be missed...
+    imaging::PixelRegion wanted;             // ...and what of it.
     std::vector<PlacedSighting> candidates;  // Once placed.
-    Picture picture;
+    imaging::Picture picture;
   };
 
-  bool IsUsable(const Sighting& sighting);
+  bool IsUsable(const placement::Sighting& sighting);
   bool IsPlaced(WaitingFrame& waiting, double now_s);
   bool HasUnknownHazard(const WaitingFrame& waiting) const;
   bool IsCoveredByEarlierFrame(std::deque<WaitingFrame>::const_iterator waiting) const;
   void AskForPicture(WaitingFrame& waiting, double now_s);
-  PixelRegion VisibleRegion(const WaitingFrame& waiting) const;
+  imaging::PixelRegion VisibleRegion(const WaitingFrame& waiting) const;
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
-  bool FitsCamera(const SightingFrame& frame) const;
+  bool FitsCamera(const placement::SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
   bool WaitsForDepth(const WaitingFrame& waiting, double waited_s) const;
   bool WaitsForPose(const WaitingFrame& waiting, double waited_s) const;
-  void PlaceSightings(WaitingFrame& waiting, const TrackPose& pose, bool fused);
-  std::optional<GroundPoint> PlaceOnRoad(const SightingFrame& frame, const Sighting& sighting,
-                                         double heading_variance_rad2);
+  void PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& pose, bool fused);
+  std::optional<geo::GroundPoint> PlaceOnRoad(const placement::SightingFrame& frame,
+                                              const placement::Sighting& sighting,
+                                              double heading_variance_rad2);
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
   void ReportCandidates(const WaitingFrame& waiting, double steady_s);
-  Report MakeReport(const WaitingFrame& waiting, const PlacedSighting& candidate);
-  void AttachPicture(const WaitingFrame& waiting, Report& report);
+  protocol::Report MakeReport(const WaitingFrame& waiting, const PlacedSighting& candidate);
+  void AttachPicture(const WaitingFrame& waiting, protocol::Report& report);
   double HoldS(int urgency) const;
   bool IsCheap(double steady_s) const;
   std::int64_t UtcNs(double steady_s) const;
@@ -224,28 +226,29 @@ class HazardReporter {
   void TellStoreError(const StoreError& error);
 
   Config config_;
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   std::mt19937_64 random_;
   LocalHazardMap map_;
   FixTrack track_;
   PoseTrack poses_;
   ResendSchedule schedule_;
-  std::optional<CameraIntrinsics> intrinsics_;
+  std::optional<geo::CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<WaitingFrame> waiting_;
-  std::map<std::int64_t, Picture> early_pictures_;  // Whose frame has not come yet, by stamp.
-  std::map<std::int64_t, DepthImage> depths_;       // By stamp.
-  std::vector<PictureRequirements> picture_requests_;
+  std::map<std::int64_t, imaging::Picture>
+      early_pictures_;                                    // Whose frame has not come yet, by stamp.
+  std::map<std::int64_t, placement::DepthImage> depths_;  // By stamp.
+  std::vector<imaging::PictureRequirements> picture_requests_;
   bool expects_pictures_ = true;
   LinkCost link_ = LinkCost::kUnknown;
   bool held_at_start_ = false;
   std::int64_t start_ns_;  // UTC at the start...
   double start_steady_s_;  // ...and the steady clock then.
-  std::deque<Notice> notices_;
+  std::deque<protocol::Notice> notices_;
   std::optional<double> forgot_s_;  // When ForgetUnannounced last looked.
   std::set<Uuid> unsent_;
   Counters counters_;
   std::string store_error_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -6,20 +6,20 @@
 #include "common/time.h"
 #include "vehicle/reporting/hazard_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr std::size_t kMaxWaitingNotices = 20000;
 
 }  // namespace
 
-void HazardReporter::AddNotice(const Notice& notice) {
+void HazardReporter::AddNotice(const protocol::Notice& notice) {
   ++counters_.notices;
   notices_.push_back(notice);
   if (notices_.size() > kMaxWaitingNotices) notices_.pop_front();
 }
 
-void HazardReporter::AddReceipt(const Receipt& receipt) {
+void HazardReporter::AddReceipt(const protocol::Receipt& receipt) {
   try {
     if (!map_.Apply(receipt)) return;
   } catch (const StoreError& error) {
@@ -29,7 +29,8 @@ void HazardReporter::AddReceipt(const Receipt& receipt) {
   }
   schedule_.Remove(receipt.report_uuid);
   unsent_.erase(receipt.report_uuid);
-  ++(receipt.status == Receipt::Status::kCommitted ? counters_.committed : counters_.refused);
+  ++(receipt.status == protocol::Receipt::Status::kCommitted ? counters_.committed
+                                                             : counters_.refused);
 }
 
 void HazardReporter::ApplyNotices() {
@@ -72,8 +73,9 @@ std::int64_t HazardReporter::UtcNs(double steady_s) const {
   return start_ns_ + Nanoseconds(steady_s - start_steady_s_);
 }
 
-Report HazardReporter::MakeReport(const WaitingFrame& waiting, const PlacedSighting& candidate) {
-  Report report;
+protocol::Report HazardReporter::MakeReport(const WaitingFrame& waiting,
+                                            const PlacedSighting& candidate) {
+  protocol::Report report;
   report.uuid = Uuid::Random(random_);
   report.drive_id = config_.drive_id;
   report.stamp_ns = waiting.frame.stamp_ns;
@@ -90,11 +92,12 @@ Report HazardReporter::MakeReport(const WaitingFrame& waiting, const PlacedSight
 }
 
 /// The surroundings of the report's box; the whole of a picture that is not of the image's size.
-void HazardReporter::AttachPicture(const WaitingFrame& waiting, Report& report) {
+void HazardReporter::AttachPicture(const WaitingFrame& waiting, protocol::Report& report) {
   const cv::Mat& bgr = waiting.picture.bgr;
   const bool fits = bgr.cols == static_cast<int>(report.image_width) &&
                     bgr.rows == static_cast<int>(report.image_height);
-  CroppedPicture cropped = CropPicture(waiting.picture, fits ? report.box : Box{}, config_.picture);
+  imaging::CroppedPicture cropped =
+      imaging::CropPicture(waiting.picture, fits ? report.box : imaging::Box{}, config_.picture);
   if (cropped.jpeg.empty()) return;
   if (!cropped.legible) ++counters_.pictures_illegible;
   report.image_format = "jpeg";
@@ -108,7 +111,7 @@ void HazardReporter::ReportCandidates(const WaitingFrame& waiting, double steady
       ++counters_.duplicates_suppressed;
       continue;
     }
-    const Report report = MakeReport(waiting, candidate);
+    const protocol::Report report = MakeReport(waiting, candidate);
     const int urgency = catalogue_.Get(report.class_name).urgency;
     const double hold_until_s = steady_s + HoldS(urgency);
     try {
@@ -128,8 +131,8 @@ void HazardReporter::ReportCandidates(const WaitingFrame& waiting, double steady
   }
 }
 
-std::vector<Report> HazardReporter::TakeDue(double steady_s, std::size_t limit) {
-  std::vector<Report> reports;
+std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size_t limit) {
+  std::vector<protocol::Report> reports;
   schedule_.SetCheapLink(IsCheap(steady_s));
   try {
     for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
@@ -155,4 +158,4 @@ void HazardReporter::TellStoreError(const StoreError& error) {
   store_error_ = error.what();
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

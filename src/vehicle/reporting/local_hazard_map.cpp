@@ -5,7 +5,7 @@
 
 #include "vehicle/outbox/report_table.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 const std::vector<std::string>& Migrations() {
@@ -33,7 +33,7 @@ const std::vector<std::string>& Migrations() {
 
 }  // namespace
 
-LocalHazardMap::LocalHazardMap(const Config& config, const HazardCatalogue& catalogue,
+LocalHazardMap::LocalHazardMap(const Config& config, const protocol::HazardCatalogue& catalogue,
                                std::int64_t now_ns)
     : config_(config), catalogue_(catalogue), filter_(catalogue) {
   try {
@@ -59,7 +59,7 @@ void LocalHazardMap::RecoverFromSetAside() {
   // So that the first page of the new file is in the file itself.
   database_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Execute();
   salvage_ = SalvageReports(set_aside_, config_.path, [this](const StoredReport& stored) {
-    const Report& report = stored.report;
+    const protocol::Report& report = stored.report;
     if (LoadPending(report.uuid)) return;
     database_->Transaction([&] {
       InsertReport(*database_, report, stored.hold_until_ns);
@@ -94,11 +94,12 @@ void LocalHazardMap::CountPending() {
 }
 
 std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& class_name,
-                                                           const GeoPoint& position) const {
+                                                           const geo::GeoPoint& position) const {
   return filter_.Find(class_name, position);
 }
 
-LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report, std::int64_t hold_until_ns) {
+LocalHazardMap::AddResult LocalHazardMap::Add(const protocol::Report& report,
+                                              std::int64_t hold_until_ns) {
   if (filter_.Find(report.class_name, report.position)) return AddResult::kDuplicate;
   const std::size_t bytes = report.image.size() + kReportBytes;
   if (pending_count_ >= static_cast<std::size_t>(config_.max_pending) ||
@@ -117,7 +118,7 @@ LocalHazardMap::AddResult LocalHazardMap::Add(const Report& report, std::int64_t
   return AddResult::kAdded;
 }
 
-void LocalHazardMap::InsertKnown(const Report& report) {
+void LocalHazardMap::InsertKnown(const protocol::Report& report) {
   SqliteStatement known = database_->Prepare(
       "INSERT INTO known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
       " VALUES(?,0,?,?,?,?,0,?)");
@@ -182,12 +183,12 @@ std::size_t LocalHazardMap::ForgetUnannounced(std::int64_t now_ns) {
   return passed.size();
 }
 
-bool LocalHazardMap::Apply(const Receipt& receipt) {
+bool LocalHazardMap::Apply(const protocol::Receipt& receipt) {
   const auto report = LoadPending(receipt.report_uuid);
   if (!report) return false;
   const auto& own_id = receipt.report_uuid.bytes;
   const auto& zone_id = receipt.hazard_uuid.bytes;
-  const bool renames = receipt.status == Receipt::Status::kCommitted &&
+  const bool renames = receipt.status == protocol::Receipt::Status::kCommitted &&
                        !receipt.hazard_uuid.IsNil() && filter_.Knows(receipt.report_uuid);
   database_->Transaction([&] {
     database_->Prepare("DELETE FROM pending WHERE uuid=?")
@@ -228,7 +229,7 @@ std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
   return pending;
 }
 
-std::optional<Report> LocalHazardMap::LoadPending(const Uuid& uuid) const {
+std::optional<protocol::Report> LocalHazardMap::LoadPending(const Uuid& uuid) const {
   if (broken_rows_.unsendable.count(uuid) != 0) return std::nullopt;
   SqliteStatement row =
       database_->Prepare(std::string("SELECT 1 FROM pending WHERE uuid=? AND ") + kFetchableReport);
@@ -260,4 +261,4 @@ std::vector<KnownHazard> LocalHazardMap::Known(std::size_t limit) const {
   return known;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

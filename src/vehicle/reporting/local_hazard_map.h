@@ -17,7 +17,7 @@
 #include "vehicle/reporting/duplicate_filter.h"
 #include "vehicle/reporting/notice_sequence_tracker.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// What the vehicle knows about one hazard.
 struct KnownHazard {
@@ -25,7 +25,7 @@ struct KnownHazard {
   bool of_zone = false;
   std::string class_name;
   float confidence = 0;
-  GeoPoint position;
+  geo::GeoPoint position;
 };
 
 /// The vehicle's memory: the hazards it knows, its own and those that the zone announced, up to
@@ -66,7 +66,8 @@ class LocalHazardMap {
   /// its companions and a new one started, with those of its reports that can still be read: see
   /// set_aside() and salvage(). In a sound file rows of impossible values count for nothing: see
   /// broken_rows(). Throws Error for every other failure.
-  LocalHazardMap(const Config& config, const HazardCatalogue& catalogue, std::int64_t now_ns);
+  LocalHazardMap(const Config& config, const protocol::HazardCatalogue& catalogue,
+                 std::int64_t now_ns);
 
   /// Where a corrupt database was moved; empty when the file was sound.
   const std::string& set_aside() const { return set_aside_; }
@@ -77,15 +78,15 @@ class LocalHazardMap {
 
   /// The known hazard that a sighting duplicates.
   std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
-                                             const GeoPoint& position) const;
+                                             const geo::GeoPoint& position) const;
   /// `hold_until_ns` is kept with it, for whoever sends it: UTC by the vehicle's clock, until which
   /// it may wait for a cheap link; 0: not at all.
-  AddResult Add(const Report& report, std::int64_t hold_until_ns = 0);
+  AddResult Add(const protocol::Report& report, std::int64_t hold_until_ns = 0);
 
   /// Takes in what the zone announced, in one transaction. Returns how many were unusable (nil id,
   /// impossible position, overlong class name) and left out. A kCaughtUp takes away what the zone
   /// no longer has; one that came without all that belongs to it counts as unusable.
-  std::size_t Apply(const std::vector<Notice>& notices);
+  std::size_t Apply(const std::vector<protocol::Notice>& notices);
   /// Up to which announcement of the zone this vehicle knows all; 0: none. Survives a restart.
   std::uint64_t map_sequence() const { return chain_.known(); }
   /// Announcements came ahead of one that is missing.
@@ -93,7 +94,7 @@ class LocalHazardMap {
   /// Ends the report that the receipt answers; false when no such report is unfinished. A committed
   /// hazard goes on under the zone's id. A refused one stays known, or it would be reported anew
   /// at the next sight.
-  bool Apply(const Receipt& receipt);
+  bool Apply(const protocol::Receipt& receipt);
 
   std::vector<PendingReport> Pending() const;
   /// Forgets hazards that the zone took in but never announced, whose class's expected life has
@@ -102,7 +103,7 @@ class LocalHazardMap {
   std::size_t ForgetUnannounced(std::int64_t now_ns);
 
   /// The whole report, as it was added.
-  std::optional<Report> LoadPending(const Uuid& uuid) const;
+  std::optional<protocol::Report> LoadPending(const Uuid& uuid) const;
   void MarkSent(const Uuid& uuid);
 
   /// At most `limit` known hazards, those with the newest news first.
@@ -120,25 +121,25 @@ class LocalHazardMap {
     Uuid id;
     bool known;  ///< False: forgotten.
     std::string class_name;
-    GeoPoint position;
+    geo::GeoPoint position;
   };
 
   void Open();
   void RecoverFromSetAside();
   void LoadFilter();
   void CountPending();
-  void InsertKnown(const Report& report);
-  bool IsNews(const Notice& notice) const;
-  void StoreNotice(const Notice& notice);
-  bool CatchUp(const Notice& notice, const std::set<Uuid>& told, NoticeSequenceTracker& chain,
-               std::vector<Change>& changes);
-  std::vector<Uuid> NotTold(const Notice& notice, const std::set<Uuid>& told) const;
+  void InsertKnown(const protocol::Report& report);
+  bool IsNews(const protocol::Notice& notice) const;
+  void StoreNotice(const protocol::Notice& notice);
+  bool CatchUp(const protocol::Notice& notice, const std::set<Uuid>& told,
+               NoticeSequenceTracker& chain, std::vector<Change>& changes);
+  std::vector<Uuid> NotTold(const protocol::Notice& notice, const std::set<Uuid>& told) const;
   void Forget(const Uuid& id, std::vector<Change>& changes);
   void EvictBeyondLimit(std::vector<Change>& changes);
   void Show(const std::vector<Change>& changes);
 
   Config config_;
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   std::string set_aside_;
   Salvage salvage_;
   InvalidRows broken_rows_;
@@ -151,4 +152,4 @@ class LocalHazardMap {
   std::uint64_t revision_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -5,39 +5,39 @@
 #include "vehicle/outbox/report_table.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 constexpr int kGoneKept = 10000;
 /// Told hazards between two kCaughtUp; the zone tells fewer.
 constexpr std::size_t kMaxTold = 200000;
 
-bool IsUsable(const Notice& notice) {
+bool IsUsable(const protocol::Notice& notice) {
   if (notice.sequence > std::numeric_limits<std::int64_t>::max()) return false;
-  if (notice.action == Notice::Action::kCaughtUp) {
-    return IsValid(notice.position) && notice.radius_m >= 0 && notice.radius_m <= 1e6;
+  if (notice.action == protocol::Notice::Action::kCaughtUp) {
+    return geo::IsValid(notice.position) && notice.radius_m >= 0 && notice.radius_m <= 1e6;
   }
   if (notice.hazard_uuid.IsNil()) return false;
-  if (notice.action == Notice::Action::kRemoved) return true;
-  return IsValid(notice.position) && !notice.class_name.empty() &&
-         notice.class_name.size() <= kMaxClassNameBytes && notice.confidence >= 0 &&
+  if (notice.action == protocol::Notice::Action::kRemoved) return true;
+  return geo::IsValid(notice.position) && !notice.class_name.empty() &&
+         notice.class_name.size() <= protocol::kMaxClassNameBytes && notice.confidence >= 0 &&
          notice.confidence <= 1;
 }
 
 }  // namespace
 
-std::size_t LocalHazardMap::Apply(const std::vector<Notice>& notices) {
+std::size_t LocalHazardMap::Apply(const std::vector<protocol::Notice>& notices) {
   std::vector<Change> changes;
   NoticeSequenceTracker chain = chain_;
   std::set<Uuid> told = told_;
   std::size_t unusable = 0;
   database_->Transaction([&] {
-    for (const Notice& notice : notices) {
+    for (const protocol::Notice& notice : notices) {
       if (!IsUsable(notice)) {
         ++unusable;
         continue;
       }
-      if (notice.action == Notice::Action::kCaughtUp) {
+      if (notice.action == protocol::Notice::Action::kCaughtUp) {
         if (!CatchUp(notice, told, chain, changes)) ++unusable;
         told.clear();
         continue;
@@ -49,7 +49,7 @@ std::size_t LocalHazardMap::Apply(const std::vector<Notice>& notices) {
       }
       if (!IsNews(notice)) continue;
       StoreNotice(notice);
-      changes.push_back({notice.hazard_uuid, notice.action != Notice::Action::kRemoved,
+      changes.push_back({notice.hazard_uuid, notice.action != protocol::Notice::Action::kRemoved,
                          notice.class_name, notice.position});
     }
     if (chain.known() != chain_.known()) {
@@ -67,7 +67,7 @@ std::size_t LocalHazardMap::Apply(const std::vector<Notice>& notices) {
 
 /// Takes away what the zone no longer has and closes the gap; false when some of what belongs to
 /// this kCaughtUp did not come: then the gap stays open, and the zone tells again.
-bool LocalHazardMap::CatchUp(const Notice& notice, const std::set<Uuid>& told,
+bool LocalHazardMap::CatchUp(const protocol::Notice& notice, const std::set<Uuid>& told,
                              NoticeSequenceTracker& chain, std::vector<Change>& changes) {
   const bool began_anew = notice.previous_sequence > notice.sequence;
   if (told.size() < notice.told) return false;
@@ -84,7 +84,8 @@ bool LocalHazardMap::CatchUp(const Notice& notice, const std::set<Uuid>& told,
 }
 
 /// Hazards of the zone that a telling of all that is there left out.
-std::vector<Uuid> LocalHazardMap::NotTold(const Notice& notice, const std::set<Uuid>& told) const {
+std::vector<Uuid> LocalHazardMap::NotTold(const protocol::Notice& notice,
+                                          const std::set<Uuid>& told) const {
   const bool began_anew = notice.previous_sequence > notice.sequence;
   SqliteStatement rows =
       database_->Prepare("SELECT id,latitude,longitude,sequence FROM known WHERE of_zone=1");
@@ -96,13 +97,13 @@ std::vector<Uuid> LocalHazardMap::NotTold(const Notice& notice, const std::set<U
     // Own ones that the zone never announced (0) are not for it to tell, newer ones not yet.
     const bool could_be_told =
         sequence > 0 && sequence <= notice.sequence &&
-        GeodesicDistanceM({rows.Real(1), rows.Real(2)}, notice.position) <= notice.radius_m;
+        geo::GeodesicDistanceM({rows.Real(1), rows.Real(2)}, notice.position) <= notice.radius_m;
     if (could_be_told || began_anew) left_out.push_back(id);
   }
   return left_out;
 }
 
-bool LocalHazardMap::IsNews(const Notice& notice) const {
+bool LocalHazardMap::IsNews(const protocol::Notice& notice) const {
   SqliteStatement query = database_->Prepare(
       "SELECT max(sequence) FROM (SELECT sequence FROM known WHERE id=?1 AND of_zone=1"
       " UNION ALL SELECT sequence FROM gone WHERE id=?1)");
@@ -111,10 +112,10 @@ bool LocalHazardMap::IsNews(const Notice& notice) const {
   return !query.Step() || static_cast<std::int64_t>(notice.sequence) > query.Int(0);
 }
 
-void LocalHazardMap::StoreNotice(const Notice& notice) {
+void LocalHazardMap::StoreNotice(const protocol::Notice& notice) {
   const auto& id = notice.hazard_uuid.bytes;
   const auto sequence = static_cast<std::int64_t>(notice.sequence);
-  if (notice.action == Notice::Action::kRemoved) {
+  if (notice.action == protocol::Notice::Action::kRemoved) {
     database_->Prepare("DELETE FROM known WHERE id=?").BindBlob(1, id.data(), id.size()).Execute();
     database_->Prepare("INSERT OR REPLACE INTO gone(id,sequence) VALUES(?,?)")
         .BindBlob(1, id.data(), id.size())
@@ -142,4 +143,4 @@ void LocalHazardMap::StoreNotice(const Notice& notice) {
       .Execute();
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

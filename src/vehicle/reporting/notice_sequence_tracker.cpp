@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::vehicle {
 
 bool NoticeSequenceTracker::Add(std::uint64_t previous, std::uint64_t sequence) {
   if (previous <= known_) {
@@ -23,4 +23,4 @@ void NoticeSequenceTracker::CloseTo(std::uint64_t sequence) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <map>
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// Up to which of the zone's announcements a vehicle knows all. Every announcement names the one
 /// before it: when that is not known, something was missed, and those that came ahead wait until
@@ -28,4 +28,4 @@ class NoticeSequenceTracker {
   std::map<std::uint64_t, std::uint64_t> ahead_;  // Previous and own sequence of what came ahead.
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -7,7 +7,7 @@
 #include "common/time.h"
 #include "imaging/image_header.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 /// A stamp this far behind the newest one: a bag began anew.
@@ -19,7 +19,7 @@ OffloadSender::OffloadSender(const Config& config)
     : config_(config), pose_(config.pose), budget_bytes_(config.max_bytes_per_s * config.burst_s) {}
 
 void OffloadSender::SetMounting(const std::string& frame_id,
-                                  const Eigen::Isometry3d& base_from_optical) {
+                                const Eigen::Isometry3d& base_from_optical) {
   mountings_[frame_id] = base_from_optical;
 }
 
@@ -40,7 +40,7 @@ bool OffloadSender::Takes(std::int64_t stamp_ns) {
 }
 
 void OffloadSender::AddJudged(std::int64_t stamp_ns, const std::string& frame_id, float score,
-                                bool is_candidate, const Picture& picture, double now_s) {
+                              bool is_candidate, const imaging::Picture& picture, double now_s) {
   if (!is_candidate) {
     ++counters_.discarded;
     return;
@@ -53,8 +53,8 @@ void OffloadSender::AddJudged(std::int64_t stamp_ns, const std::string& frame_id
   }
 }
 
-std::vector<OffloadedFrame> OffloadSender::TakeReady(double now_s, const Encode& encode) {
-  std::vector<OffloadedFrame> ready;
+std::vector<protocol::OffloadedFrame> OffloadSender::TakeReady(double now_s, const Encode& encode) {
+  std::vector<protocol::OffloadedFrame> ready;
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, encode, ready)) waiting_.pop_front();
   return ready;
 }
@@ -66,7 +66,7 @@ bool OffloadSender::FitsCamera(const Waiting& waiting) const {
 }
 
 bool OffloadSender::Advance(Waiting& waiting, double now_s, const Encode& encode,
-                              std::vector<OffloadedFrame>& ready) {
+                            std::vector<protocol::OffloadedFrame>& ready) {
   // A clock that was set back must not make a frame wait for ever.
   waiting.arrival_s = std::min(waiting.arrival_s, now_s);
   const double waited_s = now_s - waiting.arrival_s;
@@ -81,7 +81,8 @@ bool OffloadSender::Advance(Waiting& waiting, double now_s, const Encode& encode
     ++counters_.no_pose;
     return true;
   }
-  if (last_sent_ && GeodesicDistanceM(*last_sent_, lookup.base.position) < config_.min_spacing_m) {
+  if (last_sent_ &&
+      geo::GeodesicDistanceM(*last_sent_, lookup.base.position) < config_.min_spacing_m) {
     ++counters_.same_place;
     return true;
   }
@@ -94,19 +95,18 @@ bool OffloadSender::Advance(Waiting& waiting, double now_s, const Encode& encode
   return true;
 }
 
-std::optional<OffloadedFrame> OffloadSender::Encoded(const Waiting& waiting,
-                                                  const VehiclePoseLookup::Lookup& lookup,
-                                                  const Encode& encode) {
+std::optional<protocol::OffloadedFrame> OffloadSender::Encoded(
+    const Waiting& waiting, const VehiclePoseLookup::Lookup& lookup, const Encode& encode) {
   Refill(waiting.stamp_ns);
   if (budget_bytes_ < config_.min_image_bytes) {
     ++counters_.over_budget;
     return std::nullopt;
   }
   const double most = std::min(budget_bytes_, static_cast<double>(config_.max_image_bytes));
-  OffloadedFrame frame;
+  protocol::OffloadedFrame frame;
   frame.image = encode(waiting.picture, static_cast<std::size_t>(most));
-  const auto header = ReadImageHeader(frame.image.data(), frame.image.size());
-  if (!header || header->format != ImageHeader::Format::kJpeg) {
+  const auto header = imaging::ReadImageHeader(frame.image.data(), frame.image.size());
+  if (!header || header->format != imaging::ImageHeader::Format::kJpeg) {
     ++counters_.withheld;
     return std::nullopt;
   }
@@ -129,10 +129,10 @@ void OffloadSender::Refill(std::int64_t stamp_ns) {
   refilled_ns_ = stamp_ns;
 }
 
-CameraIntrinsics Resized(const CameraIntrinsics& intrinsics, int width, int height) {
+geo::CameraIntrinsics Resized(const geo::CameraIntrinsics& intrinsics, int width, int height) {
   const double x = static_cast<double>(width) / intrinsics.width;
   const double y = static_cast<double>(height) / intrinsics.height;
-  CameraIntrinsics resized = intrinsics;
+  geo::CameraIntrinsics resized = intrinsics;
   resized.fx *= x;
   resized.fy *= y;
   // (0, 0) is the first pixel's centre, but its outer corner is what stays in place.
@@ -143,4 +143,4 @@ CameraIntrinsics Resized(const CameraIntrinsics& intrinsics, int width, int heig
   return resized;
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

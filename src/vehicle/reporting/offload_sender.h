@@ -14,7 +14,7 @@
 #include "protocol/offloaded_frame.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 /// The small vehicle's outlet: of the frames that the classifier holds worth sending it sends those
 /// that show another place than the last one sent, each with the pose of its moment, within a
@@ -56,18 +56,18 @@ class OffloadSender {
 
   /// Makes the file that leaves the car: masked, a JPEG of at most `max_bytes`; empty when it must
   /// not or cannot leave.
-  using Encode =
-      std::function<std::vector<std::uint8_t>(const Picture& picture, std::size_t max_bytes)>;
+  using Encode = std::function<std::vector<std::uint8_t>(const imaging::Picture& picture,
+                                                         std::size_t max_bytes)>;
 
   explicit OffloadSender(const Config& config);
 
-  void SetIntrinsics(const CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
+  void SetIntrinsics(const geo::CameraIntrinsics& intrinsics) { intrinsics_ = intrinsics; }
   /// Pose of the camera's optical frame in base_link.
   void SetMounting(const std::string& frame_id, const Eigen::Isometry3d& base_from_optical);
   bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
 
-  FixTrack::Verdict AddFix(const Fix& fix) { return pose_.AddFix(fix); }
-  bool AddPose(std::int64_t stamp_ns, const TrackPose& pose) {
+  FixTrack::Verdict AddFix(const geo::Fix& fix) { return pose_.AddFix(fix); }
+  bool AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
     return pose_.AddPose(stamp_ns, pose);
   }
 
@@ -76,10 +76,10 @@ class OffloadSender {
   bool Takes(std::int64_t stamp_ns);
   /// The classifier's word on a frame that was taken; `is_candidate`: it is to be sent.
   void AddJudged(std::int64_t stamp_ns, const std::string& frame_id, float score, bool is_candidate,
-                 const Picture& picture, double now_s);
+                 const imaging::Picture& picture, double now_s);
 
   /// The frames that can go now, in their order.
-  std::vector<OffloadedFrame> TakeReady(double now_s, const Encode& encode);
+  std::vector<protocol::OffloadedFrame> TakeReady(double now_s, const Encode& encode);
 
   const Counters& counters() const { return counters_; }
   std::size_t waiting() const { return waiting_.size(); }
@@ -89,31 +89,33 @@ class OffloadSender {
     std::int64_t stamp_ns = 0;
     std::string frame_id;
     float score = 0;
-    Picture picture;
+    imaging::Picture picture;
     double arrival_s = 0;
   };
 
   /// True when the frame is done, whatever became of it.
-  bool Advance(Waiting& waiting, double now_s, const Encode& encode, std::vector<OffloadedFrame>& ready);
+  bool Advance(Waiting& waiting, double now_s, const Encode& encode,
+               std::vector<protocol::OffloadedFrame>& ready);
   bool FitsCamera(const Waiting& waiting) const;
-  std::optional<OffloadedFrame> Encoded(const Waiting& waiting, const VehiclePoseLookup::Lookup& lookup,
-                                   const Encode& encode);
+  std::optional<protocol::OffloadedFrame> Encoded(const Waiting& waiting,
+                                                  const VehiclePoseLookup::Lookup& lookup,
+                                                  const Encode& encode);
   void Refill(std::int64_t stamp_ns);
 
   Config config_;
   VehiclePoseLookup pose_;
-  std::optional<CameraIntrinsics> intrinsics_;
+  std::optional<geo::CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<Waiting> waiting_;
-  std::optional<std::int64_t> due_ns_;     ///< When the classifier's next frame is due.
-  std::optional<std::int64_t> newest_ns_;  ///< Of the frames that came.
-  std::optional<GeoPoint> last_sent_;      ///< Where.
+  std::optional<std::int64_t> due_ns_;      ///< When the classifier's next frame is due.
+  std::optional<std::int64_t> newest_ns_;   ///< Of the frames that came.
+  std::optional<geo::GeoPoint> last_sent_;  ///< Where.
   double budget_bytes_;
   std::optional<std::int64_t> refilled_ns_;
   Counters counters_;
 };
 
 /// The intrinsics of an image that was resized to `width` x `height` pixels.
-CameraIntrinsics Resized(const CameraIntrinsics& intrinsics, int width, int height);
+geo::CameraIntrinsics Resized(const geo::CameraIntrinsics& intrinsics, int width, int height);
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "web/json/json.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 constexpr std::string_view kImagePrefix = "/images/";
@@ -35,20 +35,20 @@ HttpResponse PostOnly() {
   return answer;
 }
 
-PictureLimits LimitsOf(const WebConfig& options) {
-  PictureLimits limits;
+zone::PictureLimits LimitsOf(const WebConfig& options) {
+  zone::PictureLimits limits;
   limits.longest_side_px = options.picture_side_px;
   return limits;
 }
 
 /// What a client should do that shows the states that the query asks for.
-HazardAction ActionFor(const Hazard& hazard, const HazardQuery& query) {
-  return query.Selects(hazard.state) ? ReplayAction(hazard) : HazardAction::kRemoved;
+zone::HazardAction ActionFor(const zone::Hazard& hazard, const HazardQuery& query) {
+  return query.Selects(hazard.state) ? ReplayAction(hazard) : zone::HazardAction::kRemoved;
 }
 
 /// 304 where the client already has this very content.
 HttpResponse CacheableAnswer(StaticFile file, const char* cache_control,
-                           const HttpRequest& question) {
+                             const HttpRequest& question) {
   HttpResponse answer;
   answer.headers.emplace_back("ETag", file.etag);
   answer.headers.emplace_back("Cache-Control", cache_control);
@@ -63,8 +63,8 @@ HttpResponse CacheableAnswer(StaticFile file, const char* cache_control,
 
 }  // namespace
 
-Api::Api(const WebConfig& options, ZoneService& zone, const HazardCatalogue& catalogue,
-         const VehicleTrails& trails)
+Api::Api(const WebConfig& options, zone::ZoneService& zone,
+         const protocol::HazardCatalogue& catalogue, const VehicleTrails& trails)
     : options_(options),
       zone_(zone),
       catalogue_(catalogue),
@@ -159,12 +159,13 @@ HttpResponse Api::Hazards(const HazardQuery& query) const {
   // Read before the list: an event that comes between the two is in the list and told again.
   std::uint64_t sequence = zone_.Sequence();
   // Since a sequence all that changed is looked at: what left the selection is told too.
-  const std::vector<Hazard> hazards = zone_.Query(query.box, query.since.value_or(0), query.limit,
-                                                  query.since ? HazardStates() : query.states);
+  const std::vector<zone::Hazard> hazards =
+      zone_.Query(query.box, query.since.value_or(0), query.limit,
+                  query.since ? zone::HazardStates() : query.states);
   const bool truncated = hazards.size() == query.limit;
   Json features = Json::array();
   std::uint64_t newest = 0;
-  for (const Hazard& hazard : hazards) {
+  for (const zone::Hazard& hazard : hazards) {
     newest = std::max(newest, hazard.sequence);
     Json feature = HazardFeature(hazard, catalogue_);
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
@@ -186,7 +187,7 @@ HttpResponse Api::OneHazard(const std::string& id) const {
   const auto hazard = zone_.Find(*uuid);
   if (!hazard) return ErrorAnswer(404, "the zone knows no hazard with this id");
   Json feature = HazardFeature(*hazard, catalogue_);
-  feature["properties"]["active"] = IsOnMap(hazard->state);
+  feature["properties"]["active"] = zone::IsOnMap(hazard->state);
   return JsonAnswer(feature, "application/geo+json");
 }
 
@@ -195,7 +196,8 @@ HttpResponse Api::Events(const std::string& id, std::size_t limit) const {
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   if (!zone_.Find(*uuid)) return ErrorAnswer(404, "the zone knows no hazard with this id");
   Json events = Json::array();
-  for (const StoredEvent& event : zone_.Events(*uuid, limit)) events.push_back(EventJson(event));
+  for (const zone::StoredEvent& event : zone_.Events(*uuid, limit))
+    events.push_back(EventJson(event));
   Json answer;
   answer["id"] = uuid->ToString();
   answer["events"] = std::move(events);
@@ -204,7 +206,7 @@ HttpResponse Api::Events(const std::string& id, std::size_t limit) const {
 
 HttpResponse Api::Vehicles() const {
   Json features = Json::array();
-  for (const VehicleState& vehicle : zone_.Vehicles()) {
+  for (const zone::VehicleState& vehicle : zone_.Vehicles()) {
     features.push_back(VehicleFeature(vehicle, trails_.Get(vehicle.vehicle_id)));
   }
   Json collection;
@@ -226,7 +228,7 @@ HttpResponse Api::PageConfig() const {
 /// A vehicle's file itself never leaves the zone.
 HttpResponse Api::Picture(const std::string& sha256, const HttpRequest& question) {
   const auto path = zone_.ImagePath(sha256);
-  const ServedPictures::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
+  const zone::ServedPictures::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
   if (!picture) return ErrorAnswer(404, "the zone has no picture of this name");
   StaticFile file;
   file.content.assign(picture->begin(), picture->end());
@@ -240,10 +242,10 @@ HttpResponse Api::Picture(const std::string& sha256, const HttpRequest& question
 }
 
 HttpResponse Api::File(const StaticFiles& files, std::string_view name,
-                     const HttpRequest& question) const {
+                       const HttpRequest& question) const {
   auto file = files.Find(name);
   if (!file) return ErrorAnswer(404, "there is nothing at this address");
   return CacheableAnswer(*std::move(file), "no-cache", question);
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

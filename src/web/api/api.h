@@ -14,14 +14,14 @@
 #include "zone/pictures/served_pictures.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1` (docs/web.md).
 /// Thread-safe; never throws.
 class Api {
  public:
   /// Keeps references to all but `options`. Throws Error when the token file is not accepted.
-  Api(const WebConfig& options, ZoneService& zone, const HazardCatalogue& catalogue,
+  Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
   HttpResponse Answer(const HttpRequest& question);
@@ -40,18 +40,18 @@ class Api {
   HttpResponse PageConfig() const;
   HttpResponse Picture(const std::string& sha256, const HttpRequest& question);
   HttpResponse File(const StaticFiles& files, std::string_view name,
-                  const HttpRequest& question) const;
+                    const HttpRequest& question) const;
 
   const WebConfig options_;
-  ZoneService& zone_;
-  const HazardCatalogue& catalogue_;
+  zone::ZoneService& zone_;
+  const protocol::HazardCatalogue& catalogue_;
   const VehicleTrails& trails_;
   OfficialApi officials_;
   const MapChangeApi map_changes_;
-  ServedPictures pictures_;
+  zone::ServedPictures pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;
   const std::string page_policy_;  ///< Content-Security-Policy of the page.
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

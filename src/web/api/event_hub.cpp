@@ -5,11 +5,12 @@
 #include "web/json/json.h"
 #include "web/json/map_change_json.h"
 
-namespace livemap {
+namespace livemap::web {
 
-EventHub::EventHub(ZoneService& zone, const HazardCatalogue& catalogue, VehicleTrails& trails)
+EventHub::EventHub(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
+                   VehicleTrails& trails)
     : zone_(zone), catalogue_(catalogue), trails_(trails) {
-  subscription_ = zone_.Subscribe([this](const ZoneEvent& event) { Publish(event); });
+  subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { Publish(event); });
 }
 
 EventHub::~EventHub() {
@@ -38,7 +39,7 @@ void EventHub::Stop() {
   released.swap(listeners_);
 }
 
-void EventHub::Publish(const ZoneEvent& event) {
+void EventHub::Publish(const zone::ZoneEvent& event) {
   if (event.vehicle) trails_.Add(*event.vehicle);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (listeners_.empty()) return;
@@ -59,4 +60,4 @@ void EventHub::Publish(const ZoneEvent& event) {
   for (const auto& entry : listeners_) entry.second->Deliver(message);
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

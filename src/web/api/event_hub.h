@@ -10,7 +10,7 @@
 #include "web/api/vehicle_trails.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// One message of the live stream, written once for all clients.
 struct LiveMessage {
@@ -30,7 +30,8 @@ class LiveListener {
 class EventHub {
  public:
   /// Subscribes to the zone; keeps references.
-  EventHub(ZoneService& zone, const HazardCatalogue& catalogue, VehicleTrails& trails);
+  EventHub(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
+           VehicleTrails& trails);
   ~EventHub();
   EventHub(const EventHub&) = delete;
   EventHub& operator=(const EventHub&) = delete;
@@ -43,10 +44,10 @@ class EventHub {
   void Stop();
 
  private:
-  void Publish(const ZoneEvent& event);
+  void Publish(const zone::ZoneEvent& event);
 
-  ZoneService& zone_;
-  const HazardCatalogue& catalogue_;
+  zone::ZoneService& zone_;
+  const protocol::HazardCatalogue& catalogue_;
   VehicleTrails& trails_;
   std::mutex mutex_;
   std::map<const LiveListener*, std::shared_ptr<LiveListener>> listeners_;
@@ -54,4 +55,4 @@ class EventHub {
   int subscription_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -4,7 +4,7 @@
 
 #include "web/json/map_change_json.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 constexpr std::string_view kHistoryEnding = "/events";
@@ -41,18 +41,19 @@ HttpResponse MapChangeApi::List(const MapChangeQuery& query) const {
   std::uint64_t sequence = zone_.Sequence();
   // Since a sequence all that changed is looked at: what left the selection is told too.
   const auto changes = zone_.QueryMapChanges(query.box, query.since.value_or(0), query.limit,
-                                             query.since ? MapChangeStates() : query.states);
+                                             query.since ? zone::MapChangeStates() : query.states);
   const bool truncated = changes.size() == query.limit;
   Json features = Json::array();
   std::uint64_t newest = 0;
-  for (const MapChangeFeature& change : changes) {
+  for (const zone::MapChangeFeature& change : changes) {
     newest = std::max(newest, change.sequence);
     Json feature = MapChangeGeoJson(change);
     if (query.since) {
       const bool selected = query.Selects(change.state);
-      const HazardAction action = selected && IsOpen(change.state) ? ReplayAction(change)
-                                  : selected                       ? HazardAction::kUpdated
-                                                                   : HazardAction::kRemoved;
+      const zone::HazardAction action = selected && zone::IsOpen(change.state)
+                                            ? ReplayAction(change)
+                                        : selected ? zone::HazardAction::kUpdated
+                                                   : zone::HazardAction::kRemoved;
       feature["properties"]["action"] = ActionName(action);
     }
     features.push_back(std::move(feature));
@@ -76,7 +77,7 @@ HttpResponse MapChangeApi::Events(const std::string& id, std::size_t limit) cons
   const Uuid uuid = ParseMapChangeId(id);
   if (!zone_.FindMapChange(uuid)) return UnknownMapChange();
   Json events = Json::array();
-  for (const StoredMapChangeEvent& event : zone_.MapChangeEvents(uuid, limit)) {
+  for (const zone::StoredMapChangeEvent& event : zone_.MapChangeEvents(uuid, limit)) {
     events.push_back(MapChangeEventJson(event));
   }
   Json answer;
@@ -85,4 +86,4 @@ HttpResponse MapChangeApi::Events(const std::string& id, std::size_t limit) cons
   return JsonAnswer(answer);
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

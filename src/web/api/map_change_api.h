@@ -6,7 +6,7 @@
 #include "web/http/http_message.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// The list of map changes; "/UUID" and "/UUID/events" stand below it.
 constexpr const char* kMapChangeAddress = "/api/v1/changes";
@@ -16,7 +16,7 @@ constexpr const char* kMapChangeAddress = "/api/v1/changes";
 class MapChangeApi {
  public:
   /// Keeps the reference.
-  explicit MapChangeApi(ZoneService& zone) : zone_(zone) {}
+  explicit MapChangeApi(zone::ZoneService& zone) : zone_(zone) {}
 
   /// `target.path` starts with kMapChangeAddress.
   HttpResponse Answer(const RequestTarget& target) const;
@@ -26,7 +26,7 @@ class MapChangeApi {
   HttpResponse One(const std::string& id) const;
   HttpResponse Events(const std::string& id, std::size_t limit) const;
 
-  ZoneService& zone_;
+  zone::ZoneService& zone_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -5,7 +5,7 @@
 #include "web/http/origin.h"
 #include "web/json/map_change_json.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 double SteadySeconds() {
@@ -22,8 +22,8 @@ bool IsJsonType(const std::string& content_type) {
 
 }  // namespace
 
-OfficialApi::OfficialApi(const WebConfig& options, ZoneService& zone,
-                         const HazardCatalogue& catalogue)
+OfficialApi::OfficialApi(const WebConfig& options, zone::ZoneService& zone,
+                         const protocol::HazardCatalogue& catalogue)
     : options_(options),
       zone_(zone),
       catalogue_(catalogue),
@@ -31,7 +31,7 @@ OfficialApi::OfficialApi(const WebConfig& options, ZoneService& zone,
                                        : ReadTokenFile(options.token_file)) {}
 
 std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& question,
-                                                     std::string& official) {
+                                                       std::string& official) {
   if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
     return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
@@ -76,7 +76,7 @@ HttpResponse OfficialApi::Decide(const DecisionTarget& target, const HttpRequest
 }
 
 HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::string& official,
-                                     const std::string& reason) {
+                                       const std::string& reason) {
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   const auto hazard = zone_.Find(*uuid);
@@ -85,7 +85,7 @@ HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::
                            ? zone_.Reject(*uuid, official, reason)
                            : zone_.Confirm(*uuid, official, reason);
   if (!decided) {
-    return MakeErrorAnswer(409, hazard->state == HazardState::kRejected
+    return MakeErrorAnswer(409, hazard->state == zone::HazardState::kRejected
                                     ? "the hazard is rejected already"
                                     : "the hazard is gone; seen again it is a new one");
   }
@@ -93,7 +93,7 @@ HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::
 }
 
 HttpResponse OfficialApi::DecideMapChange(const DecisionTarget& target, const std::string& official,
-                                        const std::string& body) {
+                                          const std::string& body) {
   const MapChangeDecision decision = ParseMapChangeDecision(body);
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the map change's id is no UUID");
@@ -102,7 +102,7 @@ HttpResponse OfficialApi::DecideMapChange(const DecisionTarget& target, const st
   const bool decided = decision.confirms ? zone_.ConfirmMapChange(*uuid, official, decision.reason)
                                          : zone_.DismissMapChange(*uuid, official, decision.reason);
   if (!decided) {
-    return MakeErrorAnswer(409, feature->state == MapChangeState::kDismissed
+    return MakeErrorAnswer(409, feature->state == zone::MapChangeState::kDismissed
                                     ? "the map change is dismissed already"
                                     : "the map change is undone; told again it is a new one");
   }
@@ -110,10 +110,10 @@ HttpResponse OfficialApi::DecideMapChange(const DecisionTarget& target, const st
 }
 
 HttpResponse OfficialApi::Distrust(const std::string& vehicle, const std::string& official,
-                                 const std::string& reason) {
+                                   const std::string& reason) {
   const auto withdrawn = zone_.Distrust(vehicle, official, reason);
   if (!withdrawn) return MakeErrorAnswer(404, "the zone has never heard of a vehicle of this name");
   return JsonAnswer({{"vehicle", vehicle}, {"hazards", *withdrawn}});
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

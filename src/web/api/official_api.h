@@ -9,14 +9,15 @@
 #include "web/http/options.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// Officials' decisions about hazards, vehicles and map changes. Thread-safe; store failures come
 /// out as exceptions.
 class OfficialApi {
  public:
   /// Keeps references. Reads the token file of the options; throws Error when it is not accepted.
-  OfficialApi(const WebConfig& options, ZoneService& zone, const HazardCatalogue& catalogue);
+  OfficialApi(const WebConfig& options, zone::ZoneService& zone,
+              const protocol::HazardCatalogue& catalogue);
 
   /// Whether anybody may decide at all.
   bool is_open() const { return gate_.is_open(); }
@@ -25,17 +26,17 @@ class OfficialApi {
 
  private:
   HttpResponse DecideHazard(const DecisionTarget& target, const std::string& official,
-                          const std::string& reason);
+                            const std::string& reason);
   HttpResponse DecideMapChange(const DecisionTarget& target, const std::string& official,
-                             const std::string& body);
+                               const std::string& body);
   HttpResponse Distrust(const std::string& vehicle, const std::string& official,
-                      const std::string& reason);
+                        const std::string& reason);
   std::optional<HttpResponse> WhyNotAllowed(const HttpRequest& question, std::string& official);
 
   const WebConfig& options_;
-  ZoneService& zone_;
-  const HazardCatalogue& catalogue_;
+  zone::ZoneService& zone_;
+  const protocol::HazardCatalogue& catalogue_;
   OfficialAuthenticator gate_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -12,7 +12,7 @@
 #include "common/sha256.h"
 #include "zone/admission/report_validation.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 constexpr std::size_t kMaxTokenFileBytes = 64 << 10;
@@ -48,7 +48,7 @@ Official ParseOfficial(std::string_view line, const std::string& where) {
   const std::string name(line.substr(0, blank));
   const std::string_view token =
       blank == std::string_view::npos ? std::string_view() : line.substr(blank + 1);
-  if (!IsPrintableText(name, kMaxNameBytes) || !IsToken(token)) {
+  if (!zone::IsPrintableText(name, kMaxNameBytes) || !IsToken(token)) {
     throw Error(where + " is not accepted, accepted is NAME TOKEN: a name of 1 to " +
                 std::to_string(kMaxNameBytes) + " bytes, one blank, a token of " +
                 std::to_string(kMinTokenBytes) + " to " + std::to_string(kMaxTokenBytes) +
@@ -111,7 +111,8 @@ std::vector<Official> ReadTokenFile(const std::string& path) {
 }
 
 OfficialAuthenticator::Answer OfficialAuthenticator::Check(const std::string& authorization,
-                                         const std::string& client, double now_s) {
+                                                           const std::string& client,
+                                                           double now_s) {
   if (officials_.empty()) return {Verdict::kClosed, ""};
   const std::string token = BearerToken(authorization);
   if (token.empty()) return {Verdict::kNoToken, ""};
@@ -156,4 +157,4 @@ void OfficialAuthenticator::CountMistake(const std::string& client, double now_s
   mistakes_[client] = {wrong, now_s, std::prev(ages_.end())};
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace livemap {
+namespace livemap::web {
 
 /// An official as the token file names him: only the token's hash is kept.
 struct Official {
@@ -47,7 +47,8 @@ class OfficialAuthenticator {
   static constexpr int kMaxWrong = 10;
   static constexpr double kSecondsPerWrong = 30;
 
-  explicit OfficialAuthenticator(std::vector<Official> officials) : officials_(std::move(officials)) {}
+  explicit OfficialAuthenticator(std::vector<Official> officials)
+      : officials_(std::move(officials)) {}
 
   bool is_open() const { return !officials_.empty(); }
   /// `authorization` is the header's value, `now_s` a clock that never goes back. Takes the same
@@ -72,4 +73,4 @@ class OfficialAuthenticator {
   std::list<std::string> ages_;  ///< Clients in the order of their last mistake.
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -5,7 +5,7 @@
 
 #include "zone/admission/report_validation.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 struct DecisionAddress {
@@ -21,7 +21,7 @@ constexpr DecisionAddress kAddresses[] = {
 };
 
 void CheckReason(const std::string& reason, const std::string& accepted) {
-  if (IsPrintableText(reason, kMaxDecisionReasonBytes)) return;
+  if (zone::IsPrintableText(reason, kMaxDecisionReasonBytes)) return;
   throw BadRequest("the reason of " + std::to_string(reason.size()) + " bytes is not accepted, " +
                    accepted);
 }
@@ -81,4 +81,4 @@ MapChangeDecision ParseMapChangeDecision(const std::string& body) {
   return decision;
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

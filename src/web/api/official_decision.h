@@ -6,7 +6,7 @@
 
 #include "web/api/query.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// What an official may do with a hazard, with a vehicle (kDistrust) or with a map change, whose
 /// decision stands in the body (kMapChange).
@@ -38,4 +38,4 @@ struct MapChangeDecision {
 /// BadRequest saying what is accepted.
 MapChangeDecision ParseMapChangeDecision(const std::string& body);
 
-}  // namespace livemap
+}  // namespace livemap::web

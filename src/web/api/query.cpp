@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 constexpr std::size_t kMaxTargetBytes = 4096;
@@ -77,7 +77,7 @@ std::optional<std::uint64_t> WholeNumber(std::string_view text) {
   return number;
 }
 
-GeoBox ParseBox(const std::string& text) {
+geo::GeoBox ParseBox(const std::string& text) {
   std::array<double, 4> edges{};
   std::size_t count = 0;
   bool numbers = true;
@@ -95,7 +95,7 @@ GeoBox ParseBox(const std::string& text) {
                      ", accepted is minLon,minLat,maxLon,maxLat in degrees with longitudes from "
                      "-180 to 180, latitudes from -90 to 90 and minLat <= maxLat");
   }
-  return GeoBox{{south, west}, {north, east}};
+  return geo::GeoBox{{south, west}, {north, east}};
 }
 
 /// The sequence is a 63-bit number in the store.
@@ -120,9 +120,9 @@ std::size_t ParseLimit(const std::string& text, std::size_t most) {
 /// "a, b and c".
 template <typename State, std::size_t kCount>
 std::string StateNames(const std::array<State, kCount>& all) {
-  std::string names = StateName(all.front());
+  std::string names = zone::StateName(all.front());
   for (std::size_t i = 1; i < kCount; ++i) {
-    names += (i + 1 < kCount ? ", " : " and ") + std::string(StateName(all[i]));
+    names += (i + 1 < kCount ? ", " : " and ") + std::string(zone::StateName(all[i]));
   }
   return names;
 }
@@ -132,7 +132,7 @@ std::set<State> ParseStates(const std::string& text, const std::array<State, kCo
   std::set<State> states;
   Split(text, ',', [&](std::string_view piece) {
     for (const State state : all) {
-      if (piece == StateName(state) && states.insert(state).second) return;
+      if (piece == zone::StateName(state) && states.insert(state).second) return;
     }
     throw BadRequest("state is " + Quoted(text) + ", accepted are " + StateNames(all) +
                      ", each once, with commas between");
@@ -203,16 +203,17 @@ RequestTarget ParseTarget(std::string_view target) {
 
 HazardQuery ParseHazardQuery(const RequestTarget& target) {
   return ParseListQuery<HazardQuery>(
-      target, std::array<HazardState, kHazardStates>{HazardState::kCandidate, HazardState::kActive,
-                                                     HazardState::kVerifying, HazardState::kGone,
-                                                     HazardState::kRejected});
+      target,
+      std::array<zone::HazardState, zone::kHazardStates>{
+          zone::HazardState::kCandidate, zone::HazardState::kActive, zone::HazardState::kVerifying,
+          zone::HazardState::kGone, zone::HazardState::kRejected});
 }
 
 MapChangeQuery ParseMapChangeQuery(const RequestTarget& target) {
   return ParseListQuery<MapChangeQuery>(
-      target, std::array<MapChangeState, kMapChangeStates>{
-                  MapChangeState::kProposed, MapChangeState::kConfirmed, MapChangeState::kUndone,
-                  MapChangeState::kDismissed});
+      target, std::array<zone::MapChangeState, zone::kMapChangeStates>{
+                  zone::MapChangeState::kProposed, zone::MapChangeState::kConfirmed,
+                  zone::MapChangeState::kUndone, zone::MapChangeState::kDismissed});
 }
 
 std::size_t ParseEventsQuery(const RequestTarget& target) {
@@ -240,4 +241,4 @@ void RefuseParameters(const RequestTarget& target) {
   RefuseUnknown(target.parameters.front().first, "this address accepts none");
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -13,7 +13,7 @@
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// A request that the client must mend; answered with status 400 and this sentence.
 class BadRequest : public Error {
@@ -33,13 +33,13 @@ RequestTarget ParseTarget(std::string_view target);
 
 /// What `GET /api/v1/hazards` asks for.
 struct HazardQuery {
-  std::optional<GeoBox> box;           ///< May cross the antimeridian (west > east).
+  std::optional<geo::GeoBox> box;      ///< May cross the antimeridian (west > east).
   std::optional<std::uint64_t> since;  ///< Only what changed after this sequence.
   std::size_t limit = 20000;
-  HazardStates states;  ///< Only these; empty: all that are on the map.
+  zone::HazardStates states;  ///< Only these; empty: all that are on the map.
 
-  bool Selects(HazardState state) const {
-    return states.empty() ? IsOnMap(state) : states.count(state) != 0;
+  bool Selects(zone::HazardState state) const {
+    return states.empty() ? zone::IsOnMap(state) : states.count(state) != 0;
   }
 };
 
@@ -54,13 +54,13 @@ HazardQuery ParseHazardQuery(const RequestTarget& target);
 
 /// What `GET /api/v1/changes` asks for; as HazardQuery.
 struct MapChangeQuery {
-  std::optional<GeoBox> box;
+  std::optional<geo::GeoBox> box;
   std::optional<std::uint64_t> since;
   std::size_t limit = 20000;
-  MapChangeStates states;  ///< Only these; empty: proposed and confirmed.
+  zone::MapChangeStates states;  ///< Only these; empty: proposed and confirmed.
 
-  bool Selects(MapChangeState state) const {
-    return states.empty() ? IsOpen(state) : states.count(state) != 0;
+  bool Selects(zone::MapChangeState state) const {
+    return states.empty() ? zone::IsOpen(state) : states.count(state) != 0;
   }
 };
 
@@ -79,4 +79,4 @@ std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);
 /// Throws BadRequest when the target has any parameter.
 void RefuseParameters(const RequestTarget& target);
 
-}  // namespace livemap
+}  // namespace livemap::web

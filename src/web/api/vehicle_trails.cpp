@@ -1,17 +1,18 @@
 #include "web/api/vehicle_trails.h"
 
-namespace livemap {
+namespace livemap::web {
 
-void VehicleTrails::Add(const VehicleState& vehicle) {
-  if (!IsValid(vehicle.position)) return;
+void VehicleTrails::Add(const zone::VehicleState& vehicle) {
+  if (!geo::IsValid(vehicle.position)) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   auto trail = trails_.find(vehicle.vehicle_id);
   if (trail == trails_.end()) {
     if (trails_.size() >= config_.max_vehicles) return;
-    trail = trails_.emplace(vehicle.vehicle_id, std::deque<GeoPoint>()).first;
+    trail = trails_.emplace(vehicle.vehicle_id, std::deque<geo::GeoPoint>()).first;
   }
-  std::deque<GeoPoint>& points = trail->second;
-  if (!points.empty() && GeodesicDistanceM(points.back(), vehicle.position) < config_.spacing_m) {
+  std::deque<geo::GeoPoint>& points = trail->second;
+  if (!points.empty() &&
+      geo::GeodesicDistanceM(points.back(), vehicle.position) < config_.spacing_m) {
     return;
   }
   points.push_back(vehicle.position);
@@ -24,10 +25,10 @@ TrailPositions VehicleTrails::Get(const std::string& vehicle_id) const {
   TrailPositions positions;
   if (trail == trails_.end()) return positions;
   positions.reserve(trail->second.size());
-  for (const GeoPoint& point : trail->second) {
+  for (const geo::GeoPoint& point : trail->second) {
     positions.emplace_back(point.longitude_deg, point.latitude_deg);
   }
   return positions;
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,7 +9,7 @@
 #include "web/json/json.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// Where each vehicle lately drove, so that a page opened in the middle of a drive shows the whole
 /// trail. Bounded in points and vehicles; lives in memory only. Thread-safe.
@@ -24,14 +24,14 @@ class VehicleTrails {
   VehicleTrails() = default;
   explicit VehicleTrails(Config config) : config_(config) {}
 
-  void Add(const VehicleState& vehicle);
+  void Add(const zone::VehicleState& vehicle);
   /// Oldest first; empty for an unknown vehicle.
   TrailPositions Get(const std::string& vehicle_id) const;
 
  private:
   Config config_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::deque<GeoPoint>> trails_;
+  std::map<std::string, std::deque<geo::GeoPoint>> trails_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

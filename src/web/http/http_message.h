@@ -6,7 +6,7 @@
 
 #include "web/json/json.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// What the router needs to know of an HTTP request. Header values are empty where absent.
 struct HttpRequest {
@@ -48,4 +48,4 @@ inline HttpResponse MakeErrorAnswer(int status, const std::string& sentence) {
   return answer;
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

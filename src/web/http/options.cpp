@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 void RequireFile(const std::string& option, const std::string& root, const std::string& name) {
@@ -48,7 +48,7 @@ void Validate(const WebConfig& options) {
   RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.min.js");
   RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.markercluster.min.js");
   TileSource(options.tile_url);
-  if (!IsValid(options.centre)) {
+  if (!geo::IsValid(options.centre)) {
     throw Error("centre is " + std::to_string(options.centre.latitude_deg) + ", " +
                 std::to_string(options.centre.longitude_deg) +
                 ", accepted is a latitude from -90 to 90 and a longitude from -180 to 180");
@@ -69,4 +69,4 @@ void Validate(const WebConfig& options) {
   RequirePositive("max_queued_bytes", static_cast<double>(options.max_queued_bytes));
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -6,7 +6,7 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// Settings of the zone's web server, with their defaults.
 struct WebConfig {
@@ -17,7 +17,7 @@ struct WebConfig {
   std::string tile_url;          ///< E.g. "https://tiles.example/{z}/{x}/{y}.png"; empty: offline.
   std::string tile_attribution;  ///< Plain text; most tile providers require it.
   std::string title = "LiveMap";
-  GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
+  geo::GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
   std::vector<std::string> allowed_origins;
   /// Officials and their tokens (web/official_gate.h); empty: nobody may confirm or reject.
@@ -45,4 +45,4 @@ void Validate(const WebConfig& options);
 /// tiles of this server. Throws Error for anything that is no http(s) address or absolute path.
 std::string TileSource(const std::string& tile_url);
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::web {
 
 bool IsAllowedOrigin(const std::string& origin, const std::string& host,
                      const std::vector<std::string>& allowed) {
@@ -11,4 +11,4 @@ bool IsAllowedOrigin(const std::string& origin, const std::string& host,
   return std::find(allowed.begin(), allowed.end(), origin) != allowed.end();
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

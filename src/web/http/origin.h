@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace livemap {
+namespace livemap::web {
 
 /// Whether a page of `origin` (the Origin header) may open the live stream of the server that the
 /// client called `host` (the Host header): its own pages may, those of `allowed` ("https://a:1")
@@ -11,4 +11,4 @@ namespace livemap {
 bool IsAllowedOrigin(const std::string& origin, const std::string& host,
                      const std::vector<std::string>& allowed);
 
-}  // namespace livemap
+}  // namespace livemap::web

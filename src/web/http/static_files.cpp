@@ -8,7 +8,7 @@
 #include "common/error.h"
 #include "common/sha256.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 constexpr std::size_t kMaxFileBytes = 8 << 20;
@@ -65,4 +65,4 @@ std::optional<StaticFile> StaticFiles::Find(std::string_view relative) const {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

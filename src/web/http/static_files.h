@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace livemap {
+namespace livemap::web {
 
 /// Content of one file to be served.
 struct StaticFile {
@@ -28,4 +28,4 @@ class StaticFiles {
   std::string root_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

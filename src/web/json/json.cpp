@@ -7,14 +7,14 @@
 #include <cstdio>
 #include <ctime>
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
-Json Coordinates(const GeoPoint& position) {
+Json Coordinates(const geo::GeoPoint& position) {
   return Json::array({Rounded(position.longitude_deg, 7), Rounded(position.latitude_deg, 7)});
 }
 
-Json ImageUrl(const Hazard& hazard) {
+Json ImageUrl(const zone::Hazard& hazard) {
   if (hazard.image_sha256.empty()) return nullptr;
   return "/images/" + hazard.image_sha256;
 }
@@ -26,7 +26,7 @@ double Rounded(double value, int digits) {
   return std::round(value * scale) / scale;
 }
 
-Json PointFeature(const std::string& id, const GeoPoint& position) {
+Json PointFeature(const std::string& id, const geo::GeoPoint& position) {
   Json feature;
   feature["type"] = "Feature";
   feature["id"] = id;
@@ -66,25 +66,25 @@ std::string Rfc3339(std::int64_t time_ns) {
   return text.data();
 }
 
-const char* ActionName(HazardAction action) {
+const char* ActionName(zone::HazardAction action) {
   switch (action) {
-    case HazardAction::kAdded:
+    case zone::HazardAction::kAdded:
       return "added";
-    case HazardAction::kUpdated:
+    case zone::HazardAction::kUpdated:
       return "updated";
-    case HazardAction::kRemoved:
+    case zone::HazardAction::kRemoved:
       return "removed";
   }
   return "updated";
 }
 
-HazardAction ReplayAction(const Hazard& hazard) {
-  if (!IsOnMap(hazard.state)) return HazardAction::kRemoved;
+zone::HazardAction ReplayAction(const zone::Hazard& hazard) {
+  if (!zone::IsOnMap(hazard.state)) return zone::HazardAction::kRemoved;
   // A hazard's first event leaves it with one sighting; every later event is an update.
-  return hazard.sightings <= 1 ? HazardAction::kAdded : HazardAction::kUpdated;
+  return hazard.sightings <= 1 ? zone::HazardAction::kAdded : zone::HazardAction::kUpdated;
 }
 
-Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue) {
+Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& catalogue) {
   Json feature = PointFeature(hazard.uuid.ToString(), hazard.position);
   Json& properties = feature["properties"];
   properties["id"] = hazard.uuid.ToString();
@@ -92,7 +92,7 @@ Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue) {
   properties["label"] = catalogue.Get(hazard.class_name).label;
   properties["confidence"] = Rounded(static_cast<double>(hazard.confidence), 4);
   properties["sightings"] = hazard.sightings;
-  properties["state"] = StateName(hazard.state);
+  properties["state"] = zone::StateName(hazard.state);
   properties["presence"] = Rounded(static_cast<double>(hazard.presence), 4);
   properties["vehicles"] = hazard.vehicles;
   properties["first_seen"] = Rfc3339(hazard.first_seen_ns);
@@ -104,18 +104,19 @@ Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue) {
   return feature;
 }
 
-Json EventJson(const StoredEvent& event) {
+Json EventJson(const zone::StoredEvent& event) {
   Json json;
   json["sequence"] = event.sequence;
   json["action"] = ActionName(event.action);
-  json["from"] = event.from ? Json(StateName(*event.from)) : Json(nullptr);
-  json["to"] = StateName(event.to);
+  json["from"] = event.from ? Json(zone::StateName(*event.from)) : Json(nullptr);
+  json["to"] = zone::StateName(event.to);
   json["reason"] = event.reason;
   json["time"] = Rfc3339(event.at_ns);
   return json;
 }
 
-Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalogue& catalogue) {
+Json HazardMessage(zone::HazardAction action, const zone::Hazard& hazard,
+                   const protocol::HazardCatalogue& catalogue) {
   Json message;
   message["type"] = "hazard";
   message["action"] = ActionName(action);
@@ -124,7 +125,7 @@ Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalo
   return message;
 }
 
-Json VehicleFeature(const VehicleState& vehicle, const TrailPositions& trail) {
+Json VehicleFeature(const zone::VehicleState& vehicle, const TrailPositions& trail) {
   Json feature = PointFeature(vehicle.vehicle_id, vehicle.position);
   Json& properties = feature["properties"];
   properties["vehicle"] = vehicle.vehicle_id;
@@ -142,14 +143,14 @@ Json VehicleFeature(const VehicleState& vehicle, const TrailPositions& trail) {
   return feature;
 }
 
-Json VehicleMessage(const VehicleState& vehicle) {
+Json VehicleMessage(const zone::VehicleState& vehicle) {
   Json message;
   message["type"] = "vehicle";
   message["feature"] = VehicleFeature(vehicle, {});
   return message;
 }
 
-Json ClassesJson(const HazardCatalogue& catalogue) {
+Json ClassesJson(const protocol::HazardCatalogue& catalogue) {
   Json classes = Json::array();
   for (const auto& [name, hazard_class] : catalogue.classes()) {
     classes.push_back({{"class", name},
@@ -157,11 +158,11 @@ Json ClassesJson(const HazardCatalogue& catalogue) {
                        {"icon", hazard_class.icon},
                        {"colour", hazard_class.colour}});
   }
-  const HazardClass fallback = catalogue.Get("");
+  const protocol::HazardClass fallback = catalogue.Get("");
   Json answer;
   answer["classes"] = std::move(classes);
   answer["default"] = {{"icon", fallback.icon}, {"colour", fallback.colour}};
   return answer;
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -10,7 +10,7 @@
 #include "zone/model/hazard.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// Keys stay in the order in which a person reads them.
 using Json = nlohmann::ordered_json;
@@ -27,36 +27,37 @@ std::string Rfc3339(std::int64_t time_ns);
 double Rounded(double value, int digits);
 
 /// A GeoJSON Feature without properties (RFC 7946, position as [longitude, latitude]).
-Json PointFeature(const std::string& id, const GeoPoint& position);
+Json PointFeature(const std::string& id, const geo::GeoPoint& position);
 
 /// Standard deviation along the worst direction, metres; null when the covariance says nothing.
 Json PositionSigma(const Eigen::Matrix2d& covariance_m2);
 
 /// "added", "updated" or "removed".
-const char* ActionName(HazardAction action);
+const char* ActionName(zone::HazardAction action);
 
 /// What a client that knows nothing newer than the hazard's predecessor should do with it.
-HazardAction ReplayAction(const Hazard& hazard);
+zone::HazardAction ReplayAction(const zone::Hazard& hazard);
 
 /// The hazard as a GeoJSON Feature (RFC 7946, position as [longitude, latitude]).
-Json HazardFeature(const Hazard& hazard, const HazardCatalogue& catalogue);
+Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& catalogue);
 
 /// One line of a hazard's history: sequence, action, from, to, reason, time.
-Json EventJson(const StoredEvent& event);
+Json EventJson(const zone::StoredEvent& event);
 
 /// The message of the live stream for one hazard event.
-Json HazardMessage(HazardAction action, const Hazard& hazard, const HazardCatalogue& catalogue);
+Json HazardMessage(zone::HazardAction action, const zone::Hazard& hazard,
+                   const protocol::HazardCatalogue& catalogue);
 
 /// Positions as (longitude, latitude) degrees, oldest first.
 using TrailPositions = std::vector<std::pair<double, double>>;
 
 /// The vehicle as a GeoJSON Feature; `trail` is where it lately drove.
-Json VehicleFeature(const VehicleState& vehicle, const TrailPositions& trail);
+Json VehicleFeature(const zone::VehicleState& vehicle, const TrailPositions& trail);
 
 /// The message of the live stream for one vehicle position (its feature has no trail).
-Json VehicleMessage(const VehicleState& vehicle);
+Json VehicleMessage(const zone::VehicleState& vehicle);
 
 /// The catalogue's classes for the map's filter: name, label, icon, colour.
-Json ClassesJson(const HazardCatalogue& catalogue);
+Json ClassesJson(const protocol::HazardCatalogue& catalogue);
 
-}  // namespace livemap
+}  // namespace livemap::web

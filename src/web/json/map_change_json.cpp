@@ -7,7 +7,7 @@
 
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 /// "Traffic cone" of "traffic_cone".
@@ -21,13 +21,13 @@ std::string LabelOf(std::string class_name) {
 
 /// "#rrggbb", as the masks of changes are painted.
 std::string ColourOf(const std::string& class_name) {
-  ChangeClass change_class = ChangeClass::kOtherObjects;
-  for (int i = 1; i < kChangeClasses; ++i) {
-    if (class_name == ChangeClassName(static_cast<ChangeClass>(i))) {
-      change_class = static_cast<ChangeClass>(i);
+  protocol::ChangeClass change_class = protocol::ChangeClass::kOtherObjects;
+  for (int i = 1; i < protocol::kChangeClasses; ++i) {
+    if (class_name == protocol::ChangeClassName(static_cast<protocol::ChangeClass>(i))) {
+      change_class = static_cast<protocol::ChangeClass>(i);
     }
   }
-  const auto rgb = ChangeClassColour(change_class);
+  const auto rgb = protocol::ChangeClassColour(change_class);
   std::array<char, 8> text{};
   std::snprintf(text.data(), text.size(), "#%02x%02x%02x", unsigned{rgb[0]}, unsigned{rgb[1]},
                 unsigned{rgb[2]});
@@ -36,12 +36,12 @@ std::string ColourOf(const std::string& class_name) {
 
 }  // namespace
 
-HazardAction ReplayAction(const MapChangeFeature& feature) {
-  if (!IsOpen(feature.state)) return HazardAction::kRemoved;
-  return feature.reports <= 1 ? HazardAction::kAdded : HazardAction::kUpdated;
+zone::HazardAction ReplayAction(const zone::MapChangeFeature& feature) {
+  if (!zone::IsOpen(feature.state)) return zone::HazardAction::kRemoved;
+  return feature.reports <= 1 ? zone::HazardAction::kAdded : zone::HazardAction::kUpdated;
 }
 
-Json MapChangeGeoJson(const MapChangeFeature& feature) {
+Json MapChangeGeoJson(const zone::MapChangeFeature& feature) {
   Json json = PointFeature(feature.uuid.ToString(), feature.position);
   Json& properties = json["properties"];
   properties["id"] = feature.uuid.ToString();
@@ -49,7 +49,7 @@ Json MapChangeGeoJson(const MapChangeFeature& feature) {
   properties["label"] = LabelOf(feature.class_name);
   properties["colour"] = ColourOf(feature.class_name);
   properties["direction"] = feature.vanished ? "vanished" : "appeared";
-  properties["state"] = StateName(feature.state);
+  properties["state"] = zone::StateName(feature.state);
   properties["confidence"] = Rounded(static_cast<double>(feature.confidence), 4);
   properties["vehicles"] = feature.Vehicles();
   properties["drives"] = feature.drives;
@@ -63,17 +63,17 @@ Json MapChangeGeoJson(const MapChangeFeature& feature) {
   return json;
 }
 
-Json MapChangeEventJson(const StoredMapChangeEvent& event) {
+Json MapChangeEventJson(const zone::StoredMapChangeEvent& event) {
   Json json;
   json["sequence"] = event.sequence;
-  json["from"] = event.from ? Json(StateName(*event.from)) : Json(nullptr);
-  json["to"] = StateName(event.to);
+  json["from"] = event.from ? Json(zone::StateName(*event.from)) : Json(nullptr);
+  json["to"] = zone::StateName(event.to);
   json["reason"] = event.reason;
   json["time"] = Rfc3339(event.at_ns);
   return json;
 }
 
-Json MapChangeMessage(HazardAction action, const MapChangeFeature& feature) {
+Json MapChangeMessage(zone::HazardAction action, const zone::MapChangeFeature& feature) {
   Json message;
   message["type"] = "change";
   message["action"] = ActionName(action);
@@ -82,4 +82,4 @@ Json MapChangeMessage(HazardAction action, const MapChangeFeature& feature) {
   return message;
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

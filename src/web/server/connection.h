@@ -9,13 +9,13 @@
 #include "web/api/event_hub.h"
 #include "web/http/options.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// What all connections share; outlives them.
 struct WebContext {
   const WebConfig& options;
-  ZoneService& zone;
-  const HazardCatalogue& catalogue;
+  zone::ZoneService& zone;
+  const protocol::HazardCatalogue& catalogue;
   Api& api;
   EventHub& hub;
   std::atomic<std::size_t> connections{0};
@@ -40,4 +40,4 @@ class ConnectionSlot {
   WebContext* context_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,7 +9,7 @@
 #include "web/http/origin.h"
 #include "web/server/websocket_session.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 namespace beast = boost::beast;
@@ -163,4 +163,4 @@ void HttpSession::Close() {
   stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,7 +9,7 @@
 
 #include "web/server/connection.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// One HTTP/1.1 connection: reads a request, lets Api answer it, and so on until the client or a
 /// time-out ends it. Only a POST may have a body, a small one. A request for the live stream turns
@@ -41,4 +41,4 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   Response response_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

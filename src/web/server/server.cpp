@@ -15,7 +15,7 @@
 #include "web/server/connection.h"
 #include "web/server/http_session.h"
 
-namespace livemap {
+namespace livemap::web {
 
 namespace net = boost::asio;
 using boost::system::error_code;
@@ -23,7 +23,8 @@ using net::ip::tcp;
 
 class WebServer::Implementation {
  public:
-  Implementation(const Options& options, ZoneService& zone, const HazardCatalogue& catalogue)
+  Implementation(const Options& options, zone::ZoneService& zone,
+                 const protocol::HazardCatalogue& catalogue)
       : options_(options),
         hub_(zone, catalogue, trails_),
         api_(options_, zone, catalogue, trails_),
@@ -115,7 +116,8 @@ class WebServer::Implementation {
   std::vector<std::thread> threads_;
 };
 
-WebServer::WebServer(const Options& options, ZoneService& zone, const HazardCatalogue& catalogue) {
+WebServer::WebServer(const Options& options, zone::ZoneService& zone,
+                     const protocol::HazardCatalogue& catalogue) {
   Validate(options);
   implementation_ = std::make_unique<Implementation>(options, zone, catalogue);
 }
@@ -126,4 +128,4 @@ int WebServer::port() const { return implementation_->port(); }
 
 std::size_t WebServer::connections() const { return implementation_->connections(); }
 
-}  // namespace livemap
+}  // namespace livemap::web

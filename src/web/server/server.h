@@ -6,7 +6,7 @@
 #include "web/http/options.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// The zone's web server: the live map's page, its API and its live stream (docs/web.md).
 /// Plain HTTP: in front of a public network stands a proxy that speaks TLS and asks who is there.
@@ -16,7 +16,8 @@ class WebServer {
 
   /// Listens and serves from its own threads when it returns. Keeps references to `zone` and
   /// `catalogue`. Throws Error when an option is not accepted or the port cannot be opened.
-  WebServer(const Options& options, ZoneService& zone, const HazardCatalogue& catalogue);
+  WebServer(const Options& options, zone::ZoneService& zone,
+            const protocol::HazardCatalogue& catalogue);
   /// Closes every connection and joins the threads.
   ~WebServer();
   WebServer(const WebServer&) = delete;
@@ -32,4 +33,4 @@ class WebServer {
   std::unique_ptr<Implementation> implementation_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -10,7 +10,7 @@
 #include "web/json/json.h"
 #include "web/json/map_change_json.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 namespace beast = boost::beast;
@@ -61,7 +61,7 @@ void WebSocketSession::OnAccepted() {
     // sequence of this message, it forgets what it knew and loads the list.
     told_sequence_ = std::min(since_.value_or(newest), newest);
     Enqueue(Shared({{"type", "hello"}, {"sequence", newest}}));
-    for (const VehicleState& vehicle : context.zone.Vehicles()) {
+    for (const zone::VehicleState& vehicle : context.zone.Vehicles()) {
       Enqueue(Shared(VehicleMessage(vehicle)));
     }
   } catch (const std::exception&) {
@@ -140,12 +140,12 @@ void WebSocketSession::ReplayPage() {
     if (hazards.size() == kReplayPage) end = std::min(end, hazards.back().sequence);
     if (changes.size() == kReplayPage) end = std::min(end, changes.back().sequence);
     std::map<std::uint64_t, std::shared_ptr<const std::string>> messages;
-    for (const Hazard& hazard : hazards) {
+    for (const zone::Hazard& hazard : hazards) {
       if (hazard.sequence > end) break;
       messages[hazard.sequence] =
           Shared(HazardMessage(ReplayAction(hazard), hazard, context.catalogue));
     }
-    for (const MapChangeFeature& change : changes) {
+    for (const zone::MapChangeFeature& change : changes) {
       if (change.sequence > end) break;
       messages[change.sequence] = Shared(MapChangeMessage(ReplayAction(change), change));
     }
@@ -214,4 +214,4 @@ void WebSocketSession::CloseWith(websocket::close_code code, const char* reason)
   });
 }
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -12,7 +12,7 @@
 
 #include "web/server/connection.h"
 
-namespace livemap {
+namespace livemap::web {
 
 /// One client of the live stream.
 ///
@@ -62,4 +62,4 @@ class WebSocketSession : public LiveListener,
   bool writing_ = false;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

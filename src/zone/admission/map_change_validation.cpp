@@ -2,12 +2,12 @@
 
 #include "protocol/change_class.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 /// What a map change has in common with a hazard's report, which has a picture besides.
-Report SharedFields(const MapChangeReport& told) {
-  Report report;
+protocol::Report SharedFields(const protocol::MapChangeReport& told) {
+  protocol::Report report;
   report.uuid = told.uuid;
   report.vehicle_id = told.vehicle_id;
   report.drive_id = told.drive_id;
@@ -29,21 +29,21 @@ Refusal Unacceptable(std::string sentence) {
 
 std::string MapChangeClassNames() {
   std::string names;
-  for (int i = 1; i < kChangeClasses; ++i) {
+  for (int i = 1; i < protocol::kChangeClasses; ++i) {
     if (i > 1) names += ", ";
-    names += ChangeClassName(static_cast<ChangeClass>(i));
+    names += protocol::ChangeClassName(static_cast<protocol::ChangeClass>(i));
   }
   return names;
 }
 
 bool IsMapChangeClass(const std::string& class_name) {
-  for (int i = 1; i < kChangeClasses; ++i) {
-    if (class_name == ChangeClassName(static_cast<ChangeClass>(i))) return true;
+  for (int i = 1; i < protocol::kChangeClasses; ++i) {
+    if (class_name == protocol::ChangeClassName(static_cast<protocol::ChangeClass>(i))) return true;
   }
   return false;
 }
 
-std::optional<Refusal> WhyMapChangeRefused(const MapChangeReport& report,
+std::optional<Refusal> WhyMapChangeRefused(const protocol::MapChangeReport& report,
                                            const ReportLimits& limits, std::int64_t now_ns) {
   if (auto why = WhyRefused(SharedFields(report), limits, now_ns)) return why;
   if (!IsMapChangeClass(report.class_name)) {
@@ -62,4 +62,4 @@ std::optional<Refusal> WhyMapChangeRefused(const MapChangeReport& report,
   return std::nullopt;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

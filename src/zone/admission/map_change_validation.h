@@ -6,7 +6,7 @@
 #include "protocol/map_change_report.h"
 #include "zone/admission/report_validation.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// The classes that a map change may have, with commas between.
 std::string MapChangeClassNames();
@@ -16,7 +16,7 @@ bool IsMapChangeClass(const std::string& class_name);
 /// Why the zone refuses what a vehicle tells of a change; none when it is acceptable. Texts,
 /// position, covariance and stamp keep to the same limits as a hazard's report. `now_ns` is the
 /// zone's clock.
-std::optional<Refusal> WhyMapChangeRefused(const MapChangeReport& report,
+std::optional<Refusal> WhyMapChangeRefused(const protocol::MapChangeReport& report,
                                            const ReportLimits& limits, std::int64_t now_ns);
 
-}  // namespace livemap
+}  // namespace livemap::zone

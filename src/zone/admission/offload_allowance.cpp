@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr double kMinuteS = 60;
@@ -19,8 +19,7 @@ OffloadAllowance::OffloadAllowance(const Config& config) : config_(config) {
   }
 }
 
-bool OffloadAllowance::Take(const std::string& vehicle_id, std::size_t bytes,
-                              std::int64_t now_ns) {
+bool OffloadAllowance::Take(const std::string& vehicle_id, std::size_t bytes, std::int64_t now_ns) {
   Bucket* bucket = Find(vehicle_id, now_ns);
   if (bucket == nullptr) return false;
   const double minutes = std::max(0.0, Seconds(now_ns - bucket->at_ns)) / kMinuteS;
@@ -38,7 +37,7 @@ bool OffloadAllowance::Take(const std::string& vehicle_id, std::size_t bytes,
 }
 
 OffloadAllowance::Bucket* OffloadAllowance::Find(const std::string& vehicle_id,
-                                                     std::int64_t now_ns) {
+                                                 std::int64_t now_ns) {
   const auto found = buckets_.find(vehicle_id);
   if (found != buckets_.end()) return &found->second;
   if (buckets_.size() >= config_.max_vehicles) {
@@ -53,4 +52,4 @@ OffloadAllowance::Bucket* OffloadAllowance::Find(const std::string& vehicle_id,
   return &buckets_.emplace(vehicle_id, fresh).first->second;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include <string>
 #include <unordered_map>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// How many candidate frames and bytes of them the zone takes from each vehicle: two buckets that
 /// refill evenly over a minute. Memory is bounded: a vehicle silent for a minute has full buckets
@@ -44,4 +44,4 @@ class OffloadAllowance {
   std::list<std::string> by_use_;  // Longest silent first.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 
 #include "imaging/image_header.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using Why = std::optional<Refusal>;
@@ -15,8 +15,8 @@ using Why = std::optional<Refusal>;
 Refusal Unusable(std::string sentence) { return {RefusalKind::kMalformed, std::move(sentence)}; }
 
 /// The parts that a candidate shares with a report, as the smallest report that has them.
-Report SharedParts(const OffloadedFrame& frame) {
-  Report report;
+protocol::Report SharedParts(const protocol::OffloadedFrame& frame) {
+  protocol::Report report;
   report.uuid.bytes[0] = 1;
   report.vehicle_id = frame.vehicle_id;
   report.drive_id = frame.drive_id;
@@ -31,7 +31,7 @@ Report SharedParts(const OffloadedFrame& frame) {
   return report;
 }
 
-Why WhyPoseRefused(const TrackPose& base, const OffloadLimits& limits) {
+Why WhyPoseRefused(const geo::TrackPose& base, const OffloadLimits& limits) {
   if (!(std::abs(base.course_rad) <= 4 * M_PI)) {
     return Unusable("course " + NumberText(base.course_rad) + " rad is not within +-4 pi");
   }
@@ -51,8 +51,8 @@ Why WhyPoseRefused(const TrackPose& base, const OffloadLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyCameraRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
-  const CameraIntrinsics& camera = frame.intrinsics;
+Why WhyCameraRefused(const protocol::OffloadedFrame& frame, const OffloadLimits& limits) {
+  const geo::CameraIntrinsics& camera = frame.intrinsics;
   const auto is_focal_length = [](double f) { return f >= 1 && f <= 1e5; };
   if (!is_focal_length(camera.fx) || !is_focal_length(camera.fy)) {
     return Unusable("focal lengths " + NumberText(camera.fx) + " and " + NumberText(camera.fy) +
@@ -74,10 +74,10 @@ Why WhyCameraRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyJpegRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
+Why WhyJpegRefused(const protocol::OffloadedFrame& frame, const OffloadLimits& limits) {
   if (auto why = WhyPictureRefused(frame.image, limits.report)) return why;
-  const auto header = ReadImageHeader(frame.image.data(), frame.image.size());
-  if (!header || header->format != ImageHeader::Format::kJpeg) {
+  const auto header = imaging::ReadImageHeader(frame.image.data(), frame.image.size());
+  if (!header || header->format != imaging::ImageHeader::Format::kJpeg) {
     return Unusable("picture is no JPEG");
   }
   if (header->width != frame.intrinsics.width || header->height != frame.intrinsics.height) {
@@ -86,7 +86,7 @@ Why WhyJpegRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
                     std::to_string(frame.intrinsics.width) + " x " +
                     std::to_string(frame.intrinsics.height));
   }
-  if (!HasImageEnd(frame.image.data(), frame.image.size(), header->format)) {
+  if (!imaging::HasImageEnd(frame.image.data(), frame.image.size(), header->format)) {
     return Unusable("picture is cut off");
   }
   return std::nullopt;
@@ -94,8 +94,8 @@ Why WhyJpegRefused(const OffloadedFrame& frame, const OffloadLimits& limits) {
 
 }  // namespace
 
-std::optional<Refusal> WhyOffloadRefused(const OffloadedFrame& frame, const OffloadLimits& limits,
-                                           std::int64_t now_ns) {
+std::optional<Refusal> WhyOffloadRefused(const protocol::OffloadedFrame& frame,
+                                         const OffloadLimits& limits, std::int64_t now_ns) {
   if (auto why = WhyRefused(SharedParts(frame), limits.report, now_ns)) return why;
   if (auto why = WhyPoseRefused(frame.base, limits)) return why;
   if (auto why = WhyCameraRefused(frame, limits)) return why;
@@ -108,4 +108,4 @@ std::optional<Refusal> WhyOffloadRefused(const OffloadedFrame& frame, const Offl
   return WhyJpegRefused(frame, limits);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include "protocol/offloaded_frame.h"
 #include "zone/admission/report_validation.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// What a candidate frame must keep to.
 struct OffloadLimits {
@@ -20,7 +20,7 @@ struct OffloadLimits {
 /// Why the zone refuses `frame`; none when it is acceptable: everything is finite and in its range,
 /// the picture is a whole JPEG whose header has the size that the intrinsics say. Decodes nothing.
 /// `now_ns` is the zone's clock.
-std::optional<Refusal> WhyOffloadRefused(const OffloadedFrame& frame, const OffloadLimits& limits,
-                                           std::int64_t now_ns);
+std::optional<Refusal> WhyOffloadRefused(const protocol::OffloadedFrame& frame,
+                                         const OffloadLimits& limits, std::int64_t now_ns);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -10,7 +10,7 @@
 
 #include "imaging/image_header.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using Why = std::optional<Refusal>;
@@ -70,12 +70,12 @@ Why WhyTextRefused(const char* name, const std::string& text, const ReportLimits
                    std::to_string(limits.max_text_bytes) + " bytes");
 }
 
-std::string ToText(const GeoPoint& point) {
+std::string ToText(const geo::GeoPoint& point) {
   return "(" + NumberText(point.latitude_deg) + ", " + NumberText(point.longitude_deg) + ")";
 }
 
-Why WhyPositionRefused(const Report& report, const ReportLimits& limits) {
-  if (!IsValid(report.position)) {
+Why WhyPositionRefused(const protocol::Report& report, const ReportLimits& limits) {
+  if (!geo::IsValid(report.position)) {
     return Malformed("position " + ToText(report.position) +
                      " is no latitude and longitude in degrees");
   }
@@ -101,7 +101,8 @@ Why WhyPositionRefused(const Report& report, const ReportLimits& limits) {
   return std::nullopt;
 }
 
-Why WhyStampRefused(const Report& report, const ReportLimits& limits, std::int64_t now_ns) {
+Why WhyStampRefused(const protocol::Report& report, const ReportLimits& limits,
+                    std::int64_t now_ns) {
   if (report.stamp_ns < limits.min_stamp_ns) {
     return Refusal{RefusalKind::kTooOld, "stamp " + std::to_string(report.stamp_ns) +
                                              " ns lies before " +
@@ -123,7 +124,7 @@ Why WhyStampRefused(const Report& report, const ReportLimits& limits, std::int64
   return std::nullopt;
 }
 
-Why WhyBoxRefused(const Report& report, const ReportLimits& limits) {
+Why WhyBoxRefused(const protocol::Report& report, const ReportLimits& limits) {
   const std::uint32_t side = limits.max_image_side_px;
   if (report.image_width == 0 || report.image_height == 0 || report.image_width > side ||
       report.image_height > side) {
@@ -133,13 +134,13 @@ Why WhyBoxRefused(const Report& report, const ReportLimits& limits) {
   }
   // A detector's edge may stand on the outer corner of the last pixel, and rounding may push it.
   constexpr float kSlackPx = 1.0F;
-  const Box& box = report.box;
+  const imaging::Box& box = report.box;
   const bool inside = box.x_min >= -kSlackPx && box.y_min >= -kSlackPx && box.x_min < box.x_max &&
                       box.y_min < box.y_max &&
                       box.x_max <= static_cast<float>(report.image_width) + kSlackPx &&
                       box.y_max <= static_cast<float>(report.image_height) + kSlackPx;
   if (!inside) return Malformed("box is empty or not inside the image");
-  const PixelRegion& shown = report.shown;
+  const imaging::PixelRegion& shown = report.shown;
   const bool shows_part = shown.width > 0 && shown.height > 0 && shown.x < report.image_width &&
                           shown.y < report.image_height &&
                           shown.width <= report.image_width - shown.x &&
@@ -186,8 +187,8 @@ std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
     return Malformed("picture has " + std::to_string(image.size()) + " bytes, at most " +
                      std::to_string(limits.max_image_bytes) + " are accepted");
   }
-  const auto header = ReadImageHeader(image.data(), image.size());
-  if (!header || header->format == ImageHeader::Format::kWebp) {
+  const auto header = imaging::ReadImageHeader(image.data(), image.size());
+  if (!header || header->format == imaging::ImageHeader::Format::kWebp) {
     return Malformed("picture is no JPEG or PNG");
   }
   const auto longer_side = static_cast<std::uint32_t>(std::max(header->width, header->height));
@@ -204,7 +205,7 @@ std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
   return std::nullopt;
 }
 
-std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limits,
+std::optional<Refusal> WhyRefused(const protocol::Report& report, const ReportLimits& limits,
                                   std::int64_t now_ns) {
   if (report.uuid.IsNil()) return Malformed("report has no uuid");
   if (auto why = WhyTextRefused("vehicle_id", report.vehicle_id, limits)) return why;
@@ -231,4 +232,4 @@ std::string NumberText(double number) {
   return text;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -10,7 +10,7 @@
 #include "protocol/report.h"
 #include "zone/model/hazard.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Kinds of refusals, for counting. The sentence of a Refusal says more.
 enum class RefusalKind {
@@ -34,7 +34,7 @@ struct Refusal {
 
 /// What a report must keep to. A report beyond a limit is refused for good.
 struct ReportLimits {
-  std::optional<GeoBox> zone;          ///< Positions outside it are refused; none: everywhere.
+  std::optional<geo::GeoBox> zone;     ///< Positions outside it are refused; none: everywhere.
   std::size_t max_text_bytes = 64;     ///< Of class name, vehicle id and drive id each.
   double max_position_sigma_m = 50.0;  ///< Along the worst direction.
   double max_future_s = 300.0;         ///< An image stamp this far ahead of the zone's clock.
@@ -55,10 +55,10 @@ std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,
 
 /// Why the zone refuses `report`; none when it is acceptable. Looks at the
 /// picture's header only and decodes nothing. `now_ns` is the zone's clock.
-std::optional<Refusal> WhyRefused(const Report& report, const ReportLimits& limits,
+std::optional<Refusal> WhyRefused(const protocol::Report& report, const ReportLimits& limits,
                                   std::int64_t now_ns);
 
 /// A number for a sentence that its sender reads: std::to_string writes 1e300 in 300 digits.
 std::string NumberText(double number);
 
-}  // namespace livemap
+}  // namespace livemap::zone

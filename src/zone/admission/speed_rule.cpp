@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-namespace livemap {
+namespace livemap::zone {
 
-ReportedFix FixOf(const Report& report) {
+ReportedFix FixOf(const protocol::Report& report) {
   // The root of the trace is never below the worst direction's standard deviation.
   return {report.stamp_ns, report.position, std::sqrt(report.covariance_m2.trace())};
 }
 
 double ImpliedSpeed(const ReportedFix& a, const ReportedFix& b, const SpeedRule& rule) {
   const double explained_m = rule.slack_m + 3.0 * (a.sigma_m + b.sigma_m);
-  const double unexplained_m = GeodesicDistanceM(a.position, b.position) - explained_m;
+  const double unexplained_m = geo::GeodesicDistanceM(a.position, b.position) - explained_m;
   if (unexplained_m <= 0) return 0;
   const double seconds =
       std::abs(static_cast<double>(a.stamp_ns) - static_cast<double>(b.stamp_ns)) * 1e-9;
@@ -33,4 +33,4 @@ std::optional<double> Challenge(ReportTrack& track, const ReportedFix& fix, cons
   return speed_mps;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include "geo/wgs84.h"
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// How fast a vehicle can be.
 struct SpeedRule {
@@ -20,11 +20,11 @@ struct SpeedRule {
 /// A place that a vehicle reported.
 struct ReportedFix {
   std::int64_t stamp_ns = 0;  ///< Of the image, vehicle clock (UTC).
-  GeoPoint position;
+  geo::GeoPoint position;
   double sigma_m = 0;  ///< Standard deviation of the position, along the worst direction or more.
 };
 
-ReportedFix FixOf(const Report& report);
+ReportedFix FixOf(const protocol::Report& report);
 
 /// Where the reports of one vehicle say it was. A small value: copied to try, assigned to keep.
 struct ReportTrack {
@@ -42,4 +42,4 @@ double ImpliedSpeed(const ReportedFix& a, const ReportedFix& b, const SpeedRule&
 /// is accepted.
 std::optional<double> Challenge(ReportTrack& track, const ReportedFix& fix, const SpeedRule& rule);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr double kRefillS = 3600;
@@ -63,4 +63,4 @@ VehicleAllowance::Buckets* VehicleAllowance::Find(const std::string& vehicle_id,
   return &buckets_.emplace(vehicle_id, fresh).first->second;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include <string>
 #include <unordered_map>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// How many messages of each vehicle count: one bucket of tokens per vehicle and kind that refills
 /// evenly over an hour, so that any hour takes at most twice the cap and the long run no more than
@@ -46,4 +46,4 @@ class VehicleAllowance {
   std::list<std::string> by_use_;  // Longest silent first.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

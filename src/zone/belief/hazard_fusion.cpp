@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::zone {
 
 Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_sigma_m) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
@@ -15,8 +15,8 @@ Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_
   return solver.eigenvectors() * raised.asDiagonal() * solver.eigenvectors().transpose();
 }
 
-void Fuse(HazardEstimate& hazard, const Report& report, const FusionRule& rule) {
-  const LocalFrame frame(hazard.position);
+void Fuse(HazardEstimate& hazard, const protocol::Report& report, const FusionRule& rule) {
+  const geo::LocalFrame frame(hazard.position);
   const Eigen::Vector2d offset = frame.ToEnu(report.position);
   const Eigen::Matrix2d report_covariance =
       WithLeastSigma(report.covariance_m2, rule.min_report_sigma_m);
@@ -34,4 +34,4 @@ void Fuse(HazardEstimate& hazard, const Report& report, const FusionRule& rule) 
   hazard.last_seen_ns = std::max(hazard.last_seen_ns, report.stamp_ns);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// How a further sighting refines a hazard.
 struct FusionRule {
@@ -21,7 +21,7 @@ struct FusionRule {
 struct HazardEstimate {
   float confidence = 0;  ///< 0..1.
   std::uint32_t sightings = 1;
-  GeoPoint position;
+  geo::GeoPoint position;
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
   std::int64_t first_seen_ns = 0;                               ///< Oldest image stamp.
   std::int64_t last_seen_ns = 0;                                ///< Newest image stamp.
@@ -38,6 +38,6 @@ Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_
 ///   confidence  noisy-or, 1 - (1 - c1)(1 - c2), capped by the rule, never lowered;
 ///   sightings + 1, first and last seen.
 /// Order matters only through the two floors and the cap.
-void Fuse(HazardEstimate& hazard, const Report& report, const FusionRule& rule);
+void Fuse(HazardEstimate& hazard, const protocol::Report& report, const FusionRule& rule);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -8,7 +8,7 @@
 #include "common/time.h"
 #include "zone/belief/hazard_lifecycle_internal.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 bool SpeaksAgainst(EvidenceKind kind) {
@@ -52,8 +52,11 @@ double Faded(const ClassModel& entry, double log_odds, const PresenceRecord& lif
 /// The vehicle's place among the voices: its own, a free one, or that of the longest silent, if it
 /// has been silent since before `at_s`. One that does not count goes before one that does, and
 /// drives none away that does.
-VehicleEvidence* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s, PresenceRecord& life) {
-  const auto keeps = [](const VehicleEvidence& voice) { return std::make_pair(voice.Counts(), voice.at_s); };
+VehicleEvidence* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s,
+                         PresenceRecord& life) {
+  const auto keeps = [](const VehicleEvidence& voice) {
+    return std::make_pair(voice.Counts(), voice.at_s);
+  };
   VehicleEvidence* place = nullptr;
   for (VehicleEvidence& voice : life.voices) {
     if (voice.vehicle == vehicle) return &voice;
@@ -72,17 +75,18 @@ void NoteNo(std::int64_t stamp_ns, PresenceRecord& life) {
 
 }  // namespace
 
-ClassModel ClassModelOf(const HazardClass& entry, const ClassSurvival& survival) {
+ClassModel ClassModelOf(const protocol::HazardClass& entry, const ClassSurvival& survival) {
   ClassModel result;
-  result.confirmations =
-      static_cast<std::uint32_t>(std::clamp(entry.confirmations, 1, static_cast<int>(kMaxEvidencePerHazard)));
+  result.confirmations = static_cast<std::uint32_t>(
+      std::clamp(entry.confirmations, 1, static_cast<int>(kMaxEvidencePerHazard)));
   result.hit_rate = entry.hit_rate;
   result.false_rate = entry.false_rate;
   result.survival = survival;
   return result;
 }
 
-void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns, PresenceRecord& life) const {
+void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns,
+                             PresenceRecord& life) const {
   if (to_ns <= life.at_ns) return;
   if (life.state != HazardState::kRejected) {
     const double dt_s = Seconds(to_ns - life.at_ns);
@@ -96,7 +100,7 @@ void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns, Presen
 }
 
 double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& evidence,
-                            double ended_since) const {
+                                 double ended_since) const {
   const EvidenceKind kind = evidence.kind;
   const bool change = kind == EvidenceKind::kVanished;
   const bool against = SpeaksAgainst(kind);
@@ -121,7 +125,8 @@ double HazardLifecycle::MaxLogOddsPerVehicle(const Evidence& evidence) const {
   return std::max(0.0, -LogOdds(std::min(evidence.hostile, 0.5)));
 }
 
-bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const {
+bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evidence,
+                                    PresenceRecord& life) const {
   const bool against = SpeaksAgainst(evidence.kind);
   if (evidence.kind == EvidenceKind::kVanished && IsTold(life.state)) {
     return ApplyUnsolicited(entry, evidence, life);
@@ -163,7 +168,7 @@ bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evi
 }
 
 bool HazardLifecycle::ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence,
-                             PresenceRecord& life) const {
+                                       PresenceRecord& life) const {
   const double least = LogOdds(config_.settled_above);
   if (life.log_odds <= least) return false;
   const double ratio = LogRatio(entry, evidence, 0);
@@ -171,8 +176,8 @@ bool HazardLifecycle::ApplyUnsolicited(const ClassModel& entry, const Evidence& 
   return true;
 }
 
-LifecycleUpdate HazardLifecycle::Begin(const ClassModel& entry, const Evidence& sighting, std::int64_t now_ns,
-                           PresenceRecord& life) const {
+LifecycleUpdate HazardLifecycle::Begin(const ClassModel& entry, const Evidence& sighting,
+                                       std::int64_t now_ns, PresenceRecord& life) const {
   life = PresenceRecord();
   life.since_ns = now_ns;
   life.at_ns = std::min(sighting.stamp_ns, now_ns);
@@ -186,8 +191,8 @@ LifecycleUpdate HazardLifecycle::Begin(const ClassModel& entry, const Evidence& 
   return step;
 }
 
-LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& evidence, std::int64_t now_ns,
-                           PresenceRecord& life) const {
+LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& evidence,
+                                       std::int64_t now_ns, PresenceRecord& life) const {
   LifecycleUpdate step;
   if (life.state == HazardState::kGone || evidence.kind == EvidenceKind::kCantSee ||
       evidence.vehicle == 0) {
@@ -208,14 +213,15 @@ LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& 
   return step;
 }
 
-LifecycleUpdate HazardLifecycle::Advance(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life) const {
+LifecycleUpdate HazardLifecycle::Advance(const ClassModel& entry, std::int64_t now_ns,
+                                         PresenceRecord& life) const {
   LifecycleUpdate step;
   if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
   return step;
 }
 
 void HazardLifecycle::Settle(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life,
-                        LifecycleUpdate& step) const {
+                             LifecycleUpdate& step) const {
   MoveTo(entry, now_ns, life);
   step.transition = Decide(entry, life);
   if (!step.transition) return;
@@ -248,7 +254,7 @@ double HazardLifecycle::VerifyBelow(const ClassModel& entry) const {
 }
 
 std::optional<LifecycleTransition> HazardLifecycle::Decide(const ClassModel& entry,
-                                                 const PresenceRecord& life) const {
+                                                           const PresenceRecord& life) const {
   if (life.state == HazardState::kRejected) return DecideRejected(life);
   if (auto gone = DecideGone(life)) return gone;
   const double presence = Probability(life.log_odds);
@@ -293,7 +299,8 @@ std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRec
                         PresenceText(life.undenied_log_odds));
 }
 
-std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(const PresenceRecord& life) const {
+std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(
+    const PresenceRecord& life) const {
   const std::uint32_t supporters = Supporters(life);
   if (supporters >= config_.reopen_vehicles && Probability(life.log_odds) >= config_.active_above) {
     return Transition(life, HazardState::kActive,
@@ -306,14 +313,15 @@ std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(const Presenc
 }
 
 double HazardLifecycle::Presence(const ClassModel& entry, const PresenceRecord& life,
-                            std::int64_t now_ns) const {
+                                 std::int64_t now_ns) const {
   if (life.state == HazardState::kRejected || now_ns <= life.at_ns) {
     return Probability(life.log_odds);
   }
   return Probability(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
 }
 
-std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry, const PresenceRecord& life) const {
+std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
+                                           const PresenceRecord& life) const {
   if (life.state == HazardState::kGone) return kNever;
   if (life.state == HazardState::kRejected) {
     return std::max(life.since_ns, life.last_yes_ns) + Nanoseconds(config_.rejected_keep_s);
@@ -335,4 +343,4 @@ std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry, const Presen
   return life.at_ns + Nanoseconds(limited_s);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -11,7 +11,7 @@
 #include "zone/belief/vehicle_trust.h"
 #include "zone/model/presence_record.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 enum class EvidenceKind : std::uint8_t {
   kSighting,    ///< A report.
@@ -33,12 +33,13 @@ struct Evidence {
 
 /// What HazardLifecycle knows of a hazard's class; made by ClassModelOf, cheap to copy.
 struct ClassModel {
-  std::uint32_t confirmations = 2;  ///< Distinct vehicles before drivers are told, 1 to kMaxEvidencePerHazard.
-  double hit_rate = 0.85;           ///< P(a vehicle that looks says yes | it is there).
-  double false_rate = 0.03;         ///< P(the same | it is not there).
+  std::uint32_t confirmations =
+      2;  ///< Distinct vehicles before drivers are told, 1 to kMaxEvidencePerHazard.
+  double hit_rate = 0.85;    ///< P(a vehicle that looks says yes | it is there).
+  double false_rate = 0.03;  ///< P(the same | it is not there).
   ClassSurvival survival;
 };
-ClassModel ClassModelOf(const HazardClass& entry, const ClassSurvival& survival);
+ClassModel ClassModelOf(const protocol::HazardClass& entry, const ClassSurvival& survival);
 
 /// "`done` by `official`: `reason`", without the colon where there is no reason; at most 200 bytes.
 std::string DecisionText(const std::string& done, const std::string& official,
@@ -55,7 +56,7 @@ struct LifecycleTransition {
 struct LifecycleUpdate {
   std::optional<LifecycleTransition> transition;
   bool counted = false;           ///< The evidence moved the odds.
-  LifetimeObservation lesson;              ///< For SurvivalModel::Learn, when the step is committed.
+  LifetimeObservation lesson;     ///< For SurvivalModel::Learn, when the step is committed.
   std::vector<Verdict> verdicts;  ///< For VehicleTrust::Judge, likewise.
 };
 
@@ -94,14 +95,14 @@ class HazardLifecycle {
     double active_alone_above = 0.5;    ///< and of classes that one vehicle confirms from this one.
     double verify_below = 0.7;          ///< An active hazard is verified below this presence (of
                                         ///< classes that one vehicle confirms: active_alone_above)
-    double settled_above = 0.85;           ///< ...and active again from this one on.
+    double settled_above = 0.85;        ///< ...and active again from this one on.
     double gone_below = 0.1;            ///< Off the map.
-    double max_presence = 0.995;              ///< Presence never counts as more certain than this.
+    double max_presence = 0.995;        ///< Presence never counts as more certain than this.
     double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
     double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
     double vanished_false_rate = 0.05;  ///< P(the same | it is there).
     double suspect_above = 0.5;         ///< A vehicle this likely hostile is not counted as one.
-    double max_trust_step = 1;            ///< No one verdict weighs more, log odds; an official's
+    double max_trust_step = 1;          ///< No one verdict weighs more, log odds; an official's
     double official_weight = 2;         ///< ...weighs this many times as much as a vehicle's.
     std::uint32_t denials = 2;          ///< Distinct vehicles against it before it is gone.
     double quarantine_s = 86400;        ///< A rejected hazard takes no support for this long.
@@ -117,25 +118,27 @@ class HazardLifecycle {
   /// A new hazard's first report. The transition has no `from`; its `to` is active at once where
   /// one vehicle confirms the class.
   LifecycleUpdate Begin(const ClassModel& entry, const Evidence& sighting, std::int64_t now_ns,
-                 PresenceRecord& life) const;
+                        PresenceRecord& life) const;
   /// A further word, in any order of stamps. Does nothing to a hazard that is gone.
   LifecycleUpdate Apply(const ClassModel& entry, const Evidence& evidence, std::int64_t now_ns,
-                 PresenceRecord& life) const;
+                        PresenceRecord& life) const;
   /// Time passes. Cheap; nothing happens before NextChangeNs.
   LifecycleUpdate Advance(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life) const;
   /// An official says that it is there (also revokes a rejection), or that it is not and never was;
   /// `reason` may be empty. Nothing happens to a hazard that is gone; Reject leaves one that is off
   /// the map alone, Confirm has a transition from active to active too.
-  LifecycleUpdate Confirm(const ClassModel& entry, const std::string& official, const std::string& reason,
-                   std::int64_t now_ns, PresenceRecord& life) const;
-  LifecycleUpdate Reject(const ClassModel& entry, const std::string& official, const std::string& reason,
-                  std::int64_t now_ns, PresenceRecord& life) const;
+  LifecycleUpdate Confirm(const ClassModel& entry, const std::string& official,
+                          const std::string& reason, std::int64_t now_ns,
+                          PresenceRecord& life) const;
+  LifecycleUpdate Reject(const ClassModel& entry, const std::string& official,
+                         const std::string& reason, std::int64_t now_ns,
+                         PresenceRecord& life) const;
   /// All that the vehicle said is taken back: the odds are as if it had said nothing, and a hazard
   /// that no other vehicle saw is gone, one that too few others saw a candidate again. What an
   /// official confirmed stays. The transition, with `why` as its reason, may lead to the same
   /// state; none where the vehicle has no voice, or the hazard is gone.
   LifecycleUpdate Withdraw(const ClassModel& entry, std::uint64_t vehicle, const std::string& why,
-                    std::int64_t now_ns, PresenceRecord& life) const;
+                           std::int64_t now_ns, PresenceRecord& life) const;
 
   /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
   double Presence(const ClassModel& entry, const PresenceRecord& life, std::int64_t now_ns) const;
@@ -150,12 +153,15 @@ class HazardLifecycle {
   void MoveTo(const ClassModel& entry, std::int64_t to_ns, PresenceRecord& life) const;
   double LogRatio(const ClassModel& entry, const Evidence& evidence, double ended_since) const;
   bool ApplyEvidence(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const;
-  bool ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const;
+  bool ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence,
+                        PresenceRecord& life) const;
   double MaxLogOddsPerVehicle(const Evidence& evidence) const;
-  void Settle(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life, LifecycleUpdate& step) const;
+  void Settle(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life,
+              LifecycleUpdate& step) const;
   double ActiveAbove(const ClassModel& entry) const;
   double VerifyBelow(const ClassModel& entry) const;
-  std::optional<LifecycleTransition> Decide(const ClassModel& entry, const PresenceRecord& life) const;
+  std::optional<LifecycleTransition> Decide(const ClassModel& entry,
+                                            const PresenceRecord& life) const;
   bool IsDeniedAway(const PresenceRecord& life) const;
   std::optional<LifecycleTransition> DecideGone(const PresenceRecord& life) const;
   std::optional<LifecycleTransition> DecideRejected(const PresenceRecord& life) const;
@@ -170,7 +176,8 @@ class HazardLifecycle {
   double WrongNo(const ClassModel& entry) const;
   void JudgeSeen(const ClassModel& entry, const Evidence& seen, PresenceRecord& life,
                  LifecycleUpdate& step) const;
-  void JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life, LifecycleUpdate& step) const;
+  void JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life,
+                       LifecycleUpdate& step) const;
   void JudgeOfficially(const ClassModel& entry, bool there, const PresenceRecord& life,
                        LifecycleUpdate& step) const;
 
@@ -179,4 +186,4 @@ class HazardLifecycle {
   double max_voice_;     // Of one vehicle, by `hostile_share`.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -4,7 +4,7 @@
 #include "common/checks.h"
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 double ConfiguredOdds(double probability) { return std::log(probability / (1 - probability)); }
@@ -36,4 +36,4 @@ HazardLifecycle::HazardLifecycle(const Config& config) : config_(config) {
   max_voice_ = -ConfiguredOdds(config.hostile_share);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -9,7 +9,7 @@
 
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 inline double Probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 inline double LogOdds(double probability) { return std::log(probability / (1 - probability)); }
@@ -24,7 +24,8 @@ inline std::string ReasonText(std::string text) {
   return text;
 }
 
-inline LifecycleTransition Transition(const PresenceRecord& life, HazardState to, std::string reason) {
+inline LifecycleTransition Transition(const PresenceRecord& life, HazardState to,
+                                      std::string reason) {
   return {life.state, to, ReasonText(std::move(reason))};
 }
 
@@ -39,4 +40,4 @@ inline void RecordConfirmation(std::int64_t stamp_ns, PresenceRecord& life) {
   if (life.first_no_ns <= life.last_yes_ns) life.first_no_ns = 0;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 #include "common/time.h"
 #include "zone/belief/hazard_lifecycle_internal.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 /// The newest stamp of a vehicle that counts and speaks for the hazard; 0 without one.
@@ -40,8 +40,8 @@ std::string DecisionText(const std::string& done, const std::string& official,
 }
 
 LifecycleUpdate HazardLifecycle::Confirm(const ClassModel& entry, const std::string& official,
-                             const std::string& reason, std::int64_t now_ns,
-                             PresenceRecord& life) const {
+                                         const std::string& reason, std::int64_t now_ns,
+                                         PresenceRecord& life) const {
   LifecycleUpdate step;
   if (life.state == HazardState::kGone) return step;
   const bool told = IsTold(life.state);
@@ -64,8 +64,8 @@ LifecycleUpdate HazardLifecycle::Confirm(const ClassModel& entry, const std::str
 }
 
 LifecycleUpdate HazardLifecycle::Reject(const ClassModel& entry, const std::string& official,
-                            const std::string& reason, std::int64_t now_ns,
-                            PresenceRecord& life) const {
+                                        const std::string& reason, std::int64_t now_ns,
+                                        PresenceRecord& life) const {
   LifecycleUpdate step;
   if (!IsOnMap(life.state)) return step;
   JudgeOfficially(entry, false, life, step);
@@ -82,11 +82,13 @@ LifecycleUpdate HazardLifecycle::Reject(const ClassModel& entry, const std::stri
   return step;
 }
 
-LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t vehicle, const std::string& why,
-                              std::int64_t now_ns, PresenceRecord& life) const {
+LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t vehicle,
+                                          const std::string& why, std::int64_t now_ns,
+                                          PresenceRecord& life) const {
   LifecycleUpdate step;
-  const auto voice = std::find_if(life.voices.begin(), life.voices.end(),
-                                  [&](const VehicleEvidence& one) { return one.vehicle == vehicle; });
+  const auto voice =
+      std::find_if(life.voices.begin(), life.voices.end(),
+                   [&](const VehicleEvidence& one) { return one.vehicle == vehicle; });
   if (vehicle == 0 || life.state == HazardState::kGone || voice == life.voices.end()) return step;
   MoveTo(entry, now_ns, life);
   const VehicleEvidence taken = *voice;
@@ -105,7 +107,8 @@ LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t
 }
 
 /// The odds as if the vehicle had said nothing.
-void HazardLifecycle::TakeBack(const ClassModel& entry, const VehicleEvidence& taken, PresenceRecord& life) const {
+void HazardLifecycle::TakeBack(const ClassModel& entry, const VehicleEvidence& taken,
+                               PresenceRecord& life) const {
   double weight = 1e-3 * taken.weight_1000;
   // A voice for the hazard has faded with the odds.
   const double age_s = std::max(0.0, Seconds(life.at_ns) - taken.at_s);
@@ -120,8 +123,8 @@ void HazardLifecycle::TakeBack(const ClassModel& entry, const VehicleEvidence& t
 
 /// A hazard that stood on the withdrawn words alone is gone; one that too few others have seen is a
 /// candidate again.
-void HazardLifecycle::Demote(const ClassModel& entry, const VehicleEvidence& taken, std::int64_t now_ns,
-                        PresenceRecord& life) const {
+void HazardLifecycle::Demote(const ClassModel& entry, const VehicleEvidence& taken,
+                             std::int64_t now_ns, PresenceRecord& life) const {
   if (taken.against || !IsOnMap(life.state)) return;
   const std::uint32_t supporters = Supporters(life);
   if (supporters == 0) {
@@ -131,4 +134,4 @@ void HazardLifecycle::Demote(const ClassModel& entry, const VehicleEvidence& tak
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 #include "common/time.h"
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 /// Who says what it likes says one or the other.
@@ -40,7 +40,7 @@ double HazardLifecycle::WrongNo(const ClassModel& entry) const {
 /// `seen` is a word for the hazard. The voices of before are judged by what all others say: nobody
 /// bears out its own word.
 void HazardLifecycle::JudgeSeen(const ClassModel& entry, const Evidence& seen, PresenceRecord& life,
-                           LifecycleUpdate& step) const {
+                                LifecycleUpdate& step) const {
   if (seen.hostile >= config_.suspect_above) return;
   for (std::size_t i = 0; i < kMaxEvidencePerHazard; ++i) {
     const VehicleEvidence& voice = life.voices[i];
@@ -56,7 +56,7 @@ void HazardLifecycle::JudgeSeen(const ClassModel& entry, const Evidence& seen, P
 /// Three things may have happened: there never was anything; it ended between the last word for it
 /// and the first against it; or it stands and every opponent missed it.
 void HazardLifecycle::JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life,
-                                 LifecycleUpdate& step) const {
+                                      LifecycleUpdate& step) const {
   const double real = life.official ? 1 : ChanceOf(OddsOfSupport(life, config_.prior_presence));
   const double gap_s = std::max(0.0, Seconds(life.first_no_ns - life.last_yes_ns));
   const double age_s = std::max(0.0, Seconds(life.last_yes_ns - life.first_seen_ns));
@@ -85,8 +85,8 @@ void HazardLifecycle::JudgeDeniedAway(const ClassModel& entry, const PresenceRec
   }
 }
 
-void HazardLifecycle::JudgeOfficially(const ClassModel& entry, bool there, const PresenceRecord& life,
-                                 LifecycleUpdate& step) const {
+void HazardLifecycle::JudgeOfficially(const ClassModel& entry, bool there,
+                                      const PresenceRecord& life, LifecycleUpdate& step) const {
   for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle == 0) continue;
     const double wrong = voice.against ? WrongNo(entry) : WrongYes(entry);
@@ -96,4 +96,4 @@ void HazardLifecycle::JudgeOfficially(const ClassModel& entry, bool there, const
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

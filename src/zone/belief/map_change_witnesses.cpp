@@ -4,7 +4,7 @@
 
 #include "common/number_text.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 bool HasDrive(const MapChangeWitness& witness, std::uint64_t drive) {
@@ -46,7 +46,7 @@ std::optional<MapChangeWitness> ReadWitness(NumberReader& reader) {
 }  // namespace
 
 WitnessUpdate RecordWitness(std::vector<MapChangeWitness>& witnesses, std::uint64_t vehicle,
-                        std::uint64_t drive, bool against) {
+                            std::uint64_t drive, bool against) {
   const auto known =
       std::find_if(witnesses.begin(), witnesses.end(), [&](const MapChangeWitness& one) {
         return one.vehicle == vehicle && one.against == against;
@@ -94,4 +94,4 @@ std::optional<std::vector<MapChangeWitness>> UnpackWitnesses(const std::string& 
   return witnesses;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 
 #include "zone/model/map_change.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// What a further word of a vehicle adds to those that spoke.
 enum class WitnessUpdate {
@@ -18,7 +18,7 @@ enum class WitnessUpdate {
 
 /// Notes that a drive of a vehicle spoke for the change, or against it. Both keys by VehicleKey.
 WitnessUpdate RecordWitness(std::vector<MapChangeWitness>& witnesses, std::uint64_t vehicle,
-                        std::uint64_t drive, bool against);
+                            std::uint64_t drive, bool against);
 
 /// The witnesses as one line of numbers, and back; none when the text is no such line.
 std::string PackWitnesses(const std::vector<MapChangeWitness>& witnesses);
@@ -27,4 +27,4 @@ std::optional<std::vector<MapChangeWitness>> UnpackWitnesses(const std::string& 
 /// No packed line is longer.
 constexpr std::size_t kMaxPackedWitnessBytes = 4096;
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 bool IsAmount(double value) { return std::isfinite(value) && value >= 0; }
@@ -32,10 +32,10 @@ double ClassSurvival::ExpectedTimeStanding(double age_s, double dt_s) const {
   return elapsed_s / (shape - 1) * ended;
 }
 
-SurvivalModel::SurvivalModel(HazardCatalogue catalogue)
+SurvivalModel::SurvivalModel(protocol::HazardCatalogue catalogue)
     : SurvivalModel(std::move(catalogue), Config()) {}
 
-SurvivalModel::SurvivalModel(HazardCatalogue catalogue, Config config)
+SurvivalModel::SurvivalModel(protocol::HazardCatalogue catalogue, Config config)
     : catalogue_(std::move(catalogue)), config_(config) {
   if (!(config_.prior_weight >= 0.5 && config_.prior_weight <= 1000)) {
     throw Error("prior_weight is " + std::to_string(config_.prior_weight) +
@@ -78,4 +78,4 @@ ClassSurvival SurvivalModel::Of(const std::string& class_name) const {
   return survival;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

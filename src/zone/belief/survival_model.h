@@ -5,7 +5,7 @@
 
 #include "protocol/hazard_catalogue.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// How long hazards of one class live: each ends at a constant but unknown rate, and what is known
 /// of the rate is a Gamma distribution of `shape` and `scale_s`. Then the life is Lomax (Pareto II)
@@ -59,8 +59,8 @@ class SurvivalModel {
     double memory = 50;       ///< Ended lives that count at most; older ones fade. >= 1.
   };
 
-  SurvivalModel(HazardCatalogue catalogue, Config config);
-  explicit SurvivalModel(HazardCatalogue catalogue);
+  SurvivalModel(protocol::HazardCatalogue catalogue, Config config);
+  explicit SurvivalModel(protocol::HazardCatalogue catalogue);
 
   /// Takes in what the store kept. Throws Error naming the class unless both numbers are finite and
   /// not negative.
@@ -75,9 +75,9 @@ class SurvivalModel {
   const std::map<std::string, LearnedLifetime>& learned() const { return learned_; }
 
  private:
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   Config config_;
   std::map<std::string, LearnedLifetime> learned_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 #include "common/number_text.h"
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::size_t kMaxVouchersBytes = 200;
@@ -109,4 +109,4 @@ bool UnpackVouchers(const std::string& text, TrustRecord& record) {
   return true;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// What became of one word that a vehicle said of a hazard, once others have settled the matter;
 /// made by HazardLifecycle.
@@ -44,7 +44,7 @@ class VehicleTrust {
   struct Config {
     double hostile_share = 0.05;       ///< h: of vehicles that say what they like; above 0, < 0.5.
     double memory_s = 10 * 86400.0;    ///< Suspicion fades to 1/e in this time; > 0.
-    double max_suspicion = 6;         ///< Log odds; more is not held against anybody; > 0.
+    double max_suspicion = 6;          ///< Log odds; more is not held against anybody; > 0.
     std::size_t max_vehicles = 50000;  ///< Beyond it the least suspected one is forgotten.
   };
 
@@ -82,4 +82,4 @@ std::string PackVouchers(const TrustRecord& record);
 /// Inverse of PackVouchers; false, and nothing is changed, when `text` is anything else.
 bool UnpackVouchers(const std::string& text, TrustRecord& record);
 
-}  // namespace livemap
+}  // namespace livemap::zone

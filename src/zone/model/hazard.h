@@ -9,14 +9,14 @@
 #include "geo/wgs84.h"
 #include "zone/model/hazard_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// One hazard of the zone.
 struct Hazard {
   Uuid uuid;               ///< The zone's own id.
   std::string class_name;  ///< Valid printable UTF-8, at most 64 bytes.
   float confidence = 0;    ///< 0..1, of all sightings together.
-  GeoPoint position;       ///< Fused from all sightings.
+  geo::GeoPoint position;  ///< Fused from all sightings.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
   std::uint32_t sightings = 1;     ///< Reports merged so far, each uuid once.
   std::int64_t first_seen_ns = 0;  ///< Oldest image stamp, UTC ns since 1970.
@@ -67,4 +67,4 @@ struct StoredEvent {
   std::int64_t at_ns = 0;  ///< Zone clock, UTC ns since 1970.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <set>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Where a hazard stands in its life, as stored: the numbers never change. See docs/life.md.
 enum class HazardState : std::uint8_t {
@@ -44,4 +44,4 @@ constexpr const char* StateName(HazardState state) {
   return "unknown";
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

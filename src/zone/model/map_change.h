@@ -13,7 +13,7 @@
 #include "geo/wgs84.h"
 #include "zone/model/hazard.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Where a map change stands, as stored: the numbers never change. docs/zone.md tells the steps.
 enum class MapChangeState : std::uint8_t {
@@ -64,7 +64,7 @@ struct MapChangeFeature {
   bool vanished = false;   ///< Else it appeared.
   MapChangeState state = MapChangeState::kProposed;
   float confidence = 0;                                         ///< 0..1, of all words together.
-  GeoPoint position;                                            ///< Of its foot on the road.
+  geo::GeoPoint position;                                       ///< Of its foot on the road.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
   std::uint32_t reports = 1;                                    ///< For it, each uuid once.
   std::uint32_t drives = 1;                                     ///< Distinct ones for it.
@@ -119,4 +119,4 @@ struct MapChangeStatistics {
   std::array<std::size_t, kMapChangeStates> by_state{};  ///< Features, by MapChangeState.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -8,7 +8,7 @@
 #include "common/sha256.h"
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::size_t kMaxPackedBytes = 500;
@@ -111,8 +111,8 @@ std::uint32_t Opponents(const PresenceRecord& life) {
   std::uint32_t opponents = 0;
   for (const VehicleEvidence& voice : life.voices) {
     if (!voice.Counts() || !voice.against) continue;
-    const auto answers =
-        std::count_if(life.voices.begin(), life.voices.end(), [&voice](const VehicleEvidence& other) {
+    const auto answers = std::count_if(
+        life.voices.begin(), life.voices.end(), [&voice](const VehicleEvidence& other) {
           return other.Counts() && !other.against && other.at_s > voice.at_s;
         });
     if (answers < kAnswersToOpponent) ++opponents;
@@ -120,4 +120,4 @@ std::uint32_t Opponents(const PresenceRecord& life) {
   return opponents;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

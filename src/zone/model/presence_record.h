@@ -8,7 +8,7 @@
 
 #include "zone/model/hazard_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// A vehicle in the records of hazards: the first 8 bytes of the SHA-256 of its proven id, the same
 /// after a restart. Never 0.
@@ -30,8 +30,8 @@ struct VehicleEvidence {
 /// Vehicles that a hazard remembers; a further one takes the place of the longest silent.
 constexpr std::size_t kMaxEvidencePerHazard = 6;
 
-/// The life of one hazard: plain data of 160 bytes, changed by HazardLifecycle only. Times are UTC, ns
-/// since 1970.
+/// The life of one hazard: plain data of 160 bytes, changed by HazardLifecycle only. Times are UTC,
+/// ns since 1970.
 struct PresenceRecord {
   HazardState state = HazardState::kCandidate;
   bool official = false;           ///< Confirmed by an official: needs no further vehicle.
@@ -63,4 +63,4 @@ std::uint32_t Supporters(const PresenceRecord& life);
 /// since, that spoke for it.
 std::uint32_t Opponents(const PresenceRecord& life);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// What was found in a sound database that the program cannot have written: rows of impossible
 /// values. They are left where they are, and not taken in.
@@ -21,4 +21,4 @@ struct StoreDamage {
   }
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,17 +5,17 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Where a vehicle was last. Never handed to other vehicles.
 struct VehicleState {
   std::string vehicle_id;
   std::string drive_id;
-  GeoPoint position;
+  geo::GeoPoint position;
   double course_rad = 0;  ///< Clockwise from true north; NaN when standing.
   double speed_mps = 0;
   std::int64_t stamp_ns = 0;  ///< Of the fix, vehicle clock (UTC).
   std::int64_t heard_ns = 0;  ///< Zone clock (UTC), set by UpdateVehicle.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

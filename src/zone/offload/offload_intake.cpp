@@ -7,7 +7,7 @@
 #include "placement/hazard_placement.h"
 #include "placement/road_ground_contact.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr double kEndlessM = 1e4;  // The projection's own limit; max_range_m is ours.
@@ -19,7 +19,7 @@ std::uint8_t HexDigit(char digit) {
 }  // namespace
 
 Uuid OffloadReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
-                         const std::string& class_name, const Box& box) {
+                       const std::string& class_name, const imaging::Box& box) {
   const auto tenths = [](float px) {
     return "\n" + std::to_string(std::llround(static_cast<double>(px) * 10));
   };
@@ -37,7 +37,7 @@ Uuid OffloadReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
   return uuid;
 }
 
-std::string OffloadIntake::Add(OffloadedFrame frame, std::int64_t now_ns) {
+std::string OffloadIntake::Add(protocol::OffloadedFrame frame, std::int64_t now_ns) {
   ++counters_.frames;
   counters_.bytes += frame.image.size();
   // The allowance first: refusing must not be free of charge.
@@ -64,7 +64,7 @@ std::string OffloadIntake::Add(OffloadedFrame frame, std::int64_t now_ns) {
   return {};
 }
 
-bool OffloadIntake::Remember(const OffloadedFrame& frame) {
+bool OffloadIntake::Remember(const protocol::OffloadedFrame& frame) {
   const Key key(frame.vehicle_id, frame.stamp_ns);
   if (!remembered_.insert(key).second) return false;
   remembered_order_.push_back(key);
@@ -107,16 +107,17 @@ std::vector<std::int64_t> OffloadIntake::Expire(double steady_s) {
   return lost;
 }
 
-std::vector<Report> OffloadIntake::Finish(std::int64_t internal_ns, const SightingFrame& answer) {
+std::vector<protocol::Report> OffloadIntake::Finish(std::int64_t internal_ns,
+                                                    const placement::SightingFrame& answer) {
   const auto found = in_flight_.find(internal_ns);
   if (found == in_flight_.end()) return {};
-  const OffloadedFrame frame = std::move(found->second.job.frame);
+  const protocol::OffloadedFrame frame = std::move(found->second.job.frame);
   in_flight_.erase(found);
   ++counters_.detected;
   counters_.sightings += answer.sightings.size();
   if (answer.sightings.empty()) ++counters_.empty;
-  std::vector<Report> reports;
-  for (const Sighting& sighting : answer.sightings) {
+  std::vector<protocol::Report> reports;
+  for (const placement::Sighting& sighting : answer.sightings) {
     if (!IsUsable(sighting)) continue;
     const auto ground = PlaceOnRoad(frame, sighting);
     if (ground) reports.push_back(ReportOf(frame, sighting, *ground));
@@ -125,8 +126,8 @@ std::vector<Report> OffloadIntake::Finish(std::int64_t internal_ns, const Sighti
   return reports;
 }
 
-bool OffloadIntake::IsUsable(const Sighting& sighting) {
-  if (!IsWellFormed(sighting)) {
+bool OffloadIntake::IsUsable(const placement::Sighting& sighting) {
+  if (!placement::IsWellFormed(sighting)) {
     ++counters_.invalid_sightings;
     return false;
   }
@@ -137,33 +138,35 @@ bool OffloadIntake::IsUsable(const Sighting& sighting) {
   return true;
 }
 
-std::optional<GroundPoint> OffloadIntake::PlaceOnRoad(const OffloadedFrame& frame,
-                                                        const Sighting& sighting) {
-  if (IsCutBySide(sighting.box, frame.intrinsics.width)) {
+std::optional<geo::GroundPoint> OffloadIntake::PlaceOnRoad(const protocol::OffloadedFrame& frame,
+                                                           const placement::Sighting& sighting) {
+  if (placement::IsCutBySide(sighting.box, frame.intrinsics.width)) {
     ++counters_.cut_by_side;
     return std::nullopt;
   }
-  GroundProjectionNoise noise = config_.projection;
+  geo::GroundProjectionNoise noise = config_.projection;
   noise.max_range_m = kEndlessM;
-  auto ground =
-      ProjectToGround(ContactPixel(sighting.box), frame.intrinsics, frame.base_from_optical, noise);
+  auto ground = geo::ProjectToGround(placement::ContactPixel(sighting.box), frame.intrinsics,
+                                     frame.base_from_optical, noise);
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
   }
   const double heading_variance_rad2 = frame.fused ? frame.base.course_variance_rad2 : 0.0;
-  if (!IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
-                    config_.max_ground_sigma_m)) {
+  if (!placement::IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
+                               config_.max_ground_sigma_m)) {
     ++counters_.too_far;
     return std::nullopt;
   }
   return ground;
 }
 
-Report OffloadIntake::ReportOf(const OffloadedFrame& frame, const Sighting& sighting,
-                                 const GroundPoint& ground) {
-  const PlacedHazard place = PlaceHazard(frame.base, Eigen::Vector2d::Zero(), ground);
-  Report report;
+protocol::Report OffloadIntake::ReportOf(const protocol::OffloadedFrame& frame,
+                                         const placement::Sighting& sighting,
+                                         const geo::GroundPoint& ground) {
+  const placement::PlacedHazard place =
+      placement::PlaceHazard(frame.base, Eigen::Vector2d::Zero(), ground);
+  protocol::Report report;
   report.uuid =
       OffloadReportUuid(frame.vehicle_id, frame.stamp_ns, sighting.class_name, sighting.box);
   report.vehicle_id = frame.vehicle_id;
@@ -180,4 +183,4 @@ Report OffloadIntake::ReportOf(const OffloadedFrame& frame, const Sighting& sigh
   return report;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

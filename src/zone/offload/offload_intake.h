@@ -17,7 +17,7 @@
 #include "zone/admission/offload_allowance.h"
 #include "zone/admission/offload_validation.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// The zone's side of a small vehicle: takes its candidate frames, hands them to a detector a few
 /// at a time under stamps of the zone's own (those of two vehicles may be equal), and turns what
@@ -38,7 +38,7 @@ class OffloadIntake {
     double min_confidence = 0.0;
     double max_range_m = 30.0;
     double max_ground_sigma_m = 1.0;
-    GroundProjectionNoise projection;
+    geo::GroundProjectionNoise projection;
   };
 
   /// Since the start. frames = refused + over_allowance + repeated + displaced + undecodable +
@@ -66,13 +66,13 @@ class OffloadIntake {
   /// A frame at the detector.
   struct Job {
     std::int64_t internal_ns = 0;  ///< Its stamp within the zone: unique, ascending.
-    OffloadedFrame frame;
+    protocol::OffloadedFrame frame;
   };
 
   explicit OffloadIntake(const Config& config) : config_(config), allowance_(config.allowance) {}
 
   /// Why the frame is not taken, in one sentence; empty when it is. `now_ns` is the zone's clock.
-  std::string Add(OffloadedFrame frame, std::int64_t now_ns);
+  std::string Add(protocol::OffloadedFrame frame, std::int64_t now_ns);
 
   /// The next frame for the detector, or null when it has enough to do or none waits. Valid until
   /// Finish or Abandon of it, or Expire. `steady_s` never pauses.
@@ -81,7 +81,8 @@ class OffloadIntake {
   void Abandon(std::int64_t internal_ns);
   /// The detector's answer to the frame with this stamp: its reports, without pictures. A stamp
   /// that is unknown, or known no more, gives none.
-  std::vector<Report> Finish(std::int64_t internal_ns, const SightingFrame& answer);
+  std::vector<protocol::Report> Finish(std::int64_t internal_ns,
+                                       const placement::SightingFrame& answer);
   /// Gives up frames that the detector has lost; their stamps.
   std::vector<std::int64_t> Expire(double steady_s);
 
@@ -96,14 +97,16 @@ class OffloadIntake {
   };
   using Key = std::pair<std::string, std::int64_t>;  // Vehicle and stamp.
 
-  bool IsUsable(const Sighting& sighting);
-  std::optional<GroundPoint> PlaceOnRoad(const OffloadedFrame& frame, const Sighting& sighting);
-  Report ReportOf(const OffloadedFrame& frame, const Sighting& sighting, const GroundPoint& ground);
-  bool Remember(const OffloadedFrame& frame);
+  bool IsUsable(const placement::Sighting& sighting);
+  std::optional<geo::GroundPoint> PlaceOnRoad(const protocol::OffloadedFrame& frame,
+                                              const placement::Sighting& sighting);
+  protocol::Report ReportOf(const protocol::OffloadedFrame& frame,
+                            const placement::Sighting& sighting, const geo::GroundPoint& ground);
+  bool Remember(const protocol::OffloadedFrame& frame);
 
   Config config_;
   OffloadAllowance allowance_;
-  std::deque<OffloadedFrame> waiting_;
+  std::deque<protocol::OffloadedFrame> waiting_;
   std::size_t waiting_bytes_ = 0;
   std::map<std::int64_t, InFlight> in_flight_;  // By internal stamp.
   std::int64_t newest_internal_ns_ = 0;
@@ -116,6 +119,6 @@ class OffloadIntake {
 /// box (to a tenth of a pixel), so that a frame that comes twice is one report. RFC 9562 version 8,
 /// by SHA-256.
 Uuid OffloadReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
-                         const std::string& class_name, const Box& box);
+                       const std::string& class_name, const imaging::Box& box);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -12,7 +12,7 @@
 #include "common/sha256.h"
 #include "common/sqlite.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 namespace fs = std::filesystem;
@@ -182,4 +182,4 @@ std::uint64_t ImageStore::total_bytes() const {
   return total_bytes_;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

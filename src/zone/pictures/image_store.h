@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Pictures on disk, each in `<directory>/<first two hex digits>/<sha256>.<format>`, so that the
 /// same picture is kept once. Thread-safe.
@@ -75,4 +75,4 @@ class ImageStore {
   std::uint64_t next_age_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -10,7 +10,7 @@
 
 #include "common/sqlite.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 OwnedDirectory::OwnedDirectory(const std::string& path) : path_(path) {
   if (path.empty()) throw Error("zone directory is empty, accepted is the path of a directory");
@@ -32,4 +32,4 @@ OwnedDirectory::OwnedDirectory(const std::string& path) : path_(path) {
 
 OwnedDirectory::~OwnedDirectory() { close(lock_file_); }
 
-}  // namespace livemap
+}  // namespace livemap::zone

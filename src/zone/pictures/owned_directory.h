@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// A directory that one process has for itself while this object lives: a second zone on the same
 /// store would give out the same sequence numbers. The kernel frees it when the process dies.
@@ -21,4 +21,4 @@ class OwnedDirectory {
   int lock_file_ = -1;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

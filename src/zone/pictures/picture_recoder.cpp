@@ -11,7 +11,7 @@
 #include "imaging/image_header.h"
 #include "imaging/report_picture.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 // Encoders write about ten for a progressive picture.
@@ -22,19 +22,21 @@ constexpr int kMinFramePx = 10;
 constexpr double kViewPerBox = 2.5;
 constexpr int kThumbnailQuality = 75;
 
-std::string Dimensions(const ImageHeader& header) {
+std::string Dimensions(const imaging::ImageHeader& header) {
   return std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
 }
 
 /// Everything that can be known without decoding.
-ImageHeader CheckedHeader(const std::vector<std::uint8_t>& file, const PictureLimits& limits) {
+imaging::ImageHeader CheckedHeader(const std::vector<std::uint8_t>& file,
+                                   const PictureLimits& limits) {
   if (file.size() > limits.max_bytes) {
     throw Error("the picture has " + std::to_string(file.size()) + " bytes, accepted are " +
                 std::to_string(limits.max_bytes));
   }
-  const std::optional<ImageHeader> header = ReadImageHeader(file.data(), file.size());
+  const std::optional<imaging::ImageHeader> header =
+      imaging::ReadImageHeader(file.data(), file.size());
   // Not WebP: where libwebp takes no interest, OpenCV would hand the bytes to other libraries.
-  if (!header || header->format == ImageHeader::Format::kWebp) {
+  if (!header || header->format == imaging::ImageHeader::Format::kWebp) {
     throw Error("the picture is no JPEG or PNG");
   }
   const std::int64_t pixels = static_cast<std::int64_t>(header->width) * header->height;
@@ -42,17 +44,17 @@ ImageHeader CheckedHeader(const std::vector<std::uint8_t>& file, const PictureLi
     throw Error("the picture says it has " + Dimensions(*header) + ", accepted are " +
                 std::to_string(limits.max_pixels) + " in all");
   }
-  if (header->format == ImageHeader::Format::kJpeg) {
+  if (header->format == imaging::ImageHeader::Format::kJpeg) {
     if (const auto why = WhyNoWholeJpeg(file, kMaxScans)) throw Error("the picture " + *why);
-  } else if (!HasImageEnd(file.data(), file.size(), header->format)) {
+  } else if (!imaging::HasImageEnd(file.data(), file.size(), header->format)) {
     throw Error("the picture of " + Dimensions(*header) + " is cut off");
   }
   return *header;
 }
 
 /// How many times smaller a JPEG can be decoded and still not be smaller than wanted.
-int Reduction(const ImageHeader& header, int wanted_side_px) {
-  if (header.format != ImageHeader::Format::kJpeg) return 1;
+int Reduction(const imaging::ImageHeader& header, int wanted_side_px) {
+  if (header.format != imaging::ImageHeader::Format::kJpeg) return 1;
   int reduction = 1;
   while (reduction < 8 &&
          std::max(header.width, header.height) / (2 * reduction) >= wanted_side_px) {
@@ -70,7 +72,7 @@ int DecodingFlags(int reduction) {
 }
 
 /// 8-bit BGR whose longest side is at least `wanted_side_px` where the picture's is.
-cv::Mat DecodePixels(const std::vector<std::uint8_t>& file, const ImageHeader& header,
+cv::Mat DecodePixels(const std::vector<std::uint8_t>& file, const imaging::ImageHeader& header,
                      int wanted_side_px) {
   const int reduction = Reduction(header, wanted_side_px);
   const cv::Size expected((header.width + reduction - 1) / reduction,
@@ -120,7 +122,8 @@ cv::Rect View(const cv::Rect2d& box, const cv::Size& image) {
 }
 
 /// The box in pixels of a copy of the region that the picture shows.
-cv::Rect2d ScaledBox(const Box& box, const PixelRegion& shown, const cv::Size& copy) {
+cv::Rect2d ScaledBox(const imaging::Box& box, const imaging::PixelRegion& shown,
+                     const cv::Size& copy) {
   const double width = shown.width;
   const double height = shown.height;
   const double left = box.x_min - 1.0 * shown.x;
@@ -220,7 +223,7 @@ std::optional<std::string> WhyNoWholeJpeg(const std::vector<std::uint8_t>& file,
 
 std::vector<std::uint8_t> RecodePicture(const std::vector<std::uint8_t>& file,
                                         const PictureLimits& limits) {
-  const ImageHeader header = CheckedHeader(file, limits);
+  const imaging::ImageHeader header = CheckedHeader(file, limits);
   cv::Mat image = DecodePixels(file, header, limits.longest_side_px);
   const int longest = std::max(image.cols, image.rows);
   if (longest > limits.longest_side_px) {
@@ -235,9 +238,10 @@ std::vector<std::uint8_t> RecodePicture(const std::vector<std::uint8_t>& file,
   return recoded;
 }
 
-std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file, const Box& box,
-                                       const PixelRegion& shown, const SmallPictureLimits& limits) {
-  const ImageHeader header = CheckedHeader(file, limits.picture);
+std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file,
+                                       const imaging::Box& box, const imaging::PixelRegion& shown,
+                                       const SmallPictureLimits& limits) {
+  const imaging::ImageHeader header = CheckedHeader(file, limits.picture);
   const cv::Size whole(header.width, header.height);
   // As many pixels as the view needs, however small the box is in the image.
   const double view_width = View(ScaledBox(box, shown, whole), whole).width;
@@ -252,15 +256,15 @@ std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file, co
       thumbnail,
       {(place.x - view.x) * size.width / view.width, (place.y - view.y) * size.height / view.height,
        place.width * size.width / view.width, place.height * size.height / view.height});
-  return EncodeJpeg({thumbnail, nullptr}, kThumbnailQuality, limits.max_bytes);
+  return imaging::EncodeJpeg({thumbnail, nullptr}, kThumbnailQuality, limits.max_bytes);
 }
 
 std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file,
                                        const SmallPictureLimits& limits) {
-  const ImageHeader header = CheckedHeader(file, limits.picture);
+  const imaging::ImageHeader header = CheckedHeader(file, limits.picture);
   const cv::Mat image = DecodePixels(file, header, limits.width_px);
   const cv::Mat thumbnail = Shrunk(image, ThumbnailSize(image.size(), limits.width_px));
-  return EncodeJpeg({thumbnail, nullptr}, kThumbnailQuality, limits.max_bytes);
+  return imaging::EncodeJpeg({thumbnail, nullptr}, kThumbnailQuality, limits.max_bytes);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

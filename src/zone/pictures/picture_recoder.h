@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "imaging/box.h"
-namespace livemap {
+namespace livemap::zone {
 
 /// What a picture of a vehicle may be, and what is made of it before anybody sees it.
 struct PictureLimits {
@@ -39,8 +39,8 @@ struct SmallPictureLimits {
 /// perhaps by fewer pixels. The view is 2.5 times as wide as the box, within the picture. Empty
 /// when not even the smallest thumbnail keeps to the budget. Throws Error as RecodePicture does,
 /// and for a box that lies outside the region or is empty.
-std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file, const Box& box,
-                                       const PixelRegion& shown,
+std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file,
+                                       const imaging::Box& box, const imaging::PixelRegion& shown,
                                        const SmallPictureLimits& limits = {});
 
 /// The whole picture as a thumbnail, where no box is known: pictures of vehicles are annotated.
@@ -53,4 +53,4 @@ std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file,
 /// ask for thousands.
 std::optional<std::string> WhyNoWholeJpeg(const std::vector<std::uint8_t>& file, int max_scans);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -2,7 +2,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 // What an entry costs besides its picture; it also bounds the refused ones.
@@ -67,4 +67,4 @@ std::size_t ServedPictures::total_bytes() const {
   return total_bytes_;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -11,7 +11,7 @@
 
 #include "zone/pictures/picture_recoder.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// The pictures as people see them: encoded anew when first asked for, then kept in memory up to a
 /// bound, the ones not asked for longest going first. Thread-safe.
@@ -52,4 +52,4 @@ class ServedPictures {
   std::size_t total_bytes_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

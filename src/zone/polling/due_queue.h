@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Which hazard is to be looked at when. One that is put off stays where it is until its old time:
 /// whoever takes it looks again and puts it back. So the queue holds about one entry per hazard
@@ -41,4 +41,4 @@ class DueQueue {
   std::vector<std::int64_t> earliest_;  ///< By slot.
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr double kHourS = 3600;
@@ -26,10 +26,10 @@ constexpr std::size_t kMaxPerTick = 20000;
 constexpr double kMovedOdds = 1e-3;
 
 /// Metres north and east, for places some hundred metres apart.
-std::pair<double, double> Offset(const GeoPoint& from, const GeoPoint& to) {
+std::pair<double, double> Offset(const geo::GeoPoint& from, const geo::GeoPoint& to) {
   const double east_deg = std::remainder(to.longitude_deg - from.longitude_deg, 360.0);
   return {(to.latitude_deg - from.latitude_deg) * kMetresPerDegree,
-          east_deg * kMetresPerDegree * std::cos(from.latitude_deg * kRadiansPerDegree)};
+          east_deg * kMetresPerDegree * std::cos(from.latitude_deg * geo::kRadiansPerDegree)};
 }
 
 double ProbabilityOf(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
@@ -97,10 +97,10 @@ std::int64_t PollScheduler::DueNs(const Target& target, double price_s) const {
   return at(late_s);
 }
 
-void PollScheduler::SetHazard(std::uint64_t hazard, const GeoPoint& position,
+void PollScheduler::SetHazard(std::uint64_t hazard, const geo::GeoPoint& position,
                               const ClassModel& entry, const PresenceRecord& life,
                               std::int64_t picture_ns, std::int64_t now_ns) {
-  if (!IsOnMap(life.state) || !IsValid(position)) return RemoveHazard(hazard);
+  if (!IsOnMap(life.state) || !geo::IsValid(position)) return RemoveHazard(hazard);
   const auto [place, is_new] = hazards_.try_emplace(hazard);
   Target& target = place->second;
   double debt_s = 0;
@@ -173,7 +173,7 @@ void PollScheduler::RemoveHazard(std::uint64_t hazard) {
 }
 
 void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& point) {
-  if (!IsValid(point.position)) return;
+  if (!geo::IsValid(point.position)) return;
   auto known = riders_by_id_.find(vehicle_id);
   if (known == riders_by_id_.end()) {
     if (riders_by_id_.size() >= config_.max_vehicles) ForgetRider(riders_.begin());
@@ -254,8 +254,7 @@ void PollScheduler::Refill(std::int64_t now_ns) {
 
 void PollScheduler::TakeFallenDue(std::int64_t now_ns) {
   const double price_s = PriceS();
-  for (std::size_t i = 0; i < kMaxPerTick && !heap_.empty() && heap_.front().at_ns <= now_ns;
-       ++i) {
+  for (std::size_t i = 0; i < kMaxPerTick && !heap_.empty() && heap_.front().at_ns <= now_ns; ++i) {
     const Due due = heap_.front();
     std::pop_heap(heap_.begin(), heap_.end());
     heap_.pop_back();
@@ -321,7 +320,7 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
   choices.push_back(std::move(choice));
 }
 
-bool PollScheduler::Passes(const TrackPoint& point, const GeoPoint& place) const {
+bool PollScheduler::Passes(const TrackPoint& point, const geo::GeoPoint& place) const {
   if (!std::isfinite(point.course_rad) || !std::isfinite(point.speed_mps)) return false;
   const auto [north_m, east_m] = Offset(point.position, place);
   const double sine = std::sin(point.course_rad);
@@ -409,4 +408,4 @@ bool PollScheduler::Answered(std::uint64_t hazard, const std::string& vehicle_id
   return true;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -15,7 +15,7 @@
 #include "zone/belief/hazard_lifecycle.h"
 #include "zone/registry/vehicle_track.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Which vehicle to ask about which hazard.
 struct PollChoice {
@@ -77,7 +77,7 @@ class PollScheduler {
 
   /// The hazard as it is now: after every step of its life, a new position or a new picture. One
   /// that is not on the map is forgotten. `picture_ns`: stamp of its newest picture, 0 without one.
-  void SetHazard(std::uint64_t hazard, const GeoPoint& position, const ClassModel& entry,
+  void SetHazard(std::uint64_t hazard, const geo::GeoPoint& position, const ClassModel& entry,
                  const PresenceRecord& life, std::int64_t picture_ns, std::int64_t now_ns);
   void RemoveHazard(std::uint64_t hazard);
   /// Where a vehicle is now. `point.stamp_ns` is when the zone heard it.
@@ -97,7 +97,7 @@ class PollScheduler {
 
  private:
   struct Target {
-    GeoPoint position;
+    geo::GeoPoint position;
     ClassSurvival survival;
     std::int64_t at_ns = 0;  ///< `log_odds` and `debt_s` are of this moment.
     std::int64_t first_seen_ns = 0;
@@ -154,7 +154,7 @@ class PollScheduler {
   void LookAround(std::uint64_t hazard, std::int64_t now_ns, std::vector<PollChoice>& choices);
   void TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int64_t now_ns,
               std::vector<PollChoice>& choices);
-  bool Passes(const TrackPoint& point, const GeoPoint& place) const;
+  bool Passes(const TrackPoint& point, const geo::GeoPoint& place) const;
   bool SeesOtherPlaces(const TrackedVehicle& rider) const;
   void Close(Open& poll);
   void CompactHeap();
@@ -162,14 +162,14 @@ class PollScheduler {
   Config config_;
   std::unordered_map<std::uint64_t, Target> hazards_;
   std::vector<Due> heap_;                   // Soonest first; entries of an old version are stale.
-  SpatialGrid waiting_;                     // Hazards that are due.
+  geo::SpatialGrid waiting_;                // Hazards that are due.
   std::vector<std::uint64_t> look_around_;  // Due since the last tick, or free to be asked again.
   std::unordered_map<std::uint64_t, Asked> asked_;
   std::deque<std::pair<std::int64_t, std::uint64_t>> asked_order_;  // When noted, hazard.
-  std::list<TrackedVehicle> riders_;                                         // Longest silent first.
+  std::list<TrackedVehicle> riders_;                                // Longest silent first.
   std::unordered_map<std::string, RiderPlace> riders_by_id_;
   std::unordered_map<std::uint64_t, RiderPlace> riders_by_key_;
-  SpatialGrid rider_grid_;
+  geo::SpatialGrid rider_grid_;
   std::vector<std::uint64_t> moved_;  // Keys of riders heard since the last tick.
   std::deque<Open> open_;             // In order of expiry.
   std::size_t open_count_ = 0;
@@ -178,4 +178,4 @@ class PollScheduler {
   double bytes_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

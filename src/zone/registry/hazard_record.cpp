@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::array<const char*, 3> kFormats{"jpeg", "png", "webp"};
@@ -43,4 +43,4 @@ std::string PackedPicture::Sha256() const {
 
 std::string PackedPicture::Format() const { return empty() ? "" : kFormats[format_ - 1U]; }
 
-}  // namespace livemap
+}  // namespace livemap::zone

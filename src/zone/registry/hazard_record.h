@@ -11,7 +11,7 @@
 #include "zone/belief/hazard_fusion.h"
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// A picture's name in 33 bytes: format and the SHA-256 itself.
 class PackedPicture {
@@ -74,4 +74,4 @@ class HazardRecords {
   std::size_t size_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,9 +6,10 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::zone {
 
-HazardRegistry::HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule)
+HazardRegistry::HazardRegistry(protocol::HazardCatalogue catalogue, std::uint64_t hash_seed,
+                               FusionRule rule)
     : catalogue_(std::move(catalogue)), hash_seed_(hash_seed), rule_(rule) {}
 
 std::uint32_t HazardRegistry::ClassOf(const std::string& class_name) {
@@ -16,7 +17,7 @@ std::uint32_t HazardRegistry::ClassOf(const std::string& class_name) {
   if (found != class_places_.end()) return found->second;
   const double radius_m = catalogue_.DuplicateRadiusM(class_name);
   const auto place = static_cast<std::uint32_t>(classes_.size());
-  classes_.push_back({class_name, radius_m, SpatialGrid::ForRadius(radius_m, hash_seed_)});
+  classes_.push_back({class_name, radius_m, geo::SpatialGrid::ForRadius(radius_m, hash_seed_)});
   class_places_.emplace(class_name, place);
   return place;
 }
@@ -74,7 +75,7 @@ void HazardRegistry::Restore(const Hazard& hazard, const PresenceRecord& life, s
 }
 
 std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string& class_name,
-                                                              const GeoPoint& position) const {
+                                                              const geo::GeoPoint& position) const {
   const auto found = class_places_.find(class_name);
   if (found == class_places_.end()) return std::nullopt;
   const Class& known = classes_[found->second];
@@ -82,7 +83,7 @@ std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string&
   return nearest ? std::optional<Slot>(static_cast<Slot>(nearest->id)) : std::nullopt;
 }
 
-HazardRegistry::Slot HazardRegistry::Add(const Report& report, const PictureName& picture,
+HazardRegistry::Slot HazardRegistry::Add(const protocol::Report& report, const PictureName& picture,
                                          const Uuid& uuid, std::uint64_t sequence,
                                          std::int64_t now_ns) {
   slots_.Prefetch(uuid);
@@ -105,12 +106,12 @@ HazardRegistry::Slot HazardRegistry::Add(const Report& report, const PictureName
   return slot;
 }
 
-void HazardRegistry::Merge(Slot slot, const Report& report, const PictureName& picture,
+void HazardRegistry::Merge(Slot slot, const protocol::Report& report, const PictureName& picture,
                            std::uint64_t sequence, std::int64_t now_ns) {
   RememberForUndo(slot);
   HazardRecord& record = records_[slot];
   const bool newest = report.stamp_ns >= record.estimate.last_seen_ns;
-  const GeoPoint from = record.estimate.position;
+  const geo::GeoPoint from = record.estimate.position;
   Fuse(record.estimate, report, rule_);
   classes_[record.hazard_class].grid.Move(from, record.estimate.position, slot);
   if (!picture.sha256.empty() && (newest || record.picture.empty())) {
@@ -185,7 +186,7 @@ std::vector<HazardRegistry::Change>::const_iterator HazardRegistry::ChangesSince
       [](std::uint64_t since, const Change& change) { return since < change.sequence; });
 }
 
-std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
+std::vector<Hazard> HazardRegistry::Query(const std::optional<geo::GeoBox>& box,
                                           std::uint64_t since_sequence, std::size_t limit,
                                           const HazardStates& states) const {
   std::vector<Hazard> result;
@@ -203,34 +204,36 @@ std::vector<Hazard> HazardRegistry::Query(const std::optional<GeoBox>& box,
   return result;
 }
 
-std::vector<HazardRegistry::Slot> HazardRegistry::HazardsWithEvidenceFrom(std::uint64_t vehicle) const {
+std::vector<HazardRegistry::Slot> HazardRegistry::HazardsWithEvidenceFrom(
+    std::uint64_t vehicle) const {
   std::vector<Slot> slots;
   for (Slot slot = 0; slot < records_.size(); ++slot) {
     const PresenceRecord& life = records_[slot].life;
     if (life.state == HazardState::kGone) continue;
-    const bool spoke = std::any_of(life.voices.begin(), life.voices.end(),
-                                   [&](const VehicleEvidence& voice) { return voice.vehicle == vehicle; });
+    const bool spoke =
+        std::any_of(life.voices.begin(), life.voices.end(),
+                    [&](const VehicleEvidence& voice) { return voice.vehicle == vehicle; });
     if (spoke) slots.push_back(slot);
   }
   return slots;
 }
 
-std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double radius_m,
+std::vector<Hazard> HazardRegistry::QueryNear(const geo::GeoPoint& centre, double radius_m,
                                               std::size_t limit) const {
   // Cheap lower bounds first of the ellipsoid's distance: most hazards of a zone are not near.
   const double max_latitude_difference = radius_m / 110574.0;
   const double poleward_deg =
       std::min(90.0, std::abs(centre.latitude_deg) + max_latitude_difference);
-  const double min_m_per_degree = 111319.0 * std::cos(poleward_deg * kRadiansPerDegree);
+  const double min_m_per_degree = 111319.0 * std::cos(poleward_deg * geo::kRadiansPerDegree);
   std::vector<std::pair<double, Slot>> found;
   for (Slot slot = 0; slot < records_.size(); ++slot) {
     if (!IsTold(State(slot))) continue;
-    const GeoPoint& position = records_[slot].estimate.position;
+    const geo::GeoPoint& position = records_[slot].estimate.position;
     if (std::abs(position.latitude_deg - centre.latitude_deg) > max_latitude_difference) continue;
     double east_deg = std::abs(position.longitude_deg - centre.longitude_deg);
     east_deg = std::min(east_deg, 360.0 - east_deg);
     if (east_deg * min_m_per_degree > radius_m) continue;
-    const double distance_m = GeodesicDistanceM(centre, position);
+    const double distance_m = geo::GeodesicDistanceM(centre, position);
     if (distance_m <= radius_m) found.emplace_back(distance_m, slot);
   }
   const std::size_t count = std::min(limit, found.size());
@@ -241,7 +244,7 @@ std::vector<Hazard> HazardRegistry::QueryNear(const GeoPoint& centre, double rad
   return result;
 }
 
-std::vector<Hazard> HazardRegistry::ChangedAround(const GeoPoint& centre, double radius_m,
+std::vector<Hazard> HazardRegistry::ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                                   std::uint64_t since_sequence,
                                                   std::size_t limit) const {
   std::vector<std::pair<std::uint64_t, Slot>> found;
@@ -251,7 +254,7 @@ std::vector<Hazard> HazardRegistry::ChangedAround(const GeoPoint& centre, double
     if (record.sequence != change->sequence) continue;
     if (record.announced_sequence <= since_sequence) continue;
     if (since_sequence == 0 && !IsTold(record.life.state)) continue;
-    if (GeodesicDistanceM(centre, record.estimate.position) > radius_m) continue;
+    if (geo::GeodesicDistanceM(centre, record.estimate.position) > radius_m) continue;
     found.emplace_back(record.announced_sequence, change->slot);
   }
   std::sort(found.begin(), found.end());
@@ -313,4 +316,4 @@ void HazardRegistry::TakeBack(const Undo& undo) {
   PutOnGrid(undo.slot);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -18,7 +18,7 @@
 #include "zone/registry/hazard_record.h"
 #include "zone/registry/uuid_index.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// A stored picture by content; both empty without one.
 struct PictureName {
@@ -37,7 +37,8 @@ class HazardRegistry {
   using Slot = std::uint32_t;
 
   /// Radii come from the catalogue. `hash_seed`: see SpatialGrid.
-  HazardRegistry(HazardCatalogue catalogue, std::uint64_t hash_seed, FusionRule rule = {});
+  HazardRegistry(protocol::HazardCatalogue catalogue, std::uint64_t hash_seed,
+                 FusionRule rule = {});
 
   /// Takes in a hazard as the store kept it under `id`; in ascending order of sequence. The life's
   /// state counts, the hazard's presence too. Throws Error when its uuid or sequence is not new.
@@ -47,14 +48,14 @@ class HazardRegistry {
 
   /// The nearest hazard of this class that is not gone within the class's radius (geodesic), the
   /// older one among equals. `position` must be valid.
-  std::optional<Slot> FindMatch(const std::string& class_name, const GeoPoint& position) const;
+  std::optional<Slot> FindMatch(const std::string& class_name, const geo::GeoPoint& position) const;
 
   /// Puts in a new hazard; SetLife gives it its life.
-  Slot Add(const Report& report, const PictureName& picture, const Uuid& uuid,
+  Slot Add(const protocol::Report& report, const PictureName& picture, const Uuid& uuid,
            std::uint64_t sequence, std::int64_t now_ns);
   /// Counts the report as a sighting of `slot`; the newer image's picture stays.
-  void Merge(Slot slot, const Report& report, const PictureName& picture, std::uint64_t sequence,
-             std::int64_t now_ns);
+  void Merge(Slot slot, const protocol::Report& report, const PictureName& picture,
+             std::uint64_t sequence, std::int64_t now_ns);
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
   void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);
@@ -77,15 +78,16 @@ class HazardRegistry {
   std::size_t on_map_count() const;
 
   /// As ZoneService::Query.
-  std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
+  std::vector<Hazard> Query(const std::optional<geo::GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit, const HazardStates& states = {}) const;
   /// Those that are not gone and of which the vehicle (VehicleKey) has said something.
   std::vector<Slot> HazardsWithEvidenceFrom(std::uint64_t vehicle) const;
   /// As ZoneService::QueryNear.
-  std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
+  std::vector<Hazard> QueryNear(const geo::GeoPoint& centre, double radius_m,
+                                std::size_t limit) const;
 
   /// As ZoneService::ChangedAround.
-  std::vector<Hazard> ChangedAround(const GeoPoint& centre, double radius_m,
+  std::vector<Hazard> ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                     std::uint64_t since_sequence, std::size_t limit) const;
 
   void Begin();
@@ -105,7 +107,7 @@ class HazardRegistry {
   struct Class {
     std::string name;
     double radius_m;
-    SpatialGrid grid;  ///< All that are not gone.
+    geo::SpatialGrid grid;  ///< All that are not gone.
   };
 
   std::uint32_t ClassOf(const std::string& class_name);
@@ -118,7 +120,7 @@ class HazardRegistry {
   void TakeBack(const Undo& undo);
   std::vector<Change>::const_iterator ChangesSince(std::uint64_t sequence) const;
 
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   std::uint64_t hash_seed_;
   FusionRule rule_;
   HazardRecords records_;  ///< By slot.
@@ -134,4 +136,4 @@ class HazardRegistry {
   std::vector<Undo> undo_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

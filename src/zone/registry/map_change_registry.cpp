@@ -9,7 +9,7 @@
 #include "zone/belief/map_change_witnesses.h"
 #include "zone/model/presence_record.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 HazardEstimate EstimateOf(const MapChangeFeature& feature) {
@@ -18,8 +18,8 @@ HazardEstimate EstimateOf(const MapChangeFeature& feature) {
 }
 
 /// What fusion reads of a report.
-Report SightingOf(const MapChangeReport& told) {
-  Report report;
+protocol::Report SightingOf(const protocol::MapChangeReport& told) {
+  protocol::Report report;
   report.stamp_ns = told.stamp_ns;
   report.confidence = told.confidence;
   report.position = told.position;
@@ -27,9 +27,10 @@ Report SightingOf(const MapChangeReport& told) {
   return report;
 }
 
-WitnessUpdate Note(MapChangeFeature& feature, const MapChangeReport& report, bool against) {
-  return RecordWitness(feature.witnesses, VehicleKey(report.vehicle_id), VehicleKey(report.drive_id),
-                     against);
+WitnessUpdate Note(MapChangeFeature& feature, const protocol::MapChangeReport& report,
+                   bool against) {
+  return RecordWitness(feature.witnesses, VehicleKey(report.vehicle_id),
+                       VehicleKey(report.drive_id), against);
 }
 
 void ForgetDenials(MapChangeFeature& feature) {
@@ -57,7 +58,7 @@ const char* ReasonFor(WitnessUpdate news) {
 }  // namespace
 
 MapChangeRegistry::MapChangeRegistry(const Rule& rule, std::uint64_t hash_seed)
-    : rule_(rule), grid_(SpatialGrid::ForRadius(rule.join_m, hash_seed)) {
+    : rule_(rule), grid_(geo::SpatialGrid::ForRadius(rule.join_m, hash_seed)) {
   if (!(rule_.join_sigmas > 0) || rule_.confirmations < 1 || rule_.denials < 1 ||
       rule_.max_features < 1) {
     throw Error(
@@ -79,14 +80,14 @@ void MapChangeRegistry::SkipIdsTo(Id id) { last_id_ = std::max(last_id_, id); }
 
 /// The feature that the report is most likely about, among those that `accepts` takes.
 template <typename Accepts>
-std::optional<MapChangeRegistry::Id> MapChangeRegistry::Nearest(const MapChangeReport& report,
-                                                                const Accepts& accepts) const {
+std::optional<MapChangeRegistry::Id> MapChangeRegistry::Nearest(
+    const protocol::MapChangeReport& report, const Accepts& accepts) const {
   std::optional<std::pair<double, Id>> best;
-  for (const SpatialGrid::Neighbour& near : grid_.Within(report.position, rule_.join_m)) {
+  for (const geo::SpatialGrid::Neighbour& near : grid_.Within(report.position, rule_.join_m)) {
     const Id id = static_cast<Id>(near.id);
     const MapChangeFeature& feature = features_.at(id);
     if (feature.class_name != report.class_name || !accepts(feature)) continue;
-    const Eigen::Vector2d offset_m = LocalFrame(feature.position).ToEnu(report.position);
+    const Eigen::Vector2d offset_m = geo::LocalFrame(feature.position).ToEnu(report.position);
     const Eigen::Matrix2d both_m2 =
         feature.covariance_m2 +
         WithLeastSigma(report.covariance_m2, rule_.fusion.min_report_sigma_m);
@@ -99,7 +100,8 @@ std::optional<MapChangeRegistry::Id> MapChangeRegistry::Nearest(const MapChangeR
 }
 
 /// Whether what became of a closed feature already answers the report.
-bool MapChangeRegistry::IsAnswered(const MapChangeFeature& feature, const MapChangeReport& report,
+bool MapChangeRegistry::IsAnswered(const MapChangeFeature& feature,
+                                   const protocol::MapChangeReport& report,
                                    std::int64_t now_ns) const {
   if (IsOpen(feature.state)) return false;
   if (Seconds(now_ns - feature.updated_ns) > rule_.closed_memory_s) return false;
@@ -108,8 +110,8 @@ bool MapChangeRegistry::IsAnswered(const MapChangeFeature& feature, const MapCha
   return !same || report.stamp_ns <= feature.denied_ns;
 }
 
-std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Tell(const MapChangeReport& report,
-                                                                 bool counts, const Stamp& stamp) {
+std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Tell(
+    const protocol::MapChangeReport& report, bool counts, const Stamp& stamp) {
   const auto open =
       Nearest(report, [](const MapChangeFeature& feature) { return IsOpen(feature.state); });
   if (open) {
@@ -127,7 +129,7 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Tell(const MapChange
   return Add(report, counts, stamp);
 }
 
-MapChangeRegistry::Effect MapChangeRegistry::Support(Id id, const MapChangeReport& report,
+MapChangeRegistry::Effect MapChangeRegistry::Support(Id id, const protocol::MapChangeReport& report,
                                                      const Stamp& stamp) {
   MapChangeFeature feature = features_.at(id);
   const WitnessUpdate news = Note(feature, report, false);
@@ -151,7 +153,7 @@ MapChangeRegistry::Effect MapChangeRegistry::Support(Id id, const MapChangeRepor
   return {Outcome::kMerged, id, Settle(id, std::move(feature), std::move(reason), stamp)};
 }
 
-MapChangeRegistry::Effect MapChangeRegistry::Deny(Id id, const MapChangeReport& report,
+MapChangeRegistry::Effect MapChangeRegistry::Deny(Id id, const protocol::MapChangeReport& report,
                                                   const Stamp& stamp) {
   MapChangeFeature feature = features_.at(id);
   Note(feature, report, true);
@@ -168,8 +170,8 @@ MapChangeRegistry::Effect MapChangeRegistry::Deny(Id id, const MapChangeReport& 
   return {Outcome::kDenied, id, Settle(id, std::move(feature), std::move(reason), stamp)};
 }
 
-std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Add(const MapChangeReport& report,
-                                                                bool counts, const Stamp& stamp) {
+std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Add(
+    const protocol::MapChangeReport& report, bool counts, const Stamp& stamp) {
   if (!MakeRoom()) return std::nullopt;
   MapChangeFeature feature;
   feature.uuid = stamp.fresh;
@@ -190,7 +192,8 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Add(const MapChangeR
 }
 
 /// As a further sighting of a hazard is.
-void MapChangeRegistry::FuseInto(MapChangeFeature& feature, const MapChangeReport& report) const {
+void MapChangeRegistry::FuseInto(MapChangeFeature& feature,
+                                 const protocol::MapChangeReport& report) const {
   HazardEstimate estimate = EstimateOf(feature);
   Fuse(estimate, SightingOf(report), rule_.fusion);
   feature.confidence = estimate.confidence;
@@ -241,7 +244,7 @@ std::optional<MapChangeRegistry::Id> MapChangeRegistry::IdOf(const Uuid& uuid) c
   return found == ids_.end() ? std::nullopt : std::optional<Id>(found->second);
 }
 
-std::vector<MapChangeFeature> MapChangeRegistry::Query(const std::optional<GeoBox>& box,
+std::vector<MapChangeFeature> MapChangeRegistry::Query(const std::optional<geo::GeoBox>& box,
                                                        std::uint64_t since_sequence,
                                                        std::size_t limit,
                                                        const MapChangeStates& states) const {
@@ -343,4 +346,4 @@ MapChangeRegistry::Touched MapChangeRegistry::TouchedSinceBegin() const {
   return touched;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

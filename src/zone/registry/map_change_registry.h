@@ -15,7 +15,7 @@
 #include "zone/belief/hazard_fusion.h"
 #include "zone/model/map_change.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// All map changes of the zone in memory: which of them a vehicle speaks of, and what follows.
 /// Knows no clock, no store and no threads; the same calls give the same state. Words count in the
@@ -71,7 +71,8 @@ class MapChangeRegistry {
   /// for one that an official dismissed; what undid a feature, told once more.
   ///
   /// None when there is no room for a new feature: only open ones are left.
-  std::optional<Effect> Tell(const MapChangeReport& report, bool counts, const Stamp& stamp);
+  std::optional<Effect> Tell(const protocol::MapChangeReport& report, bool counts,
+                             const Stamp& stamp);
 
   /// An official confirms the feature (kConfirmed; also a dismissed one, which is open again) or
   /// dismisses it (kDismissed, an open one). None when there is no such feature to decide about.
@@ -81,7 +82,7 @@ class MapChangeRegistry {
   const MapChangeFeature* Find(const Uuid& uuid) const;
   const MapChangeFeature& Get(Id id) const { return features_.at(id); }
   /// As ZoneService::QueryMapChanges.
-  std::vector<MapChangeFeature> Query(const std::optional<GeoBox>& box,
+  std::vector<MapChangeFeature> Query(const std::optional<geo::GeoBox>& box,
                                       std::uint64_t since_sequence, std::size_t limit,
                                       const MapChangeStates& states = {}) const;
   std::size_t size() const { return features_.size(); }
@@ -106,13 +107,14 @@ class MapChangeRegistry {
   };
 
   template <typename Accepts>
-  std::optional<Id> Nearest(const MapChangeReport& report, const Accepts& accepts) const;
-  bool IsAnswered(const MapChangeFeature& feature, const MapChangeReport& report,
+  std::optional<Id> Nearest(const protocol::MapChangeReport& report, const Accepts& accepts) const;
+  bool IsAnswered(const MapChangeFeature& feature, const protocol::MapChangeReport& report,
                   std::int64_t now_ns) const;
-  Effect Support(Id id, const MapChangeReport& report, const Stamp& stamp);
-  Effect Deny(Id id, const MapChangeReport& report, const Stamp& stamp);
-  std::optional<Effect> Add(const MapChangeReport& report, bool counts, const Stamp& stamp);
-  void FuseInto(MapChangeFeature& feature, const MapChangeReport& report) const;
+  Effect Support(Id id, const protocol::MapChangeReport& report, const Stamp& stamp);
+  Effect Deny(Id id, const protocol::MapChangeReport& report, const Stamp& stamp);
+  std::optional<Effect> Add(const protocol::MapChangeReport& report, bool counts,
+                            const Stamp& stamp);
+  void FuseInto(MapChangeFeature& feature, const protocol::MapChangeReport& report) const;
   MapChangeEvent Settle(Id id, MapChangeFeature feature, std::string reason, const Stamp& stamp);
   bool MakeRoom();
   void Put(Id id, MapChangeFeature feature);
@@ -125,7 +127,7 @@ class MapChangeRegistry {
   std::unordered_map<Uuid, Id> ids_;
   std::map<std::uint64_t, Id> by_sequence_;
   std::map<std::uint64_t, Id> closed_by_sequence_;  ///< Undone and dismissed ones, oldest first.
-  SpatialGrid grid_;
+  geo::SpatialGrid grid_;
   std::array<std::size_t, kMapChangeStates> counts_{};
   Id last_id_ = 0;
   bool in_transaction_ = false;
@@ -133,4 +135,4 @@ class MapChangeRegistry {
   std::vector<Undo> undo_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -9,7 +9,7 @@
 #include "common/huge_pages.h"
 #include "common/uuid.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Finds a number by its uuid; the caller keeps the uuids. One flat table of 8 bytes a place, so
 /// that a look-up in a large one is a single cache miss. The uuids are the zone's own random ones:
@@ -85,4 +85,4 @@ class UuidIndex {
   std::size_t size_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

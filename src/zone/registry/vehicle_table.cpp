@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::size_t kMaxPlaces = 240;
@@ -58,4 +58,4 @@ std::vector<TrackPoint> VehicleTable::Track(const std::string& vehicle_id) const
   return {known->second.track.begin(), known->second.track.end()};
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -11,7 +11,7 @@
 #include "zone/model/vehicle_state.h"
 #include "zone/registry/vehicle_track.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Where the vehicles were last: bounded in time and number. Thread-safe.
 class VehicleTable {
@@ -39,4 +39,4 @@ class VehicleTable {
   std::map<std::string, Vehicle> vehicles_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 
 #include "common/time.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr double kStepM = 5;        // Between looks along a straight piece of way.
@@ -47,19 +47,19 @@ bool SeesOnTheWay(const TrackPoint& a, const TrackPoint& b, const Eigen::Vector2
 
 }  // namespace
 
-bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns, const GeoPoint& place,
-              const SightRule& rule) {
-  if (!IsValid(place)) return false;
-  const LocalFrame frame(place);
+bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
+              const geo::GeoPoint& place, const SightRule& rule) {
+  if (!geo::IsValid(place)) return false;
+  const geo::LocalFrame frame(place);
   const auto offset_s = [&](const TrackPoint& point) { return Seconds(point.stamp_ns - stamp_ns); };
   for (std::size_t i = 0; i < track.size(); ++i) {
     const TrackPoint& point = track[i];
-    if (!IsValid(point.position)) continue;
+    if (!geo::IsValid(point.position)) continue;
     const Eigen::Vector2d at_m = frame.ToEnu(point.position);
     if (std::abs(offset_s(point)) <= rule.window_s && Sees({-at_m, point.course_rad}, rule)) {
       return true;
     }
-    if (i == 0 || !IsValid(track[i - 1].position)) continue;
+    if (i == 0 || !geo::IsValid(track[i - 1].position)) continue;
     const double from_s = offset_s(track[i - 1]);
     const double gap_s = offset_s(point) - from_s;
     if (!(gap_s > 0 && gap_s <= 2 * rule.window_s)) continue;
@@ -73,4 +73,4 @@ bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns, const
   return false;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

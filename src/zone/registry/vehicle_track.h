@@ -5,12 +5,12 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Where a vehicle was, as the zone heard it.
 struct TrackPoint {
   std::int64_t stamp_ns = 0;  ///< UTC, ns since 1970.
-  GeoPoint position;
+  geo::GeoPoint position;
   double course_rad = 0;  ///< Clockwise from true north; NaN when unknown.
   double speed_mps = 0;
 };
@@ -27,7 +27,7 @@ struct SightRule {
 /// `stamp_ns`: somewhere on the track then the place lay within range and within the camera's view.
 /// Between two points at most 2 * window_s apart the vehicle drove straight. False for an empty
 /// track, or one that says nothing of that time.
-bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns, const GeoPoint& place,
-              const SightRule& rule = {});
+bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
+              const geo::GeoPoint& place, const SightRule& rule = {});
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 std::int64_t SecondsToNs(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
@@ -27,7 +27,7 @@ CatchUpPlanner::Vehicle& CatchUpPlanner::Heard(const std::string& vehicle_id, st
 }
 
 std::optional<CatchUpOrder> CatchUpPlanner::Update(const std::string& vehicle_id,
-                                                   const GeoPoint& position,
+                                                   const geo::GeoPoint& position,
                                                    std::uint64_t map_sequence,
                                                    std::uint64_t announced, std::int64_t now_ns) {
   Vehicle& vehicle = Heard(vehicle_id, now_ns);
@@ -39,7 +39,7 @@ std::optional<CatchUpOrder> CatchUpPlanner::Update(const std::string& vehicle_id
   if (vehicle.in_progress || now_ns < vehicle.not_before_ns) return std::nullopt;
   const bool all = !vehicle.centre || map_sequence > announced ||
                    (map_sequence == 0 && announced > 0) ||
-                   GeodesicDistanceM(*vehicle.centre, position) > config_.radius_m / 2;
+                   geo::GeodesicDistanceM(*vehicle.centre, position) > config_.radius_m / 2;
   const bool lags =
       map_sequence < vehicle.target && now_ns - vehicle.target_ns > SecondsToNs(config_.lag_s);
   if (!all && !lags) return std::nullopt;
@@ -61,4 +61,4 @@ void CatchUpPlanner::Told(const std::string& vehicle_id, std::int64_t now_ns) {
   vehicle.retry_s = std::min(2 * vehicle.retry_s, config_.longest_retry_s);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

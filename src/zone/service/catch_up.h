@@ -8,12 +8,12 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// What one vehicle is to be told.
 struct CatchUpOrder {
   std::string vehicle_id;
-  GeoPoint centre;  ///< What lies around it.
+  geo::GeoPoint centre;  ///< What lies around it.
   /// What was announced since; 0: all that drivers are told of there now.
   std::uint64_t since = 0;
   /// What the vehicle says it knows. More than was ever announced: the zone began anew.
@@ -43,7 +43,7 @@ class CatchUpPlanner {
 
   /// A vehicle said where it is and up to where it knows the announcements, of which `announced` is
   /// the newest. What it is to be told now, if anything; then nothing more until Told.
-  std::optional<CatchUpOrder> Update(const std::string& vehicle_id, const GeoPoint& position,
+  std::optional<CatchUpOrder> Update(const std::string& vehicle_id, const geo::GeoPoint& position,
                                      std::uint64_t map_sequence, std::uint64_t announced,
                                      std::int64_t now_ns);
   /// The order of this vehicle is done.
@@ -54,8 +54,8 @@ class CatchUpPlanner {
  private:
   struct Vehicle {
     std::int64_t heard_ns = 0;
-    std::optional<GeoPoint> centre;  // Where it was last told all.
-    std::uint64_t target = 0;        // What it should know by target_ns + lag.
+    std::optional<geo::GeoPoint> centre;  // Where it was last told all.
+    std::uint64_t target = 0;             // What it should know by target_ns + lag.
     std::int64_t target_ns = 0;
     std::int64_t not_before_ns = 0;
     double retry_s = 0;
@@ -68,4 +68,4 @@ class CatchUpPlanner {
   std::map<std::string, Vehicle> vehicles_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

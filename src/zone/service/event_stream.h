@@ -6,7 +6,7 @@
 
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Hands events to subscribers, one call at a time, in the order of the calls to Publish.
 class EventStream {
@@ -32,4 +32,4 @@ class EventStream {
   int last_id_ = 0;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

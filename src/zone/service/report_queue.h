@@ -10,7 +10,7 @@
 
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Reports that wait for the next group commit, bounded in number and in bytes of pictures.
 /// Thread-safe. What does not fit is not taken: its vehicle sends it again.
@@ -20,7 +20,7 @@ class ReportQueue {
       : max_reports_(max_reports), max_bytes_(max_bytes) {}
 
   /// False when the queue is full or closed.
-  bool Push(Report report) {
+  bool Push(protocol::Report report) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       const std::size_t bytes = report.image.size();
@@ -33,10 +33,10 @@ class ReportQueue {
   }
 
   /// Waits up to `patience` for a report, then takes what is there, oldest first, at most `limit`.
-  std::vector<Report> Take(std::size_t limit, std::chrono::milliseconds patience) {
+  std::vector<protocol::Report> Take(std::size_t limit, std::chrono::milliseconds patience) {
     std::unique_lock<std::mutex> lock(mutex_);
     arrived_.wait_for(lock, patience, [this] { return closed_ || !reports_.empty(); });
-    std::vector<Report> taken;
+    std::vector<protocol::Report> taken;
     while (!reports_.empty() && taken.size() < limit) {
       bytes_ -= reports_.front().image.size();
       taken.push_back(std::move(reports_.front()));
@@ -67,9 +67,9 @@ class ReportQueue {
   const std::size_t max_bytes_;
   mutable std::mutex mutex_;
   std::condition_variable arrived_;
-  std::deque<Report> reports_;
+  std::deque<protocol::Report> reports_;
   std::size_t bytes_ = 0;
   bool closed_ = false;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 
 #include "zone/service/zone_service_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 void CheckSettings(const ZoneService::Config& config) {
@@ -177,7 +177,7 @@ bool ZoneService::Implementation::UpdateVehicle(const VehicleState& told) {
   const bool acceptable =
       IsPrintableText(vehicle.vehicle_id, max_bytes) &&
       (vehicle.drive_id.empty() || IsPrintableText(vehicle.drive_id, max_bytes)) &&
-      IsValid(vehicle.position) && !std::isinf(vehicle.course_rad) &&
+      geo::IsValid(vehicle.position) && !std::isinf(vehicle.course_rad) &&
       !std::isinf(vehicle.speed_mps) && vehicle.stamp_ns >= 0;
   if (!acceptable) {
     ++vehicle_positions_refused_;
@@ -220,28 +220,30 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed) {
 
 ZoneService::~ZoneService() = default;
 
-Receipt ZoneService::Handle(const Report& report) {
-  std::vector<Receipt> receipts = implementation_->HandleBatch({report});
+protocol::Receipt ZoneService::Handle(const protocol::Report& report) {
+  std::vector<protocol::Receipt> receipts = implementation_->HandleBatch({report});
   if (receipts.empty()) throw Error("too many reports of this vehicle within an hour");
   return std::move(receipts.front());
 }
 
-std::vector<Receipt> ZoneService::HandleBatch(const std::vector<Report>& reports) {
+std::vector<protocol::Receipt> ZoneService::HandleBatch(
+    const std::vector<protocol::Report>& reports) {
   return implementation_->HandleBatch(reports);
 }
 
-std::vector<Hazard> ZoneService::Query(const std::optional<GeoBox>& box,
+std::vector<Hazard> ZoneService::Query(const std::optional<geo::GeoBox>& box,
                                        std::uint64_t since_sequence, std::size_t limit,
                                        const HazardStates& states) const {
   const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
   return implementation_->registry_.Query(box, since_sequence, limit, states);
 }
 
-std::vector<Receipt> ZoneService::HandleMapChanges(const std::vector<MapChangeReport>& reports) {
+std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
+    const std::vector<protocol::MapChangeReport>& reports) {
   return implementation_->HandleMapChanges(reports);
 }
 
-std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<GeoBox>& box,
+std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,
                                                            std::uint64_t since_sequence,
                                                            std::size_t limit,
                                                            const MapChangeStates& states) const {
@@ -270,7 +272,7 @@ bool ZoneService::DismissMapChange(const Uuid& uuid, const std::string& official
   return implementation_->DecideMapChange(uuid, MapChangeState::kDismissed, official, reason);
 }
 
-std::vector<Hazard> ZoneService::QueryNear(const GeoPoint& centre, double radius_m,
+std::vector<Hazard> ZoneService::QueryNear(const geo::GeoPoint& centre, double radius_m,
                                            std::size_t limit) const {
   const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
   return implementation_->registry_.QueryNear(centre, radius_m, limit);
@@ -282,7 +284,7 @@ std::optional<Hazard> ZoneService::Find(const Uuid& uuid) const {
   return slot ? std::optional<Hazard>(implementation_->registry_.Get(*slot)) : std::nullopt;
 }
 
-std::vector<Hazard> ZoneService::ChangedAround(const GeoPoint& centre, double radius_m,
+std::vector<Hazard> ZoneService::ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                                std::uint64_t since_sequence,
                                                std::size_t limit) const {
   const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
@@ -351,4 +353,4 @@ std::uint64_t ZoneService::AnnouncedSequence() const {
 
 ZoneStatistics ZoneService::Statistics() const { return implementation_->Statistics(); }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -30,7 +30,7 @@
 #include "zone/registry/map_change_registry.h"
 #include "zone/registry/vehicle_track.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// One message of the zone's stream: exactly one of the three is set.
 struct ZoneEvent {
@@ -45,10 +45,10 @@ struct PollOrder {
   Uuid hazard;
   std::string vehicle_id;  ///< Addressee.
   std::string class_name;
-  GeoPoint position;
+  geo::GeoPoint position;
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
   std::int64_t expires_ns = 0;  ///< Zone clock (UTC); later answers do not count.
-  PollPicture picture = PollPicture::kNone;
+  protocol::PollPicture picture = protocol::PollPicture::kNone;
   std::uint32_t max_picture_bytes = 0;
 };
 
@@ -90,7 +90,8 @@ class ZoneService {
     double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
     std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
     std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
-    PollPicture poll_picture = PollPicture::kCrop;  ///< What polls ask for, where they want one.
+    protocol::PollPicture poll_picture =
+        protocol::PollPicture::kCrop;  ///< What polls ask for, where they want one.
     ReportLimits limits;
     SpeedRule speed;
     VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
@@ -104,7 +105,7 @@ class ZoneService {
     /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
     /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
     bool replay = false;
-    HazardCatalogue catalogue;
+    protocol::HazardCatalogue catalogue;
   };
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
   using Subscriber = std::function<void(const ZoneEvent&)>;
@@ -121,20 +122,21 @@ class ZoneService {
   /// Validates, registers or merges, commits; idempotent by uuid. Throws StoreError when the store
   /// fails: then nothing of the report counts, and the vehicle sends it again. Throws Error when
   /// the vehicle's hourly cap is reached: HandleBatch just leaves such a report unanswered.
-  Receipt Handle(const Report& report);
+  protocol::Receipt Handle(const protocol::Report& report);
   /// The same for many in one transaction, in order; one receipt per report in the order of the
   /// reports, but none for a report that is not taken now (see Config::allowance): its
   /// vehicle sends it again. All or nothing when the store fails.
-  std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
+  std::vector<protocol::Receipt> HandleBatch(const std::vector<protocol::Report>& reports);
 
   /// What vehicles tell of map changes: as HandleBatch, with their own hourly cap
   /// (Config::map_changes_per_hour) and without a rule about speed. A receipt's hazard_uuid is that
   /// of the feature.
-  std::vector<Receipt> HandleMapChanges(const std::vector<MapChangeReport>& reports);
+  std::vector<protocol::Receipt> HandleMapChanges(
+      const std::vector<protocol::MapChangeReport>& reports);
   /// Features whose last event is newer than `since_sequence`, in the order of that sequence, at
   /// most `limit`: open ones, with `since_sequence` > 0 the others too. With `states` exactly those
   /// in one of them. Sequences are those of hazards' events, too.
-  std::vector<MapChangeFeature> QueryMapChanges(const std::optional<GeoBox>& box,
+  std::vector<MapChangeFeature> QueryMapChanges(const std::optional<geo::GeoBox>& box,
                                                 std::uint64_t since_sequence, std::size_t limit,
                                                 const MapChangeStates& states = {}) const;
   std::optional<MapChangeFeature> FindMapChange(const Uuid& uuid) const;
@@ -149,16 +151,17 @@ class ZoneService {
   /// Hazards whose last event is newer than `since_sequence`, in the order of that sequence, at
   /// most `limit`. Those on the officials' map; gone and rejected ones too when `since_sequence`
   /// > 0, so that a view catches up after a gap. With `states` exactly those in one of them.
-  std::vector<Hazard> Query(const std::optional<GeoBox>& box, std::uint64_t since_sequence,
+  std::vector<Hazard> Query(const std::optional<geo::GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit, const HazardStates& states = {}) const;
   /// Hazards that drivers are told of within `radius_m` of `centre`, nearest first, at most
   /// `limit`.
-  std::vector<Hazard> QueryNear(const GeoPoint& centre, double radius_m, std::size_t limit) const;
+  std::vector<Hazard> QueryNear(const geo::GeoPoint& centre, double radius_m,
+                                std::size_t limit) const;
   /// What a vehicle that knows all announcements up to `since_sequence` must hear: hazards within
   /// `radius_m` of `centre` that were announced since, in the order of their last announcement, at
   /// most `limit`. Those that drivers are no longer told of too (IsTold(state) is false), unless
   /// `since_sequence` is 0.
-  std::vector<Hazard> ChangedAround(const GeoPoint& centre, double radius_m,
+  std::vector<Hazard> ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                     std::uint64_t since_sequence, std::size_t limit) const;
   /// Also one that is gone or rejected.
   std::optional<Hazard> Find(const Uuid& uuid) const;
@@ -174,8 +177,8 @@ class ZoneService {
   bool Confirm(const Uuid& hazard, const std::string& official, const std::string& reason = "");
   /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
   /// suspicion does, and all that it said is taken back from the hazards that are not gone
-  /// (HazardLifecycle::Withdraw), each with an event whose reason names vehicle and official as far as
-  /// 200 bytes go. Returns how many hazards that were; none when the zone has never heard of the
+  /// (HazardLifecycle::Withdraw), each with an event whose reason names vehicle and official as far
+  /// as 200 bytes go. Returns how many hazards that were; none when the zone has never heard of the
   /// vehicle. A few thousand hazards are committed at a time: when it throws StoreError those
   /// before stay changed, and another call does the rest. Throws Error as Reject does.
   std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
@@ -221,4 +224,4 @@ class ZoneService {
   std::unique_ptr<Implementation> implementation_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

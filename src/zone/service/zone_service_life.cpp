@@ -4,7 +4,7 @@
 
 #include "zone/service/zone_service_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::size_t kMaxReasonBytes = 200;
@@ -44,13 +44,13 @@ ZoneService::Implementation::Before ZoneService::Implementation::BeforeOf(Slot s
   return {record.life.state, record.sequence, record.picture};
 }
 
-void ZoneService::Implementation::Learn(const std::string& class_name, const LifetimeObservation& lesson,
-                                        Change& change) {
+void ZoneService::Implementation::Learn(const std::string& class_name,
+                                        const LifetimeObservation& lesson, Change& change) {
   if (!(lesson.stood_s >= 0) || (lesson.stood_s == 0 && !lesson.ended)) return;
   const auto known = survival_.learned().find(class_name);
   // The first time only: a failed transaction takes back all of them.
-  change.learned_before.emplace(class_name,
-                                known == survival_.learned().end() ? LearnedLifetime{} : known->second);
+  change.learned_before.emplace(
+      class_name, known == survival_.learned().end() ? LearnedLifetime{} : known->second);
   survival_.Learn(class_name, lesson);
 }
 
@@ -70,7 +70,7 @@ void ZoneService::Implementation::Judge(const LifecycleUpdate& step, Change& cha
 }
 
 std::optional<ZoneService::Implementation::Slot> ZoneService::Implementation::MatchNow(
-    const Report& report, Change& change) {
+    const protocol::Report& report, Change& change) {
   auto match = registry_.FindMatch(report.class_name, report.position);
   while (match && PassTime(*match, change) && registry_.State(*match) == HazardState::kGone) {
     match = registry_.FindMatch(report.class_name, report.position);
@@ -86,9 +86,9 @@ bool ZoneService::Implementation::PassTime(Slot slot, Change& change) {
   return true;
 }
 
-void ZoneService::Implementation::Step(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step,
-                                       const std::string& reason, const Before& before,
-                                       Change& change) {
+void ZoneService::Implementation::Step(Slot slot, const PresenceRecord& life,
+                                       const LifecycleUpdate& step, const std::string& reason,
+                                       const Before& before, Change& change) {
   Learn(registry_.ClassName(slot), step.lesson, change);
   Judge(step, change);
   registry_.SetLife(slot, life, life_.Presence(ClassOf(slot), life, change.now_ns),
@@ -97,7 +97,7 @@ void ZoneService::Implementation::Step(Slot slot, const PresenceRecord& life, co
 }
 
 void ZoneService::Implementation::RecordEvent(Slot slot, const std::optional<Before>& before,
-                                            std::string reason, bool tells, Change& change) {
+                                              std::string reason, bool tells, Change& change) {
   const HazardState state = registry_.State(slot);
   const bool was_on_map = before && IsOnMap(before->state);
   HazardEvent event;
@@ -242,4 +242,4 @@ std::vector<StoredEvent> ZoneService::Implementation::Events(const Uuid& uuid, s
   return store_.LoadEvents(uuid, registry_.Record(*slot).sequence, limit);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

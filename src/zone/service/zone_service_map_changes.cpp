@@ -4,14 +4,14 @@
 #include "zone/admission/map_change_validation.h"
 #include "zone/service/zone_service_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// Words of map changes on their way.
 struct ZoneService::Implementation::MapChangeBatch {
   Change change;
-  std::vector<std::optional<Receipt>> receipts;  ///< None: not taken now.
-  std::vector<std::size_t> acceptable;           ///< In the batch.
-  std::unordered_map<Uuid, Receipt> committed;   ///< By the report's uuid.
+  std::vector<std::optional<protocol::Receipt>> receipts;  ///< None: not taken now.
+  std::vector<std::size_t> acceptable;                     ///< In the batch.
+  std::unordered_map<Uuid, protocol::Receipt> committed;   ///< By the report's uuid.
   MapChangeStatistics counted;
 };
 
@@ -19,18 +19,19 @@ namespace {
 
 constexpr char kReplayed[] = "another vehicle's map change has this uuid";
 
-Receipt Kept(const MapChangeReport& report, const Uuid& change) {
-  return {Receipt::Status::kCommitted, report.uuid, change, report.vehicle_id, ""};
+protocol::Receipt Kept(const protocol::MapChangeReport& report, const Uuid& change) {
+  return {protocol::Receipt::Status::kCommitted, report.uuid, change, report.vehicle_id, ""};
 }
 
-Receipt Rejected(const MapChangeReport& report, std::string sentence) {
-  return {Receipt::Status::kRefused, report.uuid, Uuid{}, report.vehicle_id, std::move(sentence)};
+protocol::Receipt Rejected(const protocol::MapChangeReport& report, std::string sentence) {
+  return {protocol::Receipt::Status::kRefused, report.uuid, Uuid{}, report.vehicle_id,
+          std::move(sentence)};
 }
 
 }  // namespace
 
-std::vector<Receipt> ZoneService::Implementation::HandleMapChanges(
-    const std::vector<MapChangeReport>& reports) {
+std::vector<protocol::Receipt> ZoneService::Implementation::HandleMapChanges(
+    const std::vector<protocol::MapChangeReport>& reports) {
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   MapChangeBatch batch;
   batch.change = NewChange();
@@ -48,7 +49,7 @@ std::vector<Receipt> ZoneService::Implementation::HandleMapChanges(
     CountMapChanges(batch.counted);
   }
   Settle(batch.change);
-  std::vector<Receipt> receipts;
+  std::vector<protocol::Receipt> receipts;
   receipts.reserve(reports.size());
   for (auto& receipt : batch.receipts) {
     if (receipt) receipts.push_back(*std::move(receipt));
@@ -58,8 +59,8 @@ std::vector<Receipt> ZoneService::Implementation::HandleMapChanges(
 
 /// Whether the word may change the map; the others are counted, and answered unless they are to be
 /// sent again.
-bool ZoneService::Implementation::ExamineMapChange(const MapChangeReport& report, std::size_t index,
-                                                   MapChangeBatch& batch) {
+bool ZoneService::Implementation::ExamineMapChange(const protocol::MapChangeReport& report,
+                                                   std::size_t index, MapChangeBatch& batch) {
   // What was committed stays committed, whatever the limits are now.
   const auto known = store_.FindMapChangeReport(report.uuid);
   if (known && known->vehicle_id == report.vehicle_id) {
@@ -83,8 +84,8 @@ bool ZoneService::Implementation::ExamineMapChange(const MapChangeReport& report
   return false;
 }
 
-void ZoneService::Implementation::ApplyMapChange(const MapChangeReport& report, std::size_t index,
-                                                 MapChangeBatch& batch) {
+void ZoneService::Implementation::ApplyMapChange(const protocol::MapChangeReport& report,
+                                                 std::size_t index, MapChangeBatch& batch) {
   Change& change = batch.change;
   const auto earlier = batch.committed.find(report.uuid);
   if (earlier != batch.committed.end()) {
@@ -125,7 +126,7 @@ void ZoneService::Implementation::ApplyMapChange(const MapChangeReport& report, 
     change.map_change_events.push_back(std::move(effect->event));
   }
   change.map_change_reports.emplace_back(&report, feature);
-  const Receipt receipt = Kept(report, feature);
+  const protocol::Receipt receipt = Kept(report, feature);
   batch.receipts[index] = receipt;
   batch.committed.emplace(report.uuid, receipt);
 }
@@ -186,4 +187,4 @@ void ZoneService::Implementation::CountMapChanges(const MapChangeStatistics& cou
   all.not_now += counted.not_now;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 #include "imaging/image_header.h"
 #include "zone/service/zone_service_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 EvidenceKind KindOf(PollAnswer::Answer answer) {
@@ -46,7 +46,7 @@ std::vector<PollOrder> ZoneService::Implementation::TakeDuePolls() {
     order.position = record.estimate.position;
     order.covariance_m2 = record.estimate.covariance_m2;
     order.expires_ns = choice.expires_ns;
-    order.picture = choice.picture_wanted ? config_.poll_picture : PollPicture::kNone;
+    order.picture = choice.picture_wanted ? config_.poll_picture : protocol::PollPicture::kNone;
     order.max_picture_bytes =
         choice.picture_wanted ? static_cast<std::uint32_t>(config_.polls.picture_bytes) : 0;
     open_polls_[order.poll] = {slot, order.vehicle_id, now_ns, order.expires_ns};
@@ -104,7 +104,8 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
     const PollAnswer& answer, const OpenPoll& poll) {
   PictureName picture;
   if (answer.answer == PollAnswer::Answer::kYes && !answer.image.empty()) {
-    picture.format = FormatName(ReadImageHeader(answer.image.data(), answer.image.size())->format);
+    picture.format = imaging::FormatName(
+        imaging::ReadImageHeader(answer.image.data(), answer.image.size())->format);
     picture.sha256 = images_.Put(answer.image, picture.format);
     images_.Publish();
   }
@@ -136,4 +137,4 @@ void ZoneService::Implementation::CountAnswer(bool accepted) {
   ++(accepted ? statistics_.answers : statistics_.answers_refused);
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,16 +5,17 @@
 #include "imaging/image_header.h"
 #include "zone/service/zone_service_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
-Receipt Committed(const Report& report, const Uuid& hazard_uuid) {
-  return {Receipt::Status::kCommitted, report.uuid, hazard_uuid, report.vehicle_id, ""};
+protocol::Receipt Committed(const protocol::Report& report, const Uuid& hazard_uuid) {
+  return {protocol::Receipt::Status::kCommitted, report.uuid, hazard_uuid, report.vehicle_id, ""};
 }
 
 }  // namespace
 
-std::vector<Receipt> ZoneService::Implementation::HandleBatch(const std::vector<Report>& reports) {
+std::vector<protocol::Receipt> ZoneService::Implementation::HandleBatch(
+    const std::vector<protocol::Report>& reports) {
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   Batch batch;
   batch.change = NewChange();
@@ -29,7 +30,7 @@ std::vector<Receipt> ZoneService::Implementation::HandleBatch(const std::vector<
   }
   KeepTracks(batch);
   Settle(batch.change);
-  std::vector<Receipt> receipts;
+  std::vector<protocol::Receipt> receipts;
   receipts.reserve(reports.size());
   for (auto& receipt : batch.receipts) {
     if (receipt) receipts.push_back(std::move(*receipt));
@@ -39,14 +40,15 @@ std::vector<Receipt> ZoneService::Implementation::HandleBatch(const std::vector<
 
 /// First pass, without the lock: what needs no change, what is refused, pictures to disk. A picture
 /// whose report is never committed is unreferenced and goes first.
-void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Batch& batch) {
+void ZoneService::Implementation::Triage(const std::vector<protocol::Report>& reports,
+                                         Batch& batch) {
   for (std::size_t i = 0; i < reports.size(); ++i) {
-    const Report& report = reports[i];
+    const protocol::Report& report = reports[i];
     if (!Examine(report, i, batch)) continue;
     PendingReport candidate{i, {}};
     if (!report.image.empty()) {
-      candidate.picture.format =
-          FormatName(ReadImageHeader(report.image.data(), report.image.size())->format);
+      candidate.picture.format = imaging::FormatName(
+          imaging::ReadImageHeader(report.image.data(), report.image.size())->format);
       candidate.picture.sha256 = images_.Put(report.image, candidate.picture.format);
     }
     batch.candidates.push_back(std::move(candidate));
@@ -56,7 +58,8 @@ void ZoneService::Implementation::Triage(const std::vector<Report>& reports, Bat
 
 /// Whether the report may change the map; the others are counted, and answered unless they are to
 /// be sent again.
-bool ZoneService::Implementation::Examine(const Report& report, std::size_t index, Batch& batch) {
+bool ZoneService::Implementation::Examine(const protocol::Report& report, std::size_t index,
+                                          Batch& batch) {
   // A report that was committed stays committed, whatever the limits are now.
   const auto known = store_.FindReport(report.uuid);
   if (known && known->vehicle_id == report.vehicle_id) {
@@ -83,7 +86,8 @@ bool ZoneService::Implementation::Examine(const Report& report, std::size_t inde
   return true;
 }
 
-std::optional<Refusal> ZoneService::Implementation::WhyTooFast(const Report& report, Batch& batch) {
+std::optional<Refusal> ZoneService::Implementation::WhyTooFast(const protocol::Report& report,
+                                                               Batch& batch) {
   const auto speed_mps = Challenge(TrackOf(report.vehicle_id, batch), FixOf(report), config_.speed);
   if (!speed_mps) return std::nullopt;
   return Refusal{RefusalKind::kSpeed, "position is reached from this vehicle's last report at " +
@@ -112,17 +116,18 @@ void ZoneService::Implementation::KeepTracks(const Batch& batch) {
   for (const auto& [vehicle_id, track] : batch.tracks) tracks_[vehicle_id] = track;
 }
 
-void ZoneService::Implementation::Refuse(const Report& report, const Refusal& refusal,
+void ZoneService::Implementation::Refuse(const protocol::Report& report, const Refusal& refusal,
                                          std::size_t index, Batch& batch) {
-  batch.receipts[index] = {Receipt::Status::kRefused, report.uuid, Uuid{}, report.vehicle_id,
-                           refusal.sentence};
+  batch.receipts[index] = {protocol::Receipt::Status::kRefused, report.uuid, Uuid{},
+                           report.vehicle_id, refusal.sentence};
   ++batch.counted.refused;
   ++batch.counted.refused_by_kind[static_cast<std::size_t>(refusal.kind)];
 }
 
-void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Batch& batch) {
+void ZoneService::Implementation::Apply(const std::vector<protocol::Report>& reports,
+                                        Batch& batch) {
   for (const PendingReport& candidate : batch.candidates) {
-    const Report& report = reports[candidate.index];
+    const protocol::Report& report = reports[candidate.index];
     const auto earlier = batch.hazard_of_report.find(report.uuid);
     if (earlier != batch.hazard_of_report.end()) {
       batch.receipts[candidate.index] = Committed(report, earlier->second);
@@ -154,9 +159,8 @@ void ZoneService::Implementation::Apply(const std::vector<Report>& reports, Batc
   }
 }
 
-ZoneService::Implementation::Slot ZoneService::Implementation::Register(const Report& report,
-                                                                        const PictureName& picture,
-                                                                        Change& change) {
+ZoneService::Implementation::Slot ZoneService::Implementation::Register(
+    const protocol::Report& report, const PictureName& picture, Change& change) {
   Uuid uuid = Uuid::Random(generator_);
   while (registry_.Find(uuid)) uuid = Uuid::Random(generator_);
   const Slot slot = registry_.Add(report, picture, uuid, ++change.sequence, change.now_ns);
@@ -169,12 +173,13 @@ ZoneService::Implementation::Slot ZoneService::Implementation::Register(const Re
   Judge(step, change);
   registry_.SetLife(slot, life, life_.Presence(entry, life, change.now_ns), change.sequence,
                     change.now_ns);
-  RecordEvent(slot, std::nullopt, step.transition ? step.transition->reason : "report", true, change);
+  RecordEvent(slot, std::nullopt, step.transition ? step.transition->reason : "report", true,
+              change);
   return slot;
 }
 
-void ZoneService::Implementation::Sight(Slot slot, const Report& report, const PictureName& picture,
-                                        Change& change) {
+void ZoneService::Implementation::Sight(Slot slot, const protocol::Report& report,
+                                        const PictureName& picture, Change& change) {
   const Before before = BeforeOf(slot);
   registry_.Merge(slot, report, picture, ++change.sequence, change.now_ns);
   std::string reason = "sighting that counts for no more: too many from this vehicle";
@@ -204,4 +209,4 @@ void ZoneService::Implementation::Count(const ZoneStatistics& counted) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -21,7 +21,7 @@
 #include "zone/service/zone_service.h"
 #include "zone/store/zone_store.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// An official's reason, cut to an event's length. Throws Error when it or the official's name is
 /// no acceptable text; an empty reason is.
@@ -36,13 +36,14 @@ class ZoneService::Implementation {
 
   Implementation(Config config, Clock now_ns, std::uint64_t uuid_seed);
 
-  std::vector<Receipt> HandleBatch(const std::vector<Report>& reports);
+  std::vector<protocol::Receipt> HandleBatch(const std::vector<protocol::Report>& reports);
   bool Reject(const Uuid& uuid, const std::string& official, const std::string& reason);
   bool Confirm(const Uuid& uuid, const std::string& official, const std::string& reason);
   std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
                                       const std::string& reason);
   bool Remove(const Uuid& uuid, const std::string& reason);
-  std::vector<Receipt> HandleMapChanges(const std::vector<MapChangeReport>& reports);
+  std::vector<protocol::Receipt> HandleMapChanges(
+      const std::vector<protocol::MapChangeReport>& reports);
   bool DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
                        const std::string& reason);
   std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit);
@@ -108,7 +109,7 @@ class ZoneService::Implementation {
     std::uint64_t previous_sequence = 0;  ///< Of the hazard's event before; 0 without one.
   };
   struct AcceptedReport {
-    const Report* report = nullptr;
+    const protocol::Report* report = nullptr;
     std::uint32_t hazard_id = 0;
     std::string image_sha256;
   };
@@ -121,13 +122,14 @@ class ZoneService::Implementation {
     std::vector<EventPlace> places;                             ///< Of each event.
     std::vector<std::pair<std::string, std::string>> pictures;  ///< Before and after.
     std::vector<Slot> touched;                                  ///< Hazards to write; may repeat.
-    std::map<std::string, LearnedLifetime> learned_before;          ///< By class.
+    std::map<std::string, LearnedLifetime> learned_before;      ///< By class.
     std::map<std::uint64_t, TrustRecord> trust_before;          ///< By vehicle.
     std::vector<AcceptedReport> reports;
     const PollAnswer* answer = nullptr;
     std::uint32_t answered_id = 0;  ///< Hazard of the answer.
     std::vector<MapChangeEvent> map_change_events;
-    std::vector<std::pair<const MapChangeReport*, Uuid>> map_change_reports;  ///< And the feature.
+    std::vector<std::pair<const protocol::MapChangeReport*, Uuid>>
+        map_change_reports;  ///< And the feature.
   };
   /// A report that may change the map.
   struct PendingReport {
@@ -137,7 +139,7 @@ class ZoneService::Implementation {
   /// A batch on its way.
   struct Batch {
     Change change;
-    std::vector<std::optional<Receipt>> receipts;  ///< None: not taken now.
+    std::vector<std::optional<protocol::Receipt>> receipts;  ///< None: not taken now.
     std::vector<PendingReport> candidates;
     std::unordered_map<Uuid, Uuid> hazard_of_report;
     std::map<std::string, ReportTrack> tracks;  ///< As they will be.
@@ -149,31 +151,32 @@ class ZoneService::Implementation {
   void Load();
 
   // Reports: zone_service_reports.cpp.
-  void Triage(const std::vector<Report>& reports, Batch& batch);
-  bool Examine(const Report& report, std::size_t index, Batch& batch);
-  std::optional<Refusal> WhyTooFast(const Report& report, Batch& batch);
-  void Refuse(const Report& report, const Refusal& refusal, std::size_t index, Batch& batch);
+  void Triage(const std::vector<protocol::Report>& reports, Batch& batch);
+  bool Examine(const protocol::Report& report, std::size_t index, Batch& batch);
+  std::optional<Refusal> WhyTooFast(const protocol::Report& report, Batch& batch);
+  void Refuse(const protocol::Report& report, const Refusal& refusal, std::size_t index,
+              Batch& batch);
   ReportTrack& TrackOf(const std::string& vehicle_id, Batch& batch);
   void KeepTracks(const Batch& batch);
-  void Apply(const std::vector<Report>& reports, Batch& batch);
-  Slot Register(const Report& report, const PictureName& picture, Change& change);
-  void Sight(Slot slot, const Report& report, const PictureName& picture, Change& change);
+  void Apply(const std::vector<protocol::Report>& reports, Batch& batch);
+  Slot Register(const protocol::Report& report, const PictureName& picture, Change& change);
+  void Sight(Slot slot, const protocol::Report& report, const PictureName& picture, Change& change);
   void Count(const ZoneStatistics& counted);
 
   // One step of a hazard's life, in a running transaction: zone_service_life.cpp.
   ClassModel ClassOf(Slot slot) const;
   Before BeforeOf(Slot slot) const;
   /// The map's hazard that the report is a sighting of, after time has done what is due to it.
-  std::optional<Slot> MatchNow(const Report& report, Change& change);
+  std::optional<Slot> MatchNow(const protocol::Report& report, Change& change);
   /// Does what time has made due; false when that was nothing.
   bool PassTime(Slot slot, Change& change);
   /// `life` is what `step` made of the hazard's life. Gives the event its own sequence.
-  void Step(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step, const std::string& reason,
-            const Before& before, Change& change);
+  void Step(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step,
+            const std::string& reason, const Before& before, Change& change);
   /// The event of what happened to `slot` since `before` (none: it is new); its sequence is the
   /// change's. `tells`: drivers hear of it even when the state stays.
   void RecordEvent(Slot slot, const std::optional<Before>& before, std::string reason, bool tells,
-                 Change& change);
+                   Change& change);
   void Learn(const std::string& class_name, const LifetimeObservation& lesson, Change& change);
   /// What the step teaches of vehicles.
   void Judge(const LifecycleUpdate& step, Change& change);
@@ -207,8 +210,10 @@ class ZoneService::Implementation {
 
   // Map changes: zone_service_map_changes.cpp.
   struct MapChangeBatch;
-  bool ExamineMapChange(const MapChangeReport& report, std::size_t index, MapChangeBatch& batch);
-  void ApplyMapChange(const MapChangeReport& report, std::size_t index, MapChangeBatch& batch);
+  bool ExamineMapChange(const protocol::MapChangeReport& report, std::size_t index,
+                        MapChangeBatch& batch);
+  void ApplyMapChange(const protocol::MapChangeReport& report, std::size_t index,
+                      MapChangeBatch& batch);
   void WriteMapChanges(const Change& change);
   void CountMapChanges(const MapChangeStatistics& counted);
 
@@ -245,4 +250,4 @@ void ZoneService::Implementation::InTransaction(Change& change, const Body& body
   announced_ = change.announced;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

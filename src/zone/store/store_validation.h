@@ -7,7 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <cstddef>
 
-namespace livemap {
+namespace livemap::zone {
 
 constexpr std::size_t kMaxStoredTextBytes = 64;
 constexpr std::size_t kMaxEventReasonBytes = 200;
@@ -36,4 +36,4 @@ inline bool FetchOne(soci::statement& statement) {
   return true;
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 
 #include "common/sqlite.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using Statements = std::vector<const char*>;
@@ -256,4 +256,4 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

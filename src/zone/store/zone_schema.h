@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace livemap {
+namespace livemap::zone {
 
 /// The schema that this program writes.
 constexpr int kZoneSchemaVersion = 4;
@@ -13,4 +13,4 @@ constexpr int kZoneSchemaVersion = 4;
 /// its own transaction. Throws StoreError when it is of a newer schema.
 void MigrateZoneStore(soci::session& session, const std::string& path);
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 #include "zone/store/zone_schema.h"
 #include "zone/store/zone_store_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 std::string WhyDamaged(const std::string& path, const std::string& verdict) {
@@ -63,4 +63,4 @@ ZoneStore::~ZoneStore() = default;
 
 int ZoneStore::SchemaVersion() { return kZoneSchemaVersion; }
 
-}  // namespace livemap
+}  // namespace livemap::zone

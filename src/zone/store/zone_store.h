@@ -17,7 +17,7 @@
 #include "zone/model/map_change.h"
 #include "zone/model/store_damage.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 struct PollAnswer;
 
@@ -89,8 +89,8 @@ class ZoneStore {
 
   /// Adds the hazard, or replaces the row of the same id.
   void WriteHazard(const HazardRow& row);
-  void WriteReport(const Report& report, std::uint64_t hazard_id, const std::string& image_sha256,
-                   std::int64_t received_ns);
+  void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
+                   const std::string& image_sha256, std::int64_t received_ns);
   /// `previous_sequence`: of the hazard's event before; 0 without one.
   void WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
                   std::uint64_t previous_sequence);
@@ -101,7 +101,7 @@ class ZoneStore {
   void WriteMapChange(const MapChangeRow& row);
   /// Forgets a feature and its history; what vehicles told of it stays, so that they are answered.
   void DropMapChange(std::uint64_t id);
-  void WriteMapChangeReport(const MapChangeReport& report, const Uuid& change,
+  void WriteMapChangeReport(const protocol::MapChangeReport& report, const Uuid& change,
                             std::int64_t received_ns);
   void WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t id);
 
@@ -113,4 +113,4 @@ class ZoneStore {
   std::unique_ptr<Implementation> implementation_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -11,7 +11,7 @@
 #include "zone/store/store_validation.h"
 #include "zone/store/zone_store_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr char kSoundMapChange[] =
@@ -44,7 +44,7 @@ const char* WhyNoMapChange(const Row& row, const MapChangeFeature& feature) {
   if (feature.uuid.IsNil()) return "no uuid";
   if (!IsMapChangeClass(feature.class_name)) return "no class of changes";
   if (!(row.confidence >= 0 && row.confidence <= 1)) return "no probability";
-  if (!IsValid(feature.position)) return "no position on Earth";
+  if (!geo::IsValid(feature.position)) return "no position on Earth";
   if (!IsCovariance(feature.covariance_m2)) return "no covariance";
   const bool times = IsStamp(row.first_seen_ns) && IsStamp(row.last_seen_ns) &&
                      IsStamp(row.denied_ns) && IsStamp(row.updated_ns) &&
@@ -55,7 +55,7 @@ const char* WhyNoMapChange(const Row& row, const MapChangeFeature& feature) {
 }
 
 template <typename Row>
-void PutPlace(const GeoPoint& position, const Eigen::Matrix2d& covariance_m2, Row& row) {
+void PutPlace(const geo::GeoPoint& position, const Eigen::Matrix2d& covariance_m2, Row& row) {
   row.latitude = position.latitude_deg;
   row.longitude = position.longitude_deg;
   row.covariance_ee = covariance_m2(0, 0);
@@ -249,7 +249,7 @@ void ZoneStore::DropMapChange(std::uint64_t id) {
   });
 }
 
-void ZoneStore::WriteMapChangeReport(const MapChangeReport& report, const Uuid& change,
+void ZoneStore::WriteMapChangeReport(const protocol::MapChangeReport& report, const Uuid& change,
                                      std::int64_t received_ns) {
   ExplainStore("writing what a vehicle told of a map change", [&] {
     Implementation::ChangeRow& row = implementation_->change_row_;
@@ -285,4 +285,4 @@ void ZoneStore::WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t i
   });
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

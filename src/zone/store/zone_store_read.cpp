@@ -11,7 +11,7 @@
 #include "zone/store/store_validation.h"
 #include "zone/store/zone_store_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::int16_t kReporterWeight1000 = 1000;  // A voice of which only a report is known.
@@ -67,7 +67,7 @@ const char* WhyNoHazard(const Row& row, const Hazard& hazard) {
   if (hazard.uuid.IsNil()) return "no uuid";
   if (!IsPrintableText(hazard.class_name, kMaxStoredTextBytes)) return "no printable class";
   if (!IsShare(row.confidence) || !IsShare(row.presence)) return "no probability";
-  if (!IsValid(hazard.position)) return "no position on Earth";
+  if (!geo::IsValid(hazard.position)) return "no position on Earth";
   if (!IsCovariance(hazard.covariance_m2)) return "no covariance";
   if (!IsStamp(row.first_seen_ns) || !IsStamp(row.last_seen_ns) || !IsStamp(row.updated_ns) ||
       row.first_seen_ns > row.last_seen_ns) {
@@ -228,7 +228,8 @@ StoreDamage ZoneStore::LoadHazards(const std::function<void(HazardRow)>& take) {
   });
 }
 
-StoreDamage ZoneStore::LoadLives(const std::function<void(const std::string&, LearnedLifetime)>& take) {
+StoreDamage ZoneStore::LoadLives(
+    const std::function<void(const std::string&, LearnedLifetime)>& take) {
   return ExplainStore("loading what was learned of classes", [&] {
     Implementation::Row row;
     soci::statement query =
@@ -300,7 +301,7 @@ std::optional<ReportedFix> ZoneStore::FindLastReport(const std::string& vehicle_
     row.vehicle_id = vehicle_id;
     if (!FetchOne(*implementation_->find_last_report_)) return std::nullopt;
     const ReportedFix fix{row.stamp_ns, {row.latitude, row.longitude}, row.sigma_m};
-    const bool sound = IsStamp(fix.stamp_ns) && IsValid(fix.position) && fix.sigma_m >= 0 &&
+    const bool sound = IsStamp(fix.stamp_ns) && geo::IsValid(fix.position) && fix.sigma_m >= 0 &&
                        fix.sigma_m <= std::sqrt(2 * kMaxVarianceM2);
     return sound ? std::optional<ReportedFix>(fix) : std::nullopt;
   });
@@ -339,4 +340,4 @@ std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t
   });
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

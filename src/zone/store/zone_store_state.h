@@ -11,7 +11,7 @@
 #include "common/sqlite.h"
 #include "zone/store/zone_store.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 /// What stands behind ZoneStore; only its own sources include this.
 class ZoneStore::Implementation {
@@ -91,4 +91,4 @@ auto ExplainStore(const std::string& doing, const Body& body) -> decltype(body()
   }
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

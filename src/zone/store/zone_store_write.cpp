@@ -4,7 +4,7 @@
 #include "zone/model/poll_answer.h"
 #include "zone/store/zone_store_state.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 void ZoneStore::Implementation::PrepareWrites() {
   using soci::use;
@@ -120,7 +120,7 @@ void ZoneStore::WriteHazard(const HazardRow& written) {
   });
 }
 
-void ZoneStore::WriteReport(const Report& report, std::uint64_t hazard_id,
+void ZoneStore::WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                             const std::string& image_sha256, std::int64_t received_ns) {
   ExplainStore("writing a report", [&] {
     Implementation::Row& row = implementation_->row_;
@@ -209,4 +209,4 @@ void ZoneStore::WriteLastReport(const std::string& vehicle_id, const ReportedFix
   });
 }
 
-}  // namespace livemap
+}  // namespace livemap::zone

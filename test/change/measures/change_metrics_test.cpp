@@ -9,7 +9,7 @@
 #include "change/measures/change_report.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 /// A prediction without classes from scores of change, row by row.
@@ -27,9 +27,10 @@ cv::Mat Mask(int rows, const std::vector<std::uint8_t>& values) {
 }
 
 /// One row of pixels: each pixel's class probabilities, the rest on no change.
-ChangeProbabilities Classes(const std::vector<std::vector<std::pair<ChangeClass, float>>>& pixels) {
+ChangeProbabilities Classes(
+    const std::vector<std::vector<std::pair<protocol::ChangeClass, float>>>& pixels) {
   ChangeProbabilities probabilities;
-  for (int i = 0; i < kChangeClasses; ++i) {
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
     probabilities.of_class.emplace_back(1, static_cast<int>(pixels.size()), CV_32FC1,
                                         cv::Scalar(i == 0 ? 1 : 0));
   }
@@ -132,7 +133,7 @@ TEST(PooledChangeScores, CountsPixelsOfAllPairsAndLeavesOutWhatNobodyKnows) {
 }
 
 TEST(PooledChangeScores, MultiClassAccuracyIsAmongChangesThatWereFound) {
-  using C = ChangeClass;
+  using C = protocol::ChangeClass;
   PooledChangeScores pooled;
   // Truth: sign found as sign; sign found as bin; sign missed; nothing taken for a vehicle; bin
   // found as bin.
@@ -205,7 +206,7 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   ChangeReport report;
   report.method = "dense-sift";
   report.registration = "none";
-  using C = ChangeClass;
+  using C = protocol::ChangeClass;
   report.forward.pooled.Add(Classes({{{C::kSign, 0.8F}}, {}}), Mask(1, {7, 0}), true);
   report.forward.community.Add("000/00", Classes({{{C::kSign, 0.8F}}, {}}), Mask(1, {7, 0}));
   auto json = ToJson(report, 0);
@@ -238,8 +239,8 @@ TEST(CountDirections, LeavesOutWhatIsNoChangeInTruthOrSeveralThings) {
     region.box = cv::Rect(column, 5, 10, 10);
     region.direction = direction;
     classes(region.box).setTo(7);
-    truth(cv::Rect(column, 5, 10, appeared)).setTo(kAppearedPixel);
-    truth(cv::Rect(column, 5 + appeared, 10, vanished)).setTo(kVanishedPixel);
+    truth(cv::Rect(column, 5, 10, appeared)).setTo(protocol::kAppearedPixel);
+    truth(cv::Rect(column, 5 + appeared, 10, vanished)).setTo(protocol::kVanishedPixel);
     regions.push_back(region);
   };
   add(0, ChangeDirection::kAppeared, 8, 1);
@@ -256,4 +257,4 @@ TEST(CountDirections, LeavesOutWhatIsNoChangeInTruthOrSeveralThings) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

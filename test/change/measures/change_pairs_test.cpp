@@ -13,7 +13,7 @@
 #include "protocol/change_class.h"
 #include "test/support/temporary_directory.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 using testing::AllOf;
@@ -61,7 +61,7 @@ class ChangePairsTest : public testing::Test {
     return names;
   }
 
-  TemporaryDirectory folder_;
+  test::TemporaryDirectory folder_;
 };
 
 TEST_F(ChangePairsTest, FindsThePublishedLayoutFromEveryFolderOfIt) {
@@ -85,7 +85,7 @@ TEST_F(ChangePairsTest, ReadsTheMaskOfDirectionsWhereThereIsOne) {
   WriteSequencePair("raw/000", "00");
   EXPECT_TRUE(LoadChangePair(FindChangePairs(folder_.path())[0]).direction.empty());
   cv::Mat direction = LoadChangePair(FindChangePairs(folder_.path())[0]).truth * 0;
-  direction.at<std::uint8_t>(1, 2) = kVanishedPixel;
+  direction.at<std::uint8_t>(1, 2) = protocol::kVanishedPixel;
   Write("raw/000/GT_direction/gt00.png", direction);
   const ChangePair pair = LoadChangePair(FindChangePairs(folder_.path())[0]);
   EXPECT_EQ(cv::countNonZero(pair.direction != direction), 0);
@@ -158,15 +158,17 @@ TEST_F(ChangePairsTest, RefusesPicturesOfOtherSizesAndBrokenOnes) {
 
 TEST_F(ChangePairsTest, ReadsThePublishedColours) {
   std::vector<cv::Vec3b> rgb;
-  for (int i = 0; i < kChangeClasses; ++i) {
-    const auto colour = ChangeClassColour(static_cast<ChangeClass>(i));
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
+    const auto colour = protocol::ChangeClassColour(static_cast<protocol::ChangeClass>(i));
     rgb.emplace_back(colour[0], colour[1], colour[2]);
   }
   rgb.emplace_back(255, 242, 0);  // Miscellaneous, which is rubbish.
   rgb.emplace_back(0, 0, 0);
   const ChangeMask mask = DecodeChangeMask(Colours(rgb), "gt.png");
-  for (int i = 0; i < kChangeClasses; ++i) EXPECT_EQ(mask.classes.at<std::uint8_t>(0, i), i);
-  EXPECT_EQ(mask.classes.at<std::uint8_t>(0, 10), static_cast<int>(ChangeClass::kRubbish));
+  for (int i = 0; i < protocol::kChangeClasses; ++i)
+    EXPECT_EQ(mask.classes.at<std::uint8_t>(0, i), i);
+  EXPECT_EQ(mask.classes.at<std::uint8_t>(0, 10),
+            static_cast<int>(protocol::ChangeClass::kRubbish));
   EXPECT_EQ(mask.classes.at<std::uint8_t>(0, 11), kLeftOutPixel);
   EXPECT_EQ(mask.unknown_colour_pixels, 0U);
 }
@@ -257,4 +259,4 @@ TEST_F(ChangePairsTest, PredictionsAreFoundByThePairsName) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

@@ -8,13 +8,13 @@
 
 #include "change/memory/place_record.h"
 
-namespace livemap {
+namespace livemap::change {
 
 constexpr std::int64_t kDayNs = 86400LL * 1000000000LL;
 constexpr std::int64_t kFirstStampNs = 1760000000LL * 1000000000LL;
 
 /// A small frame whose picture and features depend on `number` alone.
-inline PlaceRecord MakePlace(const GeoPoint& position, int number, double heading_rad = 1.0,
+inline PlaceRecord MakePlace(const geo::GeoPoint& position, int number, double heading_rad = 1.0,
                              const std::string& drive = "monday") {
   PlaceRecord record;
   record.frame.drive_id = drive;
@@ -35,4 +35,4 @@ inline PlaceRecord MakePlace(const GeoPoint& position, int number, double headin
   return record;
 }
 
-}  // namespace livemap
+}  // namespace livemap::change

@@ -14,15 +14,15 @@
 #include "test/change/memory/place_fixture.h"
 #include "test/support/temporary_directory.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
-constexpr GeoPoint kHere{40.4433, -79.9436};
+constexpr geo::GeoPoint kHere{40.4433, -79.9436};
 
-GeoPoint East(double metres) { return LocalFrame(kHere).ToGeo({metres, 0}); }
+geo::GeoPoint East(double metres) { return geo::LocalFrame(kHere).ToGeo({metres, 0}); }
 
 class PlaceMemoryTest : public testing::Test {
  protected:
@@ -51,7 +51,7 @@ class PlaceMemoryTest : public testing::Test {
     for (int i = 0; i < frames; ++i) memory.Add(MakePlace(East(2.0 * i), i));
   }
 
-  TemporaryDirectory folder_;
+  test::TemporaryDirectory folder_;
 };
 
 TEST_F(PlaceMemoryTest, FindsTheNearestThatLookTheSameWay) {
@@ -84,7 +84,7 @@ TEST_F(PlaceMemoryTest, AgreesWithASearchThroughAllOfThem) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> place(-60, 60);
   std::uniform_real_distribution<double> heading(0, 6.28);
-  const LocalFrame frame(kHere);
+  const geo::LocalFrame frame(kHere);
   std::vector<std::pair<std::int64_t, PlaceFrame>> all;
   for (int i = 0; i < 150; ++i) {
     const PlaceRecord record =
@@ -95,7 +95,7 @@ TEST_F(PlaceMemoryTest, AgreesWithASearchThroughAllOfThem) {
     const PlaceQuery query{frame.ToGeo({place(random), place(random)}), heading(random), ""};
     std::vector<std::pair<double, std::int64_t>> expected;
     for (const auto& [id, remembered] : all) {
-      const double distance_m = GeodesicDistanceM(remembered.position, query.position);
+      const double distance_m = geo::GeodesicDistanceM(remembered.position, query.position);
       const double turn = std::abs(
           std::remainder(remembered.heading_rad - query.heading_rad, 2 * 3.14159265358979323846));
       if (distance_m <= 30 && turn <= config.reach.max_heading_difference_rad) {
@@ -389,4 +389,4 @@ TEST_F(PlaceMemoryTest, SurvivesBeingKilledAtAnyMoment) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

@@ -8,7 +8,7 @@
 #include "common/error.h"
 #include "test/change/memory/place_fixture.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 template <typename Change>
@@ -107,4 +107,4 @@ TEST(PlaceQuality, FallsWithBareRegionsAndAnUncertainPlace) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

@@ -6,7 +6,7 @@
 #include "change/methods/daisy.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 /// Smooth noise: texture everywhere.
@@ -127,4 +127,4 @@ TEST(MaskUnobserved, MakesNoChangeCertainThereAndLeavesTheRest) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

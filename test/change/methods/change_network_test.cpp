@@ -14,7 +14,7 @@
 #include "common/error.h"
 #include "common/sha256.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 using ::testing::AllOf;
@@ -186,7 +186,7 @@ TEST_F(ChangeNetworkTest, GraphsThatAreNotTheManifestsAreRefusedNamingTheFile) {
 }
 
 /// The picture that models/README.md defines by a formula, BGR.
-cv::Mat FormulaPicture(const ModelManifest::Input& input) {
+cv::Mat FormulaPicture(const perception::ModelManifest::Input& input) {
   cv::Mat picture(input.height, input.width, CV_8UC3);
   for (int y = 0; y < input.height; ++y) {
     for (int x = 0; x < input.width; ++x) {
@@ -230,7 +230,7 @@ TEST(GoldenChange, NetworksAnswerAsWhereTheyWereTrained) {
     ASSERT_GT(golden["pixels"].size(), 0U);
     for (const YAML::Node& pixel : golden["pixels"]) {
       const auto values = pixel["values"].as<std::vector<double>>();
-      ASSERT_EQ(values.size(), static_cast<std::size_t>(kChangeClasses));
+      ASSERT_EQ(values.size(), static_cast<std::size_t>(protocol::kChangeClasses));
       const cv::Point at(pixel["x"].as<int>(), pixel["y"].as<int>());
       for (std::size_t i = 0; i < values.size(); ++i) {
         // Of what was not seen Compare says nothing, whatever the network believes.
@@ -243,4 +243,4 @@ TEST(GoldenChange, NetworksAnswerAsWhereTheyWereTrained) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

@@ -12,7 +12,7 @@
 #include "simulation/render/lighting.h"
 #include "simulation/render/renderer.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 using ::testing::HasSubstr;
@@ -20,10 +20,10 @@ using ::testing::HasSubstr;
 constexpr std::uint64_t kSeed = 5;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
 constexpr std::int64_t kFirstNs = 1'767'268'800'000'000'000;
-const GeoPoint kStart{48.8566, 9.0};
+const geo::GeoPoint kStart{48.8566, 9.0};
 
-PlacedHazard Hazard(ObjectClass object_class, double at_m, double left_m) {
-  PlacedHazard hazard;
+simulation::PlacedHazard Hazard(simulation::ObjectClass object_class, double at_m, double left_m) {
+  simulation::PlacedHazard hazard;
   hazard.object_class = object_class;
   hazard.at_m = at_m;
   hazard.left_m = left_m;
@@ -33,14 +33,15 @@ PlacedHazard Hazard(ObjectClass object_class, double at_m, double left_m) {
 /// A drive down a straight street that has these hazards and nothing else that changes.
 class Drive {
  public:
-  Drive(const std::vector<PlacedHazard>& hazards, double start_m, std::int64_t first_ns)
+  Drive(const std::vector<simulation::PlacedHazard>& hazards, double start_m, std::int64_t first_ns)
       : street_(Describe(hazards), kSeed, 400, true),
         drive_(street_, Manner(start_m), Mounting(), 0),
-        renderer_(street_, Camera(), MakeLighting(Condition::kDay, kSeed), Options()),
+        renderer_(street_, Camera(), simulation::MakeLighting(simulation::Condition::kDay, kSeed),
+                  Options()),
         first_ns_(first_ns) {}
 
   ChangeDetectorFrame Picture(std::size_t frame) {
-    const SimulatedFrame seen =
+    const simulation::SimulatedFrame seen =
         renderer_.Render(drive_.Camera(frame), static_cast<std::uint32_t>(frame));
     ChangeDetectorFrame picture;
     picture.stamp_ns = first_ns_ + static_cast<std::int64_t>(frame) * 100'000'000;
@@ -49,7 +50,7 @@ class Drive {
     picture.camera = Camera().intrinsics;
     picture.base_from_optical = Mounting().BaseFromOptical();
     const Eigen::Isometry3d base = seen.world_from_optical * picture.base_from_optical.inverse();
-    picture.position = LocalFrame(kStart).ToGeo(base.translation().head<2>());
+    picture.position = geo::LocalFrame(kStart).ToGeo(base.translation().head<2>());
     const Eigen::Vector3d forward = base.linear().col(0);
     picture.heading_rad = std::atan2(forward.x(), forward.y());
     picture.covariance_m2 = 0.01 * Eigen::Matrix2d::Identity();
@@ -64,13 +65,14 @@ class Drive {
   }
 
   /// Of the road's coordinates.
-  GeoPoint Place(double along_m, double left_m) const {
-    return LocalFrame(kStart).ToGeo(street_.line().At(along_m, left_m, 0).head<2>());
+  geo::GeoPoint Place(double along_m, double left_m) const {
+    return geo::LocalFrame(kStart).ToGeo(street_.line().At(along_m, left_m, 0).head<2>());
   }
 
  private:
-  static WorldDescription Describe(const std::vector<PlacedHazard>& hazards) {
-    WorldDescription description;
+  static simulation::WorldDescription Describe(
+      const std::vector<simulation::PlacedHazard>& hazards) {
+    simulation::WorldDescription description;
     description.pieces = {{400, 0, 0}};
     description.trees = false;
     description.parked_cars = false;
@@ -78,46 +80,48 @@ class Drive {
     description.hazards = hazards;
     return description;
   }
-  static CameraMounting Mounting() {
-    CameraMounting mounting;
+  static datasets::CameraMounting Mounting() {
+    datasets::CameraMounting mounting;
     mounting.height_m = 1.45;
     return mounting;
   }
-  static PassManner Manner(double start_m) {
-    PassManner manner;
+  static simulation::PassManner Manner(double start_m) {
+    simulation::PassManner manner;
     manner.speed_mps = 8;
     manner.rate_hz = 10;
     manner.start_m = start_m;
     return manner;
   }
-  static SimulatedCamera Camera() {
-    SimulatedCamera camera;
+  static simulation::SimulatedCamera Camera() {
+    simulation::SimulatedCamera camera;
     camera.intrinsics = {260, 260, 159.5, 127.5, 320, 256};
     return camera;
   }
-  static RenderConfig Options() {
-    RenderConfig options;
+  static simulation::RenderConfig Options() {
+    simulation::RenderConfig options;
     options.smooth_edges = false;
     return options;
   }
 
-  Street street_;
-  PassDrive drive_;
-  StreetRenderer renderer_;
+  simulation::Street street_;
+  simulation::PassDrive drive_;
+  simulation::StreetRenderer renderer_;
   std::int64_t first_ns_;
   cv::Mat depth_;
 };
 
-const std::vector<PlacedHazard>& Before() {
-  static const std::vector<PlacedHazard> hazards = {Hazard(ObjectClass::kBarrier, 32, -3.4),
-                                                    Hazard(ObjectClass::kRoadWorkSign, 50, -3.6)};
+const std::vector<simulation::PlacedHazard>& Before() {
+  static const std::vector<simulation::PlacedHazard> hazards = {
+      Hazard(simulation::ObjectClass::kBarrier, 32, -3.4),
+      Hazard(simulation::ObjectClass::kRoadWorkSign, 50, -3.6)};
   return hazards;
 }
 
 /// The sign is gone, another barrier has come.
-const std::vector<PlacedHazard>& After() {
-  static const std::vector<PlacedHazard> hazards = {Hazard(ObjectClass::kBarrier, 32, -3.4),
-                                                    Hazard(ObjectClass::kBarrier, 62, -3.4)};
+const std::vector<simulation::PlacedHazard>& After() {
+  static const std::vector<simulation::PlacedHazard> hazards = {
+      Hazard(simulation::ObjectClass::kBarrier, 32, -3.4),
+      Hazard(simulation::ObjectClass::kBarrier, 62, -3.4)};
   return hazards;
 }
 
@@ -176,7 +180,7 @@ TEST_F(ChangeDetectorTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
     EXPECT_LE(objects.size(), 3U);
     const auto told = [&](double along_m, double left_m) {
       return std::find_if(objects.begin(), objects.end(), [&](const PlacedChange& object) {
-        return GeodesicDistanceM(object.position, drive.Place(along_m, left_m)) < 5;
+        return geo::GeodesicDistanceM(object.position, drive.Place(along_m, left_m)) < 5;
       });
     };
     const auto sign = told(50, -3.6);
@@ -186,7 +190,7 @@ TEST_F(ChangeDetectorTest, SecondPassTellsWhatWentAndWhatCameAndThirdNothing) {
     EXPECT_NE(sign->event.direction, ChangeDirection::kAppeared);
     EXPECT_NE(told(62, -3.4), objects.end());
     for (const PlacedChange& object : objects) {
-      EXPECT_EQ(object.event.change_class, ChangeClass::kOtherObjects);
+      EXPECT_EQ(object.event.change_class, protocol::ChangeClass::kOtherObjects);
       EXPECT_GE(object.event.seen, 3);
       // The vehicle's own uncertainty is in it.
       EXPECT_GT(object.covariance_m2(0, 0), 0.01);
@@ -284,7 +288,7 @@ TEST(DrawChanges, ColoursWhatChangedAndDarkensWhatIsNotKnown) {
   const cv::Mat picture(40, 60, CV_8UC3, cv::Scalar(100, 100, 100));
   cv::Mat classes(picture.size(), CV_8UC1, cv::Scalar(0));
   classes(cv::Rect(0, 0, 10, 40)).setTo(kLeftOutPixel);
-  classes(cv::Rect(20, 20, 10, 10)).setTo(static_cast<int>(ChangeClass::kBarrier));
+  classes(cv::Rect(20, 20, 10, 10)).setTo(static_cast<int>(protocol::ChangeClass::kBarrier));
   const cv::Mat drawn = DrawChanges(picture, classes, {});
   EXPECT_EQ(drawn.at<cv::Vec3b>(5, 50), cv::Vec3b(100, 100, 100));
   EXPECT_LT(drawn.at<cv::Vec3b>(5, 5)[0], 60);
@@ -293,4 +297,4 @@ TEST(DrawChanges, ColoursWhatChangedAndDarkensWhatIsNotKnown) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

@@ -8,7 +8,7 @@
 #include "change/methods/change_method.h"
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 constexpr int kWidth = 320;
@@ -30,7 +30,7 @@ ChangeFrame FrameAt(double along_m, std::int64_t stamp_s) {
 
 /// What the camera sees of a thing half a metre wide and a metre high on the road.
 ChangeRegion SeenAt(const ChangeFrame& frame, double along_m, double left_m,
-                    ChangeClass change_class = ChangeClass::kSign) {
+                    protocol::ChangeClass change_class = protocol::ChangeClass::kSign) {
   const double z = along_m - frame.map_from_base.translation().x();
   const double f = frame.camera.fx;
   const int column = static_cast<int>(std::lround(frame.camera.cx - f * left_m / z));
@@ -56,7 +56,7 @@ TEST(ChangeTracker, ConfirmsWhatSeveralPicturesShowWhereItStands) {
     confirmed.insert(confirmed.end(), events.begin(), events.end());
   }
   ASSERT_EQ(confirmed.size(), 1U);
-  EXPECT_EQ(confirmed[0].change_class, ChangeClass::kSign);
+  EXPECT_EQ(confirmed[0].change_class, protocol::ChangeClass::kSign);
   EXPECT_EQ(confirmed[0].direction, ChangeDirection::kVanished);
   const auto now = tracker.Confirmed();
   ASSERT_EQ(now.size(), 1U);
@@ -112,13 +112,14 @@ TEST(ChangeTracker, KeepsNeighboursApartAndGivesTheClassThatMostSay) {
   for (int i = 0; i < 5; ++i) {
     const ChangeFrame frame = FrameAt(i, i + 1);
     tracker.Add(frame,
-                {SeenAt(frame, 15, 2.5),
-                 SeenAt(frame, 15, -2.5, i == 1 ? ChangeClass::kBin : ChangeClass::kTrafficCone)});
+                {SeenAt(frame, 15, 2.5), SeenAt(frame, 15, -2.5,
+                                                i == 1 ? protocol::ChangeClass::kBin
+                                                       : protocol::ChangeClass::kTrafficCone)});
   }
   const auto events = tracker.Confirmed();
   ASSERT_EQ(events.size(), 2U);
-  EXPECT_EQ(events[0].change_class, ChangeClass::kSign);
-  EXPECT_EQ(events[1].change_class, ChangeClass::kTrafficCone);
+  EXPECT_EQ(events[0].change_class, protocol::ChangeClass::kSign);
+  EXPECT_EQ(events[1].change_class, protocol::ChangeClass::kTrafficCone);
   EXPECT_GT(events[0].position_m.y(), 2);
   EXPECT_LT(events[1].position_m.y(), -2);
 }
@@ -150,9 +151,9 @@ TEST(ChangeTracker, ForgetsWhatLiesFarBehindAndStaysSmall) {
 }
 
 /// Ten classes: no change but for `change_class` with probability 0.9 in a rectangle.
-ChangeProbabilities OneRegion(const cv::Rect& box, ChangeClass change_class) {
+ChangeProbabilities OneRegion(const cv::Rect& box, protocol::ChangeClass change_class) {
   ChangeProbabilities probabilities;
-  for (int i = 0; i < kChangeClasses; ++i) {
+  for (int i = 0; i < protocol::kChangeClasses; ++i) {
     probabilities.of_class.emplace_back(kHeight, kWidth, CV_32FC1, cv::Scalar(i == 0 ? 1 : 0));
   }
   probabilities.of_class[0](box).setTo(0.1);
@@ -172,12 +173,12 @@ TEST(FindChangeRegions, SayWhereWhatAndWhichPictureHasIt) {
   const cv::Mat without = Background();
   cv::Mat with = Background();
   with(box).setTo(cv::Scalar(30, 60, 220));
-  const auto probabilities = OneRegion(box, ChangeClass::kBarrier);
+  const auto probabilities = OneRegion(box, protocol::ChangeClass::kBarrier);
   const auto appeared = FindChangeRegions(probabilities, without, with);
   ASSERT_EQ(appeared.size(), 1U);
   EXPECT_EQ(appeared[0].box, box);
   EXPECT_EQ(appeared[0].pixels, box.area());
-  EXPECT_EQ(appeared[0].change_class, ChangeClass::kBarrier);
+  EXPECT_EQ(appeared[0].change_class, protocol::ChangeClass::kBarrier);
   EXPECT_NEAR(appeared[0].confidence, 0.9, 1e-5);
   EXPECT_EQ(appeared[0].direction, ChangeDirection::kAppeared);
   EXPECT_EQ(FindChangeRegions(probabilities, with, without)[0].direction,
@@ -195,7 +196,7 @@ TEST(FindChangeRegions, FindThePictureThatHasAThingWhoseOutlineShowsInNeither) {
   const cv::Rect box(100, 80, 40, 60);
   cv::Mat board = stripes.clone();
   board(box).setTo(cv::Scalar(40, 120, 200));
-  const auto probabilities = OneRegion(box, ChangeClass::kSign);
+  const auto probabilities = OneRegion(box, protocol::ChangeClass::kSign);
   EXPECT_EQ(FindChangeRegions(probabilities, stripes, board)[0].direction,
             ChangeDirection::kAppeared);
   EXPECT_EQ(FindChangeRegions(probabilities, board, stripes)[0].direction,
@@ -205,13 +206,14 @@ TEST(FindChangeRegions, FindThePictureThatHasAThingWhoseOutlineShowsInNeither) {
 TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
   const cv::Mat image = Background();
   EXPECT_TRUE(
-      FindChangeRegions(OneRegion({10, 10, 7, 8}, ChangeClass::kBin), image, image).empty());
+      FindChangeRegions(OneRegion({10, 10, 7, 8}, protocol::ChangeClass::kBin), image, image)
+          .empty());
   ChangeRegionConfig strict;
   strict.min_confidence = 0.95;
-  EXPECT_TRUE(
-      FindChangeRegions(OneRegion({10, 10, 50, 50}, ChangeClass::kBin), image, image, strict)
-          .empty());
-  EXPECT_THROW(FindChangeRegions(OneRegion({10, 10, 50, 50}, ChangeClass::kBin), image,
+  EXPECT_TRUE(FindChangeRegions(OneRegion({10, 10, 50, 50}, protocol::ChangeClass::kBin), image,
+                                image, strict)
+                  .empty());
+  EXPECT_THROW(FindChangeRegions(OneRegion({10, 10, 50, 50}, protocol::ChangeClass::kBin), image,
                                  cv::Mat(10, 10, CV_8UC3)),
                Error);
 }
@@ -219,13 +221,13 @@ TEST(FindChangeRegions, LeaveOutSmallAndUncertainOnes) {
 TEST(FindChangeRegions, TakeInTheUnsureRimAroundThemDownToTheFoot) {
   const cv::Mat image = Background();
   const cv::Rect box(100, 80, 30, 40);
-  auto probabilities = OneRegion(box, ChangeClass::kSign);
+  auto probabilities = OneRegion(box, protocol::ChangeClass::kSign);
   // Below it the network is unsure: six rows nearly, and a tail that leads far away.
   const cv::Rect foot(110, 120, 10, 6);
   const cv::Rect tail(114, 126, 2, 60);
   for (const cv::Rect& part : {foot, tail}) {
     probabilities.of_class[0](part).setTo(0.7);
-    probabilities.of_class[static_cast<std::size_t>(ChangeClass::kSign)](part).setTo(0.3);
+    probabilities.of_class[static_cast<std::size_t>(protocol::ChangeClass::kSign)](part).setTo(0.3);
   }
   const auto regions = FindChangeRegions(probabilities, image, image);
   ASSERT_EQ(regions.size(), 1U);
@@ -239,8 +241,8 @@ TEST(FindChangeRegions, TakeInTheUnsureRimAroundThemDownToTheFoot) {
 
 TEST(FindChangeRegions, StayApartWhereTheirRimsMeet) {
   const cv::Mat image = Background();
-  auto probabilities = OneRegion({60, 80, 20, 30}, ChangeClass::kSign);
-  const auto second = OneRegion({92, 80, 20, 30}, ChangeClass::kSign);
+  auto probabilities = OneRegion({60, 80, 20, 30}, protocol::ChangeClass::kSign);
+  const auto second = OneRegion({92, 80, 20, 30}, protocol::ChangeClass::kSign);
   for (std::size_t i = 0; i < probabilities.of_class.size(); ++i) {
     second.of_class[i].colRange(86, 160).copyTo(probabilities.of_class[i].colRange(86, 160));
   }
@@ -261,7 +263,7 @@ TEST(FindChangeRegions, OfProbabilitiesWithoutClassesAreOtherObjects) {
   sensitive.min_confidence = 0.35;
   const auto regions = FindChangeRegions(probabilities, image, image, sensitive);
   ASSERT_EQ(regions.size(), 1U);
-  EXPECT_EQ(regions[0].change_class, ChangeClass::kOtherObjects);
+  EXPECT_EQ(regions[0].change_class, protocol::ChangeClass::kOtherObjects);
   EXPECT_EQ(regions[0].box, box);
 }
 
@@ -340,4 +342,4 @@ TEST(ChangeTracker, BeganAnewTellsOfWhatWasConfirmedAndNotYetPassed) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

@@ -10,7 +10,7 @@
 #include "common/error.h"
 #include "test/change/simulated_pairs.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 const std::vector<SimulatedPair>& PairsOfTwoDays() {
@@ -53,17 +53,18 @@ TEST(EdgeCorrelation, FindsAKnownScaleAndShiftToACell) {
 }
 
 TEST(EdgeCorrelation, FitsPicturesOfOnePlaceInEveryLight) {
-  for (const Condition condition :
-       {Condition::kDay, Condition::kDusk, Condition::kRain, Condition::kSnow}) {
+  for (const simulation::Condition condition :
+       {simulation::Condition::kDay, simulation::Condition::kDusk, simulation::Condition::kRain,
+        simulation::Condition::kSnow}) {
     SimulatedPairOptions options;
     options.second = condition;
     int accepted = 0;
     for (const SimulatedPair& pair : MakePairs(options)) {
       const Registration found = ByEdges(pair.before.bgr, pair.after.bgr);
-      std::printf("%s: evidence %.2f\n", ConditionName(condition), found.edge_evidence);
+      std::printf("%s: evidence %.2f\n", simulation::ConditionName(condition), found.edge_evidence);
       accepted += found.accepted() ? 1 : 0;
     }
-    EXPECT_GE(accepted, 3) << ConditionName(condition) << ", of 4";
+    EXPECT_GE(accepted, 3) << simulation::ConditionName(condition) << ", of 4";
   }
 }
 
@@ -111,4 +112,4 @@ TEST(EdgeCorrelation, WhatIsNoPictureOfAStreetIsAMistake) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

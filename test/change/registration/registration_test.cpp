@@ -12,18 +12,18 @@
 #include "common/error.h"
 #include "test/change/simulated_pairs.h"
 
-namespace livemap {
+namespace livemap::change {
 namespace {
 
 FeaturedView View(const cv::Mat& bgr) { return {bgr.size(), ExtractFeatures(bgr)}; }
 
-Registration Register(const SimulatedFrame& before, const SimulatedFrame& after,
-                      std::uint64_t seed = 1) {
+Registration Register(const simulation::SimulatedFrame& before,
+                      const simulation::SimulatedFrame& after, std::uint64_t seed = 1) {
   return RegisterByHomography(View(before.bgr), View(after.bgr), RegistrationConfig(), seed);
 }
 
-const CameraIntrinsics& Camera() {
-  static const CameraIntrinsics camera = PairCamera().intrinsics;
+const geo::CameraIntrinsics& Camera() {
+  static const geo::CameraIntrinsics camera = PairCamera().intrinsics;
   return camera;
 }
 
@@ -278,7 +278,7 @@ TEST(WarpByDepth, ShowsTheEarlierPictureWhereTheTruthHasIt) {
 
 TEST(WarpByDepth, KnowsWhatWasHidden) {
   // A wall at 20 m and a post at 5 m before it; the earlier camera stands a metre to the left.
-  const CameraIntrinsics camera{100, 100, 49.5, 39.5, 100, 80};
+  const geo::CameraIntrinsics camera{100, 100, 49.5, 39.5, 100, 80};
   cv::Mat depth(80, 100, CV_32FC1, cv::Scalar(20));
   depth.colRange(45, 55).setTo(5);
   Eigen::Isometry3d before_from_after = Eigen::Isometry3d::Identity();
@@ -301,4 +301,4 @@ TEST(WarpByDepth, KnowsWhatWasHidden) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::change

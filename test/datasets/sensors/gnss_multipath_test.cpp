@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 using ::testing::HasSubstr;
@@ -107,4 +107,4 @@ TEST(Multipath, RefusesImpossibleSizes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

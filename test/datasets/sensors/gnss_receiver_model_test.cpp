@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 using ::testing::HasSubstr;
@@ -97,4 +97,4 @@ TEST(Receiver, RefusesImpossibleNoise) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

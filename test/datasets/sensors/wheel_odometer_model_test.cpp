@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::datasets {
 namespace {
 
 TEST(Odometer, ScaleErrorsOfManyVehiclesHaveOnePercentSigma) {
@@ -61,4 +61,4 @@ TEST(Odometer, SameSeedSameValues) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::datasets

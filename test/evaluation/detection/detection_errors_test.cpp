@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 const cv::Rect2f kThing(0, 0, 10, 10);
@@ -53,4 +53,4 @@ TEST(FalseReports, BeginWhereTheyAreCountedAndSayWhatTheyAreAbout) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 using ::testing::ElementsAre;
@@ -184,4 +184,4 @@ TEST(SweepThresholds, GivesTheFiguresOfEachThreshold) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

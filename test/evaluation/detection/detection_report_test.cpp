@@ -5,7 +5,7 @@
 
 #include "evaluation/quantile.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 using ::testing::HasSubstr;
@@ -68,4 +68,4 @@ TEST(Quantile, IsTheNearestRank) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 using ::testing::AllOf;
@@ -182,4 +182,4 @@ TEST(YoloLabels, BoxesAreCutToTheImage) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 TEST(TrackingEvaluation, StampsFollowTheChainageAndNeverStandStill) {
   const TrackedDriveConfig options;
-  const TrackerFrame first = ToTrackerFrame({}, {640, 400}, 32, 0, options);
+  const perception::TrackerFrame first = ToTrackerFrame({}, {640, 400}, 32, 0, options);
   EXPECT_EQ(first.stamp_ns, 2'000'000'000);
   EXPECT_GT(ToTrackerFrame({}, {640, 400}, 32, first.stamp_ns, options).stamp_ns, first.stamp_ns);
   EXPECT_FALSE(first.motion);
@@ -17,7 +17,7 @@ TEST(TrackingEvaluation, RepeatedSightsBecomeOneDetectionOfTheDrive) {
   const TrackedDriveConfig options;
   const cv::Rect2f box(300, 200, 40, 20);
   ScoredDrive labelled(3);
-  std::vector<TrackerFrame> frames;
+  std::vector<perception::TrackerFrame> frames;
   for (std::size_t i = 0; i < 3; ++i) {
     const float confidence = i == 1 ? 0.8F : 0.5F;
     labelled[i].chainage_m = static_cast<double>(i);
@@ -27,7 +27,7 @@ TEST(TrackingEvaluation, RepeatedSightsBecomeOneDetectionOfTheDrive) {
                                     labelled[i].chainage_m, i ? frames.back().stamp_ns : 0,
                                     options));
   }
-  const ObjectTracker tracker({}, {0.4F});
+  const perception::ObjectTracker tracker({}, {0.4F});
   const ScoredDrive events = EventsOfDrive(labelled, frames, "pothole", tracker);
   EXPECT_TRUE(events[0].detections.empty());
   EXPECT_EQ(events[1].detections.size(), 1U);
@@ -37,4 +37,4 @@ TEST(TrackingEvaluation, RepeatedSightsBecomeOneDetectionOfTheDrive) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

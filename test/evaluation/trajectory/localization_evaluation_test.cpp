@@ -8,22 +8,22 @@
 
 #include "datasets/comma2k19.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 /// The real drive; nothing where it is absent.
-std::optional<PositionDrive> RealDrive() {
+std::optional<datasets::PositionDrive> RealDrive() {
   const char* set = std::getenv("LIVEMAP_DATA_DIR");
   const std::string data =
       set != nullptr ? set : std::string(LIVEMAP_SOURCE_DIR) + "/../shared/data";
   const std::string folder = data + "/positions/comma2k19";
   if (!std::filesystem::is_directory(folder)) return std::nullopt;
-  return ReadComma2k19(folder);
+  return datasets::ReadComma2k19(folder);
 }
 
 /// As the tool's defaults.
-LocalizerConfig ToolConfig() {
-  LocalizerConfig config;
+localization::LocalizerConfig ToolConfig() {
+  localization::LocalizerConfig config;
   config.receiver.shared_sigma_m = 0.4;
   return config;
 }
@@ -73,4 +73,4 @@ TEST(LocalizationEvaluation, DropOutCostsLittle) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -11,7 +11,7 @@
 #include "evaluation/trajectory/trajectory.h"
 #include "evaluation/trajectory/trajectory_report.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 using ::testing::HasSubstr;
@@ -27,8 +27,8 @@ Eigen::Isometry3d Turned(double angle_rad, const Eigen::Vector3d& axis,
 std::int64_t Ns(double seconds) { return std::llround(seconds * 1e9); }
 
 /// A winding drive, 10 poses per second at `speed_m_per_s`.
-std::vector<StampedPose> Drive(std::size_t poses, double speed_m_per_s = 1) {
-  std::vector<StampedPose> drive;
+std::vector<datasets::StampedPose> Drive(std::size_t poses, double speed_m_per_s = 1) {
+  std::vector<datasets::StampedPose> drive;
   for (std::size_t i = 0; i < poses; ++i) {
     const double s = 0.1 * static_cast<double>(i);
     const Eigen::Vector3d place(speed_m_per_s * s, 2 * std::sin(s), std::cos(0.3 * s));
@@ -37,20 +37,23 @@ std::vector<StampedPose> Drive(std::size_t poses, double speed_m_per_s = 1) {
   return drive;
 }
 
-std::vector<StampedPose> Moved(std::vector<StampedPose> poses, const Eigen::Isometry3d& motion) {
-  for (StampedPose& pose : poses) pose.world_from_camera = motion * pose.world_from_camera;
+std::vector<datasets::StampedPose> Moved(std::vector<datasets::StampedPose> poses,
+                                         const Eigen::Isometry3d& motion) {
+  for (datasets::StampedPose& pose : poses)
+    pose.world_from_camera = motion * pose.world_from_camera;
   return poses;
 }
 
-std::vector<StampedPose> Resized(std::vector<StampedPose> poses, double factor) {
-  for (StampedPose& pose : poses) pose.world_from_camera.translation() *= factor;
+std::vector<datasets::StampedPose> Resized(std::vector<datasets::StampedPose> poses,
+                                           double factor) {
+  for (datasets::StampedPose& pose : poses) pose.world_from_camera.translation() *= factor;
   return poses;
 }
 
 /// Straight on at 1 m/s, `poses` per second apart by 0.1 s; `speed` and `turn` of an estimate.
-std::vector<StampedPose> Straight(std::size_t poses, double speed_m_per_s,
-                                  double turn_rad_per_s = 0) {
-  std::vector<StampedPose> drive;
+std::vector<datasets::StampedPose> Straight(std::size_t poses, double speed_m_per_s,
+                                            double turn_rad_per_s = 0) {
+  std::vector<datasets::StampedPose> drive;
   for (std::size_t i = 0; i < poses; ++i) {
     const double s = 0.1 * static_cast<double>(i);
     drive.push_back(
@@ -59,10 +62,10 @@ std::vector<StampedPose> Straight(std::size_t poses, double speed_m_per_s,
   return drive;
 }
 
-std::vector<StampedPose> AtStamps(const std::vector<double>& stamps_s) {
-  std::vector<StampedPose> poses;
+std::vector<datasets::StampedPose> AtStamps(const std::vector<double>& stamps_s) {
+  std::vector<datasets::StampedPose> poses;
   for (const double stamp_s : stamps_s) poses.push_back({Ns(stamp_s), {}});
-  for (StampedPose& pose : poses) pose.world_from_camera.setIdentity();
+  for (datasets::StampedPose& pose : poses) pose.world_from_camera.setIdentity();
   return poses;
 }
 
@@ -79,8 +82,8 @@ std::vector<std::string> PairsOf(const std::vector<double>& truth_s,
   return text;
 }
 
-TrajectoryFigures Evaluate(const std::vector<StampedPose>& truth,
-                           const std::vector<StampedPose>& estimate,
+TrajectoryFigures Evaluate(const std::vector<datasets::StampedPose>& truth,
+                           const std::vector<datasets::StampedPose>& estimate,
                            AlignmentKind alignment = AlignmentKind::kSe3) {
   TrajectoryConfig options;
   options.alignment = alignment;
@@ -142,7 +145,7 @@ TEST(TrajectoryFigures, DoNotDependOnWhereTheEstimatesWorldLies) {
 TEST(TrajectoryFigures, AlignmentNeverMirrors) {
   const auto drive = Drive(300);
   auto mirrored = drive;
-  for (StampedPose& pose : mirrored) pose.world_from_camera.translation().x() *= -1;
+  for (datasets::StampedPose& pose : mirrored) pose.world_from_camera.translation().x() *= -1;
   EXPECT_GT(Evaluate(drive, mirrored).ate_m.rmse, 0.1);
 }
 
@@ -234,7 +237,7 @@ TEST(TrajectoryFigures, GapsOfTheEstimateAreToldAndOfTheTruthLeftOut) {
 TEST(TrajectoryFigures, WithoutTwoPairsAreRefusedWithTheSpansOfBoth) {
   const auto drive = Drive(20);
   auto later = drive;
-  for (StampedPose& pose : later) pose.stamp_ns += Ns(1000);
+  for (datasets::StampedPose& pose : later) pose.stamp_ns += Ns(1000);
   EXPECT_THAT([&] { Evaluate(drive, later); },
               ThrowsMessage<Error>(HasSubstr("0 of the 20 estimated poses have a true pose nearer "
                                              "than 0.02 s")));
@@ -320,4 +323,4 @@ TEST_F(PublishedTrajectories, OfKittiHaveTheStatedFigures) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

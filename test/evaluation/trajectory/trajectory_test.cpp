@@ -5,7 +5,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::evaluation {
 namespace {
 
 using ::testing::AllOf;
@@ -73,4 +73,4 @@ TEST(Trajectory, OtherFilesAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::evaluation

@@ -5,7 +5,7 @@
 #include <boost/make_shared.hpp>
 #include <thread>
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 /// Stamped `milliseconds` after ten seconds.
@@ -72,4 +72,4 @@ TEST(StereoPairBuffer, AreWaitedForAndTheWaitEndsWhenOneIsTooLate) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -4,7 +4,7 @@
 
 #include <boost/make_shared.hpp>
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 constexpr double kMetresPerDegree = 111195;  // Of latitude, near enough.
@@ -18,8 +18,8 @@ PosedFrameQueue::Config Config() {
 }
 
 /// To the north at 8 m/s.
-Fix FixAt(double seconds) {
-  Fix fix;
+geo::Fix FixAt(double seconds) {
+  geo::Fix fix;
   fix.stamp_ns = static_cast<std::int64_t>(seconds * kSecondNs) + 100 * kSecondNs;
   fix.has_fix = true;
   fix.position = {8 * seconds / kMetresPerDegree, 0};
@@ -107,4 +107,4 @@ TEST(PosedFrameQueue, WithoutPositionsTheOldestGoAndTheOthersAreGivenUp) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::nodelets

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace livemap {
+namespace livemap::nodelets {
 namespace {
 
 TEST(RecentPictures, TheNewestAreKept) {
@@ -44,4 +44,4 @@ TEST(RecentPictures, OneStampIsOnePicture) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::nodelets

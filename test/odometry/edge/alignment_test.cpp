@@ -10,7 +10,7 @@
 #include "odometry/edge/edge_extractor.h"
 #include "test/odometry/synthetic_scene.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 const cv::Mat kExact;  // No uncertainty of the depths.
@@ -220,4 +220,4 @@ TEST(Aligner, InformationIsTheInverseOfTheScatterOverManyNoisyImages) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

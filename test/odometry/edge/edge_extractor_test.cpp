@@ -7,7 +7,7 @@
 #include "common/error.h"
 #include "odometry/edge/canny.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 /// Discs and bars with soft and hard edges, and noise.
@@ -108,4 +108,4 @@ TEST(EdgeKindTest, AnUnknownNameIsRefusedWithTheAcceptedOnes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

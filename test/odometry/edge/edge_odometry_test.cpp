@@ -9,7 +9,7 @@
 #include "common/error.h"
 #include "test/odometry/synthetic_scene.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 using ::testing::HasSubstr;
@@ -261,7 +261,9 @@ TEST(EdgeOdometry, WhatCannotBeAFrameIsRefusedInASentenceAndChangesNothing) {
 }
 
 TEST(EdgeOdometry, ACameraWithoutCalibrationIsRefusedInASentence) {
-  const auto make = [](CameraIntrinsics camera) { return [camera] { EdgeOdometry({}, camera); }; };
+  const auto make = [](geo::CameraIntrinsics camera) {
+    return [camera] { EdgeOdometry({}, camera); };
+  };
   EXPECT_THAT(make({0, 0, 0, 0, 320, 240}), ThrowsMessage<Error>(HasSubstr("calibration")));
   EXPECT_THAT(make({std::nan(""), 260, 160, 120, 320, 240}),
               ThrowsMessage<Error>(HasSubstr("calibration")));
@@ -283,4 +285,4 @@ TEST(EdgeOdometry, StraightEdgesAllOneWayDoNotFixThePose) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

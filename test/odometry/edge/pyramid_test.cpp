@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 TEST(Pyramid, HasThreeLevelsAtMostAndNoneBelowTheLeastSize) {
@@ -17,8 +17,8 @@ TEST(Pyramid, HasThreeLevelsAtMostAndNoneBelowTheLeastSize) {
 }
 
 TEST(Pyramid, ACoarserCameraSeesThePointInTheSamePlaceOfTheScene) {
-  const CameraIntrinsics fine{500, 510, 319.5, 239.5, 640, 480};
-  const CameraIntrinsics coarse = HalvedIntrinsics(fine);
+  const geo::CameraIntrinsics fine{500, 510, 319.5, 239.5, 640, 480};
+  const geo::CameraIntrinsics coarse = HalvedIntrinsics(fine);
   // The centre of the coarse pixel (x, y) lies between the fine pixels 2x, 2x + 1 and 2y, 2y + 1.
   const double ray_x = (2 * 10 + 0.5 - fine.cx) / fine.fx;
   const double ray_y = (2 * 20 + 0.5 - fine.cy) / fine.fy;
@@ -56,4 +56,4 @@ TEST(DepthPyramid, NeitherHolesNorWhatIsBehindAnEdgeIsBlendedIn) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -8,7 +8,7 @@
 #include "odometry/monocular/inverse_depth_map.h"
 #include "test/odometry/synthetic_scene.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 struct TwoViews {
@@ -169,4 +169,4 @@ TEST(InverseDepthMap, ForgetsDepthsThatTheNextViewsContradict) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

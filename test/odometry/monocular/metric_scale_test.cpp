@@ -8,7 +8,7 @@
 
 #include "odometry/monocular/road_height.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 TEST(MetricScale, IsUnknownBeforeAndMeasuredAfterTheFirstMeasurement) {
@@ -55,7 +55,7 @@ TEST(MetricScale, IgnoresWhatIsNotANumberOrNotPositive) {
   EXPECT_FALSE(scale.log_sigma());
 }
 
-constexpr CameraIntrinsics kRoadCamera{500, 500, 319.5, 239.5, 640, 480};
+constexpr geo::CameraIntrinsics kRoadCamera{500, 500, 319.5, 239.5, 640, 480};
 
 /// Edges of a road under a camera that looks down a little, and as many of other things.
 std::vector<EdgeDepth> RoadAndOtherThings(double height, double pitch_rad) {
@@ -95,4 +95,4 @@ TEST(RoadHeight, IsNotKnownWithoutARoad) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

@@ -10,7 +10,7 @@
 #include "common/error.h"
 #include "simulation/room/room.h"
 
-namespace livemap {
+namespace livemap::odometry {
 namespace {
 
 constexpr double kFrameS = 0.1;
@@ -18,8 +18,8 @@ constexpr double kSpeedMps = 0.6;
 constexpr int kFrames = 18;
 
 /// Half the size of the simulator's: the room is rendered for minutes under sanitizers.
-SimulatedCamera WalkCamera() {
-  SimulatedCamera camera;
+simulation::SimulatedCamera WalkCamera() {
+  simulation::SimulatedCamera camera;
   camera.intrinsics = {250, 250, 159.5, 119.5, 320, 240};
   return camera;
 }
@@ -32,7 +32,7 @@ struct Walk {
 
 const Walk& TheWalk() {
   static const Walk walk = [] {
-    const SimulatedRoom room(1);
+    const simulation::SimulatedRoom room(1);
     const Eigen::Isometry3d start = room.WorldFromOptical(0, 1);
     Walk made;
     for (int i = 0; i < kFrames; ++i) {
@@ -40,8 +40,8 @@ const Walk& TheWalk() {
       Vector6d twist;
       twist << 0.8 * way, 0, 0.6 * way, 0, 0.05 * way, 0;
       const Eigen::Isometry3d first_from_camera = Se3Exp(twist);
-      const SimulatedFrame seen = room.Render(WalkCamera(), start * first_from_camera,
-                                              static_cast<std::uint32_t>(i), 1.3F, 1, 2);
+      const simulation::SimulatedFrame seen = room.Render(
+          WalkCamera(), start * first_from_camera, static_cast<std::uint32_t>(i), 1.3F, 1, 2);
       cv::Mat grey;
       cv::cvtColor(seen.bgr, grey, cv::COLOR_BGR2GRAY);
       made.grey.push_back(grey);
@@ -92,13 +92,13 @@ TEST(MonocularOdometry, FollowsTheCameraInMetresWithASpeed) {
 }
 
 TEST(MonocularOdometry, DepthsOfItsEdgesAreThoseOfTheRoom) {
-  const SimulatedRoom room(1);
+  const simulation::SimulatedRoom room(1);
   MonocularOdometry odometry(Slow(), WalkCamera().intrinsics);
   int last_keyframe = 0;
   for (int i = 0; i < kFrames; ++i) {
     if (odometry.Track(Frame(i)).new_keyframe) last_keyframe = i;
   }
-  const SimulatedFrame truth =
+  const simulation::SimulatedFrame truth =
       room.Render(WalkCamera(),
                   room.WorldFromOptical(0, 1) *
                       TheWalk().first_from_camera[static_cast<std::size_t>(last_keyframe)],
@@ -202,4 +202,4 @@ TEST(MonocularOdometry, RefusesWrongImagesAndStampsAndGoesOn) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::odometry

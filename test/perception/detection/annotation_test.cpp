@@ -6,7 +6,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 int ChangedPixels(const cv::Mat& before, const cv::Mat& after) {
@@ -69,4 +69,4 @@ TEST(AnnotateImage, EmptyAndGreyImagesAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

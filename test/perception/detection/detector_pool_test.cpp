@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 using std::chrono::milliseconds;
@@ -254,4 +254,4 @@ TEST(DetectorPool, EveryFrameIsAccountedForAtAnyMomentUnderLoadFromSeveralThread
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 const cv::Scalar kRedRoad(0, 0, 255);
@@ -73,4 +73,4 @@ TEST(EarlyDiscard, ADetectorsModelIsRefusedInOneSentence) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 const cv::Scalar kRed(0, 0, 255);
@@ -95,4 +95,4 @@ TEST(HazardDetector, AnImageThatItCannotUseIsRefusedAndTheNextOneWorks) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr float kIou = 0.5F;
@@ -59,4 +59,4 @@ TEST(FuseViews, OfCountlessBoxesTheMostConfidentAreFused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

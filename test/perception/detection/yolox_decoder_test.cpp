@@ -10,7 +10,7 @@
 #include "common/error.h"
 #include "test/perception/detection/synthetic_head.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 using test::NothingSeen;
@@ -228,4 +228,4 @@ TEST(IntersectionOverUnion, OfKnownBoxes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
@@ -95,4 +95,4 @@ TEST(BlockCache, ThreadsGetBlocksOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -11,7 +11,7 @@
 
 #include "perception/inference/inference_engine.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// Paths of the models/NAME.yaml that have a NAME.golden.yaml beside them; those of other kinds are
@@ -101,4 +101,4 @@ INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest,
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenTest);
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -11,7 +11,7 @@
 #include "common/error.h"
 #include "common/sha256.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 using ::testing::AllOf;
@@ -232,4 +232,4 @@ TEST(EngineChoice, IsReadFromText) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "test/perception/detection/synthetic_head.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 using test::TwoLevelManifest;  // 64 x 48, pad 114, mean 10 20 30, std 1 2 4
@@ -76,4 +76,4 @@ TEST(Letterbox, EmptyImagesAndOtherPixelTypesAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

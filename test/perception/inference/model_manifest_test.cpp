@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 using ::testing::AllOf;
@@ -219,4 +219,4 @@ TEST(TorchFile, IsReadWhenItsHashIsTheManifestsAndRefusedWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -6,7 +6,7 @@
 #include "common/error.h"
 #include "perception/inference/model_manifest.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 using ::testing::ElementsAre;
@@ -54,4 +54,4 @@ TEST(OnnxInputs, LengthsBeyondTheEndAndEndlessNumbersAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr std::size_t kMost = 5'000'000;
@@ -65,4 +65,4 @@ TEST(Unpacked, RefusesADamagedFileByItsName) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

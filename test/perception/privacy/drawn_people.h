@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-namespace livemap {
+namespace livemap::perception {
 
 /// A drawn face looking at the camera, `height` pixels from chin to hair, around `centre`.
 inline void DrawFace(cv::Mat& bgr, cv::Point centre, int height) {
@@ -40,4 +40,4 @@ inline void DrawPlate(cv::Mat& bgr, cv::Point corner, int width, const std::stri
               cv::LINE_AA);
 }
 
-}  // namespace livemap
+}  // namespace livemap::perception

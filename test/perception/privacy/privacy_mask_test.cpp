@@ -12,7 +12,7 @@
 #include "common/error.h"
 #include "test/perception/privacy/drawn_people.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 /// Grey road with grain, as a camera sees it.
@@ -229,4 +229,4 @@ TEST(PrivacyMask, APictureThatCannotBeLookedAtIsRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

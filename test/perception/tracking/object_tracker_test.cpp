@@ -7,7 +7,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::perception {
 namespace {
 
 constexpr std::int64_t kFrameNs = 100'000'000;
@@ -192,4 +192,4 @@ TEST(ObjectTrackerConfig, NumbersOutOfRangeAreNamed) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::perception

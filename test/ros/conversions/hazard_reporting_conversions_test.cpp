@@ -11,7 +11,7 @@
 #include "ros/conversions/map_change_conversions.h"
 #include "ros/conversions/poll_conversions.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 using ::testing::HasSubstr;
@@ -26,7 +26,7 @@ Uuid Id(std::uint8_t first) {
 }
 
 TEST(HazardConversions, ReportSurvivesTheWayThroughItsMessage) {
-  Report report;
+  protocol::Report report;
   report.uuid = Id(1);
   report.vehicle_id = "car-1";
   report.drive_id = "drive-1";
@@ -45,7 +45,7 @@ TEST(HazardConversions, ReportSurvivesTheWayThroughItsMessage) {
   const HazardReport message = ToMessage(report);
   EXPECT_EQ(message.image.header.stamp, message.stamp) << "the image's stamp is the report's";
   EXPECT_EQ(message.covariance[1], 0.25) << "row-major";
-  const Report back = FromMessage(message);
+  const protocol::Report back = FromMessage(message);
   EXPECT_EQ(back.uuid, report.uuid);
   EXPECT_EQ(back.vehicle_id, report.vehicle_id);
   EXPECT_EQ(back.drive_id, report.drive_id);
@@ -71,7 +71,7 @@ TEST(HazardConversions, ReportSurvivesTheWayThroughItsMessage) {
 }
 
 TEST(HazardConversions, AReportOfVersion1ShowsTheWholeImage) {
-  HazardReport message = ToMessage(Report{});
+  HazardReport message = ToMessage(protocol::Report{});
   message.schema_version = 1;
   message.shown_width = message.shown_height = 100;
   EXPECT_TRUE(FromMessage(message).shown.IsWholeImage());
@@ -84,8 +84,8 @@ TEST(HazardConversions, AReportOfVersion1ShowsTheWholeImage) {
 
 TEST(HazardConversions, TheLinkIsWhatItsMessageSaysAndNothingElse) {
   LinkState message;
-  const LinkCost costs[] = {LinkCost::kUnknown, LinkCost::kCheap, LinkCost::kMetered,
-                            LinkCost::kNone};
+  const vehicle::LinkCost costs[] = {vehicle::LinkCost::kUnknown, vehicle::LinkCost::kCheap,
+                                     vehicle::LinkCost::kMetered, vehicle::LinkCost::kNone};
   for (std::uint8_t state = 0; state < 4; ++state) {
     message.state = state;
     EXPECT_EQ(FromMessage(message), costs[state]);
@@ -95,9 +95,10 @@ TEST(HazardConversions, TheLinkIsWhatItsMessageSaysAndNothingElse) {
 }
 
 TEST(HazardConversions, ReceiptSurvivesTheWayThroughItsMessage) {
-  for (const auto status : {Receipt::Status::kCommitted, Receipt::Status::kRefused}) {
-    const Receipt receipt{status, Id(1), Id(2), "car-1", "because"};
-    const Receipt back = FromMessage(ToMessage(receipt));
+  for (const auto status :
+       {protocol::Receipt::Status::kCommitted, protocol::Receipt::Status::kRefused}) {
+    const protocol::Receipt receipt{status, Id(1), Id(2), "car-1", "because"};
+    const protocol::Receipt back = FromMessage(ToMessage(receipt));
     EXPECT_EQ(back.status, status);
     EXPECT_EQ(back.report_uuid, Id(1));
     EXPECT_EQ(back.hazard_uuid, Id(2));
@@ -108,17 +109,20 @@ TEST(HazardConversions, ReceiptSurvivesTheWayThroughItsMessage) {
 
 TEST(HazardConversions, EventOfTheZoneBecomesTheNoticeOfTheVehicle) {
   struct Step {
-    std::optional<HazardState> from;
-    HazardState to;
-    Notice::Action expected;
+    std::optional<zone::HazardState> from;
+    zone::HazardState to;
+    protocol::Notice::Action expected;
   };
-  const Step steps[] = {{std::nullopt, HazardState::kActive, Notice::Action::kAdded},
-                        {HazardState::kCandidate, HazardState::kActive, Notice::Action::kAdded},
-                        {HazardState::kActive, HazardState::kVerifying, Notice::Action::kUpdated},
-                        {HazardState::kVerifying, HazardState::kGone, Notice::Action::kRemoved},
-                        {HazardState::kActive, HazardState::kRejected, Notice::Action::kRemoved}};
+  const Step steps[] = {
+      {std::nullopt, zone::HazardState::kActive, protocol::Notice::Action::kAdded},
+      {zone::HazardState::kCandidate, zone::HazardState::kActive, protocol::Notice::Action::kAdded},
+      {zone::HazardState::kActive, zone::HazardState::kVerifying,
+       protocol::Notice::Action::kUpdated},
+      {zone::HazardState::kVerifying, zone::HazardState::kGone, protocol::Notice::Action::kRemoved},
+      {zone::HazardState::kActive, zone::HazardState::kRejected,
+       protocol::Notice::Action::kRemoved}};
   for (const Step& step : steps) {
-    HazardEvent event;
+    zone::HazardEvent event;
     event.from = step.from;
     event.hazard.state = step.to;
     event.announced = true;
@@ -133,7 +137,7 @@ TEST(HazardConversions, EventOfTheZoneBecomesTheNoticeOfTheVehicle) {
     event.hazard.last_seen_ns = kStampNs + 1;
     event.hazard.updated_ns = kStampNs + 2;
     event.hazard.sequence = 99;
-    const Notice notice = FromMessage(ToMessage(event));
+    const protocol::Notice notice = FromMessage(ToMessage(event));
     EXPECT_EQ(notice.action, step.expected);
     EXPECT_EQ(notice.hazard_uuid, Id(3));
     EXPECT_EQ(notice.class_name, "deer");
@@ -152,22 +156,23 @@ TEST(HazardConversions, EventOfTheZoneBecomesTheNoticeOfTheVehicle) {
 }
 
 TEST(HazardConversions, WhatOneVehicleIsToldBearsItsNameAndTheAnnouncementsSequence) {
-  Hazard hazard;
+  zone::Hazard hazard;
   hazard.uuid = Id(3);
   hazard.class_name = "deer";
   hazard.position = {40, -80};
   hazard.sequence = 120;
   hazard.announced_sequence = 99;
-  const Notice notice = FromMessage(ToVehicleMessage(hazard, HazardAction::kRemoved, "car-1"));
-  EXPECT_EQ(notice.action, Notice::Action::kRemoved);
+  const protocol::Notice notice =
+      FromMessage(ToVehicleMessage(hazard, zone::HazardAction::kRemoved, "car-1"));
+  EXPECT_EQ(notice.action, protocol::Notice::Action::kRemoved);
   EXPECT_EQ(notice.vehicle_id, "car-1");
   EXPECT_EQ(notice.sequence, 99u);
   EXPECT_EQ(notice.previous_sequence, 0u);
 }
 
 TEST(HazardConversions, TheEndOfACatchUpSurvivesTheWayThroughItsMessage) {
-  Notice done;
-  done.action = Notice::Action::kCaughtUp;
+  protocol::Notice done;
+  done.action = protocol::Notice::Action::kCaughtUp;
   done.sequence = 99;
   done.previous_sequence = 7;
   done.vehicle_id = "car-1";
@@ -176,8 +181,8 @@ TEST(HazardConversions, TheEndOfACatchUpSurvivesTheWayThroughItsMessage) {
   done.told = 12;
   done.image_format = "jpeg";
   done.image = {1, 2};
-  const Notice back = FromMessage(ToMessage(done));
-  EXPECT_EQ(back.action, Notice::Action::kCaughtUp);
+  const protocol::Notice back = FromMessage(ToMessage(done));
+  EXPECT_EQ(back.action, protocol::Notice::Action::kCaughtUp);
   EXPECT_EQ(back.sequence, 99u);
   EXPECT_EQ(back.previous_sequence, 7u);
   EXPECT_EQ(back.vehicle_id, "car-1");
@@ -187,8 +192,8 @@ TEST(HazardConversions, TheEndOfACatchUpSurvivesTheWayThroughItsMessage) {
   EXPECT_EQ(back.image, done.image);
 }
 
-Poll MakePoll() {
-  Poll poll;
+protocol::Poll MakePoll() {
+  protocol::Poll poll;
   poll.poll = Id(1);
   poll.hazard = Id(2);
   poll.vehicle_id = "car-1";
@@ -197,14 +202,14 @@ Poll MakePoll() {
   poll.class_name = "deer";
   poll.position = {40, -80};
   poll.covariance_m2 << 1, 0.5, 0.5, 2;
-  poll.picture = PollPicture::kCrop;
+  poll.picture = protocol::PollPicture::kCrop;
   poll.max_picture_bytes = 5000;
   return poll;
 }
 
 TEST(PollConversions, PollSurvivesTheWayThroughItsMessage) {
-  const Poll poll = MakePoll();
-  const Poll back = FromMessage(ToMessage(poll));
+  const protocol::Poll poll = MakePoll();
+  const protocol::Poll back = FromMessage(ToMessage(poll));
   EXPECT_EQ(back.poll, poll.poll);
   EXPECT_EQ(back.hazard, poll.hazard);
   EXPECT_EQ(back.vehicle_id, "car-1");
@@ -213,7 +218,7 @@ TEST(PollConversions, PollSurvivesTheWayThroughItsMessage) {
   EXPECT_EQ(back.class_name, "deer");
   EXPECT_EQ(back.position.longitude_deg, -80);
   EXPECT_EQ(back.covariance_m2, poll.covariance_m2);
-  EXPECT_EQ(back.picture, PollPicture::kCrop);
+  EXPECT_EQ(back.picture, protocol::PollPicture::kCrop);
   EXPECT_EQ(back.max_picture_bytes, 5000u);
 }
 
@@ -221,12 +226,13 @@ TEST(PollConversions, APollOfVersion1WantsTheWholeFrameOrNone) {
   HazardPoll message = ToMessage(MakePoll());
   message.schema_version = 1;
   message.picture_kind = 0;  // As the bridge fills it in.
-  EXPECT_EQ(FromMessage(message).picture, PollPicture::kFullFrame);
+  EXPECT_EQ(FromMessage(message).picture, protocol::PollPicture::kFullFrame);
   message.picture_wanted = 0;
-  EXPECT_EQ(FromMessage(message).picture, PollPicture::kNone);
-  for (const PollPicture picture :
-       {PollPicture::kNone, PollPicture::kCrop, PollPicture::kFullFrame}) {
-    Poll poll = MakePoll();
+  EXPECT_EQ(FromMessage(message).picture, protocol::PollPicture::kNone);
+  for (const protocol::PollPicture picture :
+       {protocol::PollPicture::kNone, protocol::PollPicture::kCrop,
+        protocol::PollPicture::kFullFrame}) {
+    protocol::Poll poll = MakePoll();
     poll.picture = picture;
     EXPECT_EQ(FromMessage(ToMessage(poll)).picture, picture);
   }
@@ -252,24 +258,24 @@ TEST(PollConversions, PollsThatMakeNoSenseAreRefusedWithTheReason) {
 }
 
 TEST(PollConversions, AnswerReachesTheZoneAsItWasGiven) {
-  PollReply reply;
+  protocol::PollReply reply;
   reply.poll = Id(1);
   reply.hazard = Id(2);
   reply.vehicle_id = "car-1";
   reply.drive_id = "drive-1";
   reply.stamp_ns = kStampNs;
-  reply.answer = PollReply::Answer::kCantSee;
+  reply.answer = protocol::PollReply::Answer::kCantSee;
   reply.reason = "too dark";
   reply.confidence = 0.25F;
   reply.vehicle_position = {40, -80};
   reply.course_rad = std::numeric_limits<double>::quiet_NaN();
   reply.image_format = "jpeg";
   reply.image = {1, 2, 3};
-  const PollAnswer answer = ToPollAnswer(ToMessage(reply));
+  const zone::PollAnswer answer = ToPollAnswer(ToMessage(reply));
   EXPECT_EQ(answer.poll, Id(1));
   EXPECT_EQ(answer.hazard, Id(2));
   EXPECT_EQ(answer.vehicle_id, "car-1");
-  EXPECT_EQ(answer.answer, PollAnswer::Answer::kCantSee);
+  EXPECT_EQ(answer.answer, zone::PollAnswer::Answer::kCantSee);
   EXPECT_EQ(answer.reason, "too dark");
   EXPECT_EQ(answer.confidence, 0.25);
   EXPECT_EQ(answer.vehicle_position.latitude_deg, 40);
@@ -291,7 +297,7 @@ TEST(PollConversions, AnswerReachesTheZoneAsItWasGiven) {
 }
 
 TEST(HazardConversions, VehiclePositionKeepsThatTheCourseIsUnknown) {
-  VehicleState vehicle;
+  zone::VehicleState vehicle;
   vehicle.drive_id = "drive-1";
   vehicle.position = {40, -80};
   vehicle.course_rad = std::numeric_limits<double>::quiet_NaN();
@@ -300,7 +306,7 @@ TEST(HazardConversions, VehiclePositionKeepsThatTheCourseIsUnknown) {
   const VehiclePosition message = ToMessage(vehicle, 1.5, 42);
   EXPECT_EQ(message.map_sequence, 42u);
   EXPECT_EQ(message.horizontal_sigma, 1.5F);
-  const VehicleState back = FromMessage(message);
+  const zone::VehicleState back = FromMessage(message);
   EXPECT_TRUE(std::isnan(back.course_rad));
   EXPECT_EQ(back.speed_mps, 0.25);
   EXPECT_EQ(back.stamp_ns, kStampNs);
@@ -317,10 +323,10 @@ TEST(HazardConversions, OtherSchemaVersionsAreRefused) {
 }
 
 TEST(HazardConversions, UnknownActionsAndStatesAreRefused) {
-  HazardNotice notice = ToMessage(Notice{});
+  HazardNotice notice = ToMessage(protocol::Notice{});
   notice.action = 4;
   EXPECT_THAT([&] { FromMessage(notice); }, ThrowsMessage<Error>(HasSubstr("action 4")));
-  ReportReceipt receipt = ToMessage(Receipt{});
+  ReportReceipt receipt = ToMessage(protocol::Receipt{});
   receipt.status = 9;
   EXPECT_THAT([&] { FromMessage(receipt); }, ThrowsMessage<Error>(HasSubstr("status 9")));
 }
@@ -339,7 +345,7 @@ TEST(HazardConversions, FixTakesTheHorizontalCovarianceAndTheReceiversWord) {
   message.status.status = sensor_msgs::NavSatStatus::STATUS_SBAS_FIX;
   message.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN;
   message.position_covariance = {{1, 2, 3, 4, 5, 6, 7, 8, 9}};
-  Fix fix = ToFix(message);
+  geo::Fix fix = ToFix(message);
   EXPECT_TRUE(fix.has_fix);
   EXPECT_EQ(fix.stamp_ns, kStampNs);
   EXPECT_EQ(*fix.covariance_m2, (Eigen::Matrix2d() << 1, 2, 4, 5).finished());
@@ -361,7 +367,7 @@ TEST(HazardConversions, DetectionsBecomeSightingsInTheirOrder) {
   message.detections[0].confidence = 0.75F;
   message.detections[0].x_max = 5;
   message.detections[1].class_name = "deer";
-  const SightingFrame frame = ToSightingFrame(message);
+  const placement::SightingFrame frame = ToSightingFrame(message);
   EXPECT_EQ(frame.stamp_ns, kStampNs);
   EXPECT_EQ(frame.frame_id, "camera");
   EXPECT_EQ(frame.image_width, 640u);
@@ -372,7 +378,7 @@ TEST(HazardConversions, DetectionsBecomeSightingsInTheirOrder) {
 }
 
 TEST(MapChangeConversions, ReportSurvivesTheWayThroughItsMessage) {
-  MapChangeReport report;
+  protocol::MapChangeReport report;
   report.uuid = Id(1);
   report.vehicle_id = "car-1";
   report.drive_id = "tuesday";
@@ -385,7 +391,7 @@ TEST(MapChangeConversions, ReportSurvivesTheWayThroughItsMessage) {
   report.missed = 1;
   report.position = {-12.5, 170.25};
   report.covariance_m2 << 1.5, 0.25, 0.25, 2.5;
-  const MapChangeReport back = FromMessage(ToMessage(report));
+  const protocol::MapChangeReport back = FromMessage(ToMessage(report));
   EXPECT_EQ(back.uuid, report.uuid);
   EXPECT_EQ(back.vehicle_id, report.vehicle_id);
   EXPECT_EQ(back.drive_id, report.drive_id);
@@ -402,7 +408,7 @@ TEST(MapChangeConversions, ReportSurvivesTheWayThroughItsMessage) {
 }
 
 TEST(MapChangeConversions, UnknownVersionsAndDirectionsAreRefused) {
-  MapChange message = ToMessage(MapChangeReport());
+  MapChange message = ToMessage(protocol::MapChangeReport());
   EXPECT_FALSE(FromMessage(message).vanished);
   message.direction = 0;
   EXPECT_THAT([&] { FromMessage(message); },
@@ -413,4 +419,4 @@ TEST(MapChangeConversions, UnknownVersionsAndDirectionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -8,7 +8,7 @@
 #include "common/time.h"
 #include "localization/planar.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 constexpr std::int64_t kBeginNs = 1'600'000'000'000'000'000;
@@ -25,19 +25,19 @@ nav_msgs::Odometry OdometryAt(double x_m, double y_m, double yaw_rad) {
 
 TEST(LocalizationConversions, WhatAReporterHearsIsWhatTheLocalizerKnows) {
   // Far from the datum and far north, where meridians converge.
-  const GeoPoint datum{69, 18};
-  LocalizerConfig config;
+  const geo::GeoPoint datum{69, 18};
+  localization::LocalizerConfig config;
   config.datum = datum;
   config.receiver.latency_s = config.receiver.latency_sigma_s = 0;
-  GeoLocalizer localizer(config);
-  const LocalFrame map(datum);
-  std::optional<FusedPose> fused;
-  OdometrySample sample;
+  localization::GeoLocalizer localizer(config);
+  const geo::LocalFrame map(datum);
+  std::optional<localization::FusedPose> fused;
+  localization::OdometrySample sample;
   for (int i = 0; i < 100; ++i) {
     sample.stamp_ns = kBeginNs + Nanoseconds(0.1 * i);
     sample.odom_from_base.translation().x() = i;
     localizer.AddOdometry(sample.stamp_ns, sample.odom_from_base);
-    PositionFix fix;
+    localization::PositionFix fix;
     fix.stamp_ns = sample.stamp_ns;
     fix.position = map.ToGeo(Eigen::Vector2d(40e3 + 0.6 * i, -1e3 + 0.8 * i));
     Eigen::Matrix2d covariance_m2;
@@ -46,11 +46,11 @@ TEST(LocalizationConversions, WhatAReporterHearsIsWhatTheLocalizerKnows) {
     localizer.AddFix(fix);
     fused = localizer.Fused(sample.stamp_ns);
   }
-  ASSERT_TRUE(fused && fused->state == LocalizerState::kOk);
+  ASSERT_TRUE(fused && fused->state == localization::LocalizerState::kOk);
   const auto message =
       ToFusedOdometry(*fused, *localizer.MapFromOdom(), sample, OdometryAt(99, 0, 0), "map");
-  const TrackPose heard = ToTrackPose(message, map);
-  EXPECT_LT(GeodesicDistanceM(heard.position, fused->position), 1e-4);
+  const geo::TrackPose heard = ToTrackPose(message, map);
+  EXPECT_LT(geo::GeodesicDistanceM(heard.position, fused->position), 1e-4);
   EXPECT_NEAR(std::remainder(heard.course_rad - fused->heading_rad, 2 * M_PI), 0, 1e-9);
   EXPECT_LT((heard.covariance_m2 - fused->covariance_m2).norm(), 1e-9);
   EXPECT_NEAR(heard.course_variance_rad2, fused->heading_variance_rad2, 1e-12);
@@ -85,17 +85,17 @@ TEST(LocalizationConversions, TheTwistsCovarianceGivesThatOfTheStep) {
 TEST(LocalizationConversions, WhatIsNoRotationIsNoPose) {
   nav_msgs::Odometry message = OdometryAt(1, 2, 0.3);
   message.pose.pose.orientation.w = std::numeric_limits<double>::quiet_NaN();
-  GeoLocalizer localizer({});
-  const OdometrySample sample = ToOdometrySample(message, std::nullopt);
+  localization::GeoLocalizer localizer({});
+  const localization::OdometrySample sample = ToOdometrySample(message, std::nullopt);
   EXPECT_EQ(localizer.AddOdometry(sample.stamp_ns, sample.odom_from_base),
-            OdometryTrack::Verdict::kInvalid);
+            localization::OdometryTrack::Verdict::kInvalid);
   message = OdometryAt(1, 2, 0.3);
   message.pose.pose.orientation = {};
-  const OdometrySample empty = ToOdometrySample(message, std::nullopt);
+  const localization::OdometrySample empty = ToOdometrySample(message, std::nullopt);
   // All zeros: Eigen makes the identity of it, which is what an unset orientation stands for.
   EXPECT_NE(localizer.AddOdometry(empty.stamp_ns, empty.odom_from_base),
-            OdometryTrack::Verdict::kInvalid);
+            localization::OdometryTrack::Verdict::kInvalid);
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::ros_io

@@ -7,14 +7,14 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::ros_io {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-OffloadedFrame Example() {
-  OffloadedFrame candidate;
+protocol::OffloadedFrame Example() {
+  protocol::OffloadedFrame candidate;
   candidate.vehicle_id = "car-1";
   candidate.drive_id = "drive-1";
   candidate.stamp_ns = 1'700'000'000'123'456'789;
@@ -37,11 +37,11 @@ OffloadedFrame Example() {
 }
 
 TEST(CandidateConversions, ACandidateSurvivesTheWayThroughItsMessage) {
-  const OffloadedFrame candidate = Example();
+  const protocol::OffloadedFrame candidate = Example();
   const CandidateFrame message = ToMessage(candidate);
   EXPECT_EQ(message.image.header.stamp, message.stamp) << "the image's stamp is the frame's";
   EXPECT_EQ(message.covariance[1], 0.25) << "row-major";
-  const OffloadedFrame back = FromMessage(message);
+  const protocol::OffloadedFrame back = FromMessage(message);
   EXPECT_EQ(back.vehicle_id, candidate.vehicle_id);
   EXPECT_EQ(back.drive_id, candidate.drive_id);
   EXPECT_EQ(back.stamp_ns, candidate.stamp_ns);
@@ -84,4 +84,4 @@ TEST(CandidateConversions, AMountingThatIsNoRotationIsRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::ros_io

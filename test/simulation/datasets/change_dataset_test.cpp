@@ -11,7 +11,7 @@
 #include "common/error.h"
 #include "datasets/text_parsing.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,7 +28,7 @@ class ChangeDataset : public ::testing::Test {
   ChangeDataset() {
     folder_ = fs::temp_directory_path() / ("livemap_change_" + std::to_string(getpid()));
     fs::remove_all(folder_);
-    camera_.intrinsics = CameraIntrinsics{10, 10, 7.5, 5.5, 16, 12};
+    camera_.intrinsics = geo::CameraIntrinsics{10, 10, 7.5, 5.5, 16, 12};
     first_.frame.bgr = cv::Mat(12, 16, CV_8UC3, cv::Scalar(10, 20, 30));
     second_.frame.bgr = cv::Mat(12, 16, CV_8UC3, cv::Scalar(40, 50, 60));
     first_.along_m = 12.25;
@@ -37,9 +37,9 @@ class ChangeDataset : public ::testing::Test {
         Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
     view_.mask = cv::Mat::zeros(12, 16, CV_8UC1);
     view_.direction = view_.mask.clone();
-    for (int i = 0; i < kChangeClasses; ++i) {
+    for (int i = 0; i < protocol::kChangeClasses; ++i) {
       view_.mask.at<std::uint8_t>(1, i) = static_cast<std::uint8_t>(i);
-      view_.direction.at<std::uint8_t>(1, i) = kVanishedPixel;
+      view_.direction.at<std::uint8_t>(1, i) = protocol::kVanishedPixel;
     }
     view_.pixels = {{kCone, 30}, {kCar, 3}};
   }
@@ -81,7 +81,7 @@ TEST_F(ChangeDataset, PairsAreReadBackFromThePublishedLayout) {
     EXPECT_EQ(cv::countNonZero(direction != view_.direction), 0);
     double greatest = 0;
     cv::minMaxLoc(mask, nullptr, &greatest);
-    EXPECT_LT(greatest, kChangeClasses);
+    EXPECT_LT(greatest, protocol::kChangeClasses);
     EXPECT_EQ(colours.at<cv::Vec3b>(5, 5), cv::Vec3b(255, 255, 255));
     EXPECT_EQ(colours.at<cv::Vec3b>(1, 9), cv::Vec3b(29, 230, 181)) << "vehicle, BGR";
   }
@@ -94,13 +94,13 @@ TEST_F(ChangeDataset, ListsClassesByIndexAndBothPosesOfEveryPair) {
   writer.Add(first_, second_, view_);
   writer.Finish(street_, {48, 9}, {});
   const std::vector<std::string> classes = Lines(folder_ / "classes.txt");
-  ASSERT_EQ(classes.size(), static_cast<std::size_t>(kChangeClasses));
+  ASSERT_EQ(classes.size(), static_cast<std::size_t>(protocol::kChangeClasses));
   EXPECT_EQ(classes[0], "no_change");
   EXPECT_EQ(classes[8], "traffic_cone");
   const std::vector<std::string> poses = Lines(folder_ / "poses.csv");
   ASSERT_EQ(poses.size(), 3U);
-  const std::vector<std::string> names = Split(poses[0], ',');
-  const std::vector<std::string> values = Split(poses[2], ',');
+  const std::vector<std::string> names = datasets::Split(poses[0], ',');
+  const std::vector<std::string> values = datasets::Split(poses[2], ',');
   ASSERT_EQ(names.size(), values.size());
   std::map<std::string, std::string> row;
   for (std::size_t i = 0; i < names.size(); ++i) row[names[i]] = values[i];
@@ -132,7 +132,7 @@ TEST_F(ChangeDataset, NamesEachChangeWhereItIsAndHowOftenItWasSeen) {
   EXPECT_EQ(car.at("change"), "vanished");
   EXPECT_EQ(car.at("frames_seen"), 0) << "three pixels are not seen";
   const Eigen::Vector3d place = street_.line().At(40, -3, 0);
-  const GeoPoint position = LocalFrame({48, 9}).ToGeo(place.head<2>());
+  const geo::GeoPoint position = geo::LocalFrame({48, 9}).ToGeo(place.head<2>());
   EXPECT_NEAR(features[0]["geometry"]["coordinates"][0].get<double>(), position.longitude_deg,
               1e-12);
   EXPECT_NEAR(features[0]["geometry"]["coordinates"][1].get<double>(), position.latitude_deg,
@@ -153,4 +153,4 @@ TEST_F(ChangeDataset, OverlayIsGreyButWhereSomethingChanged) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -11,7 +11,7 @@
 #include "datasets/labels.h"
 #include "datasets/sequences.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,7 +29,7 @@ class Dataset : public ::testing::Test {
     frame_.instances(kBox) = static_cast<int>(kCone);
     frame_.world_from_optical = Eigen::Translation3d(1, 2, 3) *
                                 Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized());
-    camera_.intrinsics = CameraIntrinsics{100, 100, 79.5, 59.5, 160, 120};
+    camera_.intrinsics = geo::CameraIntrinsics{100, 100, 79.5, 59.5, 160, 120};
   }
   ~Dataset() override { fs::remove_all(folder_); }
 
@@ -85,7 +85,7 @@ TEST_F(Dataset, TumFolderIsReadBackByTheReaderOfDrives) {
   writer.Add(0, frame_);
   writer.Add(0.1, frame_);
   writer.Finish();
-  const Sequence sequence = ReadTumSequence(folder_.string());
+  const datasets::Sequence sequence = datasets::ReadTumSequence(folder_.string());
   ASSERT_EQ(sequence.frames.size(), 2U);
   ASSERT_EQ(sequence.poses.size(), 2U);
   EXPECT_EQ(sequence.depth_scale, 5000);
@@ -108,19 +108,19 @@ TEST_F(Dataset, TumFolderOfTwoEyesIsReadBackWithItsBaseline) {
   writer.Add(0, frame_, frame_.bgr);
   writer.Add(0.1, frame_, frame_.bgr);
   writer.Finish();
-  const Sequence sequence = ReadTumSequence(folder_.string());
+  const datasets::Sequence sequence = datasets::ReadTumSequence(folder_.string());
   EXPECT_EQ(sequence.baseline_m, 0.35);
   ASSERT_EQ(sequence.frames.size(), 2U);
   EXPECT_EQ(sequence.frames[1].right_path, (folder_ / "rgb_right" / "0.100000.png").string());
   fs::remove(folder_ / "rgb_right" / "0.100000.png");
-  EXPECT_THROW(ReadTumSequence(folder_.string()), Error) << "a listed picture is missing";
+  EXPECT_THROW(datasets::ReadTumSequence(folder_.string()), Error) << "a listed picture is missing";
 }
 
 TEST_F(Dataset, CoarserTumDepthReachesFurther) {
   TumWriter writer(folder_.string(), camera_, 1000);
   writer.Add(0, frame_);
   writer.Finish();
-  const Sequence sequence = ReadTumSequence(folder_.string());
+  const datasets::Sequence sequence = datasets::ReadTumSequence(folder_.string());
   EXPECT_EQ(sequence.depth_scale, 1000);
   const cv::Mat depth = cv::imread(sequence.frames[0].depth_path, cv::IMREAD_UNCHANGED);
   EXPECT_EQ(depth.at<std::uint16_t>(60, 60), 4500);
@@ -131,8 +131,8 @@ TEST_F(Dataset, YoloFolderHasFractionsOfTheImage) {
   YoloWriter writer(folder_.string());
   writer.Add(12.5, frame_, FindHazards(frame_.instances, frame_.outlines));
   writer.Finish();
-  const std::vector<LabelledBox> boxes =
-      ParseYoloLabels(ReadFile((folder_ / "labels" / "000000.txt").string(), 1000), "000000.txt");
+  const std::vector<datasets::LabelledBox> boxes = datasets::ParseYoloLabels(
+      ReadFile((folder_ / "labels" / "000000.txt").string(), 1000), "000000.txt");
   ASSERT_EQ(boxes.size(), 1U);
   EXPECT_EQ(boxes[0].class_index, 1);
   EXPECT_NEAR(boxes[0].centre_x, 46.0 / 160, 1e-6);
@@ -170,4 +170,4 @@ TEST_F(Dataset, HazardsAreNamedWhenTheyWereSeenAndMarkedWhenTheyWerePassed) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

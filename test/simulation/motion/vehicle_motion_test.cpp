@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 WorldDescription StraightWithCrossings(const std::vector<double>& crossings_m) {
@@ -144,4 +144,4 @@ TEST(VehicleMotion, AnyTimeMayBeAskedInAnyOrder) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

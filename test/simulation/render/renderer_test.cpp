@@ -11,18 +11,18 @@
 #include "simulation/motion/vehicle_motion.h"
 #include "test/simulation/render/same_pixels.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 SimulatedCamera StreetCamera() {
   SimulatedCamera camera;
-  camera.intrinsics = CameraIntrinsics{160, 160, 119.5, 79.5, 240, 160};
+  camera.intrinsics = geo::CameraIntrinsics{160, 160, 119.5, 79.5, 240, 160};
   return camera;
 }
 
 CameraExposure ViewAt(const Street& street, double time_s) {
   const VehicleMotion motion(street, DrivingStyle(), 20);
-  CameraMounting mounting;
+  datasets::CameraMounting mounting;
   mounting.height_m = 1.4;
   mounting.pitch_deg = 4;
   CameraExposure view;
@@ -241,4 +241,4 @@ TEST(Camera, NoiseGrowsWithLight) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 
-namespace livemap {
+namespace livemap::simulation {
 
 /// Whether two images have the same size, type and bytes.
 inline bool SamePixels(const cv::Mat& a, const cv::Mat& b) {
@@ -11,4 +11,4 @@ inline bool SamePixels(const cv::Mat& a, const cv::Mat& b) {
          std::equal(a.datastart, a.dataend, b.datastart);
 }
 
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
-constexpr CameraIntrinsics kCamera{500, 500, 159.5, 119.5, 320, 240};
+constexpr geo::CameraIntrinsics kCamera{500, 500, 159.5, 119.5, 320, 240};
 
 /// Mean and standard deviation over the right half of a plane.
 std::pair<double, double> Spread(DepthSensor sensor, double metres) {
@@ -53,4 +53,4 @@ TEST(DepthSensor, ExactDepthStaysAsItIs) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

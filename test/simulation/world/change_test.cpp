@@ -10,7 +10,7 @@
 #include "simulation/motion/pass_drive.h"
 #include "test/simulation/render/same_pixels.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kPassLengthM = 500;
@@ -18,12 +18,12 @@ constexpr double kShare = 0.5;
 
 SimulatedCamera PassCamera() {
   SimulatedCamera camera;
-  camera.intrinsics = CameraIntrinsics{160, 160, 99.5, 59.5, 200, 120};
+  camera.intrinsics = geo::CameraIntrinsics{160, 160, 99.5, 59.5, 200, 120};
   return camera;
 }
 
-CameraMounting Mounting() {
-  CameraMounting mounting;
+datasets::CameraMounting Mounting() {
+  datasets::CameraMounting mounting;
   mounting.height_m = 1.4;
   mounting.pitch_deg = 3;
   return mounting;
@@ -37,17 +37,17 @@ CameraExposure ViewOfFrame(const Street& street, std::size_t frame) {
   return PassDrive(street, DrawSecondManner(3, 8, 0.5, 20), Mounting(), 0).Camera(frame);
 }
 
-TEST(ChangeClass, KnowsEveryObjectThatMayChangeAndNoOther) {
-  std::set<ChangeClass> used;
+TEST(protocol::ChangeClass, KnowsEveryObjectThatMayChangeAndNoOther) {
+  std::set<protocol::ChangeClass> used;
   for (int i = 0; i < kObjectClasses; ++i) used.insert(ChangeClassOf(static_cast<ObjectClass>(i)));
-  EXPECT_EQ(used.size(), static_cast<std::size_t>(kChangeClasses));
+  EXPECT_EQ(used.size(), static_cast<std::size_t>(protocol::kChangeClasses));
   for (const ObjectClass fixed : {ObjectClass::kSky, ObjectClass::kRoad, ObjectClass::kPothole,
                                   ObjectClass::kBuilding, ObjectClass::kTree, ObjectClass::kPole}) {
-    EXPECT_EQ(ChangeClassOf(fixed), ChangeClass::kNoChange) << ClassName(fixed);
+    EXPECT_EQ(ChangeClassOf(fixed), protocol::ChangeClass::kNoChange) << ClassName(fixed);
   }
-  EXPECT_EQ(ChangeClassOf(ObjectClass::kCycle), ChangeClass::kPersonCycle);
-  EXPECT_EQ(ChangeClassOf(ObjectClass::kStoppedAccident), ChangeClass::kVehicle);
-  EXPECT_STREQ(ChangeClassName(ChangeClass::kVehicle), "vehicle");
+  EXPECT_EQ(ChangeClassOf(ObjectClass::kCycle), protocol::ChangeClass::kPersonCycle);
+  EXPECT_EQ(ChangeClassOf(ObjectClass::kStoppedAccident), protocol::ChangeClass::kVehicle);
+  EXPECT_STREQ(protocol::ChangeClassName(protocol::ChangeClass::kVehicle), "vehicle");
 }
 
 TEST(StreetPass, ChangesItsShareAndALargerShareTheSameObjectsAndMore) {
@@ -111,7 +111,7 @@ TEST(TwoPasses, DifferInEveryListedObjectAndInNothingElse) {
   const Street second = MakeStreet(StreetPass::Which::kSecond, true);
   std::size_t appeared_count = 0;
   std::size_t vanished_count = 0;
-  std::set<ChangeClass> classes;
+  std::set<protocol::ChangeClass> classes;
   for (int index = 0; index < 8; ++index) {
     const StreetBlock before = first.Build(index);
     const StreetBlock after = second.Build(index);
@@ -143,7 +143,7 @@ TEST(TwoPasses, DifferInEveryListedObjectAndInNothingElse) {
   EXPECT_GT(appeared_count, 20U);
   EXPECT_GT(vanished_count, 20U);
   EXPECT_GE(classes.size(), 7U);
-  EXPECT_EQ(classes.count(ChangeClass::kNoChange), 0U);
+  EXPECT_EQ(classes.count(protocol::ChangeClass::kNoChange), 0U);
 }
 
 TEST(TwoPasses, KeepPlacesAndInstancesOfWhatStaysInAnySeason) {
@@ -193,18 +193,20 @@ TEST(CompareInstances, PaintsTheAppearedObjectElseTheVanishedOneAndNothingUnlist
   changed[car] = {car, false, 0, 0};
   const ChangeView view = CompareInstances(image({road, car, car, car, road, cone}),
                                            image({cone, cone, road, tree, tree, cone}), changed);
-  const std::vector<ChangeClass> expected = {ChangeClass::kTrafficCone, ChangeClass::kTrafficCone,
-                                             ChangeClass::kVehicle,     ChangeClass::kVehicle,
-                                             ChangeClass::kNoChange,    ChangeClass::kNoChange};
+  const std::vector<protocol::ChangeClass> expected = {
+      protocol::ChangeClass::kTrafficCone, protocol::ChangeClass::kTrafficCone,
+      protocol::ChangeClass::kVehicle,     protocol::ChangeClass::kVehicle,
+      protocol::ChangeClass::kNoChange,    protocol::ChangeClass::kNoChange};
   for (int i = 0; i < 6; ++i) {
-    EXPECT_EQ(static_cast<ChangeClass>(view.mask.at<std::uint8_t>(0, i)),
+    EXPECT_EQ(static_cast<protocol::ChangeClass>(view.mask.at<std::uint8_t>(0, i)),
               expected[static_cast<std::size_t>(i)])
         << i;
   }
   const std::vector<int> directions(view.direction.begin<std::uint8_t>(),
                                     view.direction.end<std::uint8_t>());
-  EXPECT_EQ(directions, (std::vector<int>{kAppearedPixel, kAppearedPixel, kVanishedPixel,
-                                          kVanishedPixel, 0, 0}));
+  EXPECT_EQ(directions,
+            (std::vector<int>{protocol::kAppearedPixel, protocol::kAppearedPixel,
+                              protocol::kVanishedPixel, protocol::kVanishedPixel, 0, 0}));
   EXPECT_EQ(view.pixels, (std::map<std::uint32_t, int>{{cone, 2}, {car, 2}}));
 }
 
@@ -227,7 +229,7 @@ TEST(ChangeTruth, MasksAreTheDifferenceOfTheRenderedInstances) {
       for (int column = 0; column < mask.cols; ++column) {
         const auto old_id = static_cast<std::uint32_t>(was.at<int>(row, column));
         const auto new_id = static_cast<std::uint32_t>(is.at<int>(row, column));
-        ChangeClass expected = ChangeClass::kNoChange;
+        protocol::ChangeClass expected = protocol::ChangeClass::kNoChange;
         // The worlds are equal but for what the list names, so that a difference is a change.
         if (old_id != new_id) {
           const auto gone = truth.changes().find(old_id);
@@ -236,7 +238,7 @@ TEST(ChangeTruth, MasksAreTheDifferenceOfTheRenderedInstances) {
           expected =
               ChangeClassOf(ClassOfInstance(come != truth.changes().end() ? new_id : old_id));
         }
-        ASSERT_EQ(static_cast<ChangeClass>(mask.at<std::uint8_t>(row, column)), expected)
+        ASSERT_EQ(static_cast<protocol::ChangeClass>(mask.at<std::uint8_t>(row, column)), expected)
             << row << " " << column;
         classes.insert(static_cast<int>(expected));
       }
@@ -323,4 +325,4 @@ TEST(PassDrive, FindsTheNearestPicture) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 
 #include "test/simulation/render/same_pixels.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 SimulatedCamera RoomCamera() {
@@ -61,4 +61,4 @@ TEST(SimulatedRoom, ACalmHandMovesGently) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

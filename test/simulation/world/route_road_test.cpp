@@ -8,19 +8,19 @@
 #include "common/error.h"
 #include "simulation/world/road_line.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr GeoPoint kStart{48.1, 11.5};
+constexpr geo::GeoPoint kStart{48.1, 11.5};
 
 /// Points of a line in the plane of its start, metres east and north.
-std::vector<GeoPoint> Line(const std::vector<Eigen::Vector2d>& places) {
-  const LocalFrame frame(kStart);
-  std::vector<GeoPoint> points;
+std::vector<geo::GeoPoint> Line(const std::vector<Eigen::Vector2d>& places) {
+  const geo::LocalFrame frame(kStart);
+  std::vector<geo::GeoPoint> points;
   for (const Eigen::Vector2d& place : places) points.push_back(frame.ToGeo(place));
   return points;
 }
@@ -109,7 +109,7 @@ TEST(RouteRoad, RepeatedPointsDoNotCount) {
 }
 
 TEST(RouteRoad, CornerWithoutRoomIsRefusedByItsVertex) {
-  const std::vector<GeoPoint> points = Line({{0, 0}, {200, 0}, {250, 0.001}, {250, 50}});
+  const std::vector<geo::GeoPoint> points = Line({{0, 0}, {200, 0}, {250, 0.001}, {250, 50}});
   EXPECT_THAT([&] { LayRoad(points, "sharp.geojson"); },
               ThrowsMessage<Error>(AllOf(HasSubstr("'sharp.geojson', vertex 3 (48.1"),
                                          HasSubstr("90.0 degrees"), HasSubstr("48.0 m radius"),
@@ -141,4 +141,4 @@ TEST(RouteRoad, RefusesTurningBackFarPointsAndASinglePlace) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

@@ -6,7 +6,7 @@
 
 #include "simulation/render/scene.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 WorldDescription HousesOnly() {
@@ -44,7 +44,7 @@ TEST(Skyline, AgreesOnTheWholeWithWhatRaysAcrossTheStreetMeet) {
     const Vec3 eye = (place - scene.origin()).cast<float>();
     seen_left += SeenElevation(scene, eye, 1);
     seen_right += SeenElevation(scene, eye, -1);
-    const SkyVisibility sky = SkyOver(street, along, left_m);
+    const datasets::SkyVisibility sky = SkyOver(street, along, left_m);
     stated_left += sky.left_rad;
     stated_right += sky.right_rad;
   }
@@ -94,13 +94,13 @@ TEST(Skyline, MultipathIsLargerBetweenHousesThanInAPark) {
   WorldDescription world = HousesOnly();
   world.crossings_m.emplace();
   const Street street(world, 3, 20000, true);
-  Multipath multipath(2, 7);
+  datasets::Multipath multipath(2, 7);
   double between_houses = 0;
   double in_park = 0;
   int houses = 0;
   int parks = 0;
   for (double along = 0; along < 20000; along += 5) {
-    const SkyVisibility sky = SkyOver(street, along, street.lane_left_m());
+    const datasets::SkyVisibility sky = SkyOver(street, along, street.lane_left_m());
     const double squared = multipath.ErrorAt(along / 8, along, 0, sky).squaredNorm();
     if (sky.HiddenShare() > 0.4) between_houses += squared, ++houses;
     if (sky.HiddenShare() < 0.05) in_park += squared, ++parks;
@@ -112,4 +112,4 @@ TEST(Skyline, MultipathIsLargerBetweenHousesThanInAPark) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

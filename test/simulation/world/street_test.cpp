@@ -6,7 +6,7 @@
 
 #include "simulation/objects/random.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 constexpr double kStreetLengthM = 400;
@@ -120,4 +120,4 @@ TEST(Street, PlacesTheHazardsOfItsFileAndNoOthers) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

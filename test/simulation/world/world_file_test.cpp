@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::simulation {
 namespace {
 
 std::string Refusal(const std::string& yaml) {
@@ -96,4 +96,4 @@ TEST(WorldFile, LeavesTheRoadsLineToARoute) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::simulation

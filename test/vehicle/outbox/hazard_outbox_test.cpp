@@ -7,7 +7,7 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::Contains;
@@ -35,8 +35,8 @@ TEST_F(HazardReporterTest, ReportIsSentAgainUntilTheReceiptAlsoAfterARestart) {
   EXPECT_EQ(counters().reports_sent, 0u) << "it was sent before";
   EXPECT_EQ(counters().resends, 1u);
 
-  Receipt receipt;
-  receipt.status = Receipt::Status::kCommitted;
+  protocol::Receipt receipt;
+  receipt.status = protocol::Receipt::Status::kCommitted;
   receipt.report_uuid = first[0].uuid;
   receipt.hazard_uuid.bytes[0] = 9;
   reporter_->AddReceipt(receipt);
@@ -52,29 +52,29 @@ TEST_F(HazardReporterTest, ReportIsSentAgainUntilTheReceiptAlsoAfterARestart) {
 TEST_F(HazardReporterTest, ReceiptForAnotherReportEndsNothing) {
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
-  Receipt receipt;
-  receipt.status = Receipt::Status::kRefused;
+  protocol::Receipt receipt;
+  receipt.status = protocol::Receipt::Status::kRefused;
   receipt.report_uuid.bytes[3] = 77;
   reporter_->AddReceipt(receipt);
   EXPECT_EQ(counters().refused, 0u);
   EXPECT_EQ(reporter_->map().pending_count(), 1u);
 }
 
-Report ReportOf(int number, const std::string& class_name) {
-  Report report;
+protocol::Report ReportOf(int number, const std::string& class_name) {
+  protocol::Report report;
   report.uuid.bytes[0] = 1;
   report.uuid.bytes[15] = static_cast<std::uint8_t>(number);
   report.stamp_ns = kEpochNs + number * 1'000'000'000LL;
   report.class_name = class_name;
   report.confidence = 0.5F;
   report.box = {1, 2, 3, 4};
-  report.position = GeodesicDestination(kStart, 0, 100.0 * number);
+  report.position = geo::GeodesicDestination(kStart, 0, 100.0 * number);
   report.covariance_m2 = Eigen::Matrix2d::Identity();
   return report;
 }
 
 TEST_F(HazardReporterTest, AfterARestartUrgentReportsGoFirstAndThenTheOldest) {
-  const auto catalogue = HazardCatalogue::Parse(
+  const auto catalogue = protocol::HazardCatalogue::Parse(
       "classes:\n  deer: {urgency: 1}\n  cone: {urgency: 2}\n  pothole: {urgency: 3}\n", "test");
   const std::vector<std::pair<int, std::string>> stored = {
       {1, "pothole"}, {5, "cone"}, {4, "deer"}, {2, "pothole"}, {3, "cone"}, {6, "deer"}};
@@ -97,7 +97,7 @@ TEST_F(HazardReporterTest, AfterARestartUrgentReportsGoFirstAndThenTheOldest) {
 class HeldReportTest : public HazardReporterTest {
  protected:
   HeldReportTest() {
-    catalogue_ = HazardCatalogue::Parse(
+    catalogue_ = protocol::HazardCatalogue::Parse(
         "classes:\n  deer: {urgency: 1}\n  cone: {urgency: 2}\n  pothole: {urgency: 3}\n", "test");
     Restart();
     reporter_->SetLink(LinkCost::kMetered);
@@ -105,7 +105,7 @@ class HeldReportTest : public HazardReporterTest {
   }
   std::vector<std::string> Sent() {
     std::vector<std::string> classes;
-    for (const Report& report : TakeDue()) classes.push_back(report.class_name);
+    for (const protocol::Report& report : TakeDue()) classes.push_back(report.class_name);
     return classes;
   }
 };
@@ -120,7 +120,7 @@ TEST_F(HeldReportTest, OnADearLinkOnlyUrgentReportsGoAtOnceOthersAtTheirLimit) {
   EXPECT_THAT(Sent(), UnorderedElementsAre("deer", "cone"));
   EXPECT_EQ(reporter_->HeldReports(steady_s_), 1u);
   steady_s_ += config_.hold_s[2] - config_.hold_s[1];
-  EXPECT_THAT(Sent(), Contains("pothole"));
+  EXPECT_THAT(Sent(), imaging::Contains("pothole"));
 }
 
 TEST_F(HeldReportTest, ACheapLinkLetsAllGoUrgentFirst) {
@@ -180,12 +180,12 @@ TEST_F(HeldReportTest, AClockThatWasSetBackHoldsItNoLongerThanFromTheStart) {
 TEST_F(HazardReporterTest, AHazardThatTheZoneNeverAnnouncedIsReportedAnewAfterItsClasssLife) {
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
-  Receipt receipt;
-  receipt.status = Receipt::Status::kCommitted;
+  protocol::Receipt receipt;
+  receipt.status = protocol::Receipt::Status::kCommitted;
   receipt.report_uuid = TakeDue().at(0).uuid;
   receipt.hazard_uuid.bytes[0] = 9;
   reporter_->AddReceipt(receipt);
-  const double life_s = HazardCatalogue().Get("pothole").expected_life_s;
+  const double life_s = protocol::HazardCatalogue().Get("pothole").expected_life_s;
   const double now_s = static_cast<double>(kEpochNs) * 1e-9;
   reporter_->Process(now_s + life_s - 60, steady_s_);
   EXPECT_EQ(reporter_->map().known_count(), 1u);
@@ -195,4 +195,4 @@ TEST_F(HazardReporterTest, AHazardThatTheZoneNeverAnnouncedIsReportedAnewAfterIt
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -11,7 +11,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::ElementsAre;
@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-MapChangeReport SignGone(int number) {
-  MapChangeReport report;
+protocol::MapChangeReport SignGone(int number) {
+  protocol::MapChangeReport report;
   report.uuid.bytes[0] = 4;
   report.uuid.bytes[15] = static_cast<std::uint8_t>(number);
   report.drive_id = "tuesday";
@@ -36,9 +36,9 @@ MapChangeReport SignGone(int number) {
   return report;
 }
 
-Receipt Committed(const MapChangeReport& report) {
-  Receipt receipt;
-  receipt.status = Receipt::Status::kCommitted;
+protocol::Receipt Committed(const protocol::MapChangeReport& report) {
+  protocol::Receipt receipt;
+  receipt.status = protocol::Receipt::Status::kCommitted;
   receipt.report_uuid = report.uuid;
   return receipt;
 }
@@ -65,7 +65,7 @@ class MapChangeOutboxTest : public ::testing::Test {
 };
 
 TEST_F(MapChangeOutboxTest, SendsAReportUntilTheZoneAnswersAlsoAfterARestart) {
-  const MapChangeReport sign = SignGone(1);
+  const protocol::MapChangeReport sign = SignGone(1);
   outbox_->Add(sign, 0);
   EXPECT_THAT(outbox_->TakeDue(0, 10), SizeIs(1));
   EXPECT_THAT(outbox_->TakeDue(0.5, 10), IsEmpty());
@@ -114,20 +114,20 @@ TEST_F(MapChangeOutboxTest, WhenFullTheOldestGoesAndIsCounted) {
 
 TEST_F(MapChangeOutboxTest, ReportsThatNoZoneAcceptsAreRefused) {
   const auto refused = [&](const auto& spoil) {
-    MapChangeReport report = SignGone(1);
+    protocol::MapChangeReport report = SignGone(1);
     spoil(report);
     EXPECT_THROW(outbox_->Add(report, 0), Error);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  refused([](MapChangeReport& r) { r.uuid = Uuid(); });
-  refused([](MapChangeReport& r) { r.drive_id = ""; });
-  refused([](MapChangeReport& r) { r.class_name = std::string(65, 'a'); });
-  refused([](MapChangeReport& r) { r.stamp_ns = -1; });
-  refused([](MapChangeReport& r) { r.confidence = 1.5F; });
-  refused([](MapChangeReport& r) { r.seen = 1; });
-  refused([&](MapChangeReport& r) { r.position.latitude_deg = nan; });
-  refused([&](MapChangeReport& r) { r.covariance_m2(0, 1) = nan; });
-  refused([](MapChangeReport& r) { r.covariance_m2(0, 0) = -1; });
+  refused([](protocol::MapChangeReport& r) { r.uuid = Uuid(); });
+  refused([](protocol::MapChangeReport& r) { r.drive_id = ""; });
+  refused([](protocol::MapChangeReport& r) { r.class_name = std::string(65, 'a'); });
+  refused([](protocol::MapChangeReport& r) { r.stamp_ns = -1; });
+  refused([](protocol::MapChangeReport& r) { r.confidence = 1.5F; });
+  refused([](protocol::MapChangeReport& r) { r.seen = 1; });
+  refused([&](protocol::MapChangeReport& r) { r.position.latitude_deg = nan; });
+  refused([&](protocol::MapChangeReport& r) { r.covariance_m2(0, 1) = nan; });
+  refused([](protocol::MapChangeReport& r) { r.covariance_m2(0, 0) = -1; });
   EXPECT_EQ(outbox_->pending(), 0U);
 }
 
@@ -153,4 +153,4 @@ TEST_F(MapChangeOutboxTest, ACorruptFileIsSetAsideAndUnsoundRowsAreNeverSent) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

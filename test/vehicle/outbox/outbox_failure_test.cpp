@@ -18,7 +18,7 @@
 #include "test/vehicle/reporting/known_reports.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using AddResult = LocalHazardMap::AddResult;
@@ -28,11 +28,11 @@ constexpr char kNoMounts[] = "no mounts";
 LocalHazardMap OpenStore(const std::string& path) {
   LocalHazardMap::Config config;
   config.path = path;
-  return LocalHazardMap(config, HazardCatalogue(), kNowNs);
+  return LocalHazardMap(config, protocol::HazardCatalogue(), kNowNs);
 }
 
-Report LargeReport(int number) {
-  Report report = MakeReport(number, East(10.0 * number));
+protocol::Report LargeReport(int number) {
+  protocol::Report report = MakeReport(number, East(10.0 * number));
   report.image.assign(20000, static_cast<std::uint8_t>(number));
   return report;
 }
@@ -82,9 +82,9 @@ std::string FillAndRecover(const std::string& path, const std::function<void()>&
 }
 
 TEST(OutboxFailure, AFullFileSystemRefusesNewReportsAndHarmsNoneThatItTook) {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   const std::string& path = directory.path();
-  const std::string fault = RunInChild([&path]() -> std::string {
+  const std::string fault = test::RunInChild([&path]() -> std::string {
     const bool own_mounts = unshare(CLONE_NEWNS) == 0 || unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0;
     if (!own_mounts || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
         mount("tmpfs", path.c_str(), "tmpfs", 0, "size=1m") != 0) {
@@ -99,9 +99,9 @@ TEST(OutboxFailure, AFullFileSystemRefusesNewReportsAndHarmsNoneThatItTook) {
 }
 
 TEST(OutboxFailure, AFileThatMayNotGrowRefusesNewReportsAndHarmsNoneThatItTook) {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   const std::string& path = directory.path();
-  EXPECT_EQ("", RunInChild([&path]() -> std::string {
+  EXPECT_EQ("", test::RunInChild([&path]() -> std::string {
               signal(SIGXFSZ, SIG_IGN);
               rlimit limit{};
               getrlimit(RLIMIT_FSIZE, &limit);
@@ -116,7 +116,7 @@ TEST(OutboxFailure, AFileThatMayNotGrowRefusesNewReportsAndHarmsNoneThatItTook) 
 }
 
 TEST(OutboxFailure, AReadOnlyFolderIsRefusedAtStartAndLeftAsItIs) {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   const std::string folder = directory.path() + "/folder";
   const std::string path = folder + "/local.sqlite3";
   std::filesystem::create_directory(folder);
@@ -127,7 +127,7 @@ TEST(OutboxFailure, AReadOnlyFolderIsRefusedAtStartAndLeftAsItIs) {
   const auto size = std::filesystem::file_size(path);
   chmod(directory.path().c_str(), 0755);
   chmod(folder.c_str(), 0555);
-  const std::string sentence = RunInChild([&path]() -> std::string {
+  const std::string sentence = test::RunInChild([&path]() -> std::string {
     constexpr uid_t kNobody = 65534;
     if (geteuid() == 0 && seteuid(kNobody) != 0) return "cannot become another user";
     try {
@@ -145,17 +145,17 @@ TEST(OutboxFailure, AReadOnlyFolderIsRefusedAtStartAndLeftAsItIs) {
 }
 
 TEST(OutboxFailure, BytesOfUnfinishedReportsAreBoundedAndThoseTakenStay) {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   LocalHazardMap::Config config;
   config.path = directory.path() + "/local.sqlite3";
   config.max_pending_bytes = 3 * 21100;
-  LocalHazardMap map(config, HazardCatalogue(), kNowNs);
+  LocalHazardMap map(config, protocol::HazardCatalogue(), kNowNs);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(map.Add(LargeReport(i)), AddResult::kAdded);
   EXPECT_EQ(map.Add(LargeReport(3)), AddResult::kFull);
   EXPECT_EQ(map.pending_bytes(), 3 * (20000 + LocalHazardMap::kReportBytes));
   EXPECT_EQ(WhatIsMissing(map, 3), "");
-  Receipt receipt;
-  receipt.status = Receipt::Status::kCommitted;
+  protocol::Receipt receipt;
+  receipt.status = protocol::Receipt::Status::kCommitted;
   receipt.report_uuid = Id(1);
   receipt.hazard_uuid = Id(500);
   map.Apply(receipt);
@@ -164,24 +164,24 @@ TEST(OutboxFailure, BytesOfUnfinishedReportsAreBoundedAndThoseTakenStay) {
 
 struct Damage {
   const char* name;
-  double from_share;       ///< Of the file.
-  std::size_t bytes;       ///< Overwritten; 0: the file ends there.
+  double from_share;     ///< Of the file.
+  std::size_t bytes;     ///< Overwritten; 0: the file ends there.
   std::size_t min_left;  ///< Reports of 200 that must come back.
-  bool older = false;      ///< The file is of an older LiveMap.
+  bool older = false;    ///< The file is of an older LiveMap.
 };
 
 class DamagedOutbox : public ::testing::TestWithParam<Damage> {};
 
 TEST_P(DamagedOutbox, StartsAnewWithTheReportsThatCanStillBeRead) {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   const std::string path = directory.path() + "/local.sqlite3";
-  const Picture grey{cv::Mat(120, 160, CV_8UC3, cv::Scalar(90, 120, 90)), nullptr};
-  const auto jpeg = EncodeJpeg(grey, 80, 100000);
-  std::map<Uuid, GeoPoint> places;
+  const imaging::Picture grey{cv::Mat(120, 160, CV_8UC3, cv::Scalar(90, 120, 90)), nullptr};
+  const auto jpeg = imaging::EncodeJpeg(grey, 80, 100000);
+  std::map<Uuid, geo::GeoPoint> places;
   {
     LocalHazardMap map = OpenStore(path);
     for (int i = 0; i < 200; ++i) {
-      Report report = MakeReport(i, East(10.0 * i));
+      protocol::Report report = MakeReport(i, East(10.0 * i));
       report.image = jpeg;
       places[report.uuid] = report.position;
       ASSERT_EQ(map.Add(report), AddResult::kAdded);
@@ -230,4 +230,4 @@ INSTANTIATE_TEST_SUITE_P(Places, DamagedOutbox,
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -4,7 +4,7 @@
 
 #include "test/vehicle/reporting/known_reports.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::ElementsAre;
@@ -123,4 +123,4 @@ TEST(ResendSchedule, AHeldReportWaitsForACheapLinkOrTheEndOfItsTime) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

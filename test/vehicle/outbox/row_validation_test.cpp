@@ -6,7 +6,7 @@
 #include "test/vehicle/reporting/known_reports.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 class BrokenRowsTest : public testing::Test {
@@ -21,7 +21,9 @@ class BrokenRowsTest : public testing::Test {
   }
   ~BrokenRowsTest() override { std::filesystem::remove_all(directory_); }
 
-  LocalHazardMap Open() const { return LocalHazardMap(config_, HazardCatalogue(), kNowNs); }
+  LocalHazardMap Open() const {
+    return LocalHazardMap(config_, protocol::HazardCatalogue(), kNowNs);
+  }
   void Write(const std::string& sql) const {
     SqliteDatabase(config_.path, true).Execute("PRAGMA foreign_keys=OFF;" + sql);
   }
@@ -35,8 +37,8 @@ class BrokenRowsTest : public testing::Test {
     std::snprintf(text, sizeof text, "X'%02X000000000000000000000000000000'", number);
     return text;
   }
-  static Report MakeReport(std::uint8_t number) {
-    Report report;
+  static protocol::Report MakeReport(std::uint8_t number) {
+    protocol::Report report;
     report.uuid = MakeUuid(number);
     report.stamp_ns = kNowNs;
     report.class_name = "cone";
@@ -47,8 +49,8 @@ class BrokenRowsTest : public testing::Test {
     report.image_width = report.image_height = 10;
     return report;
   }
-  static Notice MakeNotice(std::uint8_t number) {
-    Notice notice;
+  static protocol::Notice MakeNotice(std::uint8_t number) {
+    protocol::Notice notice;
     notice.sequence = number;
     notice.previous_sequence = number == 11 ? 0 : number - 1U;
     notice.hazard_uuid = MakeUuid(number);
@@ -121,7 +123,7 @@ TEST_F(BrokenRowsTest, AReportWithoutAUuidKeepsNothingFromBeingForgotten) {
   config_.max_known = 3;
   LocalHazardMap map = Open();
   EXPECT_EQ(map.broken_rows().reports, 1U);
-  Notice notice = MakeNotice(13);
+  protocol::Notice notice = MakeNotice(13);
   notice.stamp_ns = kNowNs;
   map.Apply({notice});
   EXPECT_EQ(map.known_count(), 3U);
@@ -140,4 +142,4 @@ TEST_F(BrokenRowsTest, AnImpossibleSequenceMeansThatNothingIsKnown) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -8,17 +8,17 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-using PollAnswer = PollReply::Answer;
+using PollAnswer = protocol::PollReply::Answer;
 
 /// base_link at a moment of the straight drive, known to 0.2 m and 0.01 rad.
-TrackPose BaseAt(double seconds) {
-  TrackPose pose;
+geo::TrackPose BaseAt(double seconds) {
+  geo::TrackPose pose;
   pose.position = VehicleAt(seconds);
   pose.covariance_m2 = 0.04 * Eigen::Matrix2d::Identity();
   pose.course_rad = kBearingRad;
@@ -27,7 +27,7 @@ TrackPose BaseAt(double seconds) {
   return pose;
 }
 
-Picture Lit(double luminance) {
+imaging::Picture Lit(double luminance) {
   return {cv::Mat(400, 640, CV_8UC3, cv::Scalar::all(luminance)), nullptr};
 }
 
@@ -37,7 +37,7 @@ class PollResponderTest : public ::testing::Test {
   static constexpr double kAheadM = 60;
   static constexpr double kRightM = 1.5;
 
-  PollResponderTest() : responder_(Configured(), HazardCatalogue()) {
+  PollResponderTest() : responder_(Configured(), protocol::HazardCatalogue()) {
     poll_.poll = Named(1);
     poll_.hazard = Named(2);
     poll_.stamp_ns = 50'000'000'000;  // The zone's clock is another one.
@@ -65,22 +65,23 @@ class PollResponderTest : public ::testing::Test {
     id.bytes[15] = static_cast<std::uint8_t>(number);
     return id;
   }
-  static GeoPoint PlaceAt(double ahead_m, double right_m) {
-    return GeodesicDestination(GeodesicDestination(kStart, kBearingRad, ahead_m),
-                               kBearingRad + M_PI / 2, right_m);
+  static geo::GeoPoint PlaceAt(double ahead_m, double right_m) {
+    return geo::GeodesicDestination(geo::GeodesicDestination(kStart, kBearingRad, ahead_m),
+                                    kBearingRad + M_PI / 2, right_m);
   }
 
   /// The box of the hazard at the place as the camera sees it at that moment.
-  static Box BoxOfPlace(double seconds, double ahead_m = kAheadM) {
+  static imaging::Box BoxOfPlace(double seconds, double ahead_m = kAheadM) {
     return BoxAt(ahead_m - kSpeedMps * seconds, -kRightM);
   }
 
   /// Frames at 10 Hz; `seen` says what the detector finds in each.
   void Drive(double from_s, double to_s,
-             const std::function<std::vector<Sighting>(double)>& seen = {}) {
+             const std::function<std::vector<placement::Sighting>(double)>& seen = {}) {
     for (double time_s = from_s; time_s <= to_s; time_s += 0.1) {
       if (luminance_) responder_.AddPicture(StampNs(time_s), Lit(*luminance_));
-      responder_.AddFrame(FrameAt(time_s, seen ? seen(time_s) : std::vector<Sighting>{}), time_s);
+      responder_.AddFrame(FrameAt(time_s, seen ? seen(time_s) : std::vector<placement::Sighting>{}),
+                          time_s);
       steady_s_ += 0.1;
       responder_.Process(time_s, steady_s_, vehicle_);
     }
@@ -89,35 +90,35 @@ class PollResponderTest : public ::testing::Test {
     steady_s_ += 60;
     responder_.Process(1000, steady_s_, vehicle_);
   }
-  PollReply OnlyReply() {
+  protocol::PollReply OnlyReply() {
     const auto replies = responder_.TakeReplies();
     EXPECT_THAT(replies, SizeIs(1));
-    return replies.empty() ? PollReply{} : replies[0];
+    return replies.empty() ? protocol::PollReply{} : replies[0];
   }
 
   PollResponder responder_;
   PollResponder::Vehicle vehicle_;
-  Poll poll_;
+  protocol::Poll poll_;
   std::optional<double> luminance_ = 100;
   double steady_s_ = 10;
 };
 
 TEST_F(PollResponderTest, SaysYesAtOnceWhenTheDetectorSeesTheHazardAtItsPlace) {
-  poll_.picture = PollPicture::kFullFrame;
+  poll_.picture = protocol::PollPicture::kFullFrame;
   poll_.max_picture_bytes = 30000;
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 2.8, [](double time_s) {
-    return time_s < 2.65 ? std::vector<Sighting>{}
-                         : std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+    return time_s < 2.65 ? std::vector<placement::Sighting>{}
+                         : std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kYes);
   EXPECT_EQ(reply.poll, poll_.poll);
   EXPECT_EQ(reply.hazard, poll_.hazard);
   EXPECT_EQ(reply.drive_id, "drive-1");
   EXPECT_EQ(reply.confidence, 0.7F);
   EXPECT_NEAR(static_cast<double>(reply.stamp_ns - kEpochNs) * 1e-9, 2.7, 0.01) << "its image's";
-  EXPECT_LT(GeodesicDistanceM(reply.vehicle_position, VehicleAt(2.7)), 0.1);
+  EXPECT_LT(geo::GeodesicDistanceM(reply.vehicle_position, VehicleAt(2.7)), 0.1);
   EXPECT_EQ(reply.image_format, "jpeg");
   EXPECT_LE(reply.image.size(), 30000u);
   EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(640, 400));
@@ -127,16 +128,17 @@ TEST_F(PollResponderTest, SaysYesAtOnceWhenTheDetectorSeesTheHazardAtItsPlace) {
 TEST_F(PollResponderTest, SaysNoWhenThePlaceWasWellInViewSeveralTimesAndNothingWasThere) {
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kNo);
   EXPECT_GT(reply.confidence, 0.9F);
   EXPECT_THAT(reply.image, IsEmpty()) << "none was wanted";
-  const double distance_m = GeodesicDistanceM(reply.vehicle_position, poll_.position);
+  const double distance_m = geo::GeodesicDistanceM(reply.vehicle_position, poll_.position);
   EXPECT_LT(distance_m, 14) << "the nearest view speaks";
 }
 
 /// Change detection's word on a place beside the one asked about.
-ChangeEvidence Changed(const GeoPoint& position, bool vanished, const std::string& change_class) {
+ChangeEvidence Changed(const geo::GeoPoint& position, bool vanished,
+                       const std::string& change_class) {
   ChangeEvidence evidence;
   evidence.change_class = change_class;
   evidence.vanished = vanished;
@@ -153,7 +155,7 @@ TEST_F(PollResponderTest, OneClearViewIsEnoughWhereChangeDetectionKnowsThatItWen
   Drive(2.55, 2.65);
   responder_.AddChange(Changed(PlaceAt(kAheadM + 1, kRightM), true, "sign"));
   Expire();
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kNo);
   EXPECT_NEAR(reply.confidence, 0.8, 0.1);
   EXPECT_EQ(responder_.counters().no_by_change, 1U);
@@ -187,7 +189,7 @@ TEST_F(PollResponderTest, NothingIsDeniedWhereChangeDetectionSawThatItCame) {
   responder_.AddChange(Changed(poll_.position, false, "barrier"));
   Drive(2.0, 4.0);
   Expire();
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("not detected"));
   EXPECT_EQ(responder_.counters().disagreed, 1U);
@@ -198,7 +200,7 @@ TEST_F(PollResponderTest, WhatTheDetectorSeesIsThereWhateverChangeDetectionSays)
   responder_.Add(poll_, steady_s_);
   responder_.AddChange(Changed(poll_.position, true, "barrier"));
   Drive(2.6, 2.8, [](double time_s) {
-    return std::vector<Sighting>{{"barrier", 0.7F, BoxOfPlace(time_s)}};
+    return std::vector<placement::Sighting>{{"barrier", 0.7F, BoxOfPlace(time_s)}};
   });
   EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes);
 }
@@ -215,7 +217,7 @@ TEST_F(PollResponderTest, AnImageWaitsUntilTheCameraIsKnown) {
   const auto intrinsics = std::exchange(vehicle_.intrinsics, std::nullopt);
   responder_.Add(poll_, steady_s_);
   Drive(2.7, 2.75, [](double time_s) {
-    return std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
   vehicle_.intrinsics = intrinsics;
@@ -226,8 +228,8 @@ TEST_F(PollResponderTest, AnImageWaitsUntilTheCameraIsKnown) {
 TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0, [](double time_s) {
-    return std::vector<Sighting>{{"deer", 0.9F, BoxOfPlace(time_s)},
-                                 {"pothole", 0.9F, BoxOfPlace(time_s, kAheadM + 12)}};
+    return std::vector<placement::Sighting>{{"deer", 0.9F, BoxOfPlace(time_s)},
+                                            {"pothole", 0.9F, BoxOfPlace(time_s, kAheadM + 12)}};
   });
   EXPECT_EQ(OnlyReply().answer, PollAnswer::kNo);
 }
@@ -235,7 +237,7 @@ TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
 TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo) {
   responder_.Add(poll_, steady_s_);
   const auto seen = [](double time_s) {
-    return std::vector<Sighting>{{"pothole", 0.6F, BoxOfPlace(time_s)}};
+    return std::vector<placement::Sighting>{{"pothole", 0.6F, BoxOfPlace(time_s)}};
   };
   Drive(1.0, 1.05, seen);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty()) << "at 44 m it could be another one";
@@ -253,7 +255,7 @@ TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
   responder_.AddUnregistered();
   Drive(4.0, 8.0);
   Expire();
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("unregistered"));
 }
@@ -266,7 +268,7 @@ TEST_F(PollResponderTest, FramesAtRestAreOneView) {
   Drive(2.8, 8.0);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
   Expire();
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_EQ(reply.reason, "the place was in view too few times");
 }
@@ -282,7 +284,7 @@ TEST_F(PollResponderTest, CannotSeeWhatIsTooFarAwayOrNeverInTheImage) {
   responder_.Add(poll_, steady_s_);
   Drive(2.8, 4.5);
   Expire();
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("out of the camera's view"));
   EXPECT_NEAR(static_cast<double>(reply.stamp_ns - kEpochNs) * 1e-9, 4.5, 0.11) << "the last image";
@@ -326,7 +328,7 @@ TEST_F(PollResponderTest, SaysNothingWithoutAnyPositionAndCannotSeeWithoutThoseO
 
 TEST_F(PollResponderTest, APoorPositionMakesNoNo) {
   vehicle_.pose_at = [](std::int64_t stamp_ns) {
-    TrackPose pose = BaseAt(static_cast<double>(stamp_ns - kEpochNs) * 1e-9);
+    geo::TrackPose pose = BaseAt(static_cast<double>(stamp_ns - kEpochNs) * 1e-9);
     pose.covariance_m2 = 64 * Eigen::Matrix2d::Identity();
     return FixTrack::Lookup{FixTrack::Answer::kReady, pose};
   };
@@ -367,11 +369,11 @@ TEST_F(PollResponderTest, APollThatIsOverOrNeverEndsDoesNotStay) {
 
 TEST_F(PollResponderTest, AYesGoesWithoutThePictureThatDoesNotCome) {
   luminance_.reset();
-  poll_.picture = PollPicture::kFullFrame;
+  poll_.picture = protocol::PollPicture::kFullFrame;
   poll_.max_picture_bytes = 30000;
   responder_.Add(poll_, steady_s_);
   const auto seen = [](double time_s) {
-    return std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   };
   Drive(2.7, 2.75, seen);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
@@ -381,20 +383,20 @@ TEST_F(PollResponderTest, AYesGoesWithoutThePictureThatDoesNotCome) {
 }
 
 TEST_F(PollResponderTest, TheCropShowsThePlaceWithinTheSmallerOfBothBudgets) {
-  poll_.picture = PollPicture::kCrop;
+  poll_.picture = protocol::PollPicture::kCrop;
   poll_.max_picture_bytes = 30000;
   responder_.Add(poll_, steady_s_);
   Drive(2.7, 2.75, [](double time_s) {
-    return std::vector<Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(240, 160));
   EXPECT_LE(reply.image.size(), responder_.config().crop.max_bytes);
 }
 
 TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
   luminance_.reset();
-  poll_.picture = PollPicture::kCrop;
+  poll_.picture = protocol::PollPicture::kCrop;
   poll_.max_picture_bytes = 12000;
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
@@ -402,7 +404,7 @@ TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
   ASSERT_THAT(wanted, SizeIs(1)) << "once, though several views counted";
   responder_.AddPicture(wanted[0], Lit(100));
   responder_.Process(4.1, steady_s_, vehicle_);
-  const PollReply reply = OnlyReply();
+  const protocol::PollReply reply = OnlyReply();
   EXPECT_EQ(reply.answer, PollAnswer::kNo);
   EXPECT_EQ(reply.stamp_ns, wanted[0]);
   const cv::Size shown = cv::imdecode(reply.image, cv::IMREAD_COLOR).size();
@@ -430,4 +432,4 @@ TEST_F(PollResponderTest, FramesOfAnotherCameraOrSizeAreNoViews) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

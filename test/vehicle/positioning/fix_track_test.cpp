@@ -7,19 +7,19 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using Answer = FixTrack::Answer;
 using Verdict = FixTrack::Verdict;
 
-Fix FixOf(double seconds, const GeoPoint& position, double sigma_m = 0.1) {
+geo::Fix FixOf(double seconds, const geo::GeoPoint& position, double sigma_m = 0.1) {
   return {StampNs(seconds), true, position, Eigen::Matrix2d::Identity() * sigma_m * sigma_m};
 }
 
 /// Where a vehicle is that has driven straight on for some seconds.
-GeoPoint Straight(double bearing_rad, double speed_mps, double seconds) {
-  return GeodesicDestination(kStart, bearing_rad, speed_mps * seconds);
+geo::GeoPoint Straight(double bearing_rad, double speed_mps, double seconds) {
+  return geo::GeodesicDestination(kStart, bearing_rad, speed_mps * seconds);
 }
 
 double AngleBetween(double a_rad, double b_rad) {
@@ -43,7 +43,7 @@ TEST_P(FixTrackCourse, InterpolatesPositionAndCourseOfAStraightDrive) {
   const FixTrack track = Drive(bearing, 16.0, 1.0, 5.0);
   const auto lookup = track.At(StampNs(2.37));
   ASSERT_EQ(lookup.answer, Answer::kReady);
-  EXPECT_LT(GeodesicDistanceM(lookup.pose.position, Straight(bearing, 16.0, 2.37)), 0.001);
+  EXPECT_LT(geo::GeodesicDistanceM(lookup.pose.position, Straight(bearing, 16.0, 2.37)), 0.001);
   EXPECT_LT(AngleBetween(lookup.pose.course_rad, bearing), 1e-4);
   EXPECT_NEAR(lookup.pose.speed_mps, 16.0, 1e-3);
 }
@@ -53,7 +53,7 @@ TEST_P(FixTrackCourse, CarriesThePositionOnAShortTimeBeyondTheNewestFix) {
   const FixTrack track = Drive(bearing, 16.0, 0.2, 5.0);
   const auto lookup = track.At(StampNs(5.5));
   ASSERT_EQ(lookup.answer, Answer::kExtrapolated);
-  EXPECT_LT(GeodesicDistanceM(lookup.pose.position, Straight(bearing, 16.0, 5.5)), 0.001);
+  EXPECT_LT(geo::GeodesicDistanceM(lookup.pose.position, Straight(bearing, 16.0, 5.5)), 0.001);
   EXPECT_LT(AngleBetween(lookup.pose.course_rad, bearing), 1e-4);
 }
 
@@ -96,7 +96,7 @@ TEST(FixTrack, WithoutAnyMotionTheCourseIsUnknown) {
 TEST(FixTrack, NoiseOfAStandingVehicleIsNoCourse) {
   std::mt19937_64 random{3};
   std::normal_distribution<double> noise(0, 0.5);
-  const LocalFrame frame(kStart);
+  const geo::LocalFrame frame(kStart);
   FixTrack track{FixTrack::Config{}};
   int claimed = 0;
   for (double time_s = 0; time_s < 60; time_s += 0.2) {
@@ -119,14 +119,14 @@ TEST(FixTrack, StandingVehicleKeepsTheCourseItArrivedWith) {
 
 TEST(FixTrack, CourseInACurveLagsLessThanItsStatedUncertaintySays) {
   // 10 m/s on a circle of 50 m: 0.2 rad/s.
-  const LocalFrame frame(kStart);
+  const geo::LocalFrame frame(kStart);
   FixTrack track{FixTrack::Config{}};
   for (double time_s = 0; time_s < 12; time_s += 0.1) {
     const double angle = 0.2 * time_s;
     track.Add(FixOf(time_s, frame.ToGeo({50 * (1 - std::cos(angle)), 50 * std::sin(angle)})));
   }
   for (const double moment_s : {6.03, 11.9}) {
-    const TrackPose pose = track.At(StampNs(moment_s)).pose;
+    const geo::TrackPose pose = track.At(StampNs(moment_s)).pose;
     const double lag_rad = AngleBetween(pose.course_rad, 0.2 * moment_s);
     EXPECT_LT(lag_rad, 0.15) << moment_s;
     EXPECT_LT(lag_rad, 2 * std::sqrt(pose.course_variance_rad2)) << moment_s;
@@ -136,16 +136,16 @@ TEST(FixTrack, CourseInACurveLagsLessThanItsStatedUncertaintySays) {
 TEST(FixTrack, FixesThatComeLaterDoNotChangeAnAnswerThatWasReady) {
   std::mt19937_64 random{5};
   std::normal_distribution<double> noise(0, 0.5);
-  const LocalFrame frame(kStart);
-  std::vector<Fix> fixes;
+  const geo::LocalFrame frame(kStart);
+  std::vector<geo::Fix> fixes;
   for (double time_s = 0; time_s < 12; time_s += 0.2) {
     const double way_m = time_s < 3 ? 0 : 8 * (time_s - 3);  // Stands at first.
     fixes.push_back(FixOf(time_s, frame.ToGeo({noise(random), way_m + noise(random)}), 0.5));
   }
   for (const double moment_s : {1.3, 2.9, 3.3, 5.1, 8.05, 10.4}) {
     FixTrack track{FixTrack::Config{}};
-    std::optional<TrackPose> first;
-    for (const Fix& fix : fixes) {
+    std::optional<geo::TrackPose> first;
+    for (const geo::Fix& fix : fixes) {
       track.Add(fix);
       const auto lookup = track.At(StampNs(moment_s));
       if (lookup.answer != Answer::kReady) continue;
@@ -161,7 +161,7 @@ TEST(FixTrack, FixesThatComeLaterDoNotChangeAnAnswerThatWasReady) {
 TEST(FixTrack, StatedUncertaintyOfTheCourseHoldsUnderNoise) {
   std::mt19937_64 random{11};
   std::normal_distribution<double> noise(0, 0.5);
-  const LocalFrame frame(kStart);
+  const geo::LocalFrame frame(kStart);
   double normalised = 0;
   int count = 0;
   for (int drive = 0; drive < 40; ++drive) {
@@ -183,7 +183,7 @@ TEST(FixTrack, StatedUncertaintyOfTheCourseHoldsUnderNoise) {
 
 TEST(FixTrack, WhatIsNoPositionIsRefused) {
   FixTrack track = Drive(1.0, 16.0, 1.0, 2.0);
-  Fix fix = FixOf(3.0, Straight(1.0, 16.0, 3.0));
+  geo::Fix fix = FixOf(3.0, Straight(1.0, 16.0, 3.0));
   fix.has_fix = false;
   EXPECT_EQ(track.Add(fix), Verdict::kNoFix);
   EXPECT_EQ(track.Add(FixOf(3.0, {std::nan(""), 0})), Verdict::kInvalid);
@@ -203,7 +203,7 @@ TEST(FixTrack, WhatIsNoPositionIsRefused) {
 
 TEST(FixTrack, UnknownCovarianceBecomesTheDefault) {
   FixTrack track{FixTrack::Config{}};
-  Fix fix = FixOf(0, kStart);
+  geo::Fix fix = FixOf(0, kStart);
   fix.covariance_m2.reset();
   ASSERT_EQ(track.Add(fix), Verdict::kAccepted);
   EXPECT_DOUBLE_EQ(track.Newest()->covariance_m2(0, 0), 9.0);
@@ -215,7 +215,7 @@ TEST(FixTrack, SingleJumpIsNotBelieved) {
   EXPECT_EQ(track.Add(FixOf(5.0, Straight(1.0, 16.0, 5.0))), Verdict::kAccepted);
   const auto lookup = track.At(StampNs(4.5));
   ASSERT_EQ(lookup.answer, Answer::kReady);
-  EXPECT_LT(GeodesicDistanceM(lookup.pose.position, Straight(1.0, 16.0, 4.5)), 0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(lookup.pose.position, Straight(1.0, 16.0, 4.5)), 0.01);
 }
 
 TEST(FixTrack, JumpThatLastsStartsTheTrackAnew) {
@@ -242,19 +242,19 @@ TEST(FixTrack, ClockSetBackStartsTheTrackAnew) {
 }
 
 TEST(FixTrack, WorksAcrossTheAntimeridian) {
-  const GeoPoint start{-16.5, 179.9995};
+  const geo::GeoPoint start{-16.5, 179.9995};
   FixTrack track{FixTrack::Config{}};
   for (int second = 0; second < 12; ++second) {
-    track.Add(FixOf(second, GeodesicDestination(start, M_PI / 2, 16.0 * second)));
+    track.Add(FixOf(second, geo::GeodesicDestination(start, M_PI / 2, 16.0 * second)));
   }
   for (const double time_s : {2.5, 3.4, 6.5}) {
     const auto lookup = track.At(StampNs(time_s));
     ASSERT_EQ(lookup.answer, Answer::kReady);
-    EXPECT_LT(GeodesicDistanceM(lookup.pose.position,
-                                GeodesicDestination(start, M_PI / 2, 16.0 * time_s)),
+    EXPECT_LT(geo::GeodesicDistanceM(lookup.pose.position,
+                                     geo::GeodesicDestination(start, M_PI / 2, 16.0 * time_s)),
               0.01);
   }
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

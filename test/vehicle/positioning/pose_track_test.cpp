@@ -7,7 +7,7 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using Answer = FixTrack::Answer;
@@ -15,9 +15,9 @@ using Answer = FixTrack::Answer;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// 10 m/s to the east, turning through north.
-TrackPose PoseAt(double seconds) {
-  TrackPose pose;
-  pose.position = GeodesicDestination(kStart, M_PI / 2, 10 * seconds);
+geo::TrackPose PoseAt(double seconds) {
+  geo::TrackPose pose;
+  pose.position = geo::GeodesicDestination(kStart, M_PI / 2, 10 * seconds);
   pose.covariance_m2 = (1 + seconds) * Eigen::Matrix2d::Identity();
   pose.course_rad = std::remainder(0.2 * seconds - 0.1, 2 * M_PI);
   pose.course_variance_rad2 = 1e-4;
@@ -27,12 +27,12 @@ TrackPose PoseAt(double seconds) {
 TEST(PoseTrack, InterpolatesPositionAndHeadingThroughNorth) {
   PoseTrack track({});
   EXPECT_TRUE(track.Add(StampNs(0.4), PoseAt(0.4)));
-  TrackPose later = PoseAt(0.6);
+  geo::TrackPose later = PoseAt(0.6);
   later.course_rad += 2 * M_PI;
   EXPECT_TRUE(track.Add(StampNs(0.6), later));
   const auto lookup = track.At(StampNs(0.5));
   ASSERT_EQ(lookup.answer, Answer::kReady);
-  EXPECT_LT(GeodesicDistanceM(lookup.pose.position, PoseAt(0.5).position), 1e-3);
+  EXPECT_LT(geo::GeodesicDistanceM(lookup.pose.position, PoseAt(0.5).position), 1e-3);
   EXPECT_NEAR(std::remainder(lookup.pose.course_rad, 2 * M_PI), 0.0, 1e-9);
   EXPECT_NEAR(lookup.pose.covariance_m2(0, 0), 1.5, 1e-9);
 }
@@ -51,11 +51,11 @@ TEST(PoseTrack, CarriesNothingOnAndBridgesNoGap) {
 TEST(PoseTrack, PosesThatComeLaterDoNotChangeAnAnswerThatWasReady) {
   PoseTrack track({});
   for (int i = 0; i <= 10; ++i) track.Add(StampNs(0.1 * i), PoseAt(0.1 * i));
-  const TrackPose before = track.At(StampNs(0.93)).pose;
-  TrackPose swerved = PoseAt(1.1);
+  const geo::TrackPose before = track.At(StampNs(0.93)).pose;
+  geo::TrackPose swerved = PoseAt(1.1);
   swerved.course_rad = 2;
   track.Add(StampNs(1.1), swerved);
-  const TrackPose after = track.At(StampNs(0.93)).pose;
+  const geo::TrackPose after = track.At(StampNs(0.93)).pose;
   EXPECT_EQ(after.position.latitude_deg, before.position.latitude_deg);
   EXPECT_EQ(after.position.longitude_deg, before.position.longitude_deg);
   EXPECT_EQ(after.course_rad, before.course_rad);
@@ -67,7 +67,7 @@ TEST(PoseTrack, RefusesWhatCannotBe) {
   EXPECT_FALSE(track.Add(StampNs(1), PoseAt(1))) << "not later";
   EXPECT_FALSE(track.Add(StampNs(0.5), PoseAt(0.5))) << "a little earlier";
   EXPECT_FALSE(track.Add(0, PoseAt(1.1)));
-  TrackPose pose = PoseAt(1.1);
+  geo::TrackPose pose = PoseAt(1.1);
   pose.course_rad = kNan;
   EXPECT_FALSE(track.Add(StampNs(1.1), pose));
   pose = PoseAt(1.1);
@@ -91,4 +91,4 @@ TEST(PoseTrack, BeginsAgainWhenTheClockIsSetBack) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -11,11 +11,11 @@
 #include "test/support/temporary_directory.h"
 #include "vehicle/reporting/hazard_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 // A vehicle that drives straight on, its camera and what that sees: for tests.
 
-constexpr GeoPoint kStart{40.4433, -79.9436};
+constexpr geo::GeoPoint kStart{40.4433, -79.9436};
 constexpr std::int64_t kEpochNs = 1'600'000'000'000'000'000;
 constexpr double kSpeedMps = 16.0;
 constexpr double kBearingRad = 0.9;
@@ -24,15 +24,15 @@ inline const Eigen::Vector3d kCameraInBase(1.5, 0.1, 1.6);
 
 inline std::int64_t StampNs(double seconds) { return kEpochNs + std::llround(seconds * 1e9); }
 
-inline GeoPoint VehicleAt(double seconds) {
-  return GeodesicDestination(kStart, kBearingRad, kSpeedMps * seconds);
+inline geo::GeoPoint VehicleAt(double seconds) {
+  return geo::GeodesicDestination(kStart, kBearingRad, kSpeedMps * seconds);
 }
 
-inline Fix FixAt(double seconds) {
+inline geo::Fix FixAt(double seconds) {
   return {StampNs(seconds), true, VehicleAt(seconds), Eigen::Matrix2d::Identity() * 0.01};
 }
 
-inline CameraIntrinsics Intrinsics() { return {500, 500, 319.5, 199.5, 640, 400}; }
+inline geo::CameraIntrinsics Intrinsics() { return {500, 500, 319.5, 199.5, 640, 400}; }
 
 /// A camera that looks straight ahead, 1.6 m above the road.
 inline Eigen::Isometry3d Mounting() {
@@ -43,20 +43,21 @@ inline Eigen::Isometry3d Mounting() {
 }
 
 /// The box of an object that stands on the road at this place in base_link.
-inline Box BoxAt(double forward_m, double left_m) {
+inline imaging::Box BoxAt(double forward_m, double left_m) {
   const Eigen::Vector3d in_camera = Mounting().inverse() * Eigen::Vector3d(forward_m, left_m, 0.0);
-  const CameraIntrinsics camera = Intrinsics();
+  const geo::CameraIntrinsics camera = Intrinsics();
   const double u = camera.fx * in_camera.x() / in_camera.z() + camera.cx + 0.5;
   const double v = camera.fy * in_camera.y() / in_camera.z() + camera.cy + 0.5;
   return {static_cast<float>(u - 10), static_cast<float>(v - 12), static_cast<float>(u + 10),
           static_cast<float>(v)};
 }
 
-inline SightingFrame FrameAt(double seconds, std::vector<Sighting> sightings) {
+inline placement::SightingFrame FrameAt(double seconds,
+                                        std::vector<placement::Sighting> sightings) {
   return {StampNs(seconds), kOptical, 640, 400, std::move(sightings)};
 }
 
-inline Picture GreyPicture() {
+inline imaging::Picture GreyPicture() {
   return {cv::Mat(400, 640, CV_8UC3, cv::Scalar(90, 90, 90)), nullptr};
 }
 
@@ -87,21 +88,21 @@ class HazardReporterTest : public ::testing::Test {
   }
 
   /// A frame with its picture, seen and worked off at once.
-  void See(double seconds, std::vector<Sighting> sightings) {
+  void See(double seconds, std::vector<placement::Sighting> sightings) {
     reporter_->AddFrame(FrameAt(seconds, std::move(sightings)), seconds);
     reporter_->AddPicture(StampNs(seconds), GreyPicture());
     reporter_->Process(seconds, steady_s_);
   }
 
-  std::vector<Report> TakeDue() { return reporter_->TakeDue(steady_s_, 100); }
+  std::vector<protocol::Report> TakeDue() { return reporter_->TakeDue(steady_s_, 100); }
   const HazardReporter::Counters& counters() const { return reporter_->counters(); }
 
-  TemporaryDirectory directory_;
+  test::TemporaryDirectory directory_;
   HazardReporter::Config config_;
-  HazardCatalogue catalogue_;
+  protocol::HazardCatalogue catalogue_;
   std::uint64_t seed_ = 1;
   double steady_s_ = 500;
   std::unique_ptr<HazardReporter> reporter_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -7,11 +7,11 @@
 #include "common/error.h"
 #include "test/vehicle/reporting/known_reports.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 TEST(DuplicateFilter, SameClassWithinTheRadiusIsADuplicate) {
-  DuplicateFilter filter{HazardCatalogue()};
+  DuplicateFilter filter{protocol::HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   const auto match = filter.Find("pothole", East(4.99));
   ASSERT_TRUE(match);
@@ -21,13 +21,13 @@ TEST(DuplicateFilter, SameClassWithinTheRadiusIsADuplicate) {
 }
 
 TEST(DuplicateFilter, AnotherClassIsAnotherHazard) {
-  DuplicateFilter filter{HazardCatalogue()};
+  DuplicateFilter filter{protocol::HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   EXPECT_FALSE(filter.Find("debris", kStreet));
 }
 
 TEST(DuplicateFilter, RadiusIsTheOneOfTheClass) {
-  DuplicateFilter filter{HazardCatalogue::Parse(
+  DuplicateFilter filter{protocol::HazardCatalogue::Parse(
       "classes: {deer: {duplicate_radius_m: 50}, cone: {duplicate_radius_m: 1}}", "test")};
   filter.Put(Id(1), "deer", kStreet);
   filter.Put(Id(2), "cone", kStreet);
@@ -37,7 +37,7 @@ TEST(DuplicateFilter, RadiusIsTheOneOfTheClass) {
 }
 
 TEST(DuplicateFilter, MovedHazardIsKnownAtItsNewPlaceOnly) {
-  DuplicateFilter filter{HazardCatalogue()};
+  DuplicateFilter filter{protocol::HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   filter.Put(Id(1), "pothole", East(20));
   EXPECT_EQ(filter.size(), 1u);
@@ -46,7 +46,7 @@ TEST(DuplicateFilter, MovedHazardIsKnownAtItsNewPlaceOnly) {
 }
 
 TEST(DuplicateFilter, RemovedHazardIsNoLongerKnown) {
-  DuplicateFilter filter{HazardCatalogue()};
+  DuplicateFilter filter{protocol::HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   filter.Put(Id(2), "pothole", East(8));
   EXPECT_TRUE(filter.Remove(Id(1)));
@@ -56,7 +56,7 @@ TEST(DuplicateFilter, RemovedHazardIsNoLongerKnown) {
 }
 
 TEST(DuplicateFilter, InvalidPositionIsNeverADuplicateAndNeverKept) {
-  DuplicateFilter filter{HazardCatalogue()};
+  DuplicateFilter filter{protocol::HazardCatalogue()};
   EXPECT_THROW(filter.Put(Id(1), "pothole", {std::nan(""), 0}), Error);
   filter.Put(Id(1), "pothole", kStreet);
   EXPECT_FALSE(filter.Find("pothole", {std::nan(""), 0}));
@@ -65,17 +65,17 @@ TEST(DuplicateFilter, InvalidPositionIsNeverADuplicateAndNeverKept) {
 TEST(DuplicateFilter, AgreesWithBruteForceOverClassesMovesAndRemovals) {
   struct Known {
     std::string class_name;
-    GeoPoint position;
+    geo::GeoPoint position;
   };
   const std::vector<std::string> classes = {"pothole", "deer", "cone"};
-  const auto catalogue = HazardCatalogue::Parse(
+  const auto catalogue = protocol::HazardCatalogue::Parse(
       "classes: {deer: {duplicate_radius_m: 25}, cone: {duplicate_radius_m: 1.5}}", "test");
   // Astride the antimeridian, where naive grids miss neighbours.
-  const GeoPoint centre{64.0, 179.99995};
+  const geo::GeoPoint centre{64.0, 179.99995};
   std::mt19937_64 random{7};
   std::uniform_real_distribution<double> unit(0, 1);
   const auto scatter = [&] {
-    return GeodesicDestination(centre, 2 * M_PI * unit(random), 100 * unit(random));
+    return geo::GeodesicDestination(centre, 2 * M_PI * unit(random), 100 * unit(random));
   };
   DuplicateFilter filter(catalogue);
   std::map<Uuid, Known> known;
@@ -89,10 +89,10 @@ TEST(DuplicateFilter, AgreesWithBruteForceOverClassesMovesAndRemovals) {
     }
     ASSERT_EQ(filter.size(), known.size());
     const std::string class_name = classes[random() % 3];
-    const GeoPoint sighting = scatter();
+    const geo::GeoPoint sighting = scatter();
     std::optional<DuplicateFilter::Match> expected;
     for (const auto& [other, hazard] : known) {
-      const double distance_m = GeodesicDistanceM(hazard.position, sighting);
+      const double distance_m = geo::GeodesicDistanceM(hazard.position, sighting);
       if (hazard.class_name != class_name || distance_m > catalogue.DuplicateRadiusM(class_name)) {
         continue;
       }
@@ -106,4 +106,4 @@ TEST(DuplicateFilter, AgreesWithBruteForceOverClassesMovesAndRemovals) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

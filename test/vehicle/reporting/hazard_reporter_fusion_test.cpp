@@ -5,16 +5,16 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 /// The fused pose of base_link: a metre left of what the fixes say, and turned by 0.05 rad.
-TrackPose FusedPoseAt(double seconds) {
-  TrackPose pose;
-  pose.position = GeodesicDestination(VehicleAt(seconds), kBearingRad - M_PI / 2, 1.0);
+geo::TrackPose FusedPoseAt(double seconds) {
+  geo::TrackPose pose;
+  pose.position = geo::GeodesicDestination(VehicleAt(seconds), kBearingRad - M_PI / 2, 1.0);
   pose.covariance_m2 = 0.04 * Eigen::Matrix2d::Identity();
   pose.course_rad = kBearingRad + 0.05;
   pose.course_variance_rad2 = 1e-5;
@@ -22,8 +22,8 @@ TrackPose FusedPoseAt(double seconds) {
   return pose;
 }
 
-GeoPoint AheadOf(const TrackPose& pose, double forward_m) {
-  return GeodesicDestination(pose.position, pose.course_rad, forward_m);
+geo::GeoPoint AheadOf(const geo::TrackPose& pose, double forward_m) {
+  return geo::GeodesicDestination(pose.position, pose.course_rad, forward_m);
 }
 
 TEST_F(HazardReporterTest, PlacesByTheFusedPoseAndItsHeadingWhereTheAntennaIsElsewhere) {
@@ -37,7 +37,7 @@ TEST_F(HazardReporterTest, PlacesByTheFusedPoseAndItsHeadingWhereTheAntennaIsEls
   See(3.15, {{"pothole", 0.8F, BoxAt(12, 0)}});
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  EXPECT_LT(GeodesicDistanceM(reports[0].position, AheadOf(FusedPoseAt(3.15), 12)), 0.02);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position, AheadOf(FusedPoseAt(3.15), 12)), 0.02);
   EXPECT_LT(reports[0].covariance_m2.trace(), 0.7) << "of the fused pose, not of the fixes";
   EXPECT_EQ(counters().placed_by_fusion, 1u);
   EXPECT_EQ(counters().placed_by_fixes, 0u);
@@ -53,8 +53,8 @@ TEST_F(HazardReporterTest, WaitsForTheFusedPoseAndFallsBackToTheFixesWhenItDoesN
   reporter_->Process(3.0 + config_.fused_wait_s + 0.01, steady_s_);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  const GeoPoint by_fixes = GeodesicDestination(VehicleAt(3.0), kBearingRad, 12);
-  EXPECT_LT(GeodesicDistanceM(reports[0].position, by_fixes), 0.02);
+  const geo::GeoPoint by_fixes = geo::GeodesicDestination(VehicleAt(3.0), kBearingRad, 12);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position, by_fixes), 0.02);
   EXPECT_EQ(counters().placed_by_fixes, 1u);
   EXPECT_EQ(counters().held_back_no_fix, 0u);
 
@@ -72,7 +72,7 @@ TEST_F(HazardReporterTest, AFusedHeadingThatIsUncertainWaitsForANearerView) {
   config_.max_ground_sigma_m = 1.0;
   Restart();
   for (const double time_s : {3.0, 3.5}) {
-    TrackPose pose = FusedPoseAt(time_s);
+    geo::TrackPose pose = FusedPoseAt(time_s);
     pose.course_variance_rad2 = 0.08 * 0.08;
     reporter_->AddPose(StampNs(time_s), pose);
   }
@@ -89,7 +89,7 @@ TEST_F(HazardReporterTest, FusedPosesWithoutFixesAreEnough) {
   reporter_->AddPose(StampNs(3.0), FusedPoseAt(3.0));
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_THAT(TakeDue(), SizeIs(1)) << "the receiver may have lost its fix: that is what it is for";
-  TrackPose bad = FusedPoseAt(3.1);
+  geo::TrackPose bad = FusedPoseAt(3.1);
   bad.course_rad = std::numeric_limits<double>::quiet_NaN();
   reporter_->AddPose(StampNs(3.1), bad);
   EXPECT_EQ(counters().poses, 2u);
@@ -100,16 +100,16 @@ TEST_F(HazardReporterTest, DistanceIsThatOfTheDepthAtTheFootAndElseOfThePlane) {
   config_.use_depth = true;
   Restart();
   DriveFixes(0, 4);
-  const Box box = BoxAt(12, 0);  // 10.5 m ahead of the camera, says the plane.
-  DepthImage depth;
+  const imaging::Box box = BoxAt(12, 0);  // 10.5 m ahead of the camera, says the plane.
+  placement::DepthImage depth;
   depth.depth = cv::Mat(400, 640, CV_32FC1, cv::Scalar(9.5F));
   reporter_->AddDepth(StampNs(3.0), depth);
   See(3.0, {{"pothole", 0.8F, box}});
   auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  EXPECT_LT(
-      GeodesicDistanceM(reports[0].position, GeodesicDestination(VehicleAt(3.0), kBearingRad, 11)),
-      0.02);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position,
+                                   geo::GeodesicDestination(VehicleAt(3.0), kBearingRad, 11)),
+            0.02);
   EXPECT_EQ(counters().distances_by_depth, 1u);
 
   depth.depth = cv::Mat(400, 640, CV_32FC1, cv::Scalar(0));
@@ -117,9 +117,9 @@ TEST_F(HazardReporterTest, DistanceIsThatOfTheDepthAtTheFootAndElseOfThePlane) {
   See(3.4, {{"debris", 0.8F, box}});
   reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  EXPECT_LT(
-      GeodesicDistanceM(reports[0].position, GeodesicDestination(VehicleAt(3.4), kBearingRad, 12)),
-      0.02);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position,
+                                   geo::GeodesicDestination(VehicleAt(3.4), kBearingRad, 12)),
+            0.02);
   EXPECT_EQ(counters().distances_by_depth, 1u);
 }
 
@@ -140,4 +140,4 @@ TEST_F(HazardReporterTest, WaitsForTheDepthImageNoLongerThanItMay) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -6,7 +6,7 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::ElementsAre;
@@ -18,10 +18,10 @@ TEST_F(HazardReporterTest, PlacesTheHazardItselfToTheCentimetre) {
   See(3.1, {{"pothole", 0.8F, BoxAt(12, -1.5)}});
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  const Report& report = reports[0];
-  const GeoPoint ahead = GeodesicDestination(VehicleAt(3.1), kBearingRad, 12);
-  const GeoPoint expected = GeodesicDestination(ahead, kBearingRad + M_PI / 2, 1.5);
-  EXPECT_LT(GeodesicDistanceM(report.position, expected), 0.01);
+  const protocol::Report& report = reports[0];
+  const geo::GeoPoint ahead = geo::GeodesicDestination(VehicleAt(3.1), kBearingRad, 12);
+  const geo::GeoPoint expected = geo::GeodesicDestination(ahead, kBearingRad + M_PI / 2, 1.5);
+  EXPECT_LT(geo::GeodesicDistanceM(report.position, expected), 0.01);
   EXPECT_EQ(report.class_name, "pothole");
   EXPECT_EQ(report.confidence, 0.8F);
   EXPECT_EQ(report.stamp_ns, StampNs(3.1));
@@ -64,11 +64,11 @@ TEST_F(HazardReporterTest, OtherClassAndOtherPlaceAreOtherHazards) {
 
 TEST_F(HazardReporterTest, HazardThatTheZoneAnnouncedIsNotReported) {
   DriveFixes(0, 4);
-  Notice notice;
+  protocol::Notice notice;
   notice.hazard_uuid.bytes[0] = 9;
   notice.sequence = 1;
   notice.class_name = "pothole";
-  notice.position = GeodesicDestination(VehicleAt(3), kBearingRad, 12);
+  notice.position = geo::GeodesicDestination(VehicleAt(3), kBearingRad, 12);
   reporter_->AddNotice(notice);
   See(3.0, {{"pothole", 0.8F, BoxAt(10, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty());
@@ -106,9 +106,9 @@ TEST_F(HazardReporterTest, BoxAboveTheHorizonIsNotPlaced) {
 
 TEST_F(HazardReporterTest, BoxThatTheImagesSideCutsWaitsForAViewOfItsFoot) {
   DriveFixes(0, 4);
-  const Box whole = BoxAt(12, 0);
+  const imaging::Box whole = BoxAt(12, 0);
   for (const float left : {0.0F, 620.0F}) {
-    const Box cut{left, whole.y_min, left + (whole.x_max - whole.x_min), whole.y_max};
+    const imaging::Box cut{left, whole.y_min, left + (whole.x_max - whole.x_min), whole.y_max};
     See(3.0, {{"road_work_sign", 0.8F, cut}});
   }
   EXPECT_THAT(TakeDue(), IsEmpty());
@@ -139,15 +139,15 @@ TEST_F(HazardReporterTest, HeldBackSightingIsReportedOnceFixesEmbraceIt) {
   reporter_->Process(4.0, steady_s_);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  EXPECT_LT(
-      GeodesicDistanceM(reports[0].position, GeodesicDestination(VehicleAt(3.6), kBearingRad, 12)),
-      0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position,
+                                   geo::GeodesicDestination(VehicleAt(3.6), kBearingRad, 12)),
+            0.01);
   EXPECT_EQ(counters().dropped_no_fix, 0u);
 }
 
 TEST_F(HazardReporterTest, ReceiverWithoutFixInventsNothing) {
   for (double time_s = 0; time_s < 4; time_s += 0.2) {
-    Fix fix = FixAt(time_s);
+    geo::Fix fix = FixAt(time_s);
     fix.has_fix = false;
     reporter_->AddFix(fix);
   }
@@ -191,12 +191,12 @@ TEST_F(HazardReporterTest, WaitsForNoPictureWhereNobodyGivesAny) {
 
 TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
   DriveFixes(0, 4);
-  const auto look = [this](double seconds, const Box& box) {
+  const auto look = [this](double seconds, const imaging::Box& box) {
     reporter_->AddFrame(FrameAt(seconds, {{"pothole", 0.8F, box}}), seconds);
     reporter_->Process(seconds, steady_s_);
   };
   look(3.0, BoxAt(12, 0));
-  const std::vector<PictureRequirements> wishes = reporter_->TakePictureRequests();
+  const std::vector<imaging::PictureRequirements> wishes = reporter_->TakePictureRequests();
   ASSERT_THAT(wishes, SizeIs(1));
   EXPECT_EQ(wishes[0].stamp_ns, StampNs(3.0));
   reporter_->Process(3.1, steady_s_);
@@ -213,18 +213,18 @@ TEST_F(HazardReporterTest, APictureOfAnotherPartDoesNotDo) {
   DriveFixes(0, 4);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
-  const std::vector<PictureRequirements> wishes = reporter_->TakePictureRequests();
+  const std::vector<imaging::PictureRequirements> wishes = reporter_->TakePictureRequests();
   ASSERT_THAT(wishes, SizeIs(1));
-  const PixelRegion part = wishes[0].part;
+  const imaging::PixelRegion part = wishes[0].part;
   ASSERT_FALSE(part.IsWholeImage());
   reporter_->AddPicture(StampNs(3.0), GreyPicture(), {part.x + 1, part.y, part.width, part.height});
   reporter_->Process(3.1, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
   reporter_->AddPicture(StampNs(3.0), GreyPicture(), part);
   reporter_->Process(3.2, steady_s_);
-  const std::vector<Report> due = TakeDue();
+  const std::vector<protocol::Report> due = TakeDue();
   ASSERT_THAT(due, SizeIs(1));
-  EXPECT_TRUE(Contains(part, due[0].shown));
+  EXPECT_TRUE(imaging::Contains(part, due[0].shown));
   EXPECT_FALSE(due[0].image.empty());
 }
 
@@ -261,8 +261,8 @@ TEST_F(HazardReporterTest, AnEventOfSecondsAgoIsPlacedWhereTheVehicleWasThen) {
   See(2.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
-  const GeoPoint expected = GeodesicDestination(VehicleAt(2.0), kBearingRad, 12);
-  EXPECT_LT(GeodesicDistanceM(reports[0].position, expected), 0.02);
+  const geo::GeoPoint expected = geo::GeodesicDestination(VehicleAt(2.0), kBearingRad, 12);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position, expected), 0.02);
 }
 
 TEST_F(HazardReporterTest, APictureOfAnotherSizeThanTheImageIsShownWhole) {
@@ -270,7 +270,7 @@ TEST_F(HazardReporterTest, APictureOfAnotherSizeThanTheImageIsShownWhole) {
   reporter_->AddPicture(StampNs(3.0), {cv::Mat(64, 96, CV_8UC3, cv::Scalar(9, 9, 9)), nullptr});
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
-  const Report report = TakeDue().at(0);
+  const protocol::Report report = TakeDue().at(0);
   EXPECT_TRUE(report.shown.IsWholeImage());
   EXPECT_EQ(cv::imdecode(report.image, cv::IMREAD_COLOR).size(), cv::Size(96, 64));
 }
@@ -287,7 +287,7 @@ TEST_F(HazardReporterTest, PictureMayComeBeforeItsFrame) {
 
 TEST_F(HazardReporterTest, WithoutCameraOrWithAnotherImageSizeNothingIsPlaced) {
   DriveFixes(0, 4);
-  SightingFrame frame = FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  placement::SightingFrame frame = FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   frame.image_width = 1280;
   reporter_->AddFrame(frame, 3.0);
   frame = FrameAt(3.1, {{"pothole", 0.8F, BoxAt(12, 0)}});
@@ -302,7 +302,7 @@ TEST_F(HazardReporterTest, WithoutCameraOrWithAnotherImageSizeNothingIsPlaced) {
 TEST_F(HazardReporterTest, HostileDetectionsAreDroppedAndCounted) {
   DriveFixes(0, 4);
   const float nan = std::nanf("");
-  Box box = BoxAt(12, 0);
+  imaging::Box box = BoxAt(12, 0);
   box.x_min = nan;
   See(3.0, {{"pothole", nan, BoxAt(12, 0)},
             {"pothole", 0.8F, box},
@@ -342,4 +342,4 @@ TEST_F(HazardReporterTest, SameSeedMakesTheSameReports) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -8,15 +8,15 @@
 #include "protocol/notice.h"
 #include "protocol/report.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 
 // Reports and notices of hazards along a street, told apart by a number: for tests.
 
-constexpr GeoPoint kStreet{40.4433, -79.9436};
+constexpr geo::GeoPoint kStreet{40.4433, -79.9436};
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
 
-inline GeoPoint East(double distance_m) {
-  return GeodesicDestination(kStreet, M_PI / 2, distance_m);
+inline geo::GeoPoint East(double distance_m) {
+  return geo::GeodesicDestination(kStreet, M_PI / 2, distance_m);
 }
 
 inline Uuid Id(int number) {
@@ -27,9 +27,9 @@ inline Uuid Id(int number) {
   return id;
 }
 
-inline Report MakeReport(int number, const GeoPoint& position,
-                         const std::string& name = "pothole") {
-  Report report;
+inline protocol::Report MakeReport(int number, const geo::GeoPoint& position,
+                                   const std::string& name = "pothole") {
+  protocol::Report report;
   report.uuid = Id(number);
   report.drive_id = "drive-1";
   report.stamp_ns = kNowNs + number;
@@ -46,9 +46,9 @@ inline Report MakeReport(int number, const GeoPoint& position,
   return report;
 }
 
-inline Notice MakeNotice(Notice::Action action, int hazard, const GeoPoint& position,
-                         std::uint64_t sequence) {
-  Notice notice;
+inline protocol::Notice MakeNotice(protocol::Notice::Action action, int hazard,
+                                   const geo::GeoPoint& position, std::uint64_t sequence) {
+  protocol::Notice notice;
   notice.action = action;
   notice.sequence = sequence;
   notice.hazard_uuid = Id(hazard);
@@ -70,4 +70,4 @@ inline void MakeOlder(const std::string& path) {
   database.Execute("PRAGMA user_version=2");
 }
 
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -12,7 +12,7 @@
 #include "test/support/temporary_directory.h"
 #include "test/vehicle/reporting/known_reports.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::HasSubstr;
@@ -20,11 +20,11 @@ using ::testing::SizeIs;
 using ::testing::StartsWith;
 using AddResult = LocalHazardMap::AddResult;
 
-Receipt MakeReceipt(Receipt::Status status, int report, int hazard) {
-  Receipt receipt;
+protocol::Receipt MakeReceipt(protocol::Receipt::Status status, int report, int hazard) {
+  protocol::Receipt receipt;
   receipt.status = status;
   receipt.report_uuid = Id(report);
-  if (status == Receipt::Status::kCommitted) receipt.hazard_uuid = Id(hazard);
+  if (status == protocol::Receipt::Status::kCommitted) receipt.hazard_uuid = Id(hazard);
   return receipt;
 }
 
@@ -32,14 +32,14 @@ class LocalHazardMapTest : public ::testing::Test {
  protected:
   LocalHazardMapTest() { config_.path = directory_.path() + "/local.sqlite3"; }
 
-  LocalHazardMap Open() { return LocalHazardMap(config_, HazardCatalogue(), kNowNs); }
+  LocalHazardMap Open() { return LocalHazardMap(config_, protocol::HazardCatalogue(), kNowNs); }
 
-  TemporaryDirectory directory_;
+  test::TemporaryDirectory directory_;
   LocalHazardMap::Config config_;
 };
 
 TEST_F(LocalHazardMapTest, AddedHazardIsKnownAndToBeSentAfterARestart) {
-  const Report report = MakeReport(1, kStreet);
+  const protocol::Report report = MakeReport(1, kStreet);
   {
     LocalHazardMap map = Open();
     EXPECT_EQ(map.Add(report), AddResult::kAdded);
@@ -80,32 +80,33 @@ TEST_F(LocalHazardMapTest, CommittedReportEndsAndItsHazardGoesOnUnderTheZonesId)
   {
     LocalHazardMap map = Open();
     map.Add(MakeReport(1, kStreet));
-    EXPECT_TRUE(map.Apply(MakeReceipt(Receipt::Status::kCommitted, 1, 900)));
-    EXPECT_FALSE(map.Apply(MakeReceipt(Receipt::Status::kCommitted, 1, 900))) << "repeated";
+    EXPECT_TRUE(map.Apply(MakeReceipt(protocol::Receipt::Status::kCommitted, 1, 900)));
+    EXPECT_FALSE(map.Apply(MakeReceipt(protocol::Receipt::Status::kCommitted, 1, 900)))
+        << "repeated";
     EXPECT_EQ(map.Find("pothole", kStreet)->id, Id(900));
   }
   LocalHazardMap map = Open();
   EXPECT_THAT(map.Pending(), SizeIs(0));
   EXPECT_EQ(map.Find("pothole", kStreet)->id, Id(900));
-  map.Apply({MakeNotice(Notice::Action::kRemoved, 900, kStreet, 5)});
+  map.Apply({MakeNotice(protocol::Notice::Action::kRemoved, 900, kStreet, 5)});
   EXPECT_FALSE(map.Find("pothole", kStreet)) << "the zone's id removes it";
 }
 
 TEST_F(LocalHazardMapTest, HazardAnnouncedBeforeItsReceiptIsKnownOnce) {
   LocalHazardMap map = Open();
   map.Add(MakeReport(1, kStreet));
-  map.Apply({MakeNotice(Notice::Action::kAdded, 900, East(1), 5)});
-  map.Apply(MakeReceipt(Receipt::Status::kCommitted, 1, 900));
+  map.Apply({MakeNotice(protocol::Notice::Action::kAdded, 900, East(1), 5)});
+  map.Apply(MakeReceipt(protocol::Receipt::Status::kCommitted, 1, 900));
   EXPECT_EQ(map.known_count(), 1u);
   EXPECT_THAT(map.Known(10), SizeIs(1));
-  map.Apply({MakeNotice(Notice::Action::kRemoved, 900, East(1), 6)});
+  map.Apply({MakeNotice(protocol::Notice::Action::kRemoved, 900, East(1), 6)});
   EXPECT_EQ(map.known_count(), 0u);
 }
 
 TEST_F(LocalHazardMapTest, RefusedReportEndsAndItsHazardIsNotReportedAgain) {
   LocalHazardMap map = Open();
   map.Add(MakeReport(1, kStreet));
-  EXPECT_TRUE(map.Apply(MakeReceipt(Receipt::Status::kRefused, 1, 0)));
+  EXPECT_TRUE(map.Apply(MakeReceipt(protocol::Receipt::Status::kRefused, 1, 0)));
   EXPECT_EQ(map.pending_count(), 0u);
   EXPECT_EQ(map.Add(MakeReport(2, kStreet)), AddResult::kDuplicate);
 }
@@ -113,21 +114,21 @@ TEST_F(LocalHazardMapTest, RefusedReportEndsAndItsHazardIsNotReportedAgain) {
 TEST_F(LocalHazardMapTest, AnnouncedHazardSuppressesUntilItIsRemoved) {
   {
     LocalHazardMap map = Open();
-    EXPECT_EQ(map.Apply({MakeNotice(Notice::Action::kAdded, 900, kStreet, 5)}), 0u);
+    EXPECT_EQ(map.Apply({MakeNotice(protocol::Notice::Action::kAdded, 900, kStreet, 5)}), 0u);
     EXPECT_EQ(map.Add(MakeReport(1, East(2))), AddResult::kDuplicate);
   }
   LocalHazardMap map = Open();
   EXPECT_EQ(map.Add(MakeReport(1, East(2))), AddResult::kDuplicate) << "remembered";
-  map.Apply({MakeNotice(Notice::Action::kRemoved, 900, kStreet, 6)});
+  map.Apply({MakeNotice(protocol::Notice::Action::kRemoved, 900, kStreet, 6)});
   EXPECT_EQ(map.Add(MakeReport(1, East(2))), AddResult::kAdded) << "gone, so reported anew";
 }
 
 TEST_F(LocalHazardMapTest, UpdateMovesAHazardAndOlderNewsDoNot) {
   LocalHazardMap map = Open();
-  map.Apply({MakeNotice(Notice::Action::kAdded, 900, kStreet, 5),
-             MakeNotice(Notice::Action::kUpdated, 900, East(20), 7),
-             MakeNotice(Notice::Action::kUpdated, 900, East(40), 6),
-             MakeNotice(Notice::Action::kRemoved, 900, East(40), 4)});
+  map.Apply({MakeNotice(protocol::Notice::Action::kAdded, 900, kStreet, 5),
+             MakeNotice(protocol::Notice::Action::kUpdated, 900, East(20), 7),
+             MakeNotice(protocol::Notice::Action::kUpdated, 900, East(40), 6),
+             MakeNotice(protocol::Notice::Action::kRemoved, 900, East(40), 4)});
   EXPECT_EQ(map.known_count(), 1u);
   EXPECT_TRUE(map.Find("pothole", East(20)));
   EXPECT_FALSE(map.Find("pothole", kStreet));
@@ -135,15 +136,16 @@ TEST_F(LocalHazardMapTest, UpdateMovesAHazardAndOlderNewsDoNot) {
 
 TEST_F(LocalHazardMapTest, UnusableNoticesAreLeftOutAndCounted) {
   LocalHazardMap map = Open();
-  Notice nowhere = MakeNotice(Notice::Action::kAdded, 901, {std::nan(""), 0}, 5);
-  Notice nameless = MakeNotice(Notice::Action::kAdded, 902, kStreet, 5);
+  protocol::Notice nowhere =
+      MakeNotice(protocol::Notice::Action::kAdded, 901, {std::nan(""), 0}, 5);
+  protocol::Notice nameless = MakeNotice(protocol::Notice::Action::kAdded, 902, kStreet, 5);
   nameless.hazard_uuid = Uuid{};
-  Notice overlong = MakeNotice(Notice::Action::kAdded, 903, kStreet, 5);
+  protocol::Notice overlong = MakeNotice(protocol::Notice::Action::kAdded, 903, kStreet, 5);
   overlong.class_name.assign(65, 'x');
-  Notice unsure = MakeNotice(Notice::Action::kAdded, 904, kStreet, 5);
+  protocol::Notice unsure = MakeNotice(protocol::Notice::Action::kAdded, 904, kStreet, 5);
   unsure.confidence = std::nanf("");
   EXPECT_EQ(map.Apply({nowhere, nameless, overlong, unsure,
-                       MakeNotice(Notice::Action::kAdded, 900, kStreet, 5)}),
+                       MakeNotice(protocol::Notice::Action::kAdded, 900, kStreet, 5)}),
             4u);
   EXPECT_EQ(map.known_count(), 1u);
 }
@@ -162,7 +164,7 @@ TEST_F(LocalHazardMapTest, FullOfUnfinishedReportsRefusesNewOnesAndKeepsTheOld) 
   map.Add(MakeReport(2, East(10)));
   EXPECT_EQ(map.Add(MakeReport(3, East(20))), AddResult::kFull);
   EXPECT_FALSE(map.Find("pothole", East(20))) << "the next sight of it may report it";
-  map.Apply(MakeReceipt(Receipt::Status::kCommitted, 1, 900));
+  map.Apply(MakeReceipt(protocol::Receipt::Status::kCommitted, 1, 900));
   EXPECT_EQ(map.Add(MakeReport(3, East(20))), AddResult::kAdded);
 }
 
@@ -171,7 +173,7 @@ TEST_F(LocalHazardMapTest, BeyondTheLimitTheHazardLongestWithoutNewsIsForgotten)
   LocalHazardMap map = Open();
   map.Add(MakeReport(0, East(-50)));  // The oldest, but unfinished: never forgotten.
   for (int i = 1; i <= 4; ++i) {
-    map.Apply({MakeNotice(Notice::Action::kAdded, 900 + i, East(20.0 * i),
+    map.Apply({MakeNotice(protocol::Notice::Action::kAdded, 900 + i, East(20.0 * i),
                           static_cast<std::uint64_t>(i))});
   }
   EXPECT_EQ(map.known_count(), 3u);
@@ -230,12 +232,12 @@ TEST_F(LocalHazardMapTest, ReportsThatAnOlderProgramLeftAreStillThereAndShowTheW
 }
 
 TEST_F(LocalHazardMapTest, RegionAndHoldSurviveARestart) {
-  Report report = MakeReport(1, East(10));
+  protocol::Report report = MakeReport(1, East(10));
   report.shown = {10, 20, 240, 160};
   Open().Add(report, 12345);
   LocalHazardMap map = Open();
   EXPECT_EQ(map.Pending().at(0).hold_until_ns, 12345);
-  const PixelRegion shown = map.LoadPending(Id(1))->shown;
+  const imaging::PixelRegion shown = map.LoadPending(Id(1))->shown;
   EXPECT_EQ(shown.x, 10u);
   EXPECT_EQ(shown.y, 20u);
   EXPECT_EQ(shown.width, 240u);
@@ -290,4 +292,4 @@ TEST_F(LocalHazardMapTest, WhatAddAcceptedSurvivesKillNine) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

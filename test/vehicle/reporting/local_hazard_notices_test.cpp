@@ -5,12 +5,12 @@
 #include "vehicle/reporting/local_hazard_map.h"
 #include "vehicle/reporting/notice_sequence_tracker.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
-constexpr Notice::Action kAdded = Notice::Action::kAdded;
-constexpr Notice::Action kUpdated = Notice::Action::kUpdated;
-constexpr Notice::Action kRemoved = Notice::Action::kRemoved;
+constexpr protocol::Notice::Action kAdded = protocol::Notice::Action::kAdded;
+constexpr protocol::Notice::Action kUpdated = protocol::Notice::Action::kUpdated;
+constexpr protocol::Notice::Action kRemoved = protocol::Notice::Action::kRemoved;
 
 TEST(NoticeSequenceTracker, KnowsAllUpToTheFirstGapAndGoesOnOnceItIsClosed) {
   NoticeSequenceTracker chain(4);
@@ -36,24 +36,26 @@ TEST(NoticeSequenceTracker, AManyTimesBrokenStreamStaysBounded) {
 }
 
 /// To everybody.
-Notice Announcement(Notice::Action action, int hazard, const GeoPoint& position,
-                    std::uint64_t previous, std::uint64_t sequence) {
-  Notice notice = MakeNotice(action, hazard, position, sequence);
+protocol::Notice Announcement(protocol::Notice::Action action, int hazard,
+                              const geo::GeoPoint& position, std::uint64_t previous,
+                              std::uint64_t sequence) {
+  protocol::Notice notice = MakeNotice(action, hazard, position, sequence);
   notice.previous_sequence = previous;
   return notice;
 }
 
 /// To this vehicle alone.
-Notice Told(Notice::Action action, int hazard, const GeoPoint& position, std::uint64_t sequence) {
-  Notice notice = MakeNotice(action, hazard, position, sequence);
+protocol::Notice Told(protocol::Notice::Action action, int hazard, const geo::GeoPoint& position,
+                      std::uint64_t sequence) {
+  protocol::Notice notice = MakeNotice(action, hazard, position, sequence);
   notice.vehicle_id = "car-1";
   return notice;
 }
 
-Notice CaughtUp(std::uint64_t from, std::uint64_t sequence, std::uint32_t told,
-                double radius_m = 1000) {
-  Notice notice;
-  notice.action = Notice::Action::kCaughtUp;
+protocol::Notice CaughtUp(std::uint64_t from, std::uint64_t sequence, std::uint32_t told,
+                          double radius_m = 1000) {
+  protocol::Notice notice;
+  notice.action = protocol::Notice::Action::kCaughtUp;
   notice.vehicle_id = "car-1";
   notice.previous_sequence = from;
   notice.sequence = sequence;
@@ -71,10 +73,10 @@ class LocalHazardNotices : public ::testing::Test {
   }
   void Restart() {
     map_.reset();
-    map_ = std::make_unique<LocalHazardMap>(config_, HazardCatalogue(), kNowNs);
+    map_ = std::make_unique<LocalHazardMap>(config_, protocol::HazardCatalogue(), kNowNs);
   }
 
-  TemporaryDirectory directory_;
+  test::TemporaryDirectory directory_;
   LocalHazardMap::Config config_;
   std::unique_ptr<LocalHazardMap> map_;
 };
@@ -158,13 +160,13 @@ TEST_F(LocalHazardNotices, AStaleCatchUpDoesNotSetTheVehicleBack) {
 }
 
 TEST_F(LocalHazardNotices, AHostileCatchUpIsLeftOut) {
-  Notice nowhere = CaughtUp(0, 8, 0);
+  protocol::Notice nowhere = CaughtUp(0, 8, 0);
   nowhere.position.latitude_deg = std::nan("");
-  Notice endless = CaughtUp(0, 8, 0, std::numeric_limits<double>::infinity());
-  Notice huge = Told(kAdded, 1, kStreet, std::numeric_limits<std::uint64_t>::max());
+  protocol::Notice endless = CaughtUp(0, 8, 0, std::numeric_limits<double>::infinity());
+  protocol::Notice huge = Told(kAdded, 1, kStreet, std::numeric_limits<std::uint64_t>::max());
   EXPECT_EQ(map_->Apply({nowhere, endless, huge}), 3u);
   EXPECT_EQ(map_->map_sequence(), 0u);
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

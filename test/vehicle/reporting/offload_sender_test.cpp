@@ -7,14 +7,14 @@
 
 #include "test/vehicle/reporting/driving_reporter.h"
 
-namespace livemap {
+namespace livemap::vehicle {
 namespace {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-std::vector<std::uint8_t> PlainJpeg(const Picture& picture, std::size_t max_bytes) {
-  return EncodeJpeg(picture, 80, max_bytes);
+std::vector<std::uint8_t> PlainJpeg(const imaging::Picture& picture, std::size_t max_bytes) {
+  return imaging::EncodeJpeg(picture, 80, max_bytes);
 }
 
 /// A small vehicle that drives straight on.
@@ -38,7 +38,7 @@ class CandidateSenderTest : public ::testing::Test {
   }
 
   /// A candidate of this moment that arrives at once; what can go then.
-  std::vector<OffloadedFrame> See(double seconds) {
+  std::vector<protocol::OffloadedFrame> See(double seconds) {
     sender_->AddJudged(StampNs(seconds), kOptical, 0.8F, true, GreyPicture(), seconds);
     return sender_->TakeReady(seconds, PlainJpeg);
   }
@@ -53,8 +53,8 @@ TEST_F(CandidateSenderTest, AFrameGoesWithThePoseOfItsMomentAndItsCamera) {
   DriveFixes(0, 4);
   const auto sent = See(3.1);
   ASSERT_THAT(sent, SizeIs(1));
-  const OffloadedFrame& candidate = sent[0];
-  EXPECT_LT(GeodesicDistanceM(candidate.base.position, VehicleAt(3.1)), 0.01);
+  const protocol::OffloadedFrame& candidate = sent[0];
+  EXPECT_LT(geo::GeodesicDistanceM(candidate.base.position, VehicleAt(3.1)), 0.01);
   EXPECT_NEAR(candidate.base.course_rad, kBearingRad, 0.01);
   EXPECT_GT(candidate.base.covariance_m2.determinant(), 0);
   EXPECT_FALSE(candidate.fused);
@@ -75,8 +75,8 @@ TEST_F(CandidateSenderTest, ThePoseIsThatOfBaseLinkNotOfTheAntenna) {
   DriveFixes(0, 4);
   const auto sent = See(3.1);
   ASSERT_THAT(sent, SizeIs(1));
-  const GeoPoint behind = GeodesicDestination(VehicleAt(3.1), kBearingRad + M_PI, 2.0);
-  EXPECT_LT(GeodesicDistanceM(sent[0].base.position, behind), 0.02);
+  const geo::GeoPoint behind = geo::GeodesicDestination(VehicleAt(3.1), kBearingRad + M_PI, 2.0);
+  EXPECT_LT(geo::GeodesicDistanceM(sent[0].base.position, behind), 0.02);
   // A course error moves base_link, which lies behind the antenna, against its sense.
   EXPECT_GT(sent[0].base.position_course.norm(), 0);
 }
@@ -103,7 +103,7 @@ TEST_F(CandidateSenderTest, AStandingVehicleSendsOnce) {
   DriveFixes(0, 2);
   for (int i = 1; i <= 150; ++i) {  // It stands where it was after two seconds.
     const double time_s = 2 + 0.2 * i;
-    Fix fix = FixAt(2);
+    geo::Fix fix = FixAt(2);
     fix.stamp_ns = StampNs(time_s);
     sender_->AddFix(fix);
   }
@@ -127,7 +127,7 @@ TEST_F(CandidateSenderTest, AFrameAheadOfTheFixesWaitsForTheNextOne) {
   sender_->AddFix(FixAt(3.2));
   const auto sent = sender_->TakeReady(3.25, PlainJpeg);
   ASSERT_THAT(sent, SizeIs(1));
-  EXPECT_LT(GeodesicDistanceM(sent[0].base.position, VehicleAt(3.1)), 0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(sent[0].base.position, VehicleAt(3.1)), 0.01);
 }
 
 TEST_F(CandidateSenderTest, AFrameWithoutAPoseIsDroppedAfterItsTime) {
@@ -143,8 +143,9 @@ TEST_F(CandidateSenderTest, FusedPosesCountWhereTheyAreAndFixesElsewhere) {
   config_.pose.use_fused = true;
   Restart();
   DriveFixes(0, 4);
-  TrackPose fused;
-  fused.position = GeodesicDestination(VehicleAt(3.1), 0, 1.0);  // A metre away from the fixes.
+  geo::TrackPose fused;
+  fused.position =
+      geo::GeodesicDestination(VehicleAt(3.1), 0, 1.0);  // A metre away from the fixes.
   fused.covariance_m2 = Eigen::Matrix2d::Identity() * 0.01;
   fused.course_rad = kBearingRad;
   fused.course_variance_rad2 = 1e-4;
@@ -153,7 +154,7 @@ TEST_F(CandidateSenderTest, FusedPosesCountWhereTheyAreAndFixesElsewhere) {
   const auto sent = See(3.1);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_TRUE(sent[0].fused);
-  EXPECT_LT(GeodesicDistanceM(sent[0].base.position, fused.position), 0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(sent[0].base.position, fused.position), 0.01);
   EXPECT_THAT(See(3.5), IsEmpty()) << "the fusion may yet tell";
   const auto later = sender_->TakeReady(3.5 + 1.1, PlainJpeg);
   ASSERT_THAT(later, SizeIs(1));
@@ -163,7 +164,9 @@ TEST_F(CandidateSenderTest, FusedPosesCountWhereTheyAreAndFixesElsewhere) {
 TEST_F(CandidateSenderTest, WhatCannotBeMaskedDoesNotLeave) {
   DriveFixes(0, 4);
   sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyPicture(), 3);
-  const auto refuse = [](const Picture&, std::size_t) { return std::vector<std::uint8_t>(); };
+  const auto refuse = [](const imaging::Picture&, std::size_t) {
+    return std::vector<std::uint8_t>();
+  };
   EXPECT_THAT(sender_->TakeReady(3, refuse), IsEmpty());
   EXPECT_EQ(counters().withheld, 1U);
   EXPECT_EQ(counters().sent, 0U);
@@ -178,7 +181,7 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
   Restart();
   std::size_t largest = 0;
   std::size_t smallest = 100000;
-  const auto all_that_is_left = [&](const Picture& picture, std::size_t max_bytes) {
+  const auto all_that_is_left = [&](const imaging::Picture& picture, std::size_t max_bytes) {
     std::vector<std::uint8_t> jpeg = PlainJpeg(picture, 100000);
     jpeg.resize(max_bytes);
     largest = std::max(largest, max_bytes);
@@ -202,12 +205,12 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
 TEST_F(CandidateSenderTest, APictureThatWasShrunkHasTheIntrinsicsOfItsOwnSize) {
   DriveFixes(0, 4);
   sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyPicture(), 3);
-  const auto half = [](const Picture&, std::size_t max_bytes) {
+  const auto half = [](const imaging::Picture&, std::size_t max_bytes) {
     return PlainJpeg({cv::Mat(200, 320, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr}, max_bytes);
   };
   const auto sent = sender_->TakeReady(3, half);
   ASSERT_THAT(sent, SizeIs(1));
-  const CameraIntrinsics& camera = sent[0].intrinsics;
+  const geo::CameraIntrinsics& camera = sent[0].intrinsics;
   EXPECT_EQ(camera.width, 320);
   EXPECT_EQ(camera.height, 200);
   EXPECT_DOUBLE_EQ(camera.fx, 250);
@@ -217,7 +220,7 @@ TEST_F(CandidateSenderTest, APictureThatWasShrunkHasTheIntrinsicsOfItsOwnSize) {
 
 TEST_F(CandidateSenderTest, AnotherImageSizeThanTheCalibrationsIsNotSent) {
   DriveFixes(0, 4);
-  const Picture other{cv::Mat(480, 640, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr};
+  const imaging::Picture other{cv::Mat(480, 640, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr};
   sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, other, 3);
   EXPECT_THAT(sender_->TakeReady(9, PlainJpeg), IsEmpty());
   EXPECT_EQ(counters().no_camera, 1U);
@@ -230,4 +233,4 @@ TEST_F(CandidateSenderTest, TheWaitingRoomIsBounded) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::vehicle

@@ -11,10 +11,10 @@
 #include "web/json/json.h"
 #include "web/server/server.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
-const GeoPoint kPittsburgh{40.4433, -79.9436};
+const geo::GeoPoint kPittsburgh{40.4433, -79.9436};
 
 class ApiTest : public testing::Test {
  protected:
@@ -30,12 +30,12 @@ class ApiTest : public testing::Test {
 };
 
 TEST_F(ApiTest, AnswersAHazardAsGeoJsonFeature) {
-  Report report = fixture_.MakeReport("pothole", kPittsburgh);
+  protocol::Report report = fixture_.MakeReport("pothole", kPittsburgh);
   report.stamp_ns += 250'000'000;
   report.image_format = "png";
   report.image = OnePixelPng();
-  const Receipt receipt = fixture_.zone->Handle(report);
-  ASSERT_EQ(receipt.status, Receipt::Status::kCommitted) << receipt.reason;
+  const protocol::Receipt receipt = fixture_.zone->Handle(report);
+  ASSERT_EQ(receipt.status, protocol::Receipt::Status::kCommitted) << receipt.reason;
 
   const HttpResult answer = Get(port(), "/api/v1/hazards");
   EXPECT_EQ(answer.Field("Content-Type"), "application/geo+json");
@@ -66,7 +66,8 @@ TEST_F(ApiTest, AnswersAHazardAsGeoJsonFeature) {
 }
 
 TEST_F(ApiTest, FindsOneHazardById) {
-  const Receipt receipt = fixture_.zone->Handle(fixture_.MakeReport("pothole", kPittsburgh));
+  const protocol::Receipt receipt =
+      fixture_.zone->Handle(fixture_.MakeReport("pothole", kPittsburgh));
   const std::string id = receipt.hazard_uuid.ToString();
   EXPECT_EQ(Get(port(), "/api/v1/hazards/" + id).Json()["properties"]["active"], true);
   EXPECT_EQ(Get(port(), "/api/v1/hazards/00000000-0000-4000-8000-000000000000").status, 404);
@@ -174,7 +175,7 @@ TEST_F(ApiTest, TextThatIsNoUtf8NeverBreaksAnAnswer) {
 }
 
 TEST_F(ApiTest, AnswersClassesVehiclesConfigAndHealth) {
-  VehicleState vehicle;
+  zone::VehicleState vehicle;
   vehicle.vehicle_id = "car-1";
   vehicle.position = kPittsburgh;
   vehicle.course_rad = std::nan("");
@@ -196,7 +197,7 @@ TEST_F(ApiTest, AnswersClassesVehiclesConfigAndHealth) {
 }
 
 TEST_F(ApiTest, ServesAPictureForEverAndHarmlessly) {
-  Report report = fixture_.MakeReport("pothole", kPittsburgh);
+  protocol::Report report = fixture_.MakeReport("pothole", kPittsburgh);
   report.image_format = "png";
   report.image = OnePixelPng();
   fixture_.zone->Handle(report);
@@ -218,12 +219,12 @@ TEST_F(ApiTest, ServesAPictureForEverAndHarmlessly) {
 
 TEST_F(ApiTest, NoByteOfAVehiclesFileIsServed) {
   cv::Mat scene(48, 64, CV_8UC3, cv::Scalar(90, 120, 150));
-  Report report = fixture_.MakeReport("pothole", kPittsburgh);
+  protocol::Report report = fixture_.MakeReport("pothole", kPittsburgh);
   report.image_format = "png";  // It is none: nobody believes the name.
   cv::imencode(".jpg", scene, report.image);
   const std::string markup = "<script>alert(1)</script>";
   report.image.insert(report.image.end(), markup.begin(), markup.end());
-  ASSERT_EQ(fixture_.zone->Handle(report).status, Receipt::Status::kCommitted);
+  ASSERT_EQ(fixture_.zone->Handle(report).status, protocol::Receipt::Status::kCommitted);
   const HttpResult picture = Get(port(), Hazards()["features"][0]["properties"]["image"]);
   ASSERT_EQ(picture.status, 200);
   EXPECT_EQ(picture.body.substr(0, 3), "\xff\xd8\xff");
@@ -233,11 +234,11 @@ TEST_F(ApiTest, NoByteOfAVehiclesFileIsServed) {
 }
 
 TEST_F(ApiTest, APictureThatCannotBeDecodedIsNotServed) {
-  Report report = fixture_.MakeReport("pothole", kPittsburgh);
+  protocol::Report report = fixture_.MakeReport("pothole", kPittsburgh);
   report.image_format = "png";
   report.image = OnePixelPng();
   report.image.resize(report.image.size() - 20);
-  ASSERT_EQ(fixture_.zone->Handle(report).status, Receipt::Status::kCommitted);
+  ASSERT_EQ(fixture_.zone->Handle(report).status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(Get(port(), Hazards()["features"][0]["properties"]["image"]).status, 404);
 }
 
@@ -323,4 +324,4 @@ TEST(Rfc3339, WritesMillisecondsOfAnyStamp) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,10 +9,10 @@
 #include "test/web/zone_fixture.h"
 #include "web/server/server.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
-const GeoPoint kStart{40.4433, -79.9436};
+const geo::GeoPoint kStart{40.4433, -79.9436};
 
 class LiveStreamTest : public testing::Test {
  protected:
@@ -24,7 +24,7 @@ TEST_F(LiveStreamTest, TellsAddedUpdatedAndRemovedInOrder) {
   StreamClient client(server_.port());
   EXPECT_EQ(client.Next()["type"], "hello");
   EXPECT_EQ(client.Next()["type"], "live");
-  const Receipt receipt = fixture_.zone->Handle(fixture_.MakeReport("pothole", kStart));
+  const protocol::Receipt receipt = fixture_.zone->Handle(fixture_.MakeReport("pothole", kStart));
   fixture_.zone->Handle(fixture_.MakeReport("pothole", kStart));
   fixture_.zone->Remove(receipt.hazard_uuid, "repaired");
   std::uint64_t last = 0;
@@ -40,7 +40,7 @@ TEST_F(LiveStreamTest, TellsAddedUpdatedAndRemovedInOrder) {
 TEST_F(LiveStreamTest, TellsVehiclePositions) {
   StreamClient client(server_.port());
   client.NextOfType("live");
-  VehicleState vehicle;
+  zone::VehicleState vehicle;
   vehicle.vehicle_id = "car-1";
   vehicle.position = kStart;
   vehicle.speed_mps = 12.5;
@@ -211,4 +211,4 @@ TEST_F(LiveStreamTest, TheServerStopsWhileClientsAndReportsKeepComing) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,12 +9,12 @@
 #include "web/api/official_decision.h"
 #include "web/server/server.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 using testing::HasSubstr;
 
-const GeoPoint kCrossing{40.4433, -79.9436};
+const geo::GeoPoint kCrossing{40.4433, -79.9436};
 
 class MapChangeApiTest : public testing::Test {
  protected:
@@ -26,13 +26,13 @@ class MapChangeApiTest : public testing::Test {
 
   /// The id of the map change that a vehicle tells of.
   std::string Tell(const std::string& vehicle = "car-1", bool vanished = false,
-                   const GeoPoint& position = kCrossing) {
+                   const geo::GeoPoint& position = kCrossing) {
     fixture_.now_ns += 1'000'000'000;
-    MapChangeReport report = fixture_.MakeMapChange("traffic_cone", position);
+    protocol::MapChangeReport report = fixture_.MakeMapChange("traffic_cone", position);
     report.vehicle_id = vehicle;
     report.vanished = vanished;
-    const Receipt receipt = fixture_.zone->HandleMapChanges({report}).at(0);
-    EXPECT_EQ(receipt.status, Receipt::Status::kCommitted) << receipt.reason;
+    const protocol::Receipt receipt = fixture_.zone->HandleMapChanges({report}).at(0);
+    EXPECT_EQ(receipt.status, protocol::Receipt::Status::kCommitted) << receipt.reason;
     return receipt.hazard_uuid.ToString();
   }
   nlohmann::json Features(const std::string& query = "") {
@@ -169,4 +169,4 @@ TEST_F(MapChangeApiTest, TheStreamReplaysHazardsAndChangesInOneOrderWithoutAGap)
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::web

@@ -9,12 +9,12 @@
 #include "test/web/zone_fixture.h"
 #include "web/server/server.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 using testing::HasSubstr;
 
-const GeoPoint kPlace{40.4433, -79.9436};
+const geo::GeoPoint kPlace{40.4433, -79.9436};
 constexpr char kReason[] = R"({"reason": "filled yesterday"})";
 
 class OfficialApiTest : public testing::Test {
@@ -27,8 +27,9 @@ class OfficialApiTest : public testing::Test {
 
   /// The id of a new hazard, told to drivers or not.
   std::string Add(const std::string& class_name = "pothole") {
-    const Receipt receipt = fixture_.zone->Handle(fixture_.MakeReport(class_name, kPlace));
-    EXPECT_EQ(receipt.status, Receipt::Status::kCommitted) << receipt.reason;
+    const protocol::Receipt receipt =
+        fixture_.zone->Handle(fixture_.MakeReport(class_name, kPlace));
+    EXPECT_EQ(receipt.status, protocol::Receipt::Status::kCommitted) << receipt.reason;
     return receipt.hazard_uuid.ToString();
   }
   HttpResult Post(const std::string& id, const std::string& what, const std::string& body,
@@ -247,4 +248,4 @@ TEST_F(OfficialApiTest, ATokenFileThatIsNotAcceptedStopsTheServer) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::web

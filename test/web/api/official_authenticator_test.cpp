@@ -10,7 +10,7 @@
 #include "common/error.h"
 #include "test/web/zone_fixture.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 using Verdict = OfficialAuthenticator::Verdict;
@@ -102,7 +102,8 @@ TEST_F(OfficialGateTest, WithoutOfficialsItStaysClosed) {
 }
 
 TEST_F(OfficialGateTest, AfterTooManyWrongTokensNotEvenTheRightOneIsLookedAtForAWhile) {
-  for (int i = 0; i < OfficialAuthenticator::kMaxWrong; ++i) EXPECT_EQ(Try("wrong"), Verdict::kWrongToken);
+  for (int i = 0; i < OfficialAuthenticator::kMaxWrong; ++i)
+    EXPECT_EQ(Try("wrong"), Verdict::kWrongToken);
   EXPECT_EQ(Try("wrong"), Verdict::kTooManyWrong);
   EXPECT_EQ(Try(kToken), Verdict::kTooManyWrong);
   EXPECT_EQ(Try(kToken, 0, "10.0.0.2"), Verdict::kAllowed) << "another client is kept out too";
@@ -120,4 +121,4 @@ TEST_F(OfficialGateTest, ManyClientsDoNotFillTheMemoryNorFreeTheOneThatGoesOn) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::web

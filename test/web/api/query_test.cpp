@@ -7,7 +7,7 @@
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
 
-namespace livemap {
+namespace livemap::web {
 namespace {
 
 HazardQuery Hazards(const std::string& parameters) {
@@ -140,4 +140,4 @@ TEST(Validate, NamesTheBadOption) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::web

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace livemap {
+namespace livemap::web {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
@@ -103,4 +103,4 @@ class StreamClient {
   Stream stream_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::web

@@ -29,7 +29,7 @@
 
 namespace {
 
-using livemap::GeoPoint;
+using livemap::geo::GeoPoint;
 using Json = nlohmann::json;
 
 /// A drawn road with a drawn hazard and its box, as a detector would annotate it.
@@ -64,7 +64,7 @@ std::vector<std::uint8_t> DrawnPicture(const std::string& class_name) {
 class Session {
  public:
   Session() {
-    options_ = livemap::TestOptions();
+    options_ = livemap::web::TestOptions();
     options_.token_file = tokens_.path();
     Start();
   }
@@ -90,12 +90,13 @@ class Session {
 
  private:
   Json Start() {
-    server_ = std::make_unique<livemap::WebServer>(options_, *fixture_.zone, fixture_.catalogue);
+    server_ =
+        std::make_unique<livemap::web::WebServer>(options_, *fixture_.zone, fixture_.catalogue);
     options_.port = server_->port();
     return {{"running", true}};
   }
 
-  void Tick() { fixture_.now_ns = livemap::UtcNowNs() + ahead_ns_; }
+  void Tick() { fixture_.now_ns = livemap::web::UtcNowNs() + ahead_ns_; }
 
   Json Pass(const Json& command) {
     ahead_ns_ += static_cast<std::int64_t>(command.at("seconds").get<double>() * 1e9);
@@ -113,7 +114,7 @@ class Session {
   Json Confirm(const Json& command) {
     Tick();
     const auto uuid = livemap::Uuid::Parse(command.at("id"));
-    const std::string official = livemap::TokenFile::official();
+    const std::string official = livemap::web::TokenFile::official();
     return {{"confirmed", uuid && fixture_.zone->Confirm(*uuid, official)}};
   }
 
@@ -125,8 +126,8 @@ class Session {
       report.image_format = "jpeg";
       report.image = DrawnPicture(report.class_name);
     }
-    const livemap::Receipt receipt = fixture_.zone->Handle(report);
-    const bool committed = receipt.status == livemap::Receipt::Status::kCommitted;
+    const livemap::protocol::Receipt receipt = fixture_.zone->Handle(report);
+    const bool committed = receipt.status == livemap::protocol::Receipt::Status::kCommitted;
     return {{"id", receipt.hazard_uuid.ToString()},
             {"status", committed ? "committed" : "refused"},
             {"reason", receipt.reason}};
@@ -138,7 +139,7 @@ class Session {
         fixture_.MakeMapChange(command.at("class"), {command.at("lat"), command.at("lon")});
     report.vehicle_id = command.value("vehicle", report.vehicle_id);
     report.vanished = command.value("vanished", false);
-    const livemap::Receipt receipt = fixture_.zone->HandleMapChanges({report}).at(0);
+    const livemap::protocol::Receipt receipt = fixture_.zone->HandleMapChanges({report}).at(0);
     if (!receipt.reason.empty()) throw livemap::Error(receipt.reason);
     return {{"id", receipt.hazard_uuid.ToString()}};
   }
@@ -152,7 +153,7 @@ class Session {
   /// Hazards along a lattice of streets about 150 m apart.
   Json Fill(const Json& command) {
     Tick();
-    const GeoPoint corner{command.at("lat"), command.at("lon")};
+    const geo::GeoPoint corner{command.at("lat"), command.at("lon")};
     const std::vector<const char*> classes{"pothole", "pothole",        "pothole", "traffic_cone",
                                            "debris",  "road_work_sign", "barrier"};
     std::mt19937 random(11);
@@ -160,13 +161,13 @@ class Session {
     // Streets cross, so some of these merge: goes on until there are as many as asked for.
     for (int i = 0; fixture_.zone->Statistics().active_hazards < count;) {
       const std::size_t missing = count - fixture_.zone->Statistics().active_hazards;
-      std::vector<livemap::Report> reports;
+      std::vector<livemap::protocol::Report> reports;
       for (std::size_t k = 0; k < missing; ++k, ++i) {
         const double along = 0.00011 * (i / 60) + 1e-5 * std::uniform_real_distribution<>()(random);
         const double across = 0.0018 * (i % 30);
         const bool east = i % 60 < 30;
-        const GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
-                                corner.longitude_deg + (east ? along * 1.31 : across)};
+        const geo::GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
+                                     corner.longitude_deg + (east ? along * 1.31 : across)};
         auto report = fixture_.MakeReport(classes[random() % classes.size()], position);
         report.confidence = 0.5F + 0.49F * std::uniform_real_distribution<float>()(random);
         reports.push_back(report);
@@ -178,7 +179,7 @@ class Session {
 
   Json MoveVehicle(const Json& command) {
     Tick();
-    livemap::VehicleState vehicle;
+    livemap::zone::VehicleState vehicle;
     vehicle.vehicle_id = command.at("id");
     vehicle.position = {command.at("lat"), command.at("lon")};
     vehicle.course_rad = command.at("course");
@@ -187,11 +188,11 @@ class Session {
     return {{"accepted", fixture_.zone->UpdateVehicle(vehicle)}};
   }
 
-  livemap::TokenFile tokens_;
-  livemap::ZoneFixture fixture_;
+  livemap::web::TokenFile tokens_;
+  livemap::web::ZoneFixture fixture_;
   std::int64_t ahead_ns_ = 0;  ///< Of the zone's clock before the system's.
-  livemap::WebConfig options_;
-  std::unique_ptr<livemap::WebServer> server_;
+  livemap::web::WebConfig options_;
+  std::unique_ptr<livemap::web::WebServer> server_;
 };
 
 }  // namespace
@@ -199,7 +200,7 @@ class Session {
 int main() {
   try {
     Session session;
-    std::cout << Json{{"port", session.port()}, {"token", livemap::TokenFile::token()}}
+    std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
               << std::endl;
     std::string line;
     while (std::getline(std::cin, line)) {

@@ -4,7 +4,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
@@ -62,4 +62,4 @@ TEST(OffloadAllowance, CapsBelowOneAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -5,7 +5,7 @@
 #include "common/error.h"
 #include "test/zone/test_times.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 VehicleAllowance::Config SmallCaps() {
@@ -84,4 +84,4 @@ TEST(VehicleAllowance, RefusesCapsBelowOne) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 #include "test/zone/test_times.h"
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 
 class HazardLifeTest : public ::testing::Test {
  protected:
@@ -41,4 +41,4 @@ class HazardLifeTest : public ::testing::Test {
   PresenceRecord life_;
 };
 
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -10,7 +10,7 @@
 
 #include "test/zone/belief/hazard_lifecycle_fixture.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -49,7 +49,8 @@ TEST_F(HazardLifeTest, AnOfficialSuffices) {
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kActive);
   EXPECT_EQ(step.transition->reason, "confirmed by Ada");
-  const LifecycleUpdate again = rules_.Confirm(cone_, "Bob", "still there", kStart + kSecond, life_);
+  const LifecycleUpdate again =
+      rules_.Confirm(cone_, "Bob", "still there", kStart + kSecond, life_);
   ASSERT_TRUE(again.transition);
   EXPECT_EQ(again.transition->from, HazardState::kActive);
   EXPECT_EQ(again.transition->to, HazardState::kActive);
@@ -322,4 +323,4 @@ TEST_F(HazardLifeTest, TheFilterIsRightAsOftenAsItSays) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 #include "test/zone/belief/hazard_lifecycle_fixture.h"
 #include "zone/belief/vehicle_trust.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 class HazardVerdictsTest : public HazardLifeTest {
@@ -180,4 +180,4 @@ TEST_F(HazardVerdictsTest, WhatWasJudgedIsStoredWithTheVoice) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -4,7 +4,7 @@
 #include "test/zone/belief/hazard_lifecycle_fixture.h"
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr char kWhy[] = "words of car-9 withdrawn by Ada: stolen";
@@ -109,4 +109,4 @@ TEST_F(HazardWithdrawalTest, NothingHappensWhereItSaidNothing) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

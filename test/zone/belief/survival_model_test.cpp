@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -16,8 +16,8 @@ using ::testing::ThrowsMessage;
 
 constexpr double kDayS = 86400;
 
-HazardCatalogue LivesCatalogue() {
-  return HazardCatalogue::Parse("classes: {cone: {expected_life_s: 172800}}", "test");
+protocol::HazardCatalogue LivesCatalogue() {
+  return protocol::HazardCatalogue::Parse("classes: {cone: {expected_life_s: 172800}}", "test");
 }
 
 TEST(ClassSurvival, FallsFromOneToNothingAndNeverRises) {
@@ -107,8 +107,8 @@ TEST(SurvivalModel, RestoredGivesTheSameSurvival) {
 TEST(SurvivalModel, RefusesStoredNumbersThatCannotBe) {
   SurvivalModel model(LivesCatalogue());
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const LearnedLifetime& learned :
-       {LearnedLifetime{-1, 0}, LearnedLifetime{nan, 0}, LearnedLifetime{1, nan}, LearnedLifetime{0, -5}}) {
+  for (const LearnedLifetime& learned : {LearnedLifetime{-1, 0}, LearnedLifetime{nan, 0},
+                                         LearnedLifetime{1, nan}, LearnedLifetime{0, -5}}) {
     EXPECT_THAT([&] { model.Restore("cone", learned); }, ThrowsMessage<Error>(HasSubstr("'cone'")));
   }
 }
@@ -122,4 +122,4 @@ TEST(SurvivalModel, IgnoresLessonsThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

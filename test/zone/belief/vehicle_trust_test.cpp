@@ -7,7 +7,7 @@
 #include "common/error.h"
 #include "test/zone/test_times.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -124,4 +124,4 @@ TEST(VehicleTrust, RefusesSettingsThatAreOutOfRangeAndNamesThem) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 #include "test/zone/belief/hazard_lifecycle_fixture.h"
 #include "zone/belief/hazard_lifecycle.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -15,7 +15,8 @@ using ::testing::ThrowsMessage;
 
 TEST_F(HazardLifeTest, ARejectedHazardIsOffTheMapAndSightingsDoNotReopenItInQuarantine) {
   MakeActive();
-  const LifecycleUpdate step = rules_.Reject(cone_, "Ada", "a manhole cover", kStart + kHour, life_);
+  const LifecycleUpdate step =
+      rules_.Reject(cone_, "Ada", "a manhole cover", kStart + kHour, life_);
   ASSERT_TRUE(step.transition);
   EXPECT_EQ(step.transition->to, HazardState::kRejected);
   EXPECT_EQ(step.transition->reason, "rejected by Ada: a manhole cover");
@@ -135,4 +136,4 @@ TEST(VehicleKeys, AreStableAndNeverNobody) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,7 +7,7 @@
 #include "test/zone/offload/offloaded_frames.h"
 #include "zone/admission/report_validation.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using test::AnswerOf;
@@ -32,11 +32,11 @@ TEST_F(CandidateIntakeTest, AHazardIsPlacedByThePoseOfItsFrame) {
   ASSERT_NE(job, nullptr);
   const auto reports = intake.Finish(job->internal_ns, AnswerOf(job->internal_ns, 12, -1.5));
   ASSERT_THAT(reports, SizeIs(1));
-  const Report& report = reports[0];
-  const OffloadedFrame frame = CandidateAt(0);
-  const GeoPoint ahead = GeodesicDestination(frame.base.position, M_PI / 4, 12);
-  const GeoPoint expected = GeodesicDestination(ahead, M_PI / 4 + M_PI / 2, 1.5);
-  EXPECT_LT(GeodesicDistanceM(report.position, expected), 0.01);
+  const protocol::Report& report = reports[0];
+  const protocol::OffloadedFrame frame = CandidateAt(0);
+  const geo::GeoPoint ahead = geo::GeodesicDestination(frame.base.position, M_PI / 4, 12);
+  const geo::GeoPoint expected = geo::GeodesicDestination(ahead, M_PI / 4 + M_PI / 2, 1.5);
+  EXPECT_LT(geo::GeodesicDistanceM(report.position, expected), 0.01);
   EXPECT_EQ(report.vehicle_id, "car-1");
   EXPECT_EQ(report.drive_id, "drive-1");
   EXPECT_EQ(report.stamp_ns, frame.stamp_ns) << "the vehicle's, not the zone's own";
@@ -85,7 +85,7 @@ TEST_F(CandidateIntakeTest, TheSameBoxInTheSameFrameIsTheSameReportAfterARestart
 }
 
 TEST(OffloadReportUuid, EveryPartOfItsNameCounts) {
-  const Box box{1, 2, 3, 4};
+  const imaging::Box box{1, 2, 3, 4};
   const Uuid uuid = OffloadReportUuid("car-1", 5, "pothole", box);
   EXPECT_NE(uuid, OffloadReportUuid("car-2", 5, "pothole", box));
   EXPECT_NE(uuid, OffloadReportUuid("car-1", 6, "pothole", box));
@@ -98,7 +98,7 @@ TEST_F(CandidateIntakeTest, WhatIsTooFarOrNotOnTheRoadIsNotReported) {
   OffloadIntake intake = Intake();
   intake.Add(CandidateAt(0), kZoneNowNs);
   const std::int64_t stamp = intake.Next(kZoneNowNs, 0)->internal_ns;
-  SightingFrame answer = AnswerOf(stamp, 31, 0);
+  placement::SightingFrame answer = AnswerOf(stamp, 31, 0);
   answer.sightings.push_back({"deer", 0.9F, {100, 10, 200, 100}});  // Ends above the horizon.
   answer.sightings.push_back({"deer", 0.9F, {100, 10, std::nanf(""), 100}});
   answer.sightings.push_back({"deer", 0.9F, {0, 200, 100, 390}});  // Its foot may be out of view.
@@ -161,7 +161,7 @@ TEST_F(CandidateIntakeTest, AVehicleBeyondItsAllowanceIsNotHeardOthersAre) {
 
 TEST_F(CandidateIntakeTest, BrokenFramesAreCountedAndEveryFrameIsAccountedFor) {
   OffloadIntake intake = Intake();
-  OffloadedFrame broken = CandidateAt(0);
+  protocol::OffloadedFrame broken = CandidateAt(0);
   broken.base.course_rad = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(intake.Add(broken, kZoneNowNs), "");
   intake.Add(CandidateAt(1), kZoneNowNs);
@@ -185,4 +185,4 @@ TEST_F(CandidateIntakeTest, InternalStampsRiseWhateverTheClockDoes) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -10,7 +10,7 @@
 #include "common/sqlite.h"
 #include "test/zone/zone_fixture.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -94,4 +94,4 @@ TEST_F(ImageStoreTest, SaysSoWhenItCannotWrite) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -13,7 +13,7 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/pictures/served_pictures.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -238,11 +238,11 @@ TEST(RecodePicture, RefusesAProgressivePictureOfThousandsOfScans) {
 
 TEST(RecodePicture, TheHeaderDecidesNotTheNameOfTheFormat) {
   // Reports carry a format's name that nobody reads: a PNG under the name of a JPEG is a PNG.
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.image_format = "jpeg";
   report.image = Encode(".png", Scene(64, 48));
-  EXPECT_EQ(ReadImageHeader(RecodePicture(report.image).data(), 3000)->format,
-            ImageHeader::Format::kJpeg);
+  EXPECT_EQ(imaging::ReadImageHeader(RecodePicture(report.image).data(), 3000)->format,
+            imaging::ImageHeader::Format::kJpeg);
 }
 
 class SmallPictureTest : public testing::Test {
@@ -263,7 +263,7 @@ class SmallPictureTest : public testing::Test {
 TEST_F(SmallPictureTest, KeepsToTheBudgetWithTheBoxInView) {
   cv::Mat noise(720, 1280, CV_8UC3);
   cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 120);
-  const Box box{600, 400, 700, 460};
+  const imaging::Box box{600, 400, 700, 460};
   for (const cv::Mat& image : {noise, Scene(1280, 720)}) {
     for (const std::size_t budget : {1500U, 4096U, 12000U}) {
       SmallPictureLimits limits;
@@ -277,7 +277,7 @@ TEST_F(SmallPictureTest, KeepsToTheBudgetWithTheBoxInView) {
 }
 
 TEST_F(SmallPictureTest, TheBoxIsDrawnWhereTheHazardIs) {
-  const Box box{600, 400, 700, 460};
+  const imaging::Box box{600, 400, 700, 460};
   const cv::Mat seen =
       Decode(SmallPicture(Encode(".jpg", Scene(1280, 720)), box, {0, 0, 1280, 720}));
   ASSERT_EQ(seen.size(), cv::Size(192, 128));
@@ -290,7 +290,7 @@ TEST_F(SmallPictureTest, TheBoxIsDrawnWhereTheHazardIs) {
 }
 
 TEST_F(SmallPictureTest, TheBoxIsOfTheOriginalAlsoWhereThePictureIsASmallerCopy) {
-  const Box box{1800, 1200, 2100, 1380};
+  const imaging::Box box{1800, 1200, 2100, 1380};
   const cv::Mat seen =
       Decode(SmallPicture(Encode(".png", Scene(1280, 720)), box, {0, 0, 3840, 2160}));
   const cv::Rect frame = FrameOf(seen);
@@ -301,11 +301,11 @@ TEST_F(SmallPictureTest, TheBoxIsOfTheOriginalAlsoWhereThePictureIsASmallerCopy)
 TEST_F(SmallPictureTest, TheBoxIsOfTheOriginalAlsoWhereThePictureShowsAPartOfIt) {
   // 640 x 360 pixels of the original by as many, and by half of them.
   const cv::Rect part(500, 250, 640, 360);
-  const Box box{600, 400, 700, 460};
+  const imaging::Box box{600, 400, 700, 460};
   for (const int divisor : {1, 2}) {
     cv::Mat picture;
     cv::resize(Scene(1280, 720)(part), picture, part.size() / divisor, 0, 0, cv::INTER_AREA);
-    const PixelRegion shown{500, 250, 640, 360};
+    const imaging::PixelRegion shown{500, 250, 640, 360};
     const cv::Mat seen = Decode(SmallPicture(Encode(".png", picture), box, shown));
     // In the part the box lies at 100..200, and the view 25..275: in the middle. Taken for a box of
     // the whole image it would stand at the right edge.
@@ -319,8 +319,9 @@ TEST_F(SmallPictureTest, TheBoxIsOfTheOriginalAlsoWhereThePictureShowsAPartOfIt)
 
 TEST_F(SmallPictureTest, ABoxInTheCornerOrAsLargeAsTheImageIsStillSeen) {
   const Bytes file = Encode(".jpg", Scene(640, 480));
-  for (const Box& box : {Box{0, 0, 30, 20}, Box{610, 460, 641, 481}, Box{-1, -1, 641, 481},
-                         Box{5, 5, 6, 6}, Box{300, 0, 340, 480}, Box{0, 200, 640, 260}}) {
+  for (const imaging::Box& box : {imaging::Box{0, 0, 30, 20}, imaging::Box{610, 460, 641, 481},
+                                  imaging::Box{-1, -1, 641, 481}, imaging::Box{5, 5, 6, 6},
+                                  imaging::Box{300, 0, 340, 480}, imaging::Box{0, 200, 640, 260}}) {
     const Bytes small = SmallPicture(file, box, {0, 0, 640, 480});
     ASSERT_FALSE(small.empty());
     const cv::Mat seen = Decode(small);
@@ -333,8 +334,9 @@ TEST_F(SmallPictureTest, ABoxInTheCornerOrAsLargeAsTheImageIsStillSeen) {
 TEST_F(SmallPictureTest, RefusesBoxesOutsideAndWhatNoPictureIs) {
   const Bytes file = Encode(".jpg", Scene(64, 48));
   const float nan = std::nanf("");
-  for (const Box& box : {Box{70, 10, 90, 20}, Box{10, 10, 10, 20}, Box{nan, 0, 10, 10},
-                         Box{0, 0, nan, 10}, Box{-9, -9, -1, -1}}) {
+  for (const imaging::Box& box :
+       {imaging::Box{70, 10, 90, 20}, imaging::Box{10, 10, 10, 20}, imaging::Box{nan, 0, 10, 10},
+        imaging::Box{0, 0, nan, 10}, imaging::Box{-9, -9, -1, -1}}) {
     EXPECT_THROW(SmallPicture(file, box, {0, 0, 64, 48}), Error);
   }
   EXPECT_THROW(SmallPicture({1, 2, 3}, {0, 0, 5, 5}, {0, 0, 64, 48}), Error);
@@ -397,4 +399,4 @@ TEST_F(ServedPicturesTest, TheBoundHoldsForRefusedPicturesToo) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -11,13 +11,13 @@
 #include "common/time.h"
 #include "test/zone/test_times.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-const GeoPoint kPlace{40.44, -79.95};
+const geo::GeoPoint kPlace{40.44, -79.95};
 
 class PollSchedulerTest : public ::testing::Test {
  protected:
@@ -35,14 +35,14 @@ class PollSchedulerTest : public ::testing::Test {
     return life;
   }
   void Set(std::uint64_t id, const PresenceRecord& life, std::int64_t now_ns,
-           const GeoPoint& place = kPlace) {
+           const geo::GeoPoint& place = kPlace) {
     scheduler_->SetHazard(id, place, entry_, life, now_ns, now_ns);
   }
   /// 100 m south of the place, towards it.
   void Approach(const std::string& vehicle, std::int64_t now_ns, double course_rad = 0,
                 double speed_mps = 12) {
-    scheduler_->SetVehicle(
-        vehicle, {now_ns, GeodesicDestination(kPlace, 3.14159265, 100), course_rad, speed_mps});
+    scheduler_->SetVehicle(vehicle, {now_ns, geo::GeodesicDestination(kPlace, 3.14159265, 100),
+                                     course_rad, speed_mps});
   }
   std::vector<std::string> Asked(std::int64_t now_ns) {
     std::vector<std::string> vehicles;
@@ -100,7 +100,7 @@ TEST_F(PollSchedulerTest, AHazardThatFallsDueFindsTheVehicleThatIsThereAlready) 
   std::vector<std::string> asked;
   // The vehicle waits at a light, 40 m ahead of the place, and is heard again and again.
   for (std::int64_t t = kStart; t < kStart + 2 * kHour && asked.empty(); t += 10 * kSecond) {
-    scheduler_->SetVehicle("v", {t, GeodesicDestination(kPlace, 3.14159265, 40), 0, 0});
+    scheduler_->SetVehicle("v", {t, geo::GeodesicDestination(kPlace, 3.14159265, 40), 0, 0});
     asked = Asked(t);
   }
   EXPECT_THAT(asked, ::testing::ElementsAre("v"));
@@ -111,11 +111,11 @@ TEST_F(PollSchedulerTest, AVehicleThatStandsIsAskedTheRestWhenItHasAnswered) {
   Rebuild();
   const PresenceRecord life = Active(5400, kStart);
   Set(1, life, kStart);
-  Set(2, life, kStart, GeodesicDestination(kPlace, 0, 5));
+  Set(2, life, kStart, geo::GeodesicDestination(kPlace, 0, 5));
   std::vector<std::uint64_t> asked;
   std::int64_t now_ns = kStart + 2 * kHour;
   for (int second = 0; second < 12; ++second, now_ns += kSecond) {
-    scheduler_->SetVehicle("v", {now_ns, GeodesicDestination(kPlace, 3.14159265, 40), 0, 0});
+    scheduler_->SetVehicle("v", {now_ns, geo::GeodesicDestination(kPlace, 3.14159265, 40), 0, 0});
     for (const auto& choice : scheduler_->TakeDue(now_ns)) {
       asked.push_back(choice.hazard);
       EXPECT_TRUE(scheduler_->Answered(choice.hazard, "v", 600, now_ns));
@@ -247,7 +247,7 @@ TEST_F(PollSchedulerTest, AHazardThatMovedIsAskedAboutAtItsNewPlace) {
   Set(1, life, kStart);
   const std::int64_t later = kStart + 2 * kHour;
   EXPECT_TRUE(Asked(later).empty());
-  Set(1, life, later, GeodesicDestination(kPlace, 0, 2000));
+  Set(1, life, later, geo::GeodesicDestination(kPlace, 0, 2000));
   EXPECT_TRUE(Asked(later).empty());
   Approach("v", later);
   EXPECT_TRUE(Asked(later).empty());
@@ -316,4 +316,4 @@ TEST(PollSchedulerConfig, RefusesWhatIsOutOfRangeAndNamesIt) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -8,14 +8,14 @@
 #include "common/error.h"
 #include "test/zone/zone_fixture.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
 class RegistryTest : public testing::Test {
  protected:
-  HazardRegistry::Slot Add(const Report& report) {
+  HazardRegistry::Slot Add(const protocol::Report& report) {
     const auto slot = registry_.Add(report, {}, Uuid::Random(generator_), ++sequence_, kNowNs);
     SetState(slot, HazardState::kActive);
     return slot;
@@ -28,19 +28,19 @@ class RegistryTest : public testing::Test {
 
   std::mt19937_64 generator_{3};
   std::uint64_t sequence_ = 0;
-  HazardRegistry registry_{HazardCatalogue::Parse(R"(
+  HazardRegistry registry_{protocol::HazardCatalogue::Parse(R"(
 classes:
   barrier: {duplicate_radius_m: 30.0}
 )",
-                                                  "test"),
+                                                            "test"),
                            7};
 };
 
 TEST_F(RegistryTest, UsesTheRadiusOfTheClassAndKeepsClassesApart) {
-  const GeoPoint here{40.44, -79.94};
-  const GeoPoint at_20_m = GeodesicDestination(here, 1.0, 20.0);
-  Report pothole = MakeReport(here);
-  Report barrier = MakeReport(here);
+  const geo::GeoPoint here{40.44, -79.94};
+  const geo::GeoPoint at_20_m = geo::GeodesicDestination(here, 1.0, 20.0);
+  protocol::Report pothole = MakeReport(here);
+  protocol::Report barrier = MakeReport(here);
   barrier.class_name = "barrier";
   const auto pothole_slot = Add(pothole);
   const auto barrier_slot = Add(barrier);
@@ -52,19 +52,19 @@ TEST_F(RegistryTest, UsesTheRadiusOfTheClassAndKeepsClassesApart) {
 }
 
 TEST_F(RegistryTest, TheNearestOfSeveralWins) {
-  const GeoPoint here{40.44, -79.94};
-  Add(MakeReport(GeodesicDestination(here, 0, 4.0)));
-  const auto nearer = Add(MakeReport(GeodesicDestination(here, kPi, 3.0)));
+  const geo::GeoPoint here{40.44, -79.94};
+  Add(MakeReport(geo::GeodesicDestination(here, 0, 4.0)));
+  const auto nearer = Add(MakeReport(geo::GeodesicDestination(here, kPi, 3.0)));
   EXPECT_EQ(registry_.FindMatch("pothole", here), nearer);
 }
 
 TEST_F(RegistryTest, MergingFusesPositionsByInverseCovariance) {
-  const GeoPoint first{40.44, -79.94};
-  const LocalFrame frame(first);
-  Report report = MakeReport(first);
+  const geo::GeoPoint first{40.44, -79.94};
+  const geo::LocalFrame frame(first);
+  protocol::Report report = MakeReport(first);
   report.covariance_m2 << 2.0, 0.5, 0.5, 1.0;
   const auto slot = Add(report);
-  Report sighting = MakeReport(frame.ToGeo({1.5, -2.0}));
+  protocol::Report sighting = MakeReport(frame.ToGeo({1.5, -2.0}));
   sighting.covariance_m2 << 1.0, -0.3, -0.3, 3.0;
   registry_.Merge(slot, sighting, {}, ++sequence_, kNowNs);
 
@@ -81,22 +81,22 @@ TEST_F(RegistryTest, MergingFusesPositionsByInverseCovariance) {
 }
 
 TEST_F(RegistryTest, AHazardIsFoundWhereFusionMovedIt) {
-  const GeoPoint here{40.44, -79.94};
+  const geo::GeoPoint here{40.44, -79.94};
   const auto slot = Add(MakeReport(here));
-  GeoPoint place = here;
+  geo::GeoPoint place = here;
   for (int i = 0; i < 40; ++i) {
     // Each sighting lies 4 m east of the hazard, which creeps after it, across cells.
-    place = GeodesicDestination(registry_.Get(slot).position, kPi / 2, 4.0);
+    place = geo::GeodesicDestination(registry_.Get(slot).position, kPi / 2, 4.0);
     ASSERT_EQ(registry_.FindMatch("pothole", place), slot);
     registry_.Merge(slot, MakeReport(place), {}, ++sequence_, kNowNs);
   }
-  EXPECT_GT(GeodesicDistanceM(here, registry_.Get(slot).position), 5.0);
+  EXPECT_GT(geo::GeodesicDistanceM(here, registry_.Get(slot).position), 5.0);
   EXPECT_FALSE(registry_.FindMatch("pothole", here));
 }
 
 TEST_F(RegistryTest, ManySightingsNeitherFreezeThePositionNorReachCertainty) {
   const auto slot = Add(MakeReport());
-  Report boastful = MakeReport();
+  protocol::Report boastful = MakeReport();
   boastful.covariance_m2 = Eigen::Matrix2d::Identity() * 1e-9;
   boastful.confidence = 1.0F;
   for (int i = 0; i < 1000; ++i) {
@@ -114,13 +114,13 @@ TEST_F(RegistryTest, TheNewestImageGivesThePictureAndStampsSpanAllSightings) {
   const std::string a(64, 'a');
   const std::string b(64, 'b');
   const std::string c(64, 'c');
-  const Report report = MakeReport();
+  const protocol::Report report = MakeReport();
   const auto slot = registry_.Add(report, {a, "jpeg"}, Uuid::Random(generator_), ++sequence_, 1);
-  Report older = MakeReport();
+  protocol::Report older = MakeReport();
   older.stamp_ns = report.stamp_ns - 5;
   registry_.Merge(slot, older, {b, "png"}, ++sequence_, 2);
   EXPECT_EQ(registry_.Get(slot).image_sha256, a);
-  Report newer = MakeReport();
+  protocol::Report newer = MakeReport();
   newer.stamp_ns = report.stamp_ns + 5;
   registry_.Merge(slot, newer, {}, ++sequence_, 3);
   EXPECT_EQ(registry_.Get(slot).image_sha256, a);
@@ -147,7 +147,7 @@ TEST_F(RegistryTest, QueryAnswersInOrderOfTheLastChangeWithinBoxAndLimit) {
   const auto east = Add(MakeReport({0, -179.9}));
   const auto elsewhere = Add(MakeReport({0, 0}));
   registry_.Merge(west, MakeReport({0, 179.9}), {}, ++sequence_, kNowNs);
-  const GeoBox across{{-1, 179}, {1, -179}};
+  const geo::GeoBox across{{-1, 179}, {1, -179}};
   const auto found = registry_.Query(across, 0, 10);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].uuid, registry_.Get(east).uuid);
@@ -169,14 +169,14 @@ TEST_F(RegistryTest, QueryStaysCompleteOverManyChangesOfFewHazards) {
 }
 
 TEST_F(RegistryTest, QueryNearAnswersNearestFirstAcrossTheAntimeridian) {
-  const GeoPoint here{10, 179.9999};
+  const geo::GeoPoint here{10, 179.9999};
   for (const double distance_m : {4000.0, 1000.0, 6000.0, 2000.0}) {
-    Add(MakeReport(GeodesicDestination(here, kPi / 2, distance_m)));
+    Add(MakeReport(geo::GeodesicDestination(here, kPi / 2, distance_m)));
   }
   const auto found = registry_.QueryNear(here, 5000.0, 2);
   ASSERT_EQ(found.size(), 2U);
-  EXPECT_NEAR(GeodesicDistanceM(here, found[0].position), 1000.0, 0.01);
-  EXPECT_NEAR(GeodesicDistanceM(here, found[1].position), 2000.0, 0.01);
+  EXPECT_NEAR(geo::GeodesicDistanceM(here, found[0].position), 1000.0, 0.01);
+  EXPECT_NEAR(geo::GeodesicDistanceM(here, found[1].position), 2000.0, 0.01);
   EXPECT_EQ(registry_.QueryNear(here, 5000.0, 10).size(), 3U);
 }
 
@@ -207,13 +207,13 @@ TEST_F(RegistryTest, RollbackRestoresEverythingSinceBegin) {
 }
 
 TEST_F(RegistryTest, AChangedHazardIsToldAroundItInTheOrderOfAnnouncements) {
-  const GeoPoint here{40.44, -79.94};
+  const geo::GeoPoint here{40.44, -79.94};
   const auto first = Add(MakeReport(here));
   registry_.MarkAnnounced(first);
-  const auto never = Add(MakeReport(GeodesicDestination(here, 0, 50.0)));
-  const auto far = Add(MakeReport(GeodesicDestination(here, 0, 9000.0)));
+  const auto never = Add(MakeReport(geo::GeodesicDestination(here, 0, 50.0)));
+  const auto far = Add(MakeReport(geo::GeodesicDestination(here, 0, 9000.0)));
   registry_.MarkAnnounced(far);
-  const auto second = Add(MakeReport(GeodesicDestination(here, 0, 100.0)));
+  const auto second = Add(MakeReport(geo::GeodesicDestination(here, 0, 100.0)));
   registry_.MarkAnnounced(second);
   // What happens without an announcement does not change the order.
   registry_.Merge(first, MakeReport(here), {}, ++sequence_, kNowNs);
@@ -264,4 +264,4 @@ TEST_F(RegistryTest, RefusesToRestoreTheSameHazardTwice) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include "test/zone/map_change_fixture.h"
 #include "zone/belief/map_change_witnesses.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using Outcome = MapChangeRegistry::Outcome;
@@ -16,7 +16,7 @@ class MapChangeRegistryTest : public testing::Test {
   MapChangeRegistry::Stamp Next() {
     return {Uuid::Random(generator_), ++sequence_, kChangeNowNs + static_cast<int>(sequence_)};
   }
-  MapChangeRegistry::Effect Tell(const MapChangeReport& report, bool counts = true) {
+  MapChangeRegistry::Effect Tell(const protocol::MapChangeReport& report, bool counts = true) {
     return registry_.Tell(report, counts, Next()).value();
   }
   const MapChangeFeature& Only() const {
@@ -25,8 +25,8 @@ class MapChangeRegistryTest : public testing::Test {
     return only_;
   }
   /// Told a minute after MakeMapChange's stamp.
-  static MapChangeReport Vanished(const std::string& vehicle, int later_s = 60) {
-    MapChangeReport report = MakeMapChange(vehicle, "drive-later");
+  static protocol::MapChangeReport Vanished(const std::string& vehicle, int later_s = 60) {
+    protocol::MapChangeReport report = MakeMapChange(vehicle, "drive-later");
     report.vanished = true;
     report.stamp_ns += later_s * kSecondNs;
     return report;
@@ -71,7 +71,7 @@ TEST_F(MapChangeRegistryTest, OneVehicleNeverConfirmsHoweverOftenItTells) {
 TEST_F(MapChangeRegistryTest, TheSameDriveTellingTwiceCountsOnce) {
   Tell(MakeMapChange());
   const MapChangeFeature before = Only();
-  MapChangeReport again = MakeMapChange();
+  protocol::MapChangeReport again = MakeMapChange();
   again.position = EastOf(1);
   again.stamp_ns += kSecondNs;
   EXPECT_EQ(Tell(again).outcome, Outcome::kMerged);
@@ -85,11 +85,11 @@ TEST_F(MapChangeRegistryTest, TheSameDriveTellingTwiceCountsOnce) {
 
 TEST_F(MapChangeRegistryTest, PositionsAreFusedByInverseCovariance) {
   Tell(MakeMapChange("car-1"));
-  MapChangeReport other = MakeMapChange("car-2");
+  protocol::MapChangeReport other = MakeMapChange("car-2");
   other.position = EastOf(2);
   other.covariance_m2 = 4 * Eigen::Matrix2d::Identity();
   Tell(other);
-  const Eigen::Vector2d place_m = LocalFrame(kChangePlace).ToEnu(Only().position);
+  const Eigen::Vector2d place_m = geo::LocalFrame(kChangePlace).ToEnu(Only().position);
   EXPECT_NEAR(place_m.x(), 0.4, 1e-6);
   EXPECT_NEAR(Only().covariance_m2(0, 0), 0.8, 1e-6);
   EXPECT_NEAR(Only().confidence, 0.75, 1e-6);
@@ -97,10 +97,10 @@ TEST_F(MapChangeRegistryTest, PositionsAreFusedByInverseCovariance) {
 
 TEST_F(MapChangeRegistryTest, WordsJoinWithinThreeSigmasAndSixMetresOnly) {
   Tell(MakeMapChange("car-1"));
-  MapChangeReport far = MakeMapChange("car-2");
+  protocol::MapChangeReport far = MakeMapChange("car-2");
   far.position = EastOf(4.3);  // sqrt(2) m of sigma together: 3.04 sigmas.
   EXPECT_EQ(Tell(far).outcome, Outcome::kAdded);
-  MapChangeReport vague = MakeMapChange("car-3");
+  protocol::MapChangeReport vague = MakeMapChange("car-3");
   vague.covariance_m2 = 100 * Eigen::Matrix2d::Identity();
   vague.position = EastOf(-6.1);
   EXPECT_EQ(Tell(vague).outcome, Outcome::kAdded);
@@ -111,11 +111,11 @@ TEST_F(MapChangeRegistryTest, WordsJoinWithinThreeSigmasAndSixMetresOnly) {
 
 TEST_F(MapChangeRegistryTest, ClassesDoNotMix) {
   for (const char* name : {"barrier", "other_objects", "sign"}) {
-    MapChangeReport report = MakeMapChange();
+    protocol::MapChangeReport report = MakeMapChange();
     report.class_name = name;
     EXPECT_EQ(Tell(report).outcome, Outcome::kAdded) << name;
   }
-  MapChangeReport other = MakeMapChange("car-2");
+  protocol::MapChangeReport other = MakeMapChange("car-2");
   other.class_name = "other_objects";
   EXPECT_EQ(Tell(other).event.feature.class_name, "other_objects");
   EXPECT_EQ(registry_.size(), 3U);
@@ -150,7 +150,7 @@ TEST_F(MapChangeRegistryTest, AnOlderWordUndoesNothing) {
 TEST_F(MapChangeRegistryTest, ALaterWordForItTakesDenialsBack) {
   Confirm();
   Tell(Vanished("car-3"));
-  MapChangeReport later = MakeMapChange("car-1", "drive-2");
+  protocol::MapChangeReport later = MakeMapChange("car-1", "drive-2");
   later.stamp_ns += 90 * kSecondNs;
   Tell(later);
   EXPECT_EQ(Only().Vehicles(true), 0U);
@@ -163,7 +163,7 @@ TEST_F(MapChangeRegistryTest, WhatWasUndoneAnswersOlderWordsAndTheSameDenialAgai
   Tell(Vanished("car-2"));
   EXPECT_EQ(Tell(Vanished("car-3", 80)).outcome, Outcome::kKnown);
   EXPECT_EQ(Tell(MakeMapChange("car-4")).outcome, Outcome::kKnown);
-  MapChangeReport anew = MakeMapChange("car-4");
+  protocol::MapChangeReport anew = MakeMapChange("car-4");
   anew.stamp_ns += 90 * kSecondNs;
   EXPECT_EQ(Tell(anew).outcome, Outcome::kAdded);
   EXPECT_EQ(registry_.size(), 2U);
@@ -205,13 +205,13 @@ TEST_F(MapChangeRegistryTest, BeyondTheMaximumTheOldestClosedOneGoes) {
   Tell(MakeMapChange("car-1"));
   const Uuid undone = Tell(Vanished("car-2")).event.feature.uuid;
   for (const double east_m : {100.0, 200.0}) {
-    MapChangeReport report = MakeMapChange("car-1");
+    protocol::MapChangeReport report = MakeMapChange("car-1");
     report.position = EastOf(east_m);
     Tell(report);
   }
   EXPECT_EQ(registry_.size(), 2U);
   EXPECT_FALSE(registry_.Find(undone));
-  MapChangeReport more = MakeMapChange("car-1");
+  protocol::MapChangeReport more = MakeMapChange("car-1");
   more.position = EastOf(300);
   EXPECT_FALSE(registry_.Tell(more, true, Next())) << "open ones stay";
 }
@@ -221,7 +221,7 @@ TEST_F(MapChangeRegistryTest, ARollbackLeavesNoTrace) {
   rule.max_features = 2;
   registry_ = MapChangeRegistry(rule, 1);
   Tell(MakeMapChange("car-1"));
-  MapChangeReport elsewhere = MakeMapChange("car-1");
+  protocol::MapChangeReport elsewhere = MakeMapChange("car-1");
   elsewhere.position = EastOf(100);
   const Uuid dismissed = Tell(elsewhere).event.feature.uuid;
   registry_.Decide(dismissed, MapChangeState::kDismissed, "", Next());
@@ -250,10 +250,10 @@ TEST_F(MapChangeRegistryTest, ARollbackLeavesNoTrace) {
 
 TEST_F(MapChangeRegistryTest, QueriesFilterByBoxSequenceAndState) {
   Tell(MakeMapChange("car-1"));
-  MapChangeReport north = MakeMapChange("car-1");
+  protocol::MapChangeReport north = MakeMapChange("car-1");
   north.position = {50, 8};
   const auto added = Tell(north);
-  EXPECT_EQ(registry_.Query(GeoBox{{49, 7}, {51, 9}}, 0, 10).size(), 1U);
+  EXPECT_EQ(registry_.Query(geo::GeoBox{{49, 7}, {51, 9}}, 0, 10).size(), 1U);
   EXPECT_EQ(registry_.Query(std::nullopt, added.event.feature.sequence - 1, 10).size(), 1U);
   EXPECT_EQ(registry_.Query(std::nullopt, 0, 1).size(), 1U);
   EXPECT_TRUE(registry_.Query(std::nullopt, 0, 10, {MapChangeState::kUndone}).empty());
@@ -291,4 +291,4 @@ TEST(MapChangeRegistryRule, ImpossibleOnesAreRefused) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,24 +7,24 @@
 
 #include "test/zone/test_times.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
-const GeoPoint kTrackStart{40.44, -79.95};
+const geo::GeoPoint kTrackStart{40.44, -79.95};
 
 /// North at 10 m/s from kTrackStart at second 100, a point every `every_s`.
 std::vector<TrackPoint> DriveNorth(double seconds, double every_s, double course_rad = 0) {
   std::vector<TrackPoint> track;
   for (double t = 0; t <= seconds; t += every_s) {
     track.push_back({static_cast<std::int64_t>((100 + t) * 1e9),
-                     GeodesicDestination(kTrackStart, 0, 10 * t), course_rad, 10});
+                     geo::GeodesicDestination(kTrackStart, 0, 10 * t), course_rad, 10});
   }
   return track;
 }
 
-GeoPoint Ahead(double distance_m, double aside_m = 0) {
-  return GeodesicDestination(GeodesicDestination(kTrackStart, 0, distance_m),
-                             90 * kRadiansPerDegree, aside_m);
+geo::GeoPoint Ahead(double distance_m, double aside_m = 0) {
+  return geo::GeodesicDestination(geo::GeodesicDestination(kTrackStart, 0, distance_m),
+                                  90 * geo::kRadiansPerDegree, aside_m);
 }
 
 TEST(CouldSee, WhatLiesAheadWithinRangeAtItsTime) {
@@ -62,8 +62,9 @@ TEST(CouldSee, NothingAcrossALongGapInTheTrack) {
 TEST(CouldSee, AVehicleThatDrivesTheOtherWayPassesToo) {
   auto track = DriveNorth(30, 1);
   for (std::size_t i = 0; i < track.size(); ++i) {
-    track[i].position = GeodesicDestination(kTrackStart, 0, 300 - 10.0 * static_cast<double>(i));
-    track[i].course_rad = 180 * kRadiansPerDegree;
+    track[i].position =
+        geo::GeodesicDestination(kTrackStart, 0, 300 - 10.0 * static_cast<double>(i));
+    track[i].course_rad = 180 * geo::kRadiansPerDegree;
   }
   EXPECT_TRUE(CouldSee(track, 115 * kSecond, Ahead(120)));
   EXPECT_FALSE(CouldSee(track, 125 * kSecond, Ahead(290)));
@@ -73,7 +74,7 @@ TEST(CouldSee, AStandingVehicleSeesAheadOfIt) {
   const std::vector<TrackPoint> track{{100 * kSecond, kTrackStart, 0, 0},
                                       {105 * kSecond, kTrackStart, 0, 0}};
   EXPECT_TRUE(CouldSee(track, 103 * kSecond, Ahead(40)));
-  EXPECT_FALSE(CouldSee(track, 103 * kSecond, GeodesicDestination(kTrackStart, 3.14, 40)));
+  EXPECT_FALSE(CouldSee(track, 103 * kSecond, geo::GeodesicDestination(kTrackStart, 3.14, 40)));
 }
 
 TEST(CouldSee, NothingWithoutATrackAndNothingThatIsNoPlace) {
@@ -92,4 +93,4 @@ TEST(CouldSee, AWildTrackEndsInBoundedTime) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

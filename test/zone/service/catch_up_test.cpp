@@ -4,13 +4,13 @@
 
 #include <cmath>
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
-constexpr GeoPoint kSquare{40.44, -79.94};
+constexpr geo::GeoPoint kSquare{40.44, -79.94};
 
-GeoPoint EastOfSquare(double distance_m) {
-  return GeodesicDestination(kSquare, M_PI / 2, distance_m);
+geo::GeoPoint EastOfSquare(double distance_m) {
+  return geo::GeodesicDestination(kSquare, M_PI / 2, distance_m);
 }
 
 class CatchUpTest : public ::testing::Test {
@@ -39,7 +39,7 @@ TEST_F(CatchUpTest, ANewVehicleIsToldAllAroundItOnce) {
   ASSERT_TRUE(order);
   EXPECT_EQ(order->vehicle_id, "car-1");
   EXPECT_EQ(order->since, 0u);
-  EXPECT_LT(GeodesicDistanceM(order->centre, kSquare), 0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(order->centre, kSquare), 0.01);
   EXPECT_FALSE(Say(0)) << "it is being told";
   planner_.Told("car-1", now_ns_);
   for (int i = 0; i < 30; ++i) EXPECT_FALSE(Say(100));
@@ -89,7 +89,7 @@ TEST_F(CatchUpTest, AVehicleThatMovedFarIsToldAllAroundItsNewPlace) {
   ASSERT_TRUE(order);
   EXPECT_EQ(order->since, 0u);
   EXPECT_EQ(order->known, 100u);
-  EXPECT_LT(GeodesicDistanceM(order->centre, EastOfSquare(2600)), 0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(order->centre, EastOfSquare(2600)), 0.01);
 }
 
 TEST_F(CatchUpTest, WhatWasMissedIsToldAroundWhereAllWasTold) {
@@ -100,7 +100,7 @@ TEST_F(CatchUpTest, WhatWasMissedIsToldAroundWhereAllWasTold) {
   for (int i = 0; i < 12 && !order; ++i) order = Say(100, 2000);
   ASSERT_TRUE(order);
   EXPECT_EQ(order->since, 100u);
-  EXPECT_LT(GeodesicDistanceM(order->centre, kSquare), 0.01);
+  EXPECT_LT(geo::GeodesicDistanceM(order->centre, kSquare), 0.01);
 }
 
 TEST_F(CatchUpTest, AVehicleOfAZoneOfBeforeIsToldAll) {
@@ -136,4 +136,4 @@ TEST_F(CatchUpTest, ManyVehiclesAreBounded) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 
 #include "test/zone/zone_fixture.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 constexpr std::chrono::milliseconds kPatience{30000};
@@ -15,7 +15,7 @@ TEST(ReportQueue, GivesReportsInOrderAndAtMostTheLimit) {
   ReportQueue queue(10, 1000);
   std::vector<Uuid> uuids;
   for (int i = 0; i < 3; ++i) {
-    const Report report = MakeReport();
+    const protocol::Report report = MakeReport();
     uuids.push_back(report.uuid);
     EXPECT_TRUE(queue.Push(report));
   }
@@ -28,7 +28,7 @@ TEST(ReportQueue, GivesReportsInOrderAndAtMostTheLimit) {
 
 TEST(ReportQueue, TakesNoMoreThanItsBoundsAndRecovers) {
   ReportQueue queue(2, 1000);
-  Report heavy = MakeReport();
+  protocol::Report heavy = MakeReport();
   heavy.image = MakeJpeg(9, 9, 700);
   EXPECT_TRUE(queue.Push(heavy));
   EXPECT_FALSE(queue.Push(heavy));
@@ -52,4 +52,4 @@ TEST(ReportQueue, ClosingWakesTheTakerAndLeavesWhatIsThere) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -7,13 +7,13 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using testing::HasSubstr;
 
 constexpr std::int64_t kDayNs = 86400'000'000'000;
-constexpr GeoPoint kPlace{40.44, -79.94};
+constexpr geo::GeoPoint kPlace{40.44, -79.94};
 
 /// Hazards of one day's expected life that two vehicles must have seen.
 class ZoneLifeTest : public ZoneTest {
@@ -21,14 +21,14 @@ class ZoneLifeTest : public ZoneTest {
   ZoneService& Zone() {
     if (!zone_) {
       ZoneService::Config config = Config();
-      config.catalogue = HazardCatalogue();
+      config.catalogue = protocol::HazardCatalogue();
       zone_ = std::make_unique<ZoneService>(
           config, [this] { return now_ns_; }, 42);
     }
     return *zone_;
   }
   Uuid ReportBy(const std::string& vehicle) {
-    Report report = MakeReport(kPlace);
+    protocol::Report report = MakeReport(kPlace);
     report.vehicle_id = vehicle;
     report.stamp_ns = now_ns_ - 1;
     return Zone().Handle(report).hazard_uuid;
@@ -43,7 +43,7 @@ class ZoneLifeTest : public ZoneTest {
     for (double metres = from_m; metres <= to_m; metres += 15) {
       now_ns_ += 1'000'000'000;
       const double bearing = metres < 0 ? 3.14159265358979323846 : 0.0;
-      const GeoPoint at = GeodesicDestination(kPlace, bearing, std::abs(metres));
+      const geo::GeoPoint at = geo::GeodesicDestination(kPlace, bearing, std::abs(metres));
       Zone().UpdateVehicle({vehicle, "", at, 0.0, 15.0, now_ns_});
     }
   }
@@ -178,7 +178,7 @@ TEST_F(ZoneLifeTest, WhatIsOffTheMapIsListedByItsState) {
 
 TEST_F(ZoneLifeTest, WordsOfADistrustedVehicleAreWithdrawnWithAnEventEach) {
   const Uuid shared = ActiveHazard();
-  Report alone = MakeReport(GeodesicDestination(kPlace, 0, 500));
+  protocol::Report alone = MakeReport(geo::GeodesicDestination(kPlace, 0, 500));
   alone.vehicle_id = "car-2";
   alone.stamp_ns = now_ns_ - 1;
   const Uuid invented = Zone().Handle(alone).hazard_uuid;
@@ -310,7 +310,8 @@ TEST_F(ZoneLifeTest, AVehicleThatCannotHaveSeenThePlaceDeniesInVain) {
   // It turned away and says so anyway.
   for (int i = 0; i < 12; ++i) {
     now_ns_ += 1'000'000'000;
-    const GeoPoint away = GeodesicDestination(kPlace, 3.14159265358979323846, 200.0 + 15 * i);
+    const geo::GeoPoint away =
+        geo::GeodesicDestination(kPlace, 3.14159265358979323846, 200.0 + 15 * i);
     Zone().UpdateVehicle({"car-8", "", away, 3.14159265358979323846, 15.0, now_ns_});
   }
   EXPECT_FALSE(Zone().HandleAnswer(AnswerTo(order, PollAnswer::Answer::kNo)));
@@ -333,4 +334,4 @@ TEST_F(ZoneLifeTest, AYesKeepsItAndBringsItsPicture) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

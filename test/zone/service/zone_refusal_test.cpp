@@ -6,7 +6,7 @@
 #include "zone/admission/speed_rule.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using testing::HasSubstr;
@@ -28,18 +28,18 @@ class ZoneRefusalTest : public ZoneTest {
     return *zone_;
   }
   /// Of car-1, `seconds` after the first, `metres` north of it.
-  Report Sample(double seconds, double metres) {
-    Report report = MakeReport(GeodesicDestination({40.44, -79.94}, 0, metres));
+  protocol::Report Sample(double seconds, double metres) {
+    protocol::Report report = MakeReport(geo::GeodesicDestination({40.44, -79.94}, 0, metres));
     report.stamp_ns += static_cast<std::int64_t>(seconds * 1e9);
     return report;
   }
   std::uint64_t Refused(RefusalKind kind) {
     return Zone().Statistics().refused_by_kind[static_cast<std::size_t>(kind)];
   }
-  std::string Reason(const Report& report) {
-    const Receipt receipt = Zone().Handle(report);
+  std::string Reason(const protocol::Report& report) {
+    const protocol::Receipt receipt = Zone().Handle(report);
     EXPECT_EQ(receipt.report_uuid, report.uuid);
-    return receipt.status == Receipt::Status::kRefused ? receipt.reason : "";
+    return receipt.status == protocol::Receipt::Status::kRefused ? receipt.reason : "";
   }
 
   std::int64_t now_ns_ = kNowNs;
@@ -47,9 +47,9 @@ class ZoneRefusalTest : public ZoneTest {
 };
 
 TEST_F(ZoneRefusalTest, AnotherVehiclesReportSentAgainIsAReplay) {
-  const Report report = MakeReport();
+  const protocol::Report report = MakeReport();
   EXPECT_EQ(Reason(report), "");
-  Report replayed = report;
+  protocol::Report replayed = report;
   replayed.vehicle_id = "car-2";
   EXPECT_THAT(Reason(replayed), HasSubstr("another vehicle"));
   EXPECT_EQ(Refused(RefusalKind::kReplay), 1U);
@@ -61,10 +61,10 @@ TEST_F(ZoneRefusalTest, AnotherVehiclesReportSentAgainIsAReplay) {
 }
 
 TEST_F(ZoneRefusalTest, AReportFromAnOutboxMayBeOldButNotOlderThanTheLimit) {
-  Report waited = MakeReport();
+  protocol::Report waited = MakeReport();
   waited.stamp_ns = kNowNs - 29 * 86400 * kSecondNs;
   EXPECT_EQ(Reason(waited), "");
-  Report stale = MakeReport({50, 8});
+  protocol::Report stale = MakeReport({50, 8});
   stale.stamp_ns = kNowNs - 31 * 86400 * kSecondNs;
   EXPECT_THAT(Reason(stale), HasSubstr("past"));
   EXPECT_EQ(Refused(RefusalKind::kTooOld), 1U);
@@ -74,9 +74,9 @@ TEST_F(ZoneRefusalTest, AReplayedDriveCountsAsOfItsArrivalHoweverOldItIs) {
   ZoneService::Config config = Strict();
   config.replay = true;
   ZoneService zone(config, Clock(), 1);
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.stamp_ns = kNowNs - 3 * 365 * 86400 * kSecondNs;
-  const Receipt receipt = zone.Handle(report);
+  const protocol::Receipt receipt = zone.Handle(report);
   EXPECT_EQ(receipt.reason, "");
   zone.Advance();
   const auto hazard = zone.Find(receipt.hazard_uuid);
@@ -86,7 +86,7 @@ TEST_F(ZoneRefusalTest, AReplayedDriveCountsAsOfItsArrivalHoweverOldItIs) {
 }
 
 TEST_F(ZoneRefusalTest, AStampOfTheFutureIsRefusedAndCounted) {
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.stamp_ns = kNowNs + 400 * kSecondNs;
   EXPECT_THAT(Reason(report), HasSubstr("future"));
   EXPECT_EQ(Refused(RefusalKind::kFuture), 1U);
@@ -94,7 +94,7 @@ TEST_F(ZoneRefusalTest, AStampOfTheFutureIsRefusedAndCounted) {
 
 TEST_F(ZoneRefusalTest, APositionOutsideTheZoneIsRefusedAndCounted) {
   ZoneService::Config config = Strict();
-  config.limits.zone = GeoBox{{40, -80}, {41, -79}};
+  config.limits.zone = geo::GeoBox{{40, -80}, {41, -79}};
   ZoneService zone(config, Clock(), 1);
   EXPECT_THAT(zone.Handle(MakeReport({42, -79.5})).reason, HasSubstr("outside the zone"));
   const auto counted = zone.Statistics().refused_by_kind;
@@ -102,7 +102,7 @@ TEST_F(ZoneRefusalTest, APositionOutsideTheZoneIsRefusedAndCounted) {
 }
 
 TEST_F(ZoneRefusalTest, WhatNoHonestVehicleSendsIsCountedAsMalformed) {
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.confidence = 2;
   EXPECT_THAT(Reason(report), HasSubstr("confidence"));
   EXPECT_EQ(Refused(RefusalKind::kMalformed), 1U);
@@ -124,7 +124,7 @@ TEST_F(ZoneRefusalTest, AnImpossibleSpeedIsRefusedInEitherOrderOfStampsAndAlsoAf
 
 TEST_F(ZoneRefusalTest, OtherVehiclesHaveTheirOwnPlaces) {
   EXPECT_EQ(Reason(Sample(0, 0)), "");
-  Report other = Sample(1, 50000);
+  protocol::Report other = Sample(1, 50000);
   other.vehicle_id = "car-2";
   EXPECT_EQ(Reason(other), "");
 }
@@ -155,20 +155,20 @@ TEST_F(ZoneRefusalTest, ReportsBeyondTheHourlyCapGetNoReceiptAndAreTakenLater) {
   std::int64_t now_ns = kNowNs;
   ZoneService zone(
       config, [&] { return now_ns; }, 1);
-  std::vector<Report> reports;
+  std::vector<protocol::Report> reports;
   for (int i = 0; i < 8; ++i) reports.push_back(MakeReport({40 + 0.01 * i, 8}));
   EXPECT_EQ(zone.HandleBatch(reports).size(), 5U);
   EXPECT_EQ(zone.Statistics().not_now, 3U);
   EXPECT_EQ(zone.Statistics().refused, 0U);
   // A repeat is answered all the same, another vehicle is served.
-  EXPECT_EQ(zone.Handle(reports[0]).status, Receipt::Status::kCommitted);
-  Report other = MakeReport({41, 8});
+  EXPECT_EQ(zone.Handle(reports[0]).status, protocol::Receipt::Status::kCommitted);
+  protocol::Report other = MakeReport({41, 8});
   other.vehicle_id = "car-2";
-  EXPECT_EQ(zone.Handle(other).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(zone.Handle(other).status, protocol::Receipt::Status::kCommitted);
   EXPECT_THROW(zone.Handle(reports[7]), Error);
   now_ns += 3600 * kSecondNs;
   for (std::size_t i = 5; i < 8; ++i) {
-    EXPECT_EQ(zone.Handle(reports[i]).status, Receipt::Status::kCommitted);
+    EXPECT_EQ(zone.Handle(reports[i]).status, protocol::Receipt::Status::kCommitted);
   }
   EXPECT_EQ(zone.Query(std::nullopt, 0, 100).size(), 9U);
 }
@@ -180,4 +180,4 @@ TEST_F(ZoneRefusalTest, EveryKindOfRefusalHasItsName) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

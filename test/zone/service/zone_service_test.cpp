@@ -11,7 +11,7 @@
 #include "common/error.h"
 #include "test/zone/zone_fixture.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using testing::HasSubstr;
@@ -33,10 +33,10 @@ class ZoneServiceTest : public ZoneTest {
 };
 
 TEST_F(ZoneServiceTest, RegistersANewHazardAsReported) {
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.image = MakeJpeg(640, 480);
-  const Receipt receipt = Zone().Handle(report);
-  EXPECT_EQ(receipt.status, Receipt::Status::kCommitted);
+  const protocol::Receipt receipt = Zone().Handle(report);
+  EXPECT_EQ(receipt.status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(receipt.report_uuid, report.uuid);
   EXPECT_EQ(receipt.vehicle_id, "car-1");
   const auto hazard = Zone().Find(receipt.hazard_uuid);
@@ -52,21 +52,23 @@ TEST_F(ZoneServiceTest, RegistersANewHazardAsReported) {
 }
 
 TEST_F(ZoneServiceTest, TheFiveMetreRuleHoldsToTheCentimetre) {
-  const Report first = MakeReport();
+  const protocol::Report first = MakeReport();
   const Uuid hazard = Zone().Handle(first).hazard_uuid;
-  const Receipt outside = Zone().Handle(MakeReport(GeodesicDestination(first.position, 0.7, 5.01)));
+  const protocol::Receipt outside =
+      Zone().Handle(MakeReport(geo::GeodesicDestination(first.position, 0.7, 5.01)));
   EXPECT_NE(outside.hazard_uuid, hazard);
-  const Receipt inside = Zone().Handle(MakeReport(GeodesicDestination(first.position, 3.9, 4.99)));
+  const protocol::Receipt inside =
+      Zone().Handle(MakeReport(geo::GeodesicDestination(first.position, 3.9, 4.99)));
   EXPECT_EQ(inside.hazard_uuid, hazard);
   EXPECT_EQ(Zone().Find(hazard)->sightings, 2U);
 }
 
 TEST_F(ZoneServiceTest, ARepeatedReportCountsOnceAlsoAfterARestartAndInOneBatch) {
-  const Report report = MakeReport();
-  const std::vector<Receipt> receipts = Zone().HandleBatch({report, report});
+  const protocol::Report report = MakeReport();
+  const std::vector<protocol::Receipt> receipts = Zone().HandleBatch({report, report});
   const Uuid hazard = receipts[0].hazard_uuid;
   EXPECT_EQ(receipts[1].hazard_uuid, hazard);
-  EXPECT_EQ(receipts[1].status, Receipt::Status::kCommitted);
+  EXPECT_EQ(receipts[1].status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(Zone().Handle(report).hazard_uuid, hazard);
   EXPECT_EQ(Zone().Statistics().repeated, 2U);
   EXPECT_EQ(Restarted().Handle(report).hazard_uuid, hazard);
@@ -75,16 +77,16 @@ TEST_F(ZoneServiceTest, ARepeatedReportCountsOnceAlsoAfterARestartAndInOneBatch)
 }
 
 TEST_F(ZoneServiceTest, RefusesWhatIsInvalidWithAReasonAndKeepsNothingOfIt) {
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.position.latitude_deg = kNan;
-  Report huge = MakeReport();
+  protocol::Report huge = MakeReport();
   huge.class_name = std::string(1 << 20, 'x');
-  const std::vector<Receipt> receipts = Zone().HandleBatch({report, huge, MakeReport()});
-  EXPECT_EQ(receipts[0].status, Receipt::Status::kRefused);
+  const std::vector<protocol::Receipt> receipts = Zone().HandleBatch({report, huge, MakeReport()});
+  EXPECT_EQ(receipts[0].status, protocol::Receipt::Status::kRefused);
   EXPECT_THAT(receipts[0].reason, HasSubstr("position"));
   EXPECT_TRUE(receipts[0].hazard_uuid.IsNil());
-  EXPECT_EQ(receipts[1].status, Receipt::Status::kRefused);
-  EXPECT_EQ(receipts[2].status, Receipt::Status::kCommitted);
+  EXPECT_EQ(receipts[1].status, protocol::Receipt::Status::kRefused);
+  EXPECT_EQ(receipts[2].status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(All().size(), 1U);
   EXPECT_EQ(Zone().Statistics().refused, 2U);
 }
@@ -92,9 +94,9 @@ TEST_F(ZoneServiceTest, RefusesWhatIsInvalidWithAReasonAndKeepsNothingOfIt) {
 TEST_F(ZoneServiceTest, RestartRestoresExactlyTheSameMap) {
   std::mt19937_64 generator(8);
   std::uniform_real_distribution<double> offset(0, 0.001);
-  std::vector<Report> reports;
+  std::vector<protocol::Report> reports;
   for (int i = 0; i < 500; ++i) {
-    Report report = MakeReport({40.44 + offset(generator), -79.94 + offset(generator)});
+    protocol::Report report = MakeReport({40.44 + offset(generator), -79.94 + offset(generator)});
     report.class_name = i % 3 == 0 ? "traffic_cone" : "<img src=x onerror=alert(1)>";
     report.confidence = 0.3F + 0.001F * static_cast<float>(i);
     report.covariance_m2 << 1.0 / 3.0, 0.1, 0.1, 2.0 / 7.0;
@@ -118,7 +120,8 @@ TEST_F(ZoneServiceTest, RestartRestoresExactlyTheSameMap) {
     EXPECT_EQ(Zone().ImagePath(after[i].image_sha256).has_value(), !after[i].image_sha256.empty());
   }
   // Not only the same list: the same answers.
-  EXPECT_EQ(Zone().Handle(MakeReport(GeoPoint{10, 10})).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(Zone().Handle(MakeReport(geo::GeoPoint{10, 10})).status,
+            protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(Zone().Sequence(), sequence + 1);
 }
 
@@ -171,19 +174,19 @@ TEST_F(ZoneServiceTest, RefusesNewHazardsBeyondTheMaximumButCountsSightings) {
   ZoneService::Config config = Config();
   config.max_hazards = 1;
   ZoneService zone(config, Clock(), 1);
-  EXPECT_EQ(zone.Handle(MakeReport({1, 1})).status, Receipt::Status::kCommitted);
-  const Receipt refused = zone.Handle(MakeReport({2, 2}));
-  EXPECT_EQ(refused.status, Receipt::Status::kRefused);
+  EXPECT_EQ(zone.Handle(MakeReport({1, 1})).status, protocol::Receipt::Status::kCommitted);
+  const protocol::Receipt refused = zone.Handle(MakeReport({2, 2}));
+  EXPECT_EQ(refused.status, protocol::Receipt::Status::kRefused);
   EXPECT_THAT(refused.reason, HasSubstr("maximum"));
-  EXPECT_EQ(zone.Handle(MakeReport({1, 1})).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(zone.Handle(MakeReport({1, 1})).status, protocol::Receipt::Status::kCommitted);
 }
 
 TEST_F(ZoneServiceTest, PicturesThatNoHazardShowsGoFirst) {
   ZoneService::Config config = Config();
   config.image_cap_bytes = 2.5 * 1021;
   ZoneService zone(config, Clock(), 1);
-  const auto report_with = [&](const GeoPoint& position, std::uint8_t value) {
-    Report report = MakeReport(position);
+  const auto report_with = [&](const geo::GeoPoint& position, std::uint8_t value) {
+    protocol::Report report = MakeReport(position);
     report.image = MakeJpeg(9, 9, 1000, value);
     return *zone.Find(zone.Handle(report).hazard_uuid);
   };
@@ -244,4 +247,4 @@ TEST_F(ZoneServiceTest, RefusesImpossibleSettings) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

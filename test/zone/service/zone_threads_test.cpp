@@ -8,7 +8,7 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ZoneThreadsTest = ZoneTest;
@@ -19,9 +19,9 @@ TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
   const int id = zone.Subscribe([&](const ZoneEvent& event) {
     if (event.hazard) sequences.push_back(event.hazard->hazard.sequence);
   });
-  std::vector<std::vector<Report>> work(2);
+  std::vector<std::vector<protocol::Report>> work(2);
   for (int i = 0; i < 300; ++i) {
-    Report report = MakeReport({40 + 0.001 * (i % 40), 8});
+    protocol::Report report = MakeReport({40 + 0.001 * (i % 40), 8});
     if (i % 7 == 0) report.image = MakeJpeg(64, 48, 50, static_cast<std::uint8_t>(i));
     work[static_cast<std::size_t>(i % 2)].push_back(report);
   }
@@ -47,7 +47,7 @@ TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
     });
   }
   std::vector<std::thread> writers;
-  for (const std::vector<Report>& reports : work) {
+  for (const std::vector<protocol::Report>& reports : work) {
     writers.emplace_back([&zone, &reports] {
       for (std::size_t i = 0; i < reports.size(); i += 3) {
         zone.HandleBatch({reports[i], reports[i + 1], reports[i + 2]});
@@ -68,11 +68,11 @@ TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
 }
 
 /// Comes from the south towards `place` and passes it.
-void PassBy(ZoneService& zone, const std::string& vehicle, const GeoPoint& place,
+void PassBy(ZoneService& zone, const std::string& vehicle, const geo::GeoPoint& place,
             std::atomic<std::int64_t>& now_ns) {
   for (int metres = -200; metres <= -15; metres += 15) {
     now_ns += 1'000'000'000;
-    const GeoPoint at{place.latitude_deg + metres / 111000.0, place.longitude_deg};
+    const geo::GeoPoint at{place.latitude_deg + metres / 111000.0, place.longitude_deg};
     zone.UpdateVehicle({vehicle, "", at, 0.0, 15.0, now_ns});
   }
 }
@@ -85,8 +85,8 @@ TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnE
   const int id = zone.Subscribe([&](const ZoneEvent& event) {
     if (event.hazard) events.push_back(*event.hazard);
   });
-  const auto place = [](int i) { return GeoPoint{40 + 0.01 * i, 8}; };
-  std::vector<Report> first;
+  const auto place = [](int i) { return geo::GeoPoint{40 + 0.01 * i, 8}; };
+  std::vector<protocol::Report> first;
   for (int i = 0; i < 20; ++i) first.push_back(MakeReport(place(i)));
   zone.HandleBatch(first);
   now_ns += 12 * 3600'000'000'000;
@@ -94,7 +94,7 @@ TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnE
   std::atomic<int> working{3};
   std::thread reporter([&] {
     for (int i = 0; i < 100; ++i) {
-      Report report = MakeReport(place(i % 20));
+      protocol::Report report = MakeReport(place(i % 20));
       report.vehicle_id = "car-" + std::to_string(i);
       report.stamp_ns = now_ns;
       zone.Handle(report);
@@ -152,4 +152,4 @@ TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnE
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

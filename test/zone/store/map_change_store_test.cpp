@@ -7,7 +7,7 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using testing::HasSubstr;
@@ -34,7 +34,7 @@ class MapChangeStoreTest : public ZoneTest {
     }
     return text;
   }
-  static Receipt Tell(ZoneService& zone, const MapChangeReport& report) {
+  static protocol::Receipt Tell(ZoneService& zone, const protocol::MapChangeReport& report) {
     return zone.HandleMapChanges({report}).at(0);
   }
   long long Count(const std::string& table) const {
@@ -47,8 +47,8 @@ class MapChangeStoreTest : public ZoneTest {
 
 TEST_F(MapChangeStoreTest, ARestartRestoresExactlyTheSameAndGoesOn) {
   std::string before;
-  const MapChangeReport first = MakeMapChange("car-1");
-  MapChangeReport vanished = MakeMapChange("car-3", "drive-9");
+  const protocol::MapChangeReport first = MakeMapChange("car-1");
+  protocol::MapChangeReport vanished = MakeMapChange("car-3", "drive-9");
   vanished.vanished = true;
   vanished.stamp_ns += kSecondNs;
   {
@@ -65,7 +65,7 @@ TEST_F(MapChangeStoreTest, ARestartRestoresExactlyTheSameAndGoesOn) {
   EXPECT_EQ(Everything(zone), before);
   EXPECT_EQ(zone.Sequence(), 4U);
   // The same uuid is answered and counts once; the opposite of another vehicle is the second.
-  EXPECT_EQ(Tell(zone, first).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(Tell(zone, first).status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(Everything(zone), before);
   EXPECT_EQ(zone.Statistics().map_changes.repeated, 1U);
   vanished.uuid = MakeMapChange().uuid;
@@ -77,30 +77,30 @@ TEST_F(MapChangeStoreTest, ARestartRestoresExactlyTheSameAndGoesOn) {
 
 TEST_F(MapChangeStoreTest, AReceiptNamesTheFeatureAndAUuidCountsOnceInOneBatch) {
   ZoneService zone(Config(), Clock(), 1);
-  const MapChangeReport report = MakeMapChange();
-  MapChangeReport stolen = report;
+  const protocol::MapChangeReport report = MakeMapChange();
+  protocol::MapChangeReport stolen = report;
   stolen.vehicle_id = "car-2";
   const auto receipts = zone.HandleMapChanges({report, report, stolen});
   ASSERT_EQ(receipts.size(), 3U);
   const auto features = zone.QueryMapChanges(std::nullopt, 0, 10);
   ASSERT_EQ(features.size(), 1U);
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(receipts[i].status, Receipt::Status::kCommitted);
+    EXPECT_EQ(receipts[i].status, protocol::Receipt::Status::kCommitted);
     EXPECT_EQ(receipts[i].report_uuid, report.uuid);
     EXPECT_EQ(receipts[i].hazard_uuid, features[0].uuid);
     EXPECT_EQ(receipts[i].vehicle_id, "car-1");
   }
-  EXPECT_EQ(receipts[2].status, Receipt::Status::kRefused);
+  EXPECT_EQ(receipts[2].status, protocol::Receipt::Status::kRefused);
   EXPECT_THAT(Tell(zone, stolen).reason, HasSubstr("another vehicle's"));
   EXPECT_EQ(features[0].reports, 1U);
 }
 
 TEST_F(MapChangeStoreTest, WhatIsRefusedLeavesNothing) {
   ZoneService zone(Config(), Clock(), 1);
-  MapChangeReport report = MakeMapChange();
+  protocol::MapChangeReport report = MakeMapChange();
   report.class_name = "'); DROP TABLE map_changes; --";
-  const Receipt receipt = Tell(zone, report);
-  EXPECT_EQ(receipt.status, Receipt::Status::kRefused);
+  const protocol::Receipt receipt = Tell(zone, report);
+  EXPECT_EQ(receipt.status, protocol::Receipt::Status::kRefused);
   EXPECT_THAT(receipt.reason, HasSubstr("accepted is barrier"));
   EXPECT_TRUE(receipt.hazard_uuid.IsNil());
   EXPECT_EQ(zone.Sequence(), 0U);
@@ -114,7 +114,7 @@ TEST_F(MapChangeStoreTest, BeyondItsHourlyCapAVehicleIsNotAnsweredNow) {
   std::int64_t now_ns = kNowNs;
   ZoneService zone(
       config, [&] { return now_ns; }, 1);
-  const MapChangeReport third = MakeMapChange("car-1", "drive-3");
+  const protocol::MapChangeReport third = MakeMapChange("car-1", "drive-3");
   EXPECT_EQ(zone.HandleMapChanges(
                     {MakeMapChange("car-1", "drive-1"), MakeMapChange("car-1", "drive-2"), third})
                 .size(),
@@ -180,7 +180,7 @@ TEST_F(MapChangeStoreTest, EventsReachSubscribersInOneOrderWithThoseOfHazards) {
 
 TEST_F(MapChangeStoreTest, AVehicleThatAnOfficialDistrustsCannotConfirm) {
   ZoneService zone(Config(), Clock(), 1);
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.vehicle_id = "liar";
   zone.Handle(report);
   ASSERT_TRUE(zone.Distrust("liar", "Anna", "stolen"));
@@ -194,13 +194,13 @@ TEST_F(MapChangeStoreTest, BeyondTheMaximumTheOldestClosedOneLeavesTheStoreToo) 
   ZoneService::Config config = Config();
   config.map_changes.max_features = 1;
   ZoneService zone(config, Clock(), 1);
-  const MapChangeReport first = MakeMapChange();
+  const protocol::MapChangeReport first = MakeMapChange();
   const Uuid uuid = Tell(zone, first).hazard_uuid;
-  MapChangeReport second = MakeMapChange();
+  protocol::MapChangeReport second = MakeMapChange();
   second.class_name = "sign";
   EXPECT_THAT(Tell(zone, second).reason, HasSubstr("maximum of 1 map changes"));
   zone.DismissMapChange(uuid, "Anna", "a shadow");
-  EXPECT_EQ(Tell(zone, second).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(Tell(zone, second).status, protocol::Receipt::Status::kCommitted);
   EXPECT_FALSE(zone.FindMapChange(uuid));
   EXPECT_EQ(Count("map_changes"), 1);
   EXPECT_EQ(Count("map_change_events"), 1);
@@ -219,7 +219,7 @@ TEST_F(MapChangeStoreTest, AStoreOfVersion3IsBroughtUpToDate) {
           "DELETE FROM livemap_schema WHERE version = 4");
   ZoneService zone(Config(), Clock(), 2);
   EXPECT_TRUE(zone.Find(hazard));
-  EXPECT_EQ(Tell(zone, MakeMapChange()).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(Tell(zone, MakeMapChange()).status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(zone.Sequence(), 2U);
 }
 
@@ -235,7 +235,7 @@ TEST_F(MapChangeStoreTest, RowsOfImpossibleValuesAreLeftOutAndToldTheOthersStay)
   {
     ZoneService zone(Config(), Clock(), 1);
     for (std::size_t i = 0; i <= broken; ++i) {
-      MapChangeReport report = MakeMapChange();
+      protocol::MapChangeReport report = MakeMapChange();
       report.position = EastOf(100.0 * static_cast<double>(i));
       Tell(zone, report);
     }
@@ -250,9 +250,9 @@ TEST_F(MapChangeStoreTest, RowsOfImpossibleValuesAreLeftOutAndToldTheOthersStay)
   ZoneService zone(Config(), Clock(), 2);
   EXPECT_EQ(zone.QueryMapChanges(std::nullopt, 0, 100).size(), 1U);
   EXPECT_EQ(zone.Statistics().store_damage.rows, broken);
-  EXPECT_EQ(Tell(zone, MakeMapChange("car-7")).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(Tell(zone, MakeMapChange("car-7")).status, protocol::Receipt::Status::kCommitted);
   EXPECT_EQ(Count("map_changes"), static_cast<long long>(broken) + 2) << "broken rows stay";
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -6,7 +6,7 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -25,7 +25,7 @@ class ZoneBrokenRowsTest : public ZoneTest {
   }
   void Write(const std::string& sql) { SqliteDatabase(DatabasePath(), true).Execute(sql); }
 
-  std::vector<Report> reports_;
+  std::vector<protocol::Report> reports_;
 };
 
 TEST_F(ZoneBrokenRowsTest, ABrokenHazardIsLeftOutAndCountedAndTheOthersStay) {
@@ -64,9 +64,10 @@ TEST_F(ZoneBrokenRowsTest, ABrokenHazardIsLeftOutAndCountedAndTheOthersStay) {
     EXPECT_EQ(zone.Statistics().store_damage.rows, 1U) << broken;
     EXPECT_THAT(zone.Statistics().store_damage.first, HasSubstr("hazard")) << broken;
     // Its report is known all the same, and a new hazard does not write over its row.
-    EXPECT_EQ(zone.Handle(reports_[1]).status, Receipt::Status::kCommitted) << broken;
+    EXPECT_EQ(zone.Handle(reports_[1]).status, protocol::Receipt::Status::kCommitted) << broken;
     EXPECT_EQ(zone.Statistics().repeated, 1U) << broken;
-    EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, Receipt::Status::kCommitted) << broken;
+    EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, protocol::Receipt::Status::kCommitted)
+        << broken;
   }
 }
 
@@ -93,7 +94,7 @@ TEST_F(ZoneBrokenRowsTest, BrokenEventsLivesTrustAndPlacesAreLeftOut) {
   EXPECT_TRUE(zone.Events(hazards[0], 10).empty());
   EXPECT_EQ(zone.Events(hazards[1], 10).size(), 1U);
   EXPECT_EQ(zone.Statistics().store_damage.rows, 5U);
-  EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, protocol::Receipt::Status::kCommitted);
 }
 
 TEST_F(ZoneBrokenRowsTest, ASchemaThatNoProgramWroteIsRefused) {
@@ -104,9 +105,9 @@ TEST_F(ZoneBrokenRowsTest, ASchemaThatNoProgramWroteIsRefused) {
 
 TEST_F(ZoneBrokenRowsTest, WhatIsHeldAgainstVehiclesOutlivesARestartAndOldSchemas) {
   ZoneService::Config config = Config();
-  config.catalogue = HazardCatalogue();
+  config.catalogue = protocol::HazardCatalogue();
   const auto invent = [&](ZoneService& zone, double latitude_deg) {
-    Report report = MakeReport({latitude_deg, 1});
+    protocol::Report report = MakeReport({latitude_deg, 1});
     report.vehicle_id = "liar";
     zone.Reject(zone.Handle(report).hazard_uuid, "Anna", "nothing there");
   };
@@ -127,7 +128,7 @@ TEST_F(ZoneBrokenRowsTest, WhatIsHeldAgainstVehiclesOutlivesARestartAndOldSchema
   }
   ZoneService zone(config, Clock(), 3);
   EXPECT_EQ(zone.Statistics().suspect_vehicles, 1U);
-  Report report = MakeReport({10, 1});
+  protocol::Report report = MakeReport({10, 1});
   report.vehicle_id = "liar";
   const Uuid hazard = zone.Handle(report).hazard_uuid;
   EXPECT_EQ(zone.Find(hazard)->vehicles, 0U);
@@ -149,4 +150,4 @@ TEST_F(ZoneBrokenRowsTest, AFailedRejectionIsHeldAgainstNobody) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

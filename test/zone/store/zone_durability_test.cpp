@@ -14,7 +14,7 @@
 #include "zone/service/zone_service.h"
 #include "zone/store/zone_store.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using testing::HasSubstr;
@@ -42,7 +42,7 @@ TEST_F(ZoneDurabilityTest, ARefusedCommitLeavesMapAndStoreAsTheyWere) {
   saboteur.Execute(
       "CREATE TRIGGER no_space BEFORE INSERT ON events WHEN NEW.sequence = 3 "
       "BEGIN SELECT RAISE(ABORT, 'no space left'); END");
-  const std::vector<Report> batch{MakeReport({1, 1}), MakeReport({2, 2})};
+  const std::vector<protocol::Report> batch{MakeReport({1, 1}), MakeReport({2, 2})};
   try {
     zone.HandleBatch(batch);
     FAIL() << "the commit was sabotaged";
@@ -55,8 +55,8 @@ TEST_F(ZoneDurabilityTest, ARefusedCommitLeavesMapAndStoreAsTheyWere) {
   EXPECT_EQ(events, 0);
 
   saboteur.Execute("DROP TRIGGER no_space");
-  for (const Receipt& receipt : zone.HandleBatch(batch)) {
-    EXPECT_EQ(receipt.status, Receipt::Status::kCommitted);
+  for (const protocol::Receipt& receipt : zone.HandleBatch(batch)) {
+    EXPECT_EQ(receipt.status, protocol::Receipt::Status::kCommitted);
   }
   EXPECT_EQ(zone.Find(known)->sightings, 2U);
   EXPECT_EQ(zone.Sequence(), 3U);
@@ -71,7 +71,8 @@ TEST_F(ZoneDurabilityTest, ARefusedCommitLeavesMapAndStoreAsTheyWere) {
       config, [] { return kNowNs; }, static_cast<std::uint64_t>(round));
   std::mt19937_64 generator(static_cast<std::uint64_t>(round) + 1000);
   while (true) {
-    Report report = MakeReport({40.0 + 0.001 * static_cast<double>(generator() % 200), 8.0});
+    protocol::Report report =
+        MakeReport({40.0 + 0.001 * static_cast<double>(generator() % 200), 8.0});
     report.uuid = Uuid::Random(generator);
     zone.Handle(report);
     if (write(pipe, report.uuid.bytes.data(), 16) != 16) _exit(1);
@@ -115,7 +116,7 @@ TEST_F(ZoneDurabilityTest, NothingCommittedIsLostOrDoubledWhenTheProcessIsKilled
     EXPECT_LE(sum.Int(1), static_cast<std::int64_t>(acknowledged) + round + 1);
   }
   ZoneService zone(Config(), Clock(), 77);
-  EXPECT_EQ(zone.Handle(MakeReport({40.0, 8.0})).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(zone.Handle(MakeReport({40.0, 8.0})).status, protocol::Receipt::Status::kCommitted);
 }
 
 TEST_F(ZoneDurabilityTest, RefusesAFileThatIsNoDatabase) {
@@ -127,7 +128,7 @@ TEST_F(ZoneDurabilityTest, RefusesAFileThatIsNoDatabase) {
 TEST_F(ZoneDurabilityTest, RefusesADamagedDatabase) {
   {
     ZoneService zone(Config(), Clock(), 1);
-    std::vector<Report> reports;
+    std::vector<protocol::Report> reports;
     for (int i = 0; i < 300; ++i) reports.push_back(MakeReport({1 + 0.01 * i, 1}));
     zone.HandleBatch(reports);
   }
@@ -164,11 +165,11 @@ TEST_F(ZoneDurabilityTest, WorksInADirectoryWithBlanksAndQuotes) {
 
 TEST_F(ZoneDurabilityTest, HostileTextIsDataNotSql) {
   ZoneService zone(Config(), Clock(), 1);
-  Report report = MakeReport();
+  protocol::Report report = MakeReport();
   report.class_name = "x'); DROP TABLE hazards; --";
   report.vehicle_id = "' OR '1'='1";
   report.drive_id = ":uuid ? $1";
-  EXPECT_EQ(zone.Handle(report).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(zone.Handle(report).status, protocol::Receipt::Status::kCommitted);
   const auto hazards = zone.Query(std::nullopt, 0, 10);
   ASSERT_EQ(hazards.size(), 1U);
   EXPECT_EQ(hazards[0].class_name, report.class_name);
@@ -176,4 +177,4 @@ TEST_F(ZoneDurabilityTest, HostileTextIsDataNotSql) {
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone

@@ -13,7 +13,7 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
-namespace livemap {
+namespace livemap::zone {
 namespace {
 
 using testing::HasSubstr;
@@ -59,7 +59,7 @@ class FullDisk {
 };
 
 TEST_F(ZoneStoreTest, AFullDiskRefusesNewWorkAndDamagesNothingAccepted) {
-  std::vector<Report> reports;
+  std::vector<protocol::Report> reports;
   for (int i = 0; i < 400; ++i) reports.push_back(MakeReport({40 + 0.001 * i, 8}));
   std::string before;
   {
@@ -76,8 +76,8 @@ TEST_F(ZoneStoreTest, AFullDiskRefusesNewWorkAndDamagesNothingAccepted) {
       EXPECT_TRUE(zone.Find(known));
     }
     // With room again the same work is taken, without a restart.
-    for (const Receipt& receipt : zone.HandleBatch(reports)) {
-      EXPECT_EQ(receipt.status, Receipt::Status::kCommitted);
+    for (const protocol::Receipt& receipt : zone.HandleBatch(reports)) {
+      EXPECT_EQ(receipt.status, protocol::Receipt::Status::kCommitted);
     }
     before = Everything(zone);
   }
@@ -125,7 +125,7 @@ TEST_F(ZoneStoreTest, WhatWasLearnedOfAClassIsCommittedWithTheReportOrForgotten)
   };
   zone.Handle(MakeReport({1, 1}));
   const auto sighting = [&](const std::string& vehicle) {
-    Report report = MakeReport({1, 1});
+    protocol::Report report = MakeReport({1, 1});
     report.vehicle_id = vehicle;
     report.stamp_ns = now_ns;
     return report;
@@ -208,7 +208,7 @@ TEST_F(ZoneStoreTest, ADatabaseOfTheFirstVersionIsBroughtUpToDateWithAllItHolds)
     EXPECT_EQ(history[1].to, HazardState::kGone);
     EXPECT_EQ(history[1].reason, "repaired");
     EXPECT_EQ(zone.Events(pothole->uuid, 10).size(), 2U);
-    Report repeated = MakeReport();
+    protocol::Report repeated = MakeReport();
     repeated.uuid = *Uuid::Parse("cccccccc-cccc-4ccc-8ccc-cccccccccccc");
     repeated.vehicle_id = "car-2";
     EXPECT_EQ(zone.Handle(repeated).hazard_uuid, pothole->uuid);
@@ -224,7 +224,7 @@ TEST_F(ZoneStoreTest, ACorruptStoreIsLeftAloneAndItsContentRecoverable) {
   if (std::system("command -v sqlite3 > /dev/null") != 0) {
     GTEST_SKIP() << "skipped, no sqlite3";
   }
-  std::vector<Report> reports;
+  std::vector<protocol::Report> reports;
   {
     ZoneService zone(Config(), Clock(), 1);
     for (int i = 0; i < 600; ++i) reports.push_back(MakeReport({1 + 0.01 * i, 1}));
@@ -256,8 +256,8 @@ TEST_F(ZoneStoreTest, ACorruptStoreIsLeftAloneAndItsContentRecoverable) {
   ZoneService zone(Config(), Clock(), 2);
   // A page holds some dozens of rows.
   EXPECT_GE(zone.Query(std::nullopt, 0, 1000).size(), 500U);
-  EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, Receipt::Status::kCommitted);
+  EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, protocol::Receipt::Status::kCommitted);
 }
 
 }  // namespace
-}  // namespace livemap
+}  // namespace livemap::zone
