@@ -16,7 +16,7 @@
 
 namespace livemap::web {
 
-/// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1` (docs/web.md).
+/// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1` (docs/reference/http-api.md).
 /// Thread-safe; never throws.
 class Api {
  public:

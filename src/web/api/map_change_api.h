@@ -11,7 +11,7 @@ namespace livemap::web {
 /// The list of map changes; "/UUID" and "/UUID/events" stand below it.
 constexpr const char* kMapChangeAddress = "/api/v1/changes";
 
-/// Answers what may be read of map changes (docs/web.md). Thread-safe; store failures and bad
+/// Answers what may be read of map changes (docs/reference/http-api.md). Thread-safe; store failures and bad
 /// requests come out as exceptions.
 class MapChangeApi {
  public:
