@@ -4,36 +4,46 @@ import datetime
 import os
 import pathlib
 import statistics
+import textwrap
 
 from fault_kinds import KINDS
 
 HEAD = """# Faults: what is lost
 
-Made by `./livemap bench faults`; do not edit. What is promised, and by what means, is in [../zone.md](../zone.md),
-[../transport.md](../transport.md) and [../vehicle.md](../vehicle.md).
+`./livemap bench faults` makes this page; do not edit it. [Delivery](../explanation/delivery.md) and
+[the vehicle's outbox](../explanation/duplicates-and-outbox.md) say what is promised, and by what
+means.
 
-Machine: {machine}. Two vehicles, a broker with certificates and a zone, all real processes
-launched by their own launch files. Each vehicle and the zone have a ROS master of their own; between the vehicles' network
-namespace and the zone's is one wire, and one of the vehicles reaches it through a TCP relay. A feeder shows both vehicles
-the same street: 5 images a second with 3 things each, of which each vehicle sees two thirds, so that one in three is
-reported by both and must become one hazard with two sightings. A round: reports flow, at a random moment (by seed {seed},
-mostly while some report is under way) the fault strikes, reports go on, the fault ends, the vehicles rest. Then
+Machine: {machine}.
+
+Two vehicles, a broker with certificates and a zone run as real processes, started by their own
+launch files. Each vehicle and the zone have a ROS master of their own. Between the vehicles'
+network namespace and the zone's is one wire, and one of the vehicles reaches it through a TCP
+relay. A feeder shows both vehicles the same street: 5 images a second with 3 things each. Each
+vehicle sees two thirds of them, so one in three is reported by both and must become one hazard with
+two sightings.
+
+A round: reports flow; at a random moment (by seed {seed}, mostly while some report is under way)
+the fault strikes; reports go on; the fault ends; the vehicles rest. Then the page counts
 
 - **lost**: a report that entered an outbox, does not wait in it and is not in the zone's store;
-- **doubled**: a hazard whose number of sightings is not that of its reports, a thing that became two hazards, a hazard made
-  of two things;
+- **doubled**: a hazard whose number of sightings is not that of its reports, a thing that became
+  two hazards, a hazard made of two things;
 - **unknown**: a report in the zone's store that no outbox had made durable before;
 - **stuck**: a report that still waits {bound} s after the fault.
 
-What entered an outbox is told by a trigger in the outbox's own database, in the same transaction, not by the program. The
-stores of killed processes are copied and judged as they lie, before anything is started again. Kills are of processes: that
-a row survives a power cut as well rests on SQLite's `synchronous=FULL` and is not tested here.
+A trigger in the outbox's own database records, in the same transaction, what entered the outbox;
+the program does not. The stores of killed processes are copied and judged as they lie, before
+anything is started again. Kills are of processes: that a row survives a power cut as well rests on
+SQLite's `synchronous=FULL` and is not tested here.
 
-**Recovery** is the time from the fault's end (for a kill: the restart's begin) until everything is answered that waited then;
-rounds in which nothing waited have none. The rounds follow each other within seconds: a connection that lived less than 5 s
-counts as a failure, so the bridges' pauses grow to their longest, 10 s ([../transport.md](../transport.md#the-bridge)), and
-that is most of the recovery where connections are cut. A single cut is followed by a pause of 0.5 s at most. The zone's
-recovery includes its roslaunch: 1.2 s of processor time, 10.6 s on two cores at load 18 (n = 1).
+**Recovery** is the time from the fault's end (for a kill: from the restart's begin) until
+everything is answered that waited then; rounds in which nothing waited have none. The rounds follow
+each other within seconds. A connection that lived less than 5 s counts as a failure, so the
+bridges' pauses grow to their longest, 10 s (`reconnect_max_s` of [the
+bridge](../reference/nodes/mqtt_bridge.md)). That is most of the recovery where connections are cut.
+A single cut is followed by a pause of 0.5 s at most. The zone's recovery includes its roslaunch:
+1.2 s of processor time, 10.6 s on two cores at load 18 (n = 1).
 
 """
 COLUMNS = ("fault", "rounds", "reports", "waited at the fault's end", "lost", "doubled", "unknown", "stuck",
@@ -101,7 +111,7 @@ def notes(records_of):
                  f"{statistics.median(loads):.0f} (median, by its load average), up to {max(loads):.0f}.")
     if any(not record["namespaces"] for record in everything):
         lines.append("Skipped, no network namespaces: loss, full disks; the other partitions by relays.")
-    return "\n\n".join(lines) + "\n"
+    return "\n\n".join(textwrap.fill(line, 100) for line in lines) + "\n"
 
 
 def page(records_of, seed, bound_s):
