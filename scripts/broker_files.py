@@ -7,7 +7,7 @@ import shutil
 import sys
 
 ZONE_USER = "zone"
-# What may stand in an MQTT topic level, as a user name and as a file name; see docs/transport.md.
+# What may stand in an MQTT topic level, as a user name and as a file name; see docs/reference/wire.md.
 ID_PATTERN = re.compile(r"[A-Za-z0-9._-]{1,64}")
 # Envelope head and MQTT's own bytes around one message.
 PACKET_OVERHEAD_BYTES = 4096

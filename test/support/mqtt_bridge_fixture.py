@@ -32,7 +32,7 @@ def port_answers(port):
 
 
 def envelope(message, type_name=None, md5=None, version=1, payload=None):
-    """The wire format of docs/transport.md, written a second time on purpose."""
+    """The wire format of docs/reference/wire.md, written a second time on purpose."""
     name = (type_name or message._type).encode()
     if payload is None:
         payload = serialise(message)

@@ -247,7 +247,7 @@ TEST_F(ZoneStoreTest, ACorruptStoreIsLeftAloneAndItsContentRecoverable) {
   }
   EXPECT_EQ(ReadFile(damaged, 100 << 20), content);
 
-  // As docs/zone.md says.
+  // As docs/how-to/recover-a-store.md says.
   const std::string recover = "cd '" + directory_ +
                               "/zone' && mv zone.sqlite3 damaged.sqlite3 && " +
                               "sqlite3 damaged.sqlite3 .dump | sed 's/^ROLLBACK.*/COMMIT;/' | "
