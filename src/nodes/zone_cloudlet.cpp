@@ -1,4 +1,5 @@
-// The zone cloudlet: see docs/zone.md. Exit code 1 for a bad parameter or store, 2 for wrong usage.
+// The zone cloudlet: see docs/how-to/run-a-zone.md. Exit code 1 for a bad parameter or store, 2 for
+// wrong usage.
 #include <ros/package.h>
 #include <ros/ros.h>
 

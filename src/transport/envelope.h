@@ -19,7 +19,7 @@ inline constexpr std::size_t kMaxTypeNameBytes = 127;
 using Md5 = std::array<std::uint8_t, 16>;
 
 /// What travels as one MQTT payload: a serialised message and what is needed to know whether the
-/// receiver understands it. docs/transport.md gives the format byte by byte.
+/// receiver understands it. docs/reference/wire.md gives the format byte by byte.
 struct Envelope {
   std::string_view type;  ///< ROS type name, e.g. "livemap/HazardReport".
   Md5 md5{};              ///< MD5 of the message's definition, as ROS computes it.

@@ -8,7 +8,8 @@
 
 namespace livemap::web {
 
-/// The zone's web server: the live map's page, its API and its live stream (docs/web.md).
+/// The zone's web server: the live map's page, its API and its live stream
+/// (docs/reference/http-api.md).
 /// Plain HTTP: in front of a public network stands a proxy that speaks TLS and asks who is there.
 class WebServer {
  public:

@@ -78,7 +78,8 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// official. What nobody asked for is chosen by its sender, so change evidence against a told
 /// hazard lowers p to `settled_above` at most: it makes the zone ask, and the answers decide. It is
 /// gone when two distinct vehicles speak against it and p is small, or by time alone: one vehicle
-/// can neither confirm nor remove, nor hasten the removal. See docs/life.md.
+/// can neither confirm nor remove, nor hasten the removal. See
+/// docs/explanation/hazard-lifecycle.md.
 ///
 /// How far a vehicle is believed comes with its word (Evidence::hostile): h is the vehicle's own
 /// where it is above the share, so its voice has a lower bound, and from `suspect_above` on it

@@ -6,7 +6,8 @@
 
 namespace livemap::zone {
 
-/// Where a hazard stands in its life, as stored: the numbers never change. See docs/life.md.
+/// Where a hazard stands in its life, as stored: the numbers never change. See
+/// docs/explanation/hazard-lifecycle.md.
 enum class HazardState : std::uint8_t {
   kCandidate = 0,  ///< On the officials' map only: drivers are not told yet.
   kActive = 1,     ///< Drivers are told.

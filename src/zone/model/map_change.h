@@ -15,7 +15,8 @@
 
 namespace livemap::zone {
 
-/// Where a map change stands, as stored: the numbers never change. docs/zone.md tells the steps.
+/// Where a map change stands, as stored: the numbers never change.
+/// docs/explanation/map-changes.md tells the steps.
 enum class MapChangeState : std::uint8_t {
   kProposed = 0,   ///< One vehicle says so.
   kConfirmed = 1,  ///< Two vehicles say so, or an official.

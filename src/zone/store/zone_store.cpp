@@ -12,7 +12,7 @@ namespace {
 
 std::string WhyDamaged(const std::string& path, const std::string& verdict) {
   return "store: database '" + path + "' is damaged and left alone: " + verdict +
-         "; how to recover what it holds stands in docs/zone.md";
+         "; how to recover what it holds stands in docs/how-to/recover-a-store.md";
 }
 
 std::string ConnectionText(const std::string& path) {
