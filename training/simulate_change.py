@@ -4,7 +4,7 @@
     training/simulate_change.py --out build/training/change --first-seed 30001 --worlds 60
     training/simulate_change.py --out build/training/change_validation --first-seed 40001 --worlds 8 --plain
 
-OUT/SEED/some, none and all are what `livemap simulate --change` leaves (docs/simulation.md) when some objects, none, or
+OUT/SEED/some, none and all are what `livemap simulate --change` leaves (docs/reference/simulator.md) when some objects, none, or
 all of those change that can. In a second picture of `none` stands everything that can; what `all` says about the same
 picture is the class of each pixel's object (one in five is replaced in `all`, by another class if it stands on the
 pavement: there the mask names what replaces it). The encoder is pretrained on these.

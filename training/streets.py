@@ -1,4 +1,4 @@
-"""Streets for the simulator's world files (docs/simulation.md) that are fuller than those a seed makes up."""
+"""Streets for the simulator's world files (docs/reference/simulator.md) that are fuller than those a seed makes up."""
 
 from typing import Any, Dict, Sequence
 
