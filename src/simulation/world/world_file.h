@@ -44,9 +44,9 @@ struct WorldDescription {
 
 enum class RoadSource { kWorldFile, kRoute };
 
-/// Reads a world from YAML (docs/simulation.md states the keys). Throws Error naming `name`, the
-/// line, the key, its value and what is accepted; unknown keys are refused, and 'pieces' and
-/// 'bearing_deg' when the road's line comes from a route.
+/// Reads a world from YAML (docs/reference/simulator.md states the keys). Throws Error naming
+/// `name`, the line, the key, its value and what is accepted; unknown keys are refused, and
+/// 'pieces' and 'bearing_deg' when the road's line comes from a route.
 WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name,
                                 RoadSource source = RoadSource::kWorldFile);
 WorldDescription ReadWorldFile(const std::string& path, RoadSource source = RoadSource::kWorldFile);

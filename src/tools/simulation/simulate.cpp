@@ -27,7 +27,7 @@ std::vector<Flag> Flags() {
           {"stops", "", "wait two seconds at every second crossing"},
           {"route", "FILE.geojson", "a LineString that the road follows, instead of --start"},
           {"start", "LAT,LON", "of the world's origin, degrees (48.8566,9.0)"},
-          {"world", "FILE", "street and hazards, see docs/simulation.md (drawn by the seed)"},
+          {"world", "FILE", "street and hazards: docs/reference/simulator.md (by the seed)"},
           {"threads", "N", "that render (2)"},
           {"one-ray", "", "one ray per pixel: twice as fast, jagged edges"},
           {"stereo", "M", "baseline of a second eye to the right, for --tum and --bag (none)"},

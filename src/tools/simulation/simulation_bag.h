@@ -25,8 +25,8 @@ struct SimulationBagConfig {
 };
 
 /// Writes a simulated drive as a bag with the topics of a real vehicle and the truth beside them
-/// (docs/simulation.md lists them). This header knows no ROS, so that the simulation builds
-/// without. The same calls give the same bytes.
+/// (docs/reference/simulator.md lists them). This header knows no ROS, so that the simulation
+/// builds without. The same calls give the same bytes.
 class SimulationBag {
  public:
   struct Setup {
