@@ -1,5 +1,7 @@
 """The page of both vehicle cloudlets' figures: the thesis's tables 3.1 and 3.2 and its figure 3.6, measured here."""
 
+import textwrap
+
 import perception_figures as figures
 import perception_plots
 
@@ -12,7 +14,7 @@ MBIT = 8e-6
 
 def prose(text):
     """A paragraph of its own."""
-    return "\n" + " ".join(text.split()) + "\n"
+    return "\n" + textwrap.fill(" ".join(text.split()), 100, break_long_words=False, break_on_hyphens=False) + "\n"
 
 
 def table(head, rows):
@@ -104,16 +106,19 @@ def latency_section(results, out):
     for profile, (detection, round_trip, whole) in THESIS_LATENCY.items():
         cells.append([f"thesis: {NAMES[profile]}", "-" if profile == "big" else "in the next", detection, "-", round_trip, whole])
     text = "## Table 3.1: latency\n" + prose(f"""
-        Milliseconds, mean (standard deviation). *Link*: a relay between vehicle and broker that delays each way so that
-        the round trip is {link['rtt_ms']:g} +- {link['rtt_sigma_ms']:g} ms, as the thesis measured over LTE, and lets
-        {link['up_mbit_s']:g} Mbit/s up and {link['down_mbit_s']:g} down through, in order, as TCP has it. *Loopback*: without
-        it. *Early discard*: from the image's stamp to the candidate frame that leaves the vehicle: judging{judging(rows)}, the
-        wait for the next fix, masking, encoding. *Detection*: from the decoded image to the boxes, per frame; of the SVC, in the zone. *Placing*: from the boxes to the report: the
-        wait for the first fix after the image (up to 0.3 s), projection, and the picture. *Round trip*: from the report to
-        the zone's receipt of it, which comes after its fsync; of the SVC, from the candidate frame to the zone's report,
-        with the zone's detection in it. *End to end*: from the image's stamp to the receipt (SVC: to the report in the
-        zone); what its stages do not sum up to is waiting, for the camera's rectified image and for a turn at the detector. Stages that
-        every frame goes through are means over all frames, the others over the reports, so that the sum may exceed the end to end too. Detection of the thesis had no further stage, so its end to end is the sum of two.""")
+        Milliseconds, mean (standard deviation). *Link*: a relay between vehicle and broker that delays each way so
+        that the round trip is {link['rtt_ms']:g} +- {link['rtt_sigma_ms']:g} ms, as the thesis measured over LTE, and
+        lets {link['up_mbit_s']:g} Mbit/s up and {link['down_mbit_s']:g} down through, in order, as TCP has it.
+        *Loopback*: without it. *Early discard*: from the image's stamp to the candidate frame that leaves the
+        vehicle: judging{judging(rows)}, the wait for the next fix, masking, encoding. *Detection*: from the decoded
+        image to the boxes, per frame; of the SVC, in the zone. *Placing*: from the boxes to the report: the wait for
+        the first fix after the image (up to 0.3 s), projection, and the picture. *Round trip*: from the report to the
+        zone's receipt of it, which comes after its fsync; of the SVC, from the candidate frame to the zone's report,
+        with the zone's detection in it. *End to end*: from the image's stamp to the receipt (SVC: to the report in
+        the zone); what its stages do not sum up to is waiting, for the camera's rectified image and for a turn at the
+        detector. Stages that every frame goes through are means over all frames, the others over the reports, so that
+        the sum may exceed the end to end too. Detection of the thesis had no further stage, so its end to end is the
+        sum of two.""")
     text += "\n" + table(["configuration", "early discard", "detection", "placing", "round trip", "end to end"], cells)
     return text + "\n![Latency per stage](perception_latency.png)\n"
 
@@ -133,21 +138,23 @@ def detection_section(results):
     frames = sum(run["frames"] for run in Group(results, "big").runs)
     seconds = sum(run["drive_s"] for run in Group(results, "big").runs)
     text = "## Table 3.2: detection\n" + prose(f"""
-        Frames/s is what was processed (of the SVC: judged by its classifier) of what the drives hold: {frames} frames in {seconds:.0f} s, so
-        {frames / max(seconds, 1e-9):.1f} is the most there (the thesis's camera gave 30; what the engines could do stands
-        below). What the SVC's classifier did not judge it left out on
-        purpose, as it looks at 3 frames a second; *dropped* is what came too fast. Radius of duplicates {results['usual_radius_m']} m. A false report is each whose
-        box overlaps no label of its frame by IoU {figures.HIT_IOU}; `livemap evaluate detection` counts those within 12 m as one, so its figure is another. Mbit/s is the uplink as the bridge counts it, of reports,
-        pictures, positions and everything else.""")
+        Frames/s is what was processed (of the SVC: judged by its classifier) of what the drives hold: {frames} frames
+        in {seconds:.0f} s, so {frames / max(seconds, 1e-9):.1f} is the most there (the thesis's camera gave 30; what
+        the engines could do stands below). The SVC's classifier looks at 3 frames a second and leaves the others out
+        on purpose; *dropped* counts the frames that came too fast. Radius of duplicates {results['usual_radius_m']}
+        m. A false report is each whose box overlaps no label of its frame by IoU {figures.HIT_IOU}; `livemap evaluate
+        detection` counts those within 12 m as one, so its figure is another. Mbit/s is the uplink as the bridge
+        counts it, of reports, pictures, positions and everything else.""")
     if detector:
-        text += prose(f"""AP50 is the detector's own over all labelled frames of the drives (n = {detector['n']} frames,
-            {detector['labels']} potholes), by `livemap evaluate detection`; there, frame by frame and without places, its event recall
-            is {number(detector['event_recall'], 3)} of {detector['events']} events at {number(detector.get('false_per_km'), 1)} false
-            reports per km. Event recall in the table is harder: an event
-            counts when a *report* reached the zone whose box overlaps a label of its own frame by IoU
-            {figures.HIT_IOU}. What is too far away or badly placed to report, or suppressed as a duplicate, is missed.""")
+        text += prose(f"""AP50 is the detector's own over all labelled frames of the drives (n = {detector['n']}
+            frames, {detector['labels']} potholes), by `livemap evaluate detection`; there, frame by frame and without
+            places, its event recall is {number(detector['event_recall'], 3)} of {detector['events']} events at
+            {number(detector.get('false_per_km'), 1)} false reports per km. Event recall in the table is harder: an
+            event counts when a *report* reached the zone whose box overlaps a label of its own frame by IoU
+            {figures.HIT_IOU}. Hazards that are too far away or badly placed to report, or suppressed as duplicates,
+            are missed.""")
     else:
-        text += prose("""The drive is simulated: recall is the share of true hazards that stand on the zone's map within 5 m
+        text += prose("""The drive is simulated: recall is the share of true hazards that are on the zone's map within 5 m
             afterwards, all classes.""")
     return text + "\n" + table(["configuration", "frames/s", "dropped", "AP50", "event recall", "false reports/km", "Mbit/s",
                                 "reports"], cells)
@@ -181,11 +188,11 @@ def uplink_section(results, out):
     perception_plots.draw_uplink(points, stream_mbit_s, out / "perception_uplink.png")
     text = "## Figure 3.6: uplink against recall\n\n![Uplink against recall](perception_uplink.png)\n\n"
     text += table(["configuration", "event recall", "reports", "hazards on the map", "Mbit/s"], cells)
-    text += prose("""The perfect detector's boxes are the labels, reported by the same vehicle; they come without pictures, so
-        each of its reports is counted with a picture of the mean size of the BVC's. Its recall is what placing and
-        duplicates let through. The stream is the drive's own frames at their own rate by ffmpeg (libx264, medium, CRF 23);
-        thesis: nearly 9 Mbit/s at 30 frames/s. A duplicate is a hazard of the same class within the radius, at the
-        vehicle and at the zone alike.""")
+    text += prose("""The perfect detector's boxes are the labels, reported by the same vehicle; they come without
+        pictures, so each of its reports is counted with a picture of the mean size of the BVC's. Its recall is what
+        placing and duplicates let through. The stream is the drive's own frames at their own rate by ffmpeg (libx264,
+        medium, CRF 23); thesis: nearly 9 Mbit/s at 30 frames/s. A duplicate is a hazard of the same class within the
+        radius, at the vehicle and at the zone alike.""")
     wire = Group(results, "big", link=True)
     if wire and wire.wire_mbit_s() is not None:
         text += prose(f"""Over the link, the BVC's TCP payload towards the broker was {wire.wire_mbit_s():.4f} Mbit/s, MQTT and login
@@ -207,10 +214,10 @@ def engines_section(results):
     cells = [[engine, engines, threads, number(row["items_per_second"], 1), number(row["items_per_second"] / slowest, 2),
               number(row.get("pool_mib"), 0)] for (engine, engines, threads), row in sorted(rates.items())]
     failed = [row["name"] for row in results["engines"] if row.get("error_occurred")]
-    text = "## Engines\n" + prose("""What a pool of engines makes of 640x400 frames that never end, with the same model
-        (`livemap_detector_benchmark --benchmark_filter=BM_Pool`): letterbox, network, decoding. All in one run of one process, so
-        the ratios to OpenCV with one thread mean more than the rates. MiB: what the process grew by, in the order of the
-        runs; later ones reuse what earlier ones left.""")
+    text = "## Engines\n" + prose("""This is the rate of a pool of engines that is given 640x400 frames without end,
+        with the same model (`livemap_detector_benchmark --benchmark_filter=BM_Pool`): letterbox, network, decoding.
+        All in one run of one process, so the ratios to OpenCV with one thread mean more than the rates. MiB: what the
+        process grew by, in the order of the runs; later ones reuse what earlier ones left.""")
     text += "\n" + table(["engine", "engines", "threads each", "frames/s", "ratio", "MiB"], cells)
     if failed:
         text += prose(f"Not measured: {', '.join(failed)}.")
@@ -231,11 +238,12 @@ def saturated_section(results):
     cells = [[run["model"], pool_rate(pools.get(run["model"]), "opencv"), pool_rate(pools.get(run["model"]), "torch"),
               number(run["processed_hz"], 1), f"{run['dropped']} of {run['frames']}", run["committed"]] for run in runs]
     return "## From the camera to the report\n" + prose(f"""
-        A simulated street (seed 20201, 20 s) through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s, which is what the
-        thesis's camera gave and more than a vehicle here can do: what it cannot, it drops, oldest first. So what it processes is
-        the rate of the whole: decoding, rectification, detector (as many engines as cores, one thread each, the engine of the model's
-        manifest), placing, masking of the reports' pictures, report. Player, broker and zone take their share of the same cores.
-        *Pool*: the same engines alone, as in the table above.""") + "\n" + table(
+        A simulated street (seed 20201, 20 s) through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s,
+        as the thesis's camera gave them. That is more than a vehicle here can do; it drops the rest, oldest first. So
+        the frames that it processes give the rate of the whole: decoding, rectification, detector (as many engines as
+        cores, one thread each, the engine of the model's manifest), placing, masking of the reports' pictures,
+        report. Player, broker and zone take their share of the same cores. *Pool*: the same engines alone, as in the
+        table above.""") + "\n" + table(
         ["model", "pool, OpenCV (frames/s)", "pool, libtorch (frames/s)", "camera to report (frames/s)", "dropped",
          "reports in the zone's store"], cells)
 
@@ -269,24 +277,28 @@ def write(results, out):
     incomplete = [run for run in results["runs"] if not run["complete"]]
     drives = ", ".join(results["drives"])
     text = "# Perception: both vehicle cloudlets as the thesis measured them\n"
-    text += prose(f"""Written by `./livemap bench perception{' --quick' if results['quick'] else ''}` on {results['date']}, version
-        {results['version'] or 'unknown'}: {machine['cpu']}, {machine['cores']} cores. Vehicle, broker, zone, live map, player and
-        recorder all ran on these cores, with a load of {min(loads):.1f} to {max(loads):.1f} before and after the runs
-        ({machine['cores']} is full), the system's own among it. Times are those of a crowded machine where it is higher, and only their ratios travel.
-        Drives: {drives} ({'simulated' if results['simulated'] else 'road survey at 16 m/s, stretches without pictures cut to 1 s'}),
+    text += prose(f"""Written by `./livemap bench perception{' --quick' if results['quick'] else ''}` on
+        {results['date']}, version {results['version'] or 'unknown'}: {machine['cpu']}, {machine['cores']} cores.
+        Vehicle, broker, zone, live map, player and recorder all ran on these cores, with a load of {min(loads):.1f}
+        to {max(loads):.1f} before and after the runs ({machine['cores']} is full), the system's own among it. Times
+        are those of a crowded machine where it is higher, and only their ratios travel. Drives: {drives}
+        ({'simulated' if results['simulated'] else 'road survey at 16 m/s, stretches without pictures cut to 1 s'}),
         each configuration driven once per drive. The vehicles are real ones of `launch/vehicle.launch`, played from
-        bags by `launch/replay.launch`; GPS fixes are simulated along the road. The detector, on board and in the zone, is
-        {results['model']}, one engine of two threads, as those launch files have it.""")
-    text += prose("""*BVC* is the thesis's big vehicle cloudlet, `vehicle.launch profile:=big`: the detector runs on board. *SVC* is its
-        small one, `profile:=small`: a classifier on board sends the frames worth it to the zone, whose detector finishes the job.
-        Numbers of tables and figures are those of the thesis's chapter 3. How to measure all this again:
-        [evaluation.md](../evaluation.md#both-vehicle-cloudlets).""")
+        bags by `launch/replay.launch`; GPS fixes are simulated along the road. The detector, on board and in the
+        zone, is {results['model']}, one engine of two threads, as those launch files have it. The validation sections
+        of the survey (386RS169832, 251BDF0530, 080BDF0070, 290RS070691) chose the weights and thresholds of the
+        detectors that ship, so figures on them are somewhat optimistic.""")
+    text += prose("""*BVC* is the thesis's big vehicle cloudlet, `vehicle.launch profile:=big`: the detector runs on
+        board. *SVC* is its small one, `profile:=small`: a classifier on board sends the frames worth it to the zone,
+        whose detector finishes the job. Numbers of tables and figures are those of the thesis's chapter 3. [How to
+        measure all this again](../how-to/measure.md#both-vehicle-cloudlets).""")
     if results["quick"]:
         text += prose("""**The quick form**: one drive and three radii. Its figures have few events; the whole run's have more.""")
     text += starved(results) + other_versions(results)
     if incomplete:
-        text += prose(f"""Not everything came through in {len(incomplete)} of {len(results['runs'])} runs within a minute of the
-            drive's end: {', '.join(sorted({f"{run['name']} {run['profile']} {run['radius']} m" for run in incomplete}))}.""")
+        names = sorted({f"{run['name']} {run['profile']} {run['radius']} m" for run in incomplete})
+        text += prose(f"""Not everything came through in {len(incomplete)} of {len(results['runs'])} runs within a
+            minute of the drive's end: {', '.join(names)}.""")
     text += "\n" + "\n".join(section for section in (latency_section(results, out), detection_section(results),
                                                      uplink_section(results, out), engines_section(results),
                                                      saturated_section(results)) if section)

@@ -1,6 +1,7 @@
 """The page of visual odometry's figures: tables of what livemap_measure_vo measured, and what they say."""
 
 import statistics
+import textwrap
 
 import vo_plots
 
@@ -34,7 +35,7 @@ def number(value, digits=4):
 
 def prose(text):
     """A paragraph of its own."""
-    return "\n" + " ".join(text.split()) + "\n"
+    return "\n" + textwrap.fill(" ".join(text.split()), 100, break_long_words=False, break_on_hyphens=False) + "\n"
 
 
 def table(head, rows):
@@ -148,7 +149,7 @@ def accuracy_section(sequences, structured):
         text += f"\n### {title}\n" + accuracy_table(sequences, key, digits)
     lost = [f"{s['name']}: {describe(row)} {row['lost']} of {s['tables']['frames']}"
             for s in sequences for row in s["tables"]["rows"] if row["lost"]]
-    text += "\nLost frames: " + ("; ".join(lost) if lost else "none") + ".\n"
+    text += prose("Lost frames: " + ("; ".join(lost) if lost else "none") + ".")
     return text + sources_sentence(sequences)
 
 
@@ -186,10 +187,10 @@ def time_section(sequences):
                      *(f"{cell['median_ms']:.2f} ({cell['p95_ms']:.2f})" for cell in cells),
                      f"{share_of_keyframes(sequence):.0%}", f"{time_ratio(sequence):.3f}"])
     return "## Time\n" + prose("""Milliseconds of processor time per frame, median (95th percentile), from the decoded
-        colour picture to the pose, one thread. *Ratio*: canny KF to RgbdOdometry; *keyframes*: share of the frames that
-        became one with canny KF. Every frame is given to all methods in turn, so that the machine's other work meets all
-        alike and each finds cold caches. On a busy machine all need more processor time than on a quiet one; the ratio
-        is what to compare.""") + "\n" + table(
+        colour picture to the pose, one thread. *Ratio*: canny KF to RgbdOdometry; *keyframes*: share of the frames
+        that became one with canny KF. Every frame is given to all methods in turn, so that the machine's other work
+        meets all alike and each finds cold caches. On a busy machine all need more processor time than on a quiet
+        one; the ratio is what to compare.""") + "\n" + table(
             ["sequence", "n", *(name for name, _ in columns), "keyframes", "ratio"], rows)
 
 
@@ -218,9 +219,9 @@ def ablation_section(sequences):
     chosen = [s for s in sequences if "ablation" in s]
     text = "## Edge pixels against random pixels\n" + prose("""The thesis's figure 5.6, left: a share of the edge
         pixels against as many pixels drawn from the whole image (those with depth that is not behind an occluding
-        edge). Adaptive keyframes, each frame's alignment begins at the last pose, no limit on the points; mean (least-most) of the runs, each
-        with a seed of its own. *Lost* counts frames of all runs. Of the edges 100 % are no draw: their runs are
-        one.""") + "\n![Error against the share of edge pixels](odometry_ablation.png)\n"
+        edge). Adaptive keyframes, each frame's alignment begins at the last pose, no limit on the points; mean
+        (least-most) of the runs, each with a seed of its own. *Lost* counts frames of all runs. All of the edges (100
+        %) need no draw: their runs are one.""") + "\n![Error against the share of edge pixels](odometry_ablation.png)\n"
     for sequence in chosen:
         rows = []
         all_rows = sequence["ablation"]["rows"]
@@ -253,8 +254,8 @@ def pixels_section(sequences):
                  number(row["tracked_ms"], 2), number(row["keyframe_ms"], 2), number(row["ate_rmse_m"]), row["lost"]]
                 for row in sequence["pixels"]["rows"]]
         fit = vo_plots.line_through(sequence["pixels"]["rows"])
-        text += (f"\n**{sequence['name']}**, {sequence['pixels']['frames']} frames; a line through the tracked times: "
-                 f"{fit[1]:.2f} ms + {1000 * fit[0]:.3f} us per pixel of the finest level, all within {fit[2]:.0%}:\n\n" +
+        text += (prose(f"**{sequence['name']}**, {sequence['pixels']['frames']} frames; a line through the tracked times: "
+                       f"{fit[1]:.2f} ms + {1000 * fit[0]:.3f} us per pixel of the finest level, all within {fit[2]:.0%}:") + "\n" +
                  table(["pixels", "points of the finest level", "tracked (ms)", "keyframe (ms)", "ATE (m)", "lost"],
                        rows))
     return text
@@ -286,13 +287,15 @@ def head_section(results):
     load = statistics.median(sequence["tables"]["load"] for sequence in results["sequences"])
     others = "otherwise quiet" if load < 1.4 else f"shared with other work: load average {load:.1f}"
     measured = "; measured on " + " at ".join(word for word in (results["date"], results["version"]) if word)
-    text = "# Visual odometry: the benchmark\n" + prose(f"""Made by `./livemap bench vo`; do not edit.
-        [../odometry.md](../odometry.md) is about the method and its parameters, and has the figures of one camera
-        without depth and of stereo; here every sequence has depth.""") + prose(
-            f"""Machine: {machine['cores']} cores, {machine['cpu']}, {others}. All methods run on one thread
-        (`cv::setNumThreads(1)`) in one process, beside each other, OpenCV's with their default settings; n is the
-        number of frames{measured}. Errors are defined in [../evaluation.md](../evaluation.md#trajectories) (SE(3) alignment,
-        RPE over 1 s, RMSE).""") + """
+    text = "# Visual odometry: the benchmark\n" + prose(f"""Made by `./livemap bench vo`; do not edit. [Visual
+        odometry](../explanation/odometry.md) explains the method. [Stereo and monocular
+        odometry](stereo-and-monocular-odometry.md) has the figures without a depth sensor, and a summary of this
+        page; here every sequence has depth. The method was built for the bars below; the record does not say on which
+        sequences its parameters were chosen.""") + prose(
+            f"""Machine:
+        {machine['cores']} cores, {machine['cpu']}, {others}. All methods run on one thread (`cv::setNumThreads(1)`)
+        in one process, beside each other, OpenCV's with their default settings; n is the number of frames{measured}.
+        [What the figures mean](../reference/measures.md#evaluate-trajectory): SE(3) alignment, RPE over 1 s, RMSE.""") + """
 ```
 ./livemap bench vo                                         # this page
 ./livemap bench vo --sequence rgbd_dataset_freiburg1_desk  # with a sequence of your own
@@ -307,8 +310,8 @@ def head_section(results):
 def paths_section(sequences):
     if not vo_plots.with_paths(sequences):
         return ""
-    return ("## Paths\nThe thesis's figure 5.7: truth, LiveMap (canny KF) and RgbdOdometry, moved onto the truth: the path in "
-            "the plane of its two widest axes, and each pose's error.\n"
+    return ("## Paths\n" + prose("The thesis's figure 5.7: truth, LiveMap (canny KF) and RgbdOdometry, moved onto the truth: "
+                                "the path in the plane of its two widest axes, and each pose's error.") +
             "\n![Paths and errors over time](odometry_paths.png)\n")
 
 

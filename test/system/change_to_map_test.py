@@ -165,7 +165,7 @@ class ChangeToMapTest(unittest.TestCase):
         barriers = eventually(lambda: self.zone.places("changes", direction="appeared", **{"class": "barrier"}), "the barrier is told")
         self.assertEqual(len(barriers), 1, barriers)
         self.assertLess(abs(barriers[0][0] - BARRIER_M), NEAR_M)
-        # Whether the sign that went is told, and as what, is not sure yet: docs/change.md.
+        # Whether the sign that went is told, and as what, is not sure yet: docs/results/change.md.
         for place, properties in self.zone.places("changes"):
             self.assertLess(min(abs(place - changed_m) for changed_m in (REMOVED_M, BARRIER_M)), NEAR_M, (place, properties))
 

@@ -142,6 +142,7 @@ class PageTest(unittest.TestCase):
                    "pools": {"hazards-small": engines}, "versions": {"d_perfect_5m_loopback": "earlier", "engines": "v"}}
         with tempfile.TemporaryDirectory() as folder:
             text = perception_page.write(results, pathlib.Path(folder)).read_text(encoding="utf-8")
+            lines = " ".join(text.split())  # However the prose is wrapped.
             for name in ("perception_uplink.png", "perception_latency.png"):
                 self.assertTrue((pathlib.Path(folder) / name).read_bytes().startswith(b"\x89PNG"))
         for part in ("| BVC, link | - | 45.0 (5.0), n = 2 | 300.0 (0.0), n = 1 | 210.0 (0.0), n = 1 | 560.0 (0.0), n = 1 |",
@@ -151,7 +152,7 @@ class PageTest(unittest.TestCase):
                      "the SVC's rows are missing", "**The quick form**", "| hazards-small | 4.0 | 10.0 | 21.0 | 60 of 200 | 9 |",
                      "The detector, on board and in the zone, is hazards-most,",
                      "Measured with version earlier: d_perfect_5m_loopback."):
-            self.assertIn(part, text)
+            self.assertIn(part, lines)
 
 
 class ResumeTest(unittest.TestCase):

@@ -98,7 +98,7 @@ class BenchVoTest(unittest.TestCase):
 
     def test_a_quick_page_does_not_replace_the_published_one(self):
         tree = self.folder / "tree"
-        published = tree / "docs" / "benchmarks" / "odometry.md"
+        published = tree / "docs" / "results" / "odometry.md"
         published.parent.mkdir(parents=True)
         published.write_text("published", encoding="utf-8")
         quick = tree / "build" / "vo_benchmark" / "quick" / "odometry.md"
