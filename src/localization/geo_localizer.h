@@ -67,8 +67,8 @@ struct LocalizerCounters {
   std::uint64_t clock_resets = 0;  ///< Time went back by more than the window: all forgotten.
 };
 
-/// Fuses fixes and odometry to the vehicle's pose on the map. docs/localization.md has the model.
-/// The same calls give the same answers. Not thread-safe.
+/// Fuses fixes and odometry to the vehicle's pose on the map. docs/explanation/localization.md has
+/// the model. The same calls give the same answers. Not thread-safe.
 class GeoLocalizer {
  public:
   enum class FixVerdict {

@@ -43,7 +43,7 @@ T Wrapped(const T& angle_rad) {
   return angle_rad - kTwoPi * floor(angle_rad / kTwoPi + 0.5);
 }
 
-/// Equation (2) of docs/localization.md: the place where a fix should lie.
+/// Equation (2) of docs/explanation/localization.md: the place where a fix should lie.
 struct FixFactor {
   const FixMeasurement* fix;
   Eigen::Vector2d antenna_m;

@@ -47,8 +47,8 @@ struct ChangeReport {
   ChangeFigures reversed;  ///< The two aligned pictures swapped.
 };
 
-/// docs/change.md names the keys; figures that are not defined are null. With `curve_points` above
-/// 0 the curves of Figures 4.4 to 4.6 too.
+/// docs/reference/measures.md names the keys; figures that are not defined are null. With
+/// `curve_points` above 0 the curves of Figures 4.4 to 4.6 too.
 nlohmann::ordered_json ToJson(const ChangeReport& report, std::size_t curve_points);
 
 /// A table for people.

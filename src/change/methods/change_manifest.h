@@ -7,7 +7,7 @@
 namespace livemap::change {
 
 /// Everything that must be known about a network of change to run it: the content of
-/// models/NAME.yaml of `kind: change`, checked. docs/training.md ("The exported model") describes
+/// models/NAME.yaml of `kind: change`, checked. models/README.md ("Models of change") describes
 /// the file.
 struct ChangeManifest {
   /// An ONNX file.

@@ -16,7 +16,7 @@ constexpr int kMinRingPixels = 30;
 constexpr int kColourBins = 12;
 
 // The weights of a logistic regression on 228 regions of simulated validation streets; 0.5 is
-// where one in ten regions is judged wrongly (docs/change.md).
+// where one in ten regions is judged wrongly (docs/results/change.md).
 constexpr double kColourWeight = 4.0;
 constexpr double kOutlineWeight = 1.5;
 constexpr double kMinEvidence = 0.5;

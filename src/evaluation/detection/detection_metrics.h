@@ -7,8 +7,8 @@
 
 namespace livemap::evaluation {
 
-/// Figures of a detector on labelled frames. docs/evaluation.md defines them; everything here is
-/// about one class.
+/// Figures of a detector on labelled frames. docs/reference/measures.md defines them; everything
+/// here is about one class.
 
 /// Labelled frames at most this far apart along the road belong to one event, false detections to
 /// one false report; a longer gap between frames counts as this much of driven road.

@@ -31,7 +31,8 @@ struct DetectionReport {
   std::vector<ClassReport> classes;
 };
 
-/// docs/evaluation.md names the keys; figures that are not defined (no events, no drive) are null.
+/// docs/reference/measures.md names the keys; figures that are not defined (no events, no drive)
+/// are null.
 nlohmann::ordered_json ToJson(const DetectionReport& report);
 
 /// A table for people.

@@ -26,7 +26,7 @@ struct LocalizationTrial {
   std::uint64_t seed = 1;
 };
 
-/// docs/localization.md defines the figures.
+/// docs/reference/measures.md defines the figures.
 struct LocalizationReport {
   std::size_t fixes = 0;
   double fix_rmse_m = 0;

@@ -11,8 +11,8 @@ namespace livemap::evaluation {
 
 /// Figures of an estimated trajectory against the true one, as the TUM RGB-D benchmark's
 /// evaluate_ate.py and evaluate_rpe.py and the KITTI odometry devkit define them;
-/// docs/evaluation.md has the formulas. Trajectories are in the order of their stamps, each stamp
-/// once; poses are camera to world, in m.
+/// docs/reference/measures.md has the formulas. Trajectories are in the order of their stamps, each
+/// stamp once; poses are camera to world, in m.
 
 /// What is said about a set of errors, in their unit; zeros without errors.
 struct ErrorFigures {

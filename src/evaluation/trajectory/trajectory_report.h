@@ -12,9 +12,9 @@ std::string AlignmentName(AlignmentKind kind);
 /// None for any other name.
 std::optional<AlignmentKind> ParseAlignmentKind(const std::string& name);
 
-/// docs/evaluation.md names the keys; figures that are not defined (no pairs a delta apart, a path
-/// under 100 m) are null, `scale` and those over frames are there only when asked for. Relative
-/// errors over time are divided by their delta: m/s and deg/s.
+/// docs/reference/measures.md names the keys; figures that are not defined (no pairs a delta apart,
+/// a path under 100 m) are null, `scale` and those over frames are there only when asked for.
+/// Relative errors over time are divided by their delta: m/s and deg/s.
 nlohmann::ordered_json ToJson(const TrajectoryFigures& figures);
 
 /// The keys of TrajectoryConfig' defaults without figures: all of them null.

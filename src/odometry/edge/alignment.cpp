@@ -33,7 +33,7 @@ void Aligner::Reserve(std::size_t points) {
   }
 }
 
-/// Equation (2) of docs/odometry.md for all points.
+/// Equation (2) of docs/explanation/odometry.md for all points.
 void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
                        const geo::CameraIntrinsics& camera, const AlignmentState& state,
                        Residuals& residuals) const {
@@ -87,8 +87,9 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
   }
 }
 
-/// Residuals of points whose depth is not exact err by that, too: equation (12). They are divided
-/// by how much more, at the motion that the alignment starts with.
+/// Residuals of points whose depth is not exact err by that, too: equation (12) of
+/// docs/explanation/monocular-odometry.md. They are divided by how much more, at the motion that
+/// the alignment starts with.
 void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
   whitening_.resize(points.inverse_depth_sigma.size());
   const Eigen::Vector3f way =

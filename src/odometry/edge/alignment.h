@@ -48,8 +48,8 @@ struct AlignmentResult {
 
 /// Minimises the photometric error of edge points by inverse compositional Gauss-Newton with Huber
 /// weights (thesis, section 5.2.4; Baker and Matthews 2004); a step that does not lower the robust
-/// cost is rolled back and damped (Levenberg). docs/odometry.md derives it. Keeps its buffers from
-/// call to call; not thread-safe.
+/// cost is rolled back and damped (Levenberg). docs/explanation/odometry.md derives it. Keeps its
+/// buffers from call to call; not thread-safe.
 class Aligner {
  public:
   explicit Aligner(const AlignmentConfig& config) : config_(config) {}

@@ -19,7 +19,8 @@ struct EdgePoints {
   /// Grey value of the reference there, 0..255.
   std::vector<float> intensity;
   /// Derivative of the reference's grey value by the twist delta of a motion Exp(delta) of the
-  /// point: translation (per m), then rotation (per rad). Equation (6) of docs/odometry.md.
+  /// point: translation (per m), then rotation (per rad). Equation (6) of
+  /// docs/explanation/odometry.md.
   std::array<std::vector<float>, 6> jacobian;
   /// Standard deviation of the inverse depth, 1/m; empty: depths are exact.
   std::vector<float> inverse_depth_sigma;

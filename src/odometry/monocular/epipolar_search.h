@@ -36,8 +36,8 @@ struct EpipolarConfig {
 
 /// Finds pixels of a keyframe in another view whose motion is known: the place along the epipolar
 /// line where a small pattern around the pixel looks alike, but for a common difference of
-/// brightness. docs/odometry.md, "One camera", derives the variance. Both images CV_8UC1 of the
-/// camera's size; they must outlive this object.
+/// brightness. Equation (10) of docs/explanation/monocular-odometry.md derives the variance. Both
+/// images CV_8UC1 of the camera's size; they must outlive this object.
 class EpipolarSearch {
  public:
   EpipolarSearch(const cv::Mat& keyframe, const cv::Mat& other, const geo::CameraIntrinsics& camera,

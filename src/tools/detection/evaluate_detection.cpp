@@ -46,7 +46,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "Runs the detector over labelled images and prints how well it does, all DIRs pooled. A DIR\n"
       "holds images/ and labels/ (YOLO: \"class x y width height\" per line, fractions); with a\n"
       "frames.csv (frame,chainage_m) it is a drive, which also gives events and false reports per\n"
-      "km. docs/evaluation.md defines the figures.",
+      "km. docs/reference/measures.md defines the figures.",
       CommandLine::kOneOrMore,
       {{"json", "", "one line of JSON instead of a table"},
        {"model", "FILE", "manifest of the model, default models/hazards-base.yaml, as a vehicle's"},

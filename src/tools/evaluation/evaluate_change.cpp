@@ -61,8 +61,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it) or t0/, t1/, "
       "mask/.\n"
       "The method is a network (--model), a classical one (--method), or a folder of predictions\n"
-      "(--predictions: NAME.npy or NAME.png per pair). docs/change.md defines the figures and the "
-      "files.",
+      "(--predictions: NAME.npy or NAME.png per pair). docs/reference/measures.md defines the "
+      "figures and the files.",
       CommandLine::kOneOrMore,
       {{"json", "", "one line of JSON instead of a table"},
        {"method", "NAME", "dense-sift or daisy"},

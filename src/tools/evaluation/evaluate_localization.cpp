@@ -44,7 +44,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "Fuses the fixes of a recorded drive with odometry from its wheel speed and a simulated "
       "gyro,\n"
       "and compares with the true poses. DIR holds gnss_ublox.csv, pose.csv and can_speed.csv as\n"
-      "in comma2k19. docs/localization.md defines the figures.",
+      "in comma2k19. docs/reference/measures.md defines the figures.",
       1,
       {{"json", "", "one line of JSON instead of a table"},
        {"noise-m", "X", "white noise added to the fixes, sigma per axis, m, default 0"},

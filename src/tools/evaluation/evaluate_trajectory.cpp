@@ -47,7 +47,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "benchmark's scripts define them, segment errors as the KITTI odometry devkit does. A file "
       "has\n"
       "TUM lines \"stamp tx ty tz qx qy qz qw\" or KITTI lines of 12 numbers, camera to world.\n"
-      "docs/evaluation.md defines the figures.",
+      "docs/reference/measures.md defines the figures.",
       2,
       {{"json", "", "one line of JSON instead of a table"},
        {"align", "KIND", "none, se3, sim3 or origin (first poses on each other), default se3"},

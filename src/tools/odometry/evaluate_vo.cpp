@@ -109,7 +109,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "eyes (--stereo), or by one (--mono, and always where there is no depth). Time is that of "
       "one\n"
       "thread from the decoded colour picture to the pose, that of stereo depth apart.\n"
-      "docs/evaluation.md defines the figures.",
+      "docs/reference/measures.md defines the figures.",
       1,
       {{"json", "", "one line of JSON instead of a table"},
        {"edges", "KIND", "canny, log, sobel or structured, default canny"},
