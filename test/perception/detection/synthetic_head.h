@@ -4,7 +4,7 @@
 
 #include "perception/inference/model_manifest.h"
 
-namespace livemap::test {
+namespace livemap::perception {
 
 /// A manifest for a head of two levels and two classes, input 64 x 48 px; no model file.
 inline ModelManifest TwoLevelManifest() {
@@ -29,4 +29,4 @@ inline cv::Mat NothingSeen(const ModelManifest& manifest) {
   return {3, shape, CV_32F, cv::Scalar(0)};
 }
 
-}  // namespace livemap::test
+}  // namespace livemap::perception

@@ -13,8 +13,6 @@
 namespace livemap::perception {
 namespace {
 
-using test::NothingSeen;
-using test::TwoLevelManifest;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();

@@ -8,7 +8,6 @@
 namespace livemap::perception {
 namespace {
 
-using test::TwoLevelManifest;  // 64 x 48, pad 114, mean 10 20 30, std 1 2 4
 
 float At(const cv::Mat& tensor, int plane, int row, int column) {
   return tensor.ptr<float>(0, plane)[row * tensor.size[3] + column];

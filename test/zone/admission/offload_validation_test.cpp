@@ -15,12 +15,12 @@ using ::testing::HasSubstr;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::string WhyNot(const protocol::OffloadedFrame& candidate) {
-  const auto why = WhyOffloadRefused(candidate, OffloadLimits(), test::kZoneNowNs);
+  const auto why = WhyOffloadRefused(candidate, OffloadLimits(), kZoneNowNs);
   return why ? why->sentence : "taken";
 }
 
 TEST(CandidateValidation, AnHonestFrameIsTaken) {
-  EXPECT_EQ(WhyNot(test::CandidateAt(0)), "taken");
+  EXPECT_EQ(WhyNot(CandidateAt(0)), "taken");
 }
 
 struct Broken {
@@ -32,7 +32,7 @@ struct Broken {
 class BrokenCandidate : public ::testing::TestWithParam<Broken> {};
 
 TEST_P(BrokenCandidate, IsRefusedAndToldWhy) {
-  protocol::OffloadedFrame candidate = test::CandidateAt(0);
+  protocol::OffloadedFrame candidate = CandidateAt(0);
   GetParam().change(candidate);
   EXPECT_THAT(WhyNot(candidate), HasSubstr(GetParam().said));
 }
@@ -95,7 +95,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& broken) { return broken.param.name; });
 
 TEST(CandidateValidation, APngIsNoJpeg) {
-  protocol::OffloadedFrame candidate = test::CandidateAt(0);
+  protocol::OffloadedFrame candidate = CandidateAt(0);
   candidate.image = {0x89, 'P',  'N', 'G', '\r', '\n', 0x1a, '\n', 0,    0, 0,
                      13,   'I',  'H', 'D', 'R',  0,    0,    2,    0x80, 0, 0,
                      1,    0x90, 8,   2,   0,    0,    0,    0,    0,    0, 0};

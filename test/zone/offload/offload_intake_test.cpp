@@ -10,9 +10,6 @@
 namespace livemap::zone {
 namespace {
 
-using test::AnswerOf;
-using test::CandidateAt;
-using test::kZoneNowNs;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 

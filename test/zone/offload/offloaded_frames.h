@@ -9,7 +9,7 @@
 #include "placement/sighting.h"
 #include "protocol/offloaded_frame.h"
 
-namespace livemap::test {
+namespace livemap::zone {
 
 constexpr std::int64_t kZoneNowNs = 1'700'000'000'000'000'000;
 
@@ -53,4 +53,4 @@ inline placement::SightingFrame AnswerOf(std::int64_t stamp_ns, double forward_m
   return {stamp_ns, "candidate", 640, 400, {{"pothole", 0.8F, {u - 10, v - 12, u + 10, v}}}};
 }
 
-}  // namespace livemap::test
+}  // namespace livemap::zone
