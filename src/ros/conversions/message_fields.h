@@ -11,7 +11,7 @@
 
 namespace livemap::ros_io {
 
-// Fields that several messages share. Private to the conversions of this room.
+// Fields that several messages share. Private to the conversions of this module.
 
 /// Throws Error unless the message has a schema version that this program knows: its own, or one
 /// from `oldest` on.

@@ -15,7 +15,7 @@ namespace livemap::perception {
 namespace {
 
 /// Paths of the models/NAME.yaml that have a NAME.golden.yaml beside them; those of other kinds are
-/// tested by their own rooms.
+/// tested by their own modules.
 std::vector<std::string> ShippedManifests() {
   std::vector<std::string> paths;
   const std::string suffix = ".golden.yaml";
