@@ -40,35 +40,35 @@ Projection ParseProjection(const std::vector<std::string>& lines, std::size_t in
   return *p;
 }
 
-/// The folder of the right eye's pictures and which lines of calib.txt are the pair's.
-struct RightEye {
+/// The folder of the right camera's pictures and which lines of calib.txt are the pair's.
+struct RightCamera {
   fs::path folder;
   std::size_t left_line = 0;
 };
 
-/// None where the left eye is alone.
-std::optional<RightEye> FindRightEye(const fs::path& left_folder) {
+/// None where the left camera is alone.
+std::optional<RightCamera> FindRightCamera(const fs::path& left_folder) {
   const std::string left = left_folder.filename().string();
   if (left != "image_0" && left != "image_2") return std::nullopt;
   const fs::path folder = left_folder.parent_path() / (left == "image_0" ? "image_1" : "image_3");
   if (!fs::is_directory(folder)) return std::nullopt;
-  return RightEye{folder, left == "image_0" ? 0U : 2U};
+  return RightCamera{folder, left == "image_0" ? 0U : 2U};
 }
 
-void ReadRightEye(const RightEye& eye, const std::vector<std::string>& calibration,
-                  const std::string& name, Sequence& sequence) {
-  const Projection left = ParseProjection(calibration, eye.left_line, name);
-  const Projection right = ParseProjection(calibration, eye.left_line + 1, name);
-  // The other numbers are the left eye's, as in every rectified pair.
+void ReadRightCamera(const RightCamera& camera, const std::vector<std::string>& calibration,
+                     const std::string& name, Sequence& sequence) {
+  const Projection left = ParseProjection(calibration, camera.left_line, name);
+  const Projection right = ParseProjection(calibration, camera.left_line + 1, name);
+  // The other numbers are the left camera's, as in every rectified pair.
   sequence.baseline_m = left(0, 3) / left(0, 0) - right(0, 3) / right(0, 0);
   if ((left.leftCols<3>() - right.leftCols<3>()).cwiseAbs().maxCoeff() > 0.01 ||
       !(sequence.baseline_m > 0)) {
-    throw Error("lines " + std::to_string(eye.left_line + 1) + " and " +
-                std::to_string(eye.left_line + 2) + " of '" + name +
+    throw Error("lines " + std::to_string(camera.left_line + 1) + " and " +
+                std::to_string(camera.left_line + 2) + " of '" + name +
                 "' must be projections of a rectified pair, the right one with the baseline");
   }
   for (SequenceFrame& frame : sequence.frames) {
-    const fs::path path = eye.folder / fs::path(frame.image_path).filename();
+    const fs::path path = camera.folder / fs::path(frame.image_path).filename();
     if (fs::is_regular_file(path)) frame.right_path = path.string();
   }
 }
@@ -157,10 +157,10 @@ Sequence ReadKittiSequence(const std::string& directory, double rate_hz) {
   for (std::size_t i = 0; i < paths.size(); ++i) {
     sequence.frames.push_back({times_ns[i], paths[i], 0, ""});
   }
-  const std::optional<RightEye> right = FindRightEye(folder);
-  // A calibration that stops at the left eye is that of a folder used with one.
+  const std::optional<RightCamera> right = FindRightCamera(folder);
+  // A calibration that stops at the left camera is that of a folder used with one.
   if (right && projections.size() > right->left_line + 1) {
-    ReadRightEye(*right, projections, calibration, sequence);
+    ReadRightCamera(*right, projections, calibration, sequence);
   }
   const std::string poses_path = (root / "poses.txt").string();
   if (!fs::exists(poses_path)) return sequence;

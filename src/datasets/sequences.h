@@ -22,14 +22,15 @@ struct SequenceFrame {
   std::string image_path;
   std::int64_t depth_stamp_ns = 0;
   std::string depth_path;    ///< 16-bit PNG, empty without depth.
-  std::string right_path{};  ///< The right eye's picture of the same moment, empty without one.
+  std::string right_path{};  ///< The right camera's picture of the same moment, empty without one.
 };
 
 /// A folder in TUM RGB-D or KITTI odometry layout, paths checked, images not opened yet.
 struct Sequence {
   geo::CameraIntrinsics intrinsics;  ///< Width and height zero: as the images.
   double depth_scale = 1;            ///< Depth units per metre.
-  double baseline_m = 0;  ///< From the left eye to the right one; 0: no second eye, or unknown.
+  double baseline_m =
+      0;  ///< From the left camera to the right one; 0: no right camera, or unknown.
   std::vector<SequenceFrame> frames;
   std::vector<StampedPose> poses;
 };

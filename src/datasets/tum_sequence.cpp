@@ -121,8 +121,8 @@ void Anchor(const fs::path& root, std::string& path, const std::string& listed_i
   path = whole.string();
 }
 
-/// The right eye's picture of each frame that has one.
-void ReadRightEye(const fs::path& root, std::vector<SequenceFrame>& frames) {
+/// The right camera's picture of each frame that has one.
+void ReadRightCamera(const fs::path& root, std::vector<SequenceFrame>& frames) {
   const std::string list = (root / "rgb_right.txt").string();
   if (!fs::exists(list)) return;
   std::vector<SequenceFrame> rights = ParseTumAssociations(ReadFile(list, kMaxTextBytes), list);
@@ -267,7 +267,7 @@ Sequence ReadTumSequence(const std::string& directory, const std::string& camera
     Anchor(root, frame.image_path, list);
     Anchor(root, frame.depth_path, depth_list);
   }
-  ReadRightEye(root, sequence.frames);
+  ReadRightCamera(root, sequence.frames);
   const std::string truth = (root / "groundtruth.txt").string();
   if (fs::exists(truth)) {
     sequence.poses = ParseTumTrajectory(ReadFile(truth, kMaxTextBytes), truth);

@@ -125,10 +125,10 @@ StereoDepth::StereoDepth(const StereoConfig& config, const CameraCalibration& le
   matcher_ = MakeMatcher(config, first_px_, search_px_);
 }
 
-void StereoDepth::Prepare(const cv::Mat& image, const char* eye, cv::Mat& grey) {
+void StereoDepth::Prepare(const cv::Mat& image, const char* camera, cv::Mat& grey) {
   if (image.size() != size_ || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) {
-    throw Error("the " + std::string(eye) + " image is " + Size(image.cols, image.rows) + " of " +
-                std::to_string(image.channels()) + " channels, accepted is " +
+    throw Error("the " + std::string(camera) + " image is " + Size(image.cols, image.rows) +
+                " of " + std::to_string(image.channels()) + " channels, accepted is " +
                 Size(size_.width, size_.height) + " of 8 bit grey or BGR");
   }
   const cv::Mat* ready = &image;

@@ -7,25 +7,26 @@
 
 namespace livemap::imaging {
 
-/// How depth is found from two eyes. Pixels are those of the images that are matched: with `scale`
-/// 2 one of them is two of the camera's.
+/// How depth is found from two cameras. Pixels are those of the images that are matched: with
+/// `scale` 2 one of them is two of the camera's.
 struct StereoConfig {
   double min_depth_m = 2.5;     ///< Sets how far the search goes; what is nearer is not recognised.
   double min_disparity_px = 1;  ///< Farther than this shift says is unknown; camera's pixels.
   int scale = 2;                ///< Matched on images smaller by this: 1, 2 or 4.
   int block_size = 5;           ///< Side of the compared blocks, odd, 1 to 21.
   int uniqueness_percent = 40;  ///< The best match beats the second by this, 0 to 100.
-  int left_right_px = 1;        ///< Both eyes' matches agree within this, 0 to 100.
+  int left_right_px = 1;        ///< Both cameras' matches agree within this, 0 to 100.
   int speckle_pixels = 100;     ///< Smaller islands of depth are taken out; 0: none is.
 };
 
 /// Throws Error naming the value and what is accepted.
 void CheckStereoConfig(const StereoConfig& config);
 
-/// Where the second eye is, as sensor_msgs/CameraInfo says it of a rectified pair.
+/// Where the right camera is, as sensor_msgs/CameraInfo says it of a rectified pair.
 struct StereoGeometry {
-  double focal_px = 0;    ///< fx of both.
-  double baseline_m = 0;  ///< Right eye beside the left one; P's fourth column is -fx * baseline.
+  double focal_px = 0;  ///< fx of both.
+  double baseline_m =
+      0;                 ///< Right camera beside the left one; P's fourth column is -fx * baseline.
   double offset_px = 0;  ///< Shift of what is infinitely far: cx of the left minus cx of the right.
 };
 
@@ -57,7 +58,7 @@ class StereoDepth {
 
  private:
   /// `image` as grey values in `grey`, smaller by the scale, with room for the search on the left.
-  void Prepare(const cv::Mat& image, const char* eye, cv::Mat& grey);
+  void Prepare(const cv::Mat& image, const char* camera, cv::Mat& grey);
   /// The found shifts, of and in the full image's pixels; far negative where there is none.
   cv::Mat FullDisparity() const;
 

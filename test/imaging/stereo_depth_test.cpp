@@ -21,14 +21,14 @@ using ::testing::ThrowsMessage;
 constexpr double kFocalPx = 300;
 constexpr double kBaselineM = 0.4;
 
-/// Rectified; `x_m` is the camera's place to the right of the left eye.
-CameraCalibration Eye(double x_m, double cx = 160) {
-  CameraCalibration eye;
-  eye.width = 320;
-  eye.height = 240;
-  eye.k = {kFocalPx, 0, cx, 0, kFocalPx, 100, 0, 0, 1};
-  eye.p = {kFocalPx, 0, cx, -kFocalPx * x_m, 0, kFocalPx, 100, 0, 0, 0, 1, 0};
-  return eye;
+/// Rectified; `x_m` is the camera's place to the right of the left camera.
+CameraCalibration Camera(double x_m, double cx = 160) {
+  CameraCalibration camera;
+  camera.width = 320;
+  camera.height = 240;
+  camera.k = {kFocalPx, 0, cx, 0, kFocalPx, 100, 0, 0, 1};
+  camera.p = {kFocalPx, 0, cx, -kFocalPx * x_m, 0, kFocalPx, 100, 0, 0, 0, 1, 0};
+  return camera;
 }
 
 /// Where a ray from (x_m, 0, 0) through a pixel meets the plane normal * P = distance_m.
@@ -36,9 +36,9 @@ struct Plane {
   cv::Vec3d normal;
   double distance_m;
 
-  double Depth(const CameraCalibration& eye, double u, double v) const {
-    const double x_m = -eye.p(0, 3) / kFocalPx;
-    const cv::Vec3d ray((u - eye.p(0, 2)) / kFocalPx, (v - eye.p(1, 2)) / kFocalPx, 1);
+  double Depth(const CameraCalibration& camera, double u, double v) const {
+    const double x_m = -camera.p(0, 3) / kFocalPx;
+    const cv::Vec3d ray((u - camera.p(0, 2)) / kFocalPx, (v - camera.p(1, 2)) / kFocalPx, 1);
     return (distance_m - normal[0] * x_m) / normal.dot(ray);
   }
 };
@@ -57,26 +57,26 @@ double Texture(double x_m, double y_m, const cv::Mat& noise) {
          fv * ((1 - fu) * at(u, v + 1) + fu * at(u + 1, v + 1));
 }
 
-/// What the eye sees of the plane, which is textured in its x and in y + z.
-cv::Mat Look(const CameraCalibration& eye, const Plane& plane) {
+/// What the camera sees of the plane, which is textured in its x and in y + z.
+cv::Mat Look(const CameraCalibration& camera, const Plane& plane) {
   cv::Mat noise(512, 512, CV_64FC1);
   cv::RNG(3).fill(noise, cv::RNG::UNIFORM, 20, 235);
-  cv::Mat image(eye.height, eye.width, CV_8UC1);
-  const double x_m = -eye.p(0, 3) / kFocalPx;
+  cv::Mat image(camera.height, camera.width, CV_8UC1);
+  const double x_m = -camera.p(0, 3) / kFocalPx;
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {
-      const double z = plane.Depth(eye, u, v);
-      const double x = x_m + (u - eye.p(0, 2)) / kFocalPx * z;
-      const double y = (v - eye.p(1, 2)) / kFocalPx * z;
+      const double z = plane.Depth(camera, u, v);
+      const double x = x_m + (u - camera.p(0, 2)) / kFocalPx * z;
+      const double y = (v - camera.p(1, 2)) / kFocalPx * z;
       image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(Texture(x, y + z, noise));
     }
   }
   return image;
 }
 
-/// Of the shift between the eyes, pixels of the camera.
+/// Of the shift between the cameras, pixels of the camera.
 struct Errors {
-  double found_share = 0;  ///< Of the pixels that the right eye sees too.
+  double found_share = 0;  ///< Of the pixels that the right camera sees too.
   double median_px = 0;
   double p95_px = 0;
 };
@@ -111,11 +111,11 @@ const Plane kRamp{{0, 0.85, 0.527}, 5};
 Errors ErrorsOn(const Plane& plane, int scale) {
   StereoConfig config;
   config.scale = scale;
-  StereoDepth stereo(config, Eye(0), Eye(kBaselineM));
-  const cv::Mat depth = stereo.Compute(Look(Eye(0), plane), Look(Eye(kBaselineM), plane));
+  StereoDepth stereo(config, Camera(0), Camera(kBaselineM));
+  const cv::Mat depth = stereo.Compute(Look(Camera(0), plane), Look(Camera(kBaselineM), plane));
   EXPECT_EQ(depth.type(), CV_32FC1);
   EXPECT_EQ(depth.size(), cv::Size(320, 240));
-  return Compare(depth, Eye(0), plane);
+  return Compare(depth, Camera(0), plane);
 }
 
 TEST(StereoDepth, OfPlanesIsWithinHalfAPixelOfTheMatchedImages) {
@@ -132,8 +132,8 @@ TEST(StereoDepth, OfPlanesIsWithinHalfAPixelOfTheMatchedImages) {
 TEST(StereoDepth, OfAWallEightMetresAwayIsEightMetres) {
   StereoConfig config;
   config.scale = 1;
-  StereoDepth stereo(config, Eye(0), Eye(kBaselineM));
-  cv::Mat depth = stereo.Compute(Look(Eye(0), kWall), Look(Eye(kBaselineM), kWall));
+  StereoDepth stereo(config, Camera(0), Camera(kBaselineM));
+  cv::Mat depth = stereo.Compute(Look(Camera(0), kWall), Look(Camera(kBaselineM), kWall));
   std::vector<float> known;
   std::copy_if(depth.begin<float>(), depth.end<float>(), std::back_inserter(known),
                [](float metres) { return !std::isnan(metres); });
@@ -144,23 +144,23 @@ TEST(StereoDepth, OfAWallEightMetresAwayIsEightMetres) {
 
 TEST(StereoDepth, KnowsPrincipalPointsThatDiffer) {
   for (const double right_cx : {150.0, 171.0}) {
-    StereoDepth stereo({}, Eye(0), Eye(kBaselineM, right_cx));
+    StereoDepth stereo({}, Camera(0), Camera(kBaselineM, right_cx));
     EXPECT_EQ(stereo.geometry().offset_px, 160 - right_cx);
     const cv::Mat depth =
-        stereo.Compute(Look(Eye(0), kWall), Look(Eye(kBaselineM, right_cx), kWall));
-    const Errors errors = Compare(depth, Eye(0), kWall);
+        stereo.Compute(Look(Camera(0), kWall), Look(Camera(kBaselineM, right_cx), kWall));
+    const Errors errors = Compare(depth, Camera(0), kWall);
     EXPECT_GT(errors.found_share, 0.85) << right_cx;
     EXPECT_LT(errors.p95_px, 1) << right_cx;
   }
 }
 
 TEST(StereoDepth, TakesColourAsItsGreyValues) {
-  const cv::Mat left = Look(Eye(0), kRamp);
-  const cv::Mat right = Look(Eye(kBaselineM), kRamp);
+  const cv::Mat left = Look(Camera(0), kRamp);
+  const cv::Mat right = Look(Camera(kBaselineM), kRamp);
   cv::Mat left_colour, right_colour;
   cv::cvtColor(left, left_colour, cv::COLOR_GRAY2BGR);
   cv::cvtColor(right, right_colour, cv::COLOR_GRAY2BGR);
-  StereoDepth stereo({}, Eye(0), Eye(kBaselineM));
+  StereoDepth stereo({}, Camera(0), Camera(kBaselineM));
   const cv::Mat of_grey = stereo.Compute(left, right);
   const cv::Mat of_colour = stereo.Compute(left_colour, right_colour);
   EXPECT_TRUE(
@@ -169,21 +169,21 @@ TEST(StereoDepth, TakesColourAsItsGreyValues) {
 }
 
 TEST(StereoDepth, IsUnknownWithoutTexture) {
-  StereoDepth stereo({}, Eye(0), Eye(kBaselineM));
+  StereoDepth stereo({}, Camera(0), Camera(kBaselineM));
   const cv::Mat flat(240, 320, CV_8UC1, cv::Scalar(90));
   const cv::Mat depth = stereo.Compute(flat, flat);
   EXPECT_EQ(cv::countNonZero(depth == depth), 0);
 }
 
 TEST(StereoDepth, IsThatOfRectifiedAndResizedImages) {
-  // The second eye is turned inwards by 3 degrees and looks through a lens that bends.
-  CameraCalibration raw = Eye(kBaselineM);
+  // The right camera is turned inwards by 3 degrees and looks through a lens that bends.
+  CameraCalibration raw = Camera(kBaselineM);
   raw.distortion_model = "plumb_bob";
   raw.distortion = {-0.1, 0.01, 0, 0, 0};
   const double turn = 3 * CV_PI / 180;
   raw.r = {std::cos(turn), 0, std::sin(turn), 0, 1, 0, -std::sin(turn), 0, std::cos(turn)};
   const OutputSize half{160, 0};
-  const Rectifier left(Eye(0), half);
+  const Rectifier left(Camera(0), half);
   const Rectifier right(raw, half);
   StereoConfig config;
   config.scale = 1;
@@ -193,7 +193,7 @@ TEST(StereoDepth, IsThatOfRectifiedAndResizedImages) {
 
   // What the raw right camera sees: each raw pixel's ray, undistorted and turned into the pair's
   // axes.
-  const cv::Mat ideal = Look(Eye(kBaselineM), kWall);
+  const cv::Mat ideal = Look(Camera(kBaselineM), kWall);
   cv::Mat raw_points(raw.height * raw.width, 1, CV_64FC2);
   for (int i = 0; i < raw_points.rows; ++i) {
     const int column = i % raw.width, row = i / raw.width;
@@ -207,7 +207,7 @@ TEST(StereoDepth, IsThatOfRectifiedAndResizedImages) {
   cv::Mat seen;
   cv::remap(ideal, seen, ideal_points, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
 
-  const cv::Mat depth = stereo.Compute(left.Apply(Look(Eye(0), kWall)), right.Apply(seen));
+  const cv::Mat depth = stereo.Compute(left.Apply(Look(Camera(0), kWall)), right.Apply(seen));
   ASSERT_EQ(depth.size(), cv::Size(160, 120));
   const cv::Rect middle(40, 20, 90, 80);
   cv::Mat known = depth(middle) == depth(middle);
@@ -217,30 +217,30 @@ TEST(StereoDepth, IsThatOfRectifiedAndResizedImages) {
 
 TEST(StereoGeometry, RefusesWhatIsNoPair) {
   const auto refused = [](const CameraCalibration& right, const std::string& sentence) {
-    EXPECT_THAT([&] { MakeStereoGeometry(Eye(0), right); },
+    EXPECT_THAT([&] { MakeStereoGeometry(Camera(0), right); },
                 ThrowsMessage<Error>(HasSubstr(sentence)));
   };
-  refused(Eye(0), "accepted is -fx times the baseline");
-  refused(Eye(-0.4), "accepted is -fx times the baseline");
-  refused(Eye(std::numeric_limits<double>::quiet_NaN()), "accepted is -fx times the baseline");
-  refused(Eye(0.4, 400), "less than half the image's width");
-  CameraCalibration other = Eye(0.4);
+  refused(Camera(0), "accepted is -fx times the baseline");
+  refused(Camera(-0.4), "accepted is -fx times the baseline");
+  refused(Camera(std::numeric_limits<double>::quiet_NaN()), "accepted is -fx times the baseline");
+  refused(Camera(0.4, 400), "less than half the image's width");
+  CameraCalibration other = Camera(0.4);
   other.width = 640;
   refused(other, "the left image is 320x240 and the right one 640x240");
-  other = Eye(0.4);
+  other = Camera(0.4);
   other.p(0, 0) = 310;
   refused(other, "the focal lengths in P are 300 and 310");
-  other = Eye(0.4);
+  other = Camera(0.4);
   other.p(1, 2) = 103;
   refused(other, "the rows in P are 100 and 103");
-  other = Eye(0.4);
+  other = Camera(0.4);
   other.p = cv::Matx34d::zeros();
   refused(other, "the focal lengths in P are 300 and 0");
 }
 
 TEST(StereoDepth, RefusesParametersAndImagesThatItCannotUse) {
   const auto refused = [](const StereoConfig& config, const std::string& sentence) {
-    EXPECT_THAT([&] { StereoDepth(config, Eye(0), Eye(0.4)); },
+    EXPECT_THAT([&] { StereoDepth(config, Camera(0), Camera(0.4)); },
                 ThrowsMessage<Error>(HasSubstr(sentence)));
   };
   StereoConfig config;
@@ -263,7 +263,7 @@ TEST(StereoDepth, RefusesParametersAndImagesThatItCannotUse) {
   config.uniqueness_percent = 101;
   refused(config, "stereo's uniqueness is 101");
 
-  StereoDepth stereo({}, Eye(0), Eye(0.4));
+  StereoDepth stereo({}, Camera(0), Camera(0.4));
   const cv::Mat good(240, 320, CV_8UC1, cv::Scalar(0));
   EXPECT_THAT([&] { stereo.Compute(good, cv::Mat(240, 300, CV_8UC1)); },
               ThrowsMessage<Error>(HasSubstr("the right image is 300x240 of 1 channels, accepted "

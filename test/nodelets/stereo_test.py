@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Two eyes as a vehicle runs them: the bag of a simulated drive through camera_ingest and edge_vo."""
+"""A stereo camera as a vehicle runs them: the bag of a simulated drive through camera_ingest and edge_vo."""
 
 import copy
 import os
@@ -126,12 +126,12 @@ class StereoTest(unittest.TestCase):
         """Earlier copies of the first pair until the odometry has all its topics and the mounting, which nobody
         sees from outside; then it starts anew. Returns how many poses it gave."""
         early = copy.deepcopy(self.frames[0])
-        for eye in (LEFT, RIGHT):
-            early[eye].header.stamp -= rospy.Duration(100)
+        for camera in (LEFT, RIGHT):
+            early[camera].header.stamp -= rospy.Duration(100)
 
         def answers():
-            for eye in (LEFT, RIGHT):
-                early[eye].header.stamp += rospy.Duration(0.1)
+            for camera in (LEFT, RIGHT):
+                early[camera].header.stamp += rospy.Duration(0.1)
             vehicle.send(early)
             return vehicle.received("odom")
 
@@ -201,7 +201,7 @@ class StereoTest(unittest.TestCase):
         levels = [status.message for message in vehicle.received("diagnostics") for status in message.status
                   if vehicle.name in status.name]
         self.assertTrue(any("right images are missing" in text for text in levels), levels)
-        # An eye that was silent is not waited for: it comes back with its next image.
+        # A camera that was silent is not waited for: it comes back with its next image.
         vehicle.send(self.frames[6], (RIGHT,))
         vehicle.wait_for(right_in=2)
         vehicle.send(self.frames[6], (LEFT,))
@@ -245,7 +245,7 @@ class StereoTest(unittest.TestCase):
     def test_a_second_eye_of_a_folder_is_refused(self):
         vehicle = self.vehicle()
         vehicle.load(source="folder", uri=self.folder, camera_info_url="file:///nowhere.yaml")
-        eventually(lambda: "a second eye is read from topics only" in vehicle.output(), "it is refused")
+        eventually(lambda: "a right camera is read from topics only" in vehicle.output(), "it is refused")
 
     def test_parameters_that_cannot_be_are_refused(self):
         vehicle = self.vehicle()

@@ -25,7 +25,7 @@ def run(*arguments):
 
 
 def as_kitti(tum, kitti):
-    """The same drive as KITTI lays it out: numbered pictures of two eyes, projections, poses as matrices."""
+    """The same drive as KITTI lays it out: numbered pictures of two cameras, projections, poses as matrices."""
     with open(os.path.join(tum, "camera.yaml"), encoding="ascii") as file:
         camera = {key: float(value) for key, value in (line.split(":") for line in file)}
     os.mkdir(kitti)
@@ -173,7 +173,7 @@ class EvaluateVoTest(unittest.TestCase):
         with open(camera, "w", encoding="ascii") as file:
             file.writelines(lines)
         self.assertIn("baseline_m in camera.yaml", self.refused(tum, "--stereo"))
-        self.assertIn("no right eye", self.refused(self.room, "--stereo"))
+        self.assertIn("no right camera", self.refused(self.room, "--stereo"))
 
     def test_one_eye_follows_a_street_in_metres_by_the_speed(self):
         street, kitti = (os.path.join(self.temporary.name, name) for name in ("one_eye", "one_eye_kitti"))
@@ -288,9 +288,9 @@ class EvaluateVoTest(unittest.TestCase):
     def test_flags_that_would_be_passed_over_are_refused(self):
         for flags, words in (
                 ("--stereo --mono", "--stereo left out"),
-                ("--scale speed", "--scale tells one eye metres: it needs --mono"),
-                ("--scale height", "--scale tells one eye metres: it needs --mono"),
-                ("--speed-sigma 0.2", "--speed-sigma tells one eye metres: it needs --mono"),
+                ("--scale speed", "--scale gives monocular odometry its scale: it needs --mono"),
+                ("--scale height", "--scale gives monocular odometry its scale: it needs --mono"),
+                ("--speed-sigma 0.2", "--speed-sigma gives monocular odometry its scale: it needs --mono"),
                 ("--mono --camera-height 1.4", "--camera-height needs --scale height"),
                 ("--mono --scale speed --camera-pitch 0.1", "--camera-pitch needs --scale height"),
                 ("--mono --scale height --speed-sigma 0.2", "--speed-sigma needs --scale speed"),

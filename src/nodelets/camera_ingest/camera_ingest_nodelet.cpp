@@ -20,9 +20,9 @@
 
 namespace livemap::nodelets {
 
-/// The vehicle's eyes: takes images from a topic, device, video file or folder, takes the lens
+/// The vehicle's cameras: takes images from a topic, device, video file or folder, takes the lens
 /// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`; with
-/// a second eye depth too (IngestStereo).
+/// a right camera depth too (IngestStereo).
 ///
 /// Callbacks only enqueue; one worker decodes, rectifies and publishes. When it is behind, the
 /// oldest waiting frame goes: frames_in = published + dropped + bad + waiting, at any moment.
@@ -204,7 +204,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   std::unique_ptr<FrameQueue<IngestFrame>> queue_;
   std::unique_ptr<FrameProcessor> processor_;  ///< The worker's.
   image_transport::CameraPublisher publisher_;
-  std::unique_ptr<IngestStereo> stereo_;  ///< Null: one eye.
+  std::unique_ptr<IngestStereo> stereo_;  ///< Null: monocular.
   ros::Subscriber image_subscriber_;
   ros::Subscriber info_subscriber_;
   std::unique_ptr<camera_info_manager::CameraInfoManager> info_manager_;

@@ -19,9 +19,10 @@
 
 namespace livemap::nodelets {
 
-/// The second eye of camera_ingest: takes `camera_right/image_raw` with `camera_right/camera_info`,
-/// pairs it with the left images and publishes `camera_rect/depth/image_raw` (32FC1, metres, NaN:
-/// unknown) with `camera_rect/depth/camera_info`, stamp and frame_id those of the left image.
+/// The right camera of camera_ingest: takes `camera_right/image_raw` with
+/// `camera_right/camera_info`, pairs it with the left images and publishes
+/// `camera_rect/depth/image_raw` (32FC1, metres, NaN: unknown) with
+/// `camera_rect/depth/camera_info`, stamp and frame_id those of the left image.
 ///
 /// One worker of its own, so that left images never wait for depth. Works while somebody listens to
 /// the depth: left images = published + dropped + bad + missing + waiting, at any moment.

@@ -13,7 +13,7 @@
 
 namespace livemap::nodelets {
 
-/// The second eye's images, kept until the left image of the same moment asks for its own.
+/// The right camera's images, kept until the left image of the same moment asks for its own.
 /// Thread-safe.
 class StereoPairBuffer {
  public:
@@ -30,8 +30,8 @@ class StereoPairBuffer {
   /// Images come in the order of their stamps; one whose stamp goes back begins anew.
   void Put(IngestFrame frame);
   /// The partner of a left image of this stamp, the nearest one; older ones are forgotten. Waits
-  /// while it may still come, but not for an eye that has been silent since the last one waited in
-  /// vain. None when there is none.
+  /// while it may still come, but not for a camera that has been silent since the last one waited
+  /// in vain. None when there is none.
   std::optional<IngestFrame> Take(ros::Time stamp);
   /// Ends all waiting.
   void Close();

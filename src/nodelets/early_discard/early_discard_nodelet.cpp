@@ -36,10 +36,10 @@ constexpr double kSendPeriodS = 0.05;
 
 }  // namespace
 
-/// The small vehicle's eye (thesis, section 3.2.4): EarlyDiscard and OffloadSender with topics,
-/// tf and clocks. One worker thread classifies; all else runs in the nodelet's own queue, one
-/// callback at a time: what is worth sending is masked, encoded and published there once its pose
-/// is known.
+/// The small vehicle's camera side (thesis, section 3.2.4): EarlyDiscard and OffloadSender with
+/// topics, tf and clocks. One worker thread classifies; all else runs in the nodelet's own queue,
+/// one callback at a time: what is worth sending is masked, encoded and published there once its
+/// pose is known.
 class EarlyDiscardNodelet : public nodelet::Nodelet {
  public:
   ~EarlyDiscardNodelet() override {

@@ -52,7 +52,7 @@ IngestConfig ReadIngestConfig(ParameterReader& parameters) {
   if (config.source == IngestSource::kTopic) return config;
   if (config.stereo) {
     throw Error("parameter 'stereo' is true with source '" + source +
-                "', a second eye is read from topics only");
+                "', a right camera is read from topics only");
   }
   if (config.uri.empty()) {
     throw Error("parameter 'uri' is empty, with source '" + source + "' it names the " + source);

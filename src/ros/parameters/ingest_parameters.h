@@ -29,7 +29,7 @@ struct IngestConfig {
   double max_megapixels = 20;        ///< Larger images are refused before they are decoded.
   double diagnostics_period_s = 1.0;
 
-  bool stereo = false;         ///< Depth from a second eye on camera_right/.
+  bool stereo = false;         ///< Depth from a right camera on camera_right/.
   double stereo_sync_s = 0;    ///< How far the stamps of a pair may differ.
   double stereo_wait_s = 0.2;  ///< How long a left image's depth waits for the right one.
   imaging::StereoConfig matching;

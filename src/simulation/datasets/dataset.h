@@ -24,10 +24,10 @@ constexpr double kTumDepthScale = 5000;
 class TumWriter {
  public:
   /// Makes the folder; throws Error when it exists and is not empty. `baseline_m` is that of a
-  /// stereo pair, 0: one eye.
+  /// stereo pair, 0: monocular.
   TumWriter(const std::string& directory, const SimulatedCamera& camera,
             double depth_scale = kTumDepthScale, double baseline_m = 0);
-  /// `right` is the second eye's picture of a stereo pair, for rgb_right/; empty: none.
+  /// `right` is the right camera's picture of a stereo pair, for rgb_right/; empty: none.
   void Add(double time_s, const SimulatedFrame& frame, const cv::Mat& right = cv::Mat());
   /// Closes the lists; throws Error when the disk was full.
   void Finish();
@@ -36,7 +36,7 @@ class TumWriter {
   std::string directory_;
   double depth_scale_;
   std::ofstream rgb_;
-  std::ofstream right_;  ///< Open once there is a second eye.
+  std::ofstream right_;  ///< Open once there is a right camera.
   std::ofstream depth_;
   std::ofstream associations_;
   std::ofstream truth_;

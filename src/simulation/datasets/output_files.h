@@ -26,7 +26,8 @@ void MakeFolder(const std::string& directory);
 /// `parameters` as cv::imwrite takes them.
 void WriteImage(const std::string& path, const cv::Mat& image, const std::vector<int>& parameters);
 /// Intrinsics and distortion as the reader of drives wants them; `depth_scale` is units per metre
-/// of the depth pictures, `baseline_m` from the left eye to the right one, 0: there is one eye.
+/// of the depth pictures, `baseline_m` from the left camera to the right one, 0: there is one
+/// camera.
 void WriteCamera(const std::string& path, const SimulatedCamera& camera, double depth_scale,
                  double baseline_m = 0);
 

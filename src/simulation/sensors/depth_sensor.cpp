@@ -49,7 +49,7 @@ bool IsAtEdge(const cv::Mat& depth, int row, int column, float share) {
   return false;
 }
 
-/// For each column of the other eye the nearest surface's disparity.
+/// For each column of the other camera the nearest surface's disparity.
 std::vector<float> OtherEye(const cv::Mat& depth, int row, const Model& model) {
   std::vector<float> seen(static_cast<std::size_t>(depth.cols), 0.0F);
   for (int column = 0; column < depth.cols; ++column) {

@@ -13,7 +13,8 @@ namespace livemap::simulation {
 enum class DepthSensor {
   kExact,   ///< As it is.
   kKinect,  ///< Structured light: steps of an eighth of a pixel, 0.5 to 10 m, holes at edges.
-  kStereo,  ///< Matching of two pictures: noise grows with distance, holes where one eye is blind.
+  kStereo,  ///< Matching of two pictures: noise grows with distance, holes where one camera is
+            ///< blind.
 };
 
 /// "exact", "kinect", "stereo"; none for anything else.

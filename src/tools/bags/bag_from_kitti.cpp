@@ -12,7 +12,7 @@ int Run(int argc, char** argv) {
   CommandLine line(
       "livemap_bag_from_kitti DIR OUT.bag [flags]",
       "Makes a bag of a KITTI odometry folder: images/ (or image_0, image_2), calib.txt,\n"
-      "poses.txt and, where there are such, times.txt and the right eye's image_1 (image_3).",
+      "poses.txt and, where there are such, times.txt and the right camera's image_1 (image_3).",
       2,
       {{"rate-hz", "HZ", "frames per second without times.txt (10)"},
        {"start-time", "ISO8601", "stamp of time zero, UTC (2026-01-01T12:00:00Z)"}});

@@ -63,7 +63,7 @@ sensor_msgs::ImagePtr ReadDepth(const datasets::SequenceFrame& frame,
       .toImageMsg();
 }
 
-/// The second eye's picture with the stamp of the first one's.
+/// The right camera's picture with the stamp of the first one's.
 void WriteRight(const datasets::Sequence& sequence, const datasets::SequenceFrame& frame,
                 geo::CameraIntrinsics& intrinsics, const ros::Time& stamp, BagWriter& bag) {
   if (frame.right_path.empty() || !(sequence.baseline_m > 0)) return;

@@ -36,7 +36,8 @@ struct Options {
   odometry::EdgeOdometry::Config odometry;
   bool mono = false;
   MonocularOptions monocular;
-  std::string one_eye_flag;  ///< One that was given and is about one eye only, or none.
+  std::string
+      monocular_flag;  ///< One that was given and is about monocular odometry only, or none.
 };
 
 odometry::EdgeSource ReadEdgeSource(const CommandLine& line) {
@@ -85,7 +86,7 @@ void CheckFlags(const CommandLine& line) {
                    {"edge-source", ours, edge_method},
                    {"keyframe-every", ours, edge_method},
                    {"edge-model", structured, "--edges structured, which it is for"},
-                   {"mono", !line.Has("stereo"), "--stereo left out: one eye or two"},
+                   {"mono", !line.Has("stereo"), "--stereo left out: monocular or stereo"},
                    {"stereo-scale", line.Has("stereo"), "--stereo, which it is about"},
                    {"speed-sigma", !height, "--scale speed: the height knows no speed"},
                    {"seed", line.Has("speed-sigma"), "--speed-sigma, whose noise it is of"},
@@ -106,7 +107,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "and\n"
       "image_1, calib.txt, poses.txt) and prints accuracy and time per frame: by its depth, by "
       "two\n"
-      "eyes (--stereo), or by one (--mono, and always where there is no depth). Time is that of "
+      "cameras (--stereo), or monocular (--mono, and always where there is no depth). Time is that "
+      "of "
       "one\n"
       "thread from the decoded colour picture to the pose, that of stereo depth apart.\n"
       "docs/reference/measures.md defines the figures.",
@@ -121,9 +123,10 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"step", "N", "use every Nth frame only, default 1"},
        {"stereo", "", "depth from the left and right pictures, as camera_ingest computes it"},
        {"stereo-scale", "N", "--stereo matches pictures smaller by 1, 2 (default) or 4"},
-       {"mono", "", "one eye only: depth is not used where there is some"},
+       {"mono", "", "monocular: depth is not used where there is some"},
        {"scale", "NAME",
-        "what tells one eye metres: speed (default; that of the true poses) or height"},
+        "what gives monocular odometry its scale: speed (default; that of the true poses) or "
+        "height"},
        {"speed-sigma", "M/S", "of --scale speed: noise added to the speed, default 0"},
        {"camera-height", "M", "of --scale height: over the road, default 1.65"},
        {"camera-pitch", "RAD", "of --scale height: positive looks down, default 0"},
@@ -145,7 +148,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.mono = line.Has("mono");
   options.monocular = ReadMonocular(line);
   for (const char* flag : {"scale", "speed-sigma"}) {
-    if (line.Has(flag)) options.one_eye_flag = flag;
+    if (line.Has(flag)) options.monocular_flag = flag;
   }
   options.odometry.keyframe_every = line.Whole("keyframe-every", 0, 1, 10000);
   return options;
@@ -181,7 +184,7 @@ struct Run {
   std::size_t keyframes = 0;
 };
 
-/// Whether one eye is all there is, or all that was asked for.
+/// Whether monocular is all that is possible, or all that was asked for.
 bool IsMonocular(const datasets::Sequence& sequence, const Options& options) {
   if (options.stereo) return false;
   return options.mono || sequence.frames.front().depth_path.empty();
@@ -205,9 +208,10 @@ void AddStep(const VoMethod::Step& step, std::int64_t stamp_ns, Run& run) {
 std::unique_ptr<VoMethod> MethodFor(const datasets::Sequence& sequence,
                                     const geo::CameraIntrinsics& camera, const Options& options) {
   if (!IsMonocular(sequence, options)) {
-    if (!options.one_eye_flag.empty()) {
-      throw Error("--" + options.one_eye_flag +
-                  " tells one eye metres: it needs --mono, or a sequence without depth");
+    if (!options.monocular_flag.empty()) {
+      throw Error(
+          "--" + options.monocular_flag +
+          " gives monocular odometry its scale: it needs --mono, or a sequence without depth");
     }
     return MakeVoMethod(options.method, options.odometry, camera);
   }
@@ -281,7 +285,7 @@ void SayItNeverStarted(const datasets::Sequence& sequence, const Options& option
   std::cerr << "livemap_evaluate_vo: visual odometry never started in " << run.milliseconds.size()
             << " frames: "
             << (IsMonocular(sequence, options)
-                    ? "one eye must move far enough, in small steps, to see depth"
+                    ? "a monocular camera must move far enough, in small steps, to see depth"
                     : "no frame has enough edges with depth")
             << "; there are no poses, and the errors are null\n";
 }

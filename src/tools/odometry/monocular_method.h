@@ -19,9 +19,9 @@ struct MonocularOptions {
   double camera_pitch_rad = 0;  ///< Positive looks down.
 };
 
-/// Follows the sequence, of which every `step`th frame comes, with one eye; depth is not looked at.
-/// The speed is that between the true poses before and after a frame, as a satellite receiver
-/// would measure it. Throws Error when the speed is asked for and there are no true poses.
+/// Follows the sequence, of which every `step`th frame comes, by monocular odometry; depth is not
+/// looked at. The speed is that between the true poses before and after a frame, as a satellite
+/// receiver would measure it. Throws Error when the speed is asked for and there are no true poses.
 std::unique_ptr<VoMethod> MakeMonocularMethod(const MonocularOptions& options,
                                               const odometry::EdgeOdometry::Config& config,
                                               const geo::CameraIntrinsics& intrinsics,

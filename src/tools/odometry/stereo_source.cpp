@@ -10,14 +10,14 @@
 namespace livemap::tools {
 namespace {
 
-/// A rectified eye, `right_m` beside the left one.
-imaging::CameraCalibration Eye(const geo::CameraIntrinsics& k, double right_m) {
-  imaging::CameraCalibration eye;
-  eye.width = k.width;
-  eye.height = k.height;
-  eye.k = {k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1};
-  eye.p = {k.fx, 0, k.cx, -k.fx * right_m, 0, k.fy, k.cy, 0, 0, 0, 1, 0};
-  return eye;
+/// A rectified camera, `right_m` beside the left one.
+imaging::CameraCalibration Camera(const geo::CameraIntrinsics& k, double right_m) {
+  imaging::CameraCalibration camera;
+  camera.width = k.width;
+  camera.height = k.height;
+  camera.k = {k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1};
+  camera.p = {k.fx, 0, k.cx, -k.fx * right_m, 0, k.fy, k.cy, 0, 0, 0, 1, 0};
+  return camera;
 }
 
 imaging::StereoDepth MakeStereo(const datasets::Sequence& sequence,
@@ -28,18 +28,18 @@ imaging::StereoDepth MakeStereo(const datasets::Sequence& sequence,
                    [](const datasets::SequenceFrame& frame) { return frame.right_path.empty(); });
   if (alone == sequence.frames.begin()) {
     throw Error(
-        "the sequence has no right eye: --stereo wants rgb_right.txt beside rgb.txt, or image_1 "
+        "the sequence has no right camera: --stereo wants rgb_right.txt beside rgb.txt, or image_1 "
         "beside image_0");
   }
   if (alone != sequence.frames.end()) {
-    throw Error("the picture '" + alone->image_path + "' has no right eye's beside it");
+    throw Error("the picture '" + alone->image_path + "' has no right camera's beside it");
   }
   if (!(sequence.baseline_m > 0)) {
     throw Error(
         "the sequence has no baseline: --stereo wants baseline_m in camera.yaml, or P1 in "
         "calib.txt");
   }
-  return {config, Eye(intrinsics, 0), Eye(intrinsics, sequence.baseline_m)};
+  return {config, Camera(intrinsics, 0), Camera(intrinsics, sequence.baseline_m)};
 }
 
 }  // namespace

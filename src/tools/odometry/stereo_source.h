@@ -11,7 +11,7 @@ namespace livemap::tools {
 /// camera_ingest runs.
 class StereoSource {
  public:
-  /// `intrinsics` with width and height. Throws Error when the sequence has no second eye, or
+  /// `intrinsics` with width and height. Throws Error when the sequence has no right camera, or
   /// one that misses a picture.
   StereoSource(const datasets::Sequence& sequence, const geo::CameraIntrinsics& intrinsics,
                const imaging::StereoConfig& config);

@@ -30,7 +30,7 @@ std::vector<Flag> Flags() {
           {"world", "FILE", "street and hazards: docs/reference/simulator.md (by the seed)"},
           {"threads", "N", "that render (2)"},
           {"one-ray", "", "one ray per pixel: twice as fast, jagged edges"},
-          {"stereo", "M", "baseline of a second eye to the right, for --tum and --bag (none)"},
+          {"stereo", "M", "baseline of a right camera to the right, for --tum and --bag (none)"},
           {"depth", "SENSOR", "exact, kinect or stereo: how --tum and --bag-depth measure (exact)"},
           {"preview", "FILE.png", "contact sheet of twelve moments"},
           {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
@@ -117,7 +117,7 @@ int Run(int argc, char** argv) {
       const Eigen::Translation3d beside(setup.baseline_m, 0, 0);
       camera.world_from_optical = camera.world_from_optical * beside;
       camera.world_from_optical_end = camera.world_from_optical_end * beside;
-      // The eyes' sensors have noise of their own.
+      // The cameras' sensors have noise of their own.
       right = renderer.Render(camera, number + 0x40000000U).bgr;
     }
     outputs.Add(i, time_s, camera.along_m, frame, right);

@@ -128,7 +128,7 @@ class RosSimulationBag : public SimulationBag {
       bag_.Writer().Write("/camera/depth/image_raw", header.stamp, ToDepthImage(depth, header));
     }
     if (right.empty()) return;
-    // image_geometry wants both eyes in the left one's frame.
+    // image_geometry wants both cameras in the left one's frame.
     right_info_.header = header;
     bag_.Writer().Write("/camera_right/camera_info", header.stamp, right_info_);
     sensor_msgs::CompressedImage picture;

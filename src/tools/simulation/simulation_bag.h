@@ -32,7 +32,7 @@ class SimulationBag {
   struct Setup {
     SimulationBagConfig options;
     datasets::CameraFile camera;
-    double baseline_m = 0;  ///< Of the second eye to the right; 0: none.
+    double baseline_m = 0;  ///< Of the right camera to the right; 0: none.
     geo::GeoPoint datum;    ///< Of the world's origin.
     /// Of the vehicle in the world; also a second before and after.
     std::function<simulation::VehicleKinematics(double time_s)> state;
@@ -42,8 +42,8 @@ class SimulationBag {
   };
 
   virtual ~SimulationBag() = default;
-  /// `depth` is what the depth sensor sees (CV_32FC1 metres, 0: nothing), `right` the second eye's
-  /// picture; either is empty where the bag has none.
+  /// `depth` is what the depth sensor sees (CV_32FC1 metres, 0: nothing), `right` the right
+  /// camera's picture; either is empty where the bag has none.
   virtual void Add(double time_s, const simulation::SimulatedFrame& frame, const cv::Mat& depth,
                    const cv::Mat& right, const std::vector<simulation::HazardInView>& hazards) = 0;
   /// `hazards` is the drive's truth as GeoJSON.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxPreviews = 12;
 constexpr double kPreviewWidth = 480;
-/// Of depth as a stereo camera gives it, when the drive has no second eye.
+/// Of depth as a stereo camera gives it, when the drive has no right camera.
 constexpr double kDefaultBaselineM = 0.25;
 /// Keeps these numbers apart from the receiver's.
 constexpr std::uint64_t kMultipathStream = 0x6d756c7469706174ULL;

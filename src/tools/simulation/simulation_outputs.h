@@ -31,7 +31,7 @@ class SimulationOutputs {
   /// Reads --bag and its flags; both must outlive the outputs.
   void OpenBag(const CommandLine& line, const simulation::Street& street,
                const simulation::VehicleMotion& motion);
-  /// The frame `index`; `right` is the second eye's picture, or empty.
+  /// The frame `index`; `right` is the right camera's picture, or empty.
   void Add(std::size_t index, double time_s, double along_m,
            const simulation::SimulatedFrame& frame, const cv::Mat& right);
   /// Writes what is written once, --hazards too, and closes every file.

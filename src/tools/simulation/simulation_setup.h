@@ -13,7 +13,7 @@ namespace livemap::tools {
 struct SimulationSetup {
   simulation::SimulatedCamera camera;
   simulation::DepthSensor depth = simulation::DepthSensor::kExact;
-  double baseline_m = 0;  ///< 0: one eye.
+  double baseline_m = 0;  ///< 0: monocular.
   datasets::CameraMounting mounting;
   geo::GeoPoint datum;  ///< Of the world's origin.
 };

@@ -62,7 +62,7 @@ TEST(StereoPairBuffer, AreWaitedForAndTheWaitEndsWhenOneIsTooLate) {
   StereoPairBuffer rights(0, kForeverS, 10);
   std::thread eye([&] { rights.Put(Frame(100)); });
   EXPECT_EQ(Partner(rights, 100), 100);
-  eye.join();
+  camera.join();
   std::thread late([&] { rights.Put(Frame(300)); });
   EXPECT_EQ(Partner(rights, 200), -1) << "one after it came: its own does not come any more";
   late.join();

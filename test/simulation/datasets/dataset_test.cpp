@@ -89,7 +89,7 @@ TEST_F(Dataset, TumFolderIsReadBackByTheReaderOfDrives) {
   ASSERT_EQ(sequence.frames.size(), 2U);
   ASSERT_EQ(sequence.poses.size(), 2U);
   EXPECT_EQ(sequence.depth_scale, 5000);
-  EXPECT_EQ(sequence.baseline_m, 0) << "one eye";
+  EXPECT_EQ(sequence.baseline_m, 0) << "monocular";
   EXPECT_TRUE(sequence.frames[0].right_path.empty());
   EXPECT_EQ(sequence.intrinsics.fx, 100);
   EXPECT_EQ(sequence.frames[1].stamp_ns, 100000000);
