@@ -120,7 +120,7 @@ TEST_F(HeldReportTest, OnADearLinkOnlyUrgentReportsGoAtOnceOthersAtTheirLimit) {
   EXPECT_THAT(Sent(), UnorderedElementsAre("deer", "cone"));
   EXPECT_EQ(reporter_->HeldReports(steady_s_), 1u);
   steady_s_ += config_.hold_s[2] - config_.hold_s[1];
-  EXPECT_THAT(Sent(), imaging::Contains("pothole"));
+  EXPECT_THAT(Sent(), Contains("pothole"));
 }
 
 TEST_F(HeldReportTest, ACheapLinkLetsAllGoUrgentFirst) {
