@@ -1,12 +1,12 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <utility>
+
+#include "common/mutex.h"
 
 namespace livemap {
 
@@ -29,7 +29,7 @@ class FrameQueue {
   /// Never blocks. After Close nothing is taken in.
   void Push(Item item) {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       if (closed_) return;
       ++counters_.in;
       if (items_.size() == capacity_) {
@@ -38,14 +38,14 @@ class FrameQueue {
       }
       items_.push_back(std::move(item));
     }
-    available_.notify_one();
+    available_.NotifyOne();
   }
 
   /// Waits for the next item; none when the queue is closed. Done or Unusable must follow each
   /// item.
   std::optional<Item> Pop() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    available_.wait(lock, [this] { return closed_ || !items_.empty(); });
+    const MutexLock lock(mutex_);
+    while (!closed_ && items_.empty()) available_.Wait(mutex_);
     if (closed_) return std::nullopt;
     std::optional<Item> item(std::move(items_.front()));
     items_.pop_front();
@@ -61,16 +61,16 @@ class FrameQueue {
   /// Wakes the worker to stop; what still waits counts as dropped.
   void Close() {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       closed_ = true;
       counters_.dropped += items_.size();
       items_.clear();
     }
-    available_.notify_all();
+    available_.NotifyAll();
   }
 
   Counters counters() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     Counters counters = counters_;
     counters.waiting = items_.size() + in_work_;
     return counters;
@@ -78,18 +78,18 @@ class FrameQueue {
 
  private:
   void Finish(std::uint64_t Counters::*counter) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     --in_work_;
     ++(counters_.*counter);
   }
 
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::condition_variable available_;
-  std::deque<Item> items_;
-  std::size_t in_work_ = 0;
-  Counters counters_;
-  bool closed_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable available_;
+  std::deque<Item> items_ GUARDED_BY(mutex_);
+  std::size_t in_work_ GUARDED_BY(mutex_) = 0;
+  Counters counters_ GUARDED_BY(mutex_);
+  bool closed_ GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace livemap

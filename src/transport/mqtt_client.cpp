@@ -9,10 +9,10 @@
 #include <cmath>
 #include <csignal>
 #include <map>
-#include <mutex>
 #include <thread>
 
 #include "common/error.h"
+#include "common/mutex.h"
 #include "transport/backoff.h"
 #include "transport/event_fd.h"
 #include "transport/mosquitto_handle.h"
@@ -85,7 +85,7 @@ class MqttClient::Connection {
     }
     if (stopping_) return MqttPublishStatus::kStopped;
     if (!queue_.Push(std::move(message))) {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       ++statistics_.queue_overflows;
       return MqttPublishStatus::kQueueFull;
     }
@@ -94,12 +94,12 @@ class MqttClient::Connection {
   }
 
   bool connected() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     return statistics_.connected;
   }
 
   MqttStatistics statistics() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     MqttStatistics snapshot = statistics_;
     snapshot.queued = queue_.size();
     return snapshot;
@@ -181,7 +181,7 @@ class MqttClient::Connection {
           code == MOSQ_ERR_NO_CONN || code == MOSQ_ERR_CONN_LOST || code == MOSQ_ERR_ERRNO;
       if (code == MOSQ_ERR_SUCCESS || (broken && message->qos > 0)) {
         {
-          const std::lock_guard<std::mutex> lock(mutex_);
+          const MutexLock lock(mutex_);
           statistics_.sent_bytes += bytes;
         }
         MqttPublishOutcome outcome{message->tag, std::move(message->topic), bytes, 0, ""};
@@ -201,7 +201,7 @@ class MqttClient::Connection {
 
   void Finish(MqttPublishOutcome outcome) {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       ++(outcome.accepted() ? statistics_.published : statistics_.publishes_refused);
       if (!outcome.accepted()) {
         statistics_.last_error =
@@ -213,7 +213,7 @@ class MqttClient::Connection {
   }
 
   void CountInflight() {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     statistics_.inflight = inflight_.size();
   }
 
@@ -230,7 +230,7 @@ class MqttClient::Connection {
     logged_in_ = false;
     Explain("the connection to the broker was lost");
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!statistics_.connected) ++statistics_.connection_failures;
       statistics_.connected = false;
       statistics_.subscriptions_granted = 0;
@@ -250,7 +250,7 @@ class MqttClient::Connection {
     }
     logged_in_ = true;
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       statistics_.connected = true;
       ++statistics_.connections;
     }
@@ -262,7 +262,7 @@ class MqttClient::Connection {
   }
 
   void HandleSubscribe(int count, const int* granted) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     for (int i = 0; i < count; ++i) {
       if (granted[i] < MQTT_RC_UNSPECIFIED) {
         ++statistics_.subscriptions_granted;
@@ -289,7 +289,7 @@ class MqttClient::Connection {
                                {static_cast<const std::uint8_t*>(message.payload),
                                 static_cast<std::size_t>(message.payloadlen)}};
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       ++statistics_.received;
       statistics_.received_bytes += received.topic.size() + received.payload.size;
     }
@@ -303,7 +303,7 @@ class MqttClient::Connection {
     try {
       handler(connection);
     } catch (const std::exception& error) {
-      const std::lock_guard<std::mutex> lock(connection.mutex_);
+      const MutexLock lock(connection.mutex_);
       connection.statistics_.last_error = std::string("an MQTT callback failed: ") + error.what();
     }
   }
@@ -348,8 +348,8 @@ class MqttClient::Connection {
   EventFd stop_;
   std::atomic<bool> stopping_{false};
 
-  mutable std::mutex mutex_;
-  MqttStatistics statistics_;
+  mutable Mutex mutex_;
+  MqttStatistics statistics_ GUARDED_BY(mutex_);
 
   // Thread side.
   MosquittoHandle handle_;

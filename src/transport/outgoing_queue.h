@@ -2,10 +2,11 @@
 
 #include <cstdint>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace livemap::transport {
 
@@ -26,7 +27,7 @@ class OutgoingQueue {
 
   /// False, and nothing changed, when the message does not fit any more.
   bool Push(OutgoingMessage message) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (messages_.size() >= max_messages_ || message.bytes() > max_bytes_ - bytes_) return false;
     bytes_ += message.bytes();
     messages_.push_back(std::move(message));
@@ -34,7 +35,7 @@ class OutgoingQueue {
   }
 
   std::optional<OutgoingMessage> Pop() {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (messages_.empty()) return std::nullopt;
     OutgoingMessage message = std::move(messages_.front());
     messages_.pop_front();
@@ -43,16 +44,16 @@ class OutgoingQueue {
   }
 
   std::size_t size() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     return messages_.size();
   }
 
  private:
   const std::size_t max_messages_;
   const std::size_t max_bytes_;
-  mutable std::mutex mutex_;
-  std::deque<OutgoingMessage> messages_;
-  std::size_t bytes_ = 0;
+  mutable Mutex mutex_;
+  std::deque<OutgoingMessage> messages_ GUARDED_BY(mutex_);
+  std::size_t bytes_ GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace livemap::transport

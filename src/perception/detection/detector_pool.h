@@ -1,18 +1,18 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <exception>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace livemap::perception {
 
@@ -69,7 +69,7 @@ class DetectorPool {
   /// Never blocks. After Close nothing is taken in.
   void Push(Item item) {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       if (closed_) return;
       ++counters_.in;
       if (queue_.size() == queue_size_) {
@@ -78,21 +78,21 @@ class DetectorPool {
       }
       queue_.push_back(std::move(item));
     }
-    work_.notify_one();
+    work_.NotifyOne();
   }
 
   /// Waits for what the engines and the callback do right now and ends the threads; what was not
   /// handed on counts as dropped. Not to be called from the callback.
   void Close() {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       closed_ = true;
     }
-    work_.notify_all();
-    finished_.notify_all();
+    work_.NotifyAll();
+    finished_.NotifyAll();
     for (std::thread& thread : threads_) thread.join();
     threads_.clear();
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     counters_.dropped += queue_.size() + in_flight_;
     in_flight_ = 0;
     queue_.clear();
@@ -100,7 +100,7 @@ class DetectorPool {
   }
 
   Counters counters() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     Counters counters = counters_;
     counters.waiting = queue_.size() + in_flight_;
     return counters;
@@ -108,16 +108,15 @@ class DetectorPool {
 
  private:
   void Work(const Engine& engine) {
-    std::unique_lock<std::mutex> lock(mutex_);
+    MutexLock lock(mutex_);
     while (true) {
-      work_.wait(lock,
-                 [this] { return closed_ || (!queue_.empty() && in_flight_ < max_in_flight_); });
+      while (!closed_ && (queue_.empty() || in_flight_ >= max_in_flight_)) work_.Wait(mutex_);
       if (closed_) return;
       const std::uint64_t number = taken_++;
       Outcome outcome{std::move(queue_.front()), std::nullopt, ""};
       queue_.pop_front();
       ++in_flight_;
-      lock.unlock();
+      lock.Unlock();
       try {
         outcome.result = engine(outcome.item);
       } catch (const std::exception& error) {
@@ -125,29 +124,29 @@ class DetectorPool {
       } catch (...) {
         outcome.error = "an exception of another kind";
       }
-      lock.lock();
+      lock.Lock();
       results_.emplace(number, std::move(outcome));
-      finished_.notify_one();
+      finished_.NotifyOne();
     }
   }
 
   void Deliver() {
-    std::unique_lock<std::mutex> lock(mutex_);
+    MutexLock lock(mutex_);
     while (true) {
-      finished_.wait(lock, [this] {
-        return closed_ || (!results_.empty() && results_.begin()->first == delivered_);
-      });
+      while (!closed_ && (results_.empty() || results_.begin()->first != delivered_)) {
+        finished_.Wait(mutex_);
+      }
       if (closed_) return;
       std::optional<Outcome> outcome(std::move(results_.begin()->second));
       results_.erase(results_.begin());
-      lock.unlock();
+      lock.Unlock();
       const bool used = Tell(*outcome) && outcome->result.has_value();
       outcome.reset();  // an image's memory is freed without the lock
-      lock.lock();
+      lock.Lock();
       ++delivered_;
       --in_flight_;
       ++(used ? counters_.processed : counters_.dropped);
-      work_.notify_one();
+      work_.NotifyOne();
     }
   }
 
@@ -165,16 +164,17 @@ class DetectorPool {
   const std::size_t max_in_flight_;  ///< In work, or finished and not handed on.
   const OnOutcome on_outcome_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable work_;      ///< There is an item, or room for its result.
-  std::condition_variable finished_;  ///< There is a result.
-  std::deque<Item> queue_;
-  std::map<std::uint64_t, Outcome> results_;  ///< Finished, by number of the item.
-  std::uint64_t taken_ = 0;                   ///< Items that engines took; the next one's number.
-  std::uint64_t delivered_ = 0;               ///< Number of the item that is handed on next.
-  std::size_t in_flight_ = 0;
-  Counters counters_;
-  bool closed_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable work_;      ///< There is an item, or room for its result.
+  ConditionVariable finished_;  ///< There is a result.
+  std::deque<Item> queue_ GUARDED_BY(mutex_);
+  std::map<std::uint64_t, Outcome> results_
+      GUARDED_BY(mutex_);                       ///< Finished, by number of the item.
+  std::uint64_t taken_ GUARDED_BY(mutex_) = 0;  ///< Items that engines took; the next one's number.
+  std::uint64_t delivered_ GUARDED_BY(mutex_) = 0;  ///< Number of the item that is handed on next.
+  std::size_t in_flight_ GUARDED_BY(mutex_) = 0;
+  Counters counters_ GUARDED_BY(mutex_);
+  bool closed_ GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;
 };
 

@@ -48,7 +48,7 @@ void* BlockCache::Take(std::size_t bytes) {
     memory = std::aligned_alloc(kAlignment, RoundedUp(with_header, kAlignment));
     if (memory == nullptr) throw std::bad_alloc();
   } else {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     std::vector<void*>& kept = kept_[size_class];
     if (kept.empty()) {
       // Room for every block of the class, so that Give needs no memory.
@@ -69,7 +69,7 @@ void BlockCache::Give(void* block) noexcept {
     std::free(header);
     return;
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   kept_[header->size_class].push_back(header);
 }
 

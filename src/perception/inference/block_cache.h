@@ -2,8 +2,9 @@
 
 #include <array>
 #include <cstddef>
-#include <mutex>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace livemap::perception {
 
@@ -41,12 +42,12 @@ class BlockCache {
   /// The smallest class of blocks of at least `bytes`; kClasses: too small or too large to keep.
   static std::size_t ClassOf(std::size_t bytes);
   static std::size_t BytesOf(std::size_t size_class);
-  std::byte* Carve(std::size_t bytes);
+  std::byte* Carve(std::size_t bytes) REQUIRES(mutex_);
 
-  std::mutex mutex_;
-  std::array<std::vector<void*>, kClasses> kept_;
-  std::vector<Slab> slabs_;
-  std::size_t carved_ = 0;  ///< Bytes of the last slab that are blocks.
+  Mutex mutex_;
+  std::array<std::vector<void*>, kClasses> kept_ GUARDED_BY(mutex_);
+  std::vector<Slab> slabs_ GUARDED_BY(mutex_);
+  std::size_t carved_ GUARDED_BY(mutex_) = 0;  ///< Bytes of the last slab that are blocks.
 };
 
 }  // namespace livemap::perception

@@ -153,7 +153,7 @@ class Session {
   /// Hazards along a lattice of streets about 150 m apart.
   Json Fill(const Json& command) {
     Tick();
-    const geo::GeoPoint corner{command.at("lat"), command.at("lon")};
+    const GeoPoint corner{command.at("lat"), command.at("lon")};
     const std::vector<const char*> classes{"pothole", "pothole",        "pothole", "traffic_cone",
                                            "debris",  "road_work_sign", "barrier"};
     std::mt19937 random(11);
@@ -166,7 +166,7 @@ class Session {
         const double along = 0.00011 * (i / 60) + 1e-5 * std::uniform_real_distribution<>()(random);
         const double across = 0.0018 * (i % 30);
         const bool east = i % 60 < 30;
-        const geo::GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
+        const GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
                                      corner.longitude_deg + (east ? along * 1.31 : across)};
         auto report = fixture_.MakeReport(classes[random() % classes.size()], position);
         report.confidence = 0.5F + 0.49F * std::uniform_real_distribution<float>()(random);

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <shared_mutex>
+
+/// Clang's thread-safety analysis (https://clang.llvm.org/docs/ThreadSafetyAnalysis.html): the
+/// clang builds check with -Wthread-safety what these annotations say. Other compilers see nothing.
+#if defined(__clang__)
+#define LIVEMAP_THREAD_ANNOTATION(x) __attribute__((x))
+#else
+#define LIVEMAP_THREAD_ANNOTATION(x)
+#endif
+/// The member may be read or written only while the mutex is held.
+#define GUARDED_BY(mutex) LIVEMAP_THREAD_ANNOTATION(guarded_by(mutex))
+/// What the pointer points to may be used only while the mutex is held.
+#define PT_GUARDED_BY(mutex) LIVEMAP_THREAD_ANNOTATION(pt_guarded_by(mutex))
+/// The caller holds the mutex.
+#define REQUIRES(...) LIVEMAP_THREAD_ANNOTATION(requires_capability(__VA_ARGS__))
+/// The caller holds the mutex at least for reading.
+#define REQUIRES_SHARED(...) LIVEMAP_THREAD_ANNOTATION(requires_shared_capability(__VA_ARGS__))
+/// The caller must not hold the mutex, since the function locks it.
+#define EXCLUDES(...) LIVEMAP_THREAD_ANNOTATION(locks_excluded(__VA_ARGS__))
+/// This mutex is always locked before the others.
+#define ACQUIRED_BEFORE(...) LIVEMAP_THREAD_ANNOTATION(acquired_before(__VA_ARGS__))
+/// The function locks in a way that the analysis cannot follow.
+#define NO_THREAD_SAFETY_ANALYSIS LIVEMAP_THREAD_ANNOTATION(no_thread_safety_analysis)
+
+namespace livemap {
+
+class ConditionVariable;
+
+/// A std::mutex that the thread-safety analysis knows.
+///
+/// Typical usage:
+///
+///   Mutex mutex_;
+///   std::deque<Item> items_ GUARDED_BY(mutex_);
+///   ...
+///   const MutexLock lock(mutex_);
+///   items_.push_back(item);
+class LIVEMAP_THREAD_ANNOTATION(capability("mutex")) Mutex {
+ public:
+  void Lock() LIVEMAP_THREAD_ANNOTATION(acquire_capability()) { mutex_.lock(); }
+  void Unlock() LIVEMAP_THREAD_ANNOTATION(release_capability()) { mutex_.unlock(); }
+
+ private:
+  friend class ConditionVariable;
+  std::mutex mutex_;
+};
+
+/// A std::shared_mutex that the thread-safety analysis knows.
+class LIVEMAP_THREAD_ANNOTATION(capability("shared mutex")) SharedMutex {
+ public:
+  void Lock() LIVEMAP_THREAD_ANNOTATION(acquire_capability()) { mutex_.lock(); }
+  void Unlock() LIVEMAP_THREAD_ANNOTATION(release_capability()) { mutex_.unlock(); }
+  void LockShared() LIVEMAP_THREAD_ANNOTATION(acquire_shared_capability()) { mutex_.lock_shared(); }
+  void UnlockShared() LIVEMAP_THREAD_ANNOTATION(release_shared_capability()) {
+    mutex_.unlock_shared();
+  }
+
+ private:
+  std::shared_mutex mutex_;
+};
+
+/// Holds a Mutex from its construction to its end. Unlock and Lock open a gap in between.
+class LIVEMAP_THREAD_ANNOTATION(scoped_lockable) MutexLock {
+ public:
+  explicit MutexLock(Mutex& mutex) LIVEMAP_THREAD_ANNOTATION(acquire_capability(mutex))
+      : mutex_(mutex) {
+    mutex_.Lock();
+  }
+  ~MutexLock() LIVEMAP_THREAD_ANNOTATION(release_capability()) {
+    if (held_) mutex_.Unlock();
+  }
+  MutexLock(const MutexLock&) = delete;
+  MutexLock& operator=(const MutexLock&) = delete;
+
+  void Unlock() LIVEMAP_THREAD_ANNOTATION(release_capability()) {
+    held_ = false;
+    mutex_.Unlock();
+  }
+  void Lock() LIVEMAP_THREAD_ANNOTATION(acquire_capability()) {
+    mutex_.Lock();
+    held_ = true;
+  }
+
+ private:
+  Mutex& mutex_;
+  bool held_ = true;
+};
+
+/// Holds a SharedMutex for writing.
+class LIVEMAP_THREAD_ANNOTATION(scoped_lockable) WriterLock {
+ public:
+  explicit WriterLock(SharedMutex& mutex) LIVEMAP_THREAD_ANNOTATION(acquire_capability(mutex))
+      : mutex_(mutex) {
+    mutex_.Lock();
+  }
+  ~WriterLock() LIVEMAP_THREAD_ANNOTATION(release_capability()) { mutex_.Unlock(); }
+  WriterLock(const WriterLock&) = delete;
+  WriterLock& operator=(const WriterLock&) = delete;
+
+ private:
+  SharedMutex& mutex_;
+};
+
+/// Holds a SharedMutex for reading.
+class LIVEMAP_THREAD_ANNOTATION(scoped_lockable) ReaderLock {
+ public:
+  explicit ReaderLock(SharedMutex& mutex)
+      LIVEMAP_THREAD_ANNOTATION(acquire_shared_capability(mutex))
+      : mutex_(mutex) {
+    mutex_.LockShared();
+  }
+  ~ReaderLock() LIVEMAP_THREAD_ANNOTATION(release_capability()) { mutex_.UnlockShared(); }
+  ReaderLock(const ReaderLock&) = delete;
+  ReaderLock& operator=(const ReaderLock&) = delete;
+
+ private:
+  SharedMutex& mutex_;
+};
+
+/// A std::condition_variable for Mutex. Its waits take no predicate, so that the analysis sees
+/// the condition: `while (!ready_) changed_.Wait(mutex_);`.
+class ConditionVariable {
+ public:
+  void NotifyOne() { condition_.notify_one(); }
+  void NotifyAll() { condition_.notify_all(); }
+
+  /// Gives the mutex up, waits for a notification (or wakes without one), and holds it again.
+  void Wait(Mutex& mutex) REQUIRES(mutex) {
+    std::unique_lock<std::mutex> lock(mutex.mutex_, std::adopt_lock);
+    condition_.wait(lock);
+    lock.release();
+  }
+  /// The same until `deadline` at the latest; false when it has passed.
+  template <typename Clock, typename Duration>
+  bool WaitUntil(Mutex& mutex, const std::chrono::time_point<Clock, Duration>& deadline)
+      REQUIRES(mutex) {
+    std::unique_lock<std::mutex> lock(mutex.mutex_, std::adopt_lock);
+    const bool in_time = condition_.wait_until(lock, deadline) == std::cv_status::no_timeout;
+    lock.release();
+    return in_time;
+  }
+  /// The same for `duration` at the longest.
+  template <typename Rep, typename Period>
+  bool WaitFor(Mutex& mutex, const std::chrono::duration<Rep, Period>& duration) REQUIRES(mutex) {
+    return WaitUntil(mutex, std::chrono::steady_clock::now() + duration);
+  }
+
+ private:
+  std::condition_variable condition_;
+};
+
+}  // namespace livemap
