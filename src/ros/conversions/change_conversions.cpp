@@ -35,7 +35,7 @@ std::uint8_t ToMessage(change::ChangeDetector::Outcome outcome) {
 }
 
 ChangedObject ToMessage(const change::PlacedChange& change) {
-  const ChangedObject& event = change.event;
+  const change::ChangedObject& event = change.event;
   ChangedObject message;
   message.id = static_cast<std::uint32_t>(event.id);
   message.class_name = protocol::ChangeClassName(event.change_class);

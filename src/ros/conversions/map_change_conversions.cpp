@@ -49,7 +49,7 @@ protocol::MapChangeReport FromMessage(const MapChange& message) {
 std::optional<protocol::MapChangeReport> ToMapChangeReport(const change::PlacedChange& change,
                                                            const std::string& drive_id,
                                                            const Uuid& uuid) {
-  const ChangedObject& event = change.event;
+  const change::ChangedObject& event = change.event;
   if (event.direction == change::ChangeDirection::kUnknown) return std::nullopt;
   protocol::MapChangeReport report;
   report.uuid = uuid;

@@ -37,7 +37,7 @@ CameraExposure ViewOfFrame(const Street& street, std::size_t frame) {
   return PassDrive(street, DrawSecondManner(3, 8, 0.5, 20), Mounting(), 0).Camera(frame);
 }
 
-TEST(protocol::ChangeClass, KnowsEveryObjectThatMayChangeAndNoOther) {
+TEST(ChangeClass, KnowsEveryObjectThatMayChangeAndNoOther) {
   std::set<protocol::ChangeClass> used;
   for (int i = 0; i < kObjectClasses; ++i) used.insert(ChangeClassOf(static_cast<ObjectClass>(i)));
   EXPECT_EQ(used.size(), static_cast<std::size_t>(protocol::kChangeClasses));
