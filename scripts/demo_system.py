@@ -35,7 +35,7 @@ def program(name):
     for folder in folders:
         if (folder / name).is_file():
             return str(folder / name)
-    raise StartError(f"program '{name}' is not built; ./livemap setup builds it")
+    raise StartError(f"program '{name}' is not built; ./livemap setup --dev builds every program")
 
 
 def package_file(name):
