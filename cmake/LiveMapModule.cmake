@@ -15,17 +15,60 @@ endfunction()
 # A GoogleTest program that ctest runs as NAME. Tests that want files of the source tree read
 # LIVEMAP_SOURCE_DIR; the ones that want the real drives read LIVEMAP_DATA_DIR (environment, else
 # ../shared/data beside the source tree) and say "skipped, no data" where it is absent.
-find_package(GTest REQUIRED)
+if(LIVEMAP_DEVELOPMENT)
+  find_package(GTest REQUIRED)
+endif()
 # All of them, without what they do not need.
 add_custom_target(livemap_gtests)
 function(livemap_gtest name)
   cmake_parse_arguments(TEST "" "" "SOURCES;DEPENDS" ${ARGN})
   list(TRANSFORM TEST_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/test/)
+  if(NOT LIVEMAP_DEVELOPMENT)
+    # Declared, for the properties that folders set on it; never built.
+    add_executable(${name} EXCLUDE_FROM_ALL ${TEST_SOURCES})
+    set_target_properties(${name} PROPERTIES LIVEMAP_IS_TEST ON)
+    add_test(NAME ${name} COMMAND ${name})
+    return()
+  endif()
   add_executable(${name} ${TEST_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_definitions(${name} PRIVATE LIVEMAP_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_libraries(${name} PRIVATE ${TEST_DEPENDS} GTest::gmock GTest::gtest_main livemap_options)
+  set_target_properties(${name} PROPERTIES LIVEMAP_IS_TEST ON)
   add_dependencies(livemap_gtests ${name})
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
+endfunction()
+
+# livemap_targets_below(folder TYPES result)
+#
+# The targets, but for tests, that a folder and those below it define; TYPES is a regular expression.
+function(livemap_targets_below folder types result)
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  set(found)
+  foreach(target IN LISTS targets)
+    get_target_property(type ${target} TYPE)
+    get_target_property(is_test ${target} LIVEMAP_IS_TEST)
+    if(type MATCHES "^${types}$" AND NOT is_test)
+      list(APPEND found ${target})
+    endif()
+  endforeach()
+  get_property(folders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(below IN LISTS folders)
+    livemap_targets_below(${below} ${types} more)
+    list(APPEND found ${more})
+  endforeach()
+  set(${result} ${found} PARENT_SCOPE)
+endfunction()
+
+# livemap_part(NAME folder ...)
+#
+# The target NAME: all programs and plugin libraries of these folders. ./livemap builds one where the
+# build folder has more than a command runs.
+function(livemap_part name)
+  add_custom_target(${name})
+  foreach(folder IN LISTS ARGN)
+    livemap_targets_below(${PROJECT_SOURCE_DIR}/${folder} "(EXECUTABLE|SHARED_LIBRARY)" programs)
+    add_dependencies(${name} ${programs})
+  endforeach()
 endfunction()

@@ -6,10 +6,12 @@ set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE} CACHE FILEPATH "The same for ament's
 # have, and leaves out those that do not exist yet: the messages' Python modules would be missing.
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/devel/lib/python3/dist-packages)
 find_package(catkin REQUIRED COMPONENTS
-  camera_info_manager cv_bridge diagnostic_msgs diagnostic_updater geometry_msgs image_geometry
-  image_transport message_filters message_generation nav_msgs nodelet pcl_conversions pcl_ros
-  pluginlib rosbag roscpp rostest sensor_msgs std_msgs std_srvs tf2 tf2_eigen tf2_geometry_msgs
-  tf2_ros topic_tools visualization_msgs)
+  camera_info_manager cv_bridge diagnostic_msgs diagnostic_updater geometry_msgs image_transport
+  message_filters message_generation nav_msgs nodelet pcl_conversions pluginlib rosbag roscpp
+  sensor_msgs std_msgs std_srvs tf2 tf2_eigen tf2_ros visualization_msgs)
+if(LIVEMAP_DEVELOPMENT)
+  find_package(rostest REQUIRED)
+endif()
 
 file(GLOB message_files RELATIVE ${PROJECT_SOURCE_DIR}/msg CONFIGURE_DEPENDS msg/*.msg)
 add_message_files(FILES ${message_files})

@@ -49,7 +49,7 @@ class HelpTest(unittest.TestCase):
         for command in OF_PROGRAMS:
             answer = self.ask(command)
             self.assertEqual(answer.returncode, 2, command)
-            self.assertIn("nothing is built yet: run ./livemap setup first", answer.stderr)
+            self.assertIn("which is not built yet: ./livemap setup --dev builds every program", answer.stderr)
             self.assert_nothing_was_made(command)
 
     def test_every_argument_of_a_launch_file_is_listed_with_its_default(self):
