@@ -1,6 +1,6 @@
 # livemap_module(NAME SOURCES a.cpp ... DEPENDS target ... [SYSTEM_INCLUDES dir ...])
 #
-# One ROS-free module: the static library livemap_NAME its sources below src/, its headers
+# One ROS-free module: the static library livemap_NAME of sources below src/NAME, its headers
 # included by their path there. DEPENDS spells out every library that the module may use.
 function(livemap_module name)
   cmake_parse_arguments(MODULE "" "" "SOURCES;DEPENDS;SYSTEM_INCLUDES" ${ARGN})
