@@ -5,6 +5,8 @@ set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE} CACHE FILEPATH "The same for ament's
 # find_package(catkin) notes down, once, which folders of the devel space the tests' environment shall
 # have, and leaves out those that do not exist yet: the messages' Python modules would be missing.
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/devel/lib/python3/dist-packages)
+# Nothing here speaks Lisp.
+set(ENV{ROS_LANG_DISABLE} genlisp)
 find_package(catkin REQUIRED COMPONENTS
   camera_info_manager cv_bridge diagnostic_msgs diagnostic_updater geometry_msgs image_transport
   message_filters message_generation nav_msgs nodelet pcl_conversions pluginlib rosbag roscpp
