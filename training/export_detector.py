@@ -157,7 +157,8 @@ def calibrate(looker: Looker, arguments: argparse.Namespace, classes: Tuple[str,
     """A threshold for each class; real pictures count more than simulated ones."""
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in classes}
     simulated = data.read_simulated(arguments.simulated) if arguments.simulated else []
-    for kind, pictures in (("simulated", simulated), ("own", data.read_own(arguments.own, classes))):
+    own = [picture for pictures in data.read_own(arguments.own, classes).values() for picture in pictures]
+    for kind, pictures in (("simulated", simulated), ("own", own)):
         for name, frames in detect_labelled(looker, pictures, classes).items():
             thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
             print(f"{kind} {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")

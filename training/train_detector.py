@@ -7,9 +7,10 @@ A run that was stopped, at whatever moment, continues with the same command and 
 """
 
 import argparse
+import json
 import sys
 import time
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
 
@@ -17,7 +18,7 @@ import cv2
 import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import data
+from detector import data, sets, signs
 from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
 from detector.manifest import ManifestError, classes_of
@@ -26,7 +27,7 @@ from detector.pretrained import ConversionError, load_backbone, load_exported
 from detector.training import (
     VIEWS, AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
 )
-from detector.validation import Looker, torch_runner, validate
+from detector.validation import Looker, selection_figure, torch_runner, validate, validate_held_out
 
 
 CALIBRATION_SAMPLES = 64
@@ -50,12 +51,13 @@ class Trainer:
             part.requires_grad_(False)
         self.optimizer = make_optimizer(self.model, settings)
         self.epoch = 0
-        self.best_ap = 0.0
+        self.best_ap = 0.0  # selection_figure of best.pt
+        self.history: List[dict] = []  # of all validations
 
     def state(self) -> dict:
         """Everything that the next epoch depends on."""
         return {
-            "settings": asdict(self.settings), "epoch": self.epoch, "best_ap": self.best_ap,
+            "settings": asdict(self.settings), "epoch": self.epoch, "best_ap": self.best_ap, "history": self.history,
             "model": self.model.state_dict(), "average": self.average.model.state_dict(),
             "updates": self.average.updates, "optimizer": self.optimizer.state_dict(),
         }
@@ -73,7 +75,7 @@ class Trainer:
         self.average.model.load_state_dict(state["average"])
         self.average.updates = state["updates"]
         self.optimizer.load_state_dict(state["optimizer"])
-        self.epoch, self.best_ap = state["epoch"], state["best_ap"]
+        self.epoch, self.best_ap, self.history = state["epoch"], state["best_ap"], state.get("history", [])
 
     def check_classes(self, begun: Tuple[str, ...]) -> None:
         """Refuse weights whose outputs would become those of other classes."""
@@ -96,10 +98,12 @@ class Trainer:
         self.model.load_state_dict(weights)
         self.average = AveragedModel(self.model)
 
-    def start_from_others(self, backbone: Optional[Path], exported: Optional[Path], pictures: dict) -> None:
+    def start_from_others(
+        self, backbone: Optional[Path], exported: Optional[Path], pictures: dict, faces: Optional[signs.Faces] = None
+    ) -> None:
         """Begin with the backbone of another network, with what an exported detector shares with ours, or with both."""
         views = VIEWS["crops"]
-        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, classes=self.settings.classes)
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, classes=self.settings.classes, faces=faces)
         samples = EpochSamples(augmenter, self.settings.seed, 0, CALIBRATION_SAMPLES)
         images, targets = next(iter(batches(samples, CALIBRATION_SAMPLES, 0)))
         images = to_device(images, targets, self.device)[0]
@@ -110,13 +114,15 @@ class Trainer:
             print(f"{load_exported(self.model, exported, images)} convolutions are those of {exported}", flush=True)
         self.average = AveragedModel(self.model)
 
-    def train_epoch(self, pictures: dict, workers: int) -> dict:
+    def train_epoch(self, pictures: dict, workers: int, faces: Optional[signs.Faces] = None) -> dict:
         """One pass over freshly drawn samples; returns mean losses."""
         settings = self.settings
         # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
         torch.manual_seed(settings.seed * 100003 + self.epoch)
         views = settings.views_of(self.epoch)
-        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, settings.simulated_share, settings.classes)
+        augmenter = Augmenter(
+            pictures, views.recipe, views.width, views.height, settings.simulated_share, settings.classes, faces
+        )
         batch, count = round(settings.batch * views.share), round(settings.samples_per_epoch * views.share)
         loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
         loss_of = TaskAlignedLoss(views.height, views.width, self.device)
@@ -142,15 +148,23 @@ class Trainer:
         box_loss, score_loss = (sums / len(loader)).tolist()
         return {"box_loss": box_loss, "score_loss": score_loss}
 
-    def validate(self, drives: dict, cones: list) -> dict:
-        """Figures of the averaged weights on the validation parts."""
-        result = validate(Looker(torch_runner(self.average.model, self.device, self.settings.precision)), drives, cones)
-        figures = result.best_drive_figures()
-        return {
-            "AP50": result.pothole_ap(0.5), "AP30": result.pothole_ap(0.3), "cone_AP50": result.cone_ap(0.5),
-            "threshold": figures.threshold, "event_recall": figures.event_recall,
-            "event_recall_iou30": figures.event_recall_iou30, "false_per_km": figures.false_reports_per_km,
-        }
+    def validate(self, drives: dict, cones: list, held_out: Dict[str, List[data.Picture]]) -> dict:
+        """Figures of the averaged weights on the validation parts; those by class and set go to the history only."""
+        looker = Looker(torch_runner(self.average.model, self.device, self.settings.precision))
+        parts = validate_held_out(looker, held_out, self.settings.classes)
+        report, survey, photos = {}, 0.0, 0.0
+        if drives:
+            result = validate(looker, drives, cones)
+            figures, survey, photos = result.best_drive_figures(), result.pothole_ap(0.5), result.cone_ap(0.5)
+            report = {
+                "AP50": survey, "AP30": result.pothole_ap(0.3), "cone_AP50": photos,
+                "threshold": figures.threshold, "event_recall": figures.event_recall,
+                "event_recall_iou30": figures.event_recall_iou30, "false_per_km": figures.false_reports_per_km,
+            }
+        report.update({f"held_out_{name}": figure.ap50 for name, figure in parts.pooled.items()})
+        report["mean_AP50"] = selection_figure(parts, survey, photos)
+        self.history.append({"epoch": self.epoch, **report, **asdict(parts)})
+        return report
 
 
 def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
@@ -159,6 +173,8 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Train the hazard detector.")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets; none: own and simulated pictures alone")
     parser.add_argument("--own", type=Path, metavar="DIR", action="append", default=[], help="your own pictures: images/, labels/ and classes.txt, which may name new classes; may be repeated")
+    parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data, such as training/real_hazards.yaml")
+    parser.add_argument("--leave-out", metavar="SET", action="append", default=[], help="a set that is held out as a whole; may be repeated")
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
     parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
     parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
@@ -208,16 +224,53 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
             raise UsageError(f"--{name.replace('_', '-')} must be from 0 to 1, not {getattr(arguments, name)}.")
     known = {field.name for field in fields(Settings)}
     given = {name: value for name, value in vars(arguments).items() if name in known}
-    return Settings(**given, classes=data.with_own_classes(arguments.own))
+    given.update(
+        classes=data.with_own_classes(arguments.own), sets=catalogue_of(arguments).digest, left_out=tuple(sorted(arguments.leave_out))
+    )
+    return Settings(**given)
+
+
+def catalogue_of(arguments: argparse.Namespace) -> sets.Catalogue:
+    """What --sets names, else no sets."""
+    if arguments.sets and data.is_none(arguments.data):
+        raise UsageError("--sets wants the folder of its sets: give --data.")
+    if arguments.leave_out and not arguments.sets:
+        raise UsageError("--leave-out wants --sets.")
+    return sets.read_catalogue(arguments.sets) if arguments.sets else sets.Catalogue((), {})
+
+
+@dataclass
+class SetPictures:
+    """What the sets add: groups to train on, parts to measure on, and the signs to put into pictures."""
+
+    groups: Dict[str, List[data.Picture]]
+    held_out: Dict[str, List[data.Picture]]
+    faces: Optional[signs.Faces] = None
+
+
+def read_sets(arguments: argparse.Namespace) -> SetPictures:
+    """The pictures of --sets."""
+    catalogue = catalogue_of(arguments)
+    splits = sets.read_splits(catalogue, arguments.data, arguments.leave_out)
+    result = SetPictures({f"set:{name}": split.training for name, split in splits.items() if split.training}, {})
+    result.held_out = {name: split.held_out for name, split in splits.items() if split.held_out}
+    if catalogue.signs:
+        folder, kind, class_name = (catalogue.signs[key] for key in ("folder", "kind", "class"))
+        streets = sets.backgrounds(catalogue, splits)
+        result.faces = signs.read_faces(arguments.data / folder, kind, held_out=False)
+        result.groups["composed"] = streets.training
+        held_out_faces = signs.read_faces(arguments.data / folder, kind, held_out=True)
+        result.held_out["composed"] = signs.compose_held_out(streets.held_out, held_out_faces, class_name)
+    return result
 
 
 def read_pictures(arguments: argparse.Namespace, settings: Settings) -> Dict[str, List[data.Picture]]:
-    """Training pictures by group."""
+    """Training pictures by group, without those of the sets."""
     pictures = {} if data.is_none(arguments.data) else data.read_training_pictures(arguments.data)
     if arguments.simulated:
         pictures["simulated"] = data.read_simulated(arguments.simulated)
     if arguments.own:
-        pictures["own"] = data.read_own(arguments.own, settings.classes)
+        pictures.update(data.read_own(arguments.own, settings.classes))
     if not pictures:
         raise UsageError("--data is none: give --own or --simulated pictures to train on.")
     return pictures
@@ -244,20 +297,25 @@ def run(arguments: argparse.Namespace) -> None:
             raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
         if not exported(arguments):
             trainer.start_from(torch.load(arguments.start_from, map_location=device))
-    pictures = read_pictures(arguments, settings)
+    pictures, of_sets = read_pictures(arguments, settings), read_sets(arguments)
+    pictures.update(of_sets.groups)
+    if of_sets.faces:  # signs stand in street photos too, where no cone says that there are road works
+        pictures["composed"] += [picture for picture in pictures["cones"] if not len(picture.boxes)]
     if (arguments.pretrained or exported(arguments)) and not last.exists():
-        trainer.start_from_others(arguments.pretrained, exported(arguments), pictures)
+        trainer.start_from_others(arguments.pretrained, exported(arguments), pictures, of_sets.faces)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
+    measured = bool(drives or of_sets.held_out)
     arguments.out.mkdir(parents=True, exist_ok=True)
 
     while trainer.epoch < settings.epochs:
         began = time.monotonic()
-        report = trainer.train_epoch(pictures, arguments.workers)
-        if drives and (trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs):
-            report.update(trainer.validate(drives, cones))
-            if report["AP50"] > trainer.best_ap:
-                trainer.best_ap = report["AP50"]
+        report = trainer.train_epoch(pictures, arguments.workers, of_sets.faces)
+        if measured and (trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs):
+            report.update(trainer.validate(drives, cones, of_sets.held_out))
+            (arguments.out / "figures.json").write_text(json.dumps(trainer.history, indent=1))
+            if report["mean_AP50"] > trainer.best_ap:
+                trainer.best_ap = report["mean_AP50"]
                 save_atomically(trainer.state(), arguments.out / "best.pt")
         save_atomically(trainer.state(), last)
         line = " ".join(f"{name} {value:.3f}" for name, value in report.items())

@@ -5,12 +5,12 @@ depends on (seed, epoch, index) alone: not on workers, not on an interrupted run
 """
 
 from dataclasses import dataclass, replace
-from typing import Dict, List, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
 
-from . import CLASSES
+from . import CLASSES, inference, signs
 from . import boxes as box_math
 from .data import POTHOLE, Picture
 
@@ -23,6 +23,10 @@ MIN_VISIBLE_FRACTION = 0.4
 MIN_SIZE_PX = (6.0, 3.0)
 MIN_AREA_PX = 60.0
 """A label that a view shows smaller (width, height, or their product) is ignored."""
+
+SMALL_SIZE_PX = (4.0, 3.0)
+SMALL_AREA_PX = 16.0
+"""The same for photos of a set and own ones: debris far ahead is a few pixels high."""
 
 
 CLOSEUPS_AMONG_PASTED = 0.4
@@ -42,6 +46,7 @@ class Recipe:
     mirror: float = 0.5
     scale_spread: float = 1.6  # a group's scale is multiplied by up to this or divided by it
     aspect_spread: float = 1.12
+    far: float = 0.25  # a photo of a set is shrunk, as if seen from farther away
     focus: float = 0.75  # a view is placed around a label rather than anywhere
     blur: float = 0.2
     noise: float = 0.2
@@ -68,19 +73,36 @@ FRAMES = Recipe(
 """Views of a whole frame's size, less changed: large patches of broken road are seen uncut."""
 
 SETTLING = Recipe(
-    mosaic=0.0, mix=0.0, paste=0.5, mirror=0.5, scale_spread=1.2, aspect_spread=1.05, focus=0.0, blur=0.1, noise=0.1,
+    mosaic=0.0, mix=0.0, paste=0.5, mirror=0.5, scale_spread=1.2, aspect_spread=1.05, far=0.1, focus=0.0, blur=0.1, noise=0.1,
     grey=0.05, shadow=0.35, relight=0.2, erase=0.0, hue=5.0, saturation=0.4, brightness=0.3, white=0.05,
 )
 """The last epochs: nearly what the network will see in a vehicle."""
 
-GROUP_SHARES = {"survey_potholes": 0.41, "survey_empty": 0.14, "closeups": 0.03, "cones": 0.11, "simulated": 0.31, "own": 0.25}
-"""How often each group of pictures is drawn, relative to the others there are; survey frames rule because they are what is measured."""
+GROUP_SHARES = {
+    "survey_potholes": 0.41, "survey_empty": 0.14, "closeups": 0.03, "cones": 0.11, "simulated": 0.31, "own": 0.25, "set": 0.75,
+    "composed": 0.17,
+}
+"""How often each kind of group is drawn, relative to the others there are. Groups of one kind (set:NAME, own:NUMBER) share by weight."""
 
-GROUP_SCALES = {"survey_potholes": 1.0, "survey_empty": 1.0, "closeups": 0.35, "cones": 0.8, "simulated": 1.0, "own": 1.0}
-"""Typical scale of a group's pictures in a view: close-ups shrink to the size of potholes seen from a car."""
+GROUP_SCALES = {"closeups": 0.35, "cones": 0.8}
+"""Typical scale of a group's pictures in a view, else 1: close-ups shrink to the size of potholes seen from a car."""
 
-TILES_OF_MOSAICS = {"cones": ["cones"], "simulated": ["simulated"], "own": ["own"]}
-"""Groups that label other classes than the rest do: as the loss masks classes per image, a mosaic does not mix them."""
+LETTERBOXED = ("own", "set", "composed")
+"""Kinds of groups whose pictures have any size: a view shows them as large as the vehicle's input does."""
+
+FARTHEST = 0.3
+"""Photos of a set are mostly taken from near: some are shrunk, down to this."""
+
+MIXED_MOSAICS = ("survey_potholes", "survey_empty", "closeups")
+"""Groups that label the same. Any other group is alone in a mosaic, as the loss masks classes per image."""
+
+ABSENT_WEIGHT = 0.3
+"""How much background counts of a class that such pictures do not label but hardly ever show."""
+
+
+def kind_of(group: str) -> str:
+    """The kind of a group: set of set:accident_web."""
+    return group.partition(":")[0]
 
 
 def background_weight(group: str, class_name: str) -> float:
@@ -90,9 +112,9 @@ def background_weight(group: str, class_name: str) -> float:
     show unlabelled road works too. Survey frames show unlabelled cones but hardly any of the other hazards.
     """
     if group == "cones":
-        return 0.3 if class_name in ("pothole", "deer", "stopped_accident") else 0.0
+        return ABSENT_WEIGHT if class_name in ("pothole", "deer", "stopped_accident") else 0.0
     if group.startswith("survey"):
-        return 0.0 if class_name in ("pothole", "traffic_cone") else 0.3
+        return 0.0 if class_name in ("pothole", "traffic_cone") else ABSENT_WEIGHT
     return 0.0
 
 
@@ -121,26 +143,45 @@ def ratio(rng: np.random.Generator, spread: float) -> float:
     return float(np.exp(rng.uniform(-1, 1) * np.log(spread)))
 
 
+SIGN = "road_work_sign"
+
+
+def group_shares(weights: Dict[str, float], simulated_share: float) -> Dict[str, float]:
+    """How often each group is drawn, from the sums of its pictures' weights. They add up to 1."""
+    kinds = {kind_of(name) for name in weights}
+    simulated_share = simulated_share if "simulated" in kinds else 0.0
+    real = sum(GROUP_SHARES[kind] for kind in sorted(kinds) if kind != "simulated")
+    of_kind = {kind: simulated_share if kind == "simulated" else GROUP_SHARES[kind] * (1.0 - simulated_share) / real for kind in kinds}
+    sums = {kind: sum(weight for name, weight in weights.items() if kind_of(name) == kind) for kind in kinds}
+    return {name: of_kind[kind_of(name)] * weight / sums[kind_of(name)] for name, weight in weights.items()}
+
+
 class Augmenter:
     """Draws samples of one size from groups of pictures."""
 
     def __init__(
         self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int,
-        simulated_share: float = GROUP_SHARES["simulated"], classes: Sequence[str] = CLASSES,
+        simulated_share: float = GROUP_SHARES["simulated"], classes: Sequence[str] = CLASSES, faces: Optional[signs.Faces] = None,
     ):
+        self.faces = faces  # of signs, for the group "composed"
         self.groups, self.recipe, self.class_count = groups, recipe, len(classes)
         self.width, self.height = width, height
-        self.names = [name for name in GROUP_SHARES if groups.get(name)]
-        simulated_share = simulated_share if "simulated" in self.names else 0.0
-        real = sum(GROUP_SHARES[name] for name in self.names if name != "simulated")
-        self.shares = {
-            name: simulated_share if name == "simulated" else GROUP_SHARES[name] * (1.0 - simulated_share) / real for name in self.names
-        }
+        self.names = sorted((name for name in groups if groups[name]), key=lambda name: list(GROUP_SHARES).index(kind_of(name)))
         weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
+        self.shares = group_shares({name: float(weight.sum()) for name, weight in weights.items()}, simulated_share)
         self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}
         self.backgrounds = {
             name: np.array([background_weight(name, class_name) for class_name in classes], np.float32) for name in self.names
         }
+
+    def scale_of(self, rng: np.random.Generator, kind: str, picture: Picture) -> float:
+        """How large a view shows a picture, before the recipe's spread."""
+        scale = GROUP_SCALES.get(kind, 1.0)
+        if kind in LETTERBOXED:
+            scale *= inference.letterbox_scale(*picture.image.shape[1::-1], inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+        if kind == "set" and rng.random() < self.recipe.far:
+            scale *= rng.uniform(FARTHEST, 1.0)
+        return scale
 
     def draw(self, rng: np.random.Generator) -> Sample:
         """One sample: a view or a mosaic of views, then colour, noise and blur."""
@@ -175,7 +216,7 @@ class Augmenter:
         ]
         canvas = np.empty((self.height, self.width, 3), np.uint8)
         name = self.draw_group(rng, self.names)
-        names = TILES_OF_MOSAICS.get(name) or [n for n in self.names if n not in TILES_OF_MOSAICS]
+        names = [other for other in self.names if other in MIXED_MOSAICS] if name in MIXED_MOSAICS else [name]
         views = []
         for x, y, width, height in tiles:
             view = self.view(rng, width, height, names)
@@ -188,7 +229,7 @@ class Augmenter:
             np.concatenate([view.boxes for view in views]),
             np.concatenate([view.classes for view in views]),
             np.concatenate([view.ignored for view in views]),
-            views[0].labelled,
+            np.min([view.labelled for view in views], axis=0),
         )
 
     def mix_in(self, rng: np.random.Generator, sample: Sample) -> None:
@@ -204,14 +245,19 @@ class Augmenter:
         picture = self.groups[name][rng.choice(len(self.groups[name]), p=self.picture_shares[name])]
         if name.startswith("survey") and rng.random() < self.recipe.paste:
             picture = self.paste_potholes(rng, picture)
-        scale_y = GROUP_SCALES[name] * ratio(rng, self.recipe.scale_spread)
+        kind = kind_of(name)
+        if kind == "composed":
+            picture = signs.compose(rng, picture, self.faces, SIGN)
+        scale_y = self.scale_of(rng, kind, picture) * ratio(rng, self.recipe.scale_spread)
         scale_x = scale_y * ratio(rng, self.recipe.aspect_spread)
         left, top = self.place_window(rng, picture, width / scale_x, height / scale_y)
         transform = np.array([[scale_x, 0, -left * scale_x], [0, scale_y, -top * scale_y]])
         if rng.random() < self.recipe.mirror:
             transform[0] = [-scale_x, 0, width + left * scale_x]
-        sample = self.render(picture, transform, width, height)
+        small = kind in LETTERBOXED
+        sample = self.render(picture, transform, width, height, *((SMALL_SIZE_PX, SMALL_AREA_PX) if small else (MIN_SIZE_PX, MIN_AREA_PX)))
         sample.labelled = self.backgrounds[name].copy()
+        sample.labelled[list(picture.absent_classes)] = ABSENT_WEIGHT
         sample.labelled[list(picture.labelled_classes)] = 1
         return sample
 
@@ -230,7 +276,10 @@ class Augmenter:
             origin = np.clip(origin, np.minimum(-margin, spare), np.maximum(spare + margin, 0))
         return float(origin[0]), float(origin[1])
 
-    def render(self, picture: Picture, transform: np.ndarray, width: int, height: int) -> Sample:
+    def render(
+        self, picture: Picture, transform: np.ndarray, width: int, height: int,
+        min_size: Tuple[float, float] = MIN_SIZE_PX, min_area: float = MIN_AREA_PX,
+    ) -> Sample:
         """Warp a picture and its labels by a 2 x 3 transform without rotation."""
         image, shrink = picture.image, abs(transform[0, 0])
         warp = transform.copy()
@@ -247,8 +296,8 @@ class Augmenter:
         clipped = box_math.clip_to_image(moved, width, height)
         sizes = clipped[:, 2:] - clipped[:, :2]
         areas = box_math.areas(clipped)
-        whole = (areas > MIN_VISIBLE_FRACTION * box_math.areas(moved)) & (areas > MIN_AREA_PX)
-        clear = whole & (sizes > MIN_SIZE_PX).all(1)
+        whole = (areas > MIN_VISIBLE_FRACTION * box_math.areas(moved)) & (areas > min_area)
+        clear = whole & (sizes > min_size).all(1)
         return Sample(
             image,
             clipped[clear].astype(np.float32),

@@ -18,6 +18,9 @@ from . import CLASSES
 VALIDATION_SECTIONS = ("386RS169832", "251BDF0530", "080BDF0070", "290RS070691")
 """Drives that are never trained on; the split is fixed by the data's README."""
 
+LABELLED_CLASSES = "labelled_classes.txt"
+"""Beside classes.txt: the classes of which a folder labels every object."""
+
 CLASS_NAME = "[a-z][a-z0-9_]{0,63}"
 """What a class may be called; a report's class has 64 bytes."""
 
@@ -40,6 +43,7 @@ class Picture:
     weight: float = 1.0  # how often to draw it, relative to others of its group
     difficult: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.float32))  # K x 4 corners: nobody could name these
     difficult_classes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    absent_classes: Sequence[int] = ()  # not labelled, but hardly ever in such pictures
 
 
 @dataclass
@@ -92,18 +96,34 @@ def read_folder(images: Path, labels: Path, class_ids: Sequence[int]) -> List[Pi
     return [read_picture(path, labels / (path.stem + ".txt"), class_ids) for path in paths]
 
 
-def read_class_names(folder: Path) -> List[str]:
-    """The names of a labelled folder's classes, one per line of its classes.txt."""
+def read_names(path: Path) -> List[str]:
+    """Names of classes, one per line."""
     try:
-        return (folder / "classes.txt").read_text().split()
+        return path.read_text().split()
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"Cannot read {folder / 'classes.txt'}: {error}.") from error
+        raise DataError(f"Cannot read {path}: {error}.") from error
+
+
+def read_class_names(folder: Path) -> List[str]:
+    """The names of a labelled folder's classes, in the order of its label files."""
+    return read_names(folder / "classes.txt")
 
 
 def read_labelled_folder(folder: Path, classes: Sequence[str] = CLASSES) -> List[Picture]:
-    """The pictures of a folder with images, labels and classes.txt; its classes are found in `classes` by their names."""
-    class_ids = [list(classes).index(name) if name in classes else -1 for name in read_class_names(folder)]
-    return read_folder(folder / "images", folder / "labels", class_ids)
+    """The pictures of a folder with images, labels and classes.txt; its classes are found in `classes` by their names.
+
+    A file labelled_classes.txt beside it names the classes of which every object is labelled; without one, all are.
+    """
+    names = read_class_names(folder)
+    class_ids = [list(classes).index(name) if name in classes else -1 for name in names]
+    pictures = read_folder(folder / "images", folder / "labels", class_ids)
+    if (folder / LABELLED_CLASSES).exists():
+        labelled = read_names(folder / LABELLED_CLASSES)
+        if not labelled or not set(labelled) <= set(names):
+            raise DataError(f"{folder / LABELLED_CLASSES} must name some of the classes {', '.join(names)}.")
+        for picture in pictures:
+            picture.labelled_classes = [list(classes).index(name) for name in labelled if name in classes]
+    return pictures
 
 
 def read_simulated(root: Path) -> List[Picture]:
@@ -127,11 +147,11 @@ def with_own_classes(folders: Sequence[Path]) -> Tuple[str, ...]:
     return tuple(names)
 
 
-def read_own(folders: Sequence[Path], classes: Sequence[str]) -> List[Picture]:
-    """The pictures of the user's own folders."""
-    pictures = [picture for folder in folders for picture in read_labelled_folder(folder, classes)]
-    weigh_by_rarest_class(pictures)
-    return pictures
+def read_own(folders: Sequence[Path], classes: Sequence[str]) -> Dict[str, List[Picture]]:
+    """The pictures of the user's own folders, a group of its own for each: they may label other classes."""
+    groups = {f"own:{number}": read_labelled_folder(folder, classes) for number, folder in enumerate(folders)}
+    weigh_by_rarest_class([picture for pictures in groups.values() for picture in pictures])
+    return groups
 
 
 def weigh_by_rarest_class(pictures: List[Picture]) -> None:

@@ -31,9 +31,14 @@ class Look:
     mirrored: bool = False  # at the mirrored picture too
 
 
+def letterbox_scale(image_width: int, image_height: int, width: int, height: int) -> float:
+    """How much larger a picture becomes where it is fitted into width x height."""
+    return min(width / image_width, height / image_height)
+
+
 def letterbox(image: np.ndarray, width: int, height: int) -> Tuple[np.ndarray, float]:
     """Scale an H x W x 3 picture to fit, pad right and bottom; returns the picture and the scale."""
-    scale = min(width / image.shape[1], height / image.shape[0])
+    scale = letterbox_scale(image.shape[1], image.shape[0], width, height)
     fitted = (round(image.shape[1] * scale), round(image.shape[0] * scale))
     if fitted != (image.shape[1], image.shape[0]):
         image = cv2.resize(image, fitted, interpolation=cv2.INTER_LINEAR)

@@ -19,6 +19,7 @@ from .network import anchor_points, decode_boxes
 ALPHA, BETA = 0.5, 6.0
 POSITIVES_PER_LABEL = 10
 BOX_WEIGHT, SCORE_WEIGHT = 7.5, 1.0
+OTHER_CLASS_WEIGHT = 0.5
 
 
 @dataclass
@@ -106,6 +107,8 @@ class TaskAlignedLoss:
         scale = (iou * chosen).amax(dim=0) / fit.amax(dim=0).clamp(min=1e-12)
         classes = target.classes[labels]
         wanted_scores[points, classes] = (fit * scale)[points, labels]
+        # An object is of one class: it is background of the others a little, even where these are not labelled.
+        weights[points] = weights[points].clamp(min=OTHER_CLASS_WEIGHT)
         weights[points, classes] = 1
         return Assignment(wanted_scores, target.boxes[labels], positive, weights)
 

@@ -37,6 +37,8 @@ class Settings:
     precision: str = "bf16"
     simulated_share: float = GROUP_SHARES["simulated"]  # of the samples, where there are simulated drives
     classes: Tuple[str, ...] = CLASSES  # in the order of the outputs
+    sets: str = ""  # digest of the file of sets: another split is another run
+    left_out: Tuple[str, ...] = ()  # sets that are not trained on at all
 
     def views_of(self, epoch: int) -> "Views":
         """What an epoch shows: the last ones whole frames, weakly changed."""

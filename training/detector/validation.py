@@ -84,6 +84,53 @@ def detect_labelled(looker: Looker, pictures: List[Picture], classes: Sequence[s
     return frames
 
 
+@dataclass
+class ClassFigure:
+    """Average precision of one class over held-out pictures."""
+
+    ap50: float
+    labels: int
+    pictures: int
+
+
+def class_figure(frames: List[ScoredFrame]) -> ClassFigure:
+    """The figure of one class."""
+    return ClassFigure(average_precision(frames, 0.5), sum(len(frame.labels) for frame in frames), len(frames))
+
+
+@dataclass
+class HeldOut:
+    """Figures of the held-out parts of the sets, by class, and by class and set."""
+
+    pooled: Dict[str, ClassFigure]
+    by_set: Dict[str, Dict[str, ClassFigure]]
+
+
+def validate_held_out(looker: Looker, parts: Dict[str, List[Picture]], classes: Sequence[str]) -> HeldOut:
+    """Detect in the held-out part of every set; a picture counts for the classes that it labels."""
+    frames: Dict[str, Dict[str, List[ScoredFrame]]] = {name: {} for name in classes}
+    for part, pictures in parts.items():
+        for name, of_class in detect_labelled(looker, pictures, classes).items():
+            frames[name][part] = of_class
+    pooled = {name: class_figure([frame for part in parts.values() for frame in part]) for name, parts in frames.items() if parts}
+    return HeldOut(
+        {name: figure for name, figure in pooled.items() if figure.labels},
+        {name: {part: class_figure(of_part) for part, of_part in parts.items()} for name, parts in frames.items() if name in pooled},
+    )
+
+
+def selection_figure(held_out: HeldOut, pothole_ap: float, cone_ap: float) -> float:
+    """Which weights are best: the mean AP50 over classes.
+
+    Potholes and cones count the mean of the pooled held-out parts and of the older validation part (survey sections,
+    cone photos): neither chooses alone.
+    """
+    by_class = {name: [figure.ap50] for name, figure in held_out.pooled.items()}
+    by_class.setdefault("pothole", []).append(pothole_ap)
+    by_class.setdefault("traffic_cone", []).append(cone_ap)
+    return float(np.mean([np.mean(figures) for figures in by_class.values()]))
+
+
 def validate(looker: Looker, drives: Dict[str, List[DriveFrame]], cones: List[Picture]) -> Validation:
     """Detect in every validation picture."""
     result = Validation({}, [], {})

@@ -4,7 +4,7 @@ import unittest
 
 import torch
 
-from detector.loss import Target, TaskAlignedLoss, complete_iou
+from detector.loss import OTHER_CLASS_WEIGHT, Target, TaskAlignedLoss, complete_iou
 from detector.network import anchor_points, decode_boxes
 
 BOX = torch.tensor([[16.0, 16.0, 40.0, 32.0]])
@@ -44,8 +44,12 @@ class Assignments(unittest.TestCase):
 
     def test_unlabelled_class_and_ignored_regions_are_not_judged(self):
         ignored = torch.tensor([[48.0, 48.0, 64.0, 64.0]])
-        weights = self.loss.assign(self.scores, self.boxes, target(ignored=ignored)).weights
-        self.assertEqual(weights[:, 1].sum().item(), 0)
+        assignment = self.loss.assign(self.scores, self.boxes, target(ignored=ignored))
+        weights = assignment.weights
+        self.assertEqual(weights[~assignment.positive, 1].sum().item(), 0)
+        # An object that is labelled as of one class is none of the other, little as that counts.
+        self.assertTrue((weights[assignment.positive, 1] == OTHER_CLASS_WEIGHT).all())
+        self.assertEqual(assignment.scores[:, 1].sum().item(), 0)
         inside = (self.loss.centres > 48).all(dim=1)
         self.assertEqual(weights[inside, 0].sum().item(), 0)
         self.assertTrue((weights[~inside, 0] == 1).all())
