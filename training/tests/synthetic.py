@@ -46,6 +46,41 @@ def write_own(root: Path) -> Path:
     return root
 
 
+SETS = """\
+rename: {animal_other: deer}
+signs: {folder: signs, kind: road_work, class: road_work_sign}
+sets:
+  cattle:
+    folder: cattle
+    labelled: [deer]
+    absent: [pothole]
+    held_out: ["street2-*"]
+    background: true
+  holes:
+    folder: holes
+    classes: [pothole]
+    labelled: [pothole]
+    held_out: {blocks: 1}
+    skip: [blank]
+"""
+
+
+def write_sets(root: Path) -> Path:
+    """Two sets of photos and crops of signs below `root`; returns the file that lists the sets."""
+    for seed, name in enumerate(("street1-2", "street1-10", "street2-1", "street2-10")):
+        write_picture(root / "cattle", name, 70 + seed)
+    (root / "cattle" / "classes.txt").write_text("animal_other\ntraffic_cone\n")
+    for seed, name in enumerate(("n1", "n2", "n10", "n11", "n12", "n20", "blank")):
+        write_picture(root / "holes", name, 80 + seed)
+    for kind in ("road_work", "stop"):
+        for number in range(2):
+            crop = np.full((60, 60, 3), (40, 60, 230), np.uint8)
+            (root / "signs" / kind).mkdir(parents=True, exist_ok=True)
+            cv2.imwrite(str(root / "signs" / kind / f"{number}.png"), crop)
+    (root / "sets.yaml").write_text(SETS)
+    return root / "sets.yaml"
+
+
 def write_data(root: Path) -> Path:
     """A whole data folder; returns it."""
     for number, section in enumerate((TRAINING_SECTION, VALIDATION_SECTION)):

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import json
 import tempfile
 import unittest
 from pathlib import Path
@@ -18,7 +19,7 @@ from detector import CLASSES, onnx_model, pretrained
 from detector.manifest import sha256_of
 from detector.network import SIZES, Backbone, Detector, Widths
 
-from .synthetic import write_data, write_own
+from .synthetic import write_data, write_own, write_sets
 
 
 def quietly(program, *arguments):
@@ -151,6 +152,21 @@ class Programs(unittest.TestCase):
             self.assertEqual((status, "which ours do not begin with" in errors), (2, True), begun)
         status, errors = quietly(export_detector, "--checkpoint", first, "--name", "x", "--out", models, "--own", own)
         self.assertEqual((status, "sinkhole" in errors), (2, True))
+
+    def test_sets_of_photos_are_trained_and_their_held_out_parts_choose(self):
+        listed = write_sets(self.data)
+        self.assertEqual(self.train("sets", "--sets", listed), (0, ""))
+        state = torch.load(self.root / "sets" / "last.pt")
+        figures = json.loads((self.root / "sets" / "figures.json").read_text())
+        self.assertEqual([entry["epoch"] for entry in figures], [3])
+        self.assertEqual(set(figures[0]["pooled"]), {"pothole", "deer", "road_work_sign"})
+        self.assertEqual(figures[0]["by_set"]["deer"]["cattle"]["pictures"], 2)
+        self.assertEqual(state["history"], figures)
+        self.assertIn("left_out", self.train("sets", "--sets", listed, "--leave-out", "cattle", "--resume")[1])
+        listed.write_text(listed.read_text() + "# Another split.\n")
+        self.assertIn("sets", self.train("sets", "--sets", listed, "--resume")[1])
+        self.assertIn("--leave-out wants --sets", self.train("new", "--leave-out", "cattle")[1])
+        self.assertIn("--data", self.train("new", "--sets", listed, "--data", "none")[1])
 
     def test_own_pictures_alone_suffice(self):
         own = write_own(self.root / "alone")
