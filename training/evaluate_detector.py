@@ -17,13 +17,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 from detector import data
 from detector.manifest import Manifest, ManifestError, read_manifest
 from detector.metrics import drive_figures, f1_score
-from detector.onnx_model import opencv_runner
-from detector.validation import Looker, Runner, Validation, validate
+from detector.onnx_model import opencv_forward
+from detector.validation import DetectorRunner, ForwardFunction, Validation, validate
 
 
-def milliseconds_per_frame(run: Runner, manifest: Manifest, repeats: int = 30) -> Tuple[float, float]:
+def milliseconds_per_frame(run: ForwardFunction, manifest: Manifest, repeats: int = 30) -> Tuple[float, float]:
     """Median and shortest time of the network alone; they differ where the machine is busy."""
-    image = np.zeros((3, manifest.look.height, manifest.look.width), np.float32)
+    image = np.zeros((3, manifest.view.height, manifest.view.width), np.float32)
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
@@ -67,8 +67,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
     try:
         manifest = read_manifest(options.manifest)
         drives, cones = data.read_validation_drives(options.data), data.read_validation_cones(options.data)
-        run = opencv_runner(manifest.weights)
-        print_figures(validate(Looker(run, manifest.look), drives, cones), manifest)
+        run = opencv_forward(manifest.weights)
+        print_figures(validate(DetectorRunner(run, manifest.view), drives, cones), manifest)
         median, shortest = milliseconds_per_frame(run, manifest)
         print(f"milliseconds_per_frame: {median:.0f} median, {shortest:.0f} shortest, {options.threads} threads")
     except (ManifestError, data.DataError) as error:

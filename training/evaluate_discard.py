@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from detector.data import POTHOLE, VALIDATION_SECTIONS, DataError, DriveFrame, read_drive
 from detector.manifest import Manifest, ManifestError, read_manifest, sha256_of
 from detector.metrics import NEAR_M, ScoredFrame, drive_figures
-from detector.onnx_model import opencv_runner
-from detector.validation import Looker
+from detector.onnx_model import opencv_forward
+from detector.validation import DetectorRunner
 from export_discard import Scorer
 
 CONFIG = Path(__file__).parents[1] / "config" / "early_discard.yaml"
@@ -107,7 +107,7 @@ class Drives:
     """Both profiles over the drives, and what they saw and sent."""
 
     def __init__(self, detector: Manifest, classify: Scorer, threshold: float, settings: dict, speed_mps: float):
-        self.looker = Looker(opencv_runner(detector.weights), detector.look)
+        self.runner = DetectorRunner(opencv_forward(detector.weights), detector.view)
         self.classify, self.threshold = classify, threshold
         self.settings, self.speed_mps = settings, speed_mps
         self.big: Dict[str, List[ScoredFrame]] = {}
@@ -116,7 +116,7 @@ class Drives:
 
     def potholes(self, picture) -> np.ndarray:
         """Detections (M x 5) in a picture."""
-        return self.looker.detect(picture.image)[POTHOLE]
+        return self.runner.detect(picture.image)[POTHOLE]
 
     def drive(self, name: str, frames: List[DriveFrame]) -> None:
         """One drive; stretches without pictures are cut to NEAR_M, as replays cut them."""

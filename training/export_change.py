@@ -24,7 +24,7 @@ from change import data, inference, onnx_model
 from change.exported import load_exported
 from change.manifest import write_manifest
 from change.network import ARCHITECTURES, ChangeNetwork, Network
-from change.surroundings import together
+from change.surroundings import ensemble_of, with_present_names
 from change.validation import FALSE_POSITIVE_RATES, photo_pairs, registered_pairs, validate
 from train_change import VALIDATION_PHOTOS, read_source
 
@@ -54,14 +54,14 @@ def load_averaged(checkpoint: Path) -> Network:
     try:
         state = torch.load(checkpoint, map_location="cpu")
         network = ARCHITECTURES[state["settings"]["architecture"]]()
-        network.load_state_dict(state["average"])
+        network.load_state_dict(with_present_names(state["average"]))
     except (OSError, KeyError, RuntimeError, TypeError) as error:
         raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
     return network.eval()
 
 
-def load_together(checkpoints: List[Path]) -> Network:
-    """The network of a checkpoint; of several, with the judges of all."""
+def load_ensemble(checkpoints: List[Path]) -> Network:
+    """The network of a checkpoint; of several, with the refiners of all."""
     networks = [load_averaged(checkpoint) for checkpoint in checkpoints]
     if len(networks) == 1:
         return networks[0]
@@ -71,7 +71,7 @@ def load_together(checkpoints: List[Path]) -> Network:
     kept = [{name: value for name, value in network.state_dict().items() if not name.startswith(apart)} for network in networks]
     if not all(torch.equal(value, other[name]) for other in kept[1:] for name, value in kept[0].items()):
         raise ExportError("The checkpoints have learnt the surroundings of different networks: --start-from must be the same.")
-    networks[0].surroundings = together([network.surroundings for network in networks])
+    networks[0].surroundings = ensemble_of([network.surroundings for network in networks])
     return networks[0]
 
 
@@ -137,7 +137,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
-    network = onnx_model.export(load_together(arguments.checkpoint or [DEFAULT_CHECKPOINT]), arguments.out, arguments.name)
+    network = onnx_model.export(load_ensemble(arguments.checkpoint or [DEFAULT_CHECKPOINT]), arguments.out, arguments.name)
     for part in onnx_model.PARTS:
         size = onnx_model.file_of(arguments.out, arguments.name, part).stat().st_size
         if size > MOST_BYTES:
@@ -152,7 +152,7 @@ def run(arguments: argparse.Namespace) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 exported, 2 the command line, the checkpoint or the data is wrong."""
     parser = argparse.ArgumentParser(description="Export a checkpoint of the change network as ONNX with its manifest.")
-    parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; of train_change_surroundings.py it may be repeated: all judge together")
+    parser.add_argument("--checkpoint", type=Path, action="append", help=f"default {DEFAULT_CHECKPOINT}; of train_change_surroundings.py it may be repeated: their mean counts")
     parser.add_argument("--name", default="change-small", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--validation", type=Path, help="held-out pairs (training/simulate_change.py --plain)")

@@ -28,7 +28,7 @@ from detector.manifest import ManifestError, classes_of, write_manifest
 from detector.metrics import average_precision, best_f1_threshold
 from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
-from detector.validation import Looker, detect_labelled, validate
+from detector.validation import DetectorRunner, detect_labelled, validate
 from export_torch import ExportError, add_torch_file
 
 TOLERANCE = 1e-3
@@ -117,13 +117,13 @@ def view_scales(text: str) -> Tuple[float, ...]:
     return scales
 
 
-def look_of(arguments: argparse.Namespace) -> inference.Look:
-    """How the network is to look; every view must be covered by whole cells."""
-    look = inference.Look(*arguments.input, arguments.scales, arguments.mirrored)
-    for scale in look.scales:
+def view_of(arguments: argparse.Namespace) -> inference.ViewConfig:
+    """The input and the views of it; every view must be covered by whole cells."""
+    view = inference.ViewConfig(*arguments.input, arguments.scales, arguments.mirrored)
+    for scale in view.scales:
         if any(abs(side * scale / STRIDES[-1] - round(side * scale / STRIDES[-1])) > 1e-9 for side in arguments.input):
-            raise ExportError(f"--scales: {scale} of --input {look.width}x{look.height} is no multiple of {STRIDES[-1]} pixels.")
-    return look
+            raise ExportError(f"--scales: {scale} of --input {view.width}x{view.height} is no multiple of {STRIDES[-1]} pixels.")
+    return view
 
 
 def check_against_torch(weights: Path, exportable: torch.nn.Module, size: Tuple[int, int]) -> None:
@@ -153,16 +153,16 @@ def write_golden(path: Path, weights: Path, size: Tuple[int, int]) -> None:
     path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120))
 
 
-def calibrate(looker: Looker, arguments: argparse.Namespace, classes: Tuple[str, ...], drives: dict, cones: list) -> Dict[str, float]:
+def calibrate(runner: DetectorRunner, arguments: argparse.Namespace, classes: Tuple[str, ...], drives: dict, cones: list) -> Dict[str, float]:
     """A threshold for each class; real pictures count more than simulated ones."""
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in classes}
     simulated = data.read_simulated(arguments.simulated) if arguments.simulated else []
     own = [picture for pictures in data.read_own(arguments.own, classes).values() for picture in pictures]
     for kind, pictures in (("simulated", simulated), ("own", own)):
-        for name, frames in detect_labelled(looker, pictures, classes).items():
+        for name, frames in detect_labelled(runner, pictures, classes).items():
             thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
             print(f"{kind} {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
-    found = validate(looker, drives, cones)
+    found = validate(runner, drives, cones)
     if drives:
         thresholds["pothole"] = found.best_drive_figures().threshold
     if cones:
@@ -174,7 +174,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
-    look = look_of(arguments)
+    view = view_of(arguments)
     loaded = load_averaged(arguments.checkpoint or [DEFAULT_CHECKPOINT])
     strangers = set(data.with_own_classes(arguments.own)) - set(loaded.classes)
     if strangers:
@@ -183,17 +183,17 @@ def run(arguments: argparse.Namespace) -> None:
     cones = data.read_validation_cones(arguments.data)
 
     weights = arguments.out / f"{arguments.name}.onnx"
-    exportable = onnx_model.export(loaded.detector, weights, look)
+    exportable = onnx_model.export(loaded.detector, weights, view)
     check_against_torch(weights, exportable, arguments.input)
     if arguments.packed:
         round_weights(weights)
         weights = pack(weights)
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights, arguments.input)
 
-    looker = Looker(onnx_model.opencv_runner(weights), look)
-    thresholds = calibrate(looker, arguments, loaded.classes, drives, cones)
+    runner = DetectorRunner(onnx_model.opencv_forward(weights), view)
+    thresholds = calibrate(runner, arguments, loaded.classes, drives, cones)
     manifest = arguments.out / f"{arguments.name}.yaml"
-    write_manifest(manifest, weights, thresholds, look, arguments.engine)
+    write_manifest(manifest, weights, thresholds, view, arguments.engine)
     add_torch_file(manifest)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 

@@ -9,12 +9,9 @@ A run that was stopped, at whatever moment, continues with the same command and 
 
 import argparse
 import sys
-import time
-from dataclasses import asdict, fields
 from pathlib import Path
 from typing import List, Optional, Sequence
 
-import cv2
 import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -22,9 +19,13 @@ from change import data, objects
 from change.augment import Augmenter, SceneAugmenter, Source
 from change.loss import change_loss, class_weights
 from change.network import ARCHITECTURES, widened
+from change.surroundings import with_present_names
 from change.training import Settings, batches, make_optimizer, to_input
 from change.validation import RegisteredPair, photo_pairs, registered_pairs, torch_detector, validate
-from detector.training import AveragedModel, EpochSamples, learning_rate_factor, save_atomically
+from common.training import (
+    EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
+    checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, prepare_device,
+)
 
 VALIDATION_PHOTOS = 60
 """Pairs of held-out photos with pasted objects."""
@@ -33,51 +34,25 @@ BEST_FIGURE = "changes_f1_at_0.01"
 """By which best.pt is chosen; the photos' where there are no pairs."""
 
 
-class UsageError(Exception):
-    """The command line or a file it names is wrong; the text is one sentence for the user."""
+class Trainer(Run):
+    """A run of the change network."""
 
-
-class Trainer:
-    """One training run: state, one epoch, and its checkpoints."""
+    BEST = "selection"
+    GRADIENT_NORM = 5.0
 
     def __init__(self, settings: Settings, device: torch.device):
         torch.manual_seed(settings.seed)
-        self.settings, self.device = settings, device
-        self.network = ARCHITECTURES[settings.architecture]().to(device)
-        self.average = AveragedModel(self.network)
-        self.optimizer = make_optimizer(self.network, settings)
-        self.epoch = 0
-        self.best = 0.0
-
-    def state(self) -> dict:
-        """Everything that the next epoch depends on."""
-        return {
-            "settings": asdict(self.settings), "epoch": self.epoch, "best": self.best, "model": self.network.state_dict(),
-            "average": self.average.model.state_dict(), "updates": self.average.updates,
-            "optimizer": self.optimizer.state_dict(),
-        }
-
-    def restore(self, state: dict) -> None:
-        """Continue from `state`, which must come from a run with the same settings."""
-        for name, value in asdict(self.settings).items():
-            if state["settings"].get(name) != value:
-                raise UsageError(
-                    f"The checkpoint was written with {name} {state['settings'].get(name)}, not {value}; "
-                    "resume with the same settings or choose another --out."
-                )
-        self.network.load_state_dict(state["model"])
-        self.average.model.load_state_dict(state["average"])
-        self.average.updates = state["updates"]
-        self.optimizer.load_state_dict(state["optimizer"])
-        self.epoch, self.best = state["epoch"], state["best"]
+        self.device = device
+        network = ARCHITECTURES[settings.architecture]().to(device)
+        super().__init__(settings, network, make_optimizer(network, settings))
 
     def start_from(self, state: dict) -> None:
         """Begin a new schedule with the averaged weights of another run."""
         try:
-            self.network.load_state_dict(widened(state["average"], self.network))
+            self.model.load_state_dict(widened(with_present_names(state["average"]), self.model))
         except (KeyError, RuntimeError) as error:
             raise UsageError("--start-from: the checkpoint is of another network.") from error
-        self.average = AveragedModel(self.network)
+        self.ema = ModelEma(self.model)
 
     def pretraining(self) -> bool:
         """Whether the next epoch teaches what things are rather than what has changed."""
@@ -90,13 +65,13 @@ class Trainer:
             return settings.learning_rate * learning_rate_factor(progress / pretrain, last=0.2)
         return settings.learning_rate * learning_rate_factor((progress - pretrain) / max(settings.epochs - pretrain, 1))
 
-    def train_epoch(self, source: Source, workers: int) -> float:
+    def train_epoch(self, source: Source, workers: int) -> dict:
         """One pass over freshly drawn samples; returns the mean loss."""
         settings, pretraining = self.settings, self.pretraining()
         if self.epoch == settings.pretrain and settings.pretrain > 0:
-            self.network.begin_changes()
-            self.average = AveragedModel(self.network)
-            self.optimizer = make_optimizer(self.network, settings)
+            self.model.begin_changes()
+            self.ema = ModelEma(self.model)
+            self.optimizer = make_optimizer(self.model, settings)
         recipe, share = settings.recipe_of(self.epoch), settings.share_of(self.epoch)
         augmenter = SceneAugmenter(source.scenes, recipe) if pretraining else Augmenter(source, recipe)
         masks = [scene.classes for scene in source.scenes] if pretraining else [pair.mask for pair in source.registered]
@@ -104,71 +79,51 @@ class Trainer:
         samples = EpochSamples(augmenter, settings.seed, self.epoch, round(settings.samples_per_epoch * share))
         loader = batches(samples, max(round(settings.batch * share), 1), workers)
         total = 0.0
-        self.network.train()
+        self.model.train()
         for step, (first, second, truth) in enumerate(loader):
-            for group in self.optimizer.param_groups:
-                group["lr"] = self.rate(self.epoch + step / len(loader))
+            self.set_rate(self.rate(self.epoch + step / len(loader)))
             second = to_input(second, self.device)
             with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=settings.precision == "bf16"):
                 if pretraining:
-                    logits = self.network.classify(second)
+                    logits = self.model.classify(second)
                 else:
-                    logits = self.network(to_input(first, self.device), second)
+                    logits = self.model(to_input(first, self.device), second)
             loss = change_loss(logits, truth.to(self.device), weights)
-            self.optimizer.zero_grad(set_to_none=True)
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
-            self.optimizer.step()
-            self.average.update(self.network)
+            self.step(loss)
             total += loss.item()
         self.epoch += 1
-        return total / len(loader)
+        return {"pretrain_loss" if pretraining else "loss": total / len(loader)}
 
     def validate(self, pairs: Sequence[RegisteredPair]) -> dict:
-        """Figures of the averaged weights on held-out pairs."""
-        detect = torch_detector(self.average.model, self.device, self.settings.precision)
-        return validate(detect, pairs).figures()
+        """Figures of the averaged weights on held-out pairs; none while the encoder is pretrained."""
+        if self.epoch <= self.settings.pretrain:
+            return {}
+        detect = torch_detector(self.ema.model, self.device, self.settings.precision)
+        figures = validate(detect, pairs).figures()
+        return {**figures, self.BEST: figures.get(BEST_FIGURE, figures.get("photos_f1_at_0.01", 0.0))}
 
 
 def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     """The command line; argparse itself exits with 2 on a wrong flag."""
-    defaults = {field.name: field.default for field in fields(Settings)}
+    defaults = Settings()
     parser = argparse.ArgumentParser(description="Train the change network.")
     parser.add_argument("--pairs", type=Path, default=Path("build/training/change"), help="pairs as VL-CMU-CD lays them out")
     parser.add_argument("--validation", type=Path, help="held-out pairs, laid out alike")
     parser.add_argument("--registered", action="store_true", help="the pictures of all pairs lie upon each other already")
     parser.add_argument("--data", type=Path, help="folder of the data sets: photos to paste objects into")
-    parser.add_argument("--out", type=Path, default=Path("build/training/change_small"), help="folder for checkpoints")
-    parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
     parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with, also of a narrower network")
-    parser.add_argument("--workers", type=int, default=1, help="processes that prepare samples")
-    parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
-    parser.add_argument("--validate-every", type=int, default=8, metavar="EPOCHS")
-    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
-    parser.add_argument("--architecture", choices=tuple(ARCHITECTURES), default=defaults["architecture"])
-    for name in ("seed", "pretrain", "epochs", "samples_per_epoch", "batch"):
-        parser.add_argument("--" + name.replace("_", "-"), type=int, default=defaults[name])
-    parser.add_argument("--learning-rate", type=float, default=defaults["learning_rate"])
-    parser.add_argument("--settle", type=float, default=defaults["settle"], help="last fraction of the epochs: whole pictures")
-    parser.add_argument("--precision", choices=("bf16", "fp32"), default=defaults["precision"])
+    parser.add_argument("--architecture", choices=tuple(ARCHITECTURES), default=defaults.architecture)
+    add_run_arguments(parser, "build/training/change_small", defaults, ("seed", "pretrain", "epochs", "samples_per_epoch", "batch"))
+    add_loop_arguments(parser, defaults, validate_every=8)
     return parser.parse_args(arguments)
 
 
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """Settings of the command line, checked."""
-    for name in ("epochs", "samples_per_epoch", "validate_every", "threads"):
-        if getattr(arguments, name) < 1:
-            raise UsageError(f"--{name.replace('_', '-')} must be at least 1, not {getattr(arguments, name)}.")
-    if arguments.batch < 2 or arguments.samples_per_epoch < arguments.batch:
-        raise UsageError(f"--batch must be from 2 to --samples-per-epoch, not {arguments.batch}.")
-    if arguments.seed < 0 or arguments.workers < 0 or not arguments.learning_rate > 0:
-        raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
+    check_arguments(arguments)
     if not 0 <= arguments.pretrain < arguments.epochs:
         raise UsageError(f"--pretrain must be from 0 to less than --epochs, not {arguments.pretrain}.")
-    if not 0 <= arguments.settle <= 1:
-        raise UsageError(f"--settle must be from 0 to 1, not {arguments.settle}.")
-    known = {field.name for field in fields(Settings)}
-    return Settings(**{name: value for name, value in vars(arguments).items() if name in known})
+    return Settings(**fields_given(Settings, arguments))
 
 
 def read_source(pairs: Path, photos: Optional[Path], cache: Path, validation: bool, registered: bool = False) -> Source:
@@ -188,23 +143,13 @@ def read_source(pairs: Path, photos: Optional[Path], cache: Path, validation: bo
 def run(arguments: argparse.Namespace) -> None:
     """Train from the checkpoint, or from the start, to the last epoch."""
     settings = settings_from(arguments)
-    cuda = torch.cuda.is_available()
-    if arguments.device == "cuda" and not cuda:
-        raise UsageError("--device cuda: this torch sees no CUDA device.")
-    device = torch.device("cuda" if cuda and arguments.device != "cpu" else "cpu")
-    torch.set_num_threads(arguments.threads)
-    cv2.setNumThreads(0)
-
+    device = prepare_device(arguments)
     trainer = Trainer(settings, device)
-    last = arguments.out / "last.pt"
-    if last.exists():
-        if not arguments.resume:
-            raise UsageError(f"{last} exists; continue it with --resume or choose another --out.")
-        trainer.restore(torch.load(last, map_location=device))
+    begun = checkpoint_to_resume(arguments, device)
+    if begun:
+        trainer.restore(begun)
     elif arguments.start_from:
-        if not arguments.start_from.is_file():
-            raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
-        trainer.start_from(torch.load(arguments.start_from, map_location=device))
+        trainer.start_from(torch.load(checkpoint_to_start_from(arguments), map_location=device))
     source = read_source(arguments.pairs, arguments.data, arguments.out / "registration.npz", False, arguments.registered)
     if settings.pretrain and not source.scenes:
         raise UsageError(f"--pretrain: below {arguments.pairs} there are no scenes of training/simulate_change.py; set it to 0.")
@@ -215,31 +160,16 @@ def run(arguments: argparse.Namespace) -> None:
         cache = arguments.out / "registration_validation.npz"
         validation = read_source(arguments.validation, arguments.data, cache, True, arguments.registered)
         held_out = registered_pairs(validation.pairs) + photo_pairs(validation, VALIDATION_PHOTOS, settings.seed)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-
-    while trainer.epoch < settings.epochs:
-        began, kind = time.monotonic(), "pretrain_loss" if trainer.pretraining() else "loss"
-        report = {kind: trainer.train_epoch(source, arguments.workers)}
-        due = trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs
-        if held_out and due and trainer.epoch > settings.pretrain:
-            report.update(trainer.validate(held_out))
-            reached = report.get(BEST_FIGURE, report.get("photos_f1_at_0.01", 0.0))
-            if reached > trainer.best:
-                trainer.best = reached
-                save_atomically(trainer.state(), arguments.out / "best.pt")
-        save_atomically(trainer.state(), last)
-        line = " ".join(f"{name} {value:.4f}" for name, value in report.items())
-        print(f"epoch {trainer.epoch}/{settings.epochs} {line} {time.monotonic() - began:.0f} s", flush=True)
+    trainer.run(
+        arguments.out, lambda: trainer.train_epoch(source, arguments.workers),
+        (lambda: trainer.validate(held_out)) if held_out else None, arguments.validate_every,
+    )
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 trained, 2 the command line or the data is wrong."""
-    try:
-        run(parse_arguments(arguments))
-    except (UsageError, data.DataError) as error:
-        print(f"train_change: {error}", file=sys.stderr)
-        return 2
-    return 0
+    parsed = parse_arguments(arguments)
+    return exit_status("train_change", lambda: run(parsed), (data.DataError,))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@
 
 The network itself is held fixed; the streets must be others than those it was trained on, on which it is too good. Instead of
 its checkpoint the exported NAME.onnx will do; what that had learnt of surroundings is left aside. OUT/best.pt is a checkpoint for
-training/export_change.py, which joins those of several runs with other seeds: their judges err less together. A run that was
+training/export_change.py, which joins those of several runs with other seeds: their refiners err less together. A run that was
 stopped, at whatever moment, continues with the same command and --resume.
 """
 
@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -32,9 +31,12 @@ from change.inference import fill_invalid, normalise
 from change.loss import shares_of
 from change.metrics import PixelCounts
 from change.network import ChangeNetwork
-from change.surroundings import Surroundings, encoded_of
+from change.surroundings import Surroundings, encoded_of, with_present_names
 from change.validation import FALSE_POSITIVE_RATES, aligned
-from detector.training import learning_rate_factor, save_atomically
+from common.training import (
+    UsageError, add_run_arguments, check_arguments, checkpoint_to_resume, checkpoint_to_start_from, exit_status, learning_rate_factor,
+    prepare_device, save_atomically,
+)
 from export_change import ExportError, load_averaged
 
 HIDDEN, ALL_HIDDEN = 0.3, 0.05
@@ -45,10 +47,6 @@ MOST_UNCHANGED_FPR = 0.002
 such pairs are the rule, among the simulated ones every third: a constant on the log-odds corrects the prior, and leaves every ROC as it is."""
 
 LEARNING_RATE, BATCH = 2e-3, 8
-
-
-class UsageError(Exception):
-    """The command line or a file it names is wrong; the text is one sentence for the user."""
 
 
 @dataclass
@@ -63,7 +61,7 @@ class Example:
     changed: bool  # anything in the mask
 
 
-def hide(rng: np.random.Generator, validity: np.ndarray) -> None:
+def hide_regions(rng: np.random.Generator, validity: np.ndarray) -> None:
     """Sometimes a corner, or all, of the earlier picture, in place."""
     height, width = validity.shape
     draw = rng.random()
@@ -99,7 +97,7 @@ def training_examples(network: ChangeNetwork, pairs: Sequence[data.Pair], seed: 
         first, validity = aligned(pair)
         for one, other, flip in ((first, pair.second, 1), (pair.second, first, -1)):
             valid = validity.copy()
-            hide(rng, valid)
+            hide_regions(rng, valid)
             # Where nothing is known both pictures show the later one; what is then seen of it must be seen in either order.
             examples.append(example(network, *(np.ascontiguousarray(part[:, ::flip]) for part in (one, other, valid, pair.mask))))
     return examples
@@ -110,7 +108,7 @@ def validation_examples(network: ChangeNetwork, pairs: Sequence[data.Pair]) -> L
     return [example(network, *(first, pair.second, validity, pair.mask)) for pair in pairs for first, validity in (aligned(pair),)]
 
 
-def judged(network: ChangeNetwork, examples: Sequence[Example]) -> Tensor:
+def refined_logits(network: ChangeNetwork, examples: Sequence[Example]) -> Tensor:
     """Logits of a batch."""
     features, unseen = (torch.stack([getattr(one, name) for one in examples]).float() for name in ("features", "unseen"))
     encoded = {level: torch.stack([one.encoded[level] for one in examples]).float() for level in examples[0].encoded}
@@ -127,7 +125,7 @@ def train_epoch(network: ChangeNetwork, examples: Sequence[Example], optimizer: 
         for group in optimizer.param_groups:
             group["lr"] = LEARNING_RATE * learning_rate_factor((epoch + step / steps) / epochs)
         batch = [examples[index] for index in order[step * BATCH : (step + 1) * BATCH]]
-        shares, logits = torch.stack([one.shares for one in batch]).float(), judged(network, batch)
+        shares, logits = torch.stack([one.shares for one in batch]).float(), refined_logits(network, batch)
         loss = -(shares * F.log_softmax(logits, dim=1)).sum() / shares.sum().clamp(min=1)
         optimizer.zero_grad(set_to_none=True)
         loss.backward()
@@ -144,7 +142,7 @@ def figures(network: ChangeNetwork, examples: Sequence[Example]) -> dict:
     counts = PixelCounts()
     for one in examples:
         if one.changed:
-            counts.add(network.enlarged(torch.softmax(judged(network, [one]), dim=1))[0].numpy(), one.mask)
+            counts.add(network.enlarged(torch.softmax(refined_logits(network, [one]), dim=1))[0].numpy(), one.mask)
     return {f"f1_at_{rate:.2f}": counts.at_false_positive_rate(rate)["f1"] for rate in FALSE_POSITIVE_RATES}
 
 
@@ -155,7 +153,7 @@ def prior_correction(network: ChangeNetwork, examples: Sequence[Example]) -> flo
     log_odds = []
     for one in examples:
         if not one.changed:
-            unchanged = network.enlarged(torch.softmax(judged(network, [one]), dim=1))[0, NO_CHANGE].numpy()[one.mask != data.IGNORED]
+            unchanged = network.enlarged(torch.softmax(refined_logits(network, [one]), dim=1))[0, NO_CHANGE].numpy()[one.mask != data.IGNORED]
             log_odds.append(np.log((1 - unchanged).clip(1e-9)) - np.log(unchanged.clip(1e-9)))
     return max(float(np.quantile(np.concatenate(log_odds), 1 - MOST_UNCHANGED_FPR)), 0.0) if log_odds else 0.0
 
@@ -164,35 +162,29 @@ def corrected(network: ChangeNetwork, examples: Sequence[Example]) -> ChangeNetw
     """A copy with the prior correction in its bias."""
     network = copy.deepcopy(network)
     with torch.no_grad():
-        network.surroundings.judges[0].verdict.bias -= prior_correction(network, examples)
+        network.surroundings.refiners[0].correction.bias -= prior_correction(network, examples)
     return network
 
 
 def run(options: argparse.Namespace) -> None:
     """Train from the checkpoint, or from the start, to the last epoch."""
-    torch.set_num_threads(options.threads)
-    cv2.setNumThreads(0)
-    last = options.out / "last.pt"
-    if last.exists() and not options.resume:
-        raise UsageError(f"{last} exists; continue it with --resume or choose another --out.")
-    if not options.start_from.is_file():
-        raise UsageError(f"--start-from: there is no file {options.start_from}.")
+    check_arguments(options)
+    begun = checkpoint_to_resume(options, prepare_device(options))
     torch.manual_seed(options.seed)
-    network = load_averaged(options.start_from)
+    network = load_averaged(checkpoint_to_start_from(options))
     if not isinstance(network, ChangeNetwork):
         raise UsageError(f"--start-from: {options.start_from} is no change-small.")
-    network.surroundings = Surroundings(network.widths.final, network.widths.encoder)  # what others have judged counts for nothing here
+    network.surroundings = Surroundings(network.widths.final, network.widths.encoder)  # what it had learnt of surroundings is left aside
     network.eval().requires_grad_(False)
     network.surroundings.requires_grad_(True)
     network.surroundings.prior.unseen.requires_grad_(False)
     network.surroundings.weigh.requires_grad_(False)
     optimizer = torch.optim.AdamW([weight for weight in network.parameters() if weight.requires_grad], weight_decay=0.01)
     epoch, best = 0, 0.0
-    if last.exists():
-        state = torch.load(last, map_location="cpu")
-        network.load_state_dict(state["average"])
-        optimizer.load_state_dict(state["optimizer"])
-        epoch, best = state["epoch"], state["best"]
+    if begun:
+        network.load_state_dict(with_present_names(begun["average"]))
+        optimizer.load_state_dict(begun["optimizer"])
+        epoch, best = begun["epoch"], begun["best"]
     options.out.mkdir(parents=True, exist_ok=True)
     pairs = data.read_pairs(options.pairs, options.out / "registration.npz")
     held_out = data.read_pairs(options.validation, options.out / "registration_validation.npz")
@@ -209,7 +201,7 @@ def run(options: argparse.Namespace) -> None:
         if sum(found.values()) > best:
             best = sum(found.values())
             save_atomically({**state, "average": corrected(network, validation).state_dict(), "best": best}, options.out / "best.pt")
-        save_atomically({**state, "best": best}, last)
+        save_atomically({**state, "best": best}, options.out / "last.pt")
         report(f"epoch {epoch}/{options.epochs} loss {loss:.4f}", found, f"{time.monotonic() - began:.0f} s")
 
 
@@ -224,23 +216,9 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--start-from", type=Path, default=Path("models/change-small.onnx"), help="checkpoint, or whole exported graph, of change-small")
     parser.add_argument("--pairs", type=Path, default=Path("build/training/change_surroundings"), help="streets the network was not trained on")
     parser.add_argument("--validation", type=Path, default=Path("build/training/change_validation"), help="other streets, that choose the epoch")
-    parser.add_argument("--out", type=Path, default=Path("build/training/change_whole"), help="folder for checkpoints")
-    parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
-    parser.add_argument("--epochs", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
+    add_run_arguments(parser, "build/training/change_whole", argparse.Namespace(epochs=8, seed=1), ("epochs", "seed"))
     options = parser.parse_args(arguments)
-    try:
-        for name in ("epochs", "threads"):
-            if getattr(options, name) < 1:
-                raise UsageError(f"--{name} must be at least 1, not {getattr(options, name)}.")
-        if options.seed < 0:
-            raise UsageError(f"--seed must not be negative, not {options.seed}.")
-        run(options)
-    except (UsageError, ExportError, data.DataError) as error:
-        print(f"train_change_surroundings: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return exit_status("train_change_surroundings", lambda: run(options), (ExportError, data.DataError))
 
 
 if __name__ == "__main__":

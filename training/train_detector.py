@@ -9,73 +9,54 @@ A run that was stopped, at whatever moment, continues with the same command and 
 import argparse
 import json
 import sys
-import time
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
 
-import cv2
 import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
+from common.training import (
+    EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
+    checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, prepare_device,
+)
 from detector import data, sets, signs
 from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
 from detector.manifest import ManifestError, classes_of
 from detector.network import SIZES, Detector
 from detector.pretrained import ConversionError, load_backbone, load_exported
-from detector.training import (
-    VIEWS, AveragedModel, EpochSamples, Settings, batches, learning_rate_factor, make_optimizer, save_atomically, to_device,
-)
-from detector.validation import Looker, selection_figure, torch_runner, validate, validate_held_out
+from detector.training import VIEWS, Settings, batches, make_optimizer, to_device
+from detector.validation import DetectorRunner, selection_figure, torch_forward, validate, validate_held_out
 
 
 CALIBRATION_SAMPLES = 64
 """On so many the normalisation of a pretrained backbone is measured."""
 
 
-class UsageError(Exception):
-    """The command line or a file it names is wrong; the text is one sentence for the user."""
+class Trainer(Run):
+    """A run of the detector."""
 
-
-class Trainer:
-    """One training run: state, one epoch, and its checkpoints."""
+    BEST = "mean_AP50"
 
     def __init__(self, settings: Settings, device: torch.device):
         torch.manual_seed(settings.seed)
-        self.settings, self.device = settings, device
-        self.model = Detector(len(settings.classes), SIZES[settings.size]).to(device, memory_format=torch.channels_last)
-        self.average = AveragedModel(self.model)
-        self.frozen = [self.model.backbone.stem] if settings.freeze else []
+        self.device = device
+        model = Detector(len(settings.classes), SIZES[settings.size]).to(device, memory_format=torch.channels_last)
+        self.frozen = [model.backbone.stem] if settings.freeze else []
         for part in self.frozen:
             part.requires_grad_(False)
-        self.optimizer = make_optimizer(self.model, settings)
-        self.epoch = 0
-        self.best_ap = 0.0  # selection_figure of best.pt
+        super().__init__(settings, model, make_optimizer(model, settings))
         self.history: List[dict] = []  # of all validations
 
     def state(self) -> dict:
         """Everything that the next epoch depends on."""
-        return {
-            "settings": asdict(self.settings), "epoch": self.epoch, "best_ap": self.best_ap, "history": self.history,
-            "model": self.model.state_dict(), "average": self.average.model.state_dict(),
-            "updates": self.average.updates, "optimizer": self.optimizer.state_dict(),
-        }
+        return {**super().state(), "history": self.history}
 
     def restore(self, state: dict) -> None:
         """Continue from `state`, which must come from a run with the same settings."""
-        written = {**asdict(Settings()), **state["settings"]}  # older runs had settings' later fields as they are by default
-        for name, value in asdict(self.settings).items():
-            if written[name] != value:
-                raise UsageError(
-                    f"The checkpoint was written with {name} {written[name]}, not {value}; "
-                    "resume with the same settings or choose another --out."
-                )
-        self.model.load_state_dict(state["model"])
-        self.average.model.load_state_dict(state["average"])
-        self.average.updates = state["updates"]
-        self.optimizer.load_state_dict(state["optimizer"])
-        self.epoch, self.best_ap, self.history = state["epoch"], state["best_ap"], state.get("history", [])
+        super().restore(state)
+        self.history = state.get("history", [])
 
     def check_classes(self, begun: Tuple[str, ...]) -> None:
         """Refuse weights whose outputs would become those of other classes."""
@@ -96,7 +77,7 @@ class Trainer:
                 value = torch.cat([value, weights[name][len(value) :]])
             weights[name] = value
         self.model.load_state_dict(weights)
-        self.average = AveragedModel(self.model)
+        self.ema = ModelEma(self.model)
 
     def start_from_others(
         self, backbone: Optional[Path], exported: Optional[Path], pictures: dict, faces: Optional[signs.Faces] = None
@@ -112,7 +93,7 @@ class Trainer:
         if exported:
             self.check_classes(classes_of(exported))
             print(f"{load_exported(self.model, exported, images)} convolutions are those of {exported}", flush=True)
-        self.average = AveragedModel(self.model)
+        self.ema = ModelEma(self.model)
 
     def train_epoch(self, pictures: dict, workers: int, faces: Optional[signs.Faces] = None) -> dict:
         """One pass over freshly drawn samples; returns mean losses."""
@@ -132,17 +113,12 @@ class Trainer:
             part.eval()  # their normalisation does not follow the batches either
         for step, (images, targets) in enumerate(loader):
             progress = (self.epoch + step / len(loader)) / settings.epochs
-            for group in self.optimizer.param_groups:
-                group["lr"] = settings.learning_rate * learning_rate_factor(progress) * group["multiple"]
+            self.set_rate(settings.learning_rate * learning_rate_factor(progress))
             images, targets = to_device(images, targets, self.device)
             with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=settings.precision == "bf16"):
                 raw = self.model(images)
             losses = torch.stack(loss_of(raw, targets))
-            self.optimizer.zero_grad(set_to_none=True)
-            losses.sum().backward()
-            torch.nn.utils.clip_grad_norm_(self.model.parameters(), 10.0)
-            self.optimizer.step()
-            self.average.update(self.model)
+            self.step(losses.sum())
             sums += losses.detach().cpu()
         self.epoch += 1
         box_loss, score_loss = (sums / len(loader)).tolist()
@@ -150,11 +126,11 @@ class Trainer:
 
     def validate(self, drives: dict, cones: list, held_out: Dict[str, List[data.Picture]]) -> dict:
         """Figures of the averaged weights on the validation parts; those by class and set go to the history only."""
-        looker = Looker(torch_runner(self.average.model, self.device, self.settings.precision))
-        parts = validate_held_out(looker, held_out, self.settings.classes)
+        runner = DetectorRunner(torch_forward(self.ema.model, self.device, self.settings.precision))
+        parts = validate_held_out(runner, held_out, self.settings.classes)
         report, survey, photos = {}, 0.0, 0.0
         if drives:
-            result = validate(looker, drives, cones)
+            result = validate(runner, drives, cones)
             figures, survey, photos = result.best_drive_figures(), result.pothole_ap(0.5), result.cone_ap(0.5)
             report = {
                 "AP50": survey, "AP30": result.pothole_ap(0.3), "cone_AP50": photos,
@@ -169,35 +145,22 @@ class Trainer:
 
 def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     """The command line; argparse itself exits with 2 on a wrong flag."""
-    defaults = {field.name: field.default for field in fields(Settings)}
+    defaults = Settings()
     parser = argparse.ArgumentParser(description="Train the hazard detector.")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets; none: own and simulated pictures alone")
     parser.add_argument("--own", type=Path, metavar="DIR", action="append", default=[], help="your own pictures: images/, labels/ and classes.txt, which may name new classes; may be repeated")
     parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data, such as training/real_hazards.yaml")
     parser.add_argument("--leave-out", metavar="SET", action="append", default=[], help="a set that is held out as a whole; may be repeated")
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
-    parser.add_argument("--out", type=Path, default=Path("build/training/hazards"), help="folder for checkpoints")
-    parser.add_argument("--resume", action="store_true", help="continue from OUT/last.pt where it exists")
     parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights, or an exported .onnx, to begin a new run with")
     parser.add_argument("--pretrained", type=Path, metavar="BACKBONE", help="file of training/convert_backbone.py to begin with")
-    parser.add_argument("--size", choices=tuple(SIZES), default=defaults["size"], help="of the network")
-    parser.add_argument("--workers", type=int, default=1, help="processes that prepare samples")
-    parser.add_argument("--threads", type=int, default=2, help="threads of torch on the CPU")
-    parser.add_argument("--validate-every", type=int, default=10, metavar="EPOCHS")
-    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
-    for name in ("seed", "epochs", "samples_per_epoch", "batch"):
-        parser.add_argument("--" + name.replace("_", "-"), type=int, default=defaults[name])
-    parser.add_argument("--learning-rate", type=float, default=defaults["learning_rate"])
-    parser.add_argument(
-        "--backbone-rate", type=float, default=defaults["backbone_rate"], help="multiple of the learning rate for the backbone"
-    )
-    parser.add_argument(
-        "--simulated-share", type=float, default=defaults["simulated_share"], help="of the samples, from simulated drives"
-    )
-    parser.add_argument("--settle", type=float, default=defaults["settle"], help="last fraction of the epochs: whole frames")
-    parser.add_argument("--views", choices=tuple(VIEWS), default=defaults["views"], help="what epochs before the last show")
+    parser.add_argument("--size", choices=tuple(SIZES), default=defaults.size, help="of the network")
+    parser.add_argument("--views", choices=tuple(VIEWS), default=defaults.views, help="what epochs before the last show")
     parser.add_argument("--freeze", action="store_true", help="leave the first convolution as it begins")
-    parser.add_argument("--precision", choices=("bf16", "fp32"), default=defaults["precision"])
+    parser.add_argument("--backbone-rate", type=float, default=defaults.backbone_rate, help="multiple of the learning rate for the backbone")
+    parser.add_argument("--simulated-share", type=float, default=defaults.simulated_share, help="of the samples, from simulated drives")
+    add_run_arguments(parser, "build/training/hazards", defaults, ("seed", "epochs", "samples_per_epoch", "batch"))
+    add_loop_arguments(parser, defaults, validate_every=10)
     return parser.parse_args(arguments)
 
 
@@ -208,22 +171,12 @@ def exported(arguments: argparse.Namespace) -> Optional[Path]:
 
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """Settings of the command line, checked."""
-    for name in ("epochs", "samples_per_epoch", "validate_every", "threads"):
-        if getattr(arguments, name) < 1:
-            raise UsageError(f"--{name.replace('_', '-')} must be at least 1, not {getattr(arguments, name)}.")
-    if arguments.batch < 2 or arguments.samples_per_epoch < arguments.batch:
-        raise UsageError(f"--batch must be from 2 to --samples-per-epoch, not {arguments.batch}.")
-    if arguments.seed < 0 or arguments.workers < 0 or not arguments.learning_rate > 0:
-        raise UsageError("--seed and --workers must not be negative and --learning-rate must be positive.")
+    check_arguments(arguments)
     if not 0 <= arguments.backbone_rate <= 10:
         raise UsageError(f"--backbone-rate must be from 0 to 10, not {arguments.backbone_rate}.")
     if arguments.pretrained and arguments.start_from and not exported(arguments):
         raise UsageError("--pretrained and the checkpoint of --start-from exclude each other.")
-    for name in ("settle", "simulated_share"):
-        if not 0 <= getattr(arguments, name) <= 1:
-            raise UsageError(f"--{name.replace('_', '-')} must be from 0 to 1, not {getattr(arguments, name)}.")
-    known = {field.name for field in fields(Settings)}
-    given = {name: value for name, value in vars(arguments).items() if name in known}
+    given = fields_given(Settings, arguments)
     given.update(
         classes=data.with_own_classes(arguments.own), sets=catalogue_of(arguments).digest, left_out=tuple(sorted(arguments.leave_out))
     )
@@ -279,57 +232,39 @@ def read_pictures(arguments: argparse.Namespace, settings: Settings) -> Dict[str
 def run(arguments: argparse.Namespace) -> None:
     """Train from the checkpoint, or from the start, to the last epoch."""
     settings = settings_from(arguments)
-    cuda = torch.cuda.is_available()
-    if arguments.device == "cuda" and not cuda:
-        raise UsageError("--device cuda: this torch sees no CUDA device.")
-    device = torch.device("cuda" if cuda and arguments.device != "cpu" else "cpu")
-    torch.set_num_threads(arguments.threads)
-    cv2.setNumThreads(0)
-
+    device = prepare_device(arguments)
     trainer = Trainer(settings, device)
-    last = arguments.out / "last.pt"
-    if last.exists():
-        if not arguments.resume:
-            raise UsageError(f"{last} exists; continue it with --resume or choose another --out.")
-        trainer.restore(torch.load(last, map_location=device))
+    begun = checkpoint_to_resume(arguments, device)
+    if begun:
+        trainer.restore(begun)
     elif arguments.start_from:
-        if not arguments.start_from.is_file():
-            raise UsageError(f"--start-from: there is no checkpoint {arguments.start_from}.")
+        checkpoint = checkpoint_to_start_from(arguments)
         if not exported(arguments):
-            trainer.start_from(torch.load(arguments.start_from, map_location=device))
+            trainer.start_from(torch.load(checkpoint, map_location=device))
     pictures, of_sets = read_pictures(arguments, settings), read_sets(arguments)
     pictures.update(of_sets.groups)
     if of_sets.faces:  # signs stand in street photos too, where no cone says that there are road works
         pictures["composed"] += [picture for picture in pictures["cones"] if not len(picture.boxes)]
-    if (arguments.pretrained or exported(arguments)) and not last.exists():
+    if (arguments.pretrained or exported(arguments)) and not begun:
         trainer.start_from_others(arguments.pretrained, exported(arguments), pictures, of_sets.faces)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
-    measured = bool(drives or of_sets.held_out)
-    arguments.out.mkdir(parents=True, exist_ok=True)
 
-    while trainer.epoch < settings.epochs:
-        began = time.monotonic()
-        report = trainer.train_epoch(pictures, arguments.workers, of_sets.faces)
-        if measured and (trainer.epoch % arguments.validate_every == 0 or trainer.epoch == settings.epochs):
-            report.update(trainer.validate(drives, cones, of_sets.held_out))
-            (arguments.out / "figures.json").write_text(json.dumps(trainer.history, indent=1))
-            if report["mean_AP50"] > trainer.best_ap:
-                trainer.best_ap = report["mean_AP50"]
-                save_atomically(trainer.state(), arguments.out / "best.pt")
-        save_atomically(trainer.state(), last)
-        line = " ".join(f"{name} {value:.3f}" for name, value in report.items())
-        print(f"epoch {trainer.epoch}/{settings.epochs} {line} {time.monotonic() - began:.0f} s", flush=True)
+    def measure() -> dict:
+        report = trainer.validate(drives, cones, of_sets.held_out)
+        (arguments.out / "figures.json").write_text(json.dumps(trainer.history, indent=1))
+        return report
+
+    trainer.run(
+        arguments.out, lambda: trainer.train_epoch(pictures, arguments.workers, of_sets.faces),
+        measure if drives or of_sets.held_out else None, arguments.validate_every,
+    )
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 trained, 2 the command line or the data is wrong."""
-    try:
-        run(parse_arguments(arguments))
-    except (UsageError, ManifestError, ConversionError, data.DataError) as error:
-        print(f"train_detector: {error}", file=sys.stderr)
-        return 2
-    return 0
+    parsed = parse_arguments(arguments)
+    return exit_status("train_detector", lambda: run(parsed), (ManifestError, ConversionError, data.DataError))
 
 
 if __name__ == "__main__":

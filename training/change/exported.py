@@ -11,21 +11,23 @@ from detector.data import DataError
 
 from .blocks import ConvBlock
 from .network import ChangeNetwork
+from .surroundings import with_present_names
 
 
 @torch.no_grad()
 def load_exported(path: Path) -> ChangeNetwork:
     """A change-small with the weights of the whole graph (NAME.onnx), for inference: its normalisation does nothing any more.
 
-    What an export of an earlier version lacks (its judges) is untrained.
+    What an export of an earlier version lacks (its refiners) is untrained.
     """
     try:
         initializers = onnx.load(str(path)).graph.initializer
         stored = {entry.name.removeprefix("network."): torch.from_numpy(numpy_helper.to_array(entry).copy()) for entry in initializers}
+        stored = with_present_names(stored)
     except Exception as error:  # python3-onnx passes on what protobuf throws.
         raise DataError(f"Cannot read the exported network {path}: {error}.") from error
-    judges = {name.split(".")[2] for name in stored if name.startswith("surroundings.judges.")}
-    network = ChangeNetwork(judges=max(len(judges), 1)).eval()
+    refiners = {name.split(".")[2] for name in stored if name.startswith("surroundings.refiners.")}
+    network = ChangeNetwork(refiners=max(len(refiners), 1)).eval()
     for name, module in network.named_modules():
         if isinstance(module, ConvBlock):
             put_into(module, stored, f"{name}.0")

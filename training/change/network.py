@@ -125,7 +125,7 @@ class Network(nn.Module):
         Softmax is taken in the logits' cells and then enlarged, which costs a quarter. A cell that has a share in an
         invalid pixel's result counts as not seen.
         """
-        return self.enlarged(torch.softmax(self.judge(first, second, self.unseen_cells(validity)), dim=1))
+        return self.enlarged(torch.softmax(self.refined(first, second, self.unseen_cells(validity)), dim=1))
 
     def unseen_cells(self, validity: Tensor) -> Tensor:
         """B x 1 x h x w in the logits' cells: 1 where a cell was not seen, else 0."""
@@ -138,7 +138,7 @@ class Network(nn.Module):
             return found
         return F.interpolate(found, scale_factor=self.logits_stride, mode="bilinear", align_corners=False)
 
-    def judge(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
+    def refined(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
         """Logits as compare's, where `unseen` (B x 1 x h x w, one value per cell) is 1 without what the pictures show there."""
         raise NotImplementedError
 
@@ -163,7 +163,7 @@ class ChangeNetwork(Network):
 
     logits_stride = 2
 
-    def __init__(self, widths: Widths = Widths(), judges: int = 1):
+    def __init__(self, widths: Widths = Widths(), refiners: int = 1):
         super().__init__()
         self.widths = widths
         self.encoder = Encoder(widths)
@@ -173,7 +173,7 @@ class ChangeNetwork(Network):
             SeparableBlock(widths.final, widths.final),
             nn.Conv2d(widths.final, len(CLASSES), 1),
         )
-        self.surroundings = Surroundings(widths.final, widths.encoder, judges)
+        self.surroundings = Surroundings(widths.final, widths.encoder, refiners)
         self.objects = nn.Conv2d(widths.decoder[0], len(CLASSES), 1)  # in pretraining only
 
     def classify(self, images: Tensor) -> Tensor:
@@ -190,7 +190,7 @@ class ChangeNetwork(Network):
     def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
         return self.final[-1](self.features(first, second))
 
-    def judge(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
+    def refined(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
         features = self.features(first, second)
         return self.surroundings(features, self.final[-1](features), unseen, encoded_of(first, second))
 
@@ -260,7 +260,7 @@ class ThesisNetwork(Network):
     def compare(self, first: List[Tensor], second: List[Tensor]) -> Tensor:
         return self.final(torch.cat([self.first(first), self.second(second)], dim=1))
 
-    def judge(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
+    def refined(self, first: List[Tensor], second: List[Tensor], unseen: Tensor) -> Tensor:
         return self.prior(self.compare(first, second), unseen)
 
 

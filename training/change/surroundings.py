@@ -1,10 +1,10 @@
 """What lies around a cell decides with it: a change is rarely alone, and where nothing was seen only its surroundings can say.
 
-The network judges every cell by what two pictures show there. That leaves two things unused. Objects are wholes: cells
+The network decides on every cell by what two pictures show there. That leaves two things unused. Objects are wholes: cells
 beside a sure change are likelier to have changed than those on an empty road, and a faint change amid none is likelier an
 error. And where the registered earlier picture shows nothing, what stands there now (a car, the road, the sky) and what has
-changed beside it say how likely a change is. A `Judge` learns both, after the network and with it held fixed, on
-streets that the network has not seen: on its own it is too sure. Several judges that learnt apart err less together.
+changed beside it say how likely a change is. A `ContextRefiner` learns both, after the network and with it held fixed, on
+streets that the network has not seen: on its own it is too sure. Several refiners that learnt apart err less together.
 """
 
 import copy
@@ -46,6 +46,17 @@ def prior_logits() -> Tensor:
     return probabilities.log()
 
 
+EARLIER_NAMES = ((".judges.", ".refiners."), (".verdict.", ".correction."))
+"""Parts of weights' names in files of earlier versions, and as they are now."""
+
+
+def with_present_names(weights: Dict[str, Tensor]) -> Dict[str, Tensor]:
+    """Weights by name, of a checkpoint or an export of any version."""
+    for earlier, present in EARLIER_NAMES:
+        weights = {name.replace(earlier, present): value for name, value in weights.items()}
+    return weights
+
+
 def encoded_of(first: List[Tensor], second: List[Tensor]) -> Dict[int, Tensor]:
     """What `Surroundings` gets of the encoder's features of both pictures, by level."""
     return {level: torch.cat([first[level], second[level]], dim=1) for level in KNOWN_LEVELS}
@@ -63,10 +74,10 @@ class Prior(nn.Module):
         return logits * self.seen(1 - unseen) + self.unseen(unseen)
 
 
-class Judge(nn.Module):
+class ContextRefiner(nn.Module):
     """Features (B x F x h x w) and what was not seen (B x 1 x h x w, 0 or 1), at stride 2, to how much likelier a change is.
 
-    `encoded` are the encoder's features of both pictures: they say what stands there, whether it has changed or not. The verdict
+    `encoded` are the encoder's features of both pictures: they say what stands there, whether it has changed or not. The correction
     (B x 2 x h x w) is a difference of log-odds for cells that were seen and one for others.
     """
 
@@ -82,10 +93,10 @@ class Judge(nn.Module):
             nn.Sequential(ConvBlock(below + here, here, 1), SeparableBlock(here, here))
             for below, here in zip(WIDTHS[:1:-1], WIDTHS[-2:0:-1])
         )
-        self.verdict = nn.Conv2d(WIDTHS[1], 2, 1)
+        self.correction = nn.Conv2d(WIDTHS[1], 2, 1)
         with torch.no_grad():
-            self.verdict.weight.zero_()
-            self.verdict.bias.zero_()
+            self.correction.weight.zero_()
+            self.correction.bias.zero_()
 
     def forward(self, features: Tensor, unseen: Tensor, encoded: Dict[int, Tensor]) -> Tensor:
         levels = [self.enter(torch.cat([self.hidden(features), unseen], dim=1))]
@@ -98,35 +109,35 @@ class Judge(nn.Module):
         around = self.deepest(levels[-1])
         for block, level in zip(self.up, levels[-2:0:-1]):
             around = block(torch.cat([enlarge(around), level], dim=1))
-        return F.interpolate(self.verdict(around), scale_factor=2, mode="bilinear", align_corners=False)
+        return F.interpolate(self.correction(around), scale_factor=2, mode="bilinear", align_corners=False)
 
 
 class Surroundings(nn.Module):
-    """Logits as the network alone has them to logits that know their surroundings: the verdicts of all judges are added."""
+    """Logits as the network alone has them to logits that know their surroundings: the corrections of all refiners are added."""
 
-    def __init__(self, features: int, encoder: Tuple[int, ...], judges: int = 1):
+    def __init__(self, features: int, encoder: Tuple[int, ...], refiners: int = 1):
         super().__init__()
         self.prior = Prior()
-        self.judges = nn.ModuleList(Judge(features, encoder) for _ in range(judges))
+        self.refiners = nn.ModuleList(ContextRefiner(features, encoder) for _ in range(refiners))
         self.weigh = nn.Conv2d(2, len(CLASSES), 1, bias=False).requires_grad_(False)
         with torch.no_grad():
             self.weigh.weight.zero_()[NO_CHANGE] = -1
 
     def forward(self, features: Tensor, logits: Tensor, unseen: Tensor, encoded: Dict[int, Tensor]) -> Tensor:
-        verdicts = [judge(features, unseen, encoded) for judge in self.judges]
-        verdict = verdicts[0]
-        for other in verdicts[1:]:
-            verdict = verdict + other
-        return self.prior(logits, unseen) + self.weigh(verdict * torch.cat([1 - unseen, unseen], dim=1))
+        corrections = [refiner(features, unseen, encoded) for refiner in self.refiners]
+        correction = corrections[0]
+        for other in corrections[1:]:
+            correction = correction + other
+        return self.prior(logits, unseen) + self.weigh(correction * torch.cat([1 - unseen, unseen], dim=1))
 
 
 @torch.no_grad()
-def together(several: Sequence[Surroundings]) -> Surroundings:
+def ensemble_of(several: Sequence[Surroundings]) -> Surroundings:
     """Several that learnt apart, with the same network, as one that gives the mean of their logits."""
     joined = copy.deepcopy(several[0])
     joined.prior.seen.weight.copy_(torch.stack([one.prior.seen.weight for one in several]).mean(dim=0))
-    joined.judges = nn.ModuleList(copy.deepcopy(judge) for one in several for judge in one.judges)
-    for judge in joined.judges:
-        judge.verdict.weight.div_(len(several))
-        judge.verdict.bias.div_(len(several))
+    joined.refiners = nn.ModuleList(copy.deepcopy(refiner) for one in several for refiner in one.refiners)
+    for refiner in joined.refiners:
+        refiner.correction.weight.div_(len(several))
+        refiner.correction.bias.div_(len(several))
     return joined

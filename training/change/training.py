@@ -1,4 +1,4 @@
-"""Parts of the training loop; what does not know about changes is the detector's (detector/training.py)."""
+"""Parts of the training loop; what all trainers share is in common/training.py."""
 
 from dataclasses import dataclass
 from typing import List, Tuple
@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader
 
-from detector.training import EpochSamples
+from common.training import EpochSamples, decayed_groups
 
 from .augment import SETTLING, Recipe, Sample
 from .inference import MEAN, STD
@@ -60,9 +60,4 @@ def to_input(images: Tensor, device: torch.device) -> Tensor:
 
 def make_optimizer(network: Network, settings: Settings) -> torch.optim.Optimizer:
     """AdamW; biases and normalisation parameters do not decay."""
-    trained = [parameter for parameter in network.parameters() if parameter.requires_grad]
-    groups = [
-        {"params": [parameter for parameter in trained if parameter.dim() > 1], "weight_decay": settings.weight_decay},
-        {"params": [parameter for parameter in trained if parameter.dim() <= 1], "weight_decay": 0.0},
-    ]
-    return torch.optim.AdamW(groups, lr=settings.learning_rate)
+    return torch.optim.AdamW(decayed_groups(network, settings.weight_decay), lr=settings.learning_rate)

@@ -22,7 +22,7 @@ INPUT_WIDTH, INPUT_HEIGHT = 640, 400
 
 
 @dataclass(frozen=True)
-class Look:
+class ViewConfig:
     """How a network looks at a picture."""
 
     width: int = INPUT_WIDTH  # of its input

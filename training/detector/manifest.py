@@ -21,7 +21,7 @@ class Manifest:
 
     weights: Path
     classes: Tuple[str, ...]
-    look: inference.Look
+    view: inference.ViewConfig
     thresholds: Dict[str, float]
 
 
@@ -31,10 +31,10 @@ def sha256_of(path: Path) -> str:
 
 
 def write_manifest(
-    path: Path, weights: Path, thresholds: Dict[str, float], look: inference.Look = inference.Look(), engine: str = ""
+    path: Path, weights: Path, thresholds: Dict[str, float], view: inference.ViewConfig = inference.ViewConfig(), engine: str = ""
 ) -> None:
     """Describe `weights`, which lies beside the manifest; `thresholds` has the classes in their order, no `engine` leaves it open."""
-    views = {**({"views": len(look.scales)} if len(look.scales) > 1 else {}), **({"mirrored": True} if look.mirrored else {})}
+    views = {**({"views": len(view.scales)} if len(view.scales) > 1 else {}), **({"mirrored": True} if view.mirrored else {})}
     content = {
         "name": path.stem,
         "file": weights.name,
@@ -42,11 +42,11 @@ def write_manifest(
         **({"engine": engine} if engine else {}),
         "classes": list(thresholds),
         "input": {
-            "width": look.width, "height": look.height, "channels": "rgb",
+            "width": view.width, "height": view.height, "channels": "rgb",
             "resize": "letterbox", "pad_value": inference.PAD_VALUE,
         },
         "normalisation": {"mean": [inference.MEAN] * 3, "std": [inference.STD] * 3},
-        "head": {"type": "yolox", "strides": inference.strides_of(look.scales), **views, "output": "predictions"},
+        "head": {"type": "yolox", "strides": inference.strides_of(view.scales), **views, "output": "predictions"},
         "thresholds": thresholds,
         "nms_iou": inference.NMS_IOU,
     }
@@ -58,12 +58,12 @@ def read_manifest(path: Path) -> Manifest:
     try:
         content = yaml.safe_load(path.read_text())
         strides = [int(stride) for stride in content["head"]["strides"]]
-        look = inference.Look(
+        view = inference.ViewConfig(
             int(content["input"]["width"]), int(content["input"]["height"]),
             tuple(STRIDES[0] / first for first in strides[:: len(STRIDES)]), bool(content["head"].get("mirrored", False)),
         )
         thresholds = {name: float(value) for name, value in content["thresholds"].items()}
-        manifest = Manifest(path.parent / content["file"], tuple(content["classes"]), look, thresholds)
+        manifest = Manifest(path.parent / content["file"], tuple(content["classes"]), view, thresholds)
         digest = content["sha256"]
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ManifestError(f"Cannot read the manifest {path}: {error!r}.") from error

@@ -14,10 +14,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from .inference import Look
+from .inference import ViewConfig
 from .network import ConvBlock, Detector
 from .packing import model_bytes
-from .validation import Runner
+from .validation import ForwardFunction
 
 CERTAIN = 30.0
 """A logit whose sigmoid is exactly 1 in float32: the objectness of every anchor point."""
@@ -76,13 +76,13 @@ def with_certain_objectness(scores: nn.Conv2d) -> nn.Conv2d:
     return extended
 
 
-def export(detector: Detector, path: Path, look: Look = Look()) -> ExportableDetector:
+def export(detector: Detector, path: Path, view: ViewConfig = ViewConfig()) -> ExportableDetector:
     """Write the graph; returns the module that it was traced from."""
-    exportable = ExportableDetector(detector, look.scales)
+    exportable = ExportableDetector(detector, view.scales)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", torch.jit.TracerWarning)  # sizes are compared while tracing: the graph's are fixed
         torch.onnx.export(
-            exportable, torch.zeros(1, 3, look.height, look.width), str(path), opset_version=11,
+            exportable, torch.zeros(1, 3, view.height, view.width), str(path), opset_version=11,
             input_names=["images"], output_names=["predictions"],
         )
     onnx.save(for_opencv(onnx.load(str(path))), str(path))
@@ -122,7 +122,7 @@ def opencv_outputs(path: Path, images: np.ndarray) -> np.ndarray:
     return network.forward("predictions")
 
 
-def opencv_runner(path: Path) -> Runner:
+def opencv_forward(path: Path) -> ForwardFunction:
     """A runner as validation uses it, on OpenCV's own backend."""
     network = opencv_network(path)
 

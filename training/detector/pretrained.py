@@ -19,7 +19,7 @@ from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from .inference import MEAN, STD
-from .network import Backbone, ConvBlock, Detector
+from .network import ConvBlock, Detector
 from .packing import model_bytes
 
 NODE_PREFIX = "PartitionedCall/"

@@ -1,19 +1,17 @@
-"""Parts of the training loop: seeded samples, batches, averaged weights, schedule, checkpoints."""
+"""Parts of the detector's training: settings, batches, optimizer; what all trainers share is in common/training.py."""
 
-import copy
-import math
-import os
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import List, Tuple
 
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import DataLoader
+
+from common.training import EpochSamples, decayed_groups
 
 from . import CLASSES, inference
-from .augment import FRAMES, GROUP_SHARES, LIGHT, SETTLING, Augmenter, Recipe, Sample
+from .augment import FRAMES, GROUP_SHARES, LIGHT, SETTLING, Recipe, Sample
 from .inference import MEAN, STD
 from .loss import Target
 from .network import Detector
@@ -63,19 +61,6 @@ VIEWS = {
 SETTLING_VIEWS = Views(SETTLING, inference.INPUT_WIDTH, inference.INPUT_HEIGHT, 0.5)
 
 
-class EpochSamples(Dataset):
-    """The samples of one epoch. Sample i depends on (seed, epoch, i) only."""
-
-    def __init__(self, augmenter: Augmenter, seed: int, epoch: int, count: int):
-        self.augmenter, self.seed, self.epoch, self.count = augmenter, seed, epoch, count
-
-    def __len__(self) -> int:
-        return self.count
-
-    def __getitem__(self, index: int) -> Sample:
-        return self.augmenter.draw(np.random.default_rng([self.seed, self.epoch, index]))
-
-
 def collate(samples: List[Sample]) -> Tuple[Tensor, List[Target]]:
     """Samples to a uint8 batch (B x 3 x H x W, channels last in memory) and targets."""
     images = torch.from_numpy(np.stack([sample.image for sample in samples])).permute(0, 3, 1, 2)
@@ -98,48 +83,10 @@ def to_device(images: Tensor, targets: List[Target], device: torch.device) -> Tu
     return images, moved
 
 
-class AveragedModel:
-    """Exponential moving average of the weights and of the batch-norm statistics."""
-
-    DECAY = 0.999
-
-    def __init__(self, model: nn.Module):
-        self.model = copy.deepcopy(model).eval()
-        self.updates = 0
-
-    @torch.no_grad()
-    def update(self, model: nn.Module) -> None:
-        """Move the average towards the model; early on faster, to forget the random start."""
-        self.updates += 1
-        decay = min(self.DECAY, (1 + self.updates) / (10 + self.updates))
-        for average, current in zip(self.model.state_dict().values(), model.state_dict().values()):
-            if average.dtype.is_floating_point:
-                average.lerp_(current, 1 - decay)
-            else:
-                average.copy_(current)
-
-
-def learning_rate_factor(progress: float, warm_up: float = 0.02, last: float = 0.02) -> float:
-    """Linear warm-up, then half a cosine down to `last`; progress runs from 0 to 1."""
-    if progress < warm_up:
-        return progress / warm_up
-    return last + (1 - last) * 0.5 * (1 + math.cos(math.pi * (progress - warm_up) / (1 - warm_up)))
-
-
 def make_optimizer(model: Detector, settings: Settings) -> torch.optim.Optimizer:
     """AdamW; biases and normalisation parameters do not decay. A group has its multiple of the schedule's learning rate."""
     rest = nn.ModuleList([model.pyramid, model.heads])
     groups = []
     for part, multiple in ((model.backbone, settings.backbone_rate), (rest, 1.0)):
-        for decay, matrices in ((settings.weight_decay, True), (0.0, False)):
-            trained = (parameter for parameter in part.parameters() if parameter.requires_grad)
-            parameters = [parameter for parameter in trained if (parameter.dim() > 1) == matrices]
-            groups.append({"params": parameters, "weight_decay": decay, "multiple": multiple})
+        groups += [{**group, "multiple": multiple} for group in decayed_groups(part, settings.weight_decay)]
     return torch.optim.AdamW(groups, lr=settings.learning_rate)
-
-
-def save_atomically(content: Dict[str, Any], path: Path) -> None:
-    """Write a checkpoint so that a kill at any moment leaves the old or the new one, never a torn one."""
-    temporary = path.with_suffix(".tmp")
-    torch.save(content, temporary)
-    os.replace(temporary, path)

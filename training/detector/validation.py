@@ -13,11 +13,11 @@ from .metrics import DriveFigures, ScoredFrame, average_precision, calibrate_thr
 FALSE_REPORTS_PER_KM = 10.0
 """How many false reports the threshold may cost."""
 
-Runner = Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]]
+ForwardFunction = Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]]
 """3 x H x W normalised input to raw boxes (N x 4) and scores (N x C)."""
 
 
-def torch_runner(model: torch.nn.Module, device: torch.device, precision: str) -> Runner:
+def torch_forward(model: torch.nn.Module, device: torch.device, precision: str) -> ForwardFunction:
     """A runner of a network in evaluation mode."""
 
     @torch.no_grad()
@@ -30,22 +30,22 @@ def torch_runner(model: torch.nn.Module, device: torch.device, precision: str) -
     return run
 
 
-class Looker:
+class DetectorRunner:
     """A network that looks at whole pictures."""
 
-    def __init__(self, run: Runner, look: inference.Look = inference.Look()):
-        self.run, self.look = run, look
-        self.grid = inference.AnchorGrid.of(look.width, look.height, look.scales)
+    def __init__(self, run: ForwardFunction, view: inference.ViewConfig = inference.ViewConfig()):
+        self.run, self.view = run, view
+        self.grid = inference.AnchorGrid.of(view.width, view.height, view.scales)
 
     def views(self, pixels: np.ndarray) -> List[List[np.ndarray]]:
         """Detections (M x 5) per view and class of H x W x 3."""
-        image, scale = inference.letterbox(pixels, self.look.width, self.look.height)
+        image, scale = inference.letterbox(pixels, self.view.width, self.view.height)
         return inference.decode_views(*self.run(inference.normalise(image)), self.grid, scale, pixels.shape[1::-1])
 
     def detect(self, pixels: np.ndarray) -> List[np.ndarray]:
         """Detections (M x 5) per class."""
         views = self.views(pixels)
-        if self.look.mirrored:
+        if self.view.mirrored:
             mirrored = self.views(np.ascontiguousarray(pixels[:, ::-1]))
             views += [[inference.mirrored_boxes(found, pixels.shape[1]) for found in view] for view in mirrored]
         return inference.fuse_views(views)
@@ -72,11 +72,11 @@ class Validation:
         return drive_figures(self.potholes, calibrate_threshold(self.potholes, FALSE_REPORTS_PER_KM))
 
 
-def detect_labelled(looker: Looker, pictures: List[Picture], classes: Sequence[str]) -> Dict[str, List[ScoredFrame]]:
+def detect_labelled(runner: DetectorRunner, pictures: List[Picture], classes: Sequence[str]) -> Dict[str, List[ScoredFrame]]:
     """Detections and labels by class, in pictures that label it."""
     frames: Dict[str, List[ScoredFrame]] = {}
     for picture in pictures:
-        found = looker.detect(picture.image)
+        found = runner.detect(picture.image)
         for class_id in sorted(set(picture.labelled_classes)):
             labels, difficult = (boxes[classes == class_id] for boxes, classes in (
                 (picture.boxes, picture.classes), (picture.difficult, picture.difficult_classes)))
@@ -106,11 +106,11 @@ class HeldOut:
     by_set: Dict[str, Dict[str, ClassFigure]]
 
 
-def validate_held_out(looker: Looker, parts: Dict[str, List[Picture]], classes: Sequence[str]) -> HeldOut:
+def validate_held_out(runner: DetectorRunner, parts: Dict[str, List[Picture]], classes: Sequence[str]) -> HeldOut:
     """Detect in the held-out part of every set; a picture counts for the classes that it labels."""
     frames: Dict[str, Dict[str, List[ScoredFrame]]] = {name: {} for name in classes}
     for part, pictures in parts.items():
-        for name, of_class in detect_labelled(looker, pictures, classes).items():
+        for name, of_class in detect_labelled(runner, pictures, classes).items():
             frames[name][part] = of_class
     pooled = {name: class_figure([frame for part in parts.values() for frame in part]) for name, parts in frames.items() if parts}
     return HeldOut(
@@ -131,11 +131,11 @@ def selection_figure(held_out: HeldOut, pothole_ap: float, cone_ap: float) -> fl
     return float(np.mean([np.mean(figures) for figures in by_class.values()]))
 
 
-def validate(looker: Looker, drives: Dict[str, List[DriveFrame]], cones: List[Picture]) -> Validation:
+def validate(runner: DetectorRunner, drives: Dict[str, List[DriveFrame]], cones: List[Picture]) -> Validation:
     """Detect in every validation picture."""
     result = Validation({}, [], {})
     for name, drive in drives.items():
-        found = [looker.detect(frame.picture.image) for frame in drive]
+        found = [runner.detect(frame.picture.image) for frame in drive]
         result.potholes[name] = [
             ScoredFrame(frame.picture.boxes, detections[POTHOLE], frame.chainage_m)
             for frame, detections in zip(drive, found)
@@ -145,6 +145,6 @@ def validate(looker: Looker, drives: Dict[str, List[DriveFrame]], cones: List[Pi
             for frame, detections in zip(drive, found)
         ]
     result.cones = [
-        ScoredFrame(picture.boxes, looker.detect(picture.image)[TRAFFIC_CONE]) for picture in cones
+        ScoredFrame(picture.boxes, runner.detect(picture.image)[TRAFFIC_CONE]) for picture in cones
     ]
     return result

@@ -10,8 +10,8 @@ from detector import CLASSES
 from detector.augment import SETTLING, Augmenter, Recipe
 from detector.boxes import non_maximum_suppression
 from detector.data import POTHOLE, TRAFFIC_CONE, DataError, Picture, read_simulated
-from detector.inference import AnchorGrid, Look, decode_views, fuse, fuse_views, letterbox
-from detector.validation import Looker
+from detector.inference import AnchorGrid, ViewConfig, decode_views, fuse, fuse_views, letterbox
+from detector.validation import DetectorRunner
 
 from .synthetic import write_simulated
 
@@ -169,7 +169,7 @@ class Inference(unittest.TestCase):
 
         picture = np.zeros((32, 64, 3), np.uint8)
         picture[8:12, 12:16] = 255
-        found, = Looker(bright, Look(64, 32, mirrored=True)).detect(picture)
+        found, = DetectorRunner(bright, ViewConfig(64, 32, mirrored=True)).detect(picture)
         np.testing.assert_allclose(found, [[12, 8, 16, 12, 0.6]], rtol=1e-5)
 
     def test_suppression_keeps_the_best(self):

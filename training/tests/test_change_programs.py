@@ -13,6 +13,7 @@ import predict_change
 import simulate_change
 import train_change
 import train_change_surroundings
+from common import training
 from change import data, onnx_model
 from change.manifest import read_manifest
 from change.exported import load_exported
@@ -63,7 +64,7 @@ class ChangePrograms(unittest.TestCase):
     def test_a_stopped_run_continues_as_if_it_had_not(self):
         self.assertEqual(self.train("whole"), (0, ""))
         whole = torch.load(self.root / "whole" / "last.pt")
-        save = train_change.save_atomically
+        save = training.save_atomically
         for stop_after in (1, 2):
             def stop(content, path):
                 save(content, path)
@@ -71,12 +72,12 @@ class ChangePrograms(unittest.TestCase):
                     raise KeyboardInterrupt
 
             out = f"stopped{stop_after}"
-            train_change.save_atomically = stop
+            training.save_atomically = stop
             try:
                 with self.assertRaises(KeyboardInterrupt):
                     self.train(out)
             finally:
-                train_change.save_atomically = save
+                training.save_atomically = save
             self.assertEqual(self.train(out, "--resume"), (0, ""))
             continued = torch.load(self.root / out / "last.pt")
             for name, tensor in whole["average"].items():
@@ -102,7 +103,7 @@ class ChangePrograms(unittest.TestCase):
         for name, tensor in before.items():
             if not name.startswith("surroundings."):
                 torch.testing.assert_close(learnt[name], tensor, rtol=0, atol=0, msg=name)
-        self.assertFalse(torch.equal(learnt["surroundings.judges.0.verdict.bias"], before["surroundings.judges.0.verdict.bias"]))
+        self.assertFalse(torch.equal(learnt["surroundings.refiners.0.correction.bias"], before["surroundings.refiners.0.correction.bias"]))
         for fixed in ("surroundings.prior.unseen.weight", "surroundings.weigh.weight"):
             self.assertTrue(torch.equal(learnt[fixed], before[fixed]))
         status, errors = learn("around")
@@ -165,7 +166,7 @@ class ChangePrograms(unittest.TestCase):
 
     def test_an_exported_network_can_be_taken_up_again(self):
         torch.manual_seed(4)
-        network = ChangeNetwork(judges=2).eval()
+        network = ChangeNetwork(refiners=2).eval()
         shake(network)  # the exporter stores equal tensors once
         onnx_model.export(network, self.root, "kept", ["whole"])
         inputs = [torch.from_numpy(part) for part in onnx_model.golden_inputs()]
@@ -173,7 +174,19 @@ class ChangePrograms(unittest.TestCase):
             taken_up, expected = (one.detect(*inputs) for one in (load_exported(self.root / "kept.onnx"), network))
         torch.testing.assert_close(taken_up, expected, rtol=0, atol=1e-4)
 
-    def test_judges_of_several_runs_give_their_mean_verdict(self):
+    def test_weights_with_names_of_earlier_versions_are_taken_up(self):
+        state = ChangeNetwork().state_dict()
+        earlier = {name.replace(".refiners.", ".judges.").replace(".correction.", ".verdict."): value for name, value in state.items()}
+        self.assertNotEqual(list(earlier), list(state))
+        path = self.root / "earlier.pt"
+        torch.save({"settings": {"architecture": "change-small"}, "average": earlier}, path)
+        for name, value in export_change.load_averaged(path).state_dict().items():
+            self.assertTrue(torch.equal(value, state[name]), name)
+        shipped = load_exported(Path(__file__).resolve().parents[2] / "models" / "change-small.onnx")
+        self.assertEqual(len(shipped.surroundings.refiners), 3)
+        self.assertTrue((shipped.surroundings.refiners[2].correction.weight != 0).any())
+
+    def test_refiners_of_several_runs_give_their_mean_correction(self):
         torch.manual_seed(5)
         base = ChangeNetwork().eval()
         checkpoints, log_odds = [], []
@@ -181,18 +194,18 @@ class ChangePrograms(unittest.TestCase):
         unseen = base.unseen_cells(inputs[2])
         for run in range(3):
             shake(base.surroundings)
-            checkpoints.append(self.root / f"judge{run}.pt")
+            checkpoints.append(self.root / f"refiner{run}.pt")
             torch.save({"settings": {"architecture": "change-small"}, "average": base.state_dict()}, checkpoints[-1])
             with torch.no_grad():
-                log_odds.append(base.judge(*map(base.encode, inputs[:2]), unseen))
-        joined = export_change.load_together(checkpoints)
+                log_odds.append(base.refined(*map(base.encode, inputs[:2]), unseen))
+        joined = export_change.load_ensemble(checkpoints)
         with torch.no_grad():
-            found = joined.judge(*map(joined.encode, inputs[:2]), unseen)
+            found = joined.refined(*map(joined.encode, inputs[:2]), unseen)
         torch.testing.assert_close(found, torch.stack(log_odds).mean(dim=0), rtol=0, atol=1e-4)
         shake(base.encoder)
         torch.save({"settings": {"architecture": "change-small"}, "average": base.state_dict()}, checkpoints[1])
         with self.assertRaisesRegex(export_change.ExportError, "different networks"):
-            export_change.load_together(checkpoints)
+            export_change.load_ensemble(checkpoints)
 
     def check_predictions(self, manifest, checkpoint):
         """OpenCV and torch write the same for the evaluation, and what cannot be registered was not seen."""

@@ -14,6 +14,7 @@ import yaml
 
 import export_discard
 import train_discard
+from common import training
 from detector import CLASSES, onnx_model
 from detector.data import Picture
 from detector.loss import Target
@@ -141,19 +142,19 @@ class Programs(unittest.TestCase):
 
     def test_a_stopped_run_continues_as_if_it_had_not_and_its_export_is_the_same_in_opencv(self):
         self.assertEqual(self.train("whole"), (0, ""))
-        save = train_discard.save_atomically
+        save = training.save_atomically
 
         def stop_after_second(content, path):
             save(content, path)
             if content["epoch"] == 2:
                 raise KeyboardInterrupt
 
-        train_discard.save_atomically = stop_after_second
+        training.save_atomically = stop_after_second
         try:
             with self.assertRaises(KeyboardInterrupt):
                 self.train("stopped")
         finally:
-            train_discard.save_atomically = save
+            training.save_atomically = save
         self.assertEqual(self.train("stopped", "--resume"), (0, ""))
         whole, continued = (torch.load(self.root / name / "last.pt")["average"] for name in ("whole", "stopped"))
         for name, tensor in whole.items():

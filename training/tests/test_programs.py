@@ -15,6 +15,7 @@ import evaluate_detector
 import export_detector
 import export_torch
 import train_detector
+from common import training
 from detector import CLASSES, onnx_model, pretrained
 from detector.manifest import sha256_of
 from detector.network import SIZES, Backbone, Detector, Widths
@@ -57,19 +58,19 @@ class Programs(unittest.TestCase):
         self.assertEqual(self.train("whole"), (0, ""))
         whole = torch.load(self.root / "whole" / "last.pt")
 
-        save = train_detector.save_atomically
+        save = training.save_atomically
 
         def stop_after_second(content, path):
             save(content, path)
             if content["epoch"] == 2:
                 raise KeyboardInterrupt
 
-        train_detector.save_atomically = stop_after_second
+        training.save_atomically = stop_after_second
         try:
             with self.assertRaises(KeyboardInterrupt):
                 self.train("stopped")
         finally:
-            train_detector.save_atomically = save
+            training.save_atomically = save
         self.assertEqual(self.train("stopped", "--resume"), (0, ""))
         continued = torch.load(self.root / "stopped" / "last.pt")
         self.assertEqual(continued["epoch"], 3)
