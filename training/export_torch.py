@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Give a model its TorchScript file, for the torch engine, made from its ONNX file.
 
-    training/export_torch.py models/hazards-first.yaml
+    training/export_torch.py models/hazards-base.yaml
 
 Writes NAME.pt beside the manifest and its name and hash into the manifest, after comparing it with OpenCV on random
 input. The rest of the manifest, comments included, stays as it is.

@@ -1,6 +1,7 @@
 """Detection figures: average precision, event recall and false reports along a drive.
 
-The same definitions as `livemap evaluate detection`. All boxes are N x 4 corners in pixels; detections
+The same definitions as `livemap evaluate detection`, by which the figures of the model cards are measured; here they
+choose weights and thresholds while a network is trained, where no exported model exists and no tree is built. All boxes are N x 4 corners in pixels; detections
 are N x 5, corners and score.
 """
 
@@ -77,17 +78,21 @@ def driven_km(drive: Drive) -> float:
     return float(np.minimum(np.diff([frame.chainage_m for frame in drive]), NEAR_M).sum() / 1000)
 
 
-def events(drive: Drive) -> List[List[ScoredFrame]]:
-    """Maximal runs of labelled frames whose neighbours are at most NEAR_M apart."""
-    runs: List[List[ScoredFrame]] = []
-    for frame in drive:
-        if not len(frame.labels):
-            continue
-        if runs and frame.chainage_m - runs[-1][-1].chainage_m <= NEAR_M:
-            runs[-1].append(frame)
+def runs_of(marked: Sequence[bool], chainage_m: Sequence[float]) -> List[List[int]]:
+    """Maximal runs of marked frames whose neighbours are at most NEAR_M apart: the indices of each run's frames."""
+    runs: List[List[int]] = []
+    for index in np.flatnonzero(marked):
+        if runs and chainage_m[index] - chainage_m[runs[-1][-1]] <= NEAR_M:
+            runs[-1].append(int(index))
         else:
-            runs.append([frame])
+            runs.append([int(index)])
     return runs
+
+
+def events(drive: Drive) -> List[List[ScoredFrame]]:
+    """Runs of labelled frames."""
+    runs = runs_of([len(frame.labels) > 0 for frame in drive], [frame.chainage_m for frame in drive])
+    return [[drive[index] for index in run] for run in runs]
 
 
 def recall_score(event: List[ScoredFrame], iou: float) -> float:

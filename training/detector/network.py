@@ -45,12 +45,11 @@ class Widths:
 
 
 SIZES = {
-    "first": Widths(),
     "small": Widths(pyramid=(32, 64, 64), context=64),
     "medium": Widths(pyramid=(48, 96, 128), deep=88),
     "base": Widths(pyramid=(48, 96, 128), deep=256),
 }
-"""Networks by name: 1.19 M, 0.96 M, 1.97 M and 4.25 M parameters."""
+"""Networks by name: 0.96 M, 1.97 M and 4.25 M parameters."""
 
 
 class ConvBlock(nn.Sequential):

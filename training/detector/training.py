@@ -21,7 +21,7 @@ from .network import Detector
 class Settings:
     """What determines a training run. A resumed run must have been started with the same settings."""
 
-    size: str = "first"  # of network.SIZES
+    size: str = "medium"  # of network.SIZES
     seed: int = 1
     epochs: int = 120
     samples_per_epoch: int = 960

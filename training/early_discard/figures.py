@@ -6,7 +6,7 @@ from typing import Dict, List
 import numpy as np
 
 from detector.data import DriveFrame
-from detector.metrics import NEAR_M
+from detector.metrics import runs_of
 
 from .labels import holds_hazard
 
@@ -31,17 +31,7 @@ def score_drive(frames: List[DriveFrame], score) -> ScoredDrive:
 
 def event_scores(drive: ScoredDrive) -> List[float]:
     """Per event (a run of frames with hazards at most NEAR_M apart) the best score of its frames."""
-    best: List[float] = []
-    last_m = -np.inf
-    for score, hazard, at_m in zip(drive.scores, drive.hazards, drive.chainage_m):
-        if not hazard:
-            continue
-        if at_m - last_m <= NEAR_M:
-            best[-1] = max(best[-1], float(score))
-        else:
-            best.append(float(score))
-        last_m = at_m
-    return best
+    return [float(drive.scores[run].max()) for run in runs_of(drive.hazards, drive.chainage_m)]
 
 
 def threshold_for_recall(drives: Dict[str, ScoredDrive], recall: float) -> float:

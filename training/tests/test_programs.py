@@ -51,7 +51,7 @@ class Programs(unittest.TestCase):
         """Three tiny epochs, the last one of whole frames."""
         return quietly(
             train_detector, "--data", self.data, "--out", self.root / out, "--epochs", 3, "--samples-per-epoch", 4,
-            "--batch", 2, "--workers", 0, "--threads", 1, "--device", "cpu", "--validate-every", 3, *more,
+            "--batch", 2, "--workers", 0, "--threads", 1, "--device", "cpu", "--validate-every", 3, "--size", "small", *more,
         )
 
     def test_a_stopped_run_continues_as_if_it_had_not(self):
