@@ -52,7 +52,7 @@ def print_figures(found: Validation, manifest: Manifest) -> None:
     print(f"cone_ap50: {found.cone_ap(0.5):.3f}")
     print(f"cone_threshold: {cone_limit}")
     print(f"cone_f1: {f1_score(found.cones, cone_limit, 0.5):.3f}")
-    on_drives = drive_figures(found.cones_on_drives, cone_limit).false_reports_per_km
+    on_drives = drive_figures(found.others_on_drives[data.TRAFFIC_CONE], cone_limit).false_reports_per_km
     print(f"cone_reports_per_km_on_survey_drives: {on_drives:.2f}")
 
 

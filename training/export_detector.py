@@ -23,9 +23,9 @@ import torch
 import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import CLASSES, data, inference, onnx_model, pretrained
+from detector import CLASSES, data, inference, onnx_model, pretrained, sets
 from detector.manifest import ManifestError, classes_of, write_manifest
-from detector.metrics import average_precision, best_f1_threshold
+from detector.metrics import average_precision, best_f1_threshold, calibrate_threshold
 from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
 from detector.validation import DetectorRunner, detect_labelled, validate
@@ -35,6 +35,9 @@ TOLERANCE = 1e-3
 """Largest difference between OpenCV and torch, in raw units, that an export may have."""
 
 GOLDEN_ROWS = 24
+
+MOST_ON_DRIVES = 1.0
+"""Reports per km of a class on survey drives that show hardly any of it, at the threshold that photos of the sets choose."""
 
 LEAST_THRESHOLD = 0.2
 """Of a class learnt from simulated drives: one that is hardly found would otherwise be reported everywhere."""
@@ -154,15 +157,22 @@ def write_golden(path: Path, weights: Path, size: Tuple[int, int]) -> None:
 
 
 def calibrate(runner: DetectorRunner, arguments: argparse.Namespace, classes: Tuple[str, ...], drives: dict, cones: list) -> Dict[str, float]:
-    """A threshold for each class; real pictures count more than simulated ones."""
+    """A threshold for each class; real pictures count more than simulated ones, and own ones most.
+
+    Photos of the sets nearly all show a hazard: there the threshold is not lower than the survey's drives allow, which show none.
+    """
     thresholds = {name: UNCALIBRATED_THRESHOLD for name in classes}
-    simulated = data.read_simulated(arguments.simulated) if arguments.simulated else []
-    own = [picture for pictures in data.read_own(arguments.own, classes).values() for picture in pictures]
-    for kind, pictures in (("simulated", simulated), ("own", own)):
-        for name, frames in detect_labelled(runner, pictures, classes).items():
-            thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
-            print(f"{kind} {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
     found = validate(runner, drives, cones)
+    simulated = data.read_simulated(arguments.simulated) if arguments.simulated else []
+    of_sets = sets.read_pictures(sets.read_catalogue(arguments.sets), arguments.data).held_out if arguments.sets else {}
+    parts = {"simulated": [simulated], "held-out": of_sets.values(), "own": data.read_own(arguments.own, classes).values()}
+    for kind, groups in parts.items():
+        for name, frames in detect_labelled(runner, [picture for group in groups for picture in group], classes).items():
+            if any(len(frame.labels) for frame in frames):
+                thresholds[name] = max(best_f1_threshold(frames, 0.5), LEAST_THRESHOLD)
+                if kind == "held-out" and drives:
+                    thresholds[name] = max(thresholds[name], calibrate_threshold(found.others_on_drives[classes.index(name)], MOST_ON_DRIVES))
+                print(f"{kind} {name}: AP50 {average_precision(frames, 0.5):.3f} at threshold {thresholds[name]}")
     if drives:
         thresholds["pothole"] = found.best_drive_figures().threshold
     if cones:
@@ -206,6 +216,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets; none: calibrate on own and simulated pictures alone")
     parser.add_argument("--own", type=Path, metavar="DIR", action="append", default=[], help="pictures of your own that were held back from training; may be repeated")
+    parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of photos as the training had them: their held-out parts calibrate")
     parser.add_argument("--simulated", type=Path, help="folder of simulated validation drives (training/simulate_drives.py)")
     parser.add_argument("--input", type=input_size, default=(inference.INPUT_WIDTH, inference.INPUT_HEIGHT), metavar="WIDTHxHEIGHT", help="of the network (640x400)")
     parser.add_argument("--scales", type=view_scales, default=(1.0,), metavar="S,...", help="views of the picture whose findings are fused (1)")

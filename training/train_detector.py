@@ -9,7 +9,7 @@ A run that was stopped, at whatever moment, continues with the same command and 
 import argparse
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
 
@@ -20,7 +20,7 @@ from common.training import (
     EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
     checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, prepare_device,
 )
-from detector import data, sets, signs
+from detector import data, sets
 from detector.augment import Augmenter
 from detector.loss import TaskAlignedLoss
 from detector.manifest import ManifestError, classes_of
@@ -80,11 +80,11 @@ class Trainer(Run):
         self.ema = ModelEma(self.model)
 
     def start_from_others(
-        self, backbone: Optional[Path], exported: Optional[Path], pictures: dict, faces: Optional[signs.Faces] = None
+        self, backbone: Optional[Path], exported: Optional[Path], pictures: dict, pasted: Optional[sets.Pasted] = None
     ) -> None:
         """Begin with the backbone of another network, with what an exported detector shares with ours, or with both."""
         views = VIEWS["crops"]
-        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, classes=self.settings.classes, faces=faces)
+        augmenter = Augmenter(pictures, views.recipe, views.width, views.height, classes=self.settings.classes, pasted=pasted)
         samples = EpochSamples(augmenter, self.settings.seed, 0, CALIBRATION_SAMPLES)
         images, targets = next(iter(batches(samples, CALIBRATION_SAMPLES, 0)))
         images = to_device(images, targets, self.device)[0]
@@ -95,14 +95,14 @@ class Trainer(Run):
             print(f"{load_exported(self.model, exported, images)} convolutions are those of {exported}", flush=True)
         self.ema = ModelEma(self.model)
 
-    def train_epoch(self, pictures: dict, workers: int, faces: Optional[signs.Faces] = None) -> dict:
+    def train_epoch(self, pictures: dict, workers: int, pasted: Optional[sets.Pasted] = None) -> dict:
         """One pass over freshly drawn samples; returns mean losses."""
         settings = self.settings
         # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
         torch.manual_seed(settings.seed * 100003 + self.epoch)
         views = settings.views_of(self.epoch)
         augmenter = Augmenter(
-            pictures, views.recipe, views.width, views.height, settings.simulated_share, settings.classes, faces
+            pictures, views.recipe, views.width, views.height, settings.simulated_share, settings.classes, pasted
         )
         batch, count = round(settings.batch * views.share), round(settings.samples_per_epoch * views.share)
         loader = batches(EpochSamples(augmenter, settings.seed, self.epoch, count), batch, workers)
@@ -150,6 +150,7 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets; none: own and simulated pictures alone")
     parser.add_argument("--own", type=Path, metavar="DIR", action="append", default=[], help="your own pictures: images/, labels/ and classes.txt, which may name new classes; may be repeated")
     parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data, such as training/real_hazards.yaml")
+    parser.add_argument("--cut-outs", action="store_true", help="hazards of the sets' photos are cut out and put onto the roads of others")
     parser.add_argument("--leave-out", metavar="SET", action="append", default=[], help="a set that is held out as a whole; may be repeated")
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
     parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights, or an exported .onnx, to begin a new run with")
@@ -192,31 +193,6 @@ def catalogue_of(arguments: argparse.Namespace) -> sets.Catalogue:
     return sets.read_catalogue(arguments.sets) if arguments.sets else sets.Catalogue((), {})
 
 
-@dataclass
-class SetPictures:
-    """What the sets add: groups to train on, parts to measure on, and the signs to put into pictures."""
-
-    groups: Dict[str, List[data.Picture]]
-    held_out: Dict[str, List[data.Picture]]
-    faces: Optional[signs.Faces] = None
-
-
-def read_sets(arguments: argparse.Namespace) -> SetPictures:
-    """The pictures of --sets."""
-    catalogue = catalogue_of(arguments)
-    splits = sets.read_splits(catalogue, arguments.data, arguments.leave_out)
-    result = SetPictures({f"set:{name}": split.training for name, split in splits.items() if split.training}, {})
-    result.held_out = {name: split.held_out for name, split in splits.items() if split.held_out}
-    if catalogue.signs:
-        folder, kind, class_name = (catalogue.signs[key] for key in ("folder", "kind", "class"))
-        streets = sets.backgrounds(catalogue, splits)
-        result.faces = signs.read_faces(arguments.data / folder, kind, held_out=False)
-        result.groups["composed"] = streets.training
-        held_out_faces = signs.read_faces(arguments.data / folder, kind, held_out=True)
-        result.held_out["composed"] = signs.compose_held_out(streets.held_out, held_out_faces, class_name)
-    return result
-
-
 def read_pictures(arguments: argparse.Namespace, settings: Settings) -> Dict[str, List[data.Picture]]:
     """Training pictures by group, without those of the sets."""
     pictures = {} if data.is_none(arguments.data) else data.read_training_pictures(arguments.data)
@@ -241,12 +217,13 @@ def run(arguments: argparse.Namespace) -> None:
         checkpoint = checkpoint_to_start_from(arguments)
         if not exported(arguments):
             trainer.start_from(torch.load(checkpoint, map_location=device))
-    pictures, of_sets = read_pictures(arguments, settings), read_sets(arguments)
+    pictures = read_pictures(arguments, settings)
+    of_sets = sets.read_pictures(catalogue_of(arguments), arguments.data, arguments.leave_out, settings.cut_outs)
     pictures.update(of_sets.groups)
-    if of_sets.faces:  # signs stand in street photos too, where no cone says that there are road works
+    if of_sets.pasted and "cones" in pictures:  # signs stand in street photos too, where no cone says that there are road works
         pictures["composed"] += [picture for picture in pictures["cones"] if not len(picture.boxes)]
     if (arguments.pretrained or exported(arguments)) and not begun:
-        trainer.start_from_others(arguments.pretrained, exported(arguments), pictures, of_sets.faces)
+        trainer.start_from_others(arguments.pretrained, exported(arguments), pictures, of_sets.pasted)
     drives = data.read_validation_drives(arguments.data)
     cones = data.read_validation_cones(arguments.data)
 
@@ -256,7 +233,7 @@ def run(arguments: argparse.Namespace) -> None:
         return report
 
     trainer.run(
-        arguments.out, lambda: trainer.train_epoch(pictures, arguments.workers, of_sets.faces),
+        arguments.out, lambda: trainer.train_epoch(pictures, arguments.workers, of_sets.pasted),
         measure if drives or of_sets.held_out else None, arguments.validate_every,
     )
 

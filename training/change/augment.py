@@ -10,12 +10,12 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import cv2
 import numpy as np
 
+from common.pasting import CutOut
 from detector.augment import cast_shadows, ratio, relight
 
 from .classes import NO_CHANGE
 from .data import IGNORED, Pair, Scene
 from .inference import PAD_VALUE, fill_invalid
-from .objects import CutOut
 from .paste import paste_pair
 
 

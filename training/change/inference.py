@@ -2,15 +2,18 @@
 
 import numpy as np
 
-from detector.inference import MEAN, PAD_VALUE, STD, normalise  # noqa: F401: the same for both networks
-from detector.inference import letterbox as letterbox_to
+from detector import inference
+
+MEAN, STD, PAD_VALUE = inference.MEAN, inference.STD, inference.PAD_VALUE
+normalise = inference.normalise
+"""As in the detector."""
 
 INPUT_WIDTH, INPUT_HEIGHT = 320, 256
 
 
 def letterbox(image: np.ndarray) -> np.ndarray:
     """An H x W x 3 picture scaled to fit the network's input, padded on the right and at the bottom."""
-    return letterbox_to(image, INPUT_WIDTH, INPUT_HEIGHT)[0]
+    return inference.letterbox(image, INPUT_WIDTH, INPUT_HEIGHT)[0]
 
 
 def fill_invalid(warped: np.ndarray, other: np.ndarray, validity: np.ndarray) -> np.ndarray:

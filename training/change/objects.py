@@ -1,12 +1,12 @@
-"""Cut-out objects and putting them into photos, standing on the road at the size that the perspective asks for."""
+"""Objects cut out of simulated pictures, photos and crops of signs (common/pasting.py puts them into photos)."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, List, Sequence, Tuple
+from typing import Dict, List, Sequence
 
 import cv2
 import numpy as np
 
+from common.pasting import CONE, CutOut, cut_box
 from detector.data import DataError
 
 from .classes import CLASSES, NO_CHANGE
@@ -35,26 +35,6 @@ SIGN_OUTLINES = {"general_caution": "up", "road_work": "up", "wild_animals": "up
 """Triangles, by the corner that stands alone; the other kinds are round, or nearly."""
 
 
-@dataclass
-class CutOut:
-    """An object without what was around it."""
-
-    rgba: np.ndarray  # H x W x 4 uint8
-    class_id: int
-
-
-@dataclass(frozen=True)
-class Ground:
-    """How large things are at which row of a photo: the horizon's row, and the camera's height above the road."""
-
-    horizon_px: float
-    camera_m: float
-
-    def height_px(self, object_m: float, row: float) -> float:
-        """Of an upright object whose foot is at that row."""
-        return object_m / self.camera_m * (row - self.horizon_px)
-
-
 def cut_scene(scene: Scene) -> List[CutOut]:
     """The connected objects of a simulated picture that the border does not cut."""
     found = []
@@ -72,28 +52,6 @@ def cut_scene(scene: Scene) -> List[CutOut]:
     return found
 
 
-def cut_cone(image: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """A cone of a photo (box: corners in pixels) as RGBA, its outline found by GrabCut; empty where that fails."""
-    height, width = image.shape[:2]
-    margin = 0.25 * (box[2:] - box[:2])
-    left, top = np.maximum(np.floor(box[:2] - margin), 0).astype(int)
-    right, bottom = np.minimum(np.ceil(box[2:] + margin), [width, height]).astype(int)
-    window = np.ascontiguousarray(image[top:bottom, left:right])
-    inner = np.round(box - [left, top, left, top]).astype(int)
-    labels = np.full(window.shape[:2], cv2.GC_BGD, np.uint8)
-    labels[inner[1] : inner[3], inner[0] : inner[2]] = cv2.GC_PR_BGD
-    corners = np.array([[(inner[0] + inner[2]) // 2, inner[1]], [inner[0], inner[3]], [inner[2], inner[3]]])
-    cv2.fillPoly(labels, [corners], cv2.GC_PR_FGD)
-    cv2.setRNGSeed(1)
-    cv2.grabCut(window, labels, None, np.zeros((1, 65)), np.zeros((1, 65)), 3, cv2.GC_INIT_WITH_MASK)
-    alpha = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.uint8) * 255
-    part = (slice(inner[1], inner[3]), slice(inner[0], inner[2]))
-    share = alpha[part].mean() / 255 if alpha[part].size else 0
-    if not 0.25 < share < 0.85:
-        return np.zeros((0, 0, 4), np.uint8)
-    return np.dstack([window[part], alpha[part]])
-
-
 def read_cones(data: Path, validation: bool) -> List[CutOut]:
     """Cones of the street photos that are large enough."""
     split, found = "val" if validation else "train", []
@@ -109,7 +67,7 @@ def read_cones(data: Path, validation: bool) -> List[CutOut]:
             scale = min(CONE_HEIGHT_PX / (high * image.shape[0]), 1.0)
             small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
             centre, size = (np.array(part) * small.shape[1::-1] for part in ((x, y), (wide, high)))
-            rgba = cut_cone(small, np.concatenate([centre - size / 2, centre + size / 2]))
+            rgba = cut_box(small, np.concatenate([centre - size / 2, centre + size / 2]), CONE)
             if rgba.size:
                 found.append(CutOut(rgba, CLASSES.index("traffic_cone")))
     return found
@@ -150,34 +108,3 @@ def read_cut_outs(data: Path, scenes: Sequence[Scene], validation: bool) -> Dict
     for cut_out in cut_outs:
         by_class.setdefault(cut_out.class_id, []).append(cut_out)
     return by_class
-
-
-def paste(
-    image: np.ndarray, instances: np.ndarray, cut_out: CutOut, instance: int, foot: Tuple[float, float], height_px: float,
-    gain: float, mirrored: bool,
-) -> None:
-    """Put an object's lowest middle point at `foot` (x, row), in place; `instances` gets its number where it covers."""
-    scale = height_px / cut_out.rgba.shape[0]
-    size = max(round(cut_out.rgba.shape[1] * scale), 2), max(round(height_px), 2)
-    patch = cv2.resize(cut_out.rgba, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
-    if mirrored:
-        patch = patch[:, ::-1]
-    left, top = round(foot[0] - size[0] / 2), round(foot[1] - size[1])
-    x1, y1 = max(left, 0), max(top, 0)
-    x2, y2 = min(left + size[0], image.shape[1]), min(top + size[1], image.shape[0])
-    if x1 >= x2 or y1 >= y2:
-        return
-    patch = patch[y1 - top : y2 - top, x1 - left : x2 - left]
-    alpha = patch[..., 3:].astype(np.float32) / 255
-    place = image[y1:y2, x1:x2]
-    place[:] = (place * (1 - alpha) + (patch[..., :3] * gain).clip(0, 255) * alpha).astype(np.uint8)
-    instances[y1:y2, x1:x2][alpha[..., 0] > 0.5] = instance
-
-
-def cast_contact_shadow(image: np.ndarray, foot: Tuple[float, float], width_px: float, darkness: float) -> None:
-    """A dark spot on the road under an object, in place: no part of it."""
-    shade = np.zeros(image.shape[:2], np.float32)
-    axes = (max(round(0.6 * width_px), 1), max(round(0.12 * width_px), 1))
-    cv2.ellipse(shade, (round(foot[0]), round(foot[1])), axes, 0, 0, 360, darkness, -1)
-    shade = cv2.GaussianBlur(shade, (0, 0), max(0.08 * width_px, 0.6))
-    image[:] = (image * (1 - shade[..., None])).astype(np.uint8)

@@ -4,8 +4,10 @@ from typing import Dict, List, Tuple
 
 import numpy as np
 
+from common.pasting import CutOut, Ground, cast_contact_shadow, paste
+
 from .classes import CLASSES, NO_CHANGE
-from .objects import CLASS_SHARES, HEIGHTS_M, MOST_ENLARGED, CutOut, Ground, cast_contact_shadow, paste
+from .objects import CLASS_SHARES, HEIGHTS_M, MOST_ENLARGED
 
 MOST_OBJECTS = 6
 FATES = ("stays", "appears", "vanishes", "replaced")

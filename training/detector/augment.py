@@ -10,7 +10,7 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import cv2
 import numpy as np
 
-from . import CLASSES, inference, signs
+from . import CLASSES, inference, sets
 from . import boxes as box_math
 from .data import POTHOLE, Picture
 
@@ -143,9 +143,6 @@ def ratio(rng: np.random.Generator, spread: float) -> float:
     return float(np.exp(rng.uniform(-1, 1) * np.log(spread)))
 
 
-SIGN = "road_work_sign"
-
-
 def group_shares(weights: Dict[str, float], simulated_share: float) -> Dict[str, float]:
     """How often each group is drawn, from the sums of its pictures' weights. They add up to 1."""
     kinds = {kind_of(name) for name in weights}
@@ -161,9 +158,9 @@ class Augmenter:
 
     def __init__(
         self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int,
-        simulated_share: float = GROUP_SHARES["simulated"], classes: Sequence[str] = CLASSES, faces: Optional[signs.Faces] = None,
+        simulated_share: float = GROUP_SHARES["simulated"], classes: Sequence[str] = CLASSES, pasted: Optional[sets.Pasted] = None,
     ):
-        self.faces = faces  # of signs, for the group "composed"
+        self.pasted = pasted  # what is put into the pictures of the group "composed"
         self.groups, self.recipe, self.class_count = groups, recipe, len(classes)
         self.width, self.height = width, height
         self.names = sorted((name for name in groups if groups[name]), key=lambda name: list(GROUP_SHARES).index(kind_of(name)))
@@ -247,7 +244,7 @@ class Augmenter:
             picture = self.paste_potholes(rng, picture)
         kind = kind_of(name)
         if kind == "composed":
-            picture = signs.compose(rng, picture, self.faces, SIGN)
+            picture = self.pasted.into(rng, picture)
         scale_y = self.scale_of(rng, kind, picture) * ratio(rng, self.recipe.scale_spread)
         scale_x = scale_y * ratio(rng, self.recipe.aspect_spread)
         left, top = self.place_window(rng, picture, width / scale_x, height / scale_y)

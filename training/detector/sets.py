@@ -6,14 +6,17 @@ training/real_hazards.yaml is such a file, and explains the entries.
 import fnmatch
 import hashlib
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Dict, List, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import yaml
 
-from . import CLASSES
+from common.pasting import CutOut
+
+from . import CLASSES, signs
+from .cutouts import put_objects, read_cut_outs
 from .data import DataError, Picture, read_class_names, read_picture, weigh_by_rarest_class
 
 EVERY_BLOCK, FIRST_BLOCK = 5, 1
@@ -149,3 +152,50 @@ def backgrounds(catalogue: Catalogue, splits: Dict[str, Split]) -> Split:
     """Pictures that signs may be put into."""
     chosen = [splits[one.name] for one in catalogue.sets if one.background]
     return Split([p for split in chosen for p in split.training], [p for split in chosen for p in split.held_out])
+
+
+@dataclass
+class Pasted:
+    """What is put into street photos to train on: signs, and hazards cut out of other photos."""
+
+    faces: signs.Faces
+    sign_class: str
+    cut_outs: Dict[int, List[CutOut]] = field(default_factory=dict)
+
+    def into(self, rng: np.random.Generator, picture: Picture) -> Picture:
+        """A picture with one to three signs and, where there are cut-outs, some of these. Their classes are labelled."""
+        composed = signs.compose(rng, picture, self.faces, self.sign_class)
+        if not self.cut_outs:
+            return composed
+        boxes, classes = put_objects(rng, composed.image, self.cut_outs, composed.boxes)
+        return replace(
+            composed, boxes=np.vstack([composed.boxes, boxes]).astype(np.float32), classes=np.concatenate([composed.classes, classes])
+        )
+
+
+@dataclass
+class SetPictures:
+    """What the sets bring: groups to train on, parts to measure on, and what is put into pictures."""
+
+    groups: Dict[str, List[Picture]]
+    held_out: Dict[str, List[Picture]]
+    pasted: Optional[Pasted] = None
+
+
+def read_pictures(catalogue: Catalogue, data: Path, left_out: Sequence[str] = (), cut: bool = False) -> SetPictures:
+    """The pictures of all sets; signs make a group and a held-out part of their own, "composed".
+
+    `cut`: hazards of the training parts are cut out, to be put into pictures to train on too.
+    """
+    splits = read_splits(catalogue, data, left_out)
+    result = SetPictures({f"set:{name}": split.training for name, split in splits.items() if split.training}, {})
+    result.held_out = {name: split.held_out for name, split in splits.items() if split.held_out}
+    if catalogue.signs:
+        folder, streets = data / catalogue.signs["folder"], backgrounds(catalogue, splits)
+        faces, held_out_faces = (signs.read_faces(folder, catalogue.signs["kind"], held_out) for held_out in (False, True))
+        result.pasted = Pasted(faces, catalogue.signs["class"])
+        if cut:
+            result.pasted.cut_outs = read_cut_outs([split.training for split in splits.values()])
+        result.groups["composed"] = streets.training
+        result.held_out["composed"] = signs.compose_held_out(streets.held_out, held_out_faces, catalogue.signs["class"])
+    return result

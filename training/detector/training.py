@@ -36,6 +36,7 @@ class Settings:
     simulated_share: float = GROUP_SHARES["simulated"]  # of the samples, where there are simulated drives
     classes: Tuple[str, ...] = CLASSES  # in the order of the outputs
     sets: str = ""  # digest of the file of sets: another split is another run
+    cut_outs: bool = False  # hazards of the sets are put onto the roads of other photos
     left_out: Tuple[str, ...] = ()  # sets that are not trained on at all
 
     def views_of(self, epoch: int) -> "Views":

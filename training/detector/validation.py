@@ -57,7 +57,7 @@ class Validation:
 
     potholes: Dict[str, List[ScoredFrame]]  # by drive
     cones: List[ScoredFrame]
-    cones_on_drives: Dict[str, List[ScoredFrame]]  # drives do not label cones: nearly all of these are false
+    others_on_drives: Dict[int, Dict[str, List[ScoredFrame]]]  # by class and drive; drives label potholes only: nearly all are false
 
     def pothole_ap(self, iou: float) -> float:
         """Average precision over the frames of all drives."""
@@ -140,10 +140,10 @@ def validate(runner: DetectorRunner, drives: Dict[str, List[DriveFrame]], cones:
             ScoredFrame(frame.picture.boxes, detections[POTHOLE], frame.chainage_m)
             for frame, detections in zip(drive, found)
         ]
-        result.cones_on_drives[name] = [
-            ScoredFrame(np.zeros((0, 4)), detections[TRAFFIC_CONE], frame.chainage_m)
-            for frame, detections in zip(drive, found)
-        ]
+        for class_id in range(len(found[0]) if found else 0):
+            result.others_on_drives.setdefault(class_id, {})[name] = [
+                ScoredFrame(np.zeros((0, 4)), detections[class_id], frame.chainage_m) for frame, detections in zip(drive, found)
+            ]
     result.cones = [
         ScoredFrame(picture.boxes, runner.detect(picture.image)[TRAFFIC_CONE]) for picture in cones
     ]

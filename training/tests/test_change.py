@@ -19,7 +19,7 @@ from change.loss import change_loss, class_weights
 from change.metrics import PixelCounts
 from change.network import ChangeNetwork, ThesisNetwork, Widths, beyond, widened
 from change.surroundings import UNSEEN_CHANGE
-from change.objects import CutOut, Ground
+from common.pasting import CutOut, Ground
 from change.paste import paste_pair
 from change.validation import registered_pairs, validate
 

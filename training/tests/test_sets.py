@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from detector import CLASSES, sets, signs
+from detector import CLASSES, cutouts, sets, signs
 from detector.augment import ABSENT_WEIGHT, Augmenter, Recipe, group_shares
 from detector.data import POTHOLE, TRAFFIC_CONE, DataError, Picture, read_labelled_folder
 from detector.validation import ClassFigure, HeldOut, selection_figure, validate_held_out
@@ -111,9 +111,32 @@ class Signs(Folder):
 
     def test_training_puts_signs_into_pictures_and_keeps_their_labels(self):
         street = Picture(np.full((400, 640, 3), 120, np.uint8), np.array([[10, 300, 60, 350]], np.float32), np.array([POTHOLE]), [POTHOLE])
-        source = Augmenter({"composed": [street]}, Recipe(), 416, 320, faces=self.faces[0])
+        source = Augmenter({"composed": [street]}, Recipe(), 416, 320, pasted=sets.Pasted(self.faces[0], "road_work_sign"))
         classes = np.concatenate([source.draw(np.random.default_rng(index)).classes for index in range(30)])
         self.assertEqual(set(classes.tolist()), {POTHOLE, SIGN})
+
+
+class CutOuts(unittest.TestCase):
+    def test_an_object_is_cut_out_and_stands_on_another_road(self):
+        image = np.random.default_rng(1).normal(120, 4, (200, 300, 3)).clip(0, 255).astype(np.uint8)
+        image[60:140, 100:180] = (230, 40, 30)
+        boxes = np.array([[98, 58, 182, 142], [0, 0, 50, 50], [200, 20, 210, 30]], np.float32)  # one whole, one cut, one small
+        picture = Picture(image, boxes, np.array([DEER] * 3), [DEER])
+        found = cutouts.read_cut_outs([[picture]])
+        self.assertEqual({class_id: len(of) for class_id, of in found.items()}, {DEER: 1})
+        rgba = found[DEER][0].rgba
+        self.assertGreater(rgba[rgba[..., 3] > 0][:, 0].mean(), 200)
+        placed = 0
+        for index in range(20):
+            street = np.full((400, 640, 3), 120, np.uint8)
+            taken = np.array([[0, 300, 640, 400]], np.float32)
+            boxes, classes = cutouts.put_objects(np.random.default_rng(index), street, found, taken)
+            self.assertEqual(len(boxes), len(classes))
+            for x1, y1, x2, y2 in boxes:
+                self.assertLessEqual(y2, 300)
+                self.assertGreater(int(street[int((y1 + y2) / 2), int((x1 + x2) / 2), 0]), 130)
+                placed += 1
+        self.assertGreater(placed, 5)
 
 
 class Figures(unittest.TestCase):
