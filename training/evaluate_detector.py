@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Measure a model on the validation parts of the data, run by OpenCV as in a vehicle.
 
-    training/evaluate_detector.py --manifest models/hazards-base.yaml --data ../shared/data
+    training/evaluate_detector.py --manifest models/hazards-base.yaml --data ../shared/data --sets training/real_hazards.yaml
 """
 
 import argparse
@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import data
+from detector import data, sets
 from detector.manifest import Manifest, ManifestError, read_manifest
 from detector.metrics import drive_figures, f1_score
 from detector.onnx_model import opencv_forward
-from detector.validation import DetectorRunner, ForwardFunction, Validation, validate
+from detector.validation import DetectorRunner, ForwardFunction, HeldOut, Validation, validate, validate_held_out
 
 
 def milliseconds_per_frame(run: ForwardFunction, manifest: Manifest, repeats: int = 30) -> Tuple[float, float]:
@@ -56,11 +56,21 @@ def print_figures(found: Validation, manifest: Manifest) -> None:
     print(f"cone_reports_per_km_on_survey_drives: {on_drives:.2f}")
 
 
+def print_held_out(found: HeldOut) -> None:
+    """AP50 of each class over the held-out parts of the sets, and of each set."""
+    for name, figure in found.pooled.items():
+        print(f"held_out_{name}_ap50: {figure.ap50:.3f} ({figure.labels} labels, {figure.pictures} pictures)")
+        for part, of_part in found.by_set[name].items():
+            print(f"  {part}: {of_part.ap50:.3f} ({of_part.labels} labels, {of_part.pictures} pictures)")
+    print(f"held_out_mean_ap50: {np.mean([figure.ap50 for figure in found.pooled.values()]):.3f} ({len(found.pooled)} classes)")
+
+
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 measured, 2 the command line, the model or the data is wrong."""
     parser = argparse.ArgumentParser(description="Measure a model on the validation parts of the data.")
     parser.add_argument("--manifest", type=Path, default=Path("models/hazards-base.yaml"))
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data: their held-out parts are measured too")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(options.threads)
@@ -68,7 +78,11 @@ def main(arguments: Optional[List[str]] = None) -> int:
         manifest = read_manifest(options.manifest)
         drives, cones = data.read_validation_drives(options.data), data.read_validation_cones(options.data)
         run = opencv_forward(manifest.weights)
-        print_figures(validate(DetectorRunner(run, manifest.view), drives, cones), manifest)
+        runner = DetectorRunner(run, manifest.view)
+        if options.sets:
+            held_out = sets.read_pictures(sets.read_catalogue(options.sets), options.data).held_out
+            print_held_out(validate_held_out(runner, held_out, manifest.classes))
+        print_figures(validate(runner, drives, cones), manifest)
         median, shortest = milliseconds_per_frame(run, manifest)
         print(f"milliseconds_per_frame: {median:.0f} median, {shortest:.0f} shortest, {options.threads} threads")
     except (ManifestError, data.DataError) as error:

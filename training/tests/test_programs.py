@@ -156,16 +156,22 @@ class Programs(unittest.TestCase):
 
     def test_sets_of_photos_are_trained_and_their_held_out_parts_choose(self):
         listed = write_sets(self.data)
-        self.assertEqual(self.train("sets", "--sets", listed), (0, ""))
+        self.assertEqual(self.train("sets", "--sets", listed, "--cut-outs"), (0, ""))
         state = torch.load(self.root / "sets" / "last.pt")
         figures = json.loads((self.root / "sets" / "figures.json").read_text())
         self.assertEqual([entry["epoch"] for entry in figures], [3])
         self.assertEqual(set(figures[0]["pooled"]), {"pothole", "deer", "road_work_sign"})
         self.assertEqual(figures[0]["by_set"]["deer"]["cattle"]["pictures"], 2)
         self.assertEqual(state["history"], figures)
-        self.assertIn("left_out", self.train("sets", "--sets", listed, "--leave-out", "cattle", "--resume")[1])
+        models = self.root / "models_of_sets"
+        models.mkdir()
+        export = ("--checkpoint", self.root / "sets" / "last.pt")
+        self.assertEqual(quietly(export_detector, *export, "--name", "photos", "--out", models, "--data", self.data, "--sets", listed), (0, ""))
+        measured = ("--manifest", models / "photos.yaml", "--data", self.data, "--sets", listed)
+        self.assertEqual(quietly(evaluate_detector, *measured), (0, ""))
+        self.assertIn("left_out", self.train("sets", "--sets", listed, "--cut-outs", "--leave-out", "cattle", "--resume")[1])
         listed.write_text(listed.read_text() + "# Another split.\n")
-        self.assertIn("sets", self.train("sets", "--sets", listed, "--resume")[1])
+        self.assertIn("sets", self.train("sets", "--sets", listed, "--cut-outs", "--resume")[1])
         self.assertIn("--leave-out wants --sets", self.train("new", "--leave-out", "cattle")[1])
         self.assertIn("--data", self.train("new", "--sets", listed, "--data", "none")[1])
 
