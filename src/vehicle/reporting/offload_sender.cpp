@@ -16,7 +16,10 @@ constexpr double kSetBackS = 1.0;
 }  // namespace
 
 OffloadSender::OffloadSender(const Config& config)
-    : config_(config), pose_(config.pose), budget_bytes_(config.max_bytes_per_s * config.burst_s) {}
+    : config_(config),
+      pose_(config.pose),
+      budget_({config.max_bytes_per_s * config.burst_s, config.burst_s,
+               TokenBucket::StepBack::kFollow}) {}
 
 void OffloadSender::SetMounting(const std::string& frame_id,
                                 const Eigen::Isometry3d& base_from_optical) {
@@ -97,12 +100,12 @@ bool OffloadSender::Advance(Waiting& waiting, double now_s, const Encode& encode
 
 std::optional<protocol::OffloadedFrame> OffloadSender::Encoded(
     const Waiting& waiting, const VehiclePoseLookup::Lookup& lookup, const Encode& encode) {
-  Refill(waiting.stamp_ns);
-  if (budget_bytes_ < config_.min_image_bytes) {
+  budget_.Refill(waiting.stamp_ns);
+  if (budget_.tokens() < config_.min_image_bytes) {
     ++counters_.over_budget;
     return std::nullopt;
   }
-  const double most = std::min(budget_bytes_, static_cast<double>(config_.max_image_bytes));
+  const double most = std::min(budget_.tokens(), static_cast<double>(config_.max_image_bytes));
   protocol::OffloadedFrame frame;
   frame.image = encode(waiting.picture, static_cast<std::size_t>(most));
   const auto header = imaging::ReadImageHeader(frame.image.data(), frame.image.size());
@@ -110,7 +113,7 @@ std::optional<protocol::OffloadedFrame> OffloadSender::Encoded(
     ++counters_.withheld;
     return std::nullopt;
   }
-  budget_bytes_ -= static_cast<double>(frame.image.size());
+  budget_.Spend(static_cast<double>(frame.image.size()));
   frame.drive_id = config_.drive_id;
   frame.stamp_ns = waiting.stamp_ns;
   frame.score = waiting.score;
@@ -120,13 +123,6 @@ std::optional<protocol::OffloadedFrame> OffloadSender::Encoded(
   frame.base_from_optical = mountings_.at(waiting.frame_id);
   frame.image_frame_id = waiting.frame_id;
   return frame;
-}
-
-void OffloadSender::Refill(std::int64_t stamp_ns) {
-  const double full = config_.max_bytes_per_s * config_.burst_s;
-  const double passed_s = refilled_ns_ ? std::max(0.0, Seconds(stamp_ns - *refilled_ns_)) : 0.0;
-  budget_bytes_ = std::min(full, budget_bytes_ + passed_s * config_.max_bytes_per_s);
-  refilled_ns_ = stamp_ns;
 }
 
 geo::CameraIntrinsics Resized(const geo::CameraIntrinsics& intrinsics, int width, int height) {

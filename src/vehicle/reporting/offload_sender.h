@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/token_bucket.h"
 #include "imaging/report_picture.h"
 #include "protocol/offloaded_frame.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
@@ -100,7 +101,6 @@ class OffloadSender {
   std::optional<protocol::OffloadedFrame> Encoded(const Waiting& waiting,
                                                   const VehiclePoseLookup::Lookup& lookup,
                                                   const Encode& encode);
-  void Refill(std::int64_t stamp_ns);
 
   Config config_;
   VehiclePoseLookup pose_;
@@ -110,8 +110,7 @@ class OffloadSender {
   std::optional<std::int64_t> due_ns_;      ///< When the classifier's next frame is due.
   std::optional<std::int64_t> newest_ns_;   ///< Of the frames that came.
   std::optional<geo::GeoPoint> last_sent_;  ///< Where.
-  double budget_bytes_;
-  std::optional<std::int64_t> refilled_ns_;
+  TokenBucket budget_;                      ///< Bytes, by the frames' stamps.
   Counters counters_;
 };
 

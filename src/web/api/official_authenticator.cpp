@@ -10,6 +10,7 @@
 
 #include "common/error.h"
 #include "common/sha256.h"
+#include "common/time.h"
 #include "zone/admission/report_validation.h"
 
 namespace livemap::web {
@@ -110,16 +111,22 @@ std::vector<Official> ReadTokenFile(const std::string& path) {
   return ParseTokenFile(ReadFile(path, kMaxTokenFileBytes), path);
 }
 
+OfficialAuthenticator::OfficialAuthenticator(std::vector<Official> officials)
+    : officials_(std::move(officials)),
+      attempts_({TokenBucket({kMaxWrong, kMaxWrong * kSecondsPerWrong})}, kMaxClients,
+                KeyedTokenBuckets<1>::Eviction::kAlways) {}
+
 OfficialAuthenticator::Answer OfficialAuthenticator::Check(const std::string& authorization,
                                                            const std::string& client,
                                                            double now_s) {
   if (officials_.empty()) return {Verdict::kClosed, ""};
   const std::string token = BearerToken(authorization);
   if (token.empty()) return {Verdict::kNoToken, ""};
-  if (!MayTry(client, now_s)) return {Verdict::kTooManyWrong, ""};
+  const std::int64_t now_ns = Nanoseconds(now_s);
+  if (!MayTry(client, now_ns)) return {Verdict::kTooManyWrong, ""};
   const auto name = NameOf(token);
   if (name) return {Verdict::kAllowed, *name};
-  CountMistake(client, now_s);
+  CountMistake(client, now_ns);
   return {Verdict::kWrongToken, ""};
 }
 
@@ -133,28 +140,16 @@ std::optional<std::string> OfficialAuthenticator::NameOf(const std::string& toke
   return found == nullptr ? std::nullopt : std::optional<std::string>(found->name);
 }
 
-bool OfficialAuthenticator::MayTry(const std::string& client, double now_s) {
+bool OfficialAuthenticator::MayTry(const std::string& client, std::int64_t now_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = mistakes_.find(client);
-  if (found == mistakes_.end()) return true;
-  const double healed = (now_s - found->second.at_s) / kSecondsPerWrong;
-  return found->second.wrong - healed <= kMaxWrong - 1;
+  const auto* attempts = attempts_.Find(client);
+  return attempts == nullptr || attempts->front().TokensAt(now_ns) >= 1;
 }
 
-void OfficialAuthenticator::CountMistake(const std::string& client, double now_s) {
+void OfficialAuthenticator::CountMistake(const std::string& client, std::int64_t now_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = mistakes_.find(client);
-  double wrong = 1;
-  if (found != mistakes_.end()) {
-    const double healed = (now_s - found->second.at_s) / kSecondsPerWrong;
-    wrong += std::max(0.0, found->second.wrong - healed);
-    ages_.erase(found->second.age);
-  } else if (mistakes_.size() >= kMaxClients) {
-    mistakes_.erase(ages_.front());
-    ages_.pop_front();
-  }
-  ages_.push_back(client);
-  mistakes_[client] = {wrong, now_s, std::prev(ages_.end())};
+  // Several wrong tokens may have been looked at together: each counts.
+  attempts_.Use(client, now_ns)->front().Spend(1);
 }
 
 }  // namespace livemap::web

@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <vector>
+
+#include "common/token_bucket.h"
 
 namespace livemap::web {
 
@@ -47,8 +47,7 @@ class OfficialAuthenticator {
   static constexpr int kMaxWrong = 10;
   static constexpr double kSecondsPerWrong = 30;
 
-  explicit OfficialAuthenticator(std::vector<Official> officials)
-      : officials_(std::move(officials)) {}
+  explicit OfficialAuthenticator(std::vector<Official> officials);
 
   bool is_open() const { return !officials_.empty(); }
   /// `authorization` is the header's value, `now_s` a clock that never goes back. Takes the same
@@ -56,21 +55,14 @@ class OfficialAuthenticator {
   Answer Check(const std::string& authorization, const std::string& client, double now_s);
 
  private:
-  /// A leaky bucket: `wrong` shrinks by one in kSecondsPerWrong.
-  struct Mistakes {
-    double wrong = 0;
-    double at_s = 0;
-    std::list<std::string>::iterator age;
-  };
-
   std::optional<std::string> NameOf(const std::string& token) const;
-  bool MayTry(const std::string& client, double now_s);
-  void CountMistake(const std::string& client, double now_s);
+  bool MayTry(const std::string& client, std::int64_t now_ns);
+  void CountMistake(const std::string& client, std::int64_t now_ns);
 
   const std::vector<Official> officials_;
   std::mutex mutex_;
-  std::unordered_map<std::string, Mistakes> mistakes_;  ///< By client, bounded.
-  std::list<std::string> ages_;  ///< Clients in the order of their last mistake.
+  /// For each client that was wrong, how often it may be wrong still.
+  KeyedTokenBuckets<1> attempts_;
 };
 
 }  // namespace livemap::web

@@ -2,9 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <string>
-#include <unordered_map>
+
+#include "common/token_bucket.h"
 
 namespace livemap::zone {
 
@@ -27,21 +27,11 @@ class OffloadAllowance {
   /// none left now. `now_ns` is the zone's clock; a step back of it takes nothing away.
   bool Take(const std::string& vehicle_id, std::size_t bytes, std::int64_t now_ns);
 
-  std::size_t vehicles() const { return buckets_.size(); }
+  std::size_t vehicles() const { return buckets_.keys(); }
 
  private:
-  struct Bucket {
-    double frames = 0;
-    double bytes = 0;
-    std::int64_t at_ns = 0;
-    std::list<std::string>::iterator place;
-  };
-
-  Bucket* Find(const std::string& vehicle_id, std::int64_t now_ns);
-
-  Config config_;
-  std::unordered_map<std::string, Bucket> buckets_;
-  std::list<std::string> by_use_;  // Longest silent first.
+  /// For each vehicle one bucket of frames and one of bytes.
+  KeyedTokenBuckets<2> buckets_;
 };
 
 }  // namespace livemap::zone

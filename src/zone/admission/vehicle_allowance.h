@@ -2,9 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <string>
-#include <unordered_map>
+
+#include "common/token_bucket.h"
 
 namespace livemap::zone {
 
@@ -28,22 +28,13 @@ class VehicleAllowance {
   bool TakeReport(const std::string& vehicle_id, std::int64_t now_ns);
   bool TakeEvidence(const std::string& vehicle_id, std::int64_t now_ns);
 
-  std::size_t vehicles() const { return buckets_.size(); }
+  std::size_t vehicles() const { return buckets_.keys(); }
 
  private:
-  struct Buckets {
-    double reports = 0;
-    double evidence = 0;
-    std::int64_t at_ns = 0;
-    std::list<std::string>::iterator place;
-  };
+  bool Take(const std::string& vehicle_id, std::int64_t now_ns, std::size_t kind);
 
-  Buckets* Find(const std::string& vehicle_id, std::int64_t now_ns);
-  bool Take(const std::string& vehicle_id, std::int64_t now_ns, double Buckets::*tokens);
-
-  Config config_;
-  std::unordered_map<std::string, Buckets> buckets_;
-  std::list<std::string> by_use_;  // Longest silent first.
+  /// For each vehicle one bucket of reports and one of evidence.
+  KeyedTokenBuckets<2> buckets_;
 };
 
 }  // namespace livemap::zone

@@ -49,7 +49,8 @@ double CellM(double lookahead_m) {
 PollScheduler::PollScheduler(const Config& config, std::uint64_t hash_seed)
     : config_(config),
       waiting_(CellM(config.lookahead_m), hash_seed),
-      rider_grid_(CellM(config.lookahead_m), hash_seed) {
+      rider_grid_(CellM(config.lookahead_m), hash_seed),
+      budget_({config.bytes_per_hour, kHourS}) {
   CheckPositive("price_s", config.price_s);
   CheckPositive("bytes_per_hour", config.bytes_per_hour);
   CheckPositive("poll_bytes", config.poll_bytes);
@@ -66,7 +67,6 @@ PollScheduler::PollScheduler(const Config& config, std::uint64_t hash_seed)
   if (!(config.picture_bytes >= 0) || !(config.corridor_slope >= 0)) {
     throw Error("picture_bytes and corridor_slope must not be negative");
   }
-  bucket_bytes_ = config.bytes_per_hour;
 }
 
 double PollScheduler::DebtS(const Target& target, std::int64_t now_ns) const {
@@ -78,7 +78,7 @@ double PollScheduler::DebtS(const Target& target, std::int64_t now_ns) const {
 }
 
 double PollScheduler::PriceS() const {
-  const double fill = std::clamp(bucket_bytes_ / config_.bytes_per_hour, 1e-3, 1.0);
+  const double fill = std::clamp(budget_.tokens() / budget_.capacity(), 1e-3, 1.0);
   return config_.price_s / (fill * fill);
 }
 
@@ -216,7 +216,7 @@ void PollScheduler::ForgetRider(RiderPlace rider) {
 
 std::vector<PollChoice> PollScheduler::TakeDue(std::int64_t now_ns) {
   std::vector<PollChoice> choices;
-  Refill(now_ns);
+  budget_.Refill(now_ns);
   while (!riders_.empty() &&
          Seconds(now_ns - riders_.front().point.stamp_ns) > config_.vehicle_silence_s) {
     ForgetRider(riders_.begin());
@@ -242,14 +242,6 @@ std::vector<PollChoice> PollScheduler::TakeDue(std::int64_t now_ns) {
     }
   }
   return choices;
-}
-
-void PollScheduler::Refill(std::int64_t now_ns) {
-  if (filled_ns_ != 0 && now_ns > filled_ns_) {
-    bucket_bytes_ += Seconds(now_ns - filled_ns_) / kHourS * config_.bytes_per_hour;
-    bucket_bytes_ = std::min(bucket_bytes_, config_.bytes_per_hour);
-  }
-  filled_ns_ = std::max(filled_ns_, now_ns);
 }
 
 void PollScheduler::TakeFallenDue(std::int64_t now_ns) {
@@ -300,17 +292,17 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
   }
   if (Seconds(now_ns - rider.point.stamp_ns) > config_.vehicle_silence_s) return;
   if (!Passes(rider.point, target.position) || WasAsked(hazard, rider.key, now_ns)) return;
-  if (bucket_bytes_ < config_.poll_bytes || DebtS(target, now_ns) < PriceS()) return;
+  if (budget_.tokens() < config_.poll_bytes || DebtS(target, now_ns) < PriceS()) return;
   PollChoice choice{hazard, rider.id, false, now_ns + Nanoseconds(config_.answer_timeout_s)};
   double bytes = config_.poll_bytes;
   const bool picture_old = Seconds(now_ns - target.picture_ns) > config_.picture_age_s;
   const bool plenty =
-      bucket_bytes_ > config_.picture_share * config_.bytes_per_hour + config_.picture_bytes;
+      budget_.tokens() > config_.picture_share * config_.bytes_per_hour + config_.picture_bytes;
   if (config_.picture_bytes > 0 && picture_old && plenty) {
     choice.picture_wanted = true;
     bytes += config_.picture_bytes;
   }
-  bucket_bytes_ -= bytes;
+  budget_.Spend(bytes);
   bytes_ += bytes;
   ++target.open;
   ++rider.open;
@@ -401,7 +393,7 @@ bool PollScheduler::Answered(std::uint64_t hazard, const std::string& vehicle_id
   });
   if (found == open_.end() || found->expires_ns <= now_ns) return false;
   if (bytes >= 0 && std::isfinite(bytes)) {
-    bucket_bytes_ = std::min(config_.bytes_per_hour, bucket_bytes_ + found->bytes - bytes);
+    budget_.Spend(bytes - found->bytes);
     bytes_ += bytes - found->bytes;
   }
   Close(*found);

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/token_bucket.h"
 #include "geo/spatial_grid.h"
 #include "zone/belief/hazard_lifecycle.h"
 #include "zone/registry/vehicle_track.h"
@@ -142,7 +143,6 @@ class PollScheduler {
   double DebtS(const Target& target, std::int64_t now_ns) const;
   double PriceS() const;
   std::int64_t DueNs(const Target& target, double price_s) const;
-  void Refill(std::int64_t now_ns);
   void Schedule(std::uint64_t hazard, Target& target, std::int64_t now_ns);
   void ForgetRider(RiderPlace rider);
   void StopWaiting(std::uint64_t hazard, Target& target);
@@ -173,8 +173,7 @@ class PollScheduler {
   std::vector<std::uint64_t> moved_;  // Keys of riders heard since the last tick.
   std::deque<Open> open_;             // In order of expiry.
   std::size_t open_count_ = 0;
-  double bucket_bytes_ = 0;
-  std::int64_t filled_ns_ = 0;
+  TokenBucket budget_;  // Bytes.
   double bytes_ = 0;
 };
 
