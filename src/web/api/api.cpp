@@ -4,6 +4,7 @@
 
 #include "common/error.h"
 #include "web/json/json.h"
+#include "zone/pictures/picture_recoder.h"
 
 namespace livemap::web {
 namespace {
@@ -71,7 +72,9 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       trails_(trails),
       officials_(options_, zone, catalogue),
       map_changes_(zone),
-      pictures_(LimitsOf(options), options.picture_cache_bytes),
+      pictures_([limits = LimitsOf(options)](
+                    const auto& file) { return zone::RecodePicture(file, limits); },
+                {LimitsOf(options).max_bytes, options.picture_cache_bytes}),
       page_(options.web_root),
       leaflet_(options.leaflet_root + "/leaflet"),
       page_policy_(PagePolicy(TileSource(options.tile_url))) {}
@@ -228,7 +231,7 @@ HttpResponse Api::PageConfig() const {
 /// A vehicle's file itself never leaves the zone.
 HttpResponse Api::Picture(const std::string& sha256, const HttpRequest& question) {
   const auto path = zone_.ImagePath(sha256);
-  const zone::ServedPictures::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
+  const zone::PictureCache::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
   if (!picture) return ErrorAnswer(404, "the zone has no picture of this name");
   StaticFile file;
   file.content.assign(picture->begin(), picture->end());

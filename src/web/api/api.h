@@ -11,13 +11,13 @@
 #include "web/http/http_message.h"
 #include "web/http/options.h"
 #include "web/http/static_files.h"
-#include "zone/pictures/served_pictures.h"
+#include "zone/pictures/picture_cache.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {
 
-/// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1` (docs/reference/http-api.md).
-/// Thread-safe; never throws.
+/// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1`
+/// (docs/reference/http-api.md). Thread-safe; never throws.
 class Api {
  public:
   /// Keeps references to all but `options`. Throws Error when the token file is not accepted.
@@ -48,7 +48,7 @@ class Api {
   const VehicleTrails& trails_;
   OfficialApi officials_;
   const MapChangeApi map_changes_;
-  zone::ServedPictures pictures_;
+  zone::PictureCache pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;
   const std::string page_policy_;  ///< Content-Security-Policy of the page.

@@ -3,15 +3,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "common/error.h"
 #include "imaging/image_header.h"
-#include "test/zone/zone_fixture.h"
-#include "zone/pictures/served_pictures.h"
 
 namespace livemap::zone {
 namespace {
@@ -354,48 +351,6 @@ TEST_F(SmallPictureTest, WithoutABoxItShowsTheWholePicture) {
   const Bytes file = SmallPicture(Encode(".jpg", Scene(1280, 720)));
   EXPECT_LE(file.size(), 4096U);
   EXPECT_EQ(Decode(file).size(), cv::Size(192, 108));
-}
-
-class ServedPicturesTest : public ZoneTest {
- protected:
-  std::string Write(const std::string& name, const Bytes& bytes) {
-    const std::string path = directory_ + "/" + name;
-    std::ofstream(path, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-    return path;
-  }
-};
-
-TEST_F(ServedPicturesTest, EncodesOnceAndForgetsWhatWasNotAskedForLongest) {
-  const std::string path = Write("a", Encode(".jpg", Scene(320, 200)));
-  const std::size_t one = RecodePicture(Encode(".jpg", Scene(320, 200))).size();
-  ServedPictures pictures(PictureLimits(), 2 * one + 600);
-  const auto first = pictures.Get("a", path);
-  ASSERT_TRUE(first);
-  EXPECT_EQ(pictures.Get("a", path), first) << "encoded twice";
-  pictures.Get("b", path);
-  pictures.Get("a", path);
-  pictures.Get("c", path);
-  EXPECT_LE(pictures.total_bytes(), 2 * one + 600);
-  EXPECT_EQ(pictures.Get("a", path), first) << "the one that was asked for is gone";
-}
-
-TEST_F(ServedPicturesTest, WhatIsNotAcceptedIsRememberedWhatIsMissingIsNot) {
-  ServedPictures pictures(PictureLimits(), 1 << 20);
-  const std::string path = Write("bad", {0xff, 0xd8, 0xff});
-  EXPECT_FALSE(pictures.Get("bad", path));
-  Write("bad", Encode(".jpg", Scene(64, 48)));
-  EXPECT_FALSE(pictures.Get("bad", path)) << "a hostile picture is decoded again and again";
-  EXPECT_FALSE(pictures.Get("late", directory_ + "/late"));
-  EXPECT_TRUE(pictures.Get("late", Write("late", Encode(".jpg", Scene(64, 48)))));
-}
-
-TEST_F(ServedPicturesTest, TheBoundHoldsForRefusedPicturesToo) {
-  ServedPictures pictures(PictureLimits(), 4096);
-  const std::string path = Write("bad", {0xff, 0xd8, 0xff});
-  for (int i = 0; i < 200; ++i) pictures.Get(std::to_string(i), path);
-  EXPECT_LE(pictures.total_bytes(), 4096U);
 }
 
 }  // namespace
