@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/error.h"
+#include "web/api/collections.h"
 #include "web/json/json.h"
 #include "zone/pictures/picture_recoder.h"
 
@@ -159,29 +160,16 @@ HttpResponse Api::RouteApi(const RequestTarget& target) const {
 }
 
 HttpResponse Api::Hazards(const HazardQuery& query) const {
-  // Read before the list: an event that comes between the two is in the list and told again.
-  std::uint64_t sequence = zone_.Sequence();
+  const std::uint64_t sequence = zone_.Sequence();  // Before the list.
   // Since a sequence all that changed is looked at: what left the selection is told too.
   const std::vector<zone::Hazard> hazards =
       zone_.Query(query.box, query.since.value_or(0), query.limit,
                   query.since ? zone::HazardStates() : query.states);
-  const bool truncated = hazards.size() == query.limit;
-  Json features = Json::array();
-  std::uint64_t newest = 0;
-  for (const zone::Hazard& hazard : hazards) {
-    newest = std::max(newest, hazard.sequence);
+  return ListAnswer(sequence, query.limit, hazards, [&](const zone::Hazard& hazard) {
     Json feature = HazardFeature(hazard, catalogue_);
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
-    features.push_back(std::move(feature));
-  }
-  // The list comes in the order of the sequence, so a cut one is complete up to its last hazard.
-  sequence = truncated ? newest : std::max(sequence, newest);
-  Json collection;
-  collection["type"] = "FeatureCollection";
-  collection["sequence"] = sequence;
-  collection["truncated"] = truncated;
-  collection["features"] = std::move(features);
-  return JsonAnswer(collection, "application/geo+json");
+    return feature;
+  });
 }
 
 HttpResponse Api::OneHazard(const std::string& id) const {
@@ -198,13 +186,7 @@ HttpResponse Api::Events(const std::string& id, std::size_t limit) const {
   const auto uuid = Uuid::Parse(id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   if (!zone_.Find(*uuid)) return ErrorAnswer(404, "the zone knows no hazard with this id");
-  Json events = Json::array();
-  for (const zone::StoredEvent& event : zone_.Events(*uuid, limit))
-    events.push_back(EventJson(event));
-  Json answer;
-  answer["id"] = uuid->ToString();
-  answer["events"] = std::move(events);
-  return JsonAnswer(answer);
+  return EventsAnswer(*uuid, zone_.Events(*uuid, limit), EventJson);
 }
 
 HttpResponse Api::Vehicles() const {

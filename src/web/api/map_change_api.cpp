@@ -1,7 +1,6 @@
 #include "web/api/map_change_api.h"
 
-#include <algorithm>
-
+#include "web/api/collections.h"
 #include "web/json/map_change_json.h"
 
 namespace livemap::web {
@@ -17,6 +16,12 @@ Uuid ParseMapChangeId(const std::string& id) {
   const auto uuid = Uuid::Parse(id);
   if (!uuid) throw BadRequest("the map change's id is no UUID");
   return *uuid;
+}
+
+/// What a client should do that shows the states that the query asks for.
+zone::HazardAction ActionFor(const zone::MapChangeFeature& change, const MapChangeQuery& query) {
+  if (!query.Selects(change.state)) return zone::HazardAction::kRemoved;
+  return zone::IsOpen(change.state) ? ReplayAction(change) : zone::HazardAction::kUpdated;
 }
 
 }  // namespace
@@ -37,34 +42,15 @@ HttpResponse MapChangeApi::Answer(const RequestTarget& target) const {
 }
 
 HttpResponse MapChangeApi::List(const MapChangeQuery& query) const {
-  // Read before the list: an event that comes between the two is in the list and told again.
-  std::uint64_t sequence = zone_.Sequence();
+  const std::uint64_t sequence = zone_.Sequence();  // Before the list.
   // Since a sequence all that changed is looked at: what left the selection is told too.
   const auto changes = zone_.QueryMapChanges(query.box, query.since.value_or(0), query.limit,
                                              query.since ? zone::MapChangeStates() : query.states);
-  const bool truncated = changes.size() == query.limit;
-  Json features = Json::array();
-  std::uint64_t newest = 0;
-  for (const zone::MapChangeFeature& change : changes) {
-    newest = std::max(newest, change.sequence);
+  return ListAnswer(sequence, query.limit, changes, [&](const zone::MapChangeFeature& change) {
     Json feature = MapChangeGeoJson(change);
-    if (query.since) {
-      const bool selected = query.Selects(change.state);
-      const zone::HazardAction action = selected && zone::IsOpen(change.state)
-                                            ? ReplayAction(change)
-                                        : selected ? zone::HazardAction::kUpdated
-                                                   : zone::HazardAction::kRemoved;
-      feature["properties"]["action"] = ActionName(action);
-    }
-    features.push_back(std::move(feature));
-  }
-  sequence = truncated ? newest : std::max(sequence, newest);
-  Json collection;
-  collection["type"] = "FeatureCollection";
-  collection["sequence"] = sequence;
-  collection["truncated"] = truncated;
-  collection["features"] = std::move(features);
-  return JsonAnswer(collection, "application/geo+json");
+    if (query.since) feature["properties"]["action"] = ActionName(ActionFor(change, query));
+    return feature;
+  });
 }
 
 HttpResponse MapChangeApi::One(const std::string& id) const {
@@ -76,14 +62,7 @@ HttpResponse MapChangeApi::One(const std::string& id) const {
 HttpResponse MapChangeApi::Events(const std::string& id, std::size_t limit) const {
   const Uuid uuid = ParseMapChangeId(id);
   if (!zone_.FindMapChange(uuid)) return UnknownMapChange();
-  Json events = Json::array();
-  for (const zone::StoredMapChangeEvent& event : zone_.MapChangeEvents(uuid, limit)) {
-    events.push_back(MapChangeEventJson(event));
-  }
-  Json answer;
-  answer["id"] = uuid.ToString();
-  answer["events"] = std::move(events);
-  return JsonAnswer(answer);
+  return EventsAnswer(uuid, zone_.MapChangeEvents(uuid, limit), MapChangeEventJson);
 }
 
 }  // namespace livemap::web

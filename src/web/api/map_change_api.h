@@ -11,8 +11,8 @@ namespace livemap::web {
 /// The list of map changes; "/UUID" and "/UUID/events" stand below it.
 constexpr const char* kMapChangeAddress = "/api/v1/changes";
 
-/// Answers what may be read of map changes (docs/reference/http-api.md). Thread-safe; store failures and bad
-/// requests come out as exceptions.
+/// Answers what may be read of map changes (docs/reference/http-api.md). Thread-safe; store
+/// failures and bad requests come out as exceptions.
 class MapChangeApi {
  public:
   /// Keeps the reference.

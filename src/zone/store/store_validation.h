@@ -18,6 +18,11 @@ constexpr long long kMaxSequence = 1LL << 60;
 constexpr double kMaxVarianceM2 = 1e8;   // Reports may say 10 km.
 constexpr double kMinVarianceM2 = 1e-4;  // Fusion stops at 0.15 m.
 
+/// A number read from the file that stands for one of `size` values, from 0.
+inline bool IsIndex(int number, std::size_t size) {
+  return number >= 0 && number < static_cast<int>(size);
+}
+
 inline bool IsCovariance(const Eigen::Matrix2d& covariance_m2) {
   if (!covariance_m2.allFinite() || covariance_m2.cwiseAbs().maxCoeff() > kMaxVarianceM2) {
     return false;

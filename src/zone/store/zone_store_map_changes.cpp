@@ -8,6 +8,7 @@
 #include "common/time.h"
 #include "zone/admission/map_change_validation.h"
 #include "zone/belief/map_change_witnesses.h"
+#include "zone/store/event_walk.h"
 #include "zone/store/store_validation.h"
 #include "zone/store/zone_store_state.h"
 
@@ -31,10 +32,6 @@ constexpr char kSoundMapChangeEvent[] =
     "typeof(to_state) = 'integer' AND typeof(reason) = 'text' AND "
     "length(CAST(reason AS BLOB)) <= 200 AND typeof(at_ns) = 'integer'";
 
-bool IsMapChangeState(int number) {
-  return number >= 0 && number < static_cast<int>(kMapChangeStates);
-}
-
 /// Why these are no values of a map change; nullptr when they are.
 template <typename Row>
 const char* WhyNoMapChange(const Row& row, const MapChangeFeature& feature) {
@@ -51,7 +48,7 @@ const char* WhyNoMapChange(const Row& row, const MapChangeFeature& feature) {
                      row.first_seen_ns <= row.last_seen_ns;
   if (!times) return "no times";
   if (row.sequence < 1 || row.sequence >= kMaxSequence) return "no sequence";
-  return IsMapChangeState(row.state) ? nullptr : "no state";
+  return IsIndex(row.state, kMapChangeStates) ? nullptr : "no state";
 }
 
 template <typename Row>
@@ -190,30 +187,9 @@ std::vector<StoredMapChangeEvent> ZoneStore::LoadMapChangeEvents(std::uint64_t s
                                                                  std::size_t limit) {
   return ExplainStore("reading events of a map change", [&] {
     Implementation::ChangeRow& row = implementation_->change_row_;
-    std::vector<StoredMapChangeEvent> events;
-    for (std::size_t looked_at = 0; sequence != 0 && looked_at < limit; ++looked_at) {
-      row.sequence = static_cast<long long>(sequence);
-      if (!FetchOne(*implementation_->find_map_change_event_)) break;
-      const bool has_from = row.has_from == soci::i_ok;
-      const bool sound = IsMapChangeState(row.state) &&
-                         (!has_from || IsMapChangeState(row.from_state)) &&
-                         IsStamp(row.updated_ns) &&
-                         (row.reason.empty() || IsPrintableText(row.reason, kMaxEventReasonBytes));
-      if (sound) {
-        StoredMapChangeEvent event;
-        event.sequence = sequence;
-        if (has_from) event.from = static_cast<MapChangeState>(row.from_state);
-        event.to = static_cast<MapChangeState>(row.state);
-        event.reason = row.reason;
-        event.at_ns = row.updated_ns;
-        events.push_back(std::move(event));
-      }
-      // Downwards only, whatever stands in the file.
-      const auto previous = static_cast<std::uint64_t>(std::max(row.previous_sequence, 0LL));
-      sequence = previous < sequence ? previous : 0;
-    }
-    std::reverse(events.begin(), events.end());
-    return events;
+    return WalkEvents(
+        sequence, limit, *implementation_->find_map_change_event_, row,
+        [](const auto& read) { return EventOf<StoredMapChangeEvent>(read, kMapChangeStates); });
   });
 }
 

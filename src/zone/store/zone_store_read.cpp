@@ -8,6 +8,7 @@
 
 #include "common/time.h"
 #include "zone/admission/report_validation.h"
+#include "zone/store/event_walk.h"
 #include "zone/store/store_validation.h"
 #include "zone/store/zone_store_state.h"
 
@@ -17,6 +18,7 @@ namespace {
 constexpr std::int16_t kReporterWeight1000 = 1000;  // A voice of which only a report is known.
 constexpr double kMaxEnded = 1e6;                   // SurvivalModel's largest memory.
 constexpr double kMaxStoodS = 1e15;
+constexpr std::size_t kActions = 3;
 
 constexpr char kSoundHazard[] =
     "typeof(uuid) = 'text' AND length(CAST(uuid AS BLOB)) = 36 AND "
@@ -47,8 +49,6 @@ constexpr char kSoundEvent[] =
     "typeof(from_state) IN ('integer', 'null') AND typeof(to_state) = 'integer' AND "
     "typeof(reason) = 'text' AND length(CAST(reason AS BLOB)) <= 200 AND typeof(at_ns) = 'integer'";
 
-bool IsState(int number) { return number >= 0 && number < static_cast<int>(kHazardStates); }
-
 bool IsShare(double value) { return value >= 0 && value <= 1; }
 
 bool IsPicture(const std::string& sha256, const std::string& format) {
@@ -76,7 +76,7 @@ const char* WhyNoHazard(const Row& row, const Hazard& hazard) {
   const bool in_order = row.sequence >= 1 && row.sequence < kMaxSequence &&
                         row.announced_sequence >= 0 && row.announced_sequence <= row.sequence;
   if (!in_order) return "no sequence";
-  if (!IsState(row.state)) return "no state";
+  if (!IsIndex(row.state, kHazardStates)) return "no state";
   return IsPicture(row.image_sha256, row.image_format) ? nullptr : "no picture's name";
 }
 
@@ -311,32 +311,14 @@ std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t
                                                std::size_t limit) {
   return ExplainStore("reading events", [&] {
     Implementation::Row& row = implementation_->row_;
-    std::vector<StoredEvent> events;
-    for (std::size_t looked_at = 0; sequence != 0 && looked_at < limit; ++looked_at) {
-      row.sequence = static_cast<long long>(sequence);
-      if (!FetchOne(*implementation_->find_event_)) break;
-      const bool has_from = row.has_from == soci::i_ok;
-      const bool sound = IsState(row.state) && (!has_from || IsState(row.from_state)) &&
-                         IsStamp(row.updated_ns) && row.action >= 0 && row.action <= 2 &&
-                         (row.reason.empty() || IsPrintableText(row.reason, kMaxEventReasonBytes));
-      if (sound) {
-        StoredEvent event;
-        event.sequence = sequence;
-        event.hazard = hazard;
-        event.action = static_cast<HazardAction>(row.action);
-        if (has_from) event.from = static_cast<HazardState>(row.from_state);
-        event.to = static_cast<HazardState>(row.state);
-        event.reason = row.reason;
-        event.announced = row.announced != 0;
-        event.at_ns = row.updated_ns;
-        events.push_back(std::move(event));
-      }
-      // Downwards only, whatever stands in the file.
-      const auto previous = static_cast<std::uint64_t>(std::max(row.previous_sequence, 0LL));
-      sequence = previous < sequence ? previous : 0;
-    }
-    std::reverse(events.begin(), events.end());
-    return events;
+    return WalkEvents(sequence, limit, *implementation_->find_event_, row, [&](const auto& read) {
+      auto event = EventOf<StoredEvent>(read, kHazardStates);
+      if (!event || !IsIndex(read.action, kActions)) return std::optional<StoredEvent>();
+      event->hazard = hazard;
+      event->action = static_cast<HazardAction>(read.action);
+      event->announced = read.announced != 0;
+      return event;
+    });
   });
 }
 
