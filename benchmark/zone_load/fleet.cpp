@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "transport/envelope.h"
@@ -22,12 +23,6 @@ constexpr std::chrono::seconds kPatience{10};
 constexpr std::chrono::milliseconds kPaceStep{2};
 constexpr std::int64_t kFirstStampAgeNs = 5LL * 86400 * 1'000'000'000;
 constexpr std::size_t kMaxBytes = 1 << 20;
-
-std::int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 template <typename Message>
 std::vector<std::uint8_t> Enclose(const Message& message) {
@@ -71,7 +66,7 @@ double MillisecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 Fleet::Fleet(const Config& config)
-    : config_(config), street_(config.vehicles, NowNs() - kFirstStampAgeNs) {
+    : config_(config), street_(config.vehicles, SystemNs() - kFirstStampAgeNs) {
   const std::string base = "livemap/v1/" + config_.zone;
   listener_ = Connect("listener", base + "/notice",
                       [this](const transport::MqttMessage& message) { OnNotice(message); });

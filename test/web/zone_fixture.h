@@ -45,9 +45,6 @@ class TokenFile {
 /// A picture of one white pixel.
 std::vector<std::uint8_t> OnePixelPng();
 
-/// The system's clock, UTC, nanoseconds since 1970.
-std::int64_t UtcNowNs();
-
 /// A real zone with a real store in a temporary folder.
 class ZoneFixture {
  public:

@@ -3,13 +3,10 @@
 #include "common/error.h"
 
 namespace livemap::change {
-namespace {
 
 std::string SizeText(cv::Size size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
-
-}  // namespace
 
 void CheckProbabilities(const ChangeProbabilities& probabilities, cv::Size size,
                         const std::string& name) {

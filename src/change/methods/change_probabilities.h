@@ -20,6 +20,9 @@ struct ChangeProbabilities {
   bool tells_classes() const { return of_class.size() == protocol::kChangeClasses; }
 };
 
+/// "640x480", for messages.
+std::string SizeText(cv::Size size);
+
 /// Throws Error, with `name` in it, when the images are not two or ten, not of `size`, not
 /// CV_32FC1, or hold a value that is not within [0, 1].
 void CheckProbabilities(const ChangeProbabilities& probabilities, cv::Size size,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "odometry/bilinear.h"
+
 namespace livemap::odometry {
 namespace {
 
@@ -69,17 +71,7 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
         residuals.visible[point] = 0;
         continue;
       }
-      const int left = static_cast<int>(u), top = static_cast<int>(v);
-      const float right_share = u - static_cast<float>(left);
-      const float lower_share = v - static_cast<float>(top);
-      const std::uint8_t* upper = grey.ptr(top) + left;
-      const std::uint8_t* lower = upper + grey.step[0];
-      const float above =
-          static_cast<float>(upper[0]) + right_share * static_cast<float>(upper[1] - upper[0]);
-      const float below =
-          static_cast<float>(lower[0]) + right_share * static_cast<float>(lower[1] - lower[0]);
-      residuals.value[point] =
-          above + lower_share * (below - above) - gain * points.intensity[point] - bias;
+      residuals.value[point] = Interpolate(grey, u, v) - gain * points.intensity[point] - bias;
       if (!whitening_.empty()) residuals.value[point] *= whitening_[point];
       residuals.visible[point] = 1;
       ++residuals.count;

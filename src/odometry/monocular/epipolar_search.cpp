@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "odometry/bilinear.h"
+
 namespace livemap::odometry {
 namespace {
 
@@ -12,20 +14,6 @@ constexpr float kMinScale = 0.2F;  // Of the point's distance to the other view,
 constexpr int kRefinements = 4;
 /// Candidates this close to the best one, in steps of about a pixel, are the same minimum.
 constexpr int kSameMinimum = 3;
-
-/// Grey value between pixels; `u` and `v` inside by a pixel on every side.
-float Interpolate(const cv::Mat& grey, float u, float v) {
-  const int left = static_cast<int>(u), top = static_cast<int>(v);
-  const float right_share = u - static_cast<float>(left);
-  const float lower_share = v - static_cast<float>(top);
-  const std::uint8_t* upper = grey.ptr(top) + left;
-  const std::uint8_t* lower = upper + grey.step[0];
-  const float above =
-      static_cast<float>(upper[0]) + right_share * static_cast<float>(upper[1] - upper[0]);
-  const float below =
-      static_cast<float>(lower[0]) + right_share * static_cast<float>(lower[1] - lower[0]);
-  return above + lower_share * (below - above);
-}
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/time.h"
 
 namespace livemap::perception {
 namespace {
@@ -14,10 +15,6 @@ namespace {
 constexpr double kNearestM = 0.3;
 /// Step of the numeric derivative of an image position by the way, m.
 constexpr double kProbeM = 0.25;
-
-double Seconds(std::int64_t from_ns, std::int64_t to_ns) {
-  return static_cast<double>(to_ns - from_ns) * 1e-9;
-}
 
 Eigen::Vector2d FootOf(const cv::Rect2f& box) {
   return {double{box.x} + 0.5 * double{box.width}, double{box.y} + double{box.height}};
@@ -108,7 +105,7 @@ std::vector<ObjectEvent> ObjectTracker::Add(const TrackerFrame& frame) {
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     Track& track = tracks_[i];
     const bool gone = !seen[i] && (expected[i].behind || expected[i].way_m > config_.max_unseen_m ||
-                                   Seconds(track.last_ns, frame.stamp_ns) > config_.max_unseen_s);
+                                   Seconds(frame.stamp_ns - track.last_ns) > config_.max_unseen_s);
     if (IsDue(track, seen[i], gone, frame.stamp_ns)) events.push_back(Report(track));
     if (!gone) living.push_back(std::move(track));
   }
@@ -205,7 +202,7 @@ std::optional<ObjectTracker::Expected> ObjectTracker::ExpectByMotion(
 ObjectTracker::Expected ObjectTracker::ExpectByVelocity(const Track& track,
                                                         const TrackerFrame& frame) const {
   Expected expected;
-  const double time_s = Seconds(track.last_ns, frame.stamp_ns);
+  const double time_s = Seconds(frame.stamp_ns - track.last_ns);
   expected.foot_px = FootOf(track.last.box) + time_s * track.velocity_px_s;
   expected.width_px = double{track.last.box.width};
   expected.flat_height_px = expected.upright_height_px = double{track.last.box.height};
@@ -264,7 +261,7 @@ void ObjectTracker::Associate(const TrackerFrame& frame, const std::vector<Expec
 
 void ObjectTracker::See(Track& track, const HazardDetection& found,
                         const TrackerFrame& frame) const {
-  const double time_s = Seconds(track.last_ns, frame.stamp_ns);
+  const double time_s = Seconds(frame.stamp_ns - track.last_ns);
   if (track.sights > 0 && time_s > 0) {
     track.velocity_px_s = (FootOf(found.box) - FootOf(track.last.box)) / time_s;
     track.velocity_known = true;
@@ -320,7 +317,7 @@ double ObjectTracker::MaxDelayS(const std::string& class_name) const {
 bool ObjectTracker::IsDue(Track& track, bool seen, bool gone, std::int64_t now_ns) const {
   if (track.reported || !track.sure_ns) return false;
   const bool past_best = seen && track.quality < config_.past_best_share * track.best_quality;
-  return gone || past_best || Seconds(*track.sure_ns, now_ns) >= MaxDelayS(track.last.class_name);
+  return gone || past_best || Seconds(now_ns - *track.sure_ns) >= MaxDelayS(track.last.class_name);
 }
 
 ObjectEvent ObjectTracker::Report(Track& track) {

@@ -1,17 +1,12 @@
 #include "web/api/official_api.h"
 
-#include <chrono>
-
+#include "common/clock.h"
+#include "common/time.h"
 #include "web/http/origin.h"
 #include "web/json/map_change_json.h"
 
 namespace livemap::web {
 namespace {
-
-double SteadySeconds() {
-  const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(since_start).count();
-}
 
 /// "application/json", with or without parameters. A page of another origin cannot send it without
 /// asking first, which this server never allows.
@@ -36,7 +31,7 @@ std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& questi
     return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
   OfficialAuthenticator::Answer answer =
-      gate_.Check(question.authorization, question.client, SteadySeconds());
+      gate_.Check(question.authorization, question.client, Seconds(SteadyNs()));
   std::optional<HttpResponse> refusal;
   switch (answer.verdict) {
     case OfficialAuthenticator::Verdict::kAllowed:

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/checks.h"
+#include "common/log_odds.h"
 #include "common/number_text.h"
 #include "common/time.h"
 
@@ -19,7 +20,7 @@ VehicleTrust::VehicleTrust(const Config& config) : config_(config) {
   CheckRange("trust_memory_s", config.memory_s, 60, 1e10);
   CheckRange("most_suspicion", config.max_suspicion, 0.1, 20);
   CheckRange("max_vehicles", static_cast<double>(config.max_vehicles), 1, 1e9);
-  prior_log_odds_ = std::log(config.hostile_share / (1 - config.hostile_share));
+  prior_log_odds_ = LogOddsOf(config.hostile_share);
 }
 
 double VehicleTrust::Faded(const TrustRecord& record, std::int64_t now_ns) const {
@@ -30,7 +31,7 @@ double VehicleTrust::Faded(const TrustRecord& record, std::int64_t now_ns) const
 double VehicleTrust::Hostile(std::uint64_t vehicle, std::int64_t now_ns) const {
   const auto found = records_.find(vehicle);
   const double suspicion = found == records_.end() ? 0 : Faded(found->second, now_ns);
-  return 1 / (1 + std::exp(-prior_log_odds_ - suspicion));
+  return ProbabilityOf(prior_log_odds_ + suspicion);
 }
 
 TrustRecord& VehicleTrust::Find(std::uint64_t vehicle, std::int64_t now_ns) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "common/log_odds.h"
 #include "common/time.h"
 
 namespace livemap::zone {
@@ -31,8 +32,6 @@ std::pair<double, double> Offset(const geo::GeoPoint& from, const geo::GeoPoint&
   return {(to.latitude_deg - from.latitude_deg) * kMetresPerDegree,
           east_deg * kMetresPerDegree * std::cos(from.latitude_deg * geo::kRadiansPerDegree)};
 }
-
-double ProbabilityOf(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
 void CheckPositive(const char* name, double value) {
   if (value > 0 && value <= 1e12) return;

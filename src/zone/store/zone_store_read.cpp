@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/log_odds.h"
 #include "common/time.h"
 #include "zone/admission/report_validation.h"
 #include "zone/store/event_walk.h"
@@ -89,7 +90,7 @@ PresenceRecord LifeOf(const Hazard& hazard) {
   life.last_yes_ns = hazard.last_seen_ns;
   life.at_ns = hazard.last_seen_ns;
   const double presence = std::clamp(static_cast<double>(hazard.presence), 0.01, 0.99);
-  life.log_odds = static_cast<float>(std::log(presence / (1 - presence)));
+  life.log_odds = static_cast<float>(LogOddsOf(presence));
   life.undenied_log_odds = life.log_odds;
   return life;
 }

@@ -24,6 +24,7 @@
 #include <string>
 #include <vector>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "test/web/zone_fixture.h"
 
@@ -96,7 +97,7 @@ class Session {
     return {{"running", true}};
   }
 
-  void Tick() { fixture_.now_ns = livemap::web::UtcNowNs() + ahead_ns_; }
+  void Tick() { fixture_.now_ns = livemap::SystemNs() + ahead_ns_; }
 
   Json Pass(const Json& command) {
     ahead_ns_ += static_cast<std::int64_t>(command.at("seconds").get<double>() * 1e9);
