@@ -15,8 +15,7 @@ void Study::Tell(std::size_t vehicle, std::size_t index, zone::EvidenceKind kind
   const zone::ClassModel entry = ClassOf(thing);
   zone::Evidence evidence{kind, keys_[vehicle], now_ns};
   if (config_.trust) evidence.hostile = trust_.Hostile(evidence.vehicle, now_ns);
-  const bool against =
-      kind == zone::EvidenceKind::kAnswerNo || kind == zone::EvidenceKind::kVanished;
+  const bool against = kind == zone::EvidenceKind::kAnswerNo;
   zone::LifecycleUpdate step;
   if (thing.item == kNone) {
     if (against) return;
@@ -43,8 +42,7 @@ void Study::Tell(std::size_t vehicle, std::size_t index, zone::EvidenceKind kind
 
 void Study::Count(Item& item, zone::EvidenceKind kind, zone::LifecycleUpdate& step, double t) {
   constexpr int kMaxScore = 5;
-  const bool against =
-      kind == zone::EvidenceKind::kAnswerNo || kind == zone::EvidenceKind::kVanished;
+  const bool against = kind == zone::EvidenceKind::kAnswerNo;
   const zone::ClassModel entry = ClassOf(things_[item.thing]);
   item.score = std::min(kMaxScore, item.score + (against ? -1 : 1));
   if (!against) item.life.last_yes_ns = Stamp(t);

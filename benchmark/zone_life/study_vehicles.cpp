@@ -83,9 +83,9 @@ void Study::PassHostile(std::size_t vehicle, Thing& thing, std::size_t index, do
   // An invention is supported by its inventor, and by all of them once drivers hear of it.
   const bool heard_of = on_map && zone::IsTold(items_[thing.item].life.state);
   const bool invented = !thing.real && t < thing.ends_s && (heard_of || thing.inventor == vehicle);
+  if (!replay && !invented) return;
   for (int i = 0; i < kHostileRepeats; ++i) {
-    if (replay || invented) Tell(vehicle, index, zone::EvidenceKind::kSighting, t + i);
-    if (thing.Stands(t) && on_map) Tell(vehicle, index, zone::EvidenceKind::kVanished, t + i);
+    Tell(vehicle, index, zone::EvidenceKind::kSighting, t + i);
   }
 }
 

@@ -11,10 +11,6 @@
 namespace livemap::zone {
 namespace {
 
-bool SpeaksAgainst(EvidenceKind kind) {
-  return kind == EvidenceKind::kAnswerNo || kind == EvidenceKind::kVanished;
-}
-
 std::string VehiclesText(std::uint32_t vehicles) {
   if (vehicles == 1) return "1 vehicle";
   return std::to_string(vehicles) + " vehicles";
@@ -101,16 +97,10 @@ void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns,
 
 double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& evidence,
                                  double ended_since) const {
-  const EvidenceKind kind = evidence.kind;
-  const bool change = kind == EvidenceKind::kVanished;
-  const bool against = SpeaksAgainst(kind);
+  const bool against = evidence.kind == EvidenceKind::kAnswerNo;
   // P(this word | there) and P(it | not there), of honest vehicles.
-  double there = against ? 1 - entry.hit_rate : entry.hit_rate;
+  const double there = against ? 1 - entry.hit_rate : entry.hit_rate;
   double absent = against ? 1 - entry.false_rate : entry.false_rate;
-  if (change) {
-    there = config_.vanished_false_rate;
-    absent = config_.vanished_hit_rate;
-  }
   // What is not there now may have been there then.
   absent = ended_since * there + (1 - ended_since) * absent;
   const double h = std::clamp(evidence.hostile, config_.hostile_share, 1.0);
@@ -127,10 +117,7 @@ double HazardLifecycle::MaxLogOddsPerVehicle(const Evidence& evidence) const {
 
 bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evidence,
                                     PresenceRecord& life) const {
-  const bool against = SpeaksAgainst(evidence.kind);
-  if (evidence.kind == EvidenceKind::kVanished && IsTold(life.state)) {
-    return ApplyUnsolicited(entry, evidence, life);
-  }
+  const bool against = evidence.kind == EvidenceKind::kAnswerNo;
   const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
   const bool suspect = evidence.hostile >= config_.suspect_above;
   VehicleEvidence* voice = PlaceOf(evidence.vehicle, suspect, at_s, life);
@@ -167,15 +154,6 @@ bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evi
   return true;
 }
 
-bool HazardLifecycle::ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence,
-                                       PresenceRecord& life) const {
-  const double least = LogOdds(config_.settled_above);
-  if (life.log_odds <= least) return false;
-  const double ratio = LogRatio(entry, evidence, 0);
-  life.log_odds = std::max(least, life.log_odds + ratio);
-  return true;
-}
-
 LifecycleUpdate HazardLifecycle::Begin(const ClassModel& entry, const Evidence& sighting,
                                        std::int64_t now_ns, PresenceRecord& life) const {
   life = PresenceRecord();
@@ -207,7 +185,7 @@ LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& 
   const std::int64_t stood_until_ns = life.last_yes_ns;
   MoveTo(entry, word.stamp_ns, life);
   step.counted = ApplyEvidence(entry, word, life);
-  if (step.counted && !SpeaksAgainst(word.kind)) JudgeSeen(entry, word, life, step);
+  if (step.counted && word.kind != EvidenceKind::kAnswerNo) JudgeSeen(entry, word, life, step);
   Settle(entry, now_ns, life, step);
   if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
   return step;

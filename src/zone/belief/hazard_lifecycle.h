@@ -14,12 +14,10 @@
 namespace livemap::zone {
 
 enum class EvidenceKind : std::uint8_t {
-  kSighting,    ///< A report.
-  kAnswerYes,   ///< To a poll, by a vehicle that could see the place.
-  kAnswerNo,    ///< The same.
-  kCantSee,     ///< Counts nothing.
-  kStillThere,  ///< Change detection between drives saw it on both.
-  kVanished,    ///< Change detection saw it on the earlier drive only.
+  kSighting,   ///< A report.
+  kAnswerYes,  ///< To a poll, by a vehicle that could see the place.
+  kAnswerNo,   ///< The same.
+  kCantSee,    ///< Counts nothing.
 };
 
 /// What one vehicle says of one hazard.
@@ -75,10 +73,8 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// way, the second message of a kind adds less than the first, and messages lose nothing by their
 /// order. A voice for the hazard fades with the class's life, as what it said ages. Drivers are
 /// told when `confirmations` distinct vehicles more speak for a hazard than against it, or an
-/// official. What nobody asked for is chosen by its sender, so change evidence against a told
-/// hazard lowers p to `settled_above` at most: it makes the zone ask, and the answers decide. It is
-/// gone when two distinct vehicles speak against it and p is small, or by time alone: one vehicle
-/// can neither confirm nor remove, nor hasten the removal. See
+/// official. It is gone when two distinct vehicles speak against it and p is small, or by time
+/// alone: one vehicle can neither confirm nor remove, nor hasten the removal. See
 /// docs/explanation/hazard-lifecycle.md.
 ///
 /// How far a vehicle is believed comes with its word (Evidence::hostile): h is the vehicle's own
@@ -100,8 +96,6 @@ class HazardLifecycle {
     double gone_below = 0.1;            ///< Off the map.
     double max_presence = 0.995;        ///< Presence never counts as more certain than this.
     double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
-    double vanished_hit_rate = 0.6;     ///< P(change detection says vanished | it is gone).
-    double vanished_false_rate = 0.05;  ///< P(the same | it is there).
     double suspect_above = 0.5;         ///< A vehicle this likely hostile is not counted as one.
     double max_trust_step = 1;          ///< No one verdict weighs more, log odds; an official's
     double official_weight = 2;         ///< ...weighs this many times as much as a vehicle's.
@@ -154,8 +148,6 @@ class HazardLifecycle {
   void MoveTo(const ClassModel& entry, std::int64_t to_ns, PresenceRecord& life) const;
   double LogRatio(const ClassModel& entry, const Evidence& evidence, double ended_since) const;
   bool ApplyEvidence(const ClassModel& entry, const Evidence& evidence, PresenceRecord& life) const;
-  bool ApplyUnsolicited(const ClassModel& entry, const Evidence& evidence,
-                        PresenceRecord& life) const;
   double MaxLogOddsPerVehicle(const Evidence& evidence) const;
   void Settle(const ClassModel& entry, std::int64_t now_ns, PresenceRecord& life,
               LifecycleUpdate& step) const;

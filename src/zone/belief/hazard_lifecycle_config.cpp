@@ -26,8 +26,6 @@ HazardLifecycle::HazardLifecycle(const Config& config) : config_(config) {
   CheckRange("suspect_above", config.suspect_above, config.hostile_share + 0.001, 1);
   CheckRange("most_against", config.max_trust_step, 0, 10);
   CheckRange("official_weight", config.official_weight, 0, 10);
-  CheckRange("vanished_hit_rate", config.vanished_hit_rate, 0.1, 1);
-  CheckRange("vanished_false_rate", config.vanished_false_rate, 0, config.vanished_hit_rate);
   CheckRange("denials", config.denials, 2, kMaxEvidencePerHazard - 1);
   CheckRange("quarantine_s", config.quarantine_s, 0, 1e9);
   CheckRange("reopen_vehicles", config.reopen_vehicles, 2, kMaxEvidencePerHazard);
