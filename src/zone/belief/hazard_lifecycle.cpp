@@ -5,11 +5,15 @@
 #include <cstdio>
 #include <utility>
 
+#include "common/checks.h"
+#include "common/log_odds.h"
+#include "common/text.h"
 #include "common/time.h"
-#include "zone/belief/hazard_lifecycle_internal.h"
 
 namespace livemap::zone {
 namespace {
+
+constexpr std::size_t kMaxReasonBytes = 200;
 
 std::string VehiclesText(std::uint32_t vehicles) {
   if (vehicles == 1) return "1 vehicle";
@@ -18,7 +22,7 @@ std::string VehiclesText(std::uint32_t vehicles) {
 
 std::string PresenceText(double log_odds) {
   char text[40];
-  std::snprintf(text, sizeof text, "presence %.0f %%", 100 * Probability(log_odds));
+  std::snprintf(text, sizeof text, "presence %.0f %%", 100 * ProbabilityOf(log_odds));
   return text;
 }
 
@@ -41,44 +45,50 @@ double AgeS(const PresenceRecord& life, std::int64_t at_ns) {
 
 double Faded(const ClassModel& entry, double log_odds, const PresenceRecord& life, double dt_s) {
   const double standing =
-      Probability(log_odds) * entry.survival.Survival(AgeS(life, life.at_ns), dt_s);
-  return LogOdds(standing);
+      ProbabilityOf(log_odds) * entry.survival.Survival(AgeS(life, life.at_ns), dt_s);
+  return LogOddsOf(standing);
 }
 
-/// The vehicle's place among the voices: its own, a free one, or that of the longest silent, if it
-/// has been silent since before `at_s`. One that does not count goes before one that does, and
-/// drives none away that does.
-VehicleEvidence* PlaceOf(std::uint64_t vehicle, bool suspect, std::uint32_t at_s,
-                         PresenceRecord& life) {
-  const auto keeps = [](const VehicleEvidence& voice) {
-    return std::make_pair(voice.Counts(), voice.at_s);
-  };
-  VehicleEvidence* place = nullptr;
-  for (VehicleEvidence& voice : life.voices) {
-    if (voice.vehicle == vehicle) return &voice;
-    if (place == nullptr || keeps(voice) < keeps(*place)) place = &voice;
-  }
-  if (place->Counts() && (suspect || place->at_s >= at_s)) return nullptr;
-  if (place->vehicle != 0 && suspect && place->at_s >= at_s) return nullptr;
-  *place = VehicleEvidence{vehicle, 0, 0, false, suspect};
-  return place;
+LifecycleTransition Transition(const PresenceRecord& life, HazardState to, std::string reason) {
+  return {life.state, to, CutUtf8(std::move(reason), kMaxReasonBytes)};
 }
 
-void NoteNo(std::int64_t stamp_ns, PresenceRecord& life) {
-  if (stamp_ns <= life.last_yes_ns) return;
-  life.first_no_ns = life.first_no_ns == 0 ? stamp_ns : std::min(life.first_no_ns, stamp_ns);
+void Enter(HazardState state, std::int64_t now_ns, PresenceRecord& life) {
+  life.state = state;
+  life.since_ns = now_ns;
 }
 
 }  // namespace
 
-ClassModel ClassModelOf(const protocol::HazardClass& entry, const ClassSurvival& survival) {
-  ClassModel result;
-  result.confirmations = static_cast<std::uint32_t>(
-      std::clamp(entry.confirmations, 1, static_cast<int>(kMaxEvidencePerHazard)));
-  result.hit_rate = entry.hit_rate;
-  result.false_rate = entry.false_rate;
-  result.survival = survival;
-  return result;
+std::string DecisionText(const std::string& done, const std::string& official,
+                         const std::string& reason) {
+  return CutUtf8(done + " by " + official + (reason.empty() ? "" : ": " + reason), kMaxReasonBytes);
+}
+
+HazardLifecycle::HazardLifecycle() : HazardLifecycle(Config()) {}
+
+HazardLifecycle::HazardLifecycle(const Config& config)
+    : config_(config),
+      trust_update_({config.prior_presence, config.settled_above, config.suspect_above,
+                     config.max_trust_step, config.official_weight}) {
+  CheckRange("gone_below", config.gone_below, 0.01, 0.5);
+  CheckRange("surest", config.max_presence, 0.9, 0.9999);
+  CheckRange("prior_presence", config.prior_presence, 0.01, config.max_presence);
+  CheckRange("verify_below", config.verify_below, config.gone_below, config.max_presence);
+  CheckRange("sure_above", config.settled_above, config.verify_below, config.max_presence);
+  CheckRange("active_above", config.active_above, config.gone_below, config.max_presence);
+  CheckRange("active_alone_above", config.active_alone_above, config.gone_below,
+             config.active_above);
+  CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
+  CheckRange("suspect_above", config.suspect_above, config.hostile_share + 0.001, 1);
+  CheckRange("most_against", config.max_trust_step, 0, 10);
+  CheckRange("official_weight", config.official_weight, 0, 10);
+  CheckRange("denials", config.denials, 2, kMaxEvidencePerHazard - 1);
+  CheckRange("quarantine_s", config.quarantine_s, 0, 1e9);
+  CheckRange("reopen_vehicles", config.reopen_vehicles, 2, kMaxEvidencePerHazard);
+  CheckRange("rejected_keep_s", config.rejected_keep_s, 3600, 1e9);
+  max_log_odds_ = LogOddsOf(config.max_presence);
+  max_voice_ = -LogOddsOf(config.hostile_share);
 }
 
 void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns,
@@ -112,7 +122,7 @@ double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& eviden
 /// Half hostile is worth nothing; who is more so must not be believed the other way round.
 double HazardLifecycle::MaxLogOddsPerVehicle(const Evidence& evidence) const {
   if (!(evidence.hostile > config_.hostile_share)) return max_voice_;
-  return std::max(0.0, -LogOdds(std::min(evidence.hostile, 0.5)));
+  return std::max(0.0, -LogOddsOf(std::min(evidence.hostile, 0.5)));
 }
 
 bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evidence,
@@ -120,7 +130,7 @@ bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evi
   const bool against = evidence.kind == EvidenceKind::kAnswerNo;
   const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
   const bool suspect = evidence.hostile >= config_.suspect_above;
-  VehicleEvidence* voice = PlaceOf(evidence.vehicle, suspect, at_s, life);
+  VehicleEvidence* voice = PlaceForEvidence(evidence.vehicle, suspect, at_s, life);
   if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
   const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
   const double ended_since = 1 - entry.survival.Survival(AgeS(life, evidence.stamp_ns), late_s);
@@ -150,7 +160,7 @@ bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evi
     life.SetJudged(static_cast<std::size_t>(voice - life.voices.data()), false);
   }
   if (suspect) return true;
-  against ? NoteNo(evidence.stamp_ns, life) : RecordConfirmation(evidence.stamp_ns, life);
+  against ? RecordDenial(evidence.stamp_ns, life) : RecordSupport(evidence.stamp_ns, life);
   return true;
 }
 
@@ -160,7 +170,7 @@ LifecycleUpdate HazardLifecycle::Begin(const ClassModel& entry, const Evidence& 
   life.since_ns = now_ns;
   life.at_ns = std::min(sighting.stamp_ns, now_ns);
   life.first_seen_ns = life.last_yes_ns = life.at_ns;
-  life.log_odds = life.undenied_log_odds = LogOdds(config_.prior_presence);
+  life.log_odds = life.undenied_log_odds = LogOddsOf(config_.prior_presence);
   LifecycleUpdate step = Apply(entry, sighting, now_ns, life);
   if (!step.transition) {
     step.transition = LifecycleTransition{std::nullopt, life.state, "first seen by 1 vehicle"};
@@ -185,7 +195,9 @@ LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& 
   const std::int64_t stood_until_ns = life.last_yes_ns;
   MoveTo(entry, word.stamp_ns, life);
   step.counted = ApplyEvidence(entry, word, life);
-  if (step.counted && word.kind != EvidenceKind::kAnswerNo) JudgeSeen(entry, word, life, step);
+  if (step.counted && word.kind != EvidenceKind::kAnswerNo) {
+    step.verdicts = trust_update_.AfterSighting(entry, word, life);
+  }
   Settle(entry, now_ns, life, step);
   if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
   return step;
@@ -204,7 +216,8 @@ void HazardLifecycle::Settle(const ClassModel& entry, std::int64_t now_ns, Prese
   step.transition = Decide(entry, life);
   if (!step.transition) return;
   if (life.state != HazardState::kRejected && IsDeniedAway(life)) {
-    JudgeDeniedAway(entry, life, step);
+    const std::vector<Verdict> verdicts = trust_update_.AfterDenial(entry, life);
+    step.verdicts.insert(step.verdicts.end(), verdicts.begin(), verdicts.end());
   }
   const HazardState from = life.state;
   const HazardState to = step.transition->to;
@@ -217,6 +230,101 @@ void HazardLifecycle::Settle(const ClassModel& entry, std::int64_t now_ns, Prese
   if (IsTold(from) && to == HazardState::kGone && life.first_no_ns > life.last_yes_ns) {
     step.lesson.stood_s = 0.5 * Seconds(life.first_no_ns - life.last_yes_ns);
     step.lesson.ended = true;
+  }
+}
+
+LifecycleUpdate HazardLifecycle::Confirm(const ClassModel& entry, const std::string& official,
+                                         const std::string& reason, std::int64_t now_ns,
+                                         PresenceRecord& life) const {
+  LifecycleUpdate step;
+  if (life.state == HazardState::kGone) return step;
+  const bool told = IsTold(life.state);
+  MoveTo(entry, now_ns, life);
+  const std::int64_t stood_until_ns = told ? life.last_yes_ns : life.first_seen_ns;
+  step.verdicts = trust_update_.AfterDecision(entry, true, life);
+  for (VehicleEvidence& voice : life.voices) {
+    if (voice.against) voice = VehicleEvidence();
+  }
+  RecordSupport(now_ns, life);
+  life.official = true;
+  life.log_odds = life.undenied_log_odds = max_log_odds_;
+  step.counted = true;
+  step.lesson.stood_s = Seconds(life.last_yes_ns - stood_until_ns);
+  // Confirmed again it stays what it is; that somebody looked is an event all the same.
+  step.transition =
+      Transition(life, HazardState::kActive, DecisionText("confirmed", official, reason));
+  if (life.state != HazardState::kActive) Enter(HazardState::kActive, now_ns, life);
+  return step;
+}
+
+LifecycleUpdate HazardLifecycle::Reject(const ClassModel& entry, const std::string& official,
+                                        const std::string& reason, std::int64_t now_ns,
+                                        PresenceRecord& life) const {
+  LifecycleUpdate step;
+  if (!IsOnMap(life.state)) return step;
+  step.verdicts = trust_update_.AfterDecision(entry, false, life);
+  step.transition =
+      Transition(life, HazardState::kRejected, DecisionText("rejected", official, reason));
+  Enter(HazardState::kRejected, now_ns, life);
+  // From here on it must be shown anew that there is something.
+  life.official = false;
+  life.voices = {};
+  life.judged = 0;
+  life.first_no_ns = 0;
+  life.at_ns = std::max(life.at_ns, now_ns);
+  life.log_odds = life.undenied_log_odds = LogOddsOf(config_.prior_presence);
+  return step;
+}
+
+LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t vehicle,
+                                          const std::string& why, std::int64_t now_ns,
+                                          PresenceRecord& life) const {
+  LifecycleUpdate step;
+  const auto voice =
+      std::find_if(life.voices.begin(), life.voices.end(),
+                   [&](const VehicleEvidence& one) { return one.vehicle == vehicle; });
+  if (vehicle == 0 || life.state == HazardState::kGone || voice == life.voices.end()) return step;
+  MoveTo(entry, now_ns, life);
+  const VehicleEvidence taken = *voice;
+  *voice = VehicleEvidence();
+  life.SetJudged(static_cast<std::size_t>(voice - life.voices.begin()), false);
+  step.counted = true;
+  const HazardState from = life.state;
+  // What an official has confirmed stands on his word, not on the vehicle's.
+  if (!life.official) {
+    TakeBack(entry, taken, life);
+    Demote(entry, taken, now_ns, life);
+  }
+  if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
+  step.transition = LifecycleTransition{from, life.state, CutUtf8(why, kMaxReasonBytes)};
+  return step;
+}
+
+/// The odds as if the vehicle had said nothing.
+void HazardLifecycle::TakeBack(const ClassModel& entry, const VehicleEvidence& taken,
+                               PresenceRecord& life) const {
+  double weight = 1e-3 * taken.weight_1000;
+  // A voice for the hazard has faded with the odds.
+  const double age_s = std::max(0.0, Seconds(life.at_ns) - taken.at_s);
+  if (weight > 0) weight *= std::exp(-age_s / entry.survival.MeanLifeS());
+  const auto less = [&](double log_odds, double by) {
+    return std::clamp(log_odds - by, -max_log_odds_, max_log_odds_);
+  };
+  life.log_odds = less(life.log_odds, weight);
+  life.undenied_log_odds = less(life.undenied_log_odds, std::max(0.0, weight));
+  ForgetStamps(taken, life);
+}
+
+/// A hazard that stood on the withdrawn words alone is gone; one that too few others have seen is a
+/// candidate again.
+void HazardLifecycle::Demote(const ClassModel& entry, const VehicleEvidence& taken,
+                             std::int64_t now_ns, PresenceRecord& life) const {
+  if (taken.against || !IsOnMap(life.state)) return;
+  const std::uint32_t supporters = Supporters(life);
+  if (supporters == 0) {
+    Enter(HazardState::kGone, now_ns, life);
+  } else if (IsTold(life.state) && supporters < entry.confirmations) {
+    Enter(HazardState::kCandidate, now_ns, life);
   }
 }
 
@@ -235,7 +343,7 @@ std::optional<LifecycleTransition> HazardLifecycle::Decide(const ClassModel& ent
                                                            const PresenceRecord& life) const {
   if (life.state == HazardState::kRejected) return DecideRejected(life);
   if (auto gone = DecideGone(life)) return gone;
-  const double presence = Probability(life.log_odds);
+  const double presence = ProbabilityOf(life.log_odds);
   const std::uint32_t supporters = Supporters(life);
   const std::uint32_t opponents = Opponents(life);
   switch (life.state) {
@@ -262,7 +370,7 @@ std::optional<LifecycleTransition> HazardLifecycle::Decide(const ClassModel& ent
 }
 
 bool HazardLifecycle::IsDeniedAway(const PresenceRecord& life) const {
-  return Opponents(life) >= config_.denials && Probability(life.log_odds) < config_.gone_below;
+  return Opponents(life) >= config_.denials && ProbabilityOf(life.log_odds) < config_.gone_below;
 }
 
 std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRecord& life) const {
@@ -271,7 +379,7 @@ std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRec
         life, HazardState::kGone,
         "denied by " + VehiclesText(Opponents(life)) + ", " + PresenceText(life.log_odds));
   }
-  if (Probability(life.undenied_log_odds) >= config_.gone_below) return std::nullopt;
+  if (ProbabilityOf(life.undenied_log_odds) >= config_.gone_below) return std::nullopt;
   return Transition(life, HazardState::kGone,
                     "not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns)) + ", " +
                         PresenceText(life.undenied_log_odds));
@@ -280,7 +388,8 @@ std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRec
 std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(
     const PresenceRecord& life) const {
   const std::uint32_t supporters = Supporters(life);
-  if (supporters >= config_.reopen_vehicles && Probability(life.log_odds) >= config_.active_above) {
+  if (supporters >= config_.reopen_vehicles &&
+      ProbabilityOf(life.log_odds) >= config_.active_above) {
     return Transition(life, HazardState::kActive,
                       "seen by " + VehiclesText(supporters) + " after its rejection");
   }
@@ -293,9 +402,9 @@ std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(
 double HazardLifecycle::Presence(const ClassModel& entry, const PresenceRecord& life,
                                  std::int64_t now_ns) const {
   if (life.state == HazardState::kRejected || now_ns <= life.at_ns) {
-    return Probability(life.log_odds);
+    return ProbabilityOf(life.log_odds);
   }
-  return Probability(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
+  return ProbabilityOf(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
 }
 
 std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
@@ -305,7 +414,7 @@ std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
     return std::max(life.since_ns, life.last_yes_ns) + Nanoseconds(config_.rejected_keep_s);
   }
   const auto falls_in_s = [&](double log_odds, double below) {
-    const double share = below / Probability(log_odds);
+    const double share = below / ProbabilityOf(log_odds);
     return share >= 1 ? 0.0 : entry.survival.TimeTo(share, AgeS(life, life.at_ns));
   };
   double soonest_s = falls_in_s(life.undenied_log_odds, config_.gone_below);

@@ -6,38 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "protocol/hazard_catalogue.h"
+#include "zone/belief/hazard_evidence.h"
 #include "zone/belief/survival_model.h"
+#include "zone/belief/trust_update.h"
 #include "zone/belief/vehicle_trust.h"
 #include "zone/model/presence_record.h"
 
 namespace livemap::zone {
-
-enum class EvidenceKind : std::uint8_t {
-  kSighting,   ///< A report.
-  kAnswerYes,  ///< To a poll, by a vehicle that could see the place.
-  kAnswerNo,   ///< The same.
-  kCantSee,    ///< Counts nothing.
-};
-
-/// What one vehicle says of one hazard.
-struct Evidence {
-  EvidenceKind kind = EvidenceKind::kSighting;
-  std::uint64_t vehicle = 0;  ///< VehicleKey.
-  std::int64_t stamp_ns = 0;  ///< Of the image.
-  /// P(its vehicle says what it likes), of VehicleTrust; `hostile_share` at least.
-  double hostile = 0;
-};
-
-/// What HazardLifecycle knows of a hazard's class; made by ClassModelOf, cheap to copy.
-struct ClassModel {
-  std::uint32_t confirmations =
-      2;  ///< Distinct vehicles before drivers are told, 1 to kMaxEvidencePerHazard.
-  double hit_rate = 0.85;    ///< P(a vehicle that looks says yes | it is there).
-  double false_rate = 0.03;  ///< P(the same | it is not there).
-  ClassSurvival survival;
-};
-ClassModel ClassModelOf(const protocol::HazardClass& entry, const ClassSurvival& survival);
 
 /// "`done` by `official`: `reason`", without the colon where there is no reason; at most 200 bytes.
 std::string DecisionText(const std::string& done, const std::string& official,
@@ -159,22 +134,12 @@ class HazardLifecycle {
   std::optional<LifecycleTransition> DecideGone(const PresenceRecord& life) const;
   std::optional<LifecycleTransition> DecideRejected(const PresenceRecord& life) const;
 
-  // Officials: hazard_officials.cpp.
   void TakeBack(const ClassModel& entry, const VehicleEvidence& taken, PresenceRecord& life) const;
   void Demote(const ClassModel& entry, const VehicleEvidence& taken, std::int64_t now_ns,
               PresenceRecord& life) const;
 
-  // Verdicts: hazard_verdicts.cpp.
-  double WrongYes(const ClassModel& entry) const;
-  double WrongNo(const ClassModel& entry) const;
-  void JudgeSeen(const ClassModel& entry, const Evidence& seen, PresenceRecord& life,
-                 LifecycleUpdate& step) const;
-  void JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life,
-                       LifecycleUpdate& step) const;
-  void JudgeOfficially(const ClassModel& entry, bool there, const PresenceRecord& life,
-                       LifecycleUpdate& step) const;
-
   Config config_;
+  TrustUpdate trust_update_;
   double max_log_odds_;  // Of presence, by `max_presence`.
   double max_voice_;     // Of one vehicle, by `hostile_share`.
 };

@@ -1,4 +1,5 @@
-// What becomes of words: the verdicts of HazardLifecycle, and what they do to vehicles.
+#include "zone/belief/trust_update.h"
+
 #include <gmock/gmock.h>
 
 #include <algorithm>

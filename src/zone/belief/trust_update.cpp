@@ -1,9 +1,10 @@
-// What becomes of vehicles' words: the part of HazardLifecycle that teaches VehicleTrust.
+#include "zone/belief/trust_update.h"
+
 #include <algorithm>
 #include <cmath>
 
+#include "common/log_odds.h"
 #include "common/time.h"
-#include "zone/belief/hazard_lifecycle.h"
 
 namespace livemap::zone {
 namespace {
@@ -11,15 +12,12 @@ namespace {
 /// Who says what it likes says one or the other.
 constexpr double kAnyWord = 0.5;
 
-double ChanceOf(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
-double OddsOf(double probability) { return std::log(probability / (1 - probability)); }
-
 double RightYes(const ClassModel& entry) { return std::log(kAnyWord / entry.hit_rate); }
 double RightNo(const ClassModel& entry) { return std::log(kAnyWord / (1 - entry.false_rate)); }
 
 /// The odds that the hazard was ever there, from what was said for it alone.
 double OddsOfSupport(const PresenceRecord& life, double prior) {
-  double log_odds = OddsOf(prior);
+  double log_odds = LogOddsOf(prior);
   for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle != 0 && !voice.against)
       log_odds += 1e-3 * std::max<int>(0, voice.weight_1000);
@@ -29,35 +27,37 @@ double OddsOfSupport(const PresenceRecord& life, double prior) {
 
 }  // namespace
 
-double HazardLifecycle::WrongYes(const ClassModel& entry) const {
+double TrustUpdate::WrongYes(const ClassModel& entry) const {
   return std::clamp(std::log(kAnyWord / entry.false_rate), 0.0, config_.max_trust_step);
 }
 
-double HazardLifecycle::WrongNo(const ClassModel& entry) const {
+double TrustUpdate::WrongNo(const ClassModel& entry) const {
   return std::clamp(std::log(kAnyWord / (1 - entry.hit_rate)), 0.0, config_.max_trust_step);
 }
 
-/// `seen` is a word for the hazard. The voices of before are judged by what all others say: nobody
-/// bears out its own word.
-void HazardLifecycle::JudgeSeen(const ClassModel& entry, const Evidence& seen, PresenceRecord& life,
-                                LifecycleUpdate& step) const {
-  if (seen.hostile >= config_.suspect_above) return;
+std::vector<Verdict> TrustUpdate::AfterSighting(const ClassModel& entry, const Evidence& seen,
+                                                PresenceRecord& life) const {
+  std::vector<Verdict> verdicts;
+  if (seen.hostile >= config_.suspect_above) return verdicts;
   for (std::size_t i = 0; i < kMaxEvidencePerHazard; ++i) {
     const VehicleEvidence& voice = life.voices[i];
     if (voice.vehicle == 0 || voice.vehicle == seen.vehicle || life.IsJudged(i)) continue;
     if (Seconds(seen.stamp_ns) <= voice.at_s) continue;
-    if (ChanceOf(life.log_odds - 1e-3 * voice.weight_1000) < config_.settled_above) continue;
+    if (ProbabilityOf(life.log_odds - 1e-3 * voice.weight_1000) < config_.certain_above) continue;
     life.SetJudged(i, true);
-    step.verdicts.push_back(
+    verdicts.push_back(
         {voice.vehicle, voice.against ? WrongNo(entry) : RightYes(entry), seen.vehicle});
   }
+  return verdicts;
 }
 
 /// Three things may have happened: there never was anything; it ended between the last word for it
 /// and the first against it; or it stands and every opponent missed it.
-void HazardLifecycle::JudgeDeniedAway(const ClassModel& entry, const PresenceRecord& life,
-                                      LifecycleUpdate& step) const {
-  const double real = life.official ? 1 : ChanceOf(OddsOfSupport(life, config_.prior_presence));
+std::vector<Verdict> TrustUpdate::AfterDenial(const ClassModel& entry,
+                                              const PresenceRecord& life) const {
+  std::vector<Verdict> verdicts;
+  const double real =
+      life.official ? 1 : ProbabilityOf(OddsOfSupport(life, config_.prior_presence));
   const double gap_s = std::max(0.0, Seconds(life.first_no_ns - life.last_yes_ns));
   const double age_s = std::max(0.0, Seconds(life.last_yes_ns - life.first_seen_ns));
   const double stands = entry.survival.Survival(age_s, gap_s);
@@ -74,26 +74,29 @@ void HazardLifecycle::JudgeDeniedAway(const ClassModel& entry, const PresenceRec
     const VehicleEvidence& voice = life.voices[i];
     if (voice.vehicle == 0 || life.IsJudged(i)) continue;
     if (!voice.against) {
-      step.verdicts.push_back({voice.vehicle, invented * WrongYes(entry), opponent});
+      verdicts.push_back({voice.vehicle, invented * WrongYes(entry), opponent});
       continue;
     }
     const std::uint64_t voucher = voice.vehicle == opponent ? other_opponent : opponent;
     if (voucher != voice.vehicle) {
-      step.verdicts.push_back({voice.vehicle, RightNo(entry), voucher});
+      verdicts.push_back({voice.vehicle, RightNo(entry), voucher});
     }
     if (voice.Counts()) other_opponent = voice.vehicle;
   }
+  return verdicts;
 }
 
-void HazardLifecycle::JudgeOfficially(const ClassModel& entry, bool there,
-                                      const PresenceRecord& life, LifecycleUpdate& step) const {
+std::vector<Verdict> TrustUpdate::AfterDecision(const ClassModel& entry, bool there,
+                                                const PresenceRecord& life) const {
+  std::vector<Verdict> verdicts;
   for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle == 0) continue;
     const double wrong = voice.against ? WrongNo(entry) : WrongYes(entry);
     const double right = voice.against ? RightNo(entry) : RightYes(entry);
     const double ratio = voice.against == there ? wrong : right;
-    step.verdicts.push_back({voice.vehicle, config_.official_weight * ratio, 0});
+    verdicts.push_back({voice.vehicle, config_.official_weight * ratio, 0});
   }
+  return verdicts;
 }
 
 }  // namespace livemap::zone
