@@ -1,6 +1,7 @@
 #pragma once
 
-// How ZoneStore reads the history of a hazard or of a map change; nobody else includes this.
+// How the tables of ZoneStore read the history of a hazard or of a map change; nobody else includes
+// this.
 #include <soci/soci.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 
 #include "common/time.h"
 #include "zone/admission/report_validation.h"
+#include "zone/store/queries.h"
 #include "zone/store/store_validation.h"
 
 namespace livemap::zone {

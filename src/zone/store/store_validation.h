@@ -1,8 +1,8 @@
 #pragma once
 
-// What the sources of ZoneStore that read share; nobody else includes this.
-#include <soci/soci.h>
-
+// What the tables of ZoneStore accept from the file: nothing in it is taken for granted, since
+// something else may have written into it. Types and sizes are checked by the database before a
+// value is fetched. Nobody else includes this.
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <cstddef>
@@ -30,15 +30,6 @@ inline bool IsCovariance(const Eigen::Matrix2d& covariance_m2) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(covariance_m2, Eigen::EigenvaluesOnly);
   return solver.eigenvalues().minCoeff() >= kMinVarianceM2;
-}
-
-/// Runs a query for at most one row. Reads to the end: an unfinished query would keep its snapshot
-/// and with it the whole log.
-inline bool FetchOne(soci::statement& statement) {
-  if (!statement.execute(true)) return false;
-  while (statement.fetch()) {
-  }
-  return true;
 }
 
 }  // namespace livemap::zone

@@ -3,9 +3,17 @@
 #include <soci/soci.h>
 #include <soci/sqlite3/soci-sqlite3.h>
 
+#include <algorithm>
+
 #include "common/sqlite.h"
+#include "zone/store/event_log.h"
+#include "zone/store/hazard_table.h"
+#include "zone/store/learned_tables.h"
+#include "zone/store/map_change_table.h"
+#include "zone/store/queries.h"
+#include "zone/store/report_log.h"
+#include "zone/store/store_validation.h"
 #include "zone/store/zone_schema.h"
-#include "zone/store/zone_store_state.h"
 
 namespace livemap::zone {
 namespace {
@@ -22,30 +30,43 @@ std::string ConnectionText(const std::string& path) {
   return "db=\"" + path + "\" timeout=10";
 }
 
-}  // namespace
-
-ZoneStore::Implementation::Implementation(const std::string& path)
-    : path_(path), session_(soci::sqlite3, ConnectionText(path)) {
-  Prepare();
-}
-
-void ZoneStore::Implementation::Prepare() {
-  session_ << "PRAGMA synchronous=FULL";
+/// Brings the database into the state that the tables expect. Throws StoreError.
+soci::session& Prepare(soci::session& session, const std::string& path) {
+  session << "PRAGMA synchronous=FULL";
   std::string mode;
-  session_ << "PRAGMA journal_mode=WAL", soci::into(mode);
-  session_ << "PRAGMA foreign_keys=ON";
+  session << "PRAGMA journal_mode=WAL", soci::into(mode);
+  session << "PRAGMA foreign_keys=ON";
   // 64 MB of pages stay in memory; the log is taken over after 40 MB, so that a page that many
   // commits touch is written to its place once for all of them.
-  session_ << "PRAGMA cache_size=-65536";
+  session << "PRAGMA cache_size=-65536";
   int pages = 0;
-  session_ << "PRAGMA wal_autocheckpoint=10000", soci::into(pages);
+  session << "PRAGMA wal_autocheckpoint=10000", soci::into(pages);
   std::string verdict;
-  session_ << "PRAGMA quick_check(1)", soci::into(verdict);
-  if (verdict != "ok") throw StoreError(WhyDamaged(path_, verdict));
-  MigrateZoneStore(session_, path_);
-  PrepareReads();
-  PrepareWrites();
+  session << "PRAGMA quick_check(1)", soci::into(verdict);
+  if (verdict != "ok") throw StoreError(WhyDamaged(path, verdict));
+  MigrateZoneStore(session, path);
+  return session;
 }
+
+}  // namespace
+
+class ZoneStore::Implementation {
+ public:
+  explicit Implementation(const std::string& path)
+      : session_(soci::sqlite3, ConnectionText(path)),
+        hazards_(Prepare(session_, path)),
+        reports_(session_),
+        events_(session_),
+        learned_(session_),
+        map_changes_(session_) {}
+
+  soci::session session_;
+  HazardTable hazards_;
+  ReportLog reports_;
+  EventLog events_;
+  LearnedTables learned_;
+  MapChangeTable map_changes_;
+};
 
 ZoneStore::ZoneStore(const std::string& path) {
   try {
@@ -60,6 +81,121 @@ ZoneStore::ZoneStore(const std::string& path) {
 }
 
 ZoneStore::~ZoneStore() = default;
+
+StoreDamage ZoneStore::LoadHazards(const std::function<void(HazardRow)>& take) {
+  return implementation_->hazards_.Load(take);
+}
+
+StoreDamage ZoneStore::LoadLives(
+    const std::function<void(const std::string&, LearnedLifetime)>& take) {
+  return implementation_->learned_.LoadLives(take);
+}
+
+StoreDamage ZoneStore::LoadTrust(
+    const std::function<void(std::uint64_t, const TrustRecord&)>& take) {
+  return implementation_->learned_.LoadTrust(take);
+}
+
+std::uint64_t ZoneStore::LastHazardId() { return implementation_->hazards_.LastId(); }
+
+std::uint64_t ZoneStore::LastSequence() {
+  return ExplainStore("reading the newest sequence", [&] {
+    long long sequence = 0;
+    implementation_->session_
+        << "SELECT max((SELECT coalesce(max(sequence), 0) FROM events WHERE sequence < :most), "
+           "(SELECT coalesce(max(sequence), 0) FROM map_change_events WHERE sequence < :most))",
+        soci::use(kMaxSequence, "most"), soci::into(sequence);
+    return static_cast<std::uint64_t>(std::max(sequence, 0LL));
+  });
+}
+
+std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_uuid) {
+  return implementation_->reports_.FindReport(report_uuid);
+}
+
+std::optional<ReportedFix> ZoneStore::FindLastReport(const std::string& vehicle_id) {
+  return implementation_->reports_.FindLastReport(vehicle_id);
+}
+
+std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t sequence,
+                                               std::size_t limit) {
+  return implementation_->events_.Load(hazard, sequence, limit);
+}
+
+StoreDamage ZoneStore::LoadMapChanges(const std::function<void(MapChangeRow)>& take) {
+  return implementation_->map_changes_.Load(take);
+}
+
+std::uint64_t ZoneStore::LastMapChangeId() { return implementation_->map_changes_.LastId(); }
+
+std::optional<ZoneStore::KnownMapChangeReport> ZoneStore::FindMapChangeReport(
+    const Uuid& report_uuid) {
+  return implementation_->map_changes_.FindReport(report_uuid);
+}
+
+std::vector<StoredMapChangeEvent> ZoneStore::LoadMapChangeEvents(std::uint64_t sequence,
+                                                                 std::size_t limit) {
+  return implementation_->map_changes_.LoadEvents(sequence, limit);
+}
+
+void ZoneStore::Begin() {
+  ExplainStore("beginning a transaction", [&] { implementation_->session_ << "BEGIN IMMEDIATE"; });
+}
+
+void ZoneStore::Commit() {
+  ExplainStore("committing", [&] { implementation_->session_ << "COMMIT"; });
+}
+
+void ZoneStore::Rollback() noexcept {
+  try {
+    implementation_->session_ << "ROLLBACK";
+  } catch (const std::exception&) {  // See the header.
+  }
+}
+
+void ZoneStore::WriteHazard(const HazardRow& row) { implementation_->hazards_.Write(row); }
+
+void ZoneStore::WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
+                            const std::string& image_sha256, std::int64_t received_ns) {
+  implementation_->reports_.WriteReport(report, hazard_id, image_sha256, received_ns);
+}
+
+void ZoneStore::WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
+                           std::uint64_t previous_sequence) {
+  implementation_->events_.Write(event, hazard_id, previous_sequence);
+}
+
+void ZoneStore::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
+                            std::int64_t received_ns) {
+  implementation_->reports_.WriteAnswer(answer, hazard_id, received_ns);
+}
+
+void ZoneStore::WriteLife(const std::string& class_name, const LearnedLifetime& learned) {
+  implementation_->learned_.WriteLife(class_name, learned);
+}
+
+void ZoneStore::WriteTrust(std::uint64_t vehicle, const TrustRecord& record) {
+  implementation_->learned_.WriteTrust(vehicle, record);
+}
+
+void ZoneStore::WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix) {
+  implementation_->reports_.WriteLastReport(vehicle_id, fix);
+}
+
+void ZoneStore::WriteMapChange(const MapChangeRow& row) {
+  implementation_->map_changes_.Write(row);
+}
+
+void ZoneStore::DropMapChange(std::uint64_t id) { implementation_->map_changes_.Drop(id); }
+
+void ZoneStore::WriteMapChangeReport(const protocol::MapChangeReport& report, const Uuid& change,
+                                     std::int64_t received_ns) {
+  implementation_->map_changes_.WriteReport(report, change, received_ns);
+}
+
+void ZoneStore::WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t id) {
+  implementation_->map_changes_.WriteEvent(event, id);
+}
 
 int ZoneStore::SchemaVersion() { return kZoneSchemaVersion; }
 

@@ -1,0 +1,125 @@
+#include "zone/store/report_log.h"
+
+#include <cmath>
+
+#include "common/time.h"
+#include "zone/model/poll_answer.h"
+#include "zone/store/queries.h"
+#include "zone/store/store_validation.h"
+
+namespace livemap::zone {
+namespace {
+
+constexpr char kSoundLastReport[] =
+    "typeof(stamp_ns) = 'integer' AND typeof(latitude) IN ('real', 'integer') AND "
+    "typeof(longitude) IN ('real', 'integer') AND typeof(sigma_m) IN ('real', 'integer')";
+
+}  // namespace
+
+ReportLog::ReportLog(soci::session& session)
+    // A report whose hazard is broken is known all the same: its uuid is taken.
+    : find_report_(
+          (session.prepare << "SELECT CASE WHEN typeof(h.uuid) = 'text' THEN substr(h.uuid, 1, 37) "
+                              "ELSE '' END, CASE WHEN typeof(r.vehicle_id) = 'text' THEN "
+                              "substr(r.vehicle_id, 1, 65) ELSE '' END FROM reports r LEFT JOIN "
+                              "hazards h ON h.id = r.hazard_id WHERE r.uuid = :uuid",
+           soci::use(row_.uuid), soci::into(row_.hazard_uuid), soci::into(row_.vehicle_id))),
+      find_last_report_((session.prepare << "SELECT stamp_ns, latitude, longitude, sigma_m "
+                                            "FROM last_reports WHERE vehicle_id = :v AND "
+                                         << kSoundLastReport,
+                         soci::use(row_.vehicle_id), soci::into(row_.stamp_ns),
+                         soci::into(row_.latitude), soci::into(row_.longitude),
+                         soci::into(row_.sigma_m))),
+      write_report_(
+          (session.prepare
+               << "INSERT INTO reports (uuid, hazard_id, vehicle_id, drive_id, stamp_ns, "
+                  "received_ns, confidence, latitude, longitude, covariance_ee, covariance_en, "
+                  "covariance_nn, image_sha256) VALUES "
+                  "(:u, :h, :v, :d, :st, :re, :co, :la, :lo, :ee, :en, :nn, :im)",
+           soci::use(row_.uuid), soci::use(row_.hazard_id), soci::use(row_.vehicle_id),
+           soci::use(row_.drive_id), soci::use(row_.stamp_ns), soci::use(row_.received_ns),
+           soci::use(row_.confidence), soci::use(row_.latitude), soci::use(row_.longitude),
+           soci::use(row_.covariance_ee), soci::use(row_.covariance_en),
+           soci::use(row_.covariance_nn), soci::use(row_.image_sha256))),
+      write_answer_((session.prepare
+                         << "INSERT INTO answers (poll_uuid, hazard_id, vehicle_id, answer, "
+                            "reason, confidence, "
+                            "stamp_ns, received_ns) VALUES (:u, :h, :v, :a, :r, :c, :st, :re)",
+                     soci::use(row_.uuid), soci::use(row_.hazard_id), soci::use(row_.vehicle_id),
+                     soci::use(row_.answer), soci::use(row_.reason), soci::use(row_.confidence),
+                     soci::use(row_.stamp_ns), soci::use(row_.received_ns))),
+      write_last_report_(
+          (session.prepare
+               << "INSERT INTO last_reports (vehicle_id, stamp_ns, latitude, longitude, sigma_m) "
+                  "VALUES (:v, :st, :la, :lo, :si) ON CONFLICT (vehicle_id) DO UPDATE SET "
+                  "stamp_ns = excluded.stamp_ns, latitude = excluded.latitude, "
+                  "longitude = excluded.longitude, sigma_m = excluded.sigma_m",
+           soci::use(row_.vehicle_id), soci::use(row_.stamp_ns), soci::use(row_.latitude),
+           soci::use(row_.longitude), soci::use(row_.sigma_m))) {}
+
+std::optional<ZoneStore::KnownReport> ReportLog::FindReport(const Uuid& report_uuid) {
+  return ExplainStore("looking up a report", [&]() -> std::optional<ZoneStore::KnownReport> {
+    row_.uuid = report_uuid.ToString();
+    if (!FetchOne(find_report_)) return std::nullopt;
+    return ZoneStore::KnownReport{Uuid::Parse(row_.hazard_uuid).value_or(Uuid{}), row_.vehicle_id};
+  });
+}
+
+std::optional<ReportedFix> ReportLog::FindLastReport(const std::string& vehicle_id) {
+  return ExplainStore("looking up a vehicle", [&]() -> std::optional<ReportedFix> {
+    row_.vehicle_id = vehicle_id;
+    if (!FetchOne(find_last_report_)) return std::nullopt;
+    const ReportedFix fix{row_.stamp_ns, {row_.latitude, row_.longitude}, row_.sigma_m};
+    const bool sound = IsStamp(fix.stamp_ns) && geo::IsValid(fix.position) && fix.sigma_m >= 0 &&
+                       fix.sigma_m <= std::sqrt(2 * kMaxVarianceM2);
+    return sound ? std::optional<ReportedFix>(fix) : std::nullopt;
+  });
+}
+
+void ReportLog::WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
+                            const std::string& image_sha256, std::int64_t received_ns) {
+  ExplainStore("writing a report", [&] {
+    row_.uuid = report.uuid.ToString();
+    row_.hazard_id = static_cast<long long>(hazard_id);
+    row_.vehicle_id = report.vehicle_id;
+    row_.drive_id = report.drive_id;
+    row_.stamp_ns = report.stamp_ns;
+    row_.received_ns = received_ns;
+    row_.confidence = static_cast<double>(report.confidence);
+    row_.latitude = report.position.latitude_deg;
+    row_.longitude = report.position.longitude_deg;
+    row_.covariance_ee = report.covariance_m2(0, 0);
+    row_.covariance_en = report.covariance_m2(0, 1);
+    row_.covariance_nn = report.covariance_m2(1, 1);
+    row_.image_sha256 = image_sha256;
+    write_report_.execute(true);
+  });
+}
+
+void ReportLog::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
+                            std::int64_t received_ns) {
+  ExplainStore("writing an answer", [&] {
+    row_.uuid = answer.poll.ToString();
+    row_.hazard_id = static_cast<long long>(hazard_id);
+    row_.vehicle_id = answer.vehicle_id;
+    row_.answer = static_cast<int>(answer.answer);
+    row_.reason = answer.reason;
+    row_.confidence = answer.confidence;
+    row_.stamp_ns = answer.stamp_ns;
+    row_.received_ns = received_ns;
+    write_answer_.execute(true);
+  });
+}
+
+void ReportLog::WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix) {
+  ExplainStore("writing a vehicle's last report", [&] {
+    row_.vehicle_id = vehicle_id;
+    row_.stamp_ns = fix.stamp_ns;
+    row_.latitude = fix.position.latitude_deg;
+    row_.longitude = fix.position.longitude_deg;
+    row_.sigma_m = fix.sigma_m;
+    write_last_report_.execute(true);
+  });
+}
+
+}  // namespace livemap::zone
