@@ -36,6 +36,7 @@ std::vector<Polling::Question> Polling::Approach(std::uint64_t hazard, const std
   if (scheduler_) {
     scheduler_->SetVehicle(vehicle, point);
     for (const zone::PollChoice& choice : scheduler_->TakeDue(now_ns)) {
+      open_[{choice.hazard, choice.vehicle_id}] = choice.poll;
       questions.push_back({choice.hazard, choice.vehicle_id});
     }
     polls_ += questions.size();
@@ -60,7 +61,10 @@ std::vector<Polling::Question> Polling::Approach(std::uint64_t hazard, const std
 
 void Polling::Answered(std::uint64_t hazard, const std::string& vehicle, std::int64_t now_ns) {
   if (scheduler_) {
-    scheduler_->Answered(hazard, vehicle, config_.poll_bytes, now_ns);
+    const auto asked = open_.find({hazard, vehicle});
+    if (asked == open_.end()) return;
+    scheduler_->Answered(asked->second, config_.poll_bytes, now_ns);
+    open_.erase(asked);
     return;
   }
   const auto found = timers_.find(hazard);

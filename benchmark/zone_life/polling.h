@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "zone/polling/poll_scheduler.h"
@@ -56,6 +58,7 @@ class Polling {
   PollingRule rule_;
   zone::PollScheduler::Config config_;
   std::unique_ptr<zone::PollScheduler> scheduler_;
+  std::map<std::pair<std::uint64_t, std::string>, Uuid> open_;  ///< By hazard and vehicle.
   std::unordered_map<std::uint64_t, Timer> timers_;
   std::uint64_t polls_ = 0;
 };

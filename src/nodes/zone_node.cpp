@@ -151,7 +151,7 @@ void ZoneNode::OnPosition(const VehiclePosition& message) {
 
 void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
   try {
-    zone::PollAnswer answer = ros_io::ToPollAnswer(message);
+    protocol::PollAnswer answer = ros_io::FromMessage(message);
     const std::lock_guard<std::mutex> lock(mutex_);
     answers_.push_back(std::move(answer));
     // The oldest have waited longest: their polls expire first.
@@ -260,12 +260,12 @@ bool ZoneNode::TellVehicles() {
 }
 
 void ZoneNode::HandleAnswers() {
-  std::deque<zone::PollAnswer> answers;
+  std::deque<protocol::PollAnswer> answers;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     answers.swap(answers_);
   }
-  for (const zone::PollAnswer& answer : answers) {
+  for (const protocol::PollAnswer& answer : answers) {
     try {
       zone_.HandleAnswer(answer);
     } catch (const Error& error) {
@@ -283,8 +283,8 @@ void ZoneNode::LetTimePass() {
   advanced_ns_ = now_ns;
   try {
     zone_.Advance();
-    for (const zone::PollOrder& order : zone_.TakeDuePolls()) {
-      poll_publisher_.publish(ros_io::ToMessage(order, NowNs()));
+    for (const protocol::Poll& poll : zone_.TakeDuePolls()) {
+      poll_publisher_.publish(ros_io::ToMessage(poll));
     }
   } catch (const Error& error) {
     ROS_ERROR_THROTTLE(kSayAgainS, "hazards do not age: %s", error.what());

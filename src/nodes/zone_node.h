@@ -79,7 +79,7 @@ class ZoneNode {
   std::optional<geo::LocalFrame> map_;
   zone::CatchUpPlanner catch_up_;
   std::deque<zone::CatchUpOrder> orders_;  ///< Not yet the worker's.
-  std::deque<zone::PollAnswer> answers_;
+  std::deque<protocol::PollAnswer> answers_;
 
   MapChangeReceiver map_changes_;
   NoticePictures pictures_;

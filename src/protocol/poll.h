@@ -32,7 +32,7 @@ struct Poll {
 };
 
 /// What a vehicle saw at a hazard's place (HazardPollAnswer.msg without ROS).
-struct PollReply {
+struct PollAnswer {
   enum class Answer { kYes, kNo, kCantSee };
   Uuid poll;
   Uuid hazard;

@@ -57,19 +57,19 @@ void CheckPoll(const Poll& poll) {
   }
 }
 
-void CheckReply(const PollReply& reply) {
-  RequireIds(reply.poll, reply.hazard, "poll answer");
-  if (!(reply.confidence >= 0 && reply.confidence <= 1)) {
-    throw Error("poll answer has confidence " + std::to_string(reply.confidence) +
+void CheckAnswer(const PollAnswer& answer) {
+  RequireIds(answer.poll, answer.hazard, "poll answer");
+  if (!(answer.confidence >= 0 && answer.confidence <= 1)) {
+    throw Error("poll answer has confidence " + std::to_string(answer.confidence) +
                 ", accepted is 0 to 1");
   }
-  RequirePosition(reply.vehicle_position, "poll answer");
-  if (std::isinf(reply.course_rad)) {
+  RequirePosition(answer.vehicle_position, "poll answer");
+  if (std::isinf(answer.course_rad)) {
     throw Error("poll answer has an infinite course, accepted are radians, or NaN when standing");
   }
-  RequireShort(reply.reason, kMaxReasonBytes, "reason of a poll answer");
-  RequireShort(reply.drive_id, kMaxNameBytes, "drive_id of a poll answer");
-  RequireShort(reply.image_format, kMaxNameBytes, "image format of a poll answer");
+  RequireShort(answer.reason, kMaxReasonBytes, "reason of a poll answer");
+  RequireShort(answer.drive_id, kMaxNameBytes, "drive_id of a poll answer");
+  RequireShort(answer.image_format, kMaxNameBytes, "image format of a poll answer");
 }
 
 }  // namespace livemap::protocol

@@ -12,6 +12,6 @@ namespace livemap::protocol {
 void CheckPoll(const Poll& poll);
 /// For the zone: what a vehicle answers. Its picture and what it claims are judged later, see
 /// ZoneService::HandleAnswer.
-void CheckReply(const PollReply& reply);
+void CheckAnswer(const PollAnswer& answer);
 
 }  // namespace livemap::protocol

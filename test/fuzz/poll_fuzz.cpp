@@ -1,5 +1,5 @@
 // Polls as vehicles hear them, answers as the zone hears them, with any values: CheckPoll,
-// CheckReply, and what the zone does with an answer to a poll that it asked.
+// CheckAnswer, and what the zone does with an answer to a poll that it asked.
 #include <unistd.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ void FuzzPoll(FuzzBytes& bytes) {
 }
 
 void FuzzReply(FuzzBytes& bytes) {
-  protocol::PollReply reply;
+  protocol::PollAnswer reply;
   Fill(reply.poll, bytes);
   Fill(reply.hazard, bytes);
   reply.confidence = static_cast<float>(Number(bytes, 0.5));
@@ -61,7 +61,7 @@ void FuzzReply(FuzzBytes& bytes) {
   reply.drive_id = bytes.Text();
   reply.image_format = bytes.Text();
   try {
-    protocol::CheckReply(reply);
+    protocol::CheckAnswer(reply);
   } catch (const Error& error) {
     Require(std::string(error.what()).size() < 900);
     return;
@@ -88,7 +88,7 @@ class AskingZone {
   }
 
   /// A poll about a hazard of its own, to a vehicle that drives up to it.
-  zone::PollOrder Ask() {
+  protocol::Poll Ask() {
     now_ns_ += std::int64_t{3600} * 1'000'000'000;
     protocol::Report report;
     report.uuid.bytes[0] = 1;
@@ -108,7 +108,7 @@ class AskingZone {
     // 50 m south of it, northwards.
     zone_->UpdateVehicle(
         {vehicle, "", {report.position.latitude_deg - 0.00045, 8}, 0, 10, now_ns_, 0});
-    for (zone::PollOrder& order : zone_->TakeDuePolls()) {
+    for (protocol::Poll& order : zone_->TakeDuePolls()) {
       if (order.vehicle_id == vehicle) return order;
     }
     std::abort();
@@ -128,17 +128,17 @@ class AskingZone {
 void FuzzAnswer(FuzzBytes& bytes) {
   static std::unique_ptr<AskingZone> asking;
   if (!asking || asking->count() >= 200) asking = std::make_unique<AskingZone>();
-  const zone::PollOrder order = asking->Ask();
-  zone::PollAnswer answer;
+  const protocol::Poll order = asking->Ask();
+  protocol::PollAnswer answer;
   answer.poll = order.poll;
   answer.hazard = order.hazard;
   answer.vehicle_id = order.vehicle_id;
   if (bytes.Below(16) == 0) Fill(answer.poll, bytes);
   if (bytes.Below(16) == 0) Fill(answer.hazard, bytes);
   if (bytes.Below(16) == 0) answer.vehicle_id = bytes.Text();
-  answer.answer = static_cast<zone::PollAnswer::Answer>(bytes.Below(3));
+  answer.answer = static_cast<protocol::PollAnswer::Answer>(bytes.Below(3));
   answer.stamp_ns = bytes.Below(3) == 0 ? bytes.Any<std::int64_t>() : asking->now_ns();
-  answer.confidence = Number(bytes, 0.5);
+  answer.confidence = static_cast<float>(Number(bytes, 0.5));
   answer.vehicle_position = {Number(bytes, 40), Number(bytes, 8)};
   answer.reason = bytes.Below(2) == 0 ? bytes.Text() : "";
   answer.image_format = bytes.Text();

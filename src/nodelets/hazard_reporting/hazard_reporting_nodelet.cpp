@@ -322,7 +322,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     };
     vehicle.pose_at = [this](std::int64_t stamp_ns) { return reporter_->BasePoseAt(stamp_ns); };
     responder_->Process(ros::Time::now().toSec(), SteadyS(), vehicle);
-    for (const protocol::PollReply& reply : responder_->TakeReplies()) {
+    for (const protocol::PollAnswer& reply : responder_->TakeReplies()) {
       answer_publisher_.publish(ros_io::ToMessage(reply));
     }
     for (const std::int64_t stamp_ns : responder_->TakePictureRequests()) {

@@ -59,47 +59,6 @@ protocol::Poll FromMessage(const HazardPoll& message) {
   return poll;
 }
 
-HazardPoll ToMessage(const zone::PollOrder& order, std::int64_t now_ns) {
-  protocol::Poll poll;
-  poll.poll = order.poll;
-  poll.hazard = order.hazard;
-  poll.vehicle_id = order.vehicle_id;
-  poll.stamp_ns = now_ns;
-  poll.expires_ns = order.expires_ns;
-  poll.class_name = order.class_name;
-  poll.position = order.position;
-  poll.covariance_m2 = order.covariance_m2;
-  poll.picture = order.picture;
-  poll.max_picture_bytes = order.max_picture_bytes;
-  return ToMessage(poll);
-}
-
-zone::PollAnswer ToPollAnswer(const HazardPollAnswer& message) {
-  const protocol::PollReply reply = FromMessage(message);
-  zone::PollAnswer answer;
-  answer.poll = reply.poll;
-  answer.hazard = reply.hazard;
-  answer.vehicle_id = reply.vehicle_id;
-  switch (reply.answer) {
-    case protocol::PollReply::Answer::kYes:
-      answer.answer = zone::PollAnswer::Answer::kYes;
-      break;
-    case protocol::PollReply::Answer::kNo:
-      answer.answer = zone::PollAnswer::Answer::kNo;
-      break;
-    case protocol::PollReply::Answer::kCantSee:
-      answer.answer = zone::PollAnswer::Answer::kCantSee;
-      break;
-  }
-  answer.reason = reply.reason;
-  answer.confidence = static_cast<double>(reply.confidence);
-  answer.vehicle_position = reply.vehicle_position;
-  answer.stamp_ns = reply.stamp_ns;
-  answer.image_format = reply.image_format;
-  answer.image = reply.image;
-  return answer;
-}
-
 std::vector<vehicle::ChangeEvidence> ToEvidence(const ChangedObjects& message) {
   std::vector<vehicle::ChangeEvidence> all;
   for (const ChangedObject& object : message.objects) {
@@ -120,66 +79,66 @@ std::vector<vehicle::ChangeEvidence> ToEvidence(const ChangedObjects& message) {
   return all;
 }
 
-HazardPollAnswer ToMessage(const protocol::PollReply& reply) {
+HazardPollAnswer ToMessage(const protocol::PollAnswer& answer) {
   HazardPollAnswer message;
   message.schema_version = HazardPollAnswer::SCHEMA_VERSION;
-  message.poll_uuid = ToBytes(reply.poll);
-  message.hazard_uuid = ToBytes(reply.hazard);
-  message.vehicle_id = reply.vehicle_id;
-  message.drive_id = reply.drive_id;
-  message.stamp = ToRosTime(reply.stamp_ns);
-  switch (reply.answer) {
-    case protocol::PollReply::Answer::kYes:
+  message.poll_uuid = ToBytes(answer.poll);
+  message.hazard_uuid = ToBytes(answer.hazard);
+  message.vehicle_id = answer.vehicle_id;
+  message.drive_id = answer.drive_id;
+  message.stamp = ToRosTime(answer.stamp_ns);
+  switch (answer.answer) {
+    case protocol::PollAnswer::Answer::kYes:
       message.answer = HazardPollAnswer::YES;
       break;
-    case protocol::PollReply::Answer::kNo:
+    case protocol::PollAnswer::Answer::kNo:
       message.answer = HazardPollAnswer::NO;
       break;
-    case protocol::PollReply::Answer::kCantSee:
+    case protocol::PollAnswer::Answer::kCantSee:
       message.answer = HazardPollAnswer::CANT_SEE;
       break;
   }
-  message.reason = reply.reason;
-  message.confidence = reply.confidence;
-  message.latitude = reply.vehicle_position.latitude_deg;
-  message.longitude = reply.vehicle_position.longitude_deg;
-  message.course = static_cast<float>(reply.course_rad);
+  message.reason = answer.reason;
+  message.confidence = answer.confidence;
+  message.latitude = answer.vehicle_position.latitude_deg;
+  message.longitude = answer.vehicle_position.longitude_deg;
+  message.course = static_cast<float>(answer.course_rad);
   message.image.header.stamp = message.stamp;
-  message.image.format = reply.image_format;
-  message.image.data = reply.image;
+  message.image.format = answer.image_format;
+  message.image.data = answer.image;
   return message;
 }
 
-protocol::PollReply FromMessage(const HazardPollAnswer& message) {
+protocol::PollAnswer FromMessage(const HazardPollAnswer& message) {
   CheckVersion(message, "poll answer");
-  protocol::PollReply reply;
+  protocol::PollAnswer answer;
   switch (message.answer) {
     case HazardPollAnswer::YES:
-      reply.answer = protocol::PollReply::Answer::kYes;
+      answer.answer = protocol::PollAnswer::Answer::kYes;
       break;
     case HazardPollAnswer::NO:
-      reply.answer = protocol::PollReply::Answer::kNo;
+      answer.answer = protocol::PollAnswer::Answer::kNo;
       break;
     case HazardPollAnswer::CANT_SEE:
-      reply.answer = protocol::PollReply::Answer::kCantSee;
+      answer.answer = protocol::PollAnswer::Answer::kCantSee;
       break;
     default:
       throw Error("poll answer is " + std::to_string(message.answer) +
                   ", accepted is 0 (yes), 1 (no) or 2 (can't see)");
   }
-  reply.poll = ToUuid(message.poll_uuid);
-  reply.hazard = ToUuid(message.hazard_uuid);
-  reply.vehicle_id = message.vehicle_id;
-  reply.drive_id = message.drive_id;
-  reply.stamp_ns = FromRosTime(message.stamp);
-  reply.reason = message.reason;
-  reply.confidence = message.confidence;
-  reply.vehicle_position = {message.latitude, message.longitude};
-  reply.course_rad = static_cast<double>(message.course);
-  reply.image_format = message.image.format;
-  reply.image = message.image.data;
-  protocol::CheckReply(reply);
-  return reply;
+  answer.poll = ToUuid(message.poll_uuid);
+  answer.hazard = ToUuid(message.hazard_uuid);
+  answer.vehicle_id = message.vehicle_id;
+  answer.drive_id = message.drive_id;
+  answer.stamp_ns = FromRosTime(message.stamp);
+  answer.reason = message.reason;
+  answer.confidence = message.confidence;
+  answer.vehicle_position = {message.latitude, message.longitude};
+  answer.course_rad = static_cast<double>(message.course);
+  answer.image_format = message.image.format;
+  answer.image = message.image.data;
+  protocol::CheckAnswer(answer);
+  return answer;
 }
 
 }  // namespace livemap::ros_io

@@ -8,7 +8,6 @@
 
 #include "protocol/poll.h"
 #include "vehicle/polls/change_evidence.h"
-#include "zone/service/zone_service.h"
 
 namespace livemap::ros_io {
 
@@ -19,16 +18,11 @@ namespace livemap::ros_io {
 HazardPoll ToMessage(const protocol::Poll& poll);
 protocol::Poll FromMessage(const HazardPoll& message);
 
-/// The zone's order as a poll that is asked at `now_ns`, zone clock.
-HazardPoll ToMessage(const zone::PollOrder& order, std::int64_t now_ns);
-/// The reply as the zone takes it; the vehicle_id is the one that the bridge wrote.
-zone::PollAnswer ToPollAnswer(const HazardPollAnswer& message);
-
 /// What change detection tells of things that surely went or came; those of unknown direction are
 /// left out.
 std::vector<vehicle::ChangeEvidence> ToEvidence(const ChangedObjects& message);
 
-HazardPollAnswer ToMessage(const protocol::PollReply& reply);
-protocol::PollReply FromMessage(const HazardPollAnswer& message);
+HazardPollAnswer ToMessage(const protocol::PollAnswer& answer);
+protocol::PollAnswer FromMessage(const HazardPollAnswer& message);
 
 }  // namespace livemap::ros_io

@@ -270,7 +270,7 @@ void PollResponder::Answer(const OpenPoll& open) {
     ++counters_.unanswered;
     return;
   }
-  protocol::PollReply reply;
+  protocol::PollAnswer reply;
   reply.poll = open.poll.poll;
   reply.hazard = open.poll.hazard;
   reply.drive_id = config_.drive_id;
@@ -280,11 +280,11 @@ void PollResponder::Answer(const OpenPoll& open) {
   reply.vehicle_position = base.position;
   reply.course_rad = base.course_rad;
   if (seen) {
-    reply.answer = protocol::PollReply::Answer::kYes;
+    reply.answer = protocol::PollAnswer::Answer::kYes;
     reply.confidence = open.match_confidence;
     ++counters_.yes;
   } else if (not_there) {
-    reply.answer = protocol::PollReply::Answer::kNo;
+    reply.answer = protocol::PollAnswer::Answer::kNo;
     // Both look at the same images: the surer one counts, not both together.
     const double views = 1 - std::pow(config_.miss_share, open.clear_views);
     reply.confidence =
@@ -292,7 +292,7 @@ void PollResponder::Answer(const OpenPoll& open) {
     ++counters_.no;
     if (open.clear_views < config_.no_views) ++counters_.no_by_change;
   } else {
-    reply.answer = protocol::PollReply::Answer::kCantSee;
+    reply.answer = protocol::PollAnswer::Answer::kCantSee;
     reply.reason = ReasonOf(open);
     ++counters_.cant_see;
     if (open.clear_views >= config_.no_views) ++counters_.disagreed;
@@ -301,7 +301,7 @@ void PollResponder::Answer(const OpenPoll& open) {
   replies_.push_back(std::move(reply));
 }
 
-void PollResponder::AttachPicture(const OpenPoll& open, protocol::PollReply& reply) {
+void PollResponder::AttachPicture(const OpenPoll& open, protocol::PollAnswer& reply) {
   const auto picture = pictures_.find(open.view_ns);
   if (open.poll.picture == protocol::PollPicture::kNone || picture == pictures_.end()) return;
   const std::size_t max_bytes = open.poll.max_picture_bytes;
@@ -353,7 +353,7 @@ std::string PollResponder::ReasonOf(const OpenPoll& open) {
   return "no image";
 }
 
-std::vector<protocol::PollReply> PollResponder::TakeReplies() {
+std::vector<protocol::PollAnswer> PollResponder::TakeReplies() {
   return std::exchange(replies_, {});
 }
 

@@ -105,7 +105,7 @@ class PollResponder {
 
   /// Works off waiting frames and expired polls. Answers are ready for TakeReplies.
   void Process(double now_s, double steady_s, const Vehicle& vehicle);
-  std::vector<protocol::PollReply> TakeReplies();
+  std::vector<protocol::PollAnswer> TakeReplies();
 
   /// Mean brightness, 0 to 255, of a coarse grid of the pixels of an 8-bit grey or colour image.
   static double MeanLuminance(const cv::Mat& image);
@@ -154,7 +154,7 @@ class PollResponder {
   /// Whether views and changes make a no.
   bool IsGone(const OpenPoll& open) const;
   void Answer(const OpenPoll& open);
-  void AttachPicture(const OpenPoll& open, protocol::PollReply& reply);
+  void AttachPicture(const OpenPoll& open, protocol::PollAnswer& reply);
   static std::string ReasonOf(const OpenPoll& open);
 
   Config config_;
@@ -166,7 +166,7 @@ class PollResponder {
       pictures_;  // The newest, and those that an open poll may need.
   std::map<std::int64_t, double> luminances_;
   std::vector<std::int64_t> picture_requests_;
-  std::vector<protocol::PollReply> replies_;
+  std::vector<protocol::PollAnswer> replies_;
   std::optional<geo::TrackPose> newest_base_;
   std::int64_t newest_ns_ = 0;
   Counters counters_;

@@ -45,10 +45,11 @@ double CellM(double lookahead_m) {
 
 }  // namespace
 
-PollScheduler::PollScheduler(const Config& config, std::uint64_t hash_seed)
+PollScheduler::PollScheduler(const Config& config, std::uint64_t seed)
     : config_(config),
-      waiting_(CellM(config.lookahead_m), hash_seed),
-      rider_grid_(CellM(config.lookahead_m), hash_seed),
+      waiting_(CellM(config.lookahead_m), seed),
+      rider_grid_(CellM(config.lookahead_m), seed),
+      generator_(seed),
       budget_({config.bytes_per_hour, kHourS}) {
   CheckPositive("price_s", config.price_s);
   CheckPositive("bytes_per_hour", config.bytes_per_hour);
@@ -292,7 +293,8 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
   if (Seconds(now_ns - rider.point.stamp_ns) > config_.vehicle_silence_s) return;
   if (!Passes(rider.point, target.position) || WasAsked(hazard, rider.key, now_ns)) return;
   if (budget_.tokens() < config_.poll_bytes || DebtS(target, now_ns) < PriceS()) return;
-  PollChoice choice{hazard, rider.id, false, now_ns + Nanoseconds(config_.answer_timeout_s)};
+  PollChoice choice{Uuid::Random(generator_), hazard, rider.id, false,
+                    now_ns + Nanoseconds(config_.answer_timeout_s)};
   double bytes = config_.poll_bytes;
   const bool picture_old = Seconds(now_ns - target.picture_ns) > config_.picture_age_s;
   const bool plenty =
@@ -305,9 +307,9 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
   bytes_ += bytes;
   ++target.open;
   ++rider.open;
-  ++open_count_;
   RecordPoll(hazard, rider.key, now_ns);
-  open_.push_back({hazard, rider.id, choice.expires_ns, bytes});
+  open_[choice.poll] = {hazard, rider.id, now_ns, choice.expires_ns, bytes};
+  expiry_order_.push_back(choice.poll);
   choices.push_back(std::move(choice));
 }
 
@@ -366,16 +368,17 @@ void PollScheduler::ForgetAsked(std::int64_t now_ns) {
 }
 
 void PollScheduler::ExpirePolls(std::int64_t now_ns) {
-  while (!open_.empty() && (open_.front().closed || open_.front().expires_ns <= now_ns)) {
-    Close(open_.front());
-    open_.pop_front();
+  for (; !expiry_order_.empty(); expiry_order_.pop_front()) {
+    const auto found = open_.find(expiry_order_.front());
+    if (found == open_.end()) continue;
+    if (now_ns <= found->second.expires_ns) return;
+    Close(found->second);
+    open_.erase(found);
   }
 }
 
-void PollScheduler::Close(Open& poll) {
-  if (poll.closed) return;
-  poll.closed = true;
-  --open_count_;
+/// Both its hazard and its vehicle are free to be asked again.
+void PollScheduler::Close(const OpenPoll& poll) {
   const auto hazard = hazards_.find(poll.hazard);
   if (hazard != hazards_.end() && hazard->second.open > 0) {
     --hazard->second.open;
@@ -385,17 +388,23 @@ void PollScheduler::Close(Open& poll) {
   if (rider != riders_by_id_.end() && rider->second->open > 0) --rider->second->open;
 }
 
-bool PollScheduler::Answered(std::uint64_t hazard, const std::string& vehicle_id, double bytes,
-                             std::int64_t now_ns) {
-  const auto found = std::find_if(open_.begin(), open_.end(), [&](const Open& poll) {
-    return !poll.closed && poll.hazard == hazard && poll.vehicle_id == vehicle_id;
-  });
-  if (found == open_.end() || found->expires_ns <= now_ns) return false;
+std::optional<PollScheduler::OpenPoll> PollScheduler::FindOpen(const Uuid& poll,
+                                                               std::int64_t now_ns) const {
+  const auto found = open_.find(poll);
+  if (found == open_.end() || now_ns > found->second.expires_ns) return std::nullopt;
+  return found->second;
+}
+
+bool PollScheduler::Answered(const Uuid& poll, double bytes, std::int64_t now_ns) {
+  const auto found = open_.find(poll);
+  if (found == open_.end() || now_ns > found->second.expires_ns) return false;
+  const OpenPoll& answered = found->second;
   if (bytes >= 0 && std::isfinite(bytes)) {
-    budget_.Spend(bytes - found->bytes);
-    bytes_ += bytes - found->bytes;
+    budget_.Spend(bytes - answered.bytes);
+    bytes_ += bytes - answered.bytes;
   }
-  Close(*found);
+  Close(answered);
+  open_.erase(found);
   return true;
 }
 

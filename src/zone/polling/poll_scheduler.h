@@ -6,12 +6,14 @@
 #include <deque>
 #include <list>
 #include <optional>
+#include <random>
 #include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "common/token_bucket.h"
+#include "common/uuid.h"
 #include "geo/spatial_grid.h"
 #include "zone/belief/hazard_lifecycle.h"
 #include "zone/registry/vehicle_track.h"
@@ -20,6 +22,7 @@ namespace livemap::zone {
 
 /// Which vehicle to ask about which hazard.
 struct PollChoice {
+  Uuid poll;                 ///< Names the poll from now on.
   std::uint64_t hazard = 0;  ///< The caller's id.
   std::string vehicle_id;
   bool picture_wanted = false;
@@ -73,8 +76,18 @@ class PollScheduler {
     std::size_t max_vehicles = 10000;  ///< The longest silent one goes beyond it.
   };
 
-  /// Throws Error naming the value that is out of range. `hash_seed`: see SpatialGrid.
-  PollScheduler(const Config& config, std::uint64_t hash_seed);
+  /// A poll that was sent and waits for its answer. It is open up to and including `expires_ns`.
+  struct OpenPoll {
+    std::uint64_t hazard = 0;
+    std::string vehicle_id;
+    std::int64_t asked_ns = 0;
+    std::int64_t expires_ns = 0;
+    double bytes = 0;  ///< Estimate of what poll and answer take.
+  };
+
+  /// Throws Error naming the value that is out of range. `seed`: of the grids' hashes (see
+  /// SpatialGrid) and of the polls' uuids.
+  PollScheduler(const Config& config, std::uint64_t seed);
 
   /// The hazard as it is now: after every step of its life, a new position or a new picture. One
   /// that is not on the map is forgotten. `picture_ns`: stamp of its newest picture, 0 without one.
@@ -84,15 +97,15 @@ class PollScheduler {
   /// Where a vehicle is now. `point.stamp_ns` is when the zone heard it.
   void SetVehicle(const std::string& vehicle_id, const TrackPoint& point);
 
-  /// The polls to send now. Each counts as open until Answered or its expiry.
+  /// The polls to send now. Each is open until Answered or its expiry.
   std::vector<PollChoice> TakeDue(std::int64_t now_ns);
+  /// The open poll of this uuid; none when it was never asked, is answered or has expired.
+  std::optional<OpenPoll> FindOpen(const Uuid& poll, std::int64_t now_ns) const;
   /// An answer came, of whatever kind; to be called before SetHazard with what followed from it.
   /// `bytes`: what it and the poll really took, in place of the estimate. False: no such open poll.
-  bool Answered(std::uint64_t hazard, const std::string& vehicle_id, double bytes,
-                std::int64_t now_ns);
+  bool Answered(const Uuid& poll, double bytes, std::int64_t now_ns);
 
   std::size_t hazards() const { return hazards_.size(); }
-  std::size_t open_polls() const { return open_count_; }
   /// Bytes of all polls so far; estimates for those not answered.
   double bytes() const { return bytes_; }
 
@@ -132,14 +145,6 @@ class PollScheduler {
     std::uint32_t version;
     friend bool operator<(const Due& a, const Due& b) { return a.at_ns > b.at_ns; }
   };
-  struct Open {
-    std::uint64_t hazard;
-    std::string vehicle_id;
-    std::int64_t expires_ns;
-    double bytes;
-    bool closed = false;
-  };
-
   double DebtS(const Target& target, std::int64_t now_ns) const;
   double PriceS() const;
   std::int64_t DueNs(const Target& target, double price_s) const;
@@ -156,7 +161,7 @@ class PollScheduler {
               std::vector<PollChoice>& choices);
   bool Passes(const TrackPoint& point, const geo::GeoPoint& place) const;
   bool SeesOtherPlaces(const TrackedVehicle& rider) const;
-  void Close(Open& poll);
+  void Close(const OpenPoll& poll);
   void CompactHeap();
 
   Config config_;
@@ -171,9 +176,10 @@ class PollScheduler {
   std::unordered_map<std::uint64_t, RiderPlace> riders_by_key_;
   geo::SpatialGrid rider_grid_;
   std::vector<std::uint64_t> moved_;  // Keys of riders heard since the last tick.
-  std::deque<Open> open_;             // In order of expiry.
-  std::size_t open_count_ = 0;
-  TokenBucket budget_;  // Bytes.
+  std::unordered_map<Uuid, OpenPoll> open_;
+  std::deque<Uuid> expiry_order_;  // Soonest first; answered ones are in `open_` no more.
+  std::mt19937_64 generator_;      // Of the polls' uuids.
+  TokenBucket budget_;             // Bytes.
   double bytes_ = 0;
 };
 

@@ -315,9 +315,9 @@ bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {
   return implementation_->Remove(hazard, reason);
 }
 
-std::vector<PollOrder> ZoneService::TakeDuePolls() { return implementation_->TakeDuePolls(); }
+std::vector<protocol::Poll> ZoneService::TakeDuePolls() { return implementation_->TakeDuePolls(); }
 
-bool ZoneService::HandleAnswer(const PollAnswer& answer) {
+bool ZoneService::HandleAnswer(const protocol::PollAnswer& answer) {
   return implementation_->HandleAnswer(answer);
 }
 

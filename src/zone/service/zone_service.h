@@ -23,7 +23,6 @@
 #include "zone/belief/vehicle_trust.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
-#include "zone/model/poll_answer.h"
 #include "zone/model/store_damage.h"
 #include "zone/model/vehicle_state.h"
 #include "zone/polling/poll_scheduler.h"
@@ -37,19 +36,6 @@ struct ZoneEvent {
   std::optional<HazardEvent> hazard;
   std::optional<MapChangeEvent> map_change;
   std::optional<VehicleState> vehicle;
-};
-
-/// The zone asks one vehicle whether a hazard is still there.
-struct PollOrder {
-  Uuid poll;
-  Uuid hazard;
-  std::string vehicle_id;  ///< Addressee.
-  std::string class_name;
-  geo::GeoPoint position;
-  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< East-north, of `position`.
-  std::int64_t expires_ns = 0;  ///< Zone clock (UTC); later answers do not count.
-  protocol::PollPicture picture = protocol::PollPicture::kNone;
-  std::uint32_t max_picture_bytes = 0;
 };
 
 /// What became of the reports, vehicle positions and polls since start.
@@ -188,12 +174,12 @@ class ZoneService {
 
   /// Polls to be sent now; each is remembered until it is answered or expires. They are not stored:
   /// after a restart the zone asks anew.
-  std::vector<PollOrder> TakeDuePolls();
+  std::vector<protocol::Poll> TakeDuePolls();
   /// Counts the answer and commits what follows. False, and counted, when the answer is not
   /// acceptable: the poll is unknown, expired or another vehicle's, its stamp is off, or that
   /// vehicle cannot have seen the place by the positions that the zone knows. Throws StoreError:
   /// then the poll stays open.
-  bool HandleAnswer(const PollAnswer& answer);
+  bool HandleAnswer(const protocol::PollAnswer& answer);
   /// Time passes: commits the transitions that are due. To be called about once a second. Throws
   /// StoreError: then nothing has changed.
   void Advance();

@@ -8,13 +8,13 @@
 namespace livemap::zone {
 namespace {
 
-EvidenceKind KindOf(PollAnswer::Answer answer) {
+EvidenceKind KindOf(protocol::PollAnswer::Answer answer) {
   switch (answer) {
-    case PollAnswer::Answer::kYes:
+    case protocol::PollAnswer::Answer::kYes:
       return EvidenceKind::kAnswerYes;
-    case PollAnswer::Answer::kNo:
+    case protocol::PollAnswer::Answer::kNo:
       return EvidenceKind::kAnswerNo;
-    case PollAnswer::Answer::kCantSee:
+    case protocol::PollAnswer::Answer::kCantSee:
       return EvidenceKind::kCantSee;
   }
   return EvidenceKind::kCantSee;
@@ -22,70 +22,72 @@ EvidenceKind KindOf(PollAnswer::Answer answer) {
 
 }  // namespace
 
-std::vector<PollOrder> ZoneService::Implementation::TakeDuePolls() {
+std::vector<protocol::Poll> ZoneService::Implementation::TakeDuePolls() {
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   const std::int64_t now_ns = now_ns_();
-  for (auto poll = open_polls_.begin(); poll != open_polls_.end();) {
-    poll = poll->second.expires_ns < now_ns ? open_polls_.erase(poll) : std::next(poll);
-  }
   std::vector<PollChoice> choices;
   {
     const std::lock_guard<std::mutex> lock(polls_mutex_);
     choices = scheduler_.TakeDue(now_ns);
   }
-  std::vector<PollOrder> orders;
-  orders.reserve(choices.size());
+  std::vector<protocol::Poll> polls;
+  polls.reserve(choices.size());
   for (PollChoice& choice : choices) {
     const auto slot = static_cast<Slot>(choice.hazard);
     const HazardRecord& record = registry_.Record(slot);
-    PollOrder order;
-    order.poll = Uuid::Random(generator_);
-    order.hazard = record.uuid;
-    order.vehicle_id = std::move(choice.vehicle_id);
-    order.class_name = registry_.ClassName(slot);
-    order.position = record.estimate.position;
-    order.covariance_m2 = record.estimate.covariance_m2;
-    order.expires_ns = choice.expires_ns;
-    order.picture = choice.picture_wanted ? config_.poll_picture : protocol::PollPicture::kNone;
-    order.max_picture_bytes =
+    protocol::Poll poll;
+    poll.poll = choice.poll;
+    poll.hazard = record.uuid;
+    poll.stamp_ns = now_ns;
+    poll.vehicle_id = std::move(choice.vehicle_id);
+    poll.class_name = registry_.ClassName(slot);
+    poll.position = record.estimate.position;
+    poll.covariance_m2 = record.estimate.covariance_m2;
+    poll.expires_ns = choice.expires_ns;
+    poll.picture = choice.picture_wanted ? config_.poll_picture : protocol::PollPicture::kNone;
+    poll.max_picture_bytes =
         choice.picture_wanted ? static_cast<std::uint32_t>(config_.polls.picture_bytes) : 0;
-    open_polls_[order.poll] = {slot, order.vehicle_id, now_ns, order.expires_ns};
-    orders.push_back(std::move(order));
+    polls.push_back(std::move(poll));
   }
   const std::unique_lock<std::shared_mutex> lock(data_mutex_);
-  statistics_.polls += orders.size();
-  return orders;
+  statistics_.polls += polls.size();
+  return polls;
 }
 
-bool ZoneService::Implementation::HandleAnswer(const PollAnswer& answer) {
+bool ZoneService::Implementation::HandleAnswer(const protocol::PollAnswer& answer) {
   const std::lock_guard<std::mutex> writer(writer_mutex_);
   const std::int64_t now_ns = now_ns_();
-  const auto found = open_polls_.find(answer.poll);
-  if (found == open_polls_.end() || !IsAcceptable(answer, found->second, now_ns) ||
+  const std::optional<PollScheduler::OpenPoll> poll = FindOpenPoll(answer.poll, now_ns);
+  if (!poll || !IsAcceptable(answer, *poll, now_ns) ||
       !allowance_.TakeEvidence(answer.vehicle_id, now_ns)) {
     CountAnswer(false);
     return false;
   }
-  const OpenPoll poll = found->second;
-  const Change change = CommitAnswer(answer, poll);
-  open_polls_.erase(found);
+  const auto slot = static_cast<Slot>(poll->hazard);
+  const Change change = CommitAnswer(answer, slot);
   CountAnswer(true);
   {
     const std::lock_guard<std::mutex> lock(polls_mutex_);
     const auto bytes = static_cast<double>(answer.image.size());
-    scheduler_.Answered(poll.slot, answer.vehicle_id, config_.polls.poll_bytes + bytes, now_ns);
+    scheduler_.Answered(answer.poll, config_.polls.poll_bytes + bytes, now_ns);
   }
   Settle(change);
-  Schedule(poll.slot, now_ns);
+  Schedule(slot, now_ns);
   return true;
 }
 
+std::optional<PollScheduler::OpenPoll> ZoneService::Implementation::FindOpenPoll(
+    const Uuid& poll, std::int64_t now_ns) {
+  const std::lock_guard<std::mutex> lock(polls_mutex_);
+  return scheduler_.FindOpen(poll, now_ns);
+}
+
 /// The answer is believed as far as the zone can check it by itself.
-bool ZoneService::Implementation::IsAcceptable(const PollAnswer& answer, const OpenPoll& poll,
+bool ZoneService::Implementation::IsAcceptable(const protocol::PollAnswer& answer,
+                                               const PollScheduler::OpenPoll& poll,
                                                std::int64_t now_ns) const {
-  const HazardRecord& record = registry_.Record(poll.slot);
+  const HazardRecord& record = registry_.Record(static_cast<Slot>(poll.hazard));
   if (answer.vehicle_id != poll.vehicle_id || answer.hazard != record.uuid) return false;
-  if (now_ns > poll.expires_ns) return false;
   // Of an image taken since the poll, by a clock that is nearly right.
   const auto window_ns = static_cast<std::int64_t>(config_.sight.window_s * 1e9);
   const std::int64_t seen_ns = SeenNs(answer.stamp_ns, now_ns);
@@ -95,15 +97,15 @@ bool ZoneService::Implementation::IsAcceptable(const PollAnswer& answer, const O
   }
   if (!(answer.confidence >= 0 && answer.confidence <= 1)) return false;
   if (!answer.image.empty() && WhyPictureRefused(answer.image, config_.limits)) return false;
-  if (answer.answer == PollAnswer::Answer::kCantSee) return true;
+  if (answer.answer == protocol::PollAnswer::Answer::kCantSee) return true;
   return CouldSee(vehicles_.Track(answer.vehicle_id), seen_ns, record.estimate.position,
                   config_.sight);
 }
 
 ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
-    const PollAnswer& answer, const OpenPoll& poll) {
+    const protocol::PollAnswer& answer, Slot slot) {
   PictureName picture;
-  if (answer.answer == PollAnswer::Answer::kYes && !answer.image.empty()) {
+  if (answer.answer == protocol::PollAnswer::Answer::kYes && !answer.image.empty()) {
     picture.format = imaging::FormatName(
         imaging::ReadImageHeader(answer.image.data(), answer.image.size())->format);
     picture.sha256 = images_.Put(answer.image, picture.format);
@@ -112,7 +114,6 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
   const std::unique_lock<std::shared_mutex> lock(data_mutex_);
   Change change = NewChange();
   InTransaction(change, [&] {
-    const Slot slot = poll.slot;
     change.answer = &answer;
     change.answered_id = registry_.Record(slot).id;
     PassTime(slot, change);
@@ -123,7 +124,7 @@ ZoneService::Implementation::Change ZoneService::Implementation::CommitAnswer(
     if (!step.counted && !step.transition) return;
     const Before before = BeforeOf(slot);
     if (!picture.sha256.empty()) registry_.SetPicture(slot, picture);
-    const bool yes = answer.answer == PollAnswer::Answer::kYes;
+    const bool yes = answer.answer == protocol::PollAnswer::Answer::kYes;
     const std::string reason = step.transition ? step.transition->reason
                                : yes           ? "a vehicle was asked and saw it"
                                                : "a vehicle was asked and did not see it";

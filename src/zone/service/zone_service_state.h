@@ -47,8 +47,8 @@ class ZoneService::Implementation {
   bool DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
                        const std::string& reason);
   std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit);
-  std::vector<PollOrder> TakeDuePolls();
-  bool HandleAnswer(const PollAnswer& answer);
+  std::vector<protocol::Poll> TakeDuePolls();
+  bool HandleAnswer(const protocol::PollAnswer& answer);
   void Advance();
   bool UpdateVehicle(const VehicleState& told);
   std::vector<StoredEvent> Events(const Uuid& uuid, std::size_t limit);
@@ -69,13 +69,6 @@ class ZoneService::Implementation {
   VehicleAllowance map_change_allowance_;
   std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id; the rest is stored.
   DueQueue due_;
-  struct OpenPoll {
-    Slot slot = 0;
-    std::string vehicle_id;
-    std::int64_t asked_ns = 0;
-    std::int64_t expires_ns = 0;
-  };
-  std::map<Uuid, OpenPoll> open_polls_;
 
   ImageStore images_;
   VehicleTable vehicles_;
@@ -125,7 +118,7 @@ class ZoneService::Implementation {
     std::map<std::string, LearnedLifetime> learned_before;      ///< By class.
     std::map<std::uint64_t, TrustRecord> trust_before;          ///< By vehicle.
     std::vector<AcceptedReport> reports;
-    const PollAnswer* answer = nullptr;
+    const protocol::PollAnswer* answer = nullptr;
     std::uint32_t answered_id = 0;  ///< Hazard of the answer.
     std::vector<MapChangeEvent> map_change_events;
     std::vector<std::pair<const protocol::MapChangeReport*, Uuid>>
@@ -218,8 +211,10 @@ class ZoneService::Implementation {
   void CountMapChanges(const MapChangeStatistics& counted);
 
   // Polls: zone_service_polls.cpp.
-  bool IsAcceptable(const PollAnswer& answer, const OpenPoll& poll, std::int64_t now_ns) const;
-  Change CommitAnswer(const PollAnswer& answer, const OpenPoll& poll);
+  std::optional<PollScheduler::OpenPoll> FindOpenPoll(const Uuid& poll, std::int64_t now_ns);
+  bool IsAcceptable(const protocol::PollAnswer& answer, const PollScheduler::OpenPoll& poll,
+                    std::int64_t now_ns) const;
+  Change CommitAnswer(const protocol::PollAnswer& answer, Slot slot);
   void CountAnswer(bool accepted);
 };
 

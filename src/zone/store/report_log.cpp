@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "common/time.h"
-#include "zone/model/poll_answer.h"
+#include "protocol/poll.h"
 #include "zone/store/queries.h"
 #include "zone/store/store_validation.h"
 
@@ -96,7 +96,7 @@ void ReportLog::WriteReport(const protocol::Report& report, std::uint64_t hazard
   });
 }
 
-void ReportLog::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
+void ReportLog::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
                             std::int64_t received_ns) {
   ExplainStore("writing an answer", [&] {
     row_.uuid = answer.poll.ToString();
@@ -104,7 +104,7 @@ void ReportLog::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
     row_.vehicle_id = answer.vehicle_id;
     row_.answer = static_cast<int>(answer.answer);
     row_.reason = answer.reason;
-    row_.confidence = answer.confidence;
+    row_.confidence = static_cast<double>(answer.confidence);
     row_.stamp_ns = answer.stamp_ns;
     row_.received_ns = received_ns;
     write_answer_.execute(true);

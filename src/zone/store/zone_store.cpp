@@ -165,7 +165,7 @@ void ZoneStore::WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
   implementation_->events_.Write(event, hazard_id, previous_sequence);
 }
 
-void ZoneStore::WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id,
+void ZoneStore::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
                             std::int64_t received_ns) {
   implementation_->reports_.WriteAnswer(answer, hazard_id, received_ns);
 }

@@ -17,9 +17,11 @@
 #include "zone/model/map_change.h"
 #include "zone/model/store_damage.h"
 
-namespace livemap::zone {
-
+namespace livemap::protocol {
 struct PollAnswer;
+}
+
+namespace livemap::zone {
 
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
 /// was learned of classes and of vehicles, where each vehicle's last report lies, and the same of
@@ -94,7 +96,8 @@ class ZoneStore {
   /// `previous_sequence`: of the hazard's event before; 0 without one.
   void WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
                   std::uint64_t previous_sequence);
-  void WriteAnswer(const PollAnswer& answer, std::uint64_t hazard_id, std::int64_t received_ns);
+  void WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
+                   std::int64_t received_ns);
   void WriteLife(const std::string& class_name, const LearnedLifetime& learned);
   void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
   void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);

@@ -258,24 +258,24 @@ TEST(PollConversions, PollsThatMakeNoSenseAreRefusedWithTheReason) {
 }
 
 TEST(PollConversions, AnswerReachesTheZoneAsItWasGiven) {
-  protocol::PollReply reply;
+  protocol::PollAnswer reply;
   reply.poll = Id(1);
   reply.hazard = Id(2);
   reply.vehicle_id = "car-1";
   reply.drive_id = "drive-1";
   reply.stamp_ns = kStampNs;
-  reply.answer = protocol::PollReply::Answer::kCantSee;
+  reply.answer = protocol::PollAnswer::Answer::kCantSee;
   reply.reason = "too dark";
   reply.confidence = 0.25F;
   reply.vehicle_position = {40, -80};
   reply.course_rad = std::numeric_limits<double>::quiet_NaN();
   reply.image_format = "jpeg";
   reply.image = {1, 2, 3};
-  const zone::PollAnswer answer = ToPollAnswer(ToMessage(reply));
+  const protocol::PollAnswer answer = FromMessage(ToMessage(reply));
   EXPECT_EQ(answer.poll, Id(1));
   EXPECT_EQ(answer.hazard, Id(2));
   EXPECT_EQ(answer.vehicle_id, "car-1");
-  EXPECT_EQ(answer.answer, zone::PollAnswer::Answer::kCantSee);
+  EXPECT_EQ(answer.answer, protocol::PollAnswer::Answer::kCantSee);
   EXPECT_EQ(answer.reason, "too dark");
   EXPECT_EQ(answer.confidence, 0.25);
   EXPECT_EQ(answer.vehicle_position.latitude_deg, 40);
@@ -292,7 +292,7 @@ TEST(PollConversions, AnswerReachesTheZoneAsItWasGiven) {
   for (const auto& [spoil, words] : faults) {
     HazardPollAnswer message = ToMessage(reply);
     spoil(message);
-    EXPECT_THAT([&message] { ToPollAnswer(message); }, ThrowsMessage<Error>(HasSubstr(words)));
+    EXPECT_THAT([&message] { FromMessage(message); }, ThrowsMessage<Error>(HasSubstr(words)));
   }
 }
 

@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-using PollAnswer = protocol::PollReply::Answer;
+using AnswerKind = protocol::PollAnswer::Answer;
 
 /// base_link at a moment of the straight drive, known to 0.2 m and 0.01 rad.
 geo::TrackPose BaseAt(double seconds) {
@@ -90,10 +90,10 @@ class PollResponderTest : public ::testing::Test {
     steady_s_ += 60;
     responder_.Process(1000, steady_s_, vehicle_);
   }
-  protocol::PollReply OnlyReply() {
+  protocol::PollAnswer OnlyReply() {
     const auto replies = responder_.TakeReplies();
     EXPECT_THAT(replies, SizeIs(1));
-    return replies.empty() ? protocol::PollReply{} : replies[0];
+    return replies.empty() ? protocol::PollAnswer{} : replies[0];
   }
 
   PollResponder responder_;
@@ -111,8 +111,8 @@ TEST_F(PollResponderTest, SaysYesAtOnceWhenTheDetectorSeesTheHazardAtItsPlace) {
     return time_s < 2.65 ? std::vector<placement::Sighting>{}
                          : std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kYes);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kYes);
   EXPECT_EQ(reply.poll, poll_.poll);
   EXPECT_EQ(reply.hazard, poll_.hazard);
   EXPECT_EQ(reply.drive_id, "drive-1");
@@ -128,8 +128,8 @@ TEST_F(PollResponderTest, SaysYesAtOnceWhenTheDetectorSeesTheHazardAtItsPlace) {
 TEST_F(PollResponderTest, SaysNoWhenThePlaceWasWellInViewSeveralTimesAndNothingWasThere) {
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kNo);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kNo);
   EXPECT_GT(reply.confidence, 0.9F);
   EXPECT_THAT(reply.image, IsEmpty()) << "none was wanted";
   const double distance_m = geo::GeodesicDistanceM(reply.vehicle_position, poll_.position);
@@ -155,8 +155,8 @@ TEST_F(PollResponderTest, OneClearViewIsEnoughWhereChangeDetectionKnowsThatItWen
   Drive(2.55, 2.65);
   responder_.AddChange(Changed(PlaceAt(kAheadM + 1, kRightM), true, "sign"));
   Expire();
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kNo);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kNo);
   EXPECT_NEAR(reply.confidence, 0.8, 0.1);
   EXPECT_EQ(responder_.counters().no_by_change, 1U);
 }
@@ -171,7 +171,7 @@ TEST_F(PollResponderTest, ChangesOfOtherClassesOrPlacesSayNothing) {
   unsound.confidence = std::nanf("");
   responder_.AddChange(unsound);
   Expire();
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kCantSee);
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kCantSee);
 }
 
 TEST_F(PollResponderTest, WithoutAClearViewAChangeAloneIsNoAnswer) {
@@ -180,7 +180,7 @@ TEST_F(PollResponderTest, WithoutAClearViewAChangeAloneIsNoAnswer) {
   Drive(0, 0.3);
   responder_.AddChange(Changed(poll_.position, true, "barrier"));
   Expire();
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kCantSee);
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kCantSee);
 }
 
 TEST_F(PollResponderTest, NothingIsDeniedWhereChangeDetectionSawThatItCame) {
@@ -189,8 +189,8 @@ TEST_F(PollResponderTest, NothingIsDeniedWhereChangeDetectionSawThatItCame) {
   responder_.AddChange(Changed(poll_.position, false, "barrier"));
   Drive(2.0, 4.0);
   Expire();
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("not detected"));
   EXPECT_EQ(responder_.counters().disagreed, 1U);
 }
@@ -202,7 +202,7 @@ TEST_F(PollResponderTest, WhatTheDetectorSeesIsThereWhateverChangeDetectionSays)
   Drive(2.6, 2.8, [](double time_s) {
     return std::vector<placement::Sighting>{{"barrier", 0.7F, BoxOfPlace(time_s)}};
   });
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes);
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kYes);
 }
 
 TEST(MayBe, AThingOfNoCertainClassMayBeAnyHazardButAPothole) {
@@ -222,7 +222,7 @@ TEST_F(PollResponderTest, AnImageWaitsUntilTheCameraIsKnown) {
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
   vehicle_.intrinsics = intrinsics;
   responder_.Process(2.8, steady_s_, vehicle_);
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes);
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kYes);
 }
 
 TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
@@ -231,7 +231,7 @@ TEST_F(PollResponderTest, AnotherClassOrAnotherPlaceIsNoYes) {
     return std::vector<placement::Sighting>{{"deer", 0.9F, BoxOfPlace(time_s)},
                                             {"pothole", 0.9F, BoxOfPlace(time_s, kAheadM + 12)}};
   });
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kNo);
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kNo);
 }
 
 TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo) {
@@ -242,7 +242,7 @@ TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo
   Drive(1.0, 1.05, seen);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty()) << "at 44 m it could be another one";
   Drive(2.25, 2.3, seen);
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kYes) << "at 24 m";
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kYes) << "at 24 m";
 }
 
 TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
@@ -255,8 +255,8 @@ TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
   responder_.AddUnregistered();
   Drive(4.0, 8.0);
   Expire();
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("unregistered"));
 }
 
@@ -268,8 +268,8 @@ TEST_F(PollResponderTest, FramesAtRestAreOneView) {
   Drive(2.8, 8.0);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
   Expire();
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kCantSee);
   EXPECT_EQ(reply.reason, "the place was in view too few times");
 }
 
@@ -284,8 +284,8 @@ TEST_F(PollResponderTest, CannotSeeWhatIsTooFarAwayOrNeverInTheImage) {
   responder_.Add(poll_, steady_s_);
   Drive(2.8, 4.5);
   Expire();
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kCantSee);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kCantSee);
   EXPECT_THAT(reply.reason, HasSubstr("out of the camera's view"));
   EXPECT_NEAR(static_cast<double>(reply.stamp_ns - kEpochNs) * 1e-9, 4.5, 0.11) << "the last image";
 }
@@ -335,7 +335,7 @@ TEST_F(PollResponderTest, APoorPositionMakesNoNo) {
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
   Expire();
-  EXPECT_EQ(OnlyReply().answer, PollAnswer::kCantSee) << "8 m: who knows where it looked";
+  EXPECT_EQ(OnlyReply().answer, AnswerKind::kCantSee) << "8 m: who knows where it looked";
 }
 
 TEST_F(PollResponderTest, ARepeatedPollIsAnsweredOnceAndTooManyAreNotTaken) {
@@ -389,7 +389,7 @@ TEST_F(PollResponderTest, TheCropShowsThePlaceWithinTheSmallerOfBothBudgets) {
   Drive(2.7, 2.75, [](double time_s) {
     return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
-  const protocol::PollReply reply = OnlyReply();
+  const protocol::PollAnswer reply = OnlyReply();
   EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(240, 160));
   EXPECT_LE(reply.image.size(), responder_.config().crop.max_bytes);
 }
@@ -404,8 +404,8 @@ TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
   ASSERT_THAT(wanted, SizeIs(1)) << "once, though several views counted";
   responder_.AddPicture(wanted[0], Lit(100));
   responder_.Process(4.1, steady_s_, vehicle_);
-  const protocol::PollReply reply = OnlyReply();
-  EXPECT_EQ(reply.answer, PollAnswer::kNo);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kNo);
   EXPECT_EQ(reply.stamp_ns, wanted[0]);
   const cv::Size shown = cv::imdecode(reply.image, cv::IMREAD_COLOR).size();
   EXPECT_GE(shown.width, 240);

@@ -48,19 +48,19 @@ class ZoneLifeTest : public ZoneTest {
     }
   }
   /// The zone asks this vehicle as it comes near.
-  PollOrder Asked(const std::string& vehicle) {
+  protocol::Poll Asked(const std::string& vehicle) {
     DriveBy(vehicle, -200, -60);
-    const std::vector<PollOrder> orders = Zone().TakeDuePolls();
+    const std::vector<protocol::Poll> orders = Zone().TakeDuePolls();
     EXPECT_EQ(orders.size(), 1U);
-    return orders.empty() ? PollOrder() : orders.front();
+    return orders.empty() ? protocol::Poll() : orders.front();
   }
-  PollAnswer AnswerTo(const PollOrder& order, PollAnswer::Answer said) {
-    PollAnswer answer;
+  protocol::PollAnswer AnswerTo(const protocol::Poll& order, protocol::PollAnswer::Answer said) {
+    protocol::PollAnswer answer;
     answer.poll = order.poll;
     answer.hazard = order.hazard;
     answer.vehicle_id = order.vehicle_id;
     answer.answer = said;
-    answer.confidence = 0.9;
+    answer.confidence = 0.9F;
     answer.vehicle_position = kPlace;
     answer.stamp_ns = now_ns_;
     return answer;
@@ -250,20 +250,20 @@ TEST_F(ZoneLifeTest, TimeWorksOnAfterARestartAndBeforeAReport) {
 TEST_F(ZoneLifeTest, VehiclesThatPassAreAskedAndTwoDenialsTakeItOff) {
   const Uuid hazard = ActiveHazard();
   now_ns_ += kDayNs / 2;
-  const PollOrder first = Asked("car-8");
+  const protocol::Poll first = Asked("car-8");
   EXPECT_EQ(first.hazard, hazard);
   EXPECT_EQ(first.vehicle_id, "car-8");
   EXPECT_EQ(first.class_name, "pothole");
   EXPECT_GT(first.expires_ns, now_ns_);
   DriveBy("car-8", -45, -15);
-  EXPECT_TRUE(Zone().HandleAnswer(AnswerTo(first, PollAnswer::Answer::kNo)));
+  EXPECT_TRUE(Zone().HandleAnswer(AnswerTo(first, protocol::PollAnswer::Answer::kNo)));
   EXPECT_TRUE(IsTold(State(hazard)));
   // An answer counts once.
-  EXPECT_FALSE(Zone().HandleAnswer(AnswerTo(first, PollAnswer::Answer::kNo)));
+  EXPECT_FALSE(Zone().HandleAnswer(AnswerTo(first, protocol::PollAnswer::Answer::kNo)));
   now_ns_ += 120'000'000'000;
-  const PollOrder second = Asked("car-9");
+  const protocol::Poll second = Asked("car-9");
   DriveBy("car-9", -45, -15);
-  EXPECT_TRUE(Zone().HandleAnswer(AnswerTo(second, PollAnswer::Answer::kNo)));
+  EXPECT_TRUE(Zone().HandleAnswer(AnswerTo(second, protocol::PollAnswer::Answer::kNo)));
   EXPECT_EQ(State(hazard), HazardState::kGone);
   EXPECT_THAT(Zone().Events(hazard, 1).front().reason, HasSubstr("denied"));
   EXPECT_EQ(Zone().Statistics().answers_refused, 1U);
@@ -272,28 +272,28 @@ TEST_F(ZoneLifeTest, VehiclesThatPassAreAskedAndTwoDenialsTakeItOff) {
 TEST_F(ZoneLifeTest, AnswersCountOnlyFromTheVehicleAskedInTimeAndWithinSight) {
   const Uuid hazard = ActiveHazard();
   now_ns_ += kDayNs / 2;
-  const PollOrder order = Asked("car-8");
+  const protocol::Poll order = Asked("car-8");
   const float before = Zone().Find(hazard)->presence;
   // The place lies 60 m and more ahead of where the zone knows the vehicle.
-  PollAnswer answer = AnswerTo(order, PollAnswer::Answer::kNo);
+  protocol::PollAnswer answer = AnswerTo(order, protocol::PollAnswer::Answer::kNo);
   EXPECT_FALSE(Zone().HandleAnswer([&] {
-    PollAnswer other = answer;
+    protocol::PollAnswer other = answer;
     other.vehicle_id = "car-9";
     return other;
   }()));
   EXPECT_FALSE(Zone().HandleAnswer([&] {
-    PollAnswer other = answer;
+    protocol::PollAnswer other = answer;
     other.poll.bytes[3] ^= 1;
     return other;
   }()));
   EXPECT_FALSE(Zone().HandleAnswer([&] {
-    PollAnswer other = answer;
+    protocol::PollAnswer other = answer;
     other.stamp_ns -= 300'000'000'000;
     return other;
   }()));
   EXPECT_FALSE(Zone().HandleAnswer([&] {
-    PollAnswer other = answer;
-    other.confidence = std::nan("");
+    protocol::PollAnswer other = answer;
+    other.confidence = std::nanf("");
     return other;
   }()));
   now_ns_ = order.expires_ns + 1;
@@ -306,7 +306,7 @@ TEST_F(ZoneLifeTest, AnswersCountOnlyFromTheVehicleAskedInTimeAndWithinSight) {
 TEST_F(ZoneLifeTest, AVehicleThatCannotHaveSeenThePlaceDeniesInVain) {
   const Uuid hazard = ActiveHazard();
   now_ns_ += kDayNs / 2;
-  const PollOrder order = Asked("car-8");
+  const protocol::Poll order = Asked("car-8");
   // It turned away and says so anyway.
   for (int i = 0; i < 12; ++i) {
     now_ns_ += 1'000'000'000;
@@ -314,16 +314,16 @@ TEST_F(ZoneLifeTest, AVehicleThatCannotHaveSeenThePlaceDeniesInVain) {
         geo::GeodesicDestination(kPlace, 3.14159265358979323846, 200.0 + 15 * i);
     Zone().UpdateVehicle({"car-8", "", away, 3.14159265358979323846, 15.0, now_ns_});
   }
-  EXPECT_FALSE(Zone().HandleAnswer(AnswerTo(order, PollAnswer::Answer::kNo)));
+  EXPECT_FALSE(Zone().HandleAnswer(AnswerTo(order, protocol::PollAnswer::Answer::kNo)));
   EXPECT_EQ(Zone().Events(hazard, 10).size(), 2U);
 }
 
 TEST_F(ZoneLifeTest, AYesKeepsItAndBringsItsPicture) {
   const Uuid hazard = ActiveHazard();
   now_ns_ += kDayNs / 2;
-  const PollOrder order = Asked("car-8");
+  const protocol::Poll order = Asked("car-8");
   DriveBy("car-8", -45, -15);
-  PollAnswer answer = AnswerTo(order, PollAnswer::Answer::kYes);
+  protocol::PollAnswer answer = AnswerTo(order, protocol::PollAnswer::Answer::kYes);
   answer.image = MakeJpeg(64, 48, 100, 7);
   const std::uint64_t announced = Zone().AnnouncedSequence();
   EXPECT_TRUE(Zone().HandleAnswer(answer));

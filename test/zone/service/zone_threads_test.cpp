@@ -117,12 +117,12 @@ TEST_F(ZoneThreadsTest, OfficialsTimeAndAnswersWorkBesideReportsWithoutLosingAnE
   std::thread passer([&] {
     for (int i = 0; i < 20; ++i) {
       PassBy(zone, "poll-" + std::to_string(i), place(i), now_ns);
-      for (const PollOrder& order : zone.TakeDuePolls()) {
-        PollAnswer answer;
+      for (const protocol::Poll& order : zone.TakeDuePolls()) {
+        protocol::PollAnswer answer;
         answer.poll = order.poll;
         answer.hazard = order.hazard;
         answer.vehicle_id = order.vehicle_id;
-        answer.answer = PollAnswer::Answer::kNo;
+        answer.answer = protocol::PollAnswer::Answer::kNo;
         answer.stamp_ns = now_ns;
         if (zone.HandleAnswer(answer)) ++accepted;
       }
