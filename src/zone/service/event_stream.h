@@ -1,17 +1,30 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <utility>
 
-#include "zone/service/zone_service.h"
+#include "zone/model/hazard.h"
+#include "zone/model/map_change.h"
+#include "zone/model/vehicle_state.h"
 
 namespace livemap::zone {
+
+/// One message of the zone's stream: exactly one of the three is set.
+struct ZoneEvent {
+  std::optional<HazardEvent> hazard;
+  std::optional<MapChangeEvent> map_change;
+  std::optional<VehicleState> vehicle;
+};
 
 /// Hands events to subscribers, one call at a time, in the order of the calls to Publish.
 class EventStream {
  public:
-  int Subscribe(ZoneService::Subscriber subscriber) {
+  using Subscriber = std::function<void(const ZoneEvent&)>;
+
+  int Subscribe(Subscriber subscriber) {
     const std::lock_guard<std::mutex> lock(mutex_);
     subscribers_.emplace(++last_id_, std::move(subscriber));
     return last_id_;
@@ -28,7 +41,7 @@ class EventStream {
 
  private:
   std::mutex mutex_;
-  std::map<int, ZoneService::Subscriber> subscribers_;
+  std::map<int, Subscriber> subscribers_;
   int last_id_ = 0;
 };
 

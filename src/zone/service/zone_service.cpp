@@ -2,154 +2,61 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
-#include "zone/service/zone_service_state.h"
+#include "common/error.h"
+#include "common/sqlite.h"
 
 namespace livemap::zone {
-namespace {
 
-void CheckSettings(const ZoneService::Config& config) {
-  if (!(config.image_cap_bytes >= 0 && config.image_cap_bytes <= 1e15)) {
-    throw Error("image_cap_bytes is " + std::to_string(config.image_cap_bytes) +
-                ", accepted is 0 to 1e15");
-  }
-  if (!(config.vehicle_retention_s > 0 && config.vehicle_retention_s <= 1e6)) {
-    throw Error("vehicle_retention_s is " + std::to_string(config.vehicle_retention_s) +
-                ", accepted is above 0 to 1e6");
-  }
-  const SpeedRule& speed = config.speed;
-  if (!(speed.max_speed_mps > 0 && speed.max_speed_mps <= 1e9 && speed.slack_m >= 0)) {
-    throw Error("max_speed_mps is " + std::to_string(speed.max_speed_mps) + " and speed_slack_m " +
-                std::to_string(speed.slack_m) + ", accepted are above 0 and at least 0");
-  }
-  if (speed.recovery_reports < 2) {
-    throw Error("recovery_reports is " + std::to_string(speed.recovery_reports) +
-                ", accepted is at least 2");
-  }
-  if (config.max_vehicles == 0) throw Error("max_vehicles is 0, accepted is at least 1");
-}
-
-/// What one vehicle tells of map changes is counted apart from its reports of hazards.
-VehicleAllowance::Config MapChangeAllowance(const ZoneService::Config& config) {
-  VehicleAllowance::Config allowance;
-  allowance.reports_per_hour = config.map_changes_per_hour;
-  allowance.max_vehicles = config.allowance.max_vehicles;
-  return allowance;
-}
-
-}  // namespace
-
-ZoneService::Implementation::Implementation(Config config, Clock now_ns, std::uint64_t uuid_seed)
-    : config_(std::move(config)),
+ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
+    : config_(CheckedConfig(std::move(config))),
       now_ns_(std::move(now_ns)),
       directory_(config_.directory),
-      life_(config_.life),
-      store_(directory_.path() + "/zone.sqlite3"),
-      survival_(config_.catalogue, config_.survival),
-      trust_(config_.trust),
-      allowance_(config_.allowance),
-      map_change_allowance_(MapChangeAllowance(config_)),
+      state_(config_, directory_.path(), uuid_seed),
       images_(directory_.path() + "/images", static_cast<std::uint64_t>(config_.image_cap_bytes)),
       vehicles_(config_.vehicle_retention_s, config_.max_vehicles),
-      sequence_(store_.LastSequence()),
-      generator_(MakeGenerator(uuid_seed, sequence_)),
-      registry_(config_.catalogue, generator_()),
-      map_changes_(config_.map_changes, generator_()),
-      scheduler_(config_.polls, generator_()) {
-  Load();
+      allowance_(config_.allowance),
+      steps_(config_, state_),
+      reports_(config_, state_, steps_, images_, allowance_),
+      map_changes_(config_, state_),
+      polls_(config_, state_, steps_, images_, allowance_, vehicles_),
+      officials_(config_, state_, steps_),
+      ageing_(state_, steps_) {
+  statistics_.store_damage = state_.damage;
+  const std::int64_t now = now_ns_();
+  for (Slot slot = 0; slot < state_.hazards.size(); ++slot) {
+    const HazardRecord& record = state_.hazards.Record(slot);
+    if (IsOnMap(record.life.state)) images_.Retain(record.picture.Sha256());
+    Schedule(slot, now);
+  }
 }
 
-std::mt19937_64 ZoneService::Implementation::MakeGenerator(std::uint64_t seed,
-                                                           std::uint64_t sequence) {
-  std::seed_seq sequence_of_seeds{seed & 0xffffffffU, seed >> 32, sequence & 0xffffffffU,
-                                  sequence >> 32};
-  return std::mt19937_64(sequence_of_seeds);
+ZoneService::~ZoneService() = default;
+
+template <typename Body>
+void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
+  try {
+    transaction.Run(body);
+  } catch (const StoreError&) {
+    ++store_errors_;
+    throw;
+  }
 }
 
-void ZoneService::Implementation::Load() {
-  StoreDamage& damage = statistics_.store_damage;
-  damage += store_.LoadLives([this](const std::string& class_name, LearnedLifetime learned) {
-    survival_.Restore(class_name, learned);
-  });
-  damage += store_.LoadTrust([this](std::uint64_t vehicle, const TrustRecord& record) {
-    if (!trust_.Restore(vehicle, record)) throw Error("a vehicle's trust is no such record");
-  });
-  damage += store_.LoadHazards([this](const ZoneStore::HazardRow& row) {
-    const Hazard& hazard = row.hazard;
-    registry_.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));
-    if (IsOnMap(hazard.state)) images_.Retain(hazard.image_sha256);
-    announced_ = std::max(announced_, hazard.announced_sequence);
-    sequence_ = std::max(sequence_, hazard.sequence);
-  });
-  registry_.SkipIdsTo(static_cast<std::uint32_t>(store_.LastHazardId()));
-  damage += store_.LoadMapChanges([this](const ZoneStore::MapChangeRow& row) {
-    map_changes_.Restore(static_cast<std::uint32_t>(row.id), row.feature);
-    sequence_ = std::max(sequence_, row.feature.sequence);
-  });
-  map_changes_.SkipIdsTo(static_cast<std::uint32_t>(store_.LastMapChangeId()));
-  const std::int64_t now_ns = now_ns_();
-  for (Slot slot = 0; slot < registry_.size(); ++slot) Schedule(slot, now_ns);
-}
-
-ZoneService::Implementation::Change ZoneService::Implementation::NewChange() const {
-  Change change;
-  change.now_ns = now_ns_();
-  change.sequence = sequence_;
-  change.announced = announced_;
-  return change;
-}
-
-/// Hazards and classes once, as they are in the end; hazards before what refers to them.
-void ZoneService::Implementation::Write(Change& change) {
-  std::vector<Slot>& touched = change.touched;
-  std::sort(touched.begin(), touched.end());
-  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
-  for (const Slot slot : touched) {
-    const HazardRecord& record = registry_.Record(slot);
-    store_.WriteHazard({record.id, registry_.Get(slot), record.life});
-  }
-  for (std::size_t i = 0; i < change.events.size(); ++i) {
-    const EventPlace& place = change.places[i];
-    store_.WriteEvent(change.events[i], place.hazard_id, place.previous_sequence);
-  }
-  for (const AcceptedReport& accepted : change.reports) {
-    store_.WriteReport(*accepted.report, accepted.hazard_id, accepted.image_sha256, change.now_ns);
-  }
-  if (change.answer != nullptr) {
-    store_.WriteAnswer(*change.answer, change.answered_id, change.now_ns);
-  }
-  for (const auto& [class_name, before] : change.learned_before) {
-    store_.WriteLife(class_name, survival_.learned().at(class_name));
-  }
-  for (const auto& [vehicle, before] : change.trust_before) {
-    store_.WriteTrust(vehicle, trust_.Get(vehicle));
-  }
-  WriteMapChanges(change);
-}
-
-/// What a failed transaction taught.
-void ZoneService::Implementation::Forget(const Change& change) {
-  for (const auto& [class_name, before] : change.learned_before) {
-    survival_.Restore(class_name, before);
-  }
-  for (const auto& [vehicle, before] : change.trust_before) trust_.Restore(vehicle, before);
-}
-
-void ZoneService::Implementation::Settle(const Change& change) {
-  for (const auto& [before, after] : change.pictures) {
+void ZoneService::FollowUp(const ZoneTransaction& transaction) {
+  for (const auto& [before, after] : transaction.pictures()) {
     images_.Retain(after);
     images_.Release(before);
   }
   images_.EvictBeyondCap();
-  for (const Slot slot : change.touched) Schedule(slot, change.now_ns);
-  for (const HazardEvent& event : change.events) {
+  for (const Slot slot : transaction.touched()) Schedule(slot, transaction.now_ns());
+  for (const HazardEvent& event : transaction.hazard_events()) {
     ZoneEvent message;
     message.hazard = event;
     stream_.Publish(message);
   }
-  for (const MapChangeEvent& event : change.map_change_events) {
+  for (const MapChangeEvent& event : transaction.map_change_events()) {
     ZoneEvent message;
     message.map_change = event;
     stream_.Publish(message);
@@ -157,20 +64,204 @@ void ZoneService::Implementation::Settle(const Change& change) {
 }
 
 /// When time changes the hazard next, and when vehicles are to be asked about it.
-void ZoneService::Implementation::Schedule(Slot slot, std::int64_t now_ns) {
-  const HazardRecord& record = registry_.Record(slot);
-  const ClassModel entry = ClassOf(slot);
-  due_.Set(slot, life_.NextChangeNs(entry, record.life));
-  const std::int64_t picture_ns = record.picture.empty() ? 0 : record.estimate.last_seen_ns;
-  const std::lock_guard<std::mutex> lock(polls_mutex_);
-  if (IsOnMap(record.life.state)) {
-    scheduler_.SetHazard(slot, record.estimate.position, entry, record.life, picture_ns, now_ns);
-  } else {
-    scheduler_.RemoveHazard(slot);
+void ZoneService::Schedule(Slot slot, std::int64_t now_ns) {
+  ageing_.Schedule(slot);
+  polls_.SetHazard(slot, now_ns);
+}
+
+protocol::Receipt ZoneService::Handle(const protocol::Report& report) {
+  std::vector<protocol::Receipt> receipts = HandleBatch({report});
+  if (receipts.empty()) throw Error("too many reports of this vehicle within an hour");
+  return std::move(receipts.front());
+}
+
+std::vector<protocol::Receipt> ZoneService::HandleBatch(
+    const std::vector<protocol::Report>& reports) {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  ZoneTransaction transaction(state_, now_ns_());
+  ReportIntake::Batch batch = reports_.Examine(reports, transaction.now_ns());
+  {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    if (!batch.pending.empty()) {
+      Commit(transaction, [&] { reports_.Apply(batch, transaction); });
+    }
+    CountReports(batch.counted);
+  }
+  reports_.KeepTracks(batch);
+  FollowUp(transaction);
+  return batch.TakeReceipts();
+}
+
+void ZoneService::CountReports(const ZoneStatistics& counted) {
+  statistics_.added += counted.added;
+  statistics_.merged += counted.merged;
+  statistics_.repeated += counted.repeated;
+  statistics_.refused += counted.refused;
+  statistics_.not_now += counted.not_now;
+  for (std::size_t i = 0; i < kRefusalKinds; ++i) {
+    statistics_.refused_by_kind[i] += counted.refused_by_kind[i];
   }
 }
 
-bool ZoneService::Implementation::UpdateVehicle(const VehicleState& told) {
+std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
+    const std::vector<protocol::MapChangeReport>& reports) {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  ZoneTransaction transaction(state_, now_ns_());
+  MapChangeIntake::Batch batch = map_changes_.Examine(reports, transaction.now_ns());
+  {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    if (!batch.pending.empty()) {
+      Commit(transaction, [&] { map_changes_.Apply(batch, transaction); });
+    }
+    CountMapChanges(batch.counted);
+  }
+  FollowUp(transaction);
+  return batch.TakeReceipts();
+}
+
+void ZoneService::CountMapChanges(const MapChangeStatistics& counted) {
+  MapChangeStatistics& all = statistics_.map_changes;
+  all.added += counted.added;
+  all.merged += counted.merged;
+  all.denied += counted.denied;
+  all.known += counted.known;
+  all.repeated += counted.repeated;
+  all.refused += counted.refused;
+  all.not_now += counted.not_now;
+}
+
+std::vector<protocol::Poll> ZoneService::TakeDuePolls() {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  std::vector<protocol::Poll> polls = polls_.TakeDue(now_ns_());
+  const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+  statistics_.polls += polls.size();
+  return polls;
+}
+
+bool ZoneService::HandleAnswer(const protocol::PollAnswer& answer) {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  ZoneTransaction transaction(state_, now_ns_());
+  const auto accepted = polls_.Accept(answer, transaction.now_ns());
+  if (accepted) {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    Commit(transaction, [&] { polls_.Apply(*accepted, transaction); });
+  }
+  CountAnswer(accepted.has_value());
+  if (!accepted) return false;
+  polls_.Close(*accepted, transaction.now_ns());
+  FollowUp(transaction);
+  Schedule(accepted->slot, transaction.now_ns());
+  return true;
+}
+
+void ZoneService::CountAnswer(bool accepted) {
+  const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+  ++(accepted ? statistics_.answers : statistics_.answers_refused);
+}
+
+void ZoneService::Advance() {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  ZoneTransaction transaction(state_, now_ns_());
+  const std::vector<Slot> due = ageing_.TakeDue(transaction.now_ns());
+  if (due.empty()) return;
+  try {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    Commit(transaction, [&] { ageing_.Apply(due, transaction); });
+  } catch (...) {
+    ageing_.PutBack(due, transaction.now_ns());
+    throw;
+  }
+  ageing_.Reschedule(due, transaction.now_ns());
+  FollowUp(transaction);
+}
+
+template <typename Decide>
+bool ZoneService::DecideHazard(const Decide& decide) {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  ZoneTransaction transaction(state_, now_ns_());
+  const std::optional<OfficialActions::HazardDecision> decision = decide(transaction.now_ns());
+  if (!decision) return false;
+  {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    Commit(transaction, [&] { officials_.Apply(*decision, transaction); });
+  }
+  FollowUp(transaction);
+  return true;
+}
+
+bool ZoneService::Confirm(const Uuid& hazard, const std::string& official,
+                          const std::string& reason) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  return DecideHazard(
+      [&](std::int64_t now_ns) { return officials_.Confirm(hazard, official, why, now_ns); });
+}
+
+bool ZoneService::Reject(const Uuid& hazard, const std::string& official,
+                         const std::string& reason) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  return DecideHazard(
+      [&](std::int64_t now_ns) { return officials_.Reject(hazard, official, why, now_ns); });
+}
+
+bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {
+  return DecideHazard(
+      [&](std::int64_t now_ns) { return officials_.Remove(hazard, reason, now_ns); });
+}
+
+bool ZoneService::ConfirmMapChange(const Uuid& uuid, const std::string& official,
+                                   const std::string& reason) {
+  return DecideMapChange(uuid, MapChangeState::kConfirmed, official, reason);
+}
+
+bool ZoneService::DismissMapChange(const Uuid& uuid, const std::string& official,
+                                   const std::string& reason) {
+  return DecideMapChange(uuid, MapChangeState::kDismissed, official, reason);
+}
+
+bool ZoneService::DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
+                                  const std::string& reason) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  ZoneTransaction transaction(state_, now_ns_());
+  {
+    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    Commit(transaction, [&] { officials_.DecideMapChange(uuid, to, official, why, transaction); });
+  }
+  FollowUp(transaction);
+  return !transaction.map_change_events().empty();
+}
+
+std::optional<std::size_t> ZoneService::Distrust(const std::string& vehicle_id,
+                                                 const std::string& official,
+                                                 const std::string& reason) {
+  // Reports wait while a portion is committed.
+  constexpr std::size_t kMaxAtOnce = 2000;
+  const std::string given = officials_.CheckedReason(official, reason);
+  if (!IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
+  const std::string why = DecisionText("words of " + vehicle_id + " withdrawn", official, given);
+  const std::uint64_t vehicle = VehicleKey(vehicle_id);
+  std::size_t withdrawn = 0;
+  for (bool first = true;; first = false) {
+    const std::lock_guard<std::mutex> writer(writer_mutex_);
+    std::vector<Slot> slots = state_.hazards.HazardsWithEvidenceFrom(vehicle);
+    if (first && slots.empty() && vehicles_.Track(vehicle_id).empty() &&
+        !reports_.HasHeardOf(vehicle_id)) {
+      return std::nullopt;
+    }
+    const bool last = slots.size() <= kMaxAtOnce;
+    slots.resize(std::min(slots.size(), kMaxAtOnce));
+    ZoneTransaction transaction(state_, now_ns_());
+    {
+      const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+      Commit(transaction, [&] { officials_.Distrust(vehicle, slots, why, transaction); });
+    }
+    FollowUp(transaction);
+    withdrawn += slots.size();
+    if (last) return withdrawn;
+  }
+}
+
+bool ZoneService::UpdateVehicle(const VehicleState& told) {
   VehicleState vehicle = told;
   vehicle.heard_ns = now_ns_();
   const std::size_t max_bytes = config_.limits.max_text_bytes;
@@ -185,172 +276,102 @@ bool ZoneService::Implementation::UpdateVehicle(const VehicleState& told) {
   }
   ++vehicle_positions_;
   vehicles_.Update(vehicle);
-  {
-    const std::lock_guard<std::mutex> lock(polls_mutex_);
-    scheduler_.SetVehicle(vehicle.vehicle_id, {vehicle.heard_ns, vehicle.position,
-                                               vehicle.course_rad, vehicle.speed_mps});
-  }
+  polls_.SetVehicle(vehicle);
   ZoneEvent message;
   message.vehicle = std::move(vehicle);
   stream_.Publish(message);
   return true;
 }
 
-ZoneStatistics ZoneService::Implementation::Statistics() const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  ZoneStatistics statistics = statistics_;
-  statistics.vehicle_positions = vehicle_positions_;
-  statistics.vehicle_positions_refused = vehicle_positions_refused_;
-  statistics.store_errors = store_errors_;
-  statistics.active_hazards = registry_.on_map_count();
-  statistics.hazards_by_state = registry_.counts();
-  statistics.map_changes.by_state = map_changes_.counts();
-  statistics.image_bytes = images_.total_bytes();
-  statistics.suspect_vehicles = trust_.Count(config_.life.suspect_above, now_ns_());
-  return statistics;
-}
-
-ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed) {
-  CheckSettings(config);
-  config.trust.hostile_share = config.life.hostile_share;
-  if (config.replay) config.limits.max_age_s = std::numeric_limits<double>::infinity();
-  implementation_ =
-      std::make_unique<Implementation>(std::move(config), std::move(now_ns), uuid_seed);
-}
-
-ZoneService::~ZoneService() = default;
-
-protocol::Receipt ZoneService::Handle(const protocol::Report& report) {
-  std::vector<protocol::Receipt> receipts = implementation_->HandleBatch({report});
-  if (receipts.empty()) throw Error("too many reports of this vehicle within an hour");
-  return std::move(receipts.front());
-}
-
-std::vector<protocol::Receipt> ZoneService::HandleBatch(
-    const std::vector<protocol::Report>& reports) {
-  return implementation_->HandleBatch(reports);
-}
+std::vector<VehicleState> ZoneService::Vehicles() const { return vehicles_.List(now_ns_()); }
 
 std::vector<Hazard> ZoneService::Query(const std::optional<geo::GeoBox>& box,
                                        std::uint64_t since_sequence, std::size_t limit,
                                        const HazardStates& states) const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->registry_.Query(box, since_sequence, limit, states);
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  return state_.hazards.Query(box, since_sequence, limit, states);
 }
 
-std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
-    const std::vector<protocol::MapChangeReport>& reports) {
-  return implementation_->HandleMapChanges(reports);
+std::vector<Hazard> ZoneService::QueryNear(const geo::GeoPoint& centre, double radius_m,
+                                           std::size_t limit) const {
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  return state_.hazards.QueryNear(centre, radius_m, limit);
+}
+
+std::vector<Hazard> ZoneService::ChangedAround(const geo::GeoPoint& centre, double radius_m,
+                                               std::uint64_t since_sequence,
+                                               std::size_t limit) const {
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  return state_.hazards.ChangedAround(centre, radius_m, since_sequence, limit);
+}
+
+std::optional<Hazard> ZoneService::Find(const Uuid& uuid) const {
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  const auto slot = state_.hazards.Find(uuid);
+  return slot ? std::optional<Hazard>(state_.hazards.Get(*slot)) : std::nullopt;
+}
+
+std::vector<StoredEvent> ZoneService::Events(const Uuid& hazard, std::size_t limit) const {
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  const auto slot = state_.hazards.Find(hazard);
+  if (!slot) return {};
+  return state_.store.LoadEvents(hazard, state_.hazards.Record(*slot).sequence, limit);
 }
 
 std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,
                                                            std::uint64_t since_sequence,
                                                            std::size_t limit,
                                                            const MapChangeStates& states) const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->map_changes_.Query(box, since_sequence, limit, states);
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  return state_.map_changes.Query(box, since_sequence, limit, states);
 }
 
 std::optional<MapChangeFeature> ZoneService::FindMapChange(const Uuid& uuid) const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  const MapChangeFeature* feature = implementation_->map_changes_.Find(uuid);
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  const MapChangeFeature* feature = state_.map_changes.Find(uuid);
   return feature != nullptr ? std::optional<MapChangeFeature>(*feature) : std::nullopt;
 }
 
 std::vector<StoredMapChangeEvent> ZoneService::MapChangeEvents(const Uuid& uuid,
                                                                std::size_t limit) const {
-  return implementation_->MapChangeEvents(uuid, limit);
+  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  const MapChangeFeature* feature = state_.map_changes.Find(uuid);
+  if (feature == nullptr) return {};
+  return state_.store.LoadMapChangeEvents(feature->sequence, limit);
 }
-
-bool ZoneService::ConfirmMapChange(const Uuid& uuid, const std::string& official,
-                                   const std::string& reason) {
-  return implementation_->DecideMapChange(uuid, MapChangeState::kConfirmed, official, reason);
-}
-
-bool ZoneService::DismissMapChange(const Uuid& uuid, const std::string& official,
-                                   const std::string& reason) {
-  return implementation_->DecideMapChange(uuid, MapChangeState::kDismissed, official, reason);
-}
-
-std::vector<Hazard> ZoneService::QueryNear(const geo::GeoPoint& centre, double radius_m,
-                                           std::size_t limit) const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->registry_.QueryNear(centre, radius_m, limit);
-}
-
-std::optional<Hazard> ZoneService::Find(const Uuid& uuid) const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  const auto slot = implementation_->registry_.Find(uuid);
-  return slot ? std::optional<Hazard>(implementation_->registry_.Get(*slot)) : std::nullopt;
-}
-
-std::vector<Hazard> ZoneService::ChangedAround(const geo::GeoPoint& centre, double radius_m,
-                                               std::uint64_t since_sequence,
-                                               std::size_t limit) const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->registry_.ChangedAround(centre, radius_m, since_sequence, limit);
-}
-
-std::vector<StoredEvent> ZoneService::Events(const Uuid& hazard, std::size_t limit) const {
-  return implementation_->Events(hazard, limit);
-}
-
-bool ZoneService::Reject(const Uuid& hazard, const std::string& official,
-                         const std::string& reason) {
-  return implementation_->Reject(hazard, official, reason);
-}
-
-bool ZoneService::Confirm(const Uuid& hazard, const std::string& official,
-                          const std::string& reason) {
-  return implementation_->Confirm(hazard, official, reason);
-}
-
-std::optional<std::size_t> ZoneService::Distrust(const std::string& vehicle_id,
-                                                 const std::string& official,
-                                                 const std::string& reason) {
-  return implementation_->Distrust(vehicle_id, official, reason);
-}
-
-bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {
-  return implementation_->Remove(hazard, reason);
-}
-
-std::vector<protocol::Poll> ZoneService::TakeDuePolls() { return implementation_->TakeDuePolls(); }
-
-bool ZoneService::HandleAnswer(const protocol::PollAnswer& answer) {
-  return implementation_->HandleAnswer(answer);
-}
-
-void ZoneService::Advance() { implementation_->Advance(); }
 
 std::optional<std::string> ZoneService::ImagePath(const std::string& sha256) const {
-  return implementation_->images_.Path(sha256);
-}
-
-bool ZoneService::UpdateVehicle(const VehicleState& vehicle) {
-  return implementation_->UpdateVehicle(vehicle);
-}
-
-std::vector<VehicleState> ZoneService::Vehicles() const {
-  return implementation_->vehicles_.List(implementation_->now_ns_());
+  return images_.Path(sha256);
 }
 
 int ZoneService::Subscribe(Subscriber subscriber) {
-  return implementation_->stream_.Subscribe(std::move(subscriber));
+  return stream_.Subscribe(std::move(subscriber));
 }
 
-void ZoneService::Unsubscribe(int id) { implementation_->stream_.Unsubscribe(id); }
+void ZoneService::Unsubscribe(int id) { stream_.Unsubscribe(id); }
 
 std::uint64_t ZoneService::Sequence() const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->sequence_;
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  return state_.sequence;
 }
 
 std::uint64_t ZoneService::AnnouncedSequence() const {
-  const std::shared_lock<std::shared_mutex> lock(implementation_->data_mutex_);
-  return implementation_->announced_;
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  return state_.announced;
 }
 
-ZoneStatistics ZoneService::Statistics() const { return implementation_->Statistics(); }
+ZoneStatistics ZoneService::Statistics() const {
+  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  ZoneStatistics statistics = statistics_;
+  statistics.vehicle_positions = vehicle_positions_;
+  statistics.vehicle_positions_refused = vehicle_positions_refused_;
+  statistics.store_errors = store_errors_;
+  statistics.active_hazards = state_.hazards.on_map_count();
+  statistics.hazards_by_state = state_.hazards.counts();
+  statistics.map_changes.by_state = state_.map_changes.counts();
+  statistics.image_bytes = images_.total_bytes();
+  statistics.suspect_vehicles = state_.trust.Count(config_.life.suspect_above, now_ns_());
+  return statistics;
+}
 
 }  // namespace livemap::zone

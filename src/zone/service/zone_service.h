@@ -1,66 +1,39 @@
 #pragma once
 
-#include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
+#include <mutex>
 #include <optional>
+#include <shared_mutex>
 #include <string>
 #include <vector>
 
-#include "common/sqlite.h"
 #include "geo/geo_box.h"
-#include "protocol/hazard_catalogue.h"
 #include "protocol/map_change_report.h"
 #include "protocol/poll.h"
 #include "protocol/report.h"
-#include "zone/admission/report_validation.h"
-#include "zone/admission/speed_rule.h"
 #include "zone/admission/vehicle_allowance.h"
-#include "zone/belief/hazard_lifecycle.h"
-#include "zone/belief/survival_model.h"
-#include "zone/belief/vehicle_trust.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
-#include "zone/model/store_damage.h"
 #include "zone/model/vehicle_state.h"
-#include "zone/polling/poll_scheduler.h"
-#include "zone/registry/map_change_registry.h"
-#include "zone/registry/vehicle_track.h"
+#include "zone/pictures/image_store.h"
+#include "zone/pictures/owned_directory.h"
+#include "zone/registry/vehicle_table.h"
+#include "zone/service/ageing.h"
+#include "zone/service/event_stream.h"
+#include "zone/service/hazard_steps.h"
+#include "zone/service/map_change_intake.h"
+#include "zone/service/official_actions.h"
+#include "zone/service/poll_coordinator.h"
+#include "zone/service/report_intake.h"
+#include "zone/service/zone_config.h"
+#include "zone/service/zone_state.h"
+#include "zone/service/zone_statistics.h"
+#include "zone/service/zone_transaction.h"
 
 namespace livemap::zone {
-
-/// One message of the zone's stream: exactly one of the three is set.
-struct ZoneEvent {
-  std::optional<HazardEvent> hazard;
-  std::optional<MapChangeEvent> map_change;
-  std::optional<VehicleState> vehicle;
-};
-
-/// What became of the reports, vehicle positions and polls since start.
-struct ZoneStatistics {
-  std::uint64_t added = 0;     ///< Reports that became a new hazard.
-  std::uint64_t merged = 0;    ///< Reports counted as a sighting of a known hazard.
-  std::uint64_t repeated = 0;  ///< Reports whose uuid was committed before.
-  std::uint64_t refused = 0;   ///< For good; all kinds together.
-  /// Of those, by RefusalKind.
-  std::array<std::uint64_t, kRefusalKinds> refused_by_kind{};
-  std::uint64_t not_now = 0;  ///< Beyond a vehicle's hourly cap: not answered, sent again later.
-  std::uint64_t store_errors = 0;  ///< Batches and decisions that the store could not keep.
-  std::uint64_t vehicle_positions = 0;
-  std::uint64_t vehicle_positions_refused = 0;
-  std::uint64_t polls = 0;    ///< Asked.
-  std::uint64_t answers = 0;  ///< Counted.
-  std::uint64_t answers_refused =
-      0;                           ///< Unknown, expired, another's, or from where nobody sees it.
-  std::size_t active_hazards = 0;  ///< On the map: candidate, active or verifying.
-  std::array<std::size_t, kHazardStates> hazards_by_state{};  ///< By HazardState.
-  std::uint64_t image_bytes = 0;                              ///< On disk.
-  std::size_t suspect_vehicles = 0;  ///< Too often contradicted: they do not count as vehicles.
-  MapChangeStatistics map_changes;
-  StoreDamage store_damage;  ///< What was found broken in the store at start.
-};
 
 /// The zone's state behind one thread-safe door: registry, store, pictures, vehicles, event stream.
 ///
@@ -70,31 +43,9 @@ struct ZoneStatistics {
 /// their sequence.
 class ZoneService {
  public:
-  struct Config {
-    std::string directory;              ///< Holds zone.sqlite3 and images/; made when missing.
-    double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
-    double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
-    std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
-    std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
-    protocol::PollPicture poll_picture =
-        protocol::PollPicture::kCrop;  ///< What polls ask for, where they want one.
-    ReportLimits limits;
-    SpeedRule speed;
-    VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
-    HazardLifecycle::Config life;
-    SurvivalModel::Config survival;
-    VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
-    PollScheduler::Config polls;
-    MapChangeRegistry::Rule map_changes;
-    double map_changes_per_hour = 240;  ///< Of one vehicle, >= 1; further ones must wait.
-    SightRule sight;                    ///< Whose answer to a poll counts.
-    /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
-    /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
-    bool replay = false;
-    protocol::HazardCatalogue catalogue;
-  };
+  using Config = ZoneConfig;
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
-  using Subscriber = std::function<void(const ZoneEvent&)>;
+  using Subscriber = EventStream::Subscriber;
 
   /// Opens or makes the store and loads it; rows of impossible values are left out, left alone and
   /// counted. `uuid_seed` seeds the ids of new hazards: a test gives
@@ -206,8 +157,55 @@ class ZoneService {
   ZoneStatistics Statistics() const;
 
  private:
-  class Implementation;
-  std::unique_ptr<Implementation> implementation_;
+  using Slot = HazardRegistry::Slot;
+
+  /// Runs the transaction and counts a failure of the store. The caller holds writer_mutex_ and,
+  /// exclusively, data_mutex_.
+  template <typename Body>
+  void Commit(ZoneTransaction& transaction, const Body& body);
+  /// What follows from a committed transaction: the pictures' references, when its hazards change
+  /// and are asked about next, and events for subscribers. The caller holds writer_mutex_ alone.
+  void FollowUp(const ZoneTransaction& transaction);
+  void Schedule(Slot slot, std::int64_t now_ns);
+  template <typename Decide>
+  bool DecideHazard(const Decide& decide);
+  bool DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
+                       const std::string& reason);
+  void CountReports(const ZoneStatistics& counted);
+  void CountMapChanges(const MapChangeStatistics& counted);
+  void CountAnswer(bool accepted);
+
+  const ZoneConfig config_;
+  const Clock now_ns_;
+  const OwnedDirectory directory_;
+
+  // Locks are taken in the order writer_mutex_, data_mutex_, then those that parts own: of the
+  // polls' scheduler, the pictures, the vehicles and the subscribers.
+
+  /// One writer at a time: owns state_ as ZoneState says, and all collaborators.
+  mutable std::mutex writer_mutex_;
+  /// Held exclusively from the first change to the end of its commit, so that no reader ever sees
+  /// what is not on disk: guards what readers see of state_, and statistics_.
+  mutable std::shared_mutex data_mutex_;
+  ZoneState state_;
+  ZoneStatistics statistics_;
+
+  // Thread-safe each by itself.
+  ImageStore images_;
+  VehicleTable vehicles_;
+  EventStream stream_;
+  std::atomic<std::uint64_t> vehicle_positions_{0};
+  std::atomic<std::uint64_t> vehicle_positions_refused_{0};
+  std::atomic<std::uint64_t> store_errors_{0};
+
+  // Collaborators: the writer's, but for PollCoordinator::SetVehicle.
+  VehicleAllowance allowance_;
+  HazardSteps steps_;
+  ReportIntake reports_;
+  MapChangeIntake map_changes_;
+  PollCoordinator polls_;
+  OfficialActions officials_;
+  Ageing ageing_;
 };
 
 }  // namespace livemap::zone

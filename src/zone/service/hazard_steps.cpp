@@ -1,0 +1,56 @@
+#include "zone/service/hazard_steps.h"
+
+namespace livemap::zone {
+
+HazardSteps::HazardSteps(const ZoneConfig& config, ZoneState& state)
+    : config_(config), state_(state), lifecycle_(config.life) {}
+
+ClassModel HazardSteps::ClassOf(Slot slot) const {
+  const std::string& name = state_.hazards.ClassName(slot);
+  return ClassModelOf(config_.catalogue.Get(name), state_.survival.Of(name));
+}
+
+Evidence HazardSteps::EvidenceOf(EvidenceKind kind, const std::string& vehicle_id,
+                                 std::int64_t stamp_ns, std::int64_t now_ns) const {
+  Evidence evidence{kind, VehicleKey(vehicle_id), SeenNs(stamp_ns, now_ns)};
+  evidence.hostile = state_.trust.Hostile(evidence.vehicle, now_ns);
+  return evidence;
+}
+
+std::optional<HazardSteps::Slot> HazardSteps::MatchNow(const protocol::Report& report,
+                                                       ZoneTransaction& transaction) {
+  const HazardRegistry& hazards = state_.hazards;
+  auto match = hazards.FindMatch(report.class_name, report.position);
+  while (match && PassTime(*match, transaction) && hazards.State(*match) == HazardState::kGone) {
+    match = hazards.FindMatch(report.class_name, report.position);
+  }
+  return match;
+}
+
+bool HazardSteps::PassTime(Slot slot, ZoneTransaction& transaction) {
+  PresenceRecord life = state_.hazards.Record(slot).life;
+  const LifecycleUpdate step = lifecycle_.Advance(ClassOf(slot), transaction.now_ns(), life);
+  if (!step.transition) return false;
+  KeepAsEvent(slot, life, step, step.transition->reason, transaction.BeforeOf(slot), transaction);
+  return true;
+}
+
+void HazardSteps::Keep(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step,
+                       ZoneTransaction& transaction) {
+  const std::int64_t now_ns = transaction.now_ns();
+  const ClassModel entry = ClassOf(slot);
+  transaction.Learn(state_.hazards.ClassName(slot), step.lesson);
+  transaction.Judge(step.verdicts);
+  state_.hazards.SetLife(slot, life, lifecycle_.Presence(entry, life, now_ns),
+                         transaction.sequence(), now_ns);
+}
+
+void HazardSteps::KeepAsEvent(Slot slot, const PresenceRecord& life, const LifecycleUpdate& step,
+                              const std::string& reason, const ZoneTransaction::Before& before,
+                              ZoneTransaction& transaction) {
+  transaction.TakeSequence();
+  Keep(slot, life, step, transaction);
+  transaction.RecordHazardEvent(slot, before, reason, false);
+}
+
+}  // namespace livemap::zone

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "common/uuid.h"
+#include "protocol/poll.h"
+#include "zone/admission/vehicle_allowance.h"
+#include "zone/model/vehicle_state.h"
+#include "zone/pictures/image_store.h"
+#include "zone/polling/poll_scheduler.h"
+#include "zone/registry/vehicle_table.h"
+#include "zone/service/hazard_steps.h"
+#include "zone/service/zone_config.h"
+#include "zone/service/zone_state.h"
+#include "zone/service/zone_transaction.h"
+
+namespace livemap::zone {
+
+/// Asks vehicles about hazards and takes their answers in: who is asked what, which answers are
+/// believed, and what follows from them. Open polls are not stored: after a restart the zone asks
+/// anew.
+///
+/// The caller holds the writer's lock, and Apply runs in a transaction; SetVehicle may be called by
+/// any thread. A lock of its own guards the scheduler; it is taken last, and no other lock is taken
+/// under it.
+class PollCoordinator {
+ public:
+  using Slot = HazardRegistry::Slot;
+
+  /// An answer that counts, before its transaction.
+  struct AcceptedAnswer {
+    const protocol::PollAnswer* answer = nullptr;
+    Slot slot = 0;        ///< The hazard.
+    PictureName picture;  ///< On disk already; none unless the answer is yes.
+  };
+
+  /// All outlive it. Throws Error for an impossible setting.
+  PollCoordinator(const ZoneConfig& config, ZoneState& state, HazardSteps& steps,
+                  ImageStore& images, VehicleAllowance& allowance, const VehicleTable& vehicles);
+
+  /// The hazard as it is now: to be called after each change to it.
+  void SetHazard(Slot slot, std::int64_t now_ns);
+  /// Where a vehicle is now.
+  void SetVehicle(const VehicleState& vehicle);
+
+  /// Polls to be sent now.
+  std::vector<protocol::Poll> TakeDue(std::int64_t now_ns);
+  /// Checks the answer as far as the zone can by itself, takes its place in the vehicle's
+  /// allowance, and brings its picture to disk. None when it does not count. Throws StoreError.
+  std::optional<AcceptedAnswer> Accept(const protocol::PollAnswer& answer, std::int64_t now_ns);
+  /// What follows from the answer.
+  void Apply(const AcceptedAnswer& accepted, ZoneTransaction& transaction);
+  /// After the commit: the poll is closed.
+  void Close(const AcceptedAnswer& accepted, std::int64_t now_ns);
+
+ private:
+  std::optional<PollScheduler::OpenPoll> FindOpen(const Uuid& poll, std::int64_t now_ns);
+  bool IsAcceptable(const protocol::PollAnswer& answer, const PollScheduler::OpenPoll& poll,
+                    std::int64_t now_ns) const;
+
+  const ZoneConfig& config_;
+  ZoneState& state_;
+  HazardSteps& steps_;
+  ImageStore& images_;
+  VehicleAllowance& allowance_;
+  const VehicleTable& vehicles_;
+
+  std::mutex mutex_;  ///< Guards scheduler_.
+  PollScheduler scheduler_;
+};
+
+}  // namespace livemap::zone

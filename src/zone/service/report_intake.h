@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "common/uuid.h"
+#include "protocol/report.h"
+#include "zone/admission/report_validation.h"
+#include "zone/admission/speed_rule.h"
+#include "zone/admission/vehicle_allowance.h"
+#include "zone/pictures/image_store.h"
+#include "zone/service/hazard_steps.h"
+#include "zone/service/zone_config.h"
+#include "zone/service/zone_state.h"
+#include "zone/service/zone_statistics.h"
+#include "zone/service/zone_transaction.h"
+
+namespace livemap::zone {
+
+/// Takes batches of hazard reports into the map: which of them count, which hazards they are
+/// sightings of, and what their vehicles are answered.
+///
+/// Not thread-safe. The caller holds the writer's lock; Examine needs no other lock, Apply runs in
+/// a transaction.
+class ReportIntake {
+ public:
+  /// A report that may change the map.
+  struct PendingReport {
+    std::size_t index = 0;  ///< In the batch.
+    PictureName picture;
+  };
+  /// A batch on its way.
+  struct Batch {
+    const std::vector<protocol::Report>* reports = nullptr;
+    std::vector<std::optional<protocol::Receipt>> receipts;  ///< None: not taken now.
+    std::vector<PendingReport> pending;
+    std::unordered_map<Uuid, Uuid> hazard_of_report;
+    std::map<std::string, ReportTrack> tracks;  ///< As they will be.
+    ZoneStatistics counted;
+
+    /// The receipts that vehicles get, in the order of the reports.
+    std::vector<protocol::Receipt> TakeReceipts();
+  };
+
+  /// All outlive it.
+  ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps, ImageStore& images,
+               VehicleAllowance& allowance);
+
+  /// First pass, which changes nothing: what was committed before, what is refused, pictures to
+  /// disk. A picture whose report is never committed is unreferenced and goes first. `reports`
+  /// outlive the batch. Throws StoreError.
+  Batch Examine(const std::vector<protocol::Report>& reports, std::int64_t now_ns);
+  /// Second pass: registers or merges what is pending.
+  void Apply(Batch& batch, ZoneTransaction& transaction);
+  /// After the commit: where the batch's vehicles reported from.
+  void KeepTracks(const Batch& batch);
+
+  /// Whether the vehicle ever reported anything that was examined.
+  bool HasHeardOf(const std::string& vehicle_id);
+
+ private:
+  using Slot = HazardRegistry::Slot;
+
+  bool MayChangeMap(std::size_t index, std::int64_t now_ns, Batch& batch);
+  std::optional<Refusal> WhyTooFast(const protocol::Report& report, Batch& batch);
+  ReportTrack& TrackOf(const std::string& vehicle_id, Batch& batch);
+  static void Refuse(const Refusal& refusal, std::size_t index, Batch& batch);
+  void ApplyOne(const PendingReport& pending, Batch& batch, ZoneTransaction& transaction);
+  Slot Register(const protocol::Report& report, const PictureName& picture,
+                ZoneTransaction& transaction);
+  void Sight(Slot slot, const protocol::Report& report, const PictureName& picture,
+             ZoneTransaction& transaction);
+
+  const ZoneConfig& config_;
+  ZoneState& state_;
+  HazardSteps& steps_;
+  ImageStore& images_;
+  VehicleAllowance& allowance_;
+  std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id; the rest is stored.
+};
+
+}  // namespace livemap::zone

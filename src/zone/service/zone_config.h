@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "protocol/hazard_catalogue.h"
+#include "protocol/poll.h"
+#include "zone/admission/report_validation.h"
+#include "zone/admission/speed_rule.h"
+#include "zone/admission/vehicle_allowance.h"
+#include "zone/belief/hazard_lifecycle.h"
+#include "zone/belief/survival_model.h"
+#include "zone/belief/vehicle_trust.h"
+#include "zone/polling/poll_scheduler.h"
+#include "zone/registry/map_change_registry.h"
+#include "zone/registry/vehicle_track.h"
+
+namespace livemap::zone {
+
+/// Settings of a zone, with the rules of all its parts.
+struct ZoneConfig {
+  std::string directory;              ///< Holds zone.sqlite3 and images/; made when missing.
+  double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
+  double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
+  std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
+  std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
+  protocol::PollPicture poll_picture =
+      protocol::PollPicture::kCrop;  ///< What polls ask for, where they want one.
+  ReportLimits limits;
+  SpeedRule speed;
+  VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
+  HazardLifecycle::Config life;
+  SurvivalModel::Config survival;
+  VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
+  PollScheduler::Config polls;
+  MapChangeRegistry::Rule map_changes;
+  double map_changes_per_hour = 240;  ///< Of one vehicle, >= 1; further ones must wait.
+  SightRule sight;                    ///< Whose answer to a poll counts.
+  /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
+  /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
+  bool replay = false;
+  protocol::HazardCatalogue catalogue;
+};
+
+/// The settings as the zone works by them: what one part takes over from another is filled in.
+/// Throws Error that names the value that is out of range; parts check their own settings.
+ZoneConfig CheckedConfig(ZoneConfig config);
+
+}  // namespace livemap::zone
