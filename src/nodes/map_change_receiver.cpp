@@ -3,9 +3,7 @@
 #include <livemap/ReportReceipt.h>
 #include <ros/console.h>
 
-#include <algorithm>
 #include <utility>
-#include <vector>
 
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/map_change_conversions.h"
@@ -14,27 +12,22 @@ namespace livemap::nodes {
 namespace {
 
 constexpr double kRepeatS = 60.0;
-constexpr std::size_t kMaxWaiting = 10000;
 
 }  // namespace
 
 MapChangeReceiver::MapChangeReceiver(ros::NodeHandle node, zone::ZoneService& zone,
-                                     std::size_t batch)
-    : zone_(zone), batch_(batch) {
+                                     zone::ZoneInbox& inbox)
+    : zone_(zone), inbox_(inbox) {
   receipt_publisher_ = node.advertise<ReportReceipt>("change/receipt", 20000);
   subscriber_ = node.subscribe("change/map_change", 1000, &MapChangeReceiver::OnMapChange, this);
 }
 
 void MapChangeReceiver::OnMapChange(const MapChange& message) {
   try {
-    protocol::MapChangeReport report = ros_io::FromMessage(message);
+    const bool queued = inbox_.Push(ros_io::FromMessage(message));
     const std::lock_guard<std::mutex> lock(mutex_);
     ++counters_.received;
-    if (waiting_.size() < kMaxWaiting) {
-      waiting_.push_back(std::move(report));
-    } else {
-      ++counters_.not_queued;
-    }
+    if (!queued) ++counters_.not_queued;
   } catch (const Error& error) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -52,16 +45,7 @@ void MapChangeReceiver::OnMapChange(const MapChange& message) {
   }
 }
 
-bool MapChangeReceiver::CommitWaiting() {
-  std::vector<protocol::MapChangeReport> reports;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    while (!waiting_.empty() && reports.size() < batch_) {
-      reports.push_back(std::move(waiting_.front()));
-      waiting_.pop_front();
-    }
-  }
-  if (reports.empty()) return false;
+void MapChangeReceiver::Commit(const std::vector<protocol::MapChangeReport>& reports) {
   for (const protocol::Receipt& receipt : zone_.HandleMapChanges(reports)) {
     if (receipt.status == protocol::Receipt::Status::kRefused) {
       ROS_WARN_THROTTLE(kRepeatS, "map change of '%.64s' refused: %s", receipt.vehicle_id.c_str(),
@@ -69,14 +53,11 @@ bool MapChangeReceiver::CommitWaiting() {
     }
     receipt_publisher_.publish(ros_io::ToMessage(receipt));
   }
-  return true;
 }
 
 MapChangeReceiver::Counters MapChangeReceiver::counters() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  Counters counters = counters_;
-  counters.waiting = waiting_.size();
-  return counters;
+  return counters_;
 }
 
 }  // namespace livemap::nodes

@@ -18,7 +18,6 @@ constexpr double kSayAgainS = 60.0;
 constexpr std::chrono::milliseconds kPatience{500};
 /// Between two portions of what a vehicle is told.
 constexpr std::chrono::milliseconds kTellPause{50};
-constexpr std::size_t kMaxAnswers = 10000;
 /// After a failed commit; the vehicles send the reports again anyway.
 constexpr std::chrono::seconds kStorePause{1};
 
@@ -35,16 +34,23 @@ std::int64_t SteadyNs() {
       .count();
 }
 
+zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
+  zone::ZoneInbox::Config limits;
+  limits.max_reports = static_cast<std::size_t>(config.queue_reports);
+  limits.max_bytes = static_cast<std::size_t>(config.queue_bytes);
+  limits.batch = static_cast<std::size_t>(config.batch_reports);
+  return limits;
+}
+
 }  // namespace
 
 ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
                    ros_io::ZoneCloudletConfig config)
     : config_(std::move(config)),
       zone_(config_.zone, NowNs, EntropySeededGenerator()()),
-      queue_(static_cast<std::size_t>(config_.queue_reports),
-             static_cast<std::size_t>(config_.queue_bytes)),
+      inbox_(InboxLimits(config_)),
       catch_up_(config_.catch_up),
-      map_changes_(node, zone_, static_cast<std::size_t>(config_.batch_reports)),
+      map_changes_(node, zone_, inbox_),
       pictures_(zone_, static_cast<std::size_t>(config_.notice_picture_bytes)),
       updater_(node, private_node) {
   if (config_.map_datum) SetMap(*config_.map_datum);
@@ -103,7 +109,7 @@ ZoneNode::~ZoneNode() {
   for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
   for (ros::SteadyTimer& timer : timers_) timer.stop();
   map_changes_.Close();
-  queue_.Close();
+  inbox_.Close();
   worker_.join();
   zone_.Unsubscribe(subscription_);
 }
@@ -131,12 +137,12 @@ void ZoneNode::OnReport(const HazardReportConstPtr& message) {
     ROS_WARN_THROTTLE(kSayAgainS, "report refused: %s", error.what());
     return;
   }
-  if (queue_.Push(std::move(report))) return;
+  if (inbox_.Push(std::move(report))) return;
   Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.reports_not_queued; });
   ROS_WARN_THROTTLE(kSayAgainS,
                     "%zu reports wait for a commit: further ones are not taken until "
                     "their vehicles send them again",
-                    queue_.size());
+                    inbox_.reports());
 }
 
 void ZoneNode::OnPosition(const VehiclePosition& message) {
@@ -151,14 +157,8 @@ void ZoneNode::OnPosition(const VehiclePosition& message) {
 
 void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
   try {
-    protocol::PollAnswer answer = ros_io::FromMessage(message);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    answers_.push_back(std::move(answer));
-    // The oldest have waited longest: their polls expire first.
-    if (answers_.size() > kMaxAnswers) {
-      answers_.pop_front();
-      ++counters_.answers_dropped;
-    }
+    if (inbox_.Push(ros_io::FromMessage(message))) return;
+    Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.answers_dropped; });
   } catch (const Error& error) {
     Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.answers_malformed; });
     ROS_WARN_THROTTLE(kSayAgainS, "poll answer of '%.64s' dropped: %s", message.vehicle_id.c_str(),
@@ -174,7 +174,7 @@ void ZoneNode::RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t
       catch_up_.Update(vehicle.vehicle_id, vehicle.position, map_sequence, announced, SteadyNs());
   if (!order) return;
   ++(order->since == 0 ? counters_.vehicles_joined : counters_.vehicles_behind);
-  orders_.push_back(std::move(*order));
+  inbox_.Push(std::move(*order));
 }
 
 void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
@@ -192,21 +192,20 @@ void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
 }
 
 void ZoneNode::WorkUntilClosed() {
-  while (true) {
-    const bool closing = queue_.closed();
-    const bool telling = TellVehicles();
-    HandleAnswers();
+  for (bool telling = false;;) {
+    const bool closing = inbox_.closed();
+    zone::ZoneInbox::Batch batch = inbox_.Take(telling ? kTellPause : kPatience);
+    // Closed before the inbox was found empty: nothing can have come since.
+    if (closing && batch.empty()) return;
+    telling = TellVehicles(std::move(batch.orders));
+    HandleAnswers(batch.answers);
     LetTimePass();
-    CommitMapChanges();
-    const std::vector<protocol::Report> reports = queue_.Take(
-        static_cast<std::size_t>(config_.batch_reports), telling ? kTellPause : kPatience);
-    if (!reports.empty()) CommitBatch(reports);
-    // Closed before the queue was found empty: nothing can have come since.
-    if (closing && reports.empty()) return;
+    if (!batch.map_changes.empty()) CommitMapChanges(batch.map_changes);
+    if (!batch.reports.empty()) CommitReports(batch.reports);
   }
 }
 
-void ZoneNode::CommitBatch(const std::vector<protocol::Report>& reports) {
+void ZoneNode::CommitReports(const std::vector<protocol::Report>& reports) {
   try {
     for (const protocol::Receipt& receipt : zone_.HandleBatch(reports)) {
       if (receipt.status == protocol::Receipt::Status::kRefused) {
@@ -221,9 +220,10 @@ void ZoneNode::CommitBatch(const std::vector<protocol::Report>& reports) {
   }
 }
 
-void ZoneNode::CommitMapChanges() {
+void ZoneNode::CommitMapChanges(const std::vector<protocol::MapChangeReport>& reports) {
   try {
-    if (map_changes_.CommitWaiting()) NoteCommit();
+    map_changes_.Commit(reports);
+    NoteCommit();
   } catch (const Error& error) {
     NoteFailedCommit(error);
   }
@@ -246,12 +246,8 @@ void ZoneNode::NoteFailedCommit(const Error& error) {
 }
 
 /// Publishes the next portion of what single vehicles must know; true while there is more.
-bool ZoneNode::TellVehicles() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    for (zone::CatchUpOrder& order : orders_) teller_->Add(std::move(order));
-    orders_.clear();
-  }
+bool ZoneNode::TellVehicles(std::deque<zone::CatchUpOrder> orders) {
+  for (zone::CatchUpOrder& order : orders) teller_->Add(std::move(order));
   const auto told = teller_->PublishBatch(NowNs());
   const std::lock_guard<std::mutex> lock(mutex_);
   if (told) catch_up_.Told(*told, SteadyNs());
@@ -259,12 +255,7 @@ bool ZoneNode::TellVehicles() {
   return teller_->busy();
 }
 
-void ZoneNode::HandleAnswers() {
-  std::deque<protocol::PollAnswer> answers;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    answers.swap(answers_);
-  }
+void ZoneNode::HandleAnswers(const std::deque<protocol::PollAnswer>& answers) {
   for (const protocol::PollAnswer& answer : answers) {
     try {
       zone_.HandleAnswer(answer);
@@ -334,12 +325,12 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     const std::lock_guard<std::mutex> lock(mutex_);
     counters = counters_;
   }
-  counters.reports_waiting = queue_.size();
+  counters.reports_waiting = inbox_.reports();
   const MapChangeReceiver::Counters changes = map_changes_.counters();
   counters.map_changes_received = changes.received;
   counters.map_changes_malformed = changes.malformed;
   counters.map_changes_not_queued = changes.not_queued;
-  counters.map_changes_waiting = changes.waiting;
+  counters.map_changes_waiting = inbox_.map_changes();
   counters.notices_sent = notices_->sent();
   counters.notice_pictures = notices_->pictures();
   counters.notice_pictures_failed = pictures_.failed();

@@ -25,16 +25,16 @@
 #include "ros/parameters/zone_parameters.h"
 #include "web/server/server.h"
 #include "zone/service/catch_up.h"
-#include "zone/service/report_queue.h"
+#include "zone/service/zone_inbox.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::nodes {
 
-/// The zone cloudlet as a ROS node. The callbacks' thread queues reports, map changes and poll
-/// answers and takes
-/// positions; one worker thread commits what is queued in groups, answers with receipts, tells
-/// single vehicles what they missed, lets time pass and asks polls; NoticeSender's thread tells
-/// everybody what is announced.
+/// The zone cloudlet as a ROS node. The callbacks' thread takes positions and puts reports, map
+/// changes, poll answers and orders to tell single vehicles what they missed into the worker's
+/// inbox, which wakes it. The worker thread commits what waits in groups, answers with receipts,
+/// tells vehicles, lets time pass and asks polls; NoticeSender's thread tells everybody what is
+/// announced.
 class ZoneNode {
  public:
   /// Opens the store, starts the web server and subscribes. Throws Error with one sentence.
@@ -58,28 +58,26 @@ class ZoneNode {
   void SetMap(const geo::GeoPoint& datum);
   void SayReady() const;
   void WorkUntilClosed();
-  void CommitBatch(const std::vector<protocol::Report>& reports);
-  void CommitMapChanges();
+  void CommitReports(const std::vector<protocol::Report>& reports);
+  void CommitMapChanges(const std::vector<protocol::MapChangeReport>& reports);
   void NoteCommit();
   void NoteFailedCommit(const Error& error);
   void RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence);
-  bool TellVehicles();
-  void HandleAnswers();
+  bool TellVehicles(std::deque<zone::CatchUpOrder> orders);
+  void HandleAnswers(const std::deque<protocol::PollAnswer>& answers);
   void LetTimePass();
   template <typename Change>
   void Count(const Change& change);
 
   const ros_io::ZoneCloudletConfig config_;
   zone::ZoneService zone_;
-  zone::ReportQueue queue_;
+  zone::ZoneInbox inbox_;  ///< What waits for the worker.
 
-  std::mutex mutex_;  ///< Guards the next six.
+  std::mutex mutex_;  ///< Guards the next four.
   ros_io::ZoneCloudletCounters counters_;
   ros_io::VehiclePaths paths_;
   std::optional<geo::LocalFrame> map_;
   zone::CatchUpPlanner catch_up_;
-  std::deque<zone::CatchUpOrder> orders_;  ///< Not yet the worker's.
-  std::deque<protocol::PollAnswer> answers_;
 
   MapChangeReceiver map_changes_;
   NoticePictures pictures_;

@@ -1,0 +1,178 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "protocol/map_change_report.h"
+#include "protocol/poll.h"
+#include "protocol/report.h"
+#include "zone/service/catch_up.h"
+
+namespace livemap::zone {
+
+/// Everything that waits for the zone's worker, each kind in the order of its arrival. Whatever
+/// comes in wakes the worker at once. Every kind is bounded: vehicles send a report or a map change
+/// that did not fit again, and the zone asks anew where an answer was dropped.
+///
+/// Thread-safe.
+///
+/// Typical usage, by the worker:
+///   while (true) {
+///     const bool closing = inbox.closed();
+///     const ZoneInbox::Batch batch = inbox.Take(patience);
+///     Handle(batch);
+///     if (closing && batch.empty()) return;
+///   }
+class ZoneInbox {
+ public:
+  struct Config {
+    std::size_t max_reports = 20000;
+    std::size_t max_bytes = 256'000'000;  ///< Of the reports' pictures together.
+    std::size_t max_map_changes = 10000;
+    std::size_t max_answers = 10000;
+    std::size_t batch = 500;  ///< Reports, and map changes, that are taken at once.
+  };
+  struct Batch {
+    std::vector<protocol::Report> reports;
+    std::vector<protocol::MapChangeReport> map_changes;
+    std::deque<protocol::PollAnswer> answers;
+    std::deque<CatchUpOrder> orders;
+
+    bool empty() const {
+      return reports.empty() && map_changes.empty() && answers.empty() && orders.empty();
+    }
+  };
+
+  explicit ZoneInbox(const Config& config) : config_(config) {}
+
+  /// False when there is no room for the report, or the inbox is closed.
+  bool Push(protocol::Report report);
+  /// False when there is no room for the map change, or the inbox is closed.
+  bool Push(protocol::MapChangeReport report);
+  /// False when the oldest answer made room for this one: it has waited longest, and its poll
+  /// expires first. A closed inbox takes none.
+  bool Push(protocol::PollAnswer answer);
+  /// CatchUpPlanner gives one order for each of a bounded number of vehicles; a closed inbox takes
+  /// none.
+  void Push(CatchUpOrder order);
+
+  /// Waits up to `patience` for anything, then takes what is there, oldest first: all answers and
+  /// orders, and reports and map changes up to Config::batch each.
+  Batch Take(std::chrono::milliseconds patience);
+
+  /// Wakes the worker; nothing is accepted any more, what is there can still be taken.
+  void Close();
+  bool closed() const;
+  std::size_t reports() const;
+  std::size_t map_changes() const;
+
+ private:
+  const Config config_;
+  mutable std::mutex mutex_;  ///< Guards all below.
+  std::condition_variable arrived_;
+  std::deque<protocol::Report> reports_;
+  std::deque<protocol::MapChangeReport> map_changes_;
+  std::deque<protocol::PollAnswer> answers_;
+  std::deque<CatchUpOrder> orders_;
+  std::size_t bytes_ = 0;  ///< Of the reports' pictures.
+  bool closed_ = false;
+};
+
+inline bool ZoneInbox::Push(protocol::Report report) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::size_t bytes = report.image.size();
+    const bool full = reports_.size() >= config_.max_reports || bytes_ + bytes > config_.max_bytes;
+    if (closed_ || full) return false;
+    bytes_ += bytes;
+    reports_.push_back(std::move(report));
+  }
+  arrived_.notify_one();
+  return true;
+}
+
+inline bool ZoneInbox::Push(protocol::MapChangeReport report) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (closed_ || map_changes_.size() >= config_.max_map_changes) return false;
+    map_changes_.push_back(std::move(report));
+  }
+  arrived_.notify_one();
+  return true;
+}
+
+inline bool ZoneInbox::Push(protocol::PollAnswer answer) {
+  bool all_kept = true;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (closed_) return false;
+    answers_.push_back(std::move(answer));
+    if (answers_.size() > config_.max_answers) {
+      answers_.pop_front();
+      all_kept = false;
+    }
+  }
+  arrived_.notify_one();
+  return all_kept;
+}
+
+inline void ZoneInbox::Push(CatchUpOrder order) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (closed_) return;
+    orders_.push_back(std::move(order));
+  }
+  arrived_.notify_one();
+}
+
+inline ZoneInbox::Batch ZoneInbox::Take(std::chrono::milliseconds patience) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  arrived_.wait_for(lock, patience, [this] {
+    return closed_ || !reports_.empty() || !map_changes_.empty() || !answers_.empty() ||
+           !orders_.empty();
+  });
+  Batch batch;
+  batch.answers.swap(answers_);
+  batch.orders.swap(orders_);
+  while (!map_changes_.empty() && batch.map_changes.size() < config_.batch) {
+    batch.map_changes.push_back(std::move(map_changes_.front()));
+    map_changes_.pop_front();
+  }
+  while (!reports_.empty() && batch.reports.size() < config_.batch) {
+    bytes_ -= reports_.front().image.size();
+    batch.reports.push_back(std::move(reports_.front()));
+    reports_.pop_front();
+  }
+  return batch;
+}
+
+inline void ZoneInbox::Close() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = true;
+  }
+  arrived_.notify_all();
+}
+
+inline bool ZoneInbox::closed() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return closed_;
+}
+
+inline std::size_t ZoneInbox::reports() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return reports_.size();
+}
+
+inline std::size_t ZoneInbox::map_changes() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return map_changes_.size();
+}
+
+}  // namespace livemap::zone
