@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/sqlite.h"
 #include "geo/geo_box.h"
 #include "protocol/map_change_report.h"
 #include "protocol/poll.h"
