@@ -82,7 +82,7 @@ int Run(int argc, char** argv) {
   config.polling.kind = KindOf(line.Text("polls", "worth"));
   config.polling.value = line.Number("value", 120, 1e-6, 1e9);
   config.polling.bytes_per_hour = line.Number("bytes-per-hour", 1e9, 1, 1e12);
-  config.hostile_share = line.Number("hostile", 0, 0, 1);
+  config.malicious_share = line.Number("hostile", 0, 0, 1);
   const std::string telling = line.Text("telling", "life");
   if (telling != "life" && telling != "alike" && telling != "count") {
     throw Error("--telling is '" + telling + "', accepted are: life, alike, count");

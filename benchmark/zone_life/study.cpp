@@ -24,7 +24,7 @@ Study::Study(const StudyConfig& config, const protocol::HazardCatalogue& catalog
       end_s_((config.days - config.last_days) * kDayS),
       last_s_(config.days * kDayS) {
   for (std::size_t i = 0; i < config.vehicles; ++i) {
-    hostile_[i] = malice_.Uniform() < config.hostile_share;
+    hostile_[i] = malice_.Uniform() < config.malicious_share;
     names_.push_back("v" + std::to_string(i));
     keys_.push_back(zone::VehicleKey(names_.back()));
     vehicle_of_name_[names_.back()] = i;

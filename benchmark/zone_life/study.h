@@ -21,7 +21,7 @@ struct StudyConfig {
   int warm_up_days = 7;  ///< Hazards and lives of these are not counted...
   int last_days = 2;     ///< ...nor what ends in these.
   std::size_t vehicles = 400;
-  double hostile_share = 0;
+  double malicious_share = 0;
   TellingRule telling = TellingRule::kLife;
   bool trust = true;  ///< kLife: learns whom to believe.
   PollingRule polling;

@@ -23,7 +23,7 @@ void Check(const ReceiverModel& receiver) {
   Accept("latency_s", receiver.latency_s, 0, 2);
   Accept("latency_sigma_s", receiver.latency_sigma_s, 0, 1);
   Accept("default_sigma_m", receiver.default_sigma_m, 0.01, 100);
-  Accept("least_sigma_m", receiver.min_sigma_m, 0, 100);
+  Accept("min_sigma_m", receiver.min_sigma_m, 0, 100);
   Accept("shared_sigma_m", receiver.shared_sigma_m, 0, 100);
   Accept("shared_time_s", receiver.shared_time_s, 1, 1e5);
 }

@@ -272,7 +272,7 @@ class ChangeDetectionTest(unittest.TestCase):
         for name, parameters, expected in (
                 ("no_model", {"method": "network"}, "'model' is empty"),
                 ("other_method", {"method": "guess"}, "accepted"),
-                ("one_picture", {"least_seen": 1}, "least_seen"),
+                ("one_picture", {"min_seen": 1}, "min_seen"),
                 ("no_directory", {"directory": ""}, "'directory' is empty"),
                 ("no_such_model", {"method": "network", "model": "/nowhere/net.yaml"}, "/nowhere/net.yaml"),
                 ("misspelt", {"spacing": 3}, "spacing")):

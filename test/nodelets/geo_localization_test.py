@@ -203,7 +203,7 @@ class GeoLocalizationTest(unittest.TestCase):
 
     def test_wrong_parameters_are_one_sentence_and_a_failed_load(self):
         for parameters, sentence in [
-                ({"gate": -1.0}, "localisation: 'gate' is -1, accepted is a number from 1"),
+                ({"gate": -1.0}, "gate' is -1, accepted is a number from 1"),
                 ({"odometry_covariance": "none"}, "accepted is one of: model, message"),
                 ({"map_datum": "north"}, "parameter 'map_datum' is 'north'"),
                 ({"windov_s": 3}, "unknown parameter")]:

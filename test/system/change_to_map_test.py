@@ -81,7 +81,7 @@ class Zone(system.LiveMapSystem):
     the default asks for more where many were sure."""
 
     zone_parameters = ("{replay: true, poll_price_s: 1.0, poll_same_vehicle_gap_s: 0.1, max_evidence_per_hour: 100000.0, "
-                       "surest_presence: 0.9, gone_below: 0.28}")
+                       "max_presence: 0.9, gone_below: 0.28}")
 
     zone_arguments = {"detect_for_small": "false"}
 

@@ -41,14 +41,14 @@ void CheckWithin(double value, double least, double most, const char* name) {
 PlaceMemory::Config Checked(const PlaceMemory::Config& config) {
   CheckWithin(config.cell_m, 2, 1000, "cell_m");
   CheckWithin(config.heading_sectors, 1, 64, "heading_sectors");
-  CheckWithin(config.max_cell_bytes, 1e4, 1e12, "most_cell_bytes");
+  CheckWithin(config.max_cell_bytes, 1e4, 1e12, "max_cell_bytes");
   CheckWithin(config.half_life_days, 0.001, 1e6, "half_life_days");
-  CheckWithin(config.max_bytes, config.max_cell_bytes, 1e15, "most_bytes");
+  CheckWithin(config.max_bytes, config.max_cell_bytes, 1e15, "max_bytes");
   CheckWithin(static_cast<double>(config.reach.candidates), 1, 1000, "candidates");
-  CheckWithin(config.reach.max_distance_m, 0.1, 1000, "most_distance_m");
-  CheckWithin(config.reach.max_heading_difference_rad, 0, kTurn / 2, "most_heading_difference_rad");
+  CheckWithin(config.reach.max_distance_m, 0.1, 1000, "max_distance_m");
+  CheckWithin(config.reach.max_heading_difference_rad, 0, kTurn / 2, "max_heading_difference_rad");
   CheckWithin(config.match_ratio, 0.1, 1, "match_ratio");
-  CheckWithin(config.max_cached_bytes, 0, 1e12, "most_cached_bytes");
+  CheckWithin(config.max_cached_bytes, 0, 1e12, "max_cached_bytes");
   return config;
 }
 

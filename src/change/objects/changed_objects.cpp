@@ -26,7 +26,7 @@ Eigen::Vector2d PlanarPlace(const Eigen::Isometry3d& pose) { return pose.transla
 
 ChangeTracker::ChangeTracker(const Config& config) : config_(config) {
   if (config.min_seen < 2) {
-    throw Error("a change's least_seen is " + std::to_string(config.min_seen) +
+    throw Error("a change's min_seen is " + std::to_string(config.min_seen) +
                 ", accepted are 2 and more: nothing is said from one picture");
   }
 }

@@ -22,24 +22,9 @@
 #include "perception/detection/hazard_detector.h"
 #include "perception/privacy/privacy_mask.h"
 #include "ros/conversions/detection_conversions.h"
-#include "ros/parameters/parameters.h"
+#include "ros/parameters/hazard_detection_parameters.h"
 
 namespace livemap::nodelets {
-
-/// Parameters of the hazard_detection nodelet; config/hazard_detection.yaml explains them.
-struct HazardDetectionConfig {
-  std::string model;            ///< Path of the manifest; must be given.
-  std::string engine = "auto";  ///< auto (the manifest's choice), opencv or torch.
-  int engines = 1;              ///< Networks that work side by side on frames in turn.
-  int threads = 2;              ///< Of each engine; OpenCV's are one pool; 0 = all cores.
-  int queue_size = 4;           ///< Frames that may wait.
-  bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
-  bool privacy = true;          ///< Mask faces and number plates in the picture.
-  perception::PrivacyMask::Config mask;
-  HazardTrackingConfig tracking;
-  int picture_frames = 64;          ///< Images with detections that may be asked for.
-  double diagnostics_period_s = 1;  ///< s
-};
 
 /// Detects hazards in the rectified images of the vehicle: exactly one `hazard/detections` with the
 /// image's stamp for each processed frame, also when it is empty, and `hazard/annotated` when
@@ -83,7 +68,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   void Initialize() {
-    ReadParameters();
+    ros_io::ParameterReader parameters(getPrivateNodeHandle());
+    config_ = ros_io::ReadHazardDetectionConfig(parameters);
     const perception::ModelManifest manifest = perception::ReadModelManifest(config_.model);
     const std::optional<perception::EngineKind> engine = perception::ParseEngineChoice(
         config_.engine, "parameter '" + getPrivateNodeHandle().resolveName("engine") + "'");
@@ -122,30 +108,6 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
         boost::function<void(const sensor_msgs::ImageConstPtr&)>(
             [this](const sensor_msgs::ImageConstPtr& image) { pool_->Push(image); }),
         ros::VoidPtr(), hints);
-  }
-
-  void ReadParameters() {
-    ros_io::ParameterReader parameters(getPrivateNodeHandle());
-    parameters.Read("model", config_.model);
-    parameters.Read("engine", config_.engine);
-    parameters.Read("engines", config_.engines, {1, 64});
-    parameters.Read("threads", config_.threads, {0, 256});
-    parameters.Read("queue_size", config_.queue_size, {1, 1000});
-    parameters.Read("annotate_empty", config_.annotate_empty);
-    parameters.Read("privacy", config_.privacy);
-    parameters.Read("privacy_cascades", config_.mask.regions.cascades);
-    parameters.Read("privacy_face_model", config_.mask.regions.face_model);
-    parameters.Read("privacy_min_side_px", config_.mask.regions.min_side_px, {8, 1000});
-    parameters.Read("privacy_grow", config_.mask.grow, {0, 5});
-    parameters.Read("privacy_keep_frames", config_.mask.keep_frames, {0, 1000});
-    config_.tracking = ReadHazardTrackingConfig(parameters);
-    parameters.Read("picture_frames", config_.picture_frames, {1, 1000});
-    parameters.Read("diagnostics_period_s", config_.diagnostics_period_s, {0.1, 60});
-    parameters.RejectUnknown({"image_transport", "diagnostic_period"});
-    if (config_.model.empty()) {
-      throw Error("parameter '" + getPrivateNodeHandle().resolveName("model") +
-                  "' is empty, accepted is the path of a model manifest (models/NAME.yaml)");
-    }
   }
 
   void StartPool() {
@@ -387,7 +349,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     double ms_in_window = 0;
   };
 
-  HazardDetectionConfig config_;
+  ros_io::HazardDetectionConfig config_;
   std::vector<std::unique_ptr<perception::HazardDetector>>
       detectors_;                  ///< Each its engine's thread's own.
   std::vector<float> thresholds_;  ///< The model's, by class index.

@@ -17,42 +17,7 @@ constexpr std::size_t kReportedViews = 32;
 
 }  // namespace
 
-HazardTrackingConfig ReadHazardTrackingConfig(ros_io::ParameterReader& parameters) {
-  HazardTrackingConfig config;
-  perception::ObjectTracker::Config& tracker = config.tracker;
-  parameters.Read("tracking", config.tracking);
-  parameters.Read("track_low_share", tracker.low_share, {0.01, 1});
-  parameters.Read("track_sure", tracker.sure, {0.01, 100});
-  parameters.Read("track_repeat_gain", tracker.repeat_gain, {0, 1});
-  parameters.Read("track_max_delay_s", tracker.max_delay_s, {0, 60});
-  parameters.Read("track_max_unseen_s", tracker.max_unseen_s, {0, 60});
-  parameters.Read("track_max_unseen_m", tracker.max_unseen_m, {0, 1000});
-  parameters.Read("track_good_range_m", tracker.good_range_m, {0.1, 1000});
-  parameters.Read("track_max", tracker.max_tracks, {1, 10000});
-  XmlRpc::XmlRpcValue delays = parameters.ReadStructured("track_class_max_delay_s");
-  if (delays.valid()) {
-    const auto refuse = [] {
-      throw Error(
-          "parameter 'track_class_max_delay_s' is wrong, accepted is a map from class to seconds, "
-          "0 to 60");
-    };
-    if (delays.getType() != XmlRpc::XmlRpcValue::TypeStruct) refuse();
-    tracker.class_max_delay_s.clear();
-    for (auto& [name, value] : delays) {
-      double seconds = std::nan("");
-      if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) seconds = static_cast<double>(value);
-      if (value.getType() == XmlRpc::XmlRpcValue::TypeInt) seconds = static_cast<int>(value);
-      if (!(seconds >= 0 && seconds <= 60)) refuse();
-      tracker.class_max_delay_s[name] = seconds;
-    }
-  }
-  parameters.Read("motion_frame", config.motion_frame);
-  parameters.Read("base_frame", config.base_frame);
-  parameters.Read("motion_max_age_s", config.motion_max_age_s, {0, 10});
-  return config;
-}
-
-HazardTracking::HazardTracking(const HazardTrackingConfig& config,
+HazardTracking::HazardTracking(const ros_io::HazardTrackingConfig& config,
                                const perception::ModelManifest& manifest, ros::NodeHandle node)
     : config_(config),
       model_(manifest.name),

@@ -15,28 +15,16 @@
 
 #include "perception/inference/model_manifest.h"
 #include "perception/tracking/object_tracker.h"
-#include "ros/parameters/parameters.h"
+#include "ros/parameters/hazard_detection_parameters.h"
 
 namespace livemap::nodelets {
-
-/// Parameters of tracking; config/hazard_detection.yaml explains them.
-struct HazardTrackingConfig {
-  bool tracking = true;  ///< Publish hazard/events.
-  perception::ObjectTracker::Config tracker;
-  std::string motion_frame = "odom";     ///< Frame in which the road stands still.
-  std::string base_frame = "base_link";  ///< Frame at road level.
-  double motion_max_age_s = 0.3;  ///< Of the newest pose, where that of the image is missing.
-};
-
-/// Throws Error.
-HazardTrackingConfig ReadHazardTrackingConfig(ros_io::ParameterReader& parameters);
 
 /// The tracker of hazard_detection, fed with the camera's motion by tf. Add, WantedPictures and
 /// Figures want one thread at a time.
 class HazardTracking {
  public:
-  HazardTracking(const HazardTrackingConfig& config, const perception::ModelManifest& manifest,
-                 ros::NodeHandle node);
+  HazardTracking(const ros_io::HazardTrackingConfig& config,
+                 const perception::ModelManifest& manifest, ros::NodeHandle node);
 
   /// Events that are to be published after this image, one message per image of a best view.
   std::vector<DetectionArray> Add(const std::vector<perception::HazardDetection>& found,
@@ -53,7 +41,7 @@ class HazardTracking {
   std::optional<perception::CameraMotion> MotionAt(const std_msgs::Header& header);
   std::optional<geometry_msgs::TransformStamped> PoseAt(const ros::Time& stamp);
 
-  const HazardTrackingConfig config_;
+  const ros_io::HazardTrackingConfig config_;
   const std::string model_;
   perception::ObjectTracker tracker_;
   std::deque<perception::ObjectEvent> reported_;  ///< The last ones.

@@ -311,7 +311,7 @@ bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
   const double step = Motion(*keyframe_, last_.world_from_camera, world_from_camera);
   const double enough = step < config_.keyframe_motion
                             ? config_.keyframe_motion
-                            : std::min(config_.keyframe_steps * step, config_.keyframe_most_motion);
+                            : std::min(config_.keyframe_steps * step, config_.keyframe_max_motion);
   return Motion(*keyframe_, keyframe_->world_from_camera, world_from_camera) > enough ||
          result.Overlap() < config_.keyframe_overlap ||
          result.sigma > config_.keyframe_sigma_ratio * keyframe_first_sigma_;

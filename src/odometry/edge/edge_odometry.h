@@ -68,7 +68,7 @@ class EdgeOdometry {
     /// in a single step already: then further than so many steps, or than this share of the width:
     /// a keyframe costs more than a frame, and a fast camera would make every frame one,
     double keyframe_steps = 3.5;
-    double keyframe_most_motion = 0.13;
+    double keyframe_max_motion = 0.13;
     /// or the residuals grew by this factor since the keyframe's first frame.
     double keyframe_sigma_ratio = 1.6;
 

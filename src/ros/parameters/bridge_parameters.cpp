@@ -2,14 +2,12 @@
 
 #include <ros/time.h>
 
-#include <algorithm>
 #include <filesystem>
-#include <functional>
-#include <map>
 #include <set>
 #include <sstream>
 
 #include "ros/bridge/bridged_type.h"
+#include "ros/parameters/shared_parameters.h"
 #include "transport/topic_template.h"
 
 namespace livemap::ros_io {
@@ -124,7 +122,12 @@ void CheckTopic(const BridgeTopic& topic, const BridgeConfig& config) {
 }
 
 std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
-  XmlRpc::XmlRpcValue list = parameters.ReadStructured("topics");
+  XmlRpc::XmlRpcValue list = parameters.ReadList(
+      "topics",
+      "Topics that the bridge carries; docs/how-to/bridge-other-topics.md lists the keys of an "
+      "entry. On the zone's side incoming messages get their vehicle_id from the level {vehicle} "
+      "of the MQTT topic, which the broker lets only that vehicle write, and outgoing messages on "
+      "a topic with {vehicle} go to the vehicle_id in the message.");
   if (list.getType() != XmlRpc::XmlRpcValue::TypeArray || list.size() == 0) {
     throw Error("parameter 'topics' of the bridge is no list, accepted is a list of topics");
   }
@@ -139,38 +142,52 @@ std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
   return topics;
 }
 
-void ReadMqttOptions(ParameterReader& parameters, transport::MqttConfig& mqtt) {
-  parameters.Read("host", mqtt.host);
-  parameters.Read("port", mqtt.port, {1, 65535});
-  parameters.Read("clean_start", mqtt.clean_start);
-  parameters.Read("keepalive_s", mqtt.keepalive_s, {5, 65535});
-  parameters.Read("connect_timeout_s", mqtt.connect_timeout_s, {0.1, 600});
-  parameters.Read("reconnect_min_s", mqtt.reconnect_min_s, {0.01, 600});
-  parameters.Read("reconnect_max_s", mqtt.reconnect_max_s, {0.01, 3600});
-  parameters.Read("max_inflight", mqtt.max_inflight, {1, 65535});
-  const auto read_size = [&](const std::string& name, auto& value, double max) {
-    int number = static_cast<int>(value);
-    parameters.Read(name, number, {1, max});
-    value = static_cast<std::decay_t<decltype(value)>>(number);
-  };
-  read_size("session_expiry_s", mqtt.session_expiry_s, 7 * 24 * 3600);
-  read_size("queue_messages", mqtt.queue_messages, 1e6);
-  read_size("queue_bytes", mqtt.queue_bytes, 1 << 30);
-  read_size("max_packet_bytes", mqtt.max_packet_bytes, 1 << 28);
+void ReadConnection(ParameterReader& parameters, transport::MqttConfig& mqtt) {
+  parameters.Section("Connection");
+  parameters.Read(
+      "clean_start", mqtt.clean_start,
+      "true: the broker forgets the last session, and the messages it queued, at login.");
+  parameters.Read("session_expiry_s", mqtt.session_expiry_s, {1, 7 * 24 * 3600},
+                  "Time that the broker keeps session and queued messages after a loss.", "s");
+  parameters.Read(
+      "keepalive_s", mqtt.keepalive_s, {5, 65535},
+      "Keep-alive of the connection. A silent connection is given up after 1.5 times this.", "s");
+  parameters.Read("connect_timeout_s", mqtt.connect_timeout_s, {0.1, 600},
+                  "Time limit of a connection attempt, per address of the host.", "s");
+  parameters.Read(
+      "reconnect_min_s", mqtt.reconnect_min_s, {0.01, 600},
+      "First wait after a loss. It doubles each time, and is shortened by up to half at random.",
+      "s");
+  parameters.Read("reconnect_max_s", mqtt.reconnect_max_s, {0.01, 3600},
+                  "Longest wait after a loss.", "s");
+  parameters.Read("max_inflight", mqtt.max_inflight, {1, 65535},
+                  "Number of QoS 1 messages sent and not yet acknowledged.");
+  parameters.Read("queue_messages", mqtt.queue_messages, {1, 1e6},
+                  "Number of messages that may wait for the connection. Beyond it messages are "
+                  "dropped and counted.");
+  parameters.Read("queue_bytes", mqtt.queue_bytes, {1, 1 << 30},
+                  "The same in bytes of payload and topic.", "bytes");
+  parameters.Read("max_packet_bytes", mqtt.max_packet_bytes, {1, 1 << 28},
+                  "Largest packet that is accepted from the broker.", "bytes");
 }
 
 /// The three TLS files, or none of them.
 std::optional<transport::MqttTlsConfig> ReadTlsOptions(ParameterReader& parameters) {
   transport::MqttTlsConfig tls;
+  parameters.Read("ca_file", tls.ca_file,
+                  "Certificate of the zone's authority, a PEM file. TLS 1.3 needs ca_file, "
+                  "certificate_file and key_file, all three; none means plain TCP. The broker's "
+                  "certificate must be for the name in host. The launch files set all three by the "
+                  "argument `identity`; docs/how-to/enroll-a-vehicle.md tells how to make them.");
+  parameters.Read("certificate_file", tls.certificate_file,
+                  "The vehicle's or zone's own certificate, a PEM file.");
+  parameters.Read("key_file", tls.key_file, "The key of that certificate, a PEM file.");
   const std::pair<const char*, std::string*> files[] = {{"ca_file", &tls.ca_file},
                                                         {"certificate_file", &tls.certificate_file},
                                                         {"key_file", &tls.key_file}};
-  bool any = false;
-  for (const auto& [name, path] : files) {
-    parameters.Read(name, *path);
-    any = any || !path->empty();
+  if (tls.ca_file.empty() && tls.certificate_file.empty() && tls.key_file.empty()) {
+    return std::nullopt;
   }
-  if (!any) return std::nullopt;
   for (const auto& [name, path] : files) {
     if (path->empty()) {
       throw Error("parameter '" + std::string(name) +
@@ -180,30 +197,59 @@ std::optional<transport::MqttTlsConfig> ReadTlsOptions(ParameterReader& paramete
   return tls;
 }
 
-}  // namespace
-
-BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
-  BridgeConfig config;
+void ReadNames(ParameterReader& parameters, BridgeConfig& config) {
   std::string role;
-  parameters.ReadChoice("role", role, {"vehicle", "zone"});
+  parameters.ReadChoice("role", role, {"vehicle", "zone"}, "Side of the bridge. Required.");
   if (role.empty())
     throw Error("parameter 'role' of the bridge is missing, accepted is vehicle or zone");
   config.role = role == "zone" ? BridgeRole::kZone : BridgeRole::kVehicle;
-  parameters.Read("zone", config.zone);
-  parameters.Read("user", config.user);
+  parameters.ReadRequired("zone", config.zone, "demo",
+                          "Name of the zone whose broker this is, 1 to 64 of A-Z a-z 0-9 . _ -. "
+                          "The launch files set it by the argument `zone`.");
+  parameters.ReadRequired("user", config.user, "car-1",
+                          "Login at the broker: the vehicle's id, which vehicle.launch sets by the "
+                          "argument `vehicle`, or the zone's login.");
   for (const auto& [name, value] : {std::pair{"zone", config.zone}, {"user", config.user}}) {
     if (!transport::IsValidId(value)) {
       throw Error("parameter '" + std::string(name) + "' of the bridge is '" + value +
                   "', accepted are 1 to 64 characters of A-Z a-z 0-9 . _ -");
     }
   }
-  parameters.Read("password_file", config.password_file);
-  parameters.Read("password_wait_s", config.password_wait_s, {0, 600});
-  parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.1, 60});
-  ReadMqttOptions(parameters, config.mqtt);
+}
+
+/// A zone's connection carries the messages of many vehicles and is to be down for longer.
+void SetZoneDefaults(transport::MqttConfig& mqtt) {
+  mqtt.session_expiry_s = 3600;
+  mqtt.max_inflight = 100;
+  mqtt.queue_messages = 10000;
+}
+
+}  // namespace
+
+BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
+  BridgeConfig config;
+  ReadNames(parameters, config);
+  if (config.role == BridgeRole::kZone) SetZoneDefaults(config.mqtt);
+  parameters.Section("Broker");
+  parameters.Read(
+      "host", config.mqtt.host,
+      "Name or address of the broker. The launch files set it by the argument `broker_host`.");
+  parameters.Read("port", config.mqtt.port, {1, 65535},
+                  "Port of the broker. The launch files set it by the argument `broker_port`.");
+  parameters.Read(
+      "password_file", config.password_file,
+      "File whose first line is the password. `livemap broker` writes DIRECTORY/credentials/USER. "
+      "Empty: log in without a password. The launch files set it by the argument `password_file`.");
+  parameters.Read("password_wait_s", config.password_wait_s, {0, 600},
+                  "Time to wait at the start for a broker that is just writing the password file.",
+                  "s");
   config.mqtt.tls = ReadTlsOptions(parameters);
+  ReadConnection(parameters, config.mqtt);
+  parameters.Section("Period of the diagnostics");
+  ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
   config.mqtt.client_id = config.user;
   config.mqtt.user = config.user;
+  parameters.Section("Topics");
   config.topics = ReadTopics(parameters);
   parameters.RejectUnknown();
   for (const BridgeTopic& topic : config.topics) CheckTopic(topic, config);

@@ -10,7 +10,7 @@
 
 namespace livemap::ros_io {
 
-/// Defaults of the change_detection nodelet; config/change_detection.yaml explains each.
+/// Defaults of the change_detection nodelet; the reader states their meanings.
 struct ChangeDetectionConfig {
   std::string method = "network";  ///< network, dense-sift or daisy.
   std::string model;               ///< Path of the network's manifest.

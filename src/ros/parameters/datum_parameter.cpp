@@ -6,9 +6,10 @@
 
 namespace livemap::ros_io {
 
-std::optional<geo::GeoPoint> ReadDatum(ParameterReader& parameters, const std::string& otherwise) {
+std::optional<geo::GeoPoint> ReadDatum(ParameterReader& parameters, const std::string& otherwise,
+                                       const std::string& meaning) {
   std::string text;
-  parameters.Read("map_datum", text);
+  parameters.Read("map_datum", text, meaning);
   if (text.empty()) return std::nullopt;
   geo::GeoPoint datum;
   int used = 0;

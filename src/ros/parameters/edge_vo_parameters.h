@@ -7,7 +7,7 @@
 
 namespace livemap::ros_io {
 
-/// Defaults of the edge_vo nodelet; config/edge_vo.yaml explains each.
+/// Defaults of the edge_vo nodelet; the reader states their meanings.
 struct EdgeVoConfig {
   odometry::EdgeOdometry::Config odometry;
   std::string sync = "exact";       ///< "exact" or "approximate".

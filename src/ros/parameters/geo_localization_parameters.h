@@ -7,7 +7,7 @@
 
 namespace livemap::ros_io {
 
-/// Defaults of the geo_localization nodelet; config/geo_localization.yaml explains each.
+/// Defaults of the geo_localization nodelet; the reader states their meanings.
 struct GeoLocalizationConfig {
   localization::LocalizerConfig localizer;
   localization::LocalizerFeed::Config feed;

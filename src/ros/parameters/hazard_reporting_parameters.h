@@ -10,7 +10,7 @@
 
 namespace livemap::ros_io {
 
-/// Defaults of the hazard_reporting nodelet; config/hazard_reporting.yaml explains each.
+/// Defaults of the hazard_reporting nodelet; the reader states their meanings.
 struct HazardReportingConfig {
   vehicle::HazardReporter::Config reporter;
   vehicle::PollResponder::Config polls;

@@ -1,80 +1,149 @@
 #include "ros/parameters/offload_parameters.h"
 
-#include "ros/parameters/vehicle_parameters.h"
+#include "ros/parameters/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
-void ReadSender(ParameterReader& parameters, vehicle::OffloadSender::Config& sender) {
-  parameters.Read("rate_hz", sender.rate_hz, {0.1, 60});
-  parameters.Read("min_spacing_m", sender.min_spacing_m, {0, 1000});
-  parameters.Read("max_bytes_per_s", sender.max_bytes_per_s, {1000, 10e6});
-  parameters.Read("burst_s", sender.burst_s, {1, 600});
-  parameters.Read("max_image_bytes", sender.max_image_bytes, {1000, 1e6});
-  parameters.Read("min_image_bytes", sender.min_image_bytes, {1, 1e6});
-  parameters.Read("max_waiting_frames", sender.max_waiting_frames, {1, 1000});
-  ReadBasePoseSource(parameters, sender.pose);
+void ReadClassifier(ParameterReader& parameters, EarlyDiscardConfig& config) {
+  parameters.Section("Classifier");
+  parameters.ReadRequired(
+      "model", config.model, "models/early-discard.yaml",
+      "Path of the classifier's manifest, whose head has the type score. vehicle.launch sets it by "
+      "the argument `discard_model`, whose default is models/early-discard.yaml.");
+  if (config.model.empty()) {
+    throw Error("parameter 'model' is empty, accepted is the path of a model manifest");
+  }
+  parameters.Read(
+      "threshold", config.threshold, {-1, 1},
+      "Least score of a frame that is sent, 0 to 1. Below 0: the manifest's threshold.");
+  parameters.Read("threads", config.threads, {0, 256},
+                  "OpenCV's threads, one pool for the whole nodelet manager. 0: all cores.");
+  parameters.Read("queue_size", config.queue_size, {1, 1000},
+                  "Number of frames that may wait for the classifier. When one more comes, the "
+                  "oldest frame is dropped and counted.");
+  parameters.Read("rate_hz", config.sender.rate_hz, {0.1, 60},
+                  "Frames per second that the classifier looks at.", "Hz");
+  ListImageTransport(parameters);
+}
+
+void ReadSender(ParameterReader& parameters, EarlyDiscardConfig& config, std::int64_t now_ns) {
+  vehicle::OffloadSender::Config& sender = config.sender;
+  parameters.Section("Frames that leave the vehicle");
+  parameters.Read("min_spacing_m", sender.min_spacing_m, {0, 1000},
+                  "Road between two frames that are sent. A standing vehicle sends nothing new.",
+                  "m");
+  parameters.Read("max_bytes_per_s", sender.max_bytes_per_s, {1000, 10e6},
+                  "Bytes of pictures per second in the long run. 60000 bytes/s are 0.48 Mbit/s.",
+                  "bytes/s");
+  parameters.Read("burst_s", sender.burst_s, {1, 600},
+                  "Unused bytes of this time may be spent at once.", "s");
+  parameters.Read("max_image_bytes", sender.max_image_bytes, {1000, 1e6},
+                  "Size of one picture, where that much is left. JPEG quality, then size are "
+                  "lowered to meet it.",
+                  "bytes");
+  parameters.Read("min_image_bytes", sender.min_image_bytes, {1, 1e6},
+                  "A frame for which less than this is left is dropped and counted.", "bytes");
+  parameters.Read("jpeg_quality", config.jpeg_quality, {1, 100},
+                  "JPEG quality of a picture where the bytes suffice.");
+  parameters.Read(
+      "max_waiting_frames", sender.max_waiting_frames, {1, 1000},
+      "Number of frames that may wait for their position. Beyond it the oldest frame is dropped.");
+  sender.drive_id = ReadDriveId(parameters, now_ns);
+}
+
+void ReadFrameLimits(ParameterReader& parameters, zone::ReportLimits& limits) {
+  parameters.Section("Limits of a frame", "A frame beyond them is refused and counted.");
+  // Defaults of frames; those of a report's picture are others.
+  limits.max_image_bytes = 200000;
+  limits.max_image_side_px = 4096;
+  double max_pixels = 4e6;
+  limits.max_age_s = 3e9;  // The zone's own limit for reports decides, and whether it replays.
+  parameters.Read("max_frame_bytes", limits.max_image_bytes, {1000, 1e6}, "Largest picture.",
+                  "bytes");
+  parameters.Read("max_frame_side_px", limits.max_image_side_px, {16, 16384},
+                  "Longer side of the picture.", "px");
+  parameters.Read("max_frame_pixels", max_pixels, {256, 20e6}, "Largest picture.", "px");
+  limits.max_image_pixels = static_cast<std::int64_t>(max_pixels);
+  parameters.Read("max_future_s", limits.max_future_s, {0, 86400},
+                  "How far a stamp may lie ahead of the zone's clock.", "s");
+  parameters.Read("max_age_s", limits.max_age_s, {1, 1e10},
+                  "How far a stamp may lie behind the zone's clock. About the reports made of a "
+                  "frame, zone_cloudlet's own max_age_s and replay decide.",
+                  "s");
+  parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.01, 1000},
+                  "Largest standard deviation of the vehicle's own position.", "m");
+}
+
+void ReadVehicleLimits(ParameterReader& parameters, zone::OffloadIntake::Config& intake) {
+  parameters.Section("Limits of a vehicle");
+  parameters.Read("frames_per_minute", intake.allowance.frames_per_minute, {1, 6000},
+                  "Frames of one vehicle per minute. The default is a third more than the 3 per "
+                  "second that a vehicle sends at most.");
+  parameters.Read("bytes_per_minute", intake.allowance.bytes_per_minute, {1000, 1e9},
+                  "Bytes of pictures of one vehicle per minute. The default is 0.8 Mbit/s.",
+                  "bytes");
+  parameters.Section("On the way to the detector");
+  parameters.Read(
+      "max_waiting", intake.max_waiting, {1, 100000},
+      "Number of frames that wait for the detector. Beyond it the oldest goes, counted.");
+  parameters.Read("max_waiting_bytes", intake.max_waiting_bytes, {1000, 1e10},
+                  "The same in bytes of their pictures.", "bytes");
+  parameters.Read("max_in_flight", intake.max_in_flight, {1, 1000},
+                  "Number of frames at the detector at once. Keep it at or below the detector's "
+                  "engines plus its queue_size: then the detector never drops a frame.");
+  parameters.Read("detection_timeout_s", intake.detection_timeout_s, {0.1, 3600},
+                  "Time after which a frame without an answer is given up.", "s");
+}
+
+void ReadReports(ParameterReader& parameters, OffloadIntakeConfig& config) {
+  zone::OffloadIntake::Config& intake = config.intake;
+  parameters.Section("What is reported", "As hazard_reporting of a vehicle with a detector.");
+  parameters.Read("min_confidence", intake.min_confidence, {0, 1},
+                  "Least confidence of a detection that is reported. The detector's own threshold "
+                  "stands before it.");
+  parameters.Read("max_range_m", intake.max_range_m, {0.1, 1000},
+                  "Largest distance from base_link. Hazards further away are not reported.", "m");
+  parameters.Read("max_ground_sigma_m", intake.max_ground_sigma_m, {0.01, 1000},
+                  "Largest standard deviation of the place on the road as seen from the vehicle.",
+                  "m");
+  ReadProjectionErrors(parameters, intake.projection);
+  parameters.Read("jpeg_quality", config.jpeg_quality, {1, 100},
+                  "JPEG quality of the report's picture.");
+  parameters.Read("max_image_bytes", config.max_image_bytes, {0, 1e6},
+                  "Largest picture of a report.", "bytes");
 }
 
 }  // namespace
 
 EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int64_t now_ns) {
   EarlyDiscardConfig config;
-  parameters.Read("model", config.model);
-  if (config.model.empty()) {
-    throw Error("parameter 'model' is empty, accepted is the path of a model manifest");
-  }
-  parameters.Read("threshold", config.threshold, {-1, 1});
-  parameters.Read("threads", config.threads, {0, 256});
-  parameters.Read("queue_size", config.queue_size, {1, 1000});
-  config.sender.drive_id = ReadDriveId(parameters, now_ns);
-  ReadSender(parameters, config.sender);
-  parameters.Read("jpeg_quality", config.jpeg_quality, {1, 100});
-  parameters.Read("privacy", config.privacy);
-  parameters.Read("privacy_cascades", config.mask.regions.cascades);
-  parameters.Read("privacy_face_model", config.mask.regions.face_model);
-  parameters.Read("privacy_min_side_px", config.mask.regions.min_side_px, {8, 1000});
-  parameters.Read("privacy_grow", config.mask.grow, {0, 5});
-  parameters.Read("privacy_keep_frames", config.mask.keep_frames, {0, 1000});
-  parameters.Read("base_frame", config.base_frame);
-  parameters.Read("map_frame", config.map_frame);
-  parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});
-  parameters.RejectUnknown({"image_transport", "diagnostic_period"});
+  ReadClassifier(parameters, config);
+  ReadSender(parameters, config, now_ns);
+  parameters.Section("Faces and number plates");
+  ReadPrivacy(parameters, config.privacy, config.mask,
+              "Mask faces and number plates before a frame leaves the vehicle. A frame that cannot "
+              "be masked is withheld and counted.");
+  parameters.Section(
+      "Position of the vehicle at the image's stamp",
+      "The parameters are those of hazard_reporting. The camera's mounting comes from tf "
+      "(base_frame to the frame_id of the images), its focal length from camera_rect/camera_info.");
+  parameters.Read("base_frame", config.base_frame, "Frame at road level: x forward, y left, z up.");
+  parameters.Read("map_frame", config.map_frame, "Frame of the fused poses.");
+  ReadBasePoseSource(parameters, config.sender.pose);
+  parameters.Section("Period of the diagnostics");
+  ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
+  parameters.RejectUnknown({"diagnostic_period"});
   return config;
 }
 
 OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters) {
   OffloadIntakeConfig config;
-  zone::OffloadIntake::Config& intake = config.intake;
-  zone::ReportLimits& limits = intake.limits.report;
-  int max_frame_bytes = 200000;
-  int max_frame_side_px = 4096;
-  parameters.Read("max_frame_bytes", max_frame_bytes, {1000, 1e6});
-  parameters.Read("max_frame_side_px", max_frame_side_px, {16, 16384});
-  limits.max_image_bytes = static_cast<std::size_t>(max_frame_bytes);
-  limits.max_image_side_px = static_cast<std::uint32_t>(max_frame_side_px);
-  double max_pixels = 4e6;
-  parameters.Read("max_frame_pixels", max_pixels, {256, 20e6});
-  limits.max_image_pixels = static_cast<std::int64_t>(max_pixels);
-  parameters.Read("max_future_s", limits.max_future_s, {0, 86400});
-  limits.max_age_s = 3e9;  // The zone's own limit for reports decides, and whether it replays.
-  parameters.Read("max_age_s", limits.max_age_s, {1, 1e10});
-  parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.01, 1000});
-  parameters.Read("frames_per_minute", intake.allowance.frames_per_minute, {1, 6000});
-  parameters.Read("bytes_per_minute", intake.allowance.bytes_per_minute, {1000, 1e9});
-  parameters.Read("max_waiting", intake.max_waiting, {1, 100000});
-  parameters.Read("max_waiting_bytes", intake.max_waiting_bytes, {1000, 1e10});
-  parameters.Read("max_in_flight", intake.max_in_flight, {1, 1000});
-  parameters.Read("detection_timeout_s", intake.detection_timeout_s, {0.1, 3600});
-  parameters.Read("min_confidence", intake.min_confidence, {0, 1});
-  parameters.Read("max_range_m", intake.max_range_m, {0.1, 1000});
-  parameters.Read("max_ground_sigma_m", intake.max_ground_sigma_m, {0.01, 1000});
-  parameters.Read("pixel_sigma_px", intake.projection.pixel_sigma_px, {0, 100});
-  parameters.Read("pitch_sigma_rad", intake.projection.pitch_sigma_rad, {0, 0.5});
-  parameters.Read("height_sigma_m", intake.projection.height_sigma_m, {0, 2});
-  parameters.Read("jpeg_quality", config.jpeg_quality, {1, 100});
-  parameters.Read("max_image_bytes", config.max_image_bytes, {0, 1e6});
-  parameters.Read("diagnostics_period_s", config.diagnostics_period_s, {0.05, 60});
+  ReadFrameLimits(parameters, config.intake.limits.report);
+  ReadVehicleLimits(parameters, config.intake);
+  ReadReports(parameters, config);
+  parameters.Section("Period of the diagnostics");
+  ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
   parameters.RejectUnknown({"image_transport", "diagnostic_period"});
   return config;
 }

@@ -10,7 +10,7 @@
 
 namespace livemap::ros_io {
 
-/// Defaults of the small vehicle's early_discard nodelet; config/early_discard.yaml explains each.
+/// Defaults of the small vehicle's early_discard nodelet; the reader states their meanings.
 struct EarlyDiscardConfig {
   std::string model;      ///< Path of the classifier's manifest; must be given.
   double threshold = -1;  ///< Least score that is sent; below 0: the manifest's.
@@ -28,7 +28,7 @@ struct EarlyDiscardConfig {
 /// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.
 EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int64_t now_ns);
 
-/// Defaults of the zone's candidate_intake nodelet; config/candidate_intake.yaml explains each.
+/// Defaults of the zone's candidate_intake nodelet; the reader states their meanings.
 struct OffloadIntakeConfig {
   zone::OffloadIntake::Config intake;
   int jpeg_quality = 80;         ///< 1..100, of a report's picture.

@@ -11,7 +11,7 @@
 
 namespace livemap::ros_io {
 
-/// Defaults of the zone_cloudlet node; config/zone_cloudlet.yaml explains each.
+/// Defaults of the zone_cloudlet node; the reader states their meanings.
 struct ZoneCloudletConfig {
   std::string hazards;  ///< Path of the catalogue; empty: config/hazards.yaml.
   zone::ZoneService::Config zone;

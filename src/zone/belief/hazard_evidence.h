@@ -20,7 +20,7 @@ struct Evidence {
   EvidenceKind kind = EvidenceKind::kSighting;
   std::uint64_t vehicle = 0;  ///< VehicleKey.
   std::int64_t stamp_ns = 0;  ///< Of the image.
-  /// P(its vehicle says what it likes), of VehicleTrust; `hostile_share` at least.
+  /// P(its vehicle says what it likes), of VehicleTrust; `malicious_share` at least.
   double hostile = 0;
 };
 

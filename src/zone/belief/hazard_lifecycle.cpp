@@ -72,23 +72,23 @@ HazardLifecycle::HazardLifecycle(const Config& config)
       trust_update_({config.prior_presence, config.settled_above, config.suspect_above,
                      config.max_trust_step, config.official_weight}) {
   CheckRange("gone_below", config.gone_below, 0.01, 0.5);
-  CheckRange("surest", config.max_presence, 0.9, 0.9999);
+  CheckRange("max_presence", config.max_presence, 0.9, 0.9999);
   CheckRange("prior_presence", config.prior_presence, 0.01, config.max_presence);
   CheckRange("verify_below", config.verify_below, config.gone_below, config.max_presence);
-  CheckRange("sure_above", config.settled_above, config.verify_below, config.max_presence);
+  CheckRange("settled_above", config.settled_above, config.verify_below, config.max_presence);
   CheckRange("active_above", config.active_above, config.gone_below, config.max_presence);
   CheckRange("active_alone_above", config.active_alone_above, config.gone_below,
              config.active_above);
-  CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
-  CheckRange("suspect_above", config.suspect_above, config.hostile_share + 0.001, 1);
-  CheckRange("most_against", config.max_trust_step, 0, 10);
+  CheckRange("malicious_share", config.malicious_share, 0.001, 0.4);
+  CheckRange("suspect_above", config.suspect_above, config.malicious_share + 0.001, 1);
+  CheckRange("max_trust_step", config.max_trust_step, 0, 10);
   CheckRange("official_weight", config.official_weight, 0, 10);
-  CheckRange("denials", config.denials, 2, kMaxEvidencePerHazard - 1);
+  CheckRange("denying_vehicles", config.denying_vehicles, 2, kMaxEvidencePerHazard - 1);
   CheckRange("quarantine_s", config.quarantine_s, 0, 1e9);
   CheckRange("reopen_vehicles", config.reopen_vehicles, 2, kMaxEvidencePerHazard);
   CheckRange("rejected_keep_s", config.rejected_keep_s, 3600, 1e9);
   max_log_odds_ = LogOddsOf(config.max_presence);
-  max_voice_ = -LogOddsOf(config.hostile_share);
+  max_voice_ = -LogOddsOf(config.malicious_share);
 }
 
 void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns,
@@ -113,7 +113,7 @@ double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& eviden
   double absent = against ? 1 - entry.false_rate : entry.false_rate;
   // What is not there now may have been there then.
   absent = ended_since * there + (1 - ended_since) * absent;
-  const double h = std::clamp(evidence.hostile, config_.hostile_share, 1.0);
+  const double h = std::clamp(evidence.hostile, config_.malicious_share, 1.0);
   const double ratio = std::log(((1 - h) * there + h) / ((1 - h) * absent + h));
   const double bound = MaxLogOddsPerVehicle(evidence);
   return std::clamp(ratio, -bound, bound);
@@ -121,7 +121,7 @@ double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& eviden
 
 /// Half hostile is worth nothing; who is more so must not be believed the other way round.
 double HazardLifecycle::MaxLogOddsPerVehicle(const Evidence& evidence) const {
-  if (!(evidence.hostile > config_.hostile_share)) return max_voice_;
+  if (!(evidence.hostile > config_.malicious_share)) return max_voice_;
   return std::max(0.0, -LogOddsOf(std::min(evidence.hostile, 0.5)));
 }
 
@@ -370,7 +370,8 @@ std::optional<LifecycleTransition> HazardLifecycle::Decide(const ClassModel& ent
 }
 
 bool HazardLifecycle::IsDeniedAway(const PresenceRecord& life) const {
-  return Opponents(life) >= config_.denials && ProbabilityOf(life.log_odds) < config_.gone_below;
+  return Opponents(life) >= config_.denying_vehicles &&
+         ProbabilityOf(life.log_odds) < config_.gone_below;
 }
 
 std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRecord& life) const {
@@ -418,7 +419,7 @@ std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
     return share >= 1 ? 0.0 : entry.survival.TimeTo(share, AgeS(life, life.at_ns));
   };
   double soonest_s = falls_in_s(life.undenied_log_odds, config_.gone_below);
-  if (Opponents(life) >= config_.denials) {
+  if (Opponents(life) >= config_.denying_vehicles) {
     soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, config_.gone_below));
   }
   if (life.state == HazardState::kActive) {

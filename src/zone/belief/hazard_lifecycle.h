@@ -62,21 +62,21 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 class HazardLifecycle {
  public:
   struct Config {
-    double prior_presence = 0.2;        ///< Before the first vehicle speaks.
-    double active_above = 0.7;          ///< Drivers are told from this presence on,
-    double active_alone_above = 0.5;    ///< and of classes that one vehicle confirms from this one.
-    double verify_below = 0.7;          ///< An active hazard is verified below this presence (of
-                                        ///< classes that one vehicle confirms: active_alone_above)
-    double settled_above = 0.85;        ///< ...and active again from this one on.
-    double gone_below = 0.1;            ///< Off the map.
-    double max_presence = 0.995;        ///< Presence never counts as more certain than this.
-    double hostile_share = 0.05;        ///< h: vehicles that may say what they like.
-    double suspect_above = 0.5;         ///< A vehicle this likely hostile is not counted as one.
-    double max_trust_step = 1;          ///< No one verdict weighs more, log odds; an official's
-    double official_weight = 2;         ///< ...weighs this many times as much as a vehicle's.
-    std::uint32_t denials = 2;          ///< Distinct vehicles against it before it is gone.
-    double quarantine_s = 86400;        ///< A rejected hazard takes no support for this long.
-    std::uint32_t reopen_vehicles = 2;  ///< Distinct vehicles that reopen it afterwards.
+    double prior_presence = 0.2;      ///< Before the first vehicle speaks.
+    double active_above = 0.7;        ///< Drivers are told from this presence on,
+    double active_alone_above = 0.5;  ///< and of classes that one vehicle confirms from this one.
+    double verify_below = 0.7;        ///< An active hazard is verified below this presence (of
+                                      ///< classes that one vehicle confirms: active_alone_above)
+    double settled_above = 0.85;      ///< ...and active again from this one on.
+    double gone_below = 0.1;          ///< Off the map.
+    double max_presence = 0.995;      ///< Presence never counts as more certain than this.
+    double malicious_share = 0.05;    ///< h: vehicles that may say what they like.
+    double suspect_above = 0.5;       ///< A vehicle this likely hostile is not counted as one.
+    double max_trust_step = 1;        ///< No one verdict weighs more, log odds; an official's
+    double official_weight = 2;       ///< ...weighs this many times as much as a vehicle's.
+    std::uint32_t denying_vehicles = 2;  ///< Distinct vehicles against it before it is gone.
+    double quarantine_s = 86400;         ///< A rejected hazard takes no support for this long.
+    std::uint32_t reopen_vehicles = 2;   ///< Distinct vehicles that reopen it afterwards.
     double rejected_keep_s =
         90 * 86400.0;  ///< Without support for this long it is forgotten (gone).
   };
@@ -141,7 +141,7 @@ class HazardLifecycle {
   Config config_;
   TrustUpdate trust_update_;
   double max_log_odds_;  // Of presence, by `max_presence`.
-  double max_voice_;     // Of one vehicle, by `hostile_share`.
+  double max_voice_;     // Of one vehicle, by `malicious_share`.
 };
 
 }  // namespace livemap::zone

@@ -16,11 +16,11 @@ constexpr std::size_t kMaxVouchersBytes = 200;
 }  // namespace
 
 VehicleTrust::VehicleTrust(const Config& config) : config_(config) {
-  CheckRange("hostile_share", config.hostile_share, 0.001, 0.4);
+  CheckRange("malicious_share", config.malicious_share, 0.001, 0.4);
   CheckRange("trust_memory_s", config.memory_s, 60, 1e10);
-  CheckRange("most_suspicion", config.max_suspicion, 0.1, 20);
+  CheckRange("max_suspicion", config.max_suspicion, 0.1, 20);
   CheckRange("max_vehicles", static_cast<double>(config.max_vehicles), 1, 1e9);
-  prior_log_odds_ = LogOddsOf(config.hostile_share);
+  prior_log_odds_ = LogOddsOf(config.malicious_share);
 }
 
 double VehicleTrust::Faded(const TrustRecord& record, std::int64_t now_ns) const {

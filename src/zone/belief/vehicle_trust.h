@@ -42,7 +42,7 @@ struct TrustRecord {
 class VehicleTrust {
  public:
   struct Config {
-    double hostile_share = 0.05;       ///< h: of vehicles that say what they like; above 0, < 0.5.
+    double malicious_share = 0.05;     ///< h: of vehicles that say what they like; above 0, < 0.5.
     double memory_s = 10 * 86400.0;    ///< Suspicion fades to 1/e in this time; > 0.
     double max_suspicion = 6;          ///< Log odds; more is not held against anybody; > 0.
     std::size_t max_vehicles = 50000;  ///< Beyond it the least suspected one is forgotten.

@@ -59,7 +59,7 @@ const char* ReasonFor(WitnessUpdate news) {
 
 MapChangeRegistry::MapChangeRegistry(const Rule& rule, std::uint64_t hash_seed)
     : rule_(rule), grid_(geo::SpatialGrid::ForRadius(rule.join_m, hash_seed)) {
-  if (!(rule_.join_sigmas > 0) || rule_.confirmations < 1 || rule_.denials < 1 ||
+  if (!(rule_.join_sigmas > 0) || rule_.confirmations < 1 || rule_.denying_vehicles < 1 ||
       rule_.max_features < 1) {
     throw Error(
         "map changes: sigmas, confirmations, denials and the number of features must be "
@@ -158,7 +158,8 @@ MapChangeRegistry::Effect MapChangeRegistry::Deny(Id id, const protocol::MapChan
   MapChangeFeature feature = features_.at(id);
   Note(feature, report, true);
   feature.denied_ns = std::max(feature.denied_ns, report.stamp_ns);
-  const std::uint32_t needed = feature.state == MapChangeState::kProposed ? 1 : rule_.denials;
+  const std::uint32_t needed =
+      feature.state == MapChangeState::kProposed ? 1 : rule_.denying_vehicles;
   const std::uint32_t against = feature.Vehicles(true);
   std::string reason = against == 1 ? "a vehicle tells the opposite"
                                     : std::to_string(against) + " vehicles tell the opposite";

@@ -28,12 +28,12 @@ class MapChangeRegistry {
   using Id = std::uint32_t;  ///< Of a row in the store; rises from 1.
 
   struct Rule {
-    double join_m = 6;                 ///< A word belongs to a feature within this (geodesic), > 0,
-    double join_sigmas = 3;            ///< and this many sigmas of both positions together, > 0.
-    std::uint32_t confirmations = 2;   ///< Distinct vehicles that make it confirmed.
-    std::uint32_t denials = 2;         ///< Distinct vehicles that undo a confirmed one.
-    double closed_memory_s = 7776000;  ///< An undone or dismissed one is known for so long.
-    std::size_t max_features = 100000;  ///< Beyond it the oldest undone or dismissed one goes.
+    double join_m = 6;                ///< A word belongs to a feature within this (geodesic), > 0,
+    double join_sigmas = 3;           ///< and this many sigmas of both positions together, > 0.
+    std::uint32_t confirmations = 2;  ///< Distinct vehicles that make it confirmed.
+    std::uint32_t denying_vehicles = 2;  ///< Distinct vehicles that undo a confirmed one.
+    double closed_memory_s = 7776000;    ///< An undone or dismissed one is known for so long.
+    std::size_t max_features = 100000;   ///< Beyond it the oldest undone or dismissed one goes.
     FusionRule fusion;
   };
 
@@ -62,9 +62,9 @@ class MapChangeRegistry {
 
   /// A vehicle tells of a change; `report` is acceptable (WhyMapChangeRefused). It speaks for the
   /// nearest open feature of its class and direction, or against the nearest one of the other
-  /// direction: that one is undone by one vehicle while it is proposed, by Rule::denials while it
-  /// is confirmed, and a word for it that is newer than those against it takes them back. Else it
-  /// is a new feature.
+  /// direction: that one is undone by one vehicle while it is proposed, by Rule::denying_vehicles
+  /// while it is confirmed, and a word for it that is newer than those against it takes them back.
+  /// Else it is a new feature.
   ///
   /// Nothing new (kKnown, no event) is a word of a vehicle that does not count (`counts` false)
   /// about a known feature; against a feature that was seen later; for one that was undone later;

@@ -26,7 +26,7 @@ ZoneConfig CheckedConfig(ZoneConfig config) {
                 ", accepted is at least 2");
   }
   if (config.max_vehicles == 0) throw Error("max_vehicles is 0, accepted is at least 1");
-  config.trust.hostile_share = config.life.hostile_share;
+  config.trust.malicious_share = config.life.malicious_share;
   if (config.replay) config.limits.max_age_s = std::numeric_limits<double>::infinity();
   return config;
 }

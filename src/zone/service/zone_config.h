@@ -31,7 +31,7 @@ struct ZoneConfig {
   VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
   HazardLifecycle::Config life;
   SurvivalModel::Config survival;
-  VehicleTrust::Config trust;  ///< `hostile_share` is that of `life`.
+  VehicleTrust::Config trust;  ///< `malicious_share` is that of `life`.
   PollScheduler::Config polls;
   MapChangeRegistry::Rule map_changes;
   double map_changes_per_hour = 240;  ///< Of one vehicle, >= 1; further ones must wait.

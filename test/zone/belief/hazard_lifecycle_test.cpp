@@ -222,7 +222,7 @@ TEST_F(HazardLifeTest, TheOrderInWhichVehiclesWordsArriveDoesNotMatter) {
   HazardLifecycle::Config config;
   config.max_presence = 0.9999;
   config.gone_below = 0.01;
-  config.denials = 5;
+  config.denying_vehicles = 5;
   const HazardLifecycle rules(config);
   const std::vector<Evidence> words = {
       Word(EvidenceKind::kAnswerNo, 3, kStart), Word(EvidenceKind::kSighting, 4, kStart),
@@ -274,7 +274,7 @@ TEST_F(HazardLifeTest, TheFilterIsRightAsOftenAsItSays) {
   // Hazards that live as the class says, and honest vehicles with the class's rates: of all moments
   // at which it says p, a share p has the hazard there.
   HazardLifecycle::Config config;
-  config.hostile_share = 0.001;
+  config.malicious_share = 0.001;
   config.max_presence = 0.999;
   const HazardLifecycle rules(config);
   std::mt19937_64 generator(11);

@@ -116,8 +116,8 @@ TEST(VehicleTrust, RefusesRecordsThatAreNone) {
 
 TEST(VehicleTrust, RefusesSettingsThatAreOutOfRangeAndNamesThem) {
   VehicleTrust::Config config;
-  config.hostile_share = 0;
-  EXPECT_THAT([&] { VehicleTrust{config}; }, ThrowsMessage<Error>(HasSubstr("hostile_share")));
+  config.malicious_share = 0;
+  EXPECT_THAT([&] { VehicleTrust{config}; }, ThrowsMessage<Error>(HasSubstr("malicious_share")));
   config = {};
   config.memory_s = std::nan("");
   EXPECT_THAT([&] { VehicleTrust{config}; }, ThrowsMessage<Error>(HasSubstr("trust_memory_s")));

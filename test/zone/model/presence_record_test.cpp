@@ -120,14 +120,15 @@ TEST_F(HazardLifeTest, WhatIsNoPackedLifeIsRefused) {
 
 TEST(HazardLifeConfig, RefusesWhatIsOutOfRangeAndNamesIt) {
   HazardLifecycle::Config config;
-  config.denials = 1;
-  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("denials")));
+  config.denying_vehicles = 1;
+  EXPECT_THAT([&] { HazardLifecycle{config}; },
+              ThrowsMessage<Error>(HasSubstr("denying_vehicles")));
   config = {};
-  config.hostile_share = std::nan("");
-  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("hostile_share")));
+  config.malicious_share = std::nan("");
+  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("malicious_share")));
   config = {};
   config.settled_above = 0.3;
-  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("sure_above")));
+  EXPECT_THAT([&] { HazardLifecycle{config}; }, ThrowsMessage<Error>(HasSubstr("settled_above")));
 }
 
 TEST(VehicleKeys, AreStableAndNeverNobody) {

@@ -1,0 +1,124 @@
+#include "ros/parameters/shared_parameters.h"
+
+#include <ctime>
+
+namespace livemap::ros_io {
+namespace {
+
+/// "drive-20260131T235959Z".
+std::string DriveName(std::int64_t now_ns) {
+  const auto seconds = static_cast<std::time_t>(now_ns / 1'000'000'000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[40];
+  std::strftime(text, sizeof(text), "drive-%Y%m%dT%H%M%SZ", &utc);
+  return text;
+}
+
+}  // namespace
+
+std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns) {
+  std::string drive_id;
+  parameters.Read(
+      "drive_id", drive_id,
+      "Name of this drive, at most 64 bytes. It must differ from drive to drive. Empty: "
+      "drive-<start time, UTC>. vehicle.launch sets it by the argument `drive`.");
+  if (drive_id.empty()) drive_id = DriveName(now_ns);
+  if (drive_id.size() > 64) {
+    throw Error("parameter 'drive_id' has " + std::to_string(drive_id.size()) +
+                " bytes, accepted are at most 64");
+  }
+  return drive_id;
+}
+
+void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track) {
+  parameters.Read("max_extrapolation_s", track.max_extrapolation_s, {0, 10},
+                  "The newest fix is stale when it is older than this.", "s");
+  parameters.Read("max_gap_s", track.max_gap_s, {0.01, 60},
+                  "Two fixes further apart than this are not interpolated.", "s");
+  parameters.Read("min_baseline_m", track.min_baseline_m, {0.01, 100},
+                  "Distance that the course needs.", "m");
+  parameters.Read("course_window_s", track.course_window_s, {0.1, 20},
+                  "Time before and after the image whose fixes tell the course.", "s");
+  parameters.Read("course_noise_m", track.course_noise_m, {0.001, 100},
+                  "Scatter of one fix against its neighbours, standard deviation.", "m");
+  parameters.Read("turn_rate_rps", track.turn_rate_rps, {0, 3},
+                  "Turn rate of a driving vehicle, standard deviation.", "rad/s");
+  parameters.Read("max_course_sigma_rad", track.max_course_sigma_rad, {0.001, 3},
+                  "A course less certain than this counts as unknown, standard deviation.", "rad");
+  parameters.Read("acceleration_mps2", track.acceleration_mps2, {0, 20},
+                  "Speeding up and braking, standard deviation.", "m/s^2");
+  parameters.Read("default_sigma_m", track.default_sigma_m, {0.01, 100},
+                  "Standard deviation of a fix whose receiver gives no covariance.", "m");
+  parameters.Read("max_speed_mps", track.max_speed_mps, {1, 500},
+                  "A fix that needs a higher speed than this is a jump and is not believed.",
+                  "m/s");
+}
+
+void ReadBasePoseSource(ParameterReader& parameters, vehicle::VehiclePoseLookup::Config& pose) {
+  parameters.Read("antenna_x_m", pose.antenna_x_m, {-50, 50},
+                  "Receiver's antenna forward of base_frame.", "m");
+  parameters.Read("antenna_y_m", pose.antenna_y_m, {-50, 50},
+                  "Receiver's antenna left of base_frame.", "m");
+  parameters.ReadChoice<bool>("position_source", pose.use_fused, {{"gps", false}, {"fused", true}},
+                              "Whose positions and headings count: gps (the fixes alone) or fused "
+                              "(localization/odometry, and the fixes where it is silent). "
+                              "vehicle.launch sets it by the argument `position_source`.");
+  parameters.Read("fused_wait_s", pose.fused_wait_s, {0, 60},
+                  "Time to wait for the fused pose of an image. Then the fixes count.", "s");
+  parameters.Read("max_fused_gap_s", pose.poses.max_gap_s, {0.01, 10},
+                  "Two fused poses further apart than this are not interpolated.", "s");
+  parameters.Read("bracket_wait_s", pose.bracket_wait_s, {0, 60},
+                  "Time to wait for a fix after the image before the position is carried on.", "s");
+  parameters.Read("max_wait_s", pose.max_wait_s, {0, 600},
+                  "Longest time that an image waits for position, course and camera.", "s");
+  ReadFixTrack(parameters, pose.fixes);
+}
+
+void ReadPrivacy(ParameterReader& parameters, bool& privacy, perception::PrivacyMask::Config& mask,
+                 const std::string& meaning) {
+  parameters.Read("privacy", privacy, meaning);
+  parameters.Read("privacy_cascades", mask.regions.cascades,
+                  "Folder of OpenCV's Haar cascades (frontal and profile faces, number plates).");
+  parameters.Read(
+      "privacy_face_model", mask.regions.face_model,
+      "A YuNet model (ONNX) that looks for the faces instead of the cascades. Empty: none.");
+  parameters.Read("privacy_min_side_px", mask.regions.min_side_px, {8, 1000},
+                  "Faces and plates whose shorter side is smaller than this are not looked for.",
+                  "px");
+  parameters.Read("privacy_grow", mask.grow, {0, 5},
+                  "A mask is larger than the face or plate by this share of its sides.");
+  parameters.Read(
+      "privacy_keep_frames", mask.keep_frames, {0, 1000},
+      "Number of frames for which a face or plate that is not found any more stays masked.");
+}
+
+void ReadProjectionErrors(ParameterReader& parameters, geo::GroundProjectionNoise& noise) {
+  parameters.Read("pixel_sigma_px", noise.pixel_sigma_px, {0, 100},
+                  "Uncertainty of the lower edge of a box or region, standard deviation. It and "
+                  "the next two say how far the projection to the road can be trusted.",
+                  "px");
+  parameters.Read(
+      "pitch_sigma_rad", noise.pitch_sigma_rad, {0, 0.5},
+      "Uncertainty of the camera's pitch (suspension and mounting), standard deviation.", "rad");
+  parameters.Read("height_sigma_m", noise.height_sigma_m, {0, 2},
+                  "Uncertainty of the camera's height above the road, standard deviation.", "m");
+}
+
+void ReadDepthUnits(ParameterReader& parameters, double& units_per_m) {
+  parameters.Read("depth_units_per_m", units_per_m, {1, 1e6},
+                  "Units per metre of 16-bit depth images (REP 118: 1000). Depth images of floats "
+                  "are in metres.");
+}
+
+void ReadDiagnosticsPeriod(ParameterReader& parameters, double& period_s, double min_s) {
+  parameters.Read("diagnostics_period_s", period_s, {min_s, 60},
+                  "Time between two messages on /diagnostics, by the wall clock.", "s");
+}
+
+void ListImageTransport(ParameterReader& parameters, const std::string& more) {
+  parameters.Foreign("image_transport", "raw",
+                     "Transport of camera_rect/image by image_transport: raw unless set." + more);
+}
+
+}  // namespace livemap::ros_io
