@@ -43,7 +43,8 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
                                    const std::string& directory) {
   if (yaml.size() > perception::kMaxManifestBytes) {
     throw Error("model manifest '" + origin + "' has " + std::to_string(yaml.size()) +
-                " bytes, at most " + std::to_string(perception::kMaxManifestBytes) + " are accepted");
+                " bytes, at most " + std::to_string(perception::kMaxManifestBytes) +
+                " are accepted");
   }
   try {
     const YAML::Node file = YAML::Load(yaml);

@@ -25,7 +25,8 @@ class ReportLog {
   std::optional<ReportedFix> FindLastReport(const std::string& vehicle_id);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                    const std::string& image_sha256, std::int64_t received_ns);
-  void WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id, std::int64_t received_ns);
+  void WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
+                   std::int64_t received_ns);
   void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
 
  private:

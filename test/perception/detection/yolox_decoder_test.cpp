@@ -13,7 +13,6 @@
 namespace livemap::perception {
 namespace {
 
-
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 const cv::Size kPicture(128, 96);  // twice the input

@@ -8,7 +8,6 @@
 namespace livemap::perception {
 namespace {
 
-
 float At(const cv::Mat& tensor, int plane, int row, int column) {
   return tensor.ptr<float>(0, plane)[row * tensor.size[3] + column];
 }

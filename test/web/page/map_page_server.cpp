@@ -168,7 +168,7 @@ class Session {
         const double across = 0.0018 * (i % 30);
         const bool east = i % 60 < 30;
         const GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
-                                     corner.longitude_deg + (east ? along * 1.31 : across)};
+                                corner.longitude_deg + (east ? along * 1.31 : across)};
         auto report = fixture_.MakeReport(classes[random() % classes.size()], position);
         report.confidence = 0.5F + 0.49F * std::uniform_real_distribution<float>()(random);
         reports.push_back(report);

@@ -19,9 +19,7 @@ std::string WhyNot(const protocol::OffloadedFrame& candidate) {
   return why ? why->sentence : "taken";
 }
 
-TEST(CandidateValidation, AnHonestFrameIsTaken) {
-  EXPECT_EQ(WhyNot(CandidateAt(0)), "taken");
-}
+TEST(CandidateValidation, AnHonestFrameIsTaken) { EXPECT_EQ(WhyNot(CandidateAt(0)), "taken"); }
 
 struct Broken {
   std::string name;
