@@ -34,17 +34,17 @@ class Drive {
     localizer_.AddOdometry(now_ns_, pose);
   }
 
-  localization::PositionFix Fix() {
+  geo::Fix Fix() {
     // Errors without a random generator: the same in every run.
     const double turn = 2.4 * static_cast<double>(++fixes_);
-    localization::PositionFix fix;
+    geo::Fix fix;
     fix.stamp_ns = now_ns_;
     fix.position = frame_.ToGeo(place_m_ + 0.7 * Eigen::Vector2d(std::cos(turn), std::sin(turn)));
     fix.covariance_m2 = 0.5 * Eigen::Matrix2d::Identity();
     return fix;
   }
 
-  void AddFix(const localization::PositionFix& fix) { localizer_.AddFix(fix); }
+  void AddFix(const geo::Fix& fix) { localizer_.AddFix(fix); }
 
  private:
   static localization::LocalizerConfig Config() {
@@ -75,7 +75,7 @@ void AddFix(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     for (int step = 0; step < steps_per_fix; ++step) drive.StepOdometry();
-    const localization::PositionFix fix = drive.Fix();
+    const geo::Fix fix = drive.Fix();
     state.ResumeTiming();
     drive.AddFix(fix);
   }

@@ -11,8 +11,8 @@ namespace livemap::geo {
 /// One answer of the satellite receiver.
 struct Fix {
   std::int64_t stamp_ns = 0;
-  bool has_fix = false;  ///< False: the receiver itself says that it has none.
-  GeoPoint position;     ///< Of the antenna.
+  bool has_fix = true;  ///< False: the receiver itself says that it has none.
+  GeoPoint position;    ///< Of the antenna.
   /// Of the horizontal position, local east-north axes, m^2; nothing when the receiver gives none.
   std::optional<Eigen::Matrix2d> covariance_m2;
 };

@@ -138,7 +138,7 @@ void GeoLocalizer::CountSecondThoughts(std::uint64_t reinstated, std::uint64_t r
   counters_.fixes_refused += refused - reinstated;
 }
 
-GeoLocalizer::FixVerdict GeoLocalizer::AddFix(const PositionFix& fix) {
+GeoLocalizer::FixVerdict GeoLocalizer::AddFix(const geo::Fix& fix) {
   if (!fix.has_fix) return Count(FixVerdict::kAbsent);
   const auto measurement = ToMeasurement(fix);
   if (!measurement) return Count(FixVerdict::kInvalid);
@@ -168,7 +168,7 @@ std::int64_t GeoLocalizer::MomentOf(const FixMeasurement& fix) const {
   return fix.stamp_ns - Nanoseconds(window_->latency_s());
 }
 
-std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const PositionFix& fix) {
+std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const geo::Fix& fix) {
   if (fix.stamp_ns <= 0 || !geo::IsValid(fix.position)) return std::nullopt;
   const double default_variance =
       config_.receiver.default_sigma_m * config_.receiver.default_sigma_m;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
 #include "localization/fix_measurement.h"
 #include "localization/localizer_config.h"
@@ -16,15 +17,6 @@
 namespace livemap::localization {
 
 class SlidingWindow;
-
-/// One answer of the satellite receiver.
-struct PositionFix {
-  std::int64_t stamp_ns = 0;
-  bool has_fix = true;     ///< False: the receiver itself says that it has none.
-  geo::GeoPoint position;  ///< Of the antenna.
-  /// Of the horizontal position, east-north axes there, m^2; nothing when the receiver gives none.
-  std::optional<Eigen::Matrix2d> covariance_m2;
-};
 
 enum class LocalizerState {
   kUninitialised,  ///< The heading is not known yet: the vehicle has not moved enough.
@@ -95,7 +87,7 @@ class GeoLocalizer {
   /// While the odometry is lost: see OdometryTrack::AddLost. Counts as a reset.
   OdometryTrack::Verdict AddLostOdometry(std::int64_t stamp_ns,
                                          const Eigen::Isometry3d& odom_from_base);
-  FixVerdict AddFix(const PositionFix& fix);
+  FixVerdict AddFix(const geo::Fix& fix);
   /// Forgets everything but the datum: the clock was set back, as by a bag that starts again.
   void Forget();
 
@@ -122,7 +114,7 @@ class GeoLocalizer {
                                  const std::function<OdometryTrack::Verdict()>& add);
   FixVerdict Count(FixVerdict verdict);
   void CountSecondThoughts(std::uint64_t reinstated, std::uint64_t refused);
-  std::optional<FixMeasurement> ToMeasurement(const PositionFix& fix);
+  std::optional<FixMeasurement> ToMeasurement(const geo::Fix& fix);
   std::int64_t MomentOf(const FixMeasurement& fix) const;
   FixVerdict Process(FixMeasurement fix);
   void Keep(const FixMeasurement& fix, double keep_s);

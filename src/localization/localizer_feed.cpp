@@ -20,7 +20,7 @@ LocalizerFeed::LocalizerFeed(const Config& config, GeoLocalizer& localizer, OnOd
       on_odometry_(std::move(on_odometry)),
       on_fix_(std::move(on_fix)) {}
 
-void LocalizerFeed::AddFix(const PositionFix& fix, double steady_s) {
+void LocalizerFeed::AddFix(const geo::Fix& fix, double steady_s) {
   if (IsSetBack(fix.stamp_ns, newest_fix_ns_)) {
     // What waits is counted as what it is, too.
     for (; !fixes_.empty(); fixes_.pop_front()) Hand(fixes_.front().what);
@@ -71,7 +71,7 @@ bool LocalizerFeed::HandNext(double steady_s) {
       (odometry_.empty() || fixes_.front().what.stamp_ns <= odometry_.front().what.stamp_ns);
   if (fix_next) {
     if (!is_due(fixes_, newest_odometry_ns_)) return false;
-    const PositionFix fix = fixes_.front().what;
+    const geo::Fix fix = fixes_.front().what;
     fixes_.pop_front();
     Hand(fix);
     return true;
@@ -83,7 +83,7 @@ bool LocalizerFeed::HandNext(double steady_s) {
   return true;
 }
 
-void LocalizerFeed::Hand(const PositionFix& fix) { on_fix_(fix, localizer_.AddFix(fix)); }
+void LocalizerFeed::Hand(const geo::Fix& fix) { on_fix_(fix, localizer_.AddFix(fix)); }
 
 void LocalizerFeed::Hand(const OdometrySample& sample) {
   using Verdict = OdometryTrack::Verdict;

@@ -36,13 +36,13 @@ class LocalizerFeed {
   /// Called when the localizer has taken an odometry.
   using OnOdometry = std::function<void(const OdometrySample&)>;
   /// Called with what became of a fix when it was handed over.
-  using OnFix = std::function<void(const PositionFix&, GeoLocalizer::FixVerdict)>;
+  using OnFix = std::function<void(const geo::Fix&, GeoLocalizer::FixVerdict)>;
 
   /// The localizer must outlive the feed.
   LocalizerFeed(const Config& config, GeoLocalizer& localizer, OnOdometry on_odometry,
                 OnFix on_fix);
 
-  void AddFix(const PositionFix& fix, double steady_s);
+  void AddFix(const geo::Fix& fix, double steady_s);
   /// True when the stamp went back and everything was forgotten.
   bool AddOdometry(const OdometrySample& sample, double steady_s);
   /// Hands over what has waited long enough.
@@ -56,7 +56,7 @@ class LocalizerFeed {
   };
 
   bool IsSetBack(std::int64_t stamp_ns, std::int64_t newest_ns) const;
-  void Hand(const PositionFix& fix);
+  void Hand(const geo::Fix& fix);
   void Hand(const OdometrySample& sample);
   bool HandNext(double steady_s);
 
@@ -64,7 +64,7 @@ class LocalizerFeed {
   GeoLocalizer& localizer_;
   const OnOdometry on_odometry_;
   const OnFix on_fix_;
-  std::deque<Waiting<PositionFix>> fixes_;  // Ascending stamps, as the odometry.
+  std::deque<Waiting<geo::Fix>> fixes_;  // Ascending stamps, as the odometry.
   std::deque<Waiting<OdometrySample>> odometry_;
   std::int64_t newest_fix_ns_ = 0;
   std::int64_t newest_odometry_ns_ = 0;

@@ -316,7 +316,7 @@ TEST(GeoLocalizer, RefusesWhatCannotBe) {
   using Fix = GeoLocalizer::FixVerdict;
   using Odometry = OdometryTrack::Verdict;
   constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  PositionFix fix;
+  geo::Fix fix;
   fix.stamp_ns = 10 * kSecond_ns;
   fix.position = {48, 11};
   EXPECT_EQ(localizer.AddFix(fix), Fix::kWithoutOdometry);
@@ -336,11 +336,11 @@ TEST(GeoLocalizer, RefusesWhatCannotBe) {
   for (const geo::GeoPoint bad :
        {geo::GeoPoint{kNan, 11}, geo::GeoPoint{48, 181}, geo::GeoPoint{1e300, 11},
         geo::GeoPoint{48, std::numeric_limits<double>::infinity()}}) {
-    PositionFix broken = fix;
+    geo::Fix broken = fix;
     broken.position = bad;
     EXPECT_EQ(localizer.AddFix(broken), Fix::kInvalid);
   }
-  PositionFix broken = fix;
+  geo::Fix broken = fix;
   broken.covariance_m2 = Eigen::Matrix2d::Constant(kNan);
   EXPECT_EQ(localizer.AddFix(broken), Fix::kInvalid);
   broken.covariance_m2 = Eigen::Matrix2d(1e9 * Eigen::Matrix2d::Identity());

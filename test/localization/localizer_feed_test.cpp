@@ -20,13 +20,13 @@ const geo::GeoPoint kDatum{48.1, 11.5};
 /// What arrives at a moment of the steady clock.
 struct Arrival {
   double steady_s = 0;
-  std::optional<PositionFix> fix;
+  std::optional<geo::Fix> fix;
   std::optional<OdometrySample> odometry;
 };
 
-PositionFix FixAt(double time_s) {
+geo::Fix FixAt(double time_s) {
   const double wobble_m = 0.3 * std::sin(7 * time_s);
-  PositionFix fix;
+  geo::Fix fix;
   fix.stamp_ns = kBeginNs + Nanoseconds(time_s);
   fix.position = geo::LocalFrame(kDatum).ToGeo({10 * time_s + wobble_m, wobble_m});
   fix.covariance_m2 = 0.25 * Eigen::Matrix2d::Identity();
@@ -74,7 +74,7 @@ class FedLocalizer {
               stamps_ns.push_back(sample.stamp_ns);
               easts_m.push_back(fused->map_from_base.position_m.x());
             },
-            [this](const PositionFix&, Verdict verdict) { verdicts.push_back(verdict); }) {}
+            [this](const geo::Fix&, Verdict verdict) { verdicts.push_back(verdict); }) {}
 
   void Play(const std::vector<Arrival>& arrivals) {
     for (const Arrival& arrival : arrivals) {
@@ -133,7 +133,7 @@ TEST(LocalizerFeed, AFixThatIsStampedWronglyOnceHarmsNothing) {
   FedLocalizer undisturbed;
   undisturbed.Play(arrivals);
   const auto without = undisturbed.localizer.counters().fixes_without_odometry;
-  PositionFix wrong = FixAt(8.05);
+  geo::Fix wrong = FixAt(8.05);
   wrong.stamp_ns += 100LL * 365 * 86400 * 1'000'000'000;
   const auto middle = std::find_if(arrivals.begin(), arrivals.end(),
                                    [](const Arrival& arrival) { return arrival.steady_s > 8.05; });
@@ -163,7 +163,7 @@ TEST(LocalizerFeed, LostOdometryIsBridgedByTheLastSpeed) {
 
 TEST(LocalizerFeed, WhatHasNoStampIsCountedAndLeftOut) {
   FedLocalizer run;
-  PositionFix fix = FixAt(1);
+  geo::Fix fix = FixAt(1);
   fix.stamp_ns = 0;
   run.feed.AddFix(fix, 1.0);
   OdometrySample sample = OdometryAt(1);

@@ -108,7 +108,7 @@ inline void Simulate(const SimulatedDrive& drive, GeoLocalizer& localizer,
       const auto more_m = drive.fix_error(time_s);
       if (more_m) {
         const PlanarPose antenna = history[step - lag] * PlanarPose{drive.antenna_m, 0};
-        PositionFix fix;
+        geo::Fix fix;
         fix.stamp_ns = stamp_ns;
         fix.position = frame.ToGeo(antenna.position_m + error_m + *more_m);
         fix.covariance_m2 =

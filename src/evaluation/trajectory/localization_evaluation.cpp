@@ -102,7 +102,7 @@ std::vector<TruePose> Odometry(const datasets::PositionDrive& drive,
 }
 
 struct TrialFix {
-  localization::PositionFix fix;
+  geo::Fix fix;
   bool outlier = false;
 };
 

@@ -51,7 +51,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     feed_ = std::make_unique<localization::LocalizerFeed>(
         config_.feed, *localizer_,
         [this](const localization::OdometrySample& sample) { Publish(sample); },
-        [this](const localization::PositionFix&, localization::GeoLocalizer::FixVerdict verdict) {
+        [this](const geo::Fix&, localization::GeoLocalizer::FixVerdict verdict) {
           if (verdict != localization::GeoLocalizer::FixVerdict::kRefused) Explain(verdict);
         });
     ros::NodeHandle& node = getNodeHandle();
@@ -72,7 +72,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   void OnFix(const sensor_msgs::NavSatFix& message) {
     ++arrivals_.fixes;
     const Stopwatch stopwatch(figures_);
-    feed_->AddFix(ros_io::ToPositionFix(message), SteadyS());
+    feed_->AddFix(ros_io::ToFix(message), SteadyS());
     TellNews();
   }
 

@@ -34,11 +34,6 @@ Eigen::Matrix3d PlanarPart(const boost::array<double, 36>& covariance) {
 
 }  // namespace
 
-localization::PositionFix ToPositionFix(const sensor_msgs::NavSatFix& message) {
-  const geo::Fix fix = ToFix(message);
-  return {fix.stamp_ns, fix.has_fix, fix.position, fix.covariance_m2};
-}
-
 localization::OdometrySample ToOdometrySample(const nav_msgs::Odometry& message,
                                               std::optional<std::int64_t> previous_ns) {
   localization::OdometrySample sample;

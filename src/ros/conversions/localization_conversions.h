@@ -14,8 +14,6 @@
 
 namespace livemap::ros_io {
 
-localization::PositionFix ToPositionFix(const sensor_msgs::NavSatFix& message);
-
 /// `previous_ns` is the stamp of the odometry before: with it the covariance of the step is that of
 /// the twist times the square of the time between them; without, or where the twist has none, the
 /// localizer's own model counts. A twist that says that it is unknown (a variance of 1e5 or more,

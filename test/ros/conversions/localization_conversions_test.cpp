@@ -37,7 +37,7 @@ TEST(LocalizationConversions, WhatAReporterHearsIsWhatTheLocalizerKnows) {
     sample.stamp_ns = kBeginNs + Nanoseconds(0.1 * i);
     sample.odom_from_base.translation().x() = i;
     localizer.AddOdometry(sample.stamp_ns, sample.odom_from_base);
-    localization::PositionFix fix;
+    geo::Fix fix;
     fix.stamp_ns = sample.stamp_ns;
     fix.position = map.ToGeo(Eigen::Vector2d(40e3 + 0.6 * i, -1e3 + 0.8 * i));
     Eigen::Matrix2d covariance_m2;
