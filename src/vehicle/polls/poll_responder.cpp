@@ -160,15 +160,14 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
   }
   const placement::PlacedCamera camera{lookup.pose, *vehicle.intrinsics, *mounting};
   for (OpenPoll& open : open_) {
-    if (!open.matched_s) Look(open, frame, camera, steady_s, vehicle);
+    if (!open.matched_s) Look(open, frame, camera, steady_s);
   }
   return true;
 }
 
 /// One image's word on one poll.
 void PollResponder::Look(OpenPoll& open, const placement::SightingFrame& frame,
-                         const placement::PlacedCamera& camera, double steady_s,
-                         const Vehicle& vehicle) {
+                         const placement::PlacedCamera& camera, double steady_s) {
   const placement::ProjectedPlace view =
       placement::ProjectPlace(open.poll.position, open.poll.covariance_m2, camera,
                               config_.projection, config_.margin_share);
@@ -180,7 +179,7 @@ void PollResponder::Look(OpenPoll& open, const placement::SightingFrame& frame,
     open.view_box = match->box;
     return;
   }
-  const auto trouble = WhyNotClear(view, frame, vehicle);
+  const auto trouble = WhyNotClear(view, frame);
   if (!trouble) {
     CountView(open, frame, view, camera.base);
     return;
@@ -211,17 +210,13 @@ const placement::Sighting* PollResponder::Match(const OpenPoll& open,
 }
 
 std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(
-    const placement::ProjectedPlace& view, const placement::SightingFrame& frame,
-    const Vehicle& vehicle) const {
+    const placement::ProjectedPlace& view, const placement::SightingFrame& frame) const {
   if (view.visibility == placement::ProjectedPlace::Visibility::kBehind) return Trouble::kOutside;
   if (view.distance_m > config_.max_range_m) return Trouble::kTooFar;
   if (view.visibility == placement::ProjectedPlace::Visibility::kOutside) return Trouble::kOutside;
   const auto luminance = luminances_.find(frame.stamp_ns);
   if (luminance != luminances_.end() && luminance->second < config_.dark_luminance) {
     return Trouble::kDark;
-  }
-  if (vehicle.hidden && vehicle.hidden(frame.stamp_ns, view.pixel, view.distance_m)) {
-    return Trouble::kHidden;
   }
   return std::nullopt;
 }
@@ -343,8 +338,6 @@ std::string PollResponder::ReasonOf(const OpenPoll& open) {
       return "the place was too far away";
     case Trouble::kOutside:
       return "the place was out of the camera's view";
-    case Trouble::kHidden:
-      return "something stood before the place";
     case Trouble::kDark:
       return "too dark";
     case Trouble::kTooFew:

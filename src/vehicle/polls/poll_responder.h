@@ -65,10 +65,6 @@ class PollResponder {
     std::function<std::optional<Eigen::Isometry3d>(const std::string& frame_id)> mounting;
     /// Pose of base_link at a moment.
     std::function<FixTrack::Lookup(std::int64_t stamp_ns)> pose_at;
-    /// Whether something stands before the road at a pixel and a horizontal distance in the image
-    /// of that stamp; empty: nothing is known about that.
-    std::function<bool(std::int64_t stamp_ns, const Eigen::Vector2d& pixel, double distance_m)>
-        hidden;
   };
 
   /// Since the start; polls unless it says otherwise.
@@ -116,7 +112,7 @@ class PollResponder {
 
  private:
   /// Why an image did not count.
-  enum class Trouble { kNoFix, kNoCamera, kTooFar, kOutside, kHidden, kDark, kTooFew };
+  enum class Trouble { kNoFix, kNoCamera, kTooFar, kOutside, kDark, kTooFew };
   struct OpenPoll {
     protocol::Poll poll;
     double deadline_s;  // Steady.
@@ -141,10 +137,9 @@ class PollResponder {
 
   bool Work(WaitingFrame& waiting, double now_s, double steady_s, const Vehicle& vehicle);
   void Look(OpenPoll& open, const placement::SightingFrame& frame,
-            const placement::PlacedCamera& camera, double steady_s, const Vehicle& vehicle);
+            const placement::PlacedCamera& camera, double steady_s);
   std::optional<Trouble> WhyNotClear(const placement::ProjectedPlace& view,
-                                     const placement::SightingFrame& frame,
-                                     const Vehicle& vehicle) const;
+                                     const placement::SightingFrame& frame) const;
   const placement::Sighting* Match(const OpenPoll& open, const placement::SightingFrame& frame,
                                    const placement::ProjectedPlace& view,
                                    const placement::PlacedCamera& camera) const;

@@ -140,7 +140,6 @@ void LocalHazardMap::Show(const std::vector<Change>& changes) {
       filter_.Remove(change.id);
     }
   }
-  if (!changes.empty()) ++revision_;
 }
 
 void LocalHazardMap::Forget(const Uuid& id, std::vector<Change>& changes) {
@@ -212,7 +211,6 @@ bool LocalHazardMap::Apply(const protocol::Receipt& receipt) {
   if (!filter_.Knows(receipt.hazard_uuid)) {
     filter_.Put(receipt.hazard_uuid, report->class_name, report->position);
   }
-  ++revision_;
   return true;
 }
 

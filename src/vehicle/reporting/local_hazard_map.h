@@ -112,8 +112,6 @@ class LocalHazardMap {
   std::size_t pending_count() const { return pending_count_; }
   /// As max_pending_bytes counts them.
   std::size_t pending_bytes() const { return pending_bytes_; }
-  /// Changes whenever a known hazard does.
-  std::uint64_t revision() const { return revision_; }
 
  private:
   /// What a transaction did to `known`, for the filter after its commit.
@@ -149,7 +147,6 @@ class LocalHazardMap {
   std::set<Uuid> told_;  // To this vehicle alone, since the last kCaughtUp.
   std::size_t pending_count_ = 0;
   std::size_t pending_bytes_ = 0;
-  std::uint64_t revision_ = 0;
 };
 
 }  // namespace livemap::vehicle

@@ -290,20 +290,12 @@ TEST_F(PollResponderTest, CannotSeeWhatIsTooFarAwayOrNeverInTheImage) {
   EXPECT_NEAR(static_cast<double>(reply.stamp_ns - kEpochNs) * 1e-9, 4.5, 0.11) << "the last image";
 }
 
-TEST_F(PollResponderTest, CannotSeeInTheDarkNorWhatSomethingHides) {
+TEST_F(PollResponderTest, CannotSeeInTheDark) {
   luminance_ = 8;
   responder_.Add(poll_, steady_s_);
   Drive(2.6, 3.3);
   Expire();
   EXPECT_EQ(OnlyReply().reason, "too dark");
-
-  luminance_ = 100;
-  vehicle_.hidden = [](std::int64_t, const Eigen::Vector2d&, double) { return true; };
-  poll_.poll = Named(3);
-  responder_.Add(poll_, steady_s_);
-  Drive(2.6, 3.3);
-  Expire();
-  EXPECT_EQ(OnlyReply().reason, "something stood before the place");
 }
 
 TEST_F(PollResponderTest, SaysNothingWithoutAnyPositionAndCannotSeeWithoutThoseOfTheImages) {
