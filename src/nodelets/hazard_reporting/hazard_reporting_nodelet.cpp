@@ -320,7 +320,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     vehicle.mounting = [this](const std::string& frame_id) {
       return reporter_->Mounting(frame_id);
     };
-    vehicle.pose_at = [this](std::int64_t stamp_ns) { return reporter_->BasePoseAt(stamp_ns); };
+    vehicle.pose_at = [this](std::int64_t stamp_ns, double waited_s) {
+      return reporter_->vehicle_poses().At(stamp_ns, waited_s, responder_->PosePatience());
+    };
     responder_->Process(ros::Time::now().toSec(), SteadyS(), vehicle);
     for (const protocol::PollAnswer& reply : responder_->TakeReplies()) {
       answer_publisher_.publish(ros_io::ToMessage(reply));

@@ -135,18 +135,13 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
   waiting.arrival_s = std::min(waiting.arrival_s, now_s);  // The clock was set back.
   const double waited_s = now_s - waiting.arrival_s;
   const placement::SightingFrame& frame = waiting.frame;
-  const FixTrack::Lookup lookup = vehicle.pose_at(frame.stamp_ns);
-  const bool ready =
-      lookup.answer == FixTrack::Answer::kReady ||
-      (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s);
-  if (!ready && lookup.answer != FixTrack::Answer::kHopeless && waited_s < config_.pose_wait_s) {
-    return false;
-  }
-  if (!ready) {
+  const VehiclePoseLookup::Lookup lookup = vehicle.pose_at(frame.stamp_ns, waited_s);
+  if (lookup.answer == VehiclePoseLookup::Answer::kWait) return false;
+  if (lookup.answer == VehiclePoseLookup::Answer::kHopeless) {
     for (OpenPoll& open : open_) ++open.troubles[Trouble::kNoFix];
     return true;
   }
-  newest_base_ = lookup.pose;
+  newest_base_ = lookup.base;
   newest_ns_ = frame.stamp_ns;
   const auto mounting = vehicle.mounting(frame.frame_id);
   // At a start the camera's calibration and mounting may come after its first image.
@@ -158,7 +153,7 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
     for (OpenPoll& open : open_) ++open.troubles[Trouble::kNoCamera];
     return true;
   }
-  const placement::PlacedCamera camera{lookup.pose, *vehicle.intrinsics, *mounting};
+  const placement::PlacedCamera camera{lookup.base, *vehicle.intrinsics, *mounting};
   for (OpenPoll& open : open_) {
     if (!open.matched_s) Look(open, frame, camera, steady_s);
   }

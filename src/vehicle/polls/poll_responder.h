@@ -15,7 +15,7 @@
 #include "protocol/hazard_catalogue.h"
 #include "protocol/poll.h"
 #include "vehicle/polls/change_evidence.h"
-#include "vehicle/positioning/fix_track.h"
+#include "vehicle/positioning/vehicle_pose_lookup.h"
 
 namespace livemap::vehicle {
 
@@ -63,8 +63,8 @@ class PollResponder {
     std::optional<geo::CameraIntrinsics> intrinsics;
     /// Pose of a camera's optical frame in base_link; none: not known yet.
     std::function<std::optional<Eigen::Isometry3d>(const std::string& frame_id)> mounting;
-    /// Pose of base_link at a moment.
-    std::function<FixTrack::Lookup(std::int64_t stamp_ns)> pose_at;
+    /// Pose of base_link at the moment of an image that has waited `waited_s`.
+    std::function<VehiclePoseLookup::Lookup(std::int64_t stamp_ns, double waited_s)> pose_at;
   };
 
   /// Since the start; polls unless it says otherwise.
@@ -109,6 +109,11 @@ class PollResponder {
   std::size_t open() const { return open_.size(); }
   const Counters& counters() const { return counters_; }
   const Config& config() const { return config_; }
+  /// How long a frame waits for its pose. The fixes count at once where the fused pose is late: an
+  /// answer is wanted soon, and the place asked about is known already.
+  VehiclePoseLookup::Patience PosePatience() const {
+    return {0, config_.bracket_wait_s, config_.pose_wait_s};
+  }
 
  private:
   /// Why an image did not count.

@@ -9,26 +9,26 @@ namespace livemap::vehicle {
 VehiclePoseLookup::VehiclePoseLookup(const Config& config)
     : config_(config), fixes_(config.fixes), poses_(config.poses) {}
 
-VehiclePoseLookup::Lookup VehiclePoseLookup::At(std::int64_t stamp_ns, double waited_s) const {
+VehiclePoseLookup::Lookup VehiclePoseLookup::At(std::int64_t stamp_ns, double waited_s,
+                                                const Patience& patience) const {
   if (config_.use_fused) {
     const FixTrack::Lookup fused = poses_.At(stamp_ns);
-    if (fused.answer == FixTrack::Answer::kReady) return {Answer::kReady, fused.pose, true};
-    if (fused.answer == FixTrack::Answer::kWait && waited_s < config_.fused_wait_s) return {};
+    if (fused.answer == FixTrack::Answer::kReady) return {Answer::kReady, fused.pose, true, false};
+    if (fused.answer == FixTrack::Answer::kWait && waited_s < patience.fused_wait_s) return {};
   }
   const FixTrack::Lookup lookup = fixes_.At(stamp_ns);
-  const bool patient = waited_s < config_.max_wait_s;
   switch (lookup.answer) {
     case FixTrack::Answer::kReady:
-      return {Answer::kReady, BaseOf(lookup.pose), false};
+      return {Answer::kReady, BaseOf(lookup.pose), false, false};
     case FixTrack::Answer::kExtrapolated:
-      if (waited_s < config_.bracket_wait_s) return {};
-      return {Answer::kReady, BaseOf(lookup.pose), false};
+      if (waited_s < patience.bracket_wait_s) return {};
+      return {Answer::kReady, BaseOf(lookup.pose), false, false};
     case FixTrack::Answer::kWait:
-      return {patient ? Answer::kWait : Answer::kHopeless, {}, false};
+      return {waited_s < patience.max_wait_s ? Answer::kWait : Answer::kHopeless, {}, false, true};
     case FixTrack::Answer::kHopeless:
       break;
   }
-  return {Answer::kHopeless, {}, false};
+  return {Answer::kHopeless, {}, false, true};
 }
 
 geo::TrackPose VehiclePoseLookup::BaseOf(const geo::TrackPose& antenna) const {

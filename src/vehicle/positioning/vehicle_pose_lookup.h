@@ -7,18 +7,25 @@
 
 namespace livemap::vehicle {
 
-/// Where base_link was at the moment of an image, by the tracks that HazardReporter uses and with
-/// its patience: the fused pose, else the fixes, which are carried on only when none comes after
-/// the image. Not thread-safe.
+/// Where base_link was at the moment of an image, with patience for positions that come after the
+/// image: the fused pose, else the fixes. Fixes are carried on only when none comes after the
+/// image. Everything on the vehicle that places images asks this class. Not thread-safe.
+///
+/// Typical usage: AddFix and AddPose as they arrive; At for each waiting image in turn, until the
+/// answer is not kWait.
 class VehiclePoseLookup {
  public:
-  struct Config {
-    bool use_fused = false;       ///< Fused poses count; the fixes where those do not come.
-    double fused_wait_s = 1.0;    ///< An image waits at most this long for its fused pose, s.
-    double bracket_wait_s = 0.3;  ///< And this long for a fix after it, s.
-    double max_wait_s = 5.0;      ///< And for any position, s.
-    double antenna_x_m = 0.0;     ///< Antenna forward of base_link's origin, m.
-    double antenna_y_m = 0.0;     ///< And left of it, m.
+  /// How long an image waits, s.
+  struct Patience {
+    double fused_wait_s = 1.0;    ///< For its fused pose; then the fixes count.
+    double bracket_wait_s = 0.3;  ///< For a fix after it; then the fixes before it are carried on.
+    double max_wait_s = 5.0;      ///< For any position.
+  };
+
+  struct Config : Patience {
+    bool use_fused = false;    ///< Fused poses count; the fixes where those do not come.
+    double antenna_x_m = 0.0;  ///< Antenna forward of base_link's origin, m.
+    double antenna_y_m = 0.0;  ///< And left of it, m.
     FixTrack::Config fixes;
     PoseTrack::Config poses;
   };
@@ -33,6 +40,8 @@ class VehiclePoseLookup {
     Answer answer = Answer::kWait;
     geo::TrackPose base;  ///< Valid for kReady: of base_link.
     bool fused = false;   ///< Valid for kReady.
+    /// Valid unless kReady: neither fix nor fused pose tells the position, nor is a fused pose due.
+    bool unknown = false;
   };
 
   explicit VehiclePoseLookup(const Config& config);
@@ -44,7 +53,14 @@ class VehiclePoseLookup {
   }
 
   /// For an image of `stamp_ns` that has waited `waited_s`.
-  Lookup At(std::int64_t stamp_ns, double waited_s) const;
+  Lookup At(std::int64_t stamp_ns, double waited_s) const {
+    return At(stamp_ns, waited_s, config_);
+  }
+  /// The same with another patience than the configured one.
+  Lookup At(std::int64_t stamp_ns, double waited_s, const Patience& patience) const;
+
+  const FixTrack& fixes() const { return fixes_; }
+  const PoseTrack& poses() const { return poses_; }
 
  private:
   /// The antenna's pose as that of base_link.

@@ -13,6 +13,19 @@ namespace {
 constexpr std::size_t kMaxEarlyPictures = 8;
 constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
 
+VehiclePoseLookup::Config PoseConfigOf(const HazardReporter::Config& config) {
+  VehiclePoseLookup::Config pose;
+  pose.use_fused = config.position_source == PositionSource::kFused;
+  pose.fused_wait_s = config.fused_wait_s;
+  pose.bracket_wait_s = config.bracket_wait_s;
+  pose.max_wait_s = config.max_wait_s;
+  pose.antenna_x_m = config.antenna_x_m;
+  pose.antenna_y_m = config.antenna_y_m;
+  pose.fixes = config.track;
+  pose.poses = config.poses;
+  return pose;
+}
+
 }  // namespace
 
 HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatalogue& catalogue,
@@ -21,8 +34,7 @@ HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatal
       catalogue_(catalogue),
       random_(random),
       map_(config.map, catalogue, now_ns),
-      track_(config.track),
-      poses_(config.poses),
+      vehicle_poses_(PoseConfigOf(config)),
       schedule_(config.resend, std::mt19937_64(random_())),
       start_ns_(now_ns),
       start_steady_s_(steady_s) {
@@ -51,23 +63,9 @@ std::optional<Eigen::Isometry3d> HazardReporter::Mounting(const std::string& fra
   return found->second;
 }
 
-FixTrack::Lookup HazardReporter::BasePoseAt(std::int64_t stamp_ns) const {
-  if (config_.position_source == PositionSource::kFused) {
-    FixTrack::Lookup fused = poses_.At(stamp_ns);
-    if (fused.answer == FixTrack::Answer::kReady) return fused;
-  }
-  FixTrack::Lookup lookup = track_.At(stamp_ns);
-  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
-  const geo::GroundPoint origin{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
-  const bool known =
-      lookup.answer == FixTrack::Answer::kReady || lookup.answer == FixTrack::Answer::kExtrapolated;
-  if (known) lookup.pose.position = placement::PlaceHazard(lookup.pose, antenna_m, origin).position;
-  return lookup;
-}
-
 void HazardReporter::AddFix(const geo::Fix& fix) {
   ++counters_.fixes;
-  switch (track_.Add(fix)) {
+  switch (vehicle_poses_.AddFix(fix)) {
     case FixTrack::Verdict::kAccepted:
     case FixTrack::Verdict::kRestarted:
       break;
@@ -86,7 +84,7 @@ void HazardReporter::AddFix(const geo::Fix& fix) {
 
 void HazardReporter::AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
   ++counters_.poses;
-  if (!poses_.Add(stamp_ns, pose)) ++counters_.invalid_poses;
+  if (!vehicle_poses_.AddPose(stamp_ns, pose)) ++counters_.invalid_poses;
 }
 
 bool HazardReporter::IsUsable(const placement::Sighting& sighting) {
@@ -241,35 +239,26 @@ bool HazardReporter::FitsCamera(const placement::SightingFrame& frame) const {
 /// come. A frame for which they never come ends up placed, without candidates.
 bool HazardReporter::Place(WaitingFrame& waiting, double waited_s) {
   const std::size_t count = waiting.frame.sightings.size();
-  const bool patient = waited_s < config_.max_wait_s;
   if (!FitsCamera(waiting.frame)) {
-    if (patient) return false;
+    if (waited_s < config_.max_wait_s) return false;
     counters_.dropped_no_camera += count;
     waiting.placed = true;
     return true;
   }
-  if (WaitsForPose(waiting, waited_s) || WaitsForDepth(waiting, waited_s)) return false;
-  FixTrack::Lookup lookup;
-  if (config_.position_source == PositionSource::kFused) lookup = poses_.At(waiting.frame.stamp_ns);
-  const bool fused = lookup.answer == FixTrack::Answer::kReady;
-  if (!fused) lookup = track_.At(waiting.frame.stamp_ns);
-  if (lookup.answer == FixTrack::Answer::kReady ||
-      (lookup.answer == FixTrack::Answer::kExtrapolated && waited_s >= config_.bracket_wait_s)) {
-    PlaceSightings(waiting, lookup.pose, fused);
+  if (WaitsForDepth(waiting, waited_s)) return false;
+  const VehiclePoseLookup::Lookup lookup = vehicle_poses_.At(waiting.frame.stamp_ns, waited_s);
+  if (lookup.answer == VehiclePoseLookup::Answer::kReady) {
+    PlaceSightings(waiting, lookup.base, lookup.fused);
     return true;
   }
-  if (lookup.answer == FixTrack::Answer::kExtrapolated) return false;
-  if (!waiting.held_back) counters_.held_back_no_fix += count;
-  waiting.held_back = true;
-  if (lookup.answer == FixTrack::Answer::kWait && patient) return false;
+  if (lookup.unknown && !waiting.held_back) {
+    counters_.held_back_no_fix += count;
+    waiting.held_back = true;
+  }
+  if (lookup.answer == VehiclePoseLookup::Answer::kWait) return false;
   counters_.dropped_no_fix += count;
   waiting.placed = true;
   return true;
-}
-
-bool HazardReporter::WaitsForPose(const WaitingFrame& waiting, double waited_s) const {
-  return config_.position_source == PositionSource::kFused && waited_s < config_.fused_wait_s &&
-         poses_.At(waiting.frame.stamp_ns).answer == FixTrack::Answer::kWait;
 }
 
 bool HazardReporter::WaitsForDepth(const WaitingFrame& waiting, double waited_s) const {
@@ -310,14 +299,13 @@ std::optional<geo::GroundPoint> HazardReporter::PlaceOnRoad(const placement::Sig
   return ground;
 }
 
-void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& pose, bool fused) {
-  const Eigen::Vector2d antenna_m(config_.antenna_x_m, config_.antenna_y_m);
-  const Eigen::Vector2d pose_in_base_m = fused ? Eigen::Vector2d::Zero() : antenna_m;
+void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& base, bool fused) {
   for (const placement::Sighting& sighting : waiting.frame.sightings) {
     const auto ground =
-        PlaceOnRoad(waiting.frame, sighting, fused ? pose.course_variance_rad2 : 0.0);
+        PlaceOnRoad(waiting.frame, sighting, fused ? base.course_variance_rad2 : 0.0);
     if (!ground) continue;
-    waiting.candidates.push_back({sighting, placement::PlaceHazard(pose, pose_in_base_m, *ground)});
+    waiting.candidates.push_back(
+        {sighting, placement::PlaceHazard(base, Eigen::Vector2d::Zero(), *ground)});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
   waiting.placed = true;

@@ -20,8 +20,7 @@
 #include "protocol/notice.h"
 #include "protocol/report.h"
 #include "vehicle/outbox/resend_schedule.h"
-#include "vehicle/positioning/fix_track.h"
-#include "vehicle/positioning/pose_track.h"
+#include "vehicle/positioning/vehicle_pose_lookup.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
 namespace livemap::vehicle {
@@ -161,16 +160,15 @@ class HazardReporter {
   /// At most `limit` reports to send now.
   std::vector<protocol::Report> TakeDue(double steady_s, std::size_t limit);
 
-  /// Where base_link was at a moment and which way it looked: by the source that counts, for kFused
-  /// the fixes where the fusion has no word.
-  FixTrack::Lookup BasePoseAt(std::int64_t stamp_ns) const;
+  /// Where base_link was, by the source that counts.
+  const VehiclePoseLookup& vehicle_poses() const { return vehicle_poses_; }
   const std::optional<geo::CameraIntrinsics>& intrinsics() const { return intrinsics_; }
   std::optional<Eigen::Isometry3d> Mounting(const std::string& frame_id) const;
 
   /// Intrinsics and some camera's mounting are known.
   bool HasCamera() const { return intrinsics_ && !mountings_.empty(); }
-  const FixTrack& track() const { return track_; }
-  const PoseTrack& poses() const { return poses_; }
+  const FixTrack& track() const { return vehicle_poses_.fixes(); }
+  const PoseTrack& poses() const { return vehicle_poses_.poses(); }
   const Config& config() const { return config_; }
   const LocalHazardMap& map() const { return map_; }
   const Counters& counters() const { return counters_; }
@@ -209,8 +207,7 @@ class HazardReporter {
   bool FitsCamera(const placement::SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
   bool WaitsForDepth(const WaitingFrame& waiting, double waited_s) const;
-  bool WaitsForPose(const WaitingFrame& waiting, double waited_s) const;
-  void PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& pose, bool fused);
+  void PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& base, bool fused);
   std::optional<geo::GroundPoint> PlaceOnRoad(const placement::SightingFrame& frame,
                                               const placement::Sighting& sighting,
                                               double heading_variance_rad2);
@@ -229,8 +226,7 @@ class HazardReporter {
   protocol::HazardCatalogue catalogue_;
   std::mt19937_64 random_;
   LocalHazardMap map_;
-  FixTrack track_;
-  PoseTrack poses_;
+  VehiclePoseLookup vehicle_poses_;
   ResendSchedule schedule_;
   std::optional<geo::CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;

@@ -49,9 +49,9 @@ class PollResponderTest : public ::testing::Test {
     vehicle_.mounting = [](const std::string& frame_id) {
       return frame_id == kOptical ? std::optional<Eigen::Isometry3d>(Mounting()) : std::nullopt;
     };
-    vehicle_.pose_at = [](std::int64_t stamp_ns) {
+    vehicle_.pose_at = [](std::int64_t stamp_ns, double) {
       const double seconds = static_cast<double>(stamp_ns - kEpochNs) * 1e-9;
-      return FixTrack::Lookup{FixTrack::Answer::kReady, BaseAt(seconds)};
+      return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kReady, BaseAt(seconds)};
     };
   }
 
@@ -246,8 +246,8 @@ TEST_F(PollResponderTest, ADetectionFarAwayIsAYesAlthoughNothingThereWouldBeNoNo
 }
 
 TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
-  vehicle_.pose_at = [](std::int64_t) {
-    return FixTrack::Lookup{FixTrack::Answer::kReady, BaseAt(2.8)};
+  vehicle_.pose_at = [](std::int64_t, double) {
+    return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kReady, BaseAt(2.8)};
   };
   responder_.AddUnregistered();  // Before the poll: not of its place.
   responder_.Add(poll_, steady_s_);
@@ -261,8 +261,8 @@ TEST_F(PollResponderTest, CantSeeTellsWhenChangeDetectionRecognisedNothing) {
 }
 
 TEST_F(PollResponderTest, FramesAtRestAreOneView) {
-  vehicle_.pose_at = [](std::int64_t) {
-    return FixTrack::Lookup{FixTrack::Answer::kReady, BaseAt(2.8)};
+  vehicle_.pose_at = [](std::int64_t, double) {
+    return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kReady, BaseAt(2.8)};
   };
   responder_.Add(poll_, steady_s_);
   Drive(2.8, 8.0);
@@ -300,7 +300,7 @@ TEST_F(PollResponderTest, CannotSeeInTheDark) {
 
 TEST_F(PollResponderTest, SaysNothingWithoutAnyPositionAndCannotSeeWithoutThoseOfTheImages) {
   const auto known = vehicle_.pose_at;
-  vehicle_.pose_at = [](std::int64_t) { return FixTrack::Lookup{}; };
+  vehicle_.pose_at = [](std::int64_t, double) { return VehiclePoseLookup::Lookup{}; };
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
   responder_.Process(10, steady_s_, vehicle_);
@@ -312,17 +312,19 @@ TEST_F(PollResponderTest, SaysNothingWithoutAnyPositionAndCannotSeeWithoutThoseO
   poll_.poll = Named(3);
   responder_.Add(poll_, steady_s_);
   Drive(0, 0.05);
-  vehicle_.pose_at = [](std::int64_t) { return FixTrack::Lookup{FixTrack::Answer::kHopeless, {}}; };
+  vehicle_.pose_at = [](std::int64_t, double) {
+    return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kHopeless, {}};
+  };
   Drive(2.0, 4.0);
   Expire();
   EXPECT_EQ(OnlyReply().reason, "no position of the vehicle");
 }
 
 TEST_F(PollResponderTest, APoorPositionMakesNoNo) {
-  vehicle_.pose_at = [](std::int64_t stamp_ns) {
+  vehicle_.pose_at = [](std::int64_t stamp_ns, double) {
     geo::TrackPose pose = BaseAt(static_cast<double>(stamp_ns - kEpochNs) * 1e-9);
     pose.covariance_m2 = 64 * Eigen::Matrix2d::Identity();
-    return FixTrack::Lookup{FixTrack::Answer::kReady, pose};
+    return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kReady, pose};
   };
   responder_.Add(poll_, steady_s_);
   Drive(2.0, 4.0);
