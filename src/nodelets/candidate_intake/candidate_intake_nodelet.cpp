@@ -19,6 +19,7 @@
 #include "imaging/report_picture.h"
 #include "nodelets/nodelet_support.h"
 #include "perception/detection/annotation.h"
+#include "ros/conversions/detection_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
 #include "ros/parameters/offload_parameters.h"
@@ -28,20 +29,6 @@ namespace livemap::nodelets {
 namespace {
 
 constexpr double kWorkPeriodS = 0.05;
-
-std::vector<perception::HazardDetection> ToDetections(const placement::SightingFrame& answer) {
-  std::vector<perception::HazardDetection> detections;
-  for (const placement::Sighting& sighting : answer.sightings) {
-    perception::HazardDetection detection;
-    detection.class_name = sighting.class_name;
-    detection.confidence = sighting.confidence;
-    detection.box = {sighting.box.x_min, sighting.box.y_min,
-                     sighting.box.x_max - sighting.box.x_min,
-                     sighting.box.y_max - sighting.box.y_min};
-    detections.push_back(detection);
-  }
-  return detections;
-}
 
 }  // namespace
 
@@ -139,7 +126,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     std::vector<protocol::Report> reports = intake_->Finish(answer.stamp_ns, answer);
     const auto picture = pictures_.find(answer.stamp_ns);
     if (!reports.empty() && picture != pictures_.end()) {
-      AddPicture(*picture->second, ToDetections(answer), reports);
+      AddPicture(*picture->second, ros_io::ToDetections(message), reports);
     }
     if (picture != pictures_.end()) pictures_.erase(picture);
     for (const protocol::Report& report : reports) {

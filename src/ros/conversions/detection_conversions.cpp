@@ -7,6 +7,7 @@
 #include "perception/detection/annotation.h"
 
 namespace livemap::ros_io {
+
 DetectionArray ToMessage(const std::vector<perception::HazardDetection>& detections,
                          const std_msgs::Header& header, const std::string& model,
                          cv::Size image_size, double inference_ms) {
@@ -26,6 +27,15 @@ DetectionArray ToMessage(const std::vector<perception::HazardDetection>& detecti
     message.detections[i].y_max = detections[i].box.y + detections[i].box.height;
   }
   return message;
+}
+
+std::vector<perception::HazardDetection> ToDetections(const DetectionArray& message) {
+  std::vector<perception::HazardDetection> detections;
+  for (const Detection& each : message.detections) {
+    const cv::Rect2f box(each.x_min, each.y_min, each.x_max - each.x_min, each.y_max - each.y_min);
+    detections.push_back({each.class_name, 0, each.confidence, box});
+  }
+  return detections;
 }
 
 sensor_msgs::ImagePtr ToAnnotatedMessage(const cv::Mat& bgr,
