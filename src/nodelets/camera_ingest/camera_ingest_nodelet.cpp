@@ -1,5 +1,4 @@
 #include <camera_info_manager/camera_info_manager.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <image_transport/image_transport.h>
 #include <nodelet/nodelet.h>
 #include <sensor_msgs/CompressedImage.h>
@@ -14,6 +13,7 @@
 #include "nodelets/camera_ingest/ingest_frames.h"
 #include "nodelets/camera_ingest/ingest_reader.h"
 #include "nodelets/camera_ingest/ingest_stereo.h"
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/parameters/ingest_parameters.h"
@@ -29,7 +29,7 @@ namespace livemap::nodelets {
 class CameraIngestNodelet : public nodelet::Nodelet {
  public:
   ~CameraIngestNodelet() override {
-    diagnostics_timer_.stop();
+    diagnostics_.reset();
     image_subscriber_.shutdown();
     info_subscriber_.shutdown();
     reader_.reset();
@@ -63,7 +63,12 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     } else {
       Subscribe();
     }
-    StartDiagnostics();
+    window_start_ = ros::WallTime::now();
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "camera_ingest", "camera ingest",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
   }
 
   void Subscribe() {
@@ -153,19 +158,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     }
   }
 
-  void StartDiagnostics() {
-    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
-                                                             getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("camera_ingest");
-    updater_->add("camera ingest", this, &CameraIngestNodelet::Diagnose);
-    window_start_ = ros::WallTime::now();
-    // Wall time: a replay that stands still must not silence the nodelet.
-    diagnostics_timer_ = getNodeHandle().createWallTimer(
-        ros::WallDuration(config_.diagnostics_period_s),
-        [this](const ros::WallTimerEvent&) { updater_->force_update(); });
-  }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     const std::lock_guard<std::mutex> lock(accounts_mutex_);
     const FrameQueue<IngestFrame>::Counters counters = queue_->counters();
     // The queue counts unusable frames among its dropped ones.
@@ -178,19 +171,19 @@ class CameraIngestNodelet : public nodelet::Nodelet {
       window_start_ = now;
     }
     const bool ended = reader_ && reader_->ended();
+    const bool more_bad = bad_watch_.HasRisen(bad_ + unread_);
+    const bool more_dropped = dropped_watch_.HasRisen(dropped);
     if (ended) {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "the source has ended");
-    } else if (bad_ + unread_ > bad_said_) {
+    } else if (more_bad) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "bad frames");
-    } else if (dropped > dropped_said_) {
+    } else if (more_dropped) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "behind: dropping frames");
     } else if (rate_hz_ == 0) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
-    bad_said_ = bad_ + unread_;
-    dropped_said_ = dropped;
     status.add("frames_in", counters.in + unread_);
     status.add("frames_published", counters.processed);
     status.add("frames_dropped", dropped);
@@ -210,17 +203,16 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   std::unique_ptr<camera_info_manager::CameraInfoManager> info_manager_;
   std::unique_ptr<IngestReader> reader_;
   std::thread worker_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::WallTimer diagnostics_timer_;
 
   std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
   std::uint64_t bad_ = 0;
   std::uint64_t unread_ = 0;  ///< Bad ones that never reached the queue.
   std::uint64_t published_in_window_ = 0;
-  std::uint64_t bad_said_ = 0;
-  std::uint64_t dropped_said_ = 0;
+  CounterWatch bad_watch_, dropped_watch_;
   ros::WallTime window_start_;
   double rate_hz_ = 0;
+
+  std::unique_ptr<Diagnostics> diagnostics_;  ///< Last: it uses the rest.
 };
 
 }  // namespace livemap::nodelets

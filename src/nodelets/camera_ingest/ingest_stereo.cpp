@@ -140,14 +140,14 @@ void IngestStereo::SayMissing(const std_msgs::Header& left) const {
                                              << "; left images go on without depth");
 }
 
-void IngestStereo::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+void IngestStereo::Diagnose(Diagnostics::Status& status) {
   const std::lock_guard<std::mutex> lock(accounts_mutex_);
   const FrameQueue<ProcessedFrame>::Counters counters = queue_.counters();
   using Level = diagnostic_msgs::DiagnosticStatus;
-  if (bad_ > bad_said_) status.mergeSummary(Level::WARN, "bad stereo pairs");
-  if (missing_ > missing_said_) status.mergeSummary(Level::WARN, "right images are missing");
-  bad_said_ = bad_;
-  missing_said_ = missing_;
+  if (bad_watch_.HasRisen(bad_)) status.mergeSummary(Level::WARN, "bad stereo pairs");
+  if (missing_watch_.HasRisen(missing_)) {
+    status.mergeSummary(Level::WARN, "right images are missing");
+  }
   const StereoPairBuffer::Counters rights = rights_.counters();
   const auto middle = milliseconds_.begin() + static_cast<std::ptrdiff_t>(milliseconds_.size() / 2);
   std::nth_element(milliseconds_.begin(), middle, milliseconds_.end());

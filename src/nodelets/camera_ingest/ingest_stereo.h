@@ -1,6 +1,5 @@
 #pragma once
 
-#include <diagnostic_updater/DiagnosticStatusWrapper.h>
 #include <image_transport/image_transport.h>
 #include <ros/node_handle.h>
 
@@ -15,6 +14,7 @@
 #include "imaging/stereo_depth.h"
 #include "nodelets/camera_ingest/ingest_frames.h"
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
+#include "nodelets/diagnostics.h"
 #include "ros/parameters/ingest_parameters.h"
 
 namespace livemap::nodelets {
@@ -35,7 +35,7 @@ class IngestStereo {
   /// A left image as it was published. Never blocks.
   void Take(const ProcessedFrame& left);
   /// Adds the figures, and what is wrong to the summary.
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void Diagnose(Diagnostics::Status& status);
 
  private:
   void Subscribe(ros::NodeHandle& node);
@@ -64,8 +64,7 @@ class IngestStereo {
   std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
   std::uint64_t bad_ = 0;
   std::uint64_t missing_ = 0;
-  std::uint64_t bad_said_ = 0;
-  std::uint64_t missing_said_ = 0;
+  CounterWatch bad_watch_, missing_watch_;
   std::vector<double> milliseconds_;  ///< Of the matching, since the last diagnostics.
 };
 

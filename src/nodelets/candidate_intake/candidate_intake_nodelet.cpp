@@ -1,5 +1,4 @@
 #include <cv_bridge/cv_bridge.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <livemap/CandidateFrame.h>
 #include <livemap/DetectionArray.h>
 #include <livemap/HazardReport.h>
@@ -17,6 +16,7 @@
 
 #include "imaging/decode.h"
 #include "imaging/report_picture.h"
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "perception/detection/annotation.h"
 #include "ros/conversions/detection_conversions.h"
@@ -50,19 +50,16 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     ros::NodeHandle& node = getNodeHandle();
     image_publisher_ = node.advertise<sensor_msgs::Image>("candidate/image", 100);
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 1000);
-    updater_ =
-        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("candidate_intake");
-    updater_->add("candidate_intake", this, &Self::Diagnose);
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "candidate_intake", "candidate_intake",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
     subscribers_ = {
         node.subscribe("candidate/frame", 1000, &Self::OnFrame, this),
         node.subscribe("candidate/detections", 1000, &Self::OnDetections, this),
     };
-    timers_ = {
-        node.createSteadyTimer(ros::WallDuration(kWorkPeriodS), &Self::OnWorkTimer, this),
-        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
-                               &Self::OnDiagnosticsTimer, this),
-    };
+    work_timer_ = node.createSteadyTimer(ros::WallDuration(kWorkPeriodS), &Self::OnWorkTimer, this);
   }
 
   static std::int64_t NowNs() { return static_cast<std::int64_t>(ros::WallTime::now().toNSec()); }
@@ -154,19 +151,16 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     }
   }
 
-  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     const zone::OffloadIntake::Counters& counters = intake_->counters();
-    const std::uint64_t lost = counters.displaced + counters.lost_by_detector;
+    const bool more_lost = lost_.HasRisen(counters.displaced + counters.lost_by_detector);
     if (image_publisher_.getNumSubscribers() == 0) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no detector listens");
-    } else if (lost > lost_said_) {
+    } else if (more_lost) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "behind: dropping frames");
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
-    lost_said_ = lost;
     status.add("frames_in", counters.frames + unreadable_);
     status.add("frames_bytes", counters.bytes);
     status.add("frames_refused", counters.refused + unreadable_);
@@ -192,11 +186,11 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   std::unique_ptr<zone::OffloadIntake> intake_;
   std::map<std::int64_t, sensor_msgs::ImageConstPtr> pictures_;  // At the detector, by stamp.
   std::uint64_t unreadable_ = 0;  // Frames whose message the conversion refused.
-  std::uint64_t lost_said_ = 0;
+  CounterWatch lost_;             // Of the diagnostics.
   ros::Publisher image_publisher_, report_publisher_;
   std::vector<ros::Subscriber> subscribers_;
-  std::vector<ros::SteadyTimer> timers_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::SteadyTimer work_timer_;
+  std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
 
 }  // namespace livemap::nodelets

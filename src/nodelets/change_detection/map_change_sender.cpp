@@ -71,7 +71,7 @@ void MapChangeSender::TellStoreError(const Error& error) {
   ROS_ERROR_THROTTLE(kSayAgainS, "a change is not kept for the zone: %s", error.what());
 }
 
-void MapChangeSender::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+void MapChangeSender::Diagnose(Diagnostics::Status& status) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const vehicle::MapChangeOutbox::Counters& counters = outbox_.counters();
   status.add("changes_unsure", unsure_);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <livemap/ReportReceipt.h>
 #include <ros/ros.h>
 
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "change/objects/change_detector.h"
+#include "nodelets/diagnostics.h"
 #include "vehicle/outbox/map_change_outbox.h"
 
 namespace livemap::nodelets {
@@ -29,7 +29,7 @@ class MapChangeSender {
 
   /// What the zone is to know of objects that the vehicle has passed. Any thread.
   void Tell(const std::vector<change::PlacedChange>& passed);
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  void Diagnose(Diagnostics::Status& status) const;
 
  private:
   void OnReceipt(const ReportReceipt& message);

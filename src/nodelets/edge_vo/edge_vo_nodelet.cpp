@@ -1,5 +1,4 @@
 #include <cv_bridge/cv_bridge.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <image_transport/image_transport.h>
 #include <image_transport/subscriber_filter.h>
 #include <message_filters/subscriber.h>
@@ -21,6 +20,7 @@
 #include <pluginlib/class_list_macros.hpp>
 #include <vector>
 
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "odometry/edge/edge_view.h"
 #include "ros/conversions/camera_info_conversions.h"
@@ -81,7 +81,10 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     edges_publisher_ = transport.advertise("vo/edges", 1);
     reset_service_ =
         getPrivateNodeHandle().advertiseService("reset", &EdgeVoNodelet::OnReset, this);
-    StartDiagnostics();
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "edge_vo", "edge vo", config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
     Subscribe(transport);
   }
 
@@ -238,18 +241,7 @@ class EdgeVoNodelet : public nodelet::Nodelet {
         came.infos, info_subscriber_.getTopic().c_str());
   }
 
-  void StartDiagnostics() {
-    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
-                                                             getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("edge_vo");
-    updater_->add("edge vo", this, &EdgeVoNodelet::Diagnose);
-    // Not the updater's own timer: that one follows the simulated clock.
-    diagnostics_timer_ = getNodeHandle().createSteadyTimer(
-        ros::WallDuration(config_.diagnostics_period_s),
-        [this](const ros::SteadyTimerEvent&) { updater_->force_update(); });
-  }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     using Level = diagnostic_msgs::DiagnosticStatus;
     const bool tracking = last_.state == odometry::VoState::kTracking;
     status.summary(tracking ? Level::OK : Level::WARN, odometry::VoStateName(last_.state));
@@ -290,13 +282,13 @@ class EdgeVoNodelet : public nodelet::Nodelet {
   ros::Publisher odometry_publisher_, path_publisher_, cloud_publisher_;
   image_transport::Publisher edges_publisher_;
   ros::ServiceServer reset_service_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::SteadyTimer diagnostics_timer_, silence_timer_;
+  ros::SteadyTimer silence_timer_;
 
   image_transport::SubscriberFilter image_subscriber_, depth_subscriber_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
   std::unique_ptr<Synchronizer<Exact>> exact_;
   std::unique_ptr<Synchronizer<Approximate>> approximate_;
+  std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
 
 }  // namespace livemap::nodelets

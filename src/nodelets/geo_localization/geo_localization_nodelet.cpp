@@ -1,4 +1,3 @@
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <nodelet/nodelet.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_eigen/tf2_eigen.h>
@@ -12,6 +11,7 @@
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
 
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/localization_conversions.h"
@@ -59,7 +59,11 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     odometry_publisher_ = node.advertise<nav_msgs::Odometry>("localization/odometry", 10);
     reset_service_ =
         getPrivateNodeHandle().advertiseService("reset", &GeoLocalizationNodelet::OnReset, this);
-    StartDiagnostics();
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "geo_localization", "geo localization",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
     fix_subscriber_ = node.subscribe("fix", 1000, &GeoLocalizationNodelet::OnFix, this);
     odometry_subscriber_ = node.subscribe("odom", 1000, &GeoLocalizationNodelet::OnOdometry, this);
     // Steady: a bag that pauses must not keep back what has come.
@@ -184,18 +188,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     NODELET_WARN_THROTTLE(kSayAgainS, "for %.1f s %s", config_.silence_warning_s, missing_.c_str());
   }
 
-  void StartDiagnostics() {
-    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
-                                                             getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("geo_localization");
-    updater_->add("geo localization", this, &GeoLocalizationNodelet::Diagnose);
-    // Not the updater's own timer: that one follows the simulated clock.
-    diagnostics_timer_ = getNodeHandle().createSteadyTimer(
-        ros::WallDuration(config_.diagnostics_period_s),
-        [this](const ros::SteadyTimerEvent&) { updater_->force_update(); });
-  }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     using Level = diagnostic_msgs::DiagnosticStatus;
     const localization::LocalizerState state = localizer_->state();
     const std::string name = ros_io::LocalizerStateName(state);
@@ -253,8 +246,8 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   ros::Publisher fix_publisher_, odometry_publisher_;
   ros::Subscriber fix_subscriber_, odometry_subscriber_;
   ros::ServiceServer reset_service_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::SteadyTimer tick_timer_, silence_timer_, diagnostics_timer_;
+  ros::SteadyTimer tick_timer_, silence_timer_;
+  std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
 
 }  // namespace livemap::nodelets

@@ -1,5 +1,4 @@
 #include <cv_bridge/cv_bridge.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <image_transport/image_transport.h>
 #include <livemap/DetectionArray.h>
 #include <livemap/PicturePart.h>
@@ -15,6 +14,7 @@
 #include <mutex>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "nodelets/diagnostics.h"
 #include "nodelets/hazard_detection/hazard_tracking.h"
 #include "nodelets/hazard_detection/recent_pictures.h"
 #include "nodelets/nodelet_support.h"
@@ -40,7 +40,7 @@ namespace livemap::nodelets {
 class HazardDetectionNodelet : public nodelet::Nodelet {
  public:
   ~HazardDetectionNodelet() override {
-    diagnostics_timer_.stop();
+    diagnostics_.reset();
     subscriber_.shutdown();
     request_subscriber_.shutdown();
     if (pool_) pool_->Close();
@@ -100,7 +100,12 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
         "hazard/picture_request", 100,
         [this](const PictureRequest::ConstPtr& request) { AnswerPicture(*request); });
     StartPool();
-    StartDiagnostics();
+    window_start_ = Clock::now();
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "hazard_detection", "hazard_detection",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
                                                 getPrivateNodeHandle());
     subscriber_ = transport.subscribe(
@@ -270,19 +275,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     ++figures_.annotated;
   }
 
-  void StartDiagnostics() {
-    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
-                                                             getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("hazard_detection");
-    updater_->add("hazard_detection", this, &HazardDetectionNodelet::Diagnose);
-    window_start_ = Clock::now();
-    // Wall time: a replay that stands still must not silence the nodelet.
-    diagnostics_timer_ = getNodeHandle().createWallTimer(
-        ros::WallDuration(config_.diagnostics_period_s),
-        [this](const ros::WallTimerEvent&) { updater_->force_update(); });
-  }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     Figures figures;
     {
       const std::lock_guard<std::mutex> lock(figures_mutex_);
@@ -295,17 +288,16 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     const double window_s = std::chrono::duration<double>(now - window_start_).count();
     window_start_ = now;
     const auto in_window = static_cast<double>(figures.processed_in_window);
-    if (counters.dropped > dropped_said_) {
-      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, figures.bad > bad_said_
-                                                                  ? "dropping unusable images"
-                                                                  : "behind: dropping frames");
+    const bool more_dropped = dropped_watch_.HasRisen(counters.dropped);
+    const bool more_bad = bad_watch_.HasRisen(figures.bad);
+    if (more_dropped) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
+                     more_bad ? "dropping unusable images" : "behind: dropping frames");
     } else if (figures.processed_in_window == 0) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
-    dropped_said_ = counters.dropped;
-    bad_said_ = figures.bad;
     status.add("frames_in", counters.in);
     status.add("frames_processed", counters.processed);
     status.add("frames_dropped", counters.dropped);  // unusable ones among them
@@ -325,7 +317,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     status.add("engines", detectors_.size());
   }
 
-  void DiagnoseTracking(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void DiagnoseTracking(Diagnostics::Status& status) {
     const std::lock_guard<std::mutex> lock(pictures_mutex_);
     const perception::ObjectTracker::Counters& counters = tracking_->counters();
     status.add("events", counters.events);
@@ -367,16 +359,15 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   ros::Publisher picture_publisher_;
   ros::Publisher part_publisher_;
   image_transport::Publisher annotated_publisher_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::WallTimer diagnostics_timer_;
-  // The diagnostics timer's own:
+  // The diagnostics' own:
   Clock::time_point window_start_;
-  std::uint64_t dropped_said_ = 0;
-  std::uint64_t bad_said_ = 0;
+  CounterWatch dropped_watch_, bad_watch_;
 
   std::mutex figures_mutex_;
   Figures figures_;
-  std::unique_ptr<Pool> pool_;  ///< Last: its threads use the rest.
+  // Last: their threads use the rest.
+  std::unique_ptr<Pool> pool_;
+  std::unique_ptr<Diagnostics> diagnostics_;
 };
 
 }  // namespace livemap::nodelets

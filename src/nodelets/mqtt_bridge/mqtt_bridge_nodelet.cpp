@@ -1,4 +1,3 @@
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <nodelet/nodelet.h>
 
 #include <atomic>
@@ -11,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/bridge/bridged_type.h"
 #include "ros/parameters/bridge_parameters.h"
@@ -75,7 +75,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
 
   void Close() {
     // Nothing may call into the client while it goes, nor the client into the topics.
-    diagnostics_timer_.stop();
+    diagnostics_.reset();
     for (const auto& topic : topics_) topic->subscriber.shutdown();
     client_.reset();
     topics_.clear();
@@ -94,7 +94,10 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     // Publishers stand before the client can call, the client before subscribers can.
     StartClient(AdvertiseIncoming());
     SubscribeOutgoing();
-    StartDiagnostics();
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "mqtt_bridge", "MQTT bridge", config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
   }
 
   std::vector<transport::MqttSubscription> AdvertiseIncoming() {
@@ -217,18 +220,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     }
   }
 
-  void StartDiagnostics() {
-    updater_ = std::make_unique<diagnostic_updater::Updater>(getNodeHandle(),
-                                                             getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("mqtt_bridge");
-    updater_->add("MQTT bridge", this, &MqttBridgeNodelet::Diagnose);
-    // Wall time: a replay that stands still must not silence the bridge.
-    diagnostics_timer_ = getNodeHandle().createWallTimer(
-        ros::WallDuration(config_.diagnostics_period_s),
-        [this](const ros::WallTimerEvent&) { updater_->force_update(); });
-  }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     const transport::MqttStatistics mqtt = client_->statistics();
     if (!mqtt.connected) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
@@ -266,8 +258,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   OnceAMinute say_losses_again_;
   std::set<std::string> said_losses_;  ///< In this minute; the client's thread's.
   std::unique_ptr<transport::MqttClient> client_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::WallTimer diagnostics_timer_;
+  std::unique_ptr<Diagnostics> diagnostics_;  ///< Last: it uses the rest.
 };
 
 }  // namespace livemap::nodelets
