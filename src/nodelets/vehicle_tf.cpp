@@ -51,4 +51,19 @@ std::optional<Eigen::Isometry3d> VehicleTf::Mounting(const std::string& optical_
   }
 }
 
+void MountingLearner::Want(const std::string& optical_frame) {
+  if (known_.count(optical_frame) != 0) return;
+  wanted_ = optical_frame;
+  Retry();
+}
+
+void MountingLearner::Retry() {
+  if (wanted_.empty()) return;
+  const std::optional<Eigen::Isometry3d> mounting = vehicle_tf_.Mounting(wanted_);
+  if (!mounting) return;
+  known_.insert(wanted_);
+  on_mounting_(wanted_, *mounting);
+  wanted_.clear();
+}
+
 }  // namespace livemap::nodelets

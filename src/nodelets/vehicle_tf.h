@@ -6,10 +6,13 @@
 #include <tf2_ros/transform_listener.h>
 
 #include <Eigen/Geometry>
+#include <functional>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
-#include "vehicle/positioning/fix_track.h"
+#include "geo/vehicle_pose.h"
 
 namespace livemap::nodelets {
 
@@ -25,12 +28,37 @@ class VehicleTf {
   /// Pose of a camera's optical frame in base_link.
   std::optional<Eigen::Isometry3d> Mounting(const std::string& optical_frame) const;
 
+  const tf2_ros::Buffer& buffer() const { return buffer_; }
+
  private:
   std::string nodelet_name_;
   std::string map_frame_;
   std::string base_frame_;
   tf2_ros::Buffer buffer_;
   tf2_ros::TransformListener listener_;
+};
+
+/// Learns the mountings of cameras from tf, each once, because a mounting does not change. Not
+/// thread-safe.
+class MountingLearner {
+ public:
+  using OnMounting = std::function<void(const std::string& optical_frame,
+                                        const Eigen::Isometry3d& base_from_optical)>;
+
+  /// `vehicle_tf` outlives this.
+  MountingLearner(const VehicleTf& vehicle_tf, OnMounting on_mounting)
+      : vehicle_tf_(vehicle_tf), on_mounting_(std::move(on_mounting)) {}
+
+  /// An image of this camera came. Its mounting is looked up unless it is known.
+  void Want(const std::string& optical_frame);
+  /// Looks up again what was wanted last and is not known yet.
+  void Retry();
+
+ private:
+  const VehicleTf& vehicle_tf_;
+  OnMounting on_mounting_;
+  std::set<std::string> known_;
+  std::string wanted_;  ///< Empty: none.
 };
 
 }  // namespace livemap::nodelets

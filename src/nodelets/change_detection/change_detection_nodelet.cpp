@@ -1,14 +1,8 @@
 #include <cv_bridge/cv_bridge.h>
-#include <diagnostic_updater/diagnostic_updater.h>
-#include <image_transport/image_transport.h>
-#include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/image_encodings.h>
 
 #include <array>
-#include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <map>
@@ -24,9 +18,9 @@
 #include "common/frame_queue.h"
 #include "nodelets/change_detection/map_change_sender.h"
 #include "nodelets/change_detection/posed_frame_queue.h"
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
-#include "nodelets/vehicle_tf.h"
-#include "ros/conversions/camera_info_conversions.h"
+#include "nodelets/vehicle_feed.h"
 #include "ros/conversions/change_conversions.h"
 #include "ros/conversions/depth_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
@@ -46,8 +40,9 @@ constexpr double kPickPeriodS = 0.02;
 class ChangeDetectionNodelet : public nodelet::Nodelet {
  public:
   ~ChangeDetectionNodelet() override {
-    for (ros::SteadyTimer& timer : timers_) timer.stop();
-    image_subscriber_.shutdown();
+    diagnostics_.reset();
+    pick_timer_.stop();
+    if (feed_) feed_->StopImages();
     if (queue_) queue_->Close();
     if (worker_.joinable()) worker_.join();
     if (watch_ && sender_) sender_->Tell(watch_->EndDrive());
@@ -124,78 +119,40 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     report_publisher_ = node.advertise<ChangedObjects>("change/report", 100);
     mask_publisher_ = node.advertise<sensor_msgs::Image>("change/mask", 2);
     overlay_publisher_ = node.advertise<sensor_msgs::Image>("change/overlay", 2);
-    vehicle_frames_ =
-        std::make_unique<VehicleTf>(node, getName(), config_.map_frame, config_.base_frame);
-    subscribers_ = {
-        node.subscribe("fix", 100, &Self::OnFix, this),
-        node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
-    };
-    if (config_.pose.use_fused) {
-      subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
-    }
     if (config_.use_depth) {
-      subscribers_.push_back(node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this));
+      depth_subscriber_ = node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this);
     }
-    updater_ =
-        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("change_detection");
-    updater_->add("change_detection", this, &Self::Diagnose);
-    // Steady time: a replay that stands still must not silence the nodelet.
-    timers_ = {
-        node.createSteadyTimer(ros::WallDuration(kPickPeriodS), &Self::OnPickTimer, this),
-        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
-                               &Self::OnDiagnosticsTimer, this),
+    diagnostics_ = std::make_unique<Diagnostics>(
+        node, getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "change_detection", "change_detection",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
+    // Steady time: a replay that stands still must not keep back what has come.
+    pick_timer_ = node.createSteadyTimer(ros::WallDuration(kPickPeriodS), &Self::OnPickTimer, this);
+    VehicleFeed::Handlers handlers;
+    handlers.on_fix = [this](const geo::Fix& fix) { frames_->AddFix(fix); };
+    handlers.on_pose = [this](std::int64_t stamp_ns, const geo::TrackPose& pose) {
+      frames_->AddPose(stamp_ns, pose);
     };
-    image_transport::ImageTransport transport(node);
-    const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
-                                                getPrivateNodeHandle());
-    // No bound of ROS's, which would lose frames without a word: PosedFrameQueue has one, and
-    // counts.
-    image_subscriber_ = transport.subscribe(
-        "camera_rect/image", 0,
-        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
-            [this](const sensor_msgs::ImageConstPtr& image) { OnImage(image); }),
-        ros::VoidPtr(), hints);
-  }
-
-  void OnImage(const sensor_msgs::ImageConstPtr& image) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    LearnMounting(image->header.frame_id);
-    frames_->AddImage(image, ros::Time::now().toSec());
+    handlers.on_intrinsics = [this](const geo::CameraIntrinsics& intrinsics) {
+      intrinsics_ = intrinsics;
+    };
+    handlers.on_mounting = [this](const std::string& frame, const Eigen::Isometry3d& mounting) {
+      mountings_[frame] = mounting;
+    };
+    handlers.on_image = [this](const sensor_msgs::ImageConstPtr& image) {
+      frames_->AddImage(image, ros::Time::now().toSec());
+    };
+    feed_ = std::make_unique<VehicleFeed>(
+        node, getPrivateNodeHandle(),
+        VehicleFeed::Config{getName(), config_.map_frame, config_.base_frame,
+                            config_.pose.use_fused},
+        mutex_, std::move(handlers));
   }
 
   void OnDepth(const sensor_msgs::ImageConstPtr& depth) {
     const std::lock_guard<std::mutex> lock(mutex_);
     frames_->AddDepth(depth);
-  }
-
-  void OnFix(const sensor_msgs::NavSatFix& message) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    frames_->AddFix(ros_io::ToFix(message));
-  }
-
-  void OnPose(const nav_msgs::Odometry& message) {
-    const std::optional<geo::TrackPose> pose = vehicle_frames_->FusedPose(message);
-    if (!pose) return;
-    const std::lock_guard<std::mutex> lock(mutex_);
-    frames_->AddPose(ros_io::FromRosTime(message.header.stamp), *pose);
-  }
-
-  void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
-    try {
-      const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(message);
-      const std::lock_guard<std::mutex> lock(mutex_);
-      intrinsics_ = intrinsics;
-    } catch (const Error& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
-    }
-  }
-
-  /// The mounting does not change: looked up until it is known, then kept. The mutex is held.
-  void LearnMounting(const std::string& frame_id) {
-    if (mountings_.count(frame_id) != 0) return;
-    const auto mounting = vehicle_frames_->Mounting(frame_id);
-    if (mounting) mountings_[frame_id] = *mounting;
   }
 
   void OnPickTimer(const ros::SteadyTimerEvent&) {
@@ -221,7 +178,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
       } catch (const std::exception& error) {
         queue_->Unusable();
         NODELET_ERROR_THROTTLE(kSayAgainS, "dropped an image of %s: %s",
-                               image_subscriber_.getTopic().c_str(), error.what());
+                               feed_->image_topic().c_str(), error.what());
       }
     }
   }
@@ -305,9 +262,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
         ros_io::ToMessage(answer, header, config_.watch.drive_id, method_name_)));
   }
 
-  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     using Outcome = change::ChangeDetector::Outcome;
     const Queue::Counters queue = queue_->counters();
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -315,18 +270,18 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     const auto outcome = [this](Outcome which) {
       return figures_.outcomes[static_cast<std::size_t>(which)];
     };
-    if (figures_.store_errors > store_errors_said_) {
+    const bool not_stored = store_errors_.HasRisen(figures_.store_errors);
+    const bool dropped = dropped_.HasRisen(queue.dropped);
+    const bool came = came_.HasRisen(frames.frames);
+    if (not_stored) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "places are not remembered");
-    } else if (queue.dropped > dropped_said_) {
+    } else if (dropped) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "dropping unusable images");
-    } else if (frames.frames == frames_said_) {
+    } else if (!came) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
-    store_errors_said_ = figures_.store_errors;
-    dropped_said_ = queue.dropped;
-    frames_said_ = frames.frames;
     status.add("frames_in", frames.frames);
     status.add("frames_waiting", frames_->waiting());
     status.add("frames_displaced", frames.displaced);
@@ -365,15 +320,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   std::unique_ptr<change::ChangeDetector> watch_;  // The worker's, once it runs.
   std::unique_ptr<MapChangeSender> sender_;        // None: nothing is told to the zone.
   std::unique_ptr<Queue> queue_;
-  std::unique_ptr<VehicleTf> vehicle_frames_;
   ros::Publisher report_publisher_, mask_publisher_, overlay_publisher_;
-  std::vector<ros::Subscriber> subscribers_;
-  image_transport::Subscriber image_subscriber_;
-  std::vector<ros::SteadyTimer> timers_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  std::uint64_t store_errors_said_ = 0;
-  std::uint64_t dropped_said_ = 0;
-  std::uint64_t frames_said_ = 0;
+  ros::Subscriber depth_subscriber_;
+  ros::SteadyTimer pick_timer_;
+  CounterWatch store_errors_, dropped_, came_;  // Of the diagnostics.
   std::thread worker_;
 
   std::mutex mutex_;  ///< Guards the rest.
@@ -383,6 +333,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   std::uint64_t no_camera_ = 0;
   std::uint64_t busy_ = 0;
   Figures figures_;
+
+  // Last: their callbacks use the rest.
+  std::unique_ptr<VehicleFeed> feed_;
+  std::unique_ptr<Diagnostics> diagnostics_;
 };
 
 }  // namespace livemap::nodelets

@@ -1,14 +1,8 @@
 #include <cv_bridge/cv_bridge.h>
-#include <diagnostic_updater/diagnostic_updater.h>
-#include <image_transport/image_transport.h>
 #include <livemap/CandidateFrame.h>
-#include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/image_encodings.h>
 
-#include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <memory>
@@ -19,11 +13,11 @@
 #include <thread>
 
 #include "common/frame_queue.h"
+#include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
-#include "nodelets/vehicle_tf.h"
+#include "nodelets/vehicle_feed.h"
 #include "perception/detection/early_discard.h"
 #include "perception/privacy/privacy_mask.h"
-#include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
 #include "ros/parameters/offload_parameters.h"
@@ -43,8 +37,9 @@ constexpr double kSendPeriodS = 0.05;
 class EarlyDiscardNodelet : public nodelet::Nodelet {
  public:
   ~EarlyDiscardNodelet() override {
-    for (ros::SteadyTimer& timer : timers_) timer.stop();
-    image_subscriber_.shutdown();
+    diagnostics_.reset();
+    send_timer_.stop();
+    if (feed_) feed_->StopImages();
     if (queue_) queue_->Close();
     if (worker_.joinable()) worker_.join();
   }
@@ -76,70 +71,33 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     using Self = EarlyDiscardNodelet;
     ros::NodeHandle& node = getNodeHandle();
     publisher_ = node.advertise<CandidateFrame>("candidate/frame", 100);
-    vehicle_frames_ =
-        std::make_unique<VehicleTf>(node, getName(), config_.map_frame, config_.base_frame);
-    subscribers_ = {
-        node.subscribe("fix", 100, &Self::OnFix, this),
-        node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
+    diagnostics_ = std::make_unique<Diagnostics>(
+        node, getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "early_discard", "early_discard",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
+    // Steady time: a replay that stands still must not keep back what has come.
+    send_timer_ = node.createSteadyTimer(ros::WallDuration(kSendPeriodS), &Self::OnSendTimer, this);
+    VehicleFeed::Handlers handlers;
+    handlers.on_fix = [this](const geo::Fix& fix) { sender_->AddFix(fix); };
+    handlers.on_pose = [this](std::int64_t stamp_ns, const geo::TrackPose& pose) {
+      sender_->AddPose(stamp_ns, pose);
     };
-    if (config_.sender.pose.use_fused) {
-      subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
-    }
-    updater_ =
-        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("early_discard");
-    updater_->add("early_discard", this, &Self::Diagnose);
-    // Steady time: a replay that stands still must not silence the nodelet.
-    timers_ = {
-        node.createSteadyTimer(ros::WallDuration(kSendPeriodS), &Self::OnSendTimer, this),
-        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
-                               &Self::OnDiagnosticsTimer, this),
-    };
-    image_transport::ImageTransport transport(node);
-    const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
-                                                getPrivateNodeHandle());
-    // No bound of ROS's, which would lose frames without a word: the queue has one, and counts.
-    image_subscriber_ = transport.subscribe(
-        "camera_rect/image", 0,
-        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
-            [this](const sensor_msgs::ImageConstPtr& image) { OnImage(image); }),
-        ros::VoidPtr(), hints);
-  }
-
-  void OnImage(const sensor_msgs::ImageConstPtr& image) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++frame_;
-    LearnMounting(image->header.frame_id);
-    if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push(image);
-  }
-
-  void OnFix(const sensor_msgs::NavSatFix& message) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    sender_->AddFix(ros_io::ToFix(message));
-  }
-
-  void OnPose(const nav_msgs::Odometry& message) {
-    const std::optional<geo::TrackPose> pose = vehicle_frames_->FusedPose(message);
-    if (!pose) return;
-    const std::lock_guard<std::mutex> lock(mutex_);
-    sender_->AddPose(ros_io::FromRosTime(message.header.stamp), *pose);
-  }
-
-  void OnCameraInfo(const sensor_msgs::CameraInfo& message) {
-    try {
-      const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(message);
-      const std::lock_guard<std::mutex> lock(mutex_);
+    handlers.on_intrinsics = [this](const geo::CameraIntrinsics& intrinsics) {
       sender_->SetIntrinsics(intrinsics);
-    } catch (const Error& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped: %s", error.what());
-    }
-  }
-
-  /// The mounting does not change: looked up until it is known, then kept. The mutex is held.
-  void LearnMounting(const std::string& frame_id) {
-    if (sender_->HasMounting(frame_id)) return;
-    const auto mounting = vehicle_frames_->Mounting(frame_id);
-    if (mounting) sender_->SetMounting(frame_id, *mounting);
+    };
+    handlers.on_mounting = [this](const std::string& frame, const Eigen::Isometry3d& mounting) {
+      sender_->SetMounting(frame, mounting);
+    };
+    handlers.on_image = [this](const sensor_msgs::ImageConstPtr& image) {
+      ++frame_;
+      if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push(image);
+    };
+    feed_ = std::make_unique<VehicleFeed>(
+        node, getPrivateNodeHandle(),
+        VehicleFeed::Config{getName(), config_.map_frame, config_.base_frame,
+                            config_.sender.pose.use_fused},
+        mutex_, std::move(handlers));
   }
 
   void Work() {
@@ -150,7 +108,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
       } catch (const std::exception& error) {
         queue_->Unusable();
         NODELET_ERROR_THROTTLE(kSayAgainS, "dropped an image of %s: %s",
-                               image_subscriber_.getTopic().c_str(), error.what());
+                               feed_->image_topic().c_str(), error.what());
       }
     }
   }
@@ -197,23 +155,21 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     return imaging::EncodeJpeg(masked, config_.jpeg_quality, max_bytes);
   }
 
-  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     const Queue::Counters queue = queue_->counters();
     const std::lock_guard<std::mutex> lock(mutex_);
     const vehicle::OffloadSender::Counters& counters = sender_->counters();
-    if (counters.withheld > withheld_said_) {
+    const bool withheld = withheld_.HasRisen(counters.withheld);
+    const bool dropped = dropped_.HasRisen(queue.dropped);
+    if (withheld) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "frames are withheld: no mask");
-    } else if (queue.dropped > dropped_said_) {
+    } else if (dropped) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "behind: dropping frames");
     } else if (judged_in_window_ == 0) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
-    withheld_said_ = counters.withheld;
-    dropped_said_ = queue.dropped;
     status.add("frames_in", counters.frames);
     status.add("frames_skipped", counters.rate_skipped);
     status.add("frames_judged", queue.processed);
@@ -244,14 +200,9 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::unique_ptr<perception::EarlyDiscard> discard_;  // The worker's.
   std::unique_ptr<perception::PrivacyMask> mask_;      // The send timer's; none: privacy is off.
   std::unique_ptr<Queue> queue_;
-  std::unique_ptr<VehicleTf> vehicle_frames_;
   ros::Publisher publisher_;
-  std::vector<ros::Subscriber> subscribers_;
-  image_transport::Subscriber image_subscriber_;
-  std::vector<ros::SteadyTimer> timers_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  std::uint64_t withheld_said_ = 0;
-  std::uint64_t dropped_said_ = 0;
+  ros::SteadyTimer send_timer_;
+  CounterWatch withheld_, dropped_;  // Of the diagnostics.
   std::thread worker_;
 
   std::mutex mutex_;  ///< Guards the rest.
@@ -260,6 +211,10 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::uint64_t masked_regions_ = 0;
   std::uint64_t judged_in_window_ = 0;
   double ms_in_window_ = 0;
+
+  // Last: their callbacks use the rest.
+  std::unique_ptr<VehicleFeed> feed_;
+  std::unique_ptr<Diagnostics> diagnostics_;
 };
 
 }  // namespace livemap::nodelets

@@ -1,5 +1,4 @@
 #include <cv_bridge/cv_bridge.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <livemap/PicturePart.h>
 #include <livemap/PictureRequest.h>
 #include <nav_msgs/Odometry.h>
@@ -8,9 +7,6 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
-#include <tf2_eigen/tf2_eigen.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <filesystem>
 #include <memory>
@@ -18,8 +14,10 @@
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
 
+#include "nodelets/diagnostics.h"
 #include "nodelets/hazard_reporting/vehicle_view.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/vehicle_tf.h"
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/depth_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
@@ -88,6 +86,12 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     answer_publisher_ = node.advertise<HazardPollAnswer>("hazard/poll_answer", 100);
     request_publisher_ = node.advertise<PictureRequest>("hazard/picture_request", 100);
     view_ = std::make_unique<VehicleView>(config_, *reporter_, catalogue_, node);
+    vehicle_tf_ =
+        std::make_unique<VehicleTf>(node, getName(), config_.map_frame, config_.base_frame);
+    mountings_ = std::make_unique<MountingLearner>(
+        *vehicle_tf_, [this](const std::string& frame, const Eigen::Isometry3d& mounting) {
+          reporter_->SetMounting(frame, mounting);
+        });
     subscribers_ = {
         node.subscribe("hazard/detections", 100, &Self::OnDetections, this),
         node.subscribe("link_state", 1, &Self::OnLink, this),
@@ -115,16 +119,14 @@ class HazardReportingNodelet : public nodelet::Nodelet {
     if (config_.reporter.use_depth) {
       subscribers_.push_back(node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this));
     }
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node);
-    updater_ =
-        std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
-    updater_->setHardwareID("hazard_reporting");
-    updater_->add("hazard reporting", this, &Self::Diagnose);
+    diagnostics_ = std::make_unique<Diagnostics>(
+        getNodeHandle(), getPrivateNodeHandle(),
+        Diagnostics::Config{getName(), "hazard_reporting", "hazard reporting",
+                            config_.diagnostics_period_s},
+        [this](Diagnostics::Status& status) { Diagnose(status); });
     timers_ = {
         node.createSteadyTimer(ros::WallDuration(kSendTickS), &Self::OnTick, this),
         node.createSteadyTimer(ros::WallDuration(kViewPeriodS), &Self::OnViewTimer, this),
-        node.createSteadyTimer(ros::WallDuration(config_.diagnostics_period_s),
-                               &Self::OnDiagnosticsTimer, this),
     };
   }
 
@@ -133,7 +135,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void OnDetections(const DetectionArray& message) {
-    WantMounting(message.header.frame_id);
+    mountings_->Want(message.header.frame_id);
     const placement::SightingFrame frame = ros_io::ToSightingFrame(message);
     responder_->AddFrame(frame, ros::Time::now().toSec());
     if (!config_.use_events) reporter_->AddFrame(frame, ros::Time::now().toSec());
@@ -142,7 +144,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   /// Objects that the tracker is sure of, at their best view.
   void OnEvents(const DetectionArray& message) {
-    WantMounting(message.header.frame_id);
+    mountings_->Want(message.header.frame_id);
     reporter_->AddFrame(ros_io::ToSightingFrame(message), ros::Time::now().toSec());
     Work();
   }
@@ -213,7 +215,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
 
   /// A fused pose of base_link in the map frame.
   void OnPose(const nav_msgs::Odometry& message) {
-    view_->LearnDatum(tf_buffer_);
+    view_->LearnDatum(vehicle_tf_->buffer());
     if (!view_->map() || message.header.frame_id != config_.map_frame ||
         message.child_frame_id != config_.base_frame) {
       NODELET_WARN_THROTTLE(kSayAgainS,
@@ -288,7 +290,7 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   }
 
   void OnTick(const ros::SteadyTimerEvent&) {
-    LearnMounting();
+    mountings_->Retry();
     Work();
   }
 
@@ -352,30 +354,9 @@ class HazardReportingNodelet : public nodelet::Nodelet {
                      : ros::Subscriber();
   }
 
-  void WantMounting(const std::string& frame_id) {
-    if (!reporter_->HasMounting(frame_id)) wanted_frame_ = frame_id;
-    LearnMounting();
-  }
-
-  /// The mounting does not change: looked up until it is known, then kept.
-  void LearnMounting() {
-    if (wanted_frame_.empty()) return;
-    try {
-      const auto transform =
-          tf_buffer_.lookupTransform(config_.base_frame, wanted_frame_, ros::Time(0));
-      reporter_->SetMounting(wanted_frame_, tf2::transformToEigen(transform));
-      wanted_frame_.clear();
-    } catch (const tf2::TransformException& error) {
-      NODELET_WARN_THROTTLE(kSayAgainS, "no mounting of the camera yet: %s", error.what());
-    }
-  }
-
   void OnViewTimer(const ros::SteadyTimerEvent&) { view_->Publish(); }
 
-  // Not the updater's own timer: that one follows the simulated clock.
-  void OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_->force_update(); }
-
-  void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  void Diagnose(Diagnostics::Status& status) {
     ros_io::DescribeHazardReporter(*reporter_, SteadyS(), status);
     ros_io::DescribePollResponder(*responder_, status);
   }
@@ -386,16 +367,15 @@ class HazardReportingNodelet : public nodelet::Nodelet {
   std::unique_ptr<vehicle::PollResponder> responder_;
   std::unique_ptr<VehicleView> view_;
   std::uint64_t placed_by_fixes_ = 0;  // When it was last looked at.
-  std::string wanted_frame_;           // Optical frame whose mounting is not known yet.
-  tf2_ros::Buffer tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  std::unique_ptr<VehicleTf> vehicle_tf_;
+  std::unique_ptr<MountingLearner> mountings_;
   ros::Publisher report_publisher_, answer_publisher_, request_publisher_;
   ros::Subscriber images_;  // While a poll is open.
   ros::Subscriber picture_subscriber_;
   ros::Subscriber part_subscriber_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;
+  std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
 
 }  // namespace livemap::nodelets

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <image_transport/subscriber.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/node_handle.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/NavSatFix.h>
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "geo/camera_intrinsics.h"
+#include "geo/vehicle_pose.h"
+#include "nodelets/vehicle_tf.h"
+
+namespace livemap::nodelets {
+
+/// What a nodelet that places camera images listens to: fixes, fused poses, the calibration of the
+/// rectified camera, its mounting, and its images. What cannot be used is warned of and dropped.
+/// The handlers are called in the queue of `node`, each with the nodelet's mutex held.
+///
+/// Typical usage: the last step of a nodelet's start makes one; the destructor calls StopImages
+/// before it ends the threads to which the images go.
+class VehicleFeed {
+ public:
+  struct Config {
+    std::string nodelet_name;  ///< In warnings.
+    std::string map_frame = "map";
+    std::string base_frame = "base_link";
+    bool use_fused = false;  ///< Whether to listen to localization/odometry.
+  };
+
+  struct Handlers {
+    std::function<void(const geo::Fix& fix)> on_fix;
+    /// A fused pose of base_link.
+    std::function<void(std::int64_t stamp_ns, const geo::TrackPose& pose)> on_pose;
+    std::function<void(const geo::CameraIntrinsics& intrinsics)> on_intrinsics;
+    MountingLearner::OnMounting on_mounting;
+    /// Every image, after the mounting of its camera where that is known.
+    std::function<void(const sensor_msgs::ImageConstPtr& image)> on_image;
+  };
+
+  /// `mutex` is the nodelet's and outlives this.
+  VehicleFeed(ros::NodeHandle& node, ros::NodeHandle& private_node, const Config& config,
+              std::mutex& mutex, Handlers handlers);
+
+  /// No image comes after it returns. The mutex is not held.
+  void StopImages() { image_subscriber_.shutdown(); }
+  /// The resolved name. Any thread.
+  const std::string& image_topic() const { return image_topic_; }
+
+ private:
+  void OnFix(const sensor_msgs::NavSatFix& message);
+  void OnPose(const nav_msgs::Odometry& message);
+  void OnCameraInfo(const sensor_msgs::CameraInfo& message);
+  void OnImage(const sensor_msgs::ImageConstPtr& image);
+
+  std::mutex& mutex_;
+  Handlers handlers_;
+  std::string nodelet_name_;
+  std::string image_topic_;
+  VehicleTf vehicle_tf_;
+  MountingLearner mountings_;
+  std::vector<ros::Subscriber> subscribers_;
+  image_transport::Subscriber image_subscriber_;
+};
+
+}  // namespace livemap::nodelets
