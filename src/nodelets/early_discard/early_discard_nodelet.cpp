@@ -17,7 +17,7 @@
 #include "nodelets/nodelet_support.h"
 #include "nodelets/vehicle_feed.h"
 #include "perception/detection/early_discard.h"
-#include "perception/privacy/privacy_mask.h"
+#include "perception/privacy/picture_masker.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
 #include "ros/parameters/offload_parameters.h"
@@ -60,7 +60,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
         perception::ReadModelManifest(config_.model), config_.threads);
     threshold_ =
         config_.threshold < 0 ? discard_->threshold() : static_cast<float>(config_.threshold);
-    if (config_.privacy) mask_ = std::make_unique<perception::PrivacyMask>(config_.mask);
+    masker_ = std::make_unique<perception::PictureMasker>(
+        perception::PictureMasker::Config{config_.privacy, config_.mask});
     sender_ = std::make_unique<vehicle::OffloadSender>(config_.sender);
     queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
     Connect();
@@ -90,7 +91,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
       sender_->SetMounting(frame, mounting);
     };
     handlers.on_image = [this](const sensor_msgs::ImageConstPtr& image) {
-      ++frame_;
+      masker_->CountFrame();
       if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push(image);
     };
     feed_ = std::make_unique<VehicleFeed>(
@@ -141,18 +142,13 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
 
   /// What leaves the car; empty when it cannot be masked: it fails closed.
   std::vector<std::uint8_t> MaskedJpeg(const imaging::Picture& picture, std::size_t max_bytes) {
-    imaging::Picture masked = picture;
-    if (mask_) {
-      masked.bgr = picture.bgr.clone();
-      try {
-        mask_->Apply(masked.bgr, frame_);
-      } catch (const std::exception& error) {
-        NODELET_ERROR_THROTTLE(kSayAgainS, "a frame is withheld: %s", error.what());
-        return {};
-      }
-      masked_regions_ += mask_->Masked().size();
+    const cv::Rect whole({}, picture.bgr.size());
+    const perception::PictureMasker::Masked masked = masker_->Mask(picture.bgr, whole);
+    if (masked.bgr.empty()) {
+      NODELET_ERROR_THROTTLE(kSayAgainS, "a frame is withheld: %s", masked.why_withheld.c_str());
+      return {};
     }
-    return imaging::EncodeJpeg(masked, config_.jpeg_quality, max_bytes);
+    return imaging::EncodeJpeg({masked.bgr, picture.owner}, config_.jpeg_quality, max_bytes);
   }
 
   void Diagnose(Diagnostics::Status& status) {
@@ -185,7 +181,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     status.add("candidates_no_camera", counters.no_camera);
     status.add("candidates_displaced", counters.displaced);
     status.add("candidates_withheld", counters.withheld);
-    status.add("regions_masked", masked_regions_);
+    status.add("regions_masked", masker_->counters().masked_regions);
     status.add("judging_ms", judged_in_window_ > 0
                                  ? ms_in_window_ / static_cast<double>(judged_in_window_)
                                  : 0.0);
@@ -198,7 +194,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   ros_io::EarlyDiscardConfig config_;
   float threshold_ = 0;
   std::unique_ptr<perception::EarlyDiscard> discard_;  // The worker's.
-  std::unique_ptr<perception::PrivacyMask> mask_;      // The send timer's; none: privacy is off.
+  std::unique_ptr<perception::PictureMasker> masker_;
   std::unique_ptr<Queue> queue_;
   ros::Publisher publisher_;
   ros::SteadyTimer send_timer_;
@@ -207,8 +203,6 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
 
   std::mutex mutex_;  ///< Guards the rest.
   std::unique_ptr<vehicle::OffloadSender> sender_;
-  std::uint64_t frame_ = 0;  ///< The camera's, for the mask's memory.
-  std::uint64_t masked_regions_ = 0;
   std::uint64_t judged_in_window_ = 0;
   double ms_in_window_ = 0;
 

@@ -6,7 +6,6 @@
 #include <nodelet/nodelet.h>
 
 #include <algorithm>
-#include <atomic>
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
@@ -20,7 +19,7 @@
 #include "nodelets/nodelet_support.h"
 #include "perception/detection/detector_pool.h"
 #include "perception/detection/hazard_detector.h"
-#include "perception/privacy/privacy_mask.h"
+#include "perception/privacy/picture_masker.h"
 #include "ros/conversions/detection_conversions.h"
 #include "ros/parameters/hazard_detection_parameters.h"
 
@@ -83,7 +82,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       detectors_.push_back(
           std::make_unique<perception::HazardDetector>(lowered, config_.threads, engine));
     }
-    if (config_.privacy) mask_ = std::make_unique<perception::PrivacyMask>(config_.mask);
+    masker_ = std::make_unique<perception::PictureMasker>(
+        perception::PictureMasker::Config{config_.privacy, config_.mask});
     ros::NodeHandle& node = getNodeHandle();
     detections_publisher_ = node.advertise<DetectionArray>("hazard/detections", 100);
     image_transport::ImageTransport transport(node);
@@ -160,7 +160,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
         CountPicture();
       }
     }
-    ++frame_;
+    masker_->CountFrame();
     // The image is kept before anything is told of it: who hears of it may ask for it at once.
     const std::vector<DetectionArray> events = Keep(seen, header);
     detections_publisher_.publish(boost::make_shared<DetectionArray>(ros_io::ToMessage(
@@ -248,26 +248,12 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   sensor_msgs::ImagePtr Drawn(const cv::Mat& bgr,
                               const std::vector<perception::HazardDetection>& found,
                               const std_msgs::Header& header, const cv::Rect& part) {
-    cv::Mat picture = bgr;
-    std::size_t masked_regions = 0;
-    if (mask_) {
-      const std::lock_guard<std::mutex> mask_lock(mask_mutex_);
-      picture = bgr.clone();
-      try {
-        mask_->Apply(picture, frame_, part);
-        masked_regions = mask_->Masked().size();
-      } catch (const std::exception& error) {
-        NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", error.what());
-        const std::lock_guard<std::mutex> lock(figures_mutex_);
-        ++figures_.withheld;
-        return nullptr;
-      }
+    const perception::PictureMasker::Masked masked = masker_->Mask(bgr, part);
+    if (masked.bgr.empty()) {
+      NODELET_ERROR_THROTTLE(60, "a picture is withheld: %s", masked.why_withheld.c_str());
+      return nullptr;
     }
-    {
-      const std::lock_guard<std::mutex> lock(figures_mutex_);
-      figures_.masked_regions += masked_regions;
-    }
-    return ros_io::ToAnnotatedMessage(picture, found, header);
+    return ros_io::ToAnnotatedMessage(masked.bgr, found, header);
   }
 
   void CountPicture() {
@@ -304,8 +290,9 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     status.add("frames_waiting", counters.waiting);
     status.add("frames_unusable", figures.bad);
     status.add("frames_annotated", figures.annotated);
-    status.add("pictures_withheld", figures.withheld);
-    status.add("regions_masked", figures.masked_regions);
+    const perception::PictureMasker::Counters pictures = masker_->counters();
+    status.add("pictures_withheld", pictures.withheld);
+    status.add("regions_masked", pictures.masked_regions);
     status.add("detections", figures.detections);
     status.add("pictures_sent", figures.sent_pictures);
     status.add("pictures_unknown", figures.unknown_requests);
@@ -332,8 +319,6 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   struct Figures {
     std::uint64_t bad = 0;
     std::uint64_t annotated = 0;
-    std::uint64_t withheld = 0;        ///< Pictures that could not be masked.
-    std::uint64_t masked_regions = 0;  ///< Over all pictures.
     std::uint64_t detections = 0;
     std::uint64_t sent_pictures = 0;     ///< On request.
     std::uint64_t unknown_requests = 0;  ///< For images that are not kept any more.
@@ -349,9 +334,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   std::mutex pictures_mutex_;                 ///< Guards tracking_ and recent_.
   std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
   std::unique_ptr<Recent> recent_;
-  std::mutex mask_mutex_;                          ///< Guards mask_; taken before figures_mutex_.
-  std::unique_ptr<perception::PrivacyMask> mask_;  ///< None: privacy is off.
-  std::atomic<std::uint64_t> frame_{0};
+  std::unique_ptr<perception::PictureMasker> masker_;
   image_transport::Subscriber subscriber_;
   ros::Subscriber request_subscriber_;
   ros::Publisher detections_publisher_;
