@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/time.h"
-#include "vehicle/outbox/report_table.h"
+#include "vehicle/outbox/pending_table.h"
 #include "vehicle/outbox/row_validation.h"
 
 namespace livemap::vehicle {
@@ -77,21 +77,8 @@ bool IsSound(const protocol::MapChangeReport& report) {
 MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, std::int64_t now_ns,
                                  double steady_s)
     : config_(config), schedule_(config.resend, random) {
-  try {
-    Open();
-  } catch (const StoreError& error) {
-    if (!IsCorruption(error)) throw;
-    database_.reset();
-    set_aside_ = QuarantineDatabase(config_.path, now_ns);
-    Open();
-  }
+  set_aside_ = OpenOrQuarantine(config_.path, ChangeMigrations(), now_ns, database_, [] {});
   Load(steady_s);
-}
-
-void MapChangeOutbox::Open() {
-  database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
-  database_->CheckPages();
-  database_->Migrate(ChangeMigrations());
 }
 
 void MapChangeOutbox::Load(double steady_s) {
@@ -106,7 +93,7 @@ void MapChangeOutbox::Load(double steady_s) {
       ++counters_.unsound;
       continue;
     }
-    pending_[report.uuid].report = report;
+    pending_[report.uuid] = report;
     schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
   }
   Displace();
@@ -118,7 +105,7 @@ void MapChangeOutbox::Add(const protocol::MapChangeReport& report, double steady
                 "' has values that no zone accepts");
   }
   Insert(*database_, report);
-  pending_[report.uuid] = {report, false};
+  pending_[report.uuid] = report;
   schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
   ++counters_.added;
   Displace();
@@ -128,10 +115,9 @@ std::vector<protocol::MapChangeReport> MapChangeOutbox::TakeDue(double steady_s,
                                                                 std::size_t limit) {
   std::vector<protocol::MapChangeReport> reports;
   for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
-    Entry& entry = pending_.at(uuid);
-    ++(entry.sent ? counters_.resends : counters_.sent);
-    entry.sent = true;
-    reports.push_back(entry.report);
+    ++(schedule_.WasSent(uuid) ? counters_.resends : counters_.sent);
+    schedule_.MarkSent(uuid);
+    reports.push_back(pending_.at(uuid));
   }
   return reports;
 }
@@ -144,19 +130,16 @@ void MapChangeOutbox::AddReceipt(const protocol::Receipt& receipt) {
 }
 
 void MapChangeOutbox::Erase(const Uuid& uuid) {
-  SqliteStatement erase = database_->Prepare("DELETE FROM pending WHERE uuid=?");
-  erase.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
-  erase.Execute();
+  ErasePending(*database_, uuid);
   pending_.erase(uuid);
   schedule_.Remove(uuid);
 }
 
 void MapChangeOutbox::Displace() {
   while (pending_.size() > config_.most) {
-    const auto oldest =
-        std::min_element(pending_.begin(), pending_.end(), [](const auto& a, const auto& b) {
-          return a.second.report.stamp_ns < b.second.report.stamp_ns;
-        });
+    const auto oldest = std::min_element(
+        pending_.begin(), pending_.end(),
+        [](const auto& a, const auto& b) { return a.second.stamp_ns < b.second.stamp_ns; });
     Erase(Uuid(oldest->first));
     ++counters_.displaced;
   }

@@ -54,12 +54,6 @@ class MapChangeOutbox {
   const Counters& counters() const { return counters_; }
 
  private:
-  struct Entry {
-    protocol::MapChangeReport report;
-    bool sent = false;
-  };
-
-  void Open();
   void Load(double steady_s);
   void Erase(const Uuid& uuid);
   void Displace();
@@ -67,7 +61,7 @@ class MapChangeOutbox {
   Config config_;
   std::unique_ptr<SqliteDatabase> database_;
   std::string set_aside_;
-  std::map<Uuid, Entry> pending_;
+  std::map<Uuid, protocol::MapChangeReport> pending_;
   ResendSchedule schedule_;
   Counters counters_;
 };

@@ -1,7 +1,8 @@
 #include "vehicle/outbox/report_table.h"
 
-#include <algorithm>
 #include <string>
+
+#include "vehicle/outbox/pending_table.h"
 
 namespace livemap::vehicle {
 namespace {
@@ -58,12 +59,6 @@ const char* const kAddShownRegionAndHold =
     "ALTER TABLE pending ADD COLUMN shown_width INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE pending ADD COLUMN shown_height INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE pending ADD COLUMN hold_until_ns INTEGER NOT NULL DEFAULT 0;";
-
-Uuid UuidFromBlob(const std::vector<std::uint8_t>& blob) {
-  Uuid uuid;
-  if (blob.size() == uuid.bytes.size()) std::copy(blob.begin(), blob.end(), uuid.bytes.begin());
-  return uuid;
-}
 
 void InsertReport(SqliteDatabase& database, const protocol::Report& report,
                   std::int64_t hold_until_ns) {

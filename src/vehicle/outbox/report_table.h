@@ -30,7 +30,4 @@ struct StoredReport {
 /// The same by the row's number, past every index: for a table whose indices are damaged.
 std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int64_t row);
 
-/// The nil UUID when the blob has not 16 bytes.
-Uuid UuidFromBlob(const std::vector<std::uint8_t>& blob);
-
 }  // namespace livemap::vehicle

@@ -15,9 +15,20 @@ ResendSchedule::ResendSchedule(const Config& config, std::mt19937_64 random)
     : config_(config), random_(random) {}
 
 void ResendSchedule::Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s,
-                         double hold_until_s) {
+                         double hold_until_s, bool was_sent) {
   if (!last_answer_s_) last_answer_s_ = now_s;
-  entries_[report] = {urgency, created_ns, now_s, config_.first_pause_s, now_s, hold_until_s};
+  entries_[report] = {urgency, created_ns,   now_s,   config_.first_pause_s,
+                      now_s,   hold_until_s, was_sent};
+}
+
+void ResendSchedule::MarkSent(const Uuid& report) {
+  const auto found = entries_.find(report);
+  if (found != entries_.end()) found->second.was_sent = true;
+}
+
+bool ResendSchedule::WasSent(const Uuid& report) const {
+  const auto found = entries_.find(report);
+  return found != entries_.end() && found->second.was_sent;
 }
 
 std::size_t ResendSchedule::Held(double now_s) const {

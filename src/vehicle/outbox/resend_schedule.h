@@ -26,15 +26,20 @@ class ResendSchedule {
   ResendSchedule(const Config& config, std::mt19937_64 random);
 
   /// A report to send from `now_s` on, on a link that is not cheap from `hold_until_s` on.
-  /// `urgency` as in HazardClass; `created_ns` orders equals.
+  /// `urgency` as in HazardClass; `created_ns` orders equals. `was_sent`: at least once, before.
   void Add(const Uuid& report, int urgency, std::int64_t created_ns, double now_s,
-           double hold_until_s = 0);
+           double hold_until_s = 0, bool was_sent = false);
   /// Whether held reports may go, too; true until told otherwise.
   void SetCheapLink(bool cheap) { cheap_ = cheap; }
   /// The report is finished: the zone answered. Unknown ones are ignored.
   void Remove(const Uuid& report);
   /// At most `limit` reports whose time has come, in the order to send them; plans their next time.
   std::vector<Uuid> TakeDue(double now_s, std::size_t limit);
+
+  /// A report that TakeDue gave has been sent. Unknown ones are ignored.
+  void MarkSent(const Uuid& report);
+  /// Whether the next sending of a report repeats an earlier one; false for unknown ones.
+  bool WasSent(const Uuid& report) const;
 
   std::size_t size() const { return entries_.size(); }
   /// How many wait while the link is not cheap.
@@ -48,6 +53,7 @@ class ResendSchedule {
     double pause_s;
     double sent_s;  ///< Last, if it was.
     double hold_until_s;
+    bool was_sent;
   };
 
   void NoteAnswer(double now_s);

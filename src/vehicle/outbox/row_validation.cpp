@@ -7,6 +7,7 @@
 
 #include "common/time.h"
 #include "imaging/image_header.h"
+#include "vehicle/outbox/pending_table.h"
 #include "vehicle/outbox/report_table.h"
 
 namespace livemap::vehicle {

@@ -47,8 +47,8 @@ HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatal
             ? 0.0
             : std::clamp(Seconds(pending.hold_until_ns - now_ns), 0.0, HoldS(urgency));
     held_at_start_ = held_at_start_ || (left_s > 0 && !pending.sent);
-    schedule_.Add(pending.uuid, urgency, pending.created_ns, steady_s, steady_s + left_s);
-    if (!pending.sent) unsent_.insert(pending.uuid);
+    schedule_.Add(pending.uuid, urgency, pending.created_ns, steady_s, steady_s + left_s,
+                  pending.sent);
   }
 }
 

@@ -7,7 +7,6 @@
 #include <map>
 #include <optional>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -242,7 +241,6 @@ class HazardReporter {
   double start_steady_s_;  // ...and the steady clock then.
   std::deque<protocol::Notice> notices_;
   std::optional<double> forgot_s_;  // When ForgetUnannounced last looked.
-  std::set<Uuid> unsent_;
   Counters counters_;
   std::string store_error_;
 };

@@ -28,7 +28,6 @@ void HazardReporter::AddReceipt(const protocol::Receipt& receipt) {
     return;
   }
   schedule_.Remove(receipt.report_uuid);
-  unsent_.erase(receipt.report_uuid);
   ++(receipt.status == protocol::Receipt::Status::kCommitted ? counters_.committed
                                                              : counters_.refused);
 }
@@ -126,7 +125,6 @@ void HazardReporter::ReportCandidates(const WaitingFrame& waiting, double steady
     }
     ++counters_.reports_created;
     if (report.image.empty()) ++counters_.reports_without_picture;
-    unsent_.insert(report.uuid);
     schedule_.Add(report.uuid, urgency, report.stamp_ns, steady_s, hold_until_s);
   }
 }
@@ -138,12 +136,12 @@ std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size
     for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
       auto report = map_.LoadPending(uuid);
       if (!report) continue;
-      if (unsent_.count(uuid) != 0) {
-        map_.MarkSent(uuid);
-        unsent_.erase(uuid);
-        ++counters_.reports_sent;
-      } else {
+      if (schedule_.WasSent(uuid)) {
         ++counters_.resends;
+      } else {
+        map_.MarkSent(uuid);
+        schedule_.MarkSent(uuid);
+        ++counters_.reports_sent;
       }
       reports.push_back(std::move(*report));
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "vehicle/outbox/pending_table.h"
 #include "vehicle/outbox/report_table.h"
 
 namespace livemap::vehicle {
@@ -36,23 +37,11 @@ const std::vector<std::string>& Migrations() {
 LocalHazardMap::LocalHazardMap(const Config& config, const protocol::HazardCatalogue& catalogue,
                                std::int64_t now_ns)
     : config_(config), catalogue_(catalogue), filter_(catalogue) {
-  try {
-    Open();
-  } catch (const StoreError& error) {
-    if (!IsCorruption(error)) throw;
-    database_.reset();
-    set_aside_ = QuarantineDatabase(config_.path, now_ns);
-    Open();
-    RecoverFromSetAside();
-  }
-}
-
-void LocalHazardMap::Open() {
-  database_ = std::make_unique<SqliteDatabase>(config_.path, /*durable=*/true);
-  database_->CheckPages();
-  database_->Migrate(Migrations());
-  broken_rows_ = RepairTables(*database_);
-  LoadFilter();
+  set_aside_ = OpenOrQuarantine(config_.path, Migrations(), now_ns, database_, [this] {
+    broken_rows_ = RepairTables(*database_);
+    LoadFilter();
+  });
+  if (!set_aside_.empty()) RecoverFromSetAside();
 }
 
 void LocalHazardMap::RecoverFromSetAside() {
@@ -190,9 +179,7 @@ bool LocalHazardMap::Apply(const protocol::Receipt& receipt) {
   const bool renames = receipt.status == protocol::Receipt::Status::kCommitted &&
                        !receipt.hazard_uuid.IsNil() && filter_.Knows(receipt.report_uuid);
   database_->Transaction([&] {
-    database_->Prepare("DELETE FROM pending WHERE uuid=?")
-        .BindBlob(1, own_id.data(), own_id.size())
-        .Execute();
+    ErasePending(*database_, receipt.report_uuid);
     if (!renames) return;
     // The zone may have announced it already: its word about the place counts.
     database_->Prepare("UPDATE OR IGNORE known SET id=?, of_zone=1 WHERE id=?")

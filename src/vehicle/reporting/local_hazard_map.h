@@ -122,7 +122,6 @@ class LocalHazardMap {
     geo::GeoPoint position;
   };
 
-  void Open();
   void RecoverFromSetAside();
   void LoadFilter();
   void CountPending();

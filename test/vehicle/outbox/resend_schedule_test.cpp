@@ -122,5 +122,20 @@ TEST(ResendSchedule, AHeldReportWaitsForACheapLinkOrTheEndOfItsTime) {
   EXPECT_THAT(schedule.TakeDue(200.0, 10), ElementsAre(Id(2)));
 }
 
+TEST(ResendSchedule, RemembersWhatWasSentUntilItIsFinished) {
+  ResendSchedule schedule = WithoutJitter();
+  schedule.Add(Id(1), 3, 1, 0.0);
+  schedule.Add(Id(2), 3, 2, 0.0, 0.0, /*was_sent=*/true);
+  EXPECT_THAT(schedule.TakeDue(0.0, 10), ElementsAre(Id(1), Id(2)));
+  EXPECT_FALSE(schedule.WasSent(Id(1))) << "due, but nobody has said that it went";
+  EXPECT_TRUE(schedule.WasSent(Id(2)));
+  schedule.MarkSent(Id(1));
+  EXPECT_TRUE(schedule.WasSent(Id(1)));
+  schedule.Remove(Id(1));
+  schedule.MarkSent(Id(1));
+  EXPECT_FALSE(schedule.WasSent(Id(1)));
+  EXPECT_EQ(schedule.size(), 1u);
+}
+
 }  // namespace
 }  // namespace livemap::vehicle
