@@ -12,7 +12,7 @@ endif()
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 
 # The sources of a target are compiled as a few, since their headers cost more than they do. Names in
-# anonymous namespaces have to differ then within a room, and within a program of tests.
+# anonymous namespaces have to differ then within a module, and within a program of tests.
 if(LIVEMAP_UNITY)
   set(CMAKE_UNITY_BUILD ON)
   set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
@@ -20,7 +20,7 @@ endif()
 
 add_library(livemap_options INTERFACE)
 target_compile_options(livemap_options INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror)
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
 
 if(LIVEMAP_SANITIZE)
   # Eigen's and Ceres's templates with checks around each access take -O2 minutes to compile.

@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 OF_RUN, OF_TOOLS, OF_DEVELOPMENT = "libopencv-dev", "libembree-dev", "chromium"
 
 

@@ -7,7 +7,7 @@ import pty
 import subprocess
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 # What ninja prints of a build of ten sources, half of whose steps compile nothing.
 PLAN = "".join(f"[{2 * i + 1}/20] Generating {i}.h\n[{2 * i + 2}/20] Building CXX object {i}.o\n" for i in range(10))
 
