@@ -17,8 +17,9 @@ import sys
 import tempfile
 import time
 
-import demo_observers as observers
-import demo_system as system
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "lib"))
+import demo_observers as observers  # noqa: E402
+import demo_system as system  # noqa: E402
 import perception_recorder
 
 ZONE, VEHICLE = "bench", "vehicle-1"

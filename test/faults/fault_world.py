@@ -20,7 +20,7 @@ import fault_network as network
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path.insert(0, str(ROOT / "scripts"))
+sys.path.insert(0, str(ROOT / "scripts" / "lib"))
 import demo_system as system  # noqa: E402
 
 ZONE, VEHICLES = "faults", ("car-1", "car-2")

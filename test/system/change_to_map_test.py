@@ -22,7 +22,7 @@ import rostest
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "test" / "support")]
+sys.path[:0] = [str(ROOT / "scripts" / "lib"), str(ROOT / "test" / "support")]
 import demo_system as system  # noqa: E402
 from demo_observers import parse_time  # noqa: E402
 from node_testing import eventually  # noqa: E402

@@ -20,7 +20,7 @@ import rostest
 from std_srvs.srv import SetBool
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "test" / "support")]
+sys.path[:0] = [str(ROOT / "scripts" / "lib"), str(ROOT / "test" / "support")]
 import demo_observers as observers  # noqa: E402
 import demo_system as system  # noqa: E402
 from node_testing import PATIENCE_S, eventually  # noqa: E402

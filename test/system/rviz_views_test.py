@@ -18,8 +18,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
-import view_capture as views  # noqa: E402
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts" / "lib"))
+import rviz_capture as views  # noqa: E402
 
 # Colours that no widget and no background has, RGB.
 CAMERA, DETECTIONS, HAZARD, PATH = (255, 0, 220), (0, 255, 140), (255, 120, 0), (66, 135, 245)

@@ -23,7 +23,7 @@ from livemap.msg import CandidateFrame, HazardReport
 from sensor_msgs.msg import CameraInfo, Image, NavSatFix, NavSatStatus
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "test" / "support")]
+sys.path[:0] = [str(ROOT / "scripts" / "lib"), str(ROOT / "test" / "support")]
 import demo_observers as observers  # noqa: E402
 import demo_system as system  # noqa: E402
 from hazard_reporting_fixture import east_north, place  # noqa: E402

@@ -20,7 +20,7 @@ import time
 import unittest
 
 SCRIPT = pathlib.Path(sys.argv.pop()).resolve()
-sys.path.insert(0, str(SCRIPT.parent))
+sys.path.insert(0, str(SCRIPT.parent / "lib"))
 import demo_system  # noqa: E402
 import perception_figures as figures  # noqa: E402
 import perception_page  # noqa: E402

@@ -9,10 +9,10 @@ import sys
 import tempfile
 import unittest
 
-sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "scripts"))
+sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "scripts", "lib"))
 
 import broker_files  # noqa: E402
-import zone_authority  # noqa: E402
+import certificate_authority  # noqa: E402
 
 ROUNDS = 20000
 CORPUS = [
@@ -72,11 +72,11 @@ class Names(unittest.TestCase):
     def test_a_host_is_one_that_a_certificate_can_carry(self):
         accepted = 0
         for text in self.inputs():
-            host = self.accepted(zone_authority.require_host, text)
+            host = self.accepted(certificate_authority.require_host, text)
             if host is None:
                 continue
             accepted += 1
-            zone_authority.alternative_names([host])
+            certificate_authority.alternative_names([host])
             self.assertRegex(host, re.compile(r"\A[A-Za-z0-9.:-]+\Z"))
         self.assertGreater(accepted, 100)
 
@@ -88,12 +88,12 @@ class Names(unittest.TestCase):
                 text = originals[number % len(originals)]
                 if number >= len(originals):
                     text = mutated(self.generator, text)
-                with open(os.path.join(directory, zone_authority.REGISTER), "w", encoding="utf-8",
+                with open(os.path.join(directory, certificate_authority.REGISTER), "w", encoding="utf-8",
                           errors="surrogatepass") as file:
                     file.write(text)
                 try:
                     # A register that is sound lacks its key here.
-                    self.assertIsNone(self.accepted(zone_authority.load, directory))
+                    self.assertIsNone(self.accepted(certificate_authority.load, directory))
                 except FileNotFoundError as missing:
                     self.assertIn("key.pem", str(missing))
 

@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from broker_files import ZONE_USER, Usage, limits, log_and_user, vehicle_rights, write_private
-from zone_authority import certificate_pem, key_pem
+from certificate_authority import certificate_pem, key_pem
 
 BROKER_TIMEOUT_S = 10
 

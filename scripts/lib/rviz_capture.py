@@ -8,7 +8,7 @@ import time
 
 CHROMIUM_FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
                   "--disable-background-networking", "--disable-component-update", "--disable-sync")
-RVIZ_FOLDER = pathlib.Path(__file__).resolve().parent.parent / "rviz"
+RVIZ_FOLDER = pathlib.Path(__file__).resolve().parents[2] / "rviz"
 
 
 class VirtualDisplay:

@@ -14,7 +14,7 @@ import rosbag
 import rospkg
 
 Drive = collections.namedtuple("Drive", "frames start_s duration_s")
-PROGRAMS = pathlib.Path(__file__).resolve().parent
+PROGRAMS = pathlib.Path(__file__).resolve().parents[1]
 CAMERA_TOPICS = ("camera/image_raw/compressed", "camera/image_raw")
 
 
