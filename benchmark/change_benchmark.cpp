@@ -19,7 +19,7 @@
 #include "change/registration/image_features.h"
 #include "change/registration/registration.h"
 #include "run_benchmarks.h"
-#include "simulation/render/renderer.h"
+#include "simulation/render/street_renderer.h"
 #include "test/change/simulated_pairs.h"
 #include "tools/common/shipped_model.h"
 

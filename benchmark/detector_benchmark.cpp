@@ -28,7 +28,7 @@
 #include "perception/detection/yolox_decoder.h"
 #include "perception/privacy/privacy_mask.h"
 #include "run_benchmarks.h"
-#include "simulation/render/renderer.h"
+#include "simulation/render/street_renderer.h"
 #include "test/change/simulated_pairs.h"
 #include "tools/common/shipped_model.h"
 

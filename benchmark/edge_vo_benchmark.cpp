@@ -5,10 +5,10 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "odometry/edge/canny.h"
+#include "odometry/edge/canny_detector.h"
 #include "odometry/edge/edge_odometry.h"
 #include "run_benchmarks.h"
-#include "simulation/room/room.h"
+#include "simulation/room/simulated_room.h"
 #include "tools/odometry/vo_method.h"
 
 namespace livemap::bench {

@@ -22,9 +22,9 @@
 #include "nodes/map_change_receiver.h"
 #include "nodes/notice_sender.h"
 #include "ros/conversions/zone_conversions.h"
-#include "ros/parameters/zone_parameters.h"
-#include "web/server/server.h"
-#include "zone/service/catch_up.h"
+#include "ros/parameters/zone_cloudlet_parameters.h"
+#include "web/server/web_server.h"
+#include "zone/service/catch_up_planner.h"
 #include "zone/service/zone_inbox.h"
 #include "zone/service/zone_service.h"
 

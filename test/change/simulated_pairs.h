@@ -8,7 +8,7 @@
 #include "datasets/camera_file.h"
 #include "simulation/motion/pass_drive.h"
 #include "simulation/render/lighting.h"
-#include "simulation/render/renderer.h"
+#include "simulation/render/street_renderer.h"
 
 namespace livemap::change {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "protocol/hazard_catalogue.h"
-#include "web/server/server.h"
+#include "web/server/web_server.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {

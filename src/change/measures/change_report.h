@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "change/measures/change_metrics.h"
-#include "change/objects/changed_objects.h"
+#include "change/objects/change_tracker.h"
 
 namespace livemap::change {
 

@@ -11,7 +11,7 @@
 
 #include "change/memory/place_memory.h"
 #include "change/methods/change_method.h"
-#include "change/objects/changed_objects.h"
+#include "change/objects/change_tracker.h"
 #include "change/registration/registration.h"
 
 namespace livemap::change {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
-#include "change/objects/changed_objects.h"
+#include "change/objects/change_tracker.h"
 
 namespace livemap::change {
 

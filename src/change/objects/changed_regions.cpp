@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "change/objects/change_direction_estimator.h"
-#include "change/objects/changed_objects.h"
+#include "change/objects/change_tracker.h"
 #include "common/error.h"
 
 namespace livemap::change {

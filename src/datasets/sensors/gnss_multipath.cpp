@@ -12,14 +12,15 @@ double SkyVisibility::HiddenShare() const { return (left_rad + right_rad) / M_PI
 
 double SkyVisibility::LeftSurplus() const { return (left_rad - right_rad) / M_PI; }
 
-Multipath::Multipath(double sigma_m, std::uint64_t seed) : sigma_m_(sigma_m), random_(seed) {
+GnssMultipath::GnssMultipath(double sigma_m, std::uint64_t seed)
+    : sigma_m_(sigma_m), random_(seed) {
   if (std::isfinite(sigma_m) && sigma_m >= 0 && sigma_m < 1e6) return;
   throw Error("the receiver's multipath error in metres is " + std::to_string(sigma_m) +
               ", accepted is zero or more");
 }
 
-Eigen::Vector2d Multipath::ErrorAt(double time_s, double driven_m, double heading_rad,
-                                   const SkyVisibility& sky) {
+Eigen::Vector2d GnssMultipath::ErrorAt(double time_s, double driven_m, double heading_rad,
+                                       const SkyVisibility& sky) {
   if (!started_) {
     started_ = true;
     unit_ = random_.Normal();

@@ -32,13 +32,13 @@ struct SkyVisibility {
 /// first-order Gauss-Markov processes that keep 1/e of themselves after 30 m of driving or 100 s of
 /// standing. Sizes and shape of the model are chosen, not measured. Not thread-safe; the same seed
 /// gives the same errors.
-class Multipath {
+class GnssMultipath {
  public:
   static constexpr double kCorrelationM = 30;
   static constexpr double kCorrelationS = 100;
 
   /// `sigma_m` is M; 0: no errors. Throws Error when it is negative or not finite.
-  Multipath(double sigma_m, std::uint64_t seed);
+  GnssMultipath(double sigma_m, std::uint64_t seed);
 
   /// East and north, metres, at `time_s` (not decreasing) after `driven_m` metres of driving (not
   /// decreasing) in a street of direction `heading_rad` (counter-clockwise from east).

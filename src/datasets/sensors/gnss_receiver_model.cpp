@@ -17,7 +17,7 @@ void CheckValue(const char* name, double value, bool may_be_zero) {
 
 }  // namespace
 
-void Check(const ReceiverNoise& noise) {
+void Check(const GnssReceiverNoise& noise) {
   CheckValue("white noise in metres", noise.white_sigma_m, true);
   CheckValue("bias in metres", noise.bias_sigma_m, true);
   CheckValue("bias time constant in seconds", noise.bias_time_constant_s, false);
@@ -25,16 +25,16 @@ void Check(const ReceiverNoise& noise) {
   CheckValue("mean drop-out in seconds", noise.dropout_mean_s, false);
 }
 
-ReceiverSimulator::ReceiverSimulator(const ReceiverNoise& noise, std::uint64_t seed)
+GnssReceiverModel::GnssReceiverModel(const GnssReceiverNoise& noise, std::uint64_t seed)
     : noise_(noise), random_(seed) {
   Check(noise);
 }
 
-double ReceiverSimulator::sigma_m() const {
+double GnssReceiverModel::sigma_m() const {
   return std::hypot(noise_.white_sigma_m, noise_.bias_sigma_m);
 }
 
-std::optional<Eigen::Vector2d> ReceiverSimulator::ErrorAt(double time_s) {
+std::optional<Eigen::Vector2d> GnssReceiverModel::ErrorAt(double time_s) {
   const double between_dropouts_s = noise_.dropouts_per_minute > 0
                                         ? 60 / noise_.dropouts_per_minute
                                         : std::numeric_limits<double>::infinity();

@@ -10,7 +10,7 @@ namespace livemap::datasets {
 
 /// What a satellite receiver does to a position. Errors are horizontal, equal and independent in
 /// east and north.
-struct ReceiverNoise {
+struct GnssReceiverNoise {
   double white_sigma_m = 0.5;        ///< New at every fix.
   double bias_sigma_m = 0;           ///< Slow error: first-order Gauss-Markov, long-term sigma.
   double bias_time_constant_s = 60;  ///< After this time the bias still correlates by 1/e.
@@ -19,13 +19,13 @@ struct ReceiverNoise {
 };
 
 /// Throws Error naming the value when one is negative, not finite or, for the times, zero.
-void Check(const ReceiverNoise& noise);
+void Check(const GnssReceiverNoise& noise);
 
 /// Gives the receiver's errors one fix after the other. The same seed gives the same errors on
 /// every platform. Not thread-safe.
-class ReceiverSimulator {
+class GnssReceiverModel {
  public:
-  ReceiverSimulator(const ReceiverNoise& noise, std::uint64_t seed);
+  GnssReceiverModel(const GnssReceiverNoise& noise, std::uint64_t seed);
 
   /// Error of the fix at `time_s` (not decreasing), east and north in metres; none while the
   /// receiver has no fix.
@@ -35,7 +35,7 @@ class ReceiverSimulator {
   double sigma_m() const;
 
  private:
-  const ReceiverNoise noise_;
+  const GnssReceiverNoise noise_;
   SeededRandom random_;
   Eigen::Vector2d bias_m_;
   double bias_time_s_ = 0;

@@ -12,11 +12,11 @@ double Round(double value, double step) { return step * std::round(value / step)
 
 }  // namespace
 
-Odometer::Odometer(std::uint64_t seed) : random_(seed) {
+WheelOdometerModel::WheelOdometerModel(std::uint64_t seed) : random_(seed) {
   scale_ = 1 + kScaleSigma * random_.Normal().x();
 }
 
-WheelTwist Odometer::Measure(double speed_mps, double yaw_rate_radps) {
+WheelTwist WheelOdometerModel::Measure(double speed_mps, double yaw_rate_radps) {
   const Eigen::Vector2d noise = random_.Normal();
   WheelTwist twist;
   if (std::abs(speed_mps) >= kStandsMps) {

@@ -18,7 +18,7 @@ struct WheelTwist {
 /// error of the tyre's radius (sigma 1 %, one per drive), noise (sigma 0.02 m/s and 0.003 rad/s),
 /// then rounding to the bus's steps (0.02 m/s and 0.002 rad/s). A wheel that stands reports 0. The
 /// same seed gives the same values for the same calls. Not thread-safe.
-class Odometer {
+class WheelOdometerModel {
  public:
   static constexpr double kScaleSigma = 0.01;
   static constexpr double kSpeedSigmaMps = 0.02;
@@ -26,7 +26,7 @@ class Odometer {
   static constexpr double kSpeedStepMps = 0.02;
   static constexpr double kYawRateStepRadps = 0.002;
 
-  explicit Odometer(std::uint64_t seed);
+  explicit WheelOdometerModel(std::uint64_t seed);
 
   /// Of the true values.
   WheelTwist Measure(double speed_mps, double yaw_rate_radps);

@@ -10,13 +10,13 @@
 #include <thread>
 
 #include "common/frame_queue.h"
-#include "nodelets/camera_ingest/ingest_frames.h"
+#include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/ingest_reader.h"
 #include "nodelets/camera_ingest/ingest_stereo.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/camera_info_conversions.h"
-#include "ros/parameters/ingest_parameters.h"
+#include "ros/parameters/camera_ingest_parameters.h"
 
 namespace livemap::nodelets {
 

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "imaging/frame_source.h"
-#include "nodelets/camera_ingest/ingest_frames.h"
-#include "ros/parameters/ingest_parameters.h"
+#include "nodelets/camera_ingest/frame_processor.h"
+#include "ros/parameters/camera_ingest_parameters.h"
 
 namespace livemap::nodelets {
 

@@ -12,10 +12,10 @@
 
 #include "common/frame_queue.h"
 #include "imaging/stereo_depth.h"
-#include "nodelets/camera_ingest/ingest_frames.h"
+#include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
 #include "nodelets/diagnostics.h"
-#include "ros/parameters/ingest_parameters.h"
+#include "ros/parameters/camera_ingest_parameters.h"
 
 namespace livemap::nodelets {
 

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <optional>
 
-#include "nodelets/camera_ingest/ingest_frames.h"
+#include "nodelets/camera_ingest/frame_processor.h"
 
 namespace livemap::nodelets {
 

@@ -24,7 +24,7 @@
 #include "ros/conversions/change_conversions.h"
 #include "ros/conversions/depth_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
-#include "ros/parameters/change_parameters.h"
+#include "ros/parameters/change_detection_parameters.h"
 #include "vehicle/reporting/offload_sender.h"
 
 namespace livemap::nodelets {

@@ -13,7 +13,7 @@
 #include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/bridge/bridged_type.h"
-#include "ros/parameters/bridge_parameters.h"
+#include "ros/parameters/mqtt_bridge_parameters.h"
 #include "transport/mqtt_client.h"
 #include "transport/topic_template.h"
 

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "odometry/edge/canny.h"
+#include "odometry/edge/canny_detector.h"
 
 namespace cv::ximgproc {
 class StructuredEdgeDetection;

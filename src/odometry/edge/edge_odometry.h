@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "odometry/edge/alignment.h"
+#include "odometry/edge/aligner.h"
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/edge/keyframe.h"
 #include "odometry/edge/rgbd_frame.h"

@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "odometry/edge/edge_extractor.h"
-#include "odometry/edge/edge_points.h"
-#include "odometry/edge/pyramid.h"
+#include "odometry/edge/image_pyramid.h"
+#include "odometry/edge/point_selector.h"
 #include "odometry/se3.h"
 
 namespace livemap::odometry {

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "perception/privacy/private_regions.h"
+#include "perception/privacy/private_region_finder.h"
 
 namespace livemap::perception {
 

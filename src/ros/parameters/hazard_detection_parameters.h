@@ -4,7 +4,7 @@
 
 #include "perception/privacy/privacy_mask.h"
 #include "perception/tracking/object_tracker.h"
-#include "ros/parameters/parameters.h"
+#include "ros/parameters/parameter_reader.h"
 
 namespace livemap::ros_io {
 

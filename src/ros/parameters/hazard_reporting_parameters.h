@@ -4,7 +4,7 @@
 #include <string>
 
 #include "geo/wgs84.h"
-#include "ros/parameters/parameters.h"
+#include "ros/parameters/parameter_reader.h"
 #include "vehicle/polls/poll_responder.h"
 #include "vehicle/reporting/hazard_reporter.h"
 

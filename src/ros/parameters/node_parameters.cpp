@@ -4,15 +4,15 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "ros/parameters/bridge_parameters.h"
-#include "ros/parameters/change_parameters.h"
+#include "ros/parameters/camera_ingest_parameters.h"
+#include "ros/parameters/change_detection_parameters.h"
 #include "ros/parameters/edge_vo_parameters.h"
 #include "ros/parameters/geo_localization_parameters.h"
 #include "ros/parameters/hazard_detection_parameters.h"
 #include "ros/parameters/hazard_reporting_parameters.h"
-#include "ros/parameters/ingest_parameters.h"
+#include "ros/parameters/mqtt_bridge_parameters.h"
 #include "ros/parameters/offload_parameters.h"
-#include "ros/parameters/zone_parameters.h"
+#include "ros/parameters/zone_cloudlet_parameters.h"
 
 namespace livemap::ros_io {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "geo/ground_projection.h"
 #include "perception/privacy/privacy_mask.h"
-#include "ros/parameters/parameters.h"
+#include "ros/parameters/parameter_reader.h"
 #include "vehicle/positioning/fix_track.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 

@@ -4,9 +4,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "simulation/render/renderer.h"
-#include "simulation/render/scene.h"
-#include "simulation/render/sensor.h"
+#include "simulation/render/simulated_camera.h"
+#include "simulation/render/street_renderer.h"
+#include "simulation/render/street_scene.h"
 #include "simulation/world/street.h"
 
 namespace livemap::simulation {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "simulation/render/sensor.h"
+#include "simulation/render/simulated_camera.h"
 
 namespace livemap::simulation {
 

@@ -1,6 +1,6 @@
 #include "simulation/motion/pass_drive.h"
 
-#include "simulation/objects/random.h"
+#include "simulation/objects/counter_random.h"
 
 namespace livemap::simulation {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "datasets/camera_file.h"
 #include "simulation/motion/vehicle_motion.h"
-#include "simulation/render/renderer.h"
+#include "simulation/render/street_renderer.h"
 
 namespace livemap::simulation {
 

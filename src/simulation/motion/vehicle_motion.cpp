@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulation/objects/random.h"
+#include "simulation/objects/counter_random.h"
 
 namespace livemap::simulation {
 namespace {

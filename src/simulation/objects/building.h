@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
+#include "simulation/objects/counter_random.h"
 #include "simulation/objects/mesh.h"
-#include "simulation/objects/random.h"
 
 namespace livemap::simulation {
 

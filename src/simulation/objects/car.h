@@ -1,7 +1,7 @@
 #pragma once
 
+#include "simulation/objects/counter_random.h"
 #include "simulation/objects/mesh.h"
-#include "simulation/objects/random.h"
 
 namespace livemap::simulation {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "simulation/objects/random.h"
+#include "simulation/objects/counter_random.h"
 
 namespace livemap::simulation {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <map>
 
-#include "simulation/render/scene.h"
-#include "simulation/render/sensor.h"
+#include "simulation/render/simulated_camera.h"
+#include "simulation/render/street_scene.h"
 
 namespace livemap::simulation {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "simulation/render/lighting.h"
-#include "simulation/render/scene.h"
+#include "simulation/render/street_scene.h"
 #include "simulation/render/surface.h"
 
 namespace livemap::simulation {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "simulation/objects/random.h"
+#include "simulation/objects/counter_random.h"
 
 namespace livemap::simulation {
 namespace {

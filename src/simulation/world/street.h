@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "simulation/objects/mesh.h"
-#include "simulation/world/change.h"
 #include "simulation/world/ground_plan.h"
 #include "simulation/world/road_line.h"
+#include "simulation/world/street_change.h"
 #include "simulation/world/world_file.h"
 
 namespace livemap::simulation {

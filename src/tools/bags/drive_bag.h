@@ -23,7 +23,7 @@ struct DriveSetup {
   datasets::Route route;
   double speed_mps;
   datasets::CameraFile camera;
-  datasets::ReceiverNoise noise;
+  datasets::GnssReceiverNoise noise;
   double fix_rate_hz;
   std::uint64_t seed;
   ros::Time start;  ///< Stamp of distance 0.
@@ -73,7 +73,7 @@ class DriveBag {
 
   const DriveSetup setup_;
   BagWriter bag_;
-  datasets::ReceiverSimulator receiver_;
+  datasets::GnssReceiverModel receiver_;
   sensor_msgs::CameraInfo camera_info_;
   std::int64_t next_fix_ = 0;
   std::uint32_t frame_number_ = 0;

@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "common/error.h"
-#include "simulation/datasets/change_dataset.h"
-#include "simulation/datasets/dataset.h"
+#include "simulation/datasets/change_dataset_writer.h"
+#include "simulation/datasets/dataset_writers.h"
 #include "simulation/motion/pass_drive.h"
-#include "simulation/objects/random.h"
+#include "simulation/objects/counter_random.h"
 #include "tools/common/contact_sheet.h"
 #include "tools/simulation/simulation_flags.h"
 #include "tools/simulation/simulation_outputs.h"

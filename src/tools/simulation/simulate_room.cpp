@@ -7,9 +7,9 @@
 #include <string>
 
 #include "common/error.h"
-#include "simulation/datasets/dataset.h"
+#include "simulation/datasets/dataset_writers.h"
 #include "simulation/room/patterned_wall.h"
-#include "simulation/room/room.h"
+#include "simulation/room/simulated_room.h"
 #include "tools/common/contact_sheet.h"
 #include "tools/simulation/simulation_outputs.h"
 #include "tools/simulation/simulation_setup.h"

@@ -179,7 +179,7 @@ class RosSimulationBag : public SimulationBag {
 
   const Setup setup_;
   DriveBag bag_;
-  datasets::Odometer odometer_;
+  datasets::WheelOdometerModel odometer_;
   std::int64_t next_twist_;
   sensor_msgs::CameraInfo info_;
   sensor_msgs::CameraInfo right_info_;

@@ -11,15 +11,15 @@
 #include "geo/wgs84.h"
 #include "simulation/datasets/labels_in_view.h"
 #include "simulation/motion/vehicle_motion.h"
-#include "simulation/render/renderer.h"
+#include "simulation/render/street_renderer.h"
 
 namespace livemap::tools {
 
 /// What a person may decide about a simulated drive's bag.
 struct SimulationBagConfig {
-  datasets::ReceiverNoise noise;
+  datasets::GnssReceiverNoise noise;
   double fix_rate_hz = 10;
-  double multipath_m = 2;  ///< See Multipath; 0: none.
+  double multipath_m = 2;  ///< See GnssMultipath; 0: none.
   bool depth = false;      ///< Depth images too.
   int jpeg_quality = 88;   ///< 1 to 100.
 };

@@ -35,7 +35,7 @@ SimulationBagConfig ReadBagOptions(const CommandLine& line) {
   options.jpeg_quality =
       static_cast<int>(line.Number("jpeg-quality", options.jpeg_quality, 1, 100));
   options.fix_rate_hz = line.Number("fix-rate", options.fix_rate_hz, 1, 10);
-  datasets::ReceiverNoise& noise = options.noise;
+  datasets::GnssReceiverNoise& noise = options.noise;
   noise.white_sigma_m = line.Number("fix-noise-m", noise.white_sigma_m, 0, 1000);
   noise.bias_sigma_m = line.Number("fix-bias-m", noise.bias_sigma_m, 0, 1000);
   noise.bias_time_constant_s =

@@ -84,8 +84,8 @@ void SimulationOutputs::OpenBag(const CommandLine& line, const simulation::Stree
   setup.datum = setup_.datum;
   setup.seed = street.seed();
   setup.state = [&motion](double time_s) { return motion.StateAt(time_s); };
-  const auto multipath = std::make_shared<datasets::Multipath>(setup.options.multipath_m,
-                                                               street.seed() ^ kMultipathStream);
+  const auto multipath = std::make_shared<datasets::GnssMultipath>(
+      setup.options.multipath_m, street.seed() ^ kMultipathStream);
   setup.multipath_m = [&street, &motion, multipath](double time_s) {
     const double along = motion.AlongM(time_s);
     return multipath->ErrorAt(time_s, along, street.line().HeadingRad(along),

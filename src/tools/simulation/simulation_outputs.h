@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "simulation/datasets/dataset.h"
+#include "simulation/datasets/dataset_writers.h"
 #include "tools/simulation/simulation_bag.h"
 #include "tools/simulation/simulation_setup.h"
 

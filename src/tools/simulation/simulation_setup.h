@@ -3,7 +3,7 @@
 #include "datasets/camera_file.h"
 #include "geo/wgs84.h"
 #include "simulation/render/lighting.h"
-#include "simulation/render/sensor.h"
+#include "simulation/render/simulated_camera.h"
 #include "simulation/sensors/depth_sensor.h"
 #include "tools/common/command_line.h"
 

@@ -112,7 +112,7 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
   const RequestTarget target = ParseTarget(question.target);
   const auto decision = ParseDecisionTarget(target.path);
   if (decision && question.method == "POST") {
-    RefuseParameters(target);
+    RefuseQueryParameters(target);
     return officials_.Decide(*decision, question);
   }
   const char* accepted = decision ? "POST" : "GET, HEAD";
@@ -150,7 +150,7 @@ HttpResponse Api::RouteApi(const RequestTarget& target) const {
   }
   const bool is_decision = ParseDecisionTarget(path).has_value();
   if (!is_decision && StartsWith(path, kMapChangeAddress)) return map_changes_.Answer(target);
-  RefuseParameters(target);
+  RefuseQueryParameters(target);
   if (is_decision) return PostOnly();
   if (StartsWith(path, kHazardPrefix)) return OneHazard(path.substr(kHazardPrefix.size()));
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));

@@ -9,8 +9,8 @@
 #include "web/api/query.h"
 #include "web/api/vehicle_trails.h"
 #include "web/http/http_message.h"
-#include "web/http/options.h"
 #include "web/http/static_files.h"
+#include "web/http/web_config.h"
 #include "zone/pictures/picture_cache.h"
 #include "zone/service/zone_service.h"
 

@@ -37,7 +37,7 @@ HttpResponse MapChangeApi::Answer(const RequestTarget& target) const {
   if (history) {
     return Events(id.substr(0, id.size() - kHistoryEnding.size()), ParseEventsQuery(target));
   }
-  RefuseParameters(target);
+  RefuseQueryParameters(target);
   return One(id);
 }
 

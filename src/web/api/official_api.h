@@ -6,7 +6,7 @@
 #include "web/api/official_authenticator.h"
 #include "web/api/official_decision.h"
 #include "web/http/http_message.h"
-#include "web/http/options.h"
+#include "web/http/web_config.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {

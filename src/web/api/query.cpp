@@ -236,7 +236,7 @@ std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target) {
   return since;
 }
 
-void RefuseParameters(const RequestTarget& target) {
+void RefuseQueryParameters(const RequestTarget& target) {
   if (target.parameters.empty()) return;
   RefuseUnknown(target.parameters.front().first, "this address accepts none");
 }

@@ -77,6 +77,6 @@ std::size_t ParseEventsQuery(const RequestTarget& target);
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);
 
 /// Throws BadRequest when the target has any parameter.
-void RefuseParameters(const RequestTarget& target);
+void RefuseQueryParameters(const RequestTarget& target);
 
 }  // namespace livemap::web

@@ -7,7 +7,7 @@
 #include "protocol/hazard_catalogue.h"
 #include "web/api/api.h"
 #include "web/api/event_hub.h"
-#include "web/http/options.h"
+#include "web/http/web_config.h"
 
 namespace livemap::web {
 

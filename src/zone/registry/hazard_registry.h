@@ -15,7 +15,7 @@
 #include "protocol/report.h"
 #include "zone/belief/hazard_fusion.h"
 #include "zone/model/hazard.h"
-#include "zone/registry/hazard_record.h"
+#include "zone/registry/hazard_records.h"
 #include "zone/registry/uuid_index.h"
 
 namespace livemap::zone {

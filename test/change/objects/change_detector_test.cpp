@@ -10,7 +10,7 @@
 #include "common/error.h"
 #include "simulation/motion/pass_drive.h"
 #include "simulation/render/lighting.h"
-#include "simulation/render/renderer.h"
+#include "simulation/render/street_renderer.h"
 
 namespace livemap::change {
 namespace {

@@ -25,7 +25,7 @@ struct Errors {
 
 /// Fixes every `step_m` metres and `step_s` seconds in a street that runs east.
 Errors Drive(double sigma_m, const SkyVisibility& sky, int count, double step_m, double step_s) {
-  Multipath multipath(sigma_m, 5);
+  GnssMultipath multipath(sigma_m, 5);
   Errors errors;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector2d error = multipath.ErrorAt(i * step_s, i * step_m, 0, sky);
@@ -48,7 +48,7 @@ double Covariance(const std::vector<double>& x, std::size_t lag) {
   return sum / static_cast<double>(x.size() - lag);
 }
 
-TEST(Multipath, WallsToBothSidesHideTheirWedgesOfTheSky) {
+TEST(GnssMultipath, WallsToBothSidesHideTheirWedgesOfTheSky) {
   EXPECT_DOUBLE_EQ(kPark.HiddenShare(), 0);
   EXPECT_DOUBLE_EQ(kHousesLeft.HiddenShare(), 0.25);
   EXPECT_DOUBLE_EQ(kCanyon.HiddenShare(), 0.5);
@@ -57,7 +57,7 @@ TEST(Multipath, WallsToBothSidesHideTheirWedgesOfTheSky) {
   EXPECT_DOUBLE_EQ((SkyVisibility{0, M_PI / 4}).LeftSurplus(), -0.25);
 }
 
-TEST(Multipath, CanyonHasTheStatedSigmasAndNoPush) {
+TEST(GnssMultipath, CanyonHasTheStatedSigmasAndNoPush) {
   // 10 m apart: 400000 m are about 6700 independent values, the variance is known to 1.7 %.
   const Errors errors = Drive(3, kCanyon, 40000, 10, 0);
   EXPECT_NEAR(Mean(errors.north), 0, 0.2);
@@ -65,44 +65,45 @@ TEST(Multipath, CanyonHasTheStatedSigmasAndNoPush) {
   EXPECT_NEAR(Covariance(errors.east, 0) / 2.25, 1, 0.09);
 }
 
-TEST(Multipath, HousesToTheLeftPushToTheRight) {
+TEST(GnssMultipath, HousesToTheLeftPushToTheRight) {
   const Errors errors = Drive(4, kHousesLeft, 40000, 10, 0);
   EXPECT_NEAR(Mean(errors.north), -2, 0.15);
   EXPECT_NEAR(Mean(errors.east), 0, 0.1);
   EXPECT_NEAR(std::sqrt(Covariance(errors.north, 0)), 2, 0.1);
 }
 
-TEST(Multipath, ForgetsWithinThirtyMetresOrAHundredSeconds) {
+TEST(GnssMultipath, ForgetsWithinThirtyMetresOrAHundredSeconds) {
   const Errors moving = Drive(1, kCanyon, 40000, 10, 0);
   EXPECT_NEAR(Covariance(moving.north, 3) / Covariance(moving.north, 0), std::exp(-1), 0.06);
   const Errors standing = Drive(1, kCanyon, 40000, 0, 20);
   EXPECT_NEAR(Covariance(standing.east, 5) / Covariance(standing.east, 0), std::exp(-1), 0.06);
 }
 
-TEST(Multipath, TurnsWithTheStreet) {
-  Multipath east(2, 5);
-  Multipath north(2, 5);
+TEST(GnssMultipath, TurnsWithTheStreet) {
+  GnssMultipath east(2, 5);
+  GnssMultipath north(2, 5);
   const Eigen::Vector2d a = east.ErrorAt(0, 0, 0, kHousesLeft);
   const Eigen::Vector2d b = north.ErrorAt(0, 0, M_PI / 2, kHousesLeft);
   EXPECT_NEAR(b.x(), -a.y(), 1e-12);
   EXPECT_NEAR(b.y(), a.x(), 1e-12);
 }
 
-TEST(Multipath, NeitherAParkNorZeroMetresMoveAFix) {
+TEST(GnssMultipath, NeitherAParkNorZeroMetresMoveAFix) {
   for (const Errors& errors : {Drive(0, kCanyon, 100, 1, 0.1), Drive(5, kPark, 100, 1, 0.1)}) {
     for (const double error : errors.east) ASSERT_EQ(error, 0);
     for (const double error : errors.north) ASSERT_EQ(error, 0);
   }
 }
 
-TEST(Multipath, SameSeedSameErrors) {
+TEST(GnssMultipath, SameSeedSameErrors) {
   EXPECT_EQ(Drive(2, kCanyon, 50, 1, 0.1).north, Drive(2, kCanyon, 50, 1, 0.1).north);
-  EXPECT_NE(Multipath(2, 6).ErrorAt(0, 0, 0, kCanyon), Multipath(2, 5).ErrorAt(0, 0, 0, kCanyon));
+  EXPECT_NE(GnssMultipath(2, 6).ErrorAt(0, 0, 0, kCanyon),
+            GnssMultipath(2, 5).ErrorAt(0, 0, 0, kCanyon));
 }
 
-TEST(Multipath, RefusesImpossibleSizes) {
+TEST(GnssMultipath, RefusesImpossibleSizes) {
   for (const double sigma_m : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
-    EXPECT_THAT([&] { Multipath(sigma_m, 1); }, ThrowsMessage<Error>(HasSubstr("multipath")));
+    EXPECT_THAT([&] { GnssMultipath(sigma_m, 1); }, ThrowsMessage<Error>(HasSubstr("multipath")));
   }
 }
 

@@ -13,8 +13,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-std::vector<double> EastErrors(const ReceiverNoise& noise, int count, double step_s) {
-  ReceiverSimulator receiver(noise, 11);
+std::vector<double> EastErrors(const GnssReceiverNoise& noise, int count, double step_s) {
+  GnssReceiverModel receiver(noise, 11);
   std::vector<double> errors;
   for (int i = 0; i < count; ++i) errors.push_back(receiver.ErrorAt(i * step_s)->x());
   return errors;
@@ -28,7 +28,7 @@ double Correlation(const std::vector<double>& x, std::size_t lag) {
 }
 
 TEST(Receiver, WhiteNoiseHasItsSigmaAndNoMemory) {
-  ReceiverNoise noise;
+  GnssReceiverNoise noise;
   noise.white_sigma_m = 0.8;
   const std::vector<double> errors = EastErrors(noise, 40000, 0.1);
   // Standard errors: variance sqrt(2/n) = 0.7 %, correlation 1/sqrt(n) = 0.5 %; bounds at 5 of
@@ -38,7 +38,7 @@ TEST(Receiver, WhiteNoiseHasItsSigmaAndNoMemory) {
 }
 
 TEST(Receiver, BiasHasItsSigmaAndTimeConstant) {
-  ReceiverNoise noise;
+  GnssReceiverNoise noise;
   noise.white_sigma_m = 0;
   noise.bias_sigma_m = 1.5;
   noise.bias_time_constant_s = 20;
@@ -51,10 +51,10 @@ TEST(Receiver, BiasHasItsSigmaAndTimeConstant) {
 }
 
 TEST(Receiver, DropoutsHaveTheirRateAndLength) {
-  ReceiverNoise noise;
+  GnssReceiverNoise noise;
   noise.dropouts_per_minute = 2;
   noise.dropout_mean_s = 4;
-  ReceiverSimulator receiver(noise, 3);
+  GnssReceiverModel receiver(noise, 3);
   int lost = 0;
   int losses = 0;
   bool had_fix = true;
@@ -73,24 +73,24 @@ TEST(Receiver, DropoutsHaveTheirRateAndLength) {
 }
 
 TEST(Receiver, SameSeedSameErrors) {
-  ReceiverNoise noise;
+  GnssReceiverNoise noise;
   noise.bias_sigma_m = 1;
   EXPECT_EQ(EastErrors(noise, 50, 0.1), EastErrors(noise, 50, 0.1));
-  ReceiverSimulator other(noise, 12);
+  GnssReceiverModel other(noise, 12);
   EXPECT_NE(other.ErrorAt(0)->x(), EastErrors(noise, 1, 0.1)[0]);
 }
 
 TEST(Receiver, StatesTheSigmaOfBothErrors) {
-  ReceiverNoise noise;
+  GnssReceiverNoise noise;
   noise.white_sigma_m = 3;
   noise.bias_sigma_m = 4;
-  EXPECT_DOUBLE_EQ(ReceiverSimulator(noise, 1).sigma_m(), 5);
+  EXPECT_DOUBLE_EQ(GnssReceiverModel(noise, 1).sigma_m(), 5);
 }
 
 TEST(Receiver, RefusesImpossibleNoise) {
-  ReceiverNoise noise;
+  GnssReceiverNoise noise;
   noise.white_sigma_m = -1;
-  EXPECT_THAT([&] { ReceiverSimulator(noise, 1); }, ThrowsMessage<Error>(HasSubstr("white noise")));
+  EXPECT_THAT([&] { GnssReceiverModel(noise, 1); }, ThrowsMessage<Error>(HasSubstr("white noise")));
   noise = {};
   noise.bias_time_constant_s = 0;
   EXPECT_THAT([&] { Check(noise); }, ThrowsMessage<Error>(HasSubstr("bias time constant")));

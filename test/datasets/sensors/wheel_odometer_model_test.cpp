@@ -7,19 +7,19 @@
 namespace livemap::datasets {
 namespace {
 
-TEST(Odometer, ScaleErrorsOfManyVehiclesHaveOnePercentSigma) {
+TEST(WheelOdometerModel, ScaleErrorsOfManyVehiclesHaveOnePercentSigma) {
   double squares = 0;
   constexpr int kVehicles = 2000;
   for (int seed = 0; seed < kVehicles; ++seed) {
-    const double error = Odometer(static_cast<std::uint64_t>(seed)).scale() - 1;
+    const double error = WheelOdometerModel(static_cast<std::uint64_t>(seed)).scale() - 1;
     squares += error * error;
   }
   // Known to 1.6 %; bounds at 5 of them.
   EXPECT_NEAR(std::sqrt(squares / kVehicles) / 0.01, 1, 0.08);
 }
 
-TEST(Odometer, MeasuresItsScaledSpeedWithTheVarianceItStates) {
-  Odometer odometer(4);
+TEST(WheelOdometerModel, MeasuresItsScaledSpeedWithTheVarianceItStates) {
+  WheelOdometerModel odometer(4);
   double sum = 0;
   double squares = 0;
   double yaw_squares = 0;
@@ -38,8 +38,8 @@ TEST(Odometer, MeasuresItsScaledSpeedWithTheVarianceItStates) {
   EXPECT_NEAR(yaw_squares / kCount / twist.yaw_rate_variance, 1, 0.04);
 }
 
-TEST(Odometer, ReportsWholeStepsOfItsBus) {
-  Odometer odometer(4);
+TEST(WheelOdometerModel, ReportsWholeStepsOfItsBus) {
+  WheelOdometerModel odometer(4);
   for (int i = 0; i < 100; ++i) {
     const WheelTwist twist = odometer.Measure(0.1 * i + 1, 0.001 * i);
     EXPECT_NEAR(std::remainder(twist.speed_mps, 0.02), 0, 1e-9);
@@ -47,15 +47,15 @@ TEST(Odometer, ReportsWholeStepsOfItsBus) {
   }
 }
 
-TEST(Odometer, StandingWheelReportsZero) {
-  Odometer odometer(4);
+TEST(WheelOdometerModel, StandingWheelReportsZero) {
+  WheelOdometerModel odometer(4);
   for (int i = 0; i < 100; ++i) EXPECT_EQ(odometer.Measure(0.001, 0).speed_mps, 0);
 }
 
-TEST(Odometer, SameSeedSameValues) {
-  Odometer a(4);
-  Odometer b(4);
-  Odometer other(5);
+TEST(WheelOdometerModel, SameSeedSameValues) {
+  WheelOdometerModel a(4);
+  WheelOdometerModel b(4);
+  WheelOdometerModel other(5);
   EXPECT_EQ(a.Measure(8, 0.1).speed_mps, b.Measure(8, 0.1).speed_mps);
   EXPECT_NE(a.scale(), other.scale());
 }

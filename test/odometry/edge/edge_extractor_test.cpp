@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/error.h"
-#include "odometry/edge/canny.h"
+#include "odometry/edge/canny_detector.h"
 
 namespace livemap::odometry {
 namespace {

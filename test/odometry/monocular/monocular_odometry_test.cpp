@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/error.h"
-#include "simulation/room/room.h"
+#include "simulation/room/simulated_room.h"
 
 namespace livemap::odometry {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "simulation/render/scene.h"
+#include "simulation/render/street_scene.h"
 
 namespace livemap::simulation {
 namespace {
@@ -94,7 +94,7 @@ TEST(Skyline, MultipathIsLargerBetweenHousesThanInAPark) {
   WorldDescription world = HousesOnly();
   world.crossings_m.emplace();
   const Street street(world, 3, 20000, true);
-  datasets::Multipath multipath(2, 7);
+  datasets::GnssMultipath multipath(2, 7);
   double between_houses = 0;
   double in_park = 0;
   int houses = 0;

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "simulation/objects/random.h"
+#include "simulation/objects/counter_random.h"
 
 namespace livemap::simulation {
 namespace {

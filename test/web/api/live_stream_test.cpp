@@ -7,7 +7,7 @@
 
 #include "test/web/http/http_client.h"
 #include "test/web/zone_fixture.h"
-#include "web/server/server.h"
+#include "web/server/web_server.h"
 
 namespace livemap::web {
 namespace {

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "web/http/options.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
+#include "web/http/web_config.h"
 
 namespace livemap::web {
 namespace {

@@ -1,0 +1,269 @@
+#include "odometry/edge/aligner.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "odometry/bilinear.h"
+
+namespace livemap::odometry {
+namespace {
+
+constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays stay in the cache.
+constexpr double kMinVisibleShare = 0.1;
+constexpr double kMadToSigma = 1.4826;
+constexpr double kFirstDamping = 1e-3;
+constexpr double kLastDamping = 1e3;
+constexpr float kNearestM = 0.01F;
+constexpr double kMinGain = 0.25;  // A black image must not explain everything.
+
+using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
+using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
+
+ConstMap Part(const std::vector<float>& values, std::size_t begin, std::size_t count) {
+  return {values.data() + begin, static_cast<Eigen::Index>(count)};
+}
+
+}  // namespace
+
+void Aligner::Reserve(std::size_t points) {
+  whitening_.reserve(points);
+  for (Residuals* residuals : {&current_, &candidate_}) {
+    residuals->value.reserve(points);
+    residuals->visible.reserve(points);
+  }
+}
+
+/// Equation (2) of docs/explanation/odometry.md for all points.
+void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
+                       const geo::CameraIntrinsics& camera, const AlignmentState& state,
+                       Residuals& residuals) const {
+  const Eigen::Matrix3f rotation = state.new_from_reference.linear().cast<float>();
+  const Eigen::Vector3f translation = state.new_from_reference.translation().cast<float>();
+  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+  const auto gain = static_cast<float>(state.gain), bias = static_cast<float>(state.bias);
+  const auto last_u = static_cast<float>(grey.cols - 1), last_v = static_cast<float>(grey.rows - 1);
+  residuals.value.resize(points.size());
+  residuals.visible.resize(points.size());
+  residuals.count = 0;
+  Chunk depth, column, row;
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, points.size() - begin);
+    const auto n = static_cast<Eigen::Index>(count);
+    const auto x = Part(points.x, begin, count), y = Part(points.y, begin, count),
+               z = Part(points.z, begin, count);
+    depth.head(n) = rotation(2, 0) * x + rotation(2, 1) * y + rotation(2, 2) * z + translation.z();
+    column.head(n) =
+        (rotation(0, 0) * x + rotation(0, 1) * y + rotation(0, 2) * z + translation.x()) /
+            depth.head(n) * fx +
+        cx;
+    row.head(n) = (rotation(1, 0) * x + rotation(1, 1) * y + rotation(1, 2) * z + translation.y()) /
+                      depth.head(n) * fy +
+                  cy;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const float u = column[i], v = row[i];
+      const std::size_t point = begin + static_cast<std::size_t>(i);
+      // Written so that NaN is not visible.
+      if (!(depth[i] > kNearestM && u >= 0 && v >= 0 && u < last_u && v < last_v)) {
+        residuals.value[point] = 0;
+        residuals.visible[point] = 0;
+        continue;
+      }
+      residuals.value[point] = Interpolate(grey, u, v) - gain * points.intensity[point] - bias;
+      if (!whitening_.empty()) residuals.value[point] *= whitening_[point];
+      residuals.visible[point] = 1;
+      ++residuals.count;
+    }
+  }
+}
+
+/// Residuals of points whose depth is not exact err by that, too: equation (12) of
+/// docs/explanation/monocular-odometry.md. They are divided by how much more, at the motion that
+/// the alignment starts with.
+void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
+  whitening_.resize(points.inverse_depth_sigma.size());
+  const Eigen::Vector3f way =
+      (new_from_reference.linear().transpose() * new_from_reference.translation()).cast<float>();
+  const auto grey_sigma = static_cast<float>(config_.grey_sigma);
+  for (std::size_t i = 0; i < whitening_.size(); ++i) {
+    const float by_inverse_depth =
+        points.z[i] * (points.jacobian[0][i] * way.x() + points.jacobian[1][i] * way.y() +
+                       points.jacobian[2][i] * way.z());
+    const float more = by_inverse_depth * points.inverse_depth_sigma[i] / grey_sigma;
+    whitening_[i] = 1 / std::sqrt(1 + more * more);
+  }
+}
+
+/// From the median of the absolute residuals, which half of them may spoil.
+double Aligner::RobustSigma(const Residuals& residuals) const {
+  constexpr std::size_t kBinsPerLevel = 4;
+  std::array<std::size_t, 256 * kBinsPerLevel> histogram{};
+  for (std::size_t i = 0; i < residuals.value.size(); ++i) {
+    if (residuals.visible[i] == 0) continue;
+    const float bin = std::abs(residuals.value[i]) * static_cast<float>(kBinsPerLevel);
+    ++histogram[std::min(static_cast<std::size_t>(bin), histogram.size() - 1)];
+  }
+  std::size_t seen = 0, bin = 0;
+  while (bin < histogram.size() && 2 * (seen += histogram[bin]) < residuals.count) ++bin;
+  const double median = (static_cast<double>(bin) + 0.5) / static_cast<double>(kBinsPerLevel);
+  return std::max(config_.min_sigma, kMadToSigma * median);
+}
+
+/// Mean of Huber's rho over the visible points, equation (3).
+double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
+  if (static_cast<double>(residuals.count) <
+      kMinVisibleShare * static_cast<double>(residuals.value.size())) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const auto k = static_cast<float>(config_.huber_k * sigma);
+  double sum = 0;
+  for (std::size_t begin = 0; begin < residuals.value.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, residuals.value.size() - begin);
+    const auto magnitude = Part(residuals.value, begin, count).abs();  // 0 where not visible.
+    const auto clipped = magnitude.min(k);
+    sum += static_cast<double>((clipped * (2 * magnitude - clipped)).sum());
+  }
+  return sum / static_cast<double>(residuals.count);
+}
+
+/// Equation (7): the Jacobian is the reference's and stays; only the weights change.
+void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
+  const auto k = static_cast<float>(config_.huber_k * sigma);
+  normal_.setZero();
+  gradient_.setZero();
+  Eigen::Array<float, static_cast<int>(kChunk), kUnknowns> columns, weighted;
+  const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, points.size() - begin);
+    const auto n = static_cast<Eigen::Index>(count);
+    const auto residual = Part(current_.value, begin, count);
+    const auto visible = Part(current_.visible, begin, count);
+    for (int i = 0; i < 6; ++i) {
+      columns.col(i).head(n) = Part(points.jacobian[static_cast<std::size_t>(i)], begin, count);
+    }
+    columns.col(6).head(n) = Part(points.intensity, begin, count);
+    columns.col(7).head(n).setOnes();
+    if (!whitening_.empty()) {
+      for (int i = 0; i < kUnknowns; ++i) {
+        columns.col(i).head(n) *= Part(whitening_, begin, count);
+      }
+    }
+    const Chunk weight_all = [&] {
+      Chunk weight;
+      weight.head(n) = visible * (k / residual.abs().max(k));
+      return weight;
+    }();
+    for (int i = 0; i < unknowns; ++i) {
+      weighted.col(i).head(n) = weight_all.head(n) * columns.col(i).head(n);
+      gradient_[i] += static_cast<double>((weighted.col(i).head(n) * residual).sum());
+      for (int j = 0; j <= i; ++j) {
+        normal_(i, j) +=
+            static_cast<double>((weighted.col(i).head(n) * columns.col(j).head(n)).sum());
+      }
+    }
+  }
+  normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
+}
+
+/// False when the points do not determine the unknowns.
+bool Aligner::Solve(double damping, Step& step) const {
+  Normal damped = normal_;
+  Step wanted = gradient_;
+  const auto hold = [&](int unknown) {
+    damped.row(unknown).setZero();
+    damped.col(unknown).setZero();
+    damped(unknown, unknown) = 1;
+    wanted[unknown] = 0;
+  };
+  if (config_.rotation_only) {
+    for (int i = 0; i < 3; ++i) hold(i);
+  }
+  if (!config_.estimate_illumination) {
+    for (int i = 6; i < kUnknowns; ++i) hold(i);
+  }
+  damped.diagonal() *= 1 + damping;
+  const Eigen::LDLT<Normal> factors(damped);
+  if (factors.info() != Eigen::Success || !factors.isPositive()) return false;
+  step = factors.solve(wanted);
+  return step.allFinite();
+}
+
+/// Equation (8). The twist was solved for times the gain.
+AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) const {
+  AlignmentState moved = state;
+  moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / state.gain);
+  moved.gain = std::clamp(state.gain + step[6], kMinGain, 1 / kMinGain);
+  moved.bias += step[7];
+  return moved;
+}
+
+AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
+                               const geo::CameraIntrinsics& camera, const AlignmentState& start) {
+  AlignmentResult result;
+  result.state = start;
+  result.points = points.size();
+  Whiten(points, start.new_from_reference);
+  Evaluate(points, grey, camera, start, current_);
+  double sigma = RobustSigma(current_);
+  double cost = RobustCost(current_, sigma);
+  double damping = 0;
+  bool stale = true;
+  Step step;
+  while (result.iterations < config_.max_iterations && std::isfinite(cost)) {
+    ++result.iterations;
+    if (stale) BuildNormalEquations(points, sigma);
+    stale = false;
+    if (!Solve(damping, step)) break;
+    const AlignmentState moved = Moved(result.state, step);
+    Evaluate(points, grey, camera, moved, candidate_);
+    const double new_cost = RobustCost(candidate_, sigma);
+    const double pixels =
+        camera.fx * (step.head<3>().norm() * points.mean_inverse_depth + step.segment<3>(3).norm());
+    if (!(new_cost < cost)) {
+      damping = std::max(kFirstDamping, damping * 10);
+      if (damping > kLastDamping || pixels < config_.converged_px) break;
+      continue;
+    }
+    result.state = moved;
+    std::swap(current_, candidate_);
+    sigma = RobustSigma(current_);
+    cost = RobustCost(current_, sigma);
+    damping = damping > kFirstDamping ? damping / 10 : 0;
+    stale = true;
+    if (pixels < config_.converged_px) break;
+  }
+  if (stale) BuildNormalEquations(points, sigma);
+  result.state.new_from_reference = Renormalised(result.state.new_from_reference);
+  result.cost = cost;
+  Summarise(sigma, result);
+  return result;
+}
+
+double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
+                       const geo::CameraIntrinsics& camera, const AlignmentState& state,
+                       double sigma) {
+  Whiten(points, state.new_from_reference);
+  Evaluate(points, grey, camera, state, candidate_);
+  return RobustCost(candidate_, sigma);
+}
+
+void Aligner::Summarise(double sigma, AlignmentResult& result) const {
+  result.sigma = sigma;
+  result.visible = current_.count;
+  const auto k = static_cast<float>(config_.huber_k * sigma);
+  for (std::size_t i = 0; i < current_.value.size(); ++i) {
+    result.inliers += current_.visible[i] > 0 && std::abs(current_.value[i]) <= k ? 1U : 0U;
+  }
+  // Gain and bias are not known either: their part is taken out (Schur complement).
+  Matrix6d pose = normal_.topLeftCorner<6, 6>();
+  if (config_.estimate_illumination) {
+    const Eigen::Matrix2d light = normal_.bottomRightCorner<2, 2>();
+    const Eigen::Matrix<double, 6, 2> mixed = normal_.topRightCorner<6, 2>();
+    if (std::abs(light.determinant()) > 0) pose -= mixed * light.inverse() * mixed.transpose();
+  }
+  result.information = result.state.gain * result.state.gain * pose;
+}
+
+}  // namespace livemap::odometry

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "geo/camera_intrinsics.h"
+#include "odometry/edge/point_selector.h"
+#include "odometry/se3.h"
+
+namespace livemap::odometry {
+
+/// What brings the reference's points and grey values into a new image.
+struct AlignmentState {
+  Eigen::Isometry3d new_from_reference = Eigen::Isometry3d::Identity();
+  double gain = 1;  ///< Grey value in the new image = gain * reference + bias.
+  double bias = 0;
+};
+
+struct AlignmentConfig {
+  int max_iterations = 12;  ///< Per level.
+  double huber_k = 2.0;     ///< In standard deviations of the residuals.
+  double min_sigma = 1.5;   ///< Noise below which no residual counts as an outlier, grey levels.
+  double grey_sigma = 2.0;  ///< Of residuals whose depth is exact, against those where it is not.
+  double converged_px = 0.03;  ///< A step that moves points less than this is the last.
+  bool estimate_illumination = true;
+  bool rotation_only = false;
+};
+
+struct AlignmentResult {
+  AlignmentState state;
+  /// Inverse covariance of the right-hand perturbation delta: new_from_reference * Exp(delta), for
+  /// residuals of variance 1 that are independent of each other.
+  Matrix6d information = Matrix6d::Zero();
+  double sigma = 0;         ///< Robust standard deviation of the residuals, grey levels.
+  double cost = 0;          ///< Mean robust cost, squared grey levels.
+  std::size_t points = 0;   ///< Of the reference.
+  std::size_t visible = 0;  ///< Of them, those that fall into the new image.
+  std::size_t inliers = 0;  ///< Of them, those with full weight.
+  int iterations = 0;
+  double Overlap() const {
+    return points == 0 ? 0 : static_cast<double>(visible) / static_cast<double>(points);
+  }
+};
+
+/// Minimises the photometric error of edge points by inverse compositional Gauss-Newton with Huber
+/// weights (thesis, section 5.2.4; Baker and Matthews 2004); a step that does not lower the robust
+/// cost is rolled back and damped (Levenberg). docs/explanation/odometry.md derives it. Keeps its
+/// buffers from call to call; not thread-safe.
+class Aligner {
+ public:
+  explicit Aligner(const AlignmentConfig& config) : config_(config) {}
+
+  /// Memory for so many points.
+  void Reserve(std::size_t points);
+
+  /// Aligns on one level from `start` on.
+  AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
+                        const geo::CameraIntrinsics& camera, const AlignmentState& start);
+
+  /// Mean robust cost at `state` for residuals of this sigma, without optimising; infinite when
+  /// less than a tenth of the points is visible.
+  double CostAt(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
+                const AlignmentState& state, double sigma);
+
+ private:
+  static constexpr int kUnknowns = 8;  // Twist, gain, bias.
+  using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+  using Step = Eigen::Matrix<double, kUnknowns, 1>;
+
+  struct Residuals {
+    std::vector<float> value;
+    std::vector<float> visible;  // 1 or 0.
+    std::size_t count = 0;       // Visible ones.
+  };
+
+  void Evaluate(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
+                const AlignmentState& state, Residuals& residuals) const;
+  double RobustSigma(const Residuals& residuals) const;
+  double RobustCost(const Residuals& residuals, double sigma) const;
+  void Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference);
+  void BuildNormalEquations(const EdgePoints& points, double sigma);
+  bool Solve(double damping, Step& step) const;
+  AlignmentState Moved(const AlignmentState& state, const Step& step) const;
+  void Summarise(double sigma, AlignmentResult& result) const;
+
+  AlignmentConfig config_;
+  Residuals current_, candidate_;
+  std::vector<float> whitening_;  // Factors of the residuals; empty: all 1.
+  Normal normal_;
+  Step gradient_;
+};
+
+}  // namespace livemap::odometry

@@ -1,0 +1,270 @@
+#include "ros/parameters/mqtt_bridge_parameters.h"
+
+#include <ros/time.h>
+
+#include <filesystem>
+#include <set>
+#include <sstream>
+
+#include "ros/bridge/bridged_type.h"
+#include "ros/parameters/shared_parameters.h"
+#include "transport/topic_template.h"
+
+namespace livemap::ros_io {
+namespace {
+
+constexpr std::size_t kMaxPasswordFileBytes = 4096;
+constexpr int kMaxMessageBytes = 64 << 20;
+
+/// One entry of the list `topics`, read key by key.
+class TopicReader {
+ public:
+  TopicReader(const XmlRpc::XmlRpcValue& entry, std::string place)
+      : entry_(entry), place_(std::move(place)) {
+    if (entry_.getType() != XmlRpc::XmlRpcValue::TypeStruct) {
+      throw Error("parameter '" + place_ + "' is no map of keys and values");
+    }
+  }
+
+  std::string Text(const std::string& key) {
+    return static_cast<std::string>(
+        Take(key, XmlRpc::XmlRpcValue::TypeString, true, "a text").value());
+  }
+
+  int Number(const std::string& key, int standard, int min, int max) {
+    const std::string accepted =
+        "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
+    auto value = Take(key, XmlRpc::XmlRpcValue::TypeInt, false, accepted);
+    if (!value) return standard;
+    const int number = static_cast<int>(*value);
+    if (number < min || number > max) Refuse(key, accepted);
+    return number;
+  }
+
+  bool Flag(const std::string& key, bool standard) {
+    auto value = Take(key, XmlRpc::XmlRpcValue::TypeBoolean, false, "true or false");
+    return value ? static_cast<bool>(*value) : standard;
+  }
+
+  void RejectUnknown() {
+    for (const auto& entry : entry_) {
+      if (known_.count(entry.first) != 0) continue;
+      std::string accepted;
+      for (const std::string& name : known_) accepted += (accepted.empty() ? "" : ", ") + name;
+      throw Error("unknown key '" + entry.first + "' in parameter '" + place_ +
+                  "', accepted are: " + accepted);
+    }
+  }
+
+  [[noreturn]] void Refuse(const std::string& key, const std::string& accepted) {
+    std::ostringstream text;
+    if (entry_.hasMember(key)) entry_[key].write(text);
+    throw Error("parameter '" + place_ + "/" + key + "' is " +
+                (text.str().empty() ? "missing" : text.str()) + ", accepted is " + accepted);
+  }
+
+ private:
+  std::optional<XmlRpc::XmlRpcValue> Take(const std::string& key, XmlRpc::XmlRpcValue::Type type,
+                                          bool required, const std::string& accepted) {
+    known_.insert(key);
+    if (!entry_.hasMember(key)) {
+      if (required) Refuse(key, accepted);
+      return std::nullopt;
+    }
+    if (entry_[key].getType() != type) Refuse(key, accepted);
+    return entry_[key];
+  }
+
+  XmlRpc::XmlRpcValue entry_;
+  std::string place_;
+  std::set<std::string> known_;
+};
+
+BridgeTopic ReadTopic(const XmlRpc::XmlRpcValue& entry, const std::string& place) {
+  TopicReader reader(entry, place);
+  BridgeTopic topic;
+  topic.name = reader.Text("name");
+  if (!transport::IsValidId(topic.name))
+    reader.Refuse("name", "1 to 64 characters of A-Z a-z 0-9 . _ -");
+  topic.ros_topic = reader.Text("ros_topic");
+  topic.type = reader.Text("type");
+  topic.mqtt_topic = reader.Text("mqtt_topic");
+  const std::string direction = reader.Text("direction");
+  if (direction != "in" && direction != "out") reader.Refuse("direction", "in or out");
+  topic.direction = direction == "in" ? BridgeDirection::kIn : BridgeDirection::kOut;
+  topic.qos = reader.Number("qos", topic.qos, 0, 1);
+  topic.max_bytes = reader.Number("max_bytes", topic.max_bytes, 1, kMaxMessageBytes);
+  topic.keep_when_disconnected =
+      reader.Flag("keep_when_disconnected", topic.keep_when_disconnected);
+  topic.ros_queue = reader.Number("ros_queue", topic.ros_queue, 1, 100000);
+  reader.RejectUnknown();
+  return topic;
+}
+
+/// What must hold so that no message can be attributed to the wrong vehicle.
+void CheckTopic(const BridgeTopic& topic, const BridgeConfig& config) {
+  const transport::TopicTemplate mqtt_topic(topic.mqtt_topic);
+  const bool has_vehicle_id =
+      MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes))->has_vehicle_id();
+  const std::string what = "topic '" + topic.name + "' of the bridge ";
+  if (config.role == BridgeRole::kZone) {
+    if (topic.direction == BridgeDirection::kIn && !mqtt_topic.has_vehicle()) {
+      throw Error(what + "has MQTT topic '" + topic.mqtt_topic +
+                  "', but what a zone takes in must name its sender by a level {vehicle}");
+    }
+    if (mqtt_topic.has_vehicle() && !has_vehicle_id) {
+      throw Error(what + "has type '" + topic.type +
+                  "' without a field vehicle_id, so its MQTT topic cannot have {vehicle}");
+    }
+  }
+  // Expands, and so checks, the names that are known now.
+  mqtt_topic.Expand({config.zone, config.role == BridgeRole::kZone ? "any" : config.user});
+}
+
+std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
+  XmlRpc::XmlRpcValue list = parameters.ReadList(
+      "topics",
+      "Topics that the bridge carries; docs/how-to/bridge-other-topics.md lists the keys of an "
+      "entry. On the zone's side incoming messages get their vehicle_id from the level {vehicle} "
+      "of the MQTT topic, which the broker lets only that vehicle write, and outgoing messages on "
+      "a topic with {vehicle} go to the vehicle_id in the message.");
+  if (list.getType() != XmlRpc::XmlRpcValue::TypeArray || list.size() == 0) {
+    throw Error("parameter 'topics' of the bridge is no list, accepted is a list of topics");
+  }
+  std::vector<BridgeTopic> topics;
+  std::set<std::string> names;
+  for (int i = 0; i < list.size(); ++i) {
+    topics.push_back(ReadTopic(list[i], "topics[" + std::to_string(i) + "]"));
+    if (!names.insert(topics.back().name).second) {
+      throw Error("topic name '" + topics.back().name + "' stands twice in parameter 'topics'");
+    }
+  }
+  return topics;
+}
+
+void ReadConnection(ParameterReader& parameters, transport::MqttConfig& mqtt) {
+  parameters.Section("Connection");
+  parameters.Read(
+      "clean_start", mqtt.clean_start,
+      "true: the broker forgets the last session, and the messages it queued, at login.");
+  parameters.Read("session_expiry_s", mqtt.session_expiry_s, {1, 7 * 24 * 3600},
+                  "Time that the broker keeps session and queued messages after a loss.", "s");
+  parameters.Read(
+      "keepalive_s", mqtt.keepalive_s, {5, 65535},
+      "Keep-alive of the connection. A silent connection is given up after 1.5 times this.", "s");
+  parameters.Read("connect_timeout_s", mqtt.connect_timeout_s, {0.1, 600},
+                  "Time limit of a connection attempt, per address of the host.", "s");
+  parameters.Read(
+      "reconnect_min_s", mqtt.reconnect_min_s, {0.01, 600},
+      "First wait after a loss. It doubles each time, and is shortened by up to half at random.",
+      "s");
+  parameters.Read("reconnect_max_s", mqtt.reconnect_max_s, {0.01, 3600},
+                  "Longest wait after a loss.", "s");
+  parameters.Read("max_inflight", mqtt.max_inflight, {1, 65535},
+                  "Number of QoS 1 messages sent and not yet acknowledged.");
+  parameters.Read("queue_messages", mqtt.queue_messages, {1, 1e6},
+                  "Number of messages that may wait for the connection. Beyond it messages are "
+                  "dropped and counted.");
+  parameters.Read("queue_bytes", mqtt.queue_bytes, {1, 1 << 30},
+                  "The same in bytes of payload and topic.", "bytes");
+  parameters.Read("max_packet_bytes", mqtt.max_packet_bytes, {1, 1 << 28},
+                  "Largest packet that is accepted from the broker.", "bytes");
+}
+
+/// The three TLS files, or none of them.
+std::optional<transport::MqttTlsConfig> ReadTlsOptions(ParameterReader& parameters) {
+  transport::MqttTlsConfig tls;
+  parameters.Read("ca_file", tls.ca_file,
+                  "Certificate of the zone's authority, a PEM file. TLS 1.3 needs ca_file, "
+                  "certificate_file and key_file, all three; none means plain TCP. The broker's "
+                  "certificate must be for the name in host. The launch files set all three by the "
+                  "argument `identity`; docs/how-to/enroll-a-vehicle.md tells how to make them.");
+  parameters.Read("certificate_file", tls.certificate_file,
+                  "The vehicle's or zone's own certificate, a PEM file.");
+  parameters.Read("key_file", tls.key_file, "The key of that certificate, a PEM file.");
+  const std::pair<const char*, std::string*> files[] = {{"ca_file", &tls.ca_file},
+                                                        {"certificate_file", &tls.certificate_file},
+                                                        {"key_file", &tls.key_file}};
+  if (tls.ca_file.empty() && tls.certificate_file.empty() && tls.key_file.empty()) {
+    return std::nullopt;
+  }
+  for (const auto& [name, path] : files) {
+    if (path->empty()) {
+      throw Error("parameter '" + std::string(name) +
+                  "' of the bridge is missing, ca_file, certificate_file and key_file go together");
+    }
+  }
+  return tls;
+}
+
+void ReadNames(ParameterReader& parameters, BridgeConfig& config) {
+  std::string role;
+  parameters.ReadChoice("role", role, {"vehicle", "zone"}, "Side of the bridge. Required.");
+  if (role.empty())
+    throw Error("parameter 'role' of the bridge is missing, accepted is vehicle or zone");
+  config.role = role == "zone" ? BridgeRole::kZone : BridgeRole::kVehicle;
+  parameters.ReadRequired("zone", config.zone, "demo",
+                          "Name of the zone whose broker this is, 1 to 64 of A-Z a-z 0-9 . _ -. "
+                          "The launch files set it by the argument `zone`.");
+  parameters.ReadRequired("user", config.user, "car-1",
+                          "Login at the broker: the vehicle's id, which vehicle.launch sets by the "
+                          "argument `vehicle`, or the zone's login.");
+  for (const auto& [name, value] : {std::pair{"zone", config.zone}, {"user", config.user}}) {
+    if (!transport::IsValidId(value)) {
+      throw Error("parameter '" + std::string(name) + "' of the bridge is '" + value +
+                  "', accepted are 1 to 64 characters of A-Z a-z 0-9 . _ -");
+    }
+  }
+}
+
+/// A zone's connection carries the messages of many vehicles and is to be down for longer.
+void SetZoneDefaults(transport::MqttConfig& mqtt) {
+  mqtt.session_expiry_s = 3600;
+  mqtt.max_inflight = 100;
+  mqtt.queue_messages = 10000;
+}
+
+}  // namespace
+
+BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
+  BridgeConfig config;
+  ReadNames(parameters, config);
+  if (config.role == BridgeRole::kZone) SetZoneDefaults(config.mqtt);
+  parameters.Section("Broker");
+  parameters.Read(
+      "host", config.mqtt.host,
+      "Name or address of the broker. The launch files set it by the argument `broker_host`.");
+  parameters.Read("port", config.mqtt.port, {1, 65535},
+                  "Port of the broker. The launch files set it by the argument `broker_port`.");
+  parameters.Read(
+      "password_file", config.password_file,
+      "File whose first line is the password. `livemap broker` writes DIRECTORY/credentials/USER. "
+      "Empty: log in without a password. The launch files set it by the argument `password_file`.");
+  parameters.Read("password_wait_s", config.password_wait_s, {0, 600},
+                  "Time to wait at the start for a broker that is just writing the password file.",
+                  "s");
+  config.mqtt.tls = ReadTlsOptions(parameters);
+  ReadConnection(parameters, config.mqtt);
+  parameters.Section("Period of the diagnostics");
+  ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
+  config.mqtt.client_id = config.user;
+  config.mqtt.user = config.user;
+  parameters.Section("Topics");
+  config.topics = ReadTopics(parameters);
+  parameters.RejectUnknown();
+  for (const BridgeTopic& topic : config.topics) CheckTopic(topic, config);
+  return config;
+}
+
+std::string ReadPassword(const std::string& path, double wait_s) {
+  const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(wait_s);
+  while (!std::filesystem::exists(path) && ros::WallTime::now() < deadline) {
+    ros::WallDuration(0.1).sleep();
+  }
+  const std::string text = ReadFile(path, kMaxPasswordFileBytes);
+  std::string password = text.substr(0, text.find_first_of("\r\n"));
+  if (password.empty()) throw Error("password file '" + path + "' has an empty first line");
+  return password;
+}
+
+}  // namespace livemap::ros_io

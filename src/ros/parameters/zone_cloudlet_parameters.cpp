@@ -1,0 +1,319 @@
+#include "ros/parameters/zone_cloudlet_parameters.h"
+
+#include <cstdlib>
+#include <vector>
+
+#include "ros/parameters/datum_parameter.h"
+#include "ros/parameters/shared_parameters.h"
+
+namespace livemap::ros_io {
+namespace {
+
+/// The numbers of "A,B,..."; empty when `text` is anything else.
+std::vector<double> ParseNumbers(const std::string& text, std::size_t count) {
+  std::vector<double> numbers;
+  const char* at = text.c_str();
+  while (numbers.size() < count) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(at, &end));
+    const char expected = numbers.size() == count ? '\0' : ',';
+    if (end == at || *end != expected) return {};
+    at = end + 1;
+  }
+  return numbers;
+}
+
+std::optional<geo::GeoBox> ReadBounds(ParameterReader& parameters) {
+  std::string text;
+  parameters.Read("zone_bounds", text,
+                  "SOUTH,WEST,NORTH,EAST in degrees. Reports from outside are refused. WEST > EAST "
+                  "crosses the antimeridian. Empty: the whole Earth.");
+  if (text.empty()) return std::nullopt;
+  const std::vector<double> numbers = ParseNumbers(text, 4);
+  if (!numbers.empty()) {
+    const geo::GeoBox box{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
+    if (geo::IsValid(box.south_west) && geo::IsValid(box.north_east) && numbers[0] < numbers[2])
+      return box;
+  }
+  throw Error("parameter 'zone_bounds' is '" + text +
+              "', accepted is SOUTH,WEST,NORTH,EAST in degrees, or nothing for the whole Earth");
+}
+
+void ReadKept(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+  parameters.Section("What is kept");
+  parameters.Read("image_cap_bytes", zone.image_cap_bytes, {0, 1e15},
+                  "Size of the pictures on disk. Beyond it pictures that no hazard shows go first, "
+                  "then the oldest.",
+                  "bytes");
+  parameters.Read("vehicle_retention_s", zone.vehicle_retention_s, {1, 1e6},
+                  "A vehicle that was not heard of for this long is forgotten.", "s");
+  parameters.Read(
+      "max_vehicles", zone.max_vehicles, {1, 1e6},
+      "Number of vehicles. Beyond it the vehicle that was silent for longest is forgotten.");
+  parameters.Read("max_hazards", zone.max_hazards, {1, 1e8},
+                  "Number of hazards on the map. Beyond it new ones are refused.");
+  parameters.Read(
+      "max_map_changes", zone.map_changes.max_features, {1, 1e6},
+      "Number of map changes (objects that came or went), undone and dismissed ones too. Beyond it "
+      "the oldest of these goes. Where only open ones are left, new ones are refused.");
+}
+
+void ReadReportLimits(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+  zone::ReportLimits& limits = zone.limits;
+  parameters.Section(
+      "Limits of a report",
+      "A report beyond a limit is refused for good, except beyond the limits per hour.");
+  parameters.Read("max_position_sigma_m", limits.max_position_sigma_m, {0.1, 10000},
+                  "Largest standard deviation of a reported position along its worst direction.",
+                  "m");
+  parameters.Read("max_future_s", limits.max_future_s, {0, 1e9},
+                  "How far an image's stamp may lie ahead of the zone's clock.", "s");
+  parameters.Read("max_age_s", limits.max_age_s, {60, 1e10},
+                  "How far an image's stamp may lie behind the zone's clock. A report may wait "
+                  "long in a vehicle's outbox.",
+                  "s");
+  parameters.Read(
+      "replay", zone.replay,
+      "true: drives are played back. Reports count as of their arrival, and max_age_s does not "
+      "hold. Never use it in a zone that drivers rely on: it lets old reports in.");
+  parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000},
+                  "Largest speed between two reports of one vehicle, by their stamps and places.",
+                  "m/s");
+  parameters.Read("speed_slack_m", zone.speed.slack_m, {0, 100000},
+                  "Distance by which two reports may be further apart than that: hazards lie "
+                  "beside the vehicle.",
+                  "m");
+  parameters.Read("speed_recovery_reports", zone.speed.recovery_reports, {2, 1000},
+                  "Number of reports, refused in a row for their speed, that agree among "
+                  "themselves: then they are believed.");
+  parameters.Read("max_reports_per_hour", zone.allowance.reports_per_hour, {1, 1e9},
+                  "Reports of one vehicle per hour. Further ones are not taken now; the vehicle "
+                  "sends them again.");
+  parameters.Read(
+      "max_evidence_per_hour", zone.allowance.evidence_per_hour, {1, 1e9},
+      "Evidence of one vehicle per hour: its sightings of known hazards and its answers that "
+      "count. Beyond it a sighting is merged but says nothing of the hazard's presence.");
+  parameters.Read("max_map_changes_per_hour", zone.map_changes_per_hour, {1, 1e9},
+                  "Reports of map changes of one vehicle per hour. Further ones are not taken now; "
+                  "the vehicle sends them again.");
+  parameters.Read("max_reporting_vehicles", zone.allowance.max_vehicles, {1, 1e7},
+                  "Number of vehicles whose reports per hour are counted and whose trust is kept. "
+                  "Beyond it new ones wait until another was silent for an hour.");
+  parameters.Read("max_image_bytes", limits.max_image_bytes, {0, 64e6}, "Largest picture.",
+                  "bytes");
+  parameters.Read("max_image_side_px", limits.max_image_side_px, {1, 65535},
+                  "Longest side of the original image, and of the picture by its header.", "px");
+}
+
+void ReadCommits(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  parameters.Section("Group commit");
+  parameters.Read("batch_reports", config.batch_reports, {1, 100000},
+                  "Most reports of one commit.");
+  parameters.Read("queue_reports", config.queue_reports, {1, 1e7},
+                  "Number of reports that may wait for a commit. Further ones are not taken, and "
+                  "counted; their vehicles send them again.");
+  parameters.Read("queue_bytes", config.queue_bytes, {1e6, 1e12}, "The same in bytes of pictures.",
+                  "bytes");
+}
+
+void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  zone::CatchUpPlanner::Config& catch_up = config.catch_up;
+  parameters.Section(
+      "What one vehicle is told",
+      "The zone tells a vehicle everything around it when it is new here, was silent for "
+      "join_gap_s or has driven half of join_radius_m; and what it missed when it says so.");
+  parameters.Read("join_radius_m", catch_up.radius_m, {1, 100000},
+                  "Hazards within this distance of the vehicle are told.", "m");
+  parameters.Read("join_max_hazards", config.join_max_hazards, {1, 100000},
+                  "Most hazards that one vehicle is told at once, the nearest ones.");
+  parameters.Read("join_picture_bytes", config.join_picture_bytes, {0, 1e8},
+                  "Size of all small pictures of what one vehicle is told at once, the nearest "
+                  "hazards first. 0: none.",
+                  "bytes");
+  parameters.Read("join_gap_s", catch_up.gap_s, {1, 1e6},
+                  "A vehicle that was silent for this long joins anew.", "s");
+  parameters.Read("catch_up_lag_s", catch_up.lag_s, {0, 3600},
+                  "Time that an announcement may be on its way before it counts as missed.", "s");
+  parameters.Read(
+      "catch_up_retry_s", catch_up.retry_s, {0.1, 3600},
+      "Time before a vehicle that still lacks something is told again. It doubles each time.", "s");
+  parameters.Read("catch_up_longest_retry_s", catch_up.longest_retry_s, {0.1, 3600},
+                  "Longest time before a vehicle is told again.", "s");
+  parameters.Read("notice_picture_bytes", config.notice_picture_bytes, {0, 60000},
+                  "Size of the small picture in a notice of a new hazard. 0: none.", "bytes");
+  parameters.Read("advance_period_s", config.advance_period_s, {0.05, 60},
+                  "Time between two looks at which hazards time has changed and whom to ask.", "s");
+  catch_up.max_vehicles = config.zone.max_vehicles;
+}
+
+/// The ranges are those of HazardLifecycle, which also compares the values with each other.
+void ReadLife(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+  zone::HazardLifecycle::Config& life = zone.life;
+  parameters.Renamed("sure_above", "settled_above");
+  parameters.Renamed("surest_presence", "max_presence");
+  parameters.Renamed("hostile_share", "malicious_share");
+  parameters.Renamed("denials", "denying_vehicles");
+  parameters.Section("Lifecycle of a hazard",
+                     "Presence, 0..1, is how sure the zone is that a hazard is there: "
+                     "docs/explanation/hazard-lifecycle.md.");
+  parameters.Read("prior_presence", life.prior_presence, {0.01, 0.99},
+                  "Presence before the first vehicle gives evidence.");
+  parameters.Read("active_above", life.active_above, {0.01, 0.99},
+                  "Least presence to tell drivers, besides the class's `confirmations`.");
+  parameters.Read("active_alone_above", life.active_alone_above, {0.01, 0.99},
+                  "The same for classes whose `confirmations` are 1, and the least presence at "
+                  "which these are not verified.");
+  parameters.Read("verify_below", life.verify_below, {0.01, 0.99},
+                  "Presence below which vehicles are asked whether the hazard is still there.");
+  parameters.Read("settled_above", life.settled_above, {0.01, 0.99},
+                  "Presence from which on they no longer are. At least verify_below.");
+  parameters.Read("gone_below", life.gone_below, {0.01, 0.5},
+                  "Presence below which the hazard leaves the map.");
+  parameters.Read("max_presence", life.max_presence, {0.9, 0.9999},
+                  "Presence never counts as more certain than this.");
+  parameters.Read("malicious_share", life.malicious_share, {0.001, 0.4},
+                  "Share of vehicles that may say what they like.");
+  parameters.Read("suspect_above", life.suspect_above, {0.01, 1},
+                  "A vehicle that is hostile this probably, by what became of its evidence, does "
+                  "not count as one.");
+  parameters.Read("trust_memory_s", zone.trust.memory_s, {60, 1e10},
+                  "Time in which what is held against a vehicle fades to 1/e.", "s");
+  parameters.Read("denying_vehicles", life.denying_vehicles, {2, zone::kMaxEvidencePerHazard - 1},
+                  "Distinct vehicles that deny a hazard before it is gone.");
+  parameters.Read("quarantine_s", life.quarantine_s, {0, 1e9},
+                  "Time that a rejected hazard takes no support.", "s");
+  parameters.Read("reopen_vehicles", life.reopen_vehicles, {2, zone::kMaxEvidencePerHazard},
+                  "Distinct vehicles that reopen it afterwards.");
+  parameters.Read("rejected_keep_s", life.rejected_keep_s, {3600, 1e9},
+                  "Time without support after which a rejected hazard is forgotten.", "s");
+  parameters.Read("life_prior_weight", zone.survival.prior_weight, {0.01, 1e6},
+                  "Number of ended lives that `expected_life_s` of the catalogue counts as.");
+  parameters.Read("life_memory", zone.survival.memory, {1, 1e6},
+                  "Number of ended lives that count at most; older ones fade.");
+  zone.trust.malicious_share = life.malicious_share;
+  zone.trust.max_vehicles = zone.allowance.max_vehicles;
+}
+
+void ReadPolls(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+  zone::PollScheduler::Config& polls = zone.polls;
+  parameters.Section("Polls",
+                     "Whom the zone asks, and whose answer counts: docs/explanation/polls.md.");
+  parameters.Read("poll_price_s", polls.price_s, {0.01, 1e9},
+                  "Price of a poll, as the time that a hazard stands wrongly on the map.", "s");
+  parameters.Read("poll_bytes_per_hour", polls.bytes_per_hour, {1, 1e12},
+                  "Size of polls, answers and pictures together per hour in the long run; at most "
+                  "twice as many in one hour.",
+                  "bytes");
+  parameters.Read("poll_picture_bytes", polls.picture_bytes, {0, 1e6},
+                  "Largest picture of an answer. 0: none is asked for.", "bytes");
+  parameters.ReadChoice<protocol::PollPicture>(
+      "poll_picture", zone.poll_picture,
+      {{"crop", protocol::PollPicture::kCrop}, {"full_frame", protocol::PollPicture::kFullFrame}},
+      "What such a picture shows: crop (the place and its surroundings) or full_frame. It becomes "
+      "the hazard's picture, which officials see in the hazard's popup above the buttons by which "
+      "they decide.");
+  parameters.Read("poll_picture_share", polls.picture_share, {0, 1},
+                  "Pictures are asked for while more than this share of the bytes is left.");
+  parameters.Read("poll_picture_age_s", polls.picture_age_s, {0, 1e10},
+                  "Age after which a hazard's picture is renewed.", "s");
+  parameters.Read("poll_lookahead_s", polls.lookahead_s, {1, 3600},
+                  "Most time before it passes the place that a vehicle is asked.", "s");
+  parameters.Read("poll_lookahead_m", polls.lookahead_m, {1, 10000},
+                  "Most distance ahead of it at which a vehicle is asked.", "m");
+  parameters.Read("poll_timeout_s", polls.answer_timeout_s, {1, 3600}, "Time that a poll is open.",
+                  "s");
+  parameters.Read("poll_same_vehicle_gap_s", polls.same_vehicle_gap_s, {0, 1e7},
+                  "Time before the same vehicle is asked about the same hazard again.", "s");
+  polls.max_vehicles = zone.max_vehicles;
+  parameters.Read("sight_range_m", zone.sight.range_m, {1, 1000},
+                  "An answer counts only from a vehicle that was within this distance, by the "
+                  "positions that the zone knows.",
+                  "m");
+  parameters.Read("sight_half_angle_rad", zone.sight.half_angle_rad, {0.01, 3.2},
+                  "Half of the camera's horizontal view: the place must lie within it.", "rad");
+  parameters.Read("sight_slack_m", zone.sight.position_slack_m, {0, 1000},
+                  "Errors of the vehicle's and the hazard's positions together.", "m");
+  parameters.Read("sight_window_s", zone.sight.window_s, {0.1, 600},
+                  "Time by which an answer's stamp may be off.", "s");
+}
+
+void ReadMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  parameters.Section("rviz");
+  parameters.Read("map_frame", config.map_frame, "Frame of hazard/markers: x east, y north.");
+  config.map_datum = ReadDatum(parameters, "the first hazard or vehicle",
+                               "LATITUDE,LONGITUDE of the map frame's origin, degrees, and where "
+                               "an empty live map looks. Empty: the first hazard or vehicle.");
+  parameters.Read("marker_period_s", config.marker_period_s, {0.05, 3600},
+                  "Time between two pictures of a changing map.", "s");
+  parameters.Read("max_markers", config.max_markers, {0, 1e6}, "Number of hazards shown in rviz.");
+  parameters.Section("Period of the diagnostics");
+  ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
+}
+
+void ReadWeb(ParameterReader& parameters, const std::string& package_path,
+             ZoneCloudletConfig& config) {
+  web::WebConfig& web = config.web_options;
+  parameters.Section(
+      "Live map", "Plain HTTP: before it faces a public network it needs a proxy that speaks TLS.");
+  parameters.Read("web", config.web, "Serve the live map. false: no web server.");
+  parameters.Read("web_address", web.address,
+                  "Address to listen on; 0.0.0.0 serves the whole network. zone.launch sets it by "
+                  "the argument `web_address`.");
+  parameters.Read("web_port", web.port, {0, 65535},
+                  "Port to listen on. 0: any free port; the one taken is in the parameter "
+                  "/livemap/web_port. zone.launch sets it by the argument `web_port`.");
+  parameters.Read("web_root", web.web_root, "Folder of the page. Empty: web/ of the package.");
+  if (web.web_root.empty()) web.web_root = package_path + "/web";
+  parameters.Read("leaflet_root", web.leaflet_root,
+                  "Folder that holds leaflet/ with its cluster plugin.");
+  parameters.Read("tile_url", web.tile_url,
+                  "Address of map tiles, for example https://tiles.example/{z}/{x}/{y}.png. Empty: "
+                  "plain background, offline. zone.launch sets it by the argument `tile_url`.");
+  parameters.Read("tile_attribution", web.tile_attribution,
+                  "Credit that the tiles' provider asks for. zone.launch sets it by the argument "
+                  "`tile_attribution`.");
+  parameters.Read("web_title", web.title, "Title of the page.");
+  parameters.Read("web_threads", web.threads, {1, 64}, "Number of threads of the web server.");
+  parameters.Read("web_max_connections", web.max_connections, {1, 100000},
+                  "Number of connections. Further ones are answered 503.");
+  parameters.Read("web_token_file", web.token_file,
+                  "File of the officials who may confirm, reject and distrust, a line NAME TOKEN "
+                  "each (docs/how-to/use-the-map.md). Empty: nobody.");
+  parameters.Read("web_picture_side_px", web.picture_side_px, {16, 16384},
+                  "Longest side of a picture as people see it.", "px");
+  parameters.Read("web_picture_cache_bytes", web.picture_cache_bytes, {0, 2e9},
+                  "Size of such pictures kept in memory.", "bytes");
+  if (config.map_datum) web.centre = *config.map_datum;
+}
+
+}  // namespace
+
+ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
+                                          const std::string& package_path) {
+  ZoneCloudletConfig config;
+  parameters.ReadRequired("directory", config.zone.directory, "/var/lib/livemap/zone",
+                          "Folder of the store and the pictures; each zone needs its own. "
+                          "zone.launch sets it by the argument `directory`.");
+  if (config.zone.directory.empty()) {
+    throw Error("parameter 'directory' is empty, accepted is the folder of the zone's store");
+  }
+  parameters.Read(
+      "hazards", config.hazards,
+      "Path of the catalogue of classes: radius, colour, label and more. Empty: "
+      "config/hazards.yaml of the package. zone.launch sets it by the argument `hazards`.");
+  if (config.hazards.empty()) config.hazards = package_path + "/config/hazards.yaml";
+  config.zone.catalogue = protocol::HazardCatalogue::Load(config.hazards);
+  config.zone.limits.zone = ReadBounds(parameters);
+  ReadKept(parameters, config.zone);
+  ReadReportLimits(parameters, config.zone);
+  ReadCommits(parameters, config);
+  ReadCatchUp(parameters, config);
+  ReadLife(parameters, config.zone);
+  ReadPolls(parameters, config.zone);
+  ReadMarkers(parameters, config);
+  ReadWeb(parameters, package_path, config);
+  parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
+  return config;
+}
+
+}  // namespace livemap::ros_io

@@ -1,0 +1,72 @@
+#include "web/http/web_config.h"
+
+#include <filesystem>
+#include <regex>
+
+#include "common/error.h"
+
+namespace livemap::web {
+namespace {
+
+void RequireFile(const std::string& option, const std::string& root, const std::string& name) {
+  std::error_code failure;
+  if (std::filesystem::is_regular_file(std::filesystem::path(root) / name, failure)) return;
+  throw Error(option + " is '" + root + "', accepted is a folder that holds " + name);
+}
+
+void RequirePositive(const std::string& option, double value) {
+  if (value > 0 && value < 1e9) return;
+  throw Error(option + " is " + std::to_string(value) + ", accepted is a number above 0");
+}
+
+}  // namespace
+
+std::string TileSource(const std::string& tile_url) {
+  if (tile_url.empty()) return "";
+  const std::string accepted =
+      ", accepted is http(s)://HOST/PATH or /PATH with {z}, {x} and {y} in the path";
+  const bool has_place = tile_url.find("{z}") != std::string::npos &&
+                         tile_url.find("{x}") != std::string::npos &&
+                         tile_url.find("{y}") != std::string::npos;
+  if (!has_place) throw Error("tile_url is '" + tile_url + "'" + accepted);
+  if (std::regex_match(tile_url, std::regex("/[^/\\s;,'\"][^\\s;,'\"]*"))) return "";
+  std::smatch parts;
+  // The host goes into a header: nothing but a host name, an optional {s} in front, and a port.
+  static const std::regex kAddress(
+      "(https?://)(\\{s\\}\\.)?([A-Za-z0-9.-]+(?::[0-9]{1,5})?)/[^\\s'\"]*");
+  if (!std::regex_match(tile_url, parts, kAddress)) {
+    throw Error("tile_url is '" + tile_url + "'" + accepted);
+  }
+  return parts[1].str() + (parts[2].matched ? "*." : "") + parts[3].str();
+}
+
+void Validate(const WebConfig& options) {
+  if (options.port < 0 || options.port > 65535) {
+    throw Error("port is " + std::to_string(options.port) + ", accepted is 0 to 65535");
+  }
+  RequireFile("web_root", options.web_root, "index.html");
+  RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.min.js");
+  RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.markercluster.min.js");
+  TileSource(options.tile_url);
+  if (!geo::IsValid(options.centre)) {
+    throw Error("centre is " + std::to_string(options.centre.latitude_deg) + ", " +
+                std::to_string(options.centre.longitude_deg) +
+                ", accepted is a latitude from -90 to 90 and a longitude from -180 to 180");
+  }
+  if (options.threads < 1 || options.threads > 64) {
+    throw Error("threads is " + std::to_string(options.threads) + ", accepted is 1 to 64");
+  }
+  if (options.picture_side_px < 16 || options.picture_side_px > 16384) {
+    throw Error("picture_side_px is " + std::to_string(options.picture_side_px) +
+                ", accepted is 16 to 16384");
+  }
+  RequirePositive("max_connections", static_cast<double>(options.max_connections));
+  RequirePositive("request_timeout_s", options.request_timeout_s);
+  RequirePositive("answer_timeout_s", options.answer_timeout_s);
+  RequirePositive("ping_timeout_s", options.ping_timeout_s);
+  RequirePositive("heartbeat_s", options.heartbeat_s);
+  RequirePositive("max_queued_messages", static_cast<double>(options.max_queued_messages));
+  RequirePositive("max_queued_bytes", static_cast<double>(options.max_queued_bytes));
+}
+
+}  // namespace livemap::web

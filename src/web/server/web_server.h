@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+
+#include "protocol/hazard_catalogue.h"
+#include "web/http/web_config.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap::web {
+
+/// The zone's web server: the live map's page, its API and its live stream
+/// (docs/reference/http-api.md).
+/// Plain HTTP: in front of a public network stands a proxy that speaks TLS and asks who is there.
+class WebServer {
+ public:
+  using Options = WebConfig;
+
+  /// Listens and serves from its own threads when it returns. Keeps references to `zone` and
+  /// `catalogue`. Throws Error when an option is not accepted or the port cannot be opened.
+  WebServer(const Options& options, zone::ZoneService& zone,
+            const protocol::HazardCatalogue& catalogue);
+  /// Closes every connection and joins the threads.
+  ~WebServer();
+  WebServer(const WebServer&) = delete;
+  WebServer& operator=(const WebServer&) = delete;
+
+  /// The port it listens on, also where the options asked for any.
+  int port() const;
+  /// Open connections, HTTP and live streams together.
+  std::size_t connections() const;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace livemap::web

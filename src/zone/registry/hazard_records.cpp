@@ -1,0 +1,46 @@
+#include "zone/registry/hazard_records.h"
+
+#include <algorithm>
+
+namespace livemap::zone {
+namespace {
+
+constexpr std::array<const char*, 3> kFormats{"jpeg", "png", "webp"};
+constexpr char kHexDigits[] = "0123456789abcdef";
+
+int HexValue(char digit) {
+  if (digit >= '0' && digit <= '9') return digit - '0';
+  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
+  return -1;
+}
+
+}  // namespace
+
+PackedPicture::PackedPicture(const std::string& sha256, const std::string& format) {
+  const auto known = std::find(kFormats.begin(), kFormats.end(), format);
+  if (known == kFormats.end() || sha256.size() != 64) return;
+  std::array<std::uint8_t, 32> bytes{};
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const int high = HexValue(sha256[2 * i]);
+    const int low = HexValue(sha256[2 * i + 1]);
+    if (high < 0 || low < 0) return;
+    bytes[i] = static_cast<std::uint8_t>(16 * high + low);
+  }
+  sha256_ = bytes;
+  format_ = static_cast<std::uint8_t>(1 + (known - kFormats.begin()));
+}
+
+std::string PackedPicture::Sha256() const {
+  std::string text;
+  if (empty()) return text;
+  text.reserve(64);
+  for (const std::uint8_t byte : sha256_) {
+    text.push_back(kHexDigits[byte >> 4]);
+    text.push_back(kHexDigits[byte & 0xf]);
+  }
+  return text;
+}
+
+std::string PackedPicture::Format() const { return empty() ? "" : kFormats[format_ - 1U]; }
+
+}  // namespace livemap::zone
