@@ -60,7 +60,7 @@ TEST(StereoPairBuffer, BeginAnewWhenStampsGoBack) {
 TEST(StereoPairBuffer, AreWaitedForAndTheWaitEndsWhenOneIsTooLate) {
   constexpr double kForeverS = 1e6;
   StereoPairBuffer rights(0, kForeverS, 10);
-  std::thread eye([&] { rights.Put(Frame(100)); });
+  std::thread camera([&] { rights.Put(Frame(100)); });
   EXPECT_EQ(Partner(rights, 100), 100);
   camera.join();
   std::thread late([&] { rights.Put(Frame(300)); });
