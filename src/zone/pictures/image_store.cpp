@@ -59,6 +59,7 @@ ImageStore::ImageStore(std::string directory, std::uint64_t cap_bytes)
     : directory_(std::move(directory)), cap_bytes_(cap_bytes) {
   try {
     fs::create_directories(directory_);
+    const MutexLock lock(mutex_);
     TakeStock();
   } catch (const fs::filesystem_error& error) {
     throw StoreError("store: picture directory '" + directory_ +
@@ -99,7 +100,7 @@ std::string ImageStore::FilePath(const std::string& sha256, const std::string& f
 
 std::string ImageStore::Put(const std::vector<std::uint8_t>& bytes, const std::string& format) {
   std::string sha256 = Sha256Hex(bytes.data(), bytes.size());
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (entries_.count(sha256) != 0 || pending_.count(sha256) != 0) return sha256;
   const std::string path = FilePath(sha256, format);
   const std::string temporary = path + kTemporarySuffix;
@@ -117,13 +118,13 @@ std::string ImageStore::Put(const std::vector<std::uint8_t>& bytes, const std::s
 void ImageStore::Publish() {
   std::map<std::string, Pending> pending;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     pending.swap(pending_);
   }
   if (pending.empty()) return;
   // Without the lock: those who look for pictures need not wait for the disk.
   int error = SynchroniseFileSystemOf(directory_);
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [sha256, picture] : pending) {
     const std::string path = FilePath(sha256, picture.format);
     const std::string temporary = path + kTemporarySuffix;
@@ -143,14 +144,14 @@ void ImageStore::Publish() {
 
 std::optional<std::string> ImageStore::Path(const std::string& sha256) const {
   if (!IsSha256Hex(sha256)) return std::nullopt;
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = entries_.find(sha256);
   if (found == entries_.end()) return std::nullopt;
   return FilePath(sha256, found->second.format);
 }
 
 void ImageStore::ChangeReferences(const std::string& sha256, bool retain) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = entries_.find(sha256);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
@@ -165,7 +166,7 @@ void ImageStore::Retain(const std::string& sha256) { ChangeReferences(sha256, tr
 void ImageStore::Release(const std::string& sha256) { ChangeReferences(sha256, false); }
 
 void ImageStore::EvictBeyondCap() {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   while (total_bytes_ > cap_bytes_ && !eviction_order_.empty()) {
     const std::string sha256 = eviction_order_.begin()->sha256;
     eviction_order_.erase(eviction_order_.begin());
@@ -178,7 +179,7 @@ void ImageStore::EvictBeyondCap() {
 }
 
 std::uint64_t ImageStore::total_bytes() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return total_bytes_;
 }
 

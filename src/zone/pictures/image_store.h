@@ -2,12 +2,13 @@
 
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace livemap::zone {
 
@@ -61,18 +62,19 @@ class ImageStore {
   };
 
   std::string FilePath(const std::string& sha256, const std::string& format) const;
-  void TakeStock();
-  void AddEntry(const std::string& sha256, const std::string& format, std::uint64_t bytes);
+  void TakeStock() REQUIRES(mutex_);
+  void AddEntry(const std::string& sha256, const std::string& format, std::uint64_t bytes)
+      REQUIRES(mutex_);
   void ChangeReferences(const std::string& sha256, bool retain);
 
   const std::string directory_;
   const std::uint64_t cap_bytes_;
-  mutable std::mutex mutex_;
-  std::map<std::string, Entry> entries_;    ///< By SHA-256.
-  std::map<std::string, Pending> pending_;  ///< By SHA-256.
-  std::set<Rank> eviction_order_;
-  std::uint64_t total_bytes_ = 0;
-  std::uint64_t next_age_ = 0;
+  mutable Mutex mutex_;
+  std::map<std::string, Entry> entries_ GUARDED_BY(mutex_);    ///< By SHA-256.
+  std::map<std::string, Pending> pending_ GUARDED_BY(mutex_);  ///< By SHA-256.
+  std::set<Rank> eviction_order_ GUARDED_BY(mutex_);
+  std::uint64_t total_bytes_ GUARDED_BY(mutex_) = 0;
+  std::uint64_t next_age_ GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace livemap::zone

@@ -16,7 +16,7 @@ std::size_t CostOf(const PictureCache::File& file) {
 
 PictureCache::File PictureCache::Get(const std::string& sha256, const std::string& path) {
   if (const auto kept = Find(sha256)) return *kept;
-  const std::lock_guard<std::mutex> lock(decoding_);
+  const MutexLock lock(decoding_);
   // Another thread may have asked for it at the same time.
   if (const auto kept = Find(sha256)) return *kept;
   std::string content;
@@ -36,7 +36,7 @@ PictureCache::File PictureCache::Get(const std::string& sha256, const std::strin
 }
 
 std::optional<PictureCache::File> PictureCache::Find(const std::string& sha256) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = entries_.find(sha256);
   if (found == entries_.end()) return std::nullopt;
   uses_.splice(uses_.begin(), uses_, found->second.use);
@@ -44,7 +44,7 @@ std::optional<PictureCache::File> PictureCache::Find(const std::string& sha256) 
 }
 
 void PictureCache::Keep(const std::string& sha256, const File& file) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!file) ++refused_;
   uses_.push_front(sha256);
   entries_[sha256] = {file, uses_.begin()};
@@ -58,12 +58,12 @@ void PictureCache::Keep(const std::string& sha256, const File& file) {
 }
 
 std::size_t PictureCache::total_bytes() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return total_bytes_;
 }
 
 std::uint64_t PictureCache::refused() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return refused_;
 }
 

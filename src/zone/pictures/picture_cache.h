@@ -5,12 +5,13 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace livemap::zone {
 
@@ -62,12 +63,13 @@ class PictureCache {
 
   const Recode recode_;
   const Config config_;
-  std::mutex decoding_;       ///< Held while a picture is decoded; taken before `mutex_`.
-  mutable std::mutex mutex_;  ///< Guards what follows.
-  std::unordered_map<std::string, Entry> entries_;
-  std::list<std::string> uses_;  ///< Content hashes, the one asked for last in front.
-  std::size_t total_bytes_ = 0;
-  std::uint64_t refused_ = 0;
+  Mutex decoding_ ACQUIRED_BEFORE(mutex_);  ///< Held while a picture is decoded.
+  mutable Mutex mutex_;
+  std::unordered_map<std::string, Entry> entries_ GUARDED_BY(mutex_);
+  /// Content hashes, the one asked for last in front.
+  std::list<std::string> uses_ GUARDED_BY(mutex_);
+  std::size_t total_bytes_ GUARDED_BY(mutex_) = 0;
+  std::uint64_t refused_ GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace livemap::zone

@@ -14,7 +14,7 @@ VehicleTable::VehicleTable(double retention_s, std::size_t max_vehicles)
     : retention_ns_(static_cast<std::int64_t>(retention_s * 1e9)), max_vehicles_(max_vehicles) {}
 
 void VehicleTable::Update(const VehicleState& vehicle) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   auto known = vehicles_.find(vehicle.vehicle_id);
   if (known == vehicles_.end()) {
     MakeRoom(vehicle.heard_ns);
@@ -43,7 +43,7 @@ void VehicleTable::MakeRoom(std::int64_t now_ns) {
 }
 
 std::vector<VehicleState> VehicleTable::List(std::int64_t now_ns) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<VehicleState> result;
   for (const auto& [id, vehicle] : vehicles_) {
     if (now_ns - vehicle.state.heard_ns <= retention_ns_) result.push_back(vehicle.state);
@@ -52,7 +52,7 @@ std::vector<VehicleState> VehicleTable::List(std::int64_t now_ns) const {
 }
 
 std::vector<TrackPoint> VehicleTable::Track(const std::string& vehicle_id) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto known = vehicles_.find(vehicle_id);
   if (known == vehicles_.end()) return {};
   return {known->second.track.begin(), known->second.track.end()};

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "common/mutex.h"
 #include "zone/model/vehicle_state.h"
 #include "zone/registry/vehicle_track.h"
 
@@ -27,16 +27,16 @@ class VehicleTable {
   std::vector<TrackPoint> Track(const std::string& vehicle_id) const;
 
  private:
-  void MakeRoom(std::int64_t now_ns);
+  void MakeRoom(std::int64_t now_ns) REQUIRES(mutex_);
 
   const std::int64_t retention_ns_;
   const std::size_t max_vehicles_;
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   struct Vehicle {
     VehicleState state;
     std::deque<TrackPoint> track;
   };
-  std::map<std::string, Vehicle> vehicles_;
+  std::map<std::string, Vehicle> vehicles_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::zone
