@@ -2,10 +2,10 @@
 
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <utility>
 
+#include "common/mutex.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 #include "zone/model/vehicle_state.h"
@@ -25,24 +25,24 @@ class EventStream {
   using Subscriber = std::function<void(const ZoneEvent&)>;
 
   int Subscribe(Subscriber subscriber) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     subscribers_.emplace(++last_id_, std::move(subscriber));
     return last_id_;
   }
   /// Waits for a call in progress.
   void Unsubscribe(int id) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     subscribers_.erase(id);
   }
   void Publish(const ZoneEvent& event) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     for (const auto& subscriber : subscribers_) subscriber.second(event);
   }
 
  private:
-  std::mutex mutex_;
-  std::map<int, Subscriber> subscribers_;
-  int last_id_ = 0;
+  Mutex mutex_;
+  std::map<int, Subscriber> subscribers_ GUARDED_BY(mutex_);
+  int last_id_ GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace livemap::zone

@@ -40,7 +40,7 @@ void PollCoordinator::SetHazard(Slot slot, std::int64_t now_ns) {
   const HazardRecord& record = state_.hazards.Record(slot);
   const ClassModel entry = steps_.ClassOf(slot);
   const std::int64_t picture_ns = record.picture.empty() ? 0 : record.estimate.last_seen_ns;
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (IsOnMap(record.life.state)) {
     scheduler_.SetHazard(slot, record.estimate.position, entry, record.life, picture_ns, now_ns);
   } else {
@@ -49,7 +49,7 @@ void PollCoordinator::SetHazard(Slot slot, std::int64_t now_ns) {
 }
 
 void PollCoordinator::SetVehicle(const VehicleState& vehicle) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   scheduler_.SetVehicle(vehicle.vehicle_id, {vehicle.heard_ns, vehicle.position, vehicle.course_rad,
                                              vehicle.speed_mps});
 }
@@ -57,7 +57,7 @@ void PollCoordinator::SetVehicle(const VehicleState& vehicle) {
 std::vector<protocol::Poll> PollCoordinator::TakeDue(std::int64_t now_ns) {
   std::vector<PollChoice> choices;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     choices = scheduler_.TakeDue(now_ns);
   }
   std::vector<protocol::Poll> polls;
@@ -101,7 +101,7 @@ std::optional<PollCoordinator::AcceptedAnswer> PollCoordinator::Accept(const Pol
 
 std::optional<PollScheduler::OpenPoll> PollCoordinator::FindOpen(const Uuid& poll,
                                                                  std::int64_t now_ns) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return scheduler_.FindOpen(poll, now_ns);
 }
 
@@ -148,7 +148,7 @@ void PollCoordinator::Apply(const AcceptedAnswer& accepted, ZoneTransaction& tra
 void PollCoordinator::Close(const AcceptedAnswer& accepted, std::int64_t now_ns) {
   const PollAnswer& answer = *accepted.answer;
   const auto picture_bytes = static_cast<double>(answer.image.size());
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   scheduler_.Answered(answer.poll, config_.polls.poll_bytes + picture_bytes, now_ns);
 }
 

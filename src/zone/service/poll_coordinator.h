@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <mutex>
 #include <optional>
 #include <vector>
 
+#include "common/mutex.h"
 #include "common/uuid.h"
 #include "protocol/poll.h"
 #include "zone/admission/vehicle_allowance.h"
@@ -68,8 +68,8 @@ class PollCoordinator {
   VehicleAllowance& allowance_;
   const VehicleTable& vehicles_;
 
-  std::mutex mutex_;  ///< Guards scheduler_.
-  PollScheduler scheduler_;
+  Mutex mutex_;
+  PollScheduler scheduler_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::zone

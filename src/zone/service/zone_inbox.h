@@ -1,14 +1,13 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <mutex>
 #include <utility>
 #include <vector>
 
+#include "common/mutex.h"
 #include "protocol/map_change_report.h"
 #include "protocol/poll.h"
 #include "protocol/report.h"
@@ -73,44 +72,49 @@ class ZoneInbox {
   std::size_t map_changes() const;
 
  private:
+  bool HasNews() const REQUIRES(mutex_) {
+    return closed_ || !reports_.empty() || !map_changes_.empty() || !answers_.empty() ||
+           !orders_.empty();
+  }
+
   const Config config_;
-  mutable std::mutex mutex_;  ///< Guards all below.
-  std::condition_variable arrived_;
-  std::deque<protocol::Report> reports_;
-  std::deque<protocol::MapChangeReport> map_changes_;
-  std::deque<protocol::PollAnswer> answers_;
-  std::deque<CatchUpOrder> orders_;
-  std::size_t bytes_ = 0;  ///< Of the reports' pictures.
-  bool closed_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable arrived_;
+  std::deque<protocol::Report> reports_ GUARDED_BY(mutex_);
+  std::deque<protocol::MapChangeReport> map_changes_ GUARDED_BY(mutex_);
+  std::deque<protocol::PollAnswer> answers_ GUARDED_BY(mutex_);
+  std::deque<CatchUpOrder> orders_ GUARDED_BY(mutex_);
+  std::size_t bytes_ GUARDED_BY(mutex_) = 0;  ///< Of the reports' pictures.
+  bool closed_ GUARDED_BY(mutex_) = false;
 };
 
 inline bool ZoneInbox::Push(protocol::Report report) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const std::size_t bytes = report.image.size();
     const bool full = reports_.size() >= config_.max_reports || bytes_ + bytes > config_.max_bytes;
     if (closed_ || full) return false;
     bytes_ += bytes;
     reports_.push_back(std::move(report));
   }
-  arrived_.notify_one();
+  arrived_.NotifyOne();
   return true;
 }
 
 inline bool ZoneInbox::Push(protocol::MapChangeReport report) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (closed_ || map_changes_.size() >= config_.max_map_changes) return false;
     map_changes_.push_back(std::move(report));
   }
-  arrived_.notify_one();
+  arrived_.NotifyOne();
   return true;
 }
 
 inline bool ZoneInbox::Push(protocol::PollAnswer answer) {
   bool all_kept = true;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (closed_) return false;
     answers_.push_back(std::move(answer));
     if (answers_.size() > config_.max_answers) {
@@ -118,25 +122,24 @@ inline bool ZoneInbox::Push(protocol::PollAnswer answer) {
       all_kept = false;
     }
   }
-  arrived_.notify_one();
+  arrived_.NotifyOne();
   return all_kept;
 }
 
 inline void ZoneInbox::Push(CatchUpOrder order) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (closed_) return;
     orders_.push_back(std::move(order));
   }
-  arrived_.notify_one();
+  arrived_.NotifyOne();
 }
 
 inline ZoneInbox::Batch ZoneInbox::Take(std::chrono::milliseconds patience) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  arrived_.wait_for(lock, patience, [this] {
-    return closed_ || !reports_.empty() || !map_changes_.empty() || !answers_.empty() ||
-           !orders_.empty();
-  });
+  const MutexLock lock(mutex_);
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (!HasNews() && arrived_.WaitUntil(mutex_, deadline)) {
+  }
   Batch batch;
   batch.answers.swap(answers_);
   batch.orders.swap(orders_);
@@ -154,24 +157,24 @@ inline ZoneInbox::Batch ZoneInbox::Take(std::chrono::milliseconds patience) {
 
 inline void ZoneInbox::Close() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     closed_ = true;
   }
-  arrived_.notify_all();
+  arrived_.NotifyAll();
 }
 
 inline bool ZoneInbox::closed() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return closed_;
 }
 
 inline std::size_t ZoneInbox::reports() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return reports_.size();
 }
 
 inline std::size_t ZoneInbox::map_changes() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return map_changes_.size();
 }
 

@@ -77,13 +77,16 @@ protocol::Receipt ZoneService::Handle(const protocol::Report& report) {
 
 std::vector<protocol::Receipt> ZoneService::HandleBatch(
     const std::vector<protocol::Report>& reports) {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  ZoneTransaction transaction(state_, now_ns_());
+  const MutexLock writer(writer_mutex_);
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
   ReportIntake::Batch batch = reports_.Examine(reports, transaction.now_ns());
   {
-    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    const WriterLock lock(data_mutex_);
     if (!batch.pending.empty()) {
-      Commit(transaction, [&] { reports_.Apply(batch, transaction); });
+      Commit(transaction, [&] {
+        writer_mutex_.AssertHeld();
+        reports_.Apply(batch, transaction);
+      });
     }
     CountReports(batch.counted);
   }
@@ -105,13 +108,16 @@ void ZoneService::CountReports(const ZoneStatistics& counted) {
 
 std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
     const std::vector<protocol::MapChangeReport>& reports) {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  ZoneTransaction transaction(state_, now_ns_());
+  const MutexLock writer(writer_mutex_);
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
   MapChangeIntake::Batch batch = map_changes_.Examine(reports, transaction.now_ns());
   {
-    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    const WriterLock lock(data_mutex_);
     if (!batch.pending.empty()) {
-      Commit(transaction, [&] { map_changes_.Apply(batch, transaction); });
+      Commit(transaction, [&] {
+        writer_mutex_.AssertHeld();
+        map_changes_.Apply(batch, transaction);
+      });
     }
     CountMapChanges(batch.counted);
   }
@@ -131,19 +137,19 @@ void ZoneService::CountMapChanges(const MapChangeStatistics& counted) {
 }
 
 std::vector<protocol::Poll> ZoneService::TakeDuePolls() {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
+  const MutexLock writer(writer_mutex_);
   std::vector<protocol::Poll> polls = polls_.TakeDue(now_ns_());
-  const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+  const WriterLock lock(data_mutex_);
   statistics_.polls += polls.size();
   return polls;
 }
 
 bool ZoneService::HandleAnswer(const protocol::PollAnswer& answer) {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  ZoneTransaction transaction(state_, now_ns_());
+  const MutexLock writer(writer_mutex_);
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
   const auto accepted = polls_.Accept(answer, transaction.now_ns());
   if (accepted) {
-    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    const WriterLock lock(data_mutex_);
     Commit(transaction, [&] { polls_.Apply(*accepted, transaction); });
   }
   CountAnswer(accepted.has_value());
@@ -155,18 +161,21 @@ bool ZoneService::HandleAnswer(const protocol::PollAnswer& answer) {
 }
 
 void ZoneService::CountAnswer(bool accepted) {
-  const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+  const WriterLock lock(data_mutex_);
   ++(accepted ? statistics_.answers : statistics_.answers_refused);
 }
 
 void ZoneService::Advance() {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  ZoneTransaction transaction(state_, now_ns_());
+  const MutexLock writer(writer_mutex_);
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
   const std::vector<Slot> due = ageing_.TakeDue(transaction.now_ns());
   if (due.empty()) return;
   try {
-    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
-    Commit(transaction, [&] { ageing_.Apply(due, transaction); });
+    const WriterLock lock(data_mutex_);
+    Commit(transaction, [&] {
+      writer_mutex_.AssertHeld();
+      ageing_.Apply(due, transaction);
+    });
   } catch (...) {
     ageing_.PutBack(due, transaction.now_ns());
     throw;
@@ -177,12 +186,12 @@ void ZoneService::Advance() {
 
 template <typename Decide>
 bool ZoneService::DecideHazard(const Decide& decide) {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  ZoneTransaction transaction(state_, now_ns_());
+  const MutexLock writer(writer_mutex_);
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
   const std::optional<OfficialActions::HazardDecision> decision = decide(transaction.now_ns());
   if (!decision) return false;
   {
-    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    const WriterLock lock(data_mutex_);
     Commit(transaction, [&] { officials_.Apply(*decision, transaction); });
   }
   FollowUp(transaction);
@@ -221,10 +230,10 @@ bool ZoneService::DismissMapChange(const Uuid& uuid, const std::string& official
 bool ZoneService::DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
                                   const std::string& reason) {
   const std::string why = officials_.CheckedReason(official, reason);
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  ZoneTransaction transaction(state_, now_ns_());
+  const MutexLock writer(writer_mutex_);
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
   {
-    const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+    const WriterLock lock(data_mutex_);
     Commit(transaction, [&] { officials_.DecideMapChange(uuid, to, official, why, transaction); });
   }
   FollowUp(transaction);
@@ -242,17 +251,17 @@ std::optional<std::size_t> ZoneService::Distrust(const std::string& vehicle_id,
   const std::uint64_t vehicle = VehicleKey(vehicle_id);
   std::size_t withdrawn = 0;
   for (bool first = true;; first = false) {
-    const std::lock_guard<std::mutex> writer(writer_mutex_);
-    std::vector<Slot> slots = state_.hazards.HazardsWithEvidenceFrom(vehicle);
+    const MutexLock writer(writer_mutex_);
+    std::vector<Slot> slots = StateForWriter().hazards.HazardsWithEvidenceFrom(vehicle);
     if (first && slots.empty() && vehicles_.Track(vehicle_id).empty() &&
         !reports_.HasHeardOf(vehicle_id)) {
       return std::nullopt;
     }
     const bool last = slots.size() <= kMaxAtOnce;
     slots.resize(std::min(slots.size(), kMaxAtOnce));
-    ZoneTransaction transaction(state_, now_ns_());
+    ZoneTransaction transaction(StateForWriter(), now_ns_());
     {
-      const std::unique_lock<std::shared_mutex> lock(data_mutex_);
+      const WriterLock lock(data_mutex_);
       Commit(transaction, [&] { officials_.Distrust(vehicle, slots, why, transaction); });
     }
     FollowUp(transaction);
@@ -288,56 +297,59 @@ std::vector<VehicleState> ZoneService::Vehicles() const { return vehicles_.List(
 std::vector<Hazard> ZoneService::Query(const std::optional<geo::GeoBox>& box,
                                        std::uint64_t since_sequence, std::size_t limit,
                                        const HazardStates& states) const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  return state_.hazards.Query(box, since_sequence, limit, states);
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().hazards.Query(box, since_sequence, limit, states);
 }
 
 std::vector<Hazard> ZoneService::QueryNear(const geo::GeoPoint& centre, double radius_m,
                                            std::size_t limit) const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  return state_.hazards.QueryNear(centre, radius_m, limit);
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().hazards.QueryNear(centre, radius_m, limit);
 }
 
 std::vector<Hazard> ZoneService::ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                                std::uint64_t since_sequence,
                                                std::size_t limit) const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  return state_.hazards.ChangedAround(centre, radius_m, since_sequence, limit);
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().hazards.ChangedAround(centre, radius_m, since_sequence, limit);
 }
 
 std::optional<Hazard> ZoneService::Find(const Uuid& uuid) const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  const auto slot = state_.hazards.Find(uuid);
-  return slot ? std::optional<Hazard>(state_.hazards.Get(*slot)) : std::nullopt;
+  const ReaderLock lock(data_mutex_);
+  const HazardRegistry& hazards = StateForReaders().hazards;
+  const auto slot = hazards.Find(uuid);
+  return slot ? std::optional<Hazard>(hazards.Get(*slot)) : std::nullopt;
 }
 
 std::vector<StoredEvent> ZoneService::Events(const Uuid& hazard, std::size_t limit) const {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  const auto slot = state_.hazards.Find(hazard);
+  const MutexLock writer(writer_mutex_);
+  const ZoneState& state = StateForWriter();
+  const auto slot = state.hazards.Find(hazard);
   if (!slot) return {};
-  return state_.store.LoadEvents(hazard, state_.hazards.Record(*slot).sequence, limit);
+  return state.store.LoadEvents(hazard, state.hazards.Record(*slot).sequence, limit);
 }
 
 std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,
                                                            std::uint64_t since_sequence,
                                                            std::size_t limit,
                                                            const MapChangeStates& states) const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  return state_.map_changes.Query(box, since_sequence, limit, states);
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().map_changes.Query(box, since_sequence, limit, states);
 }
 
 std::optional<MapChangeFeature> ZoneService::FindMapChange(const Uuid& uuid) const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  const MapChangeFeature* feature = state_.map_changes.Find(uuid);
+  const ReaderLock lock(data_mutex_);
+  const MapChangeFeature* feature = StateForReaders().map_changes.Find(uuid);
   return feature != nullptr ? std::optional<MapChangeFeature>(*feature) : std::nullopt;
 }
 
 std::vector<StoredMapChangeEvent> ZoneService::MapChangeEvents(const Uuid& uuid,
                                                                std::size_t limit) const {
-  const std::lock_guard<std::mutex> writer(writer_mutex_);
-  const MapChangeFeature* feature = state_.map_changes.Find(uuid);
+  const MutexLock writer(writer_mutex_);
+  const ZoneState& state = StateForWriter();
+  const MapChangeFeature* feature = state.map_changes.Find(uuid);
   if (feature == nullptr) return {};
-  return state_.store.LoadMapChangeEvents(feature->sequence, limit);
+  return state.store.LoadMapChangeEvents(feature->sequence, limit);
 }
 
 std::optional<std::string> ZoneService::ImagePath(const std::string& sha256) const {
@@ -351,26 +363,27 @@ int ZoneService::Subscribe(Subscriber subscriber) {
 void ZoneService::Unsubscribe(int id) { stream_.Unsubscribe(id); }
 
 std::uint64_t ZoneService::Sequence() const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  return state_.sequence;
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().sequence;
 }
 
 std::uint64_t ZoneService::AnnouncedSequence() const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
-  return state_.announced;
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().announced;
 }
 
 ZoneStatistics ZoneService::Statistics() const {
-  const std::shared_lock<std::shared_mutex> lock(data_mutex_);
+  const ReaderLock lock(data_mutex_);
+  const ZoneState& state = StateForReaders();
   ZoneStatistics statistics = statistics_;
   statistics.vehicle_positions = vehicle_positions_;
   statistics.vehicle_positions_refused = vehicle_positions_refused_;
   statistics.store_errors = store_errors_;
-  statistics.active_hazards = state_.hazards.on_map_count();
-  statistics.hazards_by_state = state_.hazards.counts();
-  statistics.map_changes.by_state = state_.map_changes.counts();
+  statistics.active_hazards = state.hazards.on_map_count();
+  statistics.hazards_by_state = state.hazards.counts();
+  statistics.map_changes.by_state = state.map_changes.counts();
   statistics.image_bytes = images_.total_bytes();
-  statistics.suspect_vehicles = state_.trust.Count(config_.life.suspect_above, now_ns_());
+  statistics.suspect_vehicles = state.trust.Count(config_.life.suspect_above, now_ns_());
   return statistics;
 }
 

@@ -4,12 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <optional>
-#include <shared_mutex>
 #include <string>
 #include <vector>
 
+#include "common/mutex.h"
 #include "common/sqlite.h"
 #include "geo/geo_box.h"
 #include "protocol/map_change_report.h"
@@ -160,21 +159,26 @@ class ZoneService {
  private:
   using Slot = HazardRegistry::Slot;
 
-  /// Runs the transaction and counts a failure of the store. The caller holds writer_mutex_ and,
-  /// exclusively, data_mutex_.
+  /// What a reader may read: all but what ZoneState keeps for the writer.
+  const ZoneState& StateForReaders() const REQUIRES_SHARED(data_mutex_) { return state_; }
+  /// What the writer may read, and change in a transaction.
+  ZoneState& StateForWriter() REQUIRES(writer_mutex_) { return state_; }
+  const ZoneState& StateForWriter() const REQUIRES(writer_mutex_) { return state_; }
+
+  /// Runs the transaction and counts a failure of the store.
   template <typename Body>
-  void Commit(ZoneTransaction& transaction, const Body& body);
+  void Commit(ZoneTransaction& transaction, const Body& body) REQUIRES(writer_mutex_, data_mutex_);
   /// What follows from a committed transaction: the pictures' references, when its hazards change
-  /// and are asked about next, and events for subscribers. The caller holds writer_mutex_ alone.
-  void FollowUp(const ZoneTransaction& transaction);
-  void Schedule(Slot slot, std::int64_t now_ns);
+  /// and are asked about next, and events for subscribers.
+  void FollowUp(const ZoneTransaction& transaction) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  void Schedule(Slot slot, std::int64_t now_ns) REQUIRES(writer_mutex_);
   template <typename Decide>
   bool DecideHazard(const Decide& decide);
   bool DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
                        const std::string& reason);
-  void CountReports(const ZoneStatistics& counted);
-  void CountMapChanges(const MapChangeStatistics& counted);
-  void CountAnswer(bool accepted);
+  void CountReports(const ZoneStatistics& counted) REQUIRES(data_mutex_);
+  void CountMapChanges(const MapChangeStatistics& counted) REQUIRES(data_mutex_);
+  void CountAnswer(bool accepted) EXCLUDES(data_mutex_);
 
   const ZoneConfig config_;
   const Clock now_ns_;
@@ -183,13 +187,15 @@ class ZoneService {
   // Locks are taken in the order writer_mutex_, data_mutex_, then those that parts own: of the
   // polls' scheduler, the pictures, the vehicles and the subscribers.
 
-  /// One writer at a time: owns state_ as ZoneState says, and all collaborators.
-  mutable std::mutex writer_mutex_;
+  /// One writer at a time: owns state_ as ZoneState says, and the collaborators.
+  mutable Mutex writer_mutex_ ACQUIRED_BEFORE(data_mutex_);
   /// Held exclusively from the first change to the end of its commit, so that no reader ever sees
-  /// what is not on disk: guards what readers see of state_, and statistics_.
-  mutable std::shared_mutex data_mutex_;
+  /// what is not on disk.
+  mutable SharedMutex data_mutex_;
+  /// Guarded by both, as ZoneState says. One of two locks is enough to read it, which GUARDED_BY
+  /// cannot express: it is used by StateForReaders and StateForWriter alone.
   ZoneState state_;
-  ZoneStatistics statistics_;
+  ZoneStatistics statistics_ GUARDED_BY(data_mutex_);
 
   // Thread-safe each by itself.
   ImageStore images_;
@@ -199,14 +205,15 @@ class ZoneService {
   std::atomic<std::uint64_t> vehicle_positions_refused_{0};
   std::atomic<std::uint64_t> store_errors_{0};
 
-  // Collaborators: the writer's, but for PollCoordinator::SetVehicle.
-  VehicleAllowance allowance_;
-  HazardSteps steps_;
-  ReportIntake reports_;
-  MapChangeIntake map_changes_;
-  PollCoordinator polls_;
-  OfficialActions officials_;
-  Ageing ageing_;
+  // Collaborators on the state. Two of them have a function that wants no lock; for their other
+  // functions the writer's lock is held, too.
+  VehicleAllowance allowance_ GUARDED_BY(writer_mutex_);
+  HazardSteps steps_ GUARDED_BY(writer_mutex_);
+  ReportIntake reports_ GUARDED_BY(writer_mutex_);
+  MapChangeIntake map_changes_ GUARDED_BY(writer_mutex_);
+  PollCoordinator polls_;      ///< SetVehicle: any thread.
+  OfficialActions officials_;  ///< CheckedReason: any thread.
+  Ageing ageing_ GUARDED_BY(writer_mutex_);
 };
 
 }  // namespace livemap::zone

@@ -20,7 +20,9 @@ namespace livemap::zone {
 ///
 /// Not thread-safe; ZoneService guards it with two locks. Whoever holds the writer's lock owns
 /// `store` and `generator`, and may read the rest. The rest is changed only while the data lock is
-/// held exclusively as well, so that everybody else may read it with the data lock shared.
+/// held exclusively as well, so that everybody else may read it with the data lock shared. The
+/// thread-safety analysis checks this where ZoneService reaches the state; those that get a
+/// reference to it say in their docstrings which locks their callers hold.
 struct ZoneState {
   /// Opens or makes the database in `directory` and loads it. `uuid_seed` seeds the generator; the
   /// same seed gives other ids after a restart, because the ids of before are taken. Throws
