@@ -19,13 +19,13 @@ EventHub::~EventHub() {
 }
 
 void EventHub::Join(const std::shared_ptr<LiveListener>& listener) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!stopped_) listeners_[listener.get()] = listener;
 }
 
 void EventHub::Leave(const LiveListener* listener) {
   std::shared_ptr<LiveListener> released;  // Destroyed after the lock is given back.
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = listeners_.find(listener);
   if (found == listeners_.end()) return;
   released = std::move(found->second);
@@ -34,14 +34,14 @@ void EventHub::Leave(const LiveListener* listener) {
 
 void EventHub::Stop() {
   decltype(listeners_) released;
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   stopped_ = true;
   released.swap(listeners_);
 }
 
 void EventHub::Publish(const zone::ZoneEvent& event) {
   if (event.vehicle) trails_.Add(*event.vehicle);
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (listeners_.empty()) return;
   LiveMessage message;
   if (event.hazard) {

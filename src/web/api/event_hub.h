@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "common/mutex.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/api/vehicle_trails.h"
 #include "zone/service/zone_service.h"
@@ -49,9 +49,9 @@ class EventHub {
   zone::ZoneService& zone_;
   const protocol::HazardCatalogue& catalogue_;
   VehicleTrails& trails_;
-  std::mutex mutex_;
-  std::map<const LiveListener*, std::shared_ptr<LiveListener>> listeners_;
-  bool stopped_ = false;
+  Mutex mutex_;
+  std::map<const LiveListener*, std::shared_ptr<LiveListener>> listeners_ GUARDED_BY(mutex_);
+  bool stopped_ GUARDED_BY(mutex_) = false;
   int subscription_ = 0;
 };
 

@@ -141,13 +141,13 @@ std::optional<std::string> OfficialAuthenticator::NameOf(const std::string& toke
 }
 
 bool OfficialAuthenticator::MayTry(const std::string& client, std::int64_t now_ns) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto* attempts = attempts_.Find(client);
   return attempts == nullptr || attempts->front().TokensAt(now_ns) >= 1;
 }
 
 void OfficialAuthenticator::CountMistake(const std::string& client, std::int64_t now_ns) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   // Several wrong tokens may have been looked at together: each counts.
   attempts_.Use(client, now_ns)->front().Spend(1);
 }

@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/mutex.h"
 #include "common/token_bucket.h"
 
 namespace livemap::web {
@@ -60,9 +60,9 @@ class OfficialAuthenticator {
   void CountMistake(const std::string& client, std::int64_t now_ns);
 
   const std::vector<Official> officials_;
-  std::mutex mutex_;
+  Mutex mutex_;
   /// For each client that was wrong, how often it may be wrong still.
-  KeyedTokenBuckets<1> attempts_;
+  KeyedTokenBuckets<1> attempts_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::web

@@ -4,7 +4,7 @@ namespace livemap::web {
 
 void VehicleTrails::Add(const zone::VehicleState& vehicle) {
   if (!geo::IsValid(vehicle.position)) return;
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   auto trail = trails_.find(vehicle.vehicle_id);
   if (trail == trails_.end()) {
     if (trails_.size() >= config_.max_vehicles) return;
@@ -20,7 +20,7 @@ void VehicleTrails::Add(const zone::VehicleState& vehicle) {
 }
 
 TrailPositions VehicleTrails::Get(const std::string& vehicle_id) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto trail = trails_.find(vehicle_id);
   TrailPositions positions;
   if (trail == trails_.end()) return positions;

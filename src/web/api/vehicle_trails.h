@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <string>
 
+#include "common/mutex.h"
 #include "web/json/json.h"
 #include "zone/service/zone_service.h"
 
@@ -30,8 +30,8 @@ class VehicleTrails {
 
  private:
   Config config_;
-  mutable std::mutex mutex_;
-  std::map<std::string, std::deque<geo::GeoPoint>> trails_;
+  mutable Mutex mutex_;
+  std::map<std::string, std::deque<geo::GeoPoint>> trails_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::web
