@@ -15,7 +15,7 @@ PictureMasker::PictureMasker(std::unique_ptr<PrivacyMask> mask) : mask_(std::mov
 }
 
 PictureMasker::Masked PictureMasker::Mask(const cv::Mat& bgr, const cv::Rect& part) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!mask_) return {bgr, ""};
   try {
     Masked masked{bgr.clone(), ""};
@@ -29,7 +29,7 @@ PictureMasker::Masked PictureMasker::Mask(const cv::Mat& bgr, const cv::Rect& pa
 }
 
 PictureMasker::Counters PictureMasker::counters() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return counters_;
 }
 

@@ -3,10 +3,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "common/mutex.h"
 #include "perception/privacy/privacy_mask.h"
 
 namespace livemap::perception {
@@ -49,9 +49,10 @@ class PictureMasker {
 
  private:
   std::atomic<std::uint64_t> frame_{0};
-  mutable std::mutex mutex_;           ///< Guards the rest.
-  std::unique_ptr<PrivacyMask> mask_;  ///< None: privacy is off.
-  Counters counters_;
+  mutable Mutex mutex_;
+  /// None: privacy is off.
+  std::unique_ptr<PrivacyMask> mask_ GUARDED_BY(mutex_) PT_GUARDED_BY(mutex_);
+  Counters counters_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::perception
