@@ -25,12 +25,12 @@ MapChangeReceiver::MapChangeReceiver(ros::NodeHandle node, zone::ZoneService& zo
 void MapChangeReceiver::OnMapChange(const MapChange& message) {
   try {
     const bool queued = inbox_.Push(ros_io::FromMessage(message));
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counters_.received;
     if (!queued) ++counters_.not_queued;
   } catch (const Error& error) {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       ++counters_.received;
       ++counters_.malformed;
     }
@@ -56,7 +56,7 @@ void MapChangeReceiver::Commit(const std::vector<protocol::MapChangeReport>& rep
 }
 
 MapChangeReceiver::Counters MapChangeReceiver::counters() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return counters_;
 }
 

@@ -6,9 +6,9 @@
 #include <ros/subscriber.h>
 
 #include <cstdint>
-#include <mutex>
 #include <vector>
 
+#include "common/mutex.h"
 #include "protocol/map_change_report.h"
 #include "zone/service/zone_inbox.h"
 #include "zone/service/zone_service.h"
@@ -40,8 +40,8 @@ class MapChangeReceiver {
 
   zone::ZoneService& zone_;
   zone::ZoneInbox& inbox_;
-  mutable std::mutex mutex_;  ///< Guards counters_.
-  Counters counters_;
+  mutable Mutex mutex_;
+  Counters counters_ GUARDED_BY(mutex_);
   ros::Publisher receipt_publisher_;
   ros::Subscriber subscriber_;
 };

@@ -19,32 +19,32 @@ NoticeSender::NoticeSender(NoticePictures& pictures, const ros::Publisher& publi
 
 NoticeSender::~NoticeSender() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     closing_ = true;
   }
-  changed_.notify_one();
+  changed_.NotifyOne();
   thread_.join();
 }
 
 void NoticeSender::Push(const zone::HazardEvent& event) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     events_.push_back(event);
   }
-  changed_.notify_one();
+  changed_.NotifyOne();
 }
 
 void NoticeSender::Work() {
-  std::unique_lock<std::mutex> lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return closing_ || !events_.empty(); });
+    while (!closing_ && events_.empty()) changed_.Wait(mutex_);
     if (events_.empty()) return;
     const zone::HazardEvent event = std::move(events_.front());
     events_.pop_front();
     const bool with_picture = !closing_ && events_.size() < kMaxWaitingForPictures;
-    lock.unlock();
+    lock.Unlock();
     Send(event, with_picture);
-    lock.lock();
+    lock.Lock();
   }
 }
 

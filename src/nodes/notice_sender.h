@@ -3,12 +3,11 @@
 #include <ros/publisher.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
-#include <mutex>
 #include <thread>
 
+#include "common/mutex.h"
 #include "nodes/notice_pictures.h"
 #include "zone/service/zone_service.h"
 
@@ -38,10 +37,10 @@ class NoticeSender {
   const ros::Publisher publisher_;
   std::atomic<std::uint64_t> sent_{0};
   std::atomic<std::uint64_t> pictures_{0};
-  std::mutex mutex_;  ///< Guards the next two.
-  std::deque<zone::HazardEvent> events_;
-  bool closing_ = false;
-  std::condition_variable changed_;
+  Mutex mutex_;
+  std::deque<zone::HazardEvent> events_ GUARDED_BY(mutex_);
+  bool closing_ GUARDED_BY(mutex_) = false;
+  ConditionVariable changed_;
   std::thread thread_;
 };
 

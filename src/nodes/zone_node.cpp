@@ -53,7 +53,10 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       map_changes_(node, zone_, inbox_),
       pictures_(zone_, static_cast<std::size_t>(config_.notice_picture_bytes)),
       updater_(node, private_node) {
-  if (config_.map_datum) SetMap(*config_.map_datum);
+  if (config_.map_datum) {
+    const MutexLock lock(mutex_);
+    SetMap(*config_.map_datum);
+  }
   receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
   poll_publisher_ = node.advertise<HazardPoll>("hazard/poll", 1000);
   notices_ = std::make_unique<NoticeSender>(pictures_,
@@ -116,7 +119,7 @@ ZoneNode::~ZoneNode() {
 
 template <typename Change>
 void ZoneNode::Count(const Change& change) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   change(counters_);
 }
 
@@ -169,7 +172,7 @@ void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
 /// A vehicle that is new, moved far or missed announcements: the worker tells it.
 void ZoneNode::RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence) {
   const std::uint64_t announced = zone_.AnnouncedSequence();
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   auto order =
       catch_up_.Update(vehicle.vehicle_id, vehicle.position, map_sequence, announced, SteadyNs());
   if (!order) return;
@@ -184,7 +187,7 @@ void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
   const geo::GeoPoint place =
       event.hazard ? event.hazard->hazard.position : event.vehicle->position;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!map_) SetMap(place);
     if (event.vehicle) paths_.Add(*event.vehicle);
   }
@@ -249,7 +252,7 @@ void ZoneNode::NoteFailedCommit(const Error& error) {
 bool ZoneNode::TellVehicles(std::deque<zone::CatchUpOrder> orders) {
   for (zone::CatchUpOrder& order : orders) teller_->Add(std::move(order));
   const auto told = teller_->PublishBatch(NowNs());
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (told) catch_up_.Told(*told, SteadyNs());
   counters_.vehicle_notices_sent = teller_->notices();
   return teller_->busy();
@@ -307,7 +310,7 @@ void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
   const auto vehicles = zone_.Vehicles();
   visualization_msgs::MarkerArray markers;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!map_ && hazards.empty()) return;
     if (!map_) SetMap(hazards.front().position);
     paths_.KeepOnly(vehicles);
@@ -322,7 +325,7 @@ void ZoneNode::OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_.force
 void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   ros_io::ZoneCloudletCounters counters;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     counters = counters_;
   }
   counters.reports_waiting = inbox_.reports();

@@ -12,12 +12,12 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "common/mutex.h"
 #include "nodes/catch_up_publisher.h"
 #include "nodes/map_change_receiver.h"
 #include "nodes/notice_sender.h"
@@ -54,8 +54,8 @@ class ZoneNode {
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&);
   void Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
-  /// Makes `datum` the origin of the map frame; mutex_ is held or no other thread runs yet.
-  void SetMap(const geo::GeoPoint& datum);
+  /// Makes `datum` the origin of the map frame.
+  void SetMap(const geo::GeoPoint& datum) REQUIRES(mutex_);
   void SayReady() const;
   void WorkUntilClosed();
   void CommitReports(const std::vector<protocol::Report>& reports);
@@ -73,11 +73,11 @@ class ZoneNode {
   zone::ZoneService zone_;
   zone::ZoneInbox inbox_;  ///< What waits for the worker.
 
-  std::mutex mutex_;  ///< Guards the next four.
-  ros_io::ZoneCloudletCounters counters_;
-  ros_io::VehiclePaths paths_;
-  std::optional<geo::LocalFrame> map_;
-  zone::CatchUpPlanner catch_up_;
+  Mutex mutex_;
+  ros_io::ZoneCloudletCounters counters_ GUARDED_BY(mutex_);
+  ros_io::VehiclePaths paths_ GUARDED_BY(mutex_);
+  std::optional<geo::LocalFrame> map_ GUARDED_BY(mutex_);
+  zone::CatchUpPlanner catch_up_ GUARDED_BY(mutex_);
 
   MapChangeReceiver map_changes_;
   NoticePictures pictures_;
