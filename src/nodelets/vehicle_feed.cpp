@@ -14,7 +14,7 @@
 namespace livemap::nodelets {
 
 VehicleFeed::VehicleFeed(ros::NodeHandle& node, ros::NodeHandle& private_node, const Config& config,
-                         std::mutex& mutex, Handlers handlers)
+                         Mutex& mutex, Handlers handlers)
     : mutex_(mutex),
       handlers_(std::move(handlers)),
       nodelet_name_(config.nodelet_name),
@@ -42,21 +42,21 @@ VehicleFeed::VehicleFeed(ros::NodeHandle& node, ros::NodeHandle& private_node, c
 }
 
 void VehicleFeed::OnFix(const sensor_msgs::NavSatFix& message) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   handlers_.on_fix(ros_io::ToFix(message));
 }
 
 void VehicleFeed::OnPose(const nav_msgs::Odometry& message) {
   const std::optional<geo::TrackPose> pose = vehicle_tf_.FusedPose(message);
   if (!pose) return;
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   handlers_.on_pose(ros_io::FromRosTime(message.header.stamp), *pose);
 }
 
 void VehicleFeed::OnCameraInfo(const sensor_msgs::CameraInfo& message) {
   try {
     const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(message);
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     handlers_.on_intrinsics(intrinsics);
   } catch (const Error& error) {
     ROS_WARN_THROTTLE(kSayAgainS, "%s: dropped: %s", nodelet_name_.c_str(), error.what());
@@ -64,7 +64,7 @@ void VehicleFeed::OnCameraInfo(const sensor_msgs::CameraInfo& message) {
 }
 
 void VehicleFeed::OnImage(const sensor_msgs::ImageConstPtr& image) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   mountings_.Want(image->header.frame_id);
   handlers_.on_image(image);
 }

@@ -10,10 +10,10 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "common/mutex.h"
 #include "geo/camera_intrinsics.h"
 #include "geo/vehicle_pose.h"
 #include "nodelets/vehicle_tf.h"
@@ -22,7 +22,8 @@ namespace livemap::nodelets {
 
 /// What a nodelet that places camera images listens to: fixes, fused poses, the calibration of the
 /// rectified camera, its mounting, and its images. What cannot be used is warned of and dropped.
-/// The handlers are called in the queue of `node`, each with the nodelet's mutex held.
+/// The handlers are called in the queue of `node`, each with the nodelet's mutex held: a handler
+/// that uses what the mutex guards says so to the thread-safety analysis by Mutex::AssertHeld.
 ///
 /// Typical usage: the last step of a nodelet's start makes one; the destructor calls StopImages
 /// before it ends the threads to which the images go.
@@ -47,10 +48,10 @@ class VehicleFeed {
 
   /// `mutex` is the nodelet's and outlives this.
   VehicleFeed(ros::NodeHandle& node, ros::NodeHandle& private_node, const Config& config,
-              std::mutex& mutex, Handlers handlers);
+              Mutex& mutex, Handlers handlers);
 
   /// No image comes after it returns. The mutex is not held.
-  void StopImages() { image_subscriber_.shutdown(); }
+  void StopImages() EXCLUDES(mutex_) { image_subscriber_.shutdown(); }
   /// The resolved name. Any thread.
   const std::string& image_topic() const { return image_topic_; }
 
@@ -60,12 +61,12 @@ class VehicleFeed {
   void OnCameraInfo(const sensor_msgs::CameraInfo& message);
   void OnImage(const sensor_msgs::ImageConstPtr& image);
 
-  std::mutex& mutex_;
-  Handlers handlers_;
+  Mutex& mutex_;
+  Handlers handlers_ GUARDED_BY(mutex_);
   std::string nodelet_name_;
   std::string image_topic_;
   VehicleTf vehicle_tf_;
-  MountingLearner mountings_;
+  MountingLearner mountings_ GUARDED_BY(mutex_);
   std::vector<ros::Subscriber> subscribers_;
   image_transport::Subscriber image_subscriber_;
 };

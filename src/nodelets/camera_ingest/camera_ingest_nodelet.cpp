@@ -5,11 +5,11 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <pluginlib/class_list_macros.hpp>
 #include <thread>
 
 #include "common/frame_queue.h"
+#include "common/mutex.h"
 #include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/ingest_reader.h"
 #include "nodelets/camera_ingest/ingest_stereo.h"
@@ -63,7 +63,10 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     } else {
       Subscribe();
     }
-    window_start_ = ros::WallTime::now();
+    {
+      const MutexLock lock(accounts_mutex_);
+      window_start_ = ros::WallTime::now();
+    }
     diagnostics_ = std::make_unique<Diagnostics>(
         getNodeHandle(), getPrivateNodeHandle(),
         Diagnostics::Config{getName(), "camera_ingest", "camera ingest",
@@ -122,7 +125,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   /// A frame that the source had but could not give.
   void MissFrame(const std::string& reason) {
     {
-      const std::lock_guard<std::mutex> lock(accounts_mutex_);
+      const MutexLock lock(accounts_mutex_);
       ++unread_;
     }
     NODELET_WARN_THROTTLE(kSayAgainS, "%s", reason.c_str());
@@ -148,7 +151,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   }
 
   void Account(bool published) {
-    const std::lock_guard<std::mutex> lock(accounts_mutex_);
+    const MutexLock lock(accounts_mutex_);
     if (published) {
       queue_->Done();
       ++published_in_window_;
@@ -159,7 +162,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   }
 
   void Diagnose(Diagnostics::Status& status) {
-    const std::lock_guard<std::mutex> lock(accounts_mutex_);
+    const MutexLock lock(accounts_mutex_);
     const FrameQueue<IngestFrame>::Counters counters = queue_->counters();
     // The queue counts unusable frames among its dropped ones.
     const std::uint64_t dropped = counters.dropped - bad_;
@@ -204,13 +207,15 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   std::unique_ptr<IngestReader> reader_;
   std::thread worker_;
 
-  std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
-  std::uint64_t bad_ = 0;
-  std::uint64_t unread_ = 0;  ///< Bad ones that never reached the queue.
-  std::uint64_t published_in_window_ = 0;
-  CounterWatch bad_watch_, dropped_watch_;
-  ros::WallTime window_start_;
-  double rate_hz_ = 0;
+  Mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
+  std::uint64_t bad_ GUARDED_BY(accounts_mutex_) = 0;
+  /// Bad ones that never reached the queue.
+  std::uint64_t unread_ GUARDED_BY(accounts_mutex_) = 0;
+  std::uint64_t published_in_window_ GUARDED_BY(accounts_mutex_) = 0;
+  CounterWatch bad_watch_ GUARDED_BY(accounts_mutex_);
+  CounterWatch dropped_watch_ GUARDED_BY(accounts_mutex_);
+  ros::WallTime window_start_ GUARDED_BY(accounts_mutex_);
+  double rate_hz_ GUARDED_BY(accounts_mutex_) = 0;
 
   std::unique_ptr<Diagnostics> diagnostics_;  ///< Last: it uses the rest.
 };

@@ -4,8 +4,8 @@
 #include <sensor_msgs/image_encodings.h>
 
 #include <boost/make_shared.hpp>
-#include <chrono>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "imaging/decode.h"
 #include "ros/conversions/camera_info_conversions.h"
@@ -63,18 +63,19 @@ bool NeedsConversion(const std::string& encoding) {
 
 void CalibrationCache::Put(const sensor_msgs::CameraInfoConstPtr& info) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (by_frame_id_.size() >= kMaxCameras && by_frame_id_.count(info->header.frame_id) == 0)
       return;
     by_frame_id_[info->header.frame_id] = info;
   }
-  arrived_.notify_all();
+  arrived_.NotifyAll();
 }
 
 sensor_msgs::CameraInfoConstPtr CalibrationCache::Find(const std::string& frame_id, double wait_s) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s),
-                    [&] { return closed_ || by_frame_id_.count(frame_id) > 0; });
+  const MutexLock lock(mutex_);
+  const auto deadline = SteadyDeadline(wait_s);
+  while (!closed_ && by_frame_id_.count(frame_id) == 0 && arrived_.WaitUntil(mutex_, deadline)) {
+  }
   const auto found = by_frame_id_.find(frame_id);
   if (found == by_frame_id_.end()) {
     throw Error("there is no camera_info of frame_id '" + frame_id + "'");
@@ -84,10 +85,10 @@ sensor_msgs::CameraInfoConstPtr CalibrationCache::Find(const std::string& frame_
 
 void CalibrationCache::Close() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     closed_ = true;
   }
-  arrived_.notify_all();
+  arrived_.NotifyAll();
 }
 
 const imaging::Rectifier& FrameProcessor::RectifierFor(const sensor_msgs::CameraInfo& info) {

@@ -4,13 +4,12 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
-#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "common/mutex.h"
 #include "imaging/rectifier.h"
 
 namespace livemap::nodelets {
@@ -39,10 +38,10 @@ class CalibrationCache {
   void Close();
 
  private:
-  std::mutex mutex_;
-  std::condition_variable arrived_;
-  std::map<std::string, sensor_msgs::CameraInfoConstPtr> by_frame_id_;
-  bool closed_ = false;
+  Mutex mutex_;
+  ConditionVariable arrived_;
+  std::map<std::string, sensor_msgs::CameraInfoConstPtr> by_frame_id_ GUARDED_BY(mutex_);
+  bool closed_ GUARDED_BY(mutex_) = false;
 };
 
 /// Checks, decodes, rectifies and resizes one frame after the other. Not thread-safe.

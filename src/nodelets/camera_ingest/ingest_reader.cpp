@@ -5,7 +5,8 @@
 #include <sensor_msgs/image_encodings.h>
 
 #include <algorithm>
-#include <chrono>
+
+#include "common/clock.h"
 
 namespace livemap::nodelets {
 namespace {
@@ -40,18 +41,20 @@ IngestReader::IngestReader(const ros_io::IngestConfig& config,
 
 IngestReader::~IngestReader() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     stopped_ = true;
   }
-  stop_requested_.notify_all();
+  stop_requested_.NotifyAll();
   thread_.join();
 }
 
 bool IngestReader::SleepUntil(ros::WallTime wanted) {
   const double wait_s = std::max(0.0, (wanted - ros::WallTime::now()).toSec());
-  std::unique_lock<std::mutex> lock(mutex_);
-  return !stop_requested_.wait_for(lock, std::chrono::duration<double>(wait_s),
-                                   [this] { return stopped_; });
+  const MutexLock lock(mutex_);
+  const auto deadline = SteadyDeadline(wait_s);
+  while (!stopped_ && stop_requested_.WaitUntil(mutex_, deadline)) {
+  }
+  return !stopped_;
 }
 
 bool IngestReader::GoOn() {

@@ -3,13 +3,12 @@
 #include <ros/time.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 
+#include "common/mutex.h"
 #include "imaging/frame_source.h"
 #include "nodelets/camera_ingest/frame_processor.h"
 #include "ros/parameters/camera_ingest_parameters.h"
@@ -43,9 +42,9 @@ class IngestReader {
   const std::unique_ptr<imaging::FrameSource> source_;
   const std::function<void(IngestFrame)> take_;
   const std::function<void(const std::string&)> miss_;
-  std::mutex mutex_;
-  std::condition_variable stop_requested_;
-  bool stopped_ = false;
+  Mutex mutex_;
+  ConditionVariable stop_requested_;
+  bool stopped_ GUARDED_BY(mutex_) = false;
   std::atomic<bool> ended_{false};
   std::thread thread_;
 };

@@ -83,7 +83,7 @@ void IngestStereo::Work() {
       fault = exception.what();
     }
     {
-      const std::lock_guard<std::mutex> lock(accounts_mutex_);
+      const MutexLock lock(accounts_mutex_);
       paired&& fault.empty() ? queue_.Done() : queue_.Unusable();
       bad_ += fault.empty() ? 0U : 1U;
       missing_ += paired ? 0U : 1U;
@@ -106,7 +106,7 @@ bool IngestStereo::PublishDepth(const ProcessedFrame& left) {
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
   publisher_.publish(
       cv_bridge::CvImage(left.image->header, encodings::TYPE_32FC1, depth).toImageMsg(), left.info);
-  const std::lock_guard<std::mutex> lock(accounts_mutex_);
+  const MutexLock lock(accounts_mutex_);
   milliseconds_.push_back(took.count());
   return true;
 }
@@ -141,7 +141,7 @@ void IngestStereo::SayMissing(const std_msgs::Header& left) const {
 }
 
 void IngestStereo::Diagnose(Diagnostics::Status& status) {
-  const std::lock_guard<std::mutex> lock(accounts_mutex_);
+  const MutexLock lock(accounts_mutex_);
   const FrameQueue<ProcessedFrame>::Counters counters = queue_.counters();
   using Level = diagnostic_msgs::DiagnosticStatus;
   if (bad_watch_.HasRisen(bad_)) status.mergeSummary(Level::WARN, "bad stereo pairs");

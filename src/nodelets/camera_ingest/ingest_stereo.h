@@ -5,12 +5,12 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "common/frame_queue.h"
+#include "common/mutex.h"
 #include "imaging/stereo_depth.h"
 #include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
@@ -61,11 +61,13 @@ class IngestStereo {
   std::unique_ptr<imaging::StereoDepth> matcher_;
   std::thread worker_;
 
-  std::mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
-  std::uint64_t bad_ = 0;
-  std::uint64_t missing_ = 0;
-  CounterWatch bad_watch_, missing_watch_;
-  std::vector<double> milliseconds_;  ///< Of the matching, since the last diagnostics.
+  Mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
+  std::uint64_t bad_ GUARDED_BY(accounts_mutex_) = 0;
+  std::uint64_t missing_ GUARDED_BY(accounts_mutex_) = 0;
+  CounterWatch bad_watch_ GUARDED_BY(accounts_mutex_);
+  CounterWatch missing_watch_ GUARDED_BY(accounts_mutex_);
+  /// Of the matching, since the last diagnostics.
+  std::vector<double> milliseconds_ GUARDED_BY(accounts_mutex_);
 };
 
 }  // namespace livemap::nodelets

@@ -1,7 +1,8 @@
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
 
-#include <chrono>
 #include <utility>
+
+#include "common/clock.h"
 
 namespace livemap::nodelets {
 namespace {
@@ -12,7 +13,7 @@ ros::Duration Between(ros::Time a, ros::Time b) { return a < b ? b - a : a - b; 
 
 void StereoPairBuffer::Put(IngestFrame frame) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counters_.in;
     silent_ = false;
     if (!frames_.empty() && frame.header().stamp < frames_.back().header().stamp) {
@@ -21,16 +22,15 @@ void StereoPairBuffer::Put(IngestFrame frame) {
     if (frames_.size() == capacity_) Forget(1);
     frames_.push_back(std::move(frame));
   }
-  arrived_.notify_all();
+  arrived_.NotifyAll();
 }
 
 std::optional<IngestFrame> StereoPairBuffer::Take(ros::Time stamp) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  const auto decided = [&] {
-    return closed_ || (!frames_.empty() && frames_.back().header().stamp + tolerance_ >= stamp);
-  };
-  if (!silent_) arrived_.wait_for(lock, std::chrono::duration<double>(wait_s_), decided);
-  silent_ = !decided();
+  const MutexLock lock(mutex_);
+  const auto deadline = SteadyDeadline(wait_s_);
+  while (!silent_ && !IsDecided(stamp) && arrived_.WaitUntil(mutex_, deadline)) {
+  }
+  silent_ = !IsDecided(stamp);
 
   while (!frames_.empty() && frames_.front().header().stamp + tolerance_ < stamp) Forget(1);
   while (frames_.size() > 1 &&
@@ -47,15 +47,19 @@ std::optional<IngestFrame> StereoPairBuffer::Take(ros::Time stamp) {
 
 void StereoPairBuffer::Close() {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     closed_ = true;
   }
-  arrived_.notify_all();
+  arrived_.NotifyAll();
 }
 
 StereoPairBuffer::Counters StereoPairBuffer::counters() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return counters_;
+}
+
+bool StereoPairBuffer::IsDecided(ros::Time stamp) const {
+  return closed_ || (!frames_.empty() && frames_.back().header().stamp + tolerance_ >= stamp);
 }
 
 void StereoPairBuffer::Forget(std::size_t count) {

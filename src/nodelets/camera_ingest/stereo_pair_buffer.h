@@ -2,13 +2,12 @@
 
 #include <ros/time.h>
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <mutex>
 #include <optional>
 
+#include "common/mutex.h"
 #include "nodelets/camera_ingest/frame_processor.h"
 
 namespace livemap::nodelets {
@@ -38,17 +37,19 @@ class StereoPairBuffer {
   Counters counters() const;
 
  private:
-  void Forget(std::size_t count);
+  /// Whether an image that is kept, or the end, leaves nothing to wait for.
+  bool IsDecided(ros::Time stamp) const REQUIRES(mutex_);
+  void Forget(std::size_t count) REQUIRES(mutex_);
 
   const ros::Duration tolerance_;
   const double wait_s_;
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::condition_variable arrived_;
-  std::deque<IngestFrame> frames_;
-  Counters counters_;
-  bool silent_ = false;
-  bool closed_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable arrived_;
+  std::deque<IngestFrame> frames_ GUARDED_BY(mutex_);
+  Counters counters_ GUARDED_BY(mutex_);
+  bool silent_ GUARDED_BY(mutex_) = false;
+  bool closed_ GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace livemap::nodelets

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
@@ -16,6 +15,7 @@
 
 #include "change/objects/change_detector.h"
 #include "common/frame_queue.h"
+#include "common/mutex.h"
 #include "nodelets/change_detection/map_change_sender.h"
 #include "nodelets/change_detection/posed_frame_queue.h"
 #include "nodelets/diagnostics.h"
@@ -86,7 +86,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     watch_ =
         std::make_unique<change::ChangeDetector>(config_.watch, std::move(method.method), now_ns);
     SayRecovery(watch_->memory().recovery());
-    figures_.places = watch_->memory().size();
+    {
+      const MutexLock lock(mutex_);
+      figures_.places = watch_->memory().size();
+    }
     frames_ = std::make_unique<PosedFrameQueue>(PosedFrameQueue::Config{
         config_.spacing_m, static_cast<std::size_t>(config_.max_waiting_frames),
         config_.use_depth ? config_.depth_wait_s : 0, config_.pose});
@@ -130,17 +133,24 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     // Steady time: a replay that stands still must not keep back what has come.
     pick_timer_ = node.createSteadyTimer(ros::WallDuration(kPickPeriodS), &Self::OnPickTimer, this);
     VehicleFeed::Handlers handlers;
-    handlers.on_fix = [this](const geo::Fix& fix) { frames_->AddFix(fix); };
+    handlers.on_fix = [this](const geo::Fix& fix) {
+      mutex_.AssertHeld();
+      frames_->AddFix(fix);
+    };
     handlers.on_pose = [this](std::int64_t stamp_ns, const geo::TrackPose& pose) {
+      mutex_.AssertHeld();
       frames_->AddPose(stamp_ns, pose);
     };
     handlers.on_intrinsics = [this](const geo::CameraIntrinsics& intrinsics) {
+      mutex_.AssertHeld();
       intrinsics_ = intrinsics;
     };
     handlers.on_mounting = [this](const std::string& frame, const Eigen::Isometry3d& mounting) {
+      mutex_.AssertHeld();
       mountings_[frame] = mounting;
     };
     handlers.on_image = [this](const sensor_msgs::ImageConstPtr& image) {
+      mutex_.AssertHeld();
       frames_->AddImage(image, ros::Time::now().toSec());
     };
     feed_ = std::make_unique<VehicleFeed>(
@@ -151,12 +161,12 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   }
 
   void OnDepth(const sensor_msgs::ImageConstPtr& depth) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     frames_->AddDepth(depth);
   }
 
   void OnPickTimer(const ros::SteadyTimerEvent&) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     while (const auto posed = frames_->Next(ros::Time::now().toSec())) {
       const auto mounting = mountings_.find(posed->image->header.frame_id);
       if (!intrinsics_ || mounting == mountings_.end()) {
@@ -193,7 +203,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     }
     Publish(answer, job.posed.image->header);
     if (sender_) sender_->Tell(answer.passed);
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     ++figures_.outcomes[static_cast<std::size_t>(answer.outcome)];
     if (answer.outcome == change::ChangeDetector::Outcome::kCompared) {
       ++figures_.registered[static_cast<std::size_t>(answer.registered_by)];
@@ -243,7 +253,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
       return ros_io::ToDepthMetres(job.posed.depth, size, config_.depth_units_per_m);
     } catch (const std::exception& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "depth image not used: %s", error.what());
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const MutexLock lock(mutex_);
       ++figures_.depths_unusable;
       return {};
     }
@@ -265,10 +275,10 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   void Diagnose(Diagnostics::Status& status) {
     using Outcome = change::ChangeDetector::Outcome;
     const Queue::Counters queue = queue_->counters();
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const PosedFrameQueue::Counters& frames = frames_->counters();
-    const auto outcome = [this](Outcome which) {
-      return figures_.outcomes[static_cast<std::size_t>(which)];
+    const auto outcome = [outcomes = figures_.outcomes](Outcome which) {
+      return outcomes[static_cast<std::size_t>(which)];
     };
     const bool not_stored = store_errors_.HasRisen(figures_.store_errors);
     const bool dropped = dropped_.HasRisen(queue.dropped);
@@ -326,13 +336,13 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   CounterWatch store_errors_, dropped_, came_;  // Of the diagnostics.
   std::thread worker_;
 
-  std::mutex mutex_;  ///< Guards the rest.
-  std::unique_ptr<PosedFrameQueue> frames_;
-  std::optional<geo::CameraIntrinsics> intrinsics_;
-  std::map<std::string, Eigen::Isometry3d> mountings_;  ///< By frame id.
-  std::uint64_t no_camera_ = 0;
-  std::uint64_t busy_ = 0;
-  Figures figures_;
+  Mutex mutex_;
+  std::unique_ptr<PosedFrameQueue> frames_ PT_GUARDED_BY(mutex_);
+  std::optional<geo::CameraIntrinsics> intrinsics_ GUARDED_BY(mutex_);
+  std::map<std::string, Eigen::Isometry3d> mountings_ GUARDED_BY(mutex_);  ///< By frame id.
+  std::uint64_t no_camera_ GUARDED_BY(mutex_) = 0;
+  std::uint64_t busy_ GUARDED_BY(mutex_) = 0;
+  Figures figures_ GUARDED_BY(mutex_);
 
   // Last: their callbacks use the rest.
   std::unique_ptr<VehicleFeed> feed_;

@@ -28,7 +28,7 @@ MapChangeSender::MapChangeSender(const Config& config, ros::NodeHandle& node, st
 }
 
 void MapChangeSender::Tell(const std::vector<change::PlacedChange>& passed) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const change::PlacedChange& change : passed) {
     const auto report = ros_io::ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
     if (!report || report->confidence < config_.min_confidence) {
@@ -44,7 +44,7 @@ void MapChangeSender::Tell(const std::vector<change::PlacedChange>& passed) {
 }
 
 void MapChangeSender::OnReceipt(const ReportReceipt& message) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   try {
     const protocol::Receipt receipt = ros_io::FromMessage(message);
     if (receipt.status == protocol::Receipt::Status::kRefused) {
@@ -60,7 +60,7 @@ void MapChangeSender::OnReceipt(const ReportReceipt& message) {
 
 void MapChangeSender::OnTick(const ros::SteadyTimerEvent&) {
   if (publisher_.getNumSubscribers() == 0) return;
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const protocol::MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMaxChangesPerTick)) {
     publisher_.publish(ros_io::ToMessage(report));
   }
@@ -72,7 +72,7 @@ void MapChangeSender::TellStoreError(const Error& error) {
 }
 
 void MapChangeSender::Diagnose(Diagnostics::Status& status) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   const vehicle::MapChangeOutbox::Counters& counters = outbox_.counters();
   status.add("changes_unsure", unsure_);
   status.add("changes_told", counters.added);

@@ -4,12 +4,12 @@
 #include <ros/ros.h>
 
 #include <memory>
-#include <mutex>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "change/objects/change_detector.h"
+#include "common/mutex.h"
 #include "nodelets/diagnostics.h"
 #include "vehicle/outbox/map_change_outbox.h"
 
@@ -34,17 +34,17 @@ class MapChangeSender {
  private:
   void OnReceipt(const ReportReceipt& message);
   void OnTick(const ros::SteadyTimerEvent&);
-  void TellStoreError(const Error& error);
+  void TellStoreError(const Error& error) REQUIRES(mutex_);
 
   Config config_;
   ros::Publisher publisher_;
   ros::Subscriber subscriber_;
   ros::SteadyTimer timer_;
-  mutable std::mutex mutex_;  ///< Guards the rest.
-  std::mt19937_64 random_;
-  vehicle::MapChangeOutbox outbox_;
-  std::uint64_t unsure_ = 0;
-  std::uint64_t store_errors_ = 0;
+  mutable Mutex mutex_;
+  std::mt19937_64 random_ GUARDED_BY(mutex_);
+  vehicle::MapChangeOutbox outbox_ GUARDED_BY(mutex_);
+  std::uint64_t unsure_ GUARDED_BY(mutex_) = 0;
+  std::uint64_t store_errors_ GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace livemap::nodelets

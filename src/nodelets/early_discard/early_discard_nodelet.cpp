@@ -6,13 +6,13 @@
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
 #include <thread>
 
 #include "common/frame_queue.h"
+#include "common/mutex.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_support.h"
 #include "nodelets/vehicle_feed.h"
@@ -80,17 +80,24 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     // Steady time: a replay that stands still must not keep back what has come.
     send_timer_ = node.createSteadyTimer(ros::WallDuration(kSendPeriodS), &Self::OnSendTimer, this);
     VehicleFeed::Handlers handlers;
-    handlers.on_fix = [this](const geo::Fix& fix) { sender_->AddFix(fix); };
+    handlers.on_fix = [this](const geo::Fix& fix) {
+      mutex_.AssertHeld();
+      sender_->AddFix(fix);
+    };
     handlers.on_pose = [this](std::int64_t stamp_ns, const geo::TrackPose& pose) {
+      mutex_.AssertHeld();
       sender_->AddPose(stamp_ns, pose);
     };
     handlers.on_intrinsics = [this](const geo::CameraIntrinsics& intrinsics) {
+      mutex_.AssertHeld();
       sender_->SetIntrinsics(intrinsics);
     };
     handlers.on_mounting = [this](const std::string& frame, const Eigen::Isometry3d& mounting) {
+      mutex_.AssertHeld();
       sender_->SetMounting(frame, mounting);
     };
     handlers.on_image = [this](const sensor_msgs::ImageConstPtr& image) {
+      mutex_.AssertHeld();
       masker_->CountFrame();
       if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push(image);
     };
@@ -120,7 +127,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const float score = discard_->Score(shared->image);
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     sender_->AddJudged(ros_io::FromRosTime(image->header.stamp), image->header.frame_id, score,
                        score >= threshold_, {shared->image, owner}, ros::Time::now().toSec());
     ++judged_in_window_;
@@ -128,7 +135,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   }
 
   void OnSendTimer(const ros::SteadyTimerEvent&) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     // Without a listener a frame would be spent, not sent.
     if (publisher_.getNumSubscribers() == 0) return;
     const auto encode = [this](const imaging::Picture& picture, std::size_t max_bytes) {
@@ -153,7 +160,7 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
 
   void Diagnose(Diagnostics::Status& status) {
     const Queue::Counters queue = queue_->counters();
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const vehicle::OffloadSender::Counters& counters = sender_->counters();
     const bool withheld = withheld_.HasRisen(counters.withheld);
     const bool dropped = dropped_.HasRisen(queue.dropped);
@@ -201,10 +208,10 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   CounterWatch withheld_, dropped_;  // Of the diagnostics.
   std::thread worker_;
 
-  std::mutex mutex_;  ///< Guards the rest.
-  std::unique_ptr<vehicle::OffloadSender> sender_;
-  std::uint64_t judged_in_window_ = 0;
-  double ms_in_window_ = 0;
+  Mutex mutex_;
+  std::unique_ptr<vehicle::OffloadSender> sender_ PT_GUARDED_BY(mutex_);
+  std::uint64_t judged_in_window_ GUARDED_BY(mutex_) = 0;
+  double ms_in_window_ GUARDED_BY(mutex_) = 0;
 
   // Last: their callbacks use the rest.
   std::unique_ptr<VehicleFeed> feed_;

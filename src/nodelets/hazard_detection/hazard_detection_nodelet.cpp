@@ -10,9 +10,9 @@
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "common/mutex.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/hazard_detection/hazard_tracking.h"
 #include "nodelets/hazard_detection/recent_pictures.h"
@@ -138,7 +138,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   void Drop(const std::string& error) {
-    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    const MutexLock lock(figures_mutex_);
     ++figures_.bad;
     NODELET_ERROR_THROTTLE(60, "dropped an image of %s: %s", subscriber_.getTopic().c_str(),
                            error.c_str());
@@ -166,7 +166,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     detections_publisher_.publish(boost::make_shared<DetectionArray>(ros_io::ToMessage(
         found, header, detectors_.front()->manifest().name, bgr.size(), seen.ms)));
     for (const DetectionArray& event : events) events_publisher_.publish(event);
-    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    const MutexLock lock(figures_mutex_);
     figures_.detections += found.size();
     ++figures_.processed_in_window;
     figures_.ms_in_window += seen.ms;
@@ -179,7 +179,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
 
   /// The tracker's events, if it runs; the image may be asked for from now on.
   std::vector<DetectionArray> Keep(const Seen& seen, const std_msgs::Header& header) {
-    const std::lock_guard<std::mutex> lock(pictures_mutex_);
+    const MutexLock lock(pictures_mutex_);
     std::vector<DetectionArray> events;
     std::vector<std::int64_t> wanted;
     if (tracking_) {
@@ -197,13 +197,13 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
     std::optional<Kept> kept;
     std::vector<perception::HazardDetection> shown;
     {
-      const std::lock_guard<std::mutex> pictures_lock(pictures_mutex_);
+      const MutexLock pictures_lock(pictures_mutex_);
       const auto stamp_ns = static_cast<std::int64_t>(request.stamp.toNSec());
       kept = recent_->Find(stamp_ns);
       if (kept && tracking_) shown = tracking_->ReportedIn(stamp_ns);
     }
     if (!kept) {
-      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      const MutexLock lock(figures_mutex_);
       ++figures_.unknown_requests;
       return;
     }
@@ -226,7 +226,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       answer->part = request.part;
       part_publisher_.publish(answer);
     }
-    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    const MutexLock lock(figures_mutex_);
     ++figures_.sent_pictures;
   }
 
@@ -257,14 +257,14 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   void CountPicture() {
-    const std::lock_guard<std::mutex> lock(figures_mutex_);
+    const MutexLock lock(figures_mutex_);
     ++figures_.annotated;
   }
 
   void Diagnose(Diagnostics::Status& status) {
     Figures figures;
     {
-      const std::lock_guard<std::mutex> lock(figures_mutex_);
+      const MutexLock lock(figures_mutex_);
       figures = figures_;
       figures_.processed_in_window = 0;
       figures_.ms_in_window = 0;
@@ -305,7 +305,7 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   }
 
   void DiagnoseTracking(Diagnostics::Status& status) {
-    const std::lock_guard<std::mutex> lock(pictures_mutex_);
+    const MutexLock lock(pictures_mutex_);
     const perception::ObjectTracker::Counters& counters = tracking_->counters();
     status.add("events", counters.events);
     status.add("tracks", counters.tracks);
@@ -331,9 +331,10 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
       detectors_;                  ///< Each its engine's thread's own.
   std::vector<float> thresholds_;  ///< The model's, by class index.
   // DeliverResult's and AnswerPicture's, which run at once:
-  std::mutex pictures_mutex_;                 ///< Guards tracking_ and recent_.
-  std::unique_ptr<HazardTracking> tracking_;  ///< None: tracking is off.
-  std::unique_ptr<Recent> recent_;
+  Mutex pictures_mutex_;
+  /// None: tracking is off.
+  std::unique_ptr<HazardTracking> tracking_ PT_GUARDED_BY(pictures_mutex_);
+  std::unique_ptr<Recent> recent_ PT_GUARDED_BY(pictures_mutex_);
   std::unique_ptr<perception::PictureMasker> masker_;
   image_transport::Subscriber subscriber_;
   ros::Subscriber request_subscriber_;
@@ -346,8 +347,8 @@ class HazardDetectionNodelet : public nodelet::Nodelet {
   Clock::time_point window_start_;
   CounterWatch dropped_watch_, bad_watch_;
 
-  std::mutex figures_mutex_;
-  Figures figures_;
+  Mutex figures_mutex_;
+  Figures figures_ GUARDED_BY(figures_mutex_);
   // Last: their threads use the rest.
   std::unique_ptr<Pool> pool_;
   std::unique_ptr<Diagnostics> diagnostics_;

@@ -27,7 +27,7 @@ HazardTracking::HazardTracking(const ros_io::HazardTrackingConfig& config,
       "camera_rect/camera_info", 2, [this](const sensor_msgs::CameraInfo::ConstPtr& info) {
         try {
           const geo::CameraIntrinsics intrinsics = ros_io::ToRectifiedIntrinsics(*info);
-          const std::lock_guard<std::mutex> lock(mutex_);
+          const MutexLock lock(mutex_);
           intrinsics_ = intrinsics;
         } catch (const Error& error) {
           ROS_WARN_THROTTLE(60, "tracking knows no camera: %s", error.what());
@@ -83,7 +83,7 @@ std::vector<perception::HazardDetection> HazardTracking::ReportedIn(std::int64_t
 std::optional<perception::CameraMotion> HazardTracking::MotionAt(const std_msgs::Header& header) {
   perception::CameraMotion motion;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!intrinsics_) return std::nullopt;
     motion.intrinsics = *intrinsics_;
   }

@@ -8,11 +8,11 @@
 #include <tf2_ros/transform_listener.h>
 
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/mutex.h"
 #include "perception/inference/model_manifest.h"
 #include "perception/tracking/object_tracker.h"
 #include "ros/parameters/hazard_detection_parameters.h"
@@ -48,8 +48,8 @@ class HazardTracking {
   std::uint64_t frames_with_motion_ = 0;
   tf2_ros::Buffer buffer_;
   tf2_ros::TransformListener listener_;
-  std::mutex mutex_;
-  std::optional<geo::CameraIntrinsics> intrinsics_;
+  Mutex mutex_;
+  std::optional<geo::CameraIntrinsics> intrinsics_ GUARDED_BY(mutex_);
   ros::Subscriber info_;
 };
 
