@@ -115,19 +115,19 @@ std::unique_ptr<transport::MqttClient> Fleet::Connect(
 /// False when the vehicle's window is full.
 bool Fleet::SendNext(std::uint32_t index) {
   Vehicle& vehicle = *vehicles_[index];
-  const std::lock_guard<std::mutex> lock(vehicle.mutex);
+  const MutexLock lock(vehicle.mutex);
   if (!sending_ || vehicle.waiting.size() >= config_.window) return false;
   const Uuid uuid = Uuid::Random(vehicle.random);
   const std::uint32_t step = vehicle.next_step++;
   const auto now = Clock::now();
   vehicle.waiting[uuid] = {step, now, now};
   if (step % 2 == 1) {
-    const std::lock_guard<std::mutex> result_lock(result_mutex_);
+    const MutexLock result_lock(result_mutex_);
     confirmed_[street_.PlaceOf(index, step).Key()] = now;
   }
   Send(vehicle, index, uuid, step);
   if (counting_) {
-    const std::lock_guard<std::mutex> result_lock(result_mutex_);
+    const MutexLock result_lock(result_mutex_);
     ++result_.sent;
   }
   return true;
@@ -145,11 +145,11 @@ void Fleet::OnReceipt(std::uint32_t index, const transport::MqttMessage& message
   answered_ = true;
   Vehicle& vehicle = *vehicles_[index];
   {
-    const std::lock_guard<std::mutex> lock(vehicle.mutex);
+    const MutexLock lock(vehicle.mutex);
     const auto waiting = vehicle.waiting.find(receipt.report_uuid);
     if (waiting == vehicle.waiting.end()) return;  // A second receipt, for a resend.
     if (counting_) {
-      const std::lock_guard<std::mutex> result_lock(result_mutex_);
+      const MutexLock result_lock(result_mutex_);
       ++(receipt.status == protocol::Receipt::Status::kCommitted ? result_.committed
                                                                  : result_.refused);
       result_.receipt_ms.push_back(MillisecondsSince(waiting->second.first_sent));
@@ -164,7 +164,7 @@ void Fleet::OnNotice(const transport::MqttMessage& message) {
   if (notice.sightings != 2) return;  // Of a first report, or said again.
   const auto place = street_.PlaceAt(notice.position);
   if (!place) return;
-  const std::lock_guard<std::mutex> lock(result_mutex_);
+  const MutexLock lock(result_mutex_);
   const auto sent = confirmed_.find(place->Key());
   if (sent == confirmed_.end()) return;
   if (counting_) result_.notice_ms.push_back(MillisecondsSince(sent->second));
@@ -181,7 +181,7 @@ void Fleet::Pace(Clock::time_point until) {
     const double due = config_.rate * std::chrono::duration<double>(now - start).count();
     for (; done + 1 <= due; done += 1) {
       if (SendNext(turn++ % config_.vehicles) || !counting_) continue;
-      const std::lock_guard<std::mutex> lock(result_mutex_);
+      const MutexLock lock(result_mutex_);
       ++result_.behind;
     }
     if (now >= next_look) {
@@ -207,13 +207,13 @@ void Fleet::ResendOverdue(Clock::duration patience) {
   const auto now = Clock::now();
   for (std::uint32_t i = 0; i < config_.vehicles; ++i) {
     Vehicle& vehicle = *vehicles_[i];
-    const std::lock_guard<std::mutex> lock(vehicle.mutex);
+    const MutexLock lock(vehicle.mutex);
     for (auto& [uuid, waiting] : vehicle.waiting) {
       if (now - waiting.last_sent < patience) continue;
       waiting.last_sent = now;
       Send(vehicle, i, uuid, waiting.step);
       if (!counting_) continue;
-      const std::lock_guard<std::mutex> result_lock(result_mutex_);
+      const MutexLock result_lock(result_mutex_);
       ++result_.resent;
     }
   }
@@ -236,11 +236,13 @@ Fleet::Result Fleet::Run(double warm_up_s, double seconds) {
   Pace(start + as_duration(seconds));
   counting_ = false;
   sending_ = false;
+  std::uint32_t next_step = 0;
   for (const auto& vehicle : vehicles_) {
-    const std::lock_guard<std::mutex> vehicle_lock(vehicle->mutex);
-    result_.next_step = std::max(result_.next_step, (vehicle->next_step + 1) / 2 * 2);
+    const MutexLock vehicle_lock(vehicle->mutex);
+    next_step = std::max(next_step, (vehicle->next_step + 1) / 2 * 2);
   }
-  const std::lock_guard<std::mutex> lock(result_mutex_);
+  const MutexLock lock(result_mutex_);
+  result_.next_step = next_step;
   result_.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   return std::move(result_);
 }

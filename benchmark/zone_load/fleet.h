@@ -5,12 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <random>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "common/mutex.h"
 #include "common/uuid.h"
 #include "transport/mqtt_client.h"
 #include "zone_load/report_street.h"
@@ -62,10 +62,10 @@ class Fleet {
   struct Vehicle {
     std::string id;
     std::unique_ptr<transport::MqttClient> client;
-    std::mutex mutex;  ///< Guards the rest.
-    std::unordered_map<Uuid, Waiting> waiting;
-    std::mt19937_64 random;
-    std::uint32_t next_step = 0;
+    Mutex mutex;
+    std::unordered_map<Uuid, Waiting> waiting GUARDED_BY(mutex);
+    std::mt19937_64 random GUARDED_BY(mutex);
+    std::uint32_t next_step GUARDED_BY(mutex) = 0;
   };
 
   std::unique_ptr<transport::MqttClient> Connect(
@@ -87,9 +87,10 @@ class Fleet {
   std::atomic<bool> counting_{false};
   std::atomic<bool> answered_{false};  ///< At least one report.
 
-  std::mutex result_mutex_;  ///< Guards the next two.
-  Result result_;
-  std::unordered_map<std::uint64_t, Clock::time_point> confirmed_;  ///< By place, when sent.
+  Mutex result_mutex_;  ///< Taken after a vehicle's.
+  Result result_ GUARDED_BY(result_mutex_);
+  /// By place, when sent.
+  std::unordered_map<std::uint64_t, Clock::time_point> confirmed_ GUARDED_BY(result_mutex_);
 };
 
 }  // namespace livemap::bench
