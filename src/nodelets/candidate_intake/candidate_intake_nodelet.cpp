@@ -22,7 +22,7 @@
 #include "ros/conversions/detection_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
-#include "ros/parameters/offload_parameters.h"
+#include "ros/parameters/candidate_intake_parameters.h"
 #include "zone/offload/offload_intake.h"
 
 namespace livemap::nodelets {
@@ -182,7 +182,7 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     status.add("reports", counters.reports);
   }
 
-  ros_io::OffloadIntakeConfig config_;
+  ros_io::CandidateIntakeConfig config_;
   std::unique_ptr<zone::OffloadIntake> intake_;
   std::map<std::int64_t, sensor_msgs::ImageConstPtr> pictures_;  // At the detector, by stamp.
   std::uint64_t unreadable_ = 0;  // Frames whose message the conversion refused.

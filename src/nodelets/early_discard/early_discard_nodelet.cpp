@@ -20,7 +20,7 @@
 #include "perception/privacy/picture_masker.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
-#include "ros/parameters/offload_parameters.h"
+#include "ros/parameters/early_discard_parameters.h"
 #include "vehicle/reporting/offload_sender.h"
 
 namespace livemap::nodelets {

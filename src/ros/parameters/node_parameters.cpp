@@ -5,13 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "ros/parameters/camera_ingest_parameters.h"
+#include "ros/parameters/candidate_intake_parameters.h"
 #include "ros/parameters/change_detection_parameters.h"
+#include "ros/parameters/early_discard_parameters.h"
 #include "ros/parameters/edge_vo_parameters.h"
 #include "ros/parameters/geo_localization_parameters.h"
 #include "ros/parameters/hazard_detection_parameters.h"
 #include "ros/parameters/hazard_reporting_parameters.h"
 #include "ros/parameters/mqtt_bridge_parameters.h"
-#include "ros/parameters/offload_parameters.h"
 #include "ros/parameters/zone_cloudlet_parameters.h"
 
 namespace livemap::ros_io {
@@ -100,20 +101,20 @@ Json ToJson(const ParameterDescription& description, const NodeParameters& param
 
 const std::vector<NodeParameters>& AllNodeParameters() {
   static const std::vector<NodeParameters> all{
-      {"camera_ingest", "camera_ingest", "ingest_parameters.cpp", {}},
-      {"candidate_intake", "candidate_intake", "offload_parameters.cpp", {}},
-      {"change_detection", "change_detection", "change_parameters.cpp", {}},
-      {"early_discard", "early_discard", "offload_parameters.cpp", {}},
+      {"camera_ingest", "camera_ingest", "camera_ingest_parameters.cpp", {}},
+      {"candidate_intake", "candidate_intake", "candidate_intake_parameters.cpp", {}},
+      {"change_detection", "change_detection", "change_detection_parameters.cpp", {}},
+      {"early_discard", "early_discard", "early_discard_parameters.cpp", {}},
       {"edge_vo", "edge_vo", "edge_vo_parameters.cpp", {}},
       {"geo_localization", "geo_localization", "geo_localization_parameters.cpp", {}},
       {"hazard_detection", "hazard_detection", "hazard_detection_parameters.cpp", {}},
       {"hazard_reporting", "hazard_reporting", "hazard_reporting_parameters.cpp", {}},
-      {"mqtt_bridge_vehicle", "mqtt_bridge", "bridge_parameters.cpp", {{"role", "vehicle"}}},
+      {"mqtt_bridge_vehicle", "mqtt_bridge", "mqtt_bridge_parameters.cpp", {{"role", "vehicle"}}},
       {"mqtt_bridge_zone",
        "mqtt_bridge",
-       "bridge_parameters.cpp",
+       "mqtt_bridge_parameters.cpp",
        {{"role", "zone"}, {"user", "zone"}}},
-      {"zone_cloudlet", "zone_cloudlet", "zone_parameters.cpp", {}}};
+      {"zone_cloudlet", "zone_cloudlet", "zone_cloudlet_parameters.cpp", {}}};
   return all;
 }
 

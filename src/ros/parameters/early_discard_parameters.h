@@ -6,7 +6,6 @@
 #include "perception/privacy/privacy_mask.h"
 #include "ros/parameters/parameter_reader.h"
 #include "vehicle/reporting/offload_sender.h"
-#include "zone/offload/offload_intake.h"
 
 namespace livemap::ros_io {
 
@@ -27,16 +26,5 @@ struct EarlyDiscardConfig {
 
 /// Reads and checks all of them; throws Error. `now_ns` names the drive when no parameter does.
 EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int64_t now_ns);
-
-/// Defaults of the zone's candidate_intake nodelet; the reader states their meanings.
-struct OffloadIntakeConfig {
-  zone::OffloadIntake::Config intake;
-  int jpeg_quality = 80;         ///< 1..100, of a report's picture.
-  int max_image_bytes = 100000;  ///< Of a report's picture.
-  double diagnostics_period_s = 1.0;
-};
-
-/// Reads and checks all of them; throws Error.
-OffloadIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters);
 
 }  // namespace livemap::ros_io

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "ros/parameters/parameter_reader.h"
+#include "zone/offload/offload_intake.h"
+
+namespace livemap::ros_io {
+
+/// Defaults of the zone's candidate_intake nodelet; the reader states their meanings.
+struct CandidateIntakeConfig {
+  zone::OffloadIntake::Config intake;
+  int jpeg_quality = 80;         ///< 1..100, of a report's picture.
+  int max_image_bytes = 100000;  ///< Of a report's picture.
+  double diagnostics_period_s = 1.0;
+};
+
+/// Reads and checks all of them; throws Error.
+CandidateIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters);
+
+}  // namespace livemap::ros_io
