@@ -17,9 +17,13 @@ BY_LIBRARY = {"/diagnostics", "tf", "/tf_static", "/compressed"}
 
 
 def sources(node):
+    """The node's own files, and what it uses of those that all nodelets share."""
     folder = ROOT / "src/nodelets" / node
     files = folder.iterdir() if folder.is_dir() else (ROOT / "src/nodes").iterdir()
-    return [file for file in files if file.suffix in (".cpp", ".h")]
+    own = [file for file in files if file.suffix in (".cpp", ".h")]
+    text = "".join(file.read_text(encoding="utf-8") for file in own)
+    return own + [file for file in (ROOT / "src/nodelets").glob("*.cpp")
+                  if f'#include "nodelets/{file.stem}.h"' in text]
 
 
 def names_in_source(node):
@@ -65,6 +69,17 @@ class ReferencePagesTest(unittest.TestCase):
             unknown = {name for name in in_page if f'"{name.removeprefix(node + "/")}"' not in text
                        and not name.endswith("camera_info")}
             self.assertEqual(unknown, set(), f"{node}: not in the source")
+
+    def test_the_page_of_former_names_has_all_that_the_readers_refuse(self):
+        in_source = set()
+        for file in (ROOT / "src/ros/parameters").glob("*_parameters.cpp"):
+            text = file.read_text(encoding="utf-8")
+            in_source.update(re.findall(r'Renamed\("(\w+)", "(\w+)"\)', text))
+            for body in re.findall(r"void RefuseFormerNames.*?\n}", text, re.DOTALL):
+                in_source.update(re.findall(r'{"(\w+)", "(\w+)"}', body))
+        page = (ROOT / "docs/reference/former-names.md").read_text(encoding="utf-8")
+        self.assertGreater(len(in_source), 10)
+        self.assertEqual(set(re.findall(r"\| `(\w+)` \| `(\w+)` \|", page)), in_source)
 
 
 if __name__ == "__main__":
