@@ -9,11 +9,10 @@
 #include "common/log_odds.h"
 #include "common/text.h"
 #include "common/time.h"
+#include "zone/model/hazard.h"
 
 namespace livemap::zone {
 namespace {
-
-constexpr std::size_t kMaxReasonBytes = 200;
 
 std::string VehiclesText(std::uint32_t vehicles) {
   if (vehicles == 1) return "1 vehicle";
@@ -50,7 +49,7 @@ double Faded(const ClassModel& entry, double log_odds, const PresenceRecord& lif
 }
 
 LifecycleTransition Transition(const PresenceRecord& life, HazardState to, std::string reason) {
-  return {life.state, to, CutUtf8(std::move(reason), kMaxReasonBytes)};
+  return {life.state, to, CutUtf8(std::move(reason), kMaxEventReasonBytes)};
 }
 
 void Enter(HazardState state, std::int64_t now_ns, PresenceRecord& life) {
@@ -62,7 +61,8 @@ void Enter(HazardState state, std::int64_t now_ns, PresenceRecord& life) {
 
 std::string DecisionText(const std::string& done, const std::string& official,
                          const std::string& reason) {
-  return CutUtf8(done + " by " + official + (reason.empty() ? "" : ": " + reason), kMaxReasonBytes);
+  return CutUtf8(done + " by " + official + (reason.empty() ? "" : ": " + reason),
+                 kMaxEventReasonBytes);
 }
 
 HazardLifecycle::HazardLifecycle() : HazardLifecycle(Config()) {}
@@ -296,7 +296,7 @@ LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t
     Demote(entry, taken, now_ns, life);
   }
   if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
-  step.transition = LifecycleTransition{from, life.state, CutUtf8(why, kMaxReasonBytes)};
+  step.transition = LifecycleTransition{from, life.state, CutUtf8(why, kMaxEventReasonBytes)};
   return step;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,6 +11,9 @@
 #include "zone/model/hazard_state.h"
 
 namespace livemap::zone {
+
+/// Events say why they happened in valid UTF-8 of at most so many bytes.
+constexpr std::size_t kMaxEventReasonBytes = 200;
 
 /// One hazard of the zone.
 struct Hazard {

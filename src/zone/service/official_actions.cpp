@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/text.h"
 #include "zone/admission/report_validation.h"
 
 namespace livemap::zone {
@@ -18,8 +19,8 @@ std::string OfficialActions::CheckedReason(const std::string& official,
                 " bytes is not accepted: it must be printable UTF-8 of 1 to " +
                 std::to_string(max_name_bytes) + " bytes");
   }
-  std::string why = ShortenedReason(reason);
-  if (!why.empty() && !IsPrintableText(why, kMaxReasonBytes)) {
+  std::string why = CutUtf8(reason, kMaxEventReasonBytes);
+  if (!why.empty() && !IsPrintableText(why, kMaxEventReasonBytes)) {
     throw Error("the reason is not accepted: it must be printable UTF-8");
   }
   return why;
@@ -55,8 +56,8 @@ std::optional<OfficialActions::HazardDecision> OfficialActions::Remove(const Uui
   const auto slot = state_.hazards.Find(hazard);
   if (!slot || !IsOnMap(state_.hazards.State(*slot))) return std::nullopt;
   HazardDecision decision{*slot, state_.hazards.Record(*slot).life, {}};
-  decision.step.transition =
-      LifecycleTransition{decision.life.state, HazardState::kGone, ShortenedReason(reason)};
+  decision.step.transition = LifecycleTransition{decision.life.state, HazardState::kGone,
+                                                 CutUtf8(reason, kMaxEventReasonBytes)};
   decision.life.state = HazardState::kGone;
   decision.life.since_ns = now_ns;
   return decision;

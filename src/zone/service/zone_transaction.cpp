@@ -3,16 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-namespace livemap::zone {
+#include "common/text.h"
 
-std::string ShortenedReason(std::string text) {
-  if (text.size() <= kMaxReasonBytes) return text;
-  // Between two characters, so that it stays valid UTF-8.
-  std::size_t end = kMaxReasonBytes;
-  while (end > 0 && (static_cast<std::uint8_t>(text[end]) & 0xc0U) == 0x80U) --end;
-  text.resize(end);
-  return text;
-}
+namespace livemap::zone {
 
 ZoneTransaction::ZoneTransaction(ZoneState& state, std::int64_t now_ns)
     : state_(state), now_ns_(now_ns), sequence_(state.sequence), announced_(state.announced) {}
@@ -78,7 +71,7 @@ void ZoneTransaction::RecordHazardEvent(Slot slot, const std::optional<Before>& 
                  : was_on_map    ? HazardAction::kUpdated
                                  : HazardAction::kAdded;
   if (before) event.from = before->state;
-  event.reason = ShortenedReason(std::move(reason));
+  event.reason = CutUtf8(std::move(reason), kMaxEventReasonBytes);
   event.previous_announced = announced_;
   const auto told = DriversAction(event.from, state);
   event.announced = told && (tells || *told != HazardAction::kUpdated);

@@ -125,10 +125,6 @@ class ZoneTransaction {
       map_change_reports_;  ///< And the feature.
 };
 
-/// The text, cut between two characters to the 200 bytes that an event's reason may have.
-std::string ShortenedReason(std::string text);
-constexpr std::size_t kMaxReasonBytes = 200;
-
 template <typename Body>
 void ZoneTransaction::Run(const Body& body) {
   Begin();

@@ -10,7 +10,6 @@
 namespace livemap::zone {
 
 constexpr std::size_t kMaxStoredTextBytes = 64;
-constexpr std::size_t kMaxEventReasonBytes = 200;
 /// Hazards and map changes are counted in 32 bits; a row beyond is none of ours.
 constexpr long long kMaxRowId = 4'000'000'000;
 /// More events than there will ever be; far from where a further one would overflow.
