@@ -64,8 +64,8 @@ double AsWritten(float number) {
 ParameterReader::ParameterReader(const ros::NodeHandle& private_handle)
     : ParameterReader(private_handle.getNamespace(), AllOf(private_handle.getNamespace())) {}
 
-ParameterReader::ParameterReader(std::string name_space, XmlRpc::XmlRpcValue values)
-    : name_space_(std::move(name_space)), values_(std::move(values)) {}
+ParameterReader::ParameterReader(std::string name_space, const XmlRpc::XmlRpcValue& values)
+    : name_space_(std::move(name_space)), values_(values) {}
 
 void ParameterReader::Section(const std::string& title, const std::string& note) {
   section_ = title;
@@ -74,7 +74,7 @@ void ParameterReader::Section(const std::string& title, const std::string& note)
 
 ParameterDescription& ParameterReader::Describe(const std::string& name, const std::string& type,
                                                 const std::string& meaning,
-                                                XmlRpc::XmlRpcValue standard) {
+                                                const XmlRpc::XmlRpcValue& standard) {
   ParameterDescription description;
   description.section = section_;
   description.section_note = section_note_;

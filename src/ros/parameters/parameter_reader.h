@@ -60,7 +60,7 @@ class ParameterReader {
   /// Takes all values of the handle's namespace from the parameter server.
   explicit ParameterReader(const ros::NodeHandle& private_handle);
   /// Takes `values`, a map, as the parameters of `name_space`; needs no ROS master.
-  ParameterReader(std::string name_space, XmlRpc::XmlRpcValue values);
+  ParameterReader(std::string name_space, const XmlRpc::XmlRpcValue& values);
 
   /// A required parameter that is not given takes its example from now on, so that a reader can be
   /// run for its descriptions.
@@ -129,7 +129,7 @@ class ParameterReader {
 
  private:
   ParameterDescription& Describe(const std::string& name, const std::string& type,
-                                 const std::string& meaning, XmlRpc::XmlRpcValue standard);
+                                 const std::string& meaning, const XmlRpc::XmlRpcValue& standard);
   bool Find(const std::string& name, XmlRpc::XmlRpcValue& value);
   double ReadNumber(const std::string& name, double standard, ParameterRange range,
                     const std::string& meaning, const std::string& unit);
