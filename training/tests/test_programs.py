@@ -183,7 +183,7 @@ class Programs(unittest.TestCase):
         self.assertIn("Sink-Hole", self.train("misnamed", "--data", "none", "--own", own)[1])
 
     def test_a_torch_file_is_entered_once_and_leaves_the_rest_of_the_manifest(self):
-        source = Path(__file__).resolve().parents[2] / "test" / "inference"
+        source = Path(__file__).resolve().parents[2] / "test" / "perception" / "inference"
         models = self.root / "tiny"
         models.mkdir()
         (models / "tiny.onnx").write_bytes((source / "tiny.onnx").read_bytes())
