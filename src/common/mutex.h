@@ -1,9 +1,12 @@
 #pragma once
 
+#include <pthread.h>
+#include <sched.h>
+
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
-#include <shared_mutex>
 
 /// Clang's thread-safety analysis (https://clang.llvm.org/docs/ThreadSafetyAnalysis.html): the
 /// clang builds check with -Wthread-safety what these annotations say. Other compilers see nothing.
@@ -53,18 +56,37 @@ class LIVEMAP_THREAD_ANNOTATION(capability("mutex")) Mutex {
   std::mutex mutex_;
 };
 
-/// A std::shared_mutex that the thread-safety analysis knows.
+/// A lock for one writer or many readers. A waiting writer goes before readers that come after it,
+/// so that readers who overlap without pause cannot keep it out, as they can with
+/// std::shared_mutex, which lets readers pass. A thread that holds the lock for reading must
+/// therefore not lock it again: a writer that came in between would wait for that thread, and that
+/// thread for the writer.
 class LIVEMAP_THREAD_ANNOTATION(capability("shared mutex")) SharedMutex {
  public:
-  void Lock() LIVEMAP_THREAD_ANNOTATION(acquire_capability()) { mutex_.lock(); }
-  void Unlock() LIVEMAP_THREAD_ANNOTATION(release_capability()) { mutex_.unlock(); }
-  void LockShared() LIVEMAP_THREAD_ANNOTATION(acquire_shared_capability()) { mutex_.lock_shared(); }
+  SharedMutex() {
+    // None of these calls fails for attributes and a kind that exist.
+    pthread_rwlockattr_t writers_first;
+    pthread_rwlockattr_init(&writers_first);
+    pthread_rwlockattr_setkind_np(&writers_first, PTHREAD_RWLOCK_PREFER_WRITER_NONRECURSIVE_NP);
+    pthread_rwlock_init(&lock_, &writers_first);
+    pthread_rwlockattr_destroy(&writers_first);
+  }
+  ~SharedMutex() { pthread_rwlock_destroy(&lock_); }
+  SharedMutex(const SharedMutex&) = delete;
+  SharedMutex& operator=(const SharedMutex&) = delete;
+
+  void Lock() LIVEMAP_THREAD_ANNOTATION(acquire_capability()) { pthread_rwlock_wrlock(&lock_); }
+  void Unlock() LIVEMAP_THREAD_ANNOTATION(release_capability()) { pthread_rwlock_unlock(&lock_); }
+  void LockShared() LIVEMAP_THREAD_ANNOTATION(acquire_shared_capability()) {
+    // Too many readers at once give an error of their own, and none of the lock.
+    while (pthread_rwlock_rdlock(&lock_) == EAGAIN) sched_yield();
+  }
   void UnlockShared() LIVEMAP_THREAD_ANNOTATION(release_shared_capability()) {
-    mutex_.unlock_shared();
+    pthread_rwlock_unlock(&lock_);
   }
 
  private:
-  std::shared_mutex mutex_;
+  pthread_rwlock_t lock_;
 };
 
 /// Holds a Mutex from its construction to its end. Unlock and Lock open a gap in between.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <charconv>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -43,5 +44,20 @@ class NumberReader {
   std::string_view rest_;
   bool good_ = true;
 };
+
+/// The value of a hexadecimal digit of either case; -1 for any other character.
+constexpr int HexValue(char digit) {
+  if (digit >= '0' && digit <= '9') return digit - '0';
+  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
+  if (digit >= 'A' && digit <= 'F') return digit - 'A' + 10;
+  return -1;
+}
+
+/// Appends the byte as two lower-case hexadecimal digits.
+inline void AppendHex(std::string& text, std::uint8_t byte) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  text += kDigits[byte >> 4];
+  text += kDigits[byte & 15];
+}
 
 }  // namespace livemap

@@ -9,7 +9,7 @@
 namespace livemap {
 namespace {
 
-void Check(int code, sqlite3* database, const std::string& doing) {
+void CheckSqlite(int code, sqlite3* database, const std::string& doing) {
   if (code == SQLITE_OK || code == SQLITE_DONE || code == SQLITE_ROW) return;
   throw StoreError("store: " + doing + " failed: " +
                    (database != nullptr ? sqlite3_errmsg(database) : sqlite3_errstr(code)));
@@ -37,7 +37,7 @@ std::string QuarantineDatabase(const std::string& path, std::int64_t now_ns) {
 }
 
 SqliteStatement::SqliteStatement(sqlite3* database, const std::string& sql) {
-  Check(
+  CheckSqlite(
       sqlite3_prepare_v2(database, sql.c_str(), static_cast<int>(sql.size()), &statement_, nullptr),
       database, "preparing '" + sql + "'");
 }
@@ -48,27 +48,29 @@ SqliteStatement::SqliteStatement(SqliteStatement&& other) noexcept
     : statement_(std::exchange(other.statement_, nullptr)) {}
 
 SqliteStatement& SqliteStatement::Bind(int index, std::int64_t value) {
-  Check(sqlite3_bind_int64(statement_, index, value), sqlite3_db_handle(statement_), "binding");
+  CheckSqlite(sqlite3_bind_int64(statement_, index, value), sqlite3_db_handle(statement_),
+              "binding");
   return *this;
 }
 
 SqliteStatement& SqliteStatement::Bind(int index, double value) {
-  Check(sqlite3_bind_double(statement_, index, value), sqlite3_db_handle(statement_), "binding");
+  CheckSqlite(sqlite3_bind_double(statement_, index, value), sqlite3_db_handle(statement_),
+              "binding");
   return *this;
 }
 
 SqliteStatement& SqliteStatement::Bind(int index, const std::string& text) {
-  Check(sqlite3_bind_text64(statement_, index, text.data(), text.size(), SQLITE_TRANSIENT,
-                            SQLITE_UTF8),
-        sqlite3_db_handle(statement_), "binding");
+  CheckSqlite(sqlite3_bind_text64(statement_, index, text.data(), text.size(), SQLITE_TRANSIENT,
+                                  SQLITE_UTF8),
+              sqlite3_db_handle(statement_), "binding");
   return *this;
 }
 
 SqliteStatement& SqliteStatement::BindBlob(int index, const void* data, std::size_t size) {
   // A null pointer would bind NULL; an empty blob must stay an empty blob.
   const void* bytes = size == 0 ? "" : data;
-  Check(sqlite3_bind_blob64(statement_, index, bytes, size, SQLITE_TRANSIENT),
-        sqlite3_db_handle(statement_), "binding");
+  CheckSqlite(sqlite3_bind_blob64(statement_, index, bytes, size, SQLITE_TRANSIENT),
+              sqlite3_db_handle(statement_), "binding");
   return *this;
 }
 
@@ -77,7 +79,7 @@ bool SqliteStatement::Step() {
   if (code == SQLITE_ROW) return true;
   sqlite3* database = sqlite3_db_handle(statement_);
   const int reset_code = sqlite3_reset(statement_);
-  Check(code == SQLITE_DONE ? reset_code : code, database, "running a statement");
+  CheckSqlite(code == SQLITE_DONE ? reset_code : code, database, "running a statement");
   return false;
 }
 
@@ -110,7 +112,7 @@ SqliteDatabase::SqliteDatabase(const std::string& path, bool durable) : path_(pa
   const int code = sqlite3_open_v2(path.c_str(), &database_,
                                    SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   try {
-    Check(code, database_, "opening '" + path + "'");
+    CheckSqlite(code, database_, "opening '" + path + "'");
     sqlite3_busy_timeout(database_, 5000);
     Execute("PRAGMA journal_mode=WAL");
     Execute(durable ? "PRAGMA synchronous=FULL" : "PRAGMA synchronous=NORMAL");
@@ -124,8 +126,8 @@ SqliteDatabase::SqliteDatabase(const std::string& path, bool durable) : path_(pa
 SqliteDatabase::~SqliteDatabase() { sqlite3_close_v2(database_); }
 
 void SqliteDatabase::Execute(const std::string& sql) {
-  Check(sqlite3_exec(database_, sql.c_str(), nullptr, nullptr, nullptr), database_,
-        "'" + sql + "' on '" + path_ + "'");
+  CheckSqlite(sqlite3_exec(database_, sql.c_str(), nullptr, nullptr, nullptr), database_,
+              "'" + sql + "' on '" + path_ + "'");
 }
 
 SqliteStatement SqliteDatabase::Prepare(const std::string& sql) {

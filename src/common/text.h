@@ -15,4 +15,13 @@ inline std::string CutUtf8(std::string text, std::size_t max_bytes) {
   return text;
 }
 
+/// What an image's pixels are, in words: "8 bits, three channels".
+inline std::string PixelText(int bits, int channels) {
+  const char* const words[] = {"no channel", "one channel", "two channels", "three channels",
+                               "four channels"};
+  return std::to_string(bits) + " bits, " +
+         (channels >= 0 && channels <= 4 ? words[channels]
+                                         : std::to_string(channels) + " channels");
+}
+
 }  // namespace livemap

@@ -2,28 +2,21 @@
 
 #include <cstring>
 
+#include "common/number_text.h"
+
 namespace livemap {
 namespace {
 
-int HexValue(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-bool IsDashPosition(std::size_t i) { return i == 8 || i == 13 || i == 18 || i == 23; }
+bool IsUuidDash(std::size_t i) { return i == 8 || i == 13 || i == 18 || i == 23; }
 
 }  // namespace
 
 std::string Uuid::ToString() const {
-  constexpr char kDigits[] = "0123456789abcdef";
   std::string text;
   text.reserve(36);
   for (const std::uint8_t byte : bytes) {
-    if (IsDashPosition(text.size())) text += '-';
-    text += kDigits[byte >> 4];
-    text += kDigits[byte & 15];
+    if (IsUuidDash(text.size())) text += '-';
+    AppendHex(text, byte);
   }
   return text;
 }
@@ -33,7 +26,7 @@ std::optional<Uuid> Uuid::Parse(const std::string& text) {
   Uuid uuid;
   std::size_t nibble = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    if (IsDashPosition(i)) {
+    if (IsUuidDash(i)) {
       if (text[i] != '-') return std::nullopt;
       continue;
     }
