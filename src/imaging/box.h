@@ -11,6 +11,11 @@ struct Box {
   float y_min = 0;
   float x_max = 0;
   float y_max = 0;
+
+  bool operator==(const Box& other) const {
+    return x_min == other.x_min && y_min == other.y_min && x_max == other.x_max &&
+           y_max == other.y_max;
+  }
 };
 
 /// A part of an image in whole pixels. Without width or height it stands for the whole image.

@@ -7,43 +7,63 @@
 #include <opencv2/videoio.hpp>
 
 #include "common/error.h"
+#include "common/picture_folder.h"
+#include "imaging/orientation.h"
+#include "imaging/video_orientation.h"
 
 namespace livemap::imaging {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool HasImageExtension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
+/// SourceFrame::steps of each picture.
+std::vector<int> StepsOf(const std::vector<std::string>& paths) {
+  constexpr std::uint64_t kMaxSteps = 100000;
+  std::vector<int> steps(paths.size(), 1);
+  std::vector<std::uint64_t> distances;
+  for (std::size_t i = 1; i < paths.size(); ++i) {
+    const auto before = NumberOf(StemOf(paths[i - 1]));
+    const auto number = NumberOf(StemOf(paths[i]));
+    if (!before || !number || *number <= *before) return steps;
+    distances.push_back(*number - *before);
+  }
+  if (distances.empty()) return steps;
+  const std::uint64_t step = *std::min_element(distances.begin(), distances.end());
+  const auto usual = std::count(distances.begin(), distances.end(), step);
+  const bool whole =
+      std::all_of(distances.begin(), distances.end(), [step](std::uint64_t distance) {
+        return distance % step == 0 && distance / step <= kMaxSteps;
+      });
+  // Numbers without a usual step, as stamps and places along a road, say nothing of what is
+  // missing.
+  if (!whole || 2 * static_cast<std::size_t>(usual) <= distances.size()) return steps;
+  for (std::size_t i = 1; i < steps.size(); ++i)
+    steps[i] = static_cast<int>(distances[i - 1] / step);
+  return steps;
 }
 
-class FolderSource : public FrameSource {
+class FolderFrameSource : public FrameSource {
  public:
-  FolderSource(const std::string& directory, std::size_t max_bytes) : max_bytes_(max_bytes) {
-    std::error_code error;
-    for (fs::directory_iterator entry(directory, error), end; !error && entry != end;
-         entry.increment(error)) {
-      if (entry->is_regular_file() && HasImageExtension(entry->path())) {
-        paths_.push_back(entry->path());
-      }
-    }
-    if (error) throw Error("the image folder '" + directory + "': " + error.message());
+  FolderFrameSource(const std::string& directory, std::size_t max_bytes)
+      : max_bytes_(max_bytes), paths_(PictureFolder(directory, PictureNames::kNumbered).paths()) {
     if (paths_.empty()) {
       throw Error("the image folder '" + directory + "' holds no .jpg, .jpeg or .png file");
     }
-    std::sort(paths_.begin(), paths_.end());
+    steps_ = StepsOf(paths_);
   }
 
   std::optional<SourceFrame> Next() override {
     if (next_ == paths_.size()) return std::nullopt;
-    const fs::path& path = paths_[next_++];
-    const std::string bytes = ReadFile(path.string(), max_bytes_);
     SourceFrame frame;
-    frame.encoded.assign(bytes.begin(), bytes.end());
-    frame.name = path.filename().string();
+    frame.steps = steps_[next_];
+    const std::string& path = paths_[next_++];
+    try {
+      const std::string bytes = ReadFile(path, max_bytes_);
+      frame.encoded.assign(bytes.begin(), bytes.end());
+    } catch (const Error& error) {
+      throw UnreadableFrame(error.what(), frame.steps);
+    }
+    frame.name = fs::path(path).filename().string();
     return frame;
   }
 
@@ -51,15 +71,17 @@ class FolderSource : public FrameSource {
 
  private:
   const std::size_t max_bytes_;
-  std::vector<fs::path> paths_;
+  const std::vector<std::string> paths_;
+  std::vector<int> steps_;
   std::size_t next_ = 0;
 };
 
-class CaptureSource : public FrameSource {
+class CaptureFrameSource : public FrameSource {
  public:
   /// A device when `device` is not negative, else the file `path`.
-  CaptureSource(std::string path, int device) : path_(std::move(path)), device_(device) {
-    CaptureSource::Rewind();
+  CaptureFrameSource(std::string path, int device) : path_(std::move(path)), device_(device) {
+    if (device_ < 0) orientation_ = ReadVideoOrientation(path_);
+    CaptureFrameSource::Rewind();
     if (device_ < 0) {
       const double rate = capture_.get(cv::CAP_PROP_FPS);
       if (std::isfinite(rate) && rate > 0 && rate <= 1000) rate_hz_ = rate;
@@ -69,6 +91,7 @@ class CaptureSource : public FrameSource {
   std::optional<SourceFrame> Next() override {
     SourceFrame frame;
     if (!capture_.read(frame.image) || frame.image.empty()) return std::nullopt;
+    frame.image = Upright(frame.image, orientation_);
     frame.name = std::to_string(number_++);
     return frame;
   }
@@ -80,6 +103,9 @@ class CaptureSource : public FrameSource {
       throw Error((device_ >= 0 ? "the camera device '" : "the video file '") + path_ +
                   "' cannot be opened");
     }
+    // Whether OpenCV turns frames, and mirrors them, depends on its release and on FFmpeg's: where
+    // the file says how, it is done here.
+    capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, orientation_ == kUpright ? 1 : 0);
   }
 
   double rate_hz() const override { return rate_hz_; }
@@ -89,18 +115,19 @@ class CaptureSource : public FrameSource {
   const int device_;
   cv::VideoCapture capture_;
   double rate_hz_ = 0;
+  int orientation_ = kUpright;
   std::uint64_t number_ = 0;
 };
 
 }  // namespace
 
 std::unique_ptr<FrameSource> OpenFolder(const std::string& directory, std::size_t max_bytes) {
-  return std::make_unique<FolderSource>(directory, max_bytes);
+  return std::make_unique<FolderFrameSource>(directory, max_bytes);
 }
 
 std::unique_ptr<FrameSource> OpenVideo(const std::string& path) {
   if (!fs::is_regular_file(path)) throw Error("the video file '" + path + "' does not exist");
-  return std::make_unique<CaptureSource>(path, -1);
+  return std::make_unique<CaptureFrameSource>(path, -1);
 }
 
 std::unique_ptr<FrameSource> OpenDevice(const std::string& device) {
@@ -113,7 +140,7 @@ std::unique_ptr<FrameSource> OpenDevice(const std::string& device) {
   if (!all_digits) {
     throw Error("the camera device is '" + device + "', accepted is /dev/videoN or N");
   }
-  return std::make_unique<CaptureSource>(device, std::stoi(number));
+  return std::make_unique<CaptureFrameSource>(device, std::stoi(number));
 }
 
 }  // namespace livemap::imaging

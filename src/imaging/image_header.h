@@ -29,4 +29,10 @@ std::optional<ImageHeader> ReadImageHeader(const std::uint8_t* data, std::size_t
 /// header of a WebP announces are there.
 bool HasImageEnd(const std::uint8_t* data, std::size_t size, ImageHeader::Format format);
 
+/// How many bytes stand behind the end of a whole picture, found segment by segment (JPEG), chunk
+/// by chunk (PNG) or by the RIFF header (WebP): some cameras append a film or a thumbnail. None for
+/// a picture that was cut off.
+std::optional<std::size_t> BytesBehindEnd(const std::uint8_t* data, std::size_t size,
+                                          ImageHeader::Format format);
+
 }  // namespace livemap::imaging

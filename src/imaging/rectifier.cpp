@@ -18,7 +18,7 @@ bool IsFinite(const cv::Matx<double, kRows, kColumns>& matrix) {
 }
 
 template <int kRows, int kColumns>
-std::string Text(const cv::Matx<double, kRows, kColumns>& matrix) {
+std::string CalibrationMatrixText(const cv::Matx<double, kRows, kColumns>& matrix) {
   std::ostringstream text;
   text << matrix;
   return text.str();
@@ -28,7 +28,7 @@ bool IsFisheye(const CameraCalibration& calibration) {
   return calibration.distortion_model == "equidistant" || calibration.distortion_model == "fisheye";
 }
 
-void CheckDistortion(const CameraCalibration& calibration) {
+void CheckRectifierDistortion(const CameraCalibration& calibration) {
   const std::vector<double>& d = calibration.distortion;
   if (!std::all_of(d.begin(), d.end(), [](double value) { return std::isfinite(value); })) {
     throw Error("the calibration has a distortion coefficient that is not a finite number");
@@ -47,7 +47,7 @@ void CheckDistortion(const CameraCalibration& calibration) {
   }
 }
 
-void Check(const CameraCalibration& calibration) {
+void CheckCalibration(const CameraCalibration& calibration) {
   const auto side_is_bad = [](int side) { return side <= 0 || side > Rectifier::kMaxSide; };
   if (side_is_bad(calibration.width) || side_is_bad(calibration.height)) {
     throw Error("the calibration's image size is " + std::to_string(calibration.width) + "x" +
@@ -55,18 +55,19 @@ void Check(const CameraCalibration& calibration) {
                 std::to_string(Rectifier::kMaxSide) + " per side");
   }
   if (!IsFinite(calibration.k) || calibration.k(0, 0) <= 0 || calibration.k(1, 1) <= 0) {
-    throw Error("the calibration's K is " + Text(calibration.k) +
+    throw Error("the calibration's K is " + CalibrationMatrixText(calibration.k) +
                 ", it must be finite with positive focal lengths");
   }
   if (!IsFinite(calibration.r) || std::abs(cv::determinant(calibration.r) - 1) > 0.01) {
-    throw Error("the calibration's R is " + Text(calibration.r) + ", it must be a rotation");
+    throw Error("the calibration's R is " + CalibrationMatrixText(calibration.r) +
+                ", it must be a rotation");
   }
   if (!IsFinite(calibration.p))
     throw Error("the calibration's P holds a number that is not finite");
-  CheckDistortion(calibration);
+  CheckRectifierDistortion(calibration);
 }
 
-OutputSize Complete(OutputSize wanted, const CameraCalibration& calibration) {
+OutputSize CompleteOutputSize(OutputSize wanted, const CameraCalibration& calibration) {
   const double aspect = static_cast<double>(calibration.width) / calibration.height;
   if (wanted.width < 0 || wanted.height < 0 || wanted.width > Rectifier::kMaxSide ||
       wanted.height > Rectifier::kMaxSide) {
@@ -89,11 +90,11 @@ bool operator==(const CameraCalibration& a, const CameraCalibration& b) {
 
 Rectifier::Rectifier(const CameraCalibration& calibration, OutputSize output_size)
     : input_(calibration) {
-  Check(calibration);
+  CheckCalibration(calibration);
   const cv::Matx33d p_left = calibration.p.get_minor<3, 3>(0, 0);
   const bool has_p = p_left(0, 0) > 0 && p_left(1, 1) > 0;
   if (!has_p && cv::norm(calibration.p) > 0) {
-    throw Error("the calibration's P is " + Text(calibration.p) +
+    throw Error("the calibration's P is " + CalibrationMatrixText(calibration.p) +
                 ", it must have positive focal lengths or be all zeros");
   }
   rectified_k_ = has_p ? p_left : calibration.k;
@@ -103,7 +104,7 @@ Rectifier::Rectifier(const CameraCalibration& calibration, OutputSize output_siz
             cv::norm(rectified_k_ - calibration.k, cv::NORM_INF) > 1e-9 ||
             cv::norm(calibration.r - cv::Matx33d::eye(), cv::NORM_INF) > 1e-12;
 
-  const OutputSize size = Complete(output_size, calibration);
+  const OutputSize size = CompleteOutputSize(output_size, calibration);
   resizes_ = size.width != calibration.width || size.height != calibration.height;
   const double sx = static_cast<double>(size.width) / calibration.width;
   const double sy = static_cast<double>(size.height) / calibration.height;

@@ -17,7 +17,7 @@ constexpr double kContextStep = 0.7;
 constexpr double kScaleStep = 0.84;
 
 /// The box's part of the image; empty when it has none.
-cv::Rect2d InsideImage(const Box& box, const cv::Size& image) {
+cv::Rect2d BoxInsidePicture(const Box& box, const cv::Size& image) {
   // Written so that NaN has no part.
   if (!(box.x_max > box.x_min && box.y_max > box.y_min)) return {};
   const double left = std::max(0.0, static_cast<double>(box.x_min));
@@ -30,7 +30,8 @@ cv::Rect2d InsideImage(const Box& box, const cv::Size& image) {
 
 /// 3 to 2 around the box, at least `min_px` wide, moved into the image and cut where it is
 /// larger.
-cv::Rect CropAround(const cv::Rect2d& box, double context, double min_px, const cv::Size& image) {
+cv::Rect CropPictureAround(const cv::Rect2d& box, double context, double min_px,
+                           const cv::Size& image) {
   const double width = std::max({context * box.width, context * box.height * kCropAspect, min_px});
   const cv::Size size(std::min(image.width, cvCeil(width)),
                       std::min(image.height, cvCeil(width / kCropAspect)));
@@ -41,9 +42,10 @@ cv::Rect CropAround(const cv::Rect2d& box, double context, double min_px, const 
           start(box.y + box.height / 2, size.height, image.height), size.width, size.height};
 }
 
-double Widest(const CropConfig& config) { return std::max(config.context, kMinContext); }
+double WidestPictureCrop(const CropConfig& config) { return std::max(config.context, kMinContext); }
 
-bool EncodeAt(const cv::Mat& image, int quality, std::size_t max_bytes, CroppedPicture& cropped) {
+bool EncodePictureAt(const cv::Mat& image, int quality, std::size_t max_bytes,
+                     CroppedPicture& cropped) {
   if (!cv::imencode(".jpg", image, cropped.jpeg, {cv::IMWRITE_JPEG_QUALITY, quality})) return false;
   cropped.quality = quality;
   return cropped.jpeg.size() <= max_bytes;
@@ -51,8 +53,8 @@ bool EncodeAt(const cv::Mat& image, int quality, std::size_t max_bytes, CroppedP
 
 /// The best of the part within the bytes whose scale is not below `min_scale`; false: there is
 /// none.
-bool EncodeLegibly(const cv::Mat& part, double min_scale, const CropConfig& config,
-                   CroppedPicture& cropped) {
+bool EncodePictureLegibly(const cv::Mat& part, double min_scale, const CropConfig& config,
+                          CroppedPicture& cropped) {
   const int worst = std::min(config.quality, kLegibleQuality);
   for (double scale = 1;; scale = std::max(min_scale, scale * kScaleStep)) {
     cv::Mat image = part;
@@ -62,29 +64,22 @@ bool EncodeLegibly(const cv::Mat& part, double min_scale, const CropConfig& conf
       cv::resize(part, image, size, 0, 0, cv::INTER_AREA);
     }
     cropped.scale = scale;
-    if (EncodeAt(image, worst, config.max_bytes, cropped)) {
+    if (EncodePictureAt(image, worst, config.max_bytes, cropped)) {
       for (int quality = config.quality; quality > worst; quality -= kQualityStep / 2) {
-        if (EncodeAt(image, quality, config.max_bytes, cropped)) return true;
+        if (EncodePictureAt(image, quality, config.max_bytes, cropped)) return true;
       }
-      return EncodeAt(image, worst, config.max_bytes, cropped);
+      return EncodePictureAt(image, worst, config.max_bytes, cropped);
     }
     if (scale <= min_scale) return false;
   }
 }
 
-PixelRegion ToRegion(const cv::Rect& part) {
+PixelRegion PictureRegionOf(const cv::Rect& part) {
   return {static_cast<std::uint32_t>(part.x), static_cast<std::uint32_t>(part.y),
           static_cast<std::uint32_t>(part.width), static_cast<std::uint32_t>(part.height)};
 }
 
 }  // namespace
-
-bool Contains(const PixelRegion& outer, const PixelRegion& inner) {
-  if (outer.IsWholeImage()) return true;
-  return !inner.IsWholeImage() && inner.x >= outer.x && inner.y >= outer.y &&
-         inner.x + inner.width <= outer.x + outer.width &&
-         inner.y + inner.height <= outer.y + outer.height;
-}
 
 PixelRegion Union(const PixelRegion& a, const PixelRegion& b) {
   if (a.IsWholeImage() || b.IsWholeImage()) return {};
@@ -114,27 +109,27 @@ std::vector<std::uint8_t> EncodeJpeg(const Picture& picture, int quality, std::s
 
 PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& config) {
   const cv::Size image(width, height);
-  const cv::Rect2d inside = InsideImage(box, image);
+  const cv::Rect2d inside = BoxInsidePicture(box, image);
   if (inside.empty() || config.context <= 0) return {};
-  return ToRegion(CropAround(inside, Widest(config), kMinCropPx, image));
+  return PictureRegionOf(CropPictureAround(inside, WidestPictureCrop(config), kMinCropPx, image));
 }
 
 CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config) {
   CroppedPicture cropped;
   if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return cropped;
   const cv::Size image = picture.bgr.size();
-  const cv::Rect2d inside = InsideImage(box, image);
+  const cv::Rect2d inside = BoxInsidePicture(box, image);
   const bool whole = inside.empty() || config.context <= 0;
   const double side =
       inside.empty() ? std::min(image.width, image.height) : std::min(inside.width, inside.height);
   const double min_scale = std::min(1.0, kLegibleSidePx / std::max(side, 1.0));
   cv::Rect part({}, image);
-  const double widest = Widest(config);
+  const double widest = WidestPictureCrop(config);
   double context = widest;
   while (true) {
-    if (!whole) part = CropAround(inside, context, kMinCropPx * context / widest, image);
-    cropped.shown = ToRegion(part);
-    cropped.legible = EncodeLegibly(picture.bgr(part), min_scale, config, cropped);
+    if (!whole) part = CropPictureAround(inside, context, kMinCropPx * context / widest, image);
+    cropped.shown = PictureRegionOf(part);
+    cropped.legible = EncodePictureLegibly(picture.bgr(part), min_scale, config, cropped);
     if (cropped.legible) return cropped;
     if (whole || context <= kMinContext) break;
     context = std::max(kMinContext, context * kContextStep);

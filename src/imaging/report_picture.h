@@ -15,16 +15,8 @@ struct Picture {
   std::shared_ptr<const void> owner;
 };
 
-/// Whether all of `inner` lies in `outer`; of one image.
-bool Contains(const PixelRegion& outer, const PixelRegion& inner);
 /// The least region that contains both.
 PixelRegion Union(const PixelRegion& a, const PixelRegion& b);
-
-/// An image of which a picture is wanted.
-struct PictureRequirements {
-  std::int64_t stamp_ns = 0;
-  PixelRegion part;  ///< What of it has to be clear.
-};
 
 /// The picture as a JPEG file of at most `max_bytes`: first at `quality` (1..100), then at lower
 /// ones, then at half the size and so on. Empty when there is no picture, when it is not 8-bit with

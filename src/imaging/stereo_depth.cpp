@@ -19,22 +19,22 @@ constexpr double kSamePx = 0.01;
 /// Far below every shift: what is blended with it is recognised.
 constexpr float kUnknown = -1e6F;
 
-std::string Number(double value) {
+std::string StereoNumberText(double value) {
   std::ostringstream text;
   text << value;
   return text.str();
 }
 
-std::string Size(int width, int height) {
+std::string StereoSizeText(int width, int height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
-double BaselineM(const CameraCalibration& left, const CameraCalibration& right) {
+double StereoBaselineM(const CameraCalibration& left, const CameraCalibration& right) {
   const double fx = left.p(0, 0);
   return left.p(0, 3) / fx - right.p(0, 3) / fx;
 }
 
-cv::Ptr<cv::StereoSGBM> MakeMatcher(const StereoConfig& config, int first_px, int search_px) {
+cv::Ptr<cv::StereoSGBM> MakeStereoMatcher(const StereoConfig& config, int first_px, int search_px) {
   const int area = config.block_size * config.block_size;
   constexpr int kPreFilterCap = 31;
   constexpr int kSpeckleRangePx = 2;
@@ -49,7 +49,8 @@ cv::Ptr<cv::StereoSGBM> MakeMatcher(const StereoConfig& config, int first_px, in
 
 void CheckStereoConfig(const StereoConfig& config) {
   const auto refuse = [](const std::string& name, double value, const std::string& accepted) {
-    throw Error("stereo's " + name + " is " + Number(value) + ", accepted is " + accepted);
+    throw Error("stereo's " + name + " is " + StereoNumberText(value) + ", accepted is " +
+                accepted);
   };
   if (!(config.min_depth_m > 0) || !std::isfinite(config.min_depth_m)) {
     refuse("least depth", config.min_depth_m, "more than 0 m");
@@ -70,14 +71,15 @@ void CheckStereoConfig(const StereoConfig& config) {
 
 StereoGeometry MakeStereoGeometry(const CameraCalibration& left, const CameraCalibration& right) {
   if (left.width != right.width || left.height != right.height) {
-    throw Error("the left image is " + Size(left.width, left.height) + " and the right one " +
-                Size(right.width, right.height) + ", a stereo pair has one size");
+    throw Error("the left image is " + StereoSizeText(left.width, left.height) +
+                " and the right one " + StereoSizeText(right.width, right.height) +
+                ", a stereo pair has one size");
   }
   const auto same = [&](int row, int column) {
     return std::abs(left.p(row, column) - right.p(row, column)) <= kSamePx;
   };
   const auto shows = [&](int row, int column) {
-    return Number(left.p(row, column)) + " and " + Number(right.p(row, column));
+    return StereoNumberText(left.p(row, column)) + " and " + StereoNumberText(right.p(row, column));
   };
   if (!(left.p(0, 0) > 0) || !same(0, 0) || !same(1, 1)) {
     throw Error("the focal lengths in P are " + shows(0, 0) + " across and " + shows(1, 1) +
@@ -87,9 +89,9 @@ StereoGeometry MakeStereoGeometry(const CameraCalibration& left, const CameraCal
     throw Error("the rows in P are " + shows(1, 2) + ", shifted by " + shows(1, 3) +
                 ": a rectified stereo pair sees one point in one row");
   }
-  const double baseline_m = BaselineM(left, right);
+  const double baseline_m = StereoBaselineM(left, right);
   if (!(baseline_m > 0) || !std::isfinite(baseline_m)) {
-    throw Error("the right camera's P has " + Number(right.p(0, 3)) +
+    throw Error("the right camera's P has " + StereoNumberText(right.p(0, 3)) +
                 " in its fourth column, accepted is -fx times the baseline in metres, so that the "
                 "right camera is to the right of the left one");
   }
@@ -108,28 +110,32 @@ StereoDepth::StereoDepth(const StereoConfig& config, const CameraCalibration& le
   constexpr int kMultiple = 16;  // Of StereoSGBM's search.
   matched_ = cv::Size(size_.width / config.scale, size_.height / config.scale);
   if (matched_.empty()) {
-    throw Error("the image is " + Size(size_.width, size_.height) + ", too small for stereo");
+    throw Error("the image is " + StereoSizeText(size_.width, size_.height) +
+                ", too small for stereo");
   }
   step_px_ = static_cast<double>(size_.width) / matched_.width;
   const double near_px = geometry_.focal_px * geometry_.baseline_m / config.min_depth_m;
   const double longest_px = std::min<double>(kMaxSearchPx, 0.5 * matched_.width);
   if (near_px / step_px_ > longest_px) {
-    throw Error("stereo's least depth is " + Number(config.min_depth_m) + " m, a search over " +
-                Number(std::ceil(near_px)) + " pixels; accepted with these cameras is at least " +
-                Number(geometry_.focal_px * geometry_.baseline_m / (longest_px * step_px_)) + " m");
+    throw Error(
+        "stereo's least depth is " + StereoNumberText(config.min_depth_m) + " m, a search over " +
+        StereoNumberText(std::ceil(near_px)) + " pixels; accepted with these cameras is at least " +
+        StereoNumberText(geometry_.focal_px * geometry_.baseline_m / (longest_px * step_px_)) +
+        " m");
   }
   first_px_ = static_cast<int>(std::floor(geometry_.offset_px / step_px_));
   // One more on either side, so that the ends have neighbours to interpolate with.
   const int wanted = static_cast<int>(std::ceil(near_px / step_px_)) + 2;
   search_px_ = (wanted + kMultiple - 1) / kMultiple * kMultiple;
-  matcher_ = MakeMatcher(config, first_px_, search_px_);
+  matcher_ = MakeStereoMatcher(config, first_px_, search_px_);
 }
 
 void StereoDepth::Prepare(const cv::Mat& image, const char* camera, cv::Mat& grey) {
   if (image.size() != size_ || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) {
-    throw Error("the " + std::string(camera) + " image is " + Size(image.cols, image.rows) +
-                " of " + std::to_string(image.channels()) + " channels, accepted is " +
-                Size(size_.width, size_.height) + " of 8 bit grey or BGR");
+    throw Error("the " + std::string(camera) + " image is " +
+                StereoSizeText(image.cols, image.rows) + " of " + std::to_string(image.channels()) +
+                " channels, accepted is " + StereoSizeText(size_.width, size_.height) +
+                " of 8 bit grey or BGR");
   }
   const cv::Mat* ready = &image;
   if (image.channels() == 3) {

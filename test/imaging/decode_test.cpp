@@ -63,6 +63,16 @@ TEST(DecodeImage, RefusesWhatIsCutOff) {
   }
 }
 
+TEST(DecodeImage, ReadsAWholePictureWhateverStandsBehindIt) {
+  for (const char* extension : {".jpg", ".png"}) {
+    std::vector<std::uint8_t> bytes = Encode(extension, 64, 64);
+    for (const std::size_t more : {64U, 65U, 100000U}) {
+      bytes.resize(bytes.size() + more, 0x20);
+      EXPECT_FALSE(DecodeImage(bytes.data(), bytes.size(), 1000000).empty()) << extension << more;
+    }
+  }
+}
+
 TEST(DecodeImage, RefusesWhatIsNoImage) {
   const std::string text = "no picture";
   EXPECT_THAT(

@@ -103,5 +103,21 @@ TEST(HasImageEnd, TellsWholeFilesFromCutOnes) {
   }
 }
 
+TEST(BytesBehindEnd, CountsWhatACameraAppends) {
+  for (const Bytes& whole :
+       {Encoded(".jpg", 64, 48), Encoded(".png", 64, 48), Encoded(".webp", 64, 48),
+        Encoded(".jpg", 64, 48, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}),
+        Encoded(".jpg", 64, 48, {cv::IMWRITE_JPEG_RST_INTERVAL, 2})}) {
+    const auto format = ReadImageHeader(whole.data(), whole.size())->format;
+    EXPECT_EQ(BytesBehindEnd(whole.data(), whole.size(), format), 0U) << FormatName(format);
+    Bytes longer = whole;
+    longer.resize(whole.size() + 5000, 0x55);
+    EXPECT_EQ(BytesBehindEnd(longer.data(), longer.size(), format), 5000U) << FormatName(format);
+    for (std::size_t size = 0; size < whole.size(); size += 7) {
+      EXPECT_EQ(BytesBehindEnd(whole.data(), size, format), std::nullopt) << FormatName(format);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace livemap::imaging
