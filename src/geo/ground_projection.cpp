@@ -8,15 +8,15 @@ namespace {
 /// Derivative of the ground point by a change `direction_change` of the ray's direction.
 /// From P = C - (C_z / d_z) d, for the first two coordinates:
 ///   dP = -(C_z / d_z) (dd - d (dd_z / d_z)).
-Eigen::Vector2d MoveOfPoint(double camera_height_m, const Eigen::Vector3d& direction,
-                            const Eigen::Vector3d& direction_change) {
+Eigen::Vector2d MoveOfGroundPoint(double camera_height_m, const Eigen::Vector3d& direction,
+                                  const Eigen::Vector3d& direction_change) {
   const double scale = -camera_height_m / direction.z();
   const double along = direction_change.z() / direction.z();
   return scale * (direction_change - along * direction).head<2>();
 }
 
-bool AreUsable(const Eigen::Vector2d& pixel, const CameraIntrinsics& camera,
-               const Eigen::Isometry3d& base_from_optical) {
+bool AreUsableForProjection(const Eigen::Vector2d& pixel, const CameraIntrinsics& camera,
+                            const Eigen::Isometry3d& base_from_optical) {
   return pixel.allFinite() && base_from_optical.matrix().allFinite() && std::isfinite(camera.fx) &&
          std::isfinite(camera.fy) && std::isfinite(camera.cx) && std::isfinite(camera.cy) &&
          camera.fx > 0 && camera.fy > 0;
@@ -28,7 +28,7 @@ std::optional<GroundPoint> ProjectToGround(const Eigen::Vector2d& pixel,
                                            const CameraIntrinsics& intrinsics,
                                            const Eigen::Isometry3d& base_from_optical,
                                            const GroundProjectionNoise& noise) {
-  if (!AreUsable(pixel, intrinsics, base_from_optical)) return std::nullopt;
+  if (!AreUsableForProjection(pixel, intrinsics, base_from_optical)) return std::nullopt;
   const Eigen::Matrix3d rotation = base_from_optical.linear();
   const Eigen::Vector3d centre = base_from_optical.translation();
   const Eigen::Vector3d direction =
@@ -43,12 +43,13 @@ std::optional<GroundPoint> ProjectToGround(const Eigen::Vector2d& pixel,
 
   // Columns: pixel u, pixel v, pitch, height; each times its standard deviation.
   Eigen::Matrix<double, 2, 4> weighted;
-  weighted.col(0) =
-      MoveOfPoint(centre.z(), direction, rotation.col(0) / intrinsics.fx) * noise.pixel_sigma_px;
-  weighted.col(1) =
-      MoveOfPoint(centre.z(), direction, rotation.col(1) / intrinsics.fy) * noise.pixel_sigma_px;
-  weighted.col(2) = MoveOfPoint(centre.z(), direction, Eigen::Vector3d::UnitY().cross(direction)) *
-                    noise.pitch_sigma_rad;
+  weighted.col(0) = MoveOfGroundPoint(centre.z(), direction, rotation.col(0) / intrinsics.fx) *
+                    noise.pixel_sigma_px;
+  weighted.col(1) = MoveOfGroundPoint(centre.z(), direction, rotation.col(1) / intrinsics.fy) *
+                    noise.pixel_sigma_px;
+  weighted.col(2) =
+      MoveOfGroundPoint(centre.z(), direction, Eigen::Vector3d::UnitY().cross(direction)) *
+      noise.pitch_sigma_rad;
   weighted.col(3) = -direction.head<2>() / direction.z() * noise.height_sigma_m;
 
   GroundPoint point;

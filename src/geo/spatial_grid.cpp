@@ -12,7 +12,7 @@ namespace livemap::geo {
 namespace {
 
 /// Earth-centred position of a place on the ellipsoid, metres.
-Eigen::Vector3d ToEarth(const GeoPoint& place) {
+Eigen::Vector3d GridPlaceOf(const GeoPoint& place) {
   Eigen::Vector3d earth_m;
   GeographicLib::Geocentric::WGS84().Forward(place.latitude_deg, place.longitude_deg, 0.0,
                                              earth_m.x(), earth_m.y(), earth_m.z());
@@ -22,7 +22,7 @@ Eigen::Vector3d ToEarth(const GeoPoint& place) {
 /// Geodesic distance of two places that are a chord apart. Solving the geodesic costs a
 /// microsecond; over some kilometres the ellipsoid is a sphere, and an arc is longer than its chord
 /// c by c^3 / (24 r^2): with the mean radius 0.02 mm off at 10 km.
-double DistanceM(double chord_m, const GeoPoint& a, const GeoPoint& b) {
+double GridDistanceM(double chord_m, const GeoPoint& a, const GeoPoint& b) {
   constexpr double kFarM = 10e3;
   constexpr double kEarthRadiusM = 6371e3;
   if (chord_m > kFarM) return GeodesicDistanceM(a, b);
@@ -53,7 +53,7 @@ SpatialGrid::Slot SpatialGrid::SlotOf(const Eigen::Vector3d& earth_m, std::uint3
 void SpatialGrid::Insert(const GeoPoint& place, std::uint64_t id) {
   if (!IsValid(place)) throw Error("a place of a spatial grid is no valid position");
   if (2 * (entries_.size() + 1) > slots_.size()) Grow();
-  const Eigen::Vector3d earth_m = ToEarth(place);
+  const Eigen::Vector3d earth_m = GridPlaceOf(place);
   PutSlot(SlotOf(earth_m, static_cast<std::uint32_t>(entries_.size())));
   entries_.push_back({earth_m, place, id});
 }
@@ -74,7 +74,7 @@ std::optional<std::size_t> SpatialGrid::FindPlace(const Slot& like, const GeoPoi
 
 bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
   if (!IsValid(place)) return false;
-  const auto found = FindPlace(SlotOf(ToEarth(place), kEmpty), place, id);
+  const auto found = FindPlace(SlotOf(GridPlaceOf(place), kEmpty), place, id);
   if (!found) return false;
   const std::uint32_t index = slots_[*found].entry;
   ClearSlot(*found);
@@ -91,10 +91,10 @@ bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
 bool SpatialGrid::Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t id) {
   if (!IsValid(from)) return false;
   if (!IsValid(to)) throw Error("a place of a spatial grid is no valid position");
-  const auto found = FindPlace(SlotOf(ToEarth(from), kEmpty), from, id);
+  const auto found = FindPlace(SlotOf(GridPlaceOf(from), kEmpty), from, id);
   if (!found) return false;
   const std::uint32_t index = slots_[*found].entry;
-  const Eigen::Vector3d earth_m = ToEarth(to);
+  const Eigen::Vector3d earth_m = GridPlaceOf(to);
   const Slot slot = SlotOf(earth_m, index);
   if (slot.hash == slots_[*found].hash) {
     slots_[*found] = slot;
@@ -109,7 +109,7 @@ bool SpatialGrid::Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t i
 std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centre,
                                                            double radius_m) const {
   if (!IsValid(centre) || !(radius_m >= 0)) return std::nullopt;
-  Search search{centre, ToEarth(centre), radius_m, std::nullopt};
+  Search search{centre, GridPlaceOf(centre), radius_m, std::nullopt};
   const Cell low = CellAt(search.earth_m.array() - search.ChordM());
   const Cell high = CellAt(search.earth_m.array() + search.ChordM());
   // In a large table every cell is a cache miss: ask for several at once, then read them.
@@ -137,7 +137,7 @@ std::vector<SpatialGrid::Neighbour> SpatialGrid::Within(const GeoPoint& centre,
                                                         double radius_m) const {
   std::vector<Neighbour> found;
   if (!IsValid(centre) || !(radius_m >= 0)) return found;
-  const Search search{centre, ToEarth(centre), radius_m, std::nullopt};
+  const Search search{centre, GridPlaceOf(centre), radius_m, std::nullopt};
   const Cell low = CellAt(search.earth_m.array() - search.ChordM());
   const Cell high = CellAt(search.earth_m.array() + search.ChordM());
   std::vector<std::uint32_t> hashes;
@@ -156,7 +156,7 @@ std::vector<SpatialGrid::Neighbour> SpatialGrid::Within(const GeoPoint& centre,
       const Entry& entry = entries_[slots_[i].entry];
       const double squared_m2 = (entry.earth_m - search.earth_m).squaredNorm();
       if (squared_m2 > search.ChordM() * search.ChordM()) continue;
-      const double distance_m = DistanceM(std::sqrt(squared_m2), entry.place, centre);
+      const double distance_m = GridDistanceM(std::sqrt(squared_m2), entry.place, centre);
       if (distance_m <= radius_m) found.push_back({entry.id, distance_m});
     }
   }

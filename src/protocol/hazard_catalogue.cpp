@@ -7,6 +7,8 @@
 #include <set>
 
 #include "common/error.h"
+#include "common/text_file.h"
+#include "protocol/text_rules.h"
 
 namespace livemap::protocol {
 namespace {
@@ -28,7 +30,7 @@ constexpr TextRule kHexColour{7, 7, "#0123456789abcdef", true, "#rrggbb in lower
 constexpr TextRule kUrgency{1, 1, "123", true, "1, 2 or 3"};
 constexpr TextRule kConfirmations{1, 1, "12345", true, "1, 2, 3, 4 or 5"};
 
-bool Obeys(const std::string& text, const TextRule& rule) {
+bool ObeysCatalogueRule(const std::string& text, const TextRule& rule) {
   if (text.size() < rule.min_size || text.size() > rule.max_size) return false;
   const auto odd =
       rule.allowed ? text.find_first_not_of(rule.characters) : text.find_first_of(rule.characters);
@@ -37,16 +39,17 @@ bool Obeys(const std::string& text, const TextRule& rule) {
 }
 
 /// Reads the scalars of one YAML map; its errors name source, place and key.
-class EntryReader {
+class HazardCatalogueReader {
  public:
-  EntryReader(const YAML::Node& node, std::string place) : node_(node), place_(std::move(place)) {
+  HazardCatalogueReader(const YAML::Node& node, std::string place)
+      : node_(node), place_(std::move(place)) {
     if (!node_.IsMap()) throw Error(place_ + " must be a map of properties");
   }
 
   void ReadText(const char* key, const TextRule& rule, std::string& value) {
     const std::string* text = Scalar(key);
     if (text == nullptr) return;
-    if (!Obeys(*text, rule)) Refuse(key, *text, rule.accepted);
+    if (!ObeysCatalogueRule(*text, rule)) Refuse(key, *text, rule.accepted);
     value = *text;
   }
 
@@ -108,8 +111,9 @@ class EntryReader {
   std::set<std::string> known_;
 };
 
-void ReadProperties(const YAML::Node& node, const std::string& place, HazardClass& entry) {
-  EntryReader reader(node, place);
+void ReadHazardClassProperties(const YAML::Node& node, const std::string& place,
+                               HazardClass& entry) {
+  HazardCatalogueReader reader(node, place);
   reader.ReadText("label", kLabel, entry.label);
   reader.ReadText("icon", kName, entry.icon);
   reader.ReadText("colour", kHexColour, entry.colour);
@@ -122,29 +126,29 @@ void ReadProperties(const YAML::Node& node, const std::string& place, HazardClas
   reader.RejectUnknown();
 }
 
-void CheckSection(const std::string& key, const std::string& source) {
+void CheckCatalogueSection(const std::string& key, const std::string& source) {
   if (key == "defaults" || key == "classes") return;
   throw Error("hazard catalogue '" + source + "' has the unknown key '" + key +
               "', accepted are: classes, defaults");
 }
 
-HazardClass ReadClass(const std::string& name, const YAML::Node& node, const std::string& place,
-                      HazardClass entry) {
-  if (!Obeys(name, kName)) {
+HazardClass ReadHazardClass(const std::string& name, const YAML::Node& node,
+                            const std::string& place, HazardClass entry) {
+  if (!ObeysCatalogueRule(name, kName)) {
     throw Error(place + "class '" + name + "' must be 1 to 40 of a-z, 0-9 and _");
   }
-  ReadProperties(node, place + "class '" + name + "'", entry);
+  ReadHazardClassProperties(node, place + "class '" + name + "'", entry);
   return entry;
 }
 
-[[noreturn]] void RefuseTwice(const std::string& name, const std::string& place) {
+[[noreturn]] void RefuseHazardClassTwice(const std::string& name, const std::string& place) {
   throw Error(place + "class '" + name + "' stands there twice");
 }
 
 }  // namespace
 
 HazardCatalogue HazardCatalogue::Load(const std::string& path) {
-  return Parse(ReadFile(path, kMaxFileBytes), path);
+  return Parse(ReadTextFile(path, kMaxFileBytes), path);
 }
 
 HazardCatalogue HazardCatalogue::Parse(const std::string& yaml, const std::string& source) {
@@ -155,17 +159,18 @@ HazardCatalogue HazardCatalogue::Parse(const std::string& yaml, const std::strin
     throw Error("hazard catalogue '" + source + "' is no YAML: " + error.what());
   }
   if (!root.IsMap()) throw Error("hazard catalogue '" + source + "' must be a map");
-  for (const auto& entry : root) CheckSection(entry.first.as<std::string>(""), source);
+  for (const auto& entry : root) CheckCatalogueSection(entry.first.as<std::string>(""), source);
   HazardCatalogue catalogue;
   const std::string place = "hazard catalogue '" + source + "', ";
-  if (root["defaults"]) ReadProperties(root["defaults"], place + "defaults", catalogue.defaults_);
+  if (root["defaults"])
+    ReadHazardClassProperties(root["defaults"], place + "defaults", catalogue.defaults_);
   if (!root["classes"].IsDefined() || !root["classes"].IsMap()) {
     throw Error(place + "classes must be a map of class names");
   }
   for (const auto& node : root["classes"]) {
     const auto name = node.first.as<std::string>("");
-    const HazardClass entry = ReadClass(name, node.second, place, catalogue.Get(name));
-    if (!catalogue.classes_.emplace(name, entry).second) RefuseTwice(name, place);
+    const HazardClass entry = ReadHazardClass(name, node.second, place, catalogue.Get(name));
+    if (!catalogue.classes_.emplace(name, entry).second) RefuseHazardClassTwice(name, place);
   }
   return catalogue;
 }
@@ -175,8 +180,16 @@ HazardClass HazardCatalogue::Get(const std::string& class_name) const {
   if (found != classes_.end()) return found->second;
   HazardClass entry = defaults_;
   entry.name = class_name;
-  entry.label = class_name;
+  entry.label = class_name == kOtherClass ? "Other" : class_name;
   return entry;
+}
+
+bool HazardCatalogue::Names(const std::string& class_name) const {
+  return classes_.empty() || classes_.count(Trimmed(class_name)) != 0;
+}
+
+std::string HazardCatalogue::HeadingOf(const std::string& class_name) const {
+  return Names(class_name) ? Trimmed(class_name) : kOtherClass;
 }
 
 double HazardCatalogue::DuplicateRadiusM(const std::string& class_name) const {

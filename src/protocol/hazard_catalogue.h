@@ -20,6 +20,9 @@ struct HazardClass {
   double false_rate = 0.03;         ///< P(the same | it is not there), 0.001 to 0.4.
 };
 
+/// The heading under which all classes are counted that a catalogue does not name.
+constexpr char kOtherClass[] = "other";
+
 /// The classes of hazards and their properties, read from `config/hazards.yaml`.
 class HazardCatalogue {
  public:
@@ -34,6 +37,12 @@ class HazardCatalogue {
 
   /// The class's entry; the defaults, labelled with the name, where it has none.
   HazardClass Get(const std::string& class_name) const;
+  /// Whether the file names the class, apart from blanks around the name. A catalogue that names no
+  /// class at all takes every name.
+  bool Names(const std::string& class_name) const;
+  /// The name under which hazards of this class are kept: the file's own where it names the class,
+  /// else kOtherClass. So nobody makes more classes than the file has, whatever names come.
+  std::string HeadingOf(const std::string& class_name) const;
   /// Distance within which two hazards of this class are the same, metres.
   double DuplicateRadiusM(const std::string& class_name) const;
   /// The greatest duplicate radius of any class, the default for unknown classes included, metres.

@@ -12,25 +12,25 @@ namespace {
 constexpr std::size_t kMaxReasonBytes = 64;
 constexpr std::size_t kMaxNameBytes = 64;
 
-void RequireIds(const Uuid& poll, const Uuid& hazard, const std::string& name) {
+void RequirePollIds(const Uuid& poll, const Uuid& hazard, const std::string& name) {
   if (!poll.IsNil() && !hazard.IsNil()) return;
   throw Error(name + " has a nil " + (poll.IsNil() ? "poll_uuid" : "hazard_uuid") +
               ", accepted is the uuid of one");
 }
 
-void RequirePosition(const geo::GeoPoint& position, const std::string& name) {
+void RequirePollPosition(const geo::GeoPoint& position, const std::string& name) {
   if (geo::IsValid(position)) return;
   throw Error(name + " has position " + std::to_string(position.latitude_deg) + ", " +
               std::to_string(position.longitude_deg) + ", accepted are WGS84 degrees");
 }
 
-void RequireShort(const std::string& text, std::size_t limit, const std::string& what) {
+void RequireShortPollText(const std::string& text, std::size_t limit, const std::string& what) {
   if (text.size() <= limit) return;
   throw Error(what + " has " + std::to_string(text.size()) + " bytes, accepted are at most " +
               std::to_string(limit));
 }
 
-void RequireCovariance(const Eigen::Matrix2d& covariance_m2) {
+void RequirePollCovariance(const Eigen::Matrix2d& covariance_m2) {
   const double determinant =
       covariance_m2(0, 0) * covariance_m2(1, 1) - covariance_m2(0, 1) * covariance_m2(1, 0);
   const bool positive = covariance_m2.allFinite() && covariance_m2(0, 0) > 0 &&
@@ -45,10 +45,10 @@ void RequireCovariance(const Eigen::Matrix2d& covariance_m2) {
 }  // namespace
 
 void CheckPoll(const Poll& poll) {
-  RequireIds(poll.poll, poll.hazard, "hazard poll");
-  RequirePosition(poll.position, "hazard poll");
-  RequireCovariance(poll.covariance_m2);
-  RequireShort(poll.class_name, kMaxClassNameBytes, "class_name of a hazard poll");
+  RequirePollIds(poll.poll, poll.hazard, "hazard poll");
+  RequirePollPosition(poll.position, "hazard poll");
+  RequirePollCovariance(poll.covariance_m2);
+  RequireShortPollText(poll.class_name, kMaxClassNameBytes, "class_name of a hazard poll");
   if (poll.class_name.empty()) {
     throw Error("hazard poll has no class_name, accepted is the hazard's class");
   }
@@ -58,18 +58,18 @@ void CheckPoll(const Poll& poll) {
 }
 
 void CheckAnswer(const PollAnswer& answer) {
-  RequireIds(answer.poll, answer.hazard, "poll answer");
+  RequirePollIds(answer.poll, answer.hazard, "poll answer");
   if (!(answer.confidence >= 0 && answer.confidence <= 1)) {
     throw Error("poll answer has confidence " + std::to_string(answer.confidence) +
                 ", accepted is 0 to 1");
   }
-  RequirePosition(answer.vehicle_position, "poll answer");
+  RequirePollPosition(answer.vehicle_position, "poll answer");
   if (std::isinf(answer.course_rad)) {
     throw Error("poll answer has an infinite course, accepted are radians, or NaN when standing");
   }
-  RequireShort(answer.reason, kMaxReasonBytes, "reason of a poll answer");
-  RequireShort(answer.drive_id, kMaxNameBytes, "drive_id of a poll answer");
-  RequireShort(answer.image_format, kMaxNameBytes, "image format of a poll answer");
+  RequireShortPollText(answer.reason, kMaxReasonBytes, "reason of a poll answer");
+  RequireShortPollText(answer.drive_id, kMaxNameBytes, "drive_id of a poll answer");
+  RequireShortPollText(answer.image_format, kMaxNameBytes, "image format of a poll answer");
 }
 
 }  // namespace livemap::protocol

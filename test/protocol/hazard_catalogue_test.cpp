@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "common/error.h"
+#include "test/support/temporary_directory.h"
 
 namespace livemap::protocol {
 namespace {
@@ -102,6 +105,17 @@ INSTANTIATE_TEST_SUITE_P(
                       BadCatalogue{"classes: {deer: {colour: red}}", "'red'"},
                       BadCatalogue{"classes: {deer: {icon: ../x}}", "'../x'"},
                       BadCatalogue{"classes: {deer: {label: <b>}}", "'<b>'"}));
+
+TEST(HazardCatalogue, AByteOrderMarkIsSkippedOrNamed) {
+  const test::TemporaryDirectory folder;
+  const std::string path = folder.path() + "/hazards.yaml";
+  std::ofstream(path) << "\xef\xbb\xbf"
+                      << ReadFile(LIVEMAP_SOURCE_DIR "/config/hazards.yaml", 1U << 20U);
+  EXPECT_EQ(HazardCatalogue::Load(path).classes().count("pothole"), 1U);
+  std::ofstream(path) << "\xff\xfe";
+  EXPECT_THAT([&] { HazardCatalogue::Load(path); },
+              ThrowsMessage<Error>(AllOf(HasSubstr(path), HasSubstr("UTF-16"))));
+}
 
 TEST(HazardCatalogue, MissingFileIsNamed) {
   EXPECT_THAT([] { HazardCatalogue::Load("/nowhere/hazards.yaml"); },
