@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/error.h"
+#include "common/text_file.h"
 #include "datasets/text_parsing.h"
 #include "geo/wgs84.h"
 
@@ -93,7 +94,7 @@ CameraFile ParseCameraFile(const std::string& yaml, const std::string& name) {
 }
 
 CameraFile ReadCameraFile(const std::string& path) {
-  return ParseCameraFile(ReadFile(path, kMaxCameraFileBytes), path);
+  return ParseCameraFile(ReadTextFile(path, kMaxCameraFileBytes), path);
 }
 
 }  // namespace livemap::datasets

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "common/error.h"
+#include "common/text_file.h"
 #include "datasets/text_parsing.h"
 
 namespace livemap::datasets {
@@ -24,8 +25,10 @@ class Table {
   Table(const std::string& text, std::string name, std::string head)
       : lines_(Lines(text)), name_(std::move(name)), head_(std::move(head)) {
     columns_ = Split(head_, ',').size();
-    if (lines_.empty() || lines_[0].compare(0, head_.size(), head_) != 0) {
-      throw Error("line 1 of '" + name_ + "' must begin with '" + head_ + "'");
+    if (lines_.empty() || (lines_[0] + ",").compare(0, head_.size() + 1, head_ + ",") != 0) {
+      throw Error("line 1 of '" + name_ + "' is '" +
+                  (lines_.empty() ? "" : lines_[0].substr(0, 80)) + "', it must begin with '" +
+                  head_ + "'");
     }
     if (lines_.size() < 2) throw Error("'" + name_ + "' has no row");
   }
@@ -42,10 +45,11 @@ class Table {
       values.push_back(*value);
     }
     if (values.size() != columns_) Refuse(row, "finite numbers '" + head_ + "'");
-    if (values[0] <= 0 || values[0] > kMaxTimeS) Refuse(row, "a time from 0 to 4e9 s");
+    if (values[0] < 0 || values[0] > kMaxTimeS) {
+      Refuse(row, "a time from 0 to 4e9 s" + StampHint(parts[0]));
+    }
     const auto stamp = static_cast<std::int64_t>(std::llround(values[0] * 1e9));
     if (row > 0 && stamp <= stamp_ns) Refuse(row, "a time after the line before");
-    if (stamp <= 0) Refuse(row, "a time from 0 to 4e9 s");
     stamp_ns = stamp;
     return values;
   }
@@ -111,9 +115,10 @@ std::vector<RecordedSpeed> ParseRecordedSpeeds(const std::string& text, const st
 
 PositionDrive ReadComma2k19(const std::string& directory) {
   const fs::path root(directory);
-  if (!fs::is_directory(root)) throw Error("the folder '" + directory + "' does not exist");
+  if (!fs::exists(root)) throw Error("the folder '" + directory + "' does not exist");
+  if (!fs::is_directory(root)) throw Error("'" + directory + "' is no folder");
   const auto path = [&](const char* file) { return (root / file).string(); };
-  const auto read = [&](const char* file) { return ReadFile(path(file), kMaxTableBytes); };
+  const auto read = [&](const char* file) { return ReadTextFile(path(file), kMaxTableBytes); };
   PositionDrive drive;
   drive.fixes = ParseRecordedFixes(read("gnss_ublox.csv"), path("gnss_ublox.csv"));
   drive.poses = ParseRecordedPoses(read("pose.csv"), path("pose.csv"));

@@ -1,7 +1,11 @@
 #include "datasets/image_file.h"
 
+#include <utility>
+
 #include "common/error.h"
+#include "common/text.h"
 #include "imaging/decode.h"
+#include "imaging/orientation.h"
 
 namespace livemap::datasets {
 namespace {
@@ -9,24 +13,64 @@ namespace {
 constexpr std::size_t kMaxImageFileBytes = 64U << 20U;
 constexpr std::int64_t kMaxPixels = 64'000'000;
 
-}  // namespace
+std::string SizeText(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
 
-ImageFile ReadImageFile(const std::string& path, int width, int height) {
-  const std::string text = ReadFile(path, kMaxImageFileBytes);
+struct DecodedFile {
   ImageFile file;
-  file.bytes.assign(text.begin(), text.end());
+  cv::Mat image;
+};
+
+void CheckSize(const std::string& path, const DecodedFile& decoded, int width, int height) {
+  const cv::Mat& image = decoded.image;
+  if ((width <= 0 || image.cols == width) && (height <= 0 || image.rows == height)) return;
+  const int orientation =
+      imaging::ReadOrientation(decoded.file.bytes.data(), decoded.file.bytes.size());
+  throw Error("'" + path + "' is " + SizeText(image.cols, image.rows) +
+              (orientation == imaging::kUpright ? ""
+                                                : " after turning it as its EXIF orientation " +
+                                                      std::to_string(orientation) + " says") +
+              ", the camera's calibration is for " + SizeText(width, height));
+}
+
+DecodedFile Decode(const std::string& path, int width, int height,
+                   const imaging::DecodeConfig& config) {
+  const std::string text = ReadFile(path, kMaxImageFileBytes);
+  DecodedFile decoded;
+  decoded.file.bytes.assign(text.begin(), text.end());
+  const std::vector<std::uint8_t>& bytes = decoded.file.bytes;
   try {
-    imaging::DecodeImage(file.bytes.data(), file.bytes.size(), kMaxPixels);
+    decoded.image = imaging::DecodeImage(bytes.data(), bytes.size(), kMaxPixels, config);
   } catch (const Error& error) {
     throw Error("'" + path + "': " + error.what());
   }
-  file.header = *imaging::ReadImageHeader(file.bytes.data(), file.bytes.size());
-  if ((width > 0 && file.header.width != width) || (height > 0 && file.header.height != height)) {
-    throw Error("'" + path + "' is " + std::to_string(file.header.width) + "x" +
-                std::to_string(file.header.height) + ", the camera's calibration is for " +
-                std::to_string(width) + "x" + std::to_string(height));
+  decoded.file.header = *imaging::ReadImageHeader(bytes.data(), bytes.size());
+  decoded.file.header.width = decoded.image.cols;
+  decoded.file.header.height = decoded.image.rows;
+  CheckSize(path, decoded, width, height);
+  return decoded;
+}
+
+}  // namespace
+
+ImageFile ReadImageFile(const std::string& path, int width, int height) {
+  return std::move(Decode(path, width, height, {}).file);
+}
+
+cv::Mat ReadPictureFile(const std::string& path, int width, int height,
+                        imaging::DecodeConfig::Pixels pixels) {
+  return Decode(path, width, height, {pixels, true}).image;
+}
+
+cv::Mat ReadDepthFile(const std::string& path, int width, int height) {
+  cv::Mat depth = ReadPictureFile(path, width, height, imaging::DecodeConfig::Pixels::kAsStored);
+  if (depth.type() != CV_16UC1) {
+    throw Error("the depth image '" + path + "' has " +
+                PixelText(static_cast<int>(8 * depth.elemSize1()), depth.channels()) +
+                ", accepted is a PNG of " + PixelText(16, 1));
   }
-  return file;
+  return depth;
 }
 
 }  // namespace livemap::datasets

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
+#include "common/text_file.h"
 #include "geo/wgs84.h"
 
 namespace livemap::datasets {
@@ -152,11 +153,11 @@ Route ParseRoute(const std::string& geojson, const std::string& name) {
 }
 
 std::vector<geo::GeoPoint> ReadRoutePoints(const std::string& path) {
-  return ParseRoutePoints(ReadFile(path, kMaxRouteBytes), path);
+  return ParseRoutePoints(ReadTextFile(path, kMaxRouteBytes), path);
 }
 
 Route ReadRoute(const std::string& path) {
-  return ParseRoute(ReadFile(path, kMaxRouteBytes), path);
+  return ParseRoute(ReadTextFile(path, kMaxRouteBytes), path);
 }
 
 }  // namespace livemap::datasets

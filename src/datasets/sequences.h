@@ -33,6 +33,9 @@ struct Sequence {
       0;  ///< From the left camera to the right one; 0: no right camera, or unknown.
   std::vector<SequenceFrame> frames;
   std::vector<StampedPose> poses;
+  /// Sentences about what was mended in the files or taken for granted, for people: lines that were
+  /// repeated, a scale of depth that no file says.
+  std::vector<std::string> notes{};
 };
 
 /// A TUM stamp "1305031102.175304" to nanoseconds without losing digits; none when malformed.
@@ -50,7 +53,9 @@ enum class DepthImages {
 /// fy, cx, cy, depth_scale). Of a rectified stereo pair also rgb_right.txt (as rgb.txt, pictures
 /// with the same stamp belong together) and baseline_m in camera.yaml. `camera_file` is read
 /// instead of camera.yaml when it is not empty; without either the camera is PublishedTumCamera's.
-/// With DepthImages::kIgnored depth.txt is not opened. Throws Error naming file and line.
+/// With DepthImages::kIgnored depth.txt is not opened. Stamps must increase; a line that repeats
+/// the stamp of the line before and says the same (the same images, or a pose within 0.02 m and
+/// 0.02 rad) is left out and noted. Throws Error naming file and line.
 Sequence ReadTumSequence(const std::string& directory, const std::string& camera_file = "",
                          DepthImages depth_images = DepthImages::kRead);
 
@@ -71,12 +76,30 @@ std::optional<geo::CameraIntrinsics> PublishedTumCamera(const std::string& direc
 /// numbers" or 12 bare numbers per line, the first line counts), poses.txt (3x4 rows, camera to
 /// world, optional), times.txt (seconds, optional: else frames at `rate_hz`). Of a stereo pair also
 /// image_1 beside image_0 with P1 in the second line of calib.txt, or image_3 beside image_2 with
-/// P2 and P3 in the third and fourth, pictures of the same name belonging together. Throws Error.
+/// P2 and P3 in the third and fourth; pictures of one number belong together.
+///
+/// Pictures are in the order of their numbers (PictureFolder). A picture's number, counted from 0,
+/// is its line of times.txt and poses.txt, so that a missing picture moves no other. Where the
+/// numbers do not say a line (they begin elsewhere without a gap, or are stamps), a file with
+/// exactly one line per picture is taken line by line; anything else is refused. Throws Error.
 Sequence ReadKittiSequence(const std::string& directory, double rate_hz);
 
-/// For the parsers' tests and fuzzers; `name` is for messages.
-std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const std::string& name);
-std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name);
+/// A file with a line per frame.
+struct LineCount {
+  std::string file;  ///< Its name, for messages.
+  std::size_t lines = 0;
+};
+
+/// Which line of each of the files, from 0, belongs to each of the pictures, which are in the order
+/// of their numbers, as ReadKittiSequence says. Throws Error naming picture and file.
+std::vector<std::size_t> LinesOfPictures(const std::vector<std::string>& pictures,
+                                         const std::vector<LineCount>& files);
+
+/// For the parsers' tests and fuzzers; `name` is for messages, `notes` receives Sequence::notes.
+std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const std::string& name,
+                                                std::vector<std::string>* notes = nullptr);
+std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name,
+                                            std::vector<std::string>* notes = nullptr);
 std::vector<Eigen::Isometry3d> ParseKittiPoses(const std::string& text, const std::string& name);
 
 }  // namespace livemap::datasets

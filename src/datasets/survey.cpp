@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include "common/error.h"
+#include "common/picture_folder.h"
+#include "common/text_file.h"
+#include "datasets/label_files.h"
 #include "datasets/text_parsing.h"
 
 namespace livemap::datasets {
@@ -24,9 +29,11 @@ bool IsPlainName(const std::string& name) {
 std::vector<SurveyRow> ParseSurveyTable(const std::string& text, const std::string& name) {
   const std::vector<std::string> lines = Lines(text);
   if (lines.empty() || lines[0] != "frame,chainage_m,potholes") {
-    throw Error("line 1 of '" + name + "' must be 'frame,chainage_m,potholes'");
+    throw Error("line 1 of '" + name + "' is '" + (lines.empty() ? "" : lines[0].substr(0, 80)) +
+                "', it must be 'frame,chainage_m,potholes'");
   }
   std::vector<SurveyRow> rows;
+  std::set<std::string> frames;
   for (std::size_t i = 1; i < lines.size(); ++i) {
     const std::string where = "line " + std::to_string(i + 1) + " of '" + name + "'";
     const std::vector<std::string> parts = Split(lines[i], ',');
@@ -36,6 +43,9 @@ std::vector<SurveyRow> ParseSurveyTable(const std::string& text, const std::stri
         std::abs(*chainage) > 1e8) {
       throw Error(where + " is '" + lines[i].substr(0, 80) +
                   "', accepted is 'frame,chainage_m,potholes' with a plain file name");
+    }
+    if (!frames.insert(parts[0]).second) {
+      throw Error(where + " repeats the frame '" + parts[0] + "', accepted is one line for each");
     }
     if (!rows.empty() && *chainage < rows.back().chainage_m) {
       throw Error(where + " goes back from chainage " + std::to_string(rows.back().chainage_m) +
@@ -49,26 +59,48 @@ std::vector<SurveyRow> ParseSurveyTable(const std::string& text, const std::stri
 
 SurveyDrive ReadSurveyDrive(const std::string& directory) {
   const fs::path root(directory);
-  if (!fs::is_directory(root)) throw Error("the survey folder '" + directory + "' does not exist");
+  if (!fs::exists(root)) throw Error("the survey folder '" + directory + "' does not exist");
+  if (!fs::is_directory(root)) throw Error("'" + directory + "' is no folder");
   SurveyDrive drive;
   drive.name = fs::weakly_canonical(root).filename().string();
   const std::string table_path = (root / "frames.csv").string();
-  for (const SurveyRow& row : ParseSurveyTable(ReadFile(table_path, kMaxTableBytes), table_path)) {
+  if (!fs::is_directory(root / "images")) {
+    throw Error("the survey folder '" + directory + "' has no folder images");
+  }
+  const PictureFolder pictures((root / "images").string(), PictureNames::kNamed);
+  const std::vector<SurveyRow> rows =
+      ParseSurveyTable(ReadTextFile(table_path, kMaxTableBytes), table_path);
+  std::set<std::string> listed;
+  for (const SurveyRow& row : rows) {
     SurveyFrame frame;
     frame.name = row.frame;
     frame.chainage_m = row.chainage_m;
-    frame.image_path = (root / "images" / (row.frame + ".jpg")).string();
-    if (!fs::is_regular_file(frame.image_path)) {
-      throw Error("the image '" + frame.image_path + "' of the survey is missing");
+    const std::optional<std::string> picture = pictures.Find(row.frame);
+    if (!picture) {
+      const std::string extension = HasPictureExtension(row.frame) ? "" : ".jpg";
+      throw Error("the image '" + (root / "images" / (row.frame + extension)).string() +
+                  "' of the survey is missing: accepted in frames.csv are the names of the images "
+                  "without their extensions");
     }
-    const std::string label_path = (root / "labels" / (row.frame + ".txt")).string();
-    if (fs::exists(label_path)) {
-      frame.boxes = ParseYoloLabels(ReadFile(label_path, kMaxLabelBytes), label_path);
-    } else if (row.potholes > 0) {
-      throw Error("the label file '" + label_path + "' is missing though frames.csv counts " +
-                  std::to_string(row.potholes) + " potholes");
+    if (!listed.insert(*picture).second) {
+      throw Error("'" + table_path + "' lists the picture '" + *picture +
+                  "' twice, the second time as '" + row.frame + "', accepted is one line for each");
     }
+    frame.image_path = *picture;
     drive.frames.push_back(std::move(frame));
+  }
+  const std::map<std::string, fs::path> labels = LabelFilesIn(root / "labels", pictures);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    SurveyFrame& frame = drive.frames[i];
+    const std::string name = StemOf(frame.image_path);
+    if (const auto label = labels.find(name); label != labels.end()) {
+      const std::string path = label->second.string();
+      frame.boxes = ParseYoloLabels(ReadTextFile(path, kMaxLabelBytes), path);
+    } else if (rows[i].potholes > 0) {
+      throw Error("the label file '" + (root / "labels" / (name + ".txt")).string() +
+                  "' is missing though frames.csv counts " + std::to_string(rows[i].potholes) +
+                  " potholes");
+    }
   }
   return drive;
 }

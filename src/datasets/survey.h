@@ -11,12 +11,12 @@ namespace livemap::datasets {
 struct SurveyFrame {
   std::string name;        ///< File name of image and label without extension.
   double chainage_m = 0;   ///< Metres along the road.
-  std::string image_path;  ///< A JPEG file; not opened yet.
+  std::string image_path;  ///< A JPEG or PNG file; not opened yet.
   std::vector<LabelledBox> boxes;
 };
 
 /// One survey section in driving order: `frames.csv` (frame,chainage_m,potholes), `images/NAME.jpg`
-/// and, for frames with potholes, `labels/NAME.txt` in YOLO form.
+/// (or another spelling, or a PNG) and, for frames with potholes, `labels/NAME.txt` in YOLO form.
 struct SurveyDrive {
   std::string name;  ///< Of the folder.
   std::vector<SurveyFrame> frames;

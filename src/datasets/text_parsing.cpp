@@ -49,11 +49,29 @@ std::vector<std::string> SplitBlanks(const std::string& line) {
 
 std::vector<std::string> Lines(const std::string& text) {
   std::vector<std::string> lines = Split(text, '\n');
-  if (lines.back().empty()) lines.pop_back();
-  for (std::string& line : lines) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-  }
+  for (std::string& line : lines) line.resize(line.find_last_not_of(kBlanks) + 1);
+  while (!lines.empty() && lines.back().empty()) lines.pop_back();
   return lines;
+}
+
+std::string SeparatorHint(const std::string& line) {
+  for (const char separator : {',', ';'}) {
+    if (line.find(separator) == std::string::npos) continue;
+    return std::string(": its columns are separated by '") + separator + "', accepted are blanks";
+  }
+  return "";
+}
+
+std::string StampHint(const std::string& stamp) {
+  const std::optional<double> value = ParseFinite(stamp);
+  if (!value) return "";
+  if (*value < 0) return ": its stamp is negative";
+  // Since 1970 there are 1e9 s and more, up to 2106 fewer than 5e9.
+  if (*value < 1e11) return "";
+  const char* const unit = *value < 1e14   ? "milliseconds"
+                           : *value < 1e17 ? "microseconds"
+                                           : "nanoseconds";
+  return std::string(": its stamp looks like ") + unit + ", accepted are seconds";
 }
 
 }  // namespace livemap::datasets

@@ -22,7 +22,16 @@ std::vector<std::string> Split(const std::string& line, char separator);
 /// Splits at runs of blanks and tabs; no empty parts.
 std::vector<std::string> SplitBlanks(const std::string& line);
 
-/// Lines without their ends ("\n" or "\r\n"); a last empty line does not count.
+/// Lines without their ends ("\n" or "\r\n") and the blanks before these; empty lines at the end
+/// of the text do not count.
 std::vector<std::string> Lines(const std::string& text);
+
+/// What to add to the refusal of a line whose columns blanks should separate: that it has commas or
+/// semicolons; empty where it has none.
+std::string SeparatorHint(const std::string& line);
+
+/// What to add to the refusal of a stamp that should be in seconds: that it looks like
+/// milliseconds, microseconds or nanoseconds since 1970, or is negative; empty for any other text.
+std::string StampHint(const std::string& stamp);
 
 }  // namespace livemap::datasets

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/error.h"
+#include "common/text_file.h"
 #include "datasets/sequences.h"
 #include "datasets/stamp_pairs.h"
 #include "datasets/text_parsing.h"
@@ -16,11 +17,51 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kPublishedDepthScale = 5000;
+constexpr double kMaxRepeatedM = 0.02;
+constexpr double kMaxRepeatedRad = 0.02;
 
 [[noreturn]] void RefuseLine(const std::string& name, std::size_t index, const std::string& line,
                              const std::string& accepted) {
+  const std::vector<std::string> parts = SplitBlanks(line);
+  const std::string separator = SeparatorHint(line);
   throw Error("line " + std::to_string(index + 1) + " of '" + name + "' is '" + line.substr(0, 80) +
-              "', accepted is '" + accepted + "'");
+              "', accepted is '" + accepted + "'" +
+              (separator.empty() && !parts.empty() ? StampHint(parts[0]) : separator));
+}
+
+[[noreturn]] void RefuseTwice(const std::string& name, std::size_t first, std::size_t second,
+                              const std::vector<std::string>& lines, const std::string& what) {
+  throw Error("lines " + std::to_string(first + 1) + " and " + std::to_string(second + 1) +
+              " of '" + name + "' have one stamp and two " + what + ", '" +
+              lines[first].substr(0, 80) + "' and '" + lines[second].substr(0, 80) +
+              "', accepted is one for each stamp");
+}
+
+/// Lines that say once more what the line before said.
+class RepeatedLines {
+ public:
+  void Add(std::size_t index) {
+    if (count_++ == 0) first_ = index;
+  }
+  /// Tells of them, if there were any.
+  void Note(const std::string& name, std::vector<std::string>* notes) const {
+    if (count_ == 0 || notes == nullptr) return;
+    notes->push_back(std::to_string(count_) + (count_ == 1 ? " line" : " lines") + " of '" + name +
+                     "', the first of them line " + std::to_string(first_ + 1) +
+                     ", repeated the stamp before and said (nearly) the same: left out");
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::size_t first_ = 0;
+};
+
+/// Whether two poses with one stamp say the same: a receiver of motion capture may round two
+/// neighbouring moments to one.
+bool AreNearlyEqual(const StampedPose& a, const StampedPose& b) {
+  const Eigen::Isometry3d motion = a.world_from_camera.inverse() * b.world_from_camera;
+  return motion.translation().norm() <= kMaxRepeatedM &&
+         Eigen::AngleAxisd(motion.linear()).angle() <= kMaxRepeatedRad;
 }
 
 bool IsCommentOrEmpty(const std::string& line) {
@@ -40,21 +81,33 @@ double CameraNumber(const YAML::Node& root, const std::string& key, const std::s
   const std::optional<double> value =
       node && node.IsScalar() ? ParseFinite(node.Scalar()) : std::nullopt;
   if (!value || *value <= 0 || *value > 1e6) {
-    throw Error("'" + key + "' of '" + path + "' must be a positive number");
+    throw Error("'" + key + "' of '" + path + "' is " +
+                (node && node.IsScalar() ? "'" + node.Scalar().substr(0, 40) + "'" : "missing") +
+                ", it must be a positive number up to 1e6");
   }
   return *value;
 }
 
-void ReadCamera(const std::string& path, Sequence& sequence) {
+int CameraPixels(const YAML::Node& root, const std::string& key, const std::string& path) {
+  const double pixels = CameraNumber(root, key, path);
+  if (pixels != std::floor(pixels)) {
+    throw Error("'" + key + "' of '" + path + "' is " + root[key].Scalar() +
+                ", accepted is a whole number");
+  }
+  return static_cast<int>(pixels);
+}
+
+/// Returns whether the file says the depth's scale.
+bool ReadCamera(const std::string& path, Sequence& sequence) {
   YAML::Node root;
   try {
-    root = YAML::Load(ReadFile(path, 1U << 16U));
+    root = YAML::Load(ReadTextFile(path, 1U << 16U));
   } catch (const YAML::Exception& exception) {
     throw Error("'" + path + "' is no YAML: " + exception.what());
   }
   if (!root.IsMap()) throw Error("'" + path + "' must be a map of camera numbers");
-  sequence.intrinsics.width = static_cast<int>(CameraNumber(root, "width", path));
-  sequence.intrinsics.height = static_cast<int>(CameraNumber(root, "height", path));
+  sequence.intrinsics.width = CameraPixels(root, "width", path);
+  sequence.intrinsics.height = CameraPixels(root, "height", path);
   sequence.intrinsics.fx = CameraNumber(root, "fx", path);
   sequence.intrinsics.fy = CameraNumber(root, "fy", path);
   sequence.intrinsics.cx = CameraNumber(root, "cx", path);
@@ -62,14 +115,16 @@ void ReadCamera(const std::string& path, Sequence& sequence) {
   sequence.depth_scale =
       root["depth_scale"] ? CameraNumber(root, "depth_scale", path) : kPublishedDepthScale;
   sequence.baseline_m = root["baseline_m"] ? CameraNumber(root, "baseline_m", path) : 0;
+  return root["depth_scale"].IsDefined();
 }
 
-/// The camera as a file states it, or else as published for the folder's name.
-void FindCamera(const fs::path& root, const std::string& camera_file, Sequence& sequence) {
+/// The camera as a file states it, or else as published for the folder's name. Returns the file
+/// that does not say the depth's scale, or nothing.
+std::string FindCamera(const fs::path& root, const std::string& camera_file, Sequence& sequence) {
   const fs::path beside = root / "camera.yaml";
   if (!camera_file.empty() || fs::exists(beside)) {
-    ReadCamera(camera_file.empty() ? beside.string() : camera_file, sequence);
-    return;
+    const std::string path = camera_file.empty() ? beside.string() : camera_file;
+    return ReadCamera(path, sequence) ? "" : path;
   }
   const std::optional<geo::CameraIntrinsics> published = PublishedTumCamera(root.string());
   if (!published) {
@@ -79,16 +134,22 @@ void FindCamera(const fs::path& root, const std::string& camera_file, Sequence& 
   }
   sequence.intrinsics = *published;
   sequence.depth_scale = kPublishedDepthScale;
+  return "";
+}
+
+/// A list; what is to be told of it goes to the sequence's notes.
+std::vector<SequenceFrame> ReadList(const std::string& path, Sequence& sequence) {
+  return ParseTumAssociations(ReadTextFile(path, kMaxTextBytes), path, &sequence.notes);
 }
 
 /// rgb.txt and, where there is one and it is wanted, depth.txt.
-std::vector<SequenceFrame> PairLists(const fs::path& root, DepthImages depth_images) {
+std::vector<SequenceFrame> PairLists(const fs::path& root, DepthImages depth_images,
+                                     Sequence& sequence) {
   const std::string rgb = (root / "rgb.txt").string();
   const std::string depth = (root / "depth.txt").string();
-  std::vector<SequenceFrame> pictures = ParseTumAssociations(ReadFile(rgb, kMaxTextBytes), rgb);
+  std::vector<SequenceFrame> pictures = ReadList(rgb, sequence);
   if (depth_images == DepthImages::kIgnored || !fs::exists(depth)) return pictures;
-  const std::vector<SequenceFrame> depths =
-      ParseTumAssociations(ReadFile(depth, kMaxTextBytes), depth);
+  const std::vector<SequenceFrame> depths = ReadList(depth, sequence);
   std::vector<SequenceFrame> frames = AssociateDepth(pictures, depths);
   if (frames.empty()) {
     throw Error("no picture of '" + rgb + "' is within 0.02 s of a depth image of '" + depth + "'");
@@ -97,10 +158,11 @@ std::vector<SequenceFrame> PairLists(const fs::path& root, DepthImages depth_ima
 }
 
 /// associations.txt, or else the lists that it is made of.
-std::vector<SequenceFrame> ReadLists(const fs::path& root, DepthImages depth_images) {
+std::vector<SequenceFrame> ReadLists(const fs::path& root, DepthImages depth_images,
+                                     Sequence& sequence) {
   const std::string both = (root / "associations.txt").string();
-  if (!fs::exists(both)) return PairLists(root, depth_images);
-  std::vector<SequenceFrame> frames = ParseTumAssociations(ReadFile(both, kMaxTextBytes), both);
+  if (!fs::exists(both)) return PairLists(root, depth_images, sequence);
+  std::vector<SequenceFrame> frames = ReadList(both, sequence);
   if (depth_images == DepthImages::kIgnored) {
     for (SequenceFrame& frame : frames) frame.depth_path.clear();
   }
@@ -122,12 +184,12 @@ void Anchor(const fs::path& root, std::string& path, const std::string& listed_i
 }
 
 /// The right camera's picture of each frame that has one.
-void ReadRightCamera(const fs::path& root, std::vector<SequenceFrame>& frames) {
+void ReadRightCamera(const fs::path& root, Sequence& sequence) {
   const std::string list = (root / "rgb_right.txt").string();
   if (!fs::exists(list)) return;
-  std::vector<SequenceFrame> rights = ParseTumAssociations(ReadFile(list, kMaxTextBytes), list);
+  const std::vector<SequenceFrame> rights = ReadList(list, sequence);
   auto right = rights.begin();
-  for (SequenceFrame& frame : frames) {
+  for (SequenceFrame& frame : sequence.frames) {
     while (right != rights.end() && right->stamp_ns < frame.stamp_ns) ++right;
     if (right == rights.end()) return;
     if (right->stamp_ns != frame.stamp_ns) continue;
@@ -163,8 +225,11 @@ std::optional<std::int64_t> ParseStampNs(const std::string& text) {
   return seconds * 1'000'000'000 + std::stoll(fraction);
 }
 
-std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const std::string& name) {
+std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const std::string& name,
+                                                std::vector<std::string>* notes) {
   std::vector<SequenceFrame> frames;
+  RepeatedLines repeated;
+  std::size_t last = 0;
   const std::vector<std::string> lines = Lines(text);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (IsCommentOrEmpty(lines[i])) continue;
@@ -177,17 +242,31 @@ std::vector<SequenceFrame> ParseTumAssociations(const std::string& text, const s
     if (!stamp || !depth_stamp || !IsInside(parts[1]) || (has_depth && !IsInside(parts[3]))) {
       RefuseLine(name, i, lines[i], accepted);
     }
-    if (!frames.empty() && *stamp <= frames.back().stamp_ns) {
+    const SequenceFrame frame{*stamp, parts[1], *depth_stamp, has_depth ? parts[3] : ""};
+    if (!frames.empty() && frame.stamp_ns < frames.back().stamp_ns) {
       RefuseLine(name, i, lines[i], "stamps that increase");
     }
-    frames.push_back({*stamp, parts[1], *depth_stamp, has_depth ? parts[3] : ""});
+    if (!frames.empty() && frame.stamp_ns == frames.back().stamp_ns) {
+      const SequenceFrame& before = frames.back();
+      if (frame.image_path != before.image_path || frame.depth_path != before.depth_path) {
+        RefuseTwice(name, last, i, lines, "images");
+      }
+      repeated.Add(i);
+      continue;
+    }
+    last = i;
+    frames.push_back(frame);
   }
+  repeated.Note(name, notes);
   if (frames.empty()) throw Error("'" + name + "' lists no image");
   return frames;
 }
 
-std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name) {
+std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::string& name,
+                                            std::vector<std::string>* notes) {
   std::vector<StampedPose> poses;
+  RepeatedLines repeated;
+  std::size_t last = 0;
   const std::vector<std::string> lines = Lines(text);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (IsCommentOrEmpty(lines[i])) continue;
@@ -210,11 +289,18 @@ std::vector<StampedPose> ParseTumTrajectory(const std::string& text, const std::
     StampedPose pose;
     pose.stamp_ns = *stamp;
     pose.world_from_camera = Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation;
-    if (!poses.empty() && pose.stamp_ns <= poses.back().stamp_ns) {
+    if (!poses.empty() && pose.stamp_ns < poses.back().stamp_ns) {
       RefuseLine(name, i, lines[i], "stamps that increase");
     }
+    if (!poses.empty() && pose.stamp_ns == poses.back().stamp_ns) {
+      if (!AreNearlyEqual(pose, poses.back())) RefuseTwice(name, last, i, lines, "poses");
+      repeated.Add(i);
+      continue;
+    }
+    last = i;
     poses.push_back(pose);
   }
+  repeated.Note(name, notes);
   return poses;
 }
 
@@ -259,18 +345,30 @@ Sequence ReadTumSequence(const std::string& directory, const std::string& camera
                 "' is no TUM sequence: it has no associations.txt and no rgb.txt");
   }
   Sequence sequence;
-  FindCamera(root, camera_file, sequence);
-  sequence.frames = ReadLists(root, depth_images);
+  const std::string without_scale = FindCamera(root, camera_file, sequence);
+  sequence.frames = ReadLists(root, depth_images, sequence);
+  const bool has_depth =
+      std::any_of(sequence.frames.begin(), sequence.frames.end(),
+                  [](const SequenceFrame& frame) { return !frame.depth_path.empty(); });
+  if (has_depth && !without_scale.empty()) {
+    sequence.notes.push_back("'" + without_scale +
+                             "' does not say depth_scale: depth is taken in 5000ths of a metre");
+  }
   const std::string list = (root / (associated ? "associations.txt" : "rgb.txt")).string();
   const std::string depth_list = associated ? list : (root / "depth.txt").string();
   for (SequenceFrame& frame : sequence.frames) {
     Anchor(root, frame.image_path, list);
     Anchor(root, frame.depth_path, depth_list);
   }
-  ReadRightCamera(root, sequence.frames);
+  ReadRightCamera(root, sequence);
   const std::string truth = (root / "groundtruth.txt").string();
   if (fs::exists(truth)) {
-    sequence.poses = ParseTumTrajectory(ReadFile(truth, kMaxTextBytes), truth);
+    sequence.poses = ParseTumTrajectory(ReadTextFile(truth, kMaxTextBytes), truth, &sequence.notes);
+    if (sequence.poses.empty()) {
+      throw Error("'" + truth +
+                  "' has no pose, accepted is 'stamp tx ty tz qx qy qz qw' per line, " +
+                  "or no such file where the truth is not known");
+    }
   }
   return sequence;
 }

@@ -25,6 +25,12 @@ TEST(Comma2k19, ReadsTheColumnsThatAreUsed) {
   EXPECT_DOUBLE_EQ(speeds[0].speed_mps, 7.5);
 }
 
+TEST(Comma2k19, ADriveMayBeginAtItsOwnZero) {
+  const auto speeds = ParseRecordedSpeeds("t_s,speed_mps\n0,7.5\n0.02,7.5\n", "s");
+  ASSERT_EQ(speeds.size(), 2U);
+  EXPECT_EQ(speeds[0].stamp_ns, 0);
+}
+
 TEST(Comma2k19, NamesTheLineThatIsWrong) {
   const auto refused = [](auto parse, const std::string& text, const std::string& words) {
     EXPECT_THAT([&] { parse(text, "x.csv"); }, ThrowsMessage<Error>(HasSubstr(words))) << text;
@@ -33,11 +39,13 @@ TEST(Comma2k19, NamesTheLineThatIsWrong) {
   refused(ParseRecordedFixes, "", "line 1 of 'x.csv'");
   refused(ParseRecordedFixes, "t_s,lat_deg\n1,2\n", "line 1 of 'x.csv'");
   refused(ParseRecordedFixes, fix, "no row");
+  refused(ParseRecordedSpeeds, "t_s,speed_mps2\n1,2\n", "line 1 of 'x.csv'");
   refused(ParseRecordedFixes, fix + "1,2\n", "line 2 of 'x.csv'");
   refused(ParseRecordedFixes, fix + "1,nan,3\n", "line 2 of 'x.csv'");
   refused(ParseRecordedFixes, fix + "1,91,3\n", "latitudes");
   refused(ParseRecordedFixes, fix + "1,9,3\n1,9,3\n", "line 3 of 'x.csv'");
   refused(ParseRecordedFixes, fix + "1e300,9,3\n", "a time");
+  refused(ParseRecordedFixes, fix + "-0.1,9,3\n", "a time");
   const std::string pose = "t_s,ecef_x_m,ecef_y_m,ecef_z_m,q_w,q_x,q_y,q_z\n";
   refused(ParseRecordedPoses, pose + "1,0,0,0,1,0,0,0\n", "centre of the earth");
   refused(ParseRecordedPoses, pose + "1,6378137,0,0,1,1,0,0\n", "quaternions");

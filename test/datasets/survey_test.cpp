@@ -4,12 +4,14 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "common/error.h"
 #include "datasets/camera_file.h"
 #include "datasets/image_file.h"
 #include "datasets/sequences.h"
+#include "test/support/temporary_directory.h"
 
 namespace livemap::datasets {
 namespace {
@@ -44,6 +46,7 @@ TEST(SurveyTable, NamesTheLineThatIsWrong) {
   refused(head + "a,1\n", "line 2 of 'f.csv'");
   refused(head + "../../etc/passwd,1,0\n", "plain file name");
   refused(head + "a,10,0\nb,5,0\n", "driving order");
+  refused(head + "a,1,0\nb,2,0\na,3,0\n", "line 4 of 'f.csv' repeats the frame 'a'");
 }
 
 TEST(SurveyFrames, AreTimedByChainageOverSpeed) {
@@ -78,6 +81,40 @@ TEST(YoloLabels, ReadsBoxesAndNamesTheLineThatIsWrong) {
                 ThrowsMessage<Error>(HasSubstr("line 1 of 'l.txt'")))
         << bad;
   }
+}
+
+TEST(SurveyFrames, FindTheirLabelsHoweverTheTablePadsTheirNumbers) {
+  const test::TemporaryDirectory folder;
+  const auto write = [&folder](const std::string& name, const std::string& text) {
+    const std::filesystem::path path = std::filesystem::path(folder.path()) / name;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path) << text;
+  };
+  write("images/0007.jpg", "");
+  write("labels/0007.txt", "0 0.5 0.5 0.2 0.4\n");
+  for (const char* counted : {"0", "1"}) {
+    write("frames.csv", std::string("frame,chainage_m,potholes\n7,10,") + counted + "\n");
+    const SurveyDrive drive = ReadSurveyDrive(folder.path());
+    ASSERT_EQ(drive.frames.size(), 1U);
+    EXPECT_EQ(drive.frames[0].boxes.size(), 1U) << "counted " << counted;
+  }
+  write("frames.csv", "frame,chainage_m,potholes\n7,10,0\n007,11,0\n");
+  EXPECT_THAT([&] { ReadSurveyDrive(folder.path()); },
+              ThrowsMessage<Error>(HasSubstr("0007.jpg' twice")));
+  write("frames.csv", "frame,chainage_m,potholes\n7,10,0\n");
+  write("labels/7.jpg.txt", "");
+  EXPECT_THAT([&] { ReadSurveyDrive(folder.path()); },
+              ThrowsMessage<Error>(HasSubstr("belongs to no picture")));
+}
+
+TEST(SurveyFrames, AFileInPlaceOfTheFolderIsNamedAsOne) {
+  const test::TemporaryDirectory folder;
+  const std::string file = folder.path() + "/drive.bag";
+  std::ofstream(file) << "x";
+  EXPECT_THAT([&] { ReadSurveyDrive(file); },
+              ThrowsMessage<Error>(HasSubstr("drive.bag' is no folder")));
+  EXPECT_THAT([&] { ReadSurveyDrive(file + "x"); },
+              ThrowsMessage<Error>(HasSubstr("drive.bagx' does not exist")));
 }
 
 TEST(TumStamps, KeepAllDigits) {

@@ -13,6 +13,7 @@ namespace livemap::datasets {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -52,6 +53,16 @@ class TumFolder : public ::testing::Test {
   fs::path temporary_, folder_;
 };
 
+TEST_F(TumFolder, AFileOfTruthWithoutAPoseIsRefused) {
+  for (const char* text : {"", "# ground truth\n"}) {
+    Write("groundtruth.txt", text);
+    EXPECT_THAT([&] { ReadTumSequence(folder_.string()); },
+                ThrowsMessage<Error>(HasSubstr("groundtruth.txt' has no pose")));
+  }
+  fs::remove(folder_ / "groundtruth.txt");
+  EXPECT_TRUE(ReadTumSequence(folder_.string()).poses.empty());
+}
+
 TEST_F(TumFolder, PairsPicturesWithTheNearestDepthWithinTwentyMilliseconds) {
   const Sequence sequence = ReadTumSequence(folder_.string());
   ASSERT_EQ(sequence.frames.size(), 2U) << "3.png and 4.png have no depth of their own";
@@ -78,10 +89,13 @@ TEST_F(TumFolder, ACameraFileGoesBeforeTheFoldersAndBothBeforeTheName) {
   const std::string numbers = "width: 320\nheight: 240\nfy: 300\ncx: 160\ncy: 120\n";
   Write("camera.yaml", numbers + "fx: 301\n");
   EXPECT_EQ(ReadTumSequence(folder_.string()).intrinsics.fx, 301);
+  EXPECT_THAT(ReadTumSequence(folder_.string()).notes,
+              ElementsAre(HasSubstr("camera.yaml' does not say depth_scale")));
   Write("mine.yaml", numbers + "fx: 302\ndepth_scale: 1000\n");
   const Sequence sequence = ReadTumSequence(folder_.string(), (folder_ / "mine.yaml").string());
   EXPECT_EQ(sequence.intrinsics.fx, 302);
   EXPECT_EQ(sequence.depth_scale, 1000);
+  EXPECT_THAT(sequence.notes, IsEmpty());
 }
 
 TEST_F(TumFolder, WithoutAnyCameraIsRefused) {
@@ -133,6 +147,66 @@ TEST_F(TumFolder, WhatIsNoSequenceOrNoFolderIsSaidToBeNone) {
               ThrowsMessage<Error>(HasSubstr("is no folder")));
   EXPECT_THAT([&] { ReadTumSequence((folder_ / "nothing").string()); },
               ThrowsMessage<Error>(HasSubstr("does not exist")));
+}
+
+TEST_F(TumFolder, ListsMayBeginWithAByteOrderMark) {
+  for (const char* list : {"rgb.txt", "depth.txt", "groundtruth.txt"}) {
+    std::ifstream file(folder_ / list);
+    const std::string text((std::istreambuf_iterator<char>(file)), {});
+    Write(list, "\xef\xbb\xbf" + text.substr(text.find('\n') + 1));
+  }
+  Write("camera.yaml", "\xef\xbb\xbfwidth: 320\nheight: 240\nfx: 300\nfy: 300\ncx: 160\ncy: 120\n");
+  const Sequence sequence = ReadTumSequence(folder_.string());
+  EXPECT_EQ(sequence.frames.size(), 2U);
+  EXPECT_EQ(sequence.poses.size(), 1U);
+  EXPECT_EQ(sequence.intrinsics.fx, 300);
+  Write("rgb.txt", "\xff\xfe");
+  EXPECT_THAT([&] { ReadTumSequence(folder_.string()); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("rgb.txt"), HasSubstr("UTF-16"))));
+}
+
+TEST(TumTrajectory, APoseThatIsSaidTwiceIsTakenOnceAndNoted) {
+  std::vector<std::string> notes;
+  const auto poses = ParseTumTrajectory(
+      "# fr2\n1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n2.0 1.001 0 0 0 0 0.001 1\n3 2 0 0 0 0 0 1\n", "t",
+      &notes);
+  ASSERT_EQ(poses.size(), 3U);
+  EXPECT_EQ(poses[1].world_from_camera.translation().x(), 1) << "the first";
+  EXPECT_THAT(notes, ElementsAre(AllOf(HasSubstr("1 line of 't'"), HasSubstr("line 4"))));
+}
+
+TEST(TumTrajectory, TwoPosesWithOneStampAreRefusedWithBothLines) {
+  for (const char* other : {"2 1.1 0 0 0 0 0 1", "2 1 0 0 0 0 0.1 0.995"}) {
+    EXPECT_THAT([text = "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n" +
+                        std::string(other)] { ParseTumTrajectory(text, "t.txt"); },
+                ThrowsMessage<Error>(AllOf(HasSubstr("lines 2 and 3 of 't.txt'"),
+                                           HasSubstr("2 1 0 0 0 0 0 1"), HasSubstr(other))));
+  }
+}
+
+TEST(TumTrajectory, SaysWhatALineLooksLike) {
+  for (const auto& [line, words] :
+       {std::pair("1403636579763555584 0 0 0 0 0 0 1", "looks like nanoseconds"),
+        std::pair("1.403636579763555584e+18 0 0 0 0 0 0 1", "looks like nanoseconds"),
+        std::pair("1403636579763555 0 0 0 0 0 0 1", "looks like microseconds"),
+        std::pair("1403636579763 0 0 0 0 0 0 1", "looks like milliseconds"),
+        std::pair("-1 0 0 0 0 0 0 1", "stamp is negative"),
+        std::pair("1,0,0,0,0,0,0,1", "separated by ','"),
+        std::pair("1;0;0;0;0;0;0;1", "separated by ';'"),
+        std::pair("1 0 0 0 0 0 0 2", "unit quaternion"), std::pair("1 0 0 nan 0 0 0 1", "nan")}) {
+    EXPECT_THAT([text = std::string(line)] { ParseTumTrajectory(text, "t.txt"); },
+                ThrowsMessage<Error>(AllOf(HasSubstr("line 1 of 't.txt'"), HasSubstr(words))))
+        << line;
+  }
+}
+
+TEST(TumAssociations, ALineThatIsRepeatedIsTakenOnceAndAnotherImageIsRefused) {
+  std::vector<std::string> notes;
+  EXPECT_EQ(ParseTumAssociations("1 a.png\n1.0 a.png\n2 b.png\n", "rgb.txt", &notes).size(), 2U);
+  EXPECT_EQ(notes.size(), 1U);
+  EXPECT_THAT([] { ParseTumAssociations("1 a.png\n1 b.png\n", "rgb.txt"); },
+              ThrowsMessage<Error>(
+                  AllOf(HasSubstr("lines 1 and 2"), HasSubstr("a.png"), HasSubstr("b.png"))));
 }
 
 TEST(StampPairs, TheNearestPairGoesFirstAndEachStampOnce) {
