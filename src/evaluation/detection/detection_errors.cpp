@@ -5,18 +5,18 @@
 namespace livemap::evaluation {
 namespace {
 
-float LargestLabel(const ScoredFrame& frame) {
+float LargestMissedLabel(const ScoredFrame& frame) {
   float largest = 0;
   for (const cv::Rect2f& label : frame.labels) largest = std::max(largest, label.area());
   return largest;
 }
 
 /// What the event's frames have instead of a detection that recalls it.
-MissedEvent Explain(const ScoredDrive& drive, const std::vector<std::size_t>& event,
-                    double threshold) {
+MissedEvent ExplainMissedEvent(const ScoredDrive& drive, const std::vector<std::size_t>& event,
+                               double threshold) {
   MissedEvent missed;
   missed.frame = *std::max_element(event.begin(), event.end(), [&](std::size_t a, std::size_t b) {
-    return LargestLabel(drive[a]) < LargestLabel(drive[b]);
+    return LargestMissedLabel(drive[a]) < LargestMissedLabel(drive[b]);
   });
   float misplaced = 0;
   float unsure = 0;
@@ -46,7 +46,7 @@ std::vector<MissedEvent> FindMissedEvents(const ScoredDrive& drive, double thres
   std::vector<MissedEvent> missed;
   for (const std::vector<std::size_t>& event : FindEvents(drive)) {
     if (!IsRecalled(drive, event, threshold, 0.5)) {
-      missed.push_back(Explain(drive, event, threshold));
+      missed.push_back(ExplainMissedEvent(drive, event, threshold));
     }
   }
   return missed;

@@ -17,7 +17,7 @@ struct ScoredMatch {
 /// "don't care" regions of KITTI's object benchmark.
 constexpr float kShareInDifficult = 0.5F;
 
-bool IsDifficult(const ScoredBox& detection, const ScoredFrame& frame) {
+bool IsOnDifficultLabel(const ScoredBox& detection, const ScoredFrame& frame) {
   return std::any_of(
       frame.difficult.begin(), frame.difficult.end(), [&](const cv::Rect2f& difficult) {
         return (detection.box & difficult).area() >= kShareInDifficult * detection.box.area();
@@ -26,7 +26,7 @@ bool IsDifficult(const ScoredBox& detection, const ScoredFrame& frame) {
 
 /// Matches the frame's detections to its labels, appending one entry per detection that is right or
 /// wrong.
-void MatchFrame(const ScoredFrame& frame, double iou, std::vector<ScoredMatch>& matches) {
+void MatchDetectionFrame(const ScoredFrame& frame, double iou, std::vector<ScoredMatch>& matches) {
   std::vector<const ScoredBox*> descending;
   for (const ScoredBox& detection : frame.detections) descending.push_back(&detection);
   std::stable_sort(descending.begin(), descending.end(),
@@ -45,27 +45,27 @@ void MatchFrame(const ScoredFrame& frame, double iou, std::vector<ScoredMatch>& 
     }
     const bool matched = best < frame.labels.size() && best_overlap >= iou;
     if (matched) taken[best] = true;
-    if (!matched && IsDifficult(*detection, frame)) continue;
+    if (!matched && IsOnDifficultLabel(*detection, frame)) continue;
     matches.push_back({detection->score, matched});
   }
 }
 
-std::vector<ScoredMatch> MatchAll(const std::vector<ScoredFrame>& frames, double iou) {
+std::vector<ScoredMatch> MatchDetectionFrames(const std::vector<ScoredFrame>& frames, double iou) {
   std::vector<ScoredMatch> matches;
-  for (const ScoredFrame& frame : frames) MatchFrame(frame, iou, matches);
+  for (const ScoredFrame& frame : frames) MatchDetectionFrame(frame, iou, matches);
   std::stable_sort(matches.begin(), matches.end(),
                    [](const ScoredMatch& a, const ScoredMatch& b) { return a.score > b.score; });
   return matches;
 }
 
-std::size_t CountLabels(const std::vector<ScoredFrame>& frames) {
+std::size_t CountLabelsForMetrics(const std::vector<ScoredFrame>& frames) {
   std::size_t labels = 0;
   for (const ScoredFrame& frame : frames) labels += frame.labels.size();
   return labels;
 }
 
-std::vector<ScoredFrame> Pool(const std::vector<ScoredDrive>& drives,
-                              const std::vector<ScoredFrame>& photos) {
+std::vector<ScoredFrame> PoolDetectionFrames(const std::vector<ScoredDrive>& drives,
+                                             const std::vector<ScoredFrame>& photos) {
   std::vector<ScoredFrame> all;
   for (const ScoredDrive& drive : drives) all.insert(all.end(), drive.begin(), drive.end());
   all.insert(all.end(), photos.begin(), photos.end());
@@ -73,13 +73,13 @@ std::vector<ScoredFrame> Pool(const std::vector<ScoredDrive>& drives,
 }
 
 /// A ratio, none when nothing was counted.
-std::optional<double> Ratio(std::size_t part, std::size_t whole) {
+std::optional<double> MetricRatio(std::size_t part, std::size_t whole) {
   if (whole == 0) return std::nullopt;
   return static_cast<double>(part) / static_cast<double>(whole);
 }
 
-ClassFigures FiguresAt(const std::vector<ScoredDrive>& drives, const std::vector<ScoredFrame>& all,
-                       double threshold) {
+ClassFigures MetricsAtThreshold(const std::vector<ScoredDrive>& drives,
+                                const std::vector<ScoredFrame>& all, double threshold) {
   ClassFigures figures;
   figures.threshold = threshold;
   figures.frames = all.size();
@@ -98,8 +98,8 @@ ClassFigures FiguresAt(const std::vector<ScoredDrive>& drives, const std::vector
     figures.false_reports += wrong.reports;
     figures.km += DrivenKm(drive);
   }
-  figures.event_recall = Ratio(recalled, figures.events);
-  figures.event_recall_iou30 = Ratio(recalled_iou30, figures.events);
+  figures.event_recall = MetricRatio(recalled, figures.events);
+  figures.event_recall_iou30 = MetricRatio(recalled_iou30, figures.events);
   if (figures.km > 0) {
     figures.false_per_km = static_cast<double>(figures.false_reports) / figures.km;
   }
@@ -109,8 +109,8 @@ ClassFigures FiguresAt(const std::vector<ScoredDrive>& drives, const std::vector
 }  // namespace
 
 double AveragePrecision(const std::vector<ScoredFrame>& frames, double iou) {
-  const std::vector<ScoredMatch> matches = MatchAll(frames, iou);
-  const std::size_t labels = CountLabels(frames);
+  const std::vector<ScoredMatch> matches = MatchDetectionFrames(frames, iou);
+  const std::size_t labels = CountLabelsForMetrics(frames);
   if (labels == 0) return 0;
   std::vector<double> precision;
   std::size_t matched = 0;
@@ -128,15 +128,15 @@ double AveragePrecision(const std::vector<ScoredFrame>& frames, double iou) {
   return area / static_cast<double>(labels);
 }
 
-std::optional<double> MatchCounts::Precision() const { return Ratio(matched, detections); }
+std::optional<double> MatchCounts::Precision() const { return MetricRatio(matched, detections); }
 
-std::optional<double> MatchCounts::Recall() const { return Ratio(matched, labels); }
+std::optional<double> MatchCounts::Recall() const { return MetricRatio(matched, labels); }
 
 MatchCounts CountMatches(const std::vector<ScoredFrame>& frames, double threshold, double iou) {
   MatchCounts counts;
-  counts.labels = CountLabels(frames);
+  counts.labels = CountLabelsForMetrics(frames);
   // Matching goes down in score, so weaker detections take no label from those that count here.
-  for (const ScoredMatch& match : MatchAll(frames, iou)) {
+  for (const ScoredMatch& match : MatchDetectionFrames(frames, iou)) {
     if (match.score < threshold) break;
     ++counts.detections;
     counts.matched += match.matched ? 1 : 0;
@@ -166,7 +166,7 @@ double BestOverlap(const ScoredBox& detection, const std::vector<cv::Rect2f>& la
 }
 
 bool IsFalse(const ScoredBox& detection, const ScoredFrame& frame, double iou) {
-  return BestOverlap(detection, frame.labels) < iou && !IsDifficult(detection, frame);
+  return BestOverlap(detection, frame.labels) < iou && !IsOnDifficultLabel(detection, frame);
 }
 
 bool IsRecalled(const ScoredDrive& drive, const std::vector<std::size_t>& event, double threshold,
@@ -216,8 +216,8 @@ double DrivenKm(const ScoredDrive& drive) {
 
 ClassFigures EvaluateClass(const std::vector<ScoredDrive>& drives,
                            const std::vector<ScoredFrame>& photos, double threshold) {
-  const std::vector<ScoredFrame> all = Pool(drives, photos);
-  ClassFigures figures = FiguresAt(drives, all, threshold);
+  const std::vector<ScoredFrame> all = PoolDetectionFrames(drives, photos);
+  ClassFigures figures = MetricsAtThreshold(drives, all, threshold);
   if (figures.labels > 0) {
     figures.ap50 = AveragePrecision(all, 0.5);
     figures.ap30 = AveragePrecision(all, 0.3);
@@ -228,10 +228,10 @@ ClassFigures EvaluateClass(const std::vector<ScoredDrive>& drives,
 std::vector<ClassFigures> SweepThresholds(const std::vector<ScoredDrive>& drives,
                                           const std::vector<ScoredFrame>& photos,
                                           const std::vector<double>& thresholds) {
-  const std::vector<ScoredFrame> all = Pool(drives, photos);
+  const std::vector<ScoredFrame> all = PoolDetectionFrames(drives, photos);
   std::vector<ClassFigures> sweep;
   std::transform(thresholds.begin(), thresholds.end(), std::back_inserter(sweep),
-                 [&](double threshold) { return FiguresAt(drives, all, threshold); });
+                 [&](double threshold) { return MetricsAtThreshold(drives, all, threshold); });
   return sweep;
 }
 

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,13 +27,17 @@ struct ClassReport {
 struct DetectionReport {
   std::string model;
   std::size_t frames = 0;
-  double inference_ms_p50 = 0;  ///< Median wall time of a detection, ms.
-  double inference_ms_p95 = 0;
+  /// Wall time of a detection, ms: median and 95th percentile; none where no detector ran.
+  std::optional<double> inference_ms_p50;
+  std::optional<double> inference_ms_p95;
   std::vector<ClassReport> classes;
 };
 
+/// Why nothing was measured: there is neither a label nor a driven road. None where there is one.
+std::optional<std::string> WhyNothingMeasured(const DetectionReport& report);
+
 /// docs/reference/measures.md names the keys; figures that are not defined (no events, no drive)
-/// are null.
+/// are null, and where nothing was measured "reason" says so.
 nlohmann::ordered_json ToJson(const DetectionReport& report);
 
 /// A table for people.

@@ -27,6 +27,7 @@ struct LabelledFolder {
   bool is_drive = false;              ///< frames.csv gives the frames' places along the road.
   std::vector<std::string> classes;   ///< What is labelled in it, by the label files' class ids.
   std::vector<LabelledFrame> frames;  ///< A drive's in driving order, others by name.
+  std::vector<std::string> notes;     ///< Doubts for whoever reads the figures, a sentence each.
 };
 
 /// How to read a folder.
@@ -44,12 +45,18 @@ struct LabelledFolderConfig {
 ///  - a folder with images/ and labels/ (with frames.csv, "frame,chainage_m,...", a drive),
 ///  - one whose images/ and labels/ are divided into splits, with `options.split`, or
 ///  - an images/ folder or one of its splits, its labels beside it (a/images/val, a/labels/val).
+/// A file images that holds the path of a folder, which is what copying makes of a link where links
+/// are not allowed, stands for that folder.
 /// A folder difficult/ beside labels/, divided as that is, may hold more files of the same form.
-/// A label file has lines "class x_centre y_centre width height", fractions of the image; a missing
-/// one means an empty image. Without class names from options or classes.txt, class 0 is taken as
-/// pothole in a drive whose frames.csv has the column "potholes", and otherwise as the model's
-/// class whose letters stand in the folder's name ("traffic_cones" is traffic_cone); `deduced` then
-/// receives a sentence that says so. Throws Error naming the file, its value and what is accepted.
+/// Pictures are JPEG and PNG files, their extensions spelled in any way (PictureFolder); two with
+/// one name, and a label file that belongs to no picture, are refused. A label file has lines
+/// "class x_centre y_centre width height", fractions of the image; a missing one means an empty
+/// image, and is refused where the column "potholes" of frames.csv counts some in it. Where that
+/// column and the label files count differently, `notes` says so. Without class names from options
+/// or classes.txt, class 0 is taken as pothole in a drive whose frames.csv has the column
+/// "potholes", and otherwise as the model's class whose letters stand in the folder's name
+/// ("traffic_cones" is traffic_cone); `deduced` then receives a sentence that says so. Throws Error
+/// naming the file, its value and what is accepted.
 LabelledFolder ReadLabelledFolder(const std::string& path, const LabelledFolderConfig& options,
                                   std::optional<std::string>* deduced);
 

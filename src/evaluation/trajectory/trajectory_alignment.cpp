@@ -3,6 +3,8 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "common/error.h"
 #include "datasets/stamp_pairs.h"
@@ -10,7 +12,9 @@
 namespace livemap::evaluation {
 namespace {
 
-Eigen::Matrix3Xd Positions(const std::vector<datasets::StampedPose>& poses) {
+constexpr Eigen::Index kMinScalePairs = 3;
+
+Eigen::Matrix3Xd PositionsToAlign(const std::vector<datasets::StampedPose>& poses) {
   Eigen::Matrix3Xd positions(3, static_cast<Eigen::Index>(poses.size()));
   Eigen::Index column = 0;
   for (const datasets::StampedPose& pose : poses) {
@@ -19,10 +23,31 @@ Eigen::Matrix3Xd Positions(const std::vector<datasets::StampedPose>& poses) {
   return positions;
 }
 
+/// Whether positions about their mean are all one, but for rounding.
+bool Stands(const Eigen::Matrix3Xd& centred, const Eigen::Vector3d& mean) {
+  const double variance = centred.squaredNorm() / static_cast<double>(centred.cols());
+  return variance <= 1e-20 * std::max(1.0, mean.squaredNorm());
+}
+
+/// A scale needs motion in both, and more pairs than it can fit whatever they are.
+void CheckScalable(const Eigen::Matrix3Xd& true_centred, const Eigen::Vector3d& true_mean,
+                   const Eigen::Matrix3Xd& centred, const Eigen::Vector3d& mean) {
+  if (centred.cols() < kMinScalePairs) {
+    throw Error("there are " + std::to_string(centred.cols()) +
+                " pairs of poses, on which any estimate fits with a scale of its own, at least " +
+                std::to_string(kMinScalePairs) + " are needed");
+  }
+  for (const auto& [name, stands] :
+       {std::pair("the estimate does", Stands(centred, mean)),
+        std::pair("the truth does", Stands(true_centred, true_mean))}) {
+    if (stands) throw Error(std::string(name) + " not move, so no scale can be found for it");
+  }
+}
+
 /// Umeyama's closed form; the equation numbers are those of his paper.
-Alignment AlignAll(const TrajectoryPairs& pairs, bool with_scale) {
-  const Eigen::Matrix3Xd truth = Positions(pairs.truth);
-  const Eigen::Matrix3Xd estimate = Positions(pairs.estimate);
+Alignment AlignAllPairs(const TrajectoryPairs& pairs, bool with_scale) {
+  const Eigen::Matrix3Xd truth = PositionsToAlign(pairs.truth);
+  const Eigen::Matrix3Xd estimate = PositionsToAlign(pairs.estimate);
   const auto n = static_cast<double>(pairs.truth.size());
   // (34), (35): the means.
   const Eigen::Vector3d true_mean = truth.rowwise().mean();
@@ -40,10 +65,12 @@ Alignment AlignAll(const TrajectoryPairs& pairs, bool with_scale) {
   Alignment alignment;
   // (42): the scale.
   if (with_scale) {
-    if (variance <= 1e-20 * std::max(1.0, mean.squaredNorm())) {
-      throw Error("the estimate does not move, so no scale can be found for it");
-    }
+    CheckScalable(true_centred, true_mean, centred, mean);
     alignment.scale = svd.singularValues().dot(signs) / variance;
+    const double own_scale = std::sqrt(true_centred.squaredNorm() / n / variance);
+    if (!(alignment.scale > 1e-9 * own_scale)) {
+      throw Error("truth and estimate have no motion in common, so no scale can be found");
+    }
   }
   // (40), (41): rotation and translation.
   const Eigen::Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
@@ -80,9 +107,9 @@ Alignment Align(const TrajectoryPairs& pairs, AlignmentKind kind) {
   if (pairs.truth.empty()) throw Error("there are no pairs of poses to align");
   switch (kind) {
     case AlignmentKind::kSe3:
-      return AlignAll(pairs, false);
+      return AlignAllPairs(pairs, false);
     case AlignmentKind::kSim3:
-      return AlignAll(pairs, true);
+      return AlignAllPairs(pairs, true);
     case AlignmentKind::kOrigin:
       return {1, pairs.truth[0].world_from_camera * pairs.estimate[0].world_from_camera.inverse()};
     case AlignmentKind::kNone:

@@ -52,7 +52,8 @@ struct Alignment {
 /// kSe3 and kSim3 minimise the sum of squared distances of the positions in closed form (Umeyama,
 /// "Least-squares estimation of transformation parameters between two point patterns", 1991; equals
 /// Horn's method in evaluate_ate.py). On a straight line the rotation about it is arbitrary. Throws
-/// Error without pairs, and for a scale when the estimate does not move.
+/// Error without pairs, and for a scale with fewer than three pairs, or when truth or estimate does
+/// not move, or they have no motion in common.
 Alignment Align(const TrajectoryPairs& pairs, AlignmentKind kind);
 
 }  // namespace livemap::evaluation

@@ -47,7 +47,8 @@ struct RelativeErrorConfig {
 /// is the last pose. To each of the two belongs the true pose with the nearest stamp; a pair is
 /// left out when one of them is farther than twice the median interval of the true stamps. As in
 /// the script, after a gap in the estimate the nearest pose may be another time away than
-/// `delta_s`, or the pose itself with no error. Empty when there is no such pair.
+/// `delta_s`, or the pose itself with no error. Empty when there is no such pair, or none but of
+/// poses with themselves.
 RelativeErrors RelativeErrorsOverTime(const std::vector<datasets::StampedPose>& truth,
                                       const std::vector<datasets::StampedPose>& estimate,
                                       double delta_s, const RelativeErrorConfig& options);
@@ -105,8 +106,8 @@ struct TrajectoryFigures {
 };
 
 /// ATE and KITTI's errors are of the associated pairs, RPE of all poses of the estimate that have a
-/// true one. The scale found with kSim3 is applied everywhere. Throws Error when fewer than two
-/// pairs are found, and as Align() does.
+/// true one. The scale found with kSim3 is applied everywhere. Throws NothingMeasured when
+/// fewer than two pairs are found, and Error as Align() does.
 TrajectoryFigures EvaluateTrajectory(const std::vector<datasets::StampedPose>& truth,
                                      const std::vector<datasets::StampedPose>& estimate,
                                      const TrajectoryConfig& options);

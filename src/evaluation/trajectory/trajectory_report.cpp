@@ -15,7 +15,7 @@ constexpr std::array<std::pair<const char*, AlignmentKind>, 4> kAlignments = {
      {"origin", AlignmentKind::kOrigin}}};
 
 /// The same figures in another unit.
-ErrorFigures Times(ErrorFigures figures, double factor) {
+ErrorFigures ReportFiguresTimes(ErrorFigures figures, double factor) {
   for (double* value :
        {&figures.rmse, &figures.mean, &figures.median, &figures.std, &figures.min, &figures.max}) {
     *value *= factor;
@@ -24,8 +24,8 @@ ErrorFigures Times(ErrorFigures figures, double factor) {
 }
 
 /// Keys PREFIX_rmse_UNIT and so on; null without errors.
-void AddFigures(const std::string& prefix, const std::string& unit, const ErrorFigures& figures,
-                nlohmann::ordered_json& json) {
+void AddReportFigures(const std::string& prefix, const std::string& unit,
+                      const ErrorFigures& figures, nlohmann::ordered_json& json) {
   const std::array<std::pair<const char*, double>, 6> values = {{{"rmse", figures.rmse},
                                                                  {"mean", figures.mean},
                                                                  {"median", figures.median},
@@ -38,27 +38,27 @@ void AddFigures(const std::string& prefix, const std::string& unit, const ErrorF
   }
 }
 
-std::string Number(double value, int width, int digits) {
+std::string TrajectoryReportNumber(double value, int width, int digits) {
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "%*.*f", width, digits, value);
   return text.data();
 }
 
 /// Shortest form, for what was asked for.
-std::string Plain(double value) {
+std::string PlainReportNumber(double value) {
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "%g", value);
   return text.data();
 }
 
-std::string Row(std::string name, const ErrorFigures& figures) {
+std::string TrajectoryReportRow(std::string name, const ErrorFigures& figures) {
   name.resize(std::max<std::size_t>(name.size(), 26), ' ');
   if (figures.n == 0) return name + "  no two poses are that far apart\n";
   for (const double value :
        {figures.rmse, figures.mean, figures.median, figures.std, figures.min, figures.max}) {
-    name += Number(value, 11, 6);
+    name += TrajectoryReportNumber(value, 11, 6);
   }
-  return name + Number(static_cast<double>(figures.n), 9, 0) + "\n";
+  return name + TrajectoryReportNumber(static_cast<double>(figures.n), 9, 0) + "\n";
 }
 
 }  // namespace
@@ -87,17 +87,20 @@ nlohmann::ordered_json ToJson(const TrajectoryFigures& figures) {
   json["longest_gap_s"] = figures.longest_gap_s;
   json["alignment"] = AlignmentName(figures.alignment);
   if (figures.alignment == AlignmentKind::kSim3) json["scale"] = figures.scale;
-  AddFigures("ate", "m", figures.ate_m, json);
+  AddReportFigures("ate", "m", figures.ate_m, json);
   json["rpe_delta_s"] = figures.rpe_delta_s;
   json["rpe_pairs"] = figures.rpe_m.n;
-  AddFigures("rpe", "m_per_s", Times(figures.rpe_m, 1 / figures.rpe_delta_s), json);
-  AddFigures("rpe", "deg_per_s", Times(figures.rpe_rad, kDegreesPerRadian / figures.rpe_delta_s),
-             json);
+  AddReportFigures("rpe", "m_per_s", ReportFiguresTimes(figures.rpe_m, 1 / figures.rpe_delta_s),
+                   json);
+  AddReportFigures("rpe", "deg_per_s",
+                   ReportFiguresTimes(figures.rpe_rad, kDegreesPerRadian / figures.rpe_delta_s),
+                   json);
   if (figures.rpe_delta_frames > 0) {
     json["rpe_frames_delta"] = figures.rpe_delta_frames;
     json["rpe_frames_pairs"] = figures.rpe_frames_m.n;
-    AddFigures("rpe_frames", "m", figures.rpe_frames_m, json);
-    AddFigures("rpe_frames", "deg", Times(figures.rpe_frames_rad, kDegreesPerRadian), json);
+    AddReportFigures("rpe_frames", "m", figures.rpe_frames_m, json);
+    AddReportFigures("rpe_frames", "deg",
+                     ReportFiguresTimes(figures.rpe_frames_rad, kDegreesPerRadian), json);
   }
   json["kitti_translation_percent"] = nullptr;
   json["kitti_rotation_deg_per_100m"] = nullptr;
@@ -126,26 +129,34 @@ std::string ToText(const TrajectoryFigures& figures) {
   std::string text = std::to_string(figures.pairs) + " pairs of " +
                      std::to_string(figures.truth_poses) + " true and " +
                      std::to_string(figures.estimate_poses) + " estimated poses, " +
-                     Number(figures.duration_s, 0, 1) + " s, " + Number(figures.length_m, 0, 2) +
-                     " m, longest gap " + Number(figures.longest_gap_s, 0, 2) + " s\nalignment " +
+                     TrajectoryReportNumber(figures.duration_s, 0, 1) + " s, " +
+                     TrajectoryReportNumber(figures.length_m, 0, 2) + " m, longest gap " +
+                     TrajectoryReportNumber(figures.longest_gap_s, 0, 2) + " s\nalignment " +
                      AlignmentName(figures.alignment);
-  if (figures.alignment == AlignmentKind::kSim3) text += ", scale " + Number(figures.scale, 0, 6);
+  if (figures.alignment == AlignmentKind::kSim3)
+    text += ", scale " + TrajectoryReportNumber(figures.scale, 0, 6);
   text += "\n\n" + std::string(26, ' ') +
           "       rmse       mean     median        std        min        max        n\n";
-  text += Row("ATE (m)", figures.ate_m);
-  const std::string over = "RPE over " + Plain(figures.rpe_delta_s) + " s ";
-  text += Row(over + "(m/s)", Times(figures.rpe_m, 1 / figures.rpe_delta_s));
-  text += Row(over + "(deg/s)", Times(figures.rpe_rad, kDegreesPerRadian / figures.rpe_delta_s));
+  text += TrajectoryReportRow("ATE (m)", figures.ate_m);
+  const std::string over = "RPE over " + PlainReportNumber(figures.rpe_delta_s) + " s ";
+  text += TrajectoryReportRow(over + "(m/s)",
+                              ReportFiguresTimes(figures.rpe_m, 1 / figures.rpe_delta_s));
+  text += TrajectoryReportRow(
+      over + "(deg/s)",
+      ReportFiguresTimes(figures.rpe_rad, kDegreesPerRadian / figures.rpe_delta_s));
   if (figures.rpe_delta_frames > 0) {
     const std::string frames = "RPE over " + std::to_string(figures.rpe_delta_frames) +
                                (figures.rpe_delta_frames == 1 ? " frame " : " frames ");
-    text += Row(frames + "(m)", figures.rpe_frames_m);
-    text += Row(frames + "(deg)", Times(figures.rpe_frames_rad, kDegreesPerRadian));
+    text += TrajectoryReportRow(frames + "(m)", figures.rpe_frames_m);
+    text += TrajectoryReportRow(frames + "(deg)",
+                                ReportFiguresTimes(figures.rpe_frames_rad, kDegreesPerRadian));
   }
   text += "\n";
   if (!figures.kitti) return text + "KITTI segments: none, the path is not longer than 100 m\n";
-  return text + "KITTI segments: " + Number(figures.kitti->translation_percent, 0, 4) + " %, " +
-         Number(figures.kitti->rotation_rad_per_m * kDegreesPerRadian * 100, 0, 4) +
+  return text +
+         "KITTI segments: " + TrajectoryReportNumber(figures.kitti->translation_percent, 0, 4) +
+         " %, " +
+         TrajectoryReportNumber(figures.kitti->rotation_rad_per_m * kDegreesPerRadian * 100, 0, 4) +
          " deg/100 m, n " + std::to_string(figures.kitti->n) + "\n";
 }
 

@@ -53,6 +53,18 @@ TEST(DetectionReport, UndefinedFiguresAreNullInJsonAndADashInText) {
   EXPECT_THAT(ToText(ExampleReport()), HasSubstr(" - "));
 }
 
+TEST(DetectionReport, WithoutLabelsAndRoadSaysThatNothingWasMeasured) {
+  EXPECT_FALSE(ToJson(ExampleReport()).contains("reason"));
+  DetectionReport report = ExampleReport();
+  for (ClassReport& entry : report.classes) entry.figures = {};
+  EXPECT_EQ(WhyNothingMeasured(report).value_or(""),
+            "8 frames have no label of a class of the model 'm', and no drive among them has a "
+            "length");
+  EXPECT_TRUE(ToJson(report)["reason"].is_string());
+  report.classes[0].figures.false_per_km = 0;
+  EXPECT_FALSE(WhyNothingMeasured(report)) << "a drive without hazards measures false reports";
+}
+
 TEST(DetectionReport, TextNamesModelAndClasses) {
   const std::string text = ToText(ExampleReport());
   EXPECT_THAT(text, HasSubstr("model m, 8 frames"));

@@ -69,6 +69,23 @@ TEST_F(LabelledFolderTest, ImagesAreReadInTheOrderOfTheirNamesWithTheirLabels) {
   EXPECT_DOUBLE_EQ(folder.frames[1].labels[0].box.height, 0.4);
 }
 
+TEST_F(LabelledFolderTest, ALinkThatWasCopiedAsTextIsFollowed) {
+  Write("first/images/a.jpg", "");
+  Write("first/labels/a.txt", "");
+  Write("second/images", "../first/images");
+  Write("second/labels/a.txt", "0 0.5 0.5 0.1 0.1\n");
+  Write("second/difficult/a.txt", "0 0.2 0.2 0.1 0.1\n");
+  const LabelledFolder second = Read("second", Options({"pothole"}));
+  ASSERT_EQ(second.frames.size(), 1U);
+  EXPECT_EQ(second.frames[0].image_path, Path("first/images/a.jpg"));
+  EXPECT_EQ(second.frames[0].labels.size(), 1U);
+  EXPECT_EQ(second.frames[0].difficult.size(), 1U);
+  Write("second/frames.csv", "frame,chainage_m\na,10\n");
+  EXPECT_TRUE(Read("second", Options({"pothole"})).is_drive);
+  Write("third/images", "../nowhere");
+  EXPECT_THAT(ErrorOf("third"), HasSubstr("has no images/"));
+}
+
 TEST_F(LabelledFolderTest, ADriveIsReadInDrivingOrder) {
   Write("drive/frames.csv", "frame,chainage_m,potholes\r\nx,30.5,1\r\ny,10,0\r\n");
   Write("drive/images/x.jpg", "");
@@ -95,6 +112,105 @@ TEST_F(LabelledFolderTest, SplitsAreReadByFlagOrByPath) {
   EXPECT_THAT(ErrorOf("traffic_cones"), AllOf(HasSubstr("--split"), HasSubstr("train, val")));
   EXPECT_THAT(ErrorOf("traffic_cones", Options({}, "test")),
               AllOf(HasSubstr("images/test"), HasSubstr("train, val")));
+}
+
+TEST_F(LabelledFolderTest, EverySpellingOfExtensionsIsReadInNumberOrder) {
+  for (const char* name : {"10.jpg", "9.JPEG", "013.png", "13.PNG", "._9.jpg"}) {
+    Write(std::string("pothole/images/") + name, "");
+  }
+  Write("pothole/labels/9.Txt",
+        "\xef\xbb\xbf"
+        "0 0.5 0.5 0.2 0.4\r\n");
+  Write("pothole/labels/13.txt", "0 0.5 0.5 0.2 0.4");
+  const LabelledFolder folder = Read("pothole");
+  std::vector<std::string> told;
+  for (const LabelledFrame& frame : folder.frames) {
+    told.push_back(std::filesystem::path(frame.image_path).filename().string() + " " +
+                   std::to_string(frame.labels.size()));
+  }
+  EXPECT_THAT(told, ElementsAre("9.JPEG 1", "10.jpg 0", "13.PNG 1", "013.png 0"))
+      << "a set may hold 13 and 013";
+}
+
+TEST_F(LabelledFolderTest, WhatWouldBePassedOverIsRefused) {
+  Write("pothole/images/7.jpg", "");
+  Write("pothole/labels/007.txt", "0 0.5 0.5 0.2 0.4\n");
+  EXPECT_THAT(ErrorOf("pothole"), AllOf(HasSubstr("007.txt"), HasSubstr("7.jpg")));
+  std::filesystem::remove(root_ / "pothole/labels/007.txt");
+  Write("pothole/images/7.png", "");
+  EXPECT_THAT(ErrorOf("pothole"), AllOf(HasSubstr("7.png"), HasSubstr("7.jpg")));
+  std::filesystem::remove(root_ / "pothole/images/7.png");
+  Write("pothole/labels/7.txt", "");
+  Write("pothole/labels/7.TXT", "");
+  EXPECT_THAT(ErrorOf("pothole"), HasSubstr("one label file of each"));
+}
+
+TEST_F(LabelledFolderTest, ALabelFileThatBelongsToNoPictureIsRefused) {
+  Write("pothole/images/IMG_0.jpg", "");
+  Write("pothole/images/1.jpg", "");
+  Write("pothole/labels/1.txt", "");
+  for (const char* stray : {"0.jpg.txt", "img_0.txt", "renamed.txt"}) {
+    Write(std::string("pothole/labels/") + stray, "0 0.5 0.5 0.2 0.4\n");
+    EXPECT_THAT(ErrorOf("pothole"), AllOf(HasSubstr(std::string("labels/") + stray),
+                                          HasSubstr("1 of the 2 label files"),
+                                          HasSubstr("accepted is the name of a picture")));
+    std::filesystem::remove(root_ / "pothole/labels" / stray);
+  }
+  Write("pothole/labels/classes.txt", "pothole\n");
+  EXPECT_EQ(Read("pothole").frames.size(), 2U) << "classes.txt is no label file";
+  Write("pothole/difficult/2.txt", "");
+  EXPECT_THAT(ErrorOf("pothole"), HasSubstr("difficult/2.txt"));
+  std::filesystem::remove_all(root_ / "pothole/difficult");
+  Write("pothole/labels/train/1.txt", "");
+  EXPECT_THAT(ErrorOf("pothole"),
+              AllOf(HasSubstr("labels/train/1.txt"), HasSubstr("divided as the pictures are")));
+  Write("pothole/images/train/1.jpg", "");
+  EXPECT_EQ(Read("pothole").frames.size(), 2U) << "a split of its own";
+}
+
+TEST_F(LabelledFolderTest, PotholesThatADrivesTableCountsNeedALabelFile) {
+  Write("drive/images/0.jpg", "");
+  Write("drive/images/1.jpg", "");
+  Write("drive/labels/1.txt", "0 0.5 0.5 0.2 0.4\n");
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n0,0,0\n1,5,1\n");
+  EXPECT_THAT(Read("drive").notes, ElementsAre());
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n0,0,0\n1,5,2\n");
+  EXPECT_THAT(Read("drive").notes,
+              ElementsAre(AllOf(HasSubstr("frames.csv"), HasSubstr("1 frame,"), HasSubstr("'1'"))));
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n0,0,2\n1,5,1\n");
+  EXPECT_THAT(ErrorOf("drive"), AllOf(HasSubstr("frames.csv"), HasSubstr("the frame '0'"),
+                                      HasSubstr("has no label file")));
+}
+
+TEST_F(LabelledFolderTest, ABlankLineAmongTheClassesIsRefused) {
+  Write("pothole/images/a.jpg", "");
+  Write("pothole/labels/a.txt", "");
+  Write("pothole/classes.txt", "pothole\n \ndeer\n");
+  EXPECT_THAT(ErrorOf("pothole"), AllOf(HasSubstr("classes.txt', line 2"), HasSubstr("blank")));
+  Write("pothole/classes.txt", "\n");
+  EXPECT_THAT(ErrorOf("pothole"), AllOf(HasSubstr("classes.txt"), HasSubstr("names no class")));
+}
+
+TEST_F(LabelledFolderTest, ADrivesTableNamesEachPictureOnceAndWithoutItsExtension) {
+  Write("drive/images/1.jpg", "");
+  Write("drive/labels/1.txt", "");
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n1,0,0\n01,5,0\n");
+  EXPECT_THAT(ErrorOf("drive"), AllOf(HasSubstr("1.jpg' twice"), HasSubstr("'1' and '01'")));
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n1.jpg,0,0\n");
+  EXPECT_THAT(ErrorOf("drive"), AllOf(HasSubstr("'1.jpg'"), HasSubstr("without their extensions")));
+}
+
+TEST_F(LabelledFolderTest, ADrivesTableIsReadWhateverWroteItAndRefusedWhenItRepeats) {
+  Write("drive/images/7.jpeg", "");
+  Write("drive/labels/7.txt", "");
+  Write("drive/frames.csv",
+        "\xef\xbb\xbf"
+        "frame,chainage_m,potholes\r\n007,10,0\r\n\r\n");
+  EXPECT_EQ(Read("drive").frames.size(), 1U) << "a number is found however it is padded";
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n7,10,0\n7,10,0\n");
+  EXPECT_THAT(ErrorOf("drive"), HasSubstr("'7' twice"));
+  Write("drive/frames.csv", "frame,chainage_m,potholes\n");
+  EXPECT_THAT(ErrorOf("drive"), HasSubstr("lists no frame"));
 }
 
 TEST_F(LabelledFolderTest, DifficultObjectsAreReadBesideTheLabels) {

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "common/error.h"
+#include "evaluation/nothing_measured.h"
 #include "evaluation/trajectory/trajectory.h"
 #include "evaluation/trajectory/trajectory_report.h"
 
@@ -253,6 +254,56 @@ TEST(TrajectoryFigures, ScaleOfAnEstimateThatStandsStillIsRefused) {
   EXPECT_THAT([&] { Evaluate(Drive(20), still, AlignmentKind::kSim3); },
               ThrowsMessage<Error>(HasSubstr("does not move")));
   EXPECT_GT(Evaluate(Drive(20), still).ate_m.rmse, 0);
+}
+
+TEST(TrajectoryFigures, OfPosesFartherApartThanTwiceTheDeltaHaveNoRelativeError) {
+  std::vector<datasets::StampedPose> sparse;
+  for (std::size_t i = 0; i < 300; i += 50) sparse.push_back(Drive(300, 2)[i]);
+  const TrajectoryFigures figures = EvaluateTrajectory(Drive(300), sparse, {});
+  EXPECT_EQ(figures.pairs, 6U);
+  EXPECT_GT(figures.ate_m.rmse, 0);
+  EXPECT_EQ(figures.rpe_m.n, 0U) << "a pose against itself is no measurement";
+  EXPECT_TRUE(ToJson(figures)["rpe_rmse_m_per_s"].is_null());
+}
+
+TEST(TrajectoryFigures, HaveNoScaleAgainstATruthThatStands) {
+  TrajectoryConfig options;
+  options.alignment = AlignmentKind::kSim3;
+  for (const double place_m : {0.0, 5.0e5}) {
+    std::vector<datasets::StampedPose> still = Drive(20);
+    for (datasets::StampedPose& pose : still) {
+      pose.world_from_camera = Eigen::Translation3d(place_m + 0.1, -place_m, 0.3);
+    }
+    EXPECT_THAT([&] { EvaluateTrajectory(still, Drive(20), options); },
+                ThrowsMessage<Error>(HasSubstr("the truth does not move")));
+    EXPECT_THAT([&] { EvaluateTrajectory(Drive(20), still, options); },
+                ThrowsMessage<Error>(HasSubstr("the estimate does not move")));
+  }
+}
+
+TEST(TrajectoryFigures, HaveNoScaleFromTwoPairsOnWhichAnythingFits) {
+  TrajectoryConfig options;
+  options.alignment = AlignmentKind::kSim3;
+  EXPECT_THAT([&] { EvaluateTrajectory(Drive(2), Straight(1500, 7), options); },
+              ThrowsMessage<Error>(HasSubstr("2 pairs of poses, on which any estimate fits")));
+  EXPECT_NO_THROW(EvaluateTrajectory(Drive(3), Straight(1500, 7), options));
+}
+
+TEST(TrajectoryFigures, HaveNoScaleWithoutMotionInCommon) {
+  TrajectoryConfig options;
+  options.alignment = AlignmentKind::kSim3;
+  std::vector<datasets::StampedPose> truth = Straight(4, 0);
+  std::vector<datasets::StampedPose> estimate = truth;
+  for (std::size_t i = 0; i < 4; ++i) {
+    truth[i].world_from_camera.translation().x() = i < 2 ? 1 : -1;
+    estimate[i].world_from_camera.translation().y() = i % 2 == 0 ? 1 : -1;
+  }
+  EXPECT_THAT([&] { EvaluateTrajectory(truth, estimate, options); },
+              ThrowsMessage<Error>(HasSubstr("no motion in common")));
+}
+
+TEST(TrajectoryFigures, OfTrajectoriesWithoutCommonTimeAreNotMeasured) {
+  EXPECT_THROW(EvaluateTrajectory(Drive(20), Straight(20, 1), {}), NothingMeasured);
 }
 
 TEST(TrajectoryFigures, AreNullWhereNoTwoPosesAreADeltaApart) {

@@ -52,8 +52,8 @@ TEST(Trajectory, BadLinesAreNamedInOneSentence) {
   const std::string kitti = "1 0 0 1 0 1 0 2 0 0 1 3\n";
   for (const char* bad :
        {"2 0 0 0 0 0 0\n", "2 nan 0 0 0 0 0 1\n", "2 inf 0 0 0 0 0 1\n", "2 0 0 0 0 0 0 2\n",
-        "2 0 0 0 0 0 0 0\n", "2 1e300 0 0 0 0 0 1\n", "1 0 0 0 0 0 0 1\n", "0.5 0 0 0 0 0 0 1\n",
-        "-1 0 0 0 0 0 0 1\n", "nan 0 0 0 0 0 0 1\n", "1e99 0 0 0 0 0 0 1\n", "2 x 0 0 0 0 0 1\n",
+        "2 0 0 0 0 0 0 0\n", "2 1e300 0 0 0 0 0 1\n", "0.5 0 0 0 0 0 0 1\n", "-1 0 0 0 0 0 0 1\n",
+        "nan 0 0 0 0 0 0 1\n", "1e99 0 0 0 0 0 0 1\n", "2 x 0 0 0 0 0 1\n",
         "1 0 0 1 0 1 0 2 0 0 1 3\n"}) {
     EXPECT_THAT(ErrorOf(good + bad), AllOf(HasSubstr("line 2 of 't.txt'"), HasSubstr("accepted")));
   }
