@@ -3,12 +3,13 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "common/time.h"
 #include "geo/datum.h"
-#include "geo/fix_covariance.h"
+#include "geo/fix_plausibility.h"
 #include "localization/median.h"
 #include "localization/sliding_window.h"
 #include "localization/track_alignment.h"
@@ -24,17 +25,33 @@ constexpr std::size_t kMaxKept = 1024;
 constexpr double kStartTrackS = 3.0;  // Odometry kept beyond the window.
 constexpr double kMedianSpanS = 2.0;  // Position of a standing vehicle: median of these fixes.
 
-LocalizerConfig Checked(const LocalizerConfig& config) {
+LocalizerConfig CheckedLocalizerConfig(const LocalizerConfig& config) {
   Check(config);
   return config;
+}
+
+DatumElection::Config FirstDatumConfig(const LocalizerConfig& config) {
+  DatumElection::Config election;
+  election.max_speed_mps = config.odometry.max_speed_mps;
+  return election;
+}
+
+/// A datum that stands is given up less easily.
+DatumElection::Config OtherDatumConfig(const LocalizerConfig& config) {
+  DatumElection::Config election = FirstDatumConfig(config);
+  election.min_span_s = config.restart_s;
+  election.max_wait_s = std::numeric_limits<double>::infinity();
+  return election;
 }
 
 }  // namespace
 
 GeoLocalizer::GeoLocalizer(const LocalizerConfig& config)
-    : config_(Checked(config)),
+    : config_(CheckedLocalizerConfig(config)),
       track_(config_.odometry, config_.max_extrapolation_s),
-      window_(std::make_unique<SlidingWindow>(config_)) {
+      window_(std::make_unique<SlidingWindow>(config_)),
+      first_datum_(FirstDatumConfig(config_)),
+      other_datum_(OtherDatumConfig(config_)) {
   if (config_.datum) frame_.emplace(*config_.datum);
 }
 
@@ -98,6 +115,9 @@ void GeoLocalizer::KeepTrackOfTime(std::int64_t stamp_ns) {
 void GeoLocalizer::Forget() {
   track_.Clear();
   window_->Clear();
+  first_fixes_.clear();
+  first_datum_.Reset();
+  other_datum_.Reset();
   waiting_.clear();
   kept_.clear();
   newest_fix_ns_ = 0;
@@ -140,20 +160,68 @@ void GeoLocalizer::CountSecondThoughts(std::uint64_t reinstated, std::uint64_t r
 
 GeoLocalizer::FixVerdict GeoLocalizer::AddFix(const geo::Fix& fix) {
   if (!fix.has_fix) return Count(FixVerdict::kAbsent);
-  const auto measurement = ToMeasurement(fix);
-  if (!measurement) return Count(FixVerdict::kInvalid);
+  if (!geo::IsPlausible(fix)) return Count(FixVerdict::kInvalid);
   if (fix.stamp_ns <= newest_fix_ns_) return Count(FixVerdict::kOutOfOrder);
-  if (track_.empty() || MomentOf(*measurement) < track_.oldest_ns() ||
+  if (!frame_) ElectDatum(fix);
+  if (frame_ && IsOffMap(fix)) return Count(FixVerdict::kInvalid);
+  if (track_.empty() || fix.stamp_ns - Nanoseconds(window_->latency_s()) < track_.oldest_ns() ||
       Seconds(fix.stamp_ns - track_.newest_ns()) > kMaxWaitS) {
     return Count(FixVerdict::kWithoutOdometry);
   }
   newest_fix_ns_ = fix.stamp_ns;
-  if (!waiting_.empty() || MomentOf(*measurement) > track_.newest_ns()) {
-    if (waiting_.size() >= kMaxWaitingFixes) return Count(FixVerdict::kWithoutOdometry);
-    waiting_.push_back(*measurement);
-    return Count(FixVerdict::kWaiting);
+  if (frame_ && first_fixes_.empty()) return Count(AddWithDatum(fix));
+  first_fixes_.push_back(fix);
+  if (frame_) return AddFirstFixes();
+  if (first_fixes_.size() > kMaxWaitingFixes) first_fixes_.pop_front();
+  return Count(FixVerdict::kWaiting);
+}
+
+void GeoLocalizer::ElectDatum(const geo::Fix& fix) {
+  if (const auto datum = first_datum_.Add(ToPoint(fix))) frame_.emplace(*datum);
+}
+
+/// Whether the map's plane does not reach there. When fixes agree for long that it should, the
+/// datum was wrong: the map begins anew, unless a person has chosen it.
+bool GeoLocalizer::IsOffMap(const geo::Fix& fix) {
+  // The plane cannot tell the other side of the earth.
+  if (geo::GeodesicDistanceM(frame_->datum(), fix.position) <= config_.max_range_m) {
+    other_datum_.Reset();
+    return false;
   }
-  return Count(Process(*measurement));
+  if (config_.datum) return true;
+  const std::optional<geo::GeoPoint> datum = other_datum_.Add(ToPoint(fix));
+  if (!datum) return true;
+  window_->Clear();
+  waiting_.clear();
+  kept_.clear();
+  other_datum_.Reset();
+  frame_.emplace(*datum);
+  ++counters_.datum_changes;
+  return false;
+}
+
+GeoLocalizer::FixVerdict GeoLocalizer::AddWithDatum(const geo::Fix& fix) {
+  const FixMeasurement measurement = ToMeasurement(fix);
+  if (!waiting_.empty() || MomentOf(measurement) > track_.newest_ns()) {
+    if (waiting_.size() >= kMaxWaitingFixes) return FixVerdict::kWithoutOdometry;
+    waiting_.push_back(measurement);
+    return FixVerdict::kWaiting;
+  }
+  return Process(measurement);
+}
+
+/// What waited for the datum; the verdict is that of the newest.
+GeoLocalizer::FixVerdict GeoLocalizer::AddFirstFixes() {
+  FixVerdict verdict = FixVerdict::kWaiting;
+  for (; !first_fixes_.empty(); first_fixes_.pop_front()) {
+    const geo::Fix& fix = first_fixes_.front();
+    const bool forgotten = fix.stamp_ns - Nanoseconds(window_->latency_s()) < track_.oldest_ns();
+    verdict = IsOffMap(fix) ? FixVerdict::kInvalid
+              : forgotten   ? FixVerdict::kWithoutOdometry
+                            : AddWithDatum(fix);
+    Count(verdict);
+  }
+  return verdict;
 }
 
 void GeoLocalizer::ProcessWaiting() {
@@ -168,22 +236,17 @@ std::int64_t GeoLocalizer::MomentOf(const FixMeasurement& fix) const {
   return fix.stamp_ns - Nanoseconds(window_->latency_s());
 }
 
-std::optional<FixMeasurement> GeoLocalizer::ToMeasurement(const geo::Fix& fix) {
-  if (fix.stamp_ns <= 0 || !geo::IsValid(fix.position)) return std::nullopt;
-  const double default_variance =
-      config_.receiver.default_sigma_m * config_.receiver.default_sigma_m;
-  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity() * default_variance;
-  if (fix.covariance_m2) {
-    if (!geo::IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
-    covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
-  }
-  if (!frame_) frame_.emplace(fix.position);
+geo::ReceiverPoint GeoLocalizer::ToPoint(const geo::Fix& fix) const {
+  const Eigen::Matrix2d covariance_m2 = geo::CovarianceOf(fix, config_.receiver.default_sigma_m);
+  return {fix.stamp_ns, fix.position, std::sqrt(covariance_m2.trace() / 2)};
+}
+
+FixMeasurement GeoLocalizer::ToMeasurement(const geo::Fix& fix) const {
+  Eigen::Matrix2d covariance_m2 = geo::CovarianceOf(fix, config_.receiver.default_sigma_m) +
+                                  Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   FixMeasurement measurement;
   measurement.stamp_ns = fix.stamp_ns;
   measurement.place_m = frame_->ToEnu(fix.position);
-  // The plane cannot tell the other side of the earth.
-  if (geo::GeodesicDistanceM(frame_->datum(), fix.position) > config_.max_range_m)
-    return std::nullopt;
   const Eigen::Matrix2d turn = Rotation2(geo::MeridianConvergence(*frame_, fix.position));
   covariance_m2 = turn * covariance_m2 * turn.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance_m2);

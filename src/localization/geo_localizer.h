@@ -10,6 +10,7 @@
 
 #include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
+#include "localization/datum_election.h"
 #include "localization/fix_measurement.h"
 #include "localization/localizer_config.h"
 #include "localization/odometry_track.h"
@@ -49,14 +50,15 @@ struct LocalizerCounters {
   std::uint64_t fixes_used = 0;
   std::uint64_t fixes_refused = 0;       ///< Outliers.
   std::uint64_t fixes_absent = 0;        ///< The receiver said that it has none.
-  std::uint64_t fixes_invalid = 0;       ///< NaN, out of range, or a covariance that is none.
+  std::uint64_t fixes_invalid = 0;       ///< NaN, out of range, null island, or no covariance.
   std::uint64_t fixes_out_of_order = 0;  ///< Not newer than the newest, or older than the window.
   std::uint64_t fixes_without_odometry = 0;  ///< From a time that the odometry does not cover.
   std::uint64_t odometry_invalid = 0;
   std::uint64_t odometry_out_of_order = 0;
   std::uint64_t odometry_resets = 0;
-  std::uint64_t restarts = 0;      ///< The map was fixed anew by fixes refused for long.
-  std::uint64_t clock_resets = 0;  ///< Time went back by more than the window: all forgotten.
+  std::uint64_t restarts = 0;       ///< The map was fixed anew by fixes refused for long.
+  std::uint64_t clock_resets = 0;   ///< Time went back by more than the window: all forgotten.
+  std::uint64_t datum_changes = 0;  ///< All fixes agreed that the datum was wrong.
 };
 
 /// Fuses fixes and odometry to the vehicle's pose on the map. docs/explanation/localization.md has
@@ -67,7 +69,7 @@ class GeoLocalizer {
     kUsed,
     kRefused,
     kKept,     ///< Stored until the vehicle has moved enough to know its heading.
-    kWaiting,  ///< Until the odometry reaches its moment.
+    kWaiting,  ///< Until the odometry reaches its moment, or until fixes agree on the datum.
     kAbsent,
     kInvalid,
     kOutOfOrder,
@@ -114,7 +116,12 @@ class GeoLocalizer {
                                  const std::function<OdometryTrack::Verdict()>& add);
   FixVerdict Count(FixVerdict verdict);
   void CountSecondThoughts(std::uint64_t reinstated, std::uint64_t refused);
-  std::optional<FixMeasurement> ToMeasurement(const geo::Fix& fix);
+  FixMeasurement ToMeasurement(const geo::Fix& fix) const;
+  geo::ReceiverPoint ToPoint(const geo::Fix& fix) const;
+  void ElectDatum(const geo::Fix& fix);
+  bool IsOffMap(const geo::Fix& fix);
+  FixVerdict AddWithDatum(const geo::Fix& fix);
+  FixVerdict AddFirstFixes();
   std::int64_t MomentOf(const FixMeasurement& fix) const;
   FixVerdict Process(FixMeasurement fix);
   void Keep(const FixMeasurement& fix, double keep_s);
@@ -130,6 +137,9 @@ class GeoLocalizer {
   std::optional<geo::LocalFrame> frame_;
   OdometryTrack track_;
   const std::unique_ptr<SlidingWindow> window_;
+  DatumElection first_datum_;           // Among the first fixes...
+  DatumElection other_datum_;           // ...and among those too far from the datum.
+  std::deque<geo::Fix> first_fixes_;    // They wait for the datum.
   std::deque<FixMeasurement> waiting_;  // For odometry.
   std::deque<FixMeasurement> kept_;     // The latest, for a start.
   std::int64_t newest_fix_ns_ = 0;

@@ -6,7 +6,9 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <vector>
 
+#include "common/stamp_gate.h"
 #include "localization/geo_localizer.h"
 
 namespace livemap::localization {
@@ -21,17 +23,17 @@ struct OdometrySample {
 };
 
 /// Hands fixes and odometry to a GeoLocalizer in the order of their stamps, in whatever order they
-/// arrive: so a replay gives the same poses again. Odometry whose stamp goes back is a replay that
-/// begins again: everything but the datum is forgotten. (A fix alone is not believed so much: a
-/// receiver may stamp one wrongly.) Not thread-safe.
+/// arrive: so a replay gives the same poses again. Odometry whose stamps go back is a replay that
+/// begins again: everything but the datum is forgotten. One stamp that fits neither the clock nor
+/// its neighbours is refused and counted (StampGate); those that prove true are not lost. Not
+/// thread-safe.
 class LocalizerFeed {
  public:
   struct Config {
     /// An odometry waits at most this long for a fix of its moment or later, and a fix for such an
     /// odometry, s of the steady clock.
     double order_wait_s = 0.15;
-    /// A stamp that goes back by more than this begins anew, s.
-    double set_back_s = 1.0;
+    StampGate::Config stamps;
   };
   /// Called when the localizer has taken an odometry.
   using OnOdometry = std::function<void(const OdometrySample&)>;
@@ -42,11 +44,20 @@ class LocalizerFeed {
   LocalizerFeed(const Config& config, GeoLocalizer& localizer, OnOdometry on_odometry,
                 OnFix on_fix);
 
-  void AddFix(const geo::Fix& fix, double steady_s);
-  /// True when the stamp went back and everything was forgotten.
-  bool AddOdometry(const OdometrySample& sample, double steady_s);
+  /// `now_ns` is the clock of the stamps; 0: it is not known.
+  void AddFix(const geo::Fix& fix, double steady_s, std::int64_t now_ns = 0);
+  /// True when the stamps went back and everything was forgotten.
+  bool AddOdometry(const OdometrySample& sample, double steady_s, std::int64_t now_ns = 0);
   /// Hands over what has waited long enough.
   void Advance(double steady_s);
+
+  /// Stamp of the newest odometry that was believed; none before the first. One that was refused
+  /// does not count: nothing is measured since it.
+  const std::optional<std::int64_t>& newest_odometry_ns() const {
+    return odometry_.stamps.newest_ns();
+  }
+  const StampGate::Counters& fix_stamps() const { return fixes_.stamps.counters(); }
+  const StampGate::Counters& odometry_stamps() const { return odometry_.stamps.counters(); }
 
  private:
   template <class T>
@@ -54,8 +65,24 @@ class LocalizerFeed {
     T what;
     double arrival_s;
   };
+  /// One of the two inputs.
+  template <class T>
+  struct Line {
+    explicit Line(const StampGate::Config& config) : stamps(config) {}
+    /// Takes what has come, and what waited to be confirmed by it.
+    void Push(const T& what, double steady_s);
 
-  bool IsSetBack(std::int64_t stamp_ns, std::int64_t newest_ns) const;
+    StampGate stamps;
+    std::deque<Waiting<T>> waiting;  ///< Ascending stamps.
+    std::vector<T> strays;           ///< That wait to be confirmed.
+    std::int64_t newest_ns = 0;      ///< 0: none, or of before time went back.
+  };
+
+  template <class T>
+  StampGate::Verdict Judge(Line<T>& line, const T& what, std::int64_t now_ns);
+  /// Time went back: what the other input has of before does not order anything any more.
+  template <class T>
+  void LeaveBehind(Line<T>& other, std::int64_t stamp_ns);
   void Hand(const geo::Fix& fix);
   void Hand(const OdometrySample& sample);
   bool HandNext(double steady_s);
@@ -64,10 +91,8 @@ class LocalizerFeed {
   GeoLocalizer& localizer_;
   const OnOdometry on_odometry_;
   const OnFix on_fix_;
-  std::deque<Waiting<geo::Fix>> fixes_;  // Ascending stamps, as the odometry.
-  std::deque<Waiting<OdometrySample>> odometry_;
-  std::int64_t newest_fix_ns_ = 0;
-  std::int64_t newest_odometry_ns_ = 0;
+  Line<geo::Fix> fixes_;
+  Line<OdometrySample> odometry_;
 };
 
 }  // namespace livemap::localization

@@ -17,28 +17,29 @@ constexpr double kMaxPlaceM = 1e8;        // Nobody drives that far.
 // Velocity is taken over twice this: over less, the noise of the way would pass for changes of
 // speed.
 constexpr std::int64_t kVelocitySpanNs = 500'000'000;
+constexpr int kStepsToBelieve = 3;     // That contradict the speed.
 constexpr double kSpeedMemoryS = 0.2;  // Of the speed that the track is carried on with.
 
-bool IsPose(const Eigen::Isometry3d& pose) {
+bool IsOdometryPose(const Eigen::Isometry3d& pose) {
   if (!pose.matrix().allFinite() || pose.translation().norm() > kMaxPlaceM) return false;
   const Eigen::Matrix3d rotation = pose.linear();
   return (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 &&
          rotation.determinant() > 0;
 }
 
-bool IsCovariance(const Eigen::Matrix3d& matrix) {
+bool IsOdometryCovariance(const Eigen::Matrix3d& matrix) {
   if (!matrix.allFinite() || matrix.diagonal().minCoeff() < 0 || matrix.trace() > 1e6) return false;
   if ((matrix - matrix.transpose()).norm() > 1e-6 * matrix.norm()) return false;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(matrix, Eigen::EigenvaluesOnly);
   return solver.eigenvalues().minCoeff() >= -1e-9 * matrix.norm();
 }
 
-PlanarPose ToPlanar(const Eigen::Isometry3d& pose) {
+PlanarPose OdometryPlanarPose(const Eigen::Isometry3d& pose) {
   return {pose.translation().head<2>(), std::atan2(pose.linear()(1, 0), pose.linear()(0, 0))};
 }
 
 /// Diagonal covariance of a way and a turn.
-Eigen::Matrix3d Diagonal(double way_variance, double yaw_variance) {
+Eigen::Matrix3d OdometryCovariance(double way_variance, double yaw_variance) {
   return Eigen::Vector3d(way_variance, way_variance, yaw_variance).asDiagonal();
 }
 
@@ -50,9 +51,9 @@ OdometryTrack::OdometryTrack(const OdometryModel& model, double max_extrapolatio
 /// What keeps a pose from becoming a step of the track; the first pose only starts it.
 std::optional<OdometryTrack::Verdict> OdometryTrack::Refuse(
     std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base) {
-  if (stamp_ns <= 0 || !IsPose(odom_from_base)) return Verdict::kInvalid;
+  if (stamp_ns <= 0 || !IsOdometryPose(odom_from_base)) return Verdict::kInvalid;
   if (samples_.empty()) {
-    newest_raw_ = ToPlanar(odom_from_base);
+    newest_raw_ = OdometryPlanarPose(odom_from_base);
     samples_.push_back({stamp_ns, {}, Eigen::Matrix3d::Zero()});
     return Verdict::kAccepted;
   }
@@ -63,14 +64,14 @@ std::optional<OdometryTrack::Verdict> OdometryTrack::Refuse(
 /// The track goes on by its last speed.
 void OdometryTrack::Coast(std::int64_t stamp_ns) {
   const double time_s = Seconds(stamp_ns - newest_ns());
-  const PlanarPose coast{time_s * speed_mps_, time_s * yaw_rate_rps_};
+  const PlanarPose coast{time_s * speed_.way_mps, time_s * speed_.yaw_rps};
   samples_.push_back({stamp_ns, samples_.back().pose * coast, CoastCovariance(time_s)});
 }
 
 OdometryTrack::Verdict OdometryTrack::AddLost(std::int64_t stamp_ns,
                                               const Eigen::Isometry3d& odom_from_base) {
   if (const auto refused = Refuse(stamp_ns, odom_from_base)) return *refused;
-  newest_raw_ = ToPlanar(odom_from_base);
+  newest_raw_ = OdometryPlanarPose(odom_from_base);
   Coast(stamp_ns);
   return Verdict::kReset;
 }
@@ -78,9 +79,10 @@ OdometryTrack::Verdict OdometryTrack::AddLost(std::int64_t stamp_ns,
 OdometryTrack::Verdict OdometryTrack::Add(
     std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base,
     const std::optional<Eigen::Matrix3d>& increment_covariance) {
-  if (increment_covariance && !IsCovariance(*increment_covariance)) return Verdict::kInvalid;
+  if (increment_covariance && !IsOdometryCovariance(*increment_covariance))
+    return Verdict::kInvalid;
   if (const auto refused = Refuse(stamp_ns, odom_from_base)) return *refused;
-  const PlanarPose raw = ToPlanar(odom_from_base);
+  const PlanarPose raw = OdometryPlanarPose(odom_from_base);
   const double time_s = Seconds(stamp_ns - newest_ns());
   PlanarPose step = newest_raw_.Inverse() * raw;
   step.yaw_rad = WrapAngle(step.yaw_rad);
@@ -91,38 +93,59 @@ OdometryTrack::Verdict OdometryTrack::Add(
   }
   Eigen::Matrix3d covariance = StepCovariance(step, time_s);
   if (increment_covariance) {
-    covariance = *increment_covariance +
-                 Diagonal(kMinWaySigmaM * kMinWaySigmaM, kMinYawSigmaRad * kMinYawSigmaRad);
+    covariance = *increment_covariance + OdometryCovariance(kMinWaySigmaM * kMinWaySigmaM,
+                                                            kMinYawSigmaRad * kMinYawSigmaRad);
   }
   samples_.push_back({stamp_ns, samples_.back().pose * step, covariance});
   const double fresh = moving_known_ ? 1 - std::exp(-time_s / kSpeedMemoryS) : 1;
-  speed_mps_ += fresh * (step.position_m / time_s - speed_mps_);
-  yaw_rate_rps_ += fresh * (step.yaw_rad / time_s - yaw_rate_rps_);
+  speed_.way_mps += fresh * (step.position_m / time_s - speed_.way_mps);
+  speed_.yaw_rps += fresh * (step.yaw_rad / time_s - speed_.yaw_rps);
   moving_known_ = true;
   return Verdict::kAccepted;
 }
 
-bool OdometryTrack::IsJump(const PlanarPose& step, double time_s) const {
+bool OdometryTrack::IsPossible(const PlanarPose& step, double time_s) const {
   // What rounding and noise move in a very short time is no speed.
-  if (step.position_m.norm() > model_.max_speed_mps * time_s + 0.1) return true;
-  if (std::abs(step.yaw_rad) > model_.max_yaw_rate_rps * time_s + 0.1) return true;
-  if (!moving_known_) return false;
-  const double left_m = (step.position_m - time_s * speed_mps_).norm();
-  return left_m > model_.max_jump_m + 0.5 * kMaxAccelerationMps2 * time_s * time_s;
+  return step.position_m.norm() <= model_.max_speed_mps * time_s + 0.1 &&
+         std::abs(step.yaw_rad) <= model_.max_yaw_rate_rps * time_s + 0.1;
+}
+
+bool OdometryTrack::Continues(const Speed& speed, const PlanarPose& step, double time_s) const {
+  const double left_m = (step.position_m - time_s * speed.way_mps).norm();
+  return left_m <= model_.max_jump_m + 0.5 * kMaxAccelerationMps2 * time_s * time_s;
+}
+
+/// Learns from what it sees.
+bool OdometryTrack::IsJump(const PlanarPose& step, double time_s) {
+  if (!IsPossible(step, time_s)) {
+    other_steps_ = 0;
+    return true;
+  }
+  if (!moving_known_ || Continues(speed_, step, time_s)) {
+    other_steps_ = 0;
+    return false;
+  }
+  const bool agrees = other_steps_ > 0 && Continues(other_speed_, step, time_s);
+  other_steps_ = agrees ? other_steps_ + 1 : 1;
+  other_speed_ = {step.position_m / time_s, step.yaw_rad / time_s};
+  if (other_steps_ < kStepsToBelieve) return true;
+  speed_ = other_speed_;
+  other_steps_ = 0;
+  return false;
 }
 
 Eigen::Matrix3d OdometryTrack::StepCovariance(const PlanarPose& step, double time_s) const {
   const double way_variance = model_.way_sigma_m * model_.way_sigma_m * step.position_m.norm() +
                               kStandingSigmaM * kStandingSigmaM * time_s +
                               kMinWaySigmaM * kMinWaySigmaM;
-  return Diagonal(way_variance, model_.yaw_sigma_rad * model_.yaw_sigma_rad * time_s);
+  return OdometryCovariance(way_variance, model_.yaw_sigma_rad * model_.yaw_sigma_rad * time_s);
 }
 
 Eigen::Matrix3d OdometryTrack::CoastCovariance(double time_s) const {
   const double way_sigma_m = model_.reset_speed_sigma_mps * time_s;
   const double yaw_sigma_rad = std::min(3.0, model_.reset_yaw_rate_sigma_rps * time_s);
-  return Diagonal(way_sigma_m * way_sigma_m + kMinWaySigmaM * kMinWaySigmaM,
-                  yaw_sigma_rad * yaw_sigma_rad + kMinYawSigmaRad * kMinYawSigmaRad);
+  return OdometryCovariance(way_sigma_m * way_sigma_m + kMinWaySigmaM * kMinWaySigmaM,
+                            yaw_sigma_rad * yaw_sigma_rad + kMinYawSigmaRad * kMinYawSigmaRad);
 }
 
 bool OdometryTrack::Covers(std::int64_t stamp_ns) const {
@@ -144,7 +167,7 @@ PlanarPose OdometryTrack::At(std::int64_t stamp_ns) const {
   const Sample& before = samples_[after - 1];
   if (after == samples_.size()) {
     const double ahead_s = Seconds(stamp_ns - before.stamp_ns);
-    return before.pose * PlanarPose{ahead_s * speed_mps_, ahead_s * yaw_rate_rps_};
+    return before.pose * PlanarPose{ahead_s * speed_.way_mps, ahead_s * speed_.yaw_rps};
   }
   const Sample& next = samples_[after];
   const double share =
@@ -220,8 +243,8 @@ void OdometryTrack::ForgetBefore(std::int64_t stamp_ns) {
 void OdometryTrack::Clear() {
   samples_.clear();
   moving_known_ = false;
-  speed_mps_.setZero();
-  yaw_rate_rps_ = 0;
+  speed_ = {};
+  other_steps_ = 0;
 }
 
 }  // namespace livemap::localization

@@ -23,7 +23,8 @@ struct PlanarMotion {
 };
 
 /// The recent odometry of one vehicle as one continuous track: a reset of the odometry (a jump back
-/// to the origin, a lost map) is bridged by the last speed with an honest covariance. Not
+/// to the origin, a lost map) is bridged by the last speed with an honest covariance. When steps
+/// that agree with each other contradict that speed, it was the speed that was wrong. Not
 /// thread-safe.
 class OdometryTrack {
  public:
@@ -74,7 +75,15 @@ class OdometryTrack {
   std::optional<Verdict> Refuse(std::int64_t stamp_ns, const Eigen::Isometry3d& odom_from_base);
   void Coast(std::int64_t stamp_ns);
   std::size_t After(std::int64_t stamp_ns) const;
-  bool IsJump(const PlanarPose& step, double time_s) const;
+  /// How the odometry moves, in the vehicle's frame.
+  struct Speed {
+    Eigen::Vector2d way_mps = Eigen::Vector2d::Zero();
+    double yaw_rps = 0;
+  };
+
+  bool IsPossible(const PlanarPose& step, double time_s) const;
+  bool Continues(const Speed& speed, const PlanarPose& step, double time_s) const;
+  bool IsJump(const PlanarPose& step, double time_s);
   Eigen::Matrix3d StepCovariance(const PlanarPose& step, double time_s) const;
   Eigen::Matrix3d CoastCovariance(double time_s) const;
 
@@ -82,9 +91,10 @@ class OdometryTrack {
   const double max_extrapolation_s_;
   std::deque<Sample> samples_;  // Ascending stamps.
   PlanarPose newest_raw_;
-  Eigen::Vector2d speed_mps_ = Eigen::Vector2d::Zero();  // Last, in the vehicle's frame.
-  double yaw_rate_rps_ = 0;
+  Speed speed_;  // The last.
   bool moving_known_ = false;
+  Speed other_speed_;    // That of the steps which contradict the last one...
+  int other_steps_ = 0;  // ...so many in succession.
 };
 
 }  // namespace livemap::localization

@@ -19,7 +19,7 @@ constexpr double kLatencyWalkS = 1e-4;  // The latency's change within 1 s, stan
 constexpr double kLatencyStepS = 0.005;
 constexpr double kSettledS = 2;
 
-StateVector Joined(const NodeState& node, const Calibration& calibration) {
+StateVector JoinedWindowState(const NodeState& node, const Calibration& calibration) {
   StateVector state;
   state << node, calibration;
   return state;
@@ -61,7 +61,7 @@ void SlidingWindow::Start(std::int64_t stamp_ns, const PlanarPose& map_from_base
   node.covariance = calibration_prior_;
   node.covariance.diagonal().head<kNodeSize>() << Squared(kStartSigmaM), Squared(kStartSigmaM),
       Squared(kStartYawSigmaRad), 1, 1;
-  SetPrior(Joined(node.state, calibration_), node.covariance);
+  SetPrior(JoinedWindowState(node.state, calibration_), node.covariance);
 }
 
 void SlidingWindow::SetPrior(const StateVector& mean, const StateMatrix& covariance) {
@@ -264,7 +264,8 @@ void SlidingWindow::Slide() {
     information = information.PassOn(*nodes_[1].from_previous, nodes_[0].state, nodes_[1].state,
                                      calibration_);
     StateMatrix covariance = information.Covariance();
-    const StateVector mean = Joined(nodes_[1].state, calibration_) - covariance * information.b;
+    const StateVector mean =
+        JoinedWindowState(nodes_[1].state, calibration_) - covariance * information.b;
     // The calibration changes slowly: what is older counts less.
     const double time_s = Seconds(nodes_[1].stamp_ns - nodes_[0].stamp_ns);
     const OdometryModel& odometry = config_.odometry;

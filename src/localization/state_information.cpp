@@ -10,7 +10,7 @@ template <int kRows, int kColumns>
 using RowMajor = Eigen::Matrix<double, kRows, kColumns, Eigen::RowMajor>;
 
 /// Eigen's LLT of a matrix that rounding may have left without its last small eigenvalue.
-Eigen::LLT<StateMatrix> Decompose(const StateMatrix& matrix) {
+Eigen::LLT<StateMatrix> DecomposeInformation(const StateMatrix& matrix) {
   Eigen::LLT<StateMatrix> decomposed(matrix);
   double lift = 1e-12;
   while (decomposed.info() != Eigen::Success && lift < 1) {
@@ -79,13 +79,13 @@ StateInformation StateInformation::PassOn(const ceres::CostFunction& link, const
 }
 
 StateMatrix StateInformation::Covariance() const {
-  const StateMatrix covariance = Decompose(h).solve(StateMatrix::Identity());
+  const StateMatrix covariance = DecomposeInformation(h).solve(StateMatrix::Identity());
   return 0.5 * (covariance + covariance.transpose());
 }
 
 StateMatrix RootInformation(const StateMatrix& covariance) {
-  const StateMatrix information = Decompose(covariance).solve(StateMatrix::Identity());
-  return Decompose(0.5 * (information + information.transpose())).matrixU();
+  const StateMatrix information = DecomposeInformation(covariance).solve(StateMatrix::Identity());
+  return DecomposeInformation(0.5 * (information + information.transpose())).matrixU();
 }
 
 }  // namespace livemap::localization

@@ -11,14 +11,14 @@ namespace {
 
 constexpr std::size_t kTriedEnds = 24;  // Pairs of so many evenly chosen places are tried.
 
-double Doubt(const TrackPair& pair, const PlanarPose& pose) {
+double AlignmentDoubt(const TrackPair& pair, const PlanarPose& pose) {
   const Eigen::Vector2d error_m =
       pair.map_m - pose.position_m - Rotation2(pose.yaw_rad) * pair.track_m;
   return error_m.squaredNorm() / (pair.sigma_m * pair.sigma_m);
 }
 
 /// The pose that brings one pair together and turns the line to another into its direction.
-PlanarPose ThroughTwo(const TrackPair& a, const TrackPair& b) {
+PlanarPose AlignmentThroughTwo(const TrackPair& a, const TrackPair& b) {
   const Eigen::Vector2d track_m = b.track_m - a.track_m;
   const Eigen::Vector2d map_m = b.map_m - a.map_m;
   PlanarPose pose;
@@ -28,15 +28,15 @@ PlanarPose ThroughTwo(const TrackPair& a, const TrackPair& b) {
   return pose;
 }
 
-double MedianDoubt(const std::vector<TrackPair>& pairs, const PlanarPose& pose,
-                   std::vector<double>& doubts) {
+double MedianAlignmentDoubt(const std::vector<TrackPair>& pairs, const PlanarPose& pose,
+                            std::vector<double>& doubts) {
   doubts.clear();
-  for (const TrackPair& pair : pairs) doubts.push_back(Doubt(pair, pose));
+  for (const TrackPair& pair : pairs) doubts.push_back(AlignmentDoubt(pair, pose));
   return TakeMedian(doubts);
 }
 
 /// Least squares over the pairs that agree; false when they all lie in one place.
-bool Refine(const std::vector<TrackPair>& pairs, TrackAlignment& alignment) {
+bool RefineAlignment(const std::vector<TrackPair>& pairs, TrackAlignment& alignment) {
   double weights = 0;
   Eigen::Vector2d track_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d map_m = Eigen::Vector2d::Zero();
@@ -86,8 +86,8 @@ std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, do
   const auto chosen = [&](std::size_t i) { return pairs[i * (pairs.size() - 1) / (tried - 1)]; };
   for (std::size_t i = 0; i < tried; ++i) {
     for (std::size_t j = i + 1; j < tried; ++j) {
-      const PlanarPose pose = ThroughTwo(chosen(i), chosen(j));
-      const double doubt = MedianDoubt(pairs, pose, doubts);
+      const PlanarPose pose = AlignmentThroughTwo(chosen(i), chosen(j));
+      const double doubt = MedianAlignmentDoubt(pairs, pose, doubts);
       if (doubt >= least_doubt) continue;
       least_doubt = doubt;
       best.map_from_track = pose;
@@ -95,16 +95,17 @@ std::optional<TrackAlignment> AlignTrack(const std::vector<TrackPair>& pairs, do
   }
   // Twice: the second time with the pairs that agree with the better pose.
   for (int round = 0; round < 2; ++round) {
-    MedianDoubt(pairs, best.map_from_track, doubts);
+    MedianAlignmentDoubt(pairs, best.map_from_track, doubts);
     best.widening = Widening(doubts);
     best.agrees.assign(pairs.size(), false);
     std::size_t agreeing = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      best.agrees[i] = Doubt(pairs[i], best.map_from_track) <= gate * best.widening * best.widening;
+      best.agrees[i] =
+          AlignmentDoubt(pairs[i], best.map_from_track) <= gate * best.widening * best.widening;
       agreeing += best.agrees[i] ? 1 : 0;
     }
     if (agreeing < min_pairs || 2 * agreeing <= pairs.size()) return std::nullopt;
-    if (!Refine(pairs, best)) return std::nullopt;
+    if (!RefineAlignment(pairs, best)) return std::nullopt;
   }
   return best;
 }

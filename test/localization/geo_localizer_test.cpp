@@ -312,7 +312,9 @@ TEST(GeoLocalizer, GivesTheSameAnswersAgain) {
 }
 
 TEST(GeoLocalizer, RefusesWhatCannotBe) {
-  GeoLocalizer localizer{LocalizerConfig{}};
+  LocalizerConfig config;
+  config.datum = geo::GeoPoint{48, 11};
+  GeoLocalizer localizer{config};
   using Fix = GeoLocalizer::FixVerdict;
   using Odometry = OdometryTrack::Verdict;
   constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -335,7 +337,7 @@ TEST(GeoLocalizer, RefusesWhatCannotBe) {
             Odometry::kInvalid);
   for (const geo::GeoPoint bad :
        {geo::GeoPoint{kNan, 11}, geo::GeoPoint{48, 181}, geo::GeoPoint{1e300, 11},
-        geo::GeoPoint{48, std::numeric_limits<double>::infinity()}}) {
+        geo::GeoPoint{48, std::numeric_limits<double>::infinity()}, geo::GeoPoint{0, 0}}) {
     geo::Fix broken = fix;
     broken.position = bad;
     EXPECT_EQ(localizer.AddFix(broken), Fix::kInvalid);
@@ -358,12 +360,60 @@ TEST(GeoLocalizer, RefusesWhatCannotBe) {
   EXPECT_EQ(localizer.AddFix(fix), Fix::kWaiting);
   fix.stamp_ns = 99 * kSecond_ns;
   EXPECT_EQ(localizer.AddFix(fix), Fix::kWithoutOdometry);
-  EXPECT_EQ(localizer.counters().fixes_invalid, 7U);
+  EXPECT_EQ(localizer.counters().fixes_invalid, 8U);
   EXPECT_EQ(localizer.counters().odometry_invalid, 4U);
   EXPECT_FALSE(localizer.Fused(1));
   EXPECT_FALSE(localizer.Fused(std::numeric_limits<std::int64_t>::min()));
   EXPECT_FALSE(localizer.Fused(std::numeric_limits<std::int64_t>::max()));
   EXPECT_FALSE(localizer.MapFromOdom());
+}
+
+/// How far base_link is from the truth at the end of a drive whose first fixes lie elsewhere, m.
+double ErrorAfterWrongFirstFixes(int wrong, const geo::GeoPoint& elsewhere,
+                                 const LocalizerConfig& config, double& datum_error_m) {
+  GeoLocalizer localizer{config};
+  constexpr std::int64_t kStartNs = 1'700'000'000'000'000'000;
+  const geo::GeoPoint start{48.1, 11.5};
+  const geo::LocalFrame truth(start);
+  for (int i = 0; i <= 600; ++i) {
+    const std::int64_t stamp_ns = kStartNs + i * 100'000'000LL;
+    localizer.AddOdometry(stamp_ns, ToIsometry({{i * 1.0, 0}, 0}));
+    geo::Fix fix;
+    fix.stamp_ns = stamp_ns;
+    fix.position = i < wrong ? elsewhere : truth.ToGeo({i * 1.0, 0});
+    fix.covariance_m2 = Eigen::Matrix2d::Identity();
+    localizer.AddFix(fix);
+  }
+  const auto fused = localizer.Fused(kStartNs + 60'000'000'000);
+  if (!fused || !localizer.datum()) return std::numeric_limits<double>::infinity();
+  datum_error_m = geo::GeodesicDistanceM(*localizer.datum(), start);
+  return geo::GeodesicDistanceM(fused->position, truth.ToGeo({600.0, 0}));
+}
+
+TEST(GeoLocalizer, WrongFirstFixesDoNotDecideWhereTheMapIs) {
+  LocalizerConfig config;
+  config.receiver.latency_s = config.receiver.latency_sigma_s = 0;
+  for (const geo::GeoPoint elsewhere :
+       {geo::GeoPoint{0, 0}, geo::GeoPoint{35.7, 139.7}, geo::GeoPoint{48.3, 11.5}}) {
+    for (const int wrong : {0, 1, 2, 3, 5, 20}) {
+      double datum_error_m = 0;
+      EXPECT_LT(ErrorAfterWrongFirstFixes(wrong, elsewhere, config, datum_error_m), 1.0)
+          << wrong << " fixes at " << elsewhere.latitude_deg;
+      // Within reach of the plane a datum is as good as another.
+      EXPECT_LT(datum_error_m, 30e3) << wrong << " fixes at " << elsewhere.latitude_deg;
+      if (wrong <= 2) {
+        EXPECT_LT(datum_error_m, 10) << elsewhere.latitude_deg;
+      }
+    }
+  }
+}
+
+TEST(GeoLocalizer, ADatumThatWasGivenStays) {
+  LocalizerConfig config;
+  config.receiver.latency_s = config.receiver.latency_sigma_s = 0;
+  config.datum = geo::GeoPoint{35.7, 139.7};
+  double datum_error_m = 0;
+  EXPECT_TRUE(std::isinf(ErrorAfterWrongFirstFixes(0, {0, 0}, config, datum_error_m)));
 }
 
 TEST(GeoLocalizer, BeginsAgainWhenTheClockIsSetBack) {

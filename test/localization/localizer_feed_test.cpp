@@ -130,9 +130,6 @@ TEST(LocalizerFeed, AReplayThatBeginsAgainGivesTheSamePosesAgain) {
 TEST(LocalizerFeed, AFixThatIsStampedWronglyOnceHarmsNothing) {
   FedLocalizer run;
   auto arrivals = ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; });
-  FedLocalizer undisturbed;
-  undisturbed.Play(arrivals);
-  const auto without = undisturbed.localizer.counters().fixes_without_odometry;
   geo::Fix wrong = FixAt(8.05);
   wrong.stamp_ns += 100LL * 365 * 86400 * 1'000'000'000;
   const auto middle = std::find_if(arrivals.begin(), arrivals.end(),
@@ -140,8 +137,58 @@ TEST(LocalizerFeed, AFixThatIsStampedWronglyOnceHarmsNothing) {
   arrivals.insert(middle, {8.06, wrong, std::nullopt});
   run.Play(arrivals);
   EXPECT_EQ(run.localizer.counters().clock_resets, 0u);
-  EXPECT_EQ(run.localizer.counters().fixes_without_odometry, without + 1);
+  EXPECT_EQ(run.feed.fix_stamps().refused(), 1u);
   EXPECT_NEAR(run.easts_m.back(), 120, 0.5);
+}
+
+TEST(LocalizerFeed, OdometryThatIsStampedWronglyOnceHarmsNothing) {
+  for (const double wrong_s : {100.0 * 365 * 86400, 365.0 * 86400, -365.0 * 86400, -7.0}) {
+    FedLocalizer run;
+    auto arrivals = ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; });
+    OdometrySample wrong = OdometryAt(8.05);
+    wrong.stamp_ns += Nanoseconds(wrong_s);
+    const auto middle = std::find_if(arrivals.begin(), arrivals.end(), [](const Arrival& arrival) {
+      return arrival.steady_s > 8.05;
+    });
+    arrivals.insert(middle, {8.06, std::nullopt, wrong});
+    run.Play(arrivals);
+    EXPECT_EQ(run.localizer.counters().clock_resets, 0u) << wrong_s;
+    EXPECT_EQ(run.feed.odometry_stamps().refused(), 1u) << wrong_s;
+    EXPECT_NEAR(run.easts_m.back(), 120, 0.5) << wrong_s;
+  }
+}
+
+TEST(LocalizerFeed, OdometryThatIsRefusedOrLateIsNotTheNewest) {
+  FedLocalizer run;
+  EXPECT_FALSE(run.feed.newest_odometry_ns());
+  run.feed.AddOdometry(OdometryAt(1.0), 1.0);
+  run.feed.AddOdometry(OdometryAt(1.1), 1.1);
+  for (const double wrong_s : {365.0 * 86400, -365.0 * 86400, -0.05}) {
+    run.feed.AddOdometry(OdometryAt(1.1 + wrong_s), 1.2);
+    EXPECT_EQ(run.feed.newest_odometry_ns(), OdometryAt(1.1).stamp_ns) << wrong_s;
+  }
+  run.feed.AddOdometry(OdometryAt(1.2), 1.3);
+  EXPECT_EQ(run.feed.newest_odometry_ns(), OdometryAt(1.2).stamp_ns);
+}
+
+TEST(LocalizerFeed, ALoopOfTheClockGivesTheSamePosesAgainFromTheFirstMessageOn) {
+  const auto arrivals = ArrivalsOfDrive([](int) { return 0.0; }, [](int) { return 0.001; });
+  FedLocalizer run;
+  const auto play = [&] {
+    for (const Arrival& arrival : arrivals) {
+      const std::int64_t now_ns = kBeginNs + Nanoseconds(arrival.steady_s);
+      if (arrival.fix) run.feed.AddFix(*arrival.fix, arrival.steady_s, now_ns);
+      if (arrival.odometry) run.feed.AddOdometry(*arrival.odometry, arrival.steady_s, now_ns);
+    }
+    run.feed.Advance(1e9);
+  };
+  play();
+  const std::vector<double> first = run.easts_m;
+  ASSERT_THAT(first, Not(IsEmpty()));
+  run.easts_m.clear();
+  play();
+  EXPECT_EQ(run.easts_m, first);
+  EXPECT_EQ(run.localizer.counters().clock_resets, 1u);
 }
 
 TEST(LocalizerFeed, LostOdometryIsBridgedByTheLastSpeed) {
