@@ -21,7 +21,7 @@ constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
 using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
 
-ConstMap Part(const std::vector<float>& values, std::size_t begin, std::size_t count) {
+ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::size_t count) {
   return {values.data() + begin, static_cast<Eigen::Index>(count)};
 }
 
@@ -52,8 +52,8 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, points.size() - begin);
     const auto n = static_cast<Eigen::Index>(count);
-    const auto x = Part(points.x, begin, count), y = Part(points.y, begin, count),
-               z = Part(points.z, begin, count);
+    const auto x = AlignerPart(points.x, begin, count), y = AlignerPart(points.y, begin, count),
+               z = AlignerPart(points.z, begin, count);
     depth.head(n) = rotation(2, 0) * x + rotation(2, 1) * y + rotation(2, 2) * z + translation.z();
     column.head(n) =
         (rotation(0, 0) * x + rotation(0, 1) * y + rotation(0, 2) * z + translation.x()) /
@@ -121,7 +121,8 @@ double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
   double sum = 0;
   for (std::size_t begin = 0; begin < residuals.value.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, residuals.value.size() - begin);
-    const auto magnitude = Part(residuals.value, begin, count).abs();  // 0 where not visible.
+    const auto magnitude =
+        AlignerPart(residuals.value, begin, count).abs();  // 0 where not visible.
     const auto clipped = magnitude.min(k);
     sum += static_cast<double>((clipped * (2 * magnitude - clipped)).sum());
   }
@@ -138,16 +139,17 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, points.size() - begin);
     const auto n = static_cast<Eigen::Index>(count);
-    const auto residual = Part(current_.value, begin, count);
-    const auto visible = Part(current_.visible, begin, count);
+    const auto residual = AlignerPart(current_.value, begin, count);
+    const auto visible = AlignerPart(current_.visible, begin, count);
     for (int i = 0; i < 6; ++i) {
-      columns.col(i).head(n) = Part(points.jacobian[static_cast<std::size_t>(i)], begin, count);
+      columns.col(i).head(n) =
+          AlignerPart(points.jacobian[static_cast<std::size_t>(i)], begin, count);
     }
-    columns.col(6).head(n) = Part(points.intensity, begin, count);
+    columns.col(6).head(n) = AlignerPart(points.intensity, begin, count);
     columns.col(7).head(n).setOnes();
     if (!whitening_.empty()) {
       for (int i = 0; i < kUnknowns; ++i) {
-        columns.col(i).head(n) *= Part(whitening_, begin, count);
+        columns.col(i).head(n) *= AlignerPart(whitening_, begin, count);
       }
     }
     const Chunk weight_all = [&] {

@@ -14,8 +14,8 @@ constexpr std::uint8_t kWeak = 1, kStrong = 255;
 constexpr int kLanes = 8;  // Pixels worked off at once; narrower images have no edges.
 
 /// Sobel's two factors down the columns: smoothing 1 2 1 and difference -1 0 1.
-void AcrossRows(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below,
-                int width, std::int16_t* smooth, std::int16_t* difference) {
+void CannyAcrossRows(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below,
+                     int width, std::int16_t* smooth, std::int16_t* difference) {
   for (int x = 0; x < width; ++x) {
     smooth[x] = static_cast<std::int16_t>(above[x] + 2 * here[x] + below[x]);
     difference[x] = static_cast<std::int16_t>(below[x] - above[x]);
@@ -24,8 +24,8 @@ void AcrossRows(const std::uint8_t* above, const std::uint8_t* here, const std::
 
 /// And the other two along the row; `norm` is |dx| + |dy|. The first and last column see themselves
 /// beyond the border.
-void AlongRow(const std::int16_t* smooth, const std::int16_t* difference, int width,
-              std::int16_t* dx, std::int16_t* dy, std::int16_t* norm) {
+void CannyAlongRow(const std::int16_t* smooth, const std::int16_t* difference, int width,
+                   std::int16_t* dx, std::int16_t* dy, std::int16_t* norm) {
   for (int x = 1; x < width - 1; ++x) {
     const int across = smooth[x + 1] - smooth[x - 1];
     const int down = difference[x - 1] + 2 * difference[x] + difference[x + 1];
@@ -44,8 +44,9 @@ void AlongRow(const std::int16_t* smooth, const std::int16_t* difference, int wi
 /// Which of eight pixels have the largest norm across their edge: all bits set where so. Canny's
 /// four directions, told apart by the slopes 13/32 (tan 22.1 degrees) and 32/13, which 16 bits
 /// hold.
-cv::v_int16x8 AreRidges(const std::int16_t* above, const std::int16_t* here,
-                        const std::int16_t* below, const std::int16_t* dx, const std::int16_t* dy) {
+cv::v_int16x8 AreCannyRidges(const std::int16_t* above, const std::int16_t* here,
+                             const std::int16_t* below, const std::int16_t* dx,
+                             const std::int16_t* dy) {
   using cv::v_load;
   using cv::v_select;
   const cv::v_int16x8 across = v_load(dx), down = v_load(dy), zero = cv::v_setzero_s16();
@@ -66,7 +67,7 @@ cv::v_int16x8 AreRidges(const std::int16_t* above, const std::int16_t* here,
 }
 
 /// The upper left part of an image that is kept and only ever grows.
-cv::Mat View(cv::Mat& memory, cv::Size size, int type) {
+cv::Mat CannyMemoryView(cv::Mat& memory, cv::Size size, int type) {
   if (memory.cols < size.width || memory.rows < size.height) {
     memory.create(std::max(memory.rows, size.height), std::max(memory.cols, size.width), type);
   }
@@ -93,20 +94,20 @@ const cv::Mat& CannyDetector::ExtractAbove(const cv::Mat& grey, int weak, int st
 
 void CannyDetector::Reserve(cv::Size size) {
   const cv::Size framed(size.width + 2, size.height + 2);
-  View(dx_memory_, size, CV_16SC1);
-  View(dy_memory_, size, CV_16SC1);
-  View(norm_memory_, framed, CV_16SC1);
-  View(edges_memory_, size, CV_8UC1);
+  CannyMemoryView(dx_memory_, size, CV_16SC1);
+  CannyMemoryView(dy_memory_, size, CV_16SC1);
+  CannyMemoryView(norm_memory_, framed, CV_16SC1);
+  CannyMemoryView(edges_memory_, size, CV_8UC1);
   smooth_.reserve(static_cast<std::size_t>(size.width));
   difference_.reserve(static_cast<std::size_t>(size.width));
   open_.reserve(static_cast<std::size_t>(size.area()));
 }
 
 void CannyDetector::Differentiate(const cv::Mat& grey) {
-  dx_ = View(dx_memory_, grey.size(), CV_16SC1);
-  dy_ = View(dy_memory_, grey.size(), CV_16SC1);
+  dx_ = CannyMemoryView(dx_memory_, grey.size(), CV_16SC1);
+  dy_ = CannyMemoryView(dy_memory_, grey.size(), CV_16SC1);
   // One empty row and column around, so that no pixel needs a special case.
-  norm_ = View(norm_memory_, cv::Size(grey.cols + 2, grey.rows + 2), CV_16SC1);
+  norm_ = CannyMemoryView(norm_memory_, cv::Size(grey.cols + 2, grey.rows + 2), CV_16SC1);
   for (const int y : {0, norm_.rows - 1}) {
     std::memset(norm_.ptr(y), 0, sizeof(std::int16_t) * static_cast<std::size_t>(norm_.cols));
   }
@@ -117,10 +118,11 @@ void CannyDetector::Differentiate(const cv::Mat& grey) {
   smooth_.resize(width);
   difference_.resize(width);
   for (int y = 0; y < grey.rows; ++y) {
-    AcrossRows(grey.ptr(std::max(y - 1, 0)), grey.ptr(y), grey.ptr(std::min(y + 1, grey.rows - 1)),
-               grey.cols, smooth_.data(), difference_.data());
-    AlongRow(smooth_.data(), difference_.data(), grey.cols, dx_.ptr<std::int16_t>(y),
-             dy_.ptr<std::int16_t>(y), norm_.ptr<std::int16_t>(y + 1) + 1);
+    CannyAcrossRows(grey.ptr(std::max(y - 1, 0)), grey.ptr(y),
+                    grey.ptr(std::min(y + 1, grey.rows - 1)), grey.cols, smooth_.data(),
+                    difference_.data());
+    CannyAlongRow(smooth_.data(), difference_.data(), grey.cols, dx_.ptr<std::int16_t>(y),
+                  dy_.ptr<std::int16_t>(y), norm_.ptr<std::int16_t>(y + 1) + 1);
   }
 }
 
@@ -144,7 +146,7 @@ int CannyDetector::StrongThreshold(double strong_share, double min_gradient) con
 
 /// Marks ridges above the weak threshold and lists those above the strong one.
 void CannyDetector::ThinAbove(int weak, int strong) {
-  edges_ = View(edges_memory_, dx_.size(), CV_8UC1);
+  edges_ = CannyMemoryView(edges_memory_, dx_.size(), CV_8UC1);
   open_.clear();
   if (edges_.cols < kLanes || edges_.rows < 3) {
     edges_.setTo(0);
@@ -168,7 +170,7 @@ void CannyDetector::ThinAbove(int weak, int strong) {
         continue;
       }
       const cv::v_int16x8 ridges =
-          enough & AreRidges(above + x, norm + x, below + x, dx + x, dy + x);
+          enough & AreCannyRidges(above + x, norm + x, below + x, dx + x, dy + x);
       const cv::v_int16x8 strong_ridges = ridges & (cv::v_load(norm + x) > strong_norm);
       const cv::v_int16x8 marks =
           (ridges & cv::v_setall_s16(kWeak)) | (strong_ridges & cv::v_setall_s16(kStrong));

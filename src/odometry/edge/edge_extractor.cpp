@@ -14,11 +14,11 @@ constexpr double kNarrowSigmaPx = 1.0;
 constexpr double kWideSigmaPx = 1.6;  // At this ratio the difference is nearest to a Laplacian.
 constexpr float kMinLikelihood = 0.1F;
 
-int GradientL1(const cv::Mat& dx, const cv::Mat& dy, int y, int x) {
+int EdgeGradientL1(const cv::Mat& dx, const cv::Mat& dy, int y, int x) {
   return std::abs(dx.ptr<short>(y)[x]) + std::abs(dy.ptr<short>(y)[x]);
 }
 
-cv::Ptr<cv::ximgproc::StructuredEdgeDetection> LoadForest(const std::string& path) {
+cv::Ptr<cv::ximgproc::StructuredEdgeDetection> LoadEdgeForest(const std::string& path) {
   if (path.empty() || !std::filesystem::is_regular_file(path)) {
     throw Error("structured edges need their model file (structured_model), there is none at '" +
                 path + "'");
@@ -55,7 +55,7 @@ const char* EdgeKindName(EdgeKind kind) {
 }
 
 EdgeExtractor::EdgeExtractor(const Config& config) : config_(config) {
-  if (config_.kind == EdgeKind::kStructured) forest_ = LoadForest(config_.structured_model);
+  if (config_.kind == EdgeKind::kStructured) forest_ = LoadEdgeForest(config_.structured_model);
 }
 EdgeExtractor::~EdgeExtractor() = default;
 EdgeExtractor::EdgeExtractor(EdgeExtractor&&) noexcept = default;
@@ -85,7 +85,7 @@ void EdgeExtractor::ExtractSobel(const cv::Mat& grey) {
   for (int y = 0; y < grey.rows; ++y) {
     std::uint8_t* row = edges_.ptr(y);
     for (int x = 0; x < grey.cols; ++x) {
-      row[x] = GradientL1(canny_.dx(), canny_.dy(), y, x) > threshold ? 255 : 0;
+      row[x] = EdgeGradientL1(canny_.dx(), canny_.dy(), y, x) > threshold ? 255 : 0;
     }
   }
 }
@@ -107,7 +107,7 @@ void EdgeExtractor::ExtractLaplacian(const cv::Mat& grey) {
       const int here = difference(y, x);
       const bool crossing = here >= 0 && (difference(y, x + 1) < 0 || difference(y, x - 1) < 0 ||
                                           difference(y + 1, x) < 0 || difference(y - 1, x) < 0);
-      if (crossing && GradientL1(canny_.dx(), canny_.dy(), y, x) > threshold)
+      if (crossing && EdgeGradientL1(canny_.dx(), canny_.dy(), y, x) > threshold)
         edges_.ptr(y)[x] = 255;
     }
   }

@@ -18,7 +18,7 @@ constexpr double kMinCondition = 1e-12;
 /// Light that fades further than this, or grows, between two images is a covered lens.
 constexpr double kMinBelievedGain = 0.3;
 
-AlignmentConfig RotationOnly(AlignmentConfig config) {
+AlignmentConfig OdometryOfRotationOnly(AlignmentConfig config) {
   config.rotation_only = true;
   return config;
 }
@@ -42,7 +42,7 @@ EdgeOdometry::EdgeOdometry(const Config& config, const geo::CameraIntrinsics& in
       extractor_(config.edges),
       selector_(config.points.seed),
       aligner_(config.alignment),
-      rotation_aligner_(RotationOnly(config.alignment)) {
+      rotation_aligner_(OdometryOfRotationOnly(config.alignment)) {
   cameras_[0] = CheckedCamera(intrinsics);
   levels_ = CountLevels({intrinsics.width, intrinsics.height});
   for (std::size_t level = 1; level < cameras_.size(); ++level) {

@@ -8,7 +8,7 @@ namespace livemap::odometry {
 namespace {
 
 /// Hue from red at half the mean depth to blue at twice it.
-cv::Vec3b DepthColour(double depth_m, double mean_inverse_depth) {
+cv::Vec3b EdgeDepthColour(double depth_m, double mean_inverse_depth) {
   const double share = std::clamp(0.5 + 0.5 * std::log2(depth_m * mean_inverse_depth), 0.0, 1.0);
   const double red = std::clamp(2 - 3 * share, 0.0, 1.0);
   const double green = std::clamp(1 - std::abs(2 * share - 1), 0.0, 1.0);
@@ -34,7 +34,7 @@ cv::Mat DrawEdges(const cv::Mat& grey, const Keyframe& keyframe,
     const double v = intrinsics.fy * point.y() / point.z() + intrinsics.cy;
     if (!(u > -0.5 && v > -0.5 && u < picture.cols - 0.5 && v < picture.rows - 0.5)) continue;
     picture.at<cv::Vec3b>(static_cast<int>(std::lround(v)), static_cast<int>(std::lround(u))) =
-        DepthColour(point.z(), points.mean_inverse_depth);
+        EdgeDepthColour(point.z(), points.mean_inverse_depth);
   }
   return picture;
 }

@@ -9,8 +9,8 @@ namespace livemap::odometry {
 namespace {
 
 template <typename Depth>
-void ConvertDepth(const cv::Mat& depth, float metres_per_unit, DepthPyramid::Range range,
-                  cv::Mat& metres) {
+void ConvertDepthForPyramid(const cv::Mat& depth, float metres_per_unit, DepthPyramid::Range range,
+                            cv::Mat& metres) {
   metres.create(depth.size(), CV_32FC1);
   for (int y = 0; y < depth.rows; ++y) {
     const Depth* in = depth.ptr<Depth>(y);
@@ -24,7 +24,7 @@ void ConvertDepth(const cv::Mat& depth, float metres_per_unit, DepthPyramid::Ran
 }
 
 /// Mean of those of four depths that lie on the nearest surface; unknown without any.
-float NearestSurface(const float (&depths)[4]) {
+float NearestDepthOfPyramid(const float (&depths)[4]) {
   float nearest = std::numeric_limits<float>::infinity();
   for (const float depth : depths) {
     if (depth > 0) nearest = std::min(nearest, depth);
@@ -39,20 +39,20 @@ float NearestSurface(const float (&depths)[4]) {
   return count > 0 ? sum / count : 0.0F;
 }
 
-void HalveDepth(const cv::Mat& fine, cv::Mat& coarse) {
+void HalveDepthLevel(const cv::Mat& fine, cv::Mat& coarse) {
   coarse.create(fine.rows / 2, fine.cols / 2, CV_32FC1);
   for (int y = 0; y < coarse.rows; ++y) {
     const float* upper = fine.ptr<float>(2 * y);
     const float* lower = fine.ptr<float>(2 * y + 1);
     float* out = coarse.ptr<float>(y);
     for (int x = 0; x < coarse.cols; ++x, upper += 2, lower += 2) {
-      out[x] = NearestSurface({upper[0], upper[1], lower[0], lower[1]});
+      out[x] = NearestDepthOfPyramid({upper[0], upper[1], lower[0], lower[1]});
     }
   }
 }
 
 /// Means of 2x2 pixels. An odd last row or column has no partner and is left out.
-void Halve(const cv::Mat& fine, cv::Mat& coarse) {
+void HalvePyramidLevel(const cv::Mat& fine, cv::Mat& coarse) {
   coarse.create(std::max(1, fine.rows / 2), std::max(1, fine.cols / 2), CV_8UC1);
   for (int y = 0; y < coarse.rows; ++y) {
     const std::uint8_t* upper = fine.ptr(std::min(2 * y, fine.rows - 1));
@@ -67,7 +67,7 @@ void Halve(const cv::Mat& fine, cv::Mat& coarse) {
 
 /// (1 2 1)/4 along rows and columns; the border sees itself beyond the image. `across` is a buffer
 /// of one row.
-void Smooth(const cv::Mat& grey, std::vector<std::uint16_t>& across, cv::Mat& smooth) {
+void SmoothPyramidLevel(const cv::Mat& grey, std::vector<std::uint16_t>& across, cv::Mat& smooth) {
   smooth.create(grey.size(), CV_8UC1);
   const int width = grey.cols;
   across.resize(static_cast<std::size_t>(width) + 2);
@@ -110,21 +110,22 @@ geo::CameraIntrinsics HalvedIntrinsics(const geo::CameraIntrinsics& intrinsics) 
 
 void ImagePyramid::Build(const cv::Mat& grey) {
   levels_ = CountLevels(grey.size());
-  Smooth(grey, row_, images_[0]);
+  SmoothPyramidLevel(grey, row_, images_[0]);
   for (std::size_t level = 1; level < static_cast<std::size_t>(levels_); ++level) {
-    Halve(images_[level - 1], images_[level]);
+    HalvePyramidLevel(images_[level - 1], images_[level]);
   }
-  Halve(images_[static_cast<std::size_t>(levels_ - 1)], thumbnail_);
+  HalvePyramidLevel(images_[static_cast<std::size_t>(levels_ - 1)], thumbnail_);
 }
 
 void DepthPyramid::Build(const cv::Mat& depth, double units_per_m, Range range, int levels) {
   if (depth.type() == CV_16UC1) {
-    ConvertDepth<std::uint16_t>(depth, static_cast<float>(1 / units_per_m), range, depths_[0]);
+    ConvertDepthForPyramid<std::uint16_t>(depth, static_cast<float>(1 / units_per_m), range,
+                                          depths_[0]);
   } else {
-    ConvertDepth<float>(depth, 1, range, depths_[0]);
+    ConvertDepthForPyramid<float>(depth, 1, range, depths_[0]);
   }
   for (std::size_t level = 1; level < static_cast<std::size_t>(levels); ++level) {
-    HalveDepth(depths_[level - 1], depths_[level]);
+    HalveDepthLevel(depths_[level - 1], depths_[level]);
   }
 }
 

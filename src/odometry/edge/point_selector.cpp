@@ -9,21 +9,23 @@ namespace {
 
 constexpr int kBorderPx = 2;
 
-float HalfDifference(int before, int after) { return 0.5F * static_cast<float>(after - before); }
+float HalfPointDifference(int before, int after) {
+  return 0.5F * static_cast<float>(after - before);
+}
 
 struct Gradient {
   float x, y;
 };
 
-Gradient GradientAt(const cv::Mat& grey, int x, int y) {
+Gradient PointGradientAt(const cv::Mat& grey, int x, int y) {
   const std::uint8_t* row = grey.ptr(y);
-  return {HalfDifference(row[x - 1], row[x + 1]),
-          HalfDifference(grey.ptr(y - 1)[x], grey.ptr(y + 1)[x])};
+  return {HalfPointDifference(row[x - 1], row[x + 1]),
+          HalfPointDifference(grey.ptr(y - 1)[x], grey.ptr(y + 1)[x])};
 }
 
 /// Whether some pixel up to two away is clearly nearer: as far as an occluding edge's gradient
 /// reaches.
-bool IsBehindAnEdge(const cv::Mat& depth_m, int x, int y, float ratio) {
+bool IsPointBehindAnEdge(const cv::Mat& depth_m, int x, int y, float ratio) {
   const float limit = depth_m.ptr<float>(y)[x] / ratio;
   for (int dy = -kBorderPx; dy <= kBorderPx; ++dy) {
     const float* row = depth_m.ptr<float>(y + dy);
@@ -34,17 +36,17 @@ bool IsBehindAnEdge(const cv::Mat& depth_m, int x, int y, float ratio) {
   return false;
 }
 
-bool IsUsable(const ReferenceLevel& reference, const Pixel& pixel,
-              const PointSelection& selection) {
-  const Gradient gradient = GradientAt(reference.grey, pixel.x, pixel.y);
+bool IsUsablePoint(const ReferenceLevel& reference, const Pixel& pixel,
+                   const PointSelection& selection) {
+  const Gradient gradient = PointGradientAt(reference.grey, pixel.x, pixel.y);
   return gradient.x * gradient.x + gradient.y * gradient.y >=
              selection.min_gradient * selection.min_gradient &&
-         !IsBehindAnEdge(reference.depth_m, pixel.x, pixel.y, selection.occlusion_ratio);
+         !IsPointBehindAnEdge(reference.depth_m, pixel.x, pixel.y, selection.occlusion_ratio);
 }
 
-void Add(const ReferenceLevel& reference, const Pixel& pixel, const geo::CameraIntrinsics& camera,
-         EdgePoints& points) {
-  const Gradient gradient = GradientAt(reference.grey, pixel.x, pixel.y);
+void AddEdgePoint(const ReferenceLevel& reference, const Pixel& pixel,
+                  const geo::CameraIntrinsics& camera, EdgePoints& points) {
+  const Gradient gradient = PointGradientAt(reference.grey, pixel.x, pixel.y);
   points.Add(pixel.x, pixel.y, reference.depth_m.ptr<float>(pixel.y)[pixel.x],
              reference.grey.ptr(pixel.y)[pixel.x], gradient.x, gradient.y, camera);
   const cv::Mat& sigma = reference.inverse_depth_sigma;
@@ -56,7 +58,7 @@ void Add(const ReferenceLevel& reference, const Pixel& pixel, const geo::CameraI
 /// Calls `visit` with every column of a mask's row, from `begin` on and before `end`, that is set.
 /// Most are not: eight are looked at together.
 template <typename Visit>
-void ForEachSet(const std::uint8_t* mask, int begin, int end, const Visit& visit) {
+void ForEachPointSet(const std::uint8_t* mask, int begin, int end, const Visit& visit) {
   int x = begin;
   for (; x + 8 <= end; x += 8) {
     std::uint64_t eight = 0;
@@ -119,7 +121,7 @@ void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges
   for (int y = kBorderPx; y < reference.grey.rows - kBorderPx; ++y) {
     const std::uint8_t* mask = edges.ptr(y);
     const float* depth = reference.depth_m.ptr<float>(y);
-    ForEachSet(mask, kBorderPx, reference.grey.cols - kBorderPx, [&](int x) {
+    ForEachPointSet(mask, kBorderPx, reference.grey.cols - kBorderPx, [&](int x) {
       if (depth[x] <= 0) return;
       candidates_.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y)});
     });
@@ -133,7 +135,7 @@ void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges
   const std::size_t wanted = std::min(count, selection.max_points);
   for (std::size_t i = 0; i < wanted; ++i) {
     const Pixel& pixel = candidates_[i * count / wanted];
-    if (IsUsable(reference, pixel, selection)) Add(reference, pixel, camera, points);
+    if (IsUsablePoint(reference, pixel, selection)) AddEdgePoint(reference, pixel, camera, points);
   }
   points.Finish();
 }
@@ -146,7 +148,7 @@ void PointSelector::SelectAtRandom(const ReferenceLevel& reference,
   const auto forget_useless = [&](const PointSelection& asked) {
     candidates_.erase(
         std::remove_if(candidates_.begin(), candidates_.end(),
-                       [&](const Pixel& pixel) { return !IsUsable(reference, pixel, asked); }),
+                       [&](const Pixel& pixel) { return !IsUsablePoint(reference, pixel, asked); }),
         candidates_.end());
   };
   forget_useless(selection);
@@ -169,7 +171,7 @@ void PointSelector::SelectAtRandom(const ReferenceLevel& reference,
   for (std::size_t i = 0; i < wanted; ++i) {
     // Fisher and Yates; the standard's distributions differ from library to library.
     if (wanted < count) std::swap(candidates_[i], candidates_[i + random_() % (count - i)]);
-    Add(reference, candidates_[i], camera, points);
+    AddEdgePoint(reference, candidates_[i], camera, points);
   }
   points.Finish();
 }
@@ -179,7 +181,7 @@ void PointSelector::SelectAll(const cv::Mat& grey, const geo::CameraIntrinsics& 
   points.Clear();
   for (int y = 1; y < grey.rows - 1; ++y) {
     for (int x = 1; x < grey.cols - 1; ++x) {
-      const Gradient gradient = GradientAt(grey, x, y);
+      const Gradient gradient = PointGradientAt(grey, x, y);
       points.Add(static_cast<float>(x), static_cast<float>(y), 1.0F, grey.ptr(y)[x], gradient.x,
                  gradient.y, camera);
     }

@@ -4,11 +4,12 @@
 #include <string>
 
 #include "common/error.h"
+#include "common/text.h"
 
 namespace livemap::odometry {
 namespace {
 
-std::string SizeText(const cv::Mat& image) {
+std::string FrameSizeText(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows);
 }
 
@@ -32,18 +33,19 @@ const geo::CameraIntrinsics& CheckedCamera(const geo::CameraIntrinsics& camera) 
 void CheckPictures(const RgbdFrame& frame, const geo::CameraIntrinsics& camera) {
   const cv::Size wanted(camera.width, camera.height);
   if (frame.grey.type() != CV_8UC1 || frame.grey.size() != wanted) {
-    throw Error("an image of " + SizeText(frame.grey) + " came for a camera of " +
+    throw Error("an image of " + FrameSizeText(frame.grey) + " came for a camera of " +
                 std::to_string(wanted.width) + "x" + std::to_string(wanted.height) +
                 "; 8-bit grey images of that size are accepted");
   }
   if (!frame.depth.empty()) {
     if (frame.depth.size() != wanted) {
-      throw Error("a depth image of " + SizeText(frame.depth) + " came with an image of " +
-                  SizeText(frame.grey) + "; both must have one size");
+      throw Error("a depth image of " + FrameSizeText(frame.depth) + " came with an image of " +
+                  FrameSizeText(frame.grey) + "; both must have one size");
     }
     if (frame.depth.type() != CV_16UC1 && frame.depth.type() != CV_32FC1) {
-      throw Error("a depth image has OpenCV type " + std::to_string(frame.depth.type()) +
-                  "; accepted are 16UC1 and 32FC1");
+      throw Error("a depth image has " +
+                  PixelText(static_cast<int>(8 * frame.depth.elemSize1()), frame.depth.channels()) +
+                  "; accepted are 16 bits (16UC1) and 32 bits (32FC1), one channel");
     }
     if (!(frame.depth_units_per_m > 0) || !std::isfinite(frame.depth_units_per_m)) {
       throw Error("the depth's units per metre are " + std::to_string(frame.depth_units_per_m) +

@@ -10,13 +10,14 @@ namespace {
 constexpr int kMapBorderPx = 3;
 
 /// The product of two Gaussians.
-void Fuse(EdgeDepth& edge, float inverse_depth, float variance) {
+void FuseInverseDepth(EdgeDepth& edge, float inverse_depth, float variance) {
   const float sum = edge.variance + variance;
   edge.inverse_depth = (edge.inverse_depth * variance + inverse_depth * edge.variance) / sum;
   edge.variance = edge.variance * variance / sum;
 }
 
-bool Agree(float one, float one_variance, float other, float other_variance, float sigmas) {
+bool InverseDepthsAgree(float one, float one_variance, float other, float other_variance,
+                        float sigmas) {
   const float difference = one - other;
   return difference * difference <= sigmas * sigmas * (one_variance + other_variance);
 }
@@ -105,9 +106,9 @@ void InverseDepthMap::Bring(const EdgeDepth& from, const Eigen::Isometry3d& new_
     edge->misses = from.misses;
     edge->inverse_depth = inverse_depth;
     edge->variance = variance;
-  } else if (Agree(edge->inverse_depth, edge->variance, inverse_depth, variance,
-                   config_.gate_sigmas)) {
-    Fuse(*edge, inverse_depth, variance);
+  } else if (InverseDepthsAgree(edge->inverse_depth, edge->variance, inverse_depth, variance,
+                                config_.gate_sigmas)) {
+    FuseInverseDepth(*edge, inverse_depth, variance);
   } else if (inverse_depth > edge->inverse_depth) {  // The nearer one hides the other.
     edge->misses = from.misses;
     edge->inverse_depth = inverse_depth;
@@ -134,9 +135,9 @@ void InverseDepthMap::MeasureOne(EdgeDepth& edge, const EpipolarSearch& search) 
   if (!(low < high) || search.LineLength(edge.u, edge.v, low, high) < config_.min_line_px) return;
   const auto match = search.Find(edge.u, edge.v, low, high, false);
   if (!match) return;
-  if (Agree(edge.inverse_depth, edge.variance, match->inverse_depth, match->variance,
-            config_.gate_sigmas)) {
-    Fuse(edge, match->inverse_depth, match->variance);
+  if (InverseDepthsAgree(edge.inverse_depth, edge.variance, match->inverse_depth, match->variance,
+                         config_.gate_sigmas)) {
+    FuseInverseDepth(edge, match->inverse_depth, match->variance);
     edge.misses = 0;
   } else if (++edge.misses >= config_.max_misses) {
     edge.known = false;
@@ -191,7 +192,8 @@ void InverseDepthMap::Regularise() {
         if (neighbour < 0 || (dx == 0 && dy == 0)) continue;
         const EdgeDepth& other = edges_[static_cast<std::size_t>(neighbour)];
         if (!other.known) continue;
-        if (!Agree(edge.inverse_depth, edge.variance, other.inverse_depth, other.variance, 2)) {
+        if (!InverseDepthsAgree(edge.inverse_depth, edge.variance, other.inverse_depth,
+                                other.variance, 2)) {
           ++strangers;
           continue;
         }

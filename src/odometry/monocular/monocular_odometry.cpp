@@ -17,7 +17,7 @@ constexpr double kFastestMps = 200;
 constexpr double kHeightSigmaM = 0.05;
 
 /// A motion with its translation times `factor`.
-Eigen::Isometry3d Stretched(Eigen::Isometry3d motion, double factor) {
+Eigen::Isometry3d StretchedMonocularMotion(Eigen::Isometry3d motion, double factor) {
   motion.translation() *= factor;
   return motion;
 }
@@ -114,7 +114,7 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   scale_.Reset();
   const double units = knows_way ? way_m_ : 1.0;
   if (knows_way) scale_.Measure(way_m_, config_.speed_sigma_mps * way_s_, units);
-  const Eigen::Isometry3d first_from_new = Stretched(direction->inverse(), units);
+  const Eigen::Isometry3d first_from_new = StretchedMonocularMotion(direction->inverse(), units);
 
   views_.clear();
   views_.push_back({start_.first().clone(), first_from_new.inverse()});
@@ -199,7 +199,8 @@ VoResult MonocularOdometry::InMetres(const VoResult& unscaled) {
   const double scale = scale_.metres_per_unit();
   VoResult result = unscaled;
   const Eigen::Isometry3d step = last_unscaled_.inverse() * unscaled.world_from_camera;
-  result.world_from_camera = Renormalised(last_.world_from_camera * Stretched(step, scale));
+  result.world_from_camera =
+      Renormalised(last_.world_from_camera * StretchedMonocularMotion(step, scale));
   last_unscaled_ = unscaled.world_from_camera;
   Vector6d stretch = Vector6d::Ones();
   stretch.head<3>().setConstant(scale);

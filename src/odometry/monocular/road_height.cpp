@@ -17,9 +17,9 @@ constexpr double kNearPlane = 0.03;   // Against the height.
 constexpr double kWorstRelativeSigma = 0.1;
 
 /// Points on the part of the image that is mostly road: a wedge ahead of the car.
-std::vector<Eigen::Vector3d> PointsAhead(const std::vector<EdgeDepth>& edges,
-                                         const geo::CameraIntrinsics& camera,
-                                         const Eigen::Vector3d& down) {
+std::vector<Eigen::Vector3d> RoadPointsAhead(const std::vector<EdgeDepth>& edges,
+                                             const geo::CameraIntrinsics& camera,
+                                             const Eigen::Vector3d& down) {
   std::vector<Eigen::Vector3d> points;
   for (const EdgeDepth& edge : edges) {
     const double worst = kWorstRelativeSigma * static_cast<double>(edge.inverse_depth);
@@ -38,7 +38,7 @@ std::vector<Eigen::Vector3d> PointsAhead(const std::vector<EdgeDepth>& edges,
 std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
                                  const geo::CameraIntrinsics& camera, double pitch_rad) {
   const Eigen::Vector3d down(0, std::cos(pitch_rad), std::sin(pitch_rad));
-  const std::vector<Eigen::Vector3d> points = PointsAhead(edges, camera, down);
+  const std::vector<Eigen::Vector3d> points = RoadPointsAhead(edges, camera, down);
   if (points.size() < kMinEdges) return std::nullopt;
   std::mt19937 random(1);  // The same edges give the same answer.
   std::uniform_int_distribution<std::size_t> any(0, points.size() - 1);

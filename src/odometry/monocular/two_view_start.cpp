@@ -16,7 +16,7 @@ constexpr double kCornerDistancePx = 8;
 constexpr float kThereAndBackPx = 1.0F;
 constexpr double kConfidence = 0.9999;
 
-Eigen::Vector3d Ray(const cv::Point2f& pixel, const geo::CameraIntrinsics& camera) {
+Eigen::Vector3d StartRayOf(const cv::Point2f& pixel, const geo::CameraIntrinsics& camera) {
   return {(static_cast<double>(pixel.x) - camera.cx) / camera.fx,
           (static_cast<double>(pixel.y) - camera.cy) / camera.fy, 1};
 }
@@ -115,7 +115,8 @@ Eigen::VectorXd TwoViewStart::SampsonErrors(const Eigen::Isometry3d& new_from_fi
       CrossMatrix(new_from_first.translation()) * new_from_first.linear();
   Eigen::VectorXd errors(static_cast<Eigen::Index>(begin_.size()));
   for (std::size_t i = 0; i < begin_.size(); ++i) {
-    const Eigen::Vector3d first = Ray(begin_[i], camera_), now = Ray(end_[i], camera_);
+    const Eigen::Vector3d first = StartRayOf(begin_[i], camera_),
+                          now = StartRayOf(end_[i], camera_);
     const Eigen::Vector3d line = essential * first;
     const Eigen::Vector3d line_back = essential.transpose() * now;
     const double slope =

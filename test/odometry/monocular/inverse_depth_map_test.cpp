@@ -1,3 +1,5 @@
+#include "odometry/monocular/inverse_depth_map.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -5,7 +7,6 @@
 
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/monocular/epipolar_search.h"
-#include "odometry/monocular/inverse_depth_map.h"
 #include "test/odometry/synthetic_scene.h"
 
 namespace livemap::odometry {
