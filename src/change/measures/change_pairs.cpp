@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <set>
 
-#include "change/measures/change_metrics.h"
+#include "change/methods/change_probabilities.h"
 #include "common/error.h"
+#include "common/picture_folder.h"
+#include "common/text.h"
 #include "imaging/image_header.h"
 #include "protocol/change_class.h"
 
@@ -23,66 +24,66 @@ constexpr std::size_t kMaxPairs = 1000000;
 constexpr std::array<std::uint8_t, 3> kMiscellaneousRgb{255, 242, 0};
 constexpr double kMaxUnknownColours = 0.01;
 
-bool IsPicture(const fs::path& path) {
-  const std::string extension = path.extension().string();
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-}
-
-std::vector<fs::path> Listed(const fs::path& folder, bool folders) {
+std::vector<fs::path> FoldersIn(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code error;
   for (fs::directory_iterator item(folder, error), end; !error && item != end;
        item.increment(error)) {
     std::error_code ignored;
-    const bool wanted =
-        folders ? item->is_directory(ignored) : item->is_regular_file(ignored) && IsPicture(*item);
-    if (wanted) found.push_back(item->path());
+    if (item->is_directory(ignored)) found.push_back(item->path());
   }
   if (error) {
     throw Error("folder '" + folder.string() + "' cannot be read: " + error.message());
   }
-  std::sort(found.begin(), found.end());
+  std::sort(found.begin(), found.end(), [](const fs::path& a, const fs::path& b) {
+    return NaturalLess(a.string(), b.string());
+  });
   return found;
 }
 
-/// `stem` with any picture's extension in `folder`.
-std::string PictureOf(const fs::path& folder, const std::string& stem, const fs::path& mask) {
-  for (const char* extension : {".png", ".jpg", ".jpeg"}) {
-    const fs::path path = folder / (stem + extension);
-    std::error_code ignored;
-    if (fs::is_regular_file(path, ignored)) return path.string();
-  }
-  throw Error("mask '" + mask.string() + "' has no picture '" + (folder / stem).string() +
-              ".png' or .jpg");
+/// The mask's picture of that name, in any spelling and with any number of leading zeros.
+std::string PictureOf(const PictureFolder& pictures, const fs::path& folder,
+                      const std::string& stem, const std::string& mask) {
+  const std::optional<std::string> picture = pictures.Find(stem);
+  if (picture) return *picture;
+  throw Error("mask '" + mask + "' has no picture '" + (folder / stem).string() + ".png' or .jpg");
 }
 
-void AddSequence(const fs::path& sequence, const std::string& prefix,
-                 std::vector<ChangePairFiles>& pairs) {
-  for (const fs::path& mask : Listed(sequence / "GT", false)) {
-    const std::string stem = mask.stem().string();
+void AddSequencePairs(const fs::path& sequence, const std::string& prefix,
+                      std::vector<ChangePairFiles>& pairs) {
+  const fs::path rgb = sequence / "RGB";
+  const PictureFolder pictures(rgb.string(), PictureNames::kNumbered);
+  std::optional<PictureFolder> directions;
+  std::error_code ignored;
+  if (fs::is_directory(sequence / "GT_direction", ignored)) {
+    directions.emplace((sequence / "GT_direction").string(), PictureNames::kNumbered);
+  }
+  const PictureFolder masks((sequence / "GT").string(), PictureNames::kNumbered);
+  const auto all_masks = std::make_shared<MaskFolder>((sequence / "GT").string());
+  for (const std::string& mask : masks.paths()) {
+    const std::string stem = StemOf(mask);
     if (stem.size() < 3 || stem.compare(0, 2, "gt") != 0) continue;
     const std::string number = stem.substr(2);
-    const fs::path direction = sequence / "GT_direction" / mask.filename();
-    std::error_code ignored;
-    pairs.push_back({prefix + number, PictureOf(sequence / "RGB", "1_" + number, mask),
-                     PictureOf(sequence / "RGB", "2_" + number, mask), mask.string(),
-                     fs::is_regular_file(direction, ignored) ? direction.string() : ""});
+    pairs.push_back({prefix + number, PictureOf(pictures, rgb, "1_" + number, mask),
+                     PictureOf(pictures, rgb, "2_" + number, mask), mask,
+                     directions ? directions->Find(stem).value_or("") : "", all_masks});
   }
 }
 
-bool IsSequence(const fs::path& folder) {
+bool IsSequenceOfPairs(const fs::path& folder) {
   std::error_code ignored;
   return fs::is_directory(folder / "GT", ignored) && fs::is_directory(folder / "RGB", ignored);
 }
 
-void AddSequences(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
-  for (const fs::path& sequence : Listed(folder, true)) {
-    if (IsSequence(sequence)) AddSequence(sequence, sequence.filename().string() + "/", pairs);
+void AddPairsOfSequences(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
+  for (const fs::path& sequence : FoldersIn(folder)) {
+    if (IsSequenceOfPairs(sequence))
+      AddSequencePairs(sequence, sequence.filename().string() + "/", pairs);
   }
 }
 
 /// The deepest folder above all of `folders`, which are absolute.
-fs::path CommonAncestor(const std::vector<fs::path>& folders) {
+fs::path CommonFolderOfPairs(const std::vector<fs::path>& folders) {
   fs::path common = folders[0].parent_path();
   for (const fs::path& folder : folders) {
     const auto holds = [&folder](const fs::path& above) {
@@ -94,16 +95,20 @@ fs::path CommonAncestor(const std::vector<fs::path>& folders) {
   return common;
 }
 
-void AddFlat(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
-  for (const fs::path& mask : Listed(folder / "mask", false)) {
-    const std::string stem = mask.stem().string();
-    pairs.push_back({stem, PictureOf(folder / "t0", stem, mask),
-                     PictureOf(folder / "t1", stem, mask), mask.string(), ""});
+void AddFlatPairs(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
+  const PictureFolder before((folder / "t0").string(), PictureNames::kNamed);
+  const PictureFolder after((folder / "t1").string(), PictureNames::kNamed);
+  const auto all_masks = std::make_shared<MaskFolder>((folder / "mask").string());
+  for (const std::string& mask :
+       PictureFolder((folder / "mask").string(), PictureNames::kNamed).paths()) {
+    const std::string stem = StemOf(mask);
+    pairs.push_back({stem, PictureOf(before, folder / "t0", stem, mask),
+                     PictureOf(after, folder / "t1", stem, mask), mask, "", all_masks});
   }
 }
 
 /// The class that a published colour stands for; none for a colour of no class.
-std::optional<std::uint8_t> ClassOfColour(const std::array<std::uint8_t, 3>& rgb) {
+std::optional<std::uint8_t> MaskClassOfColour(const std::array<std::uint8_t, 3>& rgb) {
   for (int i = 0; i < protocol::kChangeClasses; ++i) {
     if (protocol::ChangeClassColour(static_cast<protocol::ChangeClass>(i)) == rgb)
       return static_cast<std::uint8_t>(i);
@@ -113,12 +118,77 @@ std::optional<std::uint8_t> ClassOfColour(const std::array<std::uint8_t, 3>& rgb
   return std::nullopt;
 }
 
-ChangeMask DecodeColours(const cv::Mat& image, const std::string& path) {
+/// What the colours of a mask are, without their meaning.
+struct Colours {
+  bool grey = true;          ///< All are black, white or a shade between.
+  bool white = true;         ///< All are white.
+  bool transparent = false;  ///< Some are.
+};
+
+Colours LookAtColours(const cv::Mat& image) {
+  Colours colours;
+  const int channels = image.channels();
+  for (int row = 0; row < image.rows; ++row) {
+    const auto* bgr = image.ptr<std::uint8_t>(row);
+    for (int column = 0; column < image.cols; ++column, bgr += channels) {
+      const bool grey = bgr[0] == bgr[1] && bgr[1] == bgr[2];
+      colours.grey = colours.grey && grey;
+      colours.white = colours.white && grey && bgr[0] == 255;
+      colours.transparent = colours.transparent || (channels == 4 && bgr[3] != 255);
+    }
+  }
+  return colours;
+}
+
+/// What the values of a mask of one channel are.
+struct Values {
+  std::array<std::size_t, 256> counts{};
+
+  bool HasClasses() const {
+    return std::any_of(counts.begin() + 1, counts.begin() + protocol::kChangeClasses,
+                       [](std::size_t count) { return count > 0; });
+  }
+};
+
+Values LookAtValues(const cv::Mat& image) {
+  Values values;
+  for (int row = 0; row < image.rows; ++row) {
+    const auto* pixels = image.ptr<std::uint8_t>(row);
+    for (int column = 0; column < image.cols; ++column) ++values.counts[pixels[column]];
+  }
+  return values;
+}
+
+bool HasClasses(const cv::Mat& image) {
+  if (image.depth() != CV_8U) return false;
+  if (image.channels() == 1) return LookAtValues(image).HasClasses();
+  return image.channels() >= 3 && !LookAtColours(image).grey;
+}
+
+/// Whether a mask means something else beside masks of classes than alone.
+bool IsAmbiguous(const cv::Mat& image) {
+  if (image.depth() != CV_8U || image.channels() == 2 || HasClasses(image)) return false;
+  if (image.channels() == 1) return LookAtValues(image).counts[kLeftOutPixel] > 0;
+  return !LookAtColours(image).white;
+}
+
+ChangeMask DecodeColours(const cv::Mat& image, const std::string& path, MaskKind known) {
+  const Colours colours = LookAtColours(image);
+  if (colours.transparent) {
+    throw Error("mask '" + path + "' has transparent pixels, accepted is a mask without any");
+  }
+  if (known == MaskKind::kNotKnown && colours.grey && !colours.white) {
+    throw Error("mask '" + path + "' has " + PixelText(8, image.channels()) +
+                " that are all black, white or grey, which may mean change in white or the "
+                "published colours (white: no change, black: left out), accepted are one channel "
+                "(0 and 255, or indices) or colours");
+  }
   ChangeMask mask;
   mask.classes = cv::Mat(image.size(), CV_8UC1);
   const int channels = image.channels();
   std::array<std::uint8_t, 3> last{255, 255, 255};
-  std::optional<std::uint8_t> meaning = ClassOfColour(last);
+  std::optional<std::uint8_t> meaning = MaskClassOfColour(last);
+  bool counts = false;
   for (int row = 0; row < image.rows; ++row) {
     const auto* bgr = image.ptr<std::uint8_t>(row);
     auto* classes = mask.classes.ptr<std::uint8_t>(row);
@@ -126,41 +196,52 @@ ChangeMask DecodeColours(const cv::Mat& image, const std::string& path) {
       const std::array<std::uint8_t, 3> rgb{bgr[2], bgr[1], bgr[0]};
       if (rgb != last) {
         last = rgb;
-        meaning = ClassOfColour(rgb);
+        meaning = MaskClassOfColour(rgb);
       }
       classes[column] = meaning.value_or(kLeftOutPixel);
+      counts = counts || classes[column] != kLeftOutPixel;
       mask.unknown_colour_pixels += meaning ? 0 : 1;
     }
   }
   if (static_cast<double>(mask.unknown_colour_pixels) >
-      kMaxUnknownColours * static_cast<double>(image.total())) {
+          kMaxUnknownColours * static_cast<double>(image.total()) ||
+      (known == MaskKind::kNotKnown && !counts)) {
     throw Error("mask '" + path + "' has " + std::to_string(mask.unknown_colour_pixels) + " of " +
-                std::to_string(image.total()) +
-                " pixels in colours of no class, accepted is up to one in a hundred");
+                std::to_string(image.total()) + " pixels in colours of no class" +
+                (counts ? "" : " and the others are black") +
+                ", accepted is up to one in a hundred");
   }
   return mask;
 }
 
-ChangeMask DecodeIndices(const cv::Mat& image, const std::string& path) {
+ChangeMask DecodeIndices(const cv::Mat& image, const std::string& path, MaskKind known) {
   ChangeMask mask;
-  std::array<std::size_t, 256> counts{};
-  for (int row = 0; row < image.rows; ++row) {
-    const auto* values = image.ptr<std::uint8_t>(row);
-    for (int column = 0; column < image.cols; ++column) ++counts[values[column]];
-  }
+  const Values values = LookAtValues(image);
   for (std::size_t value = protocol::kChangeClasses; value < kLeftOutPixel; ++value) {
-    if (counts[value] == 0) continue;
+    if (values.counts[value] == 0) continue;
     throw Error("mask '" + path + "' has the value " + std::to_string(value) +
                 ", accepted are 0 to 9 and 255 (classes), or 0 and 255 (change or not)");
   }
-  const bool some_class = std::any_of(counts.begin() + 1, counts.begin() + protocol::kChangeClasses,
-                                      [](auto n) { return n; });
   mask.classes = image.clone();
-  if (counts[kLeftOutPixel] != 0 && !some_class) {
+  if (values.counts[kLeftOutPixel] > 0 && !values.HasClasses() && known == MaskKind::kNotKnown) {
     mask.with_classes = false;
     mask.classes.setTo(1, image == kLeftOutPixel);
   }
   return mask;
+}
+
+const std::uint8_t* BytesOf(const std::string& bytes) {
+  return reinterpret_cast<const std::uint8_t*>(bytes.data());
+}
+
+/// `path` is for messages.
+cv::Mat DecodePicture(const std::string& bytes, const std::string& path,
+                      imaging::DecodeConfig::Pixels pixels) {
+  try {
+    return imaging::DecodeImage(BytesOf(bytes), bytes.size(), kMaxPicturePixels, {pixels, true});
+  } catch (const Error& error) {
+    throw Error("picture '" + path + "': " + error.what());
+  }
 }
 
 }  // namespace
@@ -173,13 +254,13 @@ std::vector<ChangePairFiles> FindChangePairs(const std::string& directory) {
     throw Error("'" + directory + "' is not a folder");
   }
   if (fs::is_directory(folder / "mask", ignored)) {
-    AddFlat(folder, pairs);
-  } else if (IsSequence(folder)) {
-    AddSequence(folder, "", pairs);
+    AddFlatPairs(folder, pairs);
+  } else if (IsSequenceOfPairs(folder)) {
+    AddSequencePairs(folder, "", pairs);
   } else if (fs::is_directory(folder / "raw", ignored)) {
-    AddSequences(folder / "raw", pairs);
+    AddPairsOfSequences(folder / "raw", pairs);
   } else {
-    AddSequences(folder, pairs);
+    AddPairsOfSequences(folder, pairs);
   }
   if (pairs.empty() || pairs.size() > kMaxPairs) {
     throw Error("folder '" + directory + "' has " + std::to_string(pairs.size()) +
@@ -188,7 +269,7 @@ std::vector<ChangePairFiles> FindChangePairs(const std::string& directory) {
                 "mask/");
   }
   std::sort(pairs.begin(), pairs.end(),
-            [](const auto& a, const auto& b) { return a.name < b.name; });
+            [](const auto& a, const auto& b) { return NaturalLess(a.name, b.name); });
   return pairs;
 }
 
@@ -203,7 +284,7 @@ std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& dir
     }
     folders.push_back(folder);
   }
-  const fs::path common = CommonAncestor(folders);
+  const fs::path common = CommonFolderOfPairs(folders);
   std::vector<ChangePairFiles> pairs;
   std::set<fs::path> masks;
   for (const fs::path& folder : folders) {
@@ -220,45 +301,69 @@ std::vector<ChangePairFiles> FindChangePairs(const std::vector<std::string>& dir
   return pairs;
 }
 
-cv::Mat ReadPicture(const std::string& path, int flags) {
-  const std::string bytes = ReadFile(path, kMaxPictureBytes);
-  const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
-  const auto header = imaging::ReadImageHeader(data, bytes.size());
-  if (!header || header->format == imaging::ImageHeader::Format::kWebp) {
-    throw Error("'" + path + "' is no JPEG or PNG picture");
-  }
-  if (std::int64_t{header->width} * header->height > kMaxPicturePixels) {
-    throw Error("picture '" + path + "' is " + std::to_string(header->width) + "x" +
-                std::to_string(header->height) + ", accepted are up to 64 megapixels");
-  }
-  cv::Mat image;
-  if (imaging::HasImageEnd(data, bytes.size(), header->format)) {
-    try {
-      image = cv::imdecode(
-          cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<std::uint8_t*>(data)),
-          flags);
-    } catch (const cv::Exception&) {
-      image.release();
-    }
-  }
-  if (image.empty()) throw Error("picture '" + path + "' is corrupt or cut off");
-  return image;
+cv::Mat ReadPicture(const std::string& path, imaging::DecodeConfig::Pixels pixels) {
+  return DecodePicture(ReadFile(path, kMaxPictureBytes), path, pixels);
 }
 
-ChangeMask DecodeChangeMask(const cv::Mat& image, const std::string& path) {
+ChangeMask DecodeChangeMask(const cv::Mat& image, const std::string& path, MaskKind known) {
   if (image.depth() != CV_8U || (image.channels() != 1 && image.channels() < 3)) {
-    throw Error("mask '" + path + "' has " + std::to_string(image.channels()) + " channels of " +
-                std::to_string(8 * image.elemSize1()) +
-                " bits, accepted are 8 bits and one channel, or colour");
+    throw Error("mask '" + path + "' has " +
+                PixelText(static_cast<int>(8 * image.elemSize1()), image.channels()) +
+                ", accepted are 8 bits and one channel, or colour");
   }
-  return image.channels() == 1 ? DecodeIndices(image, path) : DecodeColours(image, path);
+  return image.channels() == 1 ? DecodeIndices(image, path, known)
+                               : DecodeColours(image, path, known);
+}
+
+namespace {
+
+/// A mask that a JPEG's losses have not made another: two values that lie far apart.
+cv::Mat DecodeLossy(const cv::Mat& image, const std::string& path) {
+  constexpr int kDark = 40;
+  constexpr int kBright = 215;
+  cv::Mat bright;
+  if (image.type() == CV_8UC1) bright = image >= kBright;
+  if (bright.empty() || cv::countNonZero(bright) == 0 ||
+      cv::countNonZero((image > kDark) & (image < kBright)) > 0) {
+    throw Error("mask '" + path +
+                "' is a JPEG, which has changed the values that were drawn, accepted is a PNG, or "
+                "one channel of black and white");
+  }
+  return bright;
+}
+
+cv::Mat ReadMask(const std::string& path) {
+  const std::string bytes = ReadFile(path, kMaxPictureBytes);
+  const cv::Mat image = DecodePicture(bytes, path, imaging::DecodeConfig::Pixels::kAsStored);
+  const auto header = imaging::ReadImageHeader(BytesOf(bytes), bytes.size());
+  return header->format == imaging::ImageHeader::Format::kJpeg ? DecodeLossy(image, path) : image;
+}
+
+ChangeMask ReadChangeMask(const std::string& path, MaskFolder& masks) {
+  const cv::Mat image = ReadMask(path);
+  const bool classes = IsAmbiguous(image) && masks.HasClasses();
+  return DecodeChangeMask(image, path, classes ? MaskKind::kClasses : MaskKind::kNotKnown);
+}
+
+}  // namespace
+
+bool MaskFolder::HasClasses() {
+  if (!has_classes_) {
+    const PictureFolder masks(path_, PictureNames::kNamed);
+    has_classes_ =
+        std::any_of(masks.paths().begin(), masks.paths().end(), [](const std::string& mask) {
+          return change::HasClasses(ReadMask(mask));  // The values that a JPEG's losses hide.
+        });
+  }
+  return *has_classes_;
 }
 
 ChangePair LoadChangePair(const ChangePairFiles& files) {
   ChangePair pair;
-  pair.before = ReadPicture(files.before, cv::IMREAD_COLOR);
-  pair.after = ReadPicture(files.after, cv::IMREAD_COLOR);
-  ChangeMask mask = DecodeChangeMask(ReadPicture(files.truth, cv::IMREAD_UNCHANGED), files.truth);
+  pair.before = ReadPicture(files.before, imaging::DecodeConfig::Pixels::kColour);
+  pair.after = ReadPicture(files.after, imaging::DecodeConfig::Pixels::kColour);
+  MaskFolder masks(fs::path(files.truth).parent_path().string());
+  ChangeMask mask = ReadChangeMask(files.truth, files.masks ? *files.masks : masks);
   pair.truth = std::move(mask.classes);
   pair.with_classes = mask.with_classes;
   pair.unknown_colour_pixels = mask.unknown_colour_pixels;
@@ -271,7 +376,7 @@ ChangePair LoadChangePair(const ChangePairFiles& files) {
   check(pair.before, files.before);
   check(pair.truth, files.truth);
   if (files.direction.empty()) return pair;
-  pair.direction = ReadPicture(files.direction, cv::IMREAD_UNCHANGED);
+  pair.direction = ReadPicture(files.direction, imaging::DecodeConfig::Pixels::kAsStored);
   check(pair.direction, files.direction);
   if (pair.direction.type() != CV_8UC1 ||
       cv::countNonZero(pair.direction > int{protocol::kVanishedPixel}) > 0) {

@@ -9,6 +9,8 @@
 
 #include "change/measures/change_pairs.h"
 #include "common/error.h"
+#include "common/picture_folder.h"
+#include "common/text.h"
 
 namespace livemap::change {
 namespace {
@@ -16,7 +18,7 @@ namespace {
 constexpr std::size_t kMaxNpyBytes = std::size_t{1} << 30U;
 constexpr std::uint64_t kMaxSide = 16384;
 
-[[noreturn]] void RefuseNpy(const std::string& path, const std::string& why) {
+[[noreturn]] void RefusePredictionNpy(const std::string& path, const std::string& why) {
   throw Error("prediction '" + path + "' " + why + ", accepted is a numpy array of " +
               std::to_string(protocol::kChangeClasses) +
               " x height x width in C order, float32 or uint8 in little endian");
@@ -29,7 +31,7 @@ struct NpyHeader {
 };
 
 /// What follows `'key':` in the header's Python dictionary, blanks aside; none when it is missing.
-std::optional<std::size_t> ValueAt(const std::string& text, const std::string& key) {
+std::optional<std::size_t> PredictionNpyValue(const std::string& text, const std::string& key) {
   const std::size_t at = text.find("'" + key + "'");
   if (at == std::string::npos) return std::nullopt;
   const std::size_t colon = text.find_first_not_of(' ', at + key.size() + 2);
@@ -40,7 +42,8 @@ std::optional<std::size_t> ValueAt(const std::string& text, const std::string& k
 }
 
 /// Three whole numbers in parentheses at `at`.
-std::optional<std::array<std::uint64_t, 3>> ReadShape(const std::string& text, std::size_t at) {
+std::optional<std::array<std::uint64_t, 3>> ReadPredictionShape(const std::string& text,
+                                                                std::size_t at) {
   if (at >= text.size() || text[at] != '(') return std::nullopt;
   std::array<std::uint64_t, 3> shape{};
   std::size_t i = at + 1;
@@ -64,8 +67,9 @@ std::optional<std::array<std::uint64_t, 3>> ReadShape(const std::string& text, s
   return shape;
 }
 
-NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
-  if (bytes.size() < 12 || bytes.compare(0, 6, "\x93NUMPY") != 0) RefuseNpy(path, "is no .npy");
+NpyHeader ReadPredictionNpyHeader(const std::string& bytes, const std::string& path) {
+  if (bytes.size() < 12 || bytes.compare(0, 6, "\x93NUMPY") != 0)
+    RefusePredictionNpy(path, "is no .npy");
   const auto byte = [&](std::size_t i) {
     return std::size_t{static_cast<unsigned char>(bytes[i])};
   };
@@ -75,20 +79,21 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
     length |= byte(10) << 16U | byte(11) << 24U;
     begin = 12;
   }
-  if (length > bytes.size() - begin) RefuseNpy(path, "is cut off");
+  if (length > bytes.size() - begin) RefusePredictionNpy(path, "is cut off");
   const std::string text = bytes.substr(begin, length);
-  const auto type = ValueAt(text, "descr");
-  const auto order = ValueAt(text, "fortran_order");
-  const auto shape_at = ValueAt(text, "shape");
-  if (!type || !order || !shape_at) RefuseNpy(path, "has a header that cannot be read");
+  const auto type = PredictionNpyValue(text, "descr");
+  const auto order = PredictionNpyValue(text, "fortran_order");
+  const auto shape_at = PredictionNpyValue(text, "shape");
+  if (!type || !order || !shape_at) RefusePredictionNpy(path, "has a header that cannot be read");
   NpyHeader header;
   header.floats = text.compare(*type, 5, "'<f4'") == 0;
-  if (!header.floats && text.compare(*type, 5, "'|u1'") != 0) RefuseNpy(path, "has another type");
-  if (text.compare(*order, 5, "False") != 0) RefuseNpy(path, "is in Fortran's order");
-  const auto shape = ReadShape(text, *shape_at);
+  if (!header.floats && text.compare(*type, 5, "'|u1'") != 0)
+    RefusePredictionNpy(path, "has another type");
+  if (text.compare(*order, 5, "False") != 0) RefusePredictionNpy(path, "is in Fortran's order");
+  const auto shape = ReadPredictionShape(text, *shape_at);
   if (!shape || (*shape)[0] != protocol::kChangeClasses || (*shape)[1] < 1 ||
       (*shape)[1] > kMaxSide || (*shape)[2] < 1 || (*shape)[2] > kMaxSide) {
-    RefuseNpy(path, "has another shape");
+    RefusePredictionNpy(path, "has another shape");
   }
   header.shape = *shape;
   header.data_at = begin + length;
@@ -98,7 +103,7 @@ NpyHeader ReadNpyHeader(const std::string& bytes, const std::string& path) {
 /// What rounding to 255ths of ten classes may cost, and some.
 constexpr double kMaxSumError = 0.05;
 
-void CheckSumIsOne(const ChangeProbabilities& probabilities, const std::string& path) {
+void CheckPredictionsSumToOne(const ChangeProbabilities& probabilities, const std::string& path) {
   cv::Mat sum = probabilities.of_class.at(0).clone();
   for (std::size_t i = 1; i < protocol::kChangeClasses; ++i) sum += probabilities.of_class[i];
   double least = 0;
@@ -110,7 +115,22 @@ void CheckSumIsOne(const ChangeProbabilities& probabilities, const std::string& 
   }
 }
 
-ChangeProbabilities FromScore(const cv::Mat& score) {
+/// The file at `stem` with that extension in any spelling, .npy or .NPY; none where there is none.
+std::optional<std::string> FindPrediction(const std::filesystem::path& stem,
+                                          const std::string& extension) {
+  const std::string exact = stem.string() + extension;
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(exact, ignored)) return exact;
+  for (const auto& entry : std::filesystem::directory_iterator(stem.parent_path(), ignored)) {
+    const std::string path = entry.path().string();
+    if (StemOf(path) == stem.filename() && LowerExtension(path) == extension &&
+        entry.is_regular_file(ignored))
+      return path;
+  }
+  return std::nullopt;
+}
+
+ChangeProbabilities PredictionFromScore(const cv::Mat& score) {
   ChangeProbabilities probabilities;
   probabilities.of_class.resize(2);
   probabilities.of_class[1] = score;
@@ -118,7 +138,7 @@ ChangeProbabilities FromScore(const cv::Mat& score) {
   return probabilities;
 }
 
-void WritePicture(const std::string& path, const cv::Mat& image) {
+void WritePredictionPicture(const std::string& path, const cv::Mat& image) {
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
   bool written = false;
@@ -132,12 +152,12 @@ void WritePicture(const std::string& path, const cv::Mat& image) {
 }  // namespace
 
 ChangeProbabilities ParseNpyProbabilities(const std::string& bytes, const std::string& path) {
-  const NpyHeader header = ReadNpyHeader(bytes, path);
+  const NpyHeader header = ReadPredictionNpyHeader(bytes, path);
   const std::size_t pixels = header.shape[1] * header.shape[2];
   const std::size_t wanted = protocol::kChangeClasses * pixels * (header.floats ? 4 : 1);
   if (bytes.size() - header.data_at != wanted) {
-    RefuseNpy(path, "has " + std::to_string(bytes.size() - header.data_at) +
-                        " bytes of data where its shape wants " + std::to_string(wanted));
+    RefusePredictionNpy(path, "has " + std::to_string(bytes.size() - header.data_at) +
+                                  " bytes of data where its shape wants " + std::to_string(wanted));
   }
   ChangeProbabilities probabilities;
   const char* data = bytes.data() + header.data_at;
@@ -154,28 +174,40 @@ ChangeProbabilities ParseNpyProbabilities(const std::string& bytes, const std::s
 
 ChangeProbabilities ReadPrediction(const std::string& folder, const std::string& name,
                                    cv::Size size) {
-  const std::string stem = folder + "/" + name;
+  const std::filesystem::path stem = std::filesystem::path(folder) / name;
   ChangeProbabilities probabilities;
-  std::string path = stem + ".npy";
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(path, ignored)) {
+  std::string path;
+  if (const auto npy = FindPrediction(stem, ".npy")) {
+    path = *npy;
     probabilities = ParseNpyProbabilities(ReadFile(path, kMaxNpyBytes), path);
   } else {
-    path = stem + ".png";
-    if (!std::filesystem::is_regular_file(path, ignored)) {
-      throw Error("prediction '" + stem + "' is missing, accepted is a .npy or .png");
+    const auto picture = FindPrediction(stem, ".png");
+    if (!picture) {
+      throw Error("prediction '" + stem.string() + "' is missing, accepted is a .npy or .png");
     }
-    const cv::Mat image = ReadPicture(path, cv::IMREAD_UNCHANGED);
+    path = *picture;
+    const cv::Mat image = ReadPicture(path, imaging::DecodeConfig::Pixels::kAsStored);
     if (image.channels() != 1 || (image.depth() != CV_8U && image.depth() != CV_16U)) {
-      throw Error("prediction '" + path + "' has " + std::to_string(image.channels()) +
-                  " channels, accepted is one of 8 or 16 bits");
+      throw Error("prediction '" + path + "' has " +
+                  PixelText(static_cast<int>(8 * image.elemSize1()), image.channels()) +
+                  ", accepted is one channel of 8 or 16 bits");
+    }
+    double most = 0;
+    cv::minMaxLoc(image, nullptr, &most);
+    if (most >= 1 && most < protocol::kChangeClasses) {
+      throw Error("prediction '" + path + "' has the values 0 " + (most == 1 ? "and " : "to ") +
+                  std::to_string(static_cast<int>(most)) +
+                  " alone, which may be classes, accepted are scores as shares of the full range, "
+                  "with " +
+                  (image.depth() == CV_8U ? "255" : "65535") + " for a sure change");
     }
     cv::Mat score;
     image.convertTo(score, CV_32FC1, image.depth() == CV_8U ? 1.0 / 255 : 1.0 / 65535);
-    probabilities = FromScore(score);
+    probabilities = PredictionFromScore(score);
   }
   CheckProbabilities(probabilities, size, path);
-  if (probabilities.of_class.size() == protocol::kChangeClasses) CheckSumIsOne(probabilities, path);
+  if (probabilities.of_class.size() == protocol::kChangeClasses)
+    CheckPredictionsSumToOne(probabilities, path);
   return probabilities;
 }
 
@@ -184,11 +216,11 @@ void WriteScorePicture(const std::string& path, const ChangeProbabilities& proba
   cv::subtract(1.0, probabilities.of_class.at(0), score);
   cv::Mat image;
   score.convertTo(image, CV_16UC1, 65535.0);
-  WritePicture(path, image);
+  WritePredictionPicture(path, image);
 }
 
 void WriteClassPicture(const std::string& path, const cv::Mat& classes) {
-  WritePicture(path, classes);
+  WritePredictionPicture(path, classes);
 }
 
 }  // namespace livemap::change

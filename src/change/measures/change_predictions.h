@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "change/measures/change_metrics.h"
+#include "change/methods/change_probabilities.h"
 
 namespace livemap::change {
 

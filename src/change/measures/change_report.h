@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "change/measures/change_metrics.h"
+#include "change/measures/community_change_scores.h"
+#include "change/measures/pooled_change_scores.h"
 #include "change/objects/change_tracker.h"
 
 namespace livemap::change {
@@ -39,16 +40,21 @@ struct ChangeReport {
   std::vector<std::string> refusals;     ///< "NAME: why", in order.
   std::size_t hardly_changed = 0;        ///< Pairs left out as too little of them has changed.
   std::size_t unknown_colour_pixels = 0;
-  double method_ms_p50 = 0;        ///< Wall time of the method alone, ms; 0 for predictions.
-  double registration_ms_p50 = 0;  ///< Of a pair, with its warp.
+  /// Wall time of the method alone, ms; none where it did not run, as for predictions.
+  std::optional<double> method_ms_p50;
+  std::optional<double> registration_ms_p50;  ///< Of a pair, with its warp.
   ChangeFigures forward;
   std::optional<DirectionCounts> directions;  ///< None where no pair has them in truth.
   bool has_reversed = false;
   ChangeFigures reversed;  ///< The two aligned pictures swapped.
 };
 
-/// docs/reference/measures.md names the keys; figures that are not defined are null. With
-/// `curve_points` above 0 the curves of Figures 4.4 to 4.6 too.
+/// Why nothing was measured: no pixel of any pair counts. None where one does.
+std::optional<std::string> WhyNothingMeasured(const ChangeReport& report);
+
+/// docs/reference/measures.md names the keys; figures that are not defined are null, and where
+/// nothing was measured "reason" says so. With `curve_points` above 0 the curves of Figures 4.4
+/// to 4.6 too.
 nlohmann::ordered_json ToJson(const ChangeReport& report, std::size_t curve_points);
 
 /// A table for people.

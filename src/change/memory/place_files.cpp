@@ -22,28 +22,28 @@ namespace fs = std::filesystem;
 constexpr char kSuffix[] = ".jpg";
 constexpr char kUnfinished[] = ".tmp";
 
-bool IsHash(const std::string& text) {
+bool IsPlaceFileName(const std::string& text) {
   return text.size() == 64 && std::all_of(text.begin(), text.end(), [](char c) {
            return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
          });
 }
 
-[[noreturn]] void Fail(const std::string& path, const char* what, int error) {
+[[noreturn]] void FailForPlaceFile(const std::string& path, const char* what, int error) {
   throw StoreError("place memory: '" + path + "' cannot be " + what + ": " + std::strerror(error));
 }
 
 /// Brings a file or a directory's entries to disk.
-void Synchronise(const std::string& path, int flags) {
+void SynchronisePlaceFile(const std::string& path, int flags) {
   const int file = open(path.c_str(), flags | O_CLOEXEC);
-  if (file < 0) Fail(path, "opened", errno);
+  if (file < 0) FailForPlaceFile(path, "opened", errno);
   const int error = fsync(file) == 0 ? 0 : errno;
   close(file);
-  if (error != 0) Fail(path, "brought to disk", error);
+  if (error != 0) FailForPlaceFile(path, "brought to disk", error);
 }
 
-void WriteWhole(const std::string& path, const std::string& bytes) {
+void WriteWholePlaceFile(const std::string& path, const std::string& bytes) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) Fail(path, "written", errno);
+  if (file < 0) FailForPlaceFile(path, "written", errno);
   int error = 0;
   std::size_t written = 0;
   while (error == 0 && written < bytes.size()) {
@@ -55,12 +55,12 @@ void WriteWhole(const std::string& path, const std::string& bytes) {
   if (close(file) != 0 && error == 0) error = errno;
   if (error == 0) return;
   unlink(path.c_str());
-  Fail(path, "written", error);
+  FailForPlaceFile(path, "written", error);
 }
 
 /// Calls `visit` with every file below the frames' folder.
 template <typename Visit>
-void ForEachFile(const std::string& frames, const Visit& visit) {
+void ForEachPlaceFile(const std::string& frames, const Visit& visit) {
   try {
     for (const auto& item : fs::recursive_directory_iterator(frames)) {
       if (item.is_regular_file()) visit(item.path());
@@ -85,13 +85,13 @@ PlaceFiles::PlaceFiles(std::string directory) : directory_(std::move(directory))
   }
   const std::string lock_path = directory_ + "/places.lock";
   lock_file_ = open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (lock_file_ < 0) Fail(lock_path, "opened", errno);
+  if (lock_file_ < 0) FailForPlaceFile(lock_path, "opened", errno);
   if (flock(lock_file_, LOCK_EX | LOCK_NB) != 0) {
     close(lock_file_);
     throw StoreError("place memory: directory '" + directory_ + "' is in use by another process");
   }
   try {
-    ForEachFile(directory_ + "/frames", [](const fs::path& path) {
+    ForEachPlaceFile(directory_ + "/frames", [](const fs::path& path) {
       std::error_code ignored;
       if (path.extension() == kUnfinished) fs::remove(path, ignored);
     });
@@ -112,15 +112,16 @@ std::string PlaceFiles::Put(const std::string& bytes) {
   const std::string path = Path(sha256);
   const std::string folder = fs::path(path).parent_path().string();
   std::error_code error;
-  if (fs::create_directory(folder, error)) Synchronise(directory_ + "/frames", O_DIRECTORY);
+  if (fs::create_directory(folder, error))
+    SynchronisePlaceFile(directory_ + "/frames", O_DIRECTORY);
   const std::string unfinished = path + kUnfinished;
-  WriteWhole(unfinished, bytes);
+  WriteWholePlaceFile(unfinished, bytes);
   if (std::rename(unfinished.c_str(), path.c_str()) != 0) {
     const int reason = errno;
     unlink(unfinished.c_str());
-    Fail(path, "written", reason);
+    FailForPlaceFile(path, "written", reason);
   }
-  Synchronise(folder, O_DIRECTORY);
+  SynchronisePlaceFile(folder, O_DIRECTORY);
   return sha256;
 }
 
@@ -146,10 +147,10 @@ void PlaceFiles::SetAside(const std::string& sha256) {
 
 std::vector<std::string> PlaceFiles::List() const {
   std::vector<std::string> names;
-  ForEachFile(directory_ + "/frames", [&](const fs::path& path) {
+  ForEachPlaceFile(directory_ + "/frames", [&](const fs::path& path) {
     const std::string name = path.stem().string();
     // What lies elsewhere is not ours.
-    if (IsHash(name) && path == Path(name)) names.push_back(name);
+    if (IsPlaceFileName(name) && path == Path(name)) names.push_back(name);
   });
   std::sort(names.begin(), names.end());
   return names;

@@ -11,7 +11,9 @@ constexpr double kFullTurn = 6.283185307179586;
 constexpr double kMinCellM = 5;
 
 /// 0 to pi.
-double HeadingDifference(double a, double b) { return std::abs(std::remainder(a - b, kFullTurn)); }
+double HeadingDifferenceOfPlaces(double a, double b) {
+  return std::abs(std::remainder(a - b, kFullTurn));
+}
 
 }  // namespace
 
@@ -40,7 +42,7 @@ std::vector<PlaceMatch> PlaceIndex::Nearest(const PlaceQuery& query) const {
     const Place& place = places_.at(id);
     if (drive != drives_.end() && place.drive == drive->second) continue;
     const double difference =
-        HeadingDifference(static_cast<double>(place.heading_rad), query.heading_rad);
+        HeadingDifferenceOfPlaces(static_cast<double>(place.heading_rad), query.heading_rad);
     if (difference > reach_.max_heading_difference_rad) continue;
     candidates.push_back({id, near.distance_m, difference});
   }

@@ -13,7 +13,7 @@ constexpr double kMetresPerDegree = 111319.49;  // Of latitude; cells need no mo
 constexpr double kNsPerDay = 86400e9;
 constexpr double kTurn = 6.283185307179586;
 
-std::vector<std::string> PlaceMigrations() {
+std::vector<std::string> PlaceMemoryMigrations() {
   return {
       "CREATE TABLE frames("
       "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
@@ -32,30 +32,31 @@ std::vector<std::string> PlaceMigrations() {
       "INSERT INTO state VALUES(0);"};
 }
 
-void CheckWithin(double value, double least, double most, const char* name) {
+void CheckMemoryLimit(double value, double least, double most, const char* name) {
   if (value >= least && value <= most) return;
   throw Error("place memory's " + std::string(name) + " is " + std::to_string(value) +
               ", accepted is " + std::to_string(least) + " to " + std::to_string(most));
 }
 
-PlaceMemory::Config Checked(const PlaceMemory::Config& config) {
-  CheckWithin(config.cell_m, 2, 1000, "cell_m");
-  CheckWithin(config.heading_sectors, 1, 64, "heading_sectors");
-  CheckWithin(config.max_cell_bytes, 1e4, 1e12, "max_cell_bytes");
-  CheckWithin(config.half_life_days, 0.001, 1e6, "half_life_days");
-  CheckWithin(config.max_bytes, config.max_cell_bytes, 1e15, "max_bytes");
-  CheckWithin(static_cast<double>(config.reach.candidates), 1, 1000, "candidates");
-  CheckWithin(config.reach.max_distance_m, 0.1, 1000, "max_distance_m");
-  CheckWithin(config.reach.max_heading_difference_rad, 0, kTurn / 2, "max_heading_difference_rad");
-  CheckWithin(config.match_ratio, 0.1, 1, "match_ratio");
-  CheckWithin(config.max_cached_bytes, 0, 1e12, "max_cached_bytes");
+PlaceMemory::Config CheckedMemoryConfig(const PlaceMemory::Config& config) {
+  CheckMemoryLimit(config.cell_m, 2, 1000, "cell_m");
+  CheckMemoryLimit(config.heading_sectors, 1, 64, "heading_sectors");
+  CheckMemoryLimit(config.max_cell_bytes, 1e4, 1e12, "max_cell_bytes");
+  CheckMemoryLimit(config.half_life_days, 0.001, 1e6, "half_life_days");
+  CheckMemoryLimit(config.max_bytes, config.max_cell_bytes, 1e15, "max_bytes");
+  CheckMemoryLimit(static_cast<double>(config.reach.candidates), 1, 1000, "candidates");
+  CheckMemoryLimit(config.reach.max_distance_m, 0.1, 1000, "max_distance_m");
+  CheckMemoryLimit(config.reach.max_heading_difference_rad, 0, kTurn / 2,
+                   "max_heading_difference_rad");
+  CheckMemoryLimit(config.match_ratio, 0.1, 1, "match_ratio");
+  CheckMemoryLimit(config.max_cached_bytes, 0, 1e12, "max_cached_bytes");
   return config;
 }
 
 }  // namespace
 
 PlaceMemory::PlaceMemory(const Config& config, std::int64_t now_ns)
-    : config_(Checked(config)), files_(config_.directory), index_(config_.reach) {
+    : config_(CheckedMemoryConfig(config)), files_(config_.directory), index_(config_.reach) {
   try {
     Open();
   } catch (const StoreError& error) {
@@ -77,7 +78,7 @@ PlaceMemory::PlaceMemory(const Config& config, std::int64_t now_ns)
 void PlaceMemory::Open() {
   database_ = std::make_unique<SqliteDatabase>(IndexPath(), /*durable=*/true);
   database_->CheckPages();
-  database_->Migrate(PlaceMigrations());
+  database_->Migrate(PlaceMemoryMigrations());
   LoadIndex();
 }
 
@@ -299,6 +300,66 @@ void PlaceMemory::Hide(std::int64_t id) {
   bytes_ -= found->second.bytes;
   entries_.erase(found);
   Uncache(id);
+}
+
+std::vector<PlaceMemory::Ranked> PlaceMemory::Rank(const ImageFeatures& features,
+                                                   const std::vector<PlaceMatch>& candidates) {
+  std::vector<Ranked> ranked;
+  for (const PlaceMatch& candidate : candidates) {
+    const auto remembered = Features(candidate.id);
+    if (remembered == nullptr) continue;
+    ranked.push_back({candidate, MatchFeatures(*remembered, features, config_.match_ratio).size()});
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const Ranked& a, const Ranked& b) { return a.matches > b.matches; });
+  return ranked;
+}
+
+std::optional<PlaceRecord> PlaceMemory::Load(std::int64_t id) {
+  const auto found = entries_.find(id);
+  if (found == entries_.end()) return std::nullopt;
+  try {
+    const std::string& sha256 = found->second.sha256;
+    return ParsePlaceRecord(files_.Read(sha256), sha256);
+  } catch (const Error&) {
+    DropDamaged(id);
+    return std::nullopt;
+  }
+}
+
+void PlaceMemory::DropDamaged(std::int64_t id) {
+  database_->Transaction([&] { DeleteRows({id}); });
+  files_.SetAside(entries_.at(id).sha256);
+  Hide(id);
+  ++damaged_;
+}
+
+std::shared_ptr<const ImageFeatures> PlaceMemory::Features(std::int64_t id) {
+  const auto cached = cached_.find(id);
+  if (cached != cached_.end()) {
+    cache_.splice(cache_.begin(), cache_, cached->second);
+    return cached->second->features;
+  }
+  std::optional<PlaceRecord> record = Load(id);
+  if (!record) return nullptr;
+  auto features = std::make_shared<const ImageFeatures>(std::move(record->features));
+  Cache(id, features);
+  return features;
+}
+
+void PlaceMemory::Cache(std::int64_t id, std::shared_ptr<const ImageFeatures> features) {
+  cached_bytes_ += static_cast<double>(features->Bytes());
+  cache_.push_front({id, std::move(features)});
+  cached_[id] = cache_.begin();
+  while (cached_bytes_ > config_.max_cached_bytes && !cache_.empty()) Uncache(cache_.back().id);
+}
+
+void PlaceMemory::Uncache(std::int64_t id) {
+  const auto found = cached_.find(id);
+  if (found == cached_.end()) return;
+  cached_bytes_ -= static_cast<double>(found->second->features->Bytes());
+  cache_.erase(found->second);
+  cached_.erase(found);
 }
 
 }  // namespace livemap::change

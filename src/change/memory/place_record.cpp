@@ -23,9 +23,9 @@ constexpr double kTwoPi = 6.283185307179586;
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "records are written in little endian");
 
-class Writer {
+class PlaceRecordWriter {
  public:
-  explicit Writer(std::string& bytes) : bytes_(bytes) {}
+  explicit PlaceRecordWriter(std::string& bytes) : bytes_(bytes) {}
   template <typename T>
   void Put(T value) {
     bytes_.append(reinterpret_cast<const char*>(&value), sizeof(value));
@@ -39,9 +39,9 @@ class Writer {
 };
 
 /// Reads within what is there; Error beyond.
-class Reader {
+class PlaceRecordReader {
  public:
-  Reader(const char* data, std::size_t size, const std::string& name)
+  PlaceRecordReader(const char* data, std::size_t size, const std::string& name)
       : data_(data), size_(size), name_(name) {}
   template <typename T>
   T Take() {
@@ -63,13 +63,13 @@ class Reader {
   std::size_t at_ = 0;
 };
 
-void Require(bool holds, const char* field, double value, const char* accepted) {
+void RequireOfRecord(bool holds, const char* field, double value, const char* accepted) {
   if (holds) return;
   throw Error("a remembered frame's " + std::string(field) + " is " + std::to_string(value) +
               ", accepted is " + accepted);
 }
 
-void CheckPicture(const PlaceRecord& record) {
+void CheckRecordPicture(const PlaceRecord& record) {
   const auto header = imaging::ReadImageHeader(record.picture.data(), record.picture.size());
   if (!header || header->format == imaging::ImageHeader::Format::kWebp ||
       !imaging::HasImageEnd(record.picture.data(), record.picture.size(), header->format)) {
@@ -82,7 +82,7 @@ void CheckPicture(const PlaceRecord& record) {
               std::to_string(camera.width) + "x" + std::to_string(camera.height));
 }
 
-void CheckFeatures(const ImageFeatures& features) {
+void CheckRecordFeatures(const ImageFeatures& features) {
   const std::size_t count = features.points.size();
   const cv::Mat& descriptors = features.descriptors;
   if (count > kMaxRecordFeatures || static_cast<std::size_t>(descriptors.rows) != count ||
@@ -107,31 +107,31 @@ void CheckPlaceFrame(const PlaceFrame& frame) {
   }
   if (!geo::IsValid(frame.position))
     throw Error("a remembered frame's position is no place on earth");
-  Require(frame.position_sigma_m >= 0 && frame.position_sigma_m <= 1e6, "position_sigma_m",
-          frame.position_sigma_m, "0 to 1e6");
-  Require(frame.heading_rad >= 0 && frame.heading_rad < kTwoPi, "heading_rad", frame.heading_rad,
-          "0 to 2 pi");
-  Require(frame.stamp_ns > 0, "stamp_ns", static_cast<double>(frame.stamp_ns), "positive");
+  RequireOfRecord(frame.position_sigma_m >= 0 && frame.position_sigma_m <= 1e6, "position_sigma_m",
+                  frame.position_sigma_m, "0 to 1e6");
+  RequireOfRecord(frame.heading_rad >= 0 && frame.heading_rad < kTwoPi, "heading_rad",
+                  frame.heading_rad, "0 to 2 pi");
+  RequireOfRecord(frame.stamp_ns > 0, "stamp_ns", static_cast<double>(frame.stamp_ns), "positive");
   const geo::CameraIntrinsics& camera = frame.camera;
-  Require(camera.width >= 1 && camera.width <= kMaxPictureSide, "width", camera.width,
-          "1 to 16384");
-  Require(camera.height >= 1 && camera.height <= kMaxPictureSide, "height", camera.height,
-          "1 to 16384");
+  RequireOfRecord(camera.width >= 1 && camera.width <= kMaxPictureSide, "width", camera.width,
+                  "1 to 16384");
+  RequireOfRecord(camera.height >= 1 && camera.height <= kMaxPictureSide, "height", camera.height,
+                  "1 to 16384");
   for (const auto& [name, value] : {std::pair("fx", camera.fx), {"fy", camera.fy}}) {
-    Require(value > 0 && value <= 1e6, name, value, "above 0, up to 1e6");
+    RequireOfRecord(value > 0 && value <= 1e6, name, value, "above 0, up to 1e6");
   }
   for (const auto& [name, value] : {std::pair("cx", camera.cx), {"cy", camera.cy}}) {
-    Require(std::abs(value) <= 1e6, name, value, "-1e6 to 1e6");
+    RequireOfRecord(std::abs(value) <= 1e6, name, value, "-1e6 to 1e6");
   }
 }
 
 std::string SerialisePlaceRecord(const PlaceRecord& record) {
   CheckPlaceFrame(record.frame);
-  CheckPicture(record);
-  CheckFeatures(record.features);
+  CheckRecordPicture(record);
+  CheckRecordFeatures(record.features);
   std::string bytes(record.picture.begin(), record.picture.end());
   const std::size_t begin = bytes.size();
-  Writer writer(bytes);
+  PlaceRecordWriter writer(bytes);
   const PlaceFrame& frame = record.frame;
   writer.Put(static_cast<std::uint16_t>(frame.drive_id.size()));
   writer.PutBytes(frame.drive_id.data(), frame.drive_id.size());
@@ -168,7 +168,7 @@ PlaceRecord ParsePlaceRecord(const std::string& bytes, const std::string& name) 
   std::memcpy(&body, bytes.data() + bytes.size() - kFooterBytes, sizeof(body));
   if (body > bytes.size() - kFooterBytes) throw Error("place record '" + name + "' is cut off");
   const std::size_t begin = bytes.size() - kFooterBytes - body;
-  Reader reader(bytes.data() + begin, body, name);
+  PlaceRecordReader reader(bytes.data() + begin, body, name);
   PlaceRecord record;
   PlaceFrame& frame = record.frame;
   const auto drive_bytes = reader.Take<std::uint16_t>();
@@ -196,8 +196,8 @@ PlaceRecord ParsePlaceRecord(const std::string& bytes, const std::string& name) 
               count * kDescriptorColumns);
   record.picture.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(begin));
   CheckPlaceFrame(frame);
-  CheckPicture(record);
-  CheckFeatures(record.features);
+  CheckRecordPicture(record);
+  CheckRecordFeatures(record.features);
   return record;
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "common/error.h"
+#include "common/text_file.h"
 #include "perception/inference/manifest_section.h"
 #include "protocol/change_class.h"
 
@@ -14,14 +15,15 @@ namespace {
 /// Names of features are told apart by one digit.
 constexpr int kMaxLevels = 10;
 
-ChangeManifest::Graph ReadGraph(const perception::ManifestSection& graphs, const std::string& part,
-                                const std::filesystem::path& directory) {
+ChangeManifest::Graph ReadManifestGraph(const perception::ManifestSection& graphs,
+                                        const std::string& part,
+                                        const std::filesystem::path& directory) {
   const perception::ManifestSection graph = graphs.Sub(part, {"file", "sha256"});
   return {(directory / graph.Text("file")).string(), graph.Hash("sha256")};
 }
 
 /// Their order is that of the channels of the answer, so it must be the program's.
-void CheckClasses(const perception::ManifestSection& root) {
+void CheckManifestClasses(const perception::ManifestSection& root) {
   const std::vector<std::string> classes = root.DistinctTexts("classes", 1000);
   std::string accepted;
   bool same = classes.size() == static_cast<std::size_t>(protocol::kChangeClasses);
@@ -33,7 +35,7 @@ void CheckClasses(const perception::ManifestSection& root) {
   if (!same) root.Refuse("classes", "in this order " + accepted);
 }
 
-double Threshold(const perception::ManifestSection& thresholds, const std::string& key) {
+double ManifestThreshold(const perception::ManifestSection& thresholds, const std::string& key) {
   return static_cast<double>(thresholds.Number(key, 1e-6, 1));
 }
 
@@ -58,11 +60,11 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
     root.Choice("kind", {"change"});
     ChangeManifest manifest;
     manifest.name = root.Text("name");
-    CheckClasses(root);
+    CheckManifestClasses(root);
     const perception::ManifestSection graphs = root.Sub("graphs", {"whole", "encoder", "head"});
-    manifest.whole = ReadGraph(graphs, "whole", directory);
-    manifest.encoder = ReadGraph(graphs, "encoder", directory);
-    manifest.head = ReadGraph(graphs, "head", directory);
+    manifest.whole = ReadManifestGraph(graphs, "whole", directory);
+    manifest.encoder = ReadManifestGraph(graphs, "encoder", directory);
+    manifest.head = ReadManifestGraph(graphs, "head", directory);
     const perception::ManifestSection input =
         root.Sub("input", {"width", "height", "channels", "resize", "pad_value", "invalid"});
     manifest.input = perception::ReadManifestInput(input);
@@ -74,9 +76,9 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
     manifest.output = head.Text("output");
     const perception::ManifestSection thresholds =
         root.Sub("thresholds", {"changed", "changed_at_fpr_0.01", "changed_at_fpr_0.10"});
-    manifest.changed = Threshold(thresholds, "changed");
-    manifest.changed_at_fpr_001 = Threshold(thresholds, "changed_at_fpr_0.01");
-    manifest.changed_at_fpr_010 = Threshold(thresholds, "changed_at_fpr_0.10");
+    manifest.changed = ManifestThreshold(thresholds, "changed");
+    manifest.changed_at_fpr_001 = ManifestThreshold(thresholds, "changed_at_fpr_0.01");
+    manifest.changed_at_fpr_010 = ManifestThreshold(thresholds, "changed_at_fpr_0.10");
     return manifest;
   } catch (const YAML::Exception& error) {
     throw Error("model manifest '" + origin + "' is no valid YAML: " + error.what());
@@ -84,7 +86,7 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
 }
 
 ChangeManifest ReadChangeManifest(const std::string& path) {
-  const std::string yaml = ReadFile(path, perception::kMaxManifestBytes);
+  const std::string yaml = ReadTextFile(path, perception::kMaxManifestBytes);
   return ParseChangeManifest(yaml, path, std::filesystem::path(path).parent_path().string());
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/error.h"
+#include "common/text.h"
 
 namespace livemap::change {
 
@@ -17,9 +18,10 @@ ChangeProbabilities NothingChanged(cv::Size size, bool tells_classes) {
 void CheckValidity(const cv::Mat& valid, cv::Size size) {
   if (valid.type() == CV_8UC1 && valid.size() == size) return;
   throw Error("a mask of what is valid is " + std::to_string(valid.cols) + "x" +
-              std::to_string(valid.rows) + " of OpenCV type " + cv::typeToString(valid.type()) +
-              ", accepted is CV_8UC1 of the pictures' " + std::to_string(size.width) + "x" +
-              std::to_string(size.height));
+              std::to_string(valid.rows) + " with " +
+              PixelText(static_cast<int>(8 * valid.elemSize1()), valid.channels()) +
+              ", accepted are " + PixelText(8, 1) + " and the pictures' " +
+              std::to_string(size.width) + "x" + std::to_string(size.height));
 }
 
 cv::Mat FillUnknown(const cv::Mat& before, const cv::Mat& after, const cv::Mat& valid) {

@@ -13,8 +13,8 @@ namespace {
 /// Of a probability beyond [0, 1]: sums of float32 are not exact.
 constexpr double kRounding = 1e-3;
 
-perception::OnnxGraph LoadGraph(const ChangeManifest& manifest,
-                                const ChangeManifest::Graph& graph) {
+perception::OnnxGraph LoadNetworkGraph(const ChangeManifest& manifest,
+                                       const ChangeManifest::Graph& graph) {
   return {graph.file, perception::ReadHashedFile(manifest.name, graph.file, graph.sha256)};
 }
 
@@ -23,11 +23,11 @@ cv::Mat Zeros(const std::vector<std::int64_t>& shape) {
   return {sizes, CV_32F, cv::Scalar(0)};
 }
 
-std::vector<std::int64_t> PictureShape(const perception::ModelManifest::Input& input) {
+std::vector<std::int64_t> NetworkPictureShape(const perception::ModelManifest::Input& input) {
   return {1, 3, input.height, input.width};
 }
 
-std::vector<std::int64_t> ValidityShape(const perception::ModelManifest::Input& input) {
+std::vector<std::int64_t> NetworkValidityShape(const perception::ModelManifest::Input& input) {
   return {1, 1, input.height, input.width};
 }
 
@@ -43,17 +43,17 @@ ChangeNetwork::ChangeNetwork(const ChangeManifest& manifest, int threads)
     : manifest_(manifest),
       before_letterbox_(manifest.input, manifest.normalisation),
       after_letterbox_(manifest.input, manifest.normalisation),
-      whole_(LoadGraph(manifest, manifest.whole)),
-      encoder_(LoadGraph(manifest, manifest.encoder)),
-      head_(LoadGraph(manifest, manifest.head)) {
+      whole_(LoadNetworkGraph(manifest, manifest.whole)),
+      encoder_(LoadNetworkGraph(manifest, manifest.encoder)),
+      head_(LoadNetworkGraph(manifest, manifest.head)) {
   if (threads > 0) cv::setNumThreads(threads);
   CheckWhole();
   CheckParts();
 }
 
 void ChangeNetwork::CheckWhole() {
-  const std::vector<std::int64_t> picture = PictureShape(manifest_.input);
-  const std::vector<std::int64_t> validity = ValidityShape(manifest_.input);
+  const std::vector<std::int64_t> picture = NetworkPictureShape(manifest_.input);
+  const std::vector<std::int64_t> validity = NetworkValidityShape(manifest_.input);
   whole_.RequireInput("first", picture);
   whole_.RequireInput("second", picture);
   whole_.RequireInput("validity", validity);
@@ -63,7 +63,7 @@ void ChangeNetwork::CheckWhole() {
 }
 
 void ChangeNetwork::CheckParts() {
-  encoder_.RequireInput("image", PictureShape(manifest_.input));
+  encoder_.RequireInput("image", NetworkPictureShape(manifest_.input));
   const auto levels = static_cast<std::size_t>(manifest_.levels);
   for (std::size_t level = 0; level < levels; ++level) {
     const std::string name = "features_" + std::to_string(level);
@@ -72,14 +72,14 @@ void ChangeNetwork::CheckParts() {
                 std::to_string(encoder_.outputs().size()) + " outputs, its manifest accepts " +
                 std::to_string(levels) + " named features_0, features_1, ...");
   }
-  const std::vector<cv::Mat> features = RunEncoder(Zeros(PictureShape(manifest_.input)));
+  const std::vector<cv::Mat> features = RunEncoder(Zeros(NetworkPictureShape(manifest_.input)));
   for (std::size_t level = 0; level < levels; ++level) {
     head_.RequireInput("first_" + std::to_string(level), perception::ShapeOf(features[level]));
     head_.RequireInput("second_" + std::to_string(level), perception::ShapeOf(features[level]));
   }
-  head_.RequireInput("validity", ValidityShape(manifest_.input));
-  CheckAnswer(head_,
-              head_.Run(HeadInputs(features, features, Zeros(ValidityShape(manifest_.input)))));
+  head_.RequireInput("validity", NetworkValidityShape(manifest_.input));
+  CheckAnswer(head_, head_.Run(HeadInputs(features, features,
+                                          Zeros(NetworkValidityShape(manifest_.input)))));
 }
 
 void ChangeNetwork::CheckAnswer(const perception::OnnxGraph& graph,

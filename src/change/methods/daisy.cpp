@@ -12,7 +12,7 @@ namespace {
 constexpr float kMinGradient = 1e-3F;
 
 /// Gradient's positive part in each direction: how steeply grey values rise that way.
-std::vector<cv::Mat> OrientationMaps(const cv::Mat& grey, int orientations) {
+std::vector<cv::Mat> DaisyOrientationMaps(const cv::Mat& grey, int orientations) {
   cv::Mat smooth;
   grey.convertTo(smooth, CV_32FC1, 1.0 / 255);
   cv::GaussianBlur(smooth, smooth, cv::Size(), 1.0);
@@ -33,7 +33,7 @@ std::vector<cv::Mat> OrientationMaps(const cv::Mat& grey, int orientations) {
 
 Daisy::Daisy(const cv::Mat& grey, const DaisyConfig& options) : options_(options) {
   if (grey.type() != CV_8UC1 || grey.empty()) throw Error("DAISY wants an 8-bit grey image");
-  std::vector<cv::Mat> maps = OrientationMaps(grey, options.orientations);
+  std::vector<cv::Mat> maps = DaisyOrientationMaps(grey, options.orientations);
   double blurred = 0;
   // A histogram's blur grows with its ring's radius, so that neighbours overlap by half.
   for (int ring = 0; ring <= options.rings; ++ring) {

@@ -13,19 +13,19 @@ namespace {
 constexpr int kStride = 2;           // Pixels between descriptors.
 constexpr float kSiftSizePx = 5.0F;  // Diameter of a keypoint; the patch is six times as wide.
 
-cv::Mat Grey(const cv::Mat& bgr) {
+cv::Mat GreyForDifference(const cv::Mat& bgr) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
   return grey;
 }
 
 /// Rows and columns of descriptors over an image.
-cv::Size GridOf(cv::Size size) {
+cv::Size DenseGridOf(cv::Size size) {
   return {(size.width + kStride - 1) / kStride, (size.height + kStride - 1) / kStride};
 }
 
 /// A score per descriptor to one per pixel.
-ChangeProbabilities FromGrid(const cv::Mat& scores, cv::Size size) {
+ChangeProbabilities DifferenceFromGrid(const cv::Mat& scores, cv::Size size) {
   cv::Mat change;
   cv::resize(scores, change, size, 0, 0, cv::INTER_LINEAR);
   cv::min(change, 1.0, change);
@@ -45,20 +45,20 @@ class DenseSiftDifference : public ChangeMethod {
   ChangeProbabilities Infer(const AlignedPair& pair) override {
     const cv::Mat before = Describe(pair.before);
     const cv::Mat after = Describe(pair.after);
-    const cv::Size grid = GridOf(pair.after.size());
+    const cv::Size grid = DenseGridOf(pair.after.size());
     cv::Mat scores(grid, CV_32FC1);
     for (int i = 0; i < before.rows; ++i) {
       const double distance = cv::norm(before.row(i), after.row(i), cv::NORM_L2);
       // Two unit vectors without negative entries are at most the root of two apart.
       scores.at<float>(i / grid.width, i % grid.width) = static_cast<float>(distance / M_SQRT2);
     }
-    return FromGrid(scores, pair.after.size());
+    return DifferenceFromGrid(scores, pair.after.size());
   }
 
  private:
   /// Upright SIFT descriptors at the grid's points, one per row, length 1 or 0.
   static cv::Mat Describe(const cv::Mat& bgr) {
-    const cv::Size grid = GridOf(bgr.size());
+    const cv::Size grid = DenseGridOf(bgr.size());
     std::vector<cv::KeyPoint> points;
     points.reserve(static_cast<std::size_t>(grid.area()));
     for (int row = 0; row < grid.height; ++row) {
@@ -68,7 +68,7 @@ class DenseSiftDifference : public ChangeMethod {
       }
     }
     cv::Mat descriptors;
-    cv::SIFT::create()->compute(Grey(bgr), points, descriptors);
+    cv::SIFT::create()->compute(GreyForDifference(bgr), points, descriptors);
     for (int i = 0; i < descriptors.rows; ++i) {
       cv::Mat descriptor = descriptors.row(i);
       const double length = cv::norm(descriptor);
@@ -78,15 +78,15 @@ class DenseSiftDifference : public ChangeMethod {
   }
 };
 
-class DaisyDifference : public ChangeMethod {
+class DenseDaisyDifference : public ChangeMethod {
  public:
   bool tells_classes() const override { return false; }
 
  protected:
   ChangeProbabilities Infer(const AlignedPair& pair) override {
-    const Daisy before(Grey(pair.before));
-    const Daisy after(Grey(pair.after));
-    const cv::Size grid = GridOf(pair.after.size());
+    const Daisy before(GreyForDifference(pair.before));
+    const Daisy after(GreyForDifference(pair.after));
+    const cv::Size grid = DenseGridOf(pair.after.size());
     const auto size = static_cast<std::size_t>(before.size());
     std::vector<float> a(size);
     std::vector<float> b(size);
@@ -105,7 +105,7 @@ class DaisyDifference : public ChangeMethod {
         scores.at<float>(row, column) = static_cast<float>(std::sqrt(square) / most);
       }
     }
-    return FromGrid(scores, pair.after.size());
+    return DifferenceFromGrid(scores, pair.after.size());
   }
 };
 
@@ -115,6 +115,8 @@ std::unique_ptr<ChangeMethod> MakeDenseSiftDifference() {
   return std::make_unique<DenseSiftDifference>();
 }
 
-std::unique_ptr<ChangeMethod> MakeDaisyDifference() { return std::make_unique<DaisyDifference>(); }
+std::unique_ptr<ChangeMethod> MakeDaisyDifference() {
+  return std::make_unique<DenseDaisyDifference>();
+}
 
 }  // namespace livemap::change

@@ -6,7 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "change/registration/robust_fit.h"
+#include "change/registration/depth_image.h"
+#include "change/registration/edge_registration.h"
 #include "common/error.h"
 
 namespace livemap::change {
@@ -18,15 +19,15 @@ constexpr double kMapRadiusM = 5000;
 constexpr int kMixedPixels = 2;
 
 /// Counterclockwise from east.
-double YawOf(double heading_rad) { return M_PI / 2 - heading_rad; }
+double DetectorYawOf(double heading_rad) { return M_PI / 2 - heading_rad; }
 
-double WrappedHeading(double heading_rad) {
+double DetectorHeading(double heading_rad) {
   const double wrapped = std::fmod(heading_rad, 2 * M_PI);
   const double positive = wrapped < 0 ? wrapped + 2 * M_PI : wrapped;
   return positive < 2 * M_PI ? positive : 0;
 }
 
-void CheckPicture(const ChangeDetectorFrame& picture) {
+void CheckDetectorPicture(const ChangeDetectorFrame& picture) {
   const geo::CameraIntrinsics& camera = picture.camera;
   if (picture.bgr.empty() || picture.bgr.type() != CV_8UC3 ||
       picture.bgr.size() != cv::Size(camera.width, camera.height)) {
@@ -34,7 +35,7 @@ void CheckPicture(const ChangeDetectorFrame& picture) {
                 std::to_string(picture.bgr.rows) + ", accepted is an 8-bit colour picture of its " +
                 "camera's " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
   }
-  if (!picture.depth.empty()) CheckDepth(picture.depth, picture.bgr.size());
+  if (!picture.depth.empty()) CheckDepthImage(picture.depth, picture.bgr.size());
   if (!geo::IsValid(picture.position) || !picture.covariance_m2.allFinite() ||
       !std::isfinite(picture.heading_rad)) {
     throw Error(
@@ -61,18 +62,18 @@ PlaceFrame ChangeDetector::FrameOf(const ChangeDetectorFrame& picture) const {
   PlaceFrame frame;
   frame.drive_id = config_.drive_id;
   frame.stamp_ns = picture.stamp_ns;
-  const Eigen::Rotation2Dd turn(YawOf(picture.heading_rad));
+  const Eigen::Rotation2Dd turn(DetectorYawOf(picture.heading_rad));
   const Eigen::Vector2d camera_m = turn * picture.base_from_optical.translation().head<2>();
   frame.position = geo::LocalFrame(picture.position).ToGeo(camera_m);
   frame.position_sigma_m = std::sqrt(std::max(0.0, picture.covariance_m2.trace() / 2));
   const Eigen::Vector3d view = picture.base_from_optical.linear().col(2);
-  frame.heading_rad = WrappedHeading(picture.heading_rad - std::atan2(view.y(), view.x()));
+  frame.heading_rad = DetectorHeading(picture.heading_rad - std::atan2(view.y(), view.x()));
   frame.camera = picture.camera;
   return frame;
 }
 
 ChangeDetector::Answer ChangeDetector::Look(const ChangeDetectorFrame& picture) {
-  CheckPicture(picture);
+  CheckDetectorPicture(picture);
   Answer answer;
   if (picture.stamp_ns < last_stamp_ns_) Restart();
   last_stamp_ns_ = picture.stamp_ns;
@@ -215,7 +216,8 @@ Eigen::Isometry3d ChangeDetector::MapFromBase(const ChangeDetectorFrame& picture
   Eigen::Isometry3d map_from_base = Eigen::Isometry3d::Identity();
   map_from_base.translation().head<2>() = map_->ToEnu(picture.position);
   map_from_base.linear() =
-      Eigen::AngleAxisd(YawOf(picture.heading_rad), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      Eigen::AngleAxisd(DetectorYawOf(picture.heading_rad), Eigen::Vector3d::UnitZ())
+          .toRotationMatrix();
   return map_from_base;
 }
 

@@ -135,9 +135,4 @@ class ChangeDetector {
   std::int64_t last_stamp_ns_ = 0;
 };
 
-/// `bgr` with the changed classes in their colours, regions boxed with class and direction, and
-/// darker where nothing earlier is known. `classes` as in ChangeDetector::Answer.
-cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
-                    const std::vector<ChangeRegion>& regions);
-
 }  // namespace livemap::change

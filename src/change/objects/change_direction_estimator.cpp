@@ -23,7 +23,7 @@ constexpr double kMinEvidence = 0.5;
 constexpr double kMinDifference = 0.05;  // Of colours; a smaller one is noise.
 
 /// Strength of grey edges, CV_32FC1, as multiples of their mean.
-cv::Mat RelativeEdges(const cv::Mat& bgr) {
+cv::Mat RelativeEdgesForDirection(const cv::Mat& bgr) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
   cv::GaussianBlur(grey, grey, cv::Size(), 0.8);
@@ -36,7 +36,7 @@ cv::Mat RelativeEdges(const cv::Mat& bgr) {
   return strength / std::max(cv::mean(strength)[0], 1e-6);
 }
 
-cv::Mat Grown(const cv::Mat& region, int by_px) {
+cv::Mat RegionGrownForDirection(const cv::Mat& region, int by_px) {
   cv::Mat grown;
   cv::dilate(region, grown,
              cv::getStructuringElement(cv::MORPH_RECT, {2 * by_px + 1, 2 * by_px + 1}));
@@ -44,7 +44,8 @@ cv::Mat Grown(const cv::Mat& region, int by_px) {
 }
 
 /// L1 distance of the distributions of one channel inside and around, 0 to 2.
-double Difference(const cv::Mat& channel, const cv::Mat& inside, const cv::Mat& around) {
+double EdgeDifferenceForDirection(const cv::Mat& channel, const cv::Mat& inside,
+                                  const cv::Mat& around) {
   double least = 0;
   double most = 0;
   cv::minMaxLoc(channel, &least, &most, nullptr, nullptr, inside | around);
@@ -63,7 +64,7 @@ double Difference(const cv::Mat& channel, const cv::Mat& inside, const cv::Mat& 
 }  // namespace
 
 struct ChangeDirectionEstimator::Picture {
-  explicit Picture(const cv::Mat& bgr) : edges(RelativeEdges(bgr)) {
+  explicit Picture(const cv::Mat& bgr) : edges(RelativeEdgesForDirection(bgr)) {
     cv::Mat lab;
     cv::GaussianBlur(bgr, lab, cv::Size(), 1);
     cv::cvtColor(lab, lab, cv::COLOR_BGR2Lab);
@@ -72,7 +73,8 @@ struct ChangeDirectionEstimator::Picture {
 
   double ColoursDiffer(const cv::Rect& where, const cv::Mat& inside, const cv::Mat& around) const {
     double difference = 0;
-    for (const cv::Mat& channel : colours) difference += Difference(channel(where), inside, around);
+    for (const cv::Mat& channel : colours)
+      difference += EdgeDifferenceForDirection(channel(where), inside, around);
     return std::max(difference, kMinDifference);
   }
 
@@ -92,7 +94,8 @@ ChangeDirection ChangeDirectionEstimator::Of(const cv::Mat& region, const cv::Re
   const cv::Rect where =
       cv::Rect(box.tl() - margin, box.br() + margin) & cv::Rect(cv::Point(), region.size());
   const cv::Mat inside = region(where);
-  const cv::Mat around = Grown(inside, pixels(kRingPx)) & ~Grown(inside, pixels(kGapPx));
+  const cv::Mat around = RegionGrownForDirection(inside, pixels(kRingPx)) &
+                         ~RegionGrownForDirection(inside, pixels(kGapPx));
   cv::Mat outline;
   cv::morphologyEx(inside, outline, cv::MORPH_GRADIENT,
                    cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));

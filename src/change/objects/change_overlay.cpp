@@ -1,7 +1,7 @@
-// What a person sees of a comparison.
+#include "change/objects/change_overlay.h"
+
 #include <opencv2/imgproc.hpp>
 
-#include "change/objects/change_detector.h"
 #include "common/error.h"
 
 namespace livemap::change {
@@ -11,12 +11,12 @@ constexpr double kColourShare = 0.5;
 constexpr double kUnknownLight = 0.4;
 constexpr double kTextHeight = 0.4;
 
-cv::Scalar BgrOf(protocol::ChangeClass change_class) {
+cv::Scalar OverlayColourOf(protocol::ChangeClass change_class) {
   const auto rgb = protocol::ChangeClassColour(change_class);
   return {static_cast<double>(rgb[2]), static_cast<double>(rgb[1]), static_cast<double>(rgb[0])};
 }
 
-std::string LabelOf(const ChangeRegion& region) {
+std::string OverlayLabelOf(const ChangeRegion& region) {
   const char* sign = region.direction == ChangeDirection::kAppeared   ? "+ "
                      : region.direction == ChangeDirection::kVanished ? "- "
                                                                       : "";
@@ -38,15 +38,16 @@ cv::Mat DrawChanges(const cv::Mat& bgr, const cv::Mat& classes,
   dark.copyTo(drawn, classes == kLeftOutPixel);
   for (int i = 1; i < protocol::kChangeClasses; ++i) {
     const cv::Mat here = classes == i;
-    const cv::Mat colour(bgr.size(), CV_8UC3, BgrOf(static_cast<protocol::ChangeClass>(i)));
+    const cv::Mat colour(bgr.size(), CV_8UC3,
+                         OverlayColourOf(static_cast<protocol::ChangeClass>(i)));
     cv::Mat blended;
     cv::addWeighted(bgr, 1 - kColourShare, colour, kColourShare, 0, blended);
     blended.copyTo(drawn, here);
   }
   for (const ChangeRegion& region : regions) {
-    const cv::Scalar colour = BgrOf(region.change_class);
+    const cv::Scalar colour = OverlayColourOf(region.change_class);
     cv::rectangle(drawn, region.box, colour, 1);
-    cv::putText(drawn, LabelOf(region), region.box.tl() + cv::Point(0, -3),
+    cv::putText(drawn, OverlayLabelOf(region), region.box.tl() + cv::Point(0, -3),
                 cv::FONT_HERSHEY_SIMPLEX, kTextHeight, colour, 1, cv::LINE_AA);
   }
   return drawn;

@@ -12,7 +12,7 @@
 namespace livemap::change {
 namespace {
 
-Eigen::Matrix2d PlanarTurn(const Eigen::Isometry3d& pose) {
+Eigen::Matrix2d TrackerTurnOf(const Eigen::Isometry3d& pose) {
   const Eigen::Vector3d forward = pose.linear().col(0);
   const double yaw = std::atan2(forward.y(), forward.x());
   Eigen::Matrix2d turn;
@@ -20,7 +20,9 @@ Eigen::Matrix2d PlanarTurn(const Eigen::Isometry3d& pose) {
   return turn;
 }
 
-Eigen::Vector2d PlanarPlace(const Eigen::Isometry3d& pose) { return pose.translation().head<2>(); }
+Eigen::Vector2d TrackerPlaceOf(const Eigen::Isometry3d& pose) {
+  return pose.translation().head<2>();
+}
 
 }  // namespace
 
@@ -42,9 +44,9 @@ std::optional<ChangeTracker::Sight> ChangeTracker::Place(const ChangeFrame& fram
   noise.max_range_m = std::min(noise.max_range_m, config_.max_range_m);
   const auto ground = geo::ProjectToGround(foot, frame.camera, frame.base_from_optical, noise);
   if (!ground) return std::nullopt;
-  const Eigen::Matrix2d turn = PlanarTurn(frame.map_from_base);
+  const Eigen::Matrix2d turn = TrackerTurnOf(frame.map_from_base);
   Sight sight;
-  sight.position_m = PlanarPlace(frame.map_from_base) + turn * ground->position_m;
+  sight.position_m = TrackerPlaceOf(frame.map_from_base) + turn * ground->position_m;
   sight.covariance_m2 =
       turn * ground->covariance_m2 * turn.transpose() +
       Eigen::Matrix2d::Identity() * config_.process_sigma_m * config_.process_sigma_m;
@@ -74,7 +76,7 @@ ChangeTracker::Track* ChangeTracker::Nearest(const Sight& sight, const std::vect
 void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& frame) const {
   ChangedObject& event = track.event;
   const ChangeRegion& region = *sight.region;
-  const Eigen::Vector2d from_m = PlanarPlace(frame.map_from_base);
+  const Eigen::Vector2d from_m = TrackerPlaceOf(frame.map_from_base);
   if (event.seen == 0) {
     event.position_m = sight.position_m;
     event.covariance_m2 = sight.covariance_m2;
@@ -109,8 +111,8 @@ void ChangeTracker::Update(Track& track, const Sight& sight, const ChangeFrame& 
 
 bool ChangeTracker::IsMissed(const Track& track, const ChangeFrame& frame,
                              const std::vector<ChangeRegion>& regions) const {
-  const Eigen::Vector2d ahead_m = PlanarTurn(frame.map_from_base).transpose() *
-                                  (track.event.position_m - PlanarPlace(frame.map_from_base));
+  const Eigen::Vector2d ahead_m = TrackerTurnOf(frame.map_from_base).transpose() *
+                                  (track.event.position_m - TrackerPlaceOf(frame.map_from_base));
   const double range_m = ahead_m.norm();
   if (range_m > config_.max_range_m || range_m < config_.min_missed_m) return false;
   const Eigen::Vector3d point =
@@ -189,12 +191,12 @@ std::vector<ChangedObject> ChangeTracker::Add(const ChangeFrame& frame,
 }
 
 std::vector<ChangedObject> ChangeTracker::LeaveBehind(const Eigen::Isometry3d& map_from_base) {
-  const Eigen::Matrix2d base_from_map = PlanarTurn(map_from_base).transpose();
+  const Eigen::Matrix2d base_from_map = TrackerTurnOf(map_from_base).transpose();
   std::vector<ChangedObject> passed;
   std::vector<Track> near;
   for (Track& track : tracks_) {
     const Eigen::Vector2d ahead_m =
-        base_from_map * (track.event.position_m - PlanarPlace(map_from_base));
+        base_from_map * (track.event.position_m - TrackerPlaceOf(map_from_base));
     const bool far = ahead_m.norm() > config_.forget_m;
     if (track.confirmed && !track.told_passed && (far || ahead_m.x() < -config_.passed_m)) {
       track.told_passed = true;

@@ -1,4 +1,5 @@
-// Connected regions of change.
+#include "change/objects/changed_regions.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -6,7 +7,6 @@
 #include <optional>
 
 #include "change/objects/change_direction_estimator.h"
-#include "change/objects/change_tracker.h"
 #include "common/error.h"
 
 namespace livemap::change {
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kRegionReferenceWidth = 320;
 
-protocol::ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region) {
+protocol::ChangeClass MostFrequentInRegion(const cv::Mat& classes, const cv::Mat& region) {
   std::array<int, protocol::kChangeClasses> counts{};
   for (int row = 0; row < region.rows; ++row) {
     for (int column = 0; column < region.cols; ++column) {
@@ -28,7 +28,7 @@ protocol::ChangeClass MostFrequent(const cv::Mat& classes, const cv::Mat& region
 
 /// Lets each labelled region take in pixels of `rim` that no region has, a ring at a time; where
 /// two meet, the one with the greater label goes on. `labels`: CV_16UC1, 0 is none.
-void GrowInto(const cv::Mat& rim, int rings, cv::Mat& labels) {
+void GrowRegionsInto(const cv::Mat& rim, int rings, cv::Mat& labels) {
   for (int i = 0; i < rings; ++i) {
     cv::Mat larger;
     cv::dilate(labels, larger, cv::Mat());
@@ -79,8 +79,8 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
   const double scale = after.cols / kRegionReferenceWidth;
   cv::Mat grown;
   labels.convertTo(grown, CV_16U);
-  GrowInto(score >= options.rim_share * options.min_confidence,
-           static_cast<int>(std::lround(options.rim_px * scale)), grown);
+  GrowRegionsInto(score >= options.rim_share * options.min_confidence,
+                  static_cast<int>(std::lround(options.rim_px * scale)), grown);
   std::optional<ChangeDirectionEstimator> judge;  // Most pictures have nothing to judge.
   std::vector<ChangeRegion> regions;
   for (int i = 1; i < count; ++i) {
@@ -91,7 +91,7 @@ std::vector<ChangeRegion> FindChangeRegions(const ChangeProbabilities& probabili
     const cv::Mat whole = grown == i;
     region.box = cv::boundingRect(whole);
     region.confidence = cv::mean(score, sure)[0];
-    region.change_class = MostFrequent(classes, sure);
+    region.change_class = MostFrequentInRegion(classes, sure);
     if (!judge) judge.emplace(before, after);
     region.direction = judge->Of(sure, region.box);
     regions.push_back(region);

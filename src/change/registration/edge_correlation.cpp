@@ -23,7 +23,7 @@ constexpr double kMinEnergy = 1e-3;
 constexpr int kBlockCells = 32;
 constexpr int kParallaxCells = 5;
 
-cv::Mat GreyOf(const cv::Mat& picture) {
+cv::Mat GreyForEdges(const cv::Mat& picture) {
   if (picture.channels() == 1) return picture;
   cv::Mat grey;
   cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
@@ -37,7 +37,7 @@ struct Gradient {
   cv::Mat y;
 };
 
-Gradient GradientOf(const cv::Mat& grey) {
+Gradient EdgeGradientOf(const cv::Mat& grey) {
   Gradient gradient;
   cv::Mat smooth;
   grey.convertTo(smooth, CV_32FC1);
@@ -58,9 +58,9 @@ Gradient GradientOf(const cv::Mat& grey) {
 }
 
 /// Sums of squares over any rectangle of cells.
-class Energy {
+class EdgeEnergy {
  public:
-  explicit Energy(const cv::Mat& cells) {
+  explicit EdgeEnergy(const cv::Mat& cells) {
     cv::Mat squared;
     cv::transform(cells.mul(cells), squared, cv::Matx14f(1, 1, 1, 1));
     cv::integral(squared, sums_, CV_64F);
@@ -76,21 +76,21 @@ class Energy {
 };
 
 /// The cells that a picture fills when it is scaled about its middle, as far as they are its own.
-cv::Rect FilledBy(double scale, cv::Size size) {
+cv::Rect EdgeCellsFilledBy(double scale, cv::Size size) {
   const int left = std::max(0, cvCeil((1 - scale) * (size.width - 1) / 2));
   const int top = std::max(0, cvCeil((1 - scale) * (size.height - 1) / 2));
   return {left, top, size.width - 2 * left, size.height - 2 * top};
 }
 
 /// One correlation for every shift up to `most`, at one scale of the earlier picture.
-cv::Mat Correlations(const cv::Mat& before, double scale, const cv::Mat& after_padded,
-                     const Energy& after_energy, const cv::Point& most) {
+cv::Mat EdgeCorrelations(const cv::Mat& before, double scale, const cv::Mat& after_padded,
+                         const EdgeEnergy& after_energy, const cv::Point& most) {
   const cv::Matx23d about_the_middle{scale, 0,     (1 - scale) * (before.cols - 1) / 2,
                                      0,     scale, (1 - scale) * (before.rows - 1) / 2};
   cv::Mat scaled;
   cv::warpAffine(before, scaled, about_the_middle, before.size());
-  const Energy before_energy(scaled);
-  const cv::Rect filled = FilledBy(scale, before.size());
+  const EdgeEnergy before_energy(scaled);
+  const cv::Rect filled = EdgeCellsFilledBy(scale, before.size());
   cv::Mat correlations;
   cv::matchTemplate(after_padded, scaled, correlations, cv::TM_CCORR);
   for (int row = 0; row < correlations.rows; ++row) {
@@ -106,7 +106,7 @@ cv::Mat Correlations(const cv::Mat& before, double scale, const cv::Mat& after_p
 }
 
 /// Where a parabola through three values a step apart is highest, in steps from the middle one.
-double Vertex(double before, double here, double after) {
+double CorrelationVertex(double before, double here, double after) {
   const double curvature = before - 2 * here + after;
   if (curvature >= 0) return 0;
   return std::clamp((before - after) / (2 * curvature), -0.5, 0.5);
@@ -119,7 +119,7 @@ struct Peak {
   double correlation = -1;
 };
 
-Peak FindPeak(const std::vector<cv::Mat>& correlations) {
+Peak FindCorrelationPeak(const std::vector<cv::Mat>& correlations) {
   Peak peak;
   for (std::size_t i = 0; i < correlations.size(); ++i) {
     double highest = 0;
@@ -131,7 +131,7 @@ Peak FindPeak(const std::vector<cv::Mat>& correlations) {
 }
 
 /// The highest correlation away from the peak's shift, at any scale.
-double BestElsewhere(const std::vector<cv::Mat>& correlations, const Peak& peak) {
+double BestCorrelationElsewhere(const std::vector<cv::Mat>& correlations, const Peak& peak) {
   const cv::Size size = correlations[0].size();
   cv::Mat elsewhere(size, CV_8UC1, cv::Scalar(255));
   cv::rectangle(elsewhere, peak.shift - cv::Point(kLeadCells, kLeadCells),
@@ -146,7 +146,7 @@ double BestElsewhere(const std::vector<cv::Mat>& correlations, const Peak& peak)
 }
 
 /// The peak's place to a fraction of a step: x, y of the shift and index of the scale.
-cv::Vec3d Refined(const std::vector<cv::Mat>& correlations, const Peak& peak) {
+cv::Vec3d RefinedCorrelationPeak(const std::vector<cv::Mat>& correlations, const Peak& peak) {
   const auto at = [&](int scale, int x, int y) {
     const cv::Mat& values = correlations[static_cast<std::size_t>(scale)];
     return static_cast<double>(values.at<float>(y, x));
@@ -155,23 +155,23 @@ cv::Vec3d Refined(const std::vector<cv::Mat>& correlations, const Peak& peak) {
   const int scale = peak.scale;
   cv::Vec3d refined(x, y, scale);
   if (x > 0 && x + 1 < correlations[0].cols) {
-    refined[0] += Vertex(at(scale, x - 1, y), peak.correlation, at(scale, x + 1, y));
+    refined[0] += CorrelationVertex(at(scale, x - 1, y), peak.correlation, at(scale, x + 1, y));
   }
   if (y > 0 && y + 1 < correlations[0].rows) {
-    refined[1] += Vertex(at(scale, x, y - 1), peak.correlation, at(scale, x, y + 1));
+    refined[1] += CorrelationVertex(at(scale, x, y - 1), peak.correlation, at(scale, x, y + 1));
   }
   if (scale > 0 && scale + 1 < static_cast<int>(correlations.size())) {
-    refined[2] += Vertex(at(scale - 1, x, y), peak.correlation, at(scale + 1, x, y));
+    refined[2] += CorrelationVertex(at(scale - 1, x, y), peak.correlation, at(scale + 1, x, y));
   }
   return refined;
 }
 
 /// The index-th of `search.scales` that rise from one over max_scale to max_scale by one ratio.
-double ScaleAt(double index, const EdgeSearch& search) {
+double CorrelationScaleAt(double index, const EdgeSearch& search) {
   return std::pow(search.max_scale, 2 * index / (search.scales - 1) - 1);
 }
 
-void CheckAlike(const EdgeCells& before, const EdgeCells& after) {
+void CheckEdgeCellsAlike(const EdgeCells& before, const EdgeCells& after) {
   if (before.picture != after.picture || before.cells.size() != after.cells.size()) {
     throw Error("edges of pictures of different sizes cannot be compared");
   }
@@ -196,9 +196,9 @@ EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
   const int cell_px = kWorkingWidth / columns;
   const int rows = static_cast<int>(std::lround(1.0 * columns * picture.rows / picture.cols));
   cv::Mat grey;
-  cv::resize(GreyOf(picture), grey, cv::Size(kWorkingWidth, rows * cell_px), 0, 0,
+  cv::resize(GreyForEdges(picture), grey, cv::Size(kWorkingWidth, rows * cell_px), 0, 0,
              picture.cols > kWorkingWidth ? cv::INTER_AREA : cv::INTER_LINEAR);
-  const Gradient gradient = GradientOf(grey);
+  const Gradient gradient = EdgeGradientOf(grey);
   // Twice the angle: an edge may be dark on the left by day and on the right in snow.
   const cv::Mat cosine = gradient.x.mul(gradient.x) - gradient.y.mul(gradient.y);
   const cv::Mat sine = 2 * gradient.x.mul(gradient.y);
@@ -219,28 +219,28 @@ EdgeCells ExtractEdgeCells(const cv::Mat& picture, EdgeDetail detail) {
 
 EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
                            const EdgeSearch& search) {
-  CheckAlike(before, after);
+  CheckEdgeCellsAlike(before, after);
   const cv::Size size = after.cells.size();
   const cv::Point most(static_cast<int>(search.max_shift_x * size.width),
                        static_cast<int>(search.max_shift_y * size.height));
   cv::Mat padded;
   cv::copyMakeBorder(after.cells, padded, most.y, most.y, most.x, most.x, cv::BORDER_CONSTANT);
-  const Energy after_energy(after.cells);
+  const EdgeEnergy after_energy(after.cells);
   std::vector<cv::Mat> correlations(static_cast<std::size_t>(search.scales));
   cv::parallel_for_(cv::Range(0, search.scales), [&](const cv::Range& scales) {
     for (int i = scales.start; i < scales.end; ++i) {
       correlations[static_cast<std::size_t>(i)] =
-          Correlations(before.cells, ScaleAt(i, search), padded, after_energy, most);
+          EdgeCorrelations(before.cells, CorrelationScaleAt(i, search), padded, after_energy, most);
     }
   });
-  const Peak peak = FindPeak(correlations);
-  const cv::Vec3d refined = Refined(correlations, peak);
+  const Peak peak = FindCorrelationPeak(correlations);
+  const cv::Vec3d refined = RefinedCorrelationPeak(correlations, peak);
 
   EdgeAlignment alignment;
   alignment.correlation = peak.correlation;
-  alignment.lead = peak.correlation - BestElsewhere(correlations, peak);
+  alignment.lead = peak.correlation - BestCorrelationElsewhere(correlations, peak);
   // Cells to pixels; a cell's middle lies half a cell from its edge.
-  const double scale = ScaleAt(refined[2], search);
+  const double scale = CorrelationScaleAt(refined[2], search);
   const cv::Vec2d cell_px(1.0 * before.picture.width / size.width,
                           1.0 * before.picture.height / size.height);
   for (int axis = 0; axis < 2; ++axis) {
@@ -255,7 +255,7 @@ EdgeAlignment AlignByEdges(const EdgeCells& before, const EdgeCells& after,
 }
 
 double EdgeAgreement(const EdgeCells& before, const EdgeCells& after) {
-  CheckAlike(before, after);
+  CheckEdgeCellsAlike(before, after);
   const cv::Rect all(cv::Point(), after.cells.size());
   const int columns = all.width / kBlockCells;
   const int blocks = columns * (all.height / kBlockCells);

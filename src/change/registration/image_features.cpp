@@ -15,7 +15,7 @@ constexpr int kDescriptorBytes = 128;
 
 /// The best partner of each row of `similarity` where it is clear enough. Descriptors have equal
 /// lengths, so that of two the one with the greater product is the nearer.
-std::vector<int> ClearlyNearest(const cv::Mat& squared, double ratio) {
+std::vector<int> ClearlyNearestFeatures(const cv::Mat& squared, double ratio) {
   std::vector<int> nearest(static_cast<std::size_t>(squared.rows), -1);
   for (int row = 0; row < squared.rows; ++row) {
     const auto* distances = squared.ptr<float>(row);
@@ -39,7 +39,7 @@ std::vector<int> ClearlyNearest(const cv::Mat& squared, double ratio) {
 }
 
 /// Squared distances of every row of `a` to every row of `b`: |a|^2 + |b|^2 - 2 ab.
-cv::Mat SquaredDistances(const cv::Mat& a, const cv::Mat& b) {
+cv::Mat SquaredFeatureDistances(const cv::Mat& a, const cv::Mat& b) {
   cv::Mat af;
   cv::Mat bf;
   a.convertTo(af, CV_32FC1);
@@ -82,9 +82,9 @@ std::vector<std::pair<int, int>> MatchFeatures(const ImageFeatures& a, const Ima
                                                double ratio) {
   std::vector<std::pair<int, int>> matches;
   if (a.points.size() < 2 || b.points.size() < 2) return matches;
-  const cv::Mat squared = SquaredDistances(a.descriptors, b.descriptors);
-  const std::vector<int> of_a = ClearlyNearest(squared, ratio);
-  const std::vector<int> of_b = ClearlyNearest(squared.t(), ratio);
+  const cv::Mat squared = SquaredFeatureDistances(a.descriptors, b.descriptors);
+  const std::vector<int> of_a = ClearlyNearestFeatures(squared, ratio);
+  const std::vector<int> of_b = ClearlyNearestFeatures(squared.t(), ratio);
   for (std::size_t i = 0; i < of_a.size(); ++i) {
     if (of_a[i] < 0 || of_b[static_cast<std::size_t>(of_a[i])] != static_cast<int>(i)) continue;
     matches.emplace_back(static_cast<int>(i), of_a[i]);

@@ -1,31 +1,19 @@
 #include "change/registration/registration.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
+#include <cstdio>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "change/registration/depth_image.h"
 #include "change/registration/robust_fit.h"
 
 namespace livemap::change {
 namespace {
 
 constexpr double kReferenceWidth = 640;
-
-std::string Figure(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
-
-void Refuse(RegistrationRefusal refusal, const std::string& why, Registration& registration) {
-  registration.refusal = refusal;
-  registration.why = why;
-}
 
 /// Local magnifications and turn of a homography at a pixel.
 struct LocalShape {
@@ -36,7 +24,7 @@ struct LocalShape {
   double turn_rad = 0;
 };
 
-LocalShape ShapeAt(const cv::Matx33d& h, double x, double y) {
+LocalShape WarpShapeAt(const cv::Matx33d& h, double x, double y) {
   LocalShape shape;
   const double w = h(2, 0) * x + h(2, 1) * y + h(2, 2);
   shape.in_front = w > 1e-6;
@@ -63,32 +51,24 @@ std::string WhyDegenerate(const cv::Matx33d& h, cv::Size size, const Registratio
   const double low = size.height - 1;
   for (const auto& [x, y] :
        {std::pair(0.0, 0.0), {right, 0.0}, {0.0, low}, {right, low}, {right / 2, low / 2}}) {
-    const LocalShape shape = ShapeAt(h, x, y);
+    const LocalShape shape = WarpShapeAt(h, x, y);
     if (!shape.in_front || shape.determinant <= 0) return "the warp mirrors a part of the picture";
     if (shape.greatest > options.max_scale || shape.least * options.max_scale < 1) {
-      return "the warp scales by " + Figure(shape.least) + " to " + Figure(shape.greatest) +
-             ", accepted is up to " + Figure(options.max_scale) + " and its inverse";
+      return "the warp scales by " + RegistrationFigure(shape.least) + " to " +
+             RegistrationFigure(shape.greatest) + ", accepted is up to " +
+             RegistrationFigure(options.max_scale) + " and its inverse";
     }
     if (shape.greatest > options.max_shear * shape.least) {
-      return "the warp shears by " + Figure(shape.greatest / shape.least) + ", accepted is up to " +
-             Figure(options.max_shear);
+      return "the warp shears by " + RegistrationFigure(shape.greatest / shape.least) +
+             ", accepted is up to " + RegistrationFigure(options.max_shear);
     }
     const double turn_deg = std::abs(shape.turn_rad) * 180 / CV_PI;
     if (turn_deg > options.max_turn_deg) {
-      return "the warp turns the picture by " + Figure(turn_deg) + " degrees, accepted are up to " +
-             Figure(options.max_turn_deg);
+      return "the warp turns the picture by " + RegistrationFigure(turn_deg) +
+             " degrees, accepted are up to " + RegistrationFigure(options.max_turn_deg);
     }
   }
   return "";
-}
-
-void CheckSizes(cv::Size before, cv::Size after, Registration& registration) {
-  if (before == after) return;
-  Refuse(RegistrationRefusal::kSize,
-         "the earlier picture is " + std::to_string(before.width) + "x" +
-             std::to_string(before.height) + ", the later one " + std::to_string(after.width) +
-             "x" + std::to_string(after.height),
-         registration);
 }
 
 /// Matched points of both pictures, in one order.
@@ -98,17 +78,17 @@ struct MatchedPoints {
 };
 
 /// The checks that both registrations begin with.
-MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
-                    const RegistrationConfig& options, Registration& registration) {
+MatchedPoints MatchForRegistration(const FeaturedView& before, const FeaturedView& after,
+                                   const RegistrationConfig& options, Registration& registration) {
   MatchedPoints points;
-  CheckSizes(before.size, after.size, registration);
+  CheckRegistrationSizes(before.size, after.size, registration);
   if (!registration.accepted()) return points;
   const std::size_t fewer = std::min(before.features.points.size(), after.features.points.size());
   if (fewer < static_cast<std::size_t>(options.min_features)) {
-    Refuse(RegistrationRefusal::kTexture,
-           "a picture has " + std::to_string(fewer) + " features, accepted are " +
-               std::to_string(options.min_features) + " and more",
-           registration);
+    RefuseRegistration(RegistrationRefusal::kTexture,
+                       "a picture has " + std::to_string(fewer) + " features, accepted are " +
+                           std::to_string(options.min_features) + " and more",
+                       registration);
     return points;
   }
   for (const auto& [a, b] : MatchFeatures(before.features, after.features, options.ratio)) {
@@ -117,10 +97,10 @@ MatchedPoints Match(const FeaturedView& before, const FeaturedView& after,
   }
   registration.matches = points.before.size();
   if (points.before.size() < static_cast<std::size_t>(options.min_matches)) {
-    Refuse(RegistrationRefusal::kMatches,
-           std::to_string(points.before.size()) + " features match, accepted are " +
-               std::to_string(options.min_matches) + " and more",
-           registration);
+    RefuseRegistration(RegistrationRefusal::kMatches,
+                       std::to_string(points.before.size()) + " features match, accepted are " +
+                           std::to_string(options.min_matches) + " and more",
+                       registration);
   }
   return points;
 }
@@ -133,11 +113,12 @@ void CheckInliers(const std::vector<cv::Point2d>& after, const RobustFit& fit, c
   const auto inliers = static_cast<double>(fit.inliers.size());
   if (inliers < options.min_inliers ||
       inliers < options.min_inlier_share * static_cast<double>(registration.matches)) {
-    Refuse(RegistrationRefusal::kInliers,
-           std::to_string(fit.inliers.size()) + " of " + std::to_string(registration.matches) +
-               " matches agree, accepted are " + std::to_string(options.min_inliers) +
-               " and more, and a share of " + Figure(options.min_inlier_share),
-           registration);
+    RefuseRegistration(RegistrationRefusal::kInliers,
+                       std::to_string(fit.inliers.size()) + " of " +
+                           std::to_string(registration.matches) + " matches agree, accepted are " +
+                           std::to_string(options.min_inliers) + " and more, and a share of " +
+                           RegistrationFigure(options.min_inlier_share),
+                       registration);
     return;
   }
   std::vector<cv::Point2f> agreeing;
@@ -146,18 +127,19 @@ void CheckInliers(const std::vector<cv::Point2d>& after, const RobustFit& fit, c
   cv::convexHull(agreeing, hull);
   const double spread = cv::contourArea(hull) / size.area();
   if (spread < options.min_spread) {
-    Refuse(RegistrationRefusal::kSpread,
-           "the matches that agree cover a share of " + Figure(spread) +
-               " of the picture, accepted is " + Figure(options.min_spread) + " and more",
-           registration);
+    RefuseRegistration(RegistrationRefusal::kSpread,
+                       "the matches that agree cover a share of " + RegistrationFigure(spread) +
+                           " of the picture, accepted is " +
+                           RegistrationFigure(options.min_spread) + " and more",
+                       registration);
     return;
   }
   const double max_error_px = options.max_error_px * size.width / kReferenceWidth;
   if (fit.error_px > max_error_px) {
-    Refuse(RegistrationRefusal::kReprojection,
-           "the matches that agree are off by " + Figure(fit.error_px) + " px, accepted is up to " +
-               Figure(max_error_px),
-           registration);
+    RefuseRegistration(RegistrationRefusal::kReprojection,
+                       "the matches that agree are off by " + RegistrationFigure(fit.error_px) +
+                           " px, accepted is up to " + RegistrationFigure(max_error_px),
+                       registration);
   }
 }
 
@@ -177,16 +159,28 @@ double DepthAt(const cv::Mat& depth, const cv::Point2d& point) {
   return z;
 }
 
-/// Runs all of them, in OpenCV's threads; returns when the last is done.
-template <typename... Tasks>
-void InParallel(const Tasks&... tasks) {
-  const std::array<std::function<void()>, sizeof...(Tasks)> all{tasks...};
-  cv::parallel_for_(cv::Range(0, static_cast<int>(all.size())), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) all[static_cast<std::size_t>(i)]();
-  });
+}  // namespace
+
+std::string RegistrationFigure(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3g", value);
+  return text;
 }
 
-}  // namespace
+void RefuseRegistration(RegistrationRefusal refusal, const std::string& why,
+                        Registration& registration) {
+  registration.refusal = refusal;
+  registration.why = why;
+}
+
+void CheckRegistrationSizes(cv::Size before, cv::Size after, Registration& registration) {
+  if (before == after) return;
+  RefuseRegistration(RegistrationRefusal::kSize,
+                     "the earlier picture is " + std::to_string(before.width) + "x" +
+                         std::to_string(before.height) + ", the later one " +
+                         std::to_string(after.width) + "x" + std::to_string(after.height),
+                     registration);
+}
 
 const char* RegistrationRefusalName(RegistrationRefusal refusal) {
   switch (refusal) {
@@ -217,7 +211,7 @@ const char* RegistrationRefusalName(RegistrationRefusal refusal) {
 Registration RegisterByHomography(const FeaturedView& before, const FeaturedView& after,
                                   const RegistrationConfig& options, std::uint64_t seed) {
   Registration registration;
-  const MatchedPoints points = Match(before, after, options, registration);
+  const MatchedPoints points = MatchForRegistration(before, after, options, registration);
   if (!registration.accepted()) return registration;
   const double inlier_px = options.inlier_px * after.size.width / kReferenceWidth;
   const HomographyFit fit =
@@ -227,7 +221,7 @@ Registration RegisterByHomography(const FeaturedView& before, const FeaturedView
   registration.after_from_before = fit.after_from_before;
   const std::string degenerate = WhyDegenerate(fit.after_from_before, after.size, options);
   if (!degenerate.empty()) {
-    Refuse(RegistrationRefusal::kDegenerate, degenerate, registration);
+    RefuseRegistration(RegistrationRefusal::kDegenerate, degenerate, registration);
     return registration;
   }
   const cv::Mat full(before.size, CV_8UC1, cv::Scalar(255));
@@ -235,53 +229,13 @@ Registration RegisterByHomography(const FeaturedView& before, const FeaturedView
   return registration;
 }
 
-Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
-                             const RegistrationConfig& options) {
-  Registration registration;
-  CheckSizes(before.size(), after.size(), registration);
-  if (!registration.accepted()) return registration;
-  if (!HasEdgeCells(after.size())) {
-    Refuse(RegistrationRefusal::kEdges,
-           "the pictures are " + std::to_string(after.cols) + "x" + std::to_string(after.rows) +
-               ", for their edges 32x32 and more are accepted, a side up to four times the other",
-           registration);
-    return registration;
-  }
-  // Filters of small pictures leave most cores idle: the pictures are looked at side by side.
-  EdgeCells before_coarse;
-  EdgeCells after_coarse;
-  EdgeCells after_fine;
-  InParallel([&] { before_coarse = ExtractEdgeCells(before, EdgeDetail::kCoarse); },
-             [&] { after_coarse = ExtractEdgeCells(after, EdgeDetail::kCoarse); },
-             [&] { after_fine = ExtractEdgeCells(after, EdgeDetail::kFine); });
-  const EdgeAlignment alignment = AlignByEdges(before_coarse, after_coarse, options.edges);
-  cv::Mat aligned;
-  cv::warpPerspective(before, aligned, alignment.after_from_before, before.size(), cv::INTER_LINEAR,
-                      cv::BORDER_REPLICATE);
-  const double agreement = EdgeAgreement(ExtractEdgeCells(aligned, EdgeDetail::kFine), after_fine);
-  registration.edge_evidence = alignment.correlation + alignment.lead + agreement;
-  if (registration.edge_evidence < options.min_edge_evidence) {
-    Refuse(RegistrationRefusal::kEdges,
-           "the edges correlate by " + Figure(alignment.correlation) + ", " +
-               Figure(alignment.lead) + " above any other place, and agree by " +
-               Figure(agreement) + " in detail, accepted is a sum of " +
-               Figure(options.min_edge_evidence) + " and more",
-           registration);
-    return registration;
-  }
-  registration.after_from_before = alignment.after_from_before;
-  const cv::Mat full(before.size(), CV_8UC1, cv::Scalar(255));
-  CheckOverlap(WarpByHomography(full, alignment.after_from_before), options, registration);
-  return registration;
-}
-
 Registration RegisterByDepth(const FeaturedView& before, const geo::CameraIntrinsics& before_camera,
                              const FeaturedView& after, const geo::CameraIntrinsics& after_camera,
                              const cv::Mat& after_depth, const RegistrationConfig& options,
                              std::uint64_t seed) {
-  CheckDepth(after_depth, after.size);
+  CheckDepthImage(after_depth, after.size);
   Registration registration;
-  const MatchedPoints points = Match(before, after, options, registration);
+  const MatchedPoints points = MatchForRegistration(before, after, options, registration);
   if (!registration.accepted()) return registration;
   std::vector<cv::Point3d> places;
   std::vector<cv::Point2d> seen;
@@ -297,10 +251,10 @@ Registration RegisterByDepth(const FeaturedView& before, const geo::CameraIntrin
   }
   registration.matches = places.size();
   if (places.size() < static_cast<std::size_t>(options.min_matches)) {
-    Refuse(RegistrationRefusal::kMatches,
-           std::to_string(places.size()) + " features with depth match, accepted are " +
-               std::to_string(options.min_matches) + " and more",
-           registration);
+    RefuseRegistration(RegistrationRefusal::kMatches,
+                       std::to_string(places.size()) + " features with depth match, accepted are " +
+                           std::to_string(options.min_matches) + " and more",
+                       registration);
     return registration;
   }
   const double inlier_px = options.inlier_px * after.size.width / kReferenceWidth;
@@ -312,11 +266,13 @@ Registration RegisterByDepth(const FeaturedView& before, const geo::CameraIntrin
   const double rotation_deg =
       Eigen::AngleAxisd(fit.camera_from_world.linear()).angle() * 180 / CV_PI;
   if (baseline_m > options.max_baseline_m || rotation_deg > options.max_rotation_deg) {
-    Refuse(RegistrationRefusal::kDegenerate,
-           "the cameras are " + Figure(baseline_m) + " m and " + Figure(rotation_deg) +
-               " degrees apart, accepted are up to " + Figure(options.max_baseline_m) + " and " +
-               Figure(options.max_rotation_deg),
-           registration);
+    RefuseRegistration(RegistrationRefusal::kDegenerate,
+                       "the cameras are " + RegistrationFigure(baseline_m) + " m and " +
+                           RegistrationFigure(rotation_deg) +
+                           " degrees apart, accepted are up to " +
+                           RegistrationFigure(options.max_baseline_m) + " and " +
+                           RegistrationFigure(options.max_rotation_deg),
+                       registration);
   }
   return registration;
 }
@@ -326,10 +282,11 @@ void CheckOverlap(const WarpedPicture& warped, const RegistrationConfig& options
   if (!registration.accepted()) return;
   registration.overlap = warped.ValidShare();
   if (registration.overlap >= options.min_overlap) return;
-  Refuse(RegistrationRefusal::kOverlap,
-         "the earlier picture covers a share of " + Figure(registration.overlap) +
-             " of the later one, accepted is " + Figure(options.min_overlap) + " and more",
-         registration);
+  RefuseRegistration(
+      RegistrationRefusal::kOverlap,
+      "the earlier picture covers a share of " + RegistrationFigure(registration.overlap) +
+          " of the later one, accepted is " + RegistrationFigure(options.min_overlap) + " and more",
+      registration);
 }
 
 }  // namespace livemap::change

@@ -8,6 +8,7 @@
 
 #include "change/registration/edge_correlation.h"
 #include "change/registration/image_features.h"
+#include "change/registration/warp.h"
 #include "geo/camera_intrinsics.h"
 
 namespace livemap::change {
@@ -83,14 +84,6 @@ struct FeaturedView {
 Registration RegisterByHomography(const FeaturedView& before, const FeaturedView& after,
                                   const RegistrationConfig& options, std::uint64_t seed);
 
-/// Finds the scale and the shift by which the earlier picture's edges fit the later one's. It needs
-/// no feature to look the same, and so works across seasons where RegisterByHomography does not; it
-/// costs half of that. What it leaves out is that a second drive also turns and shears the view: on
-/// a road by little. Pictures: 8 bit, grey or BGR; Error otherwise. Sizes without HasEdgeCells are
-/// refused.
-Registration RegisterByEdges(const cv::Mat& before, const cv::Mat& after,
-                             const RegistrationConfig& options);
-
 /// Finds the pose of the earlier camera from matches whose place in the later picture has a depth:
 /// RANSAC over a perspective-three-point solver, then Levenberg-Marquardt. `after_depth` is
 /// CV_32FC1, metres along the optical axis, 0 or NaN: unknown; Error when it has not the size of
@@ -101,33 +94,13 @@ Registration RegisterByDepth(const FeaturedView& before, const geo::CameraIntrin
                              const cv::Mat& after_depth, const RegistrationConfig& options,
                              std::uint64_t seed);
 
-/// The earlier picture in the later one's view.
-struct WarpedPicture {
-  cv::Mat picture;  ///< As the earlier picture; black where not valid.
-  cv::Mat valid;    ///< CV_8UC1: 255 where the earlier picture shows what stands there, else 0.
-
-  double ValidShare() const;
-};
-
-/// `before` of any 8-bit type; the result has its size.
-WarpedPicture WarpByHomography(const cv::Mat& before, const cv::Matx33d& after_from_before);
-
-/// Limits of WarpByDepth.
-struct DepthWarpConfig {
-  /// What lies this much further than the nearest thing on the same ray is hidden: share of the
-  /// distance, and metres.
-  double occlusion_share = 0.04;
-  double occlusion_m = 0.2;
-};
-
-/// Each pixel of the later view is placed by its depth, seen from the earlier camera and taken from
-/// there; a z-buffer of the earlier view says what was hidden from it. Not valid are pixels without
-/// depth, beyond the earlier picture, or hidden. Sizes as in RegisterByDepth; Error otherwise.
-WarpedPicture WarpByDepth(const cv::Mat& before, const geo::CameraIntrinsics& before_camera,
-                          const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
-                          const Eigen::Isometry3d& before_from_after,
-                          const DepthWarpConfig& options = {});
-
+/// A figure as sentences of a refusal have it.
+std::string RegistrationFigure(double value);
+/// Sets the refusal and its sentence.
+void RefuseRegistration(RegistrationRefusal refusal, const std::string& why,
+                        Registration& registration);
+/// Refuses pictures of two sizes.
+void CheckRegistrationSizes(cv::Size before, cv::Size after, Registration& registration);
 /// Refuses an accepted registration whose warp covers too little.
 void CheckOverlap(const WarpedPicture& warped, const RegistrationConfig& options,
                   Registration& registration);

@@ -8,9 +8,6 @@
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
-#include <string>
-
-#include "common/error.h"
 
 namespace livemap::change {
 namespace {
@@ -26,7 +23,7 @@ using Sample = std::array<std::size_t, kSample>;
 
 /// Four different indices below `count`. std::uniform_int_distribution may differ between standard
 /// libraries; a plain remainder's bias is nothing here.
-Sample DrawSample(std::size_t count, std::mt19937_64& random) {
+Sample DrawFitSample(std::size_t count, std::mt19937_64& random) {
   Sample sample{};
   for (std::size_t i = 0; i < kSample; ++i) {
     do {
@@ -37,7 +34,7 @@ Sample DrawSample(std::size_t count, std::mt19937_64& random) {
 }
 
 /// Tries that find one sample of inliers only, with kConfidence.
-int TriesWanted(std::size_t inliers, std::size_t count, int most) {
+int FitTriesWanted(std::size_t inliers, std::size_t count, int most) {
   const double share = static_cast<double>(inliers) / static_cast<double>(count);
   const double all_good = std::pow(share, kSample);
   if (all_good > 1 - 1e-9) return 1;
@@ -46,7 +43,7 @@ int TriesWanted(std::size_t inliers, std::size_t count, int most) {
 }
 
 /// `errors`: squared pixels.
-RobustFit Agreeing(const std::vector<double>& errors, double inlier_px) {
+RobustFit RobustFitOf(const std::vector<double>& errors, double inlier_px) {
   RobustFit fit;
   const double most = inlier_px * inlier_px;
   double sum = 0;
@@ -61,8 +58,9 @@ RobustFit Agreeing(const std::vector<double>& errors, double inlier_px) {
   return fit;
 }
 
-std::vector<double> HomographyErrors(const cv::Matx33d& h, const std::vector<cv::Point2d>& before,
-                                     const std::vector<cv::Point2d>& after) {
+std::vector<double> HomographyFitErrors(const cv::Matx33d& h,
+                                        const std::vector<cv::Point2d>& before,
+                                        const std::vector<cv::Point2d>& after) {
   std::vector<double> errors(before.size(), kFar);
   for (std::size_t i = 0; i < before.size(); ++i) {
     const cv::Vec3d place = h * cv::Vec3d(before[i].x, before[i].y, 1);
@@ -75,8 +73,8 @@ std::vector<double> HomographyErrors(const cv::Matx33d& h, const std::vector<cv:
 }
 
 /// A mirrored triangle cannot come from a plane seen twice from the front.
-bool KeepsOrientation(const std::array<cv::Point2f, kSample>& from,
-                      const std::array<cv::Point2f, kSample>& to) {
+bool FitKeepsOrientation(const std::array<cv::Point2f, kSample>& from,
+                         const std::array<cv::Point2f, kSample>& to) {
   for (std::size_t skipped = 0; skipped < kSample; ++skipped) {
     std::array<std::size_t, 3> corner{};
     for (std::size_t i = 0, j = 0; i < kSample; ++i) {
@@ -95,23 +93,23 @@ bool KeepsOrientation(const std::array<cv::Point2f, kSample>& from,
   return true;
 }
 
-cv::Matx33d HomographyOf(const Sample& sample, const std::vector<cv::Point2d>& before,
-                         const std::vector<cv::Point2d>& after) {
+cv::Matx33d HomographyFitOf(const Sample& sample, const std::vector<cv::Point2d>& before,
+                            const std::vector<cv::Point2d>& after) {
   std::array<cv::Point2f, kSample> from;
   std::array<cv::Point2f, kSample> to;
   for (std::size_t i = 0; i < kSample; ++i) {
     from[i] = before[sample[i]];
     to[i] = after[sample[i]];
   }
-  if (!KeepsOrientation(from, to)) return cv::Matx33d::zeros();
+  if (!FitKeepsOrientation(from, to)) return cv::Matx33d::zeros();
   return cv::getPerspectiveTransform(from.data(), to.data());
 }
 
 /// One step of Gauss and Newton on the eight numbers of a homography, each match weighted by
 /// Cauchy's 1 / (1 + error^2 / scale^2): the inliers' own outliers must not pull it.
-cv::Matx33d StepHomography(const cv::Matx33d& h, const std::vector<cv::Point2d>& before,
-                           const std::vector<cv::Point2d>& after,
-                           const std::vector<std::size_t>& inliers, double scale_px) {
+cv::Matx33d StepHomographyFit(const cv::Matx33d& h, const std::vector<cv::Point2d>& before,
+                              const std::vector<cv::Point2d>& after,
+                              const std::vector<std::size_t>& inliers, double scale_px) {
   Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
   Eigen::Matrix<double, 8, 1> right = Eigen::Matrix<double, 8, 1>::Zero();
   for (const std::size_t i : inliers) {
@@ -140,7 +138,7 @@ cv::Matx33d StepHomography(const cv::Matx33d& h, const std::vector<cv::Point2d>&
 }
 
 /// The inliers' own scale: what half of them keep to, as a standard deviation.
-double ScaleOf(const std::vector<double>& errors, const std::vector<std::size_t>& inliers) {
+double RobustScaleOf(const std::vector<double>& errors, const std::vector<std::size_t>& inliers) {
   std::vector<double> kept;
   kept.reserve(inliers.size());
   for (const std::size_t i : inliers) kept.push_back(errors[i]);
@@ -150,23 +148,24 @@ double ScaleOf(const std::vector<double>& errors, const std::vector<std::size_t>
 }
 
 /// Fits the inliers and takes in what then agrees, as long as none is lost.
-void RefineHomography(const std::vector<cv::Point2d>& before, const std::vector<cv::Point2d>& after,
-                      double inlier_px, HomographyFit& best) {
+void RefineHomographyFit(const std::vector<cv::Point2d>& before,
+                         const std::vector<cv::Point2d>& after, double inlier_px,
+                         HomographyFit& best) {
   for (int i = 0; i < kRefinements && best.fit.inliers.size() > kSample; ++i) {
     const cv::Matx33d h = best.after_from_before * (1 / best.after_from_before(2, 2));
-    const double scale_px = ScaleOf(HomographyErrors(h, before, after), best.fit.inliers);
-    const cv::Matx33d refined = StepHomography(h, before, after, best.fit.inliers, scale_px);
-    const RobustFit fit = Agreeing(HomographyErrors(refined, before, after), inlier_px);
+    const double scale_px = RobustScaleOf(HomographyFitErrors(h, before, after), best.fit.inliers);
+    const cv::Matx33d refined = StepHomographyFit(h, before, after, best.fit.inliers, scale_px);
+    const RobustFit fit = RobustFitOf(HomographyFitErrors(refined, before, after), inlier_px);
     if (fit.inliers.size() < best.fit.inliers.size()) return;
     best = {fit, refined};
   }
 }
 
-cv::Matx33d MatrixOf(const geo::CameraIntrinsics& camera) {
+cv::Matx33d CameraMatrixForFit(const geo::CameraIntrinsics& camera) {
   return {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
 }
 
-Eigen::Isometry3d PoseOf(const cv::Vec3d& rotation, const cv::Vec3d& translation) {
+Eigen::Isometry3d FittedPoseOf(const cv::Vec3d& rotation, const cv::Vec3d& translation) {
   cv::Matx33d matrix;
   cv::Rodrigues(rotation, matrix);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -177,10 +176,10 @@ Eigen::Isometry3d PoseOf(const cv::Vec3d& rotation, const cv::Vec3d& translation
   return pose;
 }
 
-std::vector<double> PoseErrors(const Eigen::Isometry3d& pose,
-                               const std::vector<cv::Point3d>& places,
-                               const std::vector<cv::Point2d>& seen,
-                               const geo::CameraIntrinsics& camera) {
+std::vector<double> PoseFitErrors(const Eigen::Isometry3d& pose,
+                                  const std::vector<cv::Point3d>& places,
+                                  const std::vector<cv::Point2d>& seen,
+                                  const geo::CameraIntrinsics& camera) {
   std::vector<double> errors(places.size(), kFar);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Eigen::Vector3d point = pose * Eigen::Vector3d(places[i].x, places[i].y, places[i].z);
@@ -199,8 +198,8 @@ struct CameraPose {
   bool found = false;
 };
 
-CameraPose PoseOfSample(const Sample& sample, const std::vector<cv::Point3d>& places,
-                        const std::vector<cv::Point2d>& seen, const cv::Matx33d& matrix) {
+CameraPose PoseFitOfSample(const Sample& sample, const std::vector<cv::Point3d>& places,
+                           const std::vector<cv::Point2d>& seen, const cv::Matx33d& matrix) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
   for (const std::size_t index : sample) {
@@ -223,14 +222,14 @@ HomographyFit FitHomography(const std::vector<cv::Point2d>& before,
   std::mt19937_64 random(seed);
   int wanted = max_tries;
   for (int i = 0; i < wanted; ++i) {
-    const cv::Matx33d h = HomographyOf(DrawSample(before.size(), random), before, after);
+    const cv::Matx33d h = HomographyFitOf(DrawFitSample(before.size(), random), before, after);
     if (h(2, 2) == 0) continue;
-    const RobustFit fit = Agreeing(HomographyErrors(h, before, after), inlier_px);
+    const RobustFit fit = RobustFitOf(HomographyFitErrors(h, before, after), inlier_px);
     if (fit.inliers.size() < kSample || fit.cost >= best.fit.cost) continue;
     best = {fit, h};
     // A sample of four carries their noise; refined it also finds the inliers it missed.
-    RefineHomography(before, after, inlier_px, best);
-    wanted = TriesWanted(best.fit.inliers.size(), before.size(), max_tries);
+    RefineHomographyFit(before, after, inlier_px, best);
+    wanted = FitTriesWanted(best.fit.inliers.size(), before.size(), max_tries);
   }
   return best;
 }
@@ -240,19 +239,20 @@ PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Po
                 std::uint64_t seed) {
   PoseFit best;
   if (places.size() < kSample) return best;
-  const cv::Matx33d matrix = MatrixOf(camera);
+  const cv::Matx33d matrix = CameraMatrixForFit(camera);
   std::mt19937_64 random(seed);
   CameraPose pose;
   int wanted = max_tries;
   for (int i = 0; i < wanted; ++i) {
-    const CameraPose tried = PoseOfSample(DrawSample(places.size(), random), places, seen, matrix);
+    const CameraPose tried =
+        PoseFitOfSample(DrawFitSample(places.size(), random), places, seen, matrix);
     if (!tried.found) continue;
-    const Eigen::Isometry3d transform = PoseOf(tried.rotation, tried.translation);
-    const RobustFit fit = Agreeing(PoseErrors(transform, places, seen, camera), inlier_px);
+    const Eigen::Isometry3d transform = FittedPoseOf(tried.rotation, tried.translation);
+    const RobustFit fit = RobustFitOf(PoseFitErrors(transform, places, seen, camera), inlier_px);
     if (fit.inliers.size() < kSample || fit.cost >= best.fit.cost) continue;
     best = {fit, transform};
     pose = tried;
-    wanted = TriesWanted(fit.inliers.size(), places.size(), max_tries);
+    wanted = FitTriesWanted(fit.inliers.size(), places.size(), max_tries);
   }
   for (int i = 0; i < kRefinements && best.fit.inliers.size() > kSample; ++i) {
     std::vector<cv::Point3d> points;
@@ -262,19 +262,12 @@ PoseFit FitPose(const std::vector<cv::Point3d>& places, const std::vector<cv::Po
       pixels.push_back(seen[index]);
     }
     cv::solvePnPRefineLM(points, pixels, matrix, cv::noArray(), pose.rotation, pose.translation);
-    const Eigen::Isometry3d transform = PoseOf(pose.rotation, pose.translation);
-    const RobustFit fit = Agreeing(PoseErrors(transform, places, seen, camera), inlier_px);
+    const Eigen::Isometry3d transform = FittedPoseOf(pose.rotation, pose.translation);
+    const RobustFit fit = RobustFitOf(PoseFitErrors(transform, places, seen, camera), inlier_px);
     if (fit.inliers.size() < best.fit.inliers.size()) break;
     best = {fit, transform};
   }
   return best;
-}
-
-void CheckDepth(const cv::Mat& depth, cv::Size size) {
-  if (depth.type() == CV_32FC1 && depth.size() == size) return;
-  throw Error("a depth image is " + std::to_string(depth.cols) + "x" + std::to_string(depth.rows) +
-              ", accepted is single precision of its picture's size, " +
-              std::to_string(size.width) + "x" + std::to_string(size.height));
 }
 
 }  // namespace livemap::change

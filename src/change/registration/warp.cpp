@@ -1,11 +1,11 @@
-// The earlier picture in the later one's view: by a homography, or by depth.
+#include "change/registration/warp.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "change/registration/registration.h"
-#include "change/registration/robust_fit.h"
+#include "change/registration/depth_image.h"
 
 namespace livemap::change {
 namespace {
@@ -17,9 +17,9 @@ struct Places {
   cv::Mat distance;  ///< Along the earlier camera's axis, metres.
 };
 
-Places PlacesInBefore(const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
-                      const geo::CameraIntrinsics& before_camera,
-                      const Eigen::Isometry3d& before_from_after) {
+Places WarpedPlacesInBefore(const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
+                            const geo::CameraIntrinsics& before_camera,
+                            const Eigen::Isometry3d& before_from_after) {
   constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   Places places;
   for (cv::Mat* image : {&places.column, &places.row, &places.distance}) {
@@ -43,20 +43,20 @@ Places PlacesInBefore(const cv::Mat& after_depth, const geo::CameraIntrinsics& a
   return places;
 }
 
-bool IsWithin(float column, float row, cv::Size size) {
+bool IsWarpedWithin(float column, float row, cv::Size size) {
   return column >= 0 && row >= 0 && column <= static_cast<float>(size.width - 1) &&
          row <= static_cast<float>(size.height - 1);
 }
 
 /// Distance of the nearest thing per pixel of the earlier view. Each place is spread over the four
 /// pixels around it, so that a surface seen larger there has no holes up to twice the size.
-cv::Mat DepthBuffer(const Places& places, cv::Size size) {
+cv::Mat DepthBufferForWarp(const Places& places, cv::Size size) {
   cv::Mat buffer(size, CV_32FC1, cv::Scalar(std::numeric_limits<float>::max()));
   for (int row = 0; row < places.row.rows; ++row) {
     for (int column = 0; column < places.row.cols; ++column) {
       const float x = places.column.at<float>(row, column);
       const float y = places.row.at<float>(row, column);
-      if (!IsWithin(x, y, size)) continue;
+      if (!IsWarpedWithin(x, y, size)) continue;
       const int left = static_cast<int>(x);
       const int top = static_cast<int>(y);
       for (int v = top; v <= std::min(top + 1, size.height - 1); ++v) {
@@ -91,16 +91,17 @@ WarpedPicture WarpByDepth(const cv::Mat& before, const geo::CameraIntrinsics& be
                           const cv::Mat& after_depth, const geo::CameraIntrinsics& after_camera,
                           const Eigen::Isometry3d& before_from_after,
                           const DepthWarpConfig& options) {
-  CheckDepth(after_depth, cv::Size(after_camera.width, after_camera.height));
-  const Places places = PlacesInBefore(after_depth, after_camera, before_camera, before_from_after);
-  const cv::Mat buffer = DepthBuffer(places, before.size());
+  CheckDepthImage(after_depth, cv::Size(after_camera.width, after_camera.height));
+  const Places places =
+      WarpedPlacesInBefore(after_depth, after_camera, before_camera, before_from_after);
+  const cv::Mat buffer = DepthBufferForWarp(places, before.size());
   WarpedPicture warped;
   warped.valid = cv::Mat::zeros(after_depth.size(), CV_8UC1);
   for (int row = 0; row < after_depth.rows; ++row) {
     for (int column = 0; column < after_depth.cols; ++column) {
       const float x = places.column.at<float>(row, column);
       const float y = places.row.at<float>(row, column);
-      if (!IsWithin(x, y, before.size())) continue;
+      if (!IsWarpedWithin(x, y, before.size())) continue;
       const auto nearest = static_cast<double>(
           buffer.at<float>(static_cast<int>(std::lround(y)), static_cast<int>(std::lround(x))));
       const auto distance = static_cast<double>(places.distance.at<float>(row, column));

@@ -7,10 +7,10 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "change/measures/change_metrics.h"
 #include "change/measures/change_predictions.h"
 #include "common/error.h"
 #include "protocol/change_class.h"
+#include "test/support/oriented_jpeg.h"
 #include "test/support/temporary_directory.h"
 
 namespace livemap::change {
@@ -197,6 +197,114 @@ TEST_F(ChangePairsTest, TellsIndicesFromTwoValues) {
               HasSubstr("16 bits"));
 }
 
+TEST_F(ChangePairsTest, RefusesGreyMasksInThreeChannelsUnlessANeighbourHasColours) {
+  WriteSequencePair("raw/000", "00");
+  cv::Mat mask(6, 8, CV_8UC3, cv::Scalar(0, 0, 0));
+  mask.at<cv::Vec3b>(2, 3) = {255, 255, 255};
+  const auto why = [&] {
+    return WhyRefused([&] { LoadChangePair(FindChangePairs(folder_.path())[0]); });
+  };
+  const cv::Mat black(6, 8, CV_8UC3, cv::Scalar(0, 0, 0));
+  const cv::Mat indices(6, 8, CV_8UC3, cv::Scalar(3, 3, 3));
+  for (const cv::Mat& ambiguous : {mask, black, indices}) {
+    Write("raw/000/GT/gt00.png", ambiguous);
+    EXPECT_THAT(why(), AllOf(HasSubstr("gt00.png"), HasSubstr("8 bits, three channels"),
+                             HasSubstr("accepted are one channel")));
+  }
+  Write("raw/000/GT/gt00.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(255, 255, 255)));
+  EXPECT_EQ(why(), "") << "no change, as every published mask of an unchanged street is";
+  Write("raw/000/GT/gt00.png", mask);
+  WriteSequencePair("raw/000", "01");
+  Write("raw/000/GT/gt01.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(29, 230, 181)));
+  const ChangePair pair = LoadChangePair(FindChangePairs(folder_.path())[0]);
+  EXPECT_EQ(cv::countNonZero(pair.truth == int{kLeftOutPixel}), 47);
+  EXPECT_EQ(pair.truth.at<std::uint8_t>(2, 3), 0);
+}
+
+TEST_F(ChangePairsTest, ReadsZeroAnd255AsLeftOutWhereANeighbourHasClassesAndAsChangeElsewhere) {
+  cv::Mat mask = cv::Mat::zeros(6, 8, CV_8UC1);
+  mask.at<std::uint8_t>(2, 3) = 255;
+  for (const char* number : {"00", "01"}) {
+    WriteSequencePair("raw/000", number);
+    Write(std::string("raw/000/GT/gt") + number + ".png", mask);
+  }
+  EXPECT_EQ(cv::countNonZero(LoadChangePair(FindChangePairs(folder_.path())[0]).truth == 1), 1);
+  Write("raw/000/GT/gt01.png", cv::Mat(6, 8, CV_8UC1, cv::Scalar(7)));
+  const ChangePair pair = LoadChangePair(FindChangePairs(folder_.path())[0]);
+  EXPECT_TRUE(pair.with_classes);
+  EXPECT_EQ(pair.truth.at<std::uint8_t>(2, 3), kLeftOutPixel) << "a street without a change";
+  EXPECT_EQ(cv::countNonZero(pair.truth), 1);
+}
+
+TEST_F(ChangePairsTest, RefusesMasksWithTransparencyAndMasksThatNothingIsLeftOf) {
+  cv::Mat transparent(1, 200, CV_8UC4, cv::Scalar(255, 255, 255, 255));
+  transparent.at<cv::Vec4b>(0, 0)[3] = 0;
+  EXPECT_THAT(WhyRefused([&] { DecodeChangeMask(transparent, "gt.png"); }),
+              AllOf(HasSubstr("gt.png"), HasSubstr("transparent")));
+  std::vector<cv::Vec3b> rgb(200, {0, 0, 0});
+  rgb[7] = {128, 0, 0};  // Of a palette of another data set.
+  EXPECT_THAT(WhyRefused([&] { DecodeChangeMask(Colours(rgb), "gt.png"); }),
+              AllOf(HasSubstr("1 of 200"), HasSubstr("the others are black")));
+}
+
+TEST_F(ChangePairsTest, ReadsAJpegMaskOfTwoValuesAndRefusesOthers) {
+  Write("t0/a.png", Picture(64, 64));
+  Write("t1/a.png", Picture(64, 64));
+  cv::Mat mask = cv::Mat::zeros(64, 64, CV_8UC1);
+  mask(cv::Rect(16, 16, 32, 32)) = 255;
+  Write("mask/a.jpg", mask);
+  const ChangePair pair = LoadChangePair(FindChangePairs(folder_.path())[0]);
+  EXPECT_FALSE(pair.with_classes);
+  EXPECT_NEAR(cv::countNonZero(pair.truth == 1), 32 * 32, 64);
+  mask(cv::Rect(16, 16, 32, 32)) = 5;
+  Write("mask/a.jpg", mask);
+  EXPECT_THAT(WhyRefused([&] { LoadChangePair(FindChangePairs(folder_.path())[0]); }),
+              AllOf(HasSubstr("a.jpg"), HasSubstr("JPEG"), HasSubstr("PNG")));
+}
+
+TEST_F(ChangePairsTest, ValuesThatAJpegsLossesMadeAreNoClasses) {
+  for (const std::string name : {"a", "b"}) {
+    Write("t0/" + name + ".png", Picture(64, 64));
+    Write("t1/" + name + ".png", Picture(64, 64));
+    cv::Mat mask = cv::Mat::zeros(64, 64, CV_8UC1);
+    mask(cv::Rect(13, 11, 31, 29)) = 255;
+    Write("mask/" + name + ".jpg", mask);
+    const cv::Mat lossy = ReadPicture(folder_.path() + "/mask/" + name + ".jpg",
+                                      imaging::DecodeConfig::Pixels::kAsStored);
+    ASSERT_GT(cv::countNonZero((lossy >= 1) & (lossy <= 9)), 0) << "else this tests nothing";
+  }
+  for (const ChangePairFiles& files : FindChangePairs(folder_.path())) {
+    const ChangePair pair = LoadChangePair(files);
+    EXPECT_FALSE(pair.with_classes);
+    EXPECT_EQ(cv::countNonZero(pair.truth == int{kLeftOutPixel}), 0);
+    EXPECT_EQ(cv::countNonZero(pair.truth == 1), 31 * 29);
+  }
+}
+
+TEST_F(ChangePairsTest, PairsPicturesByTheirNumberHoweverItIsWritten) {
+  for (const int number : {0, 2, 10}) {
+    const std::string text = std::to_string(number);
+    Write("raw/000/RGB/1_0" + text + ".PNG", Picture(8, 6, 50));
+    Write("raw/000/RGB/2_" + text + ".jpeg", Picture(8, 6, 150));
+    Write("raw/000/GT/gt" + text + ".png", cv::Mat::zeros(6, 8, CV_8UC1));
+  }
+  EXPECT_THAT(Names(), testing::ElementsAre("000/0", "000/2", "000/10"));
+  EXPECT_THAT(FindChangePairs(folder_.path())[2].before, HasSubstr("1_010.PNG"));
+  Write("raw/000/GT/gt002.png", cv::Mat::zeros(6, 8, CV_8UC1));
+  EXPECT_THAT(WhyRefused([&] { FindChangePairs(folder_.path()); }),
+              AllOf(HasSubstr("gt2.png"), HasSubstr("gt002.png")));
+}
+
+TEST_F(ChangePairsTest, TurnsPicturesAsTheirExifSays) {
+  Write("mask/a.png", cv::Mat::zeros(8, 6, CV_8UC1));
+  Write("t1/a.png", Picture(6, 8));
+  std::filesystem::create_directories(folder_.path() + "/t0");
+  const std::vector<std::uint8_t> file = test::OrientedJpeg(Picture(8, 6), 6);
+  std::ofstream(folder_.path() + "/t0/a.jpg", std::ios::binary)
+      .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
+  EXPECT_EQ(LoadChangePair(FindChangePairs(folder_.path())[0]).before.size(), cv::Size(6, 8));
+}
+
 std::string Npy(const std::string& type, const std::string& order, const std::string& shape,
                 const std::string& data) {
   std::string header =
@@ -254,6 +362,19 @@ TEST_F(ChangePairsTest, PredictionsAreFoundByThePairsName) {
                 ReadPrediction(folder, "000/01", {8, 6});
               }),
               AllOf(HasSubstr("000/01"), HasSubstr("missing")));
+  Write("predictions/000/02.png", cv::Mat::eye(6, 8, CV_8UC1));
+  EXPECT_THAT(WhyRefused([&] {
+                ReadPrediction(folder, "000/02", {8, 6});
+              }),
+              AllOf(HasSubstr("000/02.png"), HasSubstr("may be classes")));
+  Write("predictions/000/03.png", cv::Mat(6, 8, CV_8UC1, cv::Scalar(9)));
+  EXPECT_THAT(WhyRefused([&] {
+                ReadPrediction(folder, "000/03", {8, 6});
+              }),
+              AllOf(HasSubstr("000/03.png"), HasSubstr("0 to 9"), HasSubstr("may be classes")));
+  Write("predictions/000/04.png", cv::Mat(6, 8, CV_8UC1, cv::Scalar(51)));
+  std::filesystem::rename(folder + "/000/04.png", folder + "/000/04.PNG");
+  EXPECT_FLOAT_EQ(ReadPrediction(folder, "000/04", {8, 6}).of_class[1].at<float>(0, 0), 0.2F);
   WriteScorePicture(folder + "/001/00.png", scores);
   EXPECT_NEAR(ReadPrediction(folder, "001/00", {8, 6}).of_class[1].at<float>(5, 7), 0.2F, 1e-5F);
 }

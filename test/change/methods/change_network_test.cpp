@@ -207,7 +207,8 @@ std::vector<std::string> GoldenManifests() {
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       std::filesystem::path path = entry.path();
       if (path.extension() != ".yaml" || path.stem().extension() == ".golden") continue;
-      if (YAML::LoadFile(path.string())["kind"].IsDefined()) paths.push_back(path.string());
+      const YAML::Node kind = YAML::LoadFile(path.string())["kind"];
+      if (kind.IsDefined() && kind.as<std::string>() == "change") paths.push_back(path.string());
     }
   }
   return paths;

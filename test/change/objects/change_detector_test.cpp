@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "change/objects/change_overlay.h"
 #include "common/error.h"
 #include "simulation/motion/pass_drive.h"
 #include "simulation/render/lighting.h"

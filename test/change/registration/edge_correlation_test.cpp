@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "change/registration/edge_registration.h"
 #include "change/registration/registration.h"
 #include "common/error.h"
 #include "test/change/simulated_pairs.h"

@@ -1,12 +1,14 @@
-#include "change/measures/change_metrics.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "change/measures/binary_counts.h"
 #include "change/measures/change_pairs.h"
 #include "change/measures/change_report.h"
+#include "change/measures/community_change_scores.h"
+#include "change/measures/pooled_change_scores.h"
+#include "change/measures/score_histogram.h"
 #include "common/error.h"
 
 namespace livemap::change {
@@ -228,6 +230,19 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   EXPECT_EQ(json["pair_figures"][0]["name"], "000/00");
   EXPECT_EQ(json["curve"]["recall"].back(), 1.0);
   EXPECT_THAT(ToText(report), testing::HasSubstr("multi-class accuracy  1.0000"));
+}
+
+TEST(ChangeReport, OfMasksThatLeaveEverythingOutIsNullWithAReason) {
+  ChangeReport report;
+  const ChangeProbabilities certain = Scores(1, 2, {0, 0});
+  report.forward.pooled.Add(certain, Mask(1, {kLeftOutPixel, kLeftOutPixel}), false);
+  report.forward.community.Add("000/00", certain, Mask(1, {kLeftOutPixel, kLeftOutPixel}));
+  const auto json = ToJson(report, 0);
+  EXPECT_EQ(json["reason"], "the masks of all 1 pairs leave out every pixel");
+  for (const char* key : {"roc_area", "ap", "method_ms_p50", "registration_ms_p50"}) {
+    EXPECT_TRUE(json[key].is_null()) << key;
+  }
+  for (const auto& [key, value] : json["argmax"].items()) EXPECT_TRUE(value.is_null()) << key;
 }
 
 TEST(CountDirections, LeavesOutWhatIsNoChangeInTruthOrSeveralThings) {
