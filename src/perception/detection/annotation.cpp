@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/text.h"
 
 namespace livemap::perception {
 namespace {
@@ -17,7 +18,7 @@ const std::array<cv::Scalar, 6> kColours = {cv::Scalar(0, 0, 230),  cv::Scalar(0
                                             cv::Scalar(220, 60, 0), cv::Scalar(200, 0, 200),
                                             cv::Scalar(0, 160, 0),  cv::Scalar(160, 160, 0)};
 
-std::string LabelOf(const HazardDetection& detection) {
+std::string AnnotationLabelOf(const HazardDetection& detection) {
   std::string label = detection.class_name.substr(0, 40);
   // OpenCV's stroke fonts have no other characters.
   std::replace_if(
@@ -27,8 +28,8 @@ std::string LabelOf(const HazardDetection& detection) {
   return label + confidence.data();
 }
 
-void DrawLabel(cv::Mat& bgr, const cv::Rect& frame, const std::string& label,
-               const cv::Scalar& colour, double font_scale, int thickness) {
+void DrawAnnotationLabel(cv::Mat& bgr, const cv::Rect& frame, const std::string& label,
+                         const cv::Scalar& colour, double font_scale, int thickness) {
   int baseline = 0;
   const cv::Size text =
       cv::getTextSize(label, cv::FONT_HERSHEY_SIMPLEX, font_scale, thickness, &baseline);
@@ -48,8 +49,9 @@ void DrawLabel(cv::Mat& bgr, const cv::Rect& frame, const std::string& label,
 
 void AnnotateImage(cv::Mat& bgr, const std::vector<HazardDetection>& detections) {
   if (bgr.empty() || bgr.dims != 2 || bgr.type() != CV_8UC3) {
-    throw Error("an image to annotate is empty or of OpenCV type " + cv::typeToString(bgr.type()) +
-                ", accepted is CV_8UC3 (BGR)");
+    throw Error("an image to annotate is empty or has " +
+                PixelText(static_cast<int>(8 * bgr.elemSize1()), bgr.channels()) +
+                ", accepted are " + PixelText(8, 3) + " (BGR)");
   }
   const double size = std::max(bgr.rows, bgr.cols);
   const double font_scale = std::max(0.4, size / 1300);
@@ -61,7 +63,7 @@ void AnnotateImage(cv::Mat& bgr, const std::vector<HazardDetection>& detections)
                          cvCeil(detection->box.width), cvCeil(detection->box.height));
     const cv::Scalar& colour =
         kColours[static_cast<std::size_t>(detection->class_index) % kColours.size()];
-    DrawLabel(bgr, frame, LabelOf(*detection), colour, font_scale, thickness);
+    DrawAnnotationLabel(bgr, frame, AnnotationLabelOf(*detection), colour, font_scale, thickness);
     frames.emplace_back(frame, colour);
   }
   // No label hides where another hazard is.

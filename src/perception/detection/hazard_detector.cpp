@@ -32,7 +32,8 @@ std::vector<HazardDetection> HazardDetector::Detect(const cv::Mat& bgr) {
 }
 
 DetectionsOfViews HazardDetector::Views(const cv::Mat& bgr) {
-  const cv::Mat predictions = engine_->Run(letterbox_.Fill(bgr));
+  const cv::Mat predictions = engine_->Run(
+      ComputesIn() == Precision::kInt8 ? letterbox_.FillPixels(bgr) : letterbox_.Fill(bgr));
   return DecodeViews(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());
 }
 

@@ -31,6 +31,8 @@ class HazardDetector {
   const ModelManifest& manifest() const { return manifest_; }
   /// The library that runs it.
   EngineKind Engine() const { return engine_->Kind(); }
+  /// The numbers it computes in.
+  Precision ComputesIn() const { return engine_->ComputesIn(); }
 
  private:
   DetectionsOfViews Views(const cv::Mat& bgr);

@@ -17,7 +17,7 @@ struct Seen {
 
 using BestOfViews = std::vector<std::optional<HazardDetection>>;
 
-HazardDetection Mean(const BestOfViews& best) {
+HazardDetection MeanOfViews(const BestOfViews& best) {
   double confidence = 0;
   double left = 0;
   double top = 0;
@@ -44,8 +44,8 @@ HazardDetection Mean(const BestOfViews& best) {
 }
 
 /// `seen`: of one class, descending confidence.
-void FuseClass(const std::vector<Seen>& seen, std::size_t view_count, float iou_limit,
-               std::vector<HazardDetection>& fused) {
+void FuseViewsOfClass(const std::vector<Seen>& seen, std::size_t view_count, float iou_limit,
+                      std::vector<HazardDetection>& fused) {
   std::vector<bool> taken(seen.size(), false);
   for (std::size_t first = 0; first < seen.size(); ++first) {
     if (taken[first]) continue;
@@ -60,11 +60,11 @@ void FuseClass(const std::vector<Seen>& seen, std::size_t view_count, float iou_
       std::optional<HazardDetection>& of_view = best[seen[i].view];
       if (!of_view) of_view = *seen[i].detection;
     }
-    fused.push_back(Mean(best));
+    fused.push_back(MeanOfViews(best));
   }
 }
 
-bool MoreConfident(const HazardDetection& a, const HazardDetection& b) {
+bool MoreConfidentInViews(const HazardDetection& a, const HazardDetection& b) {
   return a.confidence > b.confidence;
 }
 
@@ -83,11 +83,11 @@ std::vector<HazardDetection> FuseViews(const DetectionsOfViews& views, float iou
   std::vector<HazardDetection> fused;
   for (auto& [class_index, seen] : by_class) {
     std::stable_sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) {
-      return MoreConfident(*a.detection, *b.detection);
+      return MoreConfidentInViews(*a.detection, *b.detection);
     });
-    FuseClass(seen, views.size(), iou_limit, fused);
+    FuseViewsOfClass(seen, views.size(), iou_limit, fused);
   }
-  std::stable_sort(fused.begin(), fused.end(), MoreConfident);
+  std::stable_sort(fused.begin(), fused.end(), MoreConfidentInViews);
   return fused;
 }
 

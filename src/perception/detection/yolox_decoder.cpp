@@ -38,7 +38,7 @@ struct Cell {
   int stride;
 };
 
-cv::Rect2f DecodeBox(const float* values, Cell cell, double scale, cv::Size image_size) {
+cv::Rect2f DecodeYoloxBox(const float* values, Cell cell, double scale, cv::Size image_size) {
   const double stride = cell.stride / scale;
   const double centre_x = (static_cast<double>(values[0]) + cell.column) * stride;
   const double centre_y = (static_cast<double>(values[1]) + cell.row) * stride;
@@ -53,9 +53,9 @@ cv::Rect2f DecodeBox(const float* values, Cell cell, double scale, cv::Size imag
           cut(centre_y + half_height, image_size.height) - y_min};
 }
 
-void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest,
-               const std::vector<float>& thresholds, double scale, cv::Size image_size,
-               std::vector<HazardDetection>& detections) {
+void DecodeYoloxRow(const float* values, Cell cell, const ModelManifest& manifest,
+                    const std::vector<float>& thresholds, double scale, cv::Size image_size,
+                    std::vector<HazardDetection>& detections) {
   const float objectness = values[4];
   for (std::size_t index = 0; index < manifest.classes.size(); ++index) {
     const float confidence = objectness * values[5 + index];
@@ -66,7 +66,7 @@ void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest,
     }
     const bool finite = std::all_of(values, values + 4, [](float v) { return std::isfinite(v); });
     if (!finite) return;
-    const cv::Rect2f box = DecodeBox(values, cell, scale, image_size);
+    const cv::Rect2f box = DecodeYoloxBox(values, cell, scale, image_size);
     if (!(box.width > 0 && box.height > 0)) return;
     detections.push_back({manifest.classes[index], static_cast<int>(index), confidence, box});
   }
@@ -78,10 +78,10 @@ void DecodeRow(const float* values, Cell cell, const ModelManifest& manifest,
 /// other, and from a box of width w the other's centre is at most w * max(1 - t, (1 / t - 1) / 2)
 /// away, likewise in height. So only the cells that near are looked at, and thousands of candidates
 /// cost not much more than sorting them.
-class KeptBoxes {
+class YoloxKeptBoxes {
  public:
-  KeptBoxes(const std::vector<HazardDetection>& all, const std::vector<std::size_t>& mine,
-            float iou_limit)
+  YoloxKeptBoxes(const std::vector<HazardDetection>& all, const std::vector<std::size_t>& mine,
+                 float iou_limit)
       : iou_limit_(iou_limit),
         reach_(std::max(1.0 - iou_limit, (1.0 / std::max(double{iou_limit}, 1e-9) - 1) / 2)) {
     for (const std::size_t index : mine) {
@@ -138,7 +138,7 @@ class KeptBoxes {
   std::vector<cv::Rect2f> boxes_;
 };
 
-void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
+void CheckYoloxShape(const cv::Mat& predictions, const ModelManifest& manifest) {
   const int columns = 5 + static_cast<int>(manifest.classes.size());
   const bool accepted = predictions.type() == CV_32F && predictions.dims == 3 &&
                         predictions.isContinuous() && predictions.size[0] == 1 &&
@@ -152,15 +152,15 @@ void CheckShape(const cv::Mat& predictions, const ModelManifest& manifest) {
 }
 
 /// A view may be surer than the mean of all: what is weak in one is looked at too.
-std::vector<float> ThresholdsOfViews(const ModelManifest& manifest) {
+std::vector<float> YoloxThresholdsOfViews(const ModelManifest& manifest) {
   std::vector<float> thresholds = manifest.thresholds;
   if (manifest.head.views == 1 && !manifest.head.mirrored) return thresholds;
   for (float& threshold : thresholds) threshold = std::min(threshold, kMinOfView);
   return thresholds;
 }
 
-std::vector<HazardDetection> AboveThresholds(std::vector<HazardDetection> detections,
-                                             const ModelManifest& manifest) {
+std::vector<HazardDetection> AboveYoloxThresholds(std::vector<HazardDetection> detections,
+                                                  const ModelManifest& manifest) {
   const auto weak = [&](const HazardDetection& detection) {
     return detection.confidence <
            manifest.thresholds[static_cast<std::size_t>(detection.class_index)];
@@ -188,7 +188,7 @@ std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candi
   }
   std::vector<bool> keep(candidates.size(), false);
   for (const std::vector<std::size_t>& of_class : by_class) {
-    KeptBoxes kept(candidates, of_class, iou_limit);
+    YoloxKeptBoxes kept(candidates, of_class, iou_limit);
     for (const std::size_t candidate : of_class) {
       keep[candidate] = kept.KeepUnlessOverlapped(candidates[candidate].box);
     }
@@ -202,9 +202,9 @@ std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candi
 
 DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& manifest,
                               double scale, cv::Size image_size) {
-  CheckShape(predictions, manifest);
+  CheckYoloxShape(predictions, manifest);
   const std::size_t columns = 5 + manifest.classes.size();
-  const std::vector<float> thresholds = ThresholdsOfViews(manifest);
+  const std::vector<float> thresholds = YoloxThresholdsOfViews(manifest);
   const float* values = predictions.ptr<float>();
   const auto view_count = static_cast<std::size_t>(manifest.head.views);
   const std::size_t levels = manifest.head.strides.size() / view_count;
@@ -213,8 +213,8 @@ DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& m
     const int stride = manifest.head.strides[level];
     for (int row = 0; row < manifest.input.height / stride; ++row) {
       for (int column = 0; column < manifest.input.width / stride; ++column) {
-        DecodeRow(values, {column, row, stride}, manifest, thresholds, scale, image_size,
-                  views[level / levels]);
+        DecodeYoloxRow(values, {column, row, stride}, manifest, thresholds, scale, image_size,
+                       views[level / levels]);
         values += columns;
       }
     }
@@ -227,7 +227,7 @@ DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& m
 
 std::vector<HazardDetection> JoinViews(DetectionsOfViews views, const ModelManifest& manifest) {
   if (views.size() == 1) return std::move(views[0]);
-  return AboveThresholds(FuseViews(views, kFusionIou), manifest);
+  return AboveYoloxThresholds(FuseViews(views, kFusionIou), manifest);
 }
 
 DetectionsOfViews Mirrored(DetectionsOfViews views, int width) {

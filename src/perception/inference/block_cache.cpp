@@ -17,7 +17,7 @@ struct alignas(BlockCache::kAlignment) Header {
   std::size_t size_class;
 };
 
-constexpr std::size_t RoundedUp(std::size_t bytes, std::size_t step) {
+constexpr std::size_t BlockBytesRoundedUp(std::size_t bytes, std::size_t step) {
   return (bytes + step - 1) / step * step;
 }
 
@@ -45,7 +45,7 @@ void* BlockCache::Take(std::size_t bytes) {
   const std::size_t size_class = ClassOf(with_header);
   void* memory = nullptr;
   if (size_class == kClasses) {
-    memory = std::aligned_alloc(kAlignment, RoundedUp(with_header, kAlignment));
+    memory = std::aligned_alloc(kAlignment, BlockBytesRoundedUp(with_header, kAlignment));
     if (memory == nullptr) throw std::bad_alloc();
   } else {
     const MutexLock lock(mutex_);
@@ -76,7 +76,7 @@ void BlockCache::Give(void* block) noexcept {
 std::byte* BlockCache::Carve(std::size_t bytes) {
   if (slabs_.empty() || slabs_.back().bytes - carved_ < bytes) {
     constexpr std::size_t kPage = HugePageAllocator<std::byte>::kPageBytes;
-    const std::size_t slab_bytes = std::max(kSlabBytes, RoundedUp(bytes, kPage));
+    const std::size_t slab_bytes = std::max(kSlabBytes, BlockBytesRoundedUp(bytes, kPage));
     slabs_.reserve(slabs_.size() + 1);
     slabs_.push_back({HugePageAllocator<std::byte>().allocate(slab_bytes), slab_bytes});
     carved_ = 0;

@@ -10,10 +10,12 @@
 
 namespace livemap::perception {
 
-/// The two makers behind MakeInferenceEngine; what it says of hashes, shapes, threads and errors
+/// The makers behind MakeInferenceEngine; what it says of hashes, shapes, threads and errors
 /// holds for them.
 std::unique_ptr<InferenceEngine> MakeOpenCvEngine(const ModelManifest& manifest, int threads);
 std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, int threads);
+/// libtorch with int8_file, whatever the processor has.
+std::unique_ptr<InferenceEngine> MakeInt8Engine(const ModelManifest& manifest, int threads);
 
 /// "1 x 3 x 400 x 640"; "?" for a negative size.
 std::string ShapeText(const std::vector<std::int64_t>& sizes);

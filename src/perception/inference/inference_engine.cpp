@@ -2,6 +2,7 @@
 
 #include "common/error.h"
 #include "perception/inference/engines.h"
+#include "perception/inference/processor.h"
 
 namespace livemap::perception {
 
@@ -25,7 +26,10 @@ std::string FirstLine(const std::string& text) { return text.substr(0, text.find
 
 void CheckOutput(InferenceEngine& engine, const ModelManifest& manifest, const std::string& file) {
   const int shape[] = {1, 3, manifest.input.height, manifest.input.width};
-  const cv::Mat output = engine.Run(cv::Mat(4, shape, CV_32F, cv::Scalar(0)));
+  const bool pixels = engine.ComputesIn() == Precision::kInt8;
+  const cv::Mat output = engine.Run(
+      pixels ? cv::Mat(manifest.input.height, manifest.input.width, CV_8UC3, cv::Scalar())
+             : cv::Mat(4, shape, CV_32F, cv::Scalar(0)));
   const std::vector<std::int64_t> promised = manifest.OutputShape();
   if (output.type() != CV_32F || ShapeOf(output) != promised) {
     throw Error("model file '" + file + "' answers with a tensor of " + ShapeText(ShapeOf(output)) +
@@ -43,13 +47,17 @@ std::optional<EngineKind> ParseEngineChoice(const std::string& text, const std::
 
 std::string NameOf(EngineKind kind) { return kind == EngineKind::kTorch ? "torch" : "opencv"; }
 
+std::string NameOf(Precision precision) { return precision == Precision::kInt8 ? "int8" : "fp32"; }
+
 std::unique_ptr<InferenceEngine> MakeInferenceEngine(const ModelManifest& manifest, int threads,
                                                      std::optional<EngineKind> choice) {
   const EngineKind own = HasTorchEngine() || manifest.engine == EngineKind::kOpenCv
                              ? manifest.engine
                              : EngineKind::kOpenCv;
-  return choice.value_or(own) == EngineKind::kTorch ? MakeTorchEngine(manifest, threads)
-                                                    : MakeOpenCvEngine(manifest, threads);
+  if (choice.value_or(own) == EngineKind::kOpenCv) return MakeOpenCvEngine(manifest, threads);
+  return manifest.precision == Precision::kInt8 && HasInt8Instructions()
+             ? MakeInt8Engine(manifest, threads)
+             : MakeTorchEngine(manifest, threads);
 }
 
 }  // namespace livemap::perception

@@ -14,12 +14,16 @@ class InferenceEngine {
  public:
   virtual ~InferenceEngine() = default;
 
-  /// `images`: continuous float32 of 1 x 3 x H x W as the manifest says. Returns continuous float32
-  /// of the manifest's OutputShape, valid until the next call. Throws Error when the library fails.
+  /// `images`: continuous float32 of 1 x 3 x H x W as the manifest says (Letterbox::Fill), or, in
+  /// 8 bits, its pixels, H x W x 3 (Letterbox::FillPixels). Returns continuous float32 of the
+  /// manifest's OutputShape, valid until the next call. Throws Error when the library fails.
   virtual cv::Mat Run(const cv::Mat& images) = 0;
 
   /// The library that runs it: kOpenCv or kTorch.
   virtual EngineKind Kind() const = 0;
+
+  /// The numbers it computes in; kInt8 wants pixels.
+  virtual Precision ComputesIn() const { return Precision::kFp32; }
 };
 
 /// Which library runs a network, as a parameter or a flag says it: "opencv", "torch", or "auto",
@@ -30,6 +34,9 @@ std::optional<EngineKind> ParseEngineChoice(const std::string& text, const std::
 /// "opencv" or "torch".
 std::string NameOf(EngineKind kind);
 
+/// "fp32" or "int8".
+std::string NameOf(Precision precision);
+
 /// Whether this build has libtorch.
 bool HasTorchEngine();
 
@@ -37,6 +44,9 @@ bool HasTorchEngine();
 /// OpenCV where that is torch and this build has no libtorch. Checks the file's hash and, by
 /// running the network once, its input and output shapes; throws Error on any difference, and when
 /// libtorch is asked for but is not in this build or has no file in the manifest.
+///
+/// libtorch runs it in the manifest's precision, but in float32 where the processor has no
+/// instructions for 8 bits (HasInt8Instructions).
 ///
 /// `threads` > 0: OpenCV's pool has so many threads, one pool for the process, whoever set it last.
 /// libtorch's count holds for the calling thread alone: N engines on their own threads compute with

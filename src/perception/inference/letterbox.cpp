@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/error.h"
+#include "common/text.h"
 
 namespace livemap::perception {
 
@@ -18,8 +19,6 @@ Letterbox::Letterbox(const ModelManifest::Input& input,
           (static_cast<float>(pixel) - normalisation.mean[plane]) / normalisation.std[plane];
     }
   }
-  const int shape[] = {1, 3, input_.height, input_.width};
-  tensor_.create(4, shape, CV_32F);
 }
 
 double Letterbox::Scale(cv::Size size) const {
@@ -34,18 +33,36 @@ cv::Size Letterbox::Fitted(cv::Size size) const {
           std::clamp(cvRound(size.height * scale), 1, input_.height)};
 }
 
-const cv::Mat& Letterbox::Fill(const cv::Mat& bgr) {
+cv::Mat Letterbox::Scaled(const cv::Mat& bgr) {
   if (bgr.empty()) throw Error("an image is empty, accepted is at least 1 x 1 pixel");
   if (bgr.dims != 2 || bgr.type() != CV_8UC3) {
-    throw Error("an image has OpenCV type " + cv::typeToString(bgr.type()) +
-                ", accepted is CV_8UC3 (BGR)");
+    throw Error("an image has " + PixelText(static_cast<int>(8 * bgr.elemSize1()), bgr.channels()) +
+                ", accepted are " + PixelText(8, 3) + " (BGR)");
   }
   const cv::Size fitted = Fitted(bgr.size());
-  cv::Mat source = bgr;
-  if (fitted != bgr.size()) {
-    cv::resize(bgr, scaled_, fitted, 0, 0, cv::INTER_LINEAR);
-    source = scaled_;
+  if (fitted == bgr.size()) return bgr;
+  cv::resize(bgr, scaled_, fitted, 0, 0, cv::INTER_LINEAR);
+  return scaled_;
+}
+
+const cv::Mat& Letterbox::FillPixels(const cv::Mat& bgr) {
+  const cv::Mat source = Scaled(bgr);
+  const cv::Size size(input_.width, input_.height);
+  pixels_.create(size, CV_8UC3);
+  if (source.size() != size) pixels_.setTo(cv::Scalar::all(input_.pad_value));
+  cv::Mat filled = pixels_(cv::Rect({}, source.size()));
+  if (input_.channels == ChannelOrder::kRgb) {
+    cv::cvtColor(source, filled, cv::COLOR_BGR2RGB);
+  } else {
+    source.copyTo(filled);
   }
+  return pixels_;
+}
+
+const cv::Mat& Letterbox::Fill(const cv::Mat& bgr) {
+  const cv::Mat source = Scaled(bgr);
+  const int shape[] = {1, 3, input_.height, input_.width};
+  tensor_.create(4, shape, CV_32F);
   for (std::size_t plane = 0; plane < 3; ++plane) {
     const std::array<float, 256>& normalised = normalised_[plane];
     const float padding = normalised[static_cast<std::size_t>(input_.pad_value)];

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kMaxModelBytes = std::size_t{256} * 1024 * 1024;
 
 /// A value as text for an error message: short, whatever the file holds.
-std::string Shown(const YAML::Node& node) {
+std::string ManifestValueText(const YAML::Node& node) {
   if (!node.IsDefined()) return "missing";
   if (node.IsMap()) return "a map";
   if (node.IsSequence()) return "a list of " + std::to_string(node.size());
@@ -24,13 +24,13 @@ std::string Shown(const YAML::Node& node) {
   return "'" + (text.size() <= 80 ? text : text.substr(0, 77) + "...") + "'";
 }
 
-std::string Join(const std::vector<std::string>& keys, const std::string& separator) {
+std::string JoinManifestKeys(const std::vector<std::string>& keys, const std::string& separator) {
   std::string list;
   for (const std::string& key : keys) list += (list.empty() ? "" : separator) + key;
   return list;
 }
 
-bool IsIn(const std::vector<std::string>& list, const std::string& text) {
+bool IsManifestKeyIn(const std::vector<std::string>& list, const std::string& text) {
   return std::find(list.begin(), list.end(), text) != list.end();
 }
 
@@ -44,10 +44,11 @@ ManifestSection::ManifestSection(const YAML::Node& node, std::string origin, std
   std::set<std::string> seen;
   for (const auto& entry : node) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-    if (!IsIn(keys, key) && !IsIn(optional, key)) {
-      throw Error("model manifest '" + origin_ + "': unknown key " + Shown(entry.first) + Where() +
-                  ", accepted are: " + Join(keys, ", ") +
-                  (optional.empty() ? "" : ", " + Join(optional, ", ")));
+    if (!IsManifestKeyIn(keys, key) && !IsManifestKeyIn(optional, key)) {
+      throw Error("model manifest '" + origin_ + "': unknown key " +
+                  ManifestValueText(entry.first) + Where() +
+                  ", accepted are: " + JoinManifestKeys(keys, ", ") +
+                  (optional.empty() ? "" : ", " + JoinManifestKeys(optional, ", ")));
     }
     if (!seen.insert(key).second) {
       throw Error("model manifest '" + origin_ + "': key '" + key + "'" + Where() +
@@ -57,7 +58,7 @@ ManifestSection::ManifestSection(const YAML::Node& node, std::string origin, std
   for (const std::string& key : keys) {
     if (seen.count(key) == 0) {
       throw Error("model manifest '" + origin_ + "': key '" + key + "'" + Where() +
-                  " is missing, needed are: " + Join(keys, ", "));
+                  " is missing, needed are: " + JoinManifestKeys(keys, ", "));
     }
   }
 }
@@ -65,7 +66,7 @@ ManifestSection::ManifestSection(const YAML::Node& node, std::string origin, std
 std::string ManifestSection::Choice(const std::string& key,
                                     const std::vector<std::string>& accepted) const {
   std::string text = Text(key);
-  if (!IsIn(accepted, text)) Refuse(key, Join(accepted, " or "));
+  if (!IsManifestKeyIn(accepted, text)) Refuse(key, JoinManifestKeys(accepted, " or "));
   return text;
 }
 
@@ -123,7 +124,7 @@ float ManifestSection::NumberOf(const YAML::Node& node, const std::string& path,
 
 void ManifestSection::RefuseNode(const std::string& path, const YAML::Node& node,
                                  const std::string& accepted) const {
-  throw Error("model manifest '" + origin_ + "': " + path + " is " + Shown(node) +
+  throw Error("model manifest '" + origin_ + "': " + path + " is " + ManifestValueText(node) +
               ", accepted is " + accepted);
 }
 

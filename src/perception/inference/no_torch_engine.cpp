@@ -13,4 +13,8 @@ std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, 
       "again");
 }
 
+std::unique_ptr<InferenceEngine> MakeInt8Engine(const ModelManifest& manifest, int threads) {
+  return MakeTorchEngine(manifest, threads);
+}
+
 }  // namespace livemap::perception

@@ -9,7 +9,7 @@ namespace livemap::perception {
 namespace {
 
 /// OpenCV's messages run over several lines; errors here are one sentence.
-std::string OneLine(std::string text) {
+std::string OneLineOfOnnxError(std::string text) {
   text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
   return text;
 }
@@ -30,7 +30,7 @@ OnnxGraph::OnnxGraph(std::string file, const std::string& bytes) : file_(std::mo
   } catch (const cv::Exception& error) {
     throw Error("model file '" + file_ +
                 "' cannot be loaded, accepted is an ONNX file of layers that OpenCV knows (" +
-                OneLine(error.err) + ")");
+                OneLineOfOnnxError(error.err) + ")");
   }
   std::sort(outputs_.begin(), outputs_.end());
 }
@@ -60,7 +60,7 @@ std::vector<cv::Mat> OnnxGraph::Run(const std::vector<std::pair<std::string, cv:
     network_.forward(answers, outputs_);
   } catch (const cv::Exception& error) {
     throw Error("model file '" + file_ + "' cannot run on an input of " + shapes + " (" +
-                OneLine(error.err) + ")");
+                OneLineOfOnnxError(error.err) + ")");
   }
   return answers;
 }

@@ -13,9 +13,9 @@ struct Field {
 };
 
 /// Walks over the fields of one message.
-class Message {
+class OnnxInputMessage {
  public:
-  explicit Message(std::string_view bytes) : rest_(bytes) {}
+  explicit OnnxInputMessage(std::string_view bytes) : rest_(bytes) {}
 
   /// False at the end.
   bool Next(Field& field) {
@@ -68,23 +68,23 @@ class Message {
 
 /// Calls `visit(field)` for each field `number` of `message`.
 template <typename Visit>
-void ForEach(std::string_view message, std::uint64_t number, Visit visit) {
-  Message fields(message);
+void ForEachOnnxField(std::string_view message, std::uint64_t number, Visit visit) {
+  OnnxInputMessage fields(message);
   Field field;
   while (fields.Next(field)) {
     if (field.number == number) visit(field);
   }
 }
 
-OnnxInput ReadInput(std::string_view value_info) {
+OnnxInput ReadOnnxInput(std::string_view value_info) {
   OnnxInput input;
-  ForEach(value_info, 1, [&](const Field& name) { input.name = std::string(name.bytes); });
-  ForEach(value_info, 2, [&](const Field& type) {
-    ForEach(type.bytes, 1, [&](const Field& tensor) {
-      ForEach(tensor.bytes, 2, [&](const Field& shape) {
-        ForEach(shape.bytes, 1, [&](const Field& dimension) {
+  ForEachOnnxField(value_info, 1, [&](const Field& name) { input.name = std::string(name.bytes); });
+  ForEachOnnxField(value_info, 2, [&](const Field& type) {
+    ForEachOnnxField(type.bytes, 1, [&](const Field& tensor) {
+      ForEachOnnxField(tensor.bytes, 2, [&](const Field& shape) {
+        ForEachOnnxField(shape.bytes, 1, [&](const Field& dimension) {
           input.shape.push_back(-1);
-          ForEach(dimension.bytes, 1, [&](const Field& value) {
+          ForEachOnnxField(dimension.bytes, 1, [&](const Field& value) {
             input.shape.back() = static_cast<std::int64_t>(value.varint);
           });
         });
@@ -98,8 +98,9 @@ OnnxInput ReadInput(std::string_view value_info) {
 
 std::vector<OnnxInput> ReadOnnxInputs(std::string_view model) {
   std::vector<OnnxInput> inputs;
-  ForEach(model, 7, [&](const Field& graph) {
-    ForEach(graph.bytes, 11, [&](const Field& input) { inputs.push_back(ReadInput(input.bytes)); });
+  ForEachOnnxField(model, 7, [&](const Field& graph) {
+    ForEachOnnxField(graph.bytes, 11,
+                     [&](const Field& input) { inputs.push_back(ReadOnnxInput(input.bytes)); });
   });
   return inputs;
 }

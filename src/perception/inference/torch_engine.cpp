@@ -1,12 +1,16 @@
 // The one file that sees libtorch's headers: they take as long to compile as a room.
+#include <ATen/Context.h>
 #include <ATen/Parallel.h>
 #include <c10/core/CPUAllocator.h>
 #include <torch/script.h>
 #include <torch/version.h>
 
+#include <algorithm>
 #include <mutex>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <thread>
+#include <utility>
 
 #include "common/error.h"
 #include "perception/inference/block_cache.h"
@@ -16,7 +20,7 @@ namespace livemap::perception {
 namespace {
 
 /// The memory of all tensors of the process, on the CPU.
-class TensorMemory final : public c10::Allocator {
+class TorchEngineMemory final : public c10::Allocator {
  public:
   c10::DataPtr allocate(std::size_t bytes) const override {
     void* block = bytes == 0 ? nullptr : Blocks().Take(bytes);
@@ -27,7 +31,7 @@ class TensorMemory final : public c10::Allocator {
   /// From now on; tensors that are older keep theirs.
   static void Use() {
     static std::once_flag once;
-    std::call_once(once, [] { c10::SetCPUAllocator(new TensorMemory); });
+    std::call_once(once, [] { c10::SetCPUAllocator(new TorchEngineMemory); });
   }
 
  private:
@@ -39,28 +43,50 @@ class TensorMemory final : public c10::Allocator {
   }
 };
 
+/// OpenMP keeps its number of threads for each thread that calls it, and an engine may be made on
+/// another thread than the one that runs it.
+class TorchThreads {
+ public:
+  explicit TorchThreads(int threads)
+      : threads_(threads > 0
+                     ? threads
+                     : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()))) {}
+  void Use() const {
+    if (at::get_num_threads() != threads_) at::set_num_threads(threads_);
+  }
+
+ private:
+  int threads_;
+};
+
+/// Only bytes with the manifest's hash come here: TorchScript is code as well as weights. `prepare`
+/// is called with what was loaded.
+template <typename Prepare>
+void LoadTorchFile(const std::string& file, std::string content, Prepare prepare) {
+  std::istringstream bytes(std::move(content));
+  TorchEngineMemory::Use();
+  try {
+    torch::jit::Module network = torch::jit::load(bytes, c10::kCPU);
+    network.eval();
+    prepare(network);
+  } catch (const std::exception& error) {
+    throw Error("model file '" + file +
+                "' cannot be loaded, accepted is a TorchScript file of libtorch " TORCH_VERSION
+                " or older (" +
+                FirstLine(error.what()) + ")");
+  }
+}
+
 /// libtorch (TorchScript) on the CPU.
 class TorchEngine final : public InferenceEngine {
  public:
   TorchEngine(const ModelManifest& manifest, int threads)
       : file_(manifest.torch_file), threads_(threads), input_(InputShape(manifest)) {
-    if (threads_ == 0)
-      threads_ = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    // Only bytes with the manifest's hash reach the loader: TorchScript is code as well as weights.
-    std::istringstream bytes(ReadTorchFile(manifest));
     const c10::InferenceMode inference_only;
-    TensorMemory::Use();
-    try {
-      UseThreads();
-      network_ = torch::jit::load(bytes, c10::kCPU);
-      network_.eval();
-      network_ = torch::jit::optimize_for_inference(network_);
-    } catch (const std::exception& error) {
-      throw Error("model file '" + file_ +
-                  "' cannot be loaded, accepted is a TorchScript file of libtorch " TORCH_VERSION
-                  " or older (" +
-                  FirstLine(error.what()) + ")");
-    }
+    threads_.Use();
+    LoadTorchFile(file_, ReadTorchFile(manifest), [&](torch::jit::Module& network) {
+      network_ = torch::jit::optimize_for_inference(network);
+    });
     CheckOutput(*this, manifest, file_);
   }
 
@@ -71,7 +97,7 @@ class TorchEngine final : public InferenceEngine {
                   ShapeText(input_));
     }
     const c10::InferenceMode inference_only;
-    UseThreads();
+    threads_.Use();
     try {
       // from_blob wants a pointer to what it may change; the network does not.
       const at::Tensor input =
@@ -88,17 +114,103 @@ class TorchEngine final : public InferenceEngine {
   EngineKind Kind() const override { return EngineKind::kTorch; }
 
  private:
-  /// OpenMP keeps its number of threads for each thread that calls it, and an engine may be made on
-  /// another thread than the one that runs it.
-  void UseThreads() const {
-    if (at::get_num_threads() != threads_) at::set_num_threads(threads_);
-  }
-
   std::string file_;
-  int threads_;
+  TorchThreads threads_;
   std::vector<std::int64_t> input_;
   torch::jit::Module network_;
   at::Tensor output_;  ///< Holds the memory of the last answer.
+};
+
+/// The process's library for operators in 8 bits, chosen before the first file is loaded.
+void UseOneDnn(const std::string& file) {
+  try {
+    at::globalContext().setQEngine(at::QEngine::ONEDNN);
+  } catch (const std::exception& error) {
+    throw Error("model file '" + file + "' cannot be loaded, this libtorch lacks oneDNN (" +
+                FirstLine(error.what()) + ")");
+  }
+}
+
+/// libtorch with a network in 8 bits, whose file has a method for each view: view_0 and on, from
+/// the view's pixels to its rows.
+class Int8Engine final : public InferenceEngine {
+ public:
+  Int8Engine(const ModelManifest& manifest, int threads)
+      : file_(manifest.int8_file), threads_(threads), columns_(5 + manifest.classes.size()) {
+    const c10::InferenceMode inference_only;
+    threads_.Use();
+    UseOneDnn(file_);
+    LoadTorchFile(file_, ReadInt8File(manifest), [&](torch::jit::Module& network) {
+      network_ = network;
+      for (int view = 0; view < manifest.head.views; ++view) {
+        views_.push_back({network.get_method("view_" + std::to_string(view)),
+                          manifest.SizeOfView(view), manifest.AnchorCountOfView(view)});
+      }
+    });
+    const int shape[] = {1, manifest.AnchorCount(), static_cast<int>(columns_)};
+    output_.create(3, shape, CV_32F);
+    CheckOutput(*this, manifest, file_);
+  }
+
+  cv::Mat Run(const cv::Mat& pixels) override {
+    if (pixels.type() != CV_8UC3 || !pixels.isContinuous() || pixels.size() != views_[0].size) {
+      throw Error("model file '" + file_ + "' cannot run on an input of " +
+                  ShapeText(ShapeOf(pixels)) + ", its manifest accepts 8 bits of " +
+                  std::to_string(views_[0].size.height) + " x " +
+                  std::to_string(views_[0].size.width) + " x 3");
+    }
+    const c10::InferenceMode inference_only;
+    threads_.Use();
+    float* rows = output_.ptr<float>();
+    for (View& view : views_) {
+      cv::Mat seen = pixels;
+      if (view.size != pixels.size()) {
+        cv::resize(pixels, scaled_, view.size, 0, 0, cv::INTER_LINEAR);
+        seen = scaled_;
+      }
+      rows = RunView(view, seen, rows);
+    }
+    return output_;
+  }
+
+  EngineKind Kind() const override { return EngineKind::kTorch; }
+  Precision ComputesIn() const override { return Precision::kInt8; }
+
+ private:
+  struct View {
+    torch::jit::Method method;
+    cv::Size size;  ///< px
+    int anchors;
+  };
+
+  /// Writes the view's rows to `rows` and returns what follows them.
+  float* RunView(View& view, const cv::Mat& seen, float* rows) {
+    at::Tensor found;
+    try {
+      // from_blob wants a pointer to what it may change; the network does not.
+      const at::Tensor input =
+          torch::from_blob(const_cast<uchar*>(seen.data), {1, seen.rows, seen.cols, 3}, at::kByte);
+      found = view.method({input.permute({0, 3, 1, 2})}).toTensor().to(at::kFloat).contiguous();
+    } catch (const std::exception& error) {
+      throw Error("model file '" + file_ + "' cannot run on an input of " +
+                  ShapeText(ShapeOf(seen)) + " (" + FirstLine(error.what()) + ")");
+    }
+    const std::vector<std::int64_t> promised = {1, view.anchors,
+                                                static_cast<std::int64_t>(columns_)};
+    if (found.sizes() != at::IntArrayRef(promised)) {
+      throw Error("model file '" + file_ + "' answers with a tensor of " +
+                  ShapeText(found.sizes().vec()) + ", its manifest accepts " + ShapeText(promised));
+    }
+    return std::copy_n(found.data_ptr<float>(), found.numel(), rows);
+  }
+
+  std::string file_;
+  TorchThreads threads_;
+  std::size_t columns_;
+  torch::jit::Module network_;
+  std::vector<View> views_;
+  cv::Mat scaled_;
+  cv::Mat output_;
 };
 
 }  // namespace
@@ -107,6 +219,10 @@ bool HasTorchEngine() { return true; }
 
 std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, int threads) {
   return std::make_unique<TorchEngine>(manifest, threads);
+}
+
+std::unique_ptr<InferenceEngine> MakeInt8Engine(const ModelManifest& manifest, int threads) {
+  return std::make_unique<Int8Engine>(manifest, threads);
 }
 
 }  // namespace livemap::perception

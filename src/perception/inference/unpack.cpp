@@ -13,20 +13,20 @@ namespace {
 constexpr int kGzipOnly = 15 + 16;  // inflateInit2: the largest window, and gzip's header.
 constexpr std::size_t kStepBytes = std::size_t{1} << 20;
 
-bool IsGzip(const std::string& bytes) {
+bool IsGzipToUnpack(const std::string& bytes) {
   return bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b';
 }
 
-class Inflater {
+class UnpackInflater {
  public:
-  explicit Inflater(std::string& bytes) {
+  explicit UnpackInflater(std::string& bytes) {
     stream_.next_in = reinterpret_cast<Bytef*>(bytes.data());
     stream_.avail_in = static_cast<uInt>(bytes.size());
     if (inflateInit2(&stream_, kGzipOnly) != Z_OK) throw Error("zlib cannot begin");
   }
-  ~Inflater() { inflateEnd(&stream_); }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
+  ~UnpackInflater() { inflateEnd(&stream_); }
+  UnpackInflater(const UnpackInflater&) = delete;
+  UnpackInflater& operator=(const UnpackInflater&) = delete;
 
   /// Appends at most `most` bytes; zlib's answer.
   int Append(std::size_t most, std::string& unpacked) {
@@ -47,8 +47,8 @@ class Inflater {
 }  // namespace
 
 std::string Unpacked(std::string bytes, const std::string& file, std::size_t most) {
-  if (!IsGzip(bytes)) return bytes;
-  Inflater inflater(bytes);
+  if (!IsGzipToUnpack(bytes)) return bytes;
+  UnpackInflater inflater(bytes);
   std::string unpacked;
   int answer = Z_OK;
   while (answer == Z_OK && unpacked.size() <= most) {

@@ -7,30 +7,32 @@
 
 namespace livemap::perception {
 
-PictureMasker::PictureMasker(const Config& config)
-    : mask_(config.privacy ? std::make_unique<PrivacyMask>(config.mask) : nullptr) {}
+PictureMasker::PictureMasker(const Config& config) : finder_("nothing") {
+  if (!config.privacy) return;
+  auto mask = std::make_unique<PrivacyMask>(config.mask);
+  finder_ = mask->FinderName();
+  mask_ = std::move(mask);
+}
 
-PictureMasker::PictureMasker(std::unique_ptr<PrivacyMask> mask) : mask_(std::move(mask)) {
+PictureMasker::PictureMasker(std::unique_ptr<PrivacyMask> mask)
+    : finder_(mask ? mask->FinderName() : ""), mask_(std::move(mask)) {
   if (!mask_) throw Error("pictures cannot be masked without a mask");
 }
 
-PictureMasker::Masked PictureMasker::Mask(const cv::Mat& bgr, const cv::Rect& part) {
+PictureMasker::Masked PictureMasker::Mask(const cv::Mat& bgr, std::uint64_t frame,
+                                          const cv::Rect& part,
+                                          const std::vector<cv::Rect>& subjects) {
   const MutexLock lock(mutex_);
   if (!mask_) return {bgr, ""};
   try {
     Masked masked{bgr.clone(), ""};
-    mask_->Apply(masked.bgr, frame_, part);
-    counters_.masked_regions += mask_->Masked().size();
+    mask_->Apply(masked.bgr, frame, part, subjects);
+    masked_regions_ += mask_->Masked().size();
     return masked;
   } catch (const std::exception& error) {
-    ++counters_.withheld;
+    ++withheld_;
     return {cv::Mat(), error.what()};
   }
-}
-
-PictureMasker::Counters PictureMasker::counters() const {
-  const MutexLock lock(mutex_);
-  return counters_;
 }
 
 }  // namespace livemap::perception

@@ -12,16 +12,16 @@ namespace {
 constexpr double kSameRegionOverlap = 0.2;
 /// Per frame that a kept region was not found: it may move.
 constexpr double kGrowthPerFrame = 0.05;
-/// More than these are no street: then the whole picture is masked.
+/// With more than these the whole picture is masked.
 constexpr std::size_t kMaxRegions = 100;
 
-cv::Rect Grown(const cv::Rect& box, double share) {
+cv::Rect GrownMask(const cv::Rect& box, double share) {
   const int x = cvCeil(box.width * share / 2);
   const int y = cvCeil(box.height * share / 2);
   return {box.x - x, box.y - y, box.width + 2 * x, box.height + 2 * y};
 }
 
-double Overlap(const cv::Rect& a, const cv::Rect& b) {
+double OverlapOf(const cv::Rect& a, const cv::Rect& b) {
   const double common = (a & b).area();
   return common / (a.area() + b.area() - common);
 }
@@ -62,7 +62,8 @@ void PrivacyMask::Apply(cv::Mat& bgr, std::uint64_t frame) {
   Apply(bgr, frame, cv::Rect({}, bgr.size()));
 }
 
-void PrivacyMask::Apply(cv::Mat& bgr, std::uint64_t frame, const cv::Rect& part) {
+void PrivacyMask::Apply(cv::Mat& bgr, std::uint64_t frame, const cv::Rect& part,
+                        const std::vector<cv::Rect>& subjects) {
   const cv::Rect image({}, bgr.size());
   if (bgr.empty() || bgr.type() != CV_8UC3) {
     throw Error("only images of 8 bit and 3 channels can be masked");
@@ -70,25 +71,70 @@ void PrivacyMask::Apply(cv::Mat& bgr, std::uint64_t frame, const cv::Rect& part)
   if (part.empty() || (part & image) != part) {
     throw Error("the part of a picture that is wanted does not lie in it");
   }
-  const std::vector<cv::Rect> found = finder_->Find(bgr, part);
+  const std::vector<PrivateRegion> found = finder_->Find(bgr, part);
   if (part != image) PixelateAround(bgr, part);
-  const auto is_over = [&](const Region& region) {
-    const bool too_old =
-        frame - region.found_at > static_cast<std::uint64_t>(std::max(0, config_.keep_frames));
-    return too_old || std::any_of(found.begin(), found.end(), [&](const cv::Rect& box) {
-             return Overlap(Grown(box, config_.grow), region.box) >= kSameRegionOverlap;
-           });
-  };
-  regions_.erase(std::remove_if(regions_.begin(), regions_.end(), is_over), regions_.end());
-  for (Region& region : regions_) region.box = Grown(region.box, kGrowthPerFrame);
-  for (const cv::Rect& box : found) regions_.push_back({Grown(box, config_.grow), frame});
-  if (regions_.size() > kMaxRegions) regions_ = {{cv::Rect({}, bgr.size()), frame}};
-  for (const Region& region : regions_) Pixelate(bgr, region.box);
+  Remember(found, frame);
+  // More than these are no street.
+  if (regions_.size() > kMaxRegions) regions_ = {{image, /*is_sure=*/true, frame}};
+  MaskRegions(bgr, subjects);
+}
+
+/// Doubtful regions first, so that a sure one stays masked where both lie over a subject.
+void PrivacyMask::MaskRegions(cv::Mat& bgr, const std::vector<cv::Rect>& subjects) const {
+  std::vector<std::pair<cv::Rect, cv::Mat>> clear;
+  for (const cv::Rect& subject : subjects) {
+    const cv::Rect inside = subject & cv::Rect({}, bgr.size());
+    if (!inside.empty()) clear.emplace_back(inside, bgr(inside).clone());
+  }
+  for (const Region& region : regions_) {
+    if (!region.is_sure) Pixelate(bgr, region.box);
+  }
+  for (const auto& [subject, pixels] : clear) pixels.copyTo(bgr(subject));
+  for (const Region& region : regions_) {
+    if (region.is_sure) Pixelate(bgr, region.box);
+  }
+}
+
+/// Keeps what was found before and is not found again, for a while. What was sure stays so.
+void PrivacyMask::Remember(const std::vector<PrivateRegion>& found, std::uint64_t frame) {
+  std::vector<Region> now;
+  for (const PrivateRegion& each : found) {
+    now.push_back({GrownMask(each.box, config_.grow), each.is_sure, frame});
+  }
+  const auto keep_frames = static_cast<std::uint64_t>(std::max(0, config_.keep_frames));
+  std::vector<Region> known = std::move(regions_);
+  known.insert(known.end(), later_.begin(), later_.end());
+  later_.clear();
+  for (const Region& before : known) {
+    const bool is_later = before.found_at > frame;
+    if ((is_later ? before.found_at - frame : frame - before.found_at) > keep_frames) {
+      if (is_later) later_.push_back(before);
+      continue;
+    }
+    bool is_found_again = false;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (OverlapOf(now[i].box, before.box) < kSameRegionOverlap) continue;
+      is_found_again = true;
+      now[i].is_sure = now[i].is_sure || before.is_sure;
+      now[i].found_at = std::max(now[i].found_at, before.found_at);
+    }
+    if (is_found_again) continue;
+    now.push_back({GrownMask(before.box, kGrowthPerFrame), before.is_sure, before.found_at});
+  }
+  regions_ = std::move(now);
 }
 
 std::vector<cv::Rect> PrivacyMask::Masked() const {
   std::vector<cv::Rect> boxes;
   for (const Region& region : regions_) boxes.push_back(region.box);
+  return boxes;
+}
+
+std::vector<cv::Rect> PrivacyMask::SurelyMasked() const {
+  std::vector<cv::Rect> boxes;
+  for (const Region& region : regions_) {
+    if (region.is_sure) boxes.push_back(region.box);
+  }
   return boxes;
 }
 

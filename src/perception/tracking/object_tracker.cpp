@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/stamp_gate.h"
 #include "common/time.h"
 
 namespace livemap::perception {
@@ -16,7 +17,7 @@ constexpr double kNearestM = 0.3;
 /// Step of the numeric derivative of an image position by the way, m.
 constexpr double kProbeM = 0.25;
 
-Eigen::Vector2d FootOf(const cv::Rect2f& box) {
+Eigen::Vector2d FootOfTracked(const cv::Rect2f& box) {
   return {double{box.x} + 0.5 * double{box.width}, double{box.y} + double{box.height}};
 }
 
@@ -26,7 +27,7 @@ struct SeenPoint {
   double depth_m;
 };
 
-std::optional<SeenPoint> Look(const Eigen::Vector3d& in_base, const CameraMotion& motion) {
+std::optional<SeenPoint> TrackerLook(const Eigen::Vector3d& in_base, const CameraMotion& motion) {
   const Eigen::Vector3d p = motion.base_from_optical.inverse() * in_base;
   // Written so that NaN is refused too.
   if (!(p.z() >= kNearestM)) return std::nullopt;
@@ -35,20 +36,21 @@ std::optional<SeenPoint> Look(const Eigen::Vector3d& in_base, const CameraMotion
                    p.z()};
 }
 
-std::optional<Eigen::Vector3d> OnRoad(const Eigen::Vector2d& pixel, const CameraMotion& motion) {
+std::optional<Eigen::Vector3d> TrackedOnRoad(const Eigen::Vector2d& pixel,
+                                             const CameraMotion& motion) {
   const auto point = ProjectToGround(pixel, motion.intrinsics, motion.base_from_optical, {});
   if (!point) return std::nullopt;
   return Eigen::Vector3d(point->position_m.x(), point->position_m.y(), 0);
 }
 
-bool Touches(const cv::Rect2f& box, cv::Size image) {
+bool TrackedTouchesBorder(const cv::Rect2f& box, cv::Size image) {
   constexpr float kEdgePx = 1.5F;
   return box.x < kEdgePx || box.y < kEdgePx ||
          box.x + box.width > static_cast<float>(image.width) - kEdgePx ||
          box.y + box.height > static_cast<float>(image.height) - kEdgePx;
 }
 
-void Check(const char* name, double value, double least, double most) {
+void CheckTrackerConfig(const char* name, double value, double least, double most) {
   if (!(value >= least && value <= most)) {
     throw Error(std::string("the tracker's ") + name + " is " + std::to_string(value) +
                 ", accepted is " + std::to_string(least) + " to " + std::to_string(most));
@@ -60,24 +62,25 @@ void Check(const char* name, double value, double least, double most) {
 ObjectTracker::ObjectTracker(const Config& config, std::vector<float> thresholds)
     : config_(config), thresholds_(std::move(thresholds)) {
   constexpr double kMost = 1e6;
-  Check("low_share", config_.low_share, 0.01, 1);
-  Check("sure", config_.sure, 0.01, 100);
-  Check("repeat_gain", config_.repeat_gain, 0, 1);
-  Check("gate", config_.gate, 0.1, kMost);
-  Check("pixel_sigma_px", config_.pixel_sigma_px, 0.1, kMost);
-  Check("size_sigma", config_.size_sigma, 0.01, kMost);
-  Check("good_range_m", config_.good_range_m, 0.1, kMost);
-  Check("good_side_px", config_.good_side_px, 0.1, kMost);
-  Check("max_delay_s", config_.max_delay_s, 0, kMost);
-  Check("max_unseen_s", config_.max_unseen_s, 0, kMost);
-  Check("max_tracks", config_.max_tracks, 1, 10000);
+  CheckTrackerConfig("low_share", config_.low_share, 0.01, 1);
+  CheckTrackerConfig("sure", config_.sure, 0.01, 100);
+  CheckTrackerConfig("repeat_gain", config_.repeat_gain, 0, 1);
+  CheckTrackerConfig("gate", config_.gate, 0.1, kMost);
+  CheckTrackerConfig("pixel_sigma_px", config_.pixel_sigma_px, 0.1, kMost);
+  CheckTrackerConfig("size_sigma", config_.size_sigma, 0.01, kMost);
+  CheckTrackerConfig("good_range_m", config_.good_range_m, 0.1, kMost);
+  CheckTrackerConfig("good_side_px", config_.good_side_px, 0.1, kMost);
+  CheckTrackerConfig("max_delay_s", config_.max_delay_s, 0, kMost);
+  CheckTrackerConfig("max_unseen_s", config_.max_unseen_s, 0, kMost);
+  CheckTrackerConfig("max_tracks", config_.max_tracks, 1, 10000);
 }
 
 std::vector<ObjectEvent> ObjectTracker::Add(const TrackerFrame& frame) {
   ++counters_.frames;
+  if (newest_ns_ && IsSetBack(frame.stamp_ns, *newest_ns_)) StartAnew();
   if (newest_ns_ && frame.stamp_ns <= *newest_ns_) {
-    tracks_.clear();
-    ++counters_.resets;
+    ++counters_.late;
+    return {};
   }
   newest_ns_ = frame.stamp_ns;
 
@@ -126,6 +129,12 @@ std::vector<ObjectEvent> ObjectTracker::Add(const TrackerFrame& frame) {
   return events;
 }
 
+void ObjectTracker::StartAnew() {
+  tracks_.clear();
+  newest_ns_.reset();
+  ++counters_.resets;
+}
+
 std::vector<ObjectEvent> ObjectTracker::Finish() {
   std::vector<ObjectEvent> events;
   for (Track& track : tracks_) {
@@ -163,9 +172,9 @@ ObjectTracker::Expected ObjectTracker::Expect(const Track& track, const TrackerF
 std::optional<ObjectTracker::Expected> ObjectTracker::ExpectByMotion(
     const Track& track, const CameraMotion& motion) const {
   const CameraMotion& before = *track.last_motion;
-  const auto on_road = OnRoad(FootOf(track.last.box), before);
+  const auto on_road = TrackedOnRoad(FootOfTracked(track.last.box), before);
   if (!on_road) return std::nullopt;
-  const auto seen_before = Look(*on_road, before);
+  const auto seen_before = TrackerLook(*on_road, before);
   const Eigen::Isometry3d base_from_before =
       motion.world_from_base.inverse() * before.world_from_base;
   if (!seen_before || !base_from_before.matrix().allFinite()) return std::nullopt;
@@ -173,8 +182,8 @@ std::optional<ObjectTracker::Expected> ObjectTracker::ExpectByMotion(
   Expected expected;
   expected.way_m = base_from_before.translation().norm();
   const Eigen::Vector3d in_base = base_from_before * *on_road;
-  const auto now = Look(in_base, motion);
-  const auto probe = Look(in_base - kProbeM * Eigen::Vector3d::UnitX(), motion);
+  const auto now = TrackerLook(in_base, motion);
+  const auto probe = TrackerLook(in_base - kProbeM * Eigen::Vector3d::UnitX(), motion);
   if (!now || !probe) {
     expected.behind = true;
     return expected;
@@ -203,7 +212,7 @@ ObjectTracker::Expected ObjectTracker::ExpectByVelocity(const Track& track,
                                                         const TrackerFrame& frame) const {
   Expected expected;
   const double time_s = Seconds(frame.stamp_ns - track.last_ns);
-  expected.foot_px = FootOf(track.last.box) + time_s * track.velocity_px_s;
+  expected.foot_px = FootOfTracked(track.last.box) + time_s * track.velocity_px_s;
   expected.width_px = double{track.last.box.width};
   expected.flat_height_px = expected.upright_height_px = double{track.last.box.height};
   // Before the velocity is known, only the gate says how far it may be.
@@ -219,7 +228,7 @@ double ObjectTracker::Cost(const Track& track, const Expected& expected,
   if (track.last.class_index != found.class_index || expected.behind) {
     return std::numeric_limits<double>::infinity();
   }
-  const Eigen::Vector2d off = FootOf(found.box) - expected.foot_px;
+  const Eigen::Vector2d off = FootOfTracked(found.box) - expected.foot_px;
   const double width = std::log(double{found.box.width} / expected.width_px);
   // Whether the object lies or stands is not known.
   const double flat = std::log(double{found.box.height} / expected.flat_height_px);
@@ -263,7 +272,7 @@ void ObjectTracker::See(Track& track, const HazardDetection& found,
                         const TrackerFrame& frame) const {
   const double time_s = Seconds(frame.stamp_ns - track.last_ns);
   if (track.sights > 0 && time_s > 0) {
-    track.velocity_px_s = (FootOf(found.box) - FootOf(track.last.box)) / time_s;
+    track.velocity_px_s = (FootOfTracked(found.box) - FootOfTracked(track.last.box)) / time_s;
     track.velocity_known = true;
   }
   track.last = found;
@@ -294,9 +303,9 @@ double ObjectTracker::Quality(const HazardDetection& found, const TrackerFrame& 
   double quality = double{found.confidence};
   const double side_px = std::sqrt(double{found.box.width} * double{found.box.height});
   quality *= std::min(1.0, side_px / config_.good_side_px);
-  if (Touches(found.box, frame.image_size)) quality *= config_.cut_share;
+  if (TrackedTouchesBorder(found.box, frame.image_size)) quality *= config_.cut_share;
   if (frame.motion) {
-    if (const auto place = OnRoad(FootOf(found.box), *frame.motion)) {
+    if (const auto place = TrackedOnRoad(FootOfTracked(found.box), *frame.motion)) {
       quality *= std::min(1.0, config_.good_range_m / std::max(place->norm(), kNearestM));
     }
   }

@@ -93,7 +93,8 @@ class ObjectTracker {
   struct Counters {
     std::uint64_t frames = 0;
     std::uint64_t refused = 0;    ///< Boxes that are none: NaN, empty, no class of the model.
-    std::uint64_t resets = 0;     ///< Stamps that went back.
+    std::uint64_t late = 0;       ///< Images that came after a newer one: they change nothing.
+    std::uint64_t resets = 0;     ///< Times that time was set back.
     std::uint64_t tracks = 0;     ///< Begun.
     std::uint64_t forgotten = 0;  ///< Because of max_tracks.
     std::uint64_t events = 0;
@@ -102,9 +103,11 @@ class ObjectTracker {
   /// `thresholds` by class index. Throws Error when a number of `config` is out of range.
   ObjectTracker(const Config& config, std::vector<float> thresholds);
 
-  /// The objects that are to be reported now. A stamp that is not newer than the last begins
-  /// anew: living tracks are dropped, without events.
+  /// The objects that are to be reported now. An image that is not newer than the last one is late
+  /// and changes nothing; a stamp by which time was set back (IsSetBack) begins anew.
   std::vector<ObjectEvent> Add(const TrackerFrame& frame);
+  /// Time was set back: living tracks are dropped, without events.
+  void StartAnew();
   /// The end of the drive: what is sure and not reported yet.
   std::vector<ObjectEvent> Finish();
 

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/error.h"
+#include "perception/inference/processor.h"
 
 namespace livemap::perception {
 namespace {
@@ -37,6 +40,34 @@ TEST(HazardDetector, FindsWhatTheModelFindsInPixelsOfTheImage) {
   EXPECT_EQ(cone.class_name, "traffic_cone");
   EXPECT_NEAR(cone.box.x, 96, 0.1);
   EXPECT_NEAR(cone.box.y, 64, 0.1);
+}
+
+TEST(HazardDetector, InEightBitsItFindsTheSameInTheSamePlaces) {
+  const ModelManifest manifest =
+      ReadModelManifest(LIVEMAP_SOURCE_DIR "/test/perception/inference/tiny_int8.yaml");
+  HazardDetector detector(manifest, 1);
+  if (!HasTorchEngine() || !HasInt8Instructions()) {
+    EXPECT_EQ(detector.ComputesIn(), Precision::kFp32);
+    GTEST_SKIP() << "skipped, no libtorch or no VNNI";
+  }
+  ASSERT_EQ(detector.ComputesIn(), Precision::kInt8);
+  cv::Mat image(96, 128, CV_8UC3, cv::Scalar(0, 0, 0));
+  image(cv::Rect(32, 16, 16, 16)) = kRed;
+  image(cv::Rect(96, 64, 16, 16)) = kGreen;
+  const std::vector<HazardDetection> expected = TinyDetector().Detect(image);
+  const std::vector<HazardDetection> found = detector.Detect(image);
+  ASSERT_EQ(found.size(), expected.size());
+  for (const HazardDetection& each : expected) {
+    const auto same = std::find_if(found.begin(), found.end(), [&](const HazardDetection& other) {
+      return other.class_index == each.class_index;
+    });
+    ASSERT_NE(same, found.end()) << each.class_name;
+    EXPECT_NEAR(same->confidence, each.confidence, 0.015);
+    EXPECT_NEAR(same->box.x, each.box.x, 0.2);
+    EXPECT_NEAR(same->box.y, each.box.y, 0.2);
+    EXPECT_NEAR(same->box.width, each.box.width, 0.4);
+    EXPECT_NEAR(same->box.height, each.box.height, 0.4);
+  }
 }
 
 TEST(HazardDetector, WhatTheMirroredImageShowsIsAtTheSamePlace) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "perception/inference/inference_engine.h"
+#include "perception/inference/processor.h"
 
 namespace livemap::perception {
 namespace {
@@ -49,32 +50,30 @@ cv::Mat FormulaImage(const ModelManifest& manifest) {
   return images;
 }
 
-using Parameters = std::tuple<std::string, EngineKind>;
-class GoldenTest : public ::testing::TestWithParam<Parameters> {};
-
-TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
-  const auto& [path, kind] = GetParam();
-  const std::string golden_path =
-      path.substr(0, path.size() - std::string("yaml").size()) + "golden.yaml";
-  const YAML::Node golden = YAML::LoadFile(golden_path);
-  const ModelManifest manifest = ReadModelManifest(path);
-  if (kind == EngineKind::kTorch && !HasTorchEngine()) GTEST_SKIP() << "skipped, no libtorch";
-  if (kind == EngineKind::kTorch && manifest.torch_file.empty()) {
-    GTEST_SKIP() << "skipped, '" << path << "' has no torch_file";
+/// The same as pixels, in the network's order of channels.
+cv::Mat FormulaPixels(const ModelManifest& manifest) {
+  cv::Mat pixels(manifest.input.height, manifest.input.width, CV_8UC3);
+  for (int y = 0; y < pixels.rows; ++y) {
+    for (int x = 0; x < pixels.cols; ++x) {
+      for (int plane = 0; plane < 3; ++plane) {
+        const int channel = manifest.input.channels == ChannelOrder::kRgb ? plane : 2 - plane;
+        pixels.at<cv::Vec3b>(y, x)[plane] =
+            static_cast<uchar>((x * (channel + 1) + 2 * y + x * y / 64) % 256);
+      }
+    }
   }
-  const std::unique_ptr<InferenceEngine> engine = MakeInferenceEngine(manifest, 0, kind);
-  ASSERT_EQ(engine->Kind(), kind);
-  const cv::Mat output = engine->Run(FormulaImage(manifest));
-  const auto tolerance = golden["tolerance"].as<double>();
-  ASSERT_LE(tolerance, 1e-3);
-  ASSERT_GT(golden["rows"].size(), 0U);
+  return pixels;
+}
+
+void ExpectRows(const YAML::Node& rows, const cv::Mat& output, double tolerance) {
+  ASSERT_GT(rows.size(), 0U);
   // A head of scores has one row.
   const int columns = output.size[output.dims - 1];
-  const int rows = static_cast<int>(output.total()) / columns;
-  for (const YAML::Node& row : golden["rows"]) {
+  const int count = static_cast<int>(output.total()) / columns;
+  for (const YAML::Node& row : rows) {
     const int index = row["index"].as<int>();
     const auto values = row["values"].as<std::vector<double>>();
-    ASSERT_TRUE(index >= 0 && index < rows) << index;
+    ASSERT_TRUE(index >= 0 && index < count) << index;
     ASSERT_EQ(values.size(), static_cast<std::size_t>(columns));
     for (std::size_t column = 0; column < values.size(); ++column) {
       EXPECT_NEAR(output.ptr<float>()[index * columns + static_cast<int>(column)], values[column],
@@ -84,13 +83,57 @@ TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
   }
 }
 
-std::string NameOfModel(const ::testing::TestParamInfo<Parameters>& parameters) {
-  std::string name = std::filesystem::path(std::get<0>(parameters.param)).stem().string() + "_" +
-                     NameOf(std::get<1>(parameters.param));
+YAML::Node GoldenOf(const std::string& manifest) {
+  return YAML::LoadFile(manifest.substr(0, manifest.size() - std::string("yaml").size()) +
+                        "golden.yaml");
+}
+
+class Int8GoldenTest : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Int8GoldenTest, TheModelAnswersInEightBitsAsWhereItWasMade) {
+  ModelManifest manifest = ReadModelManifest(GetParam());
+  if (manifest.int8_file.empty()) GTEST_SKIP() << "skipped, no int8_file";
+  if (!HasTorchEngine()) GTEST_SKIP() << "skipped, no libtorch";
+  if (!HasInt8Instructions()) GTEST_SKIP() << "skipped, no VNNI";
+  manifest.precision = Precision::kInt8;
+  const auto engine = MakeInferenceEngine(manifest, 0, EngineKind::kTorch);
+  ASSERT_EQ(engine->ComputesIn(), Precision::kInt8);
+  const YAML::Node golden = GoldenOf(GetParam());
+  const auto tolerance = golden["int8_tolerance"].as<double>();
+  ASSERT_LE(tolerance, 0.25);
+  ExpectRows(golden["int8_rows"], engine->Run(FormulaPixels(manifest)), tolerance);
+}
+
+using Parameters = std::tuple<std::string, EngineKind>;
+class GoldenTest : public ::testing::TestWithParam<Parameters> {};
+
+TEST_P(GoldenTest, TheModelAnswersAsWhereItWasTrained) {
+  const auto& [path, kind] = GetParam();
+  const YAML::Node golden = GoldenOf(path);
+  ModelManifest manifest = ReadModelManifest(path);
+  manifest.precision = Precision::kFp32;
+  if (kind == EngineKind::kTorch && !HasTorchEngine()) GTEST_SKIP() << "skipped, no libtorch";
+  if (kind == EngineKind::kTorch && manifest.torch_file.empty()) {
+    GTEST_SKIP() << "skipped, '" << path << "' has no torch_file";
+  }
+  const std::unique_ptr<InferenceEngine> engine = MakeInferenceEngine(manifest, 0, kind);
+  ASSERT_EQ(engine->Kind(), kind);
+  const cv::Mat output = engine->Run(FormulaImage(manifest));
+  const auto tolerance = golden["tolerance"].as<double>();
+  ASSERT_LE(tolerance, 1e-3);
+  ExpectRows(golden["rows"], output, tolerance);
+}
+
+std::string NameOfTest(const std::string& path, const std::string& kind) {
+  std::string name = std::filesystem::path(path).stem().string() + "_" + kind;
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
   }
   return name;
+}
+
+std::string NameOfModel(const ::testing::TestParamInfo<Parameters>& parameters) {
+  return NameOfTest(std::get<0>(parameters.param), NameOf(std::get<1>(parameters.param)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest,
@@ -99,6 +142,10 @@ INSTANTIATE_TEST_SUITE_P(Shipped, GoldenTest,
                                                               EngineKind::kTorch)),
                          NameOfModel);
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenTest);
+
+INSTANTIATE_TEST_SUITE_P(Shipped, Int8GoldenTest, ::testing::ValuesIn(ShippedManifests()),
+                         [](const auto& path) { return NameOfTest(path.param, "int8"); });
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Int8GoldenTest);
 
 }  // namespace
 }  // namespace livemap::perception

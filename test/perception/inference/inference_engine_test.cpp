@@ -10,6 +10,7 @@
 
 #include "common/error.h"
 #include "common/sha256.h"
+#include "perception/inference/processor.h"
 
 namespace livemap::perception {
 namespace {
@@ -19,6 +20,21 @@ using ::testing::HasSubstr;
 
 ModelManifest Tiny() {
   return ReadModelManifest(LIVEMAP_SOURCE_DIR "/test/perception/inference/tiny.yaml");
+}
+
+/// Of the answers of two engines that run at the same time, 50 times each, from the expected one.
+double LargestDifferenceOfTwoThreads(InferenceEngine& one, InferenceEngine& other,
+                                     const cv::Mat& input, const cv::Mat& expected) {
+  double worst[] = {0, 0};
+  const auto run = [&](InferenceEngine& engine, double& largest) {
+    for (int i = 0; i < 50; ++i)
+      largest = std::max(largest, cv::norm(engine.Run(input), expected, cv::NORM_INF));
+  };
+  std::thread first([&] { run(one, worst[0]); });
+  std::thread second([&] { run(other, worst[1]); });
+  first.join();
+  second.join();
+  return std::max(worst[0], worst[1]);
 }
 
 std::string LoadError(const ModelManifest& manifest, EngineKind kind) {
@@ -186,20 +202,126 @@ TEST_F(TorchEngine, TwoEnginesOnTwoThreadsAnswerAsOne) {
   // Made here, run there: an engine of a pool is not made on the thread that runs it.
   const auto one = MakeInferenceEngine(Tiny(), 1, EngineKind::kTorch);
   const auto other = MakeInferenceEngine(Tiny(), 2, EngineKind::kTorch);
-  double worst[] = {1, 1};
-  const auto run = [&](InferenceEngine& engine, double& difference) {
-    double largest = 0;
-    for (int i = 0; i < 50; ++i) {
-      largest = std::max(largest, cv::norm(engine.Run(images), expected, cv::NORM_INF));
-    }
-    difference = largest;
-  };
-  std::thread first([&] { run(*one, worst[0]); });
-  std::thread second([&] { run(*other, worst[1]); });
-  first.join();
-  second.join();
-  EXPECT_LT(worst[0], 1e-4);
-  EXPECT_LT(worst[1], 1e-4);
+  EXPECT_LT(LargestDifferenceOfTwoThreads(*one, *other, images, expected), 1e-4);
+}
+
+ModelManifest TinyInt8() {
+  return ReadModelManifest(LIVEMAP_SOURCE_DIR "/test/perception/inference/tiny_int8.yaml");
+}
+
+class Int8Engine : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!HasTorchEngine()) GTEST_SKIP() << "skipped, no libtorch";
+    if (!HasInt8Instructions()) GTEST_SKIP() << "skipped, no VNNI";
+  }
+};
+
+TEST_F(Int8Engine, AnswersTheKnownFunctionOfThePixelsUpToAStep) {
+  const std::unique_ptr<InferenceEngine> engine = MakeInferenceEngine(TinyInt8(), 1);
+  ASSERT_EQ(engine->ComputesIn(), Precision::kInt8);
+  EXPECT_EQ(engine->Kind(), EngineKind::kTorch);
+  cv::Mat pixels(48, 64, CV_8UC3, cv::Scalar::all(0));
+  pixels(cv::Rect(16, 8, 8, 8)).setTo(cv::Scalar(191, 64, 0));  // RGB: red 0.75, green 0.25
+  const cv::Mat output = engine->Run(pixels);
+  ASSERT_EQ(output.dims, 3);
+  ASSERT_EQ(output.size[1], 60);
+  ASSERT_EQ(output.size[2], 7);
+  const float red_and_green[] = {
+      0.5F, 0.5F, 0.75F * std::log(2.0F), 0.0F, Sigmoid(10), Sigmoid(10), Sigmoid(-10)};
+  const float black[] = {0.5F, 0.5F, 0, 0, Sigmoid(-10), 0.5F, 0.5F};
+  const float quarter[] = {
+      0.5F, 0.5F, 0.75F / 4 * std::log(2.0F), 0.0F, Sigmoid(-5), Sigmoid(2.5F), Sigmoid(-2.5F)};
+  for (int column = 0; column < 7; ++column) {
+    EXPECT_NEAR(output.ptr<float>(0, 1 * 8 + 2)[column], red_and_green[column], 0.015) << column;
+    EXPECT_NEAR(output.ptr<float>(0, 0)[column], black[column], 0.015) << column;
+    EXPECT_NEAR(output.ptr<float>(0, 48 + 1)[column], quarter[column], 0.015) << column;
+  }
+}
+
+TEST_F(Int8Engine, AFileOfAnotherHashAMissingOneAndOneWithoutViewsAreRefusedNamingThem) {
+  ModelManifest manifest = TinyInt8();
+  manifest.int8_sha256 = std::string(64, 'a');
+  EXPECT_THAT(LoadError(manifest, EngineKind::kTorch),
+              AllOf(HasSubstr(manifest.int8_file), HasSubstr(std::string(64, 'a'))));
+  manifest.int8_file = "/nowhere/m.int8.pt";
+  EXPECT_THAT(LoadError(manifest, EngineKind::kTorch), HasSubstr("/nowhere/m.int8.pt"));
+  manifest.int8_file.clear();
+  EXPECT_THAT(LoadError(manifest, EngineKind::kTorch), HasSubstr("no int8_file"));
+  // A TorchScript file in float32 has no method of a view.
+  manifest.int8_file = manifest.torch_file;
+  manifest.int8_sha256 = manifest.torch_sha256;
+  const std::string error = LoadError(manifest, EngineKind::kTorch);
+  EXPECT_THAT(error, AllOf(HasSubstr(manifest.torch_file), HasSubstr("view_0")));
+  EXPECT_EQ(error.find('\n'), std::string::npos);
+}
+
+TEST_F(Int8Engine, ACutOffFileIsRefusedInOneLine) {
+  const std::string whole = ReadInt8File(TinyInt8());
+  for (const std::string& bytes :
+       {std::string(), std::string(1000, 'x'), whole.substr(0, whole.size() / 2)}) {
+    ModelManifest manifest = TinyInt8();
+    manifest.int8_file = ::testing::TempDir() + "inference_engine_test.int8.pt";
+    manifest.int8_sha256 = Sha256Hex(bytes);
+    std::ofstream(manifest.int8_file, std::ios::binary) << bytes;
+    const std::string error = LoadError(manifest, EngineKind::kTorch);
+    EXPECT_THAT(error, AllOf(HasSubstr(manifest.int8_file), HasSubstr("cannot be loaded")));
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+    std::filesystem::remove(manifest.int8_file);
+  }
+}
+
+TEST_F(Int8Engine, OtherClassesAndStridesAreRefusedWithBothShapes) {
+  ModelManifest manifest = TinyInt8();
+  manifest.classes.emplace_back("deer");
+  EXPECT_THAT(LoadError(manifest, EngineKind::kTorch),
+              AllOf(HasSubstr("1 x 60 x 7"), HasSubstr("1 x 60 x 8")));
+  manifest = TinyInt8();
+  manifest.head.strides = {8};
+  EXPECT_THAT(LoadError(manifest, EngineKind::kTorch),
+              AllOf(HasSubstr("1 x 60 x 7"), HasSubstr("1 x 48 x 7")));
+}
+
+TEST_F(Int8Engine, AnInputOfAnotherShapeIsRefusedAndTheNextOneWorks) {
+  const auto engine = MakeInferenceEngine(TinyInt8(), 1);
+  const int floats[] = {1, 3, 48, 64};
+  EXPECT_THROW(engine->Run(cv::Mat(4, floats, CV_32F, cv::Scalar(0))), Error);
+  EXPECT_THROW(engine->Run(cv::Mat()), Error);
+  EXPECT_THROW(engine->Run(cv::Mat(64, 48, CV_8UC3, cv::Scalar())), Error);
+  EXPECT_THROW(engine->Run(cv::Mat(48, 128, CV_8UC3, cv::Scalar()).colRange(0, 64)), Error);
+  EXPECT_EQ(engine->Run(cv::Mat(48, 64, CV_8UC3, cv::Scalar())).size[1], 60);
+}
+
+TEST_F(Int8Engine, TwoEnginesOnTwoThreadsAnswerAsOne) {
+  cv::Mat pixels(48, 64, CV_8UC3);
+  cv::randu(pixels, 0, 256);
+  const cv::Mat expected = MakeInferenceEngine(TinyInt8(), 1)->Run(pixels).clone();
+  const auto one = MakeInferenceEngine(TinyInt8(), 1);
+  const auto other = MakeInferenceEngine(TinyInt8(), 2);
+  EXPECT_EQ(LargestDifferenceOfTwoThreads(*one, *other, pixels, expected), 0);
+}
+
+TEST(EngineChoice, EightBitsAreLibtorchsAloneAndOnlyWhereTheProcessorHasInstructionsForThem) {
+  EXPECT_EQ(MakeInferenceEngine(TinyInt8(), 1, EngineKind::kOpenCv)->ComputesIn(),
+            Precision::kFp32);
+  if (!HasTorchEngine()) return;
+  EXPECT_EQ(MakeInferenceEngine(TinyInt8(), 1, EngineKind::kTorch)->ComputesIn(),
+            HasInt8Instructions() ? Precision::kInt8 : Precision::kFp32);
+  ModelManifest manifest = TinyInt8();
+  manifest.precision = Precision::kFp32;
+  EXPECT_EQ(MakeInferenceEngine(manifest, 1, EngineKind::kTorch)->ComputesIn(), Precision::kFp32);
+}
+
+TEST(Processor, HasInstructionsForEightBitsWhereTheKernelSaysSo) {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(file, line) && line.rfind("flags", 0) != 0) {
+  }
+  if (line.rfind("flags", 0) != 0) GTEST_SKIP() << "skipped, /proc/cpuinfo has no flags";
+  line += ' ';
+  const bool listed = line.find(" avx512_vnni ") != std::string::npos ||
+                      line.find(" avx_vnni ") != std::string::npos;
+  EXPECT_EQ(HasInt8Instructions(), listed);
 }
 
 TEST(EngineChoice, IsTheManifestsUnlessOneIsGiven) {

@@ -57,6 +57,34 @@ TEST(Letterbox, APartOfALargerImageIsReadByItsOwnRows) {
   EXPECT_FLOAT_EQ(At(tensor, 0, 47, 63), 100);
 }
 
+TEST(Letterbox, PixelsAreTheSamePictureBeforeItsNormalisation) {
+  for (const ChannelOrder order : {ChannelOrder::kRgb, ChannelOrder::kBgr}) {
+    ModelManifest manifest = TwoLevelManifest();
+    manifest.input.channels = order;
+    manifest.normalisation.mean = {0, 0, 0};
+    manifest.normalisation.std = {1, 1, 1};
+    Letterbox letterbox(manifest);
+    const cv::Size fitting(manifest.input.width, manifest.input.height);
+    for (const cv::Size size : {fitting, cv::Size(fitting.width * 2, fitting.height),
+                                cv::Size(fitting.width, fitting.height * 3)}) {
+      cv::Mat image(size, CV_8UC3);
+      cv::randu(image, 0, 256);
+      const cv::Mat expected = letterbox.Fill(image).clone();
+      const cv::Mat pixels = letterbox.FillPixels(image);
+      ASSERT_EQ(pixels.size(), fitting);
+      ASSERT_EQ(pixels.type(), CV_8UC3);
+      ASSERT_TRUE(pixels.isContinuous());
+      for (int plane = 0; plane < 3; ++plane) {
+        const cv::Mat floats(fitting, CV_32F, const_cast<float*>(expected.ptr<float>(0, plane)));
+        cv::Mat channel;
+        cv::extractChannel(pixels, channel, plane);
+        channel.convertTo(channel, CV_32F);
+        EXPECT_EQ(cv::norm(channel, floats, cv::NORM_INF), 0) << size << plane;
+      }
+    }
+  }
+}
+
 TEST(Letterbox, ExtremeShapesGiveAtLeastOnePixel) {
   Letterbox letterbox(TwoLevelManifest());
   const cv::Mat& tensor = letterbox.Fill(cv::Mat(1, 30000, CV_8UC3, cv::Scalar(0, 0, 110)));

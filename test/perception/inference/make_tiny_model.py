@@ -1,8 +1,12 @@
 #!/usr/bin/python3
-"""Writes tiny.onnx and tiny.yaml, tiny_score.onnx and tiny_score.yaml: models whose answers are known functions of the image.
+"""Writes tiny.onnx and tiny.yaml, tiny_score.onnx and tiny_score.yaml, and calibration pictures: models whose answers are known functions of the image.
 
-    test/perception/inference/make_tiny_model.py [FOLDER]
+    test/perception/inference/make_tiny_model.py [FOLDER [PICTURES]]
     training/export_torch.py test/perception/inference/tiny.yaml      (adds tiny.pt)
+    training/export_int8.py test/perception/inference/tiny_int8.yaml --data none --pictures PICTURES --count 8
+
+The last adds tiny_int8.int8.pt, calibrated on the pictures of coloured blocks that are written into the folder PICTURES.
+tiny_int8.yaml is tiny.yaml, with its torch_file, under another name.
 
 It "detects" coloured blocks: a cell of 8x8 (or 16x16) pixels that is red is a pothole, one that is
 green a traffic cone. With r, g the cell's mean red and green (0..1):
@@ -20,6 +24,7 @@ import math
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
@@ -100,8 +105,21 @@ def make_model():
     return checked(graph)
 
 
+def write_pictures(folder):
+    """Blocks of every red and green."""
+    rng = np.random.default_rng(1)
+    for index in range(8):
+        picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+        picture[..., 1:] = np.kron(rng.integers(0, 256, (HEIGHT // 8, WIDTH // 8, 2)), np.ones((8, 8, 1)))
+        if index == 0:
+            picture[: HEIGHT // 2], picture[HEIGHT // 2 :] = (0, 255, 0), (0, 0, 255)
+        cv2.imwrite(str(folder / f"{index}.png"), picture)
+
+
 def main():
     """Writes all files."""
+    if len(sys.argv) > 2:
+        write_pictures(Path(sys.argv[2]))
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     model = make_model().SerializeToString()
     (folder / "tiny.onnx").write_bytes(model)

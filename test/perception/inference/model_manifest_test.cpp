@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "common/error.h"
+#include "test/support/temporary_directory.h"
 
 namespace livemap::perception {
 namespace {
@@ -185,6 +186,13 @@ TEST(ModelManifest, AMissingFileIsNamed) {
   }
 }
 
+TEST(ModelManifest, AByteOrderMarkIsSkipped) {
+  const test::TemporaryDirectory folder;
+  const std::string path = folder.path() + "/tiny.yaml";
+  std::ofstream(path) << "\xef\xbb\xbf" << ReadFile(kTinyManifest, 1U << 20U);
+  EXPECT_EQ(ReadModelManifest(path).classes, ReadModelManifest(kTinyManifest).classes);
+}
+
 TEST(ModelFile, IsReadWhenItsHashIsTheManifests) {
   const ModelManifest manifest = ReadModelManifest(kTinyManifest);
   EXPECT_EQ(ReadModelFile(manifest).size(), std::filesystem::file_size(manifest.file));
@@ -207,6 +215,59 @@ TEST(ModelFile, AMissingFileIsNamed) {
   ModelManifest manifest = ReadModelManifest(kTinyManifest);
   manifest.file = "/nowhere/m.onnx";
   EXPECT_THROW(ReadModelFile(manifest), Error);
+}
+
+const std::string kInt8Keys = "int8_file: n.int8.pt\nint8_sha256: " + std::string(64, 'c') + "\n";
+
+TEST(ModelManifest, TheFileInEightBitsAndThePrecisionAreRead) {
+  const ModelManifest without = ParseModelManifest(kGood, "x.yaml", "models");
+  EXPECT_EQ(without.int8_file, "");
+  EXPECT_EQ(without.precision, Precision::kFp32);
+  const std::string both = kGood + kTorchKeys + kInt8Keys;
+  const ModelManifest beside = ParseModelManifest(both, "x.yaml", "models");
+  EXPECT_EQ(beside.int8_file, "models/n.int8.pt");
+  EXPECT_EQ(beside.int8_sha256, std::string(64, 'c'));
+  EXPECT_EQ(beside.precision, Precision::kFp32) << "the file alone does not choose it";
+  EXPECT_EQ(ParseModelManifest(both + "precision: int8\n", "x.yaml", "models").precision,
+            Precision::kInt8);
+  EXPECT_EQ(ParseModelManifest(both + "precision: fp32\n", "x.yaml", "models").precision,
+            Precision::kFp32);
+}
+
+TEST(ModelManifest, APrecisionWithoutItsFileAndHalfAFileInEightBitsAreRefused) {
+  const std::string torch = kGood + kTorchKeys;
+  EXPECT_THAT(ErrorOf(torch + "precision: int8\n"),
+              AllOf(HasSubstr("precision is 'int8'"), HasSubstr("no int8_file")));
+  const std::string opencv = kGood + kTorchKeys.substr(0, kTorchKeys.find("engine"));
+  EXPECT_EQ(ErrorOf(opencv + kInt8Keys), "accepted");
+  EXPECT_THAT(ErrorOf(opencv + kInt8Keys + "precision: int8\n"), HasSubstr("engine is not torch"));
+  EXPECT_THAT(ErrorOf(torch + kInt8Keys + "precision: fp16\n"),
+              AllOf(HasSubstr("precision is 'fp16'"), HasSubstr("fp32"), HasSubstr("int8")));
+  EXPECT_THAT(ErrorOf(torch + "int8_file: n.int8.pt\n"), HasSubstr("int8_sha256 is missing"));
+  EXPECT_THAT(ErrorOf(torch + "int8_sha256: " + std::string(64, 'c') + "\n"),
+              HasSubstr("int8_file is missing"));
+  EXPECT_THAT(ErrorOf(torch + "int8_file: n.int8.pt\nint8_sha256: c\n"), HasSubstr("int8_sha256"));
+  EXPECT_THAT(ErrorOf(kGood + kInt8Keys), HasSubstr("a torch_file beside it"));
+}
+
+TEST(ModelManifest, AViewIsAsMuchSmallerAsItsCellsAreLarger) {
+  ModelManifest manifest;
+  manifest.input.width = 640;
+  manifest.input.height = 400;
+  manifest.head.strides = {4, 8, 16, 5, 10, 20};
+  manifest.head.views = 2;
+  EXPECT_EQ(manifest.SizeOfView(0), cv::Size(640, 400));
+  EXPECT_EQ(manifest.SizeOfView(1), cv::Size(512, 320));
+  EXPECT_EQ(manifest.AnchorCountOfView(0), 160 * 100 + 80 * 50 + 40 * 25);
+  EXPECT_EQ(manifest.AnchorCountOfView(1), 128 * 80 + 64 * 40 + 32 * 20);
+  EXPECT_EQ(manifest.AnchorCount(), manifest.AnchorCountOfView(0) + manifest.AnchorCountOfView(1));
+}
+
+TEST(ModelManifest, AViewInEightBitsThatIsLargerThanTheFirstIsRefused) {
+  const std::string larger = Replaced("strides: [8, 16]", "strides: [8, 4], views: 2");
+  EXPECT_EQ(ErrorOf(larger), "accepted");
+  EXPECT_THAT(ErrorOf(larger + kTorchKeys + kInt8Keys),
+              AllOf(HasSubstr("head.strides"), HasSubstr("first view")));
 }
 
 TEST(TorchFile, IsReadWhenItsHashIsTheManifestsAndRefusedWhereThereIsNone) {

@@ -155,12 +155,35 @@ TEST_F(ObjectTrackerTest, BoxesThatAreNoneAreRefusedAndCounted) {
   EXPECT_EQ(tracker_.living(), 0U);
 }
 
-TEST_F(ObjectTrackerTest, AStampThatGoesBackBeginsAnew) {
+TEST_F(ObjectTrackerTest, AnImageThatComesLateChangesNothing) {
+  Add({Found(0.6F, BoxAt(20, 0))}, After(0));
+  Add({Found(0.6F, BoxAt(18, 0))}, After(2));
+  now_ns_ -= 2 * kFrameNs;
+  EXPECT_EQ(Add({Found(0.6F, BoxAt(20, 0))}, After(0)), 0U) << "the first image again";
+  now_ns_ += kFrameNs;
+  Add({Found(0.6F, BoxAt(16, 0))}, After(4));
+  EXPECT_EQ(tracker_.counters().late, 1U);
+  EXPECT_EQ(tracker_.counters().tracks, 1U) << "the object is still the same one";
+  EXPECT_EQ(tracker_.counters().resets, 0U);
+}
+
+TEST_F(ObjectTrackerTest, AStampBeyondAllLatenessBeginsAnew) {
+  now_ns_ = 3600 * std::int64_t{1'000'000'000};
   Add({Found(0.6F, BoxAt(20, 0))}, After(0));
   now_ns_ = 0;
   EXPECT_EQ(Add({}, After(0)), 0U);
   EXPECT_EQ(tracker_.counters().resets, 1U);
   EXPECT_EQ(tracker_.living(), 0U);
+}
+
+TEST_F(ObjectTrackerTest, AfterStartingAnewTheNextImageIsTheFirstWhateverItsStamp) {
+  Add({Found(0.6F, BoxAt(20, 0))}, After(0));
+  tracker_.StartAnew();
+  EXPECT_EQ(tracker_.living(), 0U);
+  now_ns_ -= kFrameNs;
+  Add({Found(0.6F, BoxAt(20, 0))}, After(0));
+  EXPECT_EQ(tracker_.living(), 1U);
+  EXPECT_EQ(tracker_.counters().late, 0U);
 }
 
 TEST_F(ObjectTrackerTest, MotionThatIsNoNumberFallsBackOnTheImage) {
