@@ -10,17 +10,17 @@
 namespace livemap::simulation {
 namespace {
 
-void WritePng(const std::string& path, const cv::Mat& image) {
+void WriteDatasetPng(const std::string& path, const cv::Mat& image) {
   WriteImage(path, image, {cv::IMWRITE_PNG_COMPRESSION, 1});
 }
 
-cv::Vec3b Bgr(protocol::ChangeClass change_class) {
+cv::Vec3b DatasetColourOf(protocol::ChangeClass change_class) {
   const auto rgb = protocol::ChangeClassColour(change_class);
   return {rgb[2], rgb[1], rgb[0]};
 }
 
-nlohmann::json ToFeature(const StreetChange& change, int frames_seen, const Street& street,
-                         const geo::LocalFrame& local) {
+nlohmann::json DatasetFeatureOf(const StreetChange& change, int frames_seen, const Street& street,
+                                const geo::LocalFrame& local) {
   const Eigen::Vector3d place = street.line().At(change.along_m, change.left_m, 0);
   const geo::GeoPoint position = local.ToGeo(place.head<2>());
   const ObjectClass object_class = ClassOfInstance(change.instance);
@@ -71,11 +71,11 @@ void ChangeDatasetWriter::Add(const PassPicture& first, const PassPicture& secon
     for (const char* inside : {"/RGB", "/GT", "/GT_colours", "/GT_direction"})
       MakeFolder(folder + inside);
   }
-  WritePng(folder + "/RGB/1_" + number + ".png", first.frame.bgr);
-  WritePng(folder + "/RGB/2_" + number + ".png", second.frame.bgr);
-  WritePng(folder + "/GT/gt" + number + ".png", view.mask);
-  WritePng(folder + "/GT_direction/gt" + number + ".png", view.direction);
-  WritePng(folder + "/GT_colours/gt" + number + ".png", ColourChanges(view.mask));
+  WriteDatasetPng(folder + "/RGB/1_" + number + ".png", first.frame.bgr);
+  WriteDatasetPng(folder + "/RGB/2_" + number + ".png", second.frame.bgr);
+  WriteDatasetPng(folder + "/GT/gt" + number + ".png", view.mask);
+  WriteDatasetPng(folder + "/GT_direction/gt" + number + ".png", view.direction);
+  WriteDatasetPng(folder + "/GT_colours/gt" + number + ".png", ColourChanges(view.mask));
   poses_ << pairs_ << "," << sequence << "/" << number;
   for (const PassPicture* picture : {&first, &second}) {
     poses_ << FormatPose(",%.9f", picture->frame.world_from_optical)
@@ -96,7 +96,7 @@ void ChangeDatasetWriter::Finish(const Street& street, const geo::GeoPoint& datu
   for (const auto& [instance, change] : changes) {
     const auto seen = frames_seen_.find(instance);
     features.push_back(
-        ToFeature(change, seen == frames_seen_.end() ? 0 : seen->second, street, local));
+        DatasetFeatureOf(change, seen == frames_seen_.end() ? 0 : seen->second, street, local));
   }
   const std::string path = directory_ + "/changes.geojson";
   std::ofstream file = OpenFile(path);
@@ -109,7 +109,7 @@ cv::Mat ColourChanges(const cv::Mat& mask) {
   for (int row = 0; row < mask.rows; ++row) {
     for (int column = 0; column < mask.cols; ++column) {
       colours.at<cv::Vec3b>(row, column) =
-          Bgr(static_cast<protocol::ChangeClass>(mask.at<std::uint8_t>(row, column)));
+          DatasetColourOf(static_cast<protocol::ChangeClass>(mask.at<std::uint8_t>(row, column)));
     }
   }
   return colours;

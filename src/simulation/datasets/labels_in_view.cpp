@@ -14,8 +14,8 @@ struct Extent {
   int pixels;
 };
 
-bool IsDifficult(const HazardInView& hazard, const OutlinePixels& outlines,
-                 const LabelLimits& limits) {
+bool IsDifficultLabel(const HazardInView& hazard, const OutlinePixels& outlines,
+                      const LabelLimits& limits) {
   if (std::min(hazard.box.width, hazard.box.height) < limits.clear_side) return true;
   const auto outline = outlines.find(hazard.instance);
   return outline != outlines.end() && hazard.visible_pixels < limits.clear_share * outline->second;
@@ -50,7 +50,7 @@ std::vector<HazardInView> FindHazards(const cv::Mat& instances, const OutlinePix
     hazard.visible_pixels = extent.pixels;
     if (extent.pixels >= limits.min_pixels && hazard.box.width >= limits.min_width &&
         hazard.box.height >= limits.min_height) {
-      hazard.difficult = IsDifficult(hazard, outlines, limits);
+      hazard.difficult = IsDifficultLabel(hazard, outlines, limits);
       hazards.push_back(hazard);
     }
   }

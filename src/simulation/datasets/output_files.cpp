@@ -32,6 +32,9 @@ void CloseFile(std::ofstream& file, const std::string& path) {
 
 void MakeNewFolder(const std::string& directory, const std::vector<std::string>& inside) {
   std::error_code error;
+  if (fs::exists(directory, error) && !fs::is_directory(directory, error)) {
+    throw Error("'" + directory + "' is a file, accepted is a new or empty folder");
+  }
   if (fs::exists(directory, error) && !fs::is_empty(directory, error)) {
     throw Error("the folder '" + directory + "' is not empty, accepted is a new or empty one");
   }

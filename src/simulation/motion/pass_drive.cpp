@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::uint64_t kManner = 42;
 
-DrivingStyle StyleOf(const PassManner& manner) {
+DrivingStyle PassStyleOf(const PassManner& manner) {
   DrivingStyle style;
   style.speed_mps = manner.speed_mps;
   style.seconds = manner.seconds;
@@ -32,7 +32,7 @@ PassDrive::PassDrive(const Street& street, const PassManner& manner,
     : manner_(manner),
       base_from_optical_(mounting.BaseFromOptical()),
       exposure_s_(exposure_s),
-      motion_(street, StyleOf(manner), manner.start_m) {}
+      motion_(street, PassStyleOf(manner), manner.start_m) {}
 
 double PassDrive::TimeS(std::size_t frame) const {
   return static_cast<double>(frame) / manner_.rate_hz;

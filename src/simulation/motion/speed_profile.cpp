@@ -20,7 +20,7 @@ constexpr double kCrossingHalfM = 6;
 double Square(double x) { return x * x; }
 
 /// Of the lane, 1/m.
-double Curvature(const Street& street, double along) {
+double CurvatureForSpeed(const Street& street, double along) {
   constexpr double kReachM = 2;
   const double turn =
       street.line().HeadingRad(along + kReachM) - street.line().HeadingRad(along - kReachM);
@@ -29,7 +29,7 @@ double Curvature(const Street& street, double along) {
 }
 
 /// Lowers speeds so that they can be reached from their neighbours.
-void BoundAcceleration(std::vector<double>& squared) {
+void BoundSpeedRise(std::vector<double>& squared) {
   constexpr double kMaxPerStep = 2 * kLongitudinalMps2 * kStepM;
   for (std::size_t i = 1; i < squared.size(); ++i) {
     squared[i] = std::min(squared[i], squared[i - 1] + kMaxPerStep);
@@ -40,7 +40,7 @@ void BoundAcceleration(std::vector<double>& squared) {
 }
 
 /// The mean of each entry's surroundings; speeds stay monotone, accelerations within their bound.
-std::vector<double> Smooth(const std::vector<double>& values) {
+std::vector<double> SmoothSpeeds(const std::vector<double>& values) {
   std::vector<double> smooth;
   if (values.size() <= kSmoothingSteps) return values;
   smooth.reserve(values.size());
@@ -54,7 +54,7 @@ std::vector<double> Smooth(const std::vector<double>& values) {
 }
 
 /// Of a monotone cubic between two steps (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984).
-double MonotoneSlope(double before, double after) {
+double MonotoneSpeedSlope(double before, double after) {
   return before + after > 0 ? 2 * before * after / (before + after) : 0;
 }
 
@@ -66,8 +66,8 @@ SpeedProfile::SpeedProfile(const Street& street, const DrivingStyle& style, doub
   first_m_ = start_m - 1.2 * style.speed_mps * (kMarginS + 1);
   std::vector<std::size_t> stops;
   std::vector<double> squared = LimitSpeeds(street, phase_rad, stops);
-  BoundAcceleration(squared);
-  along_m_ = Smooth(Drive(squared, stops));
+  BoundSpeedRise(squared);
+  along_m_ = SmoothSpeeds(Drive(squared, stops));
   // Time 0 is where the start is passed.
   const auto after = std::lower_bound(along_m_.begin(), along_m_.end(), start_m);
   const auto index = std::max<std::ptrdiff_t>(1, after - along_m_.begin());
@@ -86,7 +86,7 @@ std::vector<double> SpeedProfile::LimitSpeeds(const Street& street, double phase
     const double along = std::max(start_m_, first_m_ + kStepM * static_cast<double>(i));
     const double aim =
         style_.speed_mps * (1 + kBreath * std::sin(wave * (along - start_m_) + phase_rad));
-    const double curvature = std::max(Curvature(street, along), 1e-9);
+    const double curvature = std::max(CurvatureForSpeed(street, along), 1e-9);
     squared[i] = std::min(Square(aim), kLateralMps2 / curvature);
   }
   LimitAtCrossings(street, end_m, squared, stops);
@@ -160,8 +160,8 @@ double SpeedProfile::AlongM(double time_s) const {
   const double t = index - static_cast<double>(whole);
   const double* p = &along_m_[whole - 1];
   // A monotone cubic: speed neither jumps nor falls below zero.
-  const double slope_a = MonotoneSlope(p[1] - p[0], p[2] - p[1]);
-  const double slope_b = MonotoneSlope(p[2] - p[1], p[3] - p[2]);
+  const double slope_a = MonotoneSpeedSlope(p[1] - p[0], p[2] - p[1]);
+  const double slope_b = MonotoneSpeedSlope(p[2] - p[1], p[3] - p[2]);
   const double step = p[2] - p[1];
   return p[1] + t * (slope_a +
                      t * ((3 * step - 2 * slope_a - slope_b) + t * (slope_a + slope_b - 2 * step)));

@@ -37,9 +37,9 @@ struct Style {
 };
 
 /// The front in the plane y = 0 with openings that lie back in it.
-class Front {
+class BuildingFront {
  public:
-  Front(const Style& style, float width, MeshBuilder& builder)
+  BuildingFront(const Style& style, float width, MeshBuilder& builder)
       : style_(style), width_(width), builder_(builder) {}
 
   void Wall(float x0, float z0, float x1, float z1) {
@@ -111,7 +111,7 @@ class Front {
   MeshBuilder& builder_;
 };
 
-Style DrawStyle(float width, CounterRandom& random, MeshBuilder& builder) {
+Style DrawBuildingStyle(float width, CounterRandom& random, MeshBuilder& builder) {
   Style style;
   const bool brick = random.Chance(0.5);
   Material wall;
@@ -143,8 +143,8 @@ Style DrawStyle(float width, CounterRandom& random, MeshBuilder& builder) {
   return style;
 }
 
-void AddRoof(const Style& style, float width, float depth, float height, CounterRandom& random,
-             MeshBuilder& builder) {
+void AddBuildingRoof(const Style& style, float width, float depth, float height,
+                     CounterRandom& random, MeshBuilder& builder) {
   if (!style.gable) {
     builder.UseMaterial(style.trim);
     builder.AddBox({-0.05F, -0.28F, height - 0.1F}, {width + 0.05F, 0.1F, height + 0.12F});
@@ -184,15 +184,15 @@ void AddRoof(const Style& style, float width, float depth, float height, Counter
 }
 
 /// The walls to the neighbours; they are seen where houses end at a crossing or a gap.
-void AddSides(const Style& style, float width, float depth, float ground_floor,
-              MeshBuilder& builder) {
+void AddBuildingSides(const Style& style, float width, float depth, float ground_floor,
+                      MeshBuilder& builder) {
   const Eigen::Affine3f frame = builder.frame();
   constexpr float kQuarterTurn = 1.57079633F;
   for (const bool right : {false, true}) {
     const Vec3 corner = right ? Vec3(width, 0, 0) : Vec3(0, depth, 0);
     builder.SetFrame(frame * Eigen::Translation3f(corner) *
                      Eigen::AngleAxisf(right ? kQuarterTurn : -kQuarterTurn, Vec3::UnitZ()));
-    Front wall(style, depth, builder);
+    BuildingFront wall(style, depth, builder);
     wall.Wall(0, 0, depth, ground_floor);
     float base = ground_floor;
     for (int floor = 1; floor < style.floors; ++floor) {
@@ -206,8 +206,8 @@ void AddSides(const Style& style, float width, float depth, float ground_floor,
 }  // namespace
 
 void AddBuilding(float width_m, float depth_m, CounterRandom& random, MeshBuilder& builder) {
-  const Style style = DrawStyle(width_m, random, builder);
-  Front front(style, width_m, builder);
+  const Style style = DrawBuildingStyle(width_m, random, builder);
+  BuildingFront front(style, width_m, builder);
   const int columns = std::max(2, static_cast<int>(width_m / random.Uniform(2.0F, 2.9F)));
   float base = 0.0F;
   const float ground_floor = style.shop ? 3.7F : style.floor_m + 0.2F;
@@ -228,12 +228,12 @@ void AddBuilding(float width_m, float depth_m, CounterRandom& random, MeshBuilde
   }
   const float w = width_m;
   const float d = depth_m;
-  AddSides(style, w, d, ground_floor, builder);
+  AddBuildingSides(style, w, d, ground_floor, builder);
   builder.UseMaterial(style.wall);
   builder.AddQuad({w, d, 0}, {0, d, 0}, {0, d, base}, {w, d, base}, {0, 0}, {w, base});
   builder.UseMaterial(style.trim);
   if (!style.shop) builder.AddBox({0, -0.05F, 0}, {w, 0, 0.12F});
-  AddRoof(style, w, d, base, random, builder);
+  AddBuildingRoof(style, w, d, base, random, builder);
 }
 
 }  // namespace livemap::simulation

@@ -88,7 +88,7 @@ const std::array<Vec3, 10> kPaints = {Vec3(0.60F, 0.60F, 0.60F), Vec3(0.015F, 0.
                                       Vec3(0.05F, 0.10F, 0.08F), Vec3(0.10F, 0.19F, 0.32F),
                                       Vec3(0.34F, 0.27F, 0.17F), Vec3(0.07F, 0.07F, 0.08F)};
 
-float HeightAt(const std::vector<Vec2>& top, float share) {
+float CarHeightAt(const std::vector<Vec2>& top, float share) {
   for (std::size_t i = 1; i < top.size(); ++i) {
     if (share <= top[i].x()) {
       const float t = (share - top[i - 1].x()) / (top[i].x() - top[i - 1].x());
@@ -102,9 +102,9 @@ constexpr int kRing = 8;  // points of half a cross-section from the sill to the
 
 using Ring = std::array<Vec3, kRing>;
 
-Ring CrossSection(const Silhouette& body, float share, float crushed, std::uint32_t seed) {
+Ring CarCrossSection(const Silhouette& body, float share, float crushed, std::uint32_t seed) {
   const float x = (share - 0.5F) * body.length;
-  const float top = HeightAt(body.top, share);
+  const float top = CarHeightAt(body.top, share);
   const float taper = 1 - 0.16F * std::pow(std::abs(2 * share - 1), 4.0F);
   const float half = body.half_width * taper;
   const float belt = std::min(body.belt, top - 0.02F);
@@ -131,14 +131,15 @@ Ring CrossSection(const Silhouette& body, float share, float crushed, std::uint3
   return ring;
 }
 
-class Body {
+class CarBody {
  public:
-  Body(const Silhouette& silhouette, std::uint16_t paint, std::uint16_t glass, MeshBuilder& builder)
+  CarBody(const Silhouette& silhouette, std::uint16_t paint, std::uint16_t glass,
+          MeshBuilder& builder)
       : silhouette_(silhouette), paint_(paint), glass_(glass), builder_(builder) {}
 
   void Skin(float from, float to, float crushed, std::uint32_t seed) {
-    const Ring a = CrossSection(silhouette_, from, crushed, seed);
-    const Ring b = CrossSection(silhouette_, to, crushed, seed);
+    const Ring a = CarCrossSection(silhouette_, from, crushed, seed);
+    const Ring b = CarCrossSection(silhouette_, to, crushed, seed);
     const float middle = 0.5F * (from + to);
     const Rounding rounding{Normals(from, crushed, seed), Normals(to, crushed, seed)};
     for (std::size_t i = 0; i + 1 < kRing; ++i) {
@@ -150,7 +151,7 @@ class Body {
 
   void Cap(float share, float crushed, std::uint32_t seed) {
     builder_.UseMaterial(paint_);
-    const Ring ring = CrossSection(silhouette_, share, crushed, seed);
+    const Ring ring = CarCrossSection(silhouette_, share, crushed, seed);
     const Vec3 normal(share > 0.5F ? 1.0F : -1.0F, 0, 0);
     for (std::size_t i = 0; i + 1 < kRing; ++i) {
       Vec3 a = ring[i];
@@ -177,9 +178,9 @@ class Body {
   /// Unit normals of the rounded body at one station.
   Ring Normals(float share, float crushed, std::uint32_t seed) const {
     constexpr float kStep = 0.02F;
-    const Ring before = CrossSection(silhouette_, std::max(share - kStep, 0.0F), crushed, seed);
-    const Ring here = CrossSection(silhouette_, share, crushed, seed);
-    const Ring after = CrossSection(silhouette_, std::min(share + kStep, 1.0F), crushed, seed);
+    const Ring before = CarCrossSection(silhouette_, std::max(share - kStep, 0.0F), crushed, seed);
+    const Ring here = CarCrossSection(silhouette_, share, crushed, seed);
+    const Ring after = CarCrossSection(silhouette_, std::min(share + kStep, 1.0F), crushed, seed);
     Ring normals;
     for (std::size_t i = 0; i < kRing; ++i) {
       const Vec3& low = here[i > 0 ? i - 1 : 0];
@@ -193,8 +194,8 @@ class Body {
 
   /// Side windows lie between belt and roof edge, wind shields where the roof line falls steeply.
   bool IsGlass(std::size_t i, float from, float to, float middle) const {
-    const float top = HeightAt(silhouette_.top, middle);
-    const float rise = HeightAt(silhouette_.top, to) - HeightAt(silhouette_.top, from);
+    const float top = CarHeightAt(silhouette_.top, middle);
+    const float rise = CarHeightAt(silhouette_.top, to) - CarHeightAt(silhouette_.top, from);
     const float slope = std::abs(rise) / ((to - from) * silhouette_.length);
     const bool cabin = top > silhouette_.belt + 0.12F;
     const bool pillar = std::abs(middle - 0.44F) < 0.012F;
@@ -252,7 +253,7 @@ void AddWheel(const Vec3& centre, float side, MeshBuilder& builder, std::uint16_
   builder.SetOpenness(1);
 }
 
-void AddLights(const Silhouette& body, float crushed, MeshBuilder& builder) {
+void AddCarLights(const Silhouette& body, float crushed, MeshBuilder& builder) {
   const float front = 0.5F * body.length - 0.055F;
   const float rear = -0.5F * body.length;
   const float width = body.half_width * 0.80F;
@@ -295,7 +296,7 @@ float AddCar(CounterRandom& random, float crushed, MeshBuilder& builder) {
       builder.SetMaterial({MaterialKind::kMetal, Vec3(0.42F, 0.43F, 0.44F), Vec3::Ones(), seed});
   const std::uint16_t dark = builder.SetMaterial(
       {MaterialKind::kRubber, Vec3(0.008F, 0.008F, 0.008F), Vec3::Ones(), seed});
-  Body skin(body, paint, glass, builder);
+  CarBody skin(body, paint, glass, builder);
   constexpr int kStations = 44;
   for (int i = 0; i < kStations; ++i) {
     skin.Skin(static_cast<float>(i) / kStations, static_cast<float>(i + 1) / kStations, crushed,
@@ -317,7 +318,7 @@ float AddCar(CounterRandom& random, float crushed, MeshBuilder& builder) {
     builder.AddEllipsoid({0.16F * body.length, side * (body.half_width + 0.09F), body.belt + 0.07F},
                          {0.06F, 0.10F, 0.065F}, 8);
   }
-  AddLights(body, crushed, builder);
+  AddCarLights(body, crushed, builder);
   return body.length;
 }
 

@@ -170,7 +170,7 @@ void AddPostBox(CounterRandom& random, MeshBuilder& builder) {
 }
 
 /// Tyre, rim and spokes in the plane y = 0 about `hub`.
-void AddWheel(const Vec3& hub, MeshBuilder& builder) {
+void AddBicycleWheel(const Vec3& hub, MeshBuilder& builder) {
   constexpr int kPieces = 20;
   constexpr float kRadiusM = 0.33F;
   const auto rim = [&](int piece, float radius) {
@@ -218,7 +218,7 @@ void AddBicycleFrame(CounterRandom& random, MeshBuilder& builder) {
   builder.AddDisc(pedals + Vec3(0, 0.05F, 0), Vec3::UnitY(), 0.1F, 16);
   builder.AddBox(pedals + Vec3(0.12F, -0.17F, -0.01F), pedals + Vec3(0.2F, -0.07F, 0.015F));
   builder.AddBox(pedals + Vec3(-0.2F, 0.07F, -0.01F), pedals + Vec3(-0.12F, 0.17F, 0.015F));
-  for (const Vec3& hub : {rear, front}) AddWheel(hub, builder);
+  for (const Vec3& hub : {rear, front}) AddBicycleWheel(hub, builder);
 }
 
 }  // namespace

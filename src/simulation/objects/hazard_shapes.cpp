@@ -12,10 +12,12 @@ const Vec3 kWhite(0.72F, 0.72F, 0.70F);
 const Vec3 kRed(0.55F, 0.025F, 0.02F);
 const Vec3 kBlack(0.02F, 0.02F, 0.02F);
 
-Material Plain(const Vec3& colour) { return {MaterialKind::kPlain, colour, Vec3::Ones(), 0}; }
-Material Metal(const Vec3& colour) { return {MaterialKind::kMetal, colour, Vec3::Ones(), 0}; }
+Material PlainHazardMaterial(const Vec3& colour) {
+  return {MaterialKind::kPlain, colour, Vec3::Ones(), 0};
+}
+Material HazardMetal(const Vec3& colour) { return {MaterialKind::kMetal, colour, Vec3::Ones(), 0}; }
 
-Eigen::Affine3f Turned(float angle, const Vec3& place) {
+Eigen::Affine3f TurnedHazardShape(float angle, const Vec3& place) {
   return Eigen::Translation3f(place) * Eigen::AngleAxisf(angle, Vec3::UnitZ());
 }
 
@@ -41,9 +43,9 @@ void AddTrafficCone(CounterRandom& random, MeshBuilder& builder) {
 
 void AddWorkSign(CounterRandom& random, MeshBuilder& builder) {
   const double kind = random.Uniform(0.0, 1.0);
-  builder.SetMaterial(Metal(Vec3(0.20F, 0.21F, 0.22F)));
+  builder.SetMaterial(HazardMetal(Vec3(0.20F, 0.21F, 0.22F)));
   builder.AddTube({0.03F, 0, 0.05F}, {0.03F, 0, 1.1F}, 0.025F, 0.025F, 8);
-  builder.SetMaterial(Plain(Vec3(0.04F, 0.04F, 0.04F)));
+  builder.SetMaterial(PlainHazardMaterial(Vec3(0.04F, 0.04F, 0.04F)));
   builder.AddBox({-0.25F, -0.35F, 0}, {0.35F, 0.35F, 0.09F});
   const float middle = 1.2F;
   const float half = 0.46F;
@@ -67,7 +69,7 @@ void AddWorkSign(CounterRandom& random, MeshBuilder& builder) {
 }
 
 void AddBarrier(CounterRandom& random, MeshBuilder& builder) {
-  builder.SetMaterial(Metal(Vec3(0.25F, 0.26F, 0.27F)));
+  builder.SetMaterial(HazardMetal(Vec3(0.25F, 0.26F, 0.27F)));
   for (const float y : {-0.75F, 0.75F}) {
     builder.AddTube({0.02F, y, 0}, {0.02F, y, 1.05F}, 0.025F, 0.025F, 6);
     builder.AddBox({-0.4F, y - 0.06F, 0}, {0.4F, y + 0.06F, 0.07F});
@@ -97,9 +99,10 @@ void AddDebris(CounterRandom& random, MeshBuilder& builder) {
       builder.SetMaterial(
           {MaterialKind::kWood, Vec3(0.38F, 0.25F, 0.13F), Vec3::Ones(), random.Bits32()});
       const float length = random.Uniform(0.5F, 0.9F);
-      builder.SetFrame(frame * Turned(random.Uniform(0.0F, 3.1F),
-                                      {random.Uniform(-0.2F, 0.2F), random.Uniform(-0.3F, 0.3F),
-                                       0.035F * static_cast<float>(plank)}));
+      builder.SetFrame(frame *
+                       TurnedHazardShape(random.Uniform(0.0F, 3.1F),
+                                         {random.Uniform(-0.2F, 0.2F), random.Uniform(-0.3F, 0.3F),
+                                          0.035F * static_cast<float>(plank)}));
       builder.AddBox({-0.06F, -length, 0}, {0.06F, length, 0.035F});
     }
     builder.SetFrame(frame);
@@ -143,9 +146,9 @@ void AddDeer(CounterRandom& random, MeshBuilder& builder) {
       builder.AddTube(knee, {x + swing, side * 0.10F, 0.06F}, 0.042F, 0.028F, 8);
     }
   }
-  builder.SetMaterial(Plain(Vec3(0.62F, 0.58F, 0.50F)));
+  builder.SetMaterial(PlainHazardMaterial(Vec3(0.62F, 0.58F, 0.50F)));
   builder.AddEllipsoid({-0.58F, 0, 1.0F}, {0.05F, 0.07F, 0.12F}, 8);
-  builder.SetMaterial(Plain(kBlack));
+  builder.SetMaterial(PlainHazardMaterial(kBlack));
   builder.AddEllipsoid({0.98F, 0, 1.325F}, {0.025F, 0.03F, 0.025F}, 6);
   for (const float side : {-1.0F, 1.0F}) {
     builder.AddEllipsoid({0.81F, side * 0.078F, 1.44F}, {0.02F, 0.012F, 0.02F}, 6);
@@ -154,7 +157,7 @@ void AddDeer(CounterRandom& random, MeshBuilder& builder) {
     }
   }
   if (random.Chance(0.55)) {
-    builder.SetMaterial(Plain(Vec3(0.16F, 0.11F, 0.07F)));
+    builder.SetMaterial(PlainHazardMaterial(Vec3(0.16F, 0.11F, 0.07F)));
     for (const float side : {-1.0F, 1.0F}) {
       const Vec3 fork(0.59F, side * 0.22F, 1.75F);
       builder.AddTube({0.69F, side * 0.05F, 1.49F}, fork, 0.022F, 0.017F, 6);
@@ -179,14 +182,14 @@ void AddExcavator(CounterRandom& random, MeshBuilder& builder) {
       builder.AddDisc({x, side * 1.19F, 0.41F}, {0, side, 0}, 0.37F, 16);
     }
     builder.AddBox({-1.3F, side * 0.95F - 0.24F, 0.04F}, {1.3F, side * 0.95F + 0.24F, 0.78F});
-    builder.SetMaterial(Metal(Vec3(0.16F, 0.13F, 0.10F)));
+    builder.SetMaterial(HazardMetal(Vec3(0.16F, 0.13F, 0.10F)));
     for (float x = -1.4F; x < 1.45F; x += 0.2F) {
       builder.AddBox({x, side * 0.95F - 0.27F, 0.77F}, {x + 0.09F, side * 0.95F + 0.27F, 0.81F});
     }
   }
   const Eigen::Affine3f frame = builder.frame();
   builder.SetFrame(frame * Eigen::AngleAxisf(random.Uniform(-0.7F, 0.7F), Vec3::UnitZ()));
-  builder.SetMaterial(Plain(dark));
+  builder.SetMaterial(PlainHazardMaterial(dark));
   builder.AddBox({-0.6F, -0.6F, 0.7F}, {0.6F, 0.6F, 0.95F});
   builder.SetMaterial({MaterialKind::kCarPaint, yellow, Vec3::Ones(), random.Bits32()});
   builder.AddBox({-1.7F, -1.15F, 0.95F}, {0.9F, 1.15F, 1.35F});
@@ -205,10 +208,10 @@ void AddExcavator(CounterRandom& random, MeshBuilder& builder) {
   builder.AddTube({0.7F, -0.2F, 1.5F}, {1.6F, -0.2F, 3.0F + 0.8F * lift}, 0.24F, 0.24F, 4);
   builder.AddTube({1.6F, -0.2F, 3.0F + 0.8F * lift}, elbow, 0.24F, 0.18F, 4);
   builder.AddTube(elbow - Vec3(0.3F, 0, -0.35F), wrist, 0.2F, 0.13F, 4);
-  builder.SetMaterial(Metal(Vec3(0.3F, 0.3F, 0.3F)));
+  builder.SetMaterial(HazardMetal(Vec3(0.3F, 0.3F, 0.3F)));
   builder.AddTube({1.0F, -0.2F, 1.45F}, {1.9F, -0.2F, 2.9F + 0.8F * lift}, 0.07F, 0.05F, 8);
   builder.AddTube({1.7F, -0.2F, 3.4F + 0.8F * lift}, elbow + Vec3(-0.2F, 0, 0.3F), 0.06F, 0.05F, 8);
-  builder.SetMaterial(Metal(Vec3(0.10F, 0.09F, 0.08F)));
+  builder.SetMaterial(HazardMetal(Vec3(0.10F, 0.09F, 0.08F)));
   builder.AddTube(wrist + Vec3(-0.25F, -0.5F, -0.25F), wrist + Vec3(-0.25F, 0.5F, -0.25F), 0.38F,
                   0.38F, 12);
   builder.AddBox(wrist + Vec3(-0.75F, -0.5F, -0.7F), wrist + Vec3(-0.15F, 0.5F, -0.4F));
@@ -217,16 +220,18 @@ void AddExcavator(CounterRandom& random, MeshBuilder& builder) {
 
 void AddAccident(CounterRandom& random, MeshBuilder& builder) {
   const Eigen::Affine3f frame = builder.frame();
-  builder.SetFrame(frame * Turned(random.Uniform(0.2F, 0.5F), {-1.9F, 0.1F, 0}));
+  builder.SetFrame(frame * TurnedHazardShape(random.Uniform(0.2F, 0.5F), {-1.9F, 0.1F, 0}));
   AddCar(random, random.Uniform(0.7F, 1.0F), builder);
-  builder.SetFrame(frame * Turned(3.14F + random.Uniform(-0.9F, -0.4F), {2.0F, 0.5F, 0}));
+  builder.SetFrame(frame *
+                   TurnedHazardShape(3.14F + random.Uniform(-0.9F, -0.4F), {2.0F, 0.5F, 0}));
   AddCar(random, random.Uniform(0.7F, 1.0F), builder);
   for (int part = 0; part < 24; ++part) {
     const float r = random.Uniform(0.02F, 0.11F);
-    builder.SetMaterial(
-        Plain(random.Chance(0.5) ? Vec3(0.03F, 0.03F, 0.03F) : Vec3(0.42F, 0.43F, 0.44F)));
-    builder.SetFrame(frame * Turned(random.Uniform(0.0F, 6.0F),
-                                    {random.Uniform(-2.4F, 1.6F), random.Uniform(-1.7F, 1.3F), 0}));
+    builder.SetMaterial(PlainHazardMaterial(random.Chance(0.5) ? Vec3(0.03F, 0.03F, 0.03F)
+                                                               : Vec3(0.42F, 0.43F, 0.44F)));
+    builder.SetFrame(
+        frame * TurnedHazardShape(random.Uniform(0.0F, 6.0F),
+                                  {random.Uniform(-2.4F, 1.6F), random.Uniform(-1.7F, 1.3F), 0}));
     builder.AddBox({-r, -0.6F * r, 0}, {r, 0.6F * r, 0.35F * r});
   }
   builder.SetFrame(frame);

@@ -8,7 +8,7 @@ namespace {
 constexpr float kPi = 3.14159265F;
 
 /// Two directions that span the plane across `axis`.
-void Across(const Vec3& axis, Vec3& first, Vec3& second) {
+void AcrossMeshAxis(const Vec3& axis, Vec3& first, Vec3& second) {
   const Vec3 helper = std::abs(axis.z()) < 0.9F ? Vec3::UnitZ() : Vec3::UnitX();
   first = axis.cross(helper).normalized();
   second = axis.cross(first);
@@ -101,7 +101,7 @@ void MeshBuilder::AddTube(const Vec3& from, const Vec3& to, float from_radius, f
   const Vec3 axis = (to - from).normalized();
   Vec3 u;
   Vec3 v;
-  Across(axis, u, v);
+  AcrossMeshAxis(axis, u, v);
   const float length = (to - from).norm();
   std::uint32_t before = 0;
   for (int side = 0; side <= sides; ++side) {

@@ -6,7 +6,7 @@
 namespace livemap::simulation {
 namespace {
 
-Vec3 RandomDirection(CounterRandom& random) {
+Vec3 PlantDirection(CounterRandom& random) {
   const float z = random.Uniform(-1.0F, 1.0F);
   const float angle = random.Uniform(0.0F, 6.2831853F);
   const float r = std::sqrt(std::max(0.0F, 1 - z * z));
@@ -14,11 +14,11 @@ Vec3 RandomDirection(CounterRandom& random) {
 }
 
 /// A pointed leaf or spray of leaves, its normal bent to the crown's outside for soft shading.
-void AddLeaf(const Vec3& place, const Vec3& outward, float length, CounterRandom& random,
-             MeshBuilder& builder) {
-  const Vec3 along = RandomDirection(random) * (0.5F * length);
-  const Vec3 across = along.cross(RandomDirection(random)).normalized() * (0.26F * length);
-  const Vec3 normal = outward + 0.55F * RandomDirection(random);
+void AddPlantLeaf(const Vec3& place, const Vec3& outward, float length, CounterRandom& random,
+                  MeshBuilder& builder) {
+  const Vec3 along = PlantDirection(random) * (0.5F * length);
+  const Vec3 across = along.cross(PlantDirection(random)).normalized() * (0.26F * length);
+  const Vec3 normal = outward + 0.55F * PlantDirection(random);
   const std::uint32_t first = builder.AddVertex(place - along, normal, {0, 0});
   builder.AddVertex(place + across, normal, {1, 0});
   builder.AddVertex(place + along, normal, {1, 1});
@@ -35,9 +35,9 @@ struct Limb {
 };
 
 /// Branches of a crown, thick to thin; the tips are where leaves grow.
-class Crown {
+class PlantCrown {
  public:
-  Crown(float height, bool fine, CounterRandom& random, MeshBuilder& builder)
+  PlantCrown(float height, bool fine, CounterRandom& random, MeshBuilder& builder)
       : height_(height), fine_(fine), random_(random), builder_(builder) {}
 
   void Grow(const Vec3& from, const Vec3& direction, float length, float radius, int level) {
@@ -53,7 +53,7 @@ class Crown {
                        : level == 1 ? 6
                                     : 3);
       place = next;
-      way = (way + 0.22F * RandomDirection(random_) + Vec3(0, 0, 0.06F)).normalized();
+      way = (way + 0.22F * PlantDirection(random_) + Vec3(0, 0, 0.06F)).normalized();
     }
     const int last = fine_ ? 4 : 2;
     if (level >= last) {
@@ -92,7 +92,7 @@ void AddTree(float height_m, bool leaves, CounterRandom& random, MeshBuilder& bu
   builder.SetMaterial({MaterialKind::kBark, Vec3(0.13F, 0.10F, 0.075F) * random.Uniform(0.8F, 1.4F),
                        Vec3::Ones(), random.Bits32()});
   builder.AddTube({0, 0, -0.1F}, {0, 0, 0.35F}, 1.6F * girth, 1.05F * girth, 10);
-  Crown crown(height_m, !leaves, random, builder);
+  PlantCrown crown(height_m, !leaves, random, builder);
   crown.Grow({0, 0, 0.3F}, Vec3::UnitZ(), 0.34F * height_m, 1.05F * girth, 0);
   if (!leaves) return;
   const Vec3 green(random.Uniform(0.065F, 0.13F), random.Uniform(0.15F, 0.21F),
@@ -103,15 +103,14 @@ void AddTree(float height_m, bool leaves, CounterRandom& random, MeshBuilder& bu
   for (const Vec3& tip : crown.tips()) {
     const float cluster = 0.125F * height_m * random.Uniform(0.8F, 1.3F);
     for (int leaf = 0; leaf < count; ++leaf) {
-      const Vec3 offset =
-          RandomDirection(random) * cluster * std::cbrt(random.Uniform(0.05F, 1.0F));
+      const Vec3 offset = PlantDirection(random) * cluster * std::cbrt(random.Uniform(0.05F, 1.0F));
       const Vec3 place = tip + offset.cwiseProduct(Vec3(1.15F, 1.15F, 0.8F));
       const Vec3 outward = (place - middle).normalized();
       const float depth = (place - middle).norm() / (0.36F * height_m);
       const float inside = 0.5F + 0.5F * offset.dot(outward) / cluster;
       builder.SetOpenness(Saturate(0.22F + 0.4F * depth * inside + 0.32F * inside));
-      AddLeaf(place, (outward + offset / cluster).normalized(),
-              0.036F * height_m * random.Uniform(0.7F, 1.3F), random, builder);
+      AddPlantLeaf(place, (outward + offset / cluster).normalized(),
+                   0.036F * height_m * random.Uniform(0.7F, 1.3F), random, builder);
     }
   }
   builder.SetOpenness(1);
@@ -132,7 +131,7 @@ void AddHedge(float length_m, float height_m, bool leaves, CounterRandom& random
                      top ? random.Uniform(-0.3F, 0.3F) : side * random.Uniform(0.26F, 0.32F),
                      top ? height_m : random.Uniform(0.05F, height_m));
     builder.SetOpenness(0.45F + 0.55F * Saturate(place.z() / height_m));
-    AddLeaf(place, normal, random.Uniform(0.09F, 0.18F), random, builder);
+    AddPlantLeaf(place, normal, random.Uniform(0.09F, 0.18F), random, builder);
   }
   builder.SetOpenness(1);
 }

@@ -12,23 +12,23 @@ struct Footprint {
   float mean;
 };
 
-Footprint FootprintOf(const SurfacePoint& point, float along_share) {
+Footprint GroundFootprintOf(const SurfacePoint& point, float along_share) {
   const float extra = point.width_m * (point.stretch - 1);
   return {point.width_m + extra * along_share, point.width_m + extra * (1 - along_share),
           point.width_m * std::sqrt(point.stretch)};
 }
 
-class GroundPainter {
+class GroundSurfacePainter {
  public:
-  GroundPainter(const GroundPlan& plan, const SurfacePoint& point, float along_share,
-                const Lighting& lighting)
+  GroundSurfacePainter(const GroundPlan& plan, const SurfacePoint& point, float along_share,
+                       const Lighting& lighting)
       : plan_(plan),
         point_(point),
         lighting_(lighting),
         along_(point.uv.x()),
         left_(point.uv.y()),
         away_(std::abs(left_)),
-        footprint_(FootprintOf(point, along_share)) {
+        footprint_(GroundFootprintOf(point, along_share)) {
     foot_ = plan.KerbFoot(along_, &crossing_);
     surface_.openness = point.openness;
     surface_.normal = point.normal;
@@ -326,7 +326,7 @@ class GroundPainter {
 
 Surface PaintGround(const GroundPlan& plan, const SurfacePoint& point, float along_share,
                     const Lighting& lighting) {
-  return GroundPainter(plan, point, along_share, lighting).Paint();
+  return GroundSurfacePainter(plan, point, along_share, lighting).Paint();
 }
 
 }  // namespace livemap::simulation

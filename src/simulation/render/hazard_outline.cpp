@@ -18,7 +18,7 @@ constexpr double kFarOutside = 4096;
 
 using PixelTriangle = std::array<cv::Point, 3>;  // in 1/16 px
 
-cv::Point ToSubpixels(const Eigen::Vector2d& pixel) {
+cv::Point OutlineSubpixels(const Eigen::Vector2d& pixel) {
   const auto clamp = [](double value) {
     return static_cast<int>(
         std::lround(std::clamp(value, -kFarOutside, kFarOutside) * (1 << kSubpixelBits)));
@@ -26,7 +26,7 @@ cv::Point ToSubpixels(const Eigen::Vector2d& pixel) {
   return {clamp(pixel.x()), clamp(pixel.y())};
 }
 
-int CountCovered(const std::vector<PixelTriangle>& triangles, const cv::Size& size) {
+int CountOutlinePixelsIn(const std::vector<PixelTriangle>& triangles, const cv::Size& size) {
   cv::Mat covered = cv::Mat::zeros(size, CV_8UC1);
   for (const PixelTriangle& triangle : triangles) {
     cv::fillConvexPoly(covered, triangle.data(), 3, cv::Scalar(1), cv::LINE_8, kSubpixelBits);
@@ -51,7 +51,7 @@ OutlinePixels CountOutlinePixels(const StreetScene& scene, const SimulatedCamera
             optical_from_world *
             (block->street.origin + mesh.positions[triangle.corners[i]].cast<double>());
         ahead = ahead && point.z() > kNearestM;
-        if (ahead) pixels[i] = ToSubpixels(camera.Project(point));
+        if (ahead) pixels[i] = OutlineSubpixels(camera.Project(point));
       }
       if (ahead) bodies[triangle.instance].push_back(pixels);
     }
@@ -59,7 +59,7 @@ OutlinePixels CountOutlinePixels(const StreetScene& scene, const SimulatedCamera
   OutlinePixels outlines;
   for (const auto& [instance, triangles] : bodies) {
     const int covered =
-        CountCovered(triangles, {camera.intrinsics.width, camera.intrinsics.height});
+        CountOutlinePixelsIn(triangles, {camera.intrinsics.width, camera.intrinsics.height});
     if (covered > 0) outlines[instance] = covered;
   }
   return outlines;

@@ -5,19 +5,19 @@
 namespace livemap::simulation {
 namespace {
 
-float MeanFootprint(const SurfacePoint& point) {
+float HouseFootprint(const SurfacePoint& point) {
   return point.width_m * std::sqrt(std::min(point.stretch, 6.0F));
 }
 
 /// Rain and dirt run down walls and splash up from the pavement.
-float Stains(const SurfacePoint& point, std::uint32_t seed, float footprint) {
+float HouseStains(const SurfacePoint& point, std::uint32_t seed, float footprint) {
   const float streaks =
       FractalNoise(point.uv.x() * 2.5F, point.uv.y() * 0.35F, 1.0F, 2, footprint * 2, seed + 3);
   const float splash = 1 - SmoothStep(0.0F, 0.9F, point.uv.y());
   return 1 + 0.16F * streaks - 0.22F * splash;
 }
 
-Vec3 Brick(const Material& material, const SurfacePoint& point, float footprint) {
+Vec3 HouseBrick(const Material& material, const SurfacePoint& point, float footprint) {
   constexpr float kLength = 0.225F;
   constexpr float kHeight = 0.075F;
   const float row = std::floor(point.uv.y() / kHeight);
@@ -34,14 +34,14 @@ Vec3 Brick(const Material& material, const SurfacePoint& point, float footprint)
   return Blend(clay, Vec3(0.40F, 0.38F, 0.35F), 0.8F * mortar);
 }
 
-Vec3 Plaster(const Material& material, const SurfacePoint& point, float footprint) {
+Vec3 HousePlaster(const Material& material, const SurfacePoint& point, float footprint) {
   const float wide = FractalNoise(point.uv.x(), point.uv.y(), 2.2F, 3, footprint, material.seed);
   const float fine = DetailLeft(0.012F, footprint) *
                      Noise(point.uv.x() / 0.008F, point.uv.y() / 0.008F, material.seed + 2);
   return material.colour * (1 + 0.10F * wide + 0.12F * fine);
 }
 
-Vec3 RoofTiles(const Material& material, const SurfacePoint& point, float footprint) {
+Vec3 HouseRoofTiles(const Material& material, const SurfacePoint& point, float footprint) {
   constexpr float kRow = 0.32F;
   constexpr float kTile = 0.25F;
   const float row = std::floor(point.uv.y() / kRow);
@@ -59,7 +59,7 @@ Vec3 RoofTiles(const Material& material, const SurfacePoint& point, float footpr
 }
 
 /// Frame and glazing bars of a pane whose uv runs over 0..1; 1 on wood.
-float Frame(const Vec2& uv, int columns, int rows, float border, float footprint) {
+float HouseWindowFrame(const Vec2& uv, int columns, int rows, float border, float footprint) {
   const auto bars = [&](float x, int count) {
     const float cells = static_cast<float>(count);
     const float from_bar = std::abs(x * cells - std::round(x * cells)) / cells;
@@ -71,8 +71,8 @@ float Frame(const Vec2& uv, int columns, int rows, float border, float footprint
 }
 
 /// A room behind glass: darkness, curtains, at night light.
-Surface Room(const Material& material, const SurfacePoint& point, const Lighting& lighting,
-             bool shop) {
+Surface HouseRoom(const Material& material, const SurfacePoint& point, const Lighting& lighting,
+                  bool shop) {
   Surface surface;
   const std::uint32_t window = HashBits(point.patch * 2654435761U + material.seed);
   const float kind = UnitFloat(window);
@@ -110,13 +110,13 @@ Surface Room(const Material& material, const SurfacePoint& point, const Lighting
   return surface;
 }
 
-Surface Window(const Material& material, const SurfacePoint& point, const Lighting& lighting,
-               bool shop) {
-  Surface surface = Room(material, point, lighting, shop);
+Surface HouseWindow(const Material& material, const SurfacePoint& point, const Lighting& lighting,
+                    bool shop) {
+  Surface surface = HouseRoom(material, point, lighting, shop);
   const int columns = shop ? 2 : 1 + static_cast<int>(material.seed % 2);
   const int rows = shop ? 1 : 1 + static_cast<int>((material.seed >> 3U) % 3);
-  const float wood = Frame(point.uv, columns, rows, shop ? 0.02F : 0.055F,
-                           0.5F * MeanFootprint(point) / 1.2F + 1e-4F);
+  const float wood = HouseWindowFrame(point.uv, columns, rows, shop ? 0.02F : 0.055F,
+                                      0.5F * HouseFootprint(point) / 1.2F + 1e-4F);
   surface.colour = Blend(surface.colour, material.colour, wood);
   surface.glow *= 1 - wood;
   surface.sheen = Blend(surface.sheen, 0.015F, wood);
@@ -124,7 +124,7 @@ Surface Window(const Material& material, const SurfacePoint& point, const Lighti
   return surface;
 }
 
-Vec3 Door(const Material& material, const SurfacePoint& point) {
+Vec3 HouseDoor(const Material& material, const SurfacePoint& point) {
   const float u = point.uv.x();
   const float v = point.uv.y();
   const float border = std::min(std::min(u, 1 - u), std::min(v, 1 - v));
@@ -141,29 +141,30 @@ Vec3 Door(const Material& material, const SurfacePoint& point) {
 }  // namespace
 
 Surface PaintHouse(const Material& material, const SurfacePoint& point, const Lighting& lighting) {
-  const float footprint = MeanFootprint(point);
+  const float footprint = HouseFootprint(point);
   Surface surface;
   switch (material.kind) {
     case MaterialKind::kWindow:
-      surface = Window(material, point, lighting, false);
+      surface = HouseWindow(material, point, lighting, false);
       break;
     case MaterialKind::kShopWindow:
-      surface = Window(material, point, lighting, true);
+      surface = HouseWindow(material, point, lighting, true);
       break;
     case MaterialKind::kDoor:
-      surface.colour = Door(material, point);
+      surface.colour = HouseDoor(material, point);
       surface.openness = 0.7F;
       surface.sheen = 0.02F;
       break;
     case MaterialKind::kBrick:
-      surface.colour = Brick(material, point, footprint) * Stains(point, material.seed, footprint);
+      surface.colour =
+          HouseBrick(material, point, footprint) * HouseStains(point, material.seed, footprint);
       break;
     case MaterialKind::kRoofTiles:
-      surface.colour = RoofTiles(material, point, footprint);
+      surface.colour = HouseRoofTiles(material, point, footprint);
       break;
     default:
       surface.colour =
-          Plaster(material, point, footprint) * Stains(point, material.seed, footprint);
+          HousePlaster(material, point, footprint) * HouseStains(point, material.seed, footprint);
   }
   surface.normal = point.normal;
   surface.instance = point.instance;

@@ -5,14 +5,14 @@
 namespace livemap::simulation {
 namespace {
 
-Vec3 SunFrom(float azimuth, float elevation) {
+Vec3 SunDirection(float azimuth, float elevation) {
   return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
           std::sin(elevation)};
 }
 
-Lighting Day(CounterRandom& random) {
+Lighting DayLighting(CounterRandom& random) {
   Lighting light;
-  light.sun_direction = SunFrom(random.Uniform(0.0F, 6.2832F), random.Uniform(0.6F, 0.95F));
+  light.sun_direction = SunDirection(random.Uniform(0.0F, 6.2832F), random.Uniform(0.6F, 0.95F));
   light.sun = Vec3(2.55F, 2.30F, 1.95F);
   light.zenith = Vec3(0.20F, 0.40F, 0.88F);
   light.horizon = Vec3(0.78F, 0.92F, 1.12F);
@@ -25,9 +25,9 @@ Lighting Day(CounterRandom& random) {
   return light;
 }
 
-Lighting Dusk(CounterRandom& random) {
+Lighting DuskLighting(CounterRandom& random) {
   Lighting light;
-  light.sun_direction = SunFrom(random.Uniform(-0.9F, 0.9F), -0.03F);
+  light.sun_direction = SunDirection(random.Uniform(-0.9F, 0.9F), -0.03F);
   light.zenith = Vec3(0.030F, 0.062F, 0.16F);
   light.horizon = Vec3(0.30F, 0.19F, 0.17F);
   light.ambient = Vec3(0.052F, 0.066F, 0.112F);
@@ -43,7 +43,7 @@ Lighting Dusk(CounterRandom& random) {
   return light;
 }
 
-Lighting Rain(CounterRandom& random) {
+Lighting RainLighting(CounterRandom& random) {
   Lighting light;
   light.zenith = Vec3(0.46F, 0.50F, 0.56F) * random.Uniform(0.85F, 1.1F);
   light.horizon = Vec3(0.66F, 0.70F, 0.75F);
@@ -60,7 +60,7 @@ Lighting Rain(CounterRandom& random) {
   return light;
 }
 
-Lighting Snow(CounterRandom& random) {
+Lighting SnowLighting(CounterRandom& random) {
   Lighting light;
   light.zenith = Vec3(0.62F, 0.66F, 0.72F) * random.Uniform(0.9F, 1.1F);
   light.horizon = Vec3(0.82F, 0.85F, 0.90F);
@@ -78,7 +78,7 @@ Lighting Snow(CounterRandom& random) {
 }
 
 /// Roofs and trees far away, in front of the horizon.
-float SkylineShare(const Lighting& lighting, const Vec3& direction) {
+float SkylineShareOfSky(const Lighting& lighting, const Vec3& direction) {
   const float azimuth = std::atan2(direction.y(), direction.x());
   const float wave = 0.022F + 0.010F * Noise(azimuth * 7, 1.5F, lighting.seed + 40) +
                      0.008F * Noise(azimuth * 31, 2.5F, lighting.seed + 41) +
@@ -86,7 +86,7 @@ float SkylineShare(const Lighting& lighting, const Vec3& direction) {
   return 1 - SmoothStep(wave - 0.002F, wave + 0.002F, direction.z());
 }
 
-float CloudShare(const Lighting& lighting, const Vec3& direction) {
+float CloudShareOfSky(const Lighting& lighting, const Vec3& direction) {
   const float height = 1.0F / (std::max(direction.z(), 0.0F) + 0.12F);
   const float x = direction.x() * height;
   const float y = direction.y() * height;
@@ -124,16 +124,16 @@ Lighting MakeLighting(Condition condition, std::uint64_t seed) {
   Lighting light;
   switch (condition) {
     case Condition::kDay:
-      light = Day(random);
+      light = DayLighting(random);
       break;
     case Condition::kDusk:
-      light = Dusk(random);
+      light = DuskLighting(random);
       break;
     case Condition::kRain:
-      light = Rain(random);
+      light = RainLighting(random);
       break;
     default:
-      light = Snow(random);
+      light = SnowLighting(random);
   }
   light.condition = condition;
   light.seed = random.Bits32();
@@ -163,7 +163,7 @@ Vec3 SkyRadiance(const Lighting& lighting, const Vec3& direction) {
                                        0.004F * height, lighting.seed + 52);
       sky *= 1 + 0.17F * fluff;
     } else {
-      const float share = CloudShare(lighting, direction);
+      const float share = CloudShareOfSky(lighting, direction);
       const float lit = 0.72F + 0.28F * FractalNoise(direction.x() * 5, direction.y() * 5, 1, 3,
                                                      0.01F, lighting.seed + 53);
       const Vec3 cloud =
@@ -177,7 +177,7 @@ Vec3 SkyRadiance(const Lighting& lighting, const Vec3& direction) {
       sky += disc * Vec3(40, 38, 32);
     }
   }
-  const float skyline = SkylineShare(lighting, direction);
+  const float skyline = SkylineShareOfSky(lighting, direction);
   const Vec3 far = Blend(lighting.haze, Vec3(0.10F, 0.13F, 0.10F).cwiseProduct(lighting.ambient),
                          lighting.haze_m > 400 ? 0.55F : 0.12F);
   return Blend(sky, far, skyline);

@@ -6,7 +6,7 @@ namespace livemap::simulation {
 namespace {
 
 /// 1 within `half` of the line from `a` to `b`, soft by `footprint`.
-float Stroke(const Vec2& at, const Vec2& a, const Vec2& b, float half, float footprint) {
+float StrokeOnSign(const Vec2& at, const Vec2& a, const Vec2& b, float half, float footprint) {
   const Vec2 way = b - a;
   const float t = Saturate((at - a).dot(way) / way.squaredNorm());
   const float away = (at - a - t * way).norm();
@@ -14,21 +14,21 @@ float Stroke(const Vec2& at, const Vec2& a, const Vec2& b, float half, float foo
 }
 
 /// A person who digs beside a heap, about the unit square's middle.
-float DiggingPerson(const Vec2& at, float footprint) {
+float DiggingPersonOnSign(const Vec2& at, float footprint) {
   float ink = 0;
-  ink = std::max(ink, Stroke(at, {0.42F, 0.57F}, {0.43F, 0.58F}, 0.045F, footprint));
-  ink = std::max(ink, Stroke(at, {0.40F, 0.48F}, {0.33F, 0.31F}, 0.045F, footprint));
-  ink = std::max(ink, Stroke(at, {0.33F, 0.31F}, {0.38F, 0.12F}, 0.028F, footprint));
-  ink = std::max(ink, Stroke(at, {0.33F, 0.31F}, {0.26F, 0.12F}, 0.028F, footprint));
-  ink = std::max(ink, Stroke(at, {0.40F, 0.47F}, {0.52F, 0.34F}, 0.022F, footprint));
-  ink = std::max(ink, Stroke(at, {0.44F, 0.42F}, {0.62F, 0.20F}, 0.013F, footprint));
+  ink = std::max(ink, StrokeOnSign(at, {0.42F, 0.57F}, {0.43F, 0.58F}, 0.045F, footprint));
+  ink = std::max(ink, StrokeOnSign(at, {0.40F, 0.48F}, {0.33F, 0.31F}, 0.045F, footprint));
+  ink = std::max(ink, StrokeOnSign(at, {0.33F, 0.31F}, {0.38F, 0.12F}, 0.028F, footprint));
+  ink = std::max(ink, StrokeOnSign(at, {0.33F, 0.31F}, {0.26F, 0.12F}, 0.028F, footprint));
+  ink = std::max(ink, StrokeOnSign(at, {0.40F, 0.47F}, {0.52F, 0.34F}, 0.022F, footprint));
+  ink = std::max(ink, StrokeOnSign(at, {0.44F, 0.42F}, {0.62F, 0.20F}, 0.013F, footprint));
   const float heap = 0.14F - 1.3F * std::abs(at.x() - 0.68F);
   ink = std::max(ink,
                  at.y() > 0.10F ? SmoothStep(-footprint, footprint, heap - (at.y() - 0.10F)) : 0);
   return ink;
 }
 
-Vec3 WorkSign(const Material& material, const Vec2& uv, float footprint) {
+Vec3 WorkSignSurface(const Material& material, const Vec2& uv, float footprint) {
   // Distance to the nearest edge of the triangle (0,0) (1,0) (0.5,0.87).
   const float side = 0.866F * std::min(uv.x(), 1 - uv.x()) - 0.5F * uv.y();
   const float border = std::min(uv.y(), side);
@@ -36,20 +36,20 @@ Vec3 WorkSign(const Material& material, const Vec2& uv, float footprint) {
   const Vec3 plate = Blend(material.colour, material.accent, ring);
   const Vec2 inside((uv.x() - 0.5F) * 1.45F + 0.47F, (uv.y() - 0.06F) * 1.35F);
   return Blend(plate, Vec3(0.02F, 0.02F, 0.02F),
-               (1 - ring) * DiggingPerson(inside, 1.4F * footprint));
+               (1 - ring) * DiggingPersonOnSign(inside, 1.4F * footprint));
 }
 
-Vec3 Diamond(const Material& material, const Vec2& uv, float footprint) {
+Vec3 DiamondSignSurface(const Material& material, const Vec2& uv, float footprint) {
   const float border = std::min(std::min(uv.x(), 1 - uv.x()), std::min(uv.y(), 1 - uv.y()));
   const float line = FilteredBand(0.03F, 0.055F, border, footprint);
   // The plate stands on its corner: the picture is turned back by an eighth.
   const Vec2 c = uv - Vec2(0.5F, 0.5F);
   const Vec2 upright(0.5F + 0.95F * (c.x() - c.y()), 0.34F + 0.95F * (c.x() + c.y()));
-  const float ink = std::max(line, DiggingPerson(upright, 1.3F * footprint));
+  const float ink = std::max(line, DiggingPersonOnSign(upright, 1.3F * footprint));
   return Blend(material.colour, material.accent, ink);
 }
 
-Vec3 Closed(const Material& material, const Vec2& uv, float footprint) {
+Vec3 RoadClosedSurface(const Material& material, const Vec2& uv, float footprint) {
   const float r = 2 * (uv - Vec2(0.5F, 0.5F)).norm();
   const bool no_entry = (material.seed & 1U) != 0;
   if (no_entry) {
@@ -61,29 +61,30 @@ Vec3 Closed(const Material& material, const Vec2& uv, float footprint) {
                SmoothStep(0.72F - footprint, 0.72F + footprint, r));
 }
 
-Vec3 TrafficSign(const Material& material, const Vec2& uv, float footprint) {
+Vec3 TrafficSignSurface(const Material& material, const Vec2& uv, float footprint) {
   const float r = 2 * (uv - Vec2(0.5F, 0.5F)).norm();
   const Vec3 blue(0.02F, 0.09F, 0.38F);
   const Vec3 red(0.50F, 0.02F, 0.02F);
   if (material.seed % 3 == 0) {
-    const float stroke = Stroke(uv, {0.22F, 0.78F}, {0.78F, 0.22F}, 0.06F, footprint);
+    const float stroke = StrokeOnSign(uv, {0.22F, 0.78F}, {0.78F, 0.22F}, 0.06F, footprint);
     const float ring = SmoothStep(0.78F - footprint, 0.78F + footprint, r);
     return Blend(blue, red, std::max(stroke, ring));
   }
   if (material.seed % 3 == 1) {
     const float ring = SmoothStep(0.74F - footprint, 0.74F + footprint, r);
-    const float three = std::max(Stroke(uv, {0.36F, 0.38F}, {0.36F, 0.62F}, 0.035F, footprint),
-                                 Stroke(uv, {0.56F, 0.38F}, {0.64F, 0.62F}, 0.05F, footprint));
+    const float three =
+        std::max(StrokeOnSign(uv, {0.36F, 0.38F}, {0.36F, 0.62F}, 0.035F, footprint),
+                 StrokeOnSign(uv, {0.56F, 0.38F}, {0.64F, 0.62F}, 0.05F, footprint));
     return Blend(Blend(material.colour, red, ring), Vec3(0.02F, 0.02F, 0.02F), three);
   }
   const float arrow =
-      std::max(Stroke(uv, {0.5F, 0.2F}, {0.5F, 0.75F}, 0.05F, footprint),
-               std::max(Stroke(uv, {0.5F, 0.78F}, {0.32F, 0.58F}, 0.05F, footprint),
-                        Stroke(uv, {0.5F, 0.78F}, {0.68F, 0.58F}, 0.05F, footprint)));
+      std::max(StrokeOnSign(uv, {0.5F, 0.2F}, {0.5F, 0.75F}, 0.05F, footprint),
+               std::max(StrokeOnSign(uv, {0.5F, 0.78F}, {0.32F, 0.58F}, 0.05F, footprint),
+                        StrokeOnSign(uv, {0.5F, 0.78F}, {0.68F, 0.58F}, 0.05F, footprint)));
   return Blend(blue, material.colour, std::max(arrow, r > 0.94F ? 1.0F : 0.0F));
 }
 
-Vec3 Cone(const Material& material, const SurfacePoint& point, float footprint) {
+Vec3 ConeSurface(const Material& material, const SurfacePoint& point, float footprint) {
   const float v = point.uv.y();
   const float band =
       FilteredBand(0.33F, 0.46F, v, footprint) + FilteredBand(0.54F, 0.64F, v, footprint);
@@ -93,7 +94,7 @@ Vec3 Cone(const Material& material, const SurfacePoint& point, float footprint) 
          (1 - 0.10F * dirt - 0.28F * low * (0.6F + dirt));
 }
 
-Vec3 CarPaint(const Material& material, const SurfacePoint& point, float footprint) {
+Vec3 CarSurface(const Material& material, const SurfacePoint& point, float footprint) {
   Vec3 colour = material.colour;
   const float dust =
       (1 - SmoothStep(0.25F, 0.75F, point.uv.y())) *
@@ -109,7 +110,8 @@ Vec3 CarPaint(const Material& material, const SurfacePoint& point, float footpri
   return colour * (1 - 0.75F * gaps);
 }
 
-Vec3 Grown(const Material& material, const SurfacePoint& point, float size, float footprint) {
+Vec3 PlantSurface(const Material& material, const SurfacePoint& point, float size,
+                  float footprint) {
   const float rough =
       FractalNoise(point.uv.x(), point.uv.y() * 0.45F, size, 4, footprint, material.seed);
   return material.colour * (1 + 0.75F * rough);
@@ -126,10 +128,10 @@ Surface PaintObject(const Material& material, const SurfacePoint& point, const L
   surface.instance = point.instance;
   switch (material.kind) {
     case MaterialKind::kBark:
-      surface.colour = Grown(material, point, 0.09F, footprint);
+      surface.colour = PlantSurface(material, point, 0.09F, footprint);
       break;
     case MaterialKind::kHedge:
-      surface.colour = Grown(material, point, 0.12F, footprint);
+      surface.colour = PlantSurface(material, point, 0.12F, footprint);
       surface.openness *= 0.6F;
       break;
     case MaterialKind::kLeaf: {
@@ -145,13 +147,13 @@ Surface PaintObject(const Material& material, const SurfacePoint& point, const L
                 material.accent, 0.35F * Saturate(-point.normal.z()));
       break;
     case MaterialKind::kWood:
-      surface.colour = Grown(material, point, 0.12F, footprint);
+      surface.colour = PlantSurface(material, point, 0.12F, footprint);
       break;
     case MaterialKind::kMetal:
       surface.sheen = 0.18F;
       break;
     case MaterialKind::kCarPaint:
-      surface.colour = CarPaint(material, point, footprint);
+      surface.colour = CarSurface(material, point, footprint);
       surface.sheen = 0.07F;
       break;
     case MaterialKind::kCarGlass:
@@ -161,7 +163,7 @@ Surface PaintObject(const Material& material, const SurfacePoint& point, const L
       surface.sheen = 0.01F;
       break;
     case MaterialKind::kCone:
-      surface.colour = Cone(material, point, footprint);
+      surface.colour = ConeSurface(material, point, footprint);
       surface.sheen = 0.02F;
       break;
     case MaterialKind::kStripes: {
@@ -171,16 +173,16 @@ Surface PaintObject(const Material& material, const SurfacePoint& point, const L
       break;
     }
     case MaterialKind::kWorkSign:
-      surface.colour = WorkSign(material, point.uv, footprint);
+      surface.colour = WorkSignSurface(material, point.uv, footprint);
       break;
     case MaterialKind::kDiamondSign:
-      surface.colour = Diamond(material, point.uv, footprint);
+      surface.colour = DiamondSignSurface(material, point.uv, footprint);
       break;
     case MaterialKind::kClosedSign:
-      surface.colour = Closed(material, point.uv, 1.4F * footprint);
+      surface.colour = RoadClosedSurface(material, point.uv, 1.4F * footprint);
       break;
     case MaterialKind::kTrafficSign:
-      surface.colour = TrafficSign(material, point.uv, 1.6F * footprint);
+      surface.colour = TrafficSignSurface(material, point.uv, 1.6F * footprint);
       break;
     case MaterialKind::kLight: {
       const bool on = lighting.lit_windows > 0;

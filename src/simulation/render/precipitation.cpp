@@ -6,8 +6,8 @@ namespace livemap::simulation {
 namespace {
 
 /// A soft elliptical spot, upright, that blends towards `colour`.
-void Splat(const Vec3& colour, float x, float y, float half_width, float half_height, float share,
-           float distance, const cv::Mat& depth, cv::Mat& light) {
+void SplatDrop(const Vec3& colour, float x, float y, float half_width, float half_height,
+               float share, float distance, const cv::Mat& depth, cv::Mat& light) {
   const int top = std::max(0, static_cast<int>(std::floor(y - half_height)));
   const int bottom = std::min(light.rows - 1, static_cast<int>(std::ceil(y + half_height)));
   const int first = std::max(0, static_cast<int>(std::floor(x - half_width)));
@@ -51,11 +51,11 @@ void AddPrecipitation(const Lighting& lighting, const geo::CameraIntrinsics& cam
       const float radius = 0.021F * scale * random.Uniform(0.6F, 1.3F);
       const float visible = std::min(1.0F, radius * radius / 0.35F);
       const float drawn = std::max(radius, 0.8F);
-      Splat(colour, x, y, drawn, drawn * 1.25F, 0.85F * visible, distance, depth, light);
+      SplatDrop(colour, x, y, drawn, drawn * 1.25F, 0.85F * visible, distance, depth, light);
     } else {
       const float length = std::min(0.030F * scale, 26.0F);
       const float share = std::min(0.30F, 0.0060F * scale);
-      Splat(colour, x, y, 0.85F, length + 1.0F, share, distance, depth, light);
+      SplatDrop(colour, x, y, 0.85F, length + 1.0F, share, distance, depth, light);
     }
   }
 }

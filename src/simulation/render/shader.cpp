@@ -8,7 +8,7 @@ namespace {
 
 constexpr float kLampReachSquared = 22.0F * 22.0F;
 
-bool IsHouse(MaterialKind kind) {
+bool IsShadedAsHouse(MaterialKind kind) {
   switch (kind) {
     case MaterialKind::kBrick:
     case MaterialKind::kPlaster:
@@ -71,8 +71,8 @@ Surface Shader::Paint(const SurfacePoint& point, const Material& material,
     surface.openness *= StreetScene::SkyOverGround(block, point.uv.x() - begin, point.uv.y());
     return surface;
   }
-  Surface surface = IsHouse(material.kind) ? PaintHouse(material, point, lighting_)
-                                           : PaintObject(material, point, lighting_);
+  Surface surface = IsShadedAsHouse(material.kind) ? PaintHouse(material, point, lighting_)
+                                                   : PaintObject(material, point, lighting_);
   ApplyWeather(point, lighting_, surface);
   return surface;
 }

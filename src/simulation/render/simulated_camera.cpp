@@ -12,7 +12,7 @@ constexpr int kToneSteps = 4096;
 constexpr float kToneLimit = 16;
 
 /// Camera-like response: a straight middle, a soft shoulder, then sRGB's transfer function.
-float Develop(float light) {
+float DevelopInCamera(float light) {
   const float x = 0.84F * light;
   const float film = (x * (2.2F * x + 0.10F)) / (x * (2.05F * x + 0.86F) + 0.12F);
   const float linear = Saturate(film);
@@ -20,12 +20,12 @@ float Develop(float light) {
 }
 
 /// Over the square root of light, so that shadows have steps enough.
-const std::array<float, kToneSteps + 1>& ToneTable() {
+const std::array<float, kToneSteps + 1>& CameraToneTable() {
   static const std::array<float, kToneSteps + 1> table = [] {
     std::array<float, kToneSteps + 1> values{};
     for (int i = 0; i <= kToneSteps; ++i) {
       const float root = static_cast<float>(i) / kToneSteps;
-      values[static_cast<std::size_t>(i)] = Develop(kToneLimit * root * root);
+      values[static_cast<std::size_t>(i)] = DevelopInCamera(kToneLimit * root * root);
     }
     return values;
   }();
@@ -33,7 +33,7 @@ const std::array<float, kToneSteps + 1>& ToneTable() {
 }
 
 /// Nearly normal, standard deviation 1: the sum of four uniform bytes.
-float RoughGaussian(std::uint32_t bits) {
+float CameraNoise(std::uint32_t bits) {
   const std::uint32_t sum =
       (bits & 255U) + ((bits >> 8U) & 255U) + ((bits >> 16U) & 255U) + (bits >> 24U);
   return (static_cast<float>(sum) - 510.0F) * (1.0F / 147.8F);
@@ -85,7 +85,7 @@ float MeterExposure(const cv::Mat& light, float start, float key) {
 
 void DevelopRow(const SimulatedCamera& camera, const cv::Mat& light, int row, float gain,
                 std::uint32_t noise_seed, cv::Mat& bgr) {
-  const auto& table = ToneTable();
+  const auto& table = CameraToneTable();
   const auto* pixels = light.ptr<cv::Vec3f>(row);
   auto* out = bgr.ptr<cv::Vec3b>(row);
   const float half_width = 0.5F * static_cast<float>(light.cols);
@@ -101,7 +101,7 @@ void DevelopRow(const SimulatedCamera& camera, const cv::Mat& light, int row, fl
     for (int channel = 0; channel < 3; ++channel) {
       float value = pixels[column][channel] * dim;
       bits = HashBits(bits + 0x9e3779b9U);
-      value += RoughGaussian(bits) * std::sqrt(shot * std::max(value, 0.0F) + read);
+      value += CameraNoise(bits) * std::sqrt(shot * std::max(value, 0.0F) + read);
       const float root = std::sqrt(Saturate(value / kToneLimit)) * kToneSteps;
       const auto step = std::min(static_cast<int>(root), kToneSteps - 1);
       const auto index = static_cast<std::size_t>(step);

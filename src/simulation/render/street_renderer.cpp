@@ -22,7 +22,7 @@ constexpr float kBodyContrast = 1.07F;
 constexpr float kFaint = 0.02F;
 constexpr float kBrightest = 4;
 
-float Luminance(const cv::Vec3f& p) { return 0.25F * p[0] + 0.65F * p[1] + 0.1F * p[2]; }
+float RenderedLuminance(const cv::Vec3f& p) { return 0.25F * p[0] + 0.65F * p[1] + 0.1F * p[2]; }
 
 }  // namespace
 
@@ -103,7 +103,7 @@ class StreetRenderer::Exposure {
 
  private:
   bool IsEdge(int row, int column) const {
-    const float here = Luminance(raw_.at<cv::Vec3f>(row, column)) + kFaint;
+    const float here = RenderedLuminance(raw_.at<cv::Vec3f>(row, column)) + kFaint;
     const int own = instances_.at<int>(row, column);
     const int neighbours[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
     for (const auto& step : neighbours) {
@@ -113,7 +113,7 @@ class StreetRenderer::Exposure {
       const bool same = instances_.at<int>(r, c) == own;
       const bool ground = same && own < static_cast<int>(MakeInstance(1, ObjectClass::kSky));
       const float most = ground ? kGroundContrast : same ? kEdgeContrast : kBodyContrast;
-      const float there = Luminance(raw_.at<cv::Vec3f>(r, c)) + kFaint;
+      const float there = RenderedLuminance(raw_.at<cv::Vec3f>(r, c)) + kFaint;
       if (there > most * here || here > most * there) return true;
     }
     return false;

@@ -19,7 +19,7 @@ constexpr int kSkyColumns = static_cast<int>(2 * kSkyHalfWidthM / kSkyCellM);
 constexpr int kSkyRays = 20;
 constexpr float kSkyReachM = 14;
 
-void RefuseOnError(RTCDevice device) {
+void RefuseSceneError(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error != RTC_ERROR_NONE) {
     throw std::runtime_error("Embree failed with code " + std::to_string(static_cast<int>(error)));
@@ -50,7 +50,7 @@ RTCScene MakeBlockScene(RTCDevice device, const Mesh& mesh) {
   return scene;
 }
 
-RTCRay MakeRay(const Vec3& from, const Vec3& direction, float nearest, float farthest) {
+RTCRay MakeSceneRay(const Vec3& from, const Vec3& direction, float nearest, float farthest) {
   RTCRay ray;
   ray.org_x = from.x();
   ray.org_y = from.y();
@@ -90,7 +90,7 @@ std::shared_ptr<StreetScene::Block> StreetScene::Load(int index) {
   block->heading =
       Vec2(static_cast<float>(std::cos(heading)), static_cast<float>(std::sin(heading)));
   block->scene = MakeBlockScene(device_, block->street.mesh);
-  RefuseOnError(device_);
+  RefuseSceneError(device_);
   loaded_[index] = block;
   return block;
 }
@@ -109,7 +109,7 @@ RTCScene StreetScene::Assemble(int first, int last, const Eigen::Vector3d& origi
     rtcReleaseGeometry(instance);
   }
   rtcCommitScene(scene);
-  RefuseOnError(device_);
+  RefuseSceneError(device_);
   return scene;
 }
 
@@ -135,8 +135,9 @@ void StreetScene::MeasureSky(int index) {
         const float r2 = (static_cast<float>(i) + 0.5F) / kSkyRays;
         const float angle = 2.39996F * static_cast<float>(i) + 6.2832F * UnitFloat(turn);
         const float r = std::sqrt(r2);
-        RTCRay ray = MakeRay(place, {r * std::cos(angle), r * std::sin(angle), std::sqrt(1 - r2)},
-                             0.01F, kSkyReachM);
+        RTCRay ray =
+            MakeSceneRay(place, {r * std::cos(angle), r * std::sin(angle), std::sqrt(1 - r2)},
+                         0.01F, kSkyReachM);
         rtcOccluded1(scene, &context, &ray);
         if (ray.tfar >= 0) ++open;
       }
@@ -198,7 +199,7 @@ SceneHit StreetScene::Cast(const Vec3& from, const Vec3& direction, float neares
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query;
-  query.ray = MakeRay(from, direction, nearest, farthest);
+  query.ray = MakeSceneRay(from, direction, nearest, farthest);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene_, &context, &query);

@@ -8,7 +8,7 @@ namespace {
 constexpr double kDistanceM = 2;
 
 /// Grey value of the wall: patches with edges about a centimetre wide, no two alike.
-double Pattern(double x, double y) {
+double WallPattern(double x, double y) {
   const double patches = std::tanh(6 * std::sin(9 * x + 3 * std::sin(4 * y))) +
                          std::tanh(6 * std::sin(8 * y + 2 * std::sin(5 * x)));
   return 128 + 38 * patches + 12 * std::sin(23 * x + 17 * y);
@@ -33,7 +33,7 @@ PatternedWall::View PatternedWall::See(const geo::CameraIntrinsics& camera,
       const Eigen::Vector3d point = eye + distance * ray;
       view.depth.at<float>(y, x) = static_cast<float>(distance);
       view.grey.at<std::uint8_t>(y, x) =
-          cv::saturate_cast<std::uint8_t>(gain * Pattern(point.x(), point.y()) + bias);
+          cv::saturate_cast<std::uint8_t>(gain * WallPattern(point.x(), point.y()) + bias);
     }
   }
   return view;

@@ -12,7 +12,7 @@ namespace {
 constexpr float kHalfLength = 2.5F, kHalfWidth = 2.0F, kHeight = 2.6F;
 const Vec3 kLamp(0.4F, -0.3F, 2.4F);
 
-Material Paint(MaterialKind kind, const Vec3& colour, std::uint32_t seed) {
+Material RoomMaterial(MaterialKind kind, const Vec3& colour, std::uint32_t seed) {
   Material material;
   material.kind = kind;
   material.colour = colour;
@@ -23,15 +23,15 @@ Material Paint(MaterialKind kind, const Vec3& colour, std::uint32_t seed) {
 /// Walls and floor are not of one stuff: which one a face of the room shows.
 Material RoomFace(int axis, float sign, std::uint32_t seed) {
   if (axis == 2) {
-    return sign > 0 ? Paint(MaterialKind::kWood, Vec3(0.36F, 0.22F, 0.12F), seed)
-                    : Paint(MaterialKind::kPlaster, Vec3(0.75F, 0.74F, 0.70F), seed + 1);
+    return sign > 0 ? RoomMaterial(MaterialKind::kWood, Vec3(0.36F, 0.22F, 0.12F), seed)
+                    : RoomMaterial(MaterialKind::kPlaster, Vec3(0.75F, 0.74F, 0.70F), seed + 1);
   }
-  if (axis == 0) return Paint(MaterialKind::kBrick, Vec3(0.45F, 0.22F, 0.15F), seed + 2);
-  return Paint(MaterialKind::kPlaster, Vec3(0.55F, 0.58F, 0.50F), seed + 3);
+  if (axis == 0) return RoomMaterial(MaterialKind::kBrick, Vec3(0.45F, 0.22F, 0.15F), seed + 2);
+  return RoomMaterial(MaterialKind::kPlaster, Vec3(0.55F, 0.58F, 0.50F), seed + 3);
 }
 
 /// Floor boards: the wood's grain alone has no edges.
-float Boards(const Vec2& uv, float footprint) {
+float RoomBoards(const Vec2& uv, float footprint) {
   const float seams = std::max(FilteredStripes(0.006F, 0.12F, uv.x(), footprint),
                                FilteredStripes(0.006F, 1.3F, uv.y(), footprint));
   return 1 - 0.6F * seams;
@@ -55,7 +55,7 @@ void SimulatedRoom::Furnish(std::uint64_t seed) {
   const auto add = [this, &random](const Vec3& low, const Vec3& high, MaterialKind kind,
                                    const Vec3& paint) {
     boxes_.push_back(
-        {low, high, Paint(kind, paint, static_cast<std::uint32_t>(random.Bits())), false});
+        {low, high, RoomMaterial(kind, paint, static_cast<std::uint32_t>(random.Bits())), false});
   };
   // Pictures on the wall that the camera looks at, and on the side walls.
   for (int i = 0; i < 7; ++i) {
@@ -158,7 +158,7 @@ Vec3 SimulatedRoom::Shade(const Vec3& from, const Vec3& direction, const Hit& hi
   Vec3 colour = wall ? PaintHouse(material, point, lighting_).colour
                      : PaintObject(material, point, lighting_).colour;
   if (material.kind == MaterialKind::kWood && hit.box->hollow) {
-    colour *= Boards(point.uv, point.width_m);
+    colour *= RoomBoards(point.uv, point.width_m);
   }
   const Vec3 to_lamp = kLamp - point.position;
   const float facing = std::max(0.0F, to_lamp.normalized().dot(point.normal));

@@ -20,7 +20,7 @@ struct Model {
   float edge;  ///< Neighbours whose depth differs by this share leave a hole.
 };
 
-Model ModelOf(const geo::CameraIntrinsics& camera, DepthSensor sensor, double baseline_m) {
+Model SensorModelOf(const geo::CameraIntrinsics& camera, DepthSensor sensor, double baseline_m) {
   const auto focal = static_cast<float>(camera.fx);
   if (sensor == DepthSensor::kKinect) {
     return {focal, 0.075F, 0.06F, 0.125F, 0.5F, 10, 0.06F};
@@ -29,7 +29,7 @@ Model ModelOf(const geo::CameraIntrinsics& camera, DepthSensor sensor, double ba
 }
 
 /// The sum of three uniform numbers, standard deviation 1.
-float Gaussian(int row, int column, std::uint32_t seed) {
+float SensorNoise(int row, int column, std::uint32_t seed) {
   std::uint32_t bits = HashLattice(column, row, seed);
   float sum = 0;
   for (int i = 0; i < 3; ++i) {
@@ -39,7 +39,7 @@ float Gaussian(int row, int column, std::uint32_t seed) {
   return (sum - 1.5F) * 2;
 }
 
-bool IsAtEdge(const cv::Mat& depth, int row, int column, float share) {
+bool IsDepthAtEdge(const cv::Mat& depth, int row, int column, float share) {
   const float here = depth.at<float>(row, column);
   for (const int step : {-1, 1}) {
     const int beside = std::min(std::max(column + step, 0), depth.cols - 1);
@@ -50,7 +50,7 @@ bool IsAtEdge(const cv::Mat& depth, int row, int column, float share) {
 }
 
 /// For each column of the other camera the nearest surface's disparity.
-std::vector<float> OtherEye(const cv::Mat& depth, int row, const Model& model) {
+std::vector<float> DepthOfOtherEye(const cv::Mat& depth, int row, const Model& model) {
   std::vector<float> seen(static_cast<std::size_t>(depth.cols), 0.0F);
   for (int column = 0; column < depth.cols; ++column) {
     const float metres = depth.at<float>(row, column);
@@ -76,19 +76,19 @@ std::optional<DepthSensor> ParseDepthSensor(const std::string& name) {
 cv::Mat SenseDepth(const cv::Mat& depth, const geo::CameraIntrinsics& camera, DepthSensor sensor,
                    double baseline_m, std::uint32_t seed) {
   if (sensor == DepthSensor::kExact) return depth;
-  const Model model = ModelOf(camera, sensor, baseline_m);
+  const Model model = SensorModelOf(camera, sensor, baseline_m);
   cv::Mat sensed(depth.size(), CV_32FC1, cv::Scalar(0));
   for (int row = 0; row < depth.rows; ++row) {
-    const std::vector<float> other = OtherEye(depth, row, model);
+    const std::vector<float> other = DepthOfOtherEye(depth, row, model);
     for (int column = 0; column < depth.cols; ++column) {
       const float metres = depth.at<float>(row, column);
       if (metres < model.nearest_m || metres > model.farthest_m) continue;
-      if (IsAtEdge(depth, row, column, model.edge)) continue;
+      if (IsDepthAtEdge(depth, row, column, model.edge)) continue;
       float disparity = model.focal_px * model.baseline_m / metres;
       const auto there = static_cast<int>(std::lround(static_cast<float>(column) - disparity));
       if (there < 0 || there >= depth.cols) continue;
       if (other[static_cast<std::size_t>(there)] > disparity + 1.5F) continue;
-      disparity += model.sigma_px * Gaussian(row, column, seed);
+      disparity += model.sigma_px * SensorNoise(row, column, seed);
       if (model.step_px > 0) disparity = std::round(disparity / model.step_px) * model.step_px;
       if (disparity <= 0) continue;
       sensed.at<float>(row, column) = model.focal_px * model.baseline_m / disparity;

@@ -23,12 +23,12 @@ enum BlockStream : std::uint64_t {
   kBackTrees = 31,
 };
 
-std::uint64_t Item(int index, double side) {
+std::uint64_t BlockItem(int index, double side) {
   return static_cast<std::uint64_t>(index + 1000) * 2 + (side > 0 ? 1 : 0);
 }
 
 /// What stands on the pavement for a number in [0, 1); none for the rest of it.
-std::optional<ObjectClass> SmallThing(double number) {
+std::optional<ObjectClass> SmallThingOfBlock(double number) {
   if (number < 0.16) return ObjectClass::kBin;
   if (number < 0.24) return ObjectClass::kRubbish;
   if (number < 0.46) return ObjectClass::kPerson;
@@ -40,7 +40,7 @@ std::optional<ObjectClass> SmallThing(double number) {
 
 /// What may stand where a thing stood; none: a replaced sign just vanishes, for another one could
 /// look the same.
-std::optional<ObjectClass> Successor(ObjectClass thing) {
+std::optional<ObjectClass> BlockSuccessor(ObjectClass thing) {
   switch (thing) {
     case ObjectClass::kBin:
       return ObjectClass::kRubbish;
@@ -217,7 +217,7 @@ void BlockBuilder::AddPlot(double begin, double width, double side, double setba
 
 void BlockBuilder::AddHouses(double side) {
   if (district_ == District::kPark) return;
-  CounterRandom random(street_.seed(), kHouses, Item(index_, side));
+  CounterRandom random(street_.seed(), kHouses, BlockItem(index_, side));
   const double end = (index_ + 1) * kBlockM;
   double along = index_ * kBlockM;
   while (along < end - 6) {
@@ -242,7 +242,7 @@ void BlockBuilder::AddSideStreetHouses() {
     for (const double side : {-1.0, 1.0}) {
       for (const double ahead : {-1.0, 1.0}) {
         CounterRandom random(street_.seed(), kSideStreet,
-                             Item(index_, side) * 2 + (ahead > 0 ? 1 : 0));
+                             BlockItem(index_, side) * 2 + (ahead > 0 ? 1 : 0));
         double out = Kerb() + 15.5;
         for (int house = 0; house < 3; ++house) {
           const double width = random.Uniform(8.0, 11.0);
@@ -262,7 +262,7 @@ void BlockBuilder::AddSideStreetHouses() {
 
 void BlockBuilder::AddParkedCars(double side) {
   if (street_.description().parking_width_m < 1.7) return;
-  CounterRandom random(street_.seed(), kCars, Item(index_, side));
+  CounterRandom random(street_.seed(), kCars, BlockItem(index_, side));
   const double left =
       side * (street_.description().lane_width_m + 0.52 * street_.description().parking_width_m);
   const double density = district_ == District::kPark ? 0.3 : 0.62;
@@ -302,7 +302,7 @@ void BlockBuilder::AddLampPosts() {
 }
 
 void BlockBuilder::AddStreetTrees(double side) {
-  CounterRandom random(street_.seed(), kTrees, Item(index_, side));
+  CounterRandom random(street_.seed(), kTrees, BlockItem(index_, side));
   const double out = Kerb() + 0.75;
   const double pitch = district_ == District::kShops ? 20 : 13;
   for (double along = index_ * kBlockM + 4; along < (index_ + 1) * kBlockM; along += pitch) {
@@ -316,7 +316,7 @@ void BlockBuilder::AddStreetTrees(double side) {
 }
 
 void BlockBuilder::AddBackTrees(double side) {
-  CounterRandom random(street_.seed(), kBackTrees, Item(index_, side));
+  CounterRandom random(street_.seed(), kBackTrees, BlockItem(index_, side));
   const double nearest = district_ == District::kPark ? 10.5 : 24;
   const int count = district_ == District::kPark ? 5 : 2;
   for (int i = 0; i < count; ++i) {
@@ -330,16 +330,16 @@ void BlockBuilder::AddBackTrees(double side) {
 }
 
 void BlockBuilder::AddSmallThings(double side) {
-  CounterRandom random(street_.seed(), kThings, Item(index_, side));
+  CounterRandom random(street_.seed(), kThings, BlockItem(index_, side));
   for (int i = 0; i < 4; ++i) {
     const double along = (index_ + (i + random.Uniform(0.15, 0.85)) / 4) * kBlockM;
-    const std::optional<ObjectClass> kind = SmallThing(random.Uniform(0.0, 1.0));
+    const std::optional<ObjectClass> kind = SmallThingOfBlock(random.Uniform(0.0, 1.0));
     const std::uint64_t item = random.Bits();
     if (!kind || NearCrossing(along, 5)) continue;
     const std::uint32_t instance = NewInstance(*kind);
     const ObjectFate fate = street_.pass().FateOf(street_.seed(), instance);
     AddSmallThing(instance, fate, along, side, item);
-    const std::optional<ObjectClass> successor = Successor(*kind);
+    const std::optional<ObjectClass> successor = BlockSuccessor(*kind);
     if (fate != ObjectFate::kReplaced || !successor) continue;
     AddSmallThing(SuccessorOf(instance, *successor), ObjectFate::kAppears, along, side, item + 1);
   }

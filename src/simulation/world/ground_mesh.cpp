@@ -17,9 +17,9 @@ struct Station {
   std::array<float, 2 * kColumns - 1> up{};
 };
 
-float CrownHeight(float left) { return -kCrownFall * std::min(std::abs(left), 6.0F); }
+float GroundCrownHeight(float left) { return -kCrownFall * std::min(std::abs(left), 6.0F); }
 
-Station MakeStation(const GroundPlan& plan, float along, bool in_crossing) {
+Station MakeGroundStation(const GroundPlan& plan, float along, bool in_crossing) {
   const float foot =
       in_crossing ? plan.profile.half_road_m() + kCornerRadiusM : plan.KerbFoot(along, nullptr);
   const float back = foot + kKerbWidthM;
@@ -36,7 +36,7 @@ Station MakeStation(const GroundPlan& plan, float along, bool in_crossing) {
   for (int column = 0; column < kColumns; ++column) {
     const auto c = static_cast<std::size_t>(column);
     const bool raised = column >= 3 && !in_crossing;
-    float up = CrownHeight(std::min(out[c], foot)) + (raised ? kKerbHeightM : 0);
+    float up = GroundCrownHeight(std::min(out[c], foot)) + (raised ? kKerbHeightM : 0);
     if (column >= 5 && raised) up += 0.03F;
     station.left[kColumns - 1 + c] = out[c];
     station.up[kColumns - 1 + c] = up;
@@ -46,10 +46,11 @@ Station MakeStation(const GroundPlan& plan, float along, bool in_crossing) {
   return station;
 }
 
-std::vector<Station> MakeStations(const GroundPlan& plan, float begin, float end) {
+std::vector<Station> MakeGroundStations(const GroundPlan& plan, float begin, float end) {
   std::vector<Station> stations;
   const auto add = [&](float along, bool in_crossing) {
-    if (along >= begin && along <= end) stations.push_back(MakeStation(plan, along, in_crossing));
+    if (along >= begin && along <= end)
+      stations.push_back(MakeGroundStation(plan, along, in_crossing));
   };
   std::vector<std::pair<float, bool>> places;
   for (int i = 0; static_cast<float>(i) * 2 <= end - begin + 0.01F; ++i) {
@@ -80,7 +81,7 @@ std::vector<Station> MakeStations(const GroundPlan& plan, float begin, float end
 }
 
 /// One four-cornered piece of ground, bilinear between its corners.
-struct Patch {
+struct GroundMeshPatch {
   const Station& near;
   const Station& far;
   std::size_t column;
@@ -92,13 +93,13 @@ struct Patch {
   }
 };
 
-class GroundLayer {
+class GroundMeshLayer {
  public:
-  GroundLayer(const RoadLine& line, const GroundPlan& plan, const Eigen::Vector3d& origin,
-              MeshBuilder& builder)
+  GroundMeshLayer(const RoadLine& line, const GroundPlan& plan, const Eigen::Vector3d& origin,
+                  MeshBuilder& builder)
       : line_(line), plan_(plan), origin_(origin), builder_(builder) {}
 
-  void Lay(const Patch& patch) {
+  void Lay(const GroundMeshPatch& patch) {
     const Vec3 a = Place(patch.near, patch.column);
     const Vec3 b = Place(patch.far, patch.column);
     const Vec3 c = Place(patch.far, patch.column + 1);
@@ -119,7 +120,7 @@ class GroundLayer {
         .cast<float>();
   }
 
-  std::vector<const Pothole*> HolesIn(const Patch& patch) const {
+  std::vector<const Pothole*> HolesIn(const GroundMeshPatch& patch) const {
     std::vector<const Pothole*> holes;
     const float low = std::min(patch.near.left[patch.column], patch.far.left[patch.column]);
     const float high =
@@ -134,7 +135,8 @@ class GroundLayer {
     return holes;
   }
 
-  void LayFlat(const Patch& patch, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  void LayFlat(const GroundMeshPatch& patch, const Vec3& a, const Vec3& b, const Vec3& c,
+               const Vec3& d) {
     const Vec3 normal = (c - a).cross(d - b);
     if (normal.norm() < 1e-6F) return;
     const std::uint32_t first = builder_.AddVertex(a, normal, {patch.Along(0), patch.Left(0, 0)});
@@ -153,8 +155,8 @@ class GroundLayer {
     return height;
   }
 
-  void LayDented(const Patch& patch, const std::vector<const Pothole*>& holes, const Vec3& a,
-                 const Vec3& b, const Vec3& c, const Vec3& d) {
+  void LayDented(const GroundMeshPatch& patch, const std::vector<const Pothole*>& holes,
+                 const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
     const int rows = 1 + static_cast<int>((b - a).norm() / kHoleCellM);
     const int columns = 1 + static_cast<int>((d - a).norm() / kHoleCellM);
     std::uint32_t first = 0;
@@ -204,8 +206,8 @@ class GroundLayer {
 void AddGround(const RoadLine& line, const GroundPlan& plan, double begin_m, double end_m,
                const Eigen::Vector3d& origin, MeshBuilder& builder) {
   const std::vector<Station> stations =
-      MakeStations(plan, static_cast<float>(begin_m), static_cast<float>(end_m));
-  GroundLayer layer(line, plan, origin, builder);
+      MakeGroundStations(plan, static_cast<float>(begin_m), static_cast<float>(end_m));
+  GroundMeshLayer layer(line, plan, origin, builder);
   for (std::size_t i = 0; i + 1 < stations.size(); ++i) {
     for (std::size_t column = 0; column + 1 < stations[i].left.size(); ++column) {
       layer.Lay({stations[i], stations[i + 1], column});
@@ -217,7 +219,7 @@ float GroundHeight(const GroundPlan& plan, float along_m, float left_m) {
   float crossing = 0;
   const float foot = plan.KerbFoot(along_m, &crossing);
   const float away = std::abs(left_m);
-  const float height = CrownHeight(std::min(away, foot));
+  const float height = GroundCrownHeight(std::min(away, foot));
   if (away <= foot) return height;
   return height + kKerbHeightM +
          (away > foot + kKerbWidthM + plan.profile.pavement_width_m ? 0.03F : 0.0F);

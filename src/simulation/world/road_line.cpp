@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kSampleM = 0.5;
 
-double Smooth(double t) { return t * t * (3 - 2 * t); }
+double SmoothRoadTurn(double t) { return t * t * (3 - 2 * t); }
 
 }  // namespace
 
@@ -26,10 +26,10 @@ RoadLine::RoadLine(double bearing_deg, const std::vector<RoadPiece>& pieces) {
     for (; static_cast<double>(next) * kSampleM <= piece_end; ++next) {
       const double t = (static_cast<double>(next) * kSampleM - piece_start) / piece.length_m;
       const double middle = std::max(0.0, t - 0.5 * kSampleM / piece.length_m);
-      const double heading_between = heading + turn * Smooth(middle);
+      const double heading_between = heading + turn * SmoothRoadTurn(middle);
       place += kSampleM * Eigen::Vector2d(std::cos(heading_between), std::sin(heading_between));
-      samples_.push_back(
-          {{place.x(), place.y(), height + piece.climb_m * Smooth(t)}, heading + turn * Smooth(t)});
+      samples_.push_back({{place.x(), place.y(), height + piece.climb_m * SmoothRoadTurn(t)},
+                          heading + turn * SmoothRoadTurn(t)});
     }
     heading += turn;
     height += piece.climb_m;

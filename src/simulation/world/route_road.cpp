@@ -28,18 +28,18 @@ struct Vertex {
 };
 
 /// An angle in [-pi, pi].
-double Wrap(double angle) { return std::remainder(angle, 2 * M_PI); }
+double WrapRouteAngle(double angle) { return std::remainder(angle, 2 * M_PI); }
 
 /// "the route 'x', vertex 3 (48.1, 11.5)".
-std::string Name(const Vertex& vertex, const std::string& name) {
+std::string RouteVertexName(const Vertex& vertex, const std::string& name) {
   char place[64];
   std::snprintf(place, sizeof place, "(%.6f, %.6f)", vertex.position.latitude_deg,
                 vertex.position.longitude_deg);
   return "the route '" + name + "', vertex " + std::to_string(vertex.number) + " " + place;
 }
 
-std::vector<Vertex> PlaceVertices(const std::vector<geo::GeoPoint>& points,
-                                  const std::string& name) {
+std::vector<Vertex> PlaceRouteVertices(const std::vector<geo::GeoPoint>& points,
+                                       const std::string& name) {
   std::vector<Vertex> vertices;
   if (points.empty()) throw Error("the route '" + name + "' has no point");
   const geo::LocalFrame frame(points.front());
@@ -49,7 +49,7 @@ std::vector<Vertex> PlaceVertices(const std::vector<geo::GeoPoint>& points,
     vertex.position = points[i];
     const double distance_m = geo::GeodesicDistanceM(points.front(), points[i]);
     if (distance_m > kFarthestM) {
-      throw Error(Name(vertex, name) + " lies " +
+      throw Error(RouteVertexName(vertex, name) + " lies " +
                   std::to_string(static_cast<long>(distance_m / 1000)) +
                   " km from the first, accepted are 100 km");
     }
@@ -64,23 +64,25 @@ std::vector<Vertex> PlaceVertices(const std::vector<geo::GeoPoint>& points,
   return vertices;
 }
 
-double HeadingRad(const Vertex& from, const Vertex& to) {
+double RouteHeadingRad(const Vertex& from, const Vertex& to) {
   const Eigen::Vector2d way = to.place - from.place;
   return std::atan2(way.y(), way.x());
 }
 
-double SegmentM(const Vertex& from, const Vertex& to) { return (to.place - from.place).norm(); }
+double RouteSegmentM(const Vertex& from, const Vertex& to) {
+  return (to.place - from.place).norm();
+}
 
-void BendCorners(const std::string& name, std::vector<Vertex>& vertices) {
+void BendRouteCorners(const std::string& name, std::vector<Vertex>& vertices) {
   for (std::size_t i = 1; i + 1 < vertices.size(); ++i) {
     Vertex& vertex = vertices[i];
-    vertex.turn_rad =
-        Wrap(HeadingRad(vertex, vertices[i + 1]) - HeadingRad(vertices[i - 1], vertex));
+    vertex.turn_rad = WrapRouteAngle(RouteHeadingRad(vertex, vertices[i + 1]) -
+                                     RouteHeadingRad(vertices[i - 1], vertex));
     const double turn_deg = std::abs(vertex.turn_rad) * kDegrees;
     if (turn_deg > kLargestTurnDeg) {
       std::ostringstream sentence;
       sentence.precision(1);
-      sentence << std::fixed << Name(vertex, name) << " turns by " << turn_deg
+      sentence << std::fixed << RouteVertexName(vertex, name) << " turns by " << turn_deg
                << " degrees, accepted are at most " << kLargestTurnDeg;
       throw Error(sentence.str());
     }
@@ -89,11 +91,11 @@ void BendCorners(const std::string& name, std::vector<Vertex>& vertices) {
 }
 
 /// Of a segment, the part that the curve at `vertex` may have when `other` needs its own.
-[[noreturn]] void RefuseCorner(const std::string& name, const Vertex& vertex, const Vertex& other,
-                               double segment_m) {
+[[noreturn]] void RefuseRouteCorner(const std::string& name, const Vertex& vertex,
+                                    const Vertex& other, double segment_m) {
   std::ostringstream sentence;
   sentence.precision(1);
-  sentence << std::fixed << Name(vertex, name) << " turns by "
+  sentence << std::fixed << RouteVertexName(vertex, name) << " turns by "
            << std::abs(vertex.turn_rad) * kDegrees << " degrees and its curve of "
            << kTightestRadiusM << " m radius needs " << vertex.curve.tangent_m
            << " m of the line, the segment to vertex " << other.number << " of " << segment_m
@@ -103,25 +105,25 @@ void BendCorners(const std::string& name, std::vector<Vertex>& vertices) {
   throw Error(sentence.str());
 }
 
-void CheckRoom(const std::string& name, const std::vector<Vertex>& vertices) {
+void CheckRouteRoom(const std::string& name, const std::vector<Vertex>& vertices) {
   for (std::size_t i = 0; i + 1 < vertices.size(); ++i) {
     const Vertex& a = vertices[i];
     const Vertex& b = vertices[i + 1];
-    const double segment_m = SegmentM(a, b);
+    const double segment_m = RouteSegmentM(a, b);
     if (a.curve.tangent_m + b.curve.tangent_m <= segment_m + kRoundingM) continue;
     // The sharper corner is to blame.
     const bool first = a.curve.tangent_m > b.curve.tangent_m;
-    RefuseCorner(name, first ? a : b, first ? b : a, segment_m);
+    RefuseRouteCorner(name, first ? a : b, first ? b : a, segment_m);
   }
 }
 
 /// Lengthens gentle curves while they keep to their half of both segments.
-void EaseCorners(std::vector<Vertex>& vertices) {
+void EaseRouteCorners(std::vector<Vertex>& vertices) {
   for (std::size_t i = 1; i + 1 < vertices.size(); ++i) {
     Vertex& vertex = vertices[i];
     if (vertex.curve.length_m >= kEasyCurveM || vertex.turn_rad == 0) continue;
-    const double half_m =
-        0.5 * std::min(SegmentM(vertices[i - 1], vertex), SegmentM(vertex, vertices[i + 1]));
+    const double half_m = 0.5 * std::min(RouteSegmentM(vertices[i - 1], vertex),
+                                         RouteSegmentM(vertex, vertices[i + 1]));
     const double scale =
         std::min(kEasyCurveM / vertex.curve.length_m, half_m / vertex.curve.tangent_m);
     if (scale > 1) vertex.curve = CurveOfLength(vertex.turn_rad, scale * vertex.curve.length_m);
@@ -155,17 +157,17 @@ CornerCurve TightestCurve(double turn_rad) {
 }
 
 RouteRoad LayRoad(const std::vector<geo::GeoPoint>& points, const std::string& name) {
-  std::vector<Vertex> vertices = PlaceVertices(points, name);
-  BendCorners(name, vertices);
-  CheckRoom(name, vertices);
-  EaseCorners(vertices);
+  std::vector<Vertex> vertices = PlaceRouteVertices(points, name);
+  BendRouteCorners(name, vertices);
+  CheckRouteRoom(name, vertices);
+  EaseRouteCorners(vertices);
   RouteRoad road;
-  road.bearing_deg = 90 - HeadingRad(vertices[0], vertices[1]) * kDegrees;
+  road.bearing_deg = 90 - RouteHeadingRad(vertices[0], vertices[1]) * kDegrees;
   if (road.bearing_deg < 0) road.bearing_deg += 360;
   for (std::size_t i = 0; i + 1 < vertices.size(); ++i) {
     const CornerCurve& next = vertices[i + 1].curve;
     const double straight_m =
-        SegmentM(vertices[i], vertices[i + 1]) - vertices[i].curve.tangent_m - next.tangent_m;
+        RouteSegmentM(vertices[i], vertices[i + 1]) - vertices[i].curve.tangent_m - next.tangent_m;
     if (straight_m > kRoundingM) road.pieces.push_back({straight_m, 0, 0});
     if (next.length_m > 0) {
       road.pieces.push_back({next.length_m, vertices[i + 1].turn_rad * kDegrees, 0});

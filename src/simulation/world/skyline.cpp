@@ -19,7 +19,7 @@ struct Row {
   double filled = 0;
 };
 
-Row RowAt(const Street& street, double along_m) {
+Row SkylineRowAt(const Street& street, double along_m) {
   const int index = static_cast<int>(std::floor(along_m / kBlockM));
   const double side_road_m = static_cast<double>(kSideRoadHalfM) + kCornerGapM;
   for (int near = index - 1; near <= index + 1; ++near) {
@@ -48,7 +48,7 @@ datasets::SkyVisibility SkyOver(const Street& street, double along_m, double lef
                             street.description().pavement_width_m;
   int count = 0;
   for (double off = -kSkylineReachM; off <= kSkylineReachM; off += kHillStepM, ++count) {
-    const Row row = RowAt(street, along_m + off);
+    const Row row = SkylineRowAt(street, along_m + off);
     const double front_m = pavement_m + row.setback_m;
     const double rise_m = kFrontHeightM - kAntennaHeightM;
     sky.left_rad += row.filled * std::atan2(rise_m, front_m - left_m);

@@ -10,10 +10,10 @@ namespace {
 /// Streams of randomness: one per kind of thing, so that none shifts another.
 enum StreetStream : std::uint64_t { kHazards = 11, kCrossings = 12, kGroundDetails = 13 };
 
-std::uint64_t Item(int index) { return static_cast<std::uint64_t>(index) + 1000; }
+std::uint64_t StreetItem(int index) { return static_cast<std::uint64_t>(index) + 1000; }
 
-StreetHazard Draw(ObjectClass object_class, double along, double left, double radius,
-                  CounterRandom& random) {
+StreetHazard DrawStreetHazard(ObjectClass object_class, double along, double left, double radius,
+                              CounterRandom& random) {
   StreetHazard hazard;
   hazard.object_class = object_class;
   hazard.along_m = along;
@@ -24,45 +24,48 @@ StreetHazard Draw(ObjectClass object_class, double along, double left, double ra
 }
 
 /// A place where people work on the parking lane: sign, barrier, cones, perhaps a machine.
-void DrawWorkSite(double begin, const StreetProfile& profile, CounterRandom& random,
-                  std::vector<StreetHazard>& hazards) {
+void DrawStreetWorkSite(double begin, const StreetProfile& profile, CounterRandom& random,
+                        std::vector<StreetHazard>& hazards) {
   const auto lane = static_cast<double>(profile.lane_width_m);
   const double edge = -lane - 0.15;
-  hazards.push_back(Draw(ObjectClass::kRoadWorkSign, begin + 4, -lane - 0.9, 0.5, random));
-  hazards.push_back(Draw(ObjectClass::kBarrier, begin + 10, -lane - 1.2, 0.9, random));
+  hazards.push_back(
+      DrawStreetHazard(ObjectClass::kRoadWorkSign, begin + 4, -lane - 0.9, 0.5, random));
+  hazards.push_back(DrawStreetHazard(ObjectClass::kBarrier, begin + 10, -lane - 1.2, 0.9, random));
   for (int cone = 0; cone < 4; ++cone) {
     hazards.push_back(
-        Draw(ObjectClass::kTrafficCone, begin + 10.5 + 3.5 * cone, edge, 0.2, random));
+        DrawStreetHazard(ObjectClass::kTrafficCone, begin + 10.5 + 3.5 * cone, edge, 0.2, random));
   }
   if (random.Chance(0.6)) {
     hazards.push_back(
-        Draw(ObjectClass::kConstructionMachine, begin + 17, -lane - 1.75, 1.9, random));
+        DrawStreetHazard(ObjectClass::kConstructionMachine, begin + 17, -lane - 1.75, 1.9, random));
   }
 }
 
-void DrawSingle(double begin, const StreetProfile& profile, CounterRandom& random,
-                std::vector<StreetHazard>& hazards) {
+void DrawSingleStreetHazard(double begin, const StreetProfile& profile, CounterRandom& random,
+                            std::vector<StreetHazard>& hazards) {
   const auto lane = static_cast<double>(profile.lane_width_m);
   const double along = begin + random.Uniform(14.0, 26.0);
   const double kind = random.Uniform(0.0, 1.0);
   if (kind < 0.22) {
-    hazards.push_back(
-        Draw(ObjectClass::kDebris, along, random.Chance(0.5) ? 0.4 : -lane - 0.3, 0.5, random));
+    hazards.push_back(DrawStreetHazard(ObjectClass::kDebris, along,
+                                       random.Chance(0.5) ? 0.4 : -lane - 0.3, 0.5, random));
   } else if (kind < 0.42) {
-    hazards.push_back(Draw(ObjectClass::kDeer, along,
-                           random.Chance(0.5) ? random.Uniform(1.0, 2.5) : -lane - 0.9, 0.6,
-                           random));
+    hazards.push_back(DrawStreetHazard(ObjectClass::kDeer, along,
+                                       random.Chance(0.5) ? random.Uniform(1.0, 2.5) : -lane - 0.9,
+                                       0.6, random));
   } else if (kind < 0.58) {
-    hazards.push_back(Draw(ObjectClass::kStoppedAccident, along, 0.5 * lane + 0.5, 3.2, random));
-  } else if (kind < 0.8) {
     hazards.push_back(
-        Draw(ObjectClass::kTrafficCone, along, random.Chance(0.5) ? 0.05 : -lane, 0.2, random));
+        DrawStreetHazard(ObjectClass::kStoppedAccident, along, 0.5 * lane + 0.5, 3.2, random));
+  } else if (kind < 0.8) {
+    hazards.push_back(DrawStreetHazard(ObjectClass::kTrafficCone, along,
+                                       random.Chance(0.5) ? 0.05 : -lane, 0.2, random));
   } else {
-    hazards.push_back(Draw(ObjectClass::kBarrier, along, 0.5 * lane + 0.4, 0.9, random));
+    hazards.push_back(
+        DrawStreetHazard(ObjectClass::kBarrier, along, 0.5 * lane + 0.4, 0.9, random));
   }
 }
 
-double DefaultRadius(ObjectClass object_class, CounterRandom& random) {
+double StreetHazardRadius(ObjectClass object_class, CounterRandom& random) {
   switch (object_class) {
     case ObjectClass::kPothole:
       return random.Uniform(0.24, 0.5);
@@ -102,7 +105,7 @@ std::vector<double> Street::Crossings(int index) const {
     }
     return crossings;
   }
-  CounterRandom random(seed_, kCrossings, Item(index));
+  CounterRandom random(seed_, kCrossings, StreetItem(index));
   const bool wanted = ((index % 3) + 3) % 3 == 1;
   if (wanted && random.Chance(0.75)) {
     crossings.push_back((index + 0.5) * kBlockM + random.Uniform(-6.0, 6.0));
@@ -112,7 +115,7 @@ std::vector<double> Street::Crossings(int index) const {
 
 std::vector<StreetHazard> Street::Hazards(int index) const {
   std::vector<StreetHazard> hazards;
-  CounterRandom random(seed_, kHazards, Item(index));
+  CounterRandom random(seed_, kHazards, StreetItem(index));
   const double begin = index * kBlockM;
   if (description_.hazards) {
     std::uint64_t number = 0;
@@ -120,9 +123,10 @@ std::vector<StreetHazard> Street::Hazards(int index) const {
       ++number;
       if (placed.at_m < begin || placed.at_m >= begin + kBlockM) continue;
       CounterRandom own(seed_, kHazards + 100, number);
-      StreetHazard hazard = Draw(
+      StreetHazard hazard = DrawStreetHazard(
           placed.object_class, placed.at_m, placed.left_m,
-          placed.radius_m > 0 ? placed.radius_m : DefaultRadius(placed.object_class, own), own);
+          placed.radius_m > 0 ? placed.radius_m : StreetHazardRadius(placed.object_class, own),
+          own);
       hazard.water = placed.water ? *placed.water : own.Chance(0.35);
       hazards.push_back(hazard);
     }
@@ -130,7 +134,7 @@ std::vector<StreetHazard> Street::Hazards(int index) const {
     const double lane = description_.lane_width_m;
     for (const double along : {random.Uniform(7.0, 14.0), random.Uniform(28.0, 34.0)}) {
       if (random.Chance(0.25)) continue;
-      StreetHazard hole = Draw(
+      StreetHazard hole = DrawStreetHazard(
           ObjectClass::kPothole, begin + along,
           random.Chance(0.75) ? random.Uniform(-lane + 0.5, -0.5) : random.Uniform(0.6, lane - 0.5),
           random.Uniform(0.24, 0.5), random);
@@ -139,9 +143,9 @@ std::vector<StreetHazard> Street::Hazards(int index) const {
     }
     const bool quiet = Crossings(index).empty();
     if (quiet && description_.parking_width_m > 1.5 && random.Chance(0.45)) {
-      DrawWorkSite(begin, profile_, random, hazards);
+      DrawStreetWorkSite(begin, profile_, random, hazards);
     } else if (random.Chance(0.85)) {
-      DrawSingle(begin, profile_, random, hazards);
+      DrawSingleStreetHazard(begin, profile_, random, hazards);
     }
   }
   for (std::size_t i = 0; i < hazards.size(); ++i) {
@@ -171,7 +175,7 @@ GroundPlan Street::PlanGround(int index) const {
       hole.instance = hazard.instance;
       plan.potholes.push_back(hole);
     }
-    CounterRandom random(seed_, kGroundDetails, Item(near));
+    CounterRandom random(seed_, kGroundDetails, StreetItem(near));
     const auto begin = static_cast<float>(near * kBlockM);
     const float road = profile_.half_road_m();
     for (int i = 0; i < 2; ++i) {

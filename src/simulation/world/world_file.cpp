@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "common/error.h"
+#include "common/text_file.h"
 #include "datasets/text_parsing.h"
 
 namespace livemap::simulation {
@@ -18,9 +19,9 @@ constexpr double kSteepest = 0.15;
 constexpr double kLongestRoadM = 1e6;
 
 /// One YAML document and its name, for sentences that say where a mistake is.
-class Reader {
+class WorldFileReader {
  public:
-  explicit Reader(const std::string& name) : name_(name) {}
+  explicit WorldFileReader(const std::string& name) : name_(name) {}
 
   [[noreturn]] void Refuse(const YAML::Node& node, const std::string& what) const {
     throw Error("the world file '" + name_ + "', line " + std::to_string(node.Mark().line + 1) +
@@ -85,7 +86,7 @@ class Reader {
   const std::string& name_;
 };
 
-RoadPiece ReadPiece(const Reader& reader, const YAML::Node& node) {
+RoadPiece ReadWorldPiece(const WorldFileReader& reader, const YAML::Node& node) {
   reader.CheckKeys(node, {"length_m", "turn_deg", "climb_m"}, "a piece of the road");
   RoadPiece piece;
   piece.length_m = reader.Need(node, "length_m", 5, 100000);
@@ -105,8 +106,8 @@ RoadPiece ReadPiece(const Reader& reader, const YAML::Node& node) {
   return piece;
 }
 
-void ReadRoad(const Reader& reader, const YAML::Node& road, RoadSource source,
-              WorldDescription& world) {
+void ReadWorldRoad(const WorldFileReader& reader, const YAML::Node& road, RoadSource source,
+                   WorldDescription& world) {
   reader.CheckKeys(road,
                    {"bearing_deg", "pieces", "crossings_m", "lane_width_m", "parking_width_m",
                     "pavement_width_m"},
@@ -124,7 +125,7 @@ void ReadRoad(const Reader& reader, const YAML::Node& road, RoadSource source,
     reader.CheckList(pieces, "'pieces'");
     double length_m = 0;
     for (const YAML::Node& piece : pieces) {
-      world.pieces.push_back(ReadPiece(reader, piece));
+      world.pieces.push_back(ReadWorldPiece(reader, piece));
       length_m += world.pieces.back().length_m;
       if (length_m > kLongestRoadM) reader.Refuse(piece, "the road is longer than 1000 km here");
     }
@@ -142,7 +143,7 @@ void ReadRoad(const Reader& reader, const YAML::Node& road, RoadSource source,
   }
 }
 
-PlacedHazard ReadHazard(const Reader& reader, const YAML::Node& node) {
+PlacedHazard ReadWorldHazard(const WorldFileReader& reader, const YAML::Node& node) {
   reader.CheckKeys(node, {"class", "at_m", "left_m", "radius_m", "water"}, "a hazard");
   const YAML::Node name = node["class"];
   if (!name) reader.Refuse(node, "'class' is missing");
@@ -170,10 +171,11 @@ PlacedHazard ReadHazard(const Reader& reader, const YAML::Node& node) {
   return hazard;
 }
 
-WorldDescription Parse(const Reader& reader, const YAML::Node& root, RoadSource source) {
+WorldDescription ParseWorld(const WorldFileReader& reader, const YAML::Node& root,
+                            RoadSource source) {
   reader.CheckKeys(root, {"road", "scene", "hazards"}, "the file");
   WorldDescription world;
-  if (const YAML::Node road = root["road"]) ReadRoad(reader, road, source, world);
+  if (const YAML::Node road = root["road"]) ReadWorldRoad(reader, road, source, world);
   if (const YAML::Node scene = root["scene"]) {
     reader.CheckKeys(scene, {"buildings", "trees", "parked_cars"}, "'scene'");
     if (scene["buildings"]) world.buildings = reader.Flag(scene["buildings"], "'buildings'");
@@ -186,7 +188,7 @@ WorldDescription Parse(const Reader& reader, const YAML::Node& root, RoadSource 
     reader.CheckList(hazards, "'hazards'");
     world.hazards.emplace();
     for (const YAML::Node& hazard : hazards) {
-      world.hazards->push_back(ReadHazard(reader, hazard));
+      world.hazards->push_back(ReadWorldHazard(reader, hazard));
     }
   }
   return world;
@@ -204,11 +206,11 @@ WorldDescription ParseWorldFile(const std::string& yaml, const std::string& name
                 ": no YAML: " + exception.msg);
   }
   if (!root.IsMap()) throw Error("the world file '" + name + "', line 1: must be a map");
-  return Parse(Reader(name), root, source);
+  return ParseWorld(WorldFileReader(name), root, source);
 }
 
 WorldDescription ReadWorldFile(const std::string& path, RoadSource source) {
-  return ParseWorldFile(ReadFile(path, kMaxBytes), path, source);
+  return ParseWorldFile(ReadTextFile(path, kMaxBytes), path, source);
 }
 
 }  // namespace livemap::simulation

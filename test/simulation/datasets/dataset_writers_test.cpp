@@ -1,15 +1,17 @@
-#include "simulation/datasets/dataset_writers.h"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
 #include "common/error.h"
 #include "datasets/labels.h"
 #include "datasets/sequences.h"
+#include "simulation/datasets/hazard_geojson.h"
+#include "simulation/datasets/tum_writer.h"
+#include "simulation/datasets/yolo_writer.h"
 
 namespace livemap::simulation {
 namespace {
@@ -147,6 +149,17 @@ TEST_F(Dataset, RefusesAFolderThatHoldsSomething) {
   fs::create_directories(folder_ / "old");
   EXPECT_THROW(TumWriter(folder_.string(), camera_), Error);
   EXPECT_THROW(YoloWriter(folder_.string()), Error);
+}
+
+TEST_F(Dataset, AFileInPlaceOfTheFolderIsNamedAsOne) {
+  std::ofstream(folder_) << "x";
+  try {
+    YoloWriter(folder_.string());
+    FAIL() << "a file was taken for a folder";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(),
+              "'" + folder_.string() + "' is a file, accepted is a new or empty folder");
+  }
 }
 
 TEST_F(Dataset, HazardsAreNamedWhenTheyWereSeenAndMarkedWhenTheyWerePassed) {

@@ -1,15 +1,9 @@
 #pragma once
 
-#include <cstdint>
 #include <fstream>
-#include <map>
 #include <opencv2/core.hpp>
 #include <string>
-#include <vector>
 
-#include "datasets/camera_file.h"
-#include "geo/wgs84.h"
-#include "simulation/datasets/labels_in_view.h"
 #include "simulation/render/street_renderer.h"
 
 namespace livemap::simulation {
@@ -41,33 +35,5 @@ class TumWriter {
   std::ofstream associations_;
   std::ofstream truth_;
 };
-
-/// Writes a labelled drive: images/ (JPEG), labels/ (YOLO lines), difficult/ (the same of hazards
-/// that are difficult), classes.txt and frames.csv.
-class YoloWriter {
- public:
-  explicit YoloWriter(const std::string& directory);
-  void Add(double chainage_m, const SimulatedFrame& frame,
-           const std::vector<HazardInView>& hazards);
-  void Finish();
-
- private:
-  std::string directory_;
-  std::ofstream frames_;
-  std::size_t count_ = 0;
-};
-
-/// The true hazards that at least one frame shows, as GeoJSON points (RFC 7946). `frames_seen`
-/// counts by instance; `datum` is the world's origin; a hazard before `end_along_m`, where the
-/// drive ends, is marked as passed.
-std::string HazardsAsGeoJson(const Street& street, const geo::GeoPoint& datum,
-                             const std::map<std::uint32_t, int>& frames_seen, double end_along_m);
-
-/// Each class in its colour, for looking at truth; CV_8UC3.
-cv::Mat ColourClasses(const cv::Mat& classes);
-/// Near warm, far cold, sky black; CV_8UC3.
-cv::Mat ColourDepth(const cv::Mat& depth);
-/// Draws boxes with class names into a picture.
-void DrawHazards(const std::vector<HazardInView>& hazards, cv::Mat& bgr);
 
 }  // namespace livemap::simulation

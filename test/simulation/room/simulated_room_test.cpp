@@ -1,8 +1,9 @@
+#include "simulation/room/simulated_room.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "simulation/room/simulated_room.h"
 #include "test/simulation/render/same_pixels.h"
 
 namespace livemap::simulation {
