@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <system_error>
 
@@ -17,74 +18,90 @@ constexpr int kMinKeepaliveS = 5;  // libmosquitto refuses less.
 constexpr int kMaxKeepaliveS = 65535;
 constexpr int kMaxInflight = 65535;
 
-void Require(bool holds, const std::string& name, const std::string& value,
-             const std::string& accepted) {
+void RequireMqttOption(bool holds, const std::string& name, const std::string& value,
+                       const std::string& accepted) {
   if (!holds) throw Error("MQTT " + name + " is '" + value + "', accepted is " + accepted);
 }
 
-void RequireSuccess(int code, const std::string& what) {
+void RequireMosquittoSuccess(int code, const std::string& what) {
   if (code != MOSQ_ERR_SUCCESS) throw Error(what + ": " + DescribeMosquittoError(code));
 }
 
-void InitializeLibraryOnce() {
+void InitializeMosquittoOnce() {
   static std::once_flag once;
   std::call_once(once, [] { mosquitto_lib_init(); });
 }
 
-void CheckTlsOptions(const MqttTlsConfig& tls) {
+void CheckMosquittoTlsOptions(const MqttTlsConfig& tls) {
   for (const auto& [name, path] : {std::pair{"ca_file", tls.ca_file},
                                    {"certificate_file", tls.certificate_file},
                                    {"key_file", tls.key_file}}) {
     std::error_code ignored;
-    Require(std::filesystem::is_regular_file(path, ignored) && access(path.c_str(), R_OK) == 0,
-            name, path, "a PEM file that can be read");
+    RequireMqttOption(
+        std::filesystem::is_regular_file(path, ignored) && access(path.c_str(), R_OK) == 0, name,
+        path, "a PEM file that can be read");
   }
 }
 
-void SetTls(mosquitto* handle, const MqttTlsConfig& tls) {
-  RequireSuccess(mosquitto_tls_set(handle, tls.ca_file.c_str(), nullptr,
-                                   tls.certificate_file.c_str(), tls.key_file.c_str(), nullptr),
-                 "cannot use the TLS files '" + tls.ca_file + "', '" + tls.certificate_file +
-                     "', '" + tls.key_file + "'");
+/// Whether a file begins no PEM block or does not end it, as after a power loss in mid-copy.
+bool IsTornPem(const std::string& path) {
+  constexpr std::size_t kMostBytes = 1 << 20;  // No certificate or key is as long.
+  std::string content(kMostBytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(content.data(), static_cast<std::streamsize>(content.size()));
+  content.resize(static_cast<std::size_t>(file.gcount()));
+  const std::size_t begin = content.find("-----BEGIN ");
+  return begin == std::string::npos || content.find("-----END ", begin) == std::string::npos;
+}
+
+void SetMosquittoTls(mosquitto* handle, const MqttTlsConfig& tls) {
+  RequireMosquittoSuccess(
+      mosquitto_tls_set(handle, tls.ca_file.c_str(), nullptr, tls.certificate_file.c_str(),
+                        tls.key_file.c_str(), nullptr),
+      "cannot use the TLS files '" + tls.ca_file + "', '" + tls.certificate_file + "', '" +
+          tls.key_file + "'");
   constexpr int kVerifyPeer = 1;
-  RequireSuccess(mosquitto_tls_opts_set(handle, kVerifyPeer, "tlsv1.3", nullptr),
-                 "cannot set TLS 1.3");
+  RequireMosquittoSuccess(mosquitto_tls_opts_set(handle, kVerifyPeer, "tlsv1.3", nullptr),
+                          "cannot set TLS 1.3");
 }
 
 }  // namespace
 
 void CheckMqttOptions(const MqttConfig& options) {
-  Require(!options.host.empty(), "host", options.host, "a host name or an address");
-  Require(options.port > 0 && options.port <= 65535, "port", std::to_string(options.port),
-          "1 to 65535");
-  Require(!options.client_id.empty(), "client id", options.client_id, "a text");
-  Require(options.keepalive_s >= kMinKeepaliveS && options.keepalive_s <= kMaxKeepaliveS,
-          "keepalive_s", std::to_string(options.keepalive_s), "5 to 65535");
-  Require(options.connect_timeout_s > 0 && options.connect_timeout_s <= 3600, "connect_timeout_s",
-          std::to_string(options.connect_timeout_s), "above 0 and at most 3600");
-  Require(options.max_inflight > 0 && options.max_inflight <= kMaxInflight, "max_inflight",
-          std::to_string(options.max_inflight), "1 to 65535");
-  Require(options.max_packet_bytes > 0, "max_packet_bytes",
-          std::to_string(options.max_packet_bytes), "above 0");
-  if (options.tls) CheckTlsOptions(*options.tls);
+  RequireMqttOption(!options.host.empty(), "host", options.host, "a host name or an address");
+  RequireMqttOption(options.port > 0 && options.port <= 65535, "port", std::to_string(options.port),
+                    "1 to 65535");
+  RequireMqttOption(!options.client_id.empty(), "client id", options.client_id, "a text");
+  RequireMqttOption(options.keepalive_s >= kMinKeepaliveS && options.keepalive_s <= kMaxKeepaliveS,
+                    "keepalive_s", std::to_string(options.keepalive_s), "5 to 65535");
+  RequireMqttOption(options.connect_timeout_s > 0 && options.connect_timeout_s <= 3600,
+                    "connect_timeout_s", std::to_string(options.connect_timeout_s),
+                    "above 0 and at most 3600");
+  RequireMqttOption(options.max_inflight > 0 && options.max_inflight <= kMaxInflight,
+                    "max_inflight", std::to_string(options.max_inflight), "1 to 65535");
+  RequireMqttOption(options.max_packet_bytes > 0, "max_packet_bytes",
+                    std::to_string(options.max_packet_bytes), "above 0");
+  if (options.tls) CheckMosquittoTlsOptions(*options.tls);
 }
 
 MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data) {
-  InitializeLibraryOnce();
+  InitializeMosquittoOnce();
   MosquittoHandle handle(mosquitto_new(options.client_id.c_str(), options.clean_start, user_data));
   if (!handle) throw Error("cannot create an MQTT client with id '" + options.client_id + "'");
-  RequireSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_PROTOCOL_VERSION, MQTT_PROTOCOL_V5),
-                 "cannot choose MQTT v5");
-  RequireSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_SEND_MAXIMUM, options.max_inflight),
-                 "cannot set the number of messages in flight");
-  RequireSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_TCP_NODELAY, 1),
-                 "cannot set TCP_NODELAY");
+  RequireMosquittoSuccess(
+      mosquitto_int_option(handle.get(), MOSQ_OPT_PROTOCOL_VERSION, MQTT_PROTOCOL_V5),
+      "cannot choose MQTT v5");
+  RequireMosquittoSuccess(
+      mosquitto_int_option(handle.get(), MOSQ_OPT_SEND_MAXIMUM, options.max_inflight),
+      "cannot set the number of messages in flight");
+  RequireMosquittoSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_TCP_NODELAY, 1),
+                          "cannot set TCP_NODELAY");
   if (!options.user.empty()) {
-    RequireSuccess(
+    RequireMosquittoSuccess(
         mosquitto_username_pw_set(handle.get(), options.user.c_str(), options.password.c_str()),
         "cannot set MQTT user '" + options.user + "'");
   }
-  if (options.tls) SetTls(handle.get(), *options.tls);
+  if (options.tls) SetMosquittoTls(handle.get(), *options.tls);
   return handle;
 }
 
@@ -119,9 +136,14 @@ std::string UnreadableTlsFile(const MqttTlsConfig& tls) {
   for (const auto& [name, path] : {std::pair{"ca_file", tls.ca_file},
                                    {"certificate_file", tls.certificate_file},
                                    {"key_file", tls.key_file}}) {
-    if (access(path.c_str(), R_OK) == 0) continue;
-    return "cannot read " + path + ", the bridge's " + name + ": " +
-           std::generic_category().message(errno);
+    if (access(path.c_str(), R_OK) != 0) {
+      return "cannot read " + path + ", the bridge's " + name + ": " +
+             std::generic_category().message(errno);
+    }
+    if (IsTornPem(path)) {
+      return path + ", the bridge's " + name +
+             ", is torn or no PEM file: copy it from the zone again (livemap zone enroll made it)";
+    }
   }
   return "";
 }

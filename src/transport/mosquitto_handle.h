@@ -18,7 +18,8 @@ using MosquittoHandle = std::unique_ptr<mosquitto, MosquittoDeleter>;
 void CheckMqttOptions(const MqttConfig& options);
 
 /// "cannot read FILE, the bridge's key_file: No such file or directory" for the first TLS file that
-/// cannot be read now; empty when all can. The library's own words do not name the file.
+/// cannot be read now, or a sentence about the first one that is torn; empty when all are whole.
+/// The library's own words do not name the file.
 std::string UnreadableTlsFile(const MqttTlsConfig& tls);
 
 /// A library handle that speaks MQTT v5 with the login and TLS of `options` and hands `user_data`

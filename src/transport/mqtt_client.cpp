@@ -28,19 +28,19 @@ constexpr int kPollMs = 500;
 // client with our name, a message the broker will not have) must not hammer the broker.
 constexpr std::chrono::seconds kSettled{5};
 
-void BlockSignalsInThisThread() {
+void BlockSignalsInMqttThread() {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
 }
 
 /// Waits up to `timeout_s` or until `fd` becomes readable.
-void WaitReadable(int fd, double timeout_s) {
+void WaitMqttReadable(int fd, double timeout_s) {
   pollfd waited{fd, POLLIN, 0};
   poll(&waited, 1, static_cast<int>(std::ceil(timeout_s * 1000)));
 }
 
-int ReasonOfLibraryError(int code) {
+int ReasonOfMqttError(int code) {
   if (code == MOSQ_ERR_OVERSIZE_PACKET || code == MOSQ_ERR_PAYLOAD_SIZE) {
     return MQTT_RC_PACKET_TOO_LARGE;
   }
@@ -107,14 +107,14 @@ class MqttClient::Connection {
 
  private:
   void Run() {
-    BlockSignalsInThisThread();
+    BlockSignalsInMqttThread();
     while (!stopping_) {
       const auto started = std::chrono::steady_clock::now();
       Attempt();
       if (stopping_) break;
       if (logged_in_ && std::chrono::steady_clock::now() - started > kSettled) backoff_.Reset();
       EndConnection();
-      WaitReadable(stop_.fd(), backoff_.NextDelayS());
+      WaitMqttReadable(stop_.fd(), backoff_.NextDelayS());
     }
     if (logged_in_) mosquitto_disconnect_v5(handle_.get(), MQTT_RC_NORMAL_DISCONNECTION, nullptr);
   }
@@ -192,7 +192,7 @@ class MqttClient::Connection {
           CountInflight();
         }
       } else {
-        Finish({message->tag, std::move(message->topic), bytes, ReasonOfLibraryError(code),
+        Finish({message->tag, std::move(message->topic), bytes, ReasonOfMqttError(code),
                 DescribeMosquittoError(code)});
       }
       if (broken) return;

@@ -15,10 +15,10 @@
 namespace livemap::transport {
 namespace {
 
-std::string SystemMessage(int error) { return std::generic_category().message(error); }
+std::string TcpErrorMessage(int error) { return std::generic_category().message(error); }
 
 /// A connected socket's errno-style outcome: 0, or why the connection failed.
-int ConnectWithin(const addrinfo& address, double timeout_s, int cancel_fd) {
+int ConnectTcpWithin(const addrinfo& address, double timeout_s, int cancel_fd) {
   const int fd = socket(address.ai_family, address.ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC,
                         address.ai_protocol);
   if (fd < 0) return errno;
@@ -42,7 +42,7 @@ int ConnectWithin(const addrinfo& address, double timeout_s, int cancel_fd) {
   return error;
 }
 
-std::string NumericAddress(const addrinfo& address) {
+std::string NumericTcpAddress(const addrinfo& address) {
   std::array<char, NI_MAXHOST> host{};
   const int failed = getnameinfo(address.ai_addr, address.ai_addrlen, host.data(), host.size(),
                                  nullptr, 0, NI_NUMERICHOST);
@@ -63,11 +63,11 @@ TcpProbeResult ProbeTcp(const std::string& host, int port, double timeout_s, int
 
   int last_error = EADDRNOTAVAIL;
   for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
-    last_error = ConnectWithin(*address, timeout_s, cancel_fd);
-    if (last_error == 0) return {NumericAddress(*address), ""};
+    last_error = ConnectTcpWithin(*address, timeout_s, cancel_fd);
+    if (last_error == 0) return {NumericTcpAddress(*address), ""};
     if (last_error == ECANCELED) break;
   }
-  return {"", "cannot reach broker " + place + ": " + SystemMessage(last_error)};
+  return {"", "cannot reach broker " + place + ": " + TcpErrorMessage(last_error)};
 }
 
 }  // namespace livemap::transport

@@ -12,16 +12,16 @@ constexpr std::size_t kMaxTemplateBytes = 1024;
 constexpr std::string_view kZone = "{zone}";
 constexpr std::string_view kVehicle = "{vehicle}";
 
-bool IsIdCharacter(char c) {
+bool IsTopicIdCharacter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
          c == '_' || c == '-';
 }
 
-bool IsPlainLevel(std::string_view level) {
-  return !level.empty() && std::all_of(level.begin(), level.end(), IsIdCharacter);
+bool IsPlainTopicLevel(std::string_view level) {
+  return !level.empty() && std::all_of(level.begin(), level.end(), IsTopicIdCharacter);
 }
 
-std::vector<std::string> SplitLevels(std::string_view topic) {
+std::vector<std::string> SplitTopicLevels(std::string_view topic) {
   std::vector<std::string> levels(1);
   for (const char c : topic) {
     if (c == '/') {
@@ -33,8 +33,8 @@ std::vector<std::string> SplitLevels(std::string_view topic) {
   return levels;
 }
 
-const std::string& RequireId(const std::string& id, const std::string& what,
-                             const std::string& topic) {
+const std::string& RequireTopicId(const std::string& id, const std::string& what,
+                                  const std::string& topic) {
   if (!IsValidId(id)) {
     throw Error(what + " '" + id + "' cannot stand in MQTT topic '" + topic +
                 "', accepted are 1 to 64 characters of A-Z a-z 0-9 . _ -");
@@ -45,7 +45,7 @@ const std::string& RequireId(const std::string& id, const std::string& what,
 }  // namespace
 
 bool IsValidId(std::string_view id) {
-  return IsPlainLevel(id) && id.size() <= kMaxIdBytes && id != "." && id != "..";
+  return IsPlainTopicLevel(id) && id.size() <= kMaxIdBytes && id != "." && id != "..";
 }
 
 TopicTemplate::TopicTemplate(const std::string& text) : text_(text) {
@@ -54,9 +54,9 @@ TopicTemplate::TopicTemplate(const std::string& text) : text_(text) {
                 std::to_string(text.size()) + " bytes, accepted are 1 to " +
                 std::to_string(kMaxTemplateBytes));
   }
-  levels_ = SplitLevels(text);
+  levels_ = SplitTopicLevels(text);
   const auto wrong = std::find_if(levels_.begin(), levels_.end(), [](const std::string& level) {
-    return level != kZone && level != kVehicle && !IsPlainLevel(level);
+    return level != kZone && level != kVehicle && !IsPlainTopicLevel(level);
   });
   if (wrong != levels_.end()) {
     throw Error("MQTT topic template '" + text + "' has the level '" + *wrong +
@@ -83,9 +83,9 @@ std::string TopicTemplate::Fill(const TopicNames& names, bool any_vehicle) const
   for (const std::string& level : levels_) {
     if (!topic.empty()) topic += '/';
     if (level == kZone) {
-      topic += RequireId(names.zone, "zone", text_);
+      topic += RequireTopicId(names.zone, "zone", text_);
     } else if (level == kVehicle) {
-      topic += any_vehicle ? "+" : RequireId(names.vehicle, "vehicle", text_);
+      topic += any_vehicle ? "+" : RequireTopicId(names.vehicle, "vehicle", text_);
     } else {
       topic += level;
     }
@@ -96,7 +96,7 @@ std::string TopicTemplate::Fill(const TopicNames& names, bool any_vehicle) const
 std::optional<TopicNames> TopicTemplate::Match(std::string_view topic) const {
   // The longest topic that can match is every placeholder filled to its limit.
   if (topic.size() > kMaxTemplateBytes + 2 * kMaxIdBytes) return std::nullopt;
-  const std::vector<std::string> levels = SplitLevels(topic);
+  const std::vector<std::string> levels = SplitTopicLevels(topic);
   if (levels.size() != levels_.size()) return std::nullopt;
   TopicNames names;
   for (std::size_t i = 0; i < levels.size(); ++i) {

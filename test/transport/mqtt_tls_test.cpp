@@ -140,6 +140,25 @@ TEST_F(MqttTlsTest, NamesAFileThatWentAwayAfterTheStartAndGoesOnWhenItIsBack) {
   EXPECT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
 }
 
+TEST_F(MqttTlsTest, NamesATornFileAndGoesOnWhenItIsWhole) {
+  const MqttConfig options = Options("car-1", "ca.pem");
+  for (const auto& [name, path] : {std::pair{"ca_file", options.tls->ca_file},
+                                   {"certificate_file", options.tls->certificate_file},
+                                   {"key_file", options.tls->key_file}}) {
+    const std::string whole = ReadFile(path, 1 << 20);
+    for (const std::string& torn :
+         {whole.substr(0, whole.size() / 2), std::string(whole.size(), '\0'), std::string()}) {
+      std::ofstream(path, std::ios::binary) << torn;
+      const MqttClient car(options, {}, {});
+      EXPECT_TRUE(Eventually([&, file = path, member = std::string(name)] {
+        return Says(car, file + ", the bridge's " + member + ", is torn or no PEM file");
+      })) << car.statistics().last_error;
+      std::ofstream(path, std::ios::binary) << whole;
+      EXPECT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+    }
+  }
+}
+
 TEST_F(MqttTlsTest, DoesNotConnectWithTheKeyOfAnotherCertificate) {
   MqttConfig options = Options("car-1", "ca.pem");
   options.tls->key_file = File("stranger.key");  // Of another certificate.
