@@ -24,35 +24,35 @@ struct Statistics {
   double sigma_m = 0;  // Robust.
 };
 
-double TakeMedian(std::vector<double>& values) {
+double MedianContactDepth(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
 /// NaN where it is unknown.
-double DepthAt(const DepthImage& image, int row, int column) {
+double ContactDepthAt(const DepthImage& image, int row, int column) {
   if (image.depth.type() == CV_32FC1) return image.depth.at<float>(row, column);
   return image.depth.at<std::uint16_t>(row, column) / image.units_per_m;
 }
 
 /// Over some pixels of the image; none where too few have a depth.
-std::optional<Statistics> Measure(const DepthImage& image, const cv::Rect& pixels,
-                                  const DepthNoise& noise) {
+std::optional<Statistics> MeasureContactDepth(const DepthImage& image, const cv::Rect& pixels,
+                                              const DepthNoise& noise) {
   const cv::Rect inside = pixels & cv::Rect(0, 0, image.depth.cols, image.depth.rows);
   std::vector<double> depths_m;
   for (int row = inside.y; row < inside.br().y; ++row) {
     for (int column = inside.x; column < inside.br().x; ++column) {
-      const double depth_m = DepthAt(image, row, column);
+      const double depth_m = ContactDepthAt(image, row, column);
       if (depth_m >= noise.min_m && depth_m <= noise.max_m) depths_m.push_back(depth_m);
     }
   }
   const double known = static_cast<double>(depths_m.size());
   if (depths_m.size() < kMinKnown || known < kMinKnownShare * inside.area()) return std::nullopt;
   Statistics statistics;
-  statistics.median_m = TakeMedian(depths_m);
+  statistics.median_m = MedianContactDepth(depths_m);
   for (double& depth_m : depths_m) depth_m = std::abs(depth_m - statistics.median_m);
-  statistics.sigma_m = kMadToSigma * TakeMedian(depths_m);
+  statistics.sigma_m = kMadToSigma * MedianContactDepth(depths_m);
   return statistics;
 }
 
@@ -62,8 +62,8 @@ struct Foot {
   double slope_m_per_px = 0;  // How the depth changes from row to row.
 };
 
-std::optional<Foot> MeasureFoot(const DepthImage& image, const imaging::Box& box,
-                                const DepthNoise& noise) {
+std::optional<Foot> MeasureContactFoot(const DepthImage& image, const imaging::Box& box,
+                                       const DepthNoise& noise) {
   // Box edges count from the first pixel's outer corner.
   const int left = static_cast<int>(std::floor(0.75 * box.x_min + 0.25 * box.x_max));
   const int right = static_cast<int>(std::ceil(0.25 * box.x_min + 0.75 * box.x_max));
@@ -71,16 +71,17 @@ std::optional<Foot> MeasureFoot(const DepthImage& image, const imaging::Box& box
   const int rows =
       std::max(kMinBandRows, static_cast<int>(std::round(kBandShare * (box.y_max - box.y_min))));
   const auto band = [&](int end) { return cv::Rect(left, end - rows, right - left, rows); };
-  const auto low = Measure(image, band(bottom), noise);
+  const auto low = MeasureContactDepth(image, band(bottom), noise);
   if (!low || low->sigma_m > kMaxScatter * low->median_m) return std::nullopt;
   Foot foot{*low};
   // On the road the rows above are further away, on a standing thing they are not.
-  const auto above = Measure(image, band(bottom - rows), noise);
+  const auto above = MeasureContactDepth(image, band(bottom - rows), noise);
   if (above) foot.slope_m_per_px = std::abs(above->median_m - low->median_m) / rows;
   return foot;
 }
 
-bool Fits(const DepthImage& image, const imaging::Box& box, const geo::CameraIntrinsics& camera) {
+bool DepthFitsContact(const DepthImage& image, const imaging::Box& box,
+                      const geo::CameraIntrinsics& camera) {
   const bool is_depth = image.depth.type() == CV_32FC1 || image.depth.type() == CV_16UC1;
   // A box may hang over the image's edge, but not by more than its size.
   const double most = 2.0 * std::max(image.depth.cols, image.depth.rows);
@@ -97,8 +98,9 @@ std::optional<geo::GroundPoint> ContactByDepth(const DepthImage& image, const im
                                                const Eigen::Isometry3d& base_from_optical,
                                                const geo::GroundProjectionNoise& noise,
                                                const DepthNoise& depth_noise) {
-  if (!Fits(image, box, intrinsics) || !base_from_optical.matrix().allFinite()) return std::nullopt;
-  const auto foot = MeasureFoot(image, box, depth_noise);
+  if (!DepthFitsContact(image, box, intrinsics) || !base_from_optical.matrix().allFinite())
+    return std::nullopt;
+  const auto foot = MeasureContactFoot(image, box, depth_noise);
   if (!foot) return std::nullopt;
   const double depth_m = foot->depth.median_m;
   const Eigen::Vector2d pixel = ContactPixel(box);

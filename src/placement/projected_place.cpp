@@ -14,8 +14,8 @@ constexpr double kStepM = 0.05;        // Of the numerical Jacobian.
 constexpr double kRegionSigmas = 2.0;  // Of the place that must be in the image.
 
 /// East-north from base_link to pixels; none behind the camera.
-std::optional<Eigen::Vector2d> Project(const Eigen::Vector2d& east_north_m,
-                                       const PlacedCamera& camera) {
+std::optional<Eigen::Vector2d> ProjectToCamera(const Eigen::Vector2d& east_north_m,
+                                               const PlacedCamera& camera) {
   const double sine = std::sin(camera.base.course_rad);
   const double cosine = std::cos(camera.base.course_rad);
   const Eigen::Vector3d in_base_m(sine * east_north_m.x() + cosine * east_north_m.y(),
@@ -28,14 +28,14 @@ std::optional<Eigen::Vector2d> Project(const Eigen::Vector2d& east_north_m,
 }
 
 /// Of the place seen from base_link: its own, the position's and what the heading does to it.
-Eigen::Matrix2d RelativeCovariance(const Eigen::Vector2d& east_north_m,
-                                   const Eigen::Matrix2d& place_m2, const geo::TrackPose& base) {
+Eigen::Matrix2d ProjectedCovariance(const Eigen::Vector2d& east_north_m,
+                                    const Eigen::Matrix2d& place_m2, const geo::TrackPose& base) {
   const Eigen::Vector2d swing_m(east_north_m.y(), -east_north_m.x());
   return place_m2 + base.covariance_m2 + base.course_variance_rad2 * swing_m * swing_m.transpose() +
          swing_m * base.position_course.transpose() + base.position_course * swing_m.transpose();
 }
 
-bool IsInside(double pixel, double sigma_px, int size, double margin_share) {
+bool IsProjectedInside(double pixel, double sigma_px, int size, double margin_share) {
   const double keep_px = kRegionSigmas * sigma_px + margin_share * size;
   return pixel >= keep_px && pixel <= size - 1 - keep_px;
 }
@@ -48,22 +48,22 @@ ProjectedPlace ProjectPlace(const geo::GeoPoint& place, const Eigen::Matrix2d& c
   ProjectedPlace view;
   const Eigen::Vector2d place_m = geo::LocalFrame(camera.base.position).ToEnu(place);
   view.distance_m = place_m.norm();
-  const auto pixel = Project(place_m, camera);
-  const auto east = Project(place_m + Eigen::Vector2d(kStepM, 0), camera);
-  const auto north = Project(place_m + Eigen::Vector2d(0, kStepM), camera);
+  const auto pixel = ProjectToCamera(place_m, camera);
+  const auto east = ProjectToCamera(place_m + Eigen::Vector2d(kStepM, 0), camera);
+  const auto north = ProjectToCamera(place_m + Eigen::Vector2d(0, kStepM), camera);
   if (!pixel || !east || !north || !pixel->allFinite()) return view;
   view.pixel = *pixel;
   Eigen::Matrix2d pixels_per_m;
   pixels_per_m << (*east - *pixel) / kStepM, (*north - *pixel) / kStepM;
   const double pitch_px = camera.intrinsics.fy * noise.pitch_sigma_rad;
-  view.covariance_px2 = pixels_per_m * RelativeCovariance(place_m, covariance_m2, camera.base) *
+  view.covariance_px2 = pixels_per_m * ProjectedCovariance(place_m, covariance_m2, camera.base) *
                             pixels_per_m.transpose() +
                         noise.pixel_sigma_px * noise.pixel_sigma_px * Eigen::Matrix2d::Identity();
   view.covariance_px2(1, 1) += pitch_px * pitch_px;
-  const bool inside = IsInside(pixel->x(), std::sqrt(view.covariance_px2(0, 0)),
-                               camera.intrinsics.width, margin_share) &&
-                      IsInside(pixel->y(), std::sqrt(view.covariance_px2(1, 1)),
-                               camera.intrinsics.height, margin_share);
+  const bool inside = IsProjectedInside(pixel->x(), std::sqrt(view.covariance_px2(0, 0)),
+                                        camera.intrinsics.width, margin_share) &&
+                      IsProjectedInside(pixel->y(), std::sqrt(view.covariance_px2(1, 1)),
+                                        camera.intrinsics.height, margin_share);
   view.visibility =
       inside ? ProjectedPlace::Visibility::kInside : ProjectedPlace::Visibility::kOutside;
   return view;
