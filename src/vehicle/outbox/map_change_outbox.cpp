@@ -14,7 +14,7 @@ namespace {
 /// All changes are as urgent as each other.
 constexpr int kChangeUrgency = 1;
 
-const std::vector<std::string>& ChangeMigrations() {
+const std::vector<std::string>& MapChangeMigrations() {
   static const std::vector<std::string> migrations = {R"sql(
     CREATE TABLE pending(
       uuid BLOB PRIMARY KEY, drive_id TEXT NOT NULL, stamp_ns INTEGER NOT NULL,
@@ -26,7 +26,7 @@ const std::vector<std::string>& ChangeMigrations() {
   return migrations;
 }
 
-void Insert(SqliteDatabase& database, const protocol::MapChangeReport& report) {
+void InsertMapChange(SqliteDatabase& database, const protocol::MapChangeReport& report) {
   SqliteStatement insert =
       database.Prepare("INSERT OR REPLACE INTO pending VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   insert.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
@@ -46,7 +46,7 @@ void Insert(SqliteDatabase& database, const protocol::MapChangeReport& report) {
   insert.Execute();
 }
 
-protocol::MapChangeReport ReadRow(const SqliteStatement& row) {
+protocol::MapChangeReport ReadMapChangeRow(const SqliteStatement& row) {
   protocol::MapChangeReport report;
   report.uuid = UuidFromBlob(row.Blob(0));
   report.drive_id = row.Text(1);
@@ -77,7 +77,7 @@ bool IsSound(const protocol::MapChangeReport& report) {
 MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, std::int64_t now_ns,
                                  double steady_s)
     : config_(config), schedule_(config.resend, random) {
-  set_aside_ = OpenOrQuarantine(config_.path, ChangeMigrations(), now_ns, database_, [] {});
+  set_aside_ = OpenOrQuarantine(config_.path, MapChangeMigrations(), now_ns, database_, [] {});
   Load(steady_s);
 }
 
@@ -88,7 +88,7 @@ void MapChangeOutbox::Load(double steady_s) {
       "substr(class_name, 1, 65), vanished, confidence, seen, missed, latitude, longitude, "
       "var_east, cov_east_north, var_north FROM pending");
   while (rows.Step()) {
-    const protocol::MapChangeReport report = ReadRow(rows);
+    const protocol::MapChangeReport report = ReadMapChangeRow(rows);
     if (!IsSound(report)) {
       ++counters_.unsound;
       continue;
@@ -104,7 +104,7 @@ void MapChangeOutbox::Add(const protocol::MapChangeReport& report, double steady
     throw Error("a change of class '" + report.class_name.substr(0, kMaxIdBytes) +
                 "' has values that no zone accepts");
   }
-  Insert(*database_, report);
+  InsertMapChange(*database_, report);
   pending_[report.uuid] = report;
   schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
   ++counters_.added;

@@ -19,16 +19,16 @@ constexpr std::size_t kFreeListAt = 32;       // Its first page and length.
 constexpr std::int64_t kMaxProbes = 100000;   // Rows asked for one by one.
 
 /// A copy of a store and its log that goes when it is no longer needed.
-class WorkingCopy {
+class ReportSalvageCopy {
  public:
-  explicit WorkingCopy(const std::string& path) : original_(path), path_(path + ".salvage") {
+  explicit ReportSalvageCopy(const std::string& path) : original_(path), path_(path + ".salvage") {
     Remove();
     Copy("");
     if (std::filesystem::exists(original_ + "-wal")) Copy("-wal");
   }
-  ~WorkingCopy() { Remove(); }
-  WorkingCopy(const WorkingCopy&) = delete;
-  WorkingCopy& operator=(const WorkingCopy&) = delete;
+  ~ReportSalvageCopy() { Remove(); }
+  ReportSalvageCopy(const ReportSalvageCopy&) = delete;
+  ReportSalvageCopy& operator=(const ReportSalvageCopy&) = delete;
 
   const std::string& path() const { return path_; }
 
@@ -68,7 +68,8 @@ class WorkingCopy {
 };
 
 /// Row numbers in one direction, as far as the store can be read; true when that was to the end.
-bool ListRows(SqliteDatabase& database, const char* order, std::vector<std::int64_t>& rows) {
+bool ListRowsToSalvage(SqliteDatabase& database, const char* order,
+                       std::vector<std::int64_t>& rows) {
   try {
     SqliteStatement query = database.Prepare(
         std::string("SELECT rowid FROM pending NOT INDEXED ORDER BY rowid ") + order);
@@ -85,14 +86,14 @@ struct Rows {
 };
 
 /// Every row that may be there: what both ends show, and the numbers between them.
-Rows CandidateRows(SqliteDatabase& database) {
+Rows CandidateRowsToSalvage(SqliteDatabase& database) {
   Rows rows;
   std::vector<std::int64_t>& numbers = rows.numbers;
-  const bool complete = ListRows(database, "ASC", numbers);
+  const bool complete = ListRowsToSalvage(database, "ASC", numbers);
   if (!numbers.empty()) rows.last_listed = numbers.back();
   if (complete) return rows;
   std::vector<std::int64_t> from_end;
-  ListRows(database, "DESC", from_end);
+  ListRowsToSalvage(database, "DESC", from_end);
   const std::int64_t first = rows.last_listed + 1;
   const std::int64_t last = from_end.empty() ? first + kMaxProbes : from_end.back() - 1;
   for (std::int64_t row = first; row <= std::min(last, first + kMaxProbes); ++row) {
@@ -105,9 +106,10 @@ Rows CandidateRows(SqliteDatabase& database) {
   return rows;
 }
 
-Salvage ReadRows(SqliteDatabase& database, const std::function<void(const StoredReport&)>& accept) {
+Salvage ReadSalvagedRows(SqliteDatabase& database,
+                         const std::function<void(const StoredReport&)>& accept) {
   Salvage salvage;
-  const Rows rows = CandidateRows(database);
+  const Rows rows = CandidateRowsToSalvage(database);
   for (const std::int64_t row : rows.numbers) {
     std::optional<StoredReport> stored;
     try {
@@ -126,7 +128,7 @@ Salvage ReadRows(SqliteDatabase& database, const std::function<void(const Stored
   return salvage;
 }
 
-std::unique_ptr<SqliteDatabase> OpenCopy(const WorkingCopy& copy) {
+std::unique_ptr<SqliteDatabase> OpenSalvageCopy(const ReportSalvageCopy& copy) {
   auto database = std::make_unique<SqliteDatabase>(copy.path(), /*durable=*/false);
   database->Prepare("SELECT rowid FROM pending WHERE rowid=0").Reset();
   try {
@@ -141,22 +143,22 @@ std::unique_ptr<SqliteDatabase> OpenCopy(const WorkingCopy& copy) {
 
 Salvage SalvageReports(const std::string& path, const std::string& fresh,
                        const std::function<void(const StoredReport&)>& accept) {
-  std::optional<WorkingCopy> copy;
+  std::optional<ReportSalvageCopy> copy;
   std::unique_ptr<SqliteDatabase> database;
   try {
     copy.emplace(path);
     try {
-      database = OpenCopy(*copy);
+      database = OpenSalvageCopy(*copy);
     } catch (const StoreError&) {
       copy->ReplaceFirstPage(fresh);
-      database = OpenCopy(*copy);
+      database = OpenSalvageCopy(*copy);
     }
   } catch (const std::exception& error) {
     Salvage nothing;
     nothing.error = error.what();
     return nothing;
   }
-  return ReadRows(*database, accept);
+  return ReadSalvagedRows(*database, accept);
 }
 
 }  // namespace livemap::vehicle

@@ -14,7 +14,7 @@ constexpr char kSelectReport[] =
     "shown_x,shown_y,shown_width,shown_height,hold_until_ns FROM pending ";
 
 /// Of a row of kSelectReport.
-protocol::Report ReadReport(const SqliteStatement& row) {
+protocol::Report ReadStoredReport(const SqliteStatement& row) {
   const auto real = [&row](int column) { return static_cast<float>(row.Real(column)); };
   protocol::Report report;
   report.drive_id = row.Text(0);
@@ -99,14 +99,14 @@ std::optional<protocol::Report> SelectReport(SqliteDatabase& database, const Uui
   SqliteStatement row = database.Prepare(std::string(kSelectReport) + "WHERE uuid=?");
   row.BindBlob(1, uuid.bytes.data(), uuid.bytes.size());
   if (!row.Step()) return std::nullopt;
-  return ReadReport(row);
+  return ReadStoredReport(row);
 }
 
 std::optional<StoredReport> SelectReportOfRow(SqliteDatabase& database, std::int64_t row_number) {
   SqliteStatement row = database.Prepare(std::string(kSelectReport) + "NOT INDEXED WHERE rowid=?");
   row.Bind(1, row_number);
   if (!row.Step()) return std::nullopt;
-  return StoredReport{ReadReport(row), row.Int(19) != 0, row.Int(24)};
+  return StoredReport{ReadStoredReport(row), row.Int(19) != 0, row.Int(24)};
 }
 
 }  // namespace livemap::vehicle

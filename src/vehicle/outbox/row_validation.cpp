@@ -31,21 +31,25 @@ constexpr char kBrokenZone[] =
     "NOT (typeof(map_sequence) = 'integer' AND "
     "map_sequence BETWEEN 0 AND 1152921504606846975)";
 
-std::size_t Count(SqliteDatabase& database, const std::string& table, const std::string& which) {
+std::size_t CountInvalidRows(SqliteDatabase& database, const std::string& table,
+                             const std::string& which) {
   SqliteStatement query = database.Prepare("SELECT count(*) FROM " + table + " WHERE " + which);
   query.Step();
   return static_cast<std::size_t>(query.Int(0));
 }
 
 /// One row of `zone`, whatever there was: knowing nothing, the vehicle is told everything.
-std::size_t MendZone(SqliteDatabase& database) {
-  if (Count(database, "zone", kBrokenZone) == 0 && Count(database, "zone", "1") == 1) return 0;
+std::size_t MendZoneRows(SqliteDatabase& database) {
+  if (CountInvalidRows(database, "zone", kBrokenZone) == 0 &&
+      CountInvalidRows(database, "zone", "1") == 1)
+    return 0;
   database.Execute("DELETE FROM zone; INSERT INTO zone(map_sequence) VALUES(0)");
   return 1;
 }
 
-std::size_t TakeOut(SqliteDatabase& database, const std::string& table, const std::string& which) {
-  const std::size_t count = Count(database, table, which);
+std::size_t TakeOutInvalidRows(SqliteDatabase& database, const std::string& table,
+                               const std::string& which) {
+  const std::size_t count = CountInvalidRows(database, table, which);
   if (count > 0) database.Execute("DELETE FROM " + table + " WHERE " + which);
   return count;
 }
@@ -96,10 +100,11 @@ void DropInvalidPicture(protocol::Report& report) {
 InvalidRows RepairTables(SqliteDatabase& database) {
   InvalidRows broken;
   database.Transaction([&] {
-    broken.known = TakeOut(database, "known", kBrokenKnown) +
-                   TakeOut(database, "gone", kBrokenGone) + MendZone(database);
+    broken.known = TakeOutInvalidRows(database, "known", kBrokenKnown) +
+                   TakeOutInvalidRows(database, "gone", kBrokenGone) + MendZoneRows(database);
   });
-  broken.reports = Count(database, "pending", std::string("NOT (") + kFetchableReport + ")");
+  broken.reports =
+      CountInvalidRows(database, "pending", std::string("NOT (") + kFetchableReport + ")");
   std::vector<Uuid> uuids;
   SqliteStatement rows =
       database.Prepare(std::string("SELECT uuid FROM pending WHERE ") + kFetchableReport);

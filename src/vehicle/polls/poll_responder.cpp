@@ -11,12 +11,11 @@ namespace {
 
 constexpr std::size_t kMaxAnsweredKept = 1000;
 constexpr std::size_t kMaxPollFrames = 50;
-constexpr std::size_t kMaxPollPictures = 24;  // Full images: about a second of them.
 constexpr int kLuminanceGridPx = 64;
 constexpr double kMinPlacePx = 32;
 
 /// Where a place lies in an image: two standard deviations around its pixel.
-imaging::Box BoxOf(const placement::ProjectedPlace& view) {
+imaging::Box PolledBoxOf(const placement::ProjectedPlace& view) {
   const auto half = [&view](int axis) {
     return static_cast<float>(
         std::max(kMinPlacePx / 2, 2 * std::sqrt(view.covariance_px2(axis, axis))));
@@ -53,7 +52,9 @@ void PollResponder::Add(const protocol::Poll& poll, double steady_s) {
   }
   OpenPoll open;
   open.poll = poll;
-  open.deadline_s = steady_s + life_s - config_.reserve_s;
+  open.answer_by_s = steady_s + life_s - config_.reserve_s;
+  const bool wants_picture = poll.picture != protocol::PollPicture::kNone;
+  open.no_stands_s = open.answer_by_s - (wants_picture ? config_.picture_wait_s : 0);
   open_.push_back(std::move(open));
 }
 
@@ -61,21 +62,6 @@ void PollResponder::AddFrame(const placement::SightingFrame& frame, double now_s
   if (open_.empty()) return;
   waiting_.push_back({frame, now_s});
   if (waiting_.size() > kMaxPollFrames) waiting_.pop_front();
-}
-
-void PollResponder::AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture) {
-  if (open_.empty() || picture.bgr.empty() || picture.bgr.type() != CV_8UC3) return;
-  AddLuminance(stamp_ns, MeanLuminance(picture.bgr));
-  pictures_[stamp_ns] = picture;
-  // The oldest that speaks for no answer goes.
-  for (auto old = pictures_.begin();
-       pictures_.size() > kMaxPollPictures && old != pictures_.end();) {
-    const std::int64_t old_ns = old->first;
-    const bool wanted = std::any_of(open_.begin(), open_.end(), [old_ns](const OpenPoll& open) {
-      return open.poll.picture != protocol::PollPicture::kNone && open.view_ns == old_ns;
-    });
-    old = wanted ? std::next(old) : pictures_.erase(old);
-  }
 }
 
 void PollResponder::AddLuminance(std::int64_t stamp_ns, double luminance) {
@@ -90,6 +76,7 @@ void PollResponder::AddChange(const ChangeEvidence& evidence) {
     return;
   }
   for (OpenPoll& open : open_) {
+    if (open.order != 0) continue;
     if (!MayBe(evidence.change_class, open.poll.class_name)) continue;
     const double sigma_m =
         std::sqrt((evidence.covariance_m2 + open.poll.covariance_m2).trace() / 2);
@@ -105,8 +92,15 @@ void PollResponder::AddUnregistered() {
   for (OpenPoll& open : open_) open.unregistered += open.clear_views > 0 ? 1 : 0;
 }
 
-std::vector<std::int64_t> PollResponder::TakePictureRequests() {
-  return std::exchange(picture_requests_, {});
+std::vector<PictureOrder> PollResponder::TakePictureOrders() {
+  return std::exchange(picture_orders_, {});
+}
+
+void PollResponder::AddPictures(std::uint64_t order,
+                                std::vector<imaging::CroppedPicture> pictures) {
+  for (OpenPoll& open : open_) {
+    if (open.order == order) open.pictures = std::move(pictures);
+  }
 }
 
 void PollResponder::Process(double now_s, double steady_s, const Vehicle& vehicle) {
@@ -114,7 +108,7 @@ void PollResponder::Process(double now_s, double steady_s, const Vehicle& vehicl
     waiting_.pop_front();
   }
   for (auto open = open_.begin(); open != open_.end();) {
-    if (!IsReady(*open, steady_s)) {
+    if (!IsReady(*open, steady_s, vehicle)) {
       ++open;
       continue;
     }
@@ -123,9 +117,13 @@ void PollResponder::Process(double now_s, double steady_s, const Vehicle& vehicl
     if (answered_.size() > kMaxAnsweredKept) answered_.pop_front();
     open = open_.erase(open);
   }
-  if (!open_.empty()) return;
+  if (open_.empty()) ForgetFrames();
+}
+
+void PollResponder::StartAnew() { ForgetFrames(); }
+
+void PollResponder::ForgetFrames() {
   waiting_.clear();
-  pictures_.clear();
   luminances_.clear();
 }
 
@@ -155,34 +153,34 @@ bool PollResponder::Work(WaitingFrame& waiting, double now_s, double steady_s,
   }
   const placement::PlacedCamera camera{lookup.base, *vehicle.intrinsics, *mounting};
   for (OpenPoll& open : open_) {
-    if (!open.matched_s) Look(open, frame, camera, steady_s);
+    // An answer whose picture is being made stands.
+    if (!open.matched_s && open.order == 0) Look(open, frame, camera, steady_s, vehicle);
   }
   return true;
 }
 
 /// One image's word on one poll.
 void PollResponder::Look(OpenPoll& open, const placement::SightingFrame& frame,
-                         const placement::PlacedCamera& camera, double steady_s) {
+                         const placement::PlacedCamera& camera, double steady_s,
+                         const Vehicle& vehicle) {
   const placement::ProjectedPlace view =
       placement::ProjectPlace(open.poll.position, open.poll.covariance_m2, camera,
                               config_.projection, config_.margin_share);
   if (const placement::Sighting* match = Match(open, frame, view, camera)) {
     open.matched_s = steady_s;
     open.match_confidence = match->confidence;
-    open.view_ns = frame.stamp_ns;
-    open.view_base = camera.base;
-    open.view_box = match->box;
+    SetView(open, frame, camera.base, match->box, vehicle);
     return;
   }
   const auto trouble = WhyNotClear(view, frame);
   if (!trouble) {
-    CountView(open, frame, view, camera.base);
+    CountView(open, frame, view, camera.base, vehicle);
     return;
   }
   ++open.troubles[*trouble];
   // The place has left the view: nearer images will not come.
   const bool left = *trouble == Trouble::kOutside && IsGone(open);
-  if (left) open.deadline_s = std::min(open.deadline_s, steady_s);
+  if (left) open.no_stands_s = std::min(open.no_stands_s, steady_s);
 }
 
 /// A match counts wherever the detector sees it, also beyond the range of a no.
@@ -217,20 +215,32 @@ std::optional<PollResponder::Trouble> PollResponder::WhyNotClear(
 }
 
 void PollResponder::CountView(OpenPoll& open, const placement::SightingFrame& frame,
-                              const placement::ProjectedPlace& view, const geo::TrackPose& base) {
+                              const placement::ProjectedPlace& view, const geo::TrackPose& base,
+                              const Vehicle& vehicle) {
   if (open.last_view &&
       geo::GeodesicDistanceM(*open.last_view, base.position) < config_.view_spacing_m) {
     return;
   }
   // The nearest view shows best that nothing is there.
   if (open.clear_views == 0 || view.distance_m < open.view_distance_m) {
-    open.view_ns = frame.stamp_ns;
     open.view_distance_m = view.distance_m;
-    open.view_base = base;
-    open.view_box = BoxOf(view);
+    SetView(open, frame, base, PolledBoxOf(view), vehicle);
   }
   open.last_view = base.position;
   ++open.clear_views;
+}
+
+/// The image that speaks for the answer from now on.
+void PollResponder::SetView(OpenPoll& open, const placement::SightingFrame& frame,
+                            const geo::TrackPose& base, const imaging::Box& box,
+                            const Vehicle& vehicle) {
+  open.view_ns = frame.stamp_ns;
+  open.view_base = base;
+  open.view_box = box;
+  open.view_image = {};
+  if (open.poll.picture != protocol::PollPicture::kNone && vehicle.image_at) {
+    open.view_image = vehicle.image_at(frame.stamp_ns);
+  }
 }
 
 bool PollResponder::IsGone(const OpenPoll& open) const {
@@ -238,22 +248,38 @@ bool PollResponder::IsGone(const OpenPoll& open) const {
   return open.clear_views >= (open.vanished > 0 ? 1 : config_.no_views);
 }
 
-/// Asks for the picture when the answer stands and it is missed.
-bool PollResponder::IsReady(OpenPoll& open, double steady_s) {
-  if (!open.matched_s && steady_s < open.deadline_s) return false;
-  const bool decided = open.matched_s || IsGone(open);
-  if (!decided || open.poll.picture == protocol::PollPicture::kNone ||
-      pictures_.count(open.view_ns) != 0) {
-    return true;
+/// Orders the picture when the answer stands.
+bool PollResponder::IsReady(OpenPoll& open, double steady_s, const Vehicle& vehicle) {
+  if (open.pictures || steady_s >= open.answer_by_s) return true;
+  if (open.order != 0) return false;
+  const bool decided = open.matched_s || (IsGone(open) && steady_s >= open.no_stands_s);
+  if (!decided) return false;
+  if (open.poll.picture == protocol::PollPicture::kNone) return true;
+  // It may have come after its frame.
+  if (open.view_image.IsMissing() && vehicle.image_at) {
+    open.view_image = vehicle.image_at(open.view_ns);
   }
-  if (!open.asked_s) {
-    open.asked_s = steady_s;
-    picture_requests_.push_back(open.view_ns);
+  if (open.view_image.IsMissing()) {
+    return !open.matched_s || steady_s - *open.matched_s >= config_.image_wait_s;
   }
-  return steady_s - *open.asked_s >= config_.picture_wait_s;
+  OrderPicture(open);
+  return false;
 }
 
-void PollResponder::Answer(const OpenPoll& open) {
+void PollResponder::OrderPicture(OpenPoll& open) {
+  PictureOrder::Cut cut{open.view_box, config_.crop,
+                        open.poll.picture != protocol::PollPicture::kCrop};
+  cut.crop.quality = config_.jpeg_quality;
+  const std::size_t max_bytes = open.poll.max_picture_bytes;
+  cut.crop.max_bytes = cut.is_whole_image ? max_bytes : std::min(cut.crop.max_bytes, max_bytes);
+  PictureOrder order;
+  order.number = open.order = ++last_order_;
+  order.image = open.view_image;
+  order.cuts.push_back(cut);
+  picture_orders_.push_back(std::move(order));
+}
+
+void PollResponder::Answer(OpenPoll& open) {
   const bool seen = open.matched_s.has_value();
   const bool not_there = !seen && IsGone(open);
   if (!seen && !not_there && !newest_base_) {
@@ -291,18 +317,10 @@ void PollResponder::Answer(const OpenPoll& open) {
   replies_.push_back(std::move(reply));
 }
 
-void PollResponder::AttachPicture(const OpenPoll& open, protocol::PollAnswer& reply) {
-  const auto picture = pictures_.find(open.view_ns);
-  if (open.poll.picture == protocol::PollPicture::kNone || picture == pictures_.end()) return;
-  const std::size_t max_bytes = open.poll.max_picture_bytes;
-  if (open.poll.picture == protocol::PollPicture::kCrop) {
-    imaging::CropConfig crop = config_.crop;
-    crop.quality = config_.jpeg_quality;
-    crop.max_bytes = std::min(crop.max_bytes, max_bytes);
-    reply.image = imaging::CropPicture(picture->second, open.view_box, crop).jpeg;
-  } else {
-    reply.image = imaging::EncodeJpeg(picture->second, config_.jpeg_quality, max_bytes);
-  }
+/// What its order was answered with, if it has one: what may leave the vehicle.
+void PollResponder::AttachPicture(OpenPoll& open, protocol::PollAnswer& reply) {
+  if (!open.pictures || open.pictures->empty()) return;
+  reply.image = std::move(open.pictures->front().jpeg);
   if (reply.image.empty()) return;
   reply.image_format = "jpeg";
   ++counters_.pictures;

@@ -14,6 +14,7 @@
 #include "placement/sighting.h"
 #include "protocol/hazard_catalogue.h"
 #include "protocol/poll.h"
+#include "vehicle/pictures/picture_order.h"
 #include "vehicle/polls/change_evidence.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
@@ -29,8 +30,9 @@ namespace livemap::vehicle {
 /// Change detection has a say, too: where it knows that a thing of the class went, one clear view
 /// without a match makes a no; where it knows that one came, nothing does.
 ///
-/// Pictures are asked for when an answer needs one, see TakePictureRequests; those that come by
-/// themselves are taken, too.
+/// The responder holds images as the camera saw them, and never puts one into an answer: it orders
+/// the picture (TakePictureOrders) once the answer stands, and takes what may leave the vehicle
+/// (AddPictures).
 ///
 /// Two clocks as in HazardReporter: `now_s` is that of the stamps, `steady_s` never pauses. How
 /// long a poll lives is what the zone wrote, counted from its arrival on the steady clock: the
@@ -52,8 +54,11 @@ class PollResponder {
     double min_confidence = 0;    ///< 0..1, of a match.
     double pose_wait_s = 3;       ///< A frame waits at most this long for pose and camera.
     double bracket_wait_s = 0.3;  ///< As in HazardReporter.
-    double picture_wait_s = 0.5;  ///< A yes or no waits at most this long for its picture.
-    int jpeg_quality = 70;        ///< 1..100.
+    double image_wait_s = 0.3;    ///< A yes waits at most this long for its image.
+    /// What the maker of pictures takes at most, s: a no with a picture stands this long before its
+    /// answer leaves.
+    double picture_wait_s = 3;
+    int jpeg_quality = 70;     ///< 1..100.
     imaging::CropConfig crop;  ///< Of a picture that shows a part; its own quality does not count.
     geo::GroundProjectionNoise projection;
   };
@@ -65,6 +70,8 @@ class PollResponder {
     std::function<std::optional<Eigen::Isometry3d>(const std::string& frame_id)> mounting;
     /// Pose of base_link at the moment of an image that has waited `waited_s`.
     std::function<VehiclePoseLookup::Lookup(std::int64_t stamp_ns, double waited_s)> pose_at;
+    /// The image of that stamp; missing where it is not there, or not any more.
+    std::function<CameraImage(std::int64_t stamp_ns)> image_at;
   };
 
   /// Since the start; polls unless it says otherwise.
@@ -88,16 +95,20 @@ class PollResponder {
   void Add(const protocol::Poll& poll, double steady_s);
   /// One processed image with what the detector saw, also when that is nothing.
   void AddFrame(const placement::SightingFrame& frame, double now_s);
-  /// The annotated image of that stamp, before or after its frame.
-  void AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture);
+  /// The clock was set back: frames of before are forgotten, polls stay open.
+  void StartAnew();
   /// How bright the image of that stamp is: its mean, 0..255. Best before its frame.
   void AddLuminance(std::int64_t stamp_ns, double luminance);
   /// What change detection knows of a place; told again it counts once, with its newest figures.
+  /// An answer whose picture is being made stands.
   void AddChange(const ChangeEvidence& evidence);
   /// Change detection knew earlier pictures of where the vehicle is, and recognised none of them.
   void AddUnregistered();
-  /// Stamps of the images whose pictures are wanted now, each once.
-  std::vector<std::int64_t> TakePictureRequests();
+  /// The pictures that are wanted now, each order once. Each has to be answered by AddPictures: its
+  /// poll waits for it.
+  std::vector<PictureOrder> TakePictureOrders();
+  /// The answer to an order: its one picture, or nothing where none may leave the vehicle.
+  void AddPictures(std::uint64_t order, std::vector<imaging::CroppedPicture> pictures);
 
   /// Works off waiting frames and expired polls. Answers are ready for TakeReplies.
   void Process(double now_s, double steady_s, const Vehicle& vehicle);
@@ -120,11 +131,13 @@ class PollResponder {
   enum class Trouble { kNoFix, kNoCamera, kTooFar, kOutside, kDark, kTooFew };
   struct OpenPoll {
     protocol::Poll poll;
-    double deadline_s;  // Steady.
+    double answer_by_s;  // Steady: the answer leaves, with its picture or without.
+    double no_stands_s;  // Steady: from then on a no waits for no nearer view.
     std::map<Trouble, int> troubles;
     int clear_views = 0;
     std::optional<geo::GeoPoint> last_view;
     std::int64_t view_ns = 0;  // The image that speaks for the answer, and what it showed.
+    CameraImage view_image;    // Where the poll wants a picture.
     double view_distance_m = 0;
     imaging::Box view_box;  // The match's, or where the place is in that image.
     geo::TrackPose view_base;
@@ -133,7 +146,8 @@ class PollResponder {
     float appeared = 0;
     int unregistered = 0;             // Images that change detection could not compare.
     std::optional<double> matched_s;  // Steady; it only waits for the picture.
-    std::optional<double> asked_s;    // Steady; when its picture began to be missed.
+    std::uint64_t order = 0;          // Of its picture; 0: none yet.
+    std::optional<std::vector<imaging::CroppedPicture>> pictures;  // Once that was answered.
   };
   struct WaitingFrame {
     placement::SightingFrame frame;
@@ -142,19 +156,24 @@ class PollResponder {
 
   bool Work(WaitingFrame& waiting, double now_s, double steady_s, const Vehicle& vehicle);
   void Look(OpenPoll& open, const placement::SightingFrame& frame,
-            const placement::PlacedCamera& camera, double steady_s);
+            const placement::PlacedCamera& camera, double steady_s, const Vehicle& vehicle);
   std::optional<Trouble> WhyNotClear(const placement::ProjectedPlace& view,
                                      const placement::SightingFrame& frame) const;
   const placement::Sighting* Match(const OpenPoll& open, const placement::SightingFrame& frame,
                                    const placement::ProjectedPlace& view,
                                    const placement::PlacedCamera& camera) const;
   void CountView(OpenPoll& open, const placement::SightingFrame& frame,
-                 const placement::ProjectedPlace& view, const geo::TrackPose& base);
-  bool IsReady(OpenPoll& open, double steady_s);
+                 const placement::ProjectedPlace& view, const geo::TrackPose& base,
+                 const Vehicle& vehicle);
+  static void SetView(OpenPoll& open, const placement::SightingFrame& frame,
+                      const geo::TrackPose& base, const imaging::Box& box, const Vehicle& vehicle);
+  bool IsReady(OpenPoll& open, double steady_s, const Vehicle& vehicle);
+  void OrderPicture(OpenPoll& open);
+  void ForgetFrames();
   /// Whether views and changes make a no.
   bool IsGone(const OpenPoll& open) const;
-  void Answer(const OpenPoll& open);
-  void AttachPicture(const OpenPoll& open, protocol::PollAnswer& reply);
+  void Answer(OpenPoll& open);
+  void AttachPicture(OpenPoll& open, protocol::PollAnswer& reply);
   static std::string ReasonOf(const OpenPoll& open);
 
   Config config_;
@@ -162,10 +181,9 @@ class PollResponder {
   std::deque<OpenPoll> open_;
   std::deque<Uuid> answered_;  // The newest, to know repetitions.
   std::deque<WaitingFrame> waiting_;
-  std::map<std::int64_t, imaging::Picture>
-      pictures_;  // The newest, and those that an open poll may need.
   std::map<std::int64_t, double> luminances_;
-  std::vector<std::int64_t> picture_requests_;
+  std::vector<PictureOrder> picture_orders_;
+  std::uint64_t last_order_ = 0;
   std::vector<protocol::PollAnswer> replies_;
   std::optional<geo::TrackPose> newest_base_;
   std::int64_t newest_ns_ = 0;

@@ -7,33 +7,54 @@
 #include <limits>
 
 #include "common/time.h"
-#include "geo/fix_covariance.h"
+#include "geo/fix_plausibility.h"
 
 namespace livemap::vehicle {
 namespace {
 
-constexpr double kMinSigmaM = 1e-3;        // No receiver is better; keeps covariances invertible.
-constexpr double kStandingMps = 0.3;       // Slower than this the vehicle stands.
-constexpr double kMaxJumpAllowanceM = 30;  // What uncertainty may excuse between two fixes.
+constexpr double kMinSigmaM = 1e-3;   // No receiver is better; keeps covariances invertible.
+constexpr double kStandingMps = 0.3;  // Slower than this the vehicle stands.
 
-double SigmaM(const Eigen::Matrix2d& covariance_m2) { return std::sqrt(covariance_m2.trace() / 2); }
+double FixSigmaM(const Eigen::Matrix2d& covariance_m2) {
+  return std::sqrt(covariance_m2.trace() / 2);
+}
 
 }  // namespace
 
-FixTrack::FixTrack(const Config& config) : config_(config) {}
+FixTrack::FixTrack(const Config& config) : config_(config), stamps_(config.stamps) {}
+
+void FixTrack::Reset() {
+  stamps_.Reset();
+  points_.clear();
+  suspects_.clear();
+}
 
 std::optional<std::int64_t> FixTrack::newest_ns() const {
   if (points_.empty()) return std::nullopt;
   return points_.back().stamp_ns;
 }
 
+std::optional<std::int64_t> FixTrack::oldest_ns() const {
+  if (points_.empty()) return std::nullopt;
+  return points_.front().stamp_ns;
+}
+
 std::optional<geo::TrackPose> FixTrack::Newest() const {
   if (points_.empty()) return std::nullopt;
+  return PoseOf(points_.back());
+}
+
+std::optional<geo::TrackPose> FixTrack::Oldest() const {
+  if (points_.empty()) return std::nullopt;
+  return PoseOf(points_.front());
+}
+
+geo::TrackPose FixTrack::PoseOf(const Point& point) const {
   geo::TrackPose pose;
-  pose.position = points_.back().position;
-  pose.covariance_m2 = points_.back().covariance_m2;
+  pose.position = point.position;
+  pose.covariance_m2 = point.covariance_m2;
   pose.course_rad = std::numeric_limits<double>::quiet_NaN();
-  if (const auto motion = MotionAt(points_.back().stamp_ns, points_.end())) {
+  if (const auto motion = MotionAt(point.stamp_ns, points_.end())) {
     pose.speed_mps = motion->velocity_mps.norm();
     const auto course = CourseOf(*motion);
     if (course && pose.speed_mps >= kStandingMps) {
@@ -44,58 +65,59 @@ std::optional<geo::TrackPose> FixTrack::Newest() const {
   return pose;
 }
 
-FixTrack::Verdict FixTrack::Add(const geo::Fix& fix) {
+FixTrack::Verdict FixTrack::Add(const geo::Fix& fix, std::int64_t now_ns) {
   if (!fix.has_fix) return Verdict::kNoFix;
   const auto point = ToPoint(fix);
   if (!point) return Verdict::kInvalid;
-  if (points_.empty()) {
+  const StampGate::Verdict stamp = stamps_.Judge(point->stamp_ns, now_ns);
+  if (stamp == StampGate::Verdict::kLate) return Verdict::kOutOfOrder;
+  if (!StampGate::IsUsable(stamp)) return Verdict::kBadStamp;
+  const bool time_went_back = stamp == StampGate::Verdict::kRestarted;
+  if (time_went_back) {
+    // Nothing of before can be compared.
+    points_.clear();
+    suspects_.clear();
+  }
+  if (points_.empty()) return Begin(*point, time_went_back);
+  if (Reachable(points_.back(), *point)) {
+    suspects_.clear();
     Append(*point);
     return Verdict::kAccepted;
   }
-  const double step_s = Seconds(point->stamp_ns - points_.back().stamp_ns);
-  if (step_s < -config_.keep_s) {
-    // The clock was set back (a bag starts again): nothing of before can be compared.
-    points_.clear();
-    suspects_.clear();
-    Append(*point);
-    return Verdict::kRestarted;
-  }
-  if (step_s <= 0) return Verdict::kOutOfOrder;
-  if (!Reachable(points_.back(), *point)) return AddSuspect(*point);
-  suspects_.clear();
-  Append(*point);
-  return Verdict::kAccepted;
+  if (!JoinSuspects(*point, config_.jumps_to_restart)) return Verdict::kJump;
+  return Verdict::kRestarted;
 }
 
 std::optional<FixTrack::Point> FixTrack::ToPoint(const geo::Fix& fix) const {
-  if (!geo::IsValid(fix.position) || fix.stamp_ns <= 0) return std::nullopt;
-  Eigen::Matrix2d covariance_m2 =
-      Eigen::Matrix2d::Identity() * config_.default_sigma_m * config_.default_sigma_m;
-  if (fix.covariance_m2) {
-    if (!geo::IsFixCovariance(*fix.covariance_m2)) return std::nullopt;
-    covariance_m2 = *fix.covariance_m2 + Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
-  }
+  if (!geo::IsPlausible(fix)) return std::nullopt;
+  const Eigen::Matrix2d covariance_m2 = geo::CovarianceOf(fix, config_.default_sigma_m) +
+                                        Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
   return Point{fix.stamp_ns, fix.position, covariance_m2, std::nullopt};
 }
 
 bool FixTrack::Reachable(const Point& from, const Point& to) const {
-  const double allowance_m =
-      std::min(kMaxJumpAllowanceM, 3 * (SigmaM(from.covariance_m2) + SigmaM(to.covariance_m2)));
-  const double way_m = config_.max_speed_mps * Seconds(to.stamp_ns - from.stamp_ns) + allowance_m;
-  return geo::GeodesicDistanceM(from.position, to.position) <= way_m;
+  return geo::AreReachable({from.stamp_ns, from.position, FixSigmaM(from.covariance_m2)},
+                           {to.stamp_ns, to.position, FixSigmaM(to.covariance_m2)},
+                           config_.max_speed_mps);
 }
 
-FixTrack::Verdict FixTrack::AddSuspect(const Point& point) {
-  if (!suspects_.empty() &&
-      (point.stamp_ns <= suspects_.back().stamp_ns || !Reachable(suspects_.back(), point))) {
-    suspects_.clear();
-  }
+/// A track that has no fix yet begins with some that agree.
+FixTrack::Verdict FixTrack::Begin(const Point& point, bool time_went_back) {
+  const bool contradicted = !suspects_.empty() && !Reachable(suspects_.back(), point);
+  const bool begun = JoinSuspects(point, config_.fixes_to_start);
+  if (time_went_back) return Verdict::kRestarted;
+  return begun || !contradicted ? Verdict::kAccepted : Verdict::kJump;
+}
+
+/// True when as many as `wanted` agree: then the track consists of them.
+bool FixTrack::JoinSuspects(const Point& point, int wanted) {
+  if (!suspects_.empty() && !Reachable(suspects_.back(), point)) suspects_.clear();
   suspects_.push_back(point);
-  if (static_cast<int>(suspects_.size()) < config_.jumps_to_restart) return Verdict::kJump;
+  if (static_cast<int>(suspects_.size()) < wanted) return false;
   points_.clear();
   for (const Point& suspect : suspects_) Append(suspect);
   suspects_.clear();
-  return Verdict::kRestarted;
+  return true;
 }
 
 void FixTrack::Append(const Point& point) {

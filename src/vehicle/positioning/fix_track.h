@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/stamp_gate.h"
 #include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
 
@@ -14,7 +15,8 @@ namespace livemap::vehicle {
 
 /// The recent fixes of one vehicle: answers where it was and which way it drove at the moment of an
 /// image. A position is interpolated between two fixes or carried on a bounded time beyond the
-/// newest; what is not known is not invented. Not thread-safe.
+/// newest; what is not known is not invented. The first fix alone is not believed: a track begins
+/// with fixes that agree. Not thread-safe.
 class FixTrack {
  public:
   struct Config {
@@ -41,17 +43,21 @@ class FixTrack {
     double max_speed_mps = 80.0;
     /// This many fixes that agree with each other but not with the track start it anew.
     int jumps_to_restart = 3;
+    /// So many fixes in succession that agree with each other begin a track.
+    int fixes_to_start = 2;
     /// How long fixes are kept, s.
     double keep_s = 30.0;
+    StampGate::Config stamps;
   };
 
   enum class Verdict {
-    kAccepted,
+    kAccepted,    ///< The first ones count once they agree.
     kNoFix,       ///< The receiver says that it has no fix.
-    kInvalid,     ///< NaN, out of range, or a covariance that is none.
+    kInvalid,     ///< NaN, out of range, null island, or a covariance that is none.
     kOutOfOrder,  ///< Not newer than the newest fix.
     kJump,        ///< Impossible speed.
     kRestarted,   ///< Accepted; time went back or a jump proved true: older fixes are forgotten.
+    kBadStamp,    ///< Its stamp fits neither the clock nor the other fixes.
   };
 
   enum class Answer {
@@ -68,13 +74,19 @@ class FixTrack {
 
   explicit FixTrack(const Config& config);
 
-  Verdict Add(const geo::Fix& fix);
+  /// `now_ns` is the clock of the stamps; 0: it is not known.
+  Verdict Add(const geo::Fix& fix, std::int64_t now_ns = 0);
+  /// Forgets all fixes: the clock was set back.
+  void Reset();
   /// Pose at a moment (ns, the fixes' clock). Once kReady, fixes that come later do not change it.
   Lookup At(std::int64_t stamp_ns) const;
   /// The newest accepted fix's moment; nothing before the first.
   std::optional<std::int64_t> newest_ns() const;
   /// Where the vehicle was then; course NaN when it is not known or the vehicle stands.
   std::optional<geo::TrackPose> Newest() const;
+  /// The same of the oldest fix that is kept.
+  std::optional<std::int64_t> oldest_ns() const;
+  std::optional<geo::TrackPose> Oldest() const;
 
  private:
   struct Motion {
@@ -99,8 +111,10 @@ class FixTrack {
   using Points = std::deque<Point>;
 
   std::optional<Point> ToPoint(const geo::Fix& fix) const;
+  geo::TrackPose PoseOf(const Point& point) const;
   bool Reachable(const Point& from, const Point& to) const;
-  Verdict AddSuspect(const Point& point);
+  bool JoinSuspects(const Point& point, int wanted);
+  Verdict Begin(const Point& point, bool time_went_back);
   void Append(const Point& point);
   geo::TrackPose Interpolate(const Point& before, const Point& after, std::int64_t stamp_ns) const;
   geo::TrackPose Extrapolate(const Point& last, const Motion& motion, std::int64_t stamp_ns) const;
@@ -111,8 +125,9 @@ class FixTrack {
   std::optional<Course> CourseOf(const Motion& motion) const;
 
   Config config_;
+  StampGate stamps_;
   Points points_;                // Ascending stamps.
-  std::vector<Point> suspects_;  // Jumps that agree with each other.
+  std::vector<Point> suspects_;  // First fixes, or jumps, that agree with each other.
 };
 
 }  // namespace livemap::vehicle

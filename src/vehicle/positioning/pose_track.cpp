@@ -11,14 +11,15 @@
 namespace livemap::vehicle {
 namespace {
 
-bool IsUsable(const geo::TrackPose& pose) {
+bool IsUsableTrackPose(const geo::TrackPose& pose) {
   return geo::IsValid(pose.position) && std::isfinite(pose.course_rad) &&
          std::isfinite(pose.speed_mps) && geo::IsFixCovariance(pose.covariance_m2) &&
          pose.position_course.allFinite() && pose.course_variance_rad2 >= 0 &&
          pose.course_variance_rad2 <= 10;
 }
 
-geo::TrackPose Between(const geo::TrackPose& before, const geo::TrackPose& after, double share) {
+geo::TrackPose PoseBetween(const geo::TrackPose& before, const geo::TrackPose& after,
+                           double share) {
   const geo::LocalFrame frame(before.position);
   geo::TrackPose pose;
   pose.position = frame.ToGeo(share * frame.ToEnu(after.position));
@@ -34,16 +35,20 @@ geo::TrackPose Between(const geo::TrackPose& before, const geo::TrackPose& after
 
 }  // namespace
 
-bool PoseTrack::Add(std::int64_t stamp_ns, const geo::TrackPose& pose) {
-  if (stamp_ns <= 0 || !IsUsable(pose)) return false;
-  if (!points_.empty() && stamp_ns <= points_.back().stamp_ns) {
-    // A replay that begins again: nothing of before can be compared.
-    if (Seconds(points_.back().stamp_ns - stamp_ns) <= config_.set_back_s) return false;
-    points_.clear();
-  }
+bool PoseTrack::Add(std::int64_t stamp_ns, const geo::TrackPose& pose, std::int64_t now_ns) {
+  if (!IsUsableTrackPose(pose)) return false;
+  const StampGate::Verdict stamp = stamps_.Judge(stamp_ns, now_ns);
+  if (stamp == StampGate::Verdict::kLate || !StampGate::IsUsable(stamp)) return false;
+  // A replay that begins again: nothing of before can be compared.
+  if (stamp == StampGate::Verdict::kRestarted) points_.clear();
   points_.push_back({stamp_ns, pose});
   while (Seconds(stamp_ns - points_.front().stamp_ns) > config_.keep_s) points_.pop_front();
   return true;
+}
+
+void PoseTrack::Reset() {
+  stamps_.Reset();
+  points_.clear();
 }
 
 FixTrack::Lookup PoseTrack::At(std::int64_t stamp_ns) const {
@@ -58,7 +63,7 @@ FixTrack::Lookup PoseTrack::At(std::int64_t stamp_ns) const {
   const double gap_s = Seconds(after->stamp_ns - before.stamp_ns);
   if (gap_s > config_.max_gap_s) return {Answer::kHopeless, {}};
   return {Answer::kReady,
-          Between(before.pose, after->pose, Seconds(stamp_ns - before.stamp_ns) / gap_s)};
+          PoseBetween(before.pose, after->pose, Seconds(stamp_ns - before.stamp_ns) / gap_s)};
 }
 
 std::optional<std::int64_t> PoseTrack::newest_ns() const {

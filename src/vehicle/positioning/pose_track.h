@@ -4,6 +4,7 @@
 #include <deque>
 #include <optional>
 
+#include "common/stamp_gate.h"
 #include "vehicle/positioning/fix_track.h"
 
 namespace livemap::vehicle {
@@ -16,17 +17,20 @@ class PoseTrack {
   struct Config {
     /// Two poses further apart are not interpolated, s.
     double max_gap_s = 0.5;
-    /// A stamp that goes back by more than this begins the track anew, s.
-    double set_back_s = 1.0;
     /// How long poses are kept, s.
     double keep_s = 30.0;
+    /// Stamps that go back begin the track anew.
+    StampGate::Config stamps;
   };
 
-  explicit PoseTrack(const Config& config) : config_(config) {}
+  explicit PoseTrack(const Config& config) : config_(config), stamps_(config.stamps) {}
 
   /// The pose's position is that of base_link, its course the heading. False when it is refused:
-  /// not finite, no position, no covariance, or not newer than the newest.
-  bool Add(std::int64_t stamp_ns, const geo::TrackPose& pose);
+  /// not finite, no position, no covariance, not newer than the newest, or a stamp that fits
+  /// neither the others nor the clock `now_ns` (0: not known).
+  bool Add(std::int64_t stamp_ns, const geo::TrackPose& pose, std::int64_t now_ns = 0);
+  /// Forgets all poses: the clock was set back.
+  void Reset();
   /// kReady, kWait (a later pose may tell) or kHopeless. Once kReady, poses that come later do not
   /// change it.
   FixTrack::Lookup At(std::int64_t stamp_ns) const;
@@ -40,6 +44,7 @@ class PoseTrack {
   };
 
   Config config_;
+  StampGate stamps_;
   std::deque<Point> points_;  // Ascending stamps.
 };
 

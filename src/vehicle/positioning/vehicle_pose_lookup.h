@@ -46,10 +46,18 @@ class VehiclePoseLookup {
 
   explicit VehiclePoseLookup(const Config& config);
 
-  FixTrack::Verdict AddFix(const geo::Fix& fix) { return fixes_.Add(fix); }
+  /// `now_ns` is the clock of the stamps; 0: it is not known.
+  FixTrack::Verdict AddFix(const geo::Fix& fix, std::int64_t now_ns = 0) {
+    return fixes_.Add(fix, now_ns);
+  }
   /// A fused pose of base_link; false when it is refused.
-  bool AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
-    return poses_.Add(stamp_ns, pose);
+  bool AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose, std::int64_t now_ns = 0) {
+    return poses_.Add(stamp_ns, pose, now_ns);
+  }
+  /// Forgets all of both: the clock was set back.
+  void Reset() {
+    fixes_.Reset();
+    poses_.Reset();
   }
 
   /// For an image of `stamp_ns` that has waited `waited_s`.

@@ -2,18 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
+#include "common/stamp_gate.h"
 #include "common/time.h"
 #include "placement/road_ground_contact.h"
 
 namespace livemap::vehicle {
 namespace {
 
-constexpr std::size_t kMaxEarlyPictures = 8;
 constexpr double kEndlessRangeM = 1e4;  // The projection's own limit; max_range_m is ours.
 
-VehiclePoseLookup::Config PoseConfigOf(const HazardReporter::Config& config) {
+VehiclePoseLookup::Config ReporterPoseConfigOf(const HazardReporter::Config& config) {
   VehiclePoseLookup::Config pose;
   pose.use_fused = config.position_source == PositionSource::kFused;
   pose.fused_wait_s = config.fused_wait_s;
@@ -26,6 +27,8 @@ VehiclePoseLookup::Config PoseConfigOf(const HazardReporter::Config& config) {
   return pose;
 }
 
+constexpr std::size_t kMaxWaitingNotices = 20000;
+
 }  // namespace
 
 HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatalogue& catalogue,
@@ -34,7 +37,7 @@ HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatal
       catalogue_(catalogue),
       random_(random),
       map_(config.map, catalogue, now_ns),
-      vehicle_poses_(PoseConfigOf(config)),
+      vehicle_poses_(ReporterPoseConfigOf(config)),
       schedule_(config.resend, std::mt19937_64(random_())),
       start_ns_(now_ns),
       start_steady_s_(steady_s) {
@@ -63,9 +66,9 @@ std::optional<Eigen::Isometry3d> HazardReporter::Mounting(const std::string& fra
   return found->second;
 }
 
-void HazardReporter::AddFix(const geo::Fix& fix) {
+void HazardReporter::AddFix(const geo::Fix& fix, std::int64_t now_ns) {
   ++counters_.fixes;
-  switch (vehicle_poses_.AddFix(fix)) {
+  switch (vehicle_poses_.AddFix(fix, now_ns)) {
     case FixTrack::Verdict::kAccepted:
     case FixTrack::Verdict::kRestarted:
       break;
@@ -79,12 +82,34 @@ void HazardReporter::AddFix(const geo::Fix& fix) {
     case FixTrack::Verdict::kJump:
       ++counters_.jumps;
       break;
+    case FixTrack::Verdict::kBadStamp:
+      ++counters_.fixes_bad_stamp;
+      break;
   }
 }
 
-void HazardReporter::AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
+void HazardReporter::AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose,
+                             std::int64_t now_ns) {
   ++counters_.poses;
-  if (!vehicle_poses_.AddPose(stamp_ns, pose)) ++counters_.invalid_poses;
+  if (!vehicle_poses_.AddPose(stamp_ns, pose, now_ns)) ++counters_.invalid_poses;
+}
+
+void HazardReporter::StartAnew(double now_s, double steady_s) {
+  Finish(steady_s);
+  depths_.clear();
+  vehicle_poses_.Reset();
+  forgot_s_ = now_s;
+}
+
+void HazardReporter::Finish(double steady_s) {
+  constexpr double kForEverS = 1e9;
+  for (WaitingFrame& waiting : waiting_) {
+    // Nothing of its moment can come any more.
+    if (!waiting.placed) Place(waiting, kForEverS);
+    ReportCandidates(waiting, steady_s);
+  }
+  waiting_.clear();
+  picture_orders_.clear();
 }
 
 bool HazardReporter::IsUsable(const placement::Sighting& sighting) {
@@ -109,11 +134,6 @@ void HazardReporter::AddFrame(const placement::SightingFrame& frame, double now_
       std::remove_if(sightings.begin(), sightings.end(),
                      [this](const placement::Sighting& sighting) { return !IsUsable(sighting); }),
       sightings.end());
-  const auto picture = early_pictures_.find(frame.stamp_ns);
-  if (picture != early_pictures_.end()) {
-    waiting.picture = picture->second;
-    early_pictures_.erase(picture);
-  }
   if (sightings.empty()) return;
   waiting_.push_back(std::move(waiting));
   while (waiting_.size() > static_cast<std::size_t>(config_.max_waiting_frames)) {
@@ -122,25 +142,26 @@ void HazardReporter::AddFrame(const placement::SightingFrame& frame, double now_
   }
 }
 
-void HazardReporter::AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture,
-                                const imaging::PixelRegion& part) {
-  bool is_known = false;
+const placement::SightingFrame* HazardReporter::FrameWithoutImage(std::int64_t stamp_ns) const {
+  const auto waiting =
+      std::find_if(waiting_.begin(), waiting_.end(), [stamp_ns](const WaitingFrame& each) {
+        return each.frame.stamp_ns == stamp_ns && each.image.IsMissing();
+      });
+  return waiting == waiting_.end() ? nullptr : &waiting->frame;
+}
+
+void HazardReporter::AddImage(std::int64_t stamp_ns, const CameraImage& image) {
   for (WaitingFrame& waiting : waiting_) {
-    if (waiting.frame.stamp_ns != stamp_ns) continue;
-    is_known = true;
-    if (imaging::Contains(part, waiting.wanted)) waiting.picture = picture;
+    if (waiting.frame.stamp_ns == stamp_ns && waiting.image.IsMissing()) waiting.image = image;
   }
-  if (is_known || !part.IsWholeImage()) return;
-  early_pictures_[stamp_ns] = picture;
-  if (early_pictures_.size() > kMaxEarlyPictures) early_pictures_.erase(early_pictures_.begin());
 }
 
 void HazardReporter::AddDepth(std::int64_t stamp_ns, const placement::DepthImage& depth) {
+  if (!depths_.empty() && IsSetBack(stamp_ns, depths_.rbegin()->first)) depths_.clear();
   depths_[stamp_ns] = depth;
-  if (depths_.size() <= static_cast<std::size_t>(config_.depth_images)) return;
-  // The oldest, but for those of before a clock that was set back.
-  const bool set_back = depths_.rbegin()->first - stamp_ns > 1'000'000'000;
-  depths_.erase(set_back ? std::prev(depths_.end()) : depths_.begin());
+  if (depths_.size() > static_cast<std::size_t>(config_.depth_images)) {
+    depths_.erase(depths_.begin());
+  }
 }
 
 void HazardReporter::Process(double now_s, double steady_s) {
@@ -149,9 +170,10 @@ void HazardReporter::Process(double now_s, double steady_s) {
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
   // All of them, so that none waits for its picture only after the one before it has waited.
   for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
+    if (waiting->order != 0) continue;
     if (IsPlaced(*waiting, now_s) && HasUnknownHazard(*waiting) &&
         !IsCoveredByEarlierFrame(waiting)) {
-      AskForPicture(*waiting, now_s);
+      OrderPictures(*waiting);
     }
   }
 }
@@ -180,11 +202,13 @@ bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {
   return waiting.placed || Place(waiting, now_s - waiting.arrival_s);
 }
 
+bool HazardReporter::IsKnown(const PlacedSighting& candidate) const {
+  return map_.Find(candidate.sighting.class_name, candidate.place.position).has_value();
+}
+
 bool HazardReporter::HasUnknownHazard(const WaitingFrame& waiting) const {
   return std::any_of(waiting.candidates.begin(), waiting.candidates.end(),
-                     [this](const PlacedSighting& candidate) {
-                       return !map_.Find(candidate.sighting.class_name, candidate.place.position);
-                     });
+                     [this](const PlacedSighting& candidate) { return !IsKnown(candidate); });
 }
 
 /// True when the frame is done, whatever became of it.
@@ -195,38 +219,46 @@ bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_
   return true;
 }
 
-void HazardReporter::AskForPicture(WaitingFrame& waiting, double now_s) {
-  if (waiting.asked_s || !waiting.picture.bgr.empty()) return;
-  // A picture that comes unasked is on its way since the frame came.
-  waiting.asked_s = config_.pictures_on_demand ? now_s : waiting.arrival_s;
+/// One picture for each candidate that is not known; the whole of an image that is not of the
+/// frame's size.
+void HazardReporter::OrderPictures(WaitingFrame& waiting) {
+  if (waiting.order != 0 || waiting.image.IsMissing()) return;
+  const bool fits = HasSizeOfFrame(waiting);
+  PictureOrder order;
+  order.number = waiting.order = ++last_order_;
+  order.image = waiting.image;
+  for (PlacedSighting& candidate : waiting.candidates) {
+    if (IsKnown(candidate)) continue;
+    candidate.cut = order.cuts.size();
+    order.cuts.push_back({fits ? candidate.sighting.box : imaging::Box{}, config_.picture,
+                          /*is_whole_image=*/false});
+  }
+  picture_orders_.push_back(std::move(order));
   ++counters_.pictures_requested;
-  if (!config_.pictures_on_demand) return;
-  waiting.wanted = VisibleRegion(waiting);
-  picture_requests_.push_back({waiting.frame.stamp_ns, waiting.wanted});
 }
 
-/// What the pictures of its reports may show of the image.
-imaging::PixelRegion HazardReporter::VisibleRegion(const WaitingFrame& waiting) const {
-  std::optional<imaging::PixelRegion> shown;
-  for (const PlacedSighting& candidate : waiting.candidates) {
-    const imaging::PixelRegion crop =
-        imaging::WidestCrop(candidate.sighting.box, static_cast<int>(waiting.frame.image_width),
-                            static_cast<int>(waiting.frame.image_height), config_.picture);
-    shown = shown ? imaging::Union(*shown, crop) : crop;
-  }
-  return shown.value_or(imaging::PixelRegion{});
+bool HazardReporter::HasSizeOfFrame(const WaitingFrame& waiting) {
+  const cv::Mat& bgr = waiting.image.picture.bgr;
+  return bgr.cols == static_cast<int>(waiting.frame.image_width) &&
+         bgr.rows == static_cast<int>(waiting.frame.image_height);
 }
 
 bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
-  if (!waiting.picture.bgr.empty()) return false;
-  AskForPicture(waiting, now_s);
-  if (!expects_pictures_) return false;
-  waiting.asked_s = std::min(*waiting.asked_s, now_s);  // The clock was set back.
-  return now_s - *waiting.asked_s < config_.picture_wait_s;
+  if (waiting.pictures) return false;
+  OrderPictures(waiting);
+  if (waiting.order != 0) return true;
+  return now_s - waiting.arrival_s < config_.image_wait_s;
 }
 
-std::vector<imaging::PictureRequirements> HazardReporter::TakePictureRequests() {
-  return std::exchange(picture_requests_, {});
+std::vector<PictureOrder> HazardReporter::TakePictureOrders() {
+  return std::exchange(picture_orders_, {});
+}
+
+void HazardReporter::AddPictures(std::uint64_t order,
+                                 std::vector<imaging::CroppedPicture> pictures) {
+  for (WaitingFrame& waiting : waiting_) {
+    if (waiting.order == order) waiting.pictures = std::move(pictures);
+  }
 }
 
 bool HazardReporter::FitsCamera(const placement::SightingFrame& frame) const {
@@ -305,10 +337,153 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose&
         PlaceOnRoad(waiting.frame, sighting, fused ? base.course_variance_rad2 : 0.0);
     if (!ground) continue;
     waiting.candidates.push_back(
-        {sighting, placement::PlaceHazard(base, Eigen::Vector2d::Zero(), *ground)});
+        {sighting, placement::PlaceHazard(base, Eigen::Vector2d::Zero(), *ground), std::nullopt});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
   waiting.placed = true;
+}
+
+void HazardReporter::AddNotice(const protocol::Notice& notice) {
+  ++counters_.notices;
+  notices_.push_back(notice);
+  if (notices_.size() > kMaxWaitingNotices) notices_.pop_front();
+}
+
+void HazardReporter::AddReceipt(const protocol::Receipt& receipt) {
+  try {
+    if (!map_.Apply(receipt)) return;
+  } catch (const StoreError& error) {
+    // The report stays unfinished and is sent again; so the zone answers again.
+    TellStoreError(error);
+    return;
+  }
+  schedule_.Remove(receipt.report_uuid);
+  ++(receipt.status == protocol::Receipt::Status::kCommitted ? counters_.committed
+                                                             : counters_.refused);
+}
+
+void HazardReporter::ApplyNotices() {
+  if (notices_.empty()) return;
+  try {
+    counters_.invalid_notices += map_.Apply({notices_.begin(), notices_.end()});
+    notices_.clear();
+    store_error_.clear();
+  } catch (const StoreError& error) {
+    TellStoreError(error);  // They stay and are tried again.
+  }
+}
+
+/// Once a minute of the stamps' clock.
+void HazardReporter::ForgetUnannounced(double now_s) {
+  constexpr double kPeriodS = 60.0;
+  if (forgot_s_ && now_s >= *forgot_s_ && now_s - *forgot_s_ < kPeriodS) return;
+  forgot_s_ = now_s;
+  try {
+    counters_.forgotten_unannounced +=
+        map_.ForgetUnannounced(static_cast<std::int64_t>(now_s * 1e9));
+  } catch (const StoreError& error) {
+    TellStoreError(error);
+  }
+}
+
+bool HazardReporter::IsCheap(double steady_s) const {
+  if (link_ != LinkCost::kUnknown) return link_ == LinkCost::kCheap;
+  const bool waits = held_at_start_ && steady_s - start_steady_s_ < config_.link_wait_s;
+  return config_.unknown_link_is_cheap && !waits;
+}
+
+/// How long a report of this rank may wait for a cheap link.
+double HazardReporter::HoldS(int urgency) const {
+  const int rank = std::clamp(urgency, 1, static_cast<int>(config_.hold_s.size()));
+  return config_.hold_s[static_cast<std::size_t>(rank - 1)];
+}
+
+std::int64_t HazardReporter::UtcNs(double steady_s) const {
+  return start_ns_ + Nanoseconds(steady_s - start_steady_s_);
+}
+
+protocol::Report HazardReporter::MakeReport(WaitingFrame& waiting, std::size_t index) {
+  const PlacedSighting& candidate = waiting.candidates[index];
+  protocol::Report report;
+  report.uuid = Uuid::Random(random_);
+  report.drive_id = config_.drive_id;
+  report.stamp_ns = waiting.frame.stamp_ns;
+  report.class_name = candidate.sighting.class_name;
+  report.confidence = candidate.sighting.confidence;
+  report.box = candidate.sighting.box;
+  report.position = candidate.place.position;
+  report.covariance_m2 = candidate.place.covariance_m2;
+  report.image_width = waiting.frame.image_width;
+  report.image_height = waiting.frame.image_height;
+  report.image_frame_id = waiting.frame.frame_id;
+  AttachPicture(waiting, index, report);
+  return report;
+}
+
+/// What the candidate's order was answered with, if it has one: what may leave the vehicle.
+void HazardReporter::AttachPicture(WaitingFrame& waiting, std::size_t index,
+                                   protocol::Report& report) {
+  const std::optional<std::size_t>& cut = waiting.candidates[index].cut;
+  if (!waiting.pictures || !cut || *cut >= waiting.pictures->size()) return;
+  imaging::CroppedPicture& cropped = (*waiting.pictures)[*cut];
+  if (cropped.jpeg.empty()) return;
+  if (!cropped.legible) ++counters_.pictures_illegible;
+  report.image_format = "jpeg";
+  report.image = std::move(cropped.jpeg);
+  if (HasSizeOfFrame(waiting)) report.shown = cropped.shown;
+}
+
+void HazardReporter::ReportCandidates(WaitingFrame& waiting, double steady_s) {
+  for (std::size_t index = 0; index < waiting.candidates.size(); ++index) {
+    const PlacedSighting& candidate = waiting.candidates[index];
+    if (IsKnown(candidate)) {
+      ++counters_.duplicates_suppressed;
+      continue;
+    }
+    const protocol::Report report = MakeReport(waiting, index);
+    const int urgency = catalogue_.Get(report.class_name).urgency;
+    const double hold_until_s = steady_s + HoldS(urgency);
+    try {
+      if (map_.Add(report, UtcNs(hold_until_s)) == LocalHazardMap::AddResult::kFull) {
+        ++counters_.refused_map_full;
+        continue;
+      }
+      store_error_.clear();
+    } catch (const StoreError& error) {
+      TellStoreError(error);  // Not known either: the next sight of it tries again.
+      continue;
+    }
+    ++counters_.reports_created;
+    if (report.image.empty()) ++counters_.reports_without_picture;
+    schedule_.Add(report.uuid, urgency, report.stamp_ns, steady_s, hold_until_s);
+  }
+}
+
+std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size_t limit) {
+  std::vector<protocol::Report> reports;
+  schedule_.SetCheapLink(IsCheap(steady_s));
+  try {
+    for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
+      auto report = map_.LoadPending(uuid);
+      if (!report) continue;
+      if (schedule_.WasSent(uuid)) {
+        ++counters_.resends;
+      } else {
+        map_.MarkSent(uuid);
+        schedule_.MarkSent(uuid);
+        ++counters_.reports_sent;
+      }
+      reports.push_back(std::move(*report));
+    }
+  } catch (const StoreError& error) {
+    TellStoreError(error);
+  }
+  return reports;
+}
+
+void HazardReporter::TellStoreError(const StoreError& error) {
+  ++counters_.store_errors;
+  store_error_ = error.what();
 }
 
 }  // namespace livemap::vehicle

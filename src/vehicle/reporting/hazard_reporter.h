@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -19,6 +20,7 @@
 #include "protocol/notice.h"
 #include "protocol/report.h"
 #include "vehicle/outbox/resend_schedule.h"
+#include "vehicle/pictures/picture_order.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 #include "vehicle/reporting/local_hazard_map.h"
 
@@ -36,9 +38,12 @@ enum class LinkCost { kUnknown, kCheap, kMetered, kNone };
 /// Turns what the detector sees into reports: places each hazard on the ground, sends nothing for a
 /// known one, keeps the others until the zone has answered (thesis, sections 3.1 and 3.2.2).
 ///
-/// Fixes, frames, pictures, notices and receipts come in as they arrive; Process works off what can
+/// Fixes, frames, images, notices and receipts come in as they arrive; Process works off what can
 /// be worked off; TakeDue gives the reports to send now. Two clocks: `now_s` is the clock of the
 /// stamps (it may be a simulated one that pauses), `steady_s` never pauses. Not thread-safe.
+///
+/// The reporter holds images as the camera saw them, and never puts one into a report: it orders
+/// the pictures (TakePictureOrders), and takes what may leave the vehicle (AddPictures).
 class HazardReporter {
  public:
   struct Config {
@@ -55,11 +60,9 @@ class HazardReporter {
     double max_wait_s = 5.0;
     /// A frame whose position can only be carried on waits this long for a fix after it, s.
     double bracket_wait_s = 0.3;
-    /// A frame with something to report waits this long for its picture, from when it is known to
-    /// need one, s.
-    double picture_wait_s = 3.0;
-    /// Pictures come when they are asked for (TakePictureRequests); false: by themselves.
-    bool pictures_on_demand = true;
+    /// A frame with something to report waits at most this long for its image, s: messages of
+    /// another process may overtake it.
+    double image_wait_s = 0.3;
     /// Frames that wait at the same time; beyond it the oldest is dropped.
     int max_waiting_frames = 50;
     /// Antenna in base_link: forward and left of its origin, m.
@@ -104,7 +107,7 @@ class HazardReporter {
     std::uint64_t duplicates_suppressed = 0;
     std::uint64_t reports_created = 0;
     std::uint64_t reports_without_picture = 0;
-    std::uint64_t pictures_requested = 0;  ///< Images whose picture was asked for.
+    std::uint64_t pictures_requested = 0;  ///< Images of which pictures were ordered.
     std::uint64_t pictures_illegible = 0;  ///< Reports whose bytes did not suffice: CropPicture.
     std::uint64_t refused_map_full = 0;    ///< Too many unfinished reports.
     std::uint64_t reports_sent = 0;        ///< Distinct reports, at their first sending.
@@ -116,9 +119,10 @@ class HazardReporter {
     std::uint64_t forgotten_unannounced =
         0;  ///< Hazards that the zone took in and never announced.
     std::uint64_t fixes = 0;
-    std::uint64_t invalid_fixes = 0;  ///< NaN, out of range, out of order.
-    std::uint64_t no_fixes = 0;       ///< The receiver said that it had none.
-    std::uint64_t jumps = 0;          ///< Fixes that need an impossible speed.
+    std::uint64_t invalid_fixes = 0;    ///< NaN, out of range, out of order.
+    std::uint64_t no_fixes = 0;         ///< The receiver said that it had none.
+    std::uint64_t jumps = 0;            ///< Fixes that need an impossible speed.
+    std::uint64_t fixes_bad_stamp = 0;  ///< Fixes whose stamp fits neither clock nor neighbours.
     std::uint64_t store_errors = 0;
     std::uint64_t poses = 0;          ///< Fused poses that came.
     std::uint64_t invalid_poses = 0;  ///< Not finite or not later than the one before.
@@ -136,20 +140,29 @@ class HazardReporter {
   void SetMounting(const std::string& frame_id, const Eigen::Isometry3d& base_from_optical);
   bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
 
-  void AddFix(const geo::Fix& fix);
+  /// `now_ns` is the clock of the stamps; 0: it is not known.
+  void AddFix(const geo::Fix& fix, std::int64_t now_ns = 0);
   /// Where base_link was then and which way it looked: fixes and odometry fused.
-  void AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose);
+  void AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose, std::int64_t now_ns = 0);
+  /// The clock was set back, as by a bag that is played again. What waits is finished; positions,
+  /// pictures and depth images of before are forgotten. Reports in the outbox and known hazards
+  /// stay.
+  void StartAnew(double now_s, double steady_s);
+  /// Nothing more will come, as at the end of the drive. What waits for a picture or a position is
+  /// reported with what is known of it now, or dropped and counted.
+  void Finish(double steady_s);
   void AddFrame(const placement::SightingFrame& frame, double now_s);
   /// The depth image of the frame with this stamp, before or after it.
   void AddDepth(std::int64_t stamp_ns, const placement::DepthImage& depth);
-  /// The annotated image of the frame with this stamp, before or after it.
-  /// `part` is what of the image it shows clearly.
-  void AddPicture(std::int64_t stamp_ns, const imaging::Picture& picture,
-                  const imaging::PixelRegion& part = {});
-  /// Whether there is anyone to give pictures, as there is at first; else no frame waits for one.
-  void SetPictureSourceAvailable(bool expected) { expects_pictures_ = expected; }
-  /// The images whose pictures are wanted now, each once.
-  std::vector<imaging::PictureRequirements> TakePictureRequests();
+  /// An added frame of this stamp that has not got its image yet; null: there is none.
+  const placement::SightingFrame* FrameWithoutImage(std::int64_t stamp_ns) const;
+  /// The image of the added frames with this stamp.
+  void AddImage(std::int64_t stamp_ns, const CameraImage& image);
+  /// The pictures that are wanted now, each order once. Each has to be answered by AddPictures: its
+  /// frame waits for it.
+  std::vector<PictureOrder> TakePictureOrders();
+  /// The answer to an order: one picture for each cut, or nothing where none may leave the vehicle.
+  void AddPictures(std::uint64_t order, std::vector<imaging::CroppedPicture> pictures);
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const protocol::Notice& notice);
   void AddReceipt(const protocol::Receipt& receipt);
@@ -184,24 +197,27 @@ class HazardReporter {
   struct PlacedSighting {
     placement::Sighting sighting;
     placement::PlacedHazard place;
+    std::optional<std::size_t> cut;  // Of the order; none where it was known already.
   };
   struct WaitingFrame {
     placement::SightingFrame frame;
     double arrival_s;
     bool held_back = false;
     bool placed = false;
-    std::optional<double> asked_s;           // When its picture began to be missed...
-    imaging::PixelRegion wanted;             // ...and what of it.
     std::vector<PlacedSighting> candidates;  // Once placed.
-    imaging::Picture picture;
+    CameraImage image;
+    std::uint64_t order = 0;  // Of its pictures; 0: none yet.
+    /// Once the order was answered: one for each cut, or nothing at all.
+    std::optional<std::vector<imaging::CroppedPicture>> pictures;
   };
 
   bool IsUsable(const placement::Sighting& sighting);
   bool IsPlaced(WaitingFrame& waiting, double now_s);
+  bool IsKnown(const PlacedSighting& candidate) const;
   bool HasUnknownHazard(const WaitingFrame& waiting) const;
   bool IsCoveredByEarlierFrame(std::deque<WaitingFrame>::const_iterator waiting) const;
-  void AskForPicture(WaitingFrame& waiting, double now_s);
-  imaging::PixelRegion VisibleRegion(const WaitingFrame& waiting) const;
+  void OrderPictures(WaitingFrame& waiting);
+  static bool HasSizeOfFrame(const WaitingFrame& waiting);
   bool Advance(WaitingFrame& waiting, double now_s, double steady_s);
   bool FitsCamera(const placement::SightingFrame& frame) const;
   bool Place(WaitingFrame& waiting, double waited_s);
@@ -211,9 +227,9 @@ class HazardReporter {
                                               const placement::Sighting& sighting,
                                               double heading_variance_rad2);
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
-  void ReportCandidates(const WaitingFrame& waiting, double steady_s);
-  protocol::Report MakeReport(const WaitingFrame& waiting, const PlacedSighting& candidate);
-  void AttachPicture(const WaitingFrame& waiting, protocol::Report& report);
+  void ReportCandidates(WaitingFrame& waiting, double steady_s);
+  protocol::Report MakeReport(WaitingFrame& waiting, std::size_t index);
+  void AttachPicture(WaitingFrame& waiting, std::size_t index, protocol::Report& report);
   double HoldS(int urgency) const;
   bool IsCheap(double steady_s) const;
   std::int64_t UtcNs(double steady_s) const;
@@ -230,11 +246,9 @@ class HazardReporter {
   std::optional<geo::CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<WaitingFrame> waiting_;
-  std::map<std::int64_t, imaging::Picture>
-      early_pictures_;                                    // Whose frame has not come yet, by stamp.
   std::map<std::int64_t, placement::DepthImage> depths_;  // By stamp.
-  std::vector<imaging::PictureRequirements> picture_requests_;
-  bool expects_pictures_ = true;
+  std::vector<PictureOrder> picture_orders_;
+  std::uint64_t last_order_ = 0;
   LinkCost link_ = LinkCost::kUnknown;
   bool held_at_start_ = false;
   std::int64_t start_ns_;  // UTC at the start...

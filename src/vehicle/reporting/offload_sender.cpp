@@ -4,17 +4,10 @@
 #include <cmath>
 #include <utility>
 
-#include "common/time.h"
+#include "common/stamp_gate.h"
 #include "imaging/image_header.h"
 
 namespace livemap::vehicle {
-namespace {
-
-/// A stamp this far behind the newest one: a bag began anew.
-constexpr double kSetBackS = 1.0;
-
-}  // namespace
-
 OffloadSender::OffloadSender(const Config& config)
     : config_(config),
       pose_(config.pose),
@@ -26,9 +19,17 @@ void OffloadSender::SetMounting(const std::string& frame_id,
   mountings_[frame_id] = base_from_optical;
 }
 
+void OffloadSender::StartAnew() {
+  pose_.Reset();
+  counters_.no_pose += waiting_.size();
+  waiting_.clear();
+  due_ns_.reset();
+  newest_ns_.reset();
+}
+
 bool OffloadSender::Takes(std::int64_t stamp_ns) {
   ++counters_.frames;
-  if (newest_ns_ && Seconds(*newest_ns_ - stamp_ns) > kSetBackS) due_ns_.reset();
+  if (newest_ns_ && IsSetBack(stamp_ns, *newest_ns_)) due_ns_.reset();
   newest_ns_ = stamp_ns;
   if (due_ns_ && stamp_ns < *due_ns_) {
     ++counters_.rate_skipped;
@@ -43,13 +44,13 @@ bool OffloadSender::Takes(std::int64_t stamp_ns) {
 }
 
 void OffloadSender::AddJudged(std::int64_t stamp_ns, const std::string& frame_id, float score,
-                              bool is_candidate, const imaging::Picture& picture, double now_s) {
+                              bool is_candidate, const CameraImage& image, double now_s) {
   if (!is_candidate) {
     ++counters_.discarded;
     return;
   }
   ++counters_.candidates;
-  waiting_.push_back({stamp_ns, frame_id, score, picture, now_s});
+  waiting_.push_back({stamp_ns, frame_id, score, image, now_s});
   while (waiting_.size() > static_cast<std::size_t>(config_.max_waiting_frames)) {
     ++counters_.displaced;
     waiting_.pop_front();
@@ -64,8 +65,8 @@ std::vector<protocol::OffloadedFrame> OffloadSender::TakeReady(double now_s, con
 
 bool OffloadSender::FitsCamera(const Waiting& waiting) const {
   return intrinsics_ && HasMounting(waiting.frame_id) &&
-         intrinsics_->width == waiting.picture.bgr.cols &&
-         intrinsics_->height == waiting.picture.bgr.rows;
+         intrinsics_->width == waiting.image.picture.bgr.cols &&
+         intrinsics_->height == waiting.image.picture.bgr.rows;
 }
 
 bool OffloadSender::Advance(Waiting& waiting, double now_s, const Encode& encode,
@@ -107,7 +108,7 @@ std::optional<protocol::OffloadedFrame> OffloadSender::Encoded(
   }
   const double most = std::min(budget_.tokens(), static_cast<double>(config_.max_image_bytes));
   protocol::OffloadedFrame frame;
-  frame.image = encode(waiting.picture, static_cast<std::size_t>(most));
+  frame.image = encode(waiting.image, static_cast<std::size_t>(most));
   const auto header = imaging::ReadImageHeader(frame.image.data(), frame.image.size());
   if (!header || header->format != imaging::ImageHeader::Format::kJpeg) {
     ++counters_.withheld;

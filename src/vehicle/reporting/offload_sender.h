@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "common/token_bucket.h"
-#include "imaging/report_picture.h"
 #include "protocol/offloaded_frame.h"
+#include "vehicle/pictures/picture_order.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
 namespace livemap::vehicle {
@@ -57,8 +57,8 @@ class OffloadSender {
 
   /// Makes the file that leaves the car: masked, a JPEG of at most `max_bytes`; empty when it must
   /// not or cannot leave.
-  using Encode = std::function<std::vector<std::uint8_t>(const imaging::Picture& picture,
-                                                         std::size_t max_bytes)>;
+  using Encode =
+      std::function<std::vector<std::uint8_t>(const CameraImage& image, std::size_t max_bytes)>;
 
   explicit OffloadSender(const Config& config);
 
@@ -67,17 +67,22 @@ class OffloadSender {
   void SetMounting(const std::string& frame_id, const Eigen::Isometry3d& base_from_optical);
   bool HasMounting(const std::string& frame_id) const { return mountings_.count(frame_id) != 0; }
 
-  FixTrack::Verdict AddFix(const geo::Fix& fix) { return pose_.AddFix(fix); }
-  bool AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) {
-    return pose_.AddPose(stamp_ns, pose);
+  /// `now_ns` is the clock of the stamps; 0: it is not known.
+  FixTrack::Verdict AddFix(const geo::Fix& fix, std::int64_t now_ns = 0) {
+    return pose_.AddFix(fix, now_ns);
   }
+  bool AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose, std::int64_t now_ns = 0) {
+    return pose_.AddPose(stamp_ns, pose, now_ns);
+  }
+  /// The clock was set back: positions and frames of before are forgotten, the frames as no_pose.
+  void StartAnew();
 
   /// Whether the classifier shall look at the frame of this moment: rate_hz on average, whatever
   /// the camera's rate.
   bool Takes(std::int64_t stamp_ns);
   /// The classifier's word on a frame that was taken; `is_candidate`: it is to be sent.
   void AddJudged(std::int64_t stamp_ns, const std::string& frame_id, float score, bool is_candidate,
-                 const imaging::Picture& picture, double now_s);
+                 const CameraImage& image, double now_s);
 
   /// The frames that can go now, in their order.
   std::vector<protocol::OffloadedFrame> TakeReady(double now_s, const Encode& encode);
@@ -90,7 +95,7 @@ class OffloadSender {
     std::int64_t stamp_ns = 0;
     std::string frame_id;
     float score = 0;
-    imaging::Picture picture;
+    CameraImage image;
     double arrival_s = 0;
   };
 

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
@@ -53,6 +54,7 @@ class PollResponderTest : public ::testing::Test {
       const double seconds = static_cast<double>(stamp_ns - kEpochNs) * 1e-9;
       return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kReady, BaseAt(seconds)};
     };
+    vehicle_.image_at = [](std::int64_t) { return GreyImage(); };
   }
 
   static PollResponder::Config Configured() {
@@ -79,12 +81,24 @@ class PollResponderTest : public ::testing::Test {
   void Drive(double from_s, double to_s,
              const std::function<std::vector<placement::Sighting>(double)>& seen = {}) {
     for (double time_s = from_s; time_s <= to_s; time_s += 0.1) {
-      if (luminance_) responder_.AddPicture(StampNs(time_s), Lit(*luminance_));
+      if (luminance_) {
+        responder_.AddLuminance(StampNs(time_s),
+                                PollResponder::MeanLuminance(Lit(*luminance_).bgr));
+      }
       responder_.AddFrame(FrameAt(time_s, seen ? seen(time_s) : std::vector<placement::Sighting>{}),
                           time_s);
       steady_s_ += 0.1;
       responder_.Process(time_s, steady_s_, vehicle_);
+      if (makes_pictures_) MakePictures(time_s);
     }
+  }
+
+  /// Answers the responder's orders; the image has nobody to mask.
+  void MakePictures(double time_s) {
+    for (const PictureOrder& order : responder_.TakePictureOrders()) {
+      responder_.AddPictures(order.number, CutPictures(order, order.image.picture.bgr));
+    }
+    responder_.Process(time_s, steady_s_, vehicle_);
   }
   void Expire() {
     steady_s_ += 60;
@@ -100,6 +114,7 @@ class PollResponderTest : public ::testing::Test {
   PollResponder::Vehicle vehicle_;
   protocol::Poll poll_;
   std::optional<double> luminance_ = 100;
+  bool makes_pictures_ = true;
   double steady_s_ = 10;
 };
 
@@ -361,8 +376,8 @@ TEST_F(PollResponderTest, APollThatIsOverOrNeverEndsDoesNotStay) {
   EXPECT_THAT(responder_.TakeReplies(), SizeIs(1));
 }
 
-TEST_F(PollResponderTest, AYesGoesWithoutThePictureThatDoesNotCome) {
-  luminance_.reset();
+TEST_F(PollResponderTest, AYesWaitsShortlyForItsImageAndThenGoesWithoutAPicture) {
+  vehicle_.image_at = [](std::int64_t) { return CameraImage{}; };
   poll_.picture = protocol::PollPicture::kFullFrame;
   poll_.max_picture_bytes = 30000;
   responder_.Add(poll_, steady_s_);
@@ -371,9 +386,89 @@ TEST_F(PollResponderTest, AYesGoesWithoutThePictureThatDoesNotCome) {
   };
   Drive(2.7, 2.75, seen);
   EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
-  steady_s_ += responder_.config().picture_wait_s;
+  steady_s_ += responder_.config().image_wait_s;
   responder_.Process(2.8, steady_s_, vehicle_);
   EXPECT_THAT(OnlyReply().image, IsEmpty());
+}
+
+TEST_F(PollResponderTest, AnOrderThatIsAnsweredWithNothingMakesAnAnswerWithoutPicture) {
+  makes_pictures_ = false;
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  Drive(2.7, 2.75, [](double time_s) {
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+  });
+  const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  EXPECT_THAT(responder_.TakeReplies(), IsEmpty()) << "it waits for the answer";
+  responder_.AddPictures(orders[0].number, {});
+  responder_.Process(2.8, steady_s_, vehicle_);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kYes);
+  EXPECT_THAT(reply.image, IsEmpty());
+  EXPECT_EQ(reply.image_format, "");
+}
+
+TEST_F(PollResponderTest, ANoWithAPictureIsDecidedSoEarlyThatThePictureCanBeMadeInTime) {
+  makes_pictures_ = false;
+  vehicle_.pose_at = [](std::int64_t stamp_ns, double) {
+    // It comes to rest before the place: that never leaves the view.
+    const double seconds = static_cast<double>(stamp_ns - kEpochNs) * 1e-9;
+    return VehiclePoseLookup::Lookup{VehiclePoseLookup::Answer::kReady,
+                                     BaseAt(std::min(seconds, 3.0))};
+  };
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  const double begin_s = steady_s_;
+  responder_.Add(poll_, steady_s_);
+  Drive(2.5, 3.2);
+  const double answer_by_s = begin_s + 60 - responder_.config().reserve_s;
+  responder_.Process(3, answer_by_s - responder_.config().picture_wait_s - 0.01, vehicle_);
+  EXPECT_THAT(responder_.TakePictureOrders(), IsEmpty()) << "nearer views may come";
+  responder_.Process(3, answer_by_s - responder_.config().picture_wait_s + 0.01, vehicle_);
+  const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  responder_.AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
+  responder_.Process(3, answer_by_s - 0.01, vehicle_);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kNo);
+  EXPECT_FALSE(reply.image.empty());
+}
+
+TEST_F(PollResponderTest, AnAnswerLeavesInTimeThoughItsPictureIsNotMadeYet) {
+  makes_pictures_ = false;
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  const double answer_by_s = steady_s_ + 60 - responder_.config().reserve_s;
+  Drive(2.7, 2.75, [](double time_s) {
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+  });
+  ASSERT_THAT(responder_.TakePictureOrders(), SizeIs(1));
+  responder_.Process(3, answer_by_s - 0.01, vehicle_);
+  EXPECT_THAT(responder_.TakeReplies(), IsEmpty());
+  responder_.Process(3, answer_by_s + 0.01, vehicle_);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kYes);
+  EXPECT_THAT(reply.image, IsEmpty());
+}
+
+TEST_F(PollResponderTest, AnAnswerWhosePictureIsBeingMadeStandsWhateverChangeDetectionSays) {
+  makes_pictures_ = false;
+  poll_.class_name = "barrier";
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  Drive(2.0, 4.0);
+  const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  responder_.AddChange(Changed(poll_.position, false, "barrier"));
+  responder_.AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
+  responder_.Process(4.1, steady_s_, vehicle_);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kNo);
+  EXPECT_FALSE(reply.image.empty());
 }
 
 TEST_F(PollResponderTest, TheCropShowsThePlaceWithinTheSmallerOfBothBudgets) {
@@ -388,22 +483,28 @@ TEST_F(PollResponderTest, TheCropShowsThePlaceWithinTheSmallerOfBothBudgets) {
   EXPECT_LE(reply.image.size(), responder_.config().crop.max_bytes);
 }
 
-TEST_F(PollResponderTest, APictureIsAskedForWhenTheAnswerStandsAlsoForANo) {
-  luminance_.reset();
+TEST_F(PollResponderTest, APictureIsOrderedOnceWhenTheAnswerStandsAlsoForANo) {
+  makes_pictures_ = false;
   poll_.picture = protocol::PollPicture::kCrop;
   poll_.max_picture_bytes = 12000;
   responder_.Add(poll_, steady_s_);
+  // Which image it is, by its brightness.
+  vehicle_.image_at = [](std::int64_t stamp_ns) {
+    return CameraImage{Lit(static_cast<double>((stamp_ns - kEpochNs) / 100'000'000)), {}};
+  };
   Drive(2.0, 4.0);
-  const auto wanted = responder_.TakePictureRequests();
-  ASSERT_THAT(wanted, SizeIs(1)) << "once, though several views counted";
-  responder_.AddPicture(wanted[0], Lit(100));
+  const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1)) << "once, though several views counted";
+  responder_.AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
   responder_.Process(4.1, steady_s_, vehicle_);
   const protocol::PollAnswer reply = OnlyReply();
   EXPECT_EQ(reply.answer, AnswerKind::kNo);
-  EXPECT_EQ(reply.stamp_ns, wanted[0]);
-  const cv::Size shown = cv::imdecode(reply.image, cv::IMREAD_COLOR).size();
-  EXPECT_GE(shown.width, 240);
-  EXPECT_LT(shown.width, 640) << "not the whole image";
+  const cv::Mat shown = cv::imdecode(reply.image, cv::IMREAD_COLOR);
+  EXPECT_NEAR(shown.at<cv::Vec3b>(0, 0)[0],
+              static_cast<double>((reply.stamp_ns - kEpochNs) / 100'000'000), 1)
+      << "the picture of the image that speaks for the answer";
+  EXPECT_GE(shown.cols, 240);
+  EXPECT_LT(shown.cols, 640) << "not the whole image";
 }
 
 TEST_F(PollResponderTest, BrightnessAloneTellsThatItIsTooDark) {

@@ -206,7 +206,9 @@ TEST(FixTrack, UnknownCovarianceBecomesTheDefault) {
   geo::Fix fix = FixOf(0, kStart);
   fix.covariance_m2.reset();
   ASSERT_EQ(track.Add(fix), Verdict::kAccepted);
-  EXPECT_DOUBLE_EQ(track.Newest()->covariance_m2(0, 0), 9.0);
+  fix.stamp_ns += 1'000'000'000;
+  ASSERT_EQ(track.Add(fix), Verdict::kAccepted);
+  EXPECT_NEAR(track.Newest()->covariance_m2(0, 0), 9.0, 1e-5);
 }
 
 TEST(FixTrack, SingleJumpIsNotBelieved) {
@@ -235,10 +237,48 @@ TEST(FixTrack, ScatteredJumpsDoNotStartTheTrackAnew) {
 }
 
 TEST(FixTrack, ClockSetBackStartsTheTrackAnew) {
-  FixTrack track = Drive(1.0, 16.0, 1.0, 40.0);
-  EXPECT_EQ(track.Add(FixOf(0.0, kStart)), Verdict::kRestarted);
-  EXPECT_EQ(track.newest_ns(), StampNs(0.0));
-  EXPECT_EQ(track.At(StampNs(0.5)).answer, Answer::kWait) << "the old course is forgotten too";
+  for (const double round_s : {40.0, 5.0}) {
+    FixTrack track = Drive(1.0, 16.0, 1.0, round_s);
+    EXPECT_EQ(track.Add(FixOf(0.0, kStart), StampNs(0.0)),
+              round_s > 5 ? Verdict::kRestarted : Verdict::kBadStamp);
+    for (int i = 1; i < 5; ++i) track.Add(FixOf(0.1 * i, kStart), StampNs(0.1 * i));
+    EXPECT_EQ(track.newest_ns(), StampNs(0.4)) << round_s;
+    EXPECT_EQ(track.At(StampNs(0.5)).answer, Answer::kWait) << "the old course is forgotten too";
+  }
+}
+
+TEST(FixTrack, StampsThatGoBackWithoutAClockStartTheTrackAnewOnceThreeAgree) {
+  FixTrack track = Drive(1.0, 16.0, 1.0, 20.0);
+  EXPECT_EQ(track.Add(FixOf(2.0, kStart)), Verdict::kBadStamp);
+  EXPECT_EQ(track.Add(FixOf(2.1, kStart)), Verdict::kBadStamp);
+  EXPECT_EQ(track.newest_ns(), StampNs(20.0));
+  EXPECT_EQ(track.Add(FixOf(2.2, kStart)), Verdict::kRestarted);
+}
+
+TEST(FixTrack, AFixOfTheFutureChangesNothing) {
+  constexpr double kYearS = 365 * 86400.0;
+  FixTrack track = Drive(1.0, 16.0, 1.0, 3.0);
+  EXPECT_EQ(track.Add(FixOf(kYearS, Straight(1.0, 16.0, 4.0)), StampNs(4.0)), Verdict::kBadStamp);
+  EXPECT_EQ(track.Add(FixOf(kYearS, Straight(1.0, 16.0, 4.0))), Verdict::kBadStamp);
+  EXPECT_EQ(track.Add(FixOf(4.0, Straight(1.0, 16.0, 4.0)), StampNs(4.0)), Verdict::kAccepted);
+  EXPECT_EQ(track.At(StampNs(3.5)).answer, Answer::kReady);
+}
+
+TEST(FixTrack, AWrongFirstFixIsNeverShown) {
+  FixTrack track{FixTrack::Config{}};
+  EXPECT_EQ(track.Add(FixOf(0, {35.7, 139.7})), Verdict::kAccepted);
+  EXPECT_FALSE(track.Newest()) << "nobody agrees with it yet";
+  EXPECT_EQ(track.Add(FixOf(1, Straight(1.0, 16.0, 1.0))), Verdict::kJump);
+  EXPECT_FALSE(track.Newest());
+  EXPECT_EQ(track.Add(FixOf(2, Straight(1.0, 16.0, 2.0))), Verdict::kAccepted);
+  EXPECT_EQ(track.newest_ns(), StampNs(2));
+  EXPECT_EQ(track.At(StampNs(1.5)).answer, Answer::kReady);
+}
+
+TEST(FixTrack, NullIslandIsRefused) {
+  FixTrack track = Drive(1.0, 16.0, 1.0, 3.0);
+  for (int i = 4; i < 10; ++i) EXPECT_EQ(track.Add(FixOf(i, {0, 0})), Verdict::kInvalid);
+  EXPECT_EQ(track.newest_ns(), StampNs(3));
 }
 
 TEST(FixTrack, WorksAcrossTheAntimeridian) {

@@ -85,9 +85,19 @@ TEST(PoseTrack, RefusesWhatCannotBe) {
 TEST(PoseTrack, BeginsAgainWhenTheClockIsSetBack) {
   PoseTrack track({});
   track.Add(StampNs(20), PoseAt(20));
-  EXPECT_TRUE(track.Add(StampNs(2), PoseAt(2)));
+  EXPECT_TRUE(track.Add(StampNs(2), PoseAt(2), StampNs(2)));
   EXPECT_EQ(track.newest_ns(), StampNs(2));
   EXPECT_EQ(track.At(StampNs(20)).answer, Answer::kWait);
+}
+
+TEST(PoseTrack, OneStampOfThePastOrFutureChangesNothing) {
+  constexpr double kYearS = 365 * 86400.0;
+  PoseTrack track({});
+  track.Add(StampNs(20), PoseAt(20));
+  EXPECT_FALSE(track.Add(StampNs(2), PoseAt(2)));
+  EXPECT_FALSE(track.Add(StampNs(kYearS), PoseAt(20.1), StampNs(20.1)));
+  EXPECT_FALSE(track.Add(StampNs(kYearS), PoseAt(20.1)));
+  EXPECT_TRUE(track.Add(StampNs(20.2), PoseAt(20.2), StampNs(20.2)));
 }
 
 }  // namespace

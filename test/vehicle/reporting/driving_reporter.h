@@ -57,8 +57,8 @@ inline placement::SightingFrame FrameAt(double seconds,
   return {StampNs(seconds), kOptical, 640, 400, std::move(sightings)};
 }
 
-inline imaging::Picture GreyPicture() {
-  return {cv::Mat(400, 640, CV_8UC3, cv::Scalar(90, 90, 90)), nullptr};
+inline CameraImage GreyImage() {
+  return {{cv::Mat(400, 640, CV_8UC3, cv::Scalar(90, 90, 90)), nullptr}, {}};
 }
 
 /// A reporter on a vehicle that drives straight on.
@@ -87,11 +87,25 @@ class HazardReporterTest : public ::testing::Test {
     }
   }
 
-  /// A frame with its picture, seen and worked off at once.
+  /// A frame with its image, seen and worked off at once.
   void See(double seconds, std::vector<placement::Sighting> sightings) {
     reporter_->AddFrame(FrameAt(seconds, std::move(sightings)), seconds);
-    reporter_->AddPicture(StampNs(seconds), GreyPicture());
-    reporter_->Process(seconds, steady_s_);
+    reporter_->AddImage(StampNs(seconds), GreyImage());
+    ProcessWithPictures(seconds);
+  }
+
+  /// What can be worked off at `now_s`, as the nodelet does it.
+  void ProcessWithPictures(double now_s) {
+    reporter_->Process(now_s, steady_s_);
+    MakePictures();
+    reporter_->Process(now_s, steady_s_);
+  }
+
+  /// Answers the reporter's orders; the image has nobody to mask.
+  void MakePictures() {
+    for (const PictureOrder& order : reporter_->TakePictureOrders()) {
+      reporter_->AddPictures(order.number, CutPictures(order, order.image.picture.bgr));
+    }
   }
 
   std::vector<protocol::Report> TakeDue() { return reporter_->TakeDue(steady_s_, 100); }

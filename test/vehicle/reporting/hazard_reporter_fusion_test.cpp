@@ -45,12 +45,12 @@ TEST_F(HazardReporterTest, PlacesByTheFusedPoseAndItsHeadingWhereTheAntennaIsEls
 
 TEST_F(HazardReporterTest, WaitsForTheFusedPoseAndFallsBackToTheFixesWhenItDoesNotCome) {
   config_.position_source = PositionSource::kFused;
-  config_.picture_wait_s = 0;
+  config_.image_wait_s = 0;
   Restart();
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty()) << "it may come yet";
-  reporter_->Process(3.0 + config_.fused_wait_s + 0.01, steady_s_);
+  ProcessWithPictures(3.0 + config_.fused_wait_s + 0.01);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
   const geo::GeoPoint by_fixes = geo::GeodesicDestination(VehicleAt(3.0), kBearingRad, 12);
@@ -59,10 +59,10 @@ TEST_F(HazardReporterTest, WaitsForTheFusedPoseAndFallsBackToTheFixesWhenItDoesN
   EXPECT_EQ(counters().held_back_no_fix, 0u);
 
   reporter_->AddFrame(FrameAt(3.3, {{"debris", 0.8F, BoxAt(12, 0)}}), 4.5);
-  reporter_->Process(4.6, steady_s_);
+  ProcessWithPictures(4.6);
   EXPECT_THAT(TakeDue(), IsEmpty());
   reporter_->AddPose(StampNs(3.3), FusedPoseAt(3.3));
-  reporter_->Process(4.7, steady_s_);
+  ProcessWithPictures(4.7);
   ASSERT_THAT(TakeDue(), SizeIs(1));
   EXPECT_EQ(counters().placed_by_fusion, 1u);
 }
@@ -129,12 +129,12 @@ TEST_F(HazardReporterTest, WaitsForTheDepthImageNoLongerThanItMay) {
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty());
-  reporter_->Process(3.0 + config_.depth_wait_s + 0.01, steady_s_);
+  ProcessWithPictures(3.0 + config_.depth_wait_s + 0.01);
   EXPECT_THAT(TakeDue(), SizeIs(1)) << "by the plane";
   for (int i = 0; i < 200; ++i) reporter_->AddDepth(StampNs(10 + 0.1 * i), {});
   See(3.5, {{"debris", 0.8F, BoxAt(12, 0)}});
   reporter_->AddDepth(StampNs(3.5), {cv::Mat(400, 640, CV_32FC1, cv::Scalar(9.5F)), 1, nullptr});
-  reporter_->Process(3.6, steady_s_);
+  ProcessWithPictures(3.6);
   EXPECT_THAT(TakeDue(), SizeIs(1)) << "also after a clock that was set back";
   EXPECT_EQ(counters().distances_by_depth, 1u);
 }

@@ -136,7 +136,7 @@ TEST_F(HazardReporterTest, HeldBackSightingIsReportedOnceFixesEmbraceIt) {
   EXPECT_EQ(counters().held_back_no_fix, 1u);
   EXPECT_THAT(TakeDue(), IsEmpty());
   DriveFixes(2.2, 4);
-  reporter_->Process(4.0, steady_s_);
+  ProcessWithPictures(4.0);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
   EXPECT_LT(geo::GeodesicDistanceM(reports[0].position,
@@ -162,70 +162,99 @@ TEST_F(HazardReporterTest, WaitsShortlyForAFixAfterTheImageThenCarriesThePositio
   See(3.1, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty());
   EXPECT_EQ(counters().held_back_no_fix, 0u) << "it had a fix";
-  reporter_->Process(3.1 + config_.bracket_wait_s + 0.01, steady_s_);
+  ProcessWithPictures(3.1 + config_.bracket_wait_s + 0.01);
   EXPECT_THAT(TakeDue(), SizeIs(1));
 }
 
-TEST_F(HazardReporterTest, WaitsForThePictureThenGoesWithout) {
+TEST_F(HazardReporterTest, WaitsShortlyForTheImageThenGoesWithoutAPicture) {
   DriveFixes(0, 4);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
-  reporter_->Process(3.0 + config_.picture_wait_s - 0.1, steady_s_);
+  reporter_->Process(3.0 + config_.image_wait_s - 0.01, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
-  reporter_->Process(3.0 + config_.picture_wait_s + 0.01, steady_s_);
+  reporter_->Process(3.0 + config_.image_wait_s + 0.01, steady_s_);
   const auto reports = TakeDue();
   ASSERT_THAT(reports, SizeIs(1));
   EXPECT_THAT(reports[0].image, IsEmpty());
   EXPECT_EQ(reports[0].image_format, "");
   EXPECT_EQ(counters().reports_without_picture, 1u);
+  EXPECT_EQ(counters().pictures_requested, 0u);
 }
 
-TEST_F(HazardReporterTest, WaitsForNoPictureWhereNobodyGivesAny) {
+TEST_F(HazardReporterTest, AnImageThatComesAfterItsFrameIsInTime) {
   DriveFixes(0, 4);
-  reporter_->SetPictureSourceAvailable(false);
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
   reporter_->Process(3.0, steady_s_);
-  EXPECT_THAT(TakeDue(), SizeIs(1));
-  EXPECT_EQ(counters().reports_without_picture, 1u);
+  EXPECT_EQ(reporter_->FrameWithoutImage(StampNs(2.9)), nullptr);
+  ASSERT_NE(reporter_->FrameWithoutImage(StampNs(3.0)), nullptr);
+  reporter_->AddImage(StampNs(3.0), GreyImage());
+  EXPECT_EQ(reporter_->FrameWithoutImage(StampNs(3.0)), nullptr);
+  ProcessWithPictures(3.1);
+  EXPECT_FALSE(TakeDue().at(0).image.empty());
 }
 
-TEST_F(HazardReporterTest, APictureIsAskedForOnceAndOnlyOfNews) {
+TEST_F(HazardReporterTest, PicturesAreOrderedOnceAndOnlyOfNews) {
   DriveFixes(0, 4);
   const auto look = [this](double seconds, const imaging::Box& box) {
     reporter_->AddFrame(FrameAt(seconds, {{"pothole", 0.8F, box}}), seconds);
+    reporter_->AddImage(StampNs(seconds), GreyImage());
     reporter_->Process(seconds, steady_s_);
   };
   look(3.0, BoxAt(12, 0));
-  const std::vector<imaging::PictureRequirements> wishes = reporter_->TakePictureRequests();
-  ASSERT_THAT(wishes, SizeIs(1));
-  EXPECT_EQ(wishes[0].stamp_ns, StampNs(3.0));
+  std::vector<PictureOrder> orders = reporter_->TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  ASSERT_THAT(orders[0].cuts, SizeIs(1));
+  EXPECT_EQ(orders[0].cuts[0].subject, BoxAt(12, 0));
   reporter_->Process(3.1, steady_s_);
-  EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
-  reporter_->AddPicture(StampNs(3.0), GreyPicture());
+  EXPECT_THAT(reporter_->TakePictureOrders(), IsEmpty());
+  reporter_->AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
   look(3.2, BoxAt(8.8, 0));         // The same hazard, nearer.
   look(3.3, {300, 100, 320, 150});  // Not on the road.
-  EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
+  EXPECT_THAT(reporter_->TakePictureOrders(), IsEmpty());
   EXPECT_EQ(counters().pictures_requested, 1u);
   EXPECT_FALSE(TakeDue().at(0).image.empty());
 }
 
-TEST_F(HazardReporterTest, APictureOfAnotherPartDoesNotDo) {
+TEST_F(HazardReporterTest, AReportHasThePictureThatItsOrderWasAnsweredWithAndNoOther) {
   DriveFixes(0, 4);
-  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->AddFrame(
+      FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}, {"debris", 0.7F, BoxAt(9, 1)}}), 3.0);
+  reporter_->AddImage(StampNs(3.0), GreyImage());
   reporter_->Process(3.0, steady_s_);
-  const std::vector<imaging::PictureRequirements> wishes = reporter_->TakePictureRequests();
-  ASSERT_THAT(wishes, SizeIs(1));
-  const imaging::PixelRegion part = wishes[0].part;
-  ASSERT_FALSE(part.IsWholeImage());
-  reporter_->AddPicture(StampNs(3.0), GreyPicture(), {part.x + 1, part.y, part.width, part.height});
+  const std::vector<PictureOrder> orders = reporter_->TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  ASSERT_THAT(orders[0].cuts, SizeIs(2));
+  EXPECT_THAT(TakeDue(), IsEmpty()) << "it waits for the answer";
+  imaging::CroppedPicture second;
+  second.jpeg = {1, 2, 3};
+  second.shown = {5, 6, 7, 8};
+  second.legible = true;
+  reporter_->AddPictures(orders[0].number + 1, {second, second});  // Of no frame.
   reporter_->Process(3.1, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
-  reporter_->AddPicture(StampNs(3.0), GreyPicture(), part);
-  reporter_->Process(3.2, steady_s_);
-  const std::vector<protocol::Report> due = TakeDue();
-  ASSERT_THAT(due, SizeIs(1));
-  EXPECT_TRUE(imaging::Contains(part, due[0].shown));
-  EXPECT_FALSE(due[0].image.empty());
+  reporter_->AddPictures(orders[0].number, {imaging::CroppedPicture{}, second});
+  reporter_->Process(3.1, steady_s_);
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(2));
+  for (const protocol::Report& report : reports) {
+    const bool is_second = report.class_name == "debris";
+    EXPECT_THAT(report.image, SizeIs(is_second ? 3 : 0)) << report.class_name;
+    EXPECT_EQ(report.shown.width, is_second ? 7u : 0u) << report.class_name;
+  }
+  EXPECT_EQ(counters().reports_without_picture, 1u);
+}
+
+TEST_F(HazardReporterTest, AnOrderThatIsAnsweredWithNothingMakesAReportWithoutPicture) {
+  DriveFixes(0, 4);
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->AddImage(StampNs(3.0), GreyImage());
+  reporter_->Process(3.0, steady_s_);
+  reporter_->AddPictures(reporter_->TakePictureOrders().at(0).number, {});
+  reporter_->Process(3.0, steady_s_);
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  EXPECT_THAT(reports[0].image, IsEmpty());
+  EXPECT_EQ(counters().reports_without_picture, 1u);
 }
 
 TEST_F(HazardReporterTest, FramesWaitForTheirPicturesSideBySide) {
@@ -233,25 +262,30 @@ TEST_F(HazardReporterTest, FramesWaitForTheirPicturesSideBySide) {
   for (const double seconds : {2.0, 2.1, 2.2}) {
     const double range_m = 5 + 100 * (seconds - 2);  // Three places.
     reporter_->AddFrame(FrameAt(seconds, {{"pothole", 0.8F, BoxAt(range_m, 0)}}), 3.0);
+    reporter_->AddImage(StampNs(seconds), GreyImage());
   }
   reporter_->Process(3.0, steady_s_);
-  EXPECT_THAT(reporter_->TakePictureRequests(), SizeIs(3));
+  const std::vector<PictureOrder> orders = reporter_->TakePictureOrders();
+  EXPECT_THAT(orders, SizeIs(3));
   // The third place once more: no second picture of it.
   reporter_->AddFrame(FrameAt(2.2, {{"pothole", 0.7F, BoxAt(25, 0)}}), 3.0);
+  reporter_->AddImage(StampNs(2.2), GreyImage());
   reporter_->Process(3.0, steady_s_);
-  EXPECT_THAT(reporter_->TakePictureRequests(), IsEmpty());
-  reporter_->Process(3.0 + config_.picture_wait_s, steady_s_);
+  EXPECT_THAT(reporter_->TakePictureOrders(), IsEmpty());
+  for (const PictureOrder& order : orders) reporter_->AddPictures(order.number, {});
+  reporter_->Process(3.0, steady_s_);
   EXPECT_THAT(TakeDue(), SizeIs(3));
 }
 
-TEST_F(HazardReporterTest, AFrameThatWaitedForItsPositionStillWaitsForItsPicture) {
+TEST_F(HazardReporterTest, AFrameThatWaitedForItsPositionStillGetsItsPicture) {
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->AddImage(StampNs(3.0), GreyImage());
   reporter_->Process(5.0, steady_s_);
+  EXPECT_THAT(reporter_->TakePictureOrders(), IsEmpty());
   DriveFixes(0, 4);
   reporter_->Process(5.0, steady_s_);
   EXPECT_THAT(TakeDue(), IsEmpty());
-  EXPECT_THAT(reporter_->TakePictureRequests(), SizeIs(1));
-  reporter_->AddPicture(StampNs(3.0), GreyPicture());
+  MakePictures();
   reporter_->Process(5.2, steady_s_);
   EXPECT_FALSE(TakeDue().at(0).image.empty());
 }
@@ -265,24 +299,14 @@ TEST_F(HazardReporterTest, AnEventOfSecondsAgoIsPlacedWhereTheVehicleWasThen) {
   EXPECT_LT(geo::GeodesicDistanceM(reports[0].position, expected), 0.02);
 }
 
-TEST_F(HazardReporterTest, APictureOfAnotherSizeThanTheImageIsShownWhole) {
+TEST_F(HazardReporterTest, AnImageOfAnotherSizeThanTheFrameIsShownWhole) {
   DriveFixes(0, 4);
-  reporter_->AddPicture(StampNs(3.0), {cv::Mat(64, 96, CV_8UC3, cv::Scalar(9, 9, 9)), nullptr});
   reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
-  reporter_->Process(3.0, steady_s_);
+  reporter_->AddImage(StampNs(3.0), {{cv::Mat(64, 96, CV_8UC3, cv::Scalar(9, 9, 9)), nullptr}, {}});
+  ProcessWithPictures(3.0);
   const protocol::Report report = TakeDue().at(0);
   EXPECT_TRUE(report.shown.IsWholeImage());
   EXPECT_EQ(cv::imdecode(report.image, cv::IMREAD_COLOR).size(), cv::Size(96, 64));
-}
-
-TEST_F(HazardReporterTest, PictureMayComeBeforeItsFrame) {
-  DriveFixes(0, 4);
-  reporter_->AddPicture(StampNs(3.0), GreyPicture());
-  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
-  reporter_->Process(3.0, steady_s_);
-  const auto reports = TakeDue();
-  ASSERT_THAT(reports, SizeIs(1));
-  EXPECT_FALSE(reports[0].image.empty());
 }
 
 TEST_F(HazardReporterTest, WithoutCameraOrWithAnotherImageSizeNothingIsPlaced) {
@@ -327,6 +351,97 @@ TEST_F(HazardReporterTest, ClockSetBackDoesNotMakeAFrameWaitForEver) {
   reporter_->Process(1.0, steady_s_);
   reporter_->Process(1.0 + config_.max_wait_s + 0.01, steady_s_);
   EXPECT_EQ(reporter_->waiting_frames(), 0u);
+}
+
+TEST_F(HazardReporterTest, AfterALoopOfTheClockKnownHazardsStayKnownAndNewOnesAreReported) {
+  DriveFixes(0, 6);
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  const std::vector<protocol::Report> first = TakeDue();
+  ASSERT_EQ(first.size(), 1u);
+  reporter_->StartAnew(0.1, steady_s_);
+  EXPECT_FALSE(reporter_->track().newest_ns()) << "of a time that is to come";
+  DriveFixes(0, 6);
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  EXPECT_EQ(counters().duplicates_suppressed, 1u);
+  See(4.0, {{"pothole", 0.8F, BoxAt(14, 2)}});
+  steady_s_ += 100;
+  EXPECT_EQ(TakeDue().size(), 2u) << "the unfinished one and the new one";
+  EXPECT_EQ(counters().reports_created, 2u);
+}
+
+TEST_F(HazardReporterTest, WhatWaitsForAPictureIsReportedBeforeTimeBeginsAnew) {
+  DriveFixes(0, 4);
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Process(3.0, steady_s_);
+  EXPECT_EQ(counters().reports_created, 0u);
+  reporter_->StartAnew(0.1, steady_s_);
+  EXPECT_EQ(counters().reports_created, 1u);
+  EXPECT_EQ(counters().reports_without_picture, 1u);
+  EXPECT_EQ(reporter_->waiting_frames(), 0u);
+}
+
+TEST_F(HazardReporterTest, WhatWaitsForItsPictureAtTheEndIsReportedWithoutItAfterTheNextStart) {
+  DriveFixes(0, 4);
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->AddImage(StampNs(3.0), GreyImage());
+  reporter_->Process(3.0, steady_s_);
+  EXPECT_THAT(reporter_->TakePictureOrders(), SizeIs(1)) << "it is being made";
+  reporter_->Finish(steady_s_);
+  EXPECT_EQ(reporter_->waiting_frames(), 0u);
+  EXPECT_EQ(counters().reports_without_picture, 1u);
+  Restart();
+  steady_s_ += config_.link_wait_s;
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  EXPECT_EQ(reports[0].class_name, "pothole");
+  EXPECT_THAT(reports[0].image, IsEmpty());
+}
+
+TEST_F(HazardReporterTest, WhatHasNoPositionAtTheEndIsDroppedAndCounted) {
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->Finish(steady_s_);
+  EXPECT_EQ(counters().dropped_no_fix, 1u);
+  Restart();
+  EXPECT_THAT(TakeDue(), IsEmpty());
+}
+
+TEST_F(HazardReporterTest, NoPictureIsOrderedOfAKnownHazardBesideANewOne) {
+  DriveFixes(0, 4);
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+  reporter_->AddFrame(
+      FrameAt(3.1, {{"pothole", 0.8F, BoxAt(10.4, 0)}, {"debris", 0.7F, BoxAt(9, 1)}}), 3.1);
+  reporter_->AddImage(StampNs(3.1), GreyImage());
+  reporter_->Process(3.1, steady_s_);
+  const std::vector<PictureOrder> orders = reporter_->TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  ASSERT_THAT(orders[0].cuts, SizeIs(1));
+  EXPECT_EQ(orders[0].cuts[0].subject, BoxAt(9, 1));
+  imaging::CroppedPicture picture;
+  picture.jpeg = {1, 2, 3};
+  reporter_->AddPictures(orders[0].number, {picture});
+  reporter_->Process(3.1, steady_s_);
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  EXPECT_EQ(reports[0].class_name, "debris");
+  EXPECT_THAT(reports[0].image, SizeIs(3));
+}
+
+TEST_F(HazardReporterTest, WhatHasNoPositionWhenTimeBeginsAnewIsDroppedAndCounted) {
+  reporter_->AddFrame(FrameAt(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}}), 3.0);
+  reporter_->StartAnew(0.1, steady_s_);
+  EXPECT_EQ(counters().dropped_no_fix, 1u);
+  EXPECT_EQ(reporter_->waiting_frames(), 0u);
+}
+
+TEST_F(HazardReporterTest, AFixOfTheFutureIsCountedAndPositionsGoOn) {
+  DriveFixes(0, 4);
+  geo::Fix wrong = FixAt(4.2);
+  wrong.stamp_ns += 365LL * 86400 * 1'000'000'000;
+  reporter_->AddFix(wrong, StampNs(4.2));
+  EXPECT_EQ(counters().fixes_bad_stamp, 1u);
+  reporter_->AddFix(FixAt(4.4), StampNs(4.4));
+  EXPECT_EQ(reporter_->track().newest_ns(), StampNs(4.4));
 }
 
 TEST_F(HazardReporterTest, SameSeedMakesTheSameReports) {

@@ -13,8 +13,8 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-std::vector<std::uint8_t> PlainJpeg(const imaging::Picture& picture, std::size_t max_bytes) {
-  return imaging::EncodeJpeg(picture, 80, max_bytes);
+std::vector<std::uint8_t> PlainJpeg(const CameraImage& image, std::size_t max_bytes) {
+  return imaging::EncodeJpeg(image.picture, 80, max_bytes);
 }
 
 /// A small vehicle that drives straight on.
@@ -39,7 +39,7 @@ class CandidateSenderTest : public ::testing::Test {
 
   /// A candidate of this moment that arrives at once; what can go then.
   std::vector<protocol::OffloadedFrame> See(double seconds) {
-    sender_->AddJudged(StampNs(seconds), kOptical, 0.8F, true, GreyPicture(), seconds);
+    sender_->AddJudged(StampNs(seconds), kOptical, 0.8F, true, GreyImage(), seconds);
     return sender_->TakeReady(seconds, PlainJpeg);
   }
 
@@ -115,7 +115,7 @@ TEST_F(CandidateSenderTest, AStandingVehicleSendsOnce) {
 
 TEST_F(CandidateSenderTest, WhatIsNotWorthSendingIsCountedAndGone) {
   DriveFixes(0, 4);
-  sender_->AddJudged(StampNs(3), kOptical, 0.1F, false, GreyPicture(), 3);
+  sender_->AddJudged(StampNs(3), kOptical, 0.1F, false, GreyImage(), 3);
   EXPECT_THAT(sender_->TakeReady(10, PlainJpeg), IsEmpty());
   EXPECT_EQ(counters().discarded, 1U);
   EXPECT_EQ(counters().candidates, 0U);
@@ -163,10 +163,8 @@ TEST_F(CandidateSenderTest, FusedPosesCountWhereTheyAreAndFixesElsewhere) {
 
 TEST_F(CandidateSenderTest, WhatCannotBeMaskedDoesNotLeave) {
   DriveFixes(0, 4);
-  sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyPicture(), 3);
-  const auto refuse = [](const imaging::Picture&, std::size_t) {
-    return std::vector<std::uint8_t>();
-  };
+  sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyImage(), 3);
+  const auto refuse = [](const CameraImage&, std::size_t) { return std::vector<std::uint8_t>(); };
   EXPECT_THAT(sender_->TakeReady(3, refuse), IsEmpty());
   EXPECT_EQ(counters().withheld, 1U);
   EXPECT_EQ(counters().sent, 0U);
@@ -181,8 +179,8 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
   Restart();
   std::size_t largest = 0;
   std::size_t smallest = 100000;
-  const auto all_that_is_left = [&](const imaging::Picture& picture, std::size_t max_bytes) {
-    std::vector<std::uint8_t> jpeg = PlainJpeg(picture, 100000);
+  const auto all_that_is_left = [&](const CameraImage& image, std::size_t max_bytes) {
+    std::vector<std::uint8_t> jpeg = PlainJpeg(image, 100000);
     jpeg.resize(max_bytes);
     largest = std::max(largest, max_bytes);
     smallest = std::min(smallest, max_bytes);
@@ -191,7 +189,7 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
   DriveFixes(0, 0.6);
   for (int i = 3; i < 170; ++i) {
     DriveFixes(0.33 * i, 0.33 * i + 0.1);
-    sender_->AddJudged(StampNs(0.33 * i), kOptical, 0.8F, true, GreyPicture(), 0.33 * i);
+    sender_->AddJudged(StampNs(0.33 * i), kOptical, 0.8F, true, GreyImage(), 0.33 * i);
     sender_->TakeReady(0.33 * i, all_that_is_left);
   }
   const double seconds = 0.33 * 167;
@@ -204,9 +202,9 @@ TEST_F(CandidateSenderTest, TheBudgetOfBytesHoldsInTheLongRun) {
 
 TEST_F(CandidateSenderTest, APictureThatWasShrunkHasTheIntrinsicsOfItsOwnSize) {
   DriveFixes(0, 4);
-  sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyPicture(), 3);
-  const auto half = [](const imaging::Picture&, std::size_t max_bytes) {
-    return PlainJpeg({cv::Mat(200, 320, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr}, max_bytes);
+  sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, GreyImage(), 3);
+  const auto half = [](const CameraImage&, std::size_t max_bytes) {
+    return PlainJpeg({{cv::Mat(200, 320, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr}, {}}, max_bytes);
   };
   const auto sent = sender_->TakeReady(3, half);
   ASSERT_THAT(sent, SizeIs(1));
@@ -220,7 +218,7 @@ TEST_F(CandidateSenderTest, APictureThatWasShrunkHasTheIntrinsicsOfItsOwnSize) {
 
 TEST_F(CandidateSenderTest, AnotherImageSizeThanTheCalibrationsIsNotSent) {
   DriveFixes(0, 4);
-  const imaging::Picture other{cv::Mat(480, 640, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr};
+  const CameraImage other{{cv::Mat(480, 640, CV_8UC3, cv::Scalar(1, 2, 3)), nullptr}, {}};
   sender_->AddJudged(StampNs(3), kOptical, 0.8F, true, other, 3);
   EXPECT_THAT(sender_->TakeReady(9, PlainJpeg), IsEmpty());
   EXPECT_EQ(counters().no_camera, 1U);
@@ -230,6 +228,19 @@ TEST_F(CandidateSenderTest, TheWaitingRoomIsBounded) {
   for (int i = 0; i < 100; ++i) See(3 + 0.01 * i);
   EXPECT_EQ(sender_->waiting(), static_cast<std::size_t>(config_.max_waiting_frames));
   EXPECT_EQ(counters().displaced, 100U - sender_->waiting());
+}
+
+TEST_F(CandidateSenderTest, AfterALoopOfTheClockFramesAreTakenAndSentAsBefore) {
+  DriveFixes(0, 4);
+  EXPECT_TRUE(sender_->Takes(StampNs(3.1)));
+  ASSERT_THAT(See(3.1), SizeIs(1));
+  sender_->AddJudged(StampNs(9), kOptical, 0.8F, true, GreyImage(), 9);
+  sender_->StartAnew();
+  EXPECT_EQ(sender_->waiting(), 0U);
+  EXPECT_EQ(counters().no_pose, 1U);
+  DriveFixes(0, 4);
+  EXPECT_TRUE(sender_->Takes(StampNs(2.5)));
+  EXPECT_THAT(See(2.5), SizeIs(1));
 }
 
 }  // namespace
