@@ -31,4 +31,9 @@ install(DIRECTORY launch config rviz web models rosbags
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 install(DIRECTORY scripts/ USE_SOURCE_PERMISSIONS
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION} PATTERN "__pycache__" EXCLUDE)
+# The one script that is a node. Among a built package's programs roslaunch finds it there, else twice: in scripts/ and,
+# where that lies below the sources, in the install space.
+file(MAKE_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/scripts/livemap_player
+  ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION}/livemap_player SYMBOLIC)
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

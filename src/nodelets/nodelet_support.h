@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -11,8 +12,12 @@ constexpr double kSayAgainS = 60;
 /// Seconds of the clock that neither simulated time nor the administrator moves.
 double SteadyS();
 
-/// Runs a nodelet's start-up. A livemap::Error is logged as the one sentence that it is and
-/// rethrown, so that the manager reports a failed load and lives on.
+/// ROS's clock, ns; 0 while simulated time has not begun.
+std::int64_t RosNowNs();
+
+/// Runs a nodelet's start-up. An exception, ours (one sentence) or a library's, is logged as one
+/// line under the nodelet's name and rethrown, so that the manager reports a failed load and lives
+/// on.
 void InitializeOrExplain(const std::string& nodelet_name, const std::function<void()>& initialize);
 
 }  // namespace livemap::nodelets

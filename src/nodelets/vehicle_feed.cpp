@@ -19,7 +19,9 @@ VehicleFeed::VehicleFeed(ros::NodeHandle& node, ros::NodeHandle& private_node, c
       handlers_(std::move(handlers)),
       nodelet_name_(config.nodelet_name),
       image_topic_(node.resolveName("camera_rect/image")),
-      vehicle_tf_(node, config.nodelet_name, config.map_frame, config.base_frame),
+      stamps_(config.nodelet_name, config.max_stamp_ahead_s, handlers_.on_time_reset),
+      vehicle_tf_(node, config.nodelet_name, config.map_frame, config.base_frame,
+                  config.max_stamp_ahead_s),
       mountings_(vehicle_tf_, handlers_.on_mounting) {
   subscribers_ = {
       node.subscribe("fix", 100, &VehicleFeed::OnFix, this),
@@ -43,13 +45,14 @@ VehicleFeed::VehicleFeed(ros::NodeHandle& node, ros::NodeHandle& private_node, c
 
 void VehicleFeed::OnFix(const sensor_msgs::NavSatFix& message) {
   const MutexLock lock(mutex_);
-  handlers_.on_fix(ros_io::ToFix(message));
+  if (stamps_.IsUsable("a fix", message.header.stamp)) handlers_.on_fix(ros_io::ToFix(message));
 }
 
 void VehicleFeed::OnPose(const nav_msgs::Odometry& message) {
   const std::optional<geo::TrackPose> pose = vehicle_tf_.FusedPose(message);
   if (!pose) return;
   const MutexLock lock(mutex_);
+  if (!stamps_.IsUsable("a fused pose", message.header.stamp)) return;
   handlers_.on_pose(ros_io::FromRosTime(message.header.stamp), *pose);
 }
 
@@ -65,6 +68,7 @@ void VehicleFeed::OnCameraInfo(const sensor_msgs::CameraInfo& message) {
 
 void VehicleFeed::OnImage(const sensor_msgs::ImageConstPtr& image) {
   const MutexLock lock(mutex_);
+  if (!stamps_.IsUsable("an image", image->header.stamp)) return;
   mountings_.Want(image->header.frame_id);
   handlers_.on_image(image);
 }

@@ -16,24 +16,29 @@
 #include "common/mutex.h"
 #include "geo/camera_intrinsics.h"
 #include "geo/vehicle_pose.h"
+#include "nodelets/diagnostics.h"
+#include "nodelets/stamp_checks.h"
 #include "nodelets/vehicle_tf.h"
 
 namespace livemap::nodelets {
 
 /// What a nodelet that places camera images listens to: fixes, fused poses, the calibration of the
-/// rectified camera, its mounting, and its images. What cannot be used is warned of and dropped.
+/// rectified camera, its mounting, and its images. What cannot be used, or has a stamp that cannot
+/// be, is warned of and dropped.
 /// The handlers are called in the queue of `node`, each with the nodelet's mutex held: a handler
 /// that uses what the mutex guards says so to the thread-safety analysis by Mutex::AssertHeld.
 ///
-/// Typical usage: the last step of a nodelet's start makes one; the destructor calls StopImages
-/// before it ends the threads to which the images go.
+/// Typical usage: a nodelet's start makes one when all that the handlers use stands, and before the
+/// subscribers and timers that use it; the destructor stops these, and calls StopImages before it
+/// ends the threads to which the images go.
 class VehicleFeed {
  public:
   struct Config {
     std::string nodelet_name;  ///< In warnings.
     std::string map_frame = "map";
     std::string base_frame = "base_link";
-    bool use_fused = false;  ///< Whether to listen to localization/odometry.
+    bool use_fused = false;        ///< Whether to listen to localization/odometry.
+    double max_stamp_ahead_s = 5;  ///< See StampGate::Config.
   };
 
   struct Handlers {
@@ -44,6 +49,8 @@ class VehicleFeed {
     MountingLearner::OnMounting on_mounting;
     /// Every image, after the mounting of its camera where that is known.
     std::function<void(const sensor_msgs::ImageConstPtr& image)> on_image;
+    /// Time went back: nothing of before can be compared with what comes.
+    std::function<void()> on_time_reset;
   };
 
   /// `mutex` is the nodelet's and outlives this.
@@ -54,6 +61,13 @@ class VehicleFeed {
   void StopImages() EXCLUDES(mutex_) { image_subscriber_.shutdown(); }
   /// The resolved name. Any thread.
   const std::string& image_topic() const { return image_topic_; }
+  /// Whether an image of another topic is of use. The nodelet's mutex is held: on_time_reset may be
+  /// called.
+  bool IsUsable(const std::string& input, const ros::Time& stamp) {
+    return stamps_.IsUsable(input, stamp);
+  }
+  /// Adds what was refused. Any thread.
+  void Diagnose(Diagnostics::Status& status) const { stamps_.Diagnose(status); }
 
  private:
   void OnFix(const sensor_msgs::NavSatFix& message);
@@ -65,6 +79,7 @@ class VehicleFeed {
   Handlers handlers_ GUARDED_BY(mutex_);
   std::string nodelet_name_;
   std::string image_topic_;
+  StampChecks stamps_;
   VehicleTf vehicle_tf_;
   MountingLearner mountings_ GUARDED_BY(mutex_);
   std::vector<ros::Subscriber> subscribers_;

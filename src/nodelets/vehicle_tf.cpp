@@ -12,11 +12,11 @@
 namespace livemap::nodelets {
 
 VehicleTf::VehicleTf(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
-                     std::string base_frame)
+                     std::string base_frame, double max_stamp_ahead_s)
     : nodelet_name_(std::move(nodelet_name)),
       map_frame_(std::move(map_frame)),
       base_frame_(std::move(base_frame)),
-      listener_(buffer_, node) {}
+      listener_(buffer_, node, max_stamp_ahead_s) {}
 
 std::optional<geo::TrackPose> VehicleTf::FusedPose(const nav_msgs::Odometry& message) const {
   if (message.header.frame_id != map_frame_ || message.child_frame_id != base_frame_) {

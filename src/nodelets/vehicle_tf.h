@@ -3,7 +3,6 @@
 #include <nav_msgs/Odometry.h>
 #include <ros/node_handle.h>
 #include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <Eigen/Geometry>
 #include <functional>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "geo/vehicle_pose.h"
+#include "nodelets/bounded_tf_listener.h"
 
 namespace livemap::nodelets {
 
@@ -20,8 +20,9 @@ namespace livemap::nodelets {
 /// is warned of, under the nodelet's name, once a while. Any thread.
 class VehicleTf {
  public:
+  /// `max_stamp_ahead_s`: see StampGate::Config.
   VehicleTf(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
-            std::string base_frame);
+            std::string base_frame, double max_stamp_ahead_s);
 
   /// A fused pose of base_link in the map frame, whose datum is that of its owner: tf earth -> map.
   std::optional<geo::TrackPose> FusedPose(const nav_msgs::Odometry& message) const;
@@ -35,7 +36,7 @@ class VehicleTf {
   std::string map_frame_;
   std::string base_frame_;
   tf2_ros::Buffer buffer_;
-  tf2_ros::TransformListener listener_;
+  BoundedTfListener listener_;
 };
 
 /// Learns the mountings of cameras from tf, each once, because a mounting does not change. Not

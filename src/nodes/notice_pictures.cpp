@@ -7,10 +7,13 @@ namespace {
 
 // So many pictures are kept if all of them take what one may.
 constexpr std::size_t kKeptPictures = 4096;
+// Some are made by the thread that commits reports: tens of milliseconds at most.
+constexpr std::int64_t kMaxWorkPx = 16'000'000;
 
 zone::PictureCache MakeCache(std::size_t max_bytes) {
   zone::SmallPictureLimits limits;
   limits.max_bytes = max_bytes;
+  limits.picture.max_work_px = kMaxWorkPx;
   return {
       [limits](const std::vector<std::uint8_t>& file) { return zone::SmallPicture(file, limits); },
       {limits.picture.max_bytes, kKeptPictures * max_bytes}};

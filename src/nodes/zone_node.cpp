@@ -8,6 +8,7 @@
 #include <random>
 #include <utility>
 
+#include "common/clock.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
 
@@ -15,24 +16,13 @@ namespace livemap::nodes {
 namespace {
 
 constexpr double kSayAgainS = 60.0;
+/// Of the store, that say where its map is.
+constexpr std::size_t kFirstHazards = 64;
 constexpr std::chrono::milliseconds kPatience{500};
 /// Between two portions of what a vehicle is told.
 constexpr std::chrono::milliseconds kTellPause{50};
 /// After a failed commit; the vehicles send the reports again anyway.
 constexpr std::chrono::seconds kStorePause{1};
-
-/// The zone's clock is the system's, never simulated time: a store outlives any replay.
-std::int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-std::int64_t SteadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
   zone::ZoneInbox::Config limits;
@@ -47,15 +37,20 @@ zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
 ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
                    ros_io::ZoneCloudletConfig config)
     : config_(std::move(config)),
-      zone_(config_.zone, NowNs, EntropySeededGenerator()()),
+      // Never simulated time: a store outlives any replay.
+      zone_(config_.zone, SystemNs, EntropySeededGenerator()()),
       inbox_(InboxLimits(config_)),
       catch_up_(config_.catch_up),
       map_changes_(node, zone_, inbox_),
       pictures_(zone_, static_cast<std::size_t>(config_.notice_picture_bytes)),
       updater_(node, private_node) {
-  if (config_.map_datum) {
+  {
     const MutexLock lock(mutex_);
-    SetMap(*config_.map_datum);
+    auto origin = config_.map_datum;
+    for (const zone::Hazard& hazard : zone_.Query(std::nullopt, 0, kFirstHazards)) {
+      if (!origin) origin = origin_.AddHazard(hazard.position, hazard.vehicles);
+    }
+    if (origin) SetMap(*origin);
   }
   receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
   poll_publisher_ = node.advertise<HazardPoll>("hazard/poll", 1000);
@@ -188,7 +183,11 @@ void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
       event.hazard ? event.hazard->hazard.position : event.vehicle->position;
   {
     const MutexLock lock(mutex_);
-    if (!map_) SetMap(place);
+    const auto origin = map_ ? std::nullopt
+                        : event.vehicle
+                            ? origin_.AddVehicle(event.vehicle->vehicle_id, place, SteadyNs())
+                            : origin_.AddHazard(place, event.hazard->hazard.vehicles);
+    if (origin) SetMap(*origin);
     if (event.vehicle) paths_.Add(*event.vehicle);
   }
   if (event.hazard && event.hazard->announced) notices_->Push(*event.hazard);
@@ -251,7 +250,7 @@ void ZoneNode::NoteFailedCommit(const Error& error) {
 /// Publishes the next portion of what single vehicles must know; true while there is more.
 bool ZoneNode::TellVehicles(std::deque<zone::CatchUpOrder> orders) {
   for (zone::CatchUpOrder& order : orders) teller_->Add(std::move(order));
-  const auto told = teller_->PublishBatch(NowNs());
+  const auto told = teller_->PublishBatch(SystemNs());
   const MutexLock lock(mutex_);
   if (told) catch_up_.Told(*told, SteadyNs());
   counters_.vehicle_notices_sent = teller_->notices();
@@ -311,8 +310,7 @@ void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
   visualization_msgs::MarkerArray markers;
   {
     const MutexLock lock(mutex_);
-    if (!map_ && hazards.empty()) return;
-    if (!map_) SetMap(hazards.front().position);
+    if (!map_) return;
     paths_.KeepOnly(vehicles);
     markers = ros_io::ZoneMarkers(hazards, vehicles, paths_, config_.zone.catalogue, *map_,
                                   config_.map_frame, ros::Time::now());
@@ -337,6 +335,16 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   counters.notices_sent = notices_->sent();
   counters.notice_pictures = notices_->pictures();
   counters.notice_pictures_failed = pictures_.failed();
+  if (web_) {
+    const web::WebServer::Counters web = web_->counters();
+    counters.web_connections = web_->connections();
+    counters.web_connections_ended = web.connections_ended;
+    counters.web_connections_refused = web.connections_refused;
+    counters.web_held_bytes = web.held_bytes;
+    counters.web_pictures_refused = web.pictures.refused;
+    counters.web_pictures_last_refusal = web.pictures.last_refusal;
+    counters.web_pictures_busy = web.pictures.busy;
+  }
   ros_io::DescribeZone(counters, zone_.Statistics(), status);
 }
 

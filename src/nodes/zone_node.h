@@ -24,6 +24,7 @@
 #include "ros/conversions/zone_conversions.h"
 #include "ros/parameters/zone_cloudlet_parameters.h"
 #include "web/server/web_server.h"
+#include "zone/registry/map_origin.h"
 #include "zone/service/catch_up_planner.h"
 #include "zone/service/zone_inbox.h"
 #include "zone/service/zone_service.h"
@@ -77,6 +78,7 @@ class ZoneNode {
   ros_io::ZoneCloudletCounters counters_ GUARDED_BY(mutex_);
   ros_io::VehiclePaths paths_ GUARDED_BY(mutex_);
   std::optional<geo::LocalFrame> map_ GUARDED_BY(mutex_);
+  zone::MapOrigin origin_ GUARDED_BY(mutex_);
   zone::CatchUpPlanner catch_up_ GUARDED_BY(mutex_);
 
   MapChangeReceiver map_changes_;

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 import numpy
@@ -214,7 +215,14 @@ class EdgeVoTest(unittest.TestCase):
     def test_a_replay_that_begins_again_starts_anew(self):
         vehicle = self.loaded()
         self.play(vehicle, self.frames[:20])
-        self.play(vehicle, self.frames[:2])
+        # One stamp that goes back may be wrong; the third that agrees is believed, of those that a busy machine does not drop.
+        for frame in self.frames[:20]:
+            for topic in (INFO, DEPTH, IMAGE):
+                vehicle.send(topic, frame[topic])
+            time.sleep(0.5)
+            if len(vehicle.poses()) > 20:
+                break
+        eventually(lambda: len(vehicle.poses()) > 20, "a frame of the second round is answered")
         numpy.testing.assert_allclose(base_pose(vehicle.poses()[20].pose.pose), numpy.eye(4), atol=1e-9)
         self.assertIn("stamps went back", vehicle.output())
 

@@ -16,9 +16,9 @@ import numpy
 import rospy
 import rostest
 import yaml
-from sensor_msgs.msg import Image, RegionOfInterest
+from sensor_msgs.msg import Image
 
-from livemap.msg import DetectionArray, PicturePart, PictureRequest
+from livemap.msg import BestViews, DetectionArray
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
 from node_testing import SOURCE_DIRECTORY, NodeletUnderTest, eventually, parameters_of  # noqa: E402
 
@@ -177,7 +177,7 @@ class HazardDetectionTest(unittest.TestCase):
         return pixels_of(picture)[face], pixels_of(frame)[face]
 
     def test_a_face_in_the_picture_is_masked(self):
-        masked, seen = self.picture_of_a_face()
+        masked, seen = self.picture_of_a_face(privacy_finder="cascades")
         colours = {tuple(pixel) for pixel in masked.reshape(-1, 3)}
         self.assertLess(len(colours), 50, "more blocks than a mask leaves")
         self.assertGreater(len({tuple(pixel) for pixel in seen.reshape(-1, 3)}), 100)
@@ -188,7 +188,7 @@ class HazardDetectionTest(unittest.TestCase):
 
     def test_without_a_detector_of_faces_the_load_fails_with_one_sentence(self):
         detector = self.make_detector()
-        loader = detector.load(privacy_cascades="/nowhere")
+        loader = detector.load(privacy_finder="cascades", privacy_cascades="/nowhere")
         self.assertNotEqual(loader.wait(60), 0)
         eventually(lambda: "cascade '/nowhere/" in detector.output(), "the sentence")
 
@@ -292,45 +292,31 @@ class HazardDetectionTest(unittest.TestCase):
         detector.wait_for(frames_processed=1, detections=1)
         self.assertEqual(events.get_num_connections(), 0)
 
-    def test_a_picture_on_demand_is_masked_and_one_of_an_unknown_image_is_counted(self):
-        detector = self.loaded_detector(queue_size=100)
-        requests = detector.advertise("hazard/picture_request", PictureRequest, queue_size=10)
-        pictures = detector.subscribe("hazard/picture", Image)
-        eventually(lambda: pictures.get_num_connections() > 0 and requests.get_num_connections() > 0, "the topics")
-        frame, face = street_with_face(1)
-        detector.publisher.publish(frame)
-        detector.wait_for(frames_processed=1)
-        requests.publish(PictureRequest(stamp=rospy.Time(1, 5)))
-        requests.publish(PictureRequest(stamp=frame.header.stamp))
-        detector.wait_for(pictures_sent=1, pictures_unknown=1, pictures_withheld=0)
-        picture = eventually(lambda: detector.received("hazard/picture"), "a picture")[0]
-        self.assertEqual(picture.header.stamp, frame.header.stamp)
-        colours = {tuple(pixel) for pixel in pixels_of(picture)[face].reshape(-1, 3)}
-        self.assertLess(len(colours), 50, "more blocks than a mask leaves")
+    def test_names_the_best_views_of_what_it_follows_until_their_event_is_out(self):
+        detector = self.loaded_detector(queue_size=100, track_max_delay_s=0.3)
+        events = detector.subscribe("hazard/events", DetectionArray)
+        best_views = detector.subscribe("hazard/best_views", BestViews)
+        eventually(lambda: events.get_num_connections() > 0 and best_views.get_num_connections() > 0, "the topics")
+        for number in range(8):
+            frame = image(number, (16, 8, RED))
+            frame.header.stamp = rospy.Time(1600000000, 100000000 * number)
+            detector.publisher.publish(frame)
+        detector.wait_for(frames_processed=8, events=1)
+        event = eventually(lambda: detector.received("hazard/events"), "an event")[0]
+        told = eventually(lambda: len(detector.received("hazard/best_views")) == 8
+                          and detector.received("hazard/best_views"), "the best views after each image")
+        named = [message.stamps for message in told]
+        self.assertEqual(named[0], [event.header.stamp], "all views are equally good: the first one is the best")
+        last = max(index for index, stamps in enumerate(named) if event.header.stamp in stamps)
+        self.assertEqual(named[:last + 1], [[event.header.stamp]] * (last + 1))
+        self.assertLess(last, 7, "an object that was reported needs no image any more")
 
-    def test_of_a_picture_only_the_wanted_part_is_clear(self):
-        detector = self.loaded_detector(queue_size=100)
-        requests = detector.advertise("hazard/picture_request", PictureRequest, queue_size=10)
-        parts = detector.subscribe("hazard/picture_part", PicturePart)
-        wholes = detector.subscribe("hazard/picture", Image)
-        eventually(lambda: requests.get_num_connections() > 0 and parts.get_num_connections() > 0
-                   and wholes.get_num_connections() > 0, "the topics")
-        frame, _ = street_with_face(1)
-        detector.publisher.publish(frame)
-        detector.wait_for(frames_processed=1)
-        wanted = RegionOfInterest(x_offset=230, y_offset=10, width=60, height=50)
-        requests.publish(PictureRequest(stamp=frame.header.stamp, part=wanted))
-        picture = eventually(lambda: detector.received("hazard/picture_part"), "a picture")[0]
-        self.assertEqual(picture.part, wanted)
-        self.assertEqual(picture.image.header.stamp, frame.header.stamp)
-        shown, camera = pixels_of(picture.image), pixels_of(frame)
-        part, around = (slice(10, 60), slice(230, 290)), (slice(70, 170), slice(0, 320))
-        # Not all of the part: the cascades take some grain for a plate.
-        self.assertGreater((shown[part] == camera[part]).mean(), 0.6, "the part is not clear")
-        self.assertLess((shown[around] == camera[around]).mean(), 0.4, "around the part something is clear")
-        # One that is no part of the image asks for all of it.
-        requests.publish(PictureRequest(stamp=frame.header.stamp, part=RegionOfInterest(x_offset=1, width=2**32 - 1, height=1)))
-        eventually(lambda: detector.received("hazard/picture"), "the whole picture")
+    def test_the_number_of_kept_images_is_refused_with_who_keeps_them_now(self):
+        detector = self.make_detector()
+        loader = detector.load(picture_frames=64)
+        self.assertNotEqual(loader.wait(60), 0)
+        eventually(lambda: "picture_frames' is no longer accepted: hazard_reporting keeps" in detector.output(),
+                   "the sentence")
 
     def test_a_bad_manifest_fails_the_load_with_one_sentence_and_the_manager_lives(self):
         detector = self.make_detector()

@@ -11,12 +11,12 @@ import unittest
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Image, NavSatStatus
+from sensor_msgs.msg import NavSatStatus
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from hazard_reporting_fixture import (OPTICAL, SPEED_MPS, COURSE_RAD, Vehicle, annotated, decode,
+from hazard_reporting_fixture import (COURSE_RAD, HEIGHT, OPTICAL, SPEED_MPS, WIDTH, Vehicle, camera_image, decode,
                                       detection, detections, east_north, fix, on_street, place, stamp)
-from livemap.msg import (ChangedObject, ChangedObjects, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
+from livemap.msg import (BestViews, ChangedObject, ChangedObjects, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
                          LinkState, ReportReceipt)
 from node_testing import eventually  # noqa: E402
 
@@ -63,7 +63,6 @@ class HazardReportingTest(unittest.TestCase):
 
     def driving_vehicle(self, **parameters):
         vehicle = self.make_vehicle(**parameters)
-        vehicle.answer_picture_requests()
         vehicle.start()
         vehicle.mount_camera()
         vehicle.drive(0, 4)
@@ -90,38 +89,59 @@ class HazardReportingTest(unittest.TestCase):
         self.assertLessEqual(len(report.image.data), 12000)
         self.assertGreater(report.covariance[0] * report.covariance[3], report.covariance[1] ** 2)
 
-    def test_asks_for_a_picture_only_when_a_sighting_is_news(self):
+    def test_makes_a_picture_only_when_a_sighting_is_news(self):
         vehicle = self.driving_vehicle()
         vehicle.see(3.0)
         vehicle.see(3.1, detection(12.0))
         vehicle.see(3.2, detection(10.4))
         vehicle.publish("hazard/detections", detections(3.3, detection(9.0, 3.0, "debris")))
-        vehicle.wait_for(reports_created=1, duplicates_suppressed=1, pictures_requested=1, reports_without_picture=0)
-        self.assertEqual([request.stamp for request in vehicle.received("hazard/picture_request")], [stamp(3.1)])
+        vehicle.wait_for(reports_created=1, duplicates_suppressed=1, pictures_requested=1, pictures_made=1,
+                         reports_without_picture=0)
         self.assertEqual([report.class_name for report in vehicle.reports()], ["pothole"])
 
-    def test_a_picture_that_does_not_come_is_waited_for_and_then_missing(self):
-        vehicle = self.make_vehicle(picture_wait_s=0.3)
-        vehicle.start()
-        vehicle.mount_camera()
-        vehicle.drive(0, 4)
-        vehicle.see(3.1, detection(12.0))
+    def test_an_image_that_does_not_come_is_waited_for_shortly_and_the_report_goes_without(self):
+        vehicle = self.driving_vehicle()
+        vehicle.publish("hazard/events", detections(3.1, detection(12.0)))
         report = eventually(vehicle.reports, "a report")[0]
         self.assertEqual((report.image.format, len(report.image.data)), ("", 0))
-        vehicle.wait_for(reports_without_picture=1, pictures_requested=1)
+        vehicle.wait_for(reports_without_picture=1, pictures_requested=0)
 
-    def test_without_events_every_detection_counts_with_the_annotated_image(self):
-        vehicle = self.driving_vehicle(use_events=False, pictures_on_demand=False, picture_context=0.0, max_image_bytes=100000)
+    def test_without_events_every_detection_counts(self):
+        vehicle = self.driving_vehicle(use_events=False, picture_context=0.0, max_image_bytes=100000)
         vehicle.see(3.1, detection(12.0))
         report = eventually(vehicle.reports, "a report")[0]
         self.assertEqual(decode(report.image).shape, (400, 640, 3))
         self.assertEqual((report.shown_x, report.shown_y, report.shown_width, report.shown_height), (0, 0, 640, 400))
-        self.assertEqual(vehicle.received("hazard/picture_request"), [])
+
+    def test_the_image_of_a_best_view_is_kept_until_its_event_comes(self):
+        vehicle = self.driving_vehicle(picture_frames=2)
+        view = camera_image(3.1)
+        view.data = bytes([200, 20, 20]) * (WIDTH * HEIGHT)
+        vehicle.publish("hazard/best_views", BestViews(stamps=[stamp(3.1)]))
+        rospy.sleep(0.5)
+        for tenth in range(31, 36):
+            vehicle.publish("camera_rect/image", view if tenth == 31 else camera_image(tenth / 10))
+            vehicle.wait_for(images_kept=1 if tenth == 31 else 2)
+            # The detection of the view is below the threshold: the tracker alone knows of it.
+            vehicle.publish("hazard/detections", detections(tenth / 10))
+            vehicle.wait_for(images_kept=1)
+        vehicle.publish("hazard/events", detections(3.1, detection(12.0)))
+        report = eventually(vehicle.reports, "a report")[0]
+        self.assertEqual(report.stamp, stamp(3.1))
+        blue, green, red = decode(report.image)[2, 2]
+        self.assertTrue(blue > 150 and green < 60 and red < 60, "the picture of another image")
+
+    def test_an_image_that_cannot_be_used_leaves_the_report_without_picture(self):
+        vehicle = self.driving_vehicle()
+        broken = camera_image(3.1)
+        broken.encoding = "no encoding"
+        vehicle.see(3.1, detection(12.0), image=broken)
+        report = eventually(vehicle.reports, "a report")[0]
+        self.assertEqual(len(report.image.data), 0)
 
     def deferring_vehicle(self, **parameters):
         """On a link that costs, with a report of rank 3 that waits."""
         vehicle = self.make_vehicle(resend_first_s=0.2, resend_longest_s=0.4, **parameters)
-        vehicle.answer_picture_requests()
         vehicle.link(LinkState.METERED)
         vehicle.start()
         vehicle.wait_for(link="metered")
@@ -246,26 +266,26 @@ class HazardReportingTest(unittest.TestCase):
         self.assertLessEqual(len(answer.image.data), 12000)
         self.assertEqual(decode(answer.image).shape, (160, 240, 3))
 
-    def test_looks_at_the_cameras_images_only_while_a_poll_is_open_and_says_when_it_is_too_dark(self):
-        vehicle = self.make_vehicle(poll_reserve_s=0.5)
-        images = vehicle.advertise("camera_rect/image", Image)
-        vehicle.answer_picture_requests()
-        vehicle.start()
-        vehicle.mount_camera()
-        vehicle.drive(0, 4)
-        vehicle.wait_for(polls=0)
-        self.assertEqual(images.get_num_connections(), 0)
+    def test_says_when_it_was_too_dark_to_see(self):
+        vehicle = self.driving_vehicle(poll_reserve_s=0.5)
         vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0), life_s=12))
-        eventually(lambda: images.get_num_connections() == 1, "it looks")
+        vehicle.wait_for(polls=1)
         for tenth in range(26, 38):
-            night = annotated(tenth / 10)
+            night = camera_image(tenth / 10)
             night.data = bytes(len(night.data))
-            images.publish(night)
+            vehicle.publish("camera_rect/image", night)
             rospy.sleep(0.2)
-            vehicle.see(tenth / 10)
+            vehicle.publish("hazard/detections", detections(tenth / 10))
         answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
         self.assertEqual((answer.answer, answer.reason), (HazardPollAnswer.CANT_SEE, "too dark"))
-        eventually(lambda: images.get_num_connections() == 0, "it looks no more")
+
+    def test_keeps_no_image_in_which_nothing_was_found(self):
+        vehicle = self.driving_vehicle()
+        for tenth in (31, 32):
+            vehicle.publish("camera_rect/image", camera_image(tenth / 10))
+            vehicle.wait_for(images_kept=1)
+            vehicle.publish("hazard/detections", detections(tenth / 10))
+            vehicle.wait_for(images_kept=0)
 
     def test_answers_a_poll_no_when_nothing_was_there_and_cannot_see_without_images(self):
         vehicle = self.driving_vehicle(poll_reserve_s=0.5)
@@ -386,6 +406,8 @@ class HazardReportingTest(unittest.TestCase):
                 ({"max_rang_m": 3.0}, "unknown parameter '/{}/hazard_reporting/max_rang_m'"),
                 ({"max_range_m": -3.0}, "max_range_m' is -3, accepted is a number from 0.1"),
                 ({"catalogue": "/nowhere.yaml"}, "cannot read file '/nowhere.yaml'"),
+                ({"privacy_finder": "cascades", "privacy_cascades": "/nowhere"}, "cascade '/nowhere/"),
+                ({"pictures_on_demand": False}, "pictures_on_demand' is no longer accepted: hazard_reporting makes every"),
                 ({"map_datum": "here"}, "parameter 'map_datum' is 'here'")]:
             vehicle = self.make_vehicle(**parameters)
             vehicle.start(wait=False)

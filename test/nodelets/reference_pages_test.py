@@ -13,7 +13,7 @@ NAME = re.compile(r'"(/?[a-z_]+(?:/[a-z_]+)*)"')
 # What these carry is a parameter.
 BY_PARAMETER = {"mqtt_bridge"}
 # Of diagnostic_updater and tf2; and the ending of a topic that stands in the same row.
-BY_LIBRARY = {"/diagnostics", "tf", "/tf_static", "/compressed"}
+BY_LIBRARY = {"/diagnostics", "tf", "/tf", "/tf_static", "/compressed"}
 
 
 def sources(node):
@@ -72,10 +72,10 @@ class ReferencePagesTest(unittest.TestCase):
 
     def test_the_page_of_former_names_has_all_that_the_readers_refuse(self):
         in_source = set()
-        for file in (ROOT / "src/ros/parameters").glob("*_parameters.cpp"):
+        for file in (ROOT / "src/ros/parameters").rglob("*_parameters.cpp"):
             text = file.read_text(encoding="utf-8")
             in_source.update(re.findall(r'Renamed\("(\w+)", "(\w+)"\)', text))
-            for body in re.findall(r"void RefuseFormerNames.*?\n}", text, re.DOTALL):
+            for body in re.findall(r"void RefuseFormer\w*Names.*?\n}", text, re.DOTALL):
                 in_source.update(re.findall(r'{"(\w+)", "(\w+)"}', body))
         page = (ROOT / "docs/reference/former-names.md").read_text(encoding="utf-8")
         self.assertGreater(len(in_source), 10)

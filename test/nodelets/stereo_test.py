@@ -127,7 +127,7 @@ class StereoTest(unittest.TestCase):
         sees from outside; then it starts anew. Returns how many poses it gave."""
         early = copy.deepcopy(self.frames[0])
         for camera in (LEFT, RIGHT):
-            early[camera].header.stamp -= rospy.Duration(100)
+            early[camera].header.stamp -= rospy.Duration(50)
 
         def answers():
             for camera in (LEFT, RIGHT):
@@ -136,7 +136,7 @@ class StereoTest(unittest.TestCase):
             return vehicle.received("odom")
 
         eventually(answers, "odom answers")
-        vehicle.wait_for(right_in=round((early[LEFT].header.stamp - self.frames[0][LEFT].header.stamp).to_sec() * 10) + 1000)
+        vehicle.wait_for(right_in=round((early[LEFT].header.stamp - self.frames[0][LEFT].header.stamp).to_sec() * 10) + 500)
         eventually(lambda: sum(int(vehicle.diagnostics().get(key, "0")) for key in SETTLED) ==
                    int(vehicle.diagnostics()["depth_wanted"]), "nothing waits")
         rospy.sleep(0.5)  # The last depth is on its way.

@@ -1,24 +1,33 @@
 #include <camera_info_manager/camera_info_manager.h>
 #include <image_transport/image_transport.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/CompressedImage.h>
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <thread>
 
+#include "common/error.h"
 #include "common/frame_queue.h"
 #include "common/mutex.h"
+#include "imaging/rectifier.h"
 #include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/ingest_reader.h"
 #include "nodelets/camera_ingest/ingest_stereo.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/stamp_checks.h"
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/parameters/camera_ingest_parameters.h"
 
 namespace livemap::nodelets {
+namespace {
+
+constexpr double kMaxBetweenCamerasS = 60;
+
+}  // namespace
 
 /// The vehicle's cameras: takes images from a topic, device, video file or folder, takes the lens
 /// distortion out, resizes, and publishes `camera_rect/image` with `camera_rect/camera_info`; with
@@ -26,9 +35,9 @@ namespace livemap::nodelets {
 ///
 /// Callbacks only enqueue; one worker decodes, rectifies and publishes. When it is behind, the
 /// oldest waiting frame goes: frames_in = published + dropped + bad + waiting, at any moment.
-class CameraIngestNodelet : public nodelet::Nodelet {
+class CameraIngestPart : public NodeletPart {
  public:
-  ~CameraIngestNodelet() override {
+  ~CameraIngestPart() override {
     diagnostics_.reset();
     image_subscriber_.shutdown();
     info_subscriber_.shutdown();
@@ -39,13 +48,14 @@ class CameraIngestNodelet : public nodelet::Nodelet {
   }
 
  private:
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
-  }
-
-  void Initialize() {
+  void Initialize() override {
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadIngestConfig(parameters);
+    stamps_ = std::make_unique<StampChecks>(getName(), config_.max_stamp_ahead_s, [this] {
+      if (stereo_) stereo_->StartAnew();
+    });
+    // Several cameras may share the topic, each in its own order.
+    stamps_->AllowLate("an image", kMaxBetweenCamerasS);
     queue_ =
         std::make_unique<FrameQueue<IngestFrame>>(static_cast<std::size_t>(config_.queue_size));
     processor_ = std::make_unique<FrameProcessor>(
@@ -57,12 +67,12 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     if (config_.stereo) {
       stereo_ = std::make_unique<IngestStereo>(config_, getNodeHandle(), getName());
     }
-    worker_ = std::thread([this] { Work(); });
     if (source) {
       StartReader(std::move(source));
     } else {
       Subscribe();
     }
+    worker_ = std::thread([this] { Work(); });
     {
       const MutexLock lock(accounts_mutex_);
       window_start_ = ros::WallTime::now();
@@ -86,7 +96,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
       image_subscriber_ = node.subscribe<sensor_msgs::Image>(
           topic, queue_size,
           [this](const sensor_msgs::ImageConstPtr& image) {
-            queue_->Push({image, nullptr});
+            TakeStamped({image, nullptr});
           },
           ros::VoidConstPtr(), hints);
       return;
@@ -96,7 +106,7 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     image_subscriber_ = node.subscribe<sensor_msgs::CompressedImage>(
         topic + "/compressed", queue_size,
         [this](const sensor_msgs::CompressedImageConstPtr& image) {
-          queue_->Push({nullptr, image});
+          TakeStamped({nullptr, image});
         },
         ros::VoidConstPtr(), hints);
   }
@@ -105,13 +115,46 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     // Its set_camera_info service lets a calibrator replace the calibration while this runs.
     info_manager_ = std::make_unique<camera_info_manager::CameraInfoManager>(
         ros::NodeHandle(getNodeHandle(), "camera"), config_.frame_id);
-    if (!info_manager_->loadCameraInfo(config_.camera_info_url) || !info_manager_->isCalibrated()) {
+    if (!info_manager_->loadCameraInfo(config_.camera_info_url)) {
       throw Error("parameter 'camera_info_url' is '" + config_.camera_info_url +
                   "', which is no readable camera calibration file");
     }
+    CheckCalibration(*source);
     reader_ = std::make_unique<IngestReader>(
         config_, std::move(source), [this](IngestFrame frame) { Take(std::move(frame)); },
         [this](const std::string& reason) { MissFrame(reason); });
+  }
+
+  /// Throws Error when the calibration cannot rectify, or is for images of another size.
+  void CheckCalibration(imaging::FrameSource& source) {
+    const auto info = boost::make_shared<sensor_msgs::CameraInfo>(info_manager_->getCameraInfo());
+    try {
+      const imaging::Rectifier checked(
+          ros_io::FromMessage(*info),
+          imaging::OutputSize{config_.output_width, config_.output_height});
+      // A live camera has no first image to look at and go back to.
+      if (config_.source != ros_io::IngestSource::kDevice) CheckFirstFrame(source, info);
+    } catch (const Error& error) {
+      throw Error("parameter 'camera_info_url' is '" + config_.camera_info_url +
+                  "', whose calibration cannot be used: " + error.what());
+    }
+  }
+
+  /// Throws SizeMismatch. What else is wrong with the first image is told when it is read again.
+  void CheckFirstFrame(imaging::FrameSource& source, const sensor_msgs::CameraInfoConstPtr& info) {
+    try {
+      std::optional<imaging::SourceFrame> frame = source.Next();
+      if (frame) processor_->Process(ToIngestFrame(std::move(*frame), {}), info);
+    } catch (const SizeMismatch&) {
+      throw;
+    } catch (const std::exception&) {
+    }
+    source.Rewind();
+  }
+
+  /// A frame of a topic; it keeps its stamp, which must be one.
+  void TakeStamped(IngestFrame frame) {
+    if (stamps_->IsUsable("an image", frame.header().stamp)) queue_->Push(std::move(frame));
   }
 
   /// A frame of the own reader, with the calibration as it is now.
@@ -174,7 +217,9 @@ class CameraIngestNodelet : public nodelet::Nodelet {
       window_start_ = now;
     }
     const bool ended = reader_ && reader_->ended();
-    const bool more_bad = bad_watch_.HasRisen(bad_ + unread_);
+    // A frame whose stamp cannot be came, too, and is bad.
+    const std::uint64_t not_queued = unread_ + stamps_->refused();
+    const bool more_bad = bad_watch_.HasRisen(bad_ + not_queued);
     const bool more_dropped = dropped_watch_.HasRisen(dropped);
     if (ended) {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "the source has ended");
@@ -187,16 +232,18 @@ class CameraIngestNodelet : public nodelet::Nodelet {
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
-    status.add("frames_in", counters.in + unread_);
+    status.add("frames_in", counters.in + not_queued);
     status.add("frames_published", counters.processed);
     status.add("frames_dropped", dropped);
-    status.add("frames_bad", bad_ + unread_);
+    status.add("frames_bad", bad_ + not_queued);
     status.add("rate_hz", rate_hz_);
+    stamps_->Diagnose(status);
     if (stereo_) stereo_->Diagnose(status);
   }
 
   ros_io::IngestConfig config_;
   CalibrationCache calibrations_;
+  std::unique_ptr<StampChecks> stamps_;
   std::unique_ptr<FrameQueue<IngestFrame>> queue_;
   std::unique_ptr<FrameProcessor> processor_;  ///< The worker's.
   image_transport::CameraPublisher publisher_;
@@ -219,6 +266,8 @@ class CameraIngestNodelet : public nodelet::Nodelet {
 
   std::unique_ptr<Diagnostics> diagnostics_;  ///< Last: it uses the rest.
 };
+
+using CameraIngestNodelet = PartNodelet<CameraIngestPart>;
 
 }  // namespace livemap::nodelets
 

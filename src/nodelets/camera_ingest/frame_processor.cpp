@@ -4,10 +4,12 @@
 #include <sensor_msgs/image_encodings.h>
 
 #include <boost/make_shared.hpp>
+#include <functional>
 
 #include "common/clock.h"
 #include "common/error.h"
 #include "imaging/decode.h"
+#include "imaging/orientation.h"
 #include "ros/conversions/camera_info_conversions.h"
 
 namespace livemap::nodelets {
@@ -48,11 +50,18 @@ void CheckRaw(const sensor_msgs::Image& image, std::int64_t max_pixels) {
   }
 }
 
+/// `orientation_of` reads the file again: it is asked only where the size does not fit.
 void CheckSize(std::int64_t width, std::int64_t height,
-               const imaging::CameraCalibration& calibration) {
+               const imaging::CameraCalibration& calibration,
+               const std::function<int()>& orientation_of) {
   if (width == calibration.width && height == calibration.height) return;
-  throw Error("the image is " + Size(width, height) + " but its calibration is for " +
-              Size(calibration.width, calibration.height));
+  const int orientation = orientation_of();
+  throw SizeMismatch(
+      "the image is " + Size(width, height) +
+      (orientation == imaging::kUpright
+           ? ""
+           : " after turning it as its EXIF orientation " + std::to_string(orientation) + " says") +
+      " but its calibration is for " + Size(calibration.width, calibration.height));
 }
 
 bool NeedsConversion(const std::string& encoding) {
@@ -107,7 +116,8 @@ ProcessedFrame FrameProcessor::Process(const IngestFrame& frame,
   rectified.header = frame.header();
   if (frame.raw) {
     CheckRaw(*frame.raw, max_pixels_);
-    CheckSize(frame.raw->width, frame.raw->height, rectifier.input());
+    CheckSize(frame.raw->width, frame.raw->height, rectifier.input(),
+              [] { return imaging::kUpright; });
     if (rectifier.is_identity()) {
       result.image = frame.raw;
     } else {
@@ -119,7 +129,9 @@ ProcessedFrame FrameProcessor::Process(const IngestFrame& frame,
   } else {
     const cv::Mat decoded = imaging::DecodeImage(frame.compressed->data.data(),
                                                  frame.compressed->data.size(), max_pixels_);
-    CheckSize(decoded.cols, decoded.rows, rectifier.input());
+    CheckSize(decoded.cols, decoded.rows, rectifier.input(), [&frame] {
+      return imaging::ReadOrientation(frame.compressed->data.data(), frame.compressed->data.size());
+    });
     rectified.encoding = decoded.channels() == 1 ? encodings::MONO8 : encodings::BGR8;
     rectified.image = rectifier.Apply(decoded);
   }

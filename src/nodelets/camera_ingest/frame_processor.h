@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "common/error.h"
 #include "common/mutex.h"
 #include "imaging/rectifier.h"
 
@@ -20,6 +21,12 @@ struct IngestFrame {
   sensor_msgs::CompressedImageConstPtr compressed;
 
   const std_msgs::Header& header() const { return raw ? raw->header : compressed->header; }
+};
+
+/// An image is not of the size that its calibration is for.
+class SizeMismatch : public Error {
+ public:
+  using Error::Error;
 };
 
 struct ProcessedFrame {
@@ -50,7 +57,8 @@ class FrameProcessor {
   FrameProcessor(imaging::OutputSize output_size, std::int64_t max_pixels)
       : output_size_(output_size), max_pixels_(max_pixels) {}
 
-  /// Throws Error saying what is wrong with the frame or its calibration.
+  /// Throws Error saying what is wrong with the frame or its calibration: SizeMismatch where both
+  /// are valid and do not belong together.
   ProcessedFrame Process(const IngestFrame& frame, const sensor_msgs::CameraInfoConstPtr& info);
 
  private:

@@ -12,8 +12,26 @@ namespace livemap::nodelets {
 namespace {
 
 constexpr double kReopenAfterS = 1.0;
+constexpr double kMaxAheadS = 1.0;  // Of the clock.
+constexpr double kClockPollS = 0.05;
+
+double RateHz(const ros_io::IngestConfig& config, const imaging::FrameSource& source) {
+  return source.rate_hz() > 0 ? source.rate_hz() : config.rate_hz;
+}
 
 }  // namespace
+
+IngestFrame ToIngestFrame(imaging::SourceFrame frame, const std_msgs::Header& header) {
+  if (frame.image.empty()) {
+    auto compressed = boost::make_shared<sensor_msgs::CompressedImage>();
+    compressed->header = header;
+    compressed->data = std::move(frame.encoded);
+    return {nullptr, compressed};
+  }
+  const std::string encoding = frame.image.channels() == 1 ? sensor_msgs::image_encodings::MONO8
+                                                           : sensor_msgs::image_encodings::BGR8;
+  return {cv_bridge::CvImage(header, encoding, frame.image).toImageMsg(), nullptr};
+}
 
 std::unique_ptr<imaging::FrameSource> OpenSource(const ros_io::IngestConfig& config) {
   switch (config.source) {
@@ -37,6 +55,7 @@ IngestReader::IngestReader(const ros_io::IngestConfig& config,
       source_(std::move(source)),
       take_(std::move(take)),
       miss_(std::move(miss)),
+      period_(1 / RateHz(config_, *source_)),
       thread_([this] { Run(); }) {}
 
 IngestReader::~IngestReader() {
@@ -69,26 +88,32 @@ bool IngestReader::GoOn() {
   return false;
 }
 
-IngestFrame IngestReader::Wrap(imaging::SourceFrame frame, ros::Time stamp) const {
-  std_msgs::Header header;
-  header.stamp = stamp;
-  header.frame_id = config_.frame_id;
-  if (frame.image.empty()) {
-    auto compressed = boost::make_shared<sensor_msgs::CompressedImage>();
-    compressed->header = header;
-    compressed->data = std::move(frame.encoded);
-    return {nullptr, compressed};
+ros::Time IngestReader::StampOf(std::int64_t number) {
+  const ros::Time now = ros::Time::now();
+  if (config_.stamps == "wall" || config_.source == ros_io::IngestSource::kDevice) return now;
+  const ros::Duration since_first = period_ * static_cast<double>(number);
+  // The clock was set back, or a simulated one goes slower than the file: a stamp of the future is
+  // of use to nobody.
+  if (first_stamp_ + since_first > now + ros::Duration(kMaxAheadS)) {
+    first_stamp_ = std::max(now, ros::Time(0) + since_first) - since_first;
   }
-  const std::string encoding = frame.image.channels() == 1 ? sensor_msgs::image_encodings::MONO8
-                                                           : sensor_msgs::image_encodings::BGR8;
-  return {cv_bridge::CvImage(header, encoding, frame.image).toImageMsg(), nullptr};
+  return first_stamp_ + since_first;
+}
+
+bool IngestReader::PassMissing(int steps, std::int64_t& number, ros::WallTime& next) {
+  if (steps <= 1) return true;
+  number += steps - 1;
+  next += ros::WallDuration((steps - 1) * period_.toSec());
+  return SleepUntil(next);
 }
 
 void IngestReader::Run() {
   const bool live = config_.source == ros_io::IngestSource::kDevice;
-  const double rate_hz = source_->rate_hz() > 0 ? source_->rate_hz() : config_.rate_hz;
-  const ros::Duration period(1 / rate_hz);
-  const ros::Time first_stamp = ros::Time::now();
+  // Simulated time begins with its first message: no frame is stamped with a time before it.
+  while (ros::Time::now().isZero()) {
+    if (!SleepUntil(ros::WallTime::now() + ros::WallDuration(kClockPollS))) return;
+  }
+  first_stamp_ = ros::Time::now();
   ros::WallTime next = ros::WallTime::now();
   for (std::int64_t number = 0;;) {
     if (!SleepUntil(live ? ros::WallTime::now() : next)) return;
@@ -99,15 +124,19 @@ void IngestReader::Run() {
         source_->Rewind();
         continue;
       }
-      const ros::Time stamp = config_.stamps == "wall" || live
-                                  ? ros::Time::now()
-                                  : first_stamp + period * static_cast<double>(number);
-      take_(Wrap(std::move(*frame), stamp));
+      if (!PassMissing(frame->steps, number, next)) return;
+      std_msgs::Header header;
+      header.stamp = StampOf(number);
+      header.frame_id = config_.frame_id;
+      take_(ToIngestFrame(std::move(*frame), header));
+    } catch (const imaging::UnreadableFrame& unreadable) {
+      miss_(unreadable.what());
+      if (!PassMissing(unreadable.steps(), number, next)) return;
     } catch (const std::exception& exception) {
       miss_(exception.what());
     }
     ++number;
-    next += ros::WallDuration(1 / rate_hz);
+    next += ros::WallDuration(period_.toSec());
   }
 }
 

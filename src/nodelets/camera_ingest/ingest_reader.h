@@ -3,6 +3,7 @@
 #include <ros/time.h>
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -17,6 +18,9 @@ namespace livemap::nodelets {
 
 /// None when the configuration names a topic. Throws Error when the source cannot be opened.
 std::unique_ptr<imaging::FrameSource> OpenSource(const ros_io::IngestConfig& config);
+
+/// A frame of a source as one that came in.
+IngestFrame ToIngestFrame(imaging::SourceFrame frame, const std_msgs::Header& header);
 
 /// Reads a device, video or folder on its own thread at its rate and stamps the frames. Like a
 /// camera it does not wait for whoever takes them. The destructor stops it.
@@ -34,7 +38,11 @@ class IngestReader {
   void Run();
   /// At the end of the frames: false when reading is over.
   bool GoOn();
-  IngestFrame Wrap(imaging::SourceFrame frame, ros::Time stamp) const;
+  /// Lets the time of the frames pass that are missing before one of so many steps. False when
+  /// stopped while sleeping.
+  bool PassMissing(int steps, std::int64_t& number, ros::WallTime& next);
+  /// Stamp of the frame of this number: see the parameter `stamps`.
+  ros::Time StampOf(std::int64_t number);
   /// False when stopped while sleeping.
   bool SleepUntil(ros::WallTime wanted);
 
@@ -42,6 +50,8 @@ class IngestReader {
   const std::unique_ptr<imaging::FrameSource> source_;
   const std::function<void(IngestFrame)> take_;
   const std::function<void(const std::string&)> miss_;
+  const ros::Duration period_;
+  ros::Time first_stamp_;  ///< The thread's.
   Mutex mutex_;
   ConditionVariable stop_requested_;
   bool stopped_ GUARDED_BY(mutex_) = false;

@@ -26,14 +26,15 @@ IngestStereo::IngestStereo(const ros_io::IngestConfig& config, ros::NodeHandle& 
                            std::string name)
     : config_(config),
       name_(std::move(name)),
+      stamps_(name_, config.max_stamp_ahead_s, [this] { rights_.Clear(); }),
       rights_(config.stereo_sync_s, config.stereo_wait_s, RightsKept(config)),
       queue_(static_cast<std::size_t>(config.queue_size)),
       processor_(imaging::OutputSize{config.output_width, config.output_height},
                  static_cast<std::int64_t>(config.max_megapixels * 1e6)) {
   image_transport::ImageTransport transport(node);
   publisher_ = transport.advertiseCamera("camera_rect/depth/image_raw", 10);
-  worker_ = std::thread([this] { Work(); });
   Subscribe(node);
+  worker_ = std::thread([this] { Work(); });
 }
 
 IngestStereo::~IngestStereo() {
@@ -56,7 +57,7 @@ void IngestStereo::Subscribe(ros::NodeHandle& node) {
     image_subscriber_ = node.subscribe<sensor_msgs::Image>(
         topic, queue_size,
         [this](const sensor_msgs::ImageConstPtr& image) {
-          rights_.Put({image, nullptr});
+          PutRight({image, nullptr});
         },
         ros::VoidConstPtr(), hints);
     return;
@@ -64,9 +65,13 @@ void IngestStereo::Subscribe(ros::NodeHandle& node) {
   image_subscriber_ = node.subscribe<sensor_msgs::CompressedImage>(
       topic + "/compressed", queue_size,
       [this](const sensor_msgs::CompressedImageConstPtr& image) {
-        rights_.Put({nullptr, image});
+        PutRight({nullptr, image});
       },
       ros::VoidConstPtr(), hints);
+}
+
+void IngestStereo::PutRight(IngestFrame right) {
+  if (stamps_.IsUsable("a right image", right.header().stamp)) rights_.Put(std::move(right));
 }
 
 void IngestStereo::Take(const ProcessedFrame& left) {
@@ -153,6 +158,7 @@ void IngestStereo::Diagnose(Diagnostics::Status& status) {
   std::nth_element(milliseconds_.begin(), middle, milliseconds_.end());
   status.add("right_in", rights.in);
   status.add("right_unpaired", rights.unpaired);
+  status.add("right_stamps_refused", stamps_.refused());
   status.add("depth_wanted", counters.in);
   status.add("depth_published", counters.processed);
   // The queue counts unusable ones among its dropped ones.

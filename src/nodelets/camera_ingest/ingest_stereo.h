@@ -15,6 +15,7 @@
 #include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/stamp_checks.h"
 #include "ros/parameters/camera_ingest_parameters.h"
 
 namespace livemap::nodelets {
@@ -34,11 +35,14 @@ class IngestStereo {
 
   /// A left image as it was published. Never blocks.
   void Take(const ProcessedFrame& left);
+  /// Time went back: the right images of before are forgotten.
+  void StartAnew() { rights_.Clear(); }
   /// Adds the figures, and what is wrong to the summary.
   void Diagnose(Diagnostics::Status& status);
 
  private:
   void Subscribe(ros::NodeHandle& node);
+  void PutRight(IngestFrame right);
   void Work();
   /// False when the left image has no partner.
   bool PublishDepth(const ProcessedFrame& left);
@@ -50,16 +54,14 @@ class IngestStereo {
   const ros_io::IngestConfig config_;
   const std::string name_;
   image_transport::CameraPublisher publisher_;
-  ros::Subscriber image_subscriber_;
-  ros::Subscriber info_subscriber_;
   CalibrationCache calibrations_;
+  StampChecks stamps_;
   StereoPairBuffer rights_;
   FrameQueue<ProcessedFrame> queue_;
 
   FrameProcessor processor_;  // These three are the worker's.
   imaging::CameraCalibration left_, right_;
   std::unique_ptr<imaging::StereoDepth> matcher_;
-  std::thread worker_;
 
   Mutex accounts_mutex_;  ///< Makes the queue's counters and the ones below one snapshot.
   std::uint64_t bad_ GUARDED_BY(accounts_mutex_) = 0;
@@ -68,6 +70,11 @@ class IngestStereo {
   CounterWatch missing_watch_ GUARDED_BY(accounts_mutex_);
   /// Of the matching, since the last diagnostics.
   std::vector<double> milliseconds_ GUARDED_BY(accounts_mutex_);
+
+  // Last: they use the rest. The worker begins when nothing can fail any more.
+  ros::Subscriber image_subscriber_;
+  ros::Subscriber info_subscriber_;
+  std::thread worker_;
 };
 
 }  // namespace livemap::nodelets

@@ -1,11 +1,17 @@
 #include "nodelets/camera_ingest/stereo_pair_buffer.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/clock.h"
+#include "common/stamp_gate.h"
 
 namespace livemap::nodelets {
 namespace {
+
+std::int64_t StampNs(const IngestFrame& frame) {
+  return static_cast<std::int64_t>(frame.header().stamp.toNSec());
+}
 
 ros::Duration Between(ros::Time a, ros::Time b) { return a < b ? b - a : a - b; }
 
@@ -16,11 +22,15 @@ void StereoPairBuffer::Put(IngestFrame frame) {
     const MutexLock lock(mutex_);
     ++counters_.in;
     silent_ = false;
-    if (!frames_.empty() && frame.header().stamp < frames_.back().header().stamp) {
+    const auto is_before = [](const IngestFrame& one, const IngestFrame& other) {
+      return one.header().stamp < other.header().stamp;
+    };
+    if (!frames_.empty() && IsSetBack(StampNs(frame), StampNs(frames_.back()))) {
       Forget(frames_.size());
     }
     if (frames_.size() == capacity_) Forget(1);
-    frames_.push_back(std::move(frame));
+    const auto place = std::upper_bound(frames_.begin(), frames_.end(), frame, is_before);
+    frames_.insert(place, std::move(frame));
   }
   arrived_.NotifyAll();
 }
@@ -43,6 +53,11 @@ std::optional<IngestFrame> StereoPairBuffer::Take(ros::Time stamp) {
   std::optional<IngestFrame> partner(std::move(frames_.front()));
   frames_.pop_front();
   return partner;
+}
+
+void StereoPairBuffer::Clear() {
+  const MutexLock lock(mutex_);
+  Forget(frames_.size());
 }
 
 void StereoPairBuffer::Close() {

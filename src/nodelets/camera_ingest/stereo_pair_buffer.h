@@ -26,12 +26,15 @@ class StereoPairBuffer {
   StereoPairBuffer(double tolerance_s, double wait_s, std::size_t capacity)
       : tolerance_(tolerance_s), wait_s_(wait_s), capacity_(capacity) {}
 
-  /// Images come in the order of their stamps; one whose stamp goes back begins anew.
+  /// Keeps an image, also one that comes late. A stamp by which time was set back (IsSetBack)
+  /// forgets all before.
   void Put(IngestFrame frame);
   /// The partner of a left image of this stamp, the nearest one; older ones are forgotten. Waits
   /// while it may still come, but not for a camera that has been silent since the last one waited
   /// in vain. None when there is none.
   std::optional<IngestFrame> Take(ros::Time stamp);
+  /// Forgets all images.
+  void Clear();
   /// Ends all waiting.
   void Close();
   Counters counters() const;
@@ -46,7 +49,7 @@ class StereoPairBuffer {
   const std::size_t capacity_;
   mutable Mutex mutex_;
   ConditionVariable arrived_;
-  std::deque<IngestFrame> frames_ GUARDED_BY(mutex_);
+  std::deque<IngestFrame> frames_ GUARDED_BY(mutex_);  ///< In the order of their stamps.
   Counters counters_ GUARDED_BY(mutex_);
   bool silent_ GUARDED_BY(mutex_) = false;
   bool closed_ GUARDED_BY(mutex_) = false;

@@ -2,7 +2,6 @@
 #include <livemap/CandidateFrame.h>
 #include <livemap/DetectionArray.h>
 #include <livemap/HazardReport.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 
@@ -17,6 +16,7 @@
 #include "imaging/decode.h"
 #include "imaging/report_picture.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "perception/detection/annotation.h"
 #include "ros/conversions/detection_conversions.h"
@@ -36,14 +36,10 @@ constexpr double kWorkPeriodS = 0.05;
 /// bridge, which has written who sent them; their pictures go to an unchanged hazard_detection
 /// nodelet under stamps of the zone's own; its answers become reports on the topic of all reports.
 /// All callbacks run one at a time, in the nodelet's own queue.
-class CandidateIntakeNodelet : public nodelet::Nodelet {
+class CandidateIntakePart : public NodeletPart {
  private:
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
-  }
-
-  void Initialize() {
-    using Self = CandidateIntakeNodelet;
+  void Initialize() override {
+    using Self = CandidateIntakePart;
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadCandidateIntakeConfig(parameters);
     intake_ = std::make_unique<zone::OffloadIntake>(config_.intake);
@@ -96,7 +92,9 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
     cv::Mat decoded;
     try {
       decoded = imaging::DecodeImage(job.frame.image.data(), job.frame.image.size(),
-                                     config_.intake.limits.report.max_image_pixels);
+                                     config_.intake.limits.report.max_image_pixels,
+                                     // Its size and intrinsics are those of the stored pixels.
+                                     {imaging::DecodeConfig::Pixels::kGreyOrColour, false});
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "candidate frame of '%s' dropped: %s",
                             job.frame.vehicle_id.c_str(), error.what());
@@ -192,6 +190,8 @@ class CandidateIntakeNodelet : public nodelet::Nodelet {
   ros::SteadyTimer work_timer_;
   std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
+
+using CandidateIntakeNodelet = PartNodelet<CandidateIntakePart>;
 
 }  // namespace livemap::nodelets
 

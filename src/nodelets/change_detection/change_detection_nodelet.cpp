@@ -1,5 +1,4 @@
 #include <cv_bridge/cv_bridge.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/image_encodings.h>
 
 #include <array>
@@ -14,11 +13,13 @@
 #include <thread>
 
 #include "change/objects/change_detector.h"
+#include "change/objects/change_overlay.h"
 #include "common/frame_queue.h"
 #include "common/mutex.h"
 #include "nodelets/change_detection/map_change_sender.h"
 #include "nodelets/change_detection/posed_frame_queue.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "nodelets/vehicle_feed.h"
 #include "ros/conversions/change_conversions.h"
@@ -37,11 +38,12 @@ constexpr double kPickPeriodS = 0.02;
 /// Change detection on board: ChangeDetector with topics, tf and clocks. One worker thread compares
 /// and remembers; all else runs in the nodelet's own queue. An image whose turn comes while the
 /// worker is busy is skipped and counted: what the CPU allows sets the rate, `spacing_m` bounds it.
-class ChangeDetectionNodelet : public nodelet::Nodelet {
+class ChangeDetectionPart : public NodeletPart {
  public:
-  ~ChangeDetectionNodelet() override {
+  ~ChangeDetectionPart() override {
     diagnostics_.reset();
     pick_timer_.stop();
+    depth_subscriber_.shutdown();
     if (feed_) feed_->StopImages();
     if (queue_) queue_->Close();
     if (worker_.joinable()) worker_.join();
@@ -72,11 +74,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     double ms_in_window = 0;
   };
 
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
-  }
-
-  void Initialize() {
+  void Initialize() override {
     const auto now_ns = static_cast<std::int64_t>(ros::WallTime::now().toNSec());
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadChangeDetectionConfig(parameters, now_ns);
@@ -117,29 +115,34 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   }
 
   void Connect() {
-    using Self = ChangeDetectionNodelet;
+    using Self = ChangeDetectionPart;
     ros::NodeHandle& node = getNodeHandle();
     report_publisher_ = node.advertise<ChangedObjects>("change/report", 100);
     mask_publisher_ = node.advertise<sensor_msgs::Image>("change/mask", 2);
     overlay_publisher_ = node.advertise<sensor_msgs::Image>("change/overlay", 2);
+    // First: the callbacks of the others use it.
+    MakeFeed();
     if (config_.use_depth) {
       depth_subscriber_ = node.subscribe("camera/depth/image_raw", 10, &Self::OnDepth, this);
     }
+    // Steady time: a replay that stands still must not keep back what has come.
+    pick_timer_ = node.createSteadyTimer(ros::WallDuration(kPickPeriodS), &Self::OnPickTimer, this);
     diagnostics_ = std::make_unique<Diagnostics>(
         node, getPrivateNodeHandle(),
         Diagnostics::Config{getName(), "change_detection", "change_detection",
                             config_.diagnostics_period_s},
         [this](Diagnostics::Status& status) { Diagnose(status); });
-    // Steady time: a replay that stands still must not keep back what has come.
-    pick_timer_ = node.createSteadyTimer(ros::WallDuration(kPickPeriodS), &Self::OnPickTimer, this);
+  }
+
+  void MakeFeed() {
     VehicleFeed::Handlers handlers;
     handlers.on_fix = [this](const geo::Fix& fix) {
       mutex_.AssertHeld();
-      frames_->AddFix(fix);
+      frames_->AddFix(fix, RosNowNs());
     };
     handlers.on_pose = [this](std::int64_t stamp_ns, const geo::TrackPose& pose) {
       mutex_.AssertHeld();
-      frames_->AddPose(stamp_ns, pose);
+      frames_->AddPose(stamp_ns, pose, RosNowNs());
     };
     handlers.on_intrinsics = [this](const geo::CameraIntrinsics& intrinsics) {
       mutex_.AssertHeld();
@@ -153,16 +156,20 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
       mutex_.AssertHeld();
       frames_->AddImage(image, ros::Time::now().toSec());
     };
+    handlers.on_time_reset = [this] {
+      mutex_.AssertHeld();
+      frames_->StartAnew();
+    };
     feed_ = std::make_unique<VehicleFeed>(
-        node, getPrivateNodeHandle(),
+        getNodeHandle(), getPrivateNodeHandle(),
         VehicleFeed::Config{getName(), config_.map_frame, config_.base_frame,
-                            config_.pose.use_fused},
+                            config_.pose.use_fused, config_.pose.fixes.stamps.max_ahead_s},
         mutex_, std::move(handlers));
   }
 
   void OnDepth(const sensor_msgs::ImageConstPtr& depth) {
     const MutexLock lock(mutex_);
-    frames_->AddDepth(depth);
+    if (feed_->IsUsable("a depth image", depth->header.stamp)) frames_->AddDepth(depth);
   }
 
   void OnPickTimer(const ros::SteadyTimerEvent&) {
@@ -317,6 +324,7 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
     status.add("places_mb", figures_.megabytes);
     status.add("places_damaged", figures_.damaged);
     const auto looked = static_cast<double>(figures_.looked_in_window);
+    feed_->Diagnose(status);
     status.add("looking_ms", looked > 0 ? figures_.ms_in_window / looked : 0.0);
     status.add("method", method_name_);
     status.add("threshold", config_.watch.regions.min_confidence);
@@ -348,6 +356,8 @@ class ChangeDetectionNodelet : public nodelet::Nodelet {
   std::unique_ptr<VehicleFeed> feed_;
   std::unique_ptr<Diagnostics> diagnostics_;
 };
+
+using ChangeDetectionNodelet = PartNodelet<ChangeDetectionPart>;
 
 }  // namespace livemap::nodelets
 

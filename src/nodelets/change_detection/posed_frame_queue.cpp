@@ -18,6 +18,13 @@ void PosedFrameQueue::AddDepth(const sensor_msgs::ImageConstPtr& depth) {
   if (depths_.size() > config_.max_waiting) depths_.erase(depths_.begin());
 }
 
+void PosedFrameQueue::StartAnew() {
+  pose_.Reset();
+  counters_.no_pose += waiting_.size();
+  waiting_.clear();
+  depths_.clear();
+}
+
 std::optional<PosedFrameQueue::Posed> PosedFrameQueue::Next(double now_s) {
   while (!waiting_.empty()) {
     const Waiting& waiting = waiting_.front();

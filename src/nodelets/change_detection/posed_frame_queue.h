@@ -39,8 +39,13 @@ class PosedFrameQueue {
 
   explicit PosedFrameQueue(const Config& config) : config_(config), pose_(config.pose) {}
 
-  void AddFix(const geo::Fix& fix) { pose_.AddFix(fix); }
-  void AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose) { pose_.AddPose(stamp_ns, pose); }
+  /// `now_ns` is the clock of the stamps; 0: it is not known.
+  void AddFix(const geo::Fix& fix, std::int64_t now_ns = 0) { pose_.AddFix(fix, now_ns); }
+  void AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose, std::int64_t now_ns = 0) {
+    pose_.AddPose(stamp_ns, pose, now_ns);
+  }
+  /// The clock was set back: all that waits is forgotten, the images as no_pose.
+  void StartAnew();
   void AddImage(const sensor_msgs::ImageConstPtr& image, double now_s);
   /// Before or after its image.
   void AddDepth(const sensor_msgs::ImageConstPtr& depth);

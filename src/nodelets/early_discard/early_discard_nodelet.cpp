@@ -1,6 +1,5 @@
 #include <cv_bridge/cv_bridge.h>
 #include <livemap/CandidateFrame.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/image_encodings.h>
 
 #include <boost/make_shared.hpp>
@@ -14,7 +13,9 @@
 #include "common/frame_queue.h"
 #include "common/mutex.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/picture_masks.h"
 #include "nodelets/vehicle_feed.h"
 #include "perception/detection/early_discard.h"
 #include "perception/privacy/picture_masker.h"
@@ -34,9 +35,9 @@ constexpr double kSendPeriodS = 0.05;
 /// topics, tf and clocks. One worker thread classifies; all else runs in the nodelet's own queue,
 /// one callback at a time: what is worth sending is masked, encoded and published there once its
 /// pose is known.
-class EarlyDiscardNodelet : public nodelet::Nodelet {
+class EarlyDiscardPart : public NodeletPart {
  public:
-  ~EarlyDiscardNodelet() override {
+  ~EarlyDiscardPart() override {
     diagnostics_.reset();
     send_timer_.stop();
     if (feed_) feed_->StopImages();
@@ -46,13 +47,13 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
 
  private:
   using Clock = std::chrono::steady_clock;
-  using Queue = FrameQueue<sensor_msgs::ImageConstPtr>;
+  struct Taken {
+    sensor_msgs::ImageConstPtr image;
+    std::uint64_t number = 0;  ///< Of CountFrame.
+  };
+  using Queue = FrameQueue<Taken>;
 
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
-  }
-
-  void Initialize() {
+  void Initialize() override {
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadEarlyDiscardConfig(
         parameters, static_cast<std::int64_t>(ros::WallTime::now().toNSec()));
@@ -61,7 +62,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     threshold_ =
         config_.threshold < 0 ? discard_->threshold() : static_cast<float>(config_.threshold);
     masker_ = std::make_unique<perception::PictureMasker>(
-        perception::PictureMasker::Config{config_.privacy, config_.mask});
+        MakeMaskerConfig(config_.privacy, config_.mask));
+    SayWhatFindsFaces(getName(), *masker_);
     sender_ = std::make_unique<vehicle::OffloadSender>(config_.sender);
     queue_ = std::make_unique<Queue>(static_cast<std::size_t>(config_.queue_size));
     Connect();
@@ -69,24 +71,29 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   }
 
   void Connect() {
-    using Self = EarlyDiscardNodelet;
+    using Self = EarlyDiscardPart;
     ros::NodeHandle& node = getNodeHandle();
     publisher_ = node.advertise<CandidateFrame>("candidate/frame", 100);
+    // First: the callbacks of the others use it.
+    MakeFeed();
+    // Steady time: a replay that stands still must not keep back what has come.
+    send_timer_ = node.createSteadyTimer(ros::WallDuration(kSendPeriodS), &Self::OnSendTimer, this);
     diagnostics_ = std::make_unique<Diagnostics>(
         node, getPrivateNodeHandle(),
         Diagnostics::Config{getName(), "early_discard", "early_discard",
                             config_.diagnostics_period_s},
         [this](Diagnostics::Status& status) { Diagnose(status); });
-    // Steady time: a replay that stands still must not keep back what has come.
-    send_timer_ = node.createSteadyTimer(ros::WallDuration(kSendPeriodS), &Self::OnSendTimer, this);
+  }
+
+  void MakeFeed() {
     VehicleFeed::Handlers handlers;
     handlers.on_fix = [this](const geo::Fix& fix) {
       mutex_.AssertHeld();
-      sender_->AddFix(fix);
+      sender_->AddFix(fix, RosNowNs());
     };
     handlers.on_pose = [this](std::int64_t stamp_ns, const geo::TrackPose& pose) {
       mutex_.AssertHeld();
-      sender_->AddPose(stamp_ns, pose);
+      sender_->AddPose(stamp_ns, pose, RosNowNs());
     };
     handlers.on_intrinsics = [this](const geo::CameraIntrinsics& intrinsics) {
       mutex_.AssertHeld();
@@ -98,20 +105,25 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     };
     handlers.on_image = [this](const sensor_msgs::ImageConstPtr& image) {
       mutex_.AssertHeld();
-      masker_->CountFrame();
-      if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push(image);
+      const std::uint64_t number = masker_->CountFrame();
+      if (sender_->Takes(ros_io::FromRosTime(image->header.stamp))) queue_->Push({image, number});
+    };
+    handlers.on_time_reset = [this] {
+      mutex_.AssertHeld();
+      sender_->StartAnew();
     };
     feed_ = std::make_unique<VehicleFeed>(
-        node, getPrivateNodeHandle(),
+        getNodeHandle(), getPrivateNodeHandle(),
         VehicleFeed::Config{getName(), config_.map_frame, config_.base_frame,
-                            config_.sender.pose.use_fused},
+                            config_.sender.pose.use_fused,
+                            config_.sender.pose.fixes.stamps.max_ahead_s},
         mutex_, std::move(handlers));
   }
 
   void Work() {
-    while (const std::optional<sensor_msgs::ImageConstPtr> image = queue_->Pop()) {
+    while (const std::optional<Taken> taken = queue_->Pop()) {
       try {
-        Judge(*image);
+        Judge(*taken);
         queue_->Done();
       } catch (const std::exception& error) {
         queue_->Unusable();
@@ -121,15 +133,17 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     }
   }
 
-  void Judge(const sensor_msgs::ImageConstPtr& image) {
+  void Judge(const Taken& taken) {
     const Clock::time_point start = Clock::now();
-    const auto shared = cv_bridge::toCvShare(image, sensor_msgs::image_encodings::BGR8);
+    const auto shared = cv_bridge::toCvShare(taken.image, sensor_msgs::image_encodings::BGR8);
     const float score = discard_->Score(shared->image);
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     const auto owner = std::make_shared<const cv_bridge::CvImageConstPtr>(shared);
     const MutexLock lock(mutex_);
-    sender_->AddJudged(ros_io::FromRosTime(image->header.stamp), image->header.frame_id, score,
-                       score >= threshold_, {shared->image, owner}, ros::Time::now().toSec());
+    const std_msgs::Header& header = taken.image->header;
+    sender_->AddJudged(ros_io::FromRosTime(header.stamp), header.frame_id, score,
+                       score >= threshold_, {{shared->image, owner}, {}, taken.number},
+                       ros::Time::now().toSec());
     ++judged_in_window_;
     ms_in_window_ += ms;
   }
@@ -138,8 +152,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     const MutexLock lock(mutex_);
     // Without a listener a frame would be spent, not sent.
     if (publisher_.getNumSubscribers() == 0) return;
-    const auto encode = [this](const imaging::Picture& picture, std::size_t max_bytes) {
-      return MaskedJpeg(picture, max_bytes);
+    const auto encode = [this](const vehicle::CameraImage& image, std::size_t max_bytes) {
+      return MaskedJpeg(image, max_bytes);
     };
     for (const protocol::OffloadedFrame& candidate :
          sender_->TakeReady(ros::Time::now().toSec(), encode)) {
@@ -148,14 +162,15 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   }
 
   /// What leaves the car; empty when it cannot be masked: it fails closed.
-  std::vector<std::uint8_t> MaskedJpeg(const imaging::Picture& picture, std::size_t max_bytes) {
-    const cv::Rect whole({}, picture.bgr.size());
-    const perception::PictureMasker::Masked masked = masker_->Mask(picture.bgr, whole);
+  std::vector<std::uint8_t> MaskedJpeg(const vehicle::CameraImage& image, std::size_t max_bytes) {
+    const cv::Mat& bgr = image.picture.bgr;
+    const perception::PictureMasker::Masked masked =
+        masker_->Mask(bgr, image.number, cv::Rect({}, bgr.size()));
     if (masked.bgr.empty()) {
       NODELET_ERROR_THROTTLE(kSayAgainS, "a frame is withheld: %s", masked.why_withheld.c_str());
       return {};
     }
-    return imaging::EncodeJpeg({masked.bgr, picture.owner}, config_.jpeg_quality, max_bytes);
+    return imaging::EncodeJpeg({masked.bgr, image.picture.owner}, config_.jpeg_quality, max_bytes);
   }
 
   void Diagnose(Diagnostics::Status& status) {
@@ -189,6 +204,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
     status.add("candidates_displaced", counters.displaced);
     status.add("candidates_withheld", counters.withheld);
     status.add("regions_masked", masker_->counters().masked_regions);
+    status.add("masks_found_by", masker_->finder());
+    feed_->Diagnose(status);
     status.add("judging_ms", judged_in_window_ > 0
                                  ? ms_in_window_ / static_cast<double>(judged_in_window_)
                                  : 0.0);
@@ -217,6 +234,8 @@ class EarlyDiscardNodelet : public nodelet::Nodelet {
   std::unique_ptr<VehicleFeed> feed_;
   std::unique_ptr<Diagnostics> diagnostics_;
 };
+
+using EarlyDiscardNodelet = PartNodelet<EarlyDiscardPart>;
 
 }  // namespace livemap::nodelets
 

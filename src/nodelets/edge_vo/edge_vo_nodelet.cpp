@@ -1,27 +1,27 @@
 #include <cv_bridge/cv_bridge.h>
 #include <image_transport/image_transport.h>
-#include <image_transport/subscriber_filter.h>
-#include <message_filters/subscriber.h>
 #include <message_filters/sync_policies/approximate_time.h>
 #include <message_filters/sync_policies/exact_time.h>
 #include <message_filters/synchronizer.h>
 #include <nav_msgs/Path.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <algorithm>
+#include <boost/function.hpp>
 #include <chrono>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <vector>
 
+#include "nodelets/bounded_tf_listener.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
+#include "nodelets/stamp_checks.h"
 #include "odometry/edge/edge_view.h"
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/depth_conversions.h"
@@ -29,17 +29,11 @@
 #include "ros/parameters/edge_vo_parameters.h"
 
 namespace livemap::nodelets {
-namespace {
-
-/// A stamp that goes back further than this is a replay that begins again.
-constexpr double kClockSetBackS = 1.0;
-
-}  // namespace
 
 /// Visual odometry on board: image, depth and calibration in; `odom`, tf, `vo/path`, and when
 /// somebody listens `vo/edges` and `vo/points` out. All callbacks run one at a time, in the
 /// nodelet's own queue.
-class EdgeVoNodelet : public nodelet::Nodelet {
+class EdgeVoPart : public NodeletPart {
  private:
   using ImageConstPtr = sensor_msgs::ImageConstPtr;
   using InfoConstPtr = sensor_msgs::CameraInfoConstPtr;
@@ -60,11 +54,7 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     std::vector<double> milliseconds;  // Since the last diagnostics.
   };
 
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
-  }
-
-  void Initialize() {
+  void Initialize() override {
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadEdgeVoConfig(parameters);
     // A mistake in the configuration is one now, not at the first image.
@@ -73,14 +63,15 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     frames_.base = config_.base_frame;
     path_.header.frame_id = config_.odom_frame;
     ros::NodeHandle& node = getNodeHandle();
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, node);
+    tf_listener_ = std::make_unique<BoundedTfListener>(tf_buffer_, node, config_.max_stamp_ahead_s);
+    stamps_ = std::make_unique<StampChecks>(getName(), config_.max_stamp_ahead_s,
+                                            [this] { OnTimeReset(); });
     odometry_publisher_ = node.advertise<nav_msgs::Odometry>("odom", 10);
     path_publisher_ = node.advertise<nav_msgs::Path>("vo/path", 1);
     cloud_publisher_ = node.advertise<sensor_msgs::PointCloud2>("vo/points", 1);
     image_transport::ImageTransport transport(node);
     edges_publisher_ = transport.advertise("vo/edges", 1);
-    reset_service_ =
-        getPrivateNodeHandle().advertiseService("reset", &EdgeVoNodelet::OnReset, this);
+    reset_service_ = getPrivateNodeHandle().advertiseService("reset", &EdgeVoPart::OnReset, this);
     diagnostics_ = std::make_unique<Diagnostics>(
         getNodeHandle(), getPrivateNodeHandle(),
         Diagnostics::Config{getName(), "edge_vo", "edge vo", config_.diagnostics_period_s},
@@ -90,29 +81,65 @@ class EdgeVoNodelet : public nodelet::Nodelet {
 
   void Subscribe(image_transport::ImageTransport& transport) {
     ros::NodeHandle& node = getNodeHandle();
-    const auto queue = static_cast<std::uint32_t>(config_.queue_size);
     const image_transport::TransportHints raw("raw", ros::TransportHints().tcpNoDelay(),
                                               getPrivateNodeHandle());
+    MakeSynchronizer();
     // ROS's own queues have no bound: the synchroniser's have, and drop what finds no partner.
-    image_subscriber_.subscribe(transport, "camera_rect/image", 0, raw);
-    depth_subscriber_.subscribe(transport, "camera/depth/image_raw", 0, raw);
-    info_subscriber_.subscribe(node, "camera_rect/camera_info", 0);
-    image_subscriber_.registerCallback([this](const ImageConstPtr&) { ++arrivals_.images; });
-    depth_subscriber_.registerCallback([this](const ImageConstPtr&) { ++arrivals_.depths; });
-    info_subscriber_.registerCallback([this](const InfoConstPtr&) { ++arrivals_.infos; });
+    image_subscriber_ = transport.subscribe(
+        "camera_rect/image", 0,
+        boost::function<void(const ImageConstPtr&)>([this](const ImageConstPtr& image) {
+          ++arrivals_.images;
+          if (IsUsable("an image", *image)) Synchronize<0>(image);
+        }),
+        ros::VoidPtr(), raw);
+    depth_subscriber_ = transport.subscribe(
+        "camera/depth/image_raw", 0,
+        boost::function<void(const ImageConstPtr&)>([this](const ImageConstPtr& depth) {
+          ++arrivals_.depths;
+          if (IsUsable("a depth image", *depth)) Synchronize<1>(depth);
+        }),
+        ros::VoidPtr(), raw);
+    info_subscriber_ = node.subscribe<sensor_msgs::CameraInfo>(
+        "camera_rect/camera_info", 0, [this](const InfoConstPtr& info) {
+          ++arrivals_.infos;
+          if (IsUsable("a calibration", *info)) Synchronize<2>(info);
+        });
+    silence_timer_ = node.createSteadyTimer(ros::WallDuration(config_.silence_warning_s),
+                                            &EdgeVoPart::OnSilenceTimer, this);
+  }
+
+  void MakeSynchronizer() {
+    const auto queue = static_cast<std::uint32_t>(config_.queue_size);
     if (config_.sync == "exact") {
       exact_ = std::make_unique<Synchronizer<Exact>>(
-          Exact<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo>(queue),
-          image_subscriber_, depth_subscriber_, info_subscriber_);
-      exact_->registerCallback(&EdgeVoNodelet::OnFrame, this);
+          Exact<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo>(queue));
+      exact_->registerCallback(&EdgeVoPart::OnFrame, this);
     } else {
       approximate_ = std::make_unique<Synchronizer<Approximate>>(
-          Approximate<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo>(queue),
-          image_subscriber_, depth_subscriber_, info_subscriber_);
-      approximate_->registerCallback(&EdgeVoNodelet::OnFrame, this);
+          Approximate<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo>(queue));
+      approximate_->registerCallback(&EdgeVoPart::OnFrame, this);
     }
-    silence_timer_ = node.createSteadyTimer(ros::WallDuration(config_.silence_warning_s),
-                                            &EdgeVoNodelet::OnSilenceTimer, this);
+  }
+
+  template <class Message>
+  bool IsUsable(const char* input, const Message& message) {
+    return stamps_->IsUsable(input, message.header.stamp);
+  }
+
+  template <int kInput, class Message>
+  void Synchronize(const Message& message) {
+    if (exact_) exact_->add<kInput>(message);
+    if (approximate_) approximate_->add<kInput>(message);
+  }
+
+  /// A replay that begins again, or a clock that was set back. What still waits for its partners in
+  /// the synchroniser would stay there, newer than all that comes.
+  void OnTimeReset() {
+    MakeSynchronizer();
+    if (!odometry_) return;
+    NODELET_WARN("the images' stamps went back: odometry starts anew");
+    odometry_->Reset();
+    StartAnew();
   }
 
   void OnFrame(const ImageConstPtr& image, const ImageConstPtr& depth, const InfoConstPtr& info) {
@@ -137,18 +164,14 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     }
   }
 
-  /// Calibration and mounting; a new calibration or a clock that was set back starts anew.
+  /// Calibration and mounting; a new calibration starts anew.
   void Prepare(const sensor_msgs::CameraInfo& info, const std_msgs::Header& header) {
     const geo::CameraIntrinsics camera = ros_io::ToRectifiedIntrinsics(info);
     const bool same = odometry_ && camera.fx == camera_.fx && camera.fy == camera_.fy &&
                       camera.cx == camera_.cx && camera.cy == camera_.cy &&
                       camera.width == camera_.width && camera.height == camera_.height;
-    const bool set_back = odometry_ && (last_stamp_ - header.stamp).toSec() > kClockSetBackS;
-    if (same && !set_back) return;
-    if (odometry_) {
-      NODELET_WARN("%s: odometry starts anew",
-                   set_back ? "the images' stamps went back" : "the calibration changed");
-    }
+    if (same) return;
+    if (odometry_) NODELET_WARN("the calibration changed: odometry starts anew");
     const geometry_msgs::TransformStamped mounting = tf_buffer_.lookupTransform(
         config_.base_frame, header.frame_id, ros::Time(0), ros::Duration(0));
     frames_.base_from_optical = tf2::transformToEigen(mounting);
@@ -254,6 +277,7 @@ class EdgeVoNodelet : public nodelet::Nodelet {
     status.add("frames_lost", figures_.lost);
     status.add("keyframes", figures_.keyframes);
     status.add("resets", figures_.resets);
+    stamps_->Diagnose(status);
     status.add("milliseconds_median", times.empty() ? 0.0 : *middle);
     status.add("edges", last_.points);
     status.add("inliers", last_.inliers);
@@ -277,19 +301,22 @@ class EdgeVoNodelet : public nodelet::Nodelet {
   nav_msgs::Path path_;
 
   tf2_ros::Buffer tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<BoundedTfListener> tf_listener_;
+  std::unique_ptr<StampChecks> stamps_;
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   ros::Publisher odometry_publisher_, path_publisher_, cloud_publisher_;
   image_transport::Publisher edges_publisher_;
   ros::ServiceServer reset_service_;
-  ros::SteadyTimer silence_timer_;
 
-  image_transport::SubscriberFilter image_subscriber_, depth_subscriber_;
-  message_filters::Subscriber<sensor_msgs::CameraInfo> info_subscriber_;
   std::unique_ptr<Synchronizer<Exact>> exact_;
   std::unique_ptr<Synchronizer<Approximate>> approximate_;
+  image_transport::Subscriber image_subscriber_, depth_subscriber_;
+  ros::Subscriber info_subscriber_;
+  ros::SteadyTimer silence_timer_;            // After the subscribers, which it names.
   std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
+
+using EdgeVoNodelet = PartNodelet<EdgeVoPart>;
 
 }  // namespace livemap::nodelets
 

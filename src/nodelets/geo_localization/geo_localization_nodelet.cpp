@@ -1,4 +1,3 @@
-#include <nodelet/nodelet.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/static_transform_broadcaster.h>
@@ -12,11 +11,12 @@
 #include <string>
 
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/localization_conversions.h"
-#include "ros/parameters/datum_parameter.h"
 #include "ros/parameters/geo_localization_parameters.h"
+#include "ros/parameters/shared/datum_parameter.h"
 
 namespace livemap::nodelets {
 namespace {
@@ -28,7 +28,7 @@ constexpr double kTickS = 0.02;
 /// Where the vehicle is on the map: fixes and odometry in, fused position and pose and tf
 /// map -> odom out. All callbacks run one at a time, in the nodelet's own queue; an optimisation
 /// takes one of the manager's threads for some milliseconds.
-class GeoLocalizationNodelet : public nodelet::Nodelet {
+class GeoLocalizationPart : public NodeletPart {
  private:
   /// Messages that came since the last look.
   struct Arrivals {
@@ -40,11 +40,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     std::uint64_t used_before = 0;        // Fixes, at the last diagnostics.
   };
 
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] { Initialize(); });
-  }
-
-  void Initialize() {
+  void Initialize() override {
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadGeoLocalizationConfig(parameters);
     localizer_ = std::make_unique<localization::GeoLocalizer>(config_.localizer);
@@ -58,25 +54,25 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>("localization/fix", 10);
     odometry_publisher_ = node.advertise<nav_msgs::Odometry>("localization/odometry", 10);
     reset_service_ =
-        getPrivateNodeHandle().advertiseService("reset", &GeoLocalizationNodelet::OnReset, this);
+        getPrivateNodeHandle().advertiseService("reset", &GeoLocalizationPart::OnReset, this);
     diagnostics_ = std::make_unique<Diagnostics>(
         getNodeHandle(), getPrivateNodeHandle(),
         Diagnostics::Config{getName(), "geo_localization", "geo localization",
                             config_.diagnostics_period_s},
         [this](Diagnostics::Status& status) { Diagnose(status); });
-    fix_subscriber_ = node.subscribe("fix", 1000, &GeoLocalizationNodelet::OnFix, this);
-    odometry_subscriber_ = node.subscribe("odom", 1000, &GeoLocalizationNodelet::OnOdometry, this);
+    fix_subscriber_ = node.subscribe("fix", 1000, &GeoLocalizationPart::OnFix, this);
+    odometry_subscriber_ = node.subscribe("odom", 1000, &GeoLocalizationPart::OnOdometry, this);
     // Steady: a bag that pauses must not keep back what has come.
     tick_timer_ =
-        node.createSteadyTimer(ros::WallDuration(kTickS), &GeoLocalizationNodelet::OnTick, this);
+        node.createSteadyTimer(ros::WallDuration(kTickS), &GeoLocalizationPart::OnTick, this);
     silence_timer_ = node.createSteadyTimer(ros::WallDuration(config_.silence_warning_s),
-                                            &GeoLocalizationNodelet::OnSilenceTimer, this);
+                                            &GeoLocalizationPart::OnSilenceTimer, this);
   }
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
     ++arrivals_.fixes;
     const Stopwatch stopwatch(figures_);
-    feed_->AddFix(ros_io::ToFix(message), SteadyS());
+    feed_->AddFix(ros_io::ToFix(message), SteadyS(), RosNowNs());
     TellNews();
   }
 
@@ -90,17 +86,14 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
                             config_.base_frame.c_str(), config_.odom_frame.c_str());
       return;
     }
-    const bool by_message = config_.odometry_covariance == "message" && newest_odometry_;
     const localization::OdometrySample sample = ros_io::ToOdometrySample(
-        *message, by_message
-                      ? std::make_optional(ros_io::FromRosTime(newest_odometry_->header.stamp))
-                      : std::nullopt);
+        *message,
+        config_.odometry_covariance == "message" ? feed_->newest_odometry_ns() : std::nullopt);
     // Kept until the localizer has it: its twist goes on.
-    newest_odometry_ = message;
     waiting_.push_back(message);
     if (waiting_.size() > kMaxWaiting) waiting_.pop_front();
     const Stopwatch stopwatch(figures_);
-    if (feed_->AddOdometry(sample, SteadyS())) {
+    if (feed_->AddOdometry(sample, SteadyS(), RosNowNs())) {
       ++figures_.begun_anew;
       NODELET_WARN("the odometry's stamps went back: localisation starts anew");
     }
@@ -151,16 +144,39 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     NODELET_WARN_THROTTLE(kSayAgainS, "refused a fix: %s", reason);
   }
 
-  /// Outliers, which show when the odometry has reached them, and earth -> map once the datum is
-  /// known; that stays while the nodelet lives.
+  /// Outliers, which show when the odometry has reached them, stamps that cannot be, and
+  /// earth -> map once the datum is known, or known to be another.
   void TellNews() {
     const std::uint64_t refused = localizer_->counters().fixes_refused;
     if (refused > refused_before_) Explain(localization::GeoLocalizer::FixVerdict::kRefused);
     refused_before_ = refused;
-    if (datum_told_ || !config_.publish_tf || !localizer_->datum()) return;
-    datum_told_ = true;
+    SayBadStamps();
+    const std::optional<geo::GeoPoint> datum = localizer_->datum();
+    if (!config_.publish_tf || !datum) return;
+    if (told_datum_ && told_datum_->latitude_deg == datum->latitude_deg &&
+        told_datum_->longitude_deg == datum->longitude_deg) {
+      return;
+    }
+    if (told_datum_) NODELET_WARN("all fixes are far from the datum: the map begins anew at them");
+    told_datum_ = datum;
     static_broadcaster_.sendTransform(
         ros_io::EarthFromMap(*localizer_->datum(), config_.map_frame, ros::Time::now()));
+  }
+
+  std::uint64_t BadStamps() const {
+    return feed_->fix_stamps().refused() + feed_->odometry_stamps().refused();
+  }
+
+  void SayBadStamps() {
+    const std::uint64_t bad = BadStamps();
+    if (bad > bad_stamps_before_) {
+      NODELET_WARN_THROTTLE(kSayAgainS,
+                            "dropped a fix or odometry whose stamp is more than %.1f s ahead of "
+                            "the clock (max_stamp_ahead_s), or fits neither the clock nor those "
+                            "before it",
+                            config_.feed.stamps.max_ahead_s);
+    }
+    bad_stamps_before_ = bad;
   }
 
   bool OnReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -206,6 +222,7 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
     status.add("poses_published", figures_.published);
     status.add("odometry_of_other_frames", figures_.foreign_frames);
     status.add("begun_anew", figures_.begun_anew);
+    status.add("stamps_refused", BadStamps());
     figures_.total_ms = figures_.longest_ms = 0;
     figures_.used_before = used;
   }
@@ -232,14 +249,14 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   ros_io::GeoLocalizationConfig config_;
   std::unique_ptr<localization::GeoLocalizer> localizer_;
   std::unique_ptr<localization::LocalizerFeed> feed_;
-  nav_msgs::OdometryConstPtr newest_odometry_;
   std::deque<nav_msgs::OdometryConstPtr> waiting_;  // Not yet taken by the localizer.
   Arrivals arrivals_;
   Figures figures_;
   std::string missing_;
   std::string last_refusal_;
   std::uint64_t refused_before_ = 0;
-  bool datum_told_ = false;
+  std::uint64_t bad_stamps_before_ = 0;
+  std::optional<geo::GeoPoint> told_datum_;
 
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   tf2_ros::StaticTransformBroadcaster static_broadcaster_;
@@ -249,6 +266,8 @@ class GeoLocalizationNodelet : public nodelet::Nodelet {
   ros::SteadyTimer tick_timer_, silence_timer_;
   std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };
+
+using GeoLocalizationNodelet = PartNodelet<GeoLocalizationPart>;
 
 }  // namespace livemap::nodelets
 

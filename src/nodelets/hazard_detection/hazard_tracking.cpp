@@ -6,23 +6,19 @@
 #include <cmath>
 #include <map>
 
+#include "nodelets/nodelet_support.h"
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/detection_conversions.h"
 
 namespace livemap::nodelets {
-namespace {
-
-/// Pictures of this many events are kept for who asks for them.
-constexpr std::size_t kReportedViews = 32;
-
-}  // namespace
 
 HazardTracking::HazardTracking(const ros_io::HazardTrackingConfig& config,
-                               const perception::ModelManifest& manifest, ros::NodeHandle node)
+                               const perception::ModelManifest& manifest, ros::NodeHandle node,
+                               double max_stamp_ahead_s)
     : config_(config),
       model_(manifest.name),
       tracker_(config.tracker, manifest.thresholds),
-      listener_(buffer_) {
+      listener_(buffer_, node, max_stamp_ahead_s) {
   info_ = node.subscribe<sensor_msgs::CameraInfo>(
       "camera_rect/camera_info", 2, [this](const sensor_msgs::CameraInfo::ConstPtr& info) {
         try {
@@ -30,7 +26,7 @@ HazardTracking::HazardTracking(const ros_io::HazardTrackingConfig& config,
           const MutexLock lock(mutex_);
           intrinsics_ = intrinsics;
         } catch (const Error& error) {
-          ROS_WARN_THROTTLE(60, "tracking knows no camera: %s", error.what());
+          ROS_WARN_THROTTLE(kSayAgainS, "tracking knows no camera: %s", error.what());
         }
       });
 }
@@ -60,24 +56,18 @@ std::vector<DetectionArray> HazardTracking::Add(
           return a.confidence > b.confidence;
         });
     messages.push_back(ros_io::ToMessage(detections, view, model_, events.front().image_size, 0));
-    reported_.insert(reported_.end(), events.begin(), events.end());
-    while (reported_.size() > kReportedViews) reported_.pop_front();
   }
   return messages;
 }
 
-std::vector<std::int64_t> HazardTracking::WantedPictures() const {
-  std::vector<std::int64_t> wanted = tracker_.BestViews();
-  for (const perception::ObjectEvent& event : reported_) wanted.push_back(event.stamp_ns);
-  return wanted;
-}
-
-std::vector<perception::HazardDetection> HazardTracking::ReportedIn(std::int64_t stamp_ns) const {
-  std::vector<perception::HazardDetection> detections;
-  for (const perception::ObjectEvent& event : reported_) {
-    if (event.stamp_ns == stamp_ns) detections.push_back(event.detection);
+std::vector<ros::Time> HazardTracking::BestViewStamps(
+    const std::vector<DetectionArray>& events) const {
+  std::vector<ros::Time> stamps;
+  for (const std::int64_t stamp_ns : tracker_.BestViews()) {
+    stamps.push_back(ros::Time().fromNSec(static_cast<std::uint64_t>(stamp_ns)));
   }
-  return detections;
+  for (const DetectionArray& event : events) stamps.push_back(event.header.stamp);
+  return stamps;
 }
 
 std::optional<perception::CameraMotion> HazardTracking::MotionAt(const std_msgs::Header& header) {

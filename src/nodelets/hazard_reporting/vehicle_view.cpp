@@ -15,6 +15,11 @@
 #include "ros/views/hazard_view.h"
 
 namespace livemap::nodelets {
+namespace {
+
+constexpr double kMaxRangeM = 100e3;  // Of a map that nobody else has chosen.
+
+}  // namespace
 
 VehicleView::VehicleView(const ros_io::HazardReportingConfig& config,
                          const vehicle::HazardReporter& reporter,
@@ -42,11 +47,10 @@ void VehicleView::LearnDatum(const tf2_ros::Buffer& buffer) {
   }
 }
 
-void VehicleView::ShowFix(std::int64_t stamp_ns) {
+void VehicleView::ShowFix(std::int64_t stamp_ns, const geo::TrackPose& antenna) {
   const bool fused = reporter_.config().position_source == vehicle::PositionSource::kFused;
-  const auto antenna = reporter_.track().Newest();
-  TellPosition(*antenna, ros_io::ToRosTime(stamp_ns));
-  if (!map_ && !fused) map_.emplace(antenna->position);
+  TellPosition(antenna, ros_io::ToRosTime(stamp_ns));
+  if (!fused) ChooseMap(antenna.position);
   const auto at_stamp = reporter_.track().At(stamp_ns);
   if (!map_ || at_stamp.answer != vehicle::FixTrack::Answer::kReady) return;
   const Eigen::Vector2d antenna_m(config_.reporter.antenna_x_m, config_.reporter.antenna_y_m);
@@ -54,6 +58,21 @@ void VehicleView::ShowFix(std::int64_t stamp_ns) {
   geo::TrackPose base = at_stamp.pose;
   base.position = placement::PlaceHazard(base, antenna_m, origin).position;
   ShowVehicle(base, ros_io::ToRosTime(stamp_ns));
+}
+
+/// The map begins where the vehicle is, and again where it has never been able to drive to: where
+/// it was first was wrong.
+void VehicleView::ChooseMap(const geo::GeoPoint& antenna) {
+  const bool keeps =
+      map_ && (config_.map_datum || geo::GeodesicDistanceM(map_->datum(), antenna) <= kMaxRangeM);
+  if (keeps) return;
+  map_.emplace(antenna);
+  path_.poses.clear();
+}
+
+void VehicleView::StartAnew() {
+  path_.poses.clear();
+  position_stamp_.reset();
 }
 
 void VehicleView::ShowPose(const geo::TrackPose& base, const ros::Time& stamp) {

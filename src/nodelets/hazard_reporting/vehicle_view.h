@@ -28,14 +28,17 @@ class VehicleView {
   /// The map frame's place on earth, once it is known.
   const std::optional<geo::LocalFrame>& map() const { return map_; }
 
-  /// Where the fix of this stamp, the newest, is.
-  void ShowFix(std::int64_t stamp_ns);
+  /// Where the fix of this stamp is: `antenna`.
+  void ShowFix(std::int64_t stamp_ns, const geo::TrackPose& antenna);
   /// Where base_link is by a fused pose; the map is known.
   void ShowPose(const geo::TrackPose& base, const ros::Time& stamp);
+  /// Time went back: the path begins anew, the map stays.
+  void StartAnew();
   /// Path and markers, where somebody looks at them.
   void Publish();
 
  private:
+  void ChooseMap(const geo::GeoPoint& antenna);
   void TellPosition(const geo::TrackPose& pose, const ros::Time& stamp);
   void ShowVehicle(const geo::TrackPose& base, const ros::Time& stamp);
 

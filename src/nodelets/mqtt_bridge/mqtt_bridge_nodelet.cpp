@@ -1,5 +1,3 @@
-#include <nodelet/nodelet.h>
-
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "nodelets/diagnostics.h"
+#include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/bridge/bridged_type.h"
 #include "ros/parameters/mqtt_bridge_parameters.h"
@@ -22,9 +21,9 @@ namespace livemap::nodelets {
 /// The multi-master bridge: carries the listed topics between this ROS master and the zone's MQTT
 /// broker. On the zone's side it writes the vehicle whose login the broker checked (it stands in
 /// the MQTT topic) into each message, and sends messages with an addressee to that vehicle's topic.
-class MqttBridgeNodelet : public nodelet::Nodelet {
+class MqttBridgePart : public NodeletPart {
  public:
-  ~MqttBridgeNodelet() override { Close(); }
+  ~MqttBridgePart() override { Close(); }
 
  private:
   /// What goes wrong with messages is counted always and said once a minute: of real time, for a
@@ -61,18 +60,6 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     OnceAMinute say_refusal;
   };
 
-  void onInit() override {
-    InitializeOrExplain(getName(), [this] {
-      try {
-        Initialize();
-      } catch (...) {
-        // The loader takes the callback queues away before it destroys a nodelet that failed.
-        Close();
-        throw;
-      }
-    });
-  }
-
   void Close() {
     // Nothing may call into the client while it goes, nor the client into the topics.
     diagnostics_.reset();
@@ -81,7 +68,7 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
     topics_.clear();
   }
 
-  void Initialize() {
+  void Initialize() override {
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadBridgeConfig(parameters);
     if (!config_.password_file.empty()) {
@@ -260,6 +247,8 @@ class MqttBridgeNodelet : public nodelet::Nodelet {
   std::unique_ptr<transport::MqttClient> client_;
   std::unique_ptr<Diagnostics> diagnostics_;  ///< Last: it uses the rest.
 };
+
+using MqttBridgeNodelet = PartNodelet<MqttBridgePart>;
 
 }  // namespace livemap::nodelets
 

@@ -26,7 +26,7 @@ template <typename Message>
 struct HasVehicleId<Message, std::void_t<decltype(std::declval<Message&>().vehicle_id)>>
     : std::true_type {};
 
-transport::Md5 RequireMd5(const std::string& name, const std::string& text) {
+transport::Md5 RequireBridgedMd5(const std::string& name, const std::string& text) {
   const std::optional<transport::Md5> md5 = transport::ParseMd5(text);
   if (!md5) throw Error("message type '" + name + "' has no MD5 but '" + text + "'");
   return *md5;
@@ -89,8 +89,9 @@ using Factory = std::function<std::unique_ptr<BridgedType>(std::size_t max_bytes
 
 /// `bulk_fields` may fill a message to its own limit; all other strings and arrays are short.
 template <typename Message>
-std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk_fields = {},
-                                            const std::vector<EarlierDefinition>& earlier = {}) {
+std::pair<const std::string, Factory> BridgedTypeEntry(
+    const std::vector<std::string>& bulk_fields = {},
+    const std::vector<EarlierDefinition>& earlier = {}) {
   return {ros::message_traits::datatype<Message>(), [bulk_fields, earlier](std::size_t max_bytes) {
             transport::LayoutLimits limits;
             for (const std::string& field : bulk_fields) limits.fields[field] = max_bytes;
@@ -100,16 +101,16 @@ std::pair<const std::string, Factory> Entry(const std::vector<std::string>& bulk
 
 /// A new message type joins the bridge by one line here. The earlier definitions are version 1 of
 /// theirs, which did not say what a picture shows.
-const std::map<std::string, Factory>& Registry() {
+const std::map<std::string, Factory>& BridgedTypeRegistry() {
   static const std::map<std::string, Factory> kRegistry = {
-      Entry<CandidateFrame>({"image.data"}),
-      Entry<HazardNotice>({"image.data"}),
-      Entry<HazardPoll>({}, {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
-      Entry<HazardPollAnswer>({"image.data"}),
-      Entry<HazardReport>({"image.data"}, {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
-      Entry<MapChange>(),
-      Entry<ReportReceipt>(),
-      Entry<VehiclePosition>(),
+      BridgedTypeEntry<CandidateFrame>({"image.data"}),
+      BridgedTypeEntry<HazardNotice>({"image.data"}),
+      BridgedTypeEntry<HazardPoll>({}, {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
+      BridgedTypeEntry<HazardPollAnswer>({"image.data"}),
+      BridgedTypeEntry<HazardReport>({"image.data"}, {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
+      BridgedTypeEntry<MapChange>(),
+      BridgedTypeEntry<ReportReceipt>(),
+      BridgedTypeEntry<VehiclePosition>(),
   };
   return kRegistry;
 }
@@ -120,11 +121,12 @@ BridgedType::BridgedType(std::string name, const std::string& md5, const std::st
                          std::size_t max_bytes, const transport::LayoutLimits& limits,
                          const std::vector<EarlierDefinition>& earlier)
     : name_(std::move(name)),
-      md5_(RequireMd5(name_, md5)),
+      md5_(RequireBridgedMd5(name_, md5)),
       max_bytes_(max_bytes),
       layout_(name_, definition, limits) {
   for (const EarlierDefinition& definition_before : earlier) {
-    earlier_.emplace_back(RequireMd5(name_, definition_before.md5), definition_before.added_bytes);
+    earlier_.emplace_back(RequireBridgedMd5(name_, definition_before.md5),
+                          definition_before.added_bytes);
   }
 }
 
@@ -172,13 +174,13 @@ std::optional<std::string> BridgedType::PublishChecked(
 
 std::vector<std::string> BridgedTypeNames() {
   std::vector<std::string> names;
-  for (const auto& entry : Registry()) names.push_back(entry.first);
+  for (const auto& entry : BridgedTypeRegistry()) names.push_back(entry.first);
   return names;
 }
 
 std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_t max_bytes) {
-  const auto found = Registry().find(name);
-  if (found != Registry().end()) return found->second(max_bytes);
+  const auto found = BridgedTypeRegistry().find(name);
+  if (found != BridgedTypeRegistry().end()) return found->second(max_bytes);
   std::string accepted;
   for (const std::string& known : BridgedTypeNames()) {
     accepted += (accepted.empty() ? "" : ", ") + known;

@@ -10,7 +10,7 @@
 namespace livemap::ros_io {
 namespace {
 
-int ToInt(std::uint32_t value) {
+int CameraInfoInt(std::uint32_t value) {
   return static_cast<int>(
       std::min<std::uint32_t>(value, static_cast<std::uint32_t>(std::numeric_limits<int>::max())));
 }
@@ -19,8 +19,8 @@ int ToInt(std::uint32_t value) {
 
 imaging::CameraCalibration FromMessage(const sensor_msgs::CameraInfo& message) {
   imaging::CameraCalibration calibration;
-  calibration.width = ToInt(message.width);
-  calibration.height = ToInt(message.height);
+  calibration.width = CameraInfoInt(message.width);
+  calibration.height = CameraInfoInt(message.height);
   calibration.distortion_model = message.distortion_model;
   calibration.distortion = message.D;
   std::copy(message.K.begin(), message.K.end(), calibration.k.val);

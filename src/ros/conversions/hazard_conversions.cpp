@@ -254,6 +254,7 @@ zone::VehicleState FromMessage(const VehiclePosition& message) {
   vehicle.course_rad = static_cast<double>(message.course);
   vehicle.speed_mps = static_cast<double>(message.speed);
   vehicle.stamp_ns = FromRosTime(message.stamp);
+  vehicle.sigma_m = static_cast<double>(message.horizontal_sigma);
   return vehicle;
 }
 

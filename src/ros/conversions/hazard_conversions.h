@@ -46,8 +46,8 @@ HazardNotice ToVehicleMessage(const zone::Hazard& hazard, zone::HazardAction act
 HazardNotice ToMessage(const protocol::Notice& notice);
 protocol::Notice FromMessage(const HazardNotice& message);
 
-/// `horizontal_sigma_m` per axis, NaN when unknown; `map_sequence` up to which the vehicle knows
-/// the zone's announcements.
+/// `horizontal_sigma_m` per axis; the zone refuses a position without it. `map_sequence` up to
+/// which the vehicle knows the zone's announcements.
 VehiclePosition ToMessage(const zone::VehicleState& vehicle, double horizontal_sigma_m,
                           std::uint64_t map_sequence);
 zone::VehicleState FromMessage(const VehiclePosition& message);

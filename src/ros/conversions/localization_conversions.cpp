@@ -19,14 +19,16 @@ constexpr double kLostVariance = 1e5;
 // Of ROS's (x, y, z, roll, pitch, yaw), those of a plane.
 constexpr std::array<std::size_t, 3> kPlanar = {0, 1, 5};
 
-std::size_t CovarianceIndex(std::size_t row, std::size_t column) { return 6 * row + column; }
+std::size_t LocalizationCovarianceIndex(std::size_t row, std::size_t column) {
+  return 6 * row + column;
+}
 
-Eigen::Matrix3d PlanarPart(const boost::array<double, 36>& covariance) {
+Eigen::Matrix3d LocalizationPlanarPart(const boost::array<double, 36>& covariance) {
   Eigen::Matrix3d part;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column) {
       part(static_cast<int>(row), static_cast<int>(column)) =
-          covariance[CovarianceIndex(kPlanar.at(row), kPlanar.at(column))];
+          covariance[LocalizationCovarianceIndex(kPlanar.at(row), kPlanar.at(column))];
     }
   }
   return part;
@@ -44,7 +46,7 @@ localization::OdometrySample ToOdometrySample(const nav_msgs::Odometry& message,
       Eigen::Quaterniond(rotation.w, rotation.x, rotation.y, rotation.z).toRotationMatrix();
   const auto& position = message.pose.pose.position;
   sample.odom_from_base.translation() = Eigen::Vector3d(position.x, position.y, position.z);
-  const Eigen::Matrix3d twist = PlanarPart(message.twist.covariance);
+  const Eigen::Matrix3d twist = LocalizationPlanarPart(message.twist.covariance);
   sample.lost = twist.diagonal().maxCoeff() >= kLostVariance;
   const bool stated = twist.diagonal().minCoeff() > 0;
   if (previous_ns && *previous_ns < sample.stamp_ns && stated && !sample.lost) {
@@ -87,11 +89,11 @@ nav_msgs::Odometry ToFusedOdometry(const localization::FusedPose& fused,
   message.child_frame_id = odometry.child_frame_id;
   message.pose.pose = tf2::toMsg(Eigen::Isometry3d(map_from_odom * sample.odom_from_base));
   for (std::size_t axis = 2; axis < 5; ++axis) {
-    message.pose.covariance[CovarianceIndex(axis, axis)] = kUnknownVariance;
+    message.pose.covariance[LocalizationCovarianceIndex(axis, axis)] = kUnknownVariance;
   }
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column) {
-      message.pose.covariance[CovarianceIndex(kPlanar.at(row), kPlanar.at(column))] =
+      message.pose.covariance[LocalizationCovarianceIndex(kPlanar.at(row), kPlanar.at(column))] =
           fused.map_covariance(static_cast<int>(row), static_cast<int>(column));
     }
   }
@@ -110,7 +112,7 @@ geo::TrackPose ToTrackPose(const nav_msgs::Odometry& message, const geo::LocalFr
   // Clockwise from north, as the map's axes lie there.
   pose.course_rad = std::atan2(forward.x(), forward.y()) + convergence_rad;
   const Eigen::Matrix2d turn = localization::Rotation2(-convergence_rad);
-  const Eigen::Matrix3d covariance = PlanarPart(message.pose.covariance);
+  const Eigen::Matrix3d covariance = LocalizationPlanarPart(message.pose.covariance);
   pose.covariance_m2 = turn * covariance.topLeftCorner<2, 2>() * turn.transpose();
   pose.course_variance_rad2 = covariance(2, 2);
   pose.position_course = -(turn * covariance.topRightCorner<2, 1>());
@@ -164,6 +166,7 @@ void DescribeLocalizer(const localization::GeoLocalizer& localizer,
   status.add("odometry_out_of_order", counters.odometry_out_of_order);
   status.add("odometry_resets", counters.odometry_resets);
   status.add("restarts", counters.restarts);
+  status.add("datum_changes", counters.datum_changes);
   status.add("window_poses", localizer.window_nodes());
   status.add("fix_scatter", localizer.widening());
   const localization::LatencyEstimate latency = localizer.latency();

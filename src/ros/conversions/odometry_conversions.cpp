@@ -10,7 +10,7 @@ namespace livemap::ros_io {
 namespace {
 
 /// Row by row, as ROS has covariances.
-void CopyCovariance(const odometry::Matrix6d& from, boost::array<double, 36>& to) {
+void CopyOdometryCovariance(const odometry::Matrix6d& from, boost::array<double, 36>& to) {
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(to.data()) = from;
 }
 
@@ -34,10 +34,11 @@ nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFr
   turn.topLeftCorner<3, 3>() = odom_from_base.linear();
   turn.bottomRightCorner<3, 3>() = odom_from_base.linear();
   const odometry::Matrix6d pose_jacobian = turn * to_base;
-  CopyCovariance(pose_jacobian * result.covariance * pose_jacobian.transpose(),
-                 message.pose.covariance);
+  CopyOdometryCovariance(pose_jacobian * result.covariance * pose_jacobian.transpose(),
+                         message.pose.covariance);
   if (!result.twist) {
-    CopyCovariance(kUnknownVariance * odometry::Matrix6d::Identity(), message.twist.covariance);
+    CopyOdometryCovariance(kUnknownVariance * odometry::Matrix6d::Identity(),
+                           message.twist.covariance);
     return message;
   }
   const odometry::Vector6d twist = to_base * *result.twist;
@@ -47,7 +48,8 @@ nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFr
   message.twist.twist.angular.x = twist[3];
   message.twist.twist.angular.y = twist[4];
   message.twist.twist.angular.z = twist[5];
-  CopyCovariance(to_base * result.twist_covariance * to_base.transpose(), message.twist.covariance);
+  CopyOdometryCovariance(to_base * result.twist_covariance * to_base.transpose(),
+                         message.twist.covariance);
   return message;
 }
 

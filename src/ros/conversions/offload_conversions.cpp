@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kQuaternionNormSlack = 1e-3;
 
-int ToSide(std::uint32_t pixels) {
+int OffloadSide(std::uint32_t pixels) {
   if (pixels <= static_cast<std::uint32_t>(std::numeric_limits<std::int16_t>::max())) {
     return static_cast<int>(pixels);
   }
@@ -22,7 +22,7 @@ int ToSide(std::uint32_t pixels) {
               std::to_string(std::numeric_limits<std::int16_t>::max()));
 }
 
-Eigen::Isometry3d ToMounting(const geometry_msgs::Transform& message) {
+Eigen::Isometry3d OffloadMounting(const geometry_msgs::Transform& message) {
   Eigen::Quaterniond rotation(message.rotation.w, message.rotation.x, message.rotation.y,
                               message.rotation.z);
   // Written so that NaN is refused too.
@@ -91,9 +91,9 @@ protocol::OffloadedFrame FromMessage(const CandidateFrame& message) {
   candidate.intrinsics.fy = message.fy;
   candidate.intrinsics.cx = message.cx;
   candidate.intrinsics.cy = message.cy;
-  candidate.intrinsics.width = ToSide(message.image_width);
-  candidate.intrinsics.height = ToSide(message.image_height);
-  candidate.base_from_optical = ToMounting(message.mounting);
+  candidate.intrinsics.width = OffloadSide(message.image_width);
+  candidate.intrinsics.height = OffloadSide(message.image_height);
+  candidate.base_from_optical = OffloadMounting(message.mounting);
   candidate.image_frame_id = message.image.header.frame_id;
   candidate.image = message.image.data;
   return candidate;

@@ -10,7 +10,7 @@ namespace livemap::ros_io {
 namespace {
 
 /// A message of version 1 has 0 there: a whole frame.
-protocol::PollPicture PictureOf(const HazardPoll& message) {
+protocol::PollPicture PollPictureOf(const HazardPoll& message) {
   if (message.picture_kind != HazardPoll::WHOLE_FRAME && message.picture_kind != HazardPoll::CROP) {
     throw Error("hazard poll wants picture " + std::to_string(message.picture_kind) +
                 ", accepted is 0 (whole frame) or 1 (crop)");
@@ -53,7 +53,7 @@ protocol::Poll FromMessage(const HazardPoll& message) {
   poll.class_name = message.class_name;
   poll.position = {message.latitude, message.longitude};
   poll.covariance_m2 = ToMatrix(message.covariance);
-  poll.picture = PictureOf(message);
+  poll.picture = PollPictureOf(message);
   poll.max_picture_bytes = message.max_picture_bytes;
   protocol::CheckPoll(poll);
   return poll;

@@ -20,7 +20,7 @@ constexpr double kVehicleWidthM = 3.5;
 constexpr double kTrailDotM = 1.2;
 constexpr double kTrailSpacingM = 1.0;
 
-std_msgs::ColorRGBA Colour(float red, float green, float blue) {
+std_msgs::ColorRGBA ZoneMarkerColour(float red, float green, float blue) {
   std_msgs::ColorRGBA colour;
   colour.r = red;
   colour.g = green;
@@ -29,7 +29,7 @@ std_msgs::ColorRGBA Colour(float red, float green, float blue) {
   return colour;
 }
 
-geometry_msgs::Point ToPoint(const Eigen::Vector2d& east_north_m, double z_m) {
+geometry_msgs::Point ZoneMarkerPoint(const Eigen::Vector2d& east_north_m, double z_m) {
   geometry_msgs::Point point;
   point.x = east_north_m.x();
   point.y = east_north_m.y();
@@ -37,7 +37,8 @@ geometry_msgs::Point ToPoint(const Eigen::Vector2d& east_north_m, double z_m) {
   return point;
 }
 
-Marker Begin(const Marker& base, const std::string& name_space, int id, int type, double size_m) {
+Marker BeginZoneMarker(const Marker& base, const std::string& name_space, int id, int type,
+                       double size_m) {
   Marker marker = base;
   marker.ns = name_space;
   marker.id = id;
@@ -47,9 +48,9 @@ Marker Begin(const Marker& base, const std::string& name_space, int id, int type
   return marker;
 }
 
-void AppendHazards(const std::vector<zone::Hazard>& hazards,
-                   const protocol::HazardCatalogue& catalogue, const geo::LocalFrame& map,
-                   const Marker& base, MarkerArray& array) {
+void AppendZoneHazards(const std::vector<zone::Hazard>& hazards,
+                       const protocol::HazardCatalogue& catalogue, const geo::LocalFrame& map,
+                       const Marker& base, MarkerArray& array) {
   std::map<std::string, Marker> spheres;
   std::vector<Marker> labels;
   for (const zone::Hazard& hazard : hazards) {
@@ -57,29 +58,29 @@ void AppendHazards(const std::vector<zone::Hazard>& hazards,
     Marker& list = known != spheres.end() ? known->second : spheres[hazard.class_name];
     const protocol::HazardClass entry = catalogue.Get(hazard.class_name);
     if (known == spheres.end()) {
-      list = Begin(base, "hazards", static_cast<int>(spheres.size()), Marker::SPHERE_LIST,
-                   kHazardDiameterM);
+      list = BeginZoneMarker(base, "hazards", static_cast<int>(spheres.size()), Marker::SPHERE_LIST,
+                             kHazardDiameterM);
       list.color = ClassColour(entry, 1.0F);
     }
     const Eigen::Vector2d place_m = map.ToEnu(hazard.position);
-    list.points.push_back(ToPoint(place_m, kHazardDiameterM / 2));
+    list.points.push_back(ZoneMarkerPoint(place_m, kHazardDiameterM / 2));
     if (hazards.size() > kMaxLabels) continue;
-    labels.push_back(Begin(base, "labels", static_cast<int>(labels.size()),
-                           Marker::TEXT_VIEW_FACING, kLabelHeightM));
+    labels.push_back(BeginZoneMarker(base, "labels", static_cast<int>(labels.size()),
+                                     Marker::TEXT_VIEW_FACING, kLabelHeightM));
     // North of the sphere: seen from above, height would leave the label on top of it.
     const Eigen::Vector2d beside_m(0, kHazardDiameterM);
-    labels.back().pose.position = ToPoint(place_m + beside_m, kHazardDiameterM);
-    labels.back().color = Colour(1.0F, 1.0F, 1.0F);
+    labels.back().pose.position = ZoneMarkerPoint(place_m + beside_m, kHazardDiameterM);
+    labels.back().color = ZoneMarkerColour(1.0F, 1.0F, 1.0F);
     labels.back().text = entry.label;
   }
   for (const auto& list : spheres) array.markers.push_back(list.second);
   array.markers.insert(array.markers.end(), labels.begin(), labels.end());
 }
 
-void AppendVehicle(const zone::VehicleState& vehicle, const std::deque<geo::GeoPoint>& path, int id,
-                   const geo::LocalFrame& map, const Marker& base, MarkerArray& array) {
-  Marker body = Begin(base, "vehicles", id, Marker::ARROW, kVehicleWidthM);
-  body.pose.position = ToPoint(map.ToEnu(vehicle.position), kVehicleWidthM / 2);
+void AppendZoneVehicle(const zone::VehicleState& vehicle, const std::deque<geo::GeoPoint>& path,
+                       int id, const geo::LocalFrame& map, const Marker& base, MarkerArray& array) {
+  Marker body = BeginZoneMarker(base, "vehicles", id, Marker::ARROW, kVehicleWidthM);
+  body.pose.position = ZoneMarkerPoint(map.ToEnu(vehicle.position), kVehicleWidthM / 2);
   if (std::isfinite(vehicle.course_rad)) {
     body.scale.x = kVehicleLengthM;
     const double yaw_rad = M_PI / 2 - vehicle.course_rad;  // Counterclockwise from east.
@@ -88,20 +89,22 @@ void AppendVehicle(const zone::VehicleState& vehicle, const std::deque<geo::GeoP
   } else {
     body.type = Marker::CUBE;
   }
-  body.color = Colour(0.9F, 0.1F, 0.1F);
+  body.color = ZoneMarkerColour(0.9F, 0.1F, 0.1F);
   array.markers.push_back(body);
   if (path.empty()) return;
-  Marker trail = Begin(base, "trails", id, Marker::SPHERE_LIST, kTrailDotM);
-  trail.color = Colour(0.15F, 0.4F, 1.0F);
-  for (const geo::GeoPoint& point : path) trail.points.push_back(ToPoint(map.ToEnu(point), 0.0));
+  Marker trail = BeginZoneMarker(base, "trails", id, Marker::SPHERE_LIST, kTrailDotM);
+  trail.color = ZoneMarkerColour(0.15F, 0.4F, 1.0F);
+  for (const geo::GeoPoint& point : path)
+    trail.points.push_back(ZoneMarkerPoint(map.ToEnu(point), 0.0));
   array.markers.push_back(trail);
 }
 
-void DescribeMapChanges(const ZoneCloudletCounters& counters,
-                        const zone::MapChangeStatistics& changes,
-                        diagnostic_updater::DiagnosticStatusWrapper& status) {
+void DescribeZoneMapChanges(const ZoneCloudletCounters& counters,
+                            const zone::MapChangeStatistics& changes,
+                            diagnostic_updater::DiagnosticStatusWrapper& status) {
   for (std::size_t i = 0; i < zone::kMapChangeStates; ++i) {
-    status.add(std::string("map_changes_") + zone::StateName(static_cast<zone::MapChangeState>(i)),
+    status.add(std::string("map_changes_") +
+                   zone::MapChangeStateName(static_cast<zone::MapChangeState>(i)),
                changes.by_state[i]);
   }
   status.add("map_changes_received", counters.map_changes_received);
@@ -111,6 +114,7 @@ void DescribeMapChanges(const ZoneCloudletCounters& counters,
   status.add("map_changes_known", changes.known);
   status.add("map_changes_repeated", changes.repeated);
   status.add("map_changes_refused", changes.refused);
+  status.add("map_changes_too_fast", changes.too_fast);
   status.add("map_changes_not_now", changes.not_now);
   status.add("map_changes_malformed", counters.map_changes_malformed);
   status.add("map_changes_not_queued", counters.map_changes_not_queued);
@@ -146,12 +150,13 @@ MarkerArray ZoneMarkers(const std::vector<zone::Hazard>& hazards,
   base.action = Marker::DELETEALL;
   MarkerArray array;
   array.markers.push_back(base);
-  AppendHazards(hazards, catalogue, map, base, array);
+  AppendZoneHazards(hazards, catalogue, map, base, array);
   int id = 0;
   for (const zone::VehicleState& vehicle : vehicles) {
     const auto path = paths.paths().find(vehicle.vehicle_id);
-    AppendVehicle(vehicle, path == paths.paths().end() ? std::deque<geo::GeoPoint>{} : path->second,
-                  id++, map, base, array);
+    AppendZoneVehicle(vehicle,
+                      path == paths.paths().end() ? std::deque<geo::GeoPoint>{} : path->second,
+                      id++, map, base, array);
   }
   return array;
 }
@@ -170,7 +175,7 @@ void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatisti
   }
   status.add("hazards_on_map", statistics.active_hazards);
   for (std::size_t i = 0; i < zone::kHazardStates; ++i) {
-    status.add(std::string("hazards_") + zone::StateName(static_cast<zone::HazardState>(i)),
+    status.add(std::string("hazards_") + zone::HazardStateName(static_cast<zone::HazardState>(i)),
                statistics.hazards_by_state[i]);
   }
   status.add("store_rows_broken", statistics.store_damage.rows);
@@ -201,10 +206,28 @@ void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatisti
   status.add("vehicle_positions", statistics.vehicle_positions);
   status.add("vehicle_positions_refused",
              statistics.vehicle_positions_refused + counters.positions_malformed);
+  for (std::size_t i = 0; i < zone::kRefusalKinds; ++i) {
+    status.add(
+        std::string("positions_refused_") + zone::RefusalName(static_cast<zone::RefusalKind>(i)),
+        statistics.positions_refused_by_kind[i]);
+  }
+  status.add("reports_of_unknown_class", statistics.of_unknown_class);
   status.add("vehicles_joined", counters.vehicles_joined);
   status.add("vehicles_behind", counters.vehicles_behind);
   status.add("image_bytes", statistics.image_bytes);
-  DescribeMapChanges(counters, statistics.map_changes, status);
+  for (std::size_t i = 0; i < zone::kPictureRefusals; ++i) {
+    status.add(std::string("pictures_refused_") +
+                   zone::PictureRefusalName(static_cast<zone::PictureRefusal>(i)),
+               statistics.pictures_refused[i]);
+  }
+  status.add("web_connections", counters.web_connections);
+  status.add("web_connections_ended", counters.web_connections_ended);
+  status.add("web_connections_refused", counters.web_connections_refused);
+  status.add("web_held_bytes", counters.web_held_bytes);
+  status.add("web_pictures_refused", counters.web_pictures_refused);
+  status.add("web_pictures_last_refusal", counters.web_pictures_last_refusal);
+  status.add("web_pictures_busy", counters.web_pictures_busy);
+  DescribeZoneMapChanges(counters, statistics.map_changes, status);
 }
 
 }  // namespace livemap::ros_io

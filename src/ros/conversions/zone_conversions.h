@@ -61,7 +61,14 @@ struct ZoneCloudletCounters {
   std::uint64_t map_changes_malformed = 0;   ///< Answered REFUSED: an unknown schema or direction.
   std::uint64_t map_changes_not_queued = 0;  ///< Too many waited: they are sent again.
   std::size_t map_changes_waiting = 0;
-  std::string store_error;  ///< Of the newest batch; empty when it went well.
+  std::size_t web_connections = 0;
+  std::uint64_t web_connections_ended = 0;    ///< For others that needed their place.
+  std::uint64_t web_connections_refused = 0;  ///< There was no place.
+  std::uint64_t web_held_bytes = 0;           ///< Of the answers that are being written.
+  std::uint64_t web_pictures_refused = 0;     ///< Not accepted when they were to be shown.
+  std::string web_pictures_last_refusal;
+  std::uint64_t web_pictures_busy = 0;  ///< Not made: too many waited.
+  std::string store_error;              ///< Of the newest batch; empty when it went well.
 };
 
 /// Every counter under its own name; an error while the store fails.

@@ -1,11 +1,11 @@
 #include "ros/parameters/camera_ingest_parameters.h"
 
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
-void ReadSource(ParameterReader& parameters, IngestConfig& config) {
+void ReadIngestSource(ParameterReader& parameters, IngestConfig& config) {
   parameters.Section("Source");
   parameters.ReadChoice<IngestSource>(
       "source", config.source,
@@ -44,7 +44,7 @@ void ReadSource(ParameterReader& parameters, IngestConfig& config) {
                   "for example file:///etc/livemap/camera.yaml.");
 }
 
-void ReadOutput(ParameterReader& parameters, IngestConfig& config) {
+void ReadIngestOutput(ParameterReader& parameters, IngestConfig& config) {
   parameters.Section("Output");
   parameters.Read("output_width", config.output_width, {0, 16384},
                   "Width of the published image. 0 keeps the input's width, or the aspect ratio "
@@ -66,10 +66,11 @@ void ReadOutput(ParameterReader& parameters, IngestConfig& config) {
                   "Time that a frame waits for the first camera_info of its frame_id.", "s");
   parameters.Read("max_megapixels", config.max_megapixels, {0.001, 268},
                   "Larger images are refused by their header, before decoding.", "millions of px");
+  ReadStampLimit(parameters, config.max_stamp_ahead_s);
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
 }
 
-void ReadStereo(ParameterReader& parameters, IngestConfig& config) {
+void ReadIngestStereo(ParameterReader& parameters, IngestConfig& config) {
   parameters.Section("Stereo: depth from a right camera");
   parameters.Read("stereo", config.stereo,
                   "Compute depth from camera_right/image_raw (`transport` holds for both cameras) "
@@ -111,7 +112,7 @@ void ReadStereo(ParameterReader& parameters, IngestConfig& config) {
   imaging::CheckStereoConfig(matching);
 }
 
-const char* Name(IngestSource source) {
+const char* IngestSourceName(IngestSource source) {
   return source == IngestSource::kDevice  ? "device"
          : source == IngestSource::kVideo ? "video"
                                           : "folder";
@@ -121,13 +122,13 @@ const char* Name(IngestSource source) {
 
 IngestConfig ReadIngestConfig(ParameterReader& parameters) {
   IngestConfig config;
-  ReadSource(parameters, config);
-  ReadOutput(parameters, config);
-  ReadStereo(parameters, config);
+  ReadIngestSource(parameters, config);
+  ReadIngestOutput(parameters, config);
+  ReadIngestStereo(parameters, config);
   parameters.RejectUnknown();
 
   if (config.source == IngestSource::kTopic) return config;
-  const std::string source = Name(config.source);
+  const std::string source = IngestSourceName(config.source);
   if (config.stereo) {
     throw Error("parameter 'stereo' is true with source '" + source +
                 "', a right camera is read from topics only");

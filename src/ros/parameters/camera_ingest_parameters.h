@@ -3,7 +3,7 @@
 #include <string>
 
 #include "imaging/stereo_depth.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 namespace livemap::ros_io {
 
@@ -27,6 +27,7 @@ struct IngestConfig {
   int subscriber_queue_size = 1000;  ///< Messages; only ever filled while a callback cannot run.
   double calibration_wait_s = 1.0;   ///< How long a frame waits for the first camera_info.
   double max_megapixels = 20;        ///< Larger images are refused before they are decoded.
+  double max_stamp_ahead_s = 5.0;    ///< Of the clock: see StampGate::Config.
   double diagnostics_period_s = 1.0;
 
   bool stereo = false;         ///< Depth from a right camera on camera_right/.

@@ -2,12 +2,12 @@
 
 #include <cstdint>
 
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
-void ReadFrameLimits(ParameterReader& parameters, zone::ReportLimits& limits) {
+void ReadIntakeFrameLimits(ParameterReader& parameters, zone::ReportLimits& limits) {
   parameters.Section("Limits of a frame", "A frame beyond them is refused and counted.");
   // Defaults of frames; those of a report's picture are others.
   limits.max_image_bytes = 200000;
@@ -30,7 +30,7 @@ void ReadFrameLimits(ParameterReader& parameters, zone::ReportLimits& limits) {
                   "Largest standard deviation of the vehicle's own position.", "m");
 }
 
-void ReadVehicleLimits(ParameterReader& parameters, zone::OffloadIntake::Config& intake) {
+void ReadIntakeVehicleLimits(ParameterReader& parameters, zone::OffloadIntake::Config& intake) {
   parameters.Section("Limits of a vehicle");
   parameters.Read("frames_per_minute", intake.allowance.frames_per_minute, {1, 6000},
                   "Frames of one vehicle per minute. The default is a third more than the 3 per "
@@ -51,7 +51,7 @@ void ReadVehicleLimits(ParameterReader& parameters, zone::OffloadIntake::Config&
                   "Time after which a frame without an answer is given up.", "s");
 }
 
-void ReadReports(ParameterReader& parameters, CandidateIntakeConfig& config) {
+void ReadIntakeReports(ParameterReader& parameters, CandidateIntakeConfig& config) {
   zone::OffloadIntake::Config& intake = config.intake;
   parameters.Section("What is reported", "As hazard_reporting of a vehicle with a detector.");
   parameters.Read("min_confidence", intake.min_confidence, {0, 1},
@@ -73,9 +73,9 @@ void ReadReports(ParameterReader& parameters, CandidateIntakeConfig& config) {
 
 CandidateIntakeConfig ReadCandidateIntakeConfig(ParameterReader& parameters) {
   CandidateIntakeConfig config;
-  ReadFrameLimits(parameters, config.intake.limits.report);
-  ReadVehicleLimits(parameters, config.intake);
-  ReadReports(parameters, config);
+  ReadIntakeFrameLimits(parameters, config.intake.limits.report);
+  ReadIntakeVehicleLimits(parameters, config.intake);
+  ReadIntakeReports(parameters, config);
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
   parameters.RejectUnknown({"image_transport", "diagnostic_period"});

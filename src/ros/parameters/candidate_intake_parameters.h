@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 #include "zone/offload/offload_intake.h"
 
 namespace livemap::ros_io {

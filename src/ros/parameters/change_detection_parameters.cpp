@@ -1,7 +1,7 @@
 #include "ros/parameters/change_detection_parameters.h"
 
 #include "change/methods/change_network.h"
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
@@ -10,7 +10,7 @@ namespace {
 constexpr double kClassicalThreshold = 0.3;
 constexpr double kMegabyte = 1e6;
 
-void ReadMemory(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
+void ReadChangeMemory(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
   change::PlaceMemory::Config& memory = watch.memory;
   parameters.Section("Memory of places");
   parameters.ReadRequired("directory", memory.directory, "~/places",
@@ -43,7 +43,7 @@ void ReadMemory(ParameterReader& parameters, change::ChangeDetector::Config& wat
                   "Time in which a picture loses half of its worth.", "days");
 }
 
-void ReadReach(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
+void ReadChangeReach(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
   change::PlaceMemory::Config& memory = watch.memory;
   parameters.Section("Choice of the earlier picture");
   // On board fewer than the library's own default, for the time they take; and its 30 degrees.
@@ -61,7 +61,7 @@ void ReadReach(ParameterReader& parameters, change::ChangeDetector::Config& watc
                   "Number of candidates that registration may try, those with the most matches.");
 }
 
-void ReadObjects(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
+void ReadChangeObjects(ParameterReader& parameters, change::ChangeDetector::Config& watch) {
   parameters.Section("From pixels to objects on the road");
   parameters.Read("min_region_px", watch.regions.min_pixels, {1, 1e6},
                   "Smaller pieces are noise. Pixels of a picture 320 wide.", "px");
@@ -77,7 +77,7 @@ void ReadObjects(ParameterReader& parameters, change::ChangeDetector::Config& wa
   ReadProjectionErrors(parameters, tracker.ground);
 }
 
-void RefuseFormerNames(const ParameterReader& parameters) {
+void RefuseFormerChangeNames(const ParameterReader& parameters) {
   for (const auto& [former, present] :
        {std::pair{"most_position_sigma_m", "max_position_sigma_m"},
         {"most_cell_mb", "max_cell_mb"},
@@ -98,7 +98,7 @@ void RefuseFormerNames(const ParameterReader& parameters) {
 
 ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std::int64_t now_ns) {
   ChangeDetectionConfig config;
-  RefuseFormerNames(parameters);
+  RefuseFormerChangeNames(parameters);
   parameters.Section("Method");
   parameters.ReadChoice(
       "method", config.method, {"network", "dense-sift", "daisy"},
@@ -133,8 +133,8 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
                   "A picture whose position is less certain than this is neither compared nor "
                   "remembered. Standard deviation per axis.",
                   "m");
-  ReadMemory(parameters, config.watch);
-  ReadReach(parameters, config.watch);
+  ReadChangeMemory(parameters, config.watch);
+  ReadChangeReach(parameters, config.watch);
   parameters.Section("Registration of the earlier picture",
                      "By camera/depth/image_raw where that knows enough, else by all edges of both "
                      "pictures, else by features that match.");
@@ -144,7 +144,7 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
   parameters.Read("depth_wait_s", config.depth_wait_s, {0, 60},
                   "Time that an image waits for its depth image; then it goes without.", "s");
   ReadDepthUnits(parameters, config.depth_units_per_m);
-  ReadObjects(parameters, config.watch);
+  ReadChangeObjects(parameters, config.watch);
   parameters.Section(
       "Reports to the zone",
       "The zone is told each object once, when the vehicle has passed it (change/map_change).");
@@ -161,6 +161,8 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
   parameters.Read("map_frame", config.map_frame, "Frame of the fused poses.");
   ReadBasePoseSource(parameters, config.pose);
   parameters.Section("Period of the diagnostics");
+  ReadStampLimit(parameters, config.pose.fixes.stamps.max_ahead_s);
+  config.pose.poses.stamps = config.pose.fixes.stamps;
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
   parameters.RejectUnknown({"diagnostic_period"});
   return config;

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "change/objects/change_detector.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
 namespace livemap::ros_io {

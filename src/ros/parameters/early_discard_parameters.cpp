@@ -1,11 +1,11 @@
 #include "ros/parameters/early_discard_parameters.h"
 
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
-void ReadClassifier(ParameterReader& parameters, EarlyDiscardConfig& config) {
+void ReadDiscardClassifier(ParameterReader& parameters, EarlyDiscardConfig& config) {
   parameters.Section("Classifier");
   parameters.ReadRequired(
       "model", config.model, "models/early-discard.yaml",
@@ -27,7 +27,8 @@ void ReadClassifier(ParameterReader& parameters, EarlyDiscardConfig& config) {
   ListImageTransport(parameters);
 }
 
-void ReadSender(ParameterReader& parameters, EarlyDiscardConfig& config, std::int64_t now_ns) {
+void ReadDiscardSender(ParameterReader& parameters, EarlyDiscardConfig& config,
+                       std::int64_t now_ns) {
   vehicle::OffloadSender::Config& sender = config.sender;
   parameters.Section("Frames that leave the vehicle");
   parameters.Read("min_spacing_m", sender.min_spacing_m, {0, 1000},
@@ -56,8 +57,8 @@ void ReadSender(ParameterReader& parameters, EarlyDiscardConfig& config, std::in
 
 EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int64_t now_ns) {
   EarlyDiscardConfig config;
-  ReadClassifier(parameters, config);
-  ReadSender(parameters, config, now_ns);
+  ReadDiscardClassifier(parameters, config);
+  ReadDiscardSender(parameters, config, now_ns);
   parameters.Section("Faces and number plates");
   ReadPrivacy(parameters, config.privacy, config.mask,
               "Mask faces and number plates before a frame leaves the vehicle. A frame that cannot "
@@ -70,6 +71,8 @@ EarlyDiscardConfig ReadEarlyDiscardConfig(ParameterReader& parameters, std::int6
   parameters.Read("map_frame", config.map_frame, "Frame of the fused poses.");
   ReadBasePoseSource(parameters, config.sender.pose);
   parameters.Section("Period of the diagnostics");
+  ReadStampLimit(parameters, config.sender.pose.fixes.stamps.max_ahead_s);
+  config.sender.pose.poses.stamps = config.sender.pose.fixes.stamps;
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
   parameters.RejectUnknown({"diagnostic_period"});
   return config;

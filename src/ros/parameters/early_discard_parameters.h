@@ -4,7 +4,7 @@
 #include <string>
 
 #include "perception/privacy/privacy_mask.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 #include "vehicle/reporting/offload_sender.h"
 
 namespace livemap::ros_io {

@@ -1,11 +1,11 @@
 #include "ros/parameters/edge_vo_parameters.h"
 
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
-void ReadEdges(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
+void ReadVoEdges(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
   parameters.Section("Edges and their depth");
   std::string edges = odometry::EdgeKindName(odometry.edges.kind);
   parameters.ReadChoice("edges", edges, {"canny", "log", "sobel", "structured"},
@@ -44,7 +44,7 @@ void ReadEdges(ParameterReader& parameters, odometry::EdgeOdometry::Config& odom
   }
 }
 
-void ReadKeyframes(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
+void ReadVoKeyframes(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
   parameters.Section("Keyframes");
   parameters.Read(
       "keyframe_every", odometry.keyframe_every, {0, 10000},
@@ -69,7 +69,7 @@ void ReadKeyframes(ParameterReader& parameters, odometry::EdgeOdometry::Config& 
                   "Number of keyframes that are kept to recover after tracking was lost.");
 }
 
-void ReadLoss(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
+void ReadVoLoss(ParameterReader& parameters, odometry::EdgeOdometry::Config& odometry) {
   parameters.Section("Loss of tracking");
   parameters.Read("lost_sigma", odometry.lost_sigma, {1, 255},
                   "Residuals of this standard deviation mean that tracking is lost.",
@@ -90,9 +90,9 @@ void ReadLoss(ParameterReader& parameters, odometry::EdgeOdometry::Config& odome
 
 EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
   EdgeVoConfig config;
-  ReadEdges(parameters, config.odometry);
-  ReadKeyframes(parameters, config.odometry);
-  ReadLoss(parameters, config.odometry);
+  ReadVoEdges(parameters, config.odometry);
+  ReadVoKeyframes(parameters, config.odometry);
+  ReadVoLoss(parameters, config.odometry);
   parameters.Section("Topics and frames");
   parameters.ReadChoice("sync", config.sync, {"exact", "approximate"},
                         "How image, depth and calibration are matched by their stamps.");
@@ -111,6 +111,7 @@ EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
   parameters.Read("silence_warning_s", config.silence_warning_s, {0.1, 3600},
                   "Without a synchronised frame for so long, the log says which topic is missing.",
                   "s");
+  ReadStampLimit(parameters, config.max_stamp_ahead_s);
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
   parameters.RejectUnknown({"image_transport"});
   return config;

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "odometry/edge/edge_odometry.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 namespace livemap::ros_io {
 
@@ -20,6 +20,7 @@ struct EdgeVoConfig {
   int path_max_poses = 10000;
   double cloud_voxel_m = 0.05;     ///< 0: every point.
   double silence_warning_s = 5.0;  ///< Without a synchronised frame for so long, it says why.
+  double max_stamp_ahead_s = 5.0;  ///< Of the clock: see StampGate::Config.
   double diagnostics_period_s = 1.0;
 };
 

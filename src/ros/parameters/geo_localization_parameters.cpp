@@ -1,7 +1,7 @@
 #include "ros/parameters/geo_localization_parameters.h"
 
-#include "ros/parameters/datum_parameter.h"
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/datum_parameter.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
@@ -9,7 +9,7 @@ namespace {
 // The localizer checks its own settings, too, for programs that have no parameters: the ranges are
 // those of Check, localization/localizer_config.h; parameters_test compares them.
 
-void ReadEstimation(ParameterReader& parameters, GeoLocalizationConfig& config) {
+void ReadLocalizationEstimation(ParameterReader& parameters, GeoLocalizationConfig& config) {
   localization::LocalizerConfig& localizer = config.localizer;
   parameters.Section("Estimation");
   parameters.Read("window_s", localizer.window_s, {2, 300},
@@ -45,7 +45,7 @@ void ReadEstimation(ParameterReader& parameters, GeoLocalizationConfig& config) 
                   "s");
 }
 
-void ReadReceiver(ParameterReader& parameters, localization::ReceiverModel& receiver) {
+void ReadLocalizationReceiver(ParameterReader& parameters, localization::ReceiverModel& receiver) {
   parameters.Section("Receiver");
   parameters.Read("antenna_x_m", receiver.antenna_m.x(), {-50, 50},
                   "Place of the receiver's antenna in base_link, forward.", "m");
@@ -75,7 +75,7 @@ void ReadReceiver(ParameterReader& parameters, localization::ReceiverModel& rece
                   "Time after which that shared part correlates by 1/e.", "s");
 }
 
-void ReadOdometry(ParameterReader& parameters, GeoLocalizationConfig& config) {
+void ReadLocalizationOdometry(ParameterReader& parameters, GeoLocalizationConfig& config) {
   localization::OdometryModel& odometry = config.localizer.odometry;
   parameters.Section("Odometry");
   parameters.ReadChoice(
@@ -121,15 +121,16 @@ GeoLocalizationConfig ReadGeoLocalizationConfig(ParameterReader& parameters) {
   GeoLocalizationConfig config;
   localization::LocalizerConfig& localizer = config.localizer;
   parameters.Section("Map");
-  localizer.datum = ReadDatum(parameters, "the first fix",
+  localizer.datum = ReadDatum(parameters, "the first fix with which others agree",
                               "Origin of the map, \"LATITUDE,LONGITUDE\" in degrees: the map is "
                               "the east-north-up plane that touches the ellipsoid there; empty: "
-                              "the first fix. tf earth -> map tells the other nodes.");
+                              "the first fix with which others agree. tf earth -> map tells the "
+                              "other nodes.");
   parameters.Read("max_range_m", localizer.max_range_m, {1, 300e3},
                   "Fixes further than this from the datum are refused.", "m");
-  ReadEstimation(parameters, config);
-  ReadReceiver(parameters, localizer.receiver);
-  ReadOdometry(parameters, config);
+  ReadLocalizationEstimation(parameters, config);
+  ReadLocalizationReceiver(parameters, localizer.receiver);
+  ReadLocalizationOdometry(parameters, config);
   parameters.Section("Topics and frames");
   parameters.Read("map_frame", config.map_frame, "Frame of the map, after REP 105.");
   parameters.Read("odom_frame", config.odom_frame,
@@ -141,6 +142,7 @@ GeoLocalizationConfig ReadGeoLocalizationConfig(ParameterReader& parameters) {
   parameters.Read("silence_warning_s", config.silence_warning_s, {0.1, 3600},
                   "Without fixes or without odometry for so long, the log says which is missing.",
                   "s");
+  ReadStampLimit(parameters, config.feed.stamps.max_ahead_s);
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
   return config;

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "localization/localizer_feed.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 namespace livemap::ros_io {
 

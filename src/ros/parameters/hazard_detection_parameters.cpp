@@ -1,11 +1,11 @@
 #include "ros/parameters/hazard_detection_parameters.h"
 
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
-void ReadNetwork(ParameterReader& parameters, HazardDetectionConfig& config) {
+void ReadDetectionNetwork(ParameterReader& parameters, HazardDetectionConfig& config) {
   parameters.Section("Network");
   parameters.ReadRequired("model", config.model, "models/hazards-base.yaml",
                           "Path of the model's manifest, models/NAME.yaml. The launch files set it "
@@ -34,24 +34,21 @@ void ReadNetwork(ParameterReader& parameters, HazardDetectionConfig& config) {
                      "on another machine; the receiving thread decodes.");
 }
 
-void ReadPictures(ParameterReader& parameters, HazardDetectionConfig& config) {
+void ReadDetectionPictures(ParameterReader& parameters, HazardDetectionConfig& config) {
   parameters.Section("Pictures");
   parameters.Read("annotate_empty", config.annotate_empty,
                   "Publish hazard/annotated also for images in which nothing was found. Drawing "
                   "copies the image.");
-  parameters.Read("picture_frames", config.picture_frames, {1, 1000},
-                  "Number of images with detections of which a picture may be asked for by "
-                  "hazard/picture_request. Images of best views are kept longer. They are "
-                  "pointers, but they hold the images' memory.");
+  parameters.Removed("picture_frames",
+                     "hazard_reporting keeps the images, as many as its own picture_frames says");
   parameters.Section("Faces and number plates");
   ReadPrivacy(parameters, config.privacy, config.mask,
-              "Mask faces and number plates in every picture that the nodelet gives "
-              "(hazard/picture, hazard/picture_part, hazard/annotated). No other picture leaves "
-              "the vehicle. A picture that cannot be masked is not published. Set it to false only "
-              "where the law and the people in the pictures allow it.");
+              "Mask faces and number plates in hazard/annotated, which does not leave the vehicle. "
+              "A picture that cannot be masked is not published. The pictures that leave the "
+              "vehicle are hazard_reporting's: its own parameter says whether they are masked.");
 }
 
-void ReadTracking(ParameterReader& parameters, HazardTrackingConfig& config) {
+void ReadDetectionTracking(ParameterReader& parameters, HazardTrackingConfig& config) {
   perception::ObjectTracker::Config& tracker = config.tracker;
   parameters.Section("Tracking");
   parameters.Read("tracking", config.tracking,
@@ -101,10 +98,11 @@ void ReadTracking(ParameterReader& parameters, HazardTrackingConfig& config) {
 
 HazardDetectionConfig ReadHazardDetectionConfig(ParameterReader& parameters) {
   HazardDetectionConfig config;
-  ReadNetwork(parameters, config);
-  ReadPictures(parameters, config);
-  ReadTracking(parameters, config.tracking);
+  ReadDetectionNetwork(parameters, config);
+  ReadDetectionPictures(parameters, config);
+  ReadDetectionTracking(parameters, config.tracking);
   parameters.Section("Period of the diagnostics");
+  ReadStampLimit(parameters, config.max_stamp_ahead_s);
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
   parameters.RejectUnknown({"diagnostic_period"});
   if (config.model.empty()) {

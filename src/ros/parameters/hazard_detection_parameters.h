@@ -4,7 +4,7 @@
 
 #include "perception/privacy/privacy_mask.h"
 #include "perception/tracking/object_tracker.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 namespace livemap::ros_io {
 
@@ -25,10 +25,10 @@ struct HazardDetectionConfig {
   int threads = 2;              ///< Of each engine; OpenCV's are one pool; 0 = all cores.
   int queue_size = 4;           ///< Frames that may wait.
   bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
-  bool privacy = true;          ///< Mask faces and number plates in the picture.
+  bool privacy = true;          ///< Mask faces and number plates in hazard/annotated.
   perception::PrivacyMask::Config mask;
   HazardTrackingConfig tracking;
-  int picture_frames = 64;          ///< Images with detections that may be asked for.
+  double max_stamp_ahead_s = 5.0;   ///< Of the clock: see StampGate::Config.
   double diagnostics_period_s = 1;  ///< s
 };
 

@@ -2,14 +2,14 @@
 
 #include <cstdlib>
 
-#include "ros/parameters/datum_parameter.h"
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/datum_parameter.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
 /// Where ROS keeps a user's files.
-std::string DefaultDatabase() {
+std::string DefaultReportingDatabase() {
   if (const char* ros_home = std::getenv("ROS_HOME")) {
     return std::string(ros_home) + "/livemap/local_hazards.sqlite3";
   }
@@ -17,7 +17,8 @@ std::string DefaultDatabase() {
   return std::string(home != nullptr ? home : ".") + "/.ros/livemap/local_hazards.sqlite3";
 }
 
-void ReadMap(ParameterReader& parameters, HazardReportingConfig& config, std::int64_t now_ns) {
+void ReadReportingMap(ParameterReader& parameters, HazardReportingConfig& config,
+                      std::int64_t now_ns) {
   vehicle::HazardReporter::Config& reporter = config.reporter;
   reporter.drive_id = ReadDriveId(parameters, now_ns);
   parameters.Read("catalogue", config.catalogue,
@@ -29,7 +30,7 @@ void ReadMap(ParameterReader& parameters, HazardReportingConfig& config, std::in
       "Path of the SQLite database, one file per vehicle: two vehicles on one machine need two "
       "files. Empty: $ROS_HOME/livemap/local_hazards.sqlite3, where ROS_HOME is ~/.ros unless set. "
       "vehicle.launch sets it to `directory`/local_hazards.sqlite3.");
-  if (reporter.map.path.empty()) reporter.map.path = DefaultDatabase();
+  if (reporter.map.path.empty()) reporter.map.path = DefaultReportingDatabase();
   parameters.Read("max_known", reporter.map.max_known, {1, 10e6},
                   "Number of hazards that are remembered. Beyond it the hazards longest without "
                   "news are forgotten.");
@@ -41,7 +42,7 @@ void ReadMap(ParameterReader& parameters, HazardReportingConfig& config, std::in
                   "bytes");
 }
 
-void ReadSightings(ParameterReader& parameters, HazardReportingConfig& config) {
+void ReadReportingSightings(ParameterReader& parameters, HazardReportingConfig& config) {
   vehicle::HazardReporter::Config& reporter = config.reporter;
   parameters.Section("Sightings");
   parameters.Read(
@@ -49,13 +50,9 @@ void ReadSightings(ParameterReader& parameters, HazardReportingConfig& config) {
       "Source of the sightings. true: the objects of hazard/events, each once, at its best view "
       "(`tracking` of hazard_detection). false: every detection of hazard/detections that is no "
       "duplicate. vehicle.launch sets it by its argument `tracking`.");
-  reporter.pictures_on_demand = config.use_events;
-  parameters.Read("pictures_on_demand", reporter.pictures_on_demand,
-                  "Source of the reports' pictures. true: the nodelet asks for the picture of a "
-                  "report by hazard/picture_request, and it comes on hazard/picture_part or, "
-                  "whole, on hazard/picture. false: the nodelet takes hazard/annotated, for which "
-                  "hazard_detection draws and masks every image with detections. Where it is not "
-                  "set: as use_events. vehicle.launch sets it by its argument `detect`.");
+  parameters.Removed("pictures_on_demand",
+                     "hazard_reporting makes every picture itself, of the images of "
+                     "camera_rect/image");
   parameters.Read(
       "memory_s", reporter.track.keep_s, {5, 600},
       "Time that fixes and fused poses are kept. An event may be this old when it comes.", "s");
@@ -82,12 +79,18 @@ void ReadSightings(ParameterReader& parameters, HazardReportingConfig& config) {
       "Number of frames with sightings that may wait. Beyond it the oldest frame is dropped.");
 }
 
-void ReadPicture(ParameterReader& parameters, vehicle::HazardReporter::Config& reporter) {
+void ReadReportingPicture(ParameterReader& parameters, HazardReportingConfig& config) {
+  vehicle::HazardReporter::Config& reporter = config.reporter;
   parameters.Section("Picture of a report");
+  parameters.Read("picture_frames", config.picture_frames, {1, 1000},
+                  "Number of images of camera_rect/image that are kept until it is known whether a "
+                  "picture of them is wanted. As many more are kept where the tracker names them "
+                  "as best views. They are pointers, but they hold the images' memory.");
+  ListImageTransport(parameters, " Inside the manager raw images move by pointer.");
   parameters.Read(
-      "picture_wait_s", reporter.picture_wait_s, {0, 60},
-      "Time to wait for the picture, from the moment when it is missed. Then the report goes "
-      "without a picture. Where nobody offers pictures, the report does not wait.",
+      "picture_wait_s", config.pictures.max_wait_s, {0, 60},
+      "Longest time that a report waits for its picture to be masked and encoded. Then the report "
+      "goes without a picture.",
       "s");
   parameters.Read("jpeg_quality", reporter.picture.quality, {1, 100},
                   "JPEG quality of the report's picture.");
@@ -98,9 +101,15 @@ void ReadPicture(ParameterReader& parameters, vehicle::HazardReporter::Config& r
   parameters.Read("picture_context", reporter.picture.context, {0, 100},
                   "The picture shows this many times the box's sides, at least 240 x 160 pixels. "
                   "0: the whole image.");
+  parameters.Section("Faces and number plates");
+  ReadPrivacy(parameters, config.privacy, config.mask,
+              "Mask faces and number plates in every picture of a report and of an answer. With "
+              "early_discard's frames these are all pictures that leave the vehicle. A picture "
+              "that cannot be masked does not leave it. Set it to false only where the law and the "
+              "people in the pictures allow it.");
 }
 
-void ReadUrgency(ParameterReader& parameters, vehicle::HazardReporter::Config& reporter) {
+void ReadReportingUrgency(ParameterReader& parameters, vehicle::HazardReporter::Config& reporter) {
   // Below the 30 days after which the zone refuses a report, with some to spare for the way.
   constexpr double kLongestHoldS = 20 * 86400.0;
   parameters.Section("When a report is sent",
@@ -131,7 +140,7 @@ void ReadUrgency(ParameterReader& parameters, vehicle::HazardReporter::Config& r
   parameters.Read("resend_jitter", reporter.resend.jitter, {0, 0.9}, "Pauses vary by this share.");
 }
 
-void ReadVehicle(ParameterReader& parameters, HazardReportingConfig& config) {
+void ReadReportingVehicle(ParameterReader& parameters, HazardReportingConfig& config) {
   vehicle::HazardReporter::Config& reporter = config.reporter;
   parameters.Section("The vehicle and the projection to the road",
                      "The camera's mounting comes from tf (base_frame to the frame_id of the "
@@ -144,7 +153,7 @@ void ReadVehicle(ParameterReader& parameters, HazardReportingConfig& config) {
   ReadProjectionErrors(parameters, reporter.projection);
 }
 
-void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& config) {
+void ReadReportingPosition(ParameterReader& parameters, HazardReportingConfig& config) {
   vehicle::HazardReporter::Config& reporter = config.reporter;
   parameters.Section("Fused positions and depth");
   parameters.ReadChoice<vehicle::PositionSource>(
@@ -177,13 +186,13 @@ void ReadPositionSource(ParameterReader& parameters, HazardReportingConfig& conf
 }
 
 /// After the reporter's own: what they share is read once.
-void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& config) {
+void ReadReportingPolls(ParameterReader& parameters, HazardReportingConfig& config) {
   vehicle::PollResponder::Config& polls = config.polls;
   polls.drive_id = config.reporter.drive_id;
   polls.min_confidence = config.reporter.min_confidence;
   polls.bracket_wait_s = config.reporter.bracket_wait_s;
-  polls.picture_wait_s = config.reporter.picture_wait_s;
   polls.crop = config.reporter.picture;
+  polls.picture_wait_s = config.pictures.max_wait_s;
   polls.projection.pixel_sigma_px = config.reporter.projection.pixel_sigma_px;
   polls.projection.pitch_sigma_rad = config.reporter.projection.pitch_sigma_rad;
   polls.projection.height_sigma_m = config.reporter.projection.height_sigma_m;
@@ -220,16 +229,17 @@ void ReadPollAnswering(ParameterReader& parameters, HazardReportingConfig& confi
                   "JPEG quality of an answer's picture.");
 }
 
-void ReadViews(ParameterReader& parameters, HazardReportingConfig& config) {
+void ReadReportingViews(ParameterReader& parameters, HazardReportingConfig& config) {
   parameters.Section("Published views");
   parameters.Read("position_period_s", config.position_period_s, {0.01, 3600},
                   "Time between two messages on vehicle/position.", "s");
   parameters.Read("map_frame", config.map_frame,
                   "Frame of hazard/local_map and path: x east, y north.");
   config.map_datum =
-      ReadDatum(parameters, "the first fix",
-                "Origin of map_frame, LATITUDE,LONGITUDE in degrees. Empty: the first fix. With "
-                "fused positions tf earth -> map_frame gives the origin.");
+      ReadDatum(parameters, "the first fix with which the next agrees",
+                "Origin of map_frame, LATITUDE,LONGITUDE in degrees. Empty: the first fix with "
+                "which the next agrees. With fused positions tf earth -> map_frame gives the "
+                "origin.");
   parameters.Read("publish_tf", config.publish_tf,
                   "Publish tf map_frame -> base_frame, where no odometry does it. vehicle.launch "
                   "sets it by the argument `publish_tf`.");
@@ -244,6 +254,8 @@ void ReadViews(ParameterReader& parameters, HazardReportingConfig& config) {
                   "Number of poses of path. Beyond it the oldest poses are forgotten.");
   parameters.Read("max_markers", config.max_markers, {0, 100000},
                   "Number of hazards shown on hazard/local_map: those with the newest news.");
+  ReadStampLimit(parameters, config.reporter.track.stamps.max_ahead_s);
+  config.reporter.poses.stamps = config.reporter.track.stamps;
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
 }
 
@@ -252,16 +264,16 @@ void ReadViews(ParameterReader& parameters, HazardReportingConfig& config) {
 HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std::int64_t now_ns) {
   HazardReportingConfig config;
   vehicle::HazardReporter::Config& reporter = config.reporter;
-  ReadMap(parameters, config, now_ns);
-  ReadSightings(parameters, config);
-  ReadPicture(parameters, reporter);
-  ReadUrgency(parameters, reporter);
-  ReadVehicle(parameters, config);
-  ReadPositionSource(parameters, config);
+  ReadReportingMap(parameters, config, now_ns);
+  ReadReportingSightings(parameters, config);
+  ReadReportingPicture(parameters, config);
+  ReadReportingUrgency(parameters, reporter);
+  ReadReportingVehicle(parameters, config);
+  ReadReportingPosition(parameters, config);
   parameters.Section("Position and course from the fixes");
   ReadFixTrack(parameters, reporter.track);
-  ReadPollAnswering(parameters, config);
-  ReadViews(parameters, config);
+  ReadReportingPolls(parameters, config);
+  ReadReportingViews(parameters, config);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
   return config;
 }

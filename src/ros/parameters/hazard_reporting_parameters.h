@@ -4,7 +4,9 @@
 #include <string>
 
 #include "geo/wgs84.h"
-#include "ros/parameters/parameter_reader.h"
+#include "perception/privacy/privacy_mask.h"
+#include "ros/parameters/shared/parameter_reader.h"
+#include "vehicle/pictures/picture_worker.h"
 #include "vehicle/polls/poll_responder.h"
 #include "vehicle/reporting/hazard_reporter.h"
 
@@ -14,6 +16,10 @@ namespace livemap::ros_io {
 struct HazardReportingConfig {
   vehicle::HazardReporter::Config reporter;
   vehicle::PollResponder::Config polls;
+  vehicle::PictureWorker::Config pictures;
+  int picture_frames = 64;  ///< Images that may be wanted.
+  bool privacy = true;      ///< Mask faces and number plates in all pictures.
+  perception::PrivacyMask::Config mask;
   std::string catalogue;   ///< Path of hazards.yaml; empty: the package's own.
   bool use_events = true;  ///< Sightings of hazard/events; false: of hazard/detections.
   std::string base_frame = "base_link";

@@ -6,8 +6,9 @@
 #include <set>
 #include <sstream>
 
+#include "common/text_file.h"
 #include "ros/bridge/bridged_type.h"
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 #include "transport/topic_template.h"
 
 namespace livemap::ros_io {
@@ -17,9 +18,9 @@ constexpr std::size_t kMaxPasswordFileBytes = 4096;
 constexpr int kMaxMessageBytes = 64 << 20;
 
 /// One entry of the list `topics`, read key by key.
-class TopicReader {
+class MqttBridgeTopicReader {
  public:
-  TopicReader(const XmlRpc::XmlRpcValue& entry, std::string place)
+  MqttBridgeTopicReader(const XmlRpc::XmlRpcValue& entry, std::string place)
       : entry_(entry), place_(std::move(place)) {
     if (entry_.getType() != XmlRpc::XmlRpcValue::TypeStruct) {
       throw Error("parameter '" + place_ + "' is no map of keys and values");
@@ -80,8 +81,8 @@ class TopicReader {
   std::set<std::string> known_;
 };
 
-BridgeTopic ReadTopic(const XmlRpc::XmlRpcValue& entry, const std::string& place) {
-  TopicReader reader(entry, place);
+BridgeTopic ReadBridgeTopic(const XmlRpc::XmlRpcValue& entry, const std::string& place) {
+  MqttBridgeTopicReader reader(entry, place);
   BridgeTopic topic;
   topic.name = reader.Text("name");
   if (!transport::IsValidId(topic.name))
@@ -102,7 +103,7 @@ BridgeTopic ReadTopic(const XmlRpc::XmlRpcValue& entry, const std::string& place
 }
 
 /// What must hold so that no message can be attributed to the wrong vehicle.
-void CheckTopic(const BridgeTopic& topic, const BridgeConfig& config) {
+void CheckBridgeTopic(const BridgeTopic& topic, const BridgeConfig& config) {
   const transport::TopicTemplate mqtt_topic(topic.mqtt_topic);
   const bool has_vehicle_id =
       MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes))->has_vehicle_id();
@@ -121,7 +122,7 @@ void CheckTopic(const BridgeTopic& topic, const BridgeConfig& config) {
   mqtt_topic.Expand({config.zone, config.role == BridgeRole::kZone ? "any" : config.user});
 }
 
-std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
+std::vector<BridgeTopic> ReadBridgeTopics(ParameterReader& parameters) {
   XmlRpc::XmlRpcValue list = parameters.ReadList(
       "topics",
       "Topics that the bridge carries; docs/how-to/bridge-other-topics.md lists the keys of an "
@@ -134,7 +135,7 @@ std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
   std::vector<BridgeTopic> topics;
   std::set<std::string> names;
   for (int i = 0; i < list.size(); ++i) {
-    topics.push_back(ReadTopic(list[i], "topics[" + std::to_string(i) + "]"));
+    topics.push_back(ReadBridgeTopic(list[i], "topics[" + std::to_string(i) + "]"));
     if (!names.insert(topics.back().name).second) {
       throw Error("topic name '" + topics.back().name + "' stands twice in parameter 'topics'");
     }
@@ -142,7 +143,7 @@ std::vector<BridgeTopic> ReadTopics(ParameterReader& parameters) {
   return topics;
 }
 
-void ReadConnection(ParameterReader& parameters, transport::MqttConfig& mqtt) {
+void ReadMqttConnection(ParameterReader& parameters, transport::MqttConfig& mqtt) {
   parameters.Section("Connection");
   parameters.Read(
       "clean_start", mqtt.clean_start,
@@ -172,7 +173,7 @@ void ReadConnection(ParameterReader& parameters, transport::MqttConfig& mqtt) {
 }
 
 /// The three TLS files, or none of them.
-std::optional<transport::MqttTlsConfig> ReadTlsOptions(ParameterReader& parameters) {
+std::optional<transport::MqttTlsConfig> ReadMqttTlsOptions(ParameterReader& parameters) {
   transport::MqttTlsConfig tls;
   parameters.Read("ca_file", tls.ca_file,
                   "Certificate of the zone's authority, a PEM file. TLS 1.3 needs ca_file, "
@@ -197,7 +198,7 @@ std::optional<transport::MqttTlsConfig> ReadTlsOptions(ParameterReader& paramete
   return tls;
 }
 
-void ReadNames(ParameterReader& parameters, BridgeConfig& config) {
+void ReadBridgeNames(ParameterReader& parameters, BridgeConfig& config) {
   std::string role;
   parameters.ReadChoice("role", role, {"vehicle", "zone"}, "Side of the bridge. Required.");
   if (role.empty())
@@ -218,7 +219,7 @@ void ReadNames(ParameterReader& parameters, BridgeConfig& config) {
 }
 
 /// A zone's connection carries the messages of many vehicles and is to be down for longer.
-void SetZoneDefaults(transport::MqttConfig& mqtt) {
+void SetZoneBridgeDefaults(transport::MqttConfig& mqtt) {
   mqtt.session_expiry_s = 3600;
   mqtt.max_inflight = 100;
   mqtt.queue_messages = 10000;
@@ -228,8 +229,8 @@ void SetZoneDefaults(transport::MqttConfig& mqtt) {
 
 BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
   BridgeConfig config;
-  ReadNames(parameters, config);
-  if (config.role == BridgeRole::kZone) SetZoneDefaults(config.mqtt);
+  ReadBridgeNames(parameters, config);
+  if (config.role == BridgeRole::kZone) SetZoneBridgeDefaults(config.mqtt);
   parameters.Section("Broker");
   parameters.Read(
       "host", config.mqtt.host,
@@ -243,16 +244,16 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
   parameters.Read("password_wait_s", config.password_wait_s, {0, 600},
                   "Time to wait at the start for a broker that is just writing the password file.",
                   "s");
-  config.mqtt.tls = ReadTlsOptions(parameters);
-  ReadConnection(parameters, config.mqtt);
+  config.mqtt.tls = ReadMqttTlsOptions(parameters);
+  ReadMqttConnection(parameters, config.mqtt);
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
   config.mqtt.client_id = config.user;
   config.mqtt.user = config.user;
   parameters.Section("Topics");
-  config.topics = ReadTopics(parameters);
+  config.topics = ReadBridgeTopics(parameters);
   parameters.RejectUnknown();
-  for (const BridgeTopic& topic : config.topics) CheckTopic(topic, config);
+  for (const BridgeTopic& topic : config.topics) CheckBridgeTopic(topic, config);
   return config;
 }
 
@@ -261,7 +262,7 @@ std::string ReadPassword(const std::string& path, double wait_s) {
   while (!std::filesystem::exists(path) && ros::WallTime::now() < deadline) {
     ros::WallDuration(0.1).sleep();
   }
-  const std::string text = ReadFile(path, kMaxPasswordFileBytes);
+  const std::string text = ReadTextFile(path, kMaxPasswordFileBytes);
   std::string password = text.substr(0, text.find_first_of("\r\n"));
   if (password.empty()) throw Error("password file '" + path + "' has an empty first line");
   return password;

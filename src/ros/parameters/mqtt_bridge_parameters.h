@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 #include "transport/mqtt_client.h"
 
 namespace livemap::ros_io {

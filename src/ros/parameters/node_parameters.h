@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 namespace livemap::ros_io {
 

@@ -1,16 +1,17 @@
 #include "ros/parameters/zone_cloudlet_parameters.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <vector>
 
-#include "ros/parameters/datum_parameter.h"
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/datum_parameter.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 namespace livemap::ros_io {
 namespace {
 
 /// The numbers of "A,B,..."; empty when `text` is anything else.
-std::vector<double> ParseNumbers(const std::string& text, std::size_t count) {
+std::vector<double> ParseZoneNumbers(const std::string& text, std::size_t count) {
   std::vector<double> numbers;
   const char* at = text.c_str();
   while (numbers.size() < count) {
@@ -23,13 +24,24 @@ std::vector<double> ParseNumbers(const std::string& text, std::size_t count) {
   return numbers;
 }
 
-std::optional<geo::GeoBox> ReadBounds(ParameterReader& parameters) {
+/// "a,b" as a and b; nothing as none.
+std::vector<std::string> SplitZoneList(const std::string& text) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    parts.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+std::optional<geo::GeoBox> ReadZoneBounds(ParameterReader& parameters) {
   std::string text;
   parameters.Read("zone_bounds", text,
                   "SOUTH,WEST,NORTH,EAST in degrees. Reports from outside are refused. WEST > EAST "
                   "crosses the antimeridian. Empty: the whole Earth.");
   if (text.empty()) return std::nullopt;
-  const std::vector<double> numbers = ParseNumbers(text, 4);
+  const std::vector<double> numbers = ParseZoneNumbers(text, 4);
   if (!numbers.empty()) {
     const geo::GeoBox box{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
     if (geo::IsValid(box.south_west) && geo::IsValid(box.north_east) && numbers[0] < numbers[2])
@@ -39,7 +51,7 @@ std::optional<geo::GeoBox> ReadBounds(ParameterReader& parameters) {
               "', accepted is SOUTH,WEST,NORTH,EAST in degrees, or nothing for the whole Earth");
 }
 
-void ReadKept(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+void ReadZoneKept(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   parameters.Section("What is kept");
   parameters.Read("image_cap_bytes", zone.image_cap_bytes, {0, 1e15},
                   "Size of the pictures on disk. Beyond it pictures that no hazard shows go first, "
@@ -53,12 +65,16 @@ void ReadKept(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   parameters.Read("max_hazards", zone.max_hazards, {1, 1e8},
                   "Number of hazards on the map. Beyond it new ones are refused.");
   parameters.Read(
+      "max_hazards_by_one_vehicle", zone.max_hazards_by_one_vehicle, {1, 1e8},
+      "Number of hazards on the map that one vehicle alone has seen and no official has "
+      "confirmed. Beyond it new ones of this vehicle are refused.");
+  parameters.Read(
       "max_map_changes", zone.map_changes.max_features, {1, 1e6},
       "Number of map changes (objects that came or went), undone and dismissed ones too. Beyond it "
       "the oldest of these goes. Where only open ones are left, new ones are refused.");
 }
 
-void ReadReportLimits(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+void ReadZoneReportLimits(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   zone::ReportLimits& limits = zone.limits;
   parameters.Section(
       "Limits of a report",
@@ -76,23 +92,32 @@ void ReadReportLimits(ParameterReader& parameters, zone::ZoneService::Config& zo
       "replay", zone.replay,
       "true: drives are played back. Reports count as of their arrival, and max_age_s does not "
       "hold. Never use it in a zone that drivers rely on: it lets old reports in.");
+  parameters.ReadChoice<zone::UnknownClasses>(
+      "unknown_classes", zone.unknown_classes,
+      {{"other", zone::UnknownClasses::kOther}, {"refuse", zone::UnknownClasses::kRefuse}},
+      "What becomes of reports of a class that the catalogue does not name: other (all are counted "
+      "under the one class `other`, and no vehicle is polled about them) or refuse. A catalogue "
+      "without any class takes every name.");
   parameters.Read("max_speed_mps", zone.speed.max_speed_mps, {1, 10000},
-                  "Largest speed between two reports of one vehicle, by their stamps and places.",
+                  "Largest speed of a vehicle between two places that it told, by reports, map "
+                  "changes, answers or positions: between each and those before and after it in "
+                  "time.",
                   "m/s");
   parameters.Read("speed_slack_m", zone.speed.slack_m, {0, 100000},
-                  "Distance by which two reports may be further apart than that: hazards lie "
+                  "Distance by which two places may be further apart than that: hazards lie "
                   "beside the vehicle.",
                   "m");
   parameters.Read("speed_recovery_reports", zone.speed.recovery_reports, {2, 1000},
-                  "Number of reports, refused in a row for their speed, that agree among "
-                  "themselves: then they are believed.");
+                  "Least number of places, refused in a row for their speed, that agree among "
+                  "themselves: then they are believed, if they are more than what contradicts "
+                  "them.");
   parameters.Read("max_reports_per_hour", zone.allowance.reports_per_hour, {1, 1e9},
                   "Reports of one vehicle per hour. Further ones are not taken now; the vehicle "
                   "sends them again.");
   parameters.Read(
       "max_evidence_per_hour", zone.allowance.evidence_per_hour, {1, 1e9},
       "Evidence of one vehicle per hour: its sightings of known hazards and its answers that "
-      "count. Beyond it a sighting is merged but says nothing of the hazard's presence.");
+      "count. Beyond it a sighting is counted but says nothing of the hazard.");
   parameters.Read("max_map_changes_per_hour", zone.map_changes_per_hour, {1, 1e9},
                   "Reports of map changes of one vehicle per hour. Further ones are not taken now; "
                   "the vehicle sends them again.");
@@ -101,11 +126,20 @@ void ReadReportLimits(ParameterReader& parameters, zone::ZoneService::Config& zo
                   "Beyond it new ones wait until another was silent for an hour.");
   parameters.Read("max_image_bytes", limits.max_image_bytes, {0, 64e6}, "Largest picture.",
                   "bytes");
+  parameters.Read("max_picture_pixels_per_hour", zone.pictures.pixels_per_hour, {1, 1e15},
+                  "Pixels of one vehicle's pictures per hour, by what decoding them costs. Beyond "
+                  "it a report counts without its picture.",
+                  "px");
+  parameters.Read("max_picture_bytes_per_hour", zone.pictures.bytes_per_hour, {1, 1e15},
+                  "Bytes of one vehicle's pictures per hour. Beyond it a report counts without its "
+                  "picture.",
+                  "bytes");
+  zone.pictures.max_vehicles = zone.allowance.max_vehicles;
   parameters.Read("max_image_side_px", limits.max_image_side_px, {1, 65535},
                   "Longest side of the original image, and of the picture by its header.", "px");
 }
 
-void ReadCommits(ParameterReader& parameters, ZoneCloudletConfig& config) {
+void ReadZoneCommits(ParameterReader& parameters, ZoneCloudletConfig& config) {
   parameters.Section("Group commit");
   parameters.Read("batch_reports", config.batch_reports, {1, 100000},
                   "Most reports of one commit.");
@@ -116,7 +150,7 @@ void ReadCommits(ParameterReader& parameters, ZoneCloudletConfig& config) {
                   "bytes");
 }
 
-void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
+void ReadZoneCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
   zone::CatchUpPlanner::Config& catch_up = config.catch_up;
   parameters.Section(
       "What one vehicle is told",
@@ -147,7 +181,7 @@ void ReadCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
 }
 
 /// The ranges are those of HazardLifecycle, which also compares the values with each other.
-void ReadLife(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+void ReadZoneLife(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   zone::HazardLifecycle::Config& life = zone.life;
   parameters.Renamed("sure_above", "settled_above");
   parameters.Renamed("surest_presence", "max_presence");
@@ -174,7 +208,7 @@ void ReadLife(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   parameters.Read("malicious_share", life.malicious_share, {0.001, 0.4},
                   "Share of vehicles that may say what they like.");
   parameters.Read("suspect_above", life.suspect_above, {0.01, 1},
-                  "A vehicle that is hostile this probably, by what became of its evidence, does "
+                  "A vehicle that is malicious this probably, by what became of its evidence, does "
                   "not count as one.");
   parameters.Read("trust_memory_s", zone.trust.memory_s, {60, 1e10},
                   "Time in which what is held against a vehicle fades to 1/e.", "s");
@@ -194,7 +228,7 @@ void ReadLife(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   zone.trust.max_vehicles = zone.allowance.max_vehicles;
 }
 
-void ReadPolls(ParameterReader& parameters, zone::ZoneService::Config& zone) {
+void ReadZonePolls(ParameterReader& parameters, zone::ZoneService::Config& zone) {
   zone::PollScheduler::Config& polls = zone.polls;
   parameters.Section("Polls",
                      "Whom the zone asks, and whose answer counts: docs/explanation/polls.md.");
@@ -237,12 +271,13 @@ void ReadPolls(ParameterReader& parameters, zone::ZoneService::Config& zone) {
                   "Time by which an answer's stamp may be off.", "s");
 }
 
-void ReadMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
+void ReadZoneMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
   parameters.Section("rviz");
   parameters.Read("map_frame", config.map_frame, "Frame of hazard/markers: x east, y north.");
-  config.map_datum = ReadDatum(parameters, "the first hazard or vehicle",
+  config.map_datum = ReadDatum(parameters, "the first place that others agree with",
                                "LATITUDE,LONGITUDE of the map frame's origin, degrees, and where "
-                               "an empty live map looks. Empty: the first hazard or vehicle.");
+                               "an empty live map looks. Empty: the first place of a hazard or a "
+                               "vehicle that others agree with.");
   parameters.Read("marker_period_s", config.marker_period_s, {0.05, 3600},
                   "Time between two pictures of a changing map.", "s");
   parameters.Read("max_markers", config.max_markers, {0, 1e6}, "Number of hazards shown in rviz.");
@@ -250,8 +285,8 @@ void ReadMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s);
 }
 
-void ReadWeb(ParameterReader& parameters, const std::string& package_path,
-             ZoneCloudletConfig& config) {
+void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
+                 ZoneCloudletConfig& config) {
   web::WebConfig& web = config.web_options;
   parameters.Section(
       "Live map", "Plain HTTP: before it faces a public network it needs a proxy that speaks TLS.");
@@ -264,8 +299,7 @@ void ReadWeb(ParameterReader& parameters, const std::string& package_path,
                   "/livemap/web_port. zone.launch sets it by the argument `web_port`.");
   parameters.Read("web_root", web.web_root, "Folder of the page. Empty: web/ of the package.");
   if (web.web_root.empty()) web.web_root = package_path + "/web";
-  parameters.Read("leaflet_root", web.leaflet_root,
-                  "Folder that holds leaflet/ with its cluster plugin.");
+  parameters.Read("leaflet_root", web.leaflet_root, "Folder that holds Debian's leaflet/.");
   parameters.Read("tile_url", web.tile_url,
                   "Address of map tiles, for example https://tiles.example/{z}/{x}/{y}.png. Empty: "
                   "plain background, offline. zone.launch sets it by the argument `tile_url`.");
@@ -275,7 +309,27 @@ void ReadWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("web_title", web.title, "Title of the page.");
   parameters.Read("web_threads", web.threads, {1, 64}, "Number of threads of the web server.");
   parameters.Read("web_max_connections", web.max_connections, {1, 100000},
-                  "Number of connections. Further ones are answered 503.");
+                  "Number of connections. Whoever comes when all are taken takes the place of one "
+                  "that waits, first of the client with the most; else it is answered 503.");
+  parameters.Read("web_connections_per_client", web.max_connections_per_client, {1, 100000},
+                  "Connections of one client, which is an IPv4 address or an IPv6 /64 network. "
+                  "Three quarters of them may be live streams.");
+  parameters.Read("web_reserved_connections", web.reserved_connections, {0, 100000},
+                  "Connections kept for officials with a valid token, and for /healthz from the "
+                  "same machine. At most a quarter of web_max_connections counts.");
+  std::string proxies;
+  parameters.Read("web_proxies", proxies,
+                  "Addresses of proxies, with commas between. Who asks through one is the client "
+                  "that it names last in X-Forwarded-For; all shares and limits hold for that "
+                  "client. Where it names none, web_connections_per_client does not hold, because "
+                  "all its clients have one address.");
+  web.proxies = SplitZoneList(proxies);
+  parameters.Read("web_request_timeout_s", web.request_timeout_s, {0.1, 3600},
+                  "Time for a request to arrive, also the longest pause between two.", "s");
+  parameters.Read("web_answer_timeout_s", web.answer_timeout_s, {0.1, 3600},
+                  "Time for a client to take each 32 KiB of an answer.", "s");
+  parameters.Read("web_picture_timeout_s", web.picture_timeout_s, {0.1, 3600},
+                  "Whoever waits for a picture longer is answered 503.", "s");
   parameters.Read("web_token_file", web.token_file,
                   "File of the officials who may confirm, reject and distrust, a line NAME TOKEN "
                   "each (docs/how-to/use-the-map.md). Empty: nobody.");
@@ -303,15 +357,15 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
       "config/hazards.yaml of the package. zone.launch sets it by the argument `hazards`.");
   if (config.hazards.empty()) config.hazards = package_path + "/config/hazards.yaml";
   config.zone.catalogue = protocol::HazardCatalogue::Load(config.hazards);
-  config.zone.limits.zone = ReadBounds(parameters);
-  ReadKept(parameters, config.zone);
-  ReadReportLimits(parameters, config.zone);
-  ReadCommits(parameters, config);
-  ReadCatchUp(parameters, config);
-  ReadLife(parameters, config.zone);
-  ReadPolls(parameters, config.zone);
-  ReadMarkers(parameters, config);
-  ReadWeb(parameters, package_path, config);
+  config.zone.limits.zone = ReadZoneBounds(parameters);
+  ReadZoneKept(parameters, config.zone);
+  ReadZoneReportLimits(parameters, config.zone);
+  ReadZoneCommits(parameters, config);
+  ReadZoneCatchUp(parameters, config);
+  ReadZoneLife(parameters, config.zone);
+  ReadZonePolls(parameters, config.zone);
+  ReadZoneMarkers(parameters, config);
+  ReadZoneWeb(parameters, package_path, config);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
   return config;
 }

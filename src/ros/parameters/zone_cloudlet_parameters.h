@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 #include "web/http/web_config.h"
 #include "zone/service/catch_up_planner.h"
 #include "zone/service/zone_service.h"

@@ -12,7 +12,7 @@ constexpr double kHeightM = 0.4;
 constexpr double kTextM = 1.2;
 constexpr float kOwnAlpha = 0.7F;
 
-const char* LinkName(vehicle::LinkCost link) {
+const char* LinkNameInView(vehicle::LinkCost link) {
   switch (link) {
     case vehicle::LinkCost::kCheap:
       return "cheap";
@@ -122,7 +122,7 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("reports_without_picture", counters.reports_without_picture);
   status.add("pictures_requested", counters.pictures_requested);
   status.add("pictures_illegible", counters.pictures_illegible);
-  status.add("link", LinkName(reporter.link()));
+  status.add("link", LinkNameInView(reporter.link()));
   status.add("held", reporter.HeldReports(steady_s));
   status.add("refused_map_full", counters.refused_map_full);
   status.add("reports_sent", counters.reports_sent);
@@ -144,6 +144,7 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("invalid_fixes", counters.invalid_fixes);
   status.add("no_fixes", counters.no_fixes);
   status.add("jumps", counters.jumps);
+  status.add("fixes_bad_stamp", counters.fixes_bad_stamp);
   status.add("store_errors", counters.store_errors);
   status.add("poses", counters.poses);
   status.add("invalid_poses", counters.invalid_poses);

@@ -50,9 +50,16 @@ TEST(StereoPairBuffer, KeepsAsManyAsItMay) {
   EXPECT_EQ(rights.counters().unpaired, 1U);
 }
 
-TEST(StereoPairBuffer, BeginAnewWhenStampsGoBack) {
+TEST(StereoPairBuffer, AnImageThatComesLateIsPairedAndSoAreTheOthers) {
   StereoPairBuffer rights(0, 0, 10);
-  for (const int stamp : {500, 600, 0}) rights.Put(Frame(stamp));
+  for (const int stamp : {100, 300, 200, 400}) rights.Put(Frame(stamp));
+  for (const int stamp : {100, 200, 300, 400}) EXPECT_EQ(Partner(rights, stamp), stamp);
+  EXPECT_EQ(rights.counters().unpaired, 0U);
+}
+
+TEST(StereoPairBuffer, BeginAnewWhenTimeIsSetBack) {
+  StereoPairBuffer rights(0, 0, 10);
+  for (const int stamp : {5000, 6000, 0}) rights.Put(Frame(stamp));
   EXPECT_EQ(Partner(rights, 0), 0);
   EXPECT_EQ(rights.counters().unpaired, 2U);
 }

@@ -106,5 +106,23 @@ TEST(PosedFrameQueue, WithoutPositionsTheOldestGoAndTheOthersAreGivenUp) {
   EXPECT_EQ(frames.waiting(), 0U);
 }
 
+TEST(PosedFrameQueue, AfterALoopOfTheClockImagesAndDepthsComeAsBefore) {
+  PosedFrameQueue::Config config = Config();
+  config.depth_wait_s = 0.3;
+  PosedFrameQueue frames(config);
+  for (double seconds = 0; seconds < 22; seconds += 0.5) frames.AddFix(FixAt(seconds));
+  for (const double seconds : {20.0, 20.5, 21.0}) frames.AddDepth(ImageAt(seconds));
+  frames.AddImage(ImageAt(23.0), 50);
+  frames.StartAnew();
+  EXPECT_EQ(frames.waiting(), 0U);
+  EXPECT_EQ(frames.counters().no_pose, 1U);
+  for (double seconds = 0; seconds < 9; seconds += 0.5) frames.AddFix(FixAt(seconds));
+  frames.AddDepth(ImageAt(7.0));
+  frames.AddImage(ImageAt(7.0), 51);
+  const auto posed = frames.Next(51);
+  ASSERT_TRUE(posed);
+  EXPECT_TRUE(posed->depth) << "those of before do not displace it";
+}
+
 }  // namespace
 }  // namespace livemap::nodelets

@@ -1,4 +1,4 @@
-#include "ros/parameters/shared_parameters.h"
+#include "ros/parameters/shared/shared_parameters.h"
 
 #include <ctime>
 
@@ -6,7 +6,7 @@ namespace livemap::ros_io {
 namespace {
 
 /// "drive-20260131T235959Z".
-std::string DriveName(std::int64_t now_ns) {
+std::string DefaultDriveName(std::int64_t now_ns) {
   const auto seconds = static_cast<std::time_t>(now_ns / 1'000'000'000);
   std::tm utc{};
   gmtime_r(&seconds, &utc);
@@ -23,7 +23,7 @@ std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns) {
       "drive_id", drive_id,
       "Name of this drive, at most 64 bytes. It must differ from drive to drive. Empty: "
       "drive-<start time, UTC>. vehicle.launch sets it by the argument `drive`.");
-  if (drive_id.empty()) drive_id = DriveName(now_ns);
+  if (drive_id.empty()) drive_id = DefaultDriveName(now_ns);
   if (drive_id.size() > 64) {
     throw Error("parameter 'drive_id' has " + std::to_string(drive_id.size()) +
                 " bytes, accepted are at most 64");
@@ -78,14 +78,27 @@ void ReadBasePoseSource(ParameterReader& parameters, vehicle::VehiclePoseLookup:
 void ReadPrivacy(ParameterReader& parameters, bool& privacy, perception::PrivacyMask::Config& mask,
                  const std::string& meaning) {
   parameters.Read("privacy", privacy, meaning);
+  using Source = perception::PrivateRegionSource;
+  parameters.ReadChoice<Source>(
+      "privacy_finder", mask.regions.source,
+      {{"auto", Source::kAuto}, {"networks", Source::kNetworks}, {"cascades", Source::kCascades}},
+      "What looks for faces and number plates: networks, cascades (OpenCV's), or auto: the "
+      "networks "
+      "where ./livemap privacy-models has placed them and no privacy_face_model is named, else the "
+      "cascades. Networks of which a file is missing or damaged are refused, not replaced.");
+  parameters.Read("privacy_networks", mask.regions.networks,
+                  "Manifest of the networks; their files are looked for from its folder. Empty: "
+                  "models/privacy.yaml of the package.");
   parameters.Read("privacy_cascades", mask.regions.cascades,
                   "Folder of OpenCV's Haar cascades (frontal and profile faces, number plates).");
   parameters.Read(
       "privacy_face_model", mask.regions.face_model,
       "A YuNet model (ONNX) that looks for the faces instead of the cascades. Empty: none.");
-  parameters.Read("privacy_min_side_px", mask.regions.min_side_px, {8, 1000},
-                  "Faces and plates whose shorter side is smaller than this are not looked for.",
-                  "px");
+  parameters.Read(
+      "privacy_min_side_px", mask.regions.min_side_px, {8, 1000},
+      "Faces and plates whose shorter side is smaller than this are not looked for by the "
+      "cascades. The networks know no such limit.",
+      "px");
   parameters.Read("privacy_grow", mask.grow, {0, 5},
                   "A mask is larger than the face or plate by this share of its sides.");
   parameters.Read(
@@ -114,6 +127,13 @@ void ReadDepthUnits(ParameterReader& parameters, double& units_per_m) {
 void ReadDiagnosticsPeriod(ParameterReader& parameters, double& period_s, double min_s) {
   parameters.Read("diagnostics_period_s", period_s, {min_s, 60},
                   "Time between two messages on /diagnostics, by the wall clock.", "s");
+}
+
+void ReadStampLimit(ParameterReader& parameters, double& max_ahead_s) {
+  parameters.Read("max_stamp_ahead_s", max_ahead_s, {0.1, 1e9},
+                  "A message whose stamp is further ahead of the clock than this is refused and "
+                  "counted as stamps_refused. More than 10 s lets one wrong stamp silence tf.",
+                  "s");
 }
 
 void ListImageTransport(ParameterReader& parameters, const std::string& more) {

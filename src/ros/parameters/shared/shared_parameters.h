@@ -5,7 +5,7 @@
 
 #include "geo/ground_projection.h"
 #include "perception/privacy/privacy_mask.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 #include "vehicle/positioning/fix_track.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
@@ -34,6 +34,9 @@ void ReadDepthUnits(ParameterReader& parameters, double& units_per_m);
 
 /// `diagnostics_period_s`, at least `min_s`.
 void ReadDiagnosticsPeriod(ParameterReader& parameters, double& period_s, double min_s = 0.05);
+
+/// `max_stamp_ahead_s` of all messages with a stamp.
+void ReadStampLimit(ParameterReader& parameters, double& max_ahead_s);
 
 /// Lists image_transport's own parameter of the topic camera_rect/image.
 void ListImageTransport(ParameterReader& parameters, const std::string& more = "");

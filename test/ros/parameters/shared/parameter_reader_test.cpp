@@ -1,5 +1,5 @@
 // ParameterReader by itself, and config/*.yaml through the readers that the nodes run.
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 #include <gmock/gmock.h>
 #include <yaml-cpp/yaml.h>
@@ -139,6 +139,15 @@ TEST(ParameterReader, RefusesAFormerNameWithThePresentOne) {
       [&] { reader.Renamed("most_mb", "max_mb"); },
       ThrowsMessage<Error>("parameter '/car/change_detection/most_mb' is now called 'max_mb'"));
   EXPECT_NO_THROW(reader.Renamed("most_cell_mb", "max_cell_mb"));
+}
+
+TEST(ParameterReader, RefusesAParameterThatIsGoneWithWhatHoldsInstead) {
+  const ParameterReader reader("/car/hazard_reporting", One("pictures_on_demand", true));
+  EXPECT_THAT(
+      [&] { reader.Removed("pictures_on_demand", "it makes every picture itself"); },
+      ThrowsMessage<Error>("parameter '/car/hazard_reporting/pictures_on_demand' is no longer "
+                           "accepted: it makes every picture itself"));
+  EXPECT_NO_THROW(reader.Removed("picture_frames", "nothing"));
 }
 
 TEST(ParameterReader, RefusesWhatNobodyReads) {

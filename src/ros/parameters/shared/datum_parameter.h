@@ -6,7 +6,7 @@
 #include <string>
 
 #include "geo/wgs84.h"
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 namespace livemap::ros_io {
 

@@ -119,6 +119,9 @@ class ParameterReader {
 
   /// Refuses the former name of a parameter with a sentence that says the present one.
   void Renamed(const std::string& former, const std::string& present) const;
+  /// Refuses a parameter that no longer exists with a sentence that ends in `instead`: what holds
+  /// now, without full stop.
+  void Removed(const std::string& former, const std::string& instead) const;
 
   /// Call last: throws when the namespace holds a key that nothing above read, so that a misspelt
   /// parameter cannot go unnoticed. `foreign` names keys of other libraries that need no mention.
@@ -134,6 +137,7 @@ class ParameterReader {
   double ReadNumber(const std::string& name, double standard, ParameterRange range,
                     const std::string& meaning, const std::string& unit);
   std::string FullName(const std::string& name) const;
+  bool Has(const std::string& name) const;
   [[noreturn]] void Refuse(const std::string& name, const XmlRpc::XmlRpcValue& value,
                            const std::string& accepted) const;
 

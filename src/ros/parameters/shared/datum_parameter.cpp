@@ -1,4 +1,4 @@
-#include "ros/parameters/datum_parameter.h"
+#include "ros/parameters/shared/datum_parameter.h"
 
 #include <tf2_eigen/tf2_eigen.h>
 

@@ -1,4 +1,4 @@
-#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/shared/parameter_reader.h"
 
 #include <ros/names.h>
 #include <ros/param.h>
@@ -13,7 +13,7 @@ namespace {
 
 using Presence = ParameterDescription::Presence;
 
-XmlRpc::XmlRpcValue AllOf(const std::string& name_space) {
+XmlRpc::XmlRpcValue AllParametersOf(const std::string& name_space) {
   XmlRpc::XmlRpcValue all;
   ros::param::get(name_space, all);
   return all;
@@ -31,26 +31,26 @@ std::string ToText(ParameterRange range) {
   return text.str();
 }
 
-std::string Joined(const std::vector<std::string>& words) {
+std::string JoinedParameterWords(const std::vector<std::string>& words) {
   std::string list;
   for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
   return list;
 }
 
 /// NaN for anything but a number.
-double ToNumber(const XmlRpc::XmlRpcValue& value) {
+double ParameterNumber(const XmlRpc::XmlRpcValue& value) {
   if (value.getType() == XmlRpc::XmlRpcValue::TypeInt) return static_cast<int>(value);
   if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) return static_cast<double>(value);
   return std::numeric_limits<double>::quiet_NaN();
 }
 
 /// Written so that NaN is outside.
-bool IsWithin(double number, ParameterRange range) {
+bool IsWithinParameterRange(double number, ParameterRange range) {
   return number >= range.min && number <= range.max;
 }
 
 /// The double that a person would write for it: 0.1, and not 0.10000000149.
-double AsWritten(float number) {
+double ParameterNumberText(float number) {
   char text[32];
   for (int digits = 1; digits <= std::numeric_limits<float>::max_digits10; ++digits) {
     std::snprintf(text, sizeof(text), "%.*g", digits, static_cast<double>(number));
@@ -62,7 +62,8 @@ double AsWritten(float number) {
 }  // namespace
 
 ParameterReader::ParameterReader(const ros::NodeHandle& private_handle)
-    : ParameterReader(private_handle.getNamespace(), AllOf(private_handle.getNamespace())) {}
+    : ParameterReader(private_handle.getNamespace(),
+                      AllParametersOf(private_handle.getNamespace())) {}
 
 ParameterReader::ParameterReader(std::string name_space, const XmlRpc::XmlRpcValue& values)
     : name_space_(std::move(name_space)), values_(values) {}
@@ -143,8 +144,8 @@ double ParameterReader::ReadNumber(const std::string& name, double standard, Par
   description.unit = unit;
   XmlRpc::XmlRpcValue found;
   if (!Find(name, found)) return standard;
-  const double number = ToNumber(found);
-  if (!IsWithin(number, range)) Refuse(name, found, "a number " + ToText(range));
+  const double number = ParameterNumber(found);
+  if (!IsWithinParameterRange(number, range)) Refuse(name, found, "a number " + ToText(range));
   return number;
 }
 
@@ -155,7 +156,7 @@ void ParameterReader::Read(const std::string& name, double& value, ParameterRang
 
 void ParameterReader::Read(const std::string& name, float& value, ParameterRange range,
                            const std::string& meaning, const std::string& unit) {
-  value = static_cast<float>(ReadNumber(name, AsWritten(value), range, meaning, unit));
+  value = static_cast<float>(ReadNumber(name, ParameterNumberText(value), range, meaning, unit));
 }
 
 void ParameterReader::Read(const std::string& name, int& value, ParameterRange range,
@@ -165,7 +166,8 @@ void ParameterReader::Read(const std::string& name, int& value, ParameterRange r
   description.unit = unit;
   XmlRpc::XmlRpcValue found;
   if (!Find(name, found)) return;
-  if (found.getType() != XmlRpc::XmlRpcValue::TypeInt || !IsWithin(ToNumber(found), range)) {
+  if (found.getType() != XmlRpc::XmlRpcValue::TypeInt ||
+      !IsWithinParameterRange(ParameterNumber(found), range)) {
     Refuse(name, found, "a whole number " + ToText(range));
   }
   value = static_cast<int>(found);
@@ -182,7 +184,7 @@ void ParameterReader::ReadChoice(const std::string& name, std::string& value,
     value = static_cast<std::string>(found);
     return;
   }
-  Refuse(name, found, "one of: " + Joined(accepted));
+  Refuse(name, found, "one of: " + JoinedParameterWords(accepted));
 }
 
 void ParameterReader::ReadMap(const std::string& name, std::map<std::string, double>& value,
@@ -199,8 +201,8 @@ void ParameterReader::ReadMap(const std::string& name, std::map<std::string, dou
   if (found.getType() != XmlRpc::XmlRpcValue::TypeStruct) Refuse(name, found, accepted);
   value.clear();
   for (const auto& [key, number] : found) {
-    value[key] = ToNumber(number);
-    if (!IsWithin(value[key], range)) Refuse(name, found, accepted);
+    value[key] = ParameterNumber(number);
+    if (!IsWithinParameterRange(value[key], range)) Refuse(name, found, accepted);
   }
 }
 
@@ -217,10 +219,18 @@ void ParameterReader::Foreign(const std::string& name, const std::string& exampl
   description.standard = example;
 }
 
+bool ParameterReader::Has(const std::string& name) const {
+  return values_.getType() == XmlRpc::XmlRpcValue::TypeStruct && values_.hasMember(name);
+}
+
 void ParameterReader::Renamed(const std::string& former, const std::string& present) const {
-  if (values_.getType() == XmlRpc::XmlRpcValue::TypeStruct && values_.hasMember(former)) {
-    throw Error("parameter '" + FullName(former) + "' is now called '" + present + "'");
-  }
+  if (!Has(former)) return;
+  throw Error("parameter '" + FullName(former) + "' is now called '" + present + "'");
+}
+
+void ParameterReader::Removed(const std::string& former, const std::string& instead) const {
+  if (!Has(former)) return;
+  throw Error("parameter '" + FullName(former) + "' is no longer accepted: " + instead);
 }
 
 void ParameterReader::RejectUnknown(const std::set<std::string>& foreign) const {
@@ -230,7 +240,7 @@ void ParameterReader::RejectUnknown(const std::set<std::string>& foreign) const 
   for (const auto& entry : values_) {
     if (known.count(entry.first) != 0 || foreign.count(entry.first) != 0) continue;
     throw Error("unknown parameter '" + FullName(entry.first) +
-                "', accepted are: " + Joined({known.begin(), known.end()}));
+                "', accepted are: " + JoinedParameterWords({known.begin(), known.end()}));
   }
 }
 
