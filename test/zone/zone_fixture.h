@@ -10,13 +10,23 @@
 #include <string>
 #include <vector>
 
+#include "protocol/map_change_report.h"
 #include "protocol/report.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::zone {
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
+constexpr std::int64_t kOneSecond = 1'000'000'000;
+constexpr std::int64_t kOneHour = 3600 * kOneSecond;
+constexpr std::int64_t kOneDay = 24 * kOneHour;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// What schemas 2 to 4 have in place of `places`: the newest place of each vehicle.
+constexpr char kLastReportsTable[] =
+    "CREATE TABLE last_reports (vehicle_id TEXT PRIMARY KEY, stamp_ns BIGINT NOT NULL, "
+    "latitude DOUBLE PRECISION NOT NULL, longitude DOUBLE PRECISION NOT NULL, "
+    "sigma_m DOUBLE PRECISION NOT NULL);";
 
 /// A directory of its own for each test, removed afterwards.
 class ZoneTest : public testing::Test {
@@ -63,6 +73,20 @@ inline protocol::Report MakeReport(const geo::GeoPoint& position = {40.44, -79.9
   report.covariance_m2 = Eigen::Vector2d(1.0, 4.0).asDiagonal();
   report.image_width = 640;
   report.image_height = 480;
+  return report;
+}
+
+/// An acceptable report of a barrier that has come, with a uuid of its own; its stamps are unset.
+inline protocol::MapChangeReport MakeBarrier() {
+  protocol::MapChangeReport report;
+  report.uuid = MakeReport().uuid;
+  report.vehicle_id = "car-1";
+  report.drive_id = "drive-1";
+  report.class_name = "barrier";
+  report.confidence = 0.5F;
+  report.seen = 5;
+  report.position = {40.44, -79.94};
+  report.covariance_m2 = Eigen::Matrix2d::Identity();
   return report;
 }
 

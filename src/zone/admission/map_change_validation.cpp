@@ -5,8 +5,13 @@
 namespace livemap::zone {
 namespace {
 
-/// What a map change has in common with a hazard's report, which has a picture besides.
-protocol::Report SharedFields(const protocol::MapChangeReport& told) {
+Refusal UnacceptableMapChange(std::string sentence) {
+  return {RefusalKind::kMalformed, std::move(sentence)};
+}
+
+}  // namespace
+
+protocol::Report ReportFieldsOf(const protocol::MapChangeReport& told) {
   protocol::Report report;
   report.uuid = told.uuid;
   report.vehicle_id = told.vehicle_id;
@@ -20,12 +25,6 @@ protocol::Report SharedFields(const protocol::MapChangeReport& told) {
   report.image_width = report.image_height = 1;
   return report;
 }
-
-Refusal Unacceptable(std::string sentence) {
-  return {RefusalKind::kMalformed, std::move(sentence)};
-}
-
-}  // namespace
 
 std::string MapChangeClassNames() {
   std::string names;
@@ -45,19 +44,19 @@ bool IsMapChangeClass(const std::string& class_name) {
 
 std::optional<Refusal> WhyMapChangeRefused(const protocol::MapChangeReport& report,
                                            const ReportLimits& limits, std::int64_t now_ns) {
-  if (auto why = WhyRefused(SharedFields(report), limits, now_ns)) return why;
+  if (auto why = WhyRefused(ReportFieldsOf(report), limits, now_ns)) return why;
   if (!IsMapChangeClass(report.class_name)) {
-    return Unacceptable("class name is '" + report.class_name + "', accepted is " +
-                        MapChangeClassNames());
+    return UnacceptableMapChange("class name is '" + report.class_name + "', accepted is " +
+                                 MapChangeClassNames());
   }
   if (report.seen < 2) {
-    return Unacceptable("seen is " + std::to_string(report.seen) +
-                        ", accepted is at least 2: one image proves no change");
+    return UnacceptableMapChange("seen is " + std::to_string(report.seen) +
+                                 ", accepted is at least 2: one image proves no change");
   }
   if (report.earlier_stamp_ns < 0 || report.earlier_stamp_ns >= report.stamp_ns) {
-    return Unacceptable("earlier_stamp is " + std::to_string(report.earlier_stamp_ns) +
-                        " ns, accepted is before the stamp of " + std::to_string(report.stamp_ns) +
-                        " ns");
+    return UnacceptableMapChange("earlier_stamp is " + std::to_string(report.earlier_stamp_ns) +
+                                 " ns, accepted is before the stamp of " +
+                                 std::to_string(report.stamp_ns) + " ns");
   }
   return std::nullopt;
 }

@@ -4,9 +4,14 @@
 #include <string>
 
 #include "protocol/map_change_report.h"
+#include "protocol/report.h"
 #include "zone/admission/report_validation.h"
 
 namespace livemap::zone {
+
+/// What a map change has in common with a hazard's report. A report has a box in an image besides:
+/// here one that every rule accepts.
+protocol::Report ReportFieldsOf(const protocol::MapChangeReport& told);
 
 /// The classes that a map change may have, with commas between.
 std::string MapChangeClassNames();

@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kMinuteS = 60;
 
-KeyedTokenBuckets<2> BucketsOf(const OffloadAllowance::Config& config) {
+KeyedTokenBuckets<2> OffloadBucketsOf(const OffloadAllowance::Config& config) {
   if (!(config.frames_per_minute >= 1) || !(config.bytes_per_minute >= 1) ||
       config.max_vehicles < 1) {
     throw Error("frames, bytes and vehicles of a candidate allowance must be at least 1");
@@ -21,7 +21,7 @@ KeyedTokenBuckets<2> BucketsOf(const OffloadAllowance::Config& config) {
 
 }  // namespace
 
-OffloadAllowance::OffloadAllowance(const Config& config) : buckets_(BucketsOf(config)) {}
+OffloadAllowance::OffloadAllowance(const Config& config) : buckets_(OffloadBucketsOf(config)) {}
 
 bool OffloadAllowance::Take(const std::string& vehicle_id, std::size_t bytes, std::int64_t now_ns) {
   auto* buckets = buckets_.Use(vehicle_id, now_ns);

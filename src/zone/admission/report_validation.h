@@ -14,16 +14,19 @@ namespace livemap::zone {
 
 /// Kinds of refusals, for counting. The sentence of a Refusal says more.
 enum class RefusalKind {
-  kMalformed,    ///< Numbers, texts, box or picture that no honest vehicle sends.
-  kOutsideZone,  ///< A position that this zone does not serve.
-  kTooOld,       ///< A stamp before ReportLimits::max_age_s.
-  kFuture,       ///< A stamp ahead of the zone's clock.
-  kReplay,       ///< The uuid of another vehicle's committed report.
-  kSpeed,        ///< No vehicle gets there so fast from its last report.
-  kMapFull,      ///< A new hazard beyond the maximum.
+  kMalformed,     ///< Numbers, texts, box or picture that no honest vehicle sends.
+  kOutsideZone,   ///< A position that this zone does not serve.
+  kTooOld,        ///< A stamp before ReportLimits::max_age_s.
+  kFuture,        ///< A stamp ahead of the zone's clock.
+  kReplay,        ///< The uuid of another vehicle's committed report.
+  kSpeed,         ///< No vehicle gets there so fast from its last report.
+  kMapFull,       ///< A new hazard beyond the maximum.
+  kUnknownClass,  ///< A class that the catalogue does not name; see UnknownClasses.
+  kOneWitness,    ///< A new hazard of a vehicle on whose word alone too many rest.
 };
-constexpr std::size_t kRefusalKinds = 7;
-/// "malformed", "outside_zone", "too_old", "future", "replay", "speed" or "map_full".
+constexpr std::size_t kRefusalKinds = 9;
+/// "malformed", "outside_zone", "too_old", "future", "replay", "speed", "map_full", "unknown_class"
+/// or "one_witness".
 const char* RefusalName(RefusalKind kind);
 
 /// Why a report is refused for good: `sentence` goes into its receipt.
@@ -45,9 +48,19 @@ struct ReportLimits {
   std::size_t max_image_bytes = 1 << 20;              ///< Of the picture as a compressed file.
 };
 
-/// Valid UTF-8 without control characters, line separators or invisible and direction-changing
-/// format characters, and neither empty nor longer than `max_bytes`.
-bool IsPrintableText(const std::string& text, std::size_t max_bytes);
+/// What becomes of reports of a class that the catalogue does not name.
+enum class UnknownClasses {
+  kOther,   ///< All are counted under one heading, protocol::kOtherClass.
+  kRefuse,  ///< Refused for good.
+};
+
+/// Exactly 0, 0: what a receiver without a fix says, far out at sea. No report is from there.
+bool IsPlaceOfNoFix(const geo::GeoPoint& position);
+
+/// Why the zone refuses the stamp of an image or a fix: it lies outside the window from
+/// `max_age_s` behind `now_ns`, the zone's clock, to ReportLimits::max_future_s ahead of it.
+std::optional<Refusal> WhyStampRefused(std::int64_t stamp_ns, const ReportLimits& limits,
+                                       double max_age_s, std::int64_t now_ns);
 
 /// Why the zone refuses a picture, by its size and header alone.
 std::optional<Refusal> WhyPictureRefused(const std::vector<std::uint8_t>& image,

@@ -9,7 +9,7 @@ constexpr double kRefillS = 3600;
 constexpr std::size_t kReports = 0;
 constexpr std::size_t kEvidence = 1;
 
-KeyedTokenBuckets<2> BucketsOf(const VehicleAllowance::Config& config) {
+KeyedTokenBuckets<2> VehicleBucketsOf(const VehicleAllowance::Config& config) {
   if (!(config.reports_per_hour >= 1) || !(config.evidence_per_hour >= 1) ||
       config.max_vehicles < 1) {
     throw Error("caps per vehicle and hour, and the number of vehicles, must be at least 1");
@@ -22,7 +22,7 @@ KeyedTokenBuckets<2> BucketsOf(const VehicleAllowance::Config& config) {
 
 }  // namespace
 
-VehicleAllowance::VehicleAllowance(const Config& config) : buckets_(BucketsOf(config)) {}
+VehicleAllowance::VehicleAllowance(const Config& config) : buckets_(VehicleBucketsOf(config)) {}
 
 bool VehicleAllowance::TakeReport(const std::string& vehicle_id, std::int64_t now_ns) {
   return Take(vehicle_id, now_ns, kReports);

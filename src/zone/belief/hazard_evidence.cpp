@@ -9,7 +9,7 @@ namespace livemap::zone {
 namespace {
 
 /// The newest stamp of a vehicle that counts and speaks for the hazard; 0 without one.
-std::uint32_t NewestYesS(const PresenceRecord& life) {
+std::uint32_t NewestEvidenceForS(const PresenceRecord& life) {
   std::uint32_t newest_s = 0;
   for (const VehicleEvidence& voice : life.voices) {
     if (voice.Counts() && !voice.against) newest_s = std::max(newest_s, voice.at_s);
@@ -17,22 +17,12 @@ std::uint32_t NewestYesS(const PresenceRecord& life) {
   return newest_s;
 }
 
-bool AnyAgainst(const PresenceRecord& life) {
+bool AnyEvidenceAgainst(const PresenceRecord& life) {
   return std::any_of(life.voices.begin(), life.voices.end(),
                      [](const VehicleEvidence& voice) { return voice.Counts() && voice.against; });
 }
 
 }  // namespace
-
-ClassModel ClassModelOf(const protocol::HazardClass& entry, const ClassSurvival& survival) {
-  ClassModel result;
-  result.confirmations = static_cast<std::uint32_t>(
-      std::clamp(entry.confirmations, 1, static_cast<int>(kMaxEvidencePerHazard)));
-  result.hit_rate = entry.hit_rate;
-  result.false_rate = entry.false_rate;
-  result.survival = survival;
-  return result;
-}
 
 VehicleEvidence* PlaceForEvidence(std::uint64_t vehicle, bool suspect, std::uint32_t at_s,
                                   PresenceRecord& life) {
@@ -63,11 +53,11 @@ void RecordDenial(std::int64_t stamp_ns, PresenceRecord& life) {
 
 void ForgetStamps(const VehicleEvidence& taken, PresenceRecord& life) {
   if (taken.against) {
-    if (!AnyAgainst(life)) life.first_no_ns = 0;
+    if (!AnyEvidenceAgainst(life)) life.first_no_ns = 0;
     return;
   }
   if (static_cast<std::uint32_t>(std::max(0.0, Seconds(life.last_yes_ns))) > taken.at_s) return;
-  life.last_yes_ns = std::max(life.first_seen_ns, Nanoseconds(NewestYesS(life)));
+  life.last_yes_ns = std::max(life.first_seen_ns, Nanoseconds(NewestEvidenceForS(life)));
 }
 
 }  // namespace livemap::zone

@@ -2,8 +2,7 @@
 
 #include <cstdint>
 
-#include "protocol/hazard_catalogue.h"
-#include "zone/belief/survival_model.h"
+#include "zone/belief/class_model.h"
 #include "zone/model/presence_record.h"
 
 namespace livemap::zone {
@@ -21,18 +20,8 @@ struct Evidence {
   std::uint64_t vehicle = 0;  ///< VehicleKey.
   std::int64_t stamp_ns = 0;  ///< Of the image.
   /// P(its vehicle says what it likes), of VehicleTrust; `malicious_share` at least.
-  double hostile = 0;
+  double malicious = 0;
 };
-
-/// What HazardLifecycle knows of a hazard's class; made by ClassModelOf, cheap to copy.
-struct ClassModel {
-  std::uint32_t confirmations =
-      2;  ///< Distinct vehicles before drivers are told, 1 to kMaxEvidencePerHazard.
-  double hit_rate = 0.85;    ///< P(a vehicle that looks says yes | it is there).
-  double false_rate = 0.03;  ///< P(the same | it is not there).
-  ClassSurvival survival;
-};
-ClassModel ClassModelOf(const protocol::HazardClass& entry, const ClassSurvival& survival);
 
 /// The vehicle's place in the hazard's record: its own, a free one, or that of the longest silent,
 /// if it has been silent since before `at_s`. A vehicle that does not count goes before one that

@@ -30,8 +30,12 @@ void Fuse(HazardEstimate& hazard, const protocol::Report& report, const FusionRu
   const float noisy_or = 1.0F - (1.0F - hazard.confidence) * (1.0F - report.confidence);
   hazard.confidence = std::max(hazard.confidence, std::min(rule.max_confidence, noisy_or));
   hazard.sightings += 1;
-  hazard.first_seen_ns = std::min(hazard.first_seen_ns, report.stamp_ns);
-  hazard.last_seen_ns = std::max(hazard.last_seen_ns, report.stamp_ns);
+  NoteSeen(hazard, report.stamp_ns);
+}
+
+void NoteSeen(HazardEstimate& hazard, std::int64_t stamp_ns) {
+  hazard.first_seen_ns = std::min(hazard.first_seen_ns, stamp_ns);
+  hazard.last_seen_ns = std::max(hazard.last_seen_ns, stamp_ns);
 }
 
 }  // namespace livemap::zone

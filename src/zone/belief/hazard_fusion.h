@@ -40,4 +40,7 @@ Eigen::Matrix2d WithLeastSigma(const Eigen::Matrix2d& covariance_m2, double min_
 /// Order matters only through the two floors and the cap.
 void Fuse(HazardEstimate& hazard, const protocol::Report& report, const FusionRule& rule);
 
+/// The hazard was seen then, too: its first and last seen span the stamp.
+void NoteSeen(HazardEstimate& hazard, std::int64_t stamp_ns);
+
 }  // namespace livemap::zone

@@ -14,18 +14,18 @@
 namespace livemap::zone {
 namespace {
 
-std::string VehiclesText(std::uint32_t vehicles) {
+std::string LifecycleVehiclesText(std::uint32_t vehicles) {
   if (vehicles == 1) return "1 vehicle";
   return std::to_string(vehicles) + " vehicles";
 }
 
-std::string PresenceText(double log_odds) {
+std::string LifecyclePresenceText(double log_odds) {
   char text[40];
   std::snprintf(text, sizeof text, "presence %.0f %%", 100 * ProbabilityOf(log_odds));
   return text;
 }
 
-std::string DurationText(double seconds) {
+std::string LifecycleDurationText(double seconds) {
   struct Unit {
     double seconds;
     const char* name;
@@ -38,21 +38,32 @@ std::string DurationText(double seconds) {
   return text;
 }
 
-double AgeS(const PresenceRecord& life, std::int64_t at_ns) {
+double LifecycleAgeS(const PresenceRecord& life, std::int64_t at_ns) {
   return Seconds(std::max<std::int64_t>(0, at_ns - life.first_seen_ns));
 }
 
-double Faded(const ClassModel& entry, double log_odds, const PresenceRecord& life, double dt_s) {
+double FadedLifecycle(const ClassModel& entry, double log_odds, const PresenceRecord& life,
+                      double dt_s) {
   const double standing =
-      ProbabilityOf(log_odds) * entry.survival.Survival(AgeS(life, life.at_ns), dt_s);
+      ProbabilityOf(log_odds) * entry.survival.Survival(LifecycleAgeS(life, life.at_ns), dt_s);
   return LogOddsOf(standing);
 }
 
-LifecycleTransition Transition(const PresenceRecord& life, HazardState to, std::string reason) {
+LifecycleTransition LifecycleTransitionOf(const PresenceRecord& life, HazardState to,
+                                          std::string reason) {
   return {life.state, to, CutUtf8(std::move(reason), kMaxEventReasonBytes)};
 }
 
-void Enter(HazardState state, std::int64_t now_ns, PresenceRecord& life) {
+/// One hazard teaches of no more than so many lives of its class.
+constexpr double kMaxLessonLives = 10;
+
+/// However long a hazard stood, no single step of it teaches the class so much that it would live
+/// otherwise from then on.
+void BoundLifecycleLesson(const ClassModel& entry, LifecycleUpdate& step) {
+  step.lesson.stood_s = std::min(step.lesson.stood_s, kMaxLessonLives * entry.survival.MeanLifeS());
+}
+
+void EnterLifecycleState(HazardState state, std::int64_t now_ns, PresenceRecord& life) {
   life.state = state;
   life.since_ns = now_ns;
 }
@@ -88,7 +99,7 @@ HazardLifecycle::HazardLifecycle(const Config& config)
   CheckRange("reopen_vehicles", config.reopen_vehicles, 2, kMaxEvidencePerHazard);
   CheckRange("rejected_keep_s", config.rejected_keep_s, 3600, 1e9);
   max_log_odds_ = LogOddsOf(config.max_presence);
-  max_voice_ = -LogOddsOf(config.malicious_share);
+  max_evidence_ = -LogOddsOf(config.malicious_share);
 }
 
 void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns,
@@ -97,7 +108,7 @@ void HazardLifecycle::MoveTo(const ClassModel& entry, std::int64_t to_ns,
   if (life.state != HazardState::kRejected) {
     const double dt_s = Seconds(to_ns - life.at_ns);
     const auto fade = [&](double log_odds) {
-      return std::max(-max_log_odds_, Faded(entry, log_odds, life, dt_s));
+      return std::max(-max_log_odds_, FadedLifecycle(entry, log_odds, life, dt_s));
     };
     life.log_odds = fade(life.log_odds);
     life.undenied_log_odds = fade(life.undenied_log_odds);
@@ -113,28 +124,31 @@ double HazardLifecycle::LogRatio(const ClassModel& entry, const Evidence& eviden
   double absent = against ? 1 - entry.false_rate : entry.false_rate;
   // What is not there now may have been there then.
   absent = ended_since * there + (1 - ended_since) * absent;
-  const double h = std::clamp(evidence.hostile, config_.malicious_share, 1.0);
+  const double h = std::clamp(evidence.malicious, config_.malicious_share, 1.0);
   const double ratio = std::log(((1 - h) * there + h) / ((1 - h) * absent + h));
   const double bound = MaxLogOddsPerVehicle(evidence);
   return std::clamp(ratio, -bound, bound);
 }
 
-/// Half hostile is worth nothing; who is more so must not be believed the other way round.
+/// Half malicious is worth nothing; who is more so must not be believed the other way round.
 double HazardLifecycle::MaxLogOddsPerVehicle(const Evidence& evidence) const {
-  if (!(evidence.hostile > config_.malicious_share)) return max_voice_;
-  return std::max(0.0, -LogOddsOf(std::min(evidence.hostile, 0.5)));
+  if (!(evidence.malicious > config_.malicious_share)) return max_evidence_;
+  return std::max(0.0, -LogOddsOf(std::min(evidence.malicious, 0.5)));
 }
 
 bool HazardLifecycle::ApplyEvidence(const ClassModel& entry, const Evidence& evidence,
                                     PresenceRecord& life) const {
+  const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
+  const double stood_since =
+      entry.survival.Survival(LifecycleAgeS(life, evidence.stamp_ns), late_s);
+  // What was seen that long ago and not since would be off the map by now.
+  if (stood_since < config_.gone_below) return false;
   const bool against = evidence.kind == EvidenceKind::kAnswerNo;
   const auto at_s = static_cast<std::uint32_t>(std::max(0.0, Seconds(evidence.stamp_ns)));
-  const bool suspect = evidence.hostile >= config_.suspect_above;
+  const bool suspect = evidence.malicious >= config_.suspect_above;
   VehicleEvidence* voice = PlaceForEvidence(evidence.vehicle, suspect, at_s, life);
   if (voice == nullptr || (voice->at_s == at_s && voice->against == against)) return false;
-  const double late_s = Seconds(std::max<std::int64_t>(0, life.at_ns - evidence.stamp_ns));
-  const double ended_since = 1 - entry.survival.Survival(AgeS(life, evidence.stamp_ns), late_s);
-  const double ratio = LogRatio(entry, evidence, ended_since);
+  const double ratio = LogRatio(entry, evidence, 1 - stood_since);
 
   // What the vehicle said for the hazard earlier has faded with the odds.
   double before = 1e-3 * voice->weight_1000;
@@ -200,6 +214,7 @@ LifecycleUpdate HazardLifecycle::Apply(const ClassModel& entry, const Evidence& 
   }
   Settle(entry, now_ns, life, step);
   if (told) step.lesson.stood_s += Seconds(life.last_yes_ns - stood_until_ns);
+  BoundLifecycleLesson(entry, step);
   return step;
 }
 
@@ -207,6 +222,7 @@ LifecycleUpdate HazardLifecycle::Advance(const ClassModel& entry, std::int64_t n
                                          PresenceRecord& life) const {
   LifecycleUpdate step;
   if (life.state != HazardState::kGone) Settle(entry, now_ns, life, step);
+  BoundLifecycleLesson(entry, step);
   return step;
 }
 
@@ -221,7 +237,7 @@ void HazardLifecycle::Settle(const ClassModel& entry, std::int64_t now_ns, Prese
   }
   const HazardState from = life.state;
   const HazardState to = step.transition->to;
-  Enter(to, now_ns, life);
+  EnterLifecycleState(to, now_ns, life);
   if (from == HazardState::kCandidate && to == HazardState::kActive) {
     step.lesson.stood_s = Seconds(life.last_yes_ns - life.first_seen_ns);
   }
@@ -250,10 +266,11 @@ LifecycleUpdate HazardLifecycle::Confirm(const ClassModel& entry, const std::str
   life.log_odds = life.undenied_log_odds = max_log_odds_;
   step.counted = true;
   step.lesson.stood_s = Seconds(life.last_yes_ns - stood_until_ns);
+  BoundLifecycleLesson(entry, step);
   // Confirmed again it stays what it is; that somebody looked is an event all the same.
-  step.transition =
-      Transition(life, HazardState::kActive, DecisionText("confirmed", official, reason));
-  if (life.state != HazardState::kActive) Enter(HazardState::kActive, now_ns, life);
+  step.transition = LifecycleTransitionOf(life, HazardState::kActive,
+                                          DecisionText("confirmed", official, reason));
+  if (life.state != HazardState::kActive) EnterLifecycleState(HazardState::kActive, now_ns, life);
   return step;
 }
 
@@ -263,9 +280,9 @@ LifecycleUpdate HazardLifecycle::Reject(const ClassModel& entry, const std::stri
   LifecycleUpdate step;
   if (!IsOnMap(life.state)) return step;
   step.verdicts = trust_update_.AfterDecision(entry, false, life);
-  step.transition =
-      Transition(life, HazardState::kRejected, DecisionText("rejected", official, reason));
-  Enter(HazardState::kRejected, now_ns, life);
+  step.transition = LifecycleTransitionOf(life, HazardState::kRejected,
+                                          DecisionText("rejected", official, reason));
+  EnterLifecycleState(HazardState::kRejected, now_ns, life);
   // From here on it must be shown anew that there is something.
   life.official = false;
   life.voices = {};
@@ -300,6 +317,42 @@ LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t
   return step;
 }
 
+LifecycleUpdate HazardLifecycle::Reinstate(const ClassModel& entry, const PresenceRecord& before,
+                                           const std::function<double(std::uint64_t)>& malicious_of,
+                                           const std::set<std::uint64_t>& withdrawn,
+                                           const std::string& why, std::int64_t now_ns,
+                                           PresenceRecord& life) const {
+  const HazardState from = life.state;
+  PresenceRecord restored = before;
+  for (const std::uint64_t vehicle : withdrawn) {
+    // As of the moment of before: time goes on below.
+    Withdraw(entry, vehicle, why, restored.at_ns, restored);
+  }
+  std::vector<VehicleEvidence> since;
+  for (const VehicleEvidence& voice : life.voices) {
+    if (voice.vehicle == 0) continue;
+    const bool is_known =
+        std::any_of(before.voices.begin(), before.voices.end(), [&](const VehicleEvidence& old) {
+          return old.vehicle == voice.vehicle && old.at_s >= voice.at_s;
+        });
+    if (!is_known) since.push_back(voice);
+  }
+  std::sort(since.begin(), since.end(),
+            [](const VehicleEvidence& a, const VehicleEvidence& b) { return a.at_s < b.at_s; });
+  for (const VehicleEvidence& voice : since) {
+    Evidence word{voice.against ? EvidenceKind::kAnswerNo : EvidenceKind::kSighting, voice.vehicle,
+                  Nanoseconds(voice.at_s)};
+    word.malicious = malicious_of(voice.vehicle);
+    Apply(entry, word, std::max(restored.at_ns, word.stamp_ns), restored);
+  }
+  LifecycleUpdate step;
+  step.counted = true;
+  if (restored.state != HazardState::kGone) Advance(entry, now_ns, restored);
+  life = restored;
+  step.transition = LifecycleTransition{from, life.state, CutUtf8(why, kMaxEventReasonBytes)};
+  return step;
+}
+
 /// The odds as if the vehicle had said nothing.
 void HazardLifecycle::TakeBack(const ClassModel& entry, const VehicleEvidence& taken,
                                PresenceRecord& life) const {
@@ -322,9 +375,9 @@ void HazardLifecycle::Demote(const ClassModel& entry, const VehicleEvidence& tak
   if (taken.against || !IsOnMap(life.state)) return;
   const std::uint32_t supporters = Supporters(life);
   if (supporters == 0) {
-    Enter(HazardState::kGone, now_ns, life);
+    EnterLifecycleState(HazardState::kGone, now_ns, life);
   } else if (IsTold(life.state) && supporters < entry.confirmations) {
-    Enter(HazardState::kCandidate, now_ns, life);
+    EnterLifecycleState(HazardState::kCandidate, now_ns, life);
   }
 }
 
@@ -350,20 +403,21 @@ std::optional<LifecycleTransition> HazardLifecycle::Decide(const ClassModel& ent
     case HazardState::kCandidate:
       if (supporters < entry.confirmations + opponents && !life.official) return std::nullopt;
       if (presence < ActiveAbove(entry)) return std::nullopt;
-      return Transition(life, HazardState::kActive, "seen by " + VehiclesText(supporters));
+      return LifecycleTransitionOf(life, HazardState::kActive,
+                                   "seen by " + LifecycleVehiclesText(supporters));
     case HazardState::kActive:
       if (presence >= VerifyBelow(entry)) return std::nullopt;
-      return Transition(
+      return LifecycleTransitionOf(
           life, HazardState::kVerifying,
-          PresenceText(life.log_odds) +
-              (opponents > 0
-                   ? ": denied by " + VehiclesText(opponents)
-                   : ": not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns))));
+          LifecyclePresenceText(life.log_odds) +
+              (opponents > 0 ? ": denied by " + LifecycleVehiclesText(opponents)
+                             : ": not seen for " +
+                                   LifecycleDurationText(Seconds(life.at_ns - life.last_yes_ns))));
     case HazardState::kVerifying:
       if (presence < config_.settled_above) return std::nullopt;
-      return Transition(
-          life, HazardState::kActive,
-          "still there by " + VehiclesText(supporters) + ", " + PresenceText(life.log_odds));
+      return LifecycleTransitionOf(life, HazardState::kActive,
+                                   "still there by " + LifecycleVehiclesText(supporters) + ", " +
+                                       LifecyclePresenceText(life.log_odds));
     default:
       return std::nullopt;
   }
@@ -376,14 +430,15 @@ bool HazardLifecycle::IsDeniedAway(const PresenceRecord& life) const {
 
 std::optional<LifecycleTransition> HazardLifecycle::DecideGone(const PresenceRecord& life) const {
   if (IsDeniedAway(life)) {
-    return Transition(
-        life, HazardState::kGone,
-        "denied by " + VehiclesText(Opponents(life)) + ", " + PresenceText(life.log_odds));
+    return LifecycleTransitionOf(life, HazardState::kGone,
+                                 "denied by " + LifecycleVehiclesText(Opponents(life)) + ", " +
+                                     LifecyclePresenceText(life.log_odds));
   }
   if (ProbabilityOf(life.undenied_log_odds) >= config_.gone_below) return std::nullopt;
-  return Transition(life, HazardState::kGone,
-                    "not seen for " + DurationText(Seconds(life.at_ns - life.last_yes_ns)) + ", " +
-                        PresenceText(life.undenied_log_odds));
+  return LifecycleTransitionOf(life, HazardState::kGone,
+                               "not seen for " +
+                                   LifecycleDurationText(Seconds(life.at_ns - life.last_yes_ns)) +
+                                   ", " + LifecyclePresenceText(life.undenied_log_odds));
 }
 
 std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(
@@ -391,13 +446,15 @@ std::optional<LifecycleTransition> HazardLifecycle::DecideRejected(
   const std::uint32_t supporters = Supporters(life);
   if (supporters >= config_.reopen_vehicles &&
       ProbabilityOf(life.log_odds) >= config_.active_above) {
-    return Transition(life, HazardState::kActive,
-                      "seen by " + VehiclesText(supporters) + " after its rejection");
+    return LifecycleTransitionOf(
+        life, HazardState::kActive,
+        "seen by " + LifecycleVehiclesText(supporters) + " after its rejection");
   }
   const std::int64_t heard_ns = std::max(life.since_ns, life.last_yes_ns);
   if (Seconds(life.at_ns - heard_ns) < config_.rejected_keep_s) return std::nullopt;
-  return Transition(life, HazardState::kGone,
-                    "rejected, and not seen for " + DurationText(Seconds(life.at_ns - heard_ns)));
+  return LifecycleTransitionOf(
+      life, HazardState::kGone,
+      "rejected, and not seen for " + LifecycleDurationText(Seconds(life.at_ns - heard_ns)));
 }
 
 double HazardLifecycle::Presence(const ClassModel& entry, const PresenceRecord& life,
@@ -405,7 +462,7 @@ double HazardLifecycle::Presence(const ClassModel& entry, const PresenceRecord& 
   if (life.state == HazardState::kRejected || now_ns <= life.at_ns) {
     return ProbabilityOf(life.log_odds);
   }
-  return ProbabilityOf(Faded(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
+  return ProbabilityOf(FadedLifecycle(entry, life.log_odds, life, Seconds(now_ns - life.at_ns)));
 }
 
 std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
@@ -416,7 +473,7 @@ std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
   }
   const auto falls_in_s = [&](double log_odds, double below) {
     const double share = below / ProbabilityOf(log_odds);
-    return share >= 1 ? 0.0 : entry.survival.TimeTo(share, AgeS(life, life.at_ns));
+    return share >= 1 ? 0.0 : entry.survival.TimeTo(share, LifecycleAgeS(life, life.at_ns));
   };
   double soonest_s = falls_in_s(life.undenied_log_odds, config_.gone_below);
   if (Opponents(life) >= config_.denying_vehicles) {
@@ -426,7 +483,7 @@ std::int64_t HazardLifecycle::NextChangeNs(const ClassModel& entry,
     soonest_s = std::min(soonest_s, falls_in_s(life.log_odds, VerifyBelow(entry)));
   }
   // A little later than computed, so that rounding does not make it too early.
-  const double margin_s = 1e-3 + 1e-9 * (entry.survival.scale_s + AgeS(life, life.at_ns));
+  const double margin_s = 1e-3 + 1e-9 * (entry.survival.scale_s + LifecycleAgeS(life, life.at_ns));
   const double limited_s = std::min(soonest_s + margin_s, 1e9);
   return life.at_ns + Nanoseconds(limited_s);
 }

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -40,9 +42,9 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// The presence probability p is a two-state filter in log odds (as of occupancy grids: Moravec and
 /// Elfes, 1985): between words of vehicles p shrinks by the class's survival, p(t + dt) = p(t)
 /// S(dt), for what has vanished does not come back; a word adds the logarithm of its likelihood
-/// ratio. Rates are of honest vehicles; a share h of hostile ones says what it likes, so the ratio
-/// of a yes is ((1-h) hit + h) / ((1-h) false + h). Evidence older than the odds counts less: the
-/// hazard may have ended since.
+/// ratio. Rates are of honest vehicles; a share h of malicious ones says what it likes, so the
+/// ratio of a yes is ((1-h) hit + h) / ((1-h) false + h). Evidence older than the odds counts less:
+/// the hazard may have ended since.
 ///
 /// One vehicle is one voice: all that it says together moves the odds by at most ln((1-h)/h) either
 /// way, the second message of a kind adds less than the first, and messages lose nothing by their
@@ -52,7 +54,7 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// alone: one vehicle can neither confirm nor remove, nor hasten the removal. See
 /// docs/explanation/hazard-lifecycle.md.
 ///
-/// How far a vehicle is believed comes with its word (Evidence::hostile): h is the vehicle's own
+/// How far a vehicle is believed comes with its word (Evidence::malicious): h is the vehicle's own
 /// where it is above the share, so its voice has a lower bound, and from `suspect_above` on it
 /// counts as no vehicle. What becomes of words teaches that in turn, by verdicts, one per word. A
 /// hazard that another vehicle sees when the others make it sure bears out every voice for it and
@@ -71,7 +73,7 @@ class HazardLifecycle {
     double gone_below = 0.1;          ///< Off the map.
     double max_presence = 0.995;      ///< Presence never counts as more certain than this.
     double malicious_share = 0.05;    ///< h: vehicles that may say what they like.
-    double suspect_above = 0.5;       ///< A vehicle this likely hostile is not counted as one.
+    double suspect_above = 0.5;       ///< A vehicle this likely malicious is not counted as one.
     double max_trust_step = 1;        ///< No one verdict weighs more, log odds; an official's
     double official_weight = 2;       ///< ...weighs this many times as much as a vehicle's.
     std::uint32_t denying_vehicles = 2;  ///< Distinct vehicles against it before it is gone.
@@ -110,6 +112,16 @@ class HazardLifecycle {
   LifecycleUpdate Withdraw(const ClassModel& entry, std::uint64_t vehicle, const std::string& why,
                            std::int64_t now_ns, PresenceRecord& life) const;
 
+  /// What was done to the hazard is taken back: it is as in `before`, and what vehicles have said
+  /// since, which `life` remembers, counts on top, each by what `malicious_of` says of its vehicle.
+  /// Words of vehicles that `withdrawn` names stay away, although `before` has them. The transition
+  /// is from the present state, with `why` as its reason; it may lead to the same one. Judges
+  /// nobody and teaches nothing: that was done when the words came.
+  LifecycleUpdate Reinstate(const ClassModel& entry, const PresenceRecord& before,
+                            const std::function<double(std::uint64_t)>& malicious_of,
+                            const std::set<std::uint64_t>& withdrawn, const std::string& why,
+                            std::int64_t now_ns, PresenceRecord& life) const;
+
   /// Probability that the hazard is there at `now_ns`, from `life.at_ns` on.
   double Presence(const ClassModel& entry, const PresenceRecord& life, std::int64_t now_ns) const;
   /// When Advance will do something if nobody speaks before; kNever if it will not. To be asked
@@ -141,7 +153,7 @@ class HazardLifecycle {
   Config config_;
   TrustUpdate trust_update_;
   double max_log_odds_;  // Of presence, by `max_presence`.
-  double max_voice_;     // Of one vehicle, by `malicious_share`.
+  double max_evidence_;  // Of one vehicle, by `malicious_share`.
 };
 
 }  // namespace livemap::zone

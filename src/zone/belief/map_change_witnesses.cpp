@@ -7,17 +7,17 @@
 namespace livemap::zone {
 namespace {
 
-bool HasDrive(const MapChangeWitness& witness, std::uint64_t drive) {
+bool WitnessHasDrive(const MapChangeWitness& witness, std::uint64_t drive) {
   return std::find(witness.newest.begin(), witness.newest.end(), drive) != witness.newest.end();
 }
 
-void AddDrive(MapChangeWitness& witness, std::uint64_t drive) {
+void AddWitnessDrive(MapChangeWitness& witness, std::uint64_t drive) {
   std::rotate(witness.newest.begin(), witness.newest.end() - 1, witness.newest.end());
   witness.newest.front() = drive;
   ++witness.drives;
 }
 
-std::size_t CountSide(const std::vector<MapChangeWitness>& witnesses, bool against) {
+std::size_t CountWitnessesOfSide(const std::vector<MapChangeWitness>& witnesses, bool against) {
   return static_cast<std::size_t>(
       std::count_if(witnesses.begin(), witnesses.end(),
                     [against](const MapChangeWitness& one) { return one.against == against; }));
@@ -52,15 +52,15 @@ WitnessUpdate RecordWitness(std::vector<MapChangeWitness>& witnesses, std::uint6
         return one.vehicle == vehicle && one.against == against;
       });
   if (known != witnesses.end()) {
-    if (HasDrive(*known, drive)) return WitnessUpdate::kSameDrive;
-    AddDrive(*known, drive);
+    if (WitnessHasDrive(*known, drive)) return WitnessUpdate::kSameDrive;
+    AddWitnessDrive(*known, drive);
     return WitnessUpdate::kNewDrive;
   }
-  if (CountSide(witnesses, against) >= kMaxWitnesses) return WitnessUpdate::kTooMany;
+  if (CountWitnessesOfSide(witnesses, against) >= kMaxWitnesses) return WitnessUpdate::kTooMany;
   MapChangeWitness witness;
   witness.vehicle = vehicle;
   witness.against = against;
-  AddDrive(witness, drive);
+  AddWitnessDrive(witness, drive);
   witnesses.push_back(witness);
   return WitnessUpdate::kNewVehicle;
 }
@@ -84,7 +84,8 @@ std::optional<std::vector<MapChangeWitness>> UnpackWitnesses(const std::string& 
   std::vector<MapChangeWitness> witnesses;
   while (!reader.done()) {
     const auto witness = ReadWitness(reader);
-    if (!witness || CountSide(witnesses, witness->against) >= kMaxWitnesses) return std::nullopt;
+    if (!witness || CountWitnessesOfSide(witnesses, witness->against) >= kMaxWitnesses)
+      return std::nullopt;
     const bool twice = std::any_of(witnesses.begin(), witnesses.end(), [&](const auto& other) {
       return other.vehicle == witness->vehicle && other.against == witness->against;
     });

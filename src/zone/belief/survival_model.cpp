@@ -9,7 +9,7 @@
 namespace livemap::zone {
 namespace {
 
-bool IsAmount(double value) { return std::isfinite(value) && value >= 0; }
+bool IsSurvivalAmount(double value) { return std::isfinite(value) && value >= 0; }
 
 }  // namespace
 
@@ -48,7 +48,7 @@ SurvivalModel::SurvivalModel(protocol::HazardCatalogue catalogue, Config config)
 }
 
 void SurvivalModel::Restore(const std::string& class_name, const LearnedLifetime& learned) {
-  if (!IsAmount(learned.ended) || !IsAmount(learned.stood_s)) {
+  if (!IsSurvivalAmount(learned.ended) || !IsSurvivalAmount(learned.stood_s)) {
     throw Error("what was learned of the lives of class '" + class_name +
                 "' is not two finite numbers from 0 on");
   }
@@ -56,7 +56,7 @@ void SurvivalModel::Restore(const std::string& class_name, const LearnedLifetime
 }
 
 void SurvivalModel::Learn(const std::string& class_name, const LifetimeObservation& lesson) {
-  if (!IsAmount(lesson.stood_s) || (lesson.stood_s == 0 && !lesson.ended)) return;
+  if (!IsSurvivalAmount(lesson.stood_s) || (lesson.stood_s == 0 && !lesson.ended)) return;
   LearnedLifetime& learned = learned_[class_name];
   learned.stood_s += lesson.stood_s;
   learned.ended += lesson.ended ? 1 : 0;
@@ -64,6 +64,13 @@ void SurvivalModel::Learn(const std::string& class_name, const LifetimeObservati
   if (learned.ended <= config_.memory) return;
   learned.stood_s *= config_.memory / learned.ended;
   learned.ended = config_.memory;
+}
+
+void SurvivalModel::Unlearn(const std::string& class_name, const LifetimeObservation& lesson) {
+  const auto known = learned_.find(class_name);
+  if (known == learned_.end() || !(lesson.stood_s >= 0)) return;
+  known->second.stood_s = std::max(0.0, known->second.stood_s - lesson.stood_s);
+  if (lesson.ended) known->second.ended = std::max(0.0, known->second.ended - 1);
 }
 
 ClassSurvival SurvivalModel::Of(const std::string& class_name) const {

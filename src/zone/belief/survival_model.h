@@ -68,6 +68,8 @@ class SurvivalModel {
   /// Learns from a step of a hazard's life (see HazardLifecycle); ignores what is not finite or
   /// negative.
   void Learn(const std::string& class_name, const LifetimeObservation& lesson);
+  /// Takes a lesson back that was learned before; nothing falls below zero.
+  void Unlearn(const std::string& class_name, const LifetimeObservation& lesson);
   /// The class's survival as known now; of the catalogue's expected life as long as nothing was
   /// learned: then its mean is exactly `expected_life_s`.
   ClassSurvival Of(const std::string& class_name) const;

@@ -12,11 +12,13 @@ namespace {
 /// Who says what it likes says one or the other.
 constexpr double kAnyWord = 0.5;
 
-double RightYes(const ClassModel& entry) { return std::log(kAnyWord / entry.hit_rate); }
-double RightNo(const ClassModel& entry) { return std::log(kAnyWord / (1 - entry.false_rate)); }
+double TrustForRightYes(const ClassModel& entry) { return std::log(kAnyWord / entry.hit_rate); }
+double TrustForRightNo(const ClassModel& entry) {
+  return std::log(kAnyWord / (1 - entry.false_rate));
+}
 
 /// The odds that the hazard was ever there, from what was said for it alone.
-double OddsOfSupport(const PresenceRecord& life, double prior) {
+double TrustOddsOfSupport(const PresenceRecord& life, double prior) {
   double log_odds = LogOddsOf(prior);
   for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle != 0 && !voice.against)
@@ -38,7 +40,7 @@ double TrustUpdate::WrongNo(const ClassModel& entry) const {
 std::vector<Verdict> TrustUpdate::AfterSighting(const ClassModel& entry, const Evidence& seen,
                                                 PresenceRecord& life) const {
   std::vector<Verdict> verdicts;
-  if (seen.hostile >= config_.suspect_above) return verdicts;
+  if (seen.malicious >= config_.suspect_above) return verdicts;
   for (std::size_t i = 0; i < kMaxEvidencePerHazard; ++i) {
     const VehicleEvidence& voice = life.voices[i];
     if (voice.vehicle == 0 || voice.vehicle == seen.vehicle || life.IsJudged(i)) continue;
@@ -46,7 +48,7 @@ std::vector<Verdict> TrustUpdate::AfterSighting(const ClassModel& entry, const E
     if (ProbabilityOf(life.log_odds - 1e-3 * voice.weight_1000) < config_.certain_above) continue;
     life.SetJudged(i, true);
     verdicts.push_back(
-        {voice.vehicle, voice.against ? WrongNo(entry) : RightYes(entry), seen.vehicle});
+        {voice.vehicle, voice.against ? WrongNo(entry) : TrustForRightYes(entry), seen.vehicle});
   }
   return verdicts;
 }
@@ -57,7 +59,7 @@ std::vector<Verdict> TrustUpdate::AfterDenial(const ClassModel& entry,
                                               const PresenceRecord& life) const {
   std::vector<Verdict> verdicts;
   const double real =
-      life.official ? 1 : ProbabilityOf(OddsOfSupport(life, config_.prior_presence));
+      life.official ? 1 : ProbabilityOf(TrustOddsOfSupport(life, config_.prior_presence));
   const double gap_s = std::max(0.0, Seconds(life.first_no_ns - life.last_yes_ns));
   const double age_s = std::max(0.0, Seconds(life.last_yes_ns - life.first_seen_ns));
   const double stands = entry.survival.Survival(age_s, gap_s);
@@ -79,7 +81,7 @@ std::vector<Verdict> TrustUpdate::AfterDenial(const ClassModel& entry,
     }
     const std::uint64_t voucher = voice.vehicle == opponent ? other_opponent : opponent;
     if (voucher != voice.vehicle) {
-      verdicts.push_back({voice.vehicle, RightNo(entry), voucher});
+      verdicts.push_back({voice.vehicle, TrustForRightNo(entry), voucher});
     }
     if (voice.Counts()) other_opponent = voice.vehicle;
   }
@@ -92,7 +94,7 @@ std::vector<Verdict> TrustUpdate::AfterDecision(const ClassModel& entry, bool th
   for (const VehicleEvidence& voice : life.voices) {
     if (voice.vehicle == 0) continue;
     const double wrong = voice.against ? WrongNo(entry) : WrongYes(entry);
-    const double right = voice.against ? RightNo(entry) : RightYes(entry);
+    const double right = voice.against ? TrustForRightNo(entry) : TrustForRightYes(entry);
     const double ratio = voice.against == there ? wrong : right;
     verdicts.push_back({voice.vehicle, config_.official_weight * ratio, 0});
   }

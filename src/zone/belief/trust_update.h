@@ -17,7 +17,7 @@ class TrustUpdate {
   struct Config {
     double prior_presence = 0.2;  ///< Before the first vehicle gives evidence.
     double certain_above = 0.85;  ///< Presence from which on a hazard settles what was said of it.
-    double suspect_above = 0.5;   ///< A vehicle this likely hostile bears nothing out.
+    double suspect_above = 0.5;   ///< A vehicle this likely malicious bears nothing out.
     double max_trust_step = 1;    ///< No one verdict weighs more, log odds; an official's
     double official_weight = 2;   ///< ...weighs this many times as much as a vehicle's.
   };

@@ -28,7 +28,7 @@ double VehicleTrust::Faded(const TrustRecord& record, std::int64_t now_ns) const
   return record.suspicion * std::exp(-age_s / config_.memory_s);
 }
 
-double VehicleTrust::Hostile(std::uint64_t vehicle, std::int64_t now_ns) const {
+double VehicleTrust::MaliciousProbability(std::uint64_t vehicle, std::int64_t now_ns) const {
   const auto found = records_.find(vehicle);
   const double suspicion = found == records_.end() ? 0 : Faded(found->second, now_ns);
   return ProbabilityOf(prior_log_odds_ + suspicion);
@@ -62,6 +62,22 @@ void VehicleTrust::Judge(const Verdict& verdict, std::int64_t now_ns) {
   record.suspicion = std::clamp(record.suspicion + verdict.log_ratio, 0.0, config_.max_suspicion);
 }
 
+double VehicleTrust::Suspicion(std::uint64_t vehicle, std::int64_t now_ns) const {
+  const auto found = records_.find(vehicle);
+  return found == records_.end() ? 0 : Faded(found->second, now_ns);
+}
+
+void VehicleTrust::TakeBack(std::uint64_t vehicle, double added, std::int64_t at_ns,
+                            std::int64_t now_ns) {
+  if (vehicle == 0 || !std::isfinite(added)) return;
+  const double age_s = std::max(0.0, Seconds(now_ns) - Seconds(at_ns));
+  const double left = added * std::exp(-age_s / config_.memory_s);
+  if (left >= 0 && records_.count(vehicle) == 0) return;
+  TrustRecord& record = Find(vehicle, now_ns);
+  record.suspicion = std::clamp(Faded(record, now_ns) - left, 0.0, config_.max_suspicion);
+  record.at_ns = std::max(record.at_ns, now_ns);
+}
+
 void VehicleTrust::Distrust(std::uint64_t vehicle, std::int64_t now_ns) {
   if (vehicle == 0) return;
   TrustRecord& record = Find(vehicle, now_ns);
@@ -74,10 +90,11 @@ TrustRecord VehicleTrust::Get(std::uint64_t vehicle) const {
   return found == records_.end() ? TrustRecord{} : found->second;
 }
 
-std::size_t VehicleTrust::Count(double hostile_above, std::int64_t now_ns) const {
-  return static_cast<std::size_t>(std::count_if(
-      records_.begin(), records_.end(),
-      [&](const auto& record) { return Hostile(record.first, now_ns) >= hostile_above; }));
+std::size_t VehicleTrust::Count(double malicious_above, std::int64_t now_ns) const {
+  return static_cast<std::size_t>(
+      std::count_if(records_.begin(), records_.end(), [&](const auto& record) {
+        return MaliciousProbability(record.first, now_ns) >= malicious_above;
+      }));
 }
 
 bool VehicleTrust::Restore(std::uint64_t vehicle, const TrustRecord& record) {
@@ -88,6 +105,28 @@ bool VehicleTrust::Restore(std::uint64_t vehicle, const TrustRecord& record) {
   taken.suspicion = std::min(taken.suspicion, config_.max_suspicion);
   Find(vehicle, record.at_ns) = taken;
   return true;
+}
+
+std::string PackTrust(const TrustRecord& record) {
+  std::string line;
+  AppendNumber(line, record.suspicion);
+  AppendNumber(line, record.at_ns);
+  return line + " " + PackVouchers(record);
+}
+
+std::optional<TrustRecord> UnpackTrust(const std::string& text) {
+  const std::size_t second = text.find(' ');
+  const std::size_t third = second == std::string::npos ? second : text.find(' ', second + 1);
+  if (third == std::string::npos) return std::nullopt;
+  const std::string numbers = text.substr(0, third);
+  NumberReader reader(numbers);
+  TrustRecord record;
+  reader.Read(record.suspicion);
+  reader.Read(record.at_ns);
+  const bool sound = reader.good() && reader.done() && record.suspicion >= 0 &&
+                     record.suspicion <= 100 && record.at_ns >= 0 &&
+                     UnpackVouchers(text.substr(third + 1), record);
+  return sound ? std::optional<TrustRecord>(record) : std::nullopt;
 }
 
 std::string PackVouchers(const TrustRecord& record) {

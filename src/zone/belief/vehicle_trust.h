@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace livemap::zone {
@@ -53,9 +54,14 @@ class VehicleTrust {
   explicit VehicleTrust(const Config& config);
 
   /// Probability that the vehicle says what it likes; the share h of one that nothing is known of.
-  double Hostile(std::uint64_t vehicle, std::int64_t now_ns) const;
+  double MaliciousProbability(std::uint64_t vehicle, std::int64_t now_ns) const;
   /// Takes a verdict in; one whose ratio is not finite counts nothing.
   void Judge(const Verdict& verdict, std::int64_t now_ns);
+
+  /// What is held against the vehicle at `now_ns`, log odds.
+  double Suspicion(std::uint64_t vehicle, std::int64_t now_ns) const;
+  /// Takes back what was added (or cleared, if negative) at `at_ns`, as far as it has not faded.
+  void TakeBack(std::uint64_t vehicle, double added, std::int64_t at_ns, std::int64_t now_ns);
 
   /// Holds as much against the vehicle as is held against anybody; it fades like any suspicion.
   void Distrust(std::uint64_t vehicle, std::int64_t now_ns);
@@ -65,8 +71,8 @@ class VehicleTrust {
   /// Takes in what the store kept. False, and nothing is taken in, when it is no such record.
   bool Restore(std::uint64_t vehicle, const TrustRecord& record);
   std::size_t vehicles() const { return records_.size(); }
-  /// Vehicles that are hostile with at least this probability.
-  std::size_t Count(double hostile_above, std::int64_t now_ns) const;
+  /// Vehicles that are malicious with at least this probability.
+  std::size_t Count(double malicious_above, std::int64_t now_ns) const;
 
  private:
   double Faded(const TrustRecord& record, std::int64_t now_ns) const;
@@ -76,6 +82,11 @@ class VehicleTrust {
   double prior_log_odds_;
   std::map<std::uint64_t, TrustRecord> records_;
 };
+
+/// The whole record as one line of plain numbers, at most 300 bytes; exact.
+std::string PackTrust(const TrustRecord& record);
+/// Inverse of PackTrust; none when `text` is anything else.
+std::optional<TrustRecord> UnpackTrust(const std::string& text);
 
 /// One line of plain numbers, at most 200 bytes, to be stored.
 std::string PackVouchers(const TrustRecord& record);

@@ -24,12 +24,18 @@ constexpr bool IsOnMap(HazardState state) {
   return state == HazardState::kCandidate || state == HazardState::kActive ||
          state == HazardState::kVerifying;
 }
+/// All of these.
+inline const HazardStates& StatesOnMap() {
+  static const HazardStates states{HazardState::kCandidate, HazardState::kActive,
+                                   HazardState::kVerifying};
+  return states;
+}
 /// Drivers are told of it.
 constexpr bool IsTold(HazardState state) {
   return state == HazardState::kActive || state == HazardState::kVerifying;
 }
 /// "candidate", "active", "verifying", "gone" or "rejected".
-constexpr const char* StateName(HazardState state) {
+constexpr const char* HazardStateName(HazardState state) {
   switch (state) {
     case HazardState::kCandidate:
       return "candidate";

@@ -5,46 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "common/uuid.h"
 #include "geo/wgs84.h"
 #include "zone/model/hazard.h"
+#include "zone/model/map_change_state.h"
 
 namespace livemap::zone {
-
-/// Where a map change stands, as stored: the numbers never change.
-/// docs/explanation/map-changes.md tells the steps.
-enum class MapChangeState : std::uint8_t {
-  kProposed = 0,   ///< One vehicle says so.
-  kConfirmed = 1,  ///< Two vehicles say so, or an official.
-  kUndone = 2,     ///< The opposite was told later.
-  kDismissed = 3,  ///< An official says it is none.
-};
-
-constexpr std::size_t kMapChangeStates = 4;
-using MapChangeStates = std::set<MapChangeState>;
-
-/// Shown on the map; further words of vehicles change it.
-constexpr bool IsOpen(MapChangeState state) {
-  return state == MapChangeState::kProposed || state == MapChangeState::kConfirmed;
-}
-/// "proposed", "confirmed", "undone" or "dismissed".
-constexpr const char* StateName(MapChangeState state) {
-  switch (state) {
-    case MapChangeState::kProposed:
-      return "proposed";
-    case MapChangeState::kConfirmed:
-      return "confirmed";
-    case MapChangeState::kUndone:
-      return "undone";
-    case MapChangeState::kDismissed:
-      return "dismissed";
-  }
-  return "unknown";
-}
 
 /// So many of its newest drives are known of each vehicle, and so many vehicles on each side.
 constexpr std::size_t kMaxWitnessDrives = 4;
@@ -116,6 +85,7 @@ struct MapChangeStatistics {
   std::uint64_t known = 0;     ///< Committed, but nothing new: see MapChangeRegistry::Tell.
   std::uint64_t repeated = 0;  ///< Their uuid was committed before.
   std::uint64_t refused = 0;   ///< For good.
+  std::uint64_t too_fast = 0;  ///< Of those, for the speed that their places would need.
   std::uint64_t not_now = 0;   ///< Beyond a vehicle's hourly cap: not answered, sent again later.
   std::array<std::size_t, kMapChangeStates> by_state{};  ///< Features, by MapChangeState.
 };

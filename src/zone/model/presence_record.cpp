@@ -20,13 +20,13 @@ constexpr unsigned kAgainst = 1;
 constexpr unsigned kJudged = 2;
 constexpr unsigned kSuspect = 4;
 
-bool IsSound(const PresenceRecord& life) {
+bool IsSoundPresence(const PresenceRecord& life) {
   return IsStamp(life.since_ns) && IsStamp(life.first_seen_ns) && IsStamp(life.last_yes_ns) &&
          IsStamp(life.first_no_ns) && IsStamp(life.at_ns) &&
          std::abs(life.log_odds) <= kMaxLogOdds && std::abs(life.undenied_log_odds) <= kMaxLogOdds;
 }
 
-bool ReadVoices(NumberReader& reader, PresenceRecord& life) {
+bool ReadPresenceVoices(NumberReader& reader, PresenceRecord& life) {
   for (std::size_t i = 0; !reader.done(); ++i) {
     if (i == kMaxEvidencePerHazard) return false;
     VehicleEvidence& voice = life.voices[i];
@@ -97,7 +97,7 @@ std::optional<PresenceRecord> UnpackPresence(const std::string& text) {
   if (!reader.good() || state >= kHazardStates || official > 1) return std::nullopt;
   life.state = static_cast<HazardState>(state);
   life.official = official == 1;
-  if (!IsSound(life) || !ReadVoices(reader, life)) return std::nullopt;
+  if (!IsSoundPresence(life) || !ReadPresenceVoices(reader, life)) return std::nullopt;
   return life;
 }
 
@@ -105,6 +105,17 @@ std::uint32_t Supporters(const PresenceRecord& life) {
   return static_cast<std::uint32_t>(
       std::count_if(life.voices.begin(), life.voices.end(),
                     [](const VehicleEvidence& voice) { return voice.Counts() && !voice.against; }));
+}
+
+std::uint64_t OnlyWitness(const PresenceRecord& life) {
+  if (!IsOnMap(life.state) || life.official) return 0;
+  std::uint64_t witness = 0;
+  for (const VehicleEvidence& voice : life.voices) {
+    if (voice.vehicle == 0 || voice.against) continue;
+    if (witness != 0) return 0;
+    witness = voice.vehicle;
+  }
+  return witness;
 }
 
 std::uint32_t Opponents(const PresenceRecord& life) {

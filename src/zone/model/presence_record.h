@@ -59,6 +59,9 @@ std::optional<PresenceRecord> UnpackPresence(const std::string& text);
 
 /// Vehicles that count whose newest word is for the hazard; at most kMaxEvidencePerHazard.
 std::uint32_t Supporters(const PresenceRecord& life);
+/// The vehicle on whose word alone a hazard on the map rests: no other vehicle's newest word is for
+/// it, and no official has confirmed it. 0 without one.
+std::uint64_t OnlyWitness(const PresenceRecord& life);
 /// Vehicles that count whose newest word is against it, and has not been answered by two others
 /// since, that spoke for it.
 std::uint32_t Opponents(const PresenceRecord& life);

@@ -16,6 +16,7 @@ struct VehicleState {
   double speed_mps = 0;
   std::int64_t stamp_ns = 0;  ///< Of the fix, vehicle clock (UTC).
   std::int64_t heard_ns = 0;  ///< Zone clock (UTC), set by UpdateVehicle.
+  double sigma_m = 0;         ///< Standard deviation of the position per axis.
 };
 
 }  // namespace livemap::zone

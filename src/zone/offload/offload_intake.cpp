@@ -3,18 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/number_text.h"
 #include "common/sha256.h"
 #include "placement/hazard_placement.h"
 #include "placement/road_ground_contact.h"
+#include "zone/admission/longest_silent.h"
 
 namespace livemap::zone {
 namespace {
 
 constexpr double kEndlessM = 1e4;  // The projection's own limit; max_range_m is ours.
-
-std::uint8_t HexDigit(char digit) {
-  return static_cast<std::uint8_t>(digit <= '9' ? digit - '0' : digit - 'a' + 10);
-}
 
 }  // namespace
 
@@ -30,7 +28,7 @@ Uuid OffloadReportUuid(const std::string& vehicle_id, std::int64_t stamp_ns,
   Uuid uuid;
   for (std::size_t i = 0; i < uuid.bytes.size(); ++i) {
     uuid.bytes[i] =
-        static_cast<std::uint8_t>(HexDigit(digest[2 * i]) << 4 | HexDigit(digest[2 * i + 1]));
+        static_cast<std::uint8_t>(16 * HexValue(digest[2 * i]) + HexValue(digest[2 * i + 1]));
   }
   uuid.bytes[6] = static_cast<std::uint8_t>((uuid.bytes[6] & 0x0fU) | 0x80U);
   uuid.bytes[8] = static_cast<std::uint8_t>((uuid.bytes[8] & 0x3fU) | 0x80U);
@@ -49,9 +47,15 @@ std::string OffloadIntake::Add(protocol::OffloadedFrame frame, std::int64_t now_
     ++counters_.refused;
     return why->sentence;
   }
+  // Before its place is judged: a frame that comes again does not agree with itself.
   if (!Remember(frame)) {
     ++counters_.repeated;
     return "frame came before";
+  }
+  if (const auto speed_mps = ChallengePlace(frame, now_ns)) {
+    ++counters_.refused;
+    ++counters_.too_fast;
+    return SpeedText(*speed_mps, config_.speed);
   }
   waiting_bytes_ += frame.image.size();
   waiting_.push_back(std::move(frame));
@@ -62,6 +66,19 @@ std::string OffloadIntake::Add(protocol::OffloadedFrame frame, std::int64_t now_
     ++counters_.displaced;
   }
   return {};
+}
+
+/// The speed that the frame's place would need; none when the vehicle can have been there.
+std::optional<double> OffloadIntake::ChallengePlace(const protocol::OffloadedFrame& frame,
+                                                    std::int64_t now_ns) {
+  if (tracks_.count(frame.vehicle_id) == 0) {
+    ForgetLongestSilent(tracks_, config_.allowance.max_vehicles);
+  }
+  Track& known = tracks_[frame.vehicle_id];
+  known.heard_ns = now_ns;
+  const ReportedFix fix{frame.stamp_ns, frame.base.position,
+                        std::sqrt(frame.base.covariance_m2.trace())};
+  return Challenge(known.track, fix, config_.speed, false);
 }
 
 bool OffloadIntake::Remember(const protocol::OffloadedFrame& frame) {
@@ -79,7 +96,11 @@ const OffloadIntake::Job* OffloadIntake::Next(std::int64_t now_ns, double steady
   if (waiting_.empty() || in_flight_.size() >= static_cast<std::size_t>(config_.max_in_flight)) {
     return nullptr;
   }
-  newest_internal_ns_ = std::max(now_ns, newest_internal_ns_ + 1);
+  // A clock that was set back is followed: the detector refuses stamps far ahead of it.
+  constexpr std::int64_t kSetBackNs = 1'000'000'000;
+  const bool set_back = newest_internal_ns_ - now_ns > kSetBackNs;
+  newest_internal_ns_ = set_back ? now_ns : std::max(now_ns, newest_internal_ns_ + 1);
+  while (in_flight_.count(newest_internal_ns_) != 0) ++newest_internal_ns_;
   InFlight next;
   next.job.internal_ns = newest_internal_ns_;
   next.job.frame = std::move(waiting_.front());

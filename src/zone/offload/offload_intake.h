@@ -16,6 +16,7 @@
 #include "protocol/report.h"
 #include "zone/admission/offload_allowance.h"
 #include "zone/admission/offload_validation.h"
+#include "zone/admission/speed_rule.h"
 
 namespace livemap::zone {
 
@@ -28,6 +29,7 @@ class OffloadIntake {
   struct Config {
     OffloadLimits limits;
     OffloadAllowance::Config allowance;
+    SpeedRule speed;                  ///< Between the places of a vehicle's frames.
     int max_waiting = 200;            ///< Frames that wait for the detector; then the oldest goes.
     double max_waiting_bytes = 32e6;  ///< Of their pictures.
     int max_in_flight = 4;            ///< Frames at the detector, so that it never drops one.
@@ -46,7 +48,8 @@ class OffloadIntake {
   struct Counters {
     std::uint64_t frames = 0;
     std::uint64_t bytes = 0;             ///< Of all pictures that came.
-    std::uint64_t refused = 0;           ///< Broken, see WhyOffloadRefused.
+    std::uint64_t refused = 0;           ///< Broken, see WhyOffloadRefused, or too fast.
+    std::uint64_t too_fast = 0;          ///< Of these, for the speed that their places would need.
     std::uint64_t over_allowance = 0;    ///< More than the vehicle may send.
     std::uint64_t repeated = 0;          ///< Known already.
     std::uint64_t displaced = 0;         ///< The detector was too far behind.
@@ -95,6 +98,10 @@ class OffloadIntake {
     Job job;
     double since_s = 0;
   };
+  struct Track {
+    ReportTrack track;
+    std::int64_t heard_ns = 0;  ///< Zone clock.
+  };
   using Key = std::pair<std::string, std::int64_t>;  // Vehicle and stamp.
 
   bool IsUsable(const placement::Sighting& sighting);
@@ -103,6 +110,7 @@ class OffloadIntake {
   protocol::Report ReportOf(const protocol::OffloadedFrame& frame,
                             const placement::Sighting& sighting, const geo::GroundPoint& ground);
   bool Remember(const protocol::OffloadedFrame& frame);
+  std::optional<double> ChallengePlace(const protocol::OffloadedFrame& frame, std::int64_t now_ns);
 
   Config config_;
   OffloadAllowance allowance_;
@@ -112,6 +120,10 @@ class OffloadIntake {
   std::int64_t newest_internal_ns_ = 0;
   std::set<Key> remembered_;
   std::deque<Key> remembered_order_;
+  /// Where each vehicle was; as many vehicles as the allowance has, beyond which the longest silent
+  /// one goes. The reports that come of the frames are judged once more, by what the zone has
+  /// stored.
+  std::map<std::string, Track> tracks_;
   Counters counters_;
 };
 

@@ -19,14 +19,14 @@ namespace fs = std::filesystem;
 
 constexpr char kTemporarySuffix[] = ".tmp";
 
-bool IsSha256Hex(const std::string& text) {
+bool IsStoredImageName(const std::string& text) {
   return text.size() == 64 && std::all_of(text.begin(), text.end(), [](char c) {
            return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
          });
 }
 
 /// Writes a whole file. Returns errno's value, 0 for success.
-int WriteFile(const std::string& path, const std::vector<std::uint8_t>& bytes) {
+int WriteStoredImage(const std::string& path, const std::vector<std::uint8_t>& bytes) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) return errno;
   int error = 0;
@@ -41,7 +41,7 @@ int WriteFile(const std::string& path, const std::vector<std::uint8_t>& bytes) {
 }
 
 /// Brings everything written to the directory's file system to disk. Returns errno's value.
-int SynchroniseFileSystemOf(const std::string& directory) {
+int SynchroniseImageStore(const std::string& directory) {
   const int file = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (file < 0) return errno;
   const int error = syncfs(file) == 0 ? 0 : errno;
@@ -79,7 +79,7 @@ void ImageStore::TakeStock() {
     }
     const std::string name = path.stem().string();
     const std::string extension = path.extension().string();
-    if (!IsSha256Hex(name) || extension.size() < 2) continue;
+    if (!IsStoredImageName(name) || extension.size() < 2) continue;
     found.emplace_back(item.last_write_time(), name, extension.substr(1), item.file_size());
   }
   std::sort(found.begin(), found.end());
@@ -106,7 +106,7 @@ std::string ImageStore::Put(const std::vector<std::uint8_t>& bytes, const std::s
   const std::string temporary = path + kTemporarySuffix;
   std::error_code ignored;
   fs::create_directory(directory_ + "/" + sha256.substr(0, 2), ignored);
-  const int error = WriteFile(temporary, bytes);
+  const int error = WriteStoredImage(temporary, bytes);
   if (error != 0) {
     fs::remove(temporary, ignored);
     throw StoreError("store: picture '" + path + "' cannot be written: " + std::strerror(error));
@@ -123,7 +123,7 @@ void ImageStore::Publish() {
   }
   if (pending.empty()) return;
   // Without the lock: those who look for pictures need not wait for the disk.
-  int error = SynchroniseFileSystemOf(directory_);
+  int error = SynchroniseImageStore(directory_);
   const MutexLock lock(mutex_);
   for (const auto& [sha256, picture] : pending) {
     const std::string path = FilePath(sha256, picture.format);
@@ -143,7 +143,7 @@ void ImageStore::Publish() {
 }
 
 std::optional<std::string> ImageStore::Path(const std::string& sha256) const {
-  if (!IsSha256Hex(sha256)) return std::nullopt;
+  if (!IsStoredImageName(sha256)) return std::nullopt;
   const MutexLock lock(mutex_);
   const auto found = entries_.find(sha256);
   if (found == entries_.end()) return std::nullopt;

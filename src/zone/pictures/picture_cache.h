@@ -52,6 +52,8 @@ class PictureCache {
   std::size_t total_bytes() const;
   /// How often a file was not accepted since the start.
   std::uint64_t refused() const;
+  /// Why the last of them was not accepted, in one sentence; empty when none was.
+  std::string last_refusal() const;
 
  private:
   struct Entry {
@@ -59,7 +61,7 @@ class PictureCache {
     std::list<std::string>::iterator use;
   };
 
-  void Keep(const std::string& sha256, const File& file);
+  void Keep(const std::string& sha256, const File& file, const std::string& refusal);
 
   const Recode recode_;
   const Config config_;
@@ -70,6 +72,7 @@ class PictureCache {
   std::list<std::string> uses_ GUARDED_BY(mutex_);
   std::size_t total_bytes_ GUARDED_BY(mutex_) = 0;
   std::uint64_t refused_ GUARDED_BY(mutex_) = 0;
+  std::string last_refusal_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::zone

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -10,6 +11,7 @@
 #include "common/error.h"
 #include "imaging/image_header.h"
 #include "imaging/report_picture.h"
+#include "zone/pictures/jpeg_walk.h"
 
 namespace livemap::zone {
 namespace {
@@ -24,6 +26,13 @@ constexpr int kThumbnailQuality = 75;
 
 std::string Dimensions(const imaging::ImageHeader& header) {
   return std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
+}
+
+/// `pixels` that each cost as much as `factor`, at least 1, plain ones. A header may say anything:
+/// what is beyond an int64 is the most that it holds.
+std::int64_t PictureWork(std::int64_t pixels, std::int64_t factor) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  return pixels > kMost / factor ? kMost : pixels * factor;
 }
 
 /// Everything that can be known without decoding.
@@ -43,6 +52,12 @@ imaging::ImageHeader CheckedHeader(const std::vector<std::uint8_t>& file,
   if (pixels > limits.max_pixels) {
     throw Error("the picture says it has " + Dimensions(*header) + ", accepted are " +
                 std::to_string(limits.max_pixels) + " in all");
+  }
+  if (DecodingWork(file) > limits.max_work_px) {
+    throw Error("the picture of " + Dimensions(*header) +
+                " has so many scans or bytes per pixel that it costs as much as one of " +
+                std::to_string(DecodingWork(file)) + " pixels, accepted are " +
+                std::to_string(limits.max_work_px));
   }
   if (header->format == imaging::ImageHeader::Format::kJpeg) {
     if (const auto why = WhyNoWholeJpeg(file, kMaxScans)) throw Error("the picture " + *why);
@@ -158,67 +173,22 @@ void DrawBox(cv::Mat& image, const cv::Rect2d& box) {
   cv::rectangle(image, {left, top}, {right, bottom}, cv::Scalar(40, 60, 255), 2);
 }
 
-/// Segments of a JPEG, one marker after the other.
-class JpegWalk {
- public:
-  explicit JpegWalk(const std::vector<std::uint8_t>& file) : file_(file) {}
-
-  /// The next marker's code; 0 where none stands. Fill bytes before it are skipped.
-  int TakeMarker() {
-    if (at_ >= file_.size() || file_[at_] != 0xff) return 0;
-    while (at_ < file_.size() && file_[at_] == 0xff) ++at_;
-    return at_ < file_.size() ? file_[at_++] : 0;
-  }
-  /// Skips a segment's content; false when it reaches beyond the file.
-  bool SkipSegment() {
-    if (file_.size() - at_ < 2) return false;
-    const std::size_t length = static_cast<std::size_t>(file_[at_]) << 8 | file_[at_ + 1];
-    if (length < 2 || file_.size() - at_ < length) return false;
-    at_ += length;
-    return true;
-  }
-  /// Skips entropy-coded data, stuffed bytes and restart markers, up to the next marker.
-  void SkipEntropyCoded() {
-    for (; at_ + 1 < file_.size(); ++at_) {
-      if (file_[at_] != 0xff) continue;
-      const std::uint8_t next = file_[at_ + 1];
-      if (next != 0 && next != 0xff && (next < 0xd0 || next > 0xd7)) return;
-    }
-    at_ = file_.size();
-  }
-
- private:
-  const std::vector<std::uint8_t>& file_;
-  std::size_t at_ = 0;
-};
-
-bool IsFrameMarker(int marker) {
-  return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
-}
-
 }  // namespace
 
-std::optional<std::string> WhyNoWholeJpeg(const std::vector<std::uint8_t>& file, int max_scans) {
-  constexpr int kStartOfImage = 0xd8, kEndOfImage = 0xd9, kStartOfScan = 0xda;
-  JpegWalk walk(file);
-  if (walk.TakeMarker() != kStartOfImage) return "does not begin as a JPEG";
-  int frames = 0;
-  int scans = 0;
-  while (true) {
-    const int marker = walk.TakeMarker();
-    if (marker == kEndOfImage) break;
-    if (marker == 0) return "is cut off or no JPEG: there is no marker where one must be";
-    if (marker == kStartOfImage) return "holds an image within the image";
-    if (marker == 1 || (marker >= 0xd0 && marker <= 0xd7)) continue;  // They have no content.
-    if (!walk.SkipSegment()) return "is cut off: a segment reaches beyond its end";
-    if (IsFrameMarker(marker) && ++frames > 1) return "has more than one frame header";
-    if (marker != kStartOfScan) continue;
-    if (frames == 0) return "has a scan before its frame header";
-    if (++scans > max_scans) return "has more than " + std::to_string(max_scans) + " scans";
-    walk.SkipEntropyCoded();
+std::int64_t DecodingWork(const std::vector<std::uint8_t>& file) {
+  const auto header = imaging::ReadImageHeader(file.data(), file.size());
+  if (!header) return 0;
+  const std::int64_t pixels = static_cast<std::int64_t>(header->width) * header->height;
+  if (header->format == imaging::ImageHeader::Format::kJpeg) {
+    return PictureWork(pixels, CountJpegScans(file));
   }
-  if (scans == 0) return "has no scan";
-  return std::nullopt;
+  if (header->format != imaging::ImageHeader::Format::kPng) return 0;
+  // Behind width and height in IHDR: the depth, and at the end the interlacing.
+  constexpr std::size_t kDepthAt = 24, kInterlacingAt = 28;
+  const std::int64_t bytes_per_channel = file[kDepthAt] > 8 ? 2 : 1;
+  const std::int64_t bytes_per_pixel = header->channels * bytes_per_channel;
+  const std::int64_t passes = file[kInterlacingAt] != 0 ? 2 : 1;
+  return PictureWork(pixels, std::max<std::int64_t>(1, (bytes_per_pixel + 2) / 3) * passes);
 }
 
 std::vector<std::uint8_t> RecodePicture(const std::vector<std::uint8_t>& file,

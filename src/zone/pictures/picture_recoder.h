@@ -2,19 +2,19 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "imaging/box.h"
+
 namespace livemap::zone {
 
 /// What a picture of a vehicle may be, and what is made of it before anybody sees it.
 struct PictureLimits {
-  std::size_t max_bytes = 16 << 20;      ///< Of the vehicle's file.
-  std::int64_t max_pixels = 20'000'000;  ///< By its header; larger ones are never decoded.
-  int longest_side_px = 1280;            ///< Of the picture that is served; never enlarged.
-  int jpeg_quality = 85;                 ///< 1..100, of the picture that is served.
+  std::size_t max_bytes = 16 << 20;       ///< Of the vehicle's file.
+  std::int64_t max_pixels = 20'000'000;   ///< By its header; larger ones are never decoded.
+  std::int64_t max_work_px = 48'000'000;  ///< See DecodingWork; what costs more is never decoded.
+  int longest_side_px = 1280;             ///< Of the picture that is served; never enlarged.
+  int jpeg_quality = 85;                  ///< 1..100, of the picture that is served.
 };
 
 /// Decodes a picture of a vehicle and encodes its pixels anew, so that no byte of the vehicle's
@@ -47,10 +47,10 @@ std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file,
 std::vector<std::uint8_t> SmallPicture(const std::vector<std::uint8_t>& file,
                                        const SmallPictureLimits& limits = {});
 
-/// Why `file` is not built as a JPEG must be (ITU-T T.81 annex B): segments within the file, one
-/// frame header, at most `max_scans` scans, an end marker behind the last. None when it is.
-/// Decoding a progressive file costs time for each scan over the whole image: a few kilobytes could
-/// ask for thousands.
-std::optional<std::string> WhyNoWholeJpeg(const std::vector<std::uint8_t>& file, int max_scans);
+/// What decoding `file` costs, by its header and segments: as many pixels of a plain picture take
+/// as long. Every scan of a JPEG that has several goes over the whole image; a PNG costs by its
+/// bytes per pixel, twice where it is interlaced. At most what an int64 holds, whatever the header
+/// says. 0 for what is no JPEG or PNG. Decodes nothing.
+std::int64_t DecodingWork(const std::vector<std::uint8_t>& file);
 
 }  // namespace livemap::zone

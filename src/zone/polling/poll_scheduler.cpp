@@ -27,19 +27,19 @@ constexpr std::size_t kMaxPerTick = 20000;
 constexpr double kMovedOdds = 1e-3;
 
 /// Metres north and east, for places some hundred metres apart.
-std::pair<double, double> Offset(const geo::GeoPoint& from, const geo::GeoPoint& to) {
+std::pair<double, double> PollOffset(const geo::GeoPoint& from, const geo::GeoPoint& to) {
   const double east_deg = std::remainder(to.longitude_deg - from.longitude_deg, 360.0);
   return {(to.latitude_deg - from.latitude_deg) * kMetresPerDegree,
           east_deg * kMetresPerDegree * std::cos(from.latitude_deg * geo::kRadiansPerDegree)};
 }
 
-void CheckPositive(const char* name, double value) {
+void CheckPollConfigPositive(const char* name, double value) {
   if (value > 0 && value <= 1e12) return;
   throw Error(std::string(name) + " is " + std::to_string(value) + ", accepted is above 0 to 1e12");
 }
 
 /// Edge of the grids' cells; what is out of range is refused later, by its name.
-double CellM(double lookahead_m) {
+double PollCellM(double lookahead_m) {
   return lookahead_m >= 10 && lookahead_m <= 5000 ? lookahead_m : 10;
 }
 
@@ -47,19 +47,19 @@ double CellM(double lookahead_m) {
 
 PollScheduler::PollScheduler(const Config& config, std::uint64_t seed)
     : config_(config),
-      waiting_(CellM(config.lookahead_m), seed),
-      rider_grid_(CellM(config.lookahead_m), seed),
+      waiting_(PollCellM(config.lookahead_m), seed),
+      rider_grid_(PollCellM(config.lookahead_m), seed),
       generator_(seed),
       budget_({config.bytes_per_hour, kHourS}) {
-  CheckPositive("price_s", config.price_s);
-  CheckPositive("bytes_per_hour", config.bytes_per_hour);
-  CheckPositive("poll_bytes", config.poll_bytes);
-  CheckPositive("lookahead_s", config.lookahead_s);
-  CheckPositive("answer_timeout_s", config.answer_timeout_s);
-  CheckPositive("same_vehicle_gap_s", config.same_vehicle_gap_s);
-  CheckPositive("vehicle_silence_s", config.vehicle_silence_s);
-  CheckPositive("corridor_m", config.corridor_m);
-  CheckPositive("max_vehicles", static_cast<double>(config.max_vehicles));
+  CheckPollConfigPositive("price_s", config.price_s);
+  CheckPollConfigPositive("bytes_per_hour", config.bytes_per_hour);
+  CheckPollConfigPositive("poll_bytes", config.poll_bytes);
+  CheckPollConfigPositive("lookahead_s", config.lookahead_s);
+  CheckPollConfigPositive("answer_timeout_s", config.answer_timeout_s);
+  CheckPollConfigPositive("same_vehicle_gap_s", config.same_vehicle_gap_s);
+  CheckPollConfigPositive("vehicle_silence_s", config.vehicle_silence_s);
+  CheckPollConfigPositive("corridor_m", config.corridor_m);
+  CheckPollConfigPositive("max_vehicles", static_cast<double>(config.max_vehicles));
   if (!(config.lookahead_m >= 10 && config.lookahead_m <= 5000)) {
     throw Error("lookahead_m is " + std::to_string(config.lookahead_m) +
                 ", accepted is 10 to 5000 m");
@@ -198,7 +198,7 @@ void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& 
 bool PollScheduler::SeesOtherPlaces(const TrackedVehicle& rider) const {
   if (!rider.last_scanned_at) return true;
   const TrackPoint& from = *rider.last_scanned_at;
-  const auto [north_m, east_m] = Offset(from.position, rider.point.position);
+  const auto [north_m, east_m] = PollOffset(from.position, rider.point.position);
   // A course that is not a number is always another one.
   const double turn_rad = std::remainder(rider.point.course_rad - from.course_rad, 2 * M_PI);
   return Seconds(rider.point.stamp_ns - from.stamp_ns) >= kLookAgainS ||
@@ -308,14 +308,14 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
   ++target.open;
   ++rider.open;
   RecordPoll(hazard, rider.key, now_ns);
-  open_[choice.poll] = {hazard, rider.id, now_ns, choice.expires_ns, bytes};
+  open_[choice.poll] = {hazard, rider.id, now_ns, choice.expires_ns, bytes, choice.picture_wanted};
   expiry_order_.push_back(choice.poll);
   choices.push_back(std::move(choice));
 }
 
 bool PollScheduler::Passes(const TrackPoint& point, const geo::GeoPoint& place) const {
   if (!std::isfinite(point.course_rad) || !std::isfinite(point.speed_mps)) return false;
-  const auto [north_m, east_m] = Offset(point.position, place);
+  const auto [north_m, east_m] = PollOffset(point.position, place);
   const double sine = std::sin(point.course_rad);
   const double cosine = std::cos(point.course_rad);
   const double ahead_m = east_m * sine + north_m * cosine;
@@ -400,8 +400,9 @@ bool PollScheduler::Answered(const Uuid& poll, double bytes, std::int64_t now_ns
   if (found == open_.end() || now_ns > found->second.expires_ns) return false;
   const OpenPoll& answered = found->second;
   if (bytes >= 0 && std::isfinite(bytes)) {
-    budget_.Spend(bytes - answered.bytes);
-    bytes_ += bytes - answered.bytes;
+    const double unspent = std::max(0.0, answered.bytes - bytes);
+    budget_.Spend(-unspent);
+    bytes_ -= unspent;
   }
   Close(answered);
   open_.erase(found);

@@ -82,7 +82,8 @@ class PollScheduler {
     std::string vehicle_id;
     std::int64_t asked_ns = 0;
     std::int64_t expires_ns = 0;
-    double bytes = 0;  ///< Estimate of what poll and answer take.
+    double bytes = 0;  ///< Estimate of what poll and answer take, with the picture.
+    bool picture_wanted = false;
   };
 
   /// Throws Error naming the value that is out of range. `seed`: of the grids' hashes (see
@@ -102,7 +103,8 @@ class PollScheduler {
   /// The open poll of this uuid; none when it was never asked, is answered or has expired.
   std::optional<OpenPoll> FindOpen(const Uuid& poll, std::int64_t now_ns) const;
   /// An answer came, of whatever kind; to be called before SetHazard with what followed from it.
-  /// `bytes`: what it and the poll really took, in place of the estimate. False: no such open poll.
+  /// `bytes`: what it and the poll really took, in place of the estimate. What a vehicle sends
+  /// beyond that it was not asked for, and takes nothing from others. False: no such open poll.
   bool Answered(const Uuid& poll, double bytes, std::int64_t now_ns);
 
   std::size_t hazards() const { return hazards_.size(); }

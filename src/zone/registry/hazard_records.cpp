@@ -2,17 +2,12 @@
 
 #include <algorithm>
 
+#include "common/number_text.h"
+
 namespace livemap::zone {
 namespace {
 
 constexpr std::array<const char*, 3> kFormats{"jpeg", "png", "webp"};
-constexpr char kHexDigits[] = "0123456789abcdef";
-
-int HexValue(char digit) {
-  if (digit >= '0' && digit <= '9') return digit - '0';
-  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
-  return -1;
-}
 
 }  // namespace
 
@@ -34,10 +29,7 @@ std::string PackedPicture::Sha256() const {
   std::string text;
   if (empty()) return text;
   text.reserve(64);
-  for (const std::uint8_t byte : sha256_) {
-    text.push_back(kHexDigits[byte >> 4]);
-    text.push_back(kHexDigits[byte & 0xf]);
-  }
+  for (const std::uint8_t byte : sha256_) AppendHex(text, byte);
   return text;
 }
 

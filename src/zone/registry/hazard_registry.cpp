@@ -12,6 +12,13 @@ HazardRegistry::HazardRegistry(protocol::HazardCatalogue catalogue, std::uint64_
                                FusionRule rule)
     : catalogue_(std::move(catalogue)), hash_seed_(hash_seed), rule_(rule) {}
 
+/// Names of classes come from strangers: their number is bounded, whatever the catalogue says.
+std::string HazardRegistry::HeadingOf(const std::string& class_name) const {
+  std::string heading = catalogue_.HeadingOf(class_name);
+  const bool has_room = class_places_.count(heading) != 0 || classes_.size() < kMaxClasses;
+  return has_room ? heading : protocol::kOtherClass;
+}
+
 std::uint32_t HazardRegistry::ClassOf(const std::string& class_name) {
   const auto found = class_places_.find(class_name);
   if (found != class_places_.end()) return found->second;
@@ -34,6 +41,7 @@ HazardRegistry::Slot HazardRegistry::Append(const HazardRecord& record) {
 void HazardRegistry::PutOnGrid(Slot slot) {
   const HazardRecord& record = records_[slot];
   ++counts_[static_cast<std::size_t>(record.life.state)];
+  CountWitness(record.life, 1);
   if (record.life.state == HazardState::kGone) return;
   classes_[record.hazard_class].grid.Insert(record.estimate.position, slot);
 }
@@ -41,8 +49,22 @@ void HazardRegistry::PutOnGrid(Slot slot) {
 void HazardRegistry::TakeFromGrid(Slot slot) {
   const HazardRecord& record = records_[slot];
   --counts_[static_cast<std::size_t>(record.life.state)];
+  CountWitness(record.life, -1);
   if (record.life.state == HazardState::kGone) return;
   classes_[record.hazard_class].grid.Erase(record.estimate.position, slot);
+}
+
+void HazardRegistry::CountWitness(const PresenceRecord& life, int change) {
+  const std::uint64_t witness = OnlyWitness(life);
+  if (witness == 0) return;
+  const auto known = resting_on_.try_emplace(witness).first;
+  known->second = change > 0 ? known->second + 1 : known->second - 1;
+  if (known->second == 0) resting_on_.erase(known);
+}
+
+std::size_t HazardRegistry::CountRestingOn(std::uint64_t vehicle) const {
+  const auto known = resting_on_.find(vehicle);
+  return known == resting_on_.end() ? 0 : known->second;
 }
 
 std::size_t HazardRegistry::on_map_count() const {
@@ -83,7 +105,8 @@ std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string&
   return nearest ? std::optional<Slot>(static_cast<Slot>(nearest->id)) : std::nullopt;
 }
 
-HazardRegistry::Slot HazardRegistry::Add(const protocol::Report& report, const PictureName& picture,
+HazardRegistry::Slot HazardRegistry::Add(const protocol::Report& report,
+                                         const std::string& class_name, const PictureName& picture,
                                          const Uuid& uuid, std::uint64_t sequence,
                                          std::int64_t now_ns) {
   slots_.Prefetch(uuid);
@@ -98,7 +121,7 @@ HazardRegistry::Slot HazardRegistry::Add(const protocol::Report& report, const P
   record.sequence = sequence;
   record.updated_ns = now_ns;
   record.id = ++last_id_;
-  record.hazard_class = ClassOf(report.class_name);
+  record.hazard_class = ClassOf(class_name);
   record.picture = PackedPicture(picture.sha256, picture.format);
   const Slot slot = Append(record);
   if (in_transaction_) undo_.push_back({slot, true, {}});
@@ -107,14 +130,21 @@ HazardRegistry::Slot HazardRegistry::Add(const protocol::Report& report, const P
 }
 
 void HazardRegistry::Merge(Slot slot, const protocol::Report& report, const PictureName& picture,
-                           std::uint64_t sequence, std::int64_t now_ns) {
+                           std::uint64_t sequence, std::int64_t now_ns, SightingSays says) {
   RememberForUndo(slot);
   HazardRecord& record = records_[slot];
-  const bool newest = report.stamp_ns >= record.estimate.last_seen_ns;
-  const geo::GeoPoint from = record.estimate.position;
-  Fuse(record.estimate, report, rule_);
-  classes_[record.hazard_class].grid.Move(from, record.estimate.position, slot);
-  if (!picture.sha256.empty() && (newest || record.picture.empty())) {
+  HazardEstimate& estimate = record.estimate;
+  const bool newest = report.stamp_ns >= estimate.last_seen_ns;
+  if (says == SightingSays::kWhere) {
+    const geo::GeoPoint from = estimate.position;
+    Fuse(estimate, report, rule_);
+    classes_[record.hazard_class].grid.Move(from, estimate.position, slot);
+  } else {
+    ++estimate.sightings;
+  }
+  if (says == SightingSays::kWhen) NoteSeen(estimate, report.stamp_ns);
+  const bool shows = says != SightingSays::kNothing && !picture.sha256.empty();
+  if (shows && (newest || record.picture.empty())) {
     record.picture = PackedPicture(picture.sha256, picture.format);
   }
   record.updated_ns = now_ns;
@@ -134,6 +164,10 @@ void HazardRegistry::SetLife(Slot slot, const PresenceRecord& life, double prese
   } else {
     --counts_[static_cast<std::size_t>(record.life.state)];
     ++counts_[static_cast<std::size_t>(life.state)];
+    if (OnlyWitness(record.life) != OnlyWitness(life)) {
+      CountWitness(record.life, -1);
+      CountWitness(life, 1);
+    }
     record.life = life;
   }
   record.presence = static_cast<float>(presence);
@@ -189,25 +223,36 @@ std::vector<HazardRegistry::Change>::const_iterator HazardRegistry::ChangesSince
 std::vector<Hazard> HazardRegistry::Query(const std::optional<geo::GeoBox>& box,
                                           std::uint64_t since_sequence, std::size_t limit,
                                           const HazardStates& states) const {
-  std::vector<Hazard> result;
-  auto change = ChangesSince(since_sequence);
-  for (; change != changes_.end() && result.size() < limit; ++change) {
+  Walk<HazardState> walk{box, states, since_sequence, UINT64_MAX};
+  if (states.empty() && since_sequence == 0) walk.states = StatesOnMap();
+  return ReadItems(std::move(walk), limit,
+                   [this](const auto& part, std::size_t most) { return ReadPage(part, most); });
+}
+
+Page<Hazard> HazardRegistry::ReadPage(const Walk<HazardState>& walk, std::size_t limit) const {
+  Page<Hazard> page;
+  page.sequence = walk.after;
+  std::size_t looked_at = 0;
+  for (auto change = ChangesSince(walk.after); change != changes_.end(); ++change) {
+    if (change->sequence > walk.until) break;
+    if (page.items.size() == limit || looked_at++ == kMaxLookedAtPerPage) return page;
+    page.sequence = change->sequence;
     const HazardRecord& record = records_[change->slot];
     if (record.sequence != change->sequence) continue;
-    const HazardState state = record.life.state;
-    const bool wanted =
-        states.empty() ? IsOnMap(state) || since_sequence > 0 : states.count(state) != 0;
-    if (!wanted) continue;
-    if (box && !box->Contains(record.estimate.position)) continue;
-    result.push_back(Get(change->slot));
+    if (!walk.states.empty() && walk.states.count(record.life.state) == 0) continue;
+    if (walk.box && !walk.box->Contains(record.estimate.position)) continue;
+    page.items.push_back(Get(change->slot));
   }
-  return result;
+  page.is_last = true;
+  return page;
 }
 
 std::vector<HazardRegistry::Slot> HazardRegistry::HazardsWithEvidenceFrom(
-    std::uint64_t vehicle) const {
+    std::uint64_t vehicle, Slot& next, std::size_t max_found, std::size_t max_looks) const {
   std::vector<Slot> slots;
-  for (Slot slot = 0; slot < records_.size(); ++slot) {
+  const std::size_t end = std::min(records_.size(), next + max_looks);
+  for (; next < end && slots.size() < max_found; ++next) {
+    const Slot slot = next;
     const PresenceRecord& life = records_[slot].life;
     if (life.state == HazardState::kGone) continue;
     const bool spoke =
@@ -216,6 +261,22 @@ std::vector<HazardRegistry::Slot> HazardRegistry::HazardsWithEvidenceFrom(
     if (spoke) slots.push_back(slot);
   }
   return slots;
+}
+
+void HazardRegistry::AppendToView(Slot& next, std::size_t& on_map, std::size_t step,
+                                  std::size_t max_looks, std::vector<ViewHazard>& view) const {
+  const std::size_t end = std::min(records_.size(), next + max_looks);
+  for (; next < end; ++next) {
+    const HazardRecord& record = records_[next];
+    if (!IsOnMap(record.life.state) || on_map++ % step != 0) continue;
+    ViewHazard hazard;
+    hazard.position = record.estimate.position;
+    std::transform(record.life.voices.begin(), record.life.voices.end(), hazard.supporters.begin(),
+                   [](const VehicleEvidence& voice) {
+                     return voice.Counts() && !voice.against ? voice.vehicle : 0;
+                   });
+    view.push_back(hazard);
+  }
 }
 
 std::vector<Hazard> HazardRegistry::QueryNear(const geo::GeoPoint& centre, double radius_m,

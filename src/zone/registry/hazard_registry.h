@@ -15,7 +15,9 @@
 #include "protocol/report.h"
 #include "zone/belief/hazard_fusion.h"
 #include "zone/model/hazard.h"
+#include "zone/model/page.h"
 #include "zone/registry/hazard_records.h"
+#include "zone/registry/map_view.h"
 #include "zone/registry/uuid_index.h"
 
 namespace livemap::zone {
@@ -24,6 +26,13 @@ namespace livemap::zone {
 struct PictureName {
   std::string sha256;
   std::string format;
+};
+
+/// What a hazard takes from a sighting of it.
+enum class SightingSays {
+  kNothing,  ///< No more than that there was one.
+  kWhen,     ///< When it was seen, and the picture.
+  kWhere     ///< That, its position and its confidence.
 };
 
 /// All hazards of the zone in memory: which known hazard a report belongs to, and what changed
@@ -46,16 +55,25 @@ class HazardRegistry {
   /// New hazards get ids above `id`: the store has rows up to there.
   void SkipIdsTo(std::uint32_t id) { last_id_ = std::max(last_id_, id); }
 
+  /// The class under which hazards of a name from outside are kept: the catalogue's heading
+  /// (HazardCatalogue::HeadingOf), and protocol::kOtherClass once there are very many classes.
+  std::string HeadingOf(const std::string& class_name) const;
   /// The nearest hazard of this class that is not gone within the class's radius (geodesic), the
   /// older one among equals. `position` must be valid.
   std::optional<Slot> FindMatch(const std::string& class_name, const geo::GeoPoint& position) const;
 
-  /// Puts in a new hazard; SetLife gives it its life.
+  /// Puts in a new hazard of the report's class, or of `class_name`; SetLife gives it its life.
   Slot Add(const protocol::Report& report, const PictureName& picture, const Uuid& uuid,
-           std::uint64_t sequence, std::int64_t now_ns);
-  /// Counts the report as a sighting of `slot`; the newer image's picture stays.
+           std::uint64_t sequence, std::int64_t now_ns) {
+    return Add(report, report.class_name, picture, uuid, sequence, now_ns);
+  }
+  Slot Add(const protocol::Report& report, const std::string& class_name,
+           const PictureName& picture, const Uuid& uuid, std::uint64_t sequence,
+           std::int64_t now_ns);
+  /// Counts the report as a sighting of `slot`, and takes from it what `says` names. The newer
+  /// image's picture stays.
   void Merge(Slot slot, const protocol::Report& report, const PictureName& picture,
-             std::uint64_t sequence, std::int64_t now_ns);
+             std::uint64_t sequence, std::int64_t now_ns, SightingSays says = SightingSays::kWhere);
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
   void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);
@@ -76,12 +94,23 @@ class HazardRegistry {
   const std::array<std::size_t, kHazardStates>& counts() const { return counts_; }
   /// On the officials' map.
   std::size_t on_map_count() const;
+  /// On the map by the word of this vehicle (VehicleKey) alone (OnlyWitness).
+  std::size_t CountRestingOn(std::uint64_t vehicle) const;
 
   /// As ZoneService::Query.
   std::vector<Hazard> Query(const std::optional<geo::GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit, const HazardStates& states = {}) const;
-  /// Those that are not gone and of which the vehicle (VehicleKey) has said something.
-  std::vector<Slot> HazardsWithEvidenceFrom(std::uint64_t vehicle) const;
+  /// As ZoneService::ReadHazards.
+  Page<Hazard> ReadPage(const Walk<HazardState>& walk, std::size_t limit) const;
+  /// Those that are not gone and of which the vehicle (VehicleKey) has said something, from the
+  /// slot `next` on: at most `max_found` of at most `max_looks` slots, so that one call is short.
+  /// `next` becomes the first slot that was not looked at; size() when all were.
+  std::vector<Slot> HazardsWithEvidenceFrom(std::uint64_t vehicle, Slot& next,
+                                            std::size_t max_found, std::size_t max_looks) const;
+  /// Every `step`-th hazard on the map from the slot `next` on, looking at `max_looks` slots;
+  /// `next` and `on_map`, the number of hazards on the map before it, go on from call to call.
+  void AppendToView(Slot& next, std::size_t& on_map, std::size_t step, std::size_t max_looks,
+                    std::vector<ViewHazard>& view) const;
   /// As ZoneService::QueryNear.
   std::vector<Hazard> QueryNear(const geo::GeoPoint& centre, double radius_m,
                                 std::size_t limit) const;
@@ -110,10 +139,14 @@ class HazardRegistry {
     geo::SpatialGrid grid;  ///< All that are not gone.
   };
 
+  /// More than a catalogue that somebody reads through.
+  static constexpr std::size_t kMaxClasses = 1000;
+
   std::uint32_t ClassOf(const std::string& class_name);
   Slot Append(const HazardRecord& record);
   void PutOnGrid(Slot slot);
   void TakeFromGrid(Slot slot);
+  void CountWitness(const PresenceRecord& life, int change);
   void RememberForUndo(Slot slot);
   void NoteChange(Slot slot);
   void CompactChanges();
@@ -131,6 +164,8 @@ class HazardRegistry {
   /// In ascending order of sequence; an entry is stale once its hazard has a newer sequence.
   std::vector<Change> changes_;
   std::array<std::size_t, kHazardStates> counts_{};
+  /// Hazards that rest on one vehicle's word alone, by that vehicle; none of 0.
+  std::unordered_map<std::uint64_t, std::size_t> resting_on_;
   bool in_transaction_ = false;
   std::size_t changes_at_begin_ = 0;
   std::vector<Undo> undo_;

@@ -3,37 +3,29 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "common/error.h"
 #include "common/time.h"
+#include "zone/admission/map_change_validation.h"
 #include "zone/belief/map_change_witnesses.h"
 #include "zone/model/presence_record.h"
 
 namespace livemap::zone {
 namespace {
 
-HazardEstimate EstimateOf(const MapChangeFeature& feature) {
+HazardEstimate MapChangeEstimateOf(const MapChangeFeature& feature) {
   return {feature.confidence,    feature.reports,       feature.position,
           feature.covariance_m2, feature.first_seen_ns, feature.last_seen_ns};
 }
 
-/// What fusion reads of a report.
-protocol::Report SightingOf(const protocol::MapChangeReport& told) {
-  protocol::Report report;
-  report.stamp_ns = told.stamp_ns;
-  report.confidence = told.confidence;
-  report.position = told.position;
-  report.covariance_m2 = told.covariance_m2;
-  return report;
-}
-
-WitnessUpdate Note(MapChangeFeature& feature, const protocol::MapChangeReport& report,
-                   bool against) {
+WitnessUpdate NoteMapChange(MapChangeFeature& feature, const protocol::MapChangeReport& report,
+                            bool against) {
   return RecordWitness(feature.witnesses, VehicleKey(report.vehicle_id),
                        VehicleKey(report.drive_id), against);
 }
 
-void ForgetDenials(MapChangeFeature& feature) {
+void ForgetMapChangeDenials(MapChangeFeature& feature) {
   auto& witnesses = feature.witnesses;
   witnesses.erase(std::remove_if(witnesses.begin(), witnesses.end(),
                                  [](const MapChangeWitness& one) { return one.against; }),
@@ -41,7 +33,7 @@ void ForgetDenials(MapChangeFeature& feature) {
   feature.denied_ns = 0;
 }
 
-const char* ReasonFor(WitnessUpdate news) {
+const char* MapChangeReasonFor(WitnessUpdate news) {
   switch (news) {
     case WitnessUpdate::kNewVehicle:
       return "told by another vehicle";
@@ -132,17 +124,18 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Tell(
 MapChangeRegistry::Effect MapChangeRegistry::Support(Id id, const protocol::MapChangeReport& report,
                                                      const Stamp& stamp) {
   MapChangeFeature feature = features_.at(id);
-  const WitnessUpdate news = Note(feature, report, false);
-  if (news == WitnessUpdate::kNewVehicle || news == WitnessUpdate::kNewDrive) {
+  const WitnessUpdate news = NoteMapChange(feature, report, false);
+  if (news == WitnessUpdate::kNewVehicle || news == WitnessUpdate::kNewDrive) ++feature.drives;
+  // A vehicle names its drives itself: with each it could pull the feature a little further.
+  if (news == WitnessUpdate::kNewVehicle) {
     FuseInto(feature, report);
-    ++feature.drives;
   } else {
     ++feature.reports;
     feature.last_seen_ns = std::max(feature.last_seen_ns, report.stamp_ns);
   }
-  std::string reason = ReasonFor(news);
+  std::string reason = MapChangeReasonFor(news);
   if (feature.denied_ns != 0 && report.stamp_ns > feature.denied_ns) {
-    ForgetDenials(feature);
+    ForgetMapChangeDenials(feature);
     reason += ", later than the opposite";
   }
   const std::uint32_t vehicles = feature.Vehicles();
@@ -156,7 +149,7 @@ MapChangeRegistry::Effect MapChangeRegistry::Support(Id id, const protocol::MapC
 MapChangeRegistry::Effect MapChangeRegistry::Deny(Id id, const protocol::MapChangeReport& report,
                                                   const Stamp& stamp) {
   MapChangeFeature feature = features_.at(id);
-  Note(feature, report, true);
+  NoteMapChange(feature, report, true);
   feature.denied_ns = std::max(feature.denied_ns, report.stamp_ns);
   const std::uint32_t needed =
       feature.state == MapChangeState::kProposed ? 1 : rule_.denying_vehicles;
@@ -183,7 +176,7 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Add(
   feature.covariance_m2 = WithLeastSigma(report.covariance_m2, rule_.fusion.min_report_sigma_m);
   feature.first_seen_ns = feature.last_seen_ns = report.stamp_ns;
   feature.drives = counts ? 1 : 0;
-  if (counts) Note(feature, report, false);
+  if (counts) NoteMapChange(feature, report, false);
   if (counts && rule_.confirmations <= 1) feature.state = MapChangeState::kConfirmed;
   const Id id = ++last_id_;
   std::string reason = counts ? "told by a vehicle" : "told by a vehicle that does not count";
@@ -195,8 +188,8 @@ std::optional<MapChangeRegistry::Effect> MapChangeRegistry::Add(
 /// As a further sighting of a hazard is.
 void MapChangeRegistry::FuseInto(MapChangeFeature& feature,
                                  const protocol::MapChangeReport& report) const {
-  HazardEstimate estimate = EstimateOf(feature);
-  Fuse(estimate, SightingOf(report), rule_.fusion);
+  HazardEstimate estimate = MapChangeEstimateOf(feature);
+  Fuse(estimate, ReportFieldsOf(report), rule_.fusion);
   feature.confidence = estimate.confidence;
   feature.reports = estimate.sightings;
   feature.position = estimate.position;
@@ -231,7 +224,31 @@ std::optional<MapChangeEvent> MapChangeRegistry::Decide(const Uuid& uuid, MapCha
   if (!may_follow || (!confirms && to != MapChangeState::kDismissed)) return std::nullopt;
   feature.state = to;
   // What was told against it before counts no more: somebody has looked.
-  if (confirms) ForgetDenials(feature);
+  if (confirms) ForgetMapChangeDenials(feature);
+  return Settle(*id, std::move(feature), std::move(reason), stamp);
+}
+
+std::optional<MapChangeEvent> MapChangeRegistry::TakeDecisionBack(const Uuid& uuid,
+                                                                  const MapChangeFeature& before,
+                                                                  std::string reason,
+                                                                  const Stamp& stamp) {
+  const auto id = IdOf(uuid);
+  if (!id || features_.at(*id).state == MapChangeState::kUndone) return std::nullopt;
+  MapChangeFeature feature = features_.at(*id);
+  feature.state = before.state;
+  feature.denied_ns = std::max(feature.denied_ns, before.denied_ns);
+  for (const MapChangeWitness& witness : before.witnesses) {
+    const bool is_known = std::any_of(
+        feature.witnesses.begin(), feature.witnesses.end(), [&](const MapChangeWitness& one) {
+          return one.vehicle == witness.vehicle && one.against == witness.against;
+        });
+    if (!is_known && feature.Vehicles(witness.against) < kMaxWitnesses) {
+      feature.witnesses.push_back(witness);
+    }
+  }
+  if (feature.state == MapChangeState::kProposed && feature.Vehicles() >= rule_.confirmations) {
+    feature.state = MapChangeState::kConfirmed;
+  }
   return Settle(*id, std::move(feature), std::move(reason), stamp);
 }
 
@@ -249,16 +266,28 @@ std::vector<MapChangeFeature> MapChangeRegistry::Query(const std::optional<geo::
                                                        std::uint64_t since_sequence,
                                                        std::size_t limit,
                                                        const MapChangeStates& states) const {
-  std::vector<MapChangeFeature> result;
-  for (auto entry = by_sequence_.upper_bound(since_sequence);
-       entry != by_sequence_.end() && result.size() < limit; ++entry) {
+  Walk<MapChangeState> walk{box, states, since_sequence, UINT64_MAX};
+  if (states.empty() && since_sequence == 0) walk.states = OpenStates();
+  return ReadItems(std::move(walk), limit,
+                   [this](const auto& part, std::size_t most) { return ReadPage(part, most); });
+}
+
+Page<MapChangeFeature> MapChangeRegistry::ReadPage(const Walk<MapChangeState>& walk,
+                                                   std::size_t limit) const {
+  Page<MapChangeFeature> page;
+  page.sequence = walk.after;
+  std::size_t looked_at = 0;
+  for (auto entry = by_sequence_.upper_bound(walk.after); entry != by_sequence_.end(); ++entry) {
+    if (entry->first > walk.until) break;
+    if (page.items.size() == limit || looked_at++ == kMaxLookedAtPerPage) return page;
+    page.sequence = entry->first;
     const MapChangeFeature& feature = features_.at(entry->second);
-    const bool selected = states.empty() ? since_sequence > 0 || IsOpen(feature.state)
-                                         : states.count(feature.state) != 0;
-    if (!selected || (box && !box->Contains(feature.position))) continue;
-    result.push_back(feature);
+    if (!walk.states.empty() && walk.states.count(feature.state) == 0) continue;
+    if (walk.box && !walk.box->Contains(feature.position)) continue;
+    page.items.push_back(feature);
   }
-  return result;
+  page.is_last = true;
+  return page;
 }
 
 /// Makes room for one more feature, where there is none; false when only open ones are left.

@@ -14,6 +14,7 @@
 #include "protocol/map_change_report.h"
 #include "zone/belief/hazard_fusion.h"
 #include "zone/model/map_change.h"
+#include "zone/model/page.h"
 
 namespace livemap::zone {
 
@@ -79,12 +80,20 @@ class MapChangeRegistry {
   std::optional<MapChangeEvent> Decide(const Uuid& uuid, MapChangeState to, std::string reason,
                                        const Stamp& stamp);
 
+  /// An official's decision is taken back: the feature has the state of `before`, and the denials
+  /// that a confirmation had made void count again; what was told since counts on top. None when
+  /// there is no such feature, or it is undone.
+  std::optional<MapChangeEvent> TakeDecisionBack(const Uuid& uuid, const MapChangeFeature& before,
+                                                 std::string reason, const Stamp& stamp);
+
   const MapChangeFeature* Find(const Uuid& uuid) const;
   const MapChangeFeature& Get(Id id) const { return features_.at(id); }
   /// As ZoneService::QueryMapChanges.
   std::vector<MapChangeFeature> Query(const std::optional<geo::GeoBox>& box,
                                       std::uint64_t since_sequence, std::size_t limit,
                                       const MapChangeStates& states = {}) const;
+  /// As ZoneService::ReadMapChanges.
+  Page<MapChangeFeature> ReadPage(const Walk<MapChangeState>& walk, std::size_t limit) const;
   std::size_t size() const { return features_.size(); }
   /// How many are in each state, by MapChangeState.
   const std::array<std::size_t, kMapChangeStates>& counts() const { return counts_; }

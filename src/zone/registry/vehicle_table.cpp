@@ -13,7 +13,15 @@ constexpr std::int64_t kTrackNs = 120'000'000'000;
 VehicleTable::VehicleTable(double retention_s, std::size_t max_vehicles)
     : retention_ns_(static_cast<std::int64_t>(retention_s * 1e9)), max_vehicles_(max_vehicles) {}
 
-void VehicleTable::Update(const VehicleState& vehicle) {
+bool VehicleTable::Vehicle::Tell(std::int64_t now_ns) {
+  // The zone's clock may be set back.
+  const bool is_time = told_ns == INT64_MIN || now_ns < told_ns || now_ns - told_ns >= kTellNs;
+  is_untold = !is_time;
+  if (is_time) told_ns = now_ns;
+  return is_time;
+}
+
+bool VehicleTable::Update(const VehicleState& vehicle) {
   const MutexLock lock(mutex_);
   auto known = vehicles_.find(vehicle.vehicle_id);
   if (known == vehicles_.end()) {
@@ -28,6 +36,16 @@ void VehicleTable::Update(const VehicleState& vehicle) {
   while (track.size() > kMaxPlaces || vehicle.heard_ns - track.front().stamp_ns > kTrackNs) {
     track.pop_front();
   }
+  return known->second.Tell(vehicle.heard_ns);
+}
+
+std::vector<VehicleState> VehicleTable::TakeUntold(std::int64_t now_ns) {
+  const MutexLock lock(mutex_);
+  std::vector<VehicleState> untold;
+  for (auto& [id, vehicle] : vehicles_) {
+    if (vehicle.is_untold && vehicle.Tell(now_ns)) untold.push_back(vehicle.state);
+  }
+  return untold;
 }
 
 void VehicleTable::MakeRoom(std::int64_t now_ns) {
@@ -47,6 +65,18 @@ std::vector<VehicleState> VehicleTable::List(std::int64_t now_ns) const {
   std::vector<VehicleState> result;
   for (const auto& [id, vehicle] : vehicles_) {
     if (now_ns - vehicle.state.heard_ns <= retention_ns_) result.push_back(vehicle.state);
+  }
+  return result;
+}
+
+std::vector<VehicleState> VehicleTable::ListAfter(const std::string& id, std::size_t limit,
+                                                  std::int64_t now_ns) const {
+  const MutexLock lock(mutex_);
+  std::vector<VehicleState> result;
+  for (auto known = vehicles_.upper_bound(id); known != vehicles_.end(); ++known) {
+    if (result.size() == limit) break;
+    const VehicleState& state = known->second.state;
+    if (now_ns - state.heard_ns <= retention_ns_) result.push_back(state);
   }
   return result;
 }

@@ -18,7 +18,7 @@ struct Look {
   double course_rad;         // NaN: it may look anywhere.
 };
 
-bool Sees(const Look& look, const SightRule& rule) {
+bool TrackPointSees(const Look& look, const SightRule& rule) {
   const double distance_m = look.offset_m.norm();
   if (distance_m <= rule.position_slack_m) return true;
   if (!(distance_m <= rule.range_m + rule.position_slack_m)) return false;
@@ -30,8 +30,9 @@ bool Sees(const Look& look, const SightRule& rule) {
 }
 
 /// The way from `a` to `b`, as far as it lies within `from_s` and `to_s` of the track's time.
-bool SeesOnTheWay(const TrackPoint& a, const TrackPoint& b, const Eigen::Vector2d& a_m,
-                  const Eigen::Vector2d& b_m, double begin, double end, const SightRule& rule) {
+bool SeesBetweenTrackPoints(const TrackPoint& a, const TrackPoint& b, const Eigen::Vector2d& a_m,
+                            const Eigen::Vector2d& b_m, double begin, double end,
+                            const SightRule& rule) {
   const Eigen::Vector2d travel_m = b_m - a_m;
   const double length_m = travel_m.norm();
   const bool moved = length_m > kMinTravelM;
@@ -40,7 +41,7 @@ bool SeesOnTheWay(const TrackPoint& a, const TrackPoint& b, const Eigen::Vector2
   const double steps = std::clamp(std::ceil(length_m * (end - begin) / kStepM), 1.0, kMaxSteps);
   for (double i = 0; i <= steps; i += 1) {
     const Eigen::Vector2d at_m = a_m + travel_m * (begin + (end - begin) * i / steps);
-    if (Sees({-at_m, course_rad}, rule)) return true;
+    if (TrackPointSees({-at_m, course_rad}, rule)) return true;
   }
   return false;
 }
@@ -56,7 +57,8 @@ bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
     const TrackPoint& point = track[i];
     if (!geo::IsValid(point.position)) continue;
     const Eigen::Vector2d at_m = frame.ToEnu(point.position);
-    if (std::abs(offset_s(point)) <= rule.window_s && Sees({-at_m, point.course_rad}, rule)) {
+    if (std::abs(offset_s(point)) <= rule.window_s &&
+        TrackPointSees({-at_m, point.course_rad}, rule)) {
       return true;
     }
     if (i == 0 || !geo::IsValid(track[i - 1].position)) continue;
@@ -68,7 +70,7 @@ bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
     const double end = std::min(1.0, (rule.window_s - from_s) / gap_s);
     if (begin > end) continue;
     const Eigen::Vector2d before_m = frame.ToEnu(track[i - 1].position);
-    if (SeesOnTheWay(track[i - 1], point, before_m, at_m, begin, end, rule)) return true;
+    if (SeesBetweenTrackPoints(track[i - 1], point, before_m, at_m, begin, end, rule)) return true;
   }
   return false;
 }

@@ -31,10 +31,12 @@ std::optional<CatchUpOrder> CatchUpPlanner::Update(const std::string& vehicle_id
                                                    std::uint64_t map_sequence,
                                                    std::uint64_t announced, std::int64_t now_ns) {
   Vehicle& vehicle = Heard(vehicle_id, now_ns);
-  if (map_sequence >= vehicle.target) {
+  // What was never announced is no knowledge: it shows no progress.
+  if (map_sequence >= vehicle.target && map_sequence <= announced) {
     vehicle.target = announced;
     vehicle.target_ns = now_ns;
-    vehicle.retry_s = config_.retry_s;
+    if (map_sequence > vehicle.known) vehicle.retry_s = config_.retry_s;
+    vehicle.known = std::max(vehicle.known, map_sequence);
   }
   if (vehicle.in_progress || now_ns < vehicle.not_before_ns) return std::nullopt;
   const bool all = !vehicle.centre || map_sequence > announced ||

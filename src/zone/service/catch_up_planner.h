@@ -33,7 +33,7 @@ class CatchUpPlanner {
   struct Config {
     double radius_m = 5000;
     double lag_s = 3;    ///< Announcements are on their way for this long.
-    double retry_s = 5;  ///< After a telling that did not help; doubled each time.
+    double retry_s = 5;  ///< After a telling; doubled each time until the vehicle knows more.
     double longest_retry_s = 60;
     double gap_s = 60;                 ///< A vehicle silent for this long is new.
     std::size_t max_vehicles = 10000;  ///< Beyond it the longest silent one is forgotten.
@@ -56,6 +56,7 @@ class CatchUpPlanner {
     std::int64_t heard_ns = 0;
     std::optional<geo::GeoPoint> centre;  // Where it was last told all.
     std::uint64_t target = 0;             // What it should know by target_ns + lag.
+    std::uint64_t known = 0;              // The most that it said it knows, of what was announced.
     std::int64_t target_ns = 0;
     std::int64_t not_before_ns = 0;
     double retry_s = 0;

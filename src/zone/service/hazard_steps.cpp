@@ -13,16 +13,17 @@ ClassModel HazardSteps::ClassOf(Slot slot) const {
 Evidence HazardSteps::EvidenceOf(EvidenceKind kind, const std::string& vehicle_id,
                                  std::int64_t stamp_ns, std::int64_t now_ns) const {
   Evidence evidence{kind, VehicleKey(vehicle_id), SeenNs(stamp_ns, now_ns)};
-  evidence.hostile = state_.trust.Hostile(evidence.vehicle, now_ns);
+  evidence.malicious = state_.trust.MaliciousProbability(evidence.vehicle, now_ns);
   return evidence;
 }
 
 std::optional<HazardSteps::Slot> HazardSteps::MatchNow(const protocol::Report& report,
                                                        ZoneTransaction& transaction) {
   const HazardRegistry& hazards = state_.hazards;
-  auto match = hazards.FindMatch(report.class_name, report.position);
+  const std::string class_name = hazards.HeadingOf(report.class_name);
+  auto match = hazards.FindMatch(class_name, report.position);
   while (match && PassTime(*match, transaction) && hazards.State(*match) == HazardState::kGone) {
-    match = hazards.FindMatch(report.class_name, report.position);
+    match = hazards.FindMatch(class_name, report.position);
   }
   return match;
 }

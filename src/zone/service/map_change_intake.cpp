@@ -50,8 +50,8 @@ std::vector<protocol::Receipt> MapChangeIntake::Batch::TakeReceipts() {
   return taken;
 }
 
-MapChangeIntake::MapChangeIntake(const ZoneConfig& config, ZoneState& state)
-    : config_(config), state_(state), allowance_(AllowanceOf(config)) {}
+MapChangeIntake::MapChangeIntake(const ZoneConfig& config, ZoneState& state, PlaceBook& places)
+    : config_(config), state_(state), places_(places), allowance_(AllowanceOf(config)) {}
 
 MapChangeIntake::Batch MapChangeIntake::Examine(
     const std::vector<protocol::MapChangeReport>& reports, std::int64_t now_ns) {
@@ -85,13 +85,21 @@ bool MapChangeIntake::MayChangeMap(std::size_t index, std::int64_t now_ns, Batch
     ++batch.counted.refused;
     return false;
   }
-  if (allowance_.TakeReport(report.vehicle_id, now_ns)) return true;
-  ++batch.counted.not_now;
+  if (!allowance_.TakeReport(report.vehicle_id, now_ns)) {
+    ++batch.counted.not_now;
+    return false;
+  }
+  why = places_.Challenge(report.vehicle_id, FixOf(report));
+  if (!why) return true;
+  batch.receipts[index] = Rejected(report, std::move(why->sentence));
+  ++batch.counted.refused;
+  ++batch.counted.too_fast;
   return false;
 }
 
 void MapChangeIntake::Apply(Batch& batch, ZoneTransaction& transaction) {
   for (const std::size_t index : batch.pending) ApplyOne(index, batch, transaction);
+  places_.Save(transaction.now_ns());
 }
 
 void MapChangeIntake::ApplyOne(std::size_t index, Batch& batch, ZoneTransaction& transaction) {
@@ -107,7 +115,8 @@ void MapChangeIntake::ApplyOne(std::size_t index, Batch& batch, ZoneTransaction&
   while (state_.map_changes.Find(fresh) != nullptr) fresh = Uuid::Random(state_.generator);
   const std::int64_t now_ns = transaction.now_ns();
   const std::uint64_t vehicle = VehicleKey(report.vehicle_id);
-  const bool counts = state_.trust.Hostile(vehicle, now_ns) < config_.life.suspect_above;
+  const bool counts =
+      state_.trust.MaliciousProbability(vehicle, now_ns) < config_.life.suspect_above;
   auto effect =
       state_.map_changes.Tell(report, counts, {fresh, transaction.sequence() + 1, now_ns});
   if (!effect) {

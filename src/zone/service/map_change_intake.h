@@ -15,6 +15,7 @@
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_transaction.h"
+#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 
@@ -36,8 +37,8 @@ class MapChangeIntake {
     std::vector<protocol::Receipt> TakeReceipts();
   };
 
-  /// Both outlive it.
-  MapChangeIntake(const ZoneConfig& config, ZoneState& state);
+  /// All outlive it.
+  MapChangeIntake(const ZoneConfig& config, ZoneState& state, PlaceBook& places);
 
   /// First pass, which changes nothing: what was committed before, what is refused. `reports`
   /// outlive the batch. Throws StoreError.
@@ -51,6 +52,7 @@ class MapChangeIntake {
 
   const ZoneConfig& config_;
   ZoneState& state_;
+  PlaceBook& places_;
   VehicleAllowance allowance_;  ///< Counted apart from reports of hazards.
 };
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "imaging/image_header.h"
+#include "protocol/text_rules.h"
 #include "zone/admission/report_validation.h"
 
 namespace livemap::zone {
@@ -26,14 +27,17 @@ EvidenceKind KindOf(PollAnswer::Answer answer) {
 }  // namespace
 
 PollCoordinator::PollCoordinator(const ZoneConfig& config, ZoneState& state, HazardSteps& steps,
-                                 ImageStore& images, VehicleAllowance& allowance,
-                                 const VehicleTable& vehicles)
+                                 ImageStore& images, PictureAllowance& pictures,
+                                 VehicleAllowance& allowance, const VehicleTable& vehicles,
+                                 PlaceBook& places)
     : config_(config),
       state_(state),
       steps_(steps),
       images_(images),
+      pictures_(pictures),
       allowance_(allowance),
       vehicles_(vehicles),
+      places_(places),
       scheduler_(config.polls, state.generator()) {}
 
 void PollCoordinator::SetHazard(Slot slot, std::int64_t now_ns) {
@@ -41,7 +45,10 @@ void PollCoordinator::SetHazard(Slot slot, std::int64_t now_ns) {
   const ClassModel entry = steps_.ClassOf(slot);
   const std::int64_t picture_ns = record.picture.empty() ? 0 : record.estimate.last_seen_ns;
   const MutexLock lock(mutex_);
-  if (IsOnMap(record.life.state)) {
+  // A detector never says "other": who is asked whether it sees one would always deny it.
+  const bool has_name = state_.hazards.ClassName(slot) != protocol::kOtherClass ||
+                        config_.catalogue.classes().count(protocol::kOtherClass) != 0;
+  if (IsOnMap(record.life.state) && has_name) {
     scheduler_.SetHazard(slot, record.estimate.position, entry, record.life, picture_ns, now_ns);
   } else {
     scheduler_.RemoveHazard(slot);
@@ -89,14 +96,29 @@ std::optional<PollCoordinator::AcceptedAnswer> PollCoordinator::Accept(const Pol
       !allowance_.TakeEvidence(answer.vehicle_id, now_ns)) {
     return std::nullopt;
   }
-  AcceptedAnswer accepted{&answer, static_cast<Slot>(poll->hazard), {}};
-  if (answer.answer == PollAnswer::Answer::kYes && !answer.image.empty()) {
+  AcceptedAnswer accepted{&answer, static_cast<Slot>(poll->hazard), {}, {}};
+  const ReportedFix fix{answer.stamp_ns, answer.vehicle_position, config_.sight.position_slack_m};
+  if (places_.Challenge(answer.vehicle_id, fix)) {
+    places_.Keep(now_ns);
+    return std::nullopt;
+  }
+  if (!IsPictureWanted(answer, *poll)) return accepted;
+  if (const auto cost = pictures_.Ask(answer.vehicle_id, answer.image, {}, now_ns)) {
+    accepted.picture_cost = *cost;
     accepted.picture.format = imaging::FormatName(
         imaging::ReadImageHeader(answer.image.data(), answer.image.size())->format);
     accepted.picture.sha256 = images_.Put(answer.image, accepted.picture.format);
     images_.Publish();
   }
   return accepted;
+}
+
+/// A picture that nobody asked for, or a larger one, is not kept; the answer counts without it.
+bool PollCoordinator::IsPictureWanted(const PollAnswer& answer,
+                                      const PollScheduler::OpenPoll& poll) const {
+  return answer.answer == PollAnswer::Answer::kYes && !answer.image.empty() &&
+         poll.picture_wanted &&
+         static_cast<double>(answer.image.size()) <= config_.polls.picture_bytes;
 }
 
 std::optional<PollScheduler::OpenPoll> PollCoordinator::FindOpen(const Uuid& poll,
@@ -114,7 +136,15 @@ bool PollCoordinator::IsAcceptable(const PollAnswer& answer, const PollScheduler
   const auto window_ns = static_cast<std::int64_t>(config_.sight.window_s * 1e9);
   const std::int64_t seen_ns = steps_.SeenNs(answer.stamp_ns, now_ns);
   if (seen_ns < poll.asked_ns - window_ns || seen_ns > now_ns + window_ns) return false;
-  if (!answer.reason.empty() && !IsPrintableText(answer.reason, config_.limits.max_text_bytes)) {
+  const std::size_t max_bytes = config_.limits.max_text_bytes;
+  if (!answer.reason.empty() && !protocol::IsAcceptableText(answer.reason, max_bytes)) return false;
+  if (!answer.drive_id.empty() && !protocol::IsAcceptableName(answer.drive_id, max_bytes)) {
+    return false;
+  }
+  if (!geo::IsValid(answer.vehicle_position) || IsPlaceOfNoFix(answer.vehicle_position)) {
+    return false;
+  }
+  if (WhyStampRefused(answer.stamp_ns, config_.limits, config_.limits.max_age_s, now_ns)) {
     return false;
   }
   if (!(answer.confidence >= 0 && answer.confidence <= 1)) return false;
@@ -128,6 +158,7 @@ void PollCoordinator::Apply(const AcceptedAnswer& accepted, ZoneTransaction& tra
   const PollAnswer& answer = *accepted.answer;
   const Slot slot = accepted.slot;
   transaction.KeepAnswer(answer, state_.hazards.Record(slot).id);
+  places_.Save(transaction.now_ns());
   steps_.PassTime(slot, transaction);
   PresenceRecord life = state_.hazards.Record(slot).life;
   const std::int64_t now_ns = transaction.now_ns();
@@ -146,7 +177,11 @@ void PollCoordinator::Apply(const AcceptedAnswer& accepted, ZoneTransaction& tra
 }
 
 void PollCoordinator::Close(const AcceptedAnswer& accepted, std::int64_t now_ns) {
+  places_.Keep(now_ns);
   const PollAnswer& answer = *accepted.answer;
+  if (!accepted.picture.sha256.empty()) {
+    pictures_.Spend(answer.vehicle_id, accepted.picture_cost, now_ns);
+  }
   const auto picture_bytes = static_cast<double>(answer.image.size());
   const MutexLock lock(mutex_);
   scheduler_.Answered(answer.poll, config_.polls.poll_bytes + picture_bytes, now_ns);

@@ -10,12 +10,14 @@
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/model/vehicle_state.h"
 #include "zone/pictures/image_store.h"
+#include "zone/pictures/picture_allowance.h"
 #include "zone/polling/poll_scheduler.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_transaction.h"
+#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 
@@ -35,11 +37,13 @@ class PollCoordinator {
     const protocol::PollAnswer* answer = nullptr;
     Slot slot = 0;        ///< The hazard.
     PictureName picture;  ///< On disk already; none unless the answer is yes.
+    PictureCost picture_cost;
   };
 
   /// All outlive it. Throws Error for an impossible setting.
   PollCoordinator(const ZoneConfig& config, ZoneState& state, HazardSteps& steps,
-                  ImageStore& images, VehicleAllowance& allowance, const VehicleTable& vehicles);
+                  ImageStore& images, PictureAllowance& pictures, VehicleAllowance& allowance,
+                  const VehicleTable& vehicles, PlaceBook& places);
 
   /// The hazard as it is now: to be called after each change to it.
   void SetHazard(Slot slot, std::int64_t now_ns);
@@ -50,14 +54,19 @@ class PollCoordinator {
   std::vector<protocol::Poll> TakeDue(std::int64_t now_ns);
   /// Checks the answer as far as the zone can by itself, takes its place in the vehicle's
   /// allowance, and brings its picture to disk. None when it does not count. Throws StoreError.
+  /// What the vehicle's place contradicts is remembered all the same, so that one wrong fix shuts
+  /// no vehicle out.
   std::optional<AcceptedAnswer> Accept(const protocol::PollAnswer& answer, std::int64_t now_ns);
   /// What follows from the answer.
   void Apply(const AcceptedAnswer& accepted, ZoneTransaction& transaction);
-  /// After the commit: the poll is closed.
+  /// After the commit: the poll is closed, where the vehicle was is known, and what its picture
+  /// costs is taken from it.
   void Close(const AcceptedAnswer& accepted, std::int64_t now_ns);
 
  private:
   std::optional<PollScheduler::OpenPoll> FindOpen(const Uuid& poll, std::int64_t now_ns);
+  bool IsPictureWanted(const protocol::PollAnswer& answer,
+                       const PollScheduler::OpenPoll& poll) const;
   bool IsAcceptable(const protocol::PollAnswer& answer, const PollScheduler::OpenPoll& poll,
                     std::int64_t now_ns) const;
 
@@ -65,8 +74,10 @@ class PollCoordinator {
   ZoneState& state_;
   HazardSteps& steps_;
   ImageStore& images_;
+  PictureAllowance& pictures_;
   VehicleAllowance& allowance_;
   const VehicleTable& vehicles_;
+  PlaceBook& places_;
 
   Mutex mutex_;
   PollScheduler scheduler_ GUARDED_BY(mutex_);

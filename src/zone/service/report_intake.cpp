@@ -1,5 +1,6 @@
 #include "zone/service/report_intake.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "imaging/image_header.h"
@@ -23,8 +24,15 @@ std::vector<protocol::Receipt> ReportIntake::Batch::TakeReceipts() {
 }
 
 ReportIntake::ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps,
-                           ImageStore& images, VehicleAllowance& allowance)
-    : config_(config), state_(state), steps_(steps), images_(images), allowance_(allowance) {}
+                           ImageStore& images, PictureAllowance& pictures,
+                           VehicleAllowance& allowance, PlaceBook& places)
+    : config_(config),
+      state_(state),
+      steps_(steps),
+      images_(images),
+      pictures_(pictures),
+      allowance_(allowance),
+      places_(places) {}
 
 ReportIntake::Batch ReportIntake::Examine(const std::vector<protocol::Report>& reports,
                                           std::int64_t now_ns) {
@@ -34,8 +42,15 @@ ReportIntake::Batch ReportIntake::Examine(const std::vector<protocol::Report>& r
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const protocol::Report& report = reports[i];
     if (!MayChangeMap(i, now_ns, batch)) continue;
-    PendingReport pending{i, {}};
-    if (!report.image.empty()) {
+    PendingReport pending{i, {}, {}};
+    PictureCost& asked = batch.asked[report.vehicle_id];
+    // A report counts without a picture that is not kept.
+    const auto cost = report.image.empty()
+                          ? std::nullopt
+                          : pictures_.Ask(report.vehicle_id, report.image, asked, now_ns);
+    if (cost) {
+      pending.picture_cost = *cost;
+      asked += *cost;
       pending.picture.format = imaging::FormatName(
           imaging::ReadImageHeader(report.image.data(), report.image.size())->format);
       pending.picture.sha256 = images_.Put(report.image, pending.picture.format);
@@ -64,38 +79,23 @@ bool ReportIntake::MayChangeMap(std::size_t index, std::int64_t now_ns, Batch& b
     Refuse(*why, index, batch);
     return false;
   }
+  const bool is_known_class = config_.catalogue.Names(report.class_name);
+  if (!is_known_class && config_.unknown_classes == UnknownClasses::kRefuse) {
+    Refuse({RefusalKind::kUnknownClass,
+            "class name is '" + report.class_name + "', which this zone's catalogue does not have"},
+           index, batch);
+    return false;
+  }
   if (!allowance_.TakeReport(report.vehicle_id, now_ns)) {
     ++batch.counted.not_now;
     return false;
   }
-  if (const auto why = WhyTooFast(report, batch)) {
+  if (const auto why = places_.Challenge(report.vehicle_id, FixOf(report))) {
     Refuse(*why, index, batch);
     return false;
   }
+  if (!is_known_class) ++batch.counted.of_unknown_class;
   return true;
-}
-
-std::optional<Refusal> ReportIntake::WhyTooFast(const protocol::Report& report, Batch& batch) {
-  const auto speed_mps = Challenge(TrackOf(report.vehicle_id, batch), FixOf(report), config_.speed);
-  if (!speed_mps) return std::nullopt;
-  return Refusal{RefusalKind::kSpeed, "position is reached from this vehicle's last report at " +
-                                          std::to_string(*speed_mps) + " m/s only, at most " +
-                                          std::to_string(config_.speed.max_speed_mps) +
-                                          " m/s are accepted"};
-}
-
-/// The batch's own copy, so that a failed commit leaves no trace.
-ReportTrack& ReportIntake::TrackOf(const std::string& vehicle_id, Batch& batch) {
-  const auto found = batch.tracks.find(vehicle_id);
-  if (found != batch.tracks.end()) return found->second;
-  const auto known = tracks_.find(vehicle_id);
-  ReportTrack track;
-  if (known != tracks_.end()) {
-    track = known->second;
-  } else {
-    track.accepted = state_.store.FindLastReport(vehicle_id);
-  }
-  return batch.tracks.emplace(vehicle_id, track).first->second;
 }
 
 void ReportIntake::Refuse(const Refusal& refusal, std::size_t index, Batch& batch) {
@@ -108,9 +108,12 @@ void ReportIntake::Refuse(const Refusal& refusal, std::size_t index, Batch& batc
 
 void ReportIntake::Apply(Batch& batch, ZoneTransaction& transaction) {
   for (const PendingReport& pending : batch.pending) ApplyOne(pending, batch, transaction);
-  for (const auto& [vehicle_id, track] : batch.tracks) {
-    if (track.accepted) state_.store.WriteLastReport(vehicle_id, *track.accepted);
-  }
+  places_.Save(transaction.now_ns());
+}
+
+void ReportIntake::Close(const Batch& batch, std::int64_t now_ns) {
+  for (const auto& [vehicle_id, cost] : batch.spent) pictures_.Spend(vehicle_id, cost, now_ns);
+  places_.Keep(now_ns);
 }
 
 void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
@@ -123,11 +126,11 @@ void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
     return;
   }
   auto slot = steps_.MatchNow(report, transaction);
-  if (!slot && state_.hazards.on_map_count() >= config_.max_hazards) {
-    Refuse({RefusalKind::kMapFull,
-            "the zone holds its maximum of " + std::to_string(config_.max_hazards) + " hazards"},
-           pending.index, batch);
-    return;
+  if (!slot) {
+    if (const auto why = WhyNoNewHazard(report, transaction.now_ns())) {
+      Refuse(*why, pending.index, batch);
+      return;
+    }
   }
   if (slot) {
     Sight(*slot, report, pending.picture, transaction);
@@ -138,8 +141,35 @@ void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
   }
   const HazardRecord& record = state_.hazards.Record(*slot);
   transaction.KeepReport(report, record.id, pending.picture.sha256);
+  if (!pending.picture.sha256.empty()) batch.spent[report.vehicle_id] += pending.picture_cost;
   batch.hazard_of_report.emplace(report.uuid, record.uuid);
   batch.receipts[pending.index] = Committed(report, record.uuid);
+}
+
+/// What several vehicles saw counts against none of them, so that only a vehicle that nobody else
+/// confirms ever comes to its share of the map.
+std::optional<Refusal> ReportIntake::WhyNoNewHazard(const protocol::Report& report,
+                                                    std::int64_t now_ns) const {
+  if (state_.hazards.on_map_count() >= config_.max_hazards) {
+    return Refusal{RefusalKind::kMapFull, "the zone holds its maximum of " +
+                                              std::to_string(config_.max_hazards) + " hazards"};
+  }
+  const std::uint64_t vehicle = VehicleKey(report.vehicle_id);
+  const std::size_t resting = state_.hazards.CountRestingOn(vehicle);
+  if (resting >= config_.max_hazards_by_one_vehicle) {
+    return Refusal{RefusalKind::kOneWitness,
+                   std::to_string(resting) +
+                       " hazards rest on this vehicle's word alone, at most " +
+                       std::to_string(config_.max_hazards_by_one_vehicle) + " may"};
+  }
+  // The store is asked only about those that the zone does not believe.
+  const bool is_suspect =
+      state_.trust.MaliciousProbability(vehicle, now_ns) >= config_.life.suspect_above;
+  if (is_suspect && state_.store.FindStandingDistrust(report.vehicle_id, UINT64_MAX)) {
+    return Refusal{RefusalKind::kOneWitness,
+                   "an official distrusts this vehicle: no hazard rests on its word alone"};
+  }
+  return std::nullopt;
 }
 
 ReportIntake::Slot ReportIntake::Register(const protocol::Report& report,
@@ -149,7 +179,9 @@ ReportIntake::Slot ReportIntake::Register(const protocol::Report& report,
   Uuid uuid = Uuid::Random(state_.generator);
   while (hazards.Find(uuid)) uuid = Uuid::Random(state_.generator);
   const std::int64_t now_ns = transaction.now_ns();
-  const Slot slot = hazards.Add(report, picture, uuid, transaction.TakeSequence(), now_ns);
+  const Slot slot = hazards.Add(report, hazards.HeadingOf(report.class_name), picture, uuid,
+                                transaction.TakeSequence(), now_ns);
+  transaction.NameHazard(slot, report.class_name);
   PresenceRecord life;
   const Evidence evidence =
       steps_.EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, now_ns);
@@ -165,28 +197,39 @@ void ReportIntake::Sight(Slot slot, const protocol::Report& report, const Pictur
                          ZoneTransaction& transaction) {
   const ZoneTransaction::Before before = transaction.BeforeOf(slot);
   const std::int64_t now_ns = transaction.now_ns();
-  state_.hazards.Merge(slot, report, picture, transaction.TakeSequence(), now_ns);
-  std::string reason = "sighting that counts for no more: too many from this vehicle";
-  if (allowance_.TakeEvidence(report.vehicle_id, now_ns)) {
-    PresenceRecord life = state_.hazards.Record(slot).life;
-    const Evidence evidence =
-        steps_.EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, now_ns);
-    const LifecycleUpdate step =
-        steps_.lifecycle().Apply(steps_.ClassOf(slot), evidence, now_ns, life);
-    steps_.Keep(slot, life, step, transaction);
-    reason = step.transition ? step.transition->reason : "sighting";
+  const std::uint64_t sequence = transaction.TakeSequence();
+  if (!allowance_.TakeEvidence(report.vehicle_id, now_ns)) {
+    state_.hazards.Merge(slot, report, picture, sequence, now_ns, SightingSays::kNothing);
+    transaction.RecordHazardEvent(
+        slot, before, "sighting that counts for no more: too many from this vehicle", true);
+    return;
   }
-  transaction.RecordHazardEvent(slot, before, std::move(reason), true);
+  const PresenceRecord earlier = state_.hazards.Record(slot).life;
+  PresenceRecord life = earlier;
+  const Evidence evidence =
+      steps_.EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, now_ns);
+  const LifecycleUpdate step =
+      steps_.lifecycle().Apply(steps_.ClassOf(slot), evidence, now_ns, life);
+  state_.hazards.Merge(slot, report, picture, sequence, now_ns,
+                       WhatItSays(evidence, step.counted, earlier));
+  steps_.Keep(slot, life, step, transaction);
+  transaction.RecordHazardEvent(slot, before,
+                                step.transition ? step.transition->reason : "sighting", true);
 }
 
-void ReportIntake::KeepTracks(const Batch& batch) {
-  // What is forgotten here is read from the store again, but for a vehicle's refused reports.
-  if (tracks_.size() > config_.max_vehicles) tracks_.clear();
-  for (const auto& [vehicle_id, track] : batch.tracks) tracks_[vehicle_id] = track;
-}
-
-bool ReportIntake::HasHeardOf(const std::string& vehicle_id) {
-  return tracks_.count(vehicle_id) != 0 || state_.store.FindLastReport(vehicle_id).has_value();
+/// What is no evidence moves nothing; nor does what an official has rejected move. A vehicle's
+/// further sightings of a hazard share its errors, and each could pull the hazard a little further:
+/// only its first one says where the hazard is.
+SightingSays ReportIntake::WhatItSays(const Evidence& evidence, bool counted,
+                                      const PresenceRecord& earlier) const {
+  const bool is_believed = evidence.malicious < config_.life.suspect_above;
+  if (!counted || !is_believed || earlier.state == HazardState::kRejected) {
+    return SightingSays::kNothing;
+  }
+  const bool has_spoken =
+      std::any_of(earlier.voices.begin(), earlier.voices.end(),
+                  [&](const VehicleEvidence& one) { return one.vehicle == evidence.vehicle; });
+  return has_spoken ? SightingSays::kWhen : SightingSays::kWhere;
 }
 
 }  // namespace livemap::zone

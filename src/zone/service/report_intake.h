@@ -11,14 +11,15 @@
 #include "common/uuid.h"
 #include "protocol/report.h"
 #include "zone/admission/report_validation.h"
-#include "zone/admission/speed_rule.h"
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/pictures/image_store.h"
+#include "zone/pictures/picture_allowance.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
 #include "zone/service/zone_transaction.h"
+#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 
@@ -33,6 +34,7 @@ class ReportIntake {
   struct PendingReport {
     std::size_t index = 0;  ///< In the batch.
     PictureName picture;
+    PictureCost picture_cost;
   };
   /// A batch on its way.
   struct Batch {
@@ -40,7 +42,8 @@ class ReportIntake {
     std::vector<std::optional<protocol::Receipt>> receipts;  ///< None: not taken now.
     std::vector<PendingReport> pending;
     std::unordered_map<Uuid, Uuid> hazard_of_report;
-    std::map<std::string, ReportTrack> tracks;  ///< As they will be.
+    std::map<std::string, PictureCost> asked;  ///< For pictures, by vehicle.
+    std::map<std::string, PictureCost> spent;  ///< Of these, for what is committed.
     ZoneStatistics counted;
 
     /// The receipts that vehicles get, in the order of the reports.
@@ -49,7 +52,7 @@ class ReportIntake {
 
   /// All outlive it.
   ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps, ImageStore& images,
-               VehicleAllowance& allowance);
+               PictureAllowance& pictures, VehicleAllowance& allowance, PlaceBook& places);
 
   /// First pass, which changes nothing: what was committed before, what is refused, pictures to
   /// disk. A picture whose report is never committed is unreferenced and goes first. `reports`
@@ -57,31 +60,31 @@ class ReportIntake {
   Batch Examine(const std::vector<protocol::Report>& reports, std::int64_t now_ns);
   /// Second pass: registers or merges what is pending.
   void Apply(Batch& batch, ZoneTransaction& transaction);
-  /// After the commit: where the batch's vehicles reported from.
-  void KeepTracks(const Batch& batch);
-
-  /// Whether the vehicle ever reported anything that was examined.
-  bool HasHeardOf(const std::string& vehicle_id);
+  /// After the commit: what the batch cost is taken from its vehicles, and where they were is
+  /// known. Also where nothing was pending.
+  void Close(const Batch& batch, std::int64_t now_ns);
 
  private:
   using Slot = HazardRegistry::Slot;
 
   bool MayChangeMap(std::size_t index, std::int64_t now_ns, Batch& batch);
-  std::optional<Refusal> WhyTooFast(const protocol::Report& report, Batch& batch);
-  ReportTrack& TrackOf(const std::string& vehicle_id, Batch& batch);
+  std::optional<Refusal> WhyNoNewHazard(const protocol::Report& report, std::int64_t now_ns) const;
   static void Refuse(const Refusal& refusal, std::size_t index, Batch& batch);
   void ApplyOne(const PendingReport& pending, Batch& batch, ZoneTransaction& transaction);
   Slot Register(const protocol::Report& report, const PictureName& picture,
                 ZoneTransaction& transaction);
   void Sight(Slot slot, const protocol::Report& report, const PictureName& picture,
              ZoneTransaction& transaction);
+  SightingSays WhatItSays(const Evidence& evidence, bool counted,
+                          const PresenceRecord& earlier) const;
 
   const ZoneConfig& config_;
   ZoneState& state_;
   HazardSteps& steps_;
   ImageStore& images_;
+  PictureAllowance& pictures_;
   VehicleAllowance& allowance_;
-  std::unordered_map<std::string, ReportTrack> tracks_;  ///< By vehicle id; the rest is stored.
+  PlaceBook& places_;
 };
 
 }  // namespace livemap::zone

@@ -11,6 +11,7 @@
 #include "zone/belief/hazard_lifecycle.h"
 #include "zone/belief/survival_model.h"
 #include "zone/belief/vehicle_trust.h"
+#include "zone/pictures/picture_allowance.h"
 #include "zone/polling/poll_scheduler.h"
 #include "zone/registry/map_change_registry.h"
 #include "zone/registry/vehicle_track.h"
@@ -24,11 +25,15 @@ struct ZoneConfig {
   double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
   std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
   std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.
+  /// On the map by one vehicle's word alone; new ones of that vehicle beyond it are refused.
+  std::size_t max_hazards_by_one_vehicle = 2000;
   protocol::PollPicture poll_picture =
       protocol::PollPicture::kCrop;  ///< What polls ask for, where they want one.
   ReportLimits limits;
+  UnknownClasses unknown_classes = UnknownClasses::kOther;
   SpeedRule speed;
   VehicleAllowance::Config allowance;  ///< Of one vehicle; further reports must wait.
+  PictureAllowance::Config pictures;
   HazardLifecycle::Config life;
   SurvivalModel::Config survival;
   VehicleTrust::Config trust;  ///< `malicious_share` is that of `life`.

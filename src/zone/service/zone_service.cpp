@@ -1,13 +1,30 @@
 #include "zone/service/zone_service.h"
 
 #include <algorithm>
-#include <cmath>
+#include <chrono>
+#include <thread>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "common/sqlite.h"
+#include "protocol/text_rules.h"
 
 namespace livemap::zone {
+namespace {
+
+/// Reports wait while a piece of a decision about a vehicle is looked for and committed.
+constexpr std::size_t kMaxHazardsAtOnce = 500;
+constexpr std::size_t kMaxLooksAtOnce = 100'000;
+constexpr std::size_t kShownDecisions = 20;
+/// Between two pieces: a lock that is taken again at once lets nobody in.
+constexpr std::chrono::milliseconds kPause{2};
+
+PlaceBook::Config PlaceRules(const ZoneConfig& config) {
+  return {config.speed, config.limits, config.max_vehicles};
+}
+
+}  // namespace
 
 ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
     : config_(CheckedConfig(std::move(config))),
@@ -16,13 +33,18 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
       state_(config_, directory_.path(), uuid_seed),
       images_(directory_.path() + "/images", static_cast<std::uint64_t>(config_.image_cap_bytes)),
       vehicles_(config_.vehicle_retention_s, config_.max_vehicles),
+      places_(PlaceRules(config_), state_.store),
       allowance_(config_.allowance),
+      pictures_(config_.pictures),
       steps_(config_, state_),
-      reports_(config_, state_, steps_, images_, allowance_),
-      map_changes_(config_, state_),
-      polls_(config_, state_, steps_, images_, allowance_, vehicles_),
+      reports_(config_, state_, steps_, images_, pictures_, allowance_, places_),
+      map_changes_(config_, state_, places_),
+      polls_(config_, state_, steps_, images_, pictures_, allowance_, vehicles_, places_),
       officials_(config_, state_, steps_),
       ageing_(state_, steps_) {
+  state_.damage += places_.Load();
+  sequence_ = state_.sequence;
+  announced_ = state_.announced;
   statistics_.store_damage = state_.damage;
   const std::int64_t now = now_ns_();
   for (Slot slot = 0; slot < state_.hazards.size(); ++slot) {
@@ -42,6 +64,8 @@ void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
     ++store_errors_;
     throw;
   }
+  sequence_ = StateForReaders().sequence;
+  announced_ = StateForReaders().announced;
 }
 
 void ZoneService::FollowUp(const ZoneTransaction& transaction) {
@@ -79,6 +103,7 @@ std::vector<protocol::Receipt> ZoneService::HandleBatch(
     const std::vector<protocol::Report>& reports) {
   const MutexLock writer(writer_mutex_);
   ZoneTransaction transaction(StateForWriter(), now_ns_());
+  const PlaceBook::Drafts drafts(places_);
   ReportIntake::Batch batch = reports_.Examine(reports, transaction.now_ns());
   {
     const WriterLock lock(data_mutex_);
@@ -90,7 +115,7 @@ std::vector<protocol::Receipt> ZoneService::HandleBatch(
     }
     CountReports(batch.counted);
   }
-  reports_.KeepTracks(batch);
+  reports_.Close(batch, transaction.now_ns());
   FollowUp(transaction);
   return batch.TakeReceipts();
 }
@@ -101,6 +126,7 @@ void ZoneService::CountReports(const ZoneStatistics& counted) {
   statistics_.repeated += counted.repeated;
   statistics_.refused += counted.refused;
   statistics_.not_now += counted.not_now;
+  statistics_.of_unknown_class += counted.of_unknown_class;
   for (std::size_t i = 0; i < kRefusalKinds; ++i) {
     statistics_.refused_by_kind[i] += counted.refused_by_kind[i];
   }
@@ -110,6 +136,7 @@ std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
     const std::vector<protocol::MapChangeReport>& reports) {
   const MutexLock writer(writer_mutex_);
   ZoneTransaction transaction(StateForWriter(), now_ns_());
+  const PlaceBook::Drafts drafts(places_);
   MapChangeIntake::Batch batch = map_changes_.Examine(reports, transaction.now_ns());
   {
     const WriterLock lock(data_mutex_);
@@ -121,6 +148,7 @@ std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
     }
     CountMapChanges(batch.counted);
   }
+  places_.Keep(transaction.now_ns());
   FollowUp(transaction);
   return batch.TakeReceipts();
 }
@@ -133,6 +161,7 @@ void ZoneService::CountMapChanges(const MapChangeStatistics& counted) {
   all.known += counted.known;
   all.repeated += counted.repeated;
   all.refused += counted.refused;
+  all.too_fast += counted.too_fast;
   all.not_now += counted.not_now;
 }
 
@@ -147,6 +176,7 @@ std::vector<protocol::Poll> ZoneService::TakeDuePolls() {
 bool ZoneService::HandleAnswer(const protocol::PollAnswer& answer) {
   const MutexLock writer(writer_mutex_);
   ZoneTransaction transaction(StateForWriter(), now_ns_());
+  const PlaceBook::Drafts drafts(places_);
   const auto accepted = polls_.Accept(answer, transaction.now_ns());
   if (accepted) {
     const WriterLock lock(data_mutex_);
@@ -166,7 +196,19 @@ void ZoneService::CountAnswer(bool accepted) {
 }
 
 void ZoneService::Advance() {
+  {
+    const MutexLock telling(telling_mutex_);
+    for (VehicleState& vehicle : vehicles_.TakeUntold(now_ns_())) {
+      PublishVehicle(std::move(vehicle));
+    }
+  }
   const MutexLock writer(writer_mutex_);
+  LetHazardsAge();
+  places_.SaveCounts();
+  places_.ForgetOld(now_ns_());
+}
+
+void ZoneService::LetHazardsAge() {
   ZoneTransaction transaction(StateForWriter(), now_ns_());
   const std::vector<Slot> due = ageing_.TakeDue(transaction.now_ns());
   if (due.empty()) return;
@@ -185,114 +227,246 @@ void ZoneService::Advance() {
 }
 
 template <typename Decide>
-bool ZoneService::DecideHazard(const Decide& decide) {
+std::optional<std::uint64_t> ZoneService::DecideHazard(const Decide& decide) {
   const MutexLock writer(writer_mutex_);
   ZoneTransaction transaction(StateForWriter(), now_ns_());
   const std::optional<OfficialActions::HazardDecision> decision = decide(transaction.now_ns());
-  if (!decision) return false;
+  if (!decision) return std::nullopt;
+  if (decision->repeats != 0) return decision->repeats;
+  std::uint64_t id = 0;
   {
     const WriterLock lock(data_mutex_);
-    Commit(transaction, [&] { officials_.Apply(*decision, transaction); });
+    Commit(transaction, [&] { id = officials_.Apply(*decision, transaction); });
   }
   FollowUp(transaction);
-  return true;
+  return id;
 }
 
-bool ZoneService::Confirm(const Uuid& hazard, const std::string& official,
-                          const std::string& reason) {
+std::optional<std::uint64_t> ZoneService::Confirm(const Uuid& hazard, const std::string& official,
+                                                  const std::string& reason,
+                                                  const std::optional<SeenHazard>& seen) {
   const std::string why = officials_.CheckedReason(official, reason);
   return DecideHazard(
-      [&](std::int64_t now_ns) { return officials_.Confirm(hazard, official, why, now_ns); });
+      [&](std::int64_t now_ns) { return officials_.Confirm(hazard, official, why, seen, now_ns); });
 }
 
-bool ZoneService::Reject(const Uuid& hazard, const std::string& official,
-                         const std::string& reason) {
+std::optional<std::uint64_t> ZoneService::Reject(const Uuid& hazard, const std::string& official,
+                                                 const std::string& reason,
+                                                 const std::optional<SeenHazard>& seen) {
   const std::string why = officials_.CheckedReason(official, reason);
   return DecideHazard(
-      [&](std::int64_t now_ns) { return officials_.Reject(hazard, official, why, now_ns); });
+      [&](std::int64_t now_ns) { return officials_.Reject(hazard, official, why, seen, now_ns); });
 }
 
 bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {
   return DecideHazard(
-      [&](std::int64_t now_ns) { return officials_.Remove(hazard, reason, now_ns); });
+             [&](std::int64_t now_ns) { return officials_.Remove(hazard, reason, now_ns); })
+      .has_value();
 }
 
-bool ZoneService::ConfirmMapChange(const Uuid& uuid, const std::string& official,
-                                   const std::string& reason) {
+std::optional<std::uint64_t> ZoneService::ConfirmMapChange(const Uuid& uuid,
+                                                           const std::string& official,
+                                                           const std::string& reason) {
   return DecideMapChange(uuid, MapChangeState::kConfirmed, official, reason);
 }
 
-bool ZoneService::DismissMapChange(const Uuid& uuid, const std::string& official,
-                                   const std::string& reason) {
+std::optional<std::uint64_t> ZoneService::DismissMapChange(const Uuid& uuid,
+                                                           const std::string& official,
+                                                           const std::string& reason) {
   return DecideMapChange(uuid, MapChangeState::kDismissed, official, reason);
 }
 
-bool ZoneService::DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
-                                  const std::string& reason) {
+std::optional<std::uint64_t> ZoneService::DecideMapChange(const Uuid& uuid, MapChangeState to,
+                                                          const std::string& official,
+                                                          const std::string& reason) {
   const std::string why = officials_.CheckedReason(official, reason);
   const MutexLock writer(writer_mutex_);
+  if (const auto before = officials_.RepeatOf(uuid, to, official, why)) return before;
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
+  std::uint64_t id = 0;
+  {
+    const WriterLock lock(data_mutex_);
+    Commit(transaction,
+           [&] { id = officials_.DecideMapChange(uuid, to, official, why, transaction); });
+  }
+  FollowUp(transaction);
+  if (id == 0) return std::nullopt;
+  return id;
+}
+
+ZoneService::Undone ZoneService::Undo(const Uuid& hazard, const std::string& official,
+                                      const std::string& reason,
+                                      std::optional<std::uint64_t> meant) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  Undone undone = Undone::kUnknown;
+  DecideHazard([&](std::int64_t now_ns) {
+    return officials_.Undo(hazard, official, why, meant, now_ns, undone);
+  });
+  return undone;
+}
+
+ZoneService::Undone ZoneService::UndoMapChange(const Uuid& uuid, const std::string& official,
+                                               const std::string& reason,
+                                               std::optional<std::uint64_t> meant) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  const MutexLock writer(writer_mutex_);
+  Undone undone = Undone::kUnknown;
+  const auto decision = officials_.UndoableOf(uuid, meant, undone);
+  if (!decision) return undone;
   ZoneTransaction transaction(StateForWriter(), now_ns_());
   {
     const WriterLock lock(data_mutex_);
-    Commit(transaction, [&] { officials_.DecideMapChange(uuid, to, official, why, transaction); });
+    Commit(transaction, [&] { officials_.UndoMapChange(*decision, official, why, transaction); });
   }
   FollowUp(transaction);
-  return !transaction.map_change_events().empty();
+  return undone;
 }
+
+bool ZoneService::HasHeardOf(const std::string& vehicle_id) const {
+  return !vehicles_.Track(vehicle_id).empty() || places_.HasHeardOf(vehicle_id);
+}
+
+/// As long as it lives no other decision about the vehicle is carried out: pieces of two would undo
+/// each other's.
+class ZoneService::VehicleClaim {
+ public:
+  VehicleClaim(ZoneService& zone, const std::string& vehicle_id)
+      : zone_(zone), vehicle_id_(vehicle_id) {
+    const MutexLock lock(zone_.claims_mutex_);
+    if (!zone_.claimed_vehicles_.insert(vehicle_id_).second) {
+      throw DecisionConflict(
+          "another decision about this vehicle is being carried out; decide again when it is done");
+    }
+  }
+  ~VehicleClaim() {
+    const MutexLock lock(zone_.claims_mutex_);
+    zone_.claimed_vehicles_.erase(vehicle_id_);
+  }
+  VehicleClaim(const VehicleClaim&) = delete;
+  VehicleClaim& operator=(const VehicleClaim&) = delete;
+
+ private:
+  ZoneService& zone_;
+  const std::string& vehicle_id_;
+};
 
 std::optional<std::size_t> ZoneService::Distrust(const std::string& vehicle_id,
                                                  const std::string& official,
                                                  const std::string& reason) {
-  // Reports wait while a portion is committed.
-  constexpr std::size_t kMaxAtOnce = 2000;
-  const std::string given = officials_.CheckedReason(official, reason);
-  if (!IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
-  const std::string why = DecisionText("words of " + vehicle_id + " withdrawn", official, given);
+  const std::string why = officials_.CheckedReason(official, reason);
+  if (!protocol::IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
   const std::uint64_t vehicle = VehicleKey(vehicle_id);
+  const VehicleClaim claim(*this, vehicle_id);
+  OfficialActions::VehiclePiece piece;
   std::size_t withdrawn = 0;
-  for (bool first = true;; first = false) {
+  Slot next = 0;
+  for (bool first = true;; std::this_thread::sleep_for(kPause)) {
     const MutexLock writer(writer_mutex_);
-    std::vector<Slot> slots = StateForWriter().hazards.HazardsWithEvidenceFrom(vehicle);
-    if (first && slots.empty() && vehicles_.Track(vehicle_id).empty() &&
-        !reports_.HasHeardOf(vehicle_id)) {
-      return std::nullopt;
+    ZoneState& state = StateForWriter();
+    const std::vector<Slot> slots =
+        state.hazards.HazardsWithEvidenceFrom(vehicle, next, kMaxHazardsAtOnce, kMaxLooksAtOnce);
+    const bool last = next >= state.hazards.size();
+    if (slots.empty() && !last) continue;
+    if (first && slots.empty() && !HasHeardOf(vehicle_id)) return std::nullopt;
+    if (first || !slots.empty()) {
+      ZoneTransaction transaction(state, now_ns_());
+      {
+        const WriterLock lock(data_mutex_);
+        Commit(transaction, [&] {
+          piece =
+              officials_.Distrust(vehicle_id, slots, official, why, piece.decision, transaction);
+        });
+      }
+      FollowUp(transaction);
+      withdrawn += piece.hazards;
+      first = false;
     }
-    const bool last = slots.size() <= kMaxAtOnce;
-    slots.resize(std::min(slots.size(), kMaxAtOnce));
+    if (last) return withdrawn;
+  }
+}
+
+std::optional<std::size_t> ZoneService::Trust(const std::string& vehicle_id,
+                                              const std::string& official,
+                                              const std::string& reason) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  if (!protocol::IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
+  const VehicleClaim claim(*this, vehicle_id);
+  OfficialActions::VehiclePiece piece;
+  for (std::size_t restored = 0;; std::this_thread::sleep_for(kPause)) {
+    const MutexLock writer(writer_mutex_);
+    if (!officials_.IsDistrusted(vehicle_id)) {
+      if (piece.decision == 0 && !HasHeardOf(vehicle_id)) return std::nullopt;
+      return restored;
+    }
     ZoneTransaction transaction(StateForWriter(), now_ns_());
     {
       const WriterLock lock(data_mutex_);
-      Commit(transaction, [&] { officials_.Distrust(vehicle, slots, why, transaction); });
+      Commit(transaction, [&] {
+        piece = officials_.Trust(vehicle_id, kMaxHazardsAtOnce, official, why, piece.decision,
+                                 transaction);
+      });
     }
     FollowUp(transaction);
-    withdrawn += slots.size();
-    if (last) return withdrawn;
+    restored += piece.hazards;
+    if (piece.is_last) return restored;
+  }
+}
+
+std::optional<DistrustPreview> ZoneService::PreviewDistrust(const std::string& vehicle_id) const {
+  if (!protocol::IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
+  const std::uint64_t vehicle = VehicleKey(vehicle_id);
+  DistrustPreview preview;
+  for (Slot next = 0;; std::this_thread::sleep_for(kPause)) {
+    const MutexLock writer(writer_mutex_);
+    const ZoneState& state = StateForWriter();
+    const std::vector<Slot> slots =
+        state.hazards.HazardsWithEvidenceFrom(vehicle, next, kMaxHazardsAtOnce, kMaxLooksAtOnce);
+    officials_.Preview(vehicle, slots, now_ns_(), preview);
+    if (next < state.hazards.size()) continue;
+    preview.is_distrusted = officials_.IsDistrusted(vehicle_id);
+    preview.decisions = officials_.Decisions(vehicle_id, kShownDecisions);
+    const bool is_known =
+        preview.hazards > 0 || !preview.decisions.empty() || HasHeardOf(vehicle_id);
+    return is_known ? std::optional(std::move(preview)) : std::nullopt;
   }
 }
 
 bool ZoneService::UpdateVehicle(const VehicleState& told) {
   VehicleState vehicle = told;
   vehicle.heard_ns = now_ns_();
-  const std::size_t max_bytes = config_.limits.max_text_bytes;
-  const bool acceptable =
-      IsPrintableText(vehicle.vehicle_id, max_bytes) &&
-      (vehicle.drive_id.empty() || IsPrintableText(vehicle.drive_id, max_bytes)) &&
-      geo::IsValid(vehicle.position) && !std::isinf(vehicle.course_rad) &&
-      !std::isinf(vehicle.speed_mps) && vehicle.stamp_ns >= 0;
-  if (!acceptable) {
-    ++vehicle_positions_refused_;
+  if (const auto why = places_.ChallengePosition(vehicle)) {
+    ++positions_refused_[static_cast<std::size_t>(why->kind)];
     return false;
   }
   ++vehicle_positions_;
-  vehicles_.Update(vehicle);
   polls_.SetVehicle(vehicle);
-  ZoneEvent message;
-  message.vehicle = std::move(vehicle);
-  stream_.Publish(message);
+  const MutexLock telling(telling_mutex_);
+  if (vehicles_.Update(vehicle)) PublishVehicle(std::move(vehicle));
   return true;
 }
 
+void ZoneService::PublishVehicle(VehicleState vehicle) {
+  ZoneEvent message;
+  message.vehicle = std::move(vehicle);
+  stream_.Publish(message);
+}
+
 std::vector<VehicleState> ZoneService::Vehicles() const { return vehicles_.List(now_ns_()); }
+
+std::vector<VehicleState> ZoneService::VehiclesAfter(const std::string& id,
+                                                     std::size_t limit) const {
+  return vehicles_.ListAfter(id, limit, now_ns_());
+}
+
+Page<Hazard> ZoneService::ReadHazards(const Walk<HazardState>& walk, std::size_t limit) const {
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().hazards.ReadPage(walk, limit);
+}
+
+std::array<std::size_t, kHazardStates> ZoneService::HazardCounts() const {
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().hazards.counts();
+}
 
 std::vector<Hazard> ZoneService::Query(const std::optional<geo::GeoBox>& box,
                                        std::uint64_t since_sequence, std::size_t limit,
@@ -314,6 +488,51 @@ std::vector<Hazard> ZoneService::ChangedAround(const geo::GeoPoint& centre, doub
   return StateForReaders().hazards.ChangedAround(centre, radius_m, since_sequence, limit);
 }
 
+std::optional<geo::GeoBox> ZoneService::View() const {
+  constexpr std::int64_t kShareOfTime = 100;
+  if (config_.limits.zone) return config_.limits.zone;
+  MutexLock lock(view_mutex_);
+  while (is_making_view_ && !view_due_ns_) view_changed_.Wait(view_mutex_);
+  const std::int64_t begin_ns = SteadyNs();
+  if (is_making_view_ || (view_due_ns_ && begin_ns < *view_due_ns_)) return view_;
+  is_making_view_ = true;
+  lock.Unlock();
+  std::optional<geo::GeoBox> view;
+  try {
+    view = MakeView();
+  } catch (...) {
+    lock.Lock();
+    is_making_view_ = false;
+    view_changed_.NotifyAll();
+    throw;
+  }
+  lock.Lock();
+  view_ = view;
+  const std::int64_t end_ns = SteadyNs();
+  view_due_ns_ = end_ns + kShareOfTime * (end_ns - begin_ns);
+  is_making_view_ = false;
+  view_changed_.NotifyAll();
+  return view_;
+}
+
+std::optional<geo::GeoBox> ZoneService::MakeView() const {
+  // So many votes say where a crowd is; a lock is never held for longer than some of them take.
+  constexpr std::size_t kMaxVotes = 100'000;
+  constexpr std::size_t kLooks = 20'000;
+  std::vector<ViewHazard> hazards;
+  Slot next = 0;
+  std::size_t on_map = 0;
+  std::size_t step = 0;
+  for (bool done = false; !done;) {
+    const ReaderLock lock(data_mutex_);
+    const HazardRegistry& registry = StateForReaders().hazards;
+    if (step == 0) step = 1 + registry.on_map_count() / kMaxVotes;
+    registry.AppendToView(next, on_map, step, kLooks, hazards);
+    done = next >= registry.size();
+  }
+  return ViewOf(hazards);
+}
+
 std::optional<Hazard> ZoneService::Find(const Uuid& uuid) const {
   const ReaderLock lock(data_mutex_);
   const HazardRegistry& hazards = StateForReaders().hazards;
@@ -322,11 +541,18 @@ std::optional<Hazard> ZoneService::Find(const Uuid& uuid) const {
 }
 
 std::vector<StoredEvent> ZoneService::Events(const Uuid& hazard, std::size_t limit) const {
-  const MutexLock writer(writer_mutex_);
-  const ZoneState& state = StateForWriter();
-  const auto slot = state.hazards.Find(hazard);
-  if (!slot) return {};
-  return state.store.LoadEvents(hazard, state.hazards.Record(*slot).sequence, limit);
+  std::uint64_t sequence = 0;
+  const ZoneStore* store = nullptr;
+  {
+    const ReaderLock lock(data_mutex_);
+    const ZoneState& state = StateForReaders();
+    const auto slot = state.hazards.Find(hazard);
+    if (!slot) return {};
+    sequence = state.hazards.Record(*slot).sequence;
+    store = &state.store;
+  }
+  // Any thread may.
+  return store->LoadEvents(hazard, sequence, limit);
 }
 
 std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,
@@ -337,6 +563,12 @@ std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<g
   return StateForReaders().map_changes.Query(box, since_sequence, limit, states);
 }
 
+Page<MapChangeFeature> ZoneService::ReadMapChanges(const Walk<MapChangeState>& walk,
+                                                   std::size_t limit) const {
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().map_changes.ReadPage(walk, limit);
+}
+
 std::optional<MapChangeFeature> ZoneService::FindMapChange(const Uuid& uuid) const {
   const ReaderLock lock(data_mutex_);
   const MapChangeFeature* feature = StateForReaders().map_changes.Find(uuid);
@@ -345,11 +577,17 @@ std::optional<MapChangeFeature> ZoneService::FindMapChange(const Uuid& uuid) con
 
 std::vector<StoredMapChangeEvent> ZoneService::MapChangeEvents(const Uuid& uuid,
                                                                std::size_t limit) const {
-  const MutexLock writer(writer_mutex_);
-  const ZoneState& state = StateForWriter();
-  const MapChangeFeature* feature = state.map_changes.Find(uuid);
-  if (feature == nullptr) return {};
-  return state.store.LoadMapChangeEvents(feature->sequence, limit);
+  std::uint64_t sequence = 0;
+  const ZoneStore* store = nullptr;
+  {
+    const ReaderLock lock(data_mutex_);
+    const ZoneState& state = StateForReaders();
+    const MapChangeFeature* feature = state.map_changes.Find(uuid);
+    if (feature == nullptr) return {};
+    sequence = feature->sequence;
+    store = &state.store;
+  }
+  return store->LoadMapChangeEvents(sequence, limit);
 }
 
 std::optional<std::string> ZoneService::ImagePath(const std::string& sha256) const {
@@ -362,27 +600,21 @@ int ZoneService::Subscribe(Subscriber subscriber) {
 
 void ZoneService::Unsubscribe(int id) { stream_.Unsubscribe(id); }
 
-std::uint64_t ZoneService::Sequence() const {
-  const ReaderLock lock(data_mutex_);
-  return StateForReaders().sequence;
-}
-
-std::uint64_t ZoneService::AnnouncedSequence() const {
-  const ReaderLock lock(data_mutex_);
-  return StateForReaders().announced;
-}
-
 ZoneStatistics ZoneService::Statistics() const {
   const ReaderLock lock(data_mutex_);
   const ZoneState& state = StateForReaders();
   ZoneStatistics statistics = statistics_;
   statistics.vehicle_positions = vehicle_positions_;
-  statistics.vehicle_positions_refused = vehicle_positions_refused_;
+  for (std::size_t i = 0; i < kRefusalKinds; ++i) {
+    statistics.positions_refused_by_kind[i] = positions_refused_[i];
+    statistics.vehicle_positions_refused += positions_refused_[i];
+  }
   statistics.store_errors = store_errors_;
   statistics.active_hazards = state.hazards.on_map_count();
   statistics.hazards_by_state = state.hazards.counts();
   statistics.map_changes.by_state = state.map_changes.counts();
   statistics.image_bytes = images_.total_bytes();
+  statistics.pictures_refused = pictures_.refused();
   statistics.suspect_vehicles = state.trust.Count(config_.life.suspect_above, now_ns_());
   return statistics;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,11 +17,14 @@
 #include "protocol/poll.h"
 #include "protocol/report.h"
 #include "zone/admission/vehicle_allowance.h"
+#include "zone/model/decision.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
+#include "zone/model/page.h"
 #include "zone/model/vehicle_state.h"
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/owned_directory.h"
+#include "zone/pictures/picture_allowance.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/ageing.h"
 #include "zone/service/event_stream.h"
@@ -32,6 +37,7 @@
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
 #include "zone/service/zone_transaction.h"
+#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 
@@ -66,8 +72,7 @@ class ZoneService {
   std::vector<protocol::Receipt> HandleBatch(const std::vector<protocol::Report>& reports);
 
   /// What vehicles tell of map changes: as HandleBatch, with their own hourly cap
-  /// (Config::map_changes_per_hour) and without a rule about speed. A receipt's hazard_uuid is that
-  /// of the feature.
+  /// (Config::map_changes_per_hour). A receipt's hazard_uuid is that of the feature.
   std::vector<protocol::Receipt> HandleMapChanges(
       const std::vector<protocol::MapChangeReport>& reports);
   /// Features whose last event is newer than `since_sequence`, in the order of that sequence, at
@@ -76,20 +81,29 @@ class ZoneService {
   std::vector<MapChangeFeature> QueryMapChanges(const std::optional<geo::GeoBox>& box,
                                                 std::uint64_t since_sequence, std::size_t limit,
                                                 const MapChangeStates& states = {}) const;
+  /// The next page, of at most `limit`, of a walk over the map changes. Whoever walks until
+  /// Sequence() as it was at the start is told each map change once; those that change meanwhile
+  /// may be left out and have a newer sequence.
+  Page<MapChangeFeature> ReadMapChanges(const Walk<MapChangeState>& walk, std::size_t limit) const;
   std::optional<MapChangeFeature> FindMapChange(const Uuid& uuid) const;
   /// As Events.
   std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit) const;
-  /// An official's decisions, as Confirm and Reject below. False when there is no such feature, or
+  /// An official's decisions, as Confirm and Reject below. None when there is no such feature, or
   /// none to decide about (MapChangeRegistry::Decide).
-  bool ConfirmMapChange(const Uuid& uuid, const std::string& official,
-                        const std::string& reason = "");
-  bool DismissMapChange(const Uuid& uuid, const std::string& official, const std::string& reason);
+  std::optional<std::uint64_t> ConfirmMapChange(const Uuid& uuid, const std::string& official,
+                                                const std::string& reason = "");
+  std::optional<std::uint64_t> DismissMapChange(const Uuid& uuid, const std::string& official,
+                                                const std::string& reason);
 
   /// Hazards whose last event is newer than `since_sequence`, in the order of that sequence, at
   /// most `limit`. Those on the officials' map; gone and rejected ones too when `since_sequence`
   /// > 0, so that a view catches up after a gap. With `states` exactly those in one of them.
   std::vector<Hazard> Query(const std::optional<geo::GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit, const HazardStates& states = {}) const;
+  /// As ReadMapChanges.
+  Page<Hazard> ReadHazards(const Walk<HazardState>& walk, std::size_t limit) const;
+  /// How many hazards are in each state, by HazardState.
+  std::array<std::size_t, kHazardStates> HazardCounts() const;
   /// Hazards that drivers are told of within `radius_m` of `centre`, nearest first, at most
   /// `limit`.
   std::vector<Hazard> QueryNear(const geo::GeoPoint& centre, double radius_m,
@@ -100,26 +114,62 @@ class ZoneService {
   /// `since_sequence` is 0.
   std::vector<Hazard> ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                     std::uint64_t since_sequence, std::size_t limit) const;
+  /// What a map shows that is opened: the zone's bounds where they are set, else where most hazards
+  /// are (ViewOf); none while there is nothing. Computed anew for at most a hundredth of the time,
+  /// so it may be a little old. Only the one caller who computes it waits, and those who come
+  /// before there is any.
+  std::optional<geo::GeoBox> View() const;
   /// Also one that is gone or rejected.
   std::optional<Hazard> Find(const Uuid& uuid) const;
   /// The newest `limit` events of a hazard, oldest of them first; empty for an unknown one. Throws
-  /// StoreError.
+  /// StoreError. Waits for no writer, unless one commits just now.
   std::vector<StoredEvent> Events(const Uuid& hazard, std::size_t limit) const;
 
-  /// An official's decisions. Each is committed with its event, whose reason names the official
-  /// (printable UTF-8 of at most 64 bytes) and gives `reason` as far as 200 bytes go. False when no
-  /// hazard of that uuid is on the map (Confirm: or it is rejected, which it revokes). Throw Error
-  /// for an unacceptable name, StoreError when the store fails.
-  bool Reject(const Uuid& hazard, const std::string& official, const std::string& reason);
-  bool Confirm(const Uuid& hazard, const std::string& official, const std::string& reason = "");
+  /// An official's decisions; they return the decision's id. The same decision by the same official
+  /// for the same reason returns the id of the one before, and changes nothing, while it holds.
+  /// Each is committed with its event, whose reason names the official (printable UTF-8 of at most
+  /// 64 bytes) and gives `reason` as far as 200 bytes go. None when no hazard of that uuid is on
+  /// the map (Confirm: or it is rejected, which it revokes). Throw Error for an unacceptable name,
+  /// StoreError when the store fails, and DecisionConflict when the hazard has another state than
+  /// when it was `seen`, or lies further from where it was than two reports of one hazard may.
+  std::optional<std::uint64_t> Reject(const Uuid& hazard, const std::string& official,
+                                      const std::string& reason,
+                                      const std::optional<SeenHazard>& seen = std::nullopt);
+  std::optional<std::uint64_t> Confirm(const Uuid& hazard, const std::string& official,
+                                       const std::string& reason = "",
+                                       const std::optional<SeenHazard>& seen = std::nullopt);
   /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
   /// suspicion does, and all that it said is taken back from the hazards that are not gone
   /// (HazardLifecycle::Withdraw), each with an event whose reason names vehicle and official as far
   /// as 200 bytes go. Returns how many hazards that were; none when the zone has never heard of the
-  /// vehicle. A few thousand hazards are committed at a time: when it throws StoreError those
-  /// before stay changed, and another call does the rest. Throws Error as Reject does.
+  /// vehicle. Some hundred hazards are committed at a time, and reports come between: when it
+  /// throws StoreError those before stay changed, and another call does the rest. Throws Error as
+  /// Reject does, and DecisionConflict while another decision about the vehicle is carried out.
   std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
                                       const std::string& reason);
+  /// What came of an undo.
+  using Undone = OfficialActions::Undone;
+  /// Takes the newest confirmation or rejection of the hazard back: state, odds, voices and the
+  /// official's mark are as before, what vehicles have said since counts on top, and what the
+  /// decision held against vehicles or taught of the class is taken back. Committed with an event.
+  /// With `meant`, the id of a decision, nothing is taken back unless that is the newest one.
+  /// Throws as Reject does.
+  Undone Undo(const Uuid& hazard, const std::string& official, const std::string& reason = "",
+              std::optional<std::uint64_t> meant = std::nullopt);
+  /// The same of a map change.
+  Undone UndoMapChange(const Uuid& uuid, const std::string& official,
+                       const std::string& reason = "",
+                       std::optional<std::uint64_t> meant = std::nullopt);
+  /// What Distrust would do now; none when the zone has never heard of the vehicle. Changes
+  /// nothing. Throws StoreError.
+  std::optional<DistrustPreview> PreviewDistrust(const std::string& vehicle_id) const;
+  /// Takes every Distrust of the vehicle back that stands: what it said counts again in the hazards
+  /// from which it was withdrawn, each with an event, and what is held against it is what it was.
+  /// Returns how many hazards that were; 0 when none stands; none when the zone has never heard of
+  /// the vehicle. In pieces, as Distrust.
+  std::optional<std::size_t> Trust(const std::string& vehicle_id, const std::string& official,
+                                   const std::string& reason = "");
+
   /// Takes a hazard off the map for good. False when none of that uuid is on the map.
   bool Remove(const Uuid& hazard, const std::string& reason);
 
@@ -131,18 +181,24 @@ class ZoneService {
   /// vehicle cannot have seen the place by the positions that the zone knows. Throws StoreError:
   /// then the poll stays open.
   bool HandleAnswer(const protocol::PollAnswer& answer);
-  /// Time passes: commits the transitions that are due. To be called about once a second. Throws
-  /// StoreError: then nothing has changed.
+  /// Time passes: tells subscribers of positions that they have not heard of, commits the
+  /// transitions that are due, and forgets where vehicles were too long ago. To be called about
+  /// once a second. Throws StoreError: then what failed has not happened, and is tried again.
   void Advance();
 
   /// File of a stored picture; only 64 lower-case hex digits name one.
   std::optional<std::string> ImagePath(const std::string& sha256) const;
 
-  /// Remembers where a vehicle is and tells subscribers. False, and counted, when the position or
-  /// the ids are not acceptable.
+  /// Remembers where a vehicle is and tells subscribers, of one vehicle four times a second at most
+  /// (VehicleTable::kTellNs): of what comes faster they hear the newest, by Advance at the latest.
+  /// False, and counted by its kind, when it is no acceptable position: ids or numbers, a stamp out
+  /// of the window, or a place that the vehicle cannot have reached by all that it told before
+  /// (PlaceBook).
   bool UpdateVehicle(const VehicleState& vehicle);
   /// Vehicles heard of within the retention time, by id.
   std::vector<VehicleState> Vehicles() const;
+  /// The first `limit` of them whose id comes after `id`.
+  std::vector<VehicleState> VehiclesAfter(const std::string& id, std::size_t limit) const;
 
   /// `subscriber` is called from whichever thread commits, one call at a time. It may read from
   /// this service but must neither write to it nor (un)subscribe.
@@ -150,10 +206,11 @@ class ZoneService {
   /// When this returns the subscriber is not running and will not be called again.
   void Unsubscribe(int id);
 
-  /// Of the newest event; 0 when nothing ever happened.
-  std::uint64_t Sequence() const;
-  /// Of the newest event that drivers were told; 0 without one.
-  std::uint64_t AnnouncedSequence() const;
+  /// Of the newest committed event; 0 when nothing ever happened. Waits for nothing, not for the
+  /// disk either.
+  std::uint64_t Sequence() const { return sequence_; }
+  /// Of the newest event that drivers were told; 0 without one. As Sequence.
+  std::uint64_t AnnouncedSequence() const { return announced_; }
   ZoneStatistics Statistics() const;
 
  private:
@@ -172,10 +229,16 @@ class ZoneService {
   /// and are asked about next, and events for subscribers.
   void FollowUp(const ZoneTransaction& transaction) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
   void Schedule(Slot slot, std::int64_t now_ns) REQUIRES(writer_mutex_);
+  void PublishVehicle(VehicleState vehicle) REQUIRES(telling_mutex_);
+  void LetHazardsAge() REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  class VehicleClaim;
   template <typename Decide>
-  bool DecideHazard(const Decide& decide);
-  bool DecideMapChange(const Uuid& uuid, MapChangeState to, const std::string& official,
-                       const std::string& reason);
+  std::optional<std::uint64_t> DecideHazard(const Decide& decide);
+  std::optional<std::uint64_t> DecideMapChange(const Uuid& uuid, MapChangeState to,
+                                               const std::string& official,
+                                               const std::string& reason);
+  bool HasHeardOf(const std::string& vehicle_id) const REQUIRES(writer_mutex_);
+  std::optional<geo::GeoBox> MakeView() const EXCLUDES(data_mutex_);
   void CountReports(const ZoneStatistics& counted) REQUIRES(data_mutex_);
   void CountMapChanges(const MapChangeStatistics& counted) REQUIRES(data_mutex_);
   void CountAnswer(bool accepted) EXCLUDES(data_mutex_);
@@ -196,18 +259,39 @@ class ZoneService {
   /// cannot express: it is used by StateForReaders and StateForWriter alone.
   ZoneState state_;
   ZoneStatistics statistics_ GUARDED_BY(data_mutex_);
+  // As in state_. Set before data_mutex_ is let go: who reads one finds all up to it.
+  std::atomic<std::uint64_t> sequence_{0};
+  std::atomic<std::uint64_t> announced_{0};
+
+  /// Held for moments, with no other lock taken under it.
+  Mutex claims_mutex_;
+  /// Vehicles about which a decision is carried out, piece by piece.
+  std::set<std::string> claimed_vehicles_ GUARDED_BY(claims_mutex_);
+
+  /// For the view alone. Never held while one is made.
+  mutable Mutex view_mutex_;
+  mutable ConditionVariable view_changed_;
+  mutable std::optional<geo::GeoBox> view_ GUARDED_BY(view_mutex_);
+  /// Steady clock; none before the first view.
+  mutable std::optional<std::int64_t> view_due_ns_ GUARDED_BY(view_mutex_);
+  mutable bool is_making_view_ GUARDED_BY(view_mutex_) = false;
 
   // Thread-safe each by itself.
   ImageStore images_;
   VehicleTable vehicles_;
   EventStream stream_;
+  /// From the choice of a position to its way to subscribers: of one vehicle the newest one is told
+  /// last. No other lock is taken under it but those of the vehicles and of the subscribers.
+  Mutex telling_mutex_;
   std::atomic<std::uint64_t> vehicle_positions_{0};
-  std::atomic<std::uint64_t> vehicle_positions_refused_{0};
+  std::array<std::atomic<std::uint64_t>, kRefusalKinds> positions_refused_{};
   std::atomic<std::uint64_t> store_errors_{0};
 
   // Collaborators on the state. Two of them have a function that wants no lock; for their other
   // functions the writer's lock is held, too.
+  PlaceBook places_;  ///< ChallengePosition: any thread.
   VehicleAllowance allowance_ GUARDED_BY(writer_mutex_);
+  PictureAllowance pictures_;  ///< refused: any thread.
   HazardSteps steps_ GUARDED_BY(writer_mutex_);
   ReportIntake reports_ GUARDED_BY(writer_mutex_);
   MapChangeIntake map_changes_ GUARDED_BY(writer_mutex_);

@@ -35,7 +35,10 @@ void ZoneState::Load() {
     if (!trust.Restore(vehicle, record)) throw Error("a vehicle's trust is no such record");
   });
   damage += store.LoadHazards([this](const ZoneStore::HazardRow& row) {
-    hazards.Restore(row.hazard, row.life, static_cast<std::uint32_t>(row.id));
+    Hazard hazard = row.hazard;
+    // A store of before the catalogue ruled may hold any names.
+    hazard.class_name = hazards.HeadingOf(hazard.class_name);
+    hazards.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));
     announced = std::max(announced, row.hazard.announced_sequence);
     sequence = std::max(sequence, row.hazard.sequence);
   });
@@ -45,6 +48,7 @@ void ZoneState::Load() {
     sequence = std::max(sequence, row.feature.sequence);
   });
   map_changes.SkipIdsTo(static_cast<std::uint32_t>(store.LastMapChangeId()));
+  damage += store.CheckWithdrawals();
 }
 
 }  // namespace livemap::zone

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/text.h"
+#include "protocol/text_rules.h"
 
 namespace livemap::zone {
 
@@ -51,6 +52,23 @@ void ZoneTransaction::Judge(const std::vector<Verdict>& verdicts) {
   }
 }
 
+void ZoneTransaction::Unlearn(const std::string& class_name, const LifetimeObservation& lesson) {
+  const auto known = state_.survival.learned().find(class_name);
+  if (known == state_.survival.learned().end()) return;
+  learned_before_.emplace(class_name, known->second);
+  state_.survival.Unlearn(class_name, lesson);
+}
+
+void ZoneTransaction::RestoreTrust(std::uint64_t vehicle, const TrustRecord& record) {
+  trust_before_.emplace(vehicle, state_.trust.Get(vehicle));
+  state_.trust.Restore(vehicle, record);
+}
+
+void ZoneTransaction::TakeBackSuspicion(const SuspicionChange& change, std::int64_t at_ns) {
+  trust_before_.emplace(change.vehicle, state_.trust.Get(change.vehicle));
+  state_.trust.TakeBack(change.vehicle, change.added, at_ns, now_ns_);
+}
+
 void ZoneTransaction::Distrust(std::uint64_t vehicle) {
   trust_before_.emplace(vehicle, state_.trust.Get(vehicle));
   state_.trust.Distrust(vehicle, now_ns_);
@@ -87,6 +105,10 @@ void ZoneTransaction::RecordHazardEvent(Slot slot, const std::optional<Before>& 
   hazard_events_.push_back(std::move(event));
 }
 
+void ZoneTransaction::NameHazard(Slot slot, const std::string& reported_class) {
+  reported_classes_[slot] = protocol::Trimmed(reported_class);
+}
+
 void ZoneTransaction::RecordMapChangeEvent(MapChangeEvent event) {
   ++sequence_;
   map_change_events_.push_back(std::move(event));
@@ -114,7 +136,10 @@ void ZoneTransaction::Write() {
   touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
   for (const Slot slot : touched_) {
     const HazardRecord& record = state_.hazards.Record(slot);
-    store.WriteHazard({record.id, state_.hazards.Get(slot), record.life});
+    ZoneStore::HazardRow row{record.id, state_.hazards.Get(slot), record.life};
+    const auto reported = reported_classes_.find(slot);
+    if (reported != reported_classes_.end()) row.hazard.class_name = reported->second;
+    store.WriteHazard(row);
   }
   for (std::size_t i = 0; i < hazard_events_.size(); ++i) {
     store.WriteEvent(hazard_events_[i], places_[i].hazard_id, places_[i].previous_sequence);

@@ -12,6 +12,7 @@
 #include "protocol/report.h"
 #include "zone/belief/survival_model.h"
 #include "zone/belief/vehicle_trust.h"
+#include "zone/model/decision.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 #include "zone/registry/hazard_registry.h"
@@ -63,8 +64,14 @@ class ZoneTransaction {
   void Learn(const std::string& class_name, const LifetimeObservation& lesson);
   /// The verdicts count for or against their vehicles.
   void Judge(const std::vector<Verdict>& verdicts);
+  /// The survival model forgets a lesson that it learned.
+  void Unlearn(const std::string& class_name, const LifetimeObservation& lesson);
   /// The vehicle is as suspect as can be.
   void Distrust(std::uint64_t vehicle);
+  /// What is held against the vehicle is this again.
+  void RestoreTrust(std::uint64_t vehicle, const TrustRecord& record);
+  /// What was added to the vehicle's suspicion at `at_ns` is taken back.
+  void TakeBackSuspicion(const SuspicionChange& change, std::int64_t at_ns);
 
   Before BeforeOf(Slot slot) const;
   /// The event of what happened to `slot` since `before` (none: it is new); its sequence is the
@@ -72,6 +79,9 @@ class ZoneTransaction {
   /// event's length.
   void RecordHazardEvent(Slot slot, const std::optional<Before>& before, std::string reason,
                          bool tells);
+  /// A new hazard was reported under this name, whatever the catalogue calls it now: the store
+  /// keeps the name, so that one start with a wrong catalogue loses none.
+  void NameHazard(Slot slot, const std::string& reported_class);
   /// The event, whose sequence was `sequence() + 1`.
   void RecordMapChangeEvent(MapChangeEvent event);
 
@@ -115,6 +125,7 @@ class ZoneTransaction {
   std::vector<EventPlace> places_;  ///< Of each hazard event.
   std::vector<PictureChange> pictures_;
   std::vector<Slot> touched_;                              ///< Repeats until it is written.
+  std::map<Slot, std::string> reported_classes_;           ///< Of new hazards.
   std::map<std::string, LearnedLifetime> learned_before_;  ///< By class.
   std::map<std::uint64_t, TrustRecord> trust_before_;      ///< By vehicle.
   std::vector<AcceptedReport> reports_;

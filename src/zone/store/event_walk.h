@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "common/time.h"
-#include "zone/admission/report_validation.h"
+#include "protocol/text_rules.h"
+#include "zone/model/hazard.h"
 #include "zone/store/queries.h"
 #include "zone/store/store_validation.h"
 
@@ -24,9 +25,10 @@ template <typename Event, typename Row>
 std::optional<Event> EventOf(const Row& row, std::size_t states) {
   using State = decltype(Event::to);
   const bool has_from = row.has_from == soci::i_ok;
-  const bool valid = IsIndex(row.state, states) && (!has_from || IsIndex(row.from_state, states)) &&
-                     IsStamp(row.updated_ns) &&
-                     (row.reason.empty() || IsPrintableText(row.reason, kMaxEventReasonBytes));
+  const bool valid =
+      IsIndex(row.state, states) && (!has_from || IsIndex(row.from_state, states)) &&
+      IsStamp(row.updated_ns) &&
+      (row.reason.empty() || protocol::IsPrintableText(row.reason, kMaxEventReasonBytes));
   if (!valid) return std::nullopt;
   Event event;
   event.sequence = static_cast<std::uint64_t>(row.sequence);

@@ -6,7 +6,7 @@
 
 #include "common/log_odds.h"
 #include "common/time.h"
-#include "zone/admission/report_validation.h"
+#include "protocol/text_rules.h"
 #include "zone/store/queries.h"
 #include "zone/store/store_validation.h"
 
@@ -30,9 +30,9 @@ constexpr char kSoundHazard[] =
     "typeof(image_format) = 'text' AND length(CAST(image_format AS BLOB)) <= 8 AND "
     "typeof(life) = 'text' AND length(CAST(life AS BLOB)) <= 500";
 
-bool IsShare(double value) { return value >= 0 && value <= 1; }
+bool IsHazardShare(double value) { return value >= 0 && value <= 1; }
 
-bool IsPicture(const std::string& sha256, const std::string& format) {
+bool IsHazardPicture(const std::string& sha256, const std::string& format) {
   if (sha256.empty() && format.empty()) return true;
   const auto is_digit = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
   return sha256.size() == 64 && std::all_of(sha256.begin(), sha256.end(), is_digit) &&
@@ -46,8 +46,9 @@ const char* WhyNoHazard(const Row& row, const Hazard& hazard) {
                       row.sightings <= UINT32_MAX && row.vehicles >= 0;
   if (!counts) return "counts out of range";
   if (hazard.uuid.IsNil()) return "no uuid";
-  if (!IsPrintableText(hazard.class_name, kMaxStoredTextBytes)) return "no printable class";
-  if (!IsShare(row.confidence) || !IsShare(row.presence)) return "no probability";
+  if (!protocol::IsPrintableText(hazard.class_name, kMaxStoredTextBytes))
+    return "no printable class";
+  if (!IsHazardShare(row.confidence) || !IsHazardShare(row.presence)) return "no probability";
   if (!geo::IsValid(hazard.position)) return "no position on Earth";
   if (!IsCovariance(hazard.covariance_m2)) return "no covariance";
   if (!IsStamp(row.first_seen_ns) || !IsStamp(row.last_seen_ns) || !IsStamp(row.updated_ns) ||
@@ -58,11 +59,11 @@ const char* WhyNoHazard(const Row& row, const Hazard& hazard) {
                         row.announced_sequence >= 0 && row.announced_sequence <= row.sequence;
   if (!in_order) return "no sequence";
   if (!IsIndex(row.state, kHazardStates)) return "no state";
-  return IsPicture(row.image_sha256, row.image_format) ? nullptr : "no picture's name";
+  return IsHazardPicture(row.image_sha256, row.image_format) ? nullptr : "no picture's name";
 }
 
 /// What schema 1 knew of a life: drivers were told, nobody asked. LoadHazards adds who reported.
-PresenceRecord LifeOf(const Hazard& hazard) {
+PresenceRecord HazardLifeOf(const Hazard& hazard) {
   PresenceRecord life;
   life.state = hazard.state;
   life.since_ns = hazard.updated_ns;
@@ -129,7 +130,7 @@ ZoneStore::HazardRow HazardTable::ToHazard(const Row& row) {
   const std::string name = "hazard " + std::to_string(row.id);
   if (const char* why = WhyNoHazard(row, hazard)) throw Error(name + " has " + why);
   hazard.state = static_cast<HazardState>(row.state);
-  const auto life = row.life.empty() ? LifeOf(hazard) : UnpackPresence(row.life);
+  const auto life = row.life.empty() ? HazardLifeOf(hazard) : UnpackPresence(row.life);
   if (!life || life->state != hazard.state) throw Error(name + " has no life that can be read");
   result.life = *life;
   return result;

@@ -2,7 +2,7 @@
 
 #include "common/error.h"
 #include "common/time.h"
-#include "zone/admission/report_validation.h"
+#include "protocol/text_rules.h"
 #include "zone/store/queries.h"
 #include "zone/store/store_validation.h"
 
@@ -46,8 +46,9 @@ StoreDamage LearnedTables::LoadLives(
         (session_.prepare << "SELECT class_name, ended, stood_s FROM lives WHERE " << kSoundLife,
          soci::into(row.class_name), soci::into(row.ended), soci::into(row.stood_s));
     return LoadRows(session_, "lives", query, [&] {
-      const bool sound = IsPrintableText(row.class_name, kMaxStoredTextBytes) && row.ended >= 0 &&
-                         row.ended <= kMaxEnded && row.stood_s >= 0 && row.stood_s <= kMaxStoodS;
+      const bool sound = protocol::IsPrintableText(row.class_name, kMaxStoredTextBytes) &&
+                         row.ended >= 0 && row.ended <= kMaxEnded && row.stood_s >= 0 &&
+                         row.stood_s <= kMaxStoodS;
       if (!sound) throw Error("what was learned of a class is no such thing");
       take(row.class_name, {row.ended, row.stood_s});
     });

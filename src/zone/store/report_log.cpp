@@ -1,21 +1,9 @@
 #include "zone/store/report_log.h"
 
-#include <cmath>
-
-#include "common/time.h"
 #include "protocol/poll.h"
 #include "zone/store/queries.h"
-#include "zone/store/store_validation.h"
 
 namespace livemap::zone {
-namespace {
-
-constexpr char kSoundLastReport[] =
-    "typeof(stamp_ns) = 'integer' AND typeof(latitude) IN ('real', 'integer') AND "
-    "typeof(longitude) IN ('real', 'integer') AND typeof(sigma_m) IN ('real', 'integer')";
-
-}  // namespace
-
 ReportLog::ReportLog(soci::session& session)
     // A report whose hazard is broken is known all the same: its uuid is taken.
     : find_report_(
@@ -24,12 +12,6 @@ ReportLog::ReportLog(soci::session& session)
                               "substr(r.vehicle_id, 1, 65) ELSE '' END FROM reports r LEFT JOIN "
                               "hazards h ON h.id = r.hazard_id WHERE r.uuid = :uuid",
            soci::use(row_.uuid), soci::into(row_.hazard_uuid), soci::into(row_.vehicle_id))),
-      find_last_report_((session.prepare << "SELECT stamp_ns, latitude, longitude, sigma_m "
-                                            "FROM last_reports WHERE vehicle_id = :v AND "
-                                         << kSoundLastReport,
-                         soci::use(row_.vehicle_id), soci::into(row_.stamp_ns),
-                         soci::into(row_.latitude), soci::into(row_.longitude),
-                         soci::into(row_.sigma_m))),
       write_report_(
           (session.prepare
                << "INSERT INTO reports (uuid, hazard_id, vehicle_id, drive_id, stamp_ns, "
@@ -47,32 +29,13 @@ ReportLog::ReportLog(soci::session& session)
                             "stamp_ns, received_ns) VALUES (:u, :h, :v, :a, :r, :c, :st, :re)",
                      soci::use(row_.uuid), soci::use(row_.hazard_id), soci::use(row_.vehicle_id),
                      soci::use(row_.answer), soci::use(row_.reason), soci::use(row_.confidence),
-                     soci::use(row_.stamp_ns), soci::use(row_.received_ns))),
-      write_last_report_(
-          (session.prepare
-               << "INSERT INTO last_reports (vehicle_id, stamp_ns, latitude, longitude, sigma_m) "
-                  "VALUES (:v, :st, :la, :lo, :si) ON CONFLICT (vehicle_id) DO UPDATE SET "
-                  "stamp_ns = excluded.stamp_ns, latitude = excluded.latitude, "
-                  "longitude = excluded.longitude, sigma_m = excluded.sigma_m",
-           soci::use(row_.vehicle_id), soci::use(row_.stamp_ns), soci::use(row_.latitude),
-           soci::use(row_.longitude), soci::use(row_.sigma_m))) {}
+                     soci::use(row_.stamp_ns), soci::use(row_.received_ns))) {}
 
 std::optional<ZoneStore::KnownReport> ReportLog::FindReport(const Uuid& report_uuid) {
   return ExplainStore("looking up a report", [&]() -> std::optional<ZoneStore::KnownReport> {
     row_.uuid = report_uuid.ToString();
     if (!FetchOne(find_report_)) return std::nullopt;
     return ZoneStore::KnownReport{Uuid::Parse(row_.hazard_uuid).value_or(Uuid{}), row_.vehicle_id};
-  });
-}
-
-std::optional<ReportedFix> ReportLog::FindLastReport(const std::string& vehicle_id) {
-  return ExplainStore("looking up a vehicle", [&]() -> std::optional<ReportedFix> {
-    row_.vehicle_id = vehicle_id;
-    if (!FetchOne(find_last_report_)) return std::nullopt;
-    const ReportedFix fix{row_.stamp_ns, {row_.latitude, row_.longitude}, row_.sigma_m};
-    const bool sound = IsStamp(fix.stamp_ns) && geo::IsValid(fix.position) && fix.sigma_m >= 0 &&
-                       fix.sigma_m <= std::sqrt(2 * kMaxVarianceM2);
-    return sound ? std::optional<ReportedFix>(fix) : std::nullopt;
   });
 }
 
@@ -108,17 +71,6 @@ void ReportLog::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t ha
     row_.stamp_ns = answer.stamp_ns;
     row_.received_ns = received_ns;
     write_answer_.execute(true);
-  });
-}
-
-void ReportLog::WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix) {
-  ExplainStore("writing a vehicle's last report", [&] {
-    row_.vehicle_id = vehicle_id;
-    row_.stamp_ns = fix.stamp_ns;
-    row_.latitude = fix.position.latitude_deg;
-    row_.longitude = fix.position.longitude_deg;
-    row_.sigma_m = fix.sigma_m;
-    write_last_report_.execute(true);
   });
 }
 

@@ -11,8 +11,7 @@
 
 namespace livemap::zone {
 
-/// The tables `reports`, `answers` and `last_reports`: all that vehicles said of hazards, and where
-/// each vehicle's last report lies.
+/// The tables `reports` and `answers`: all that vehicles said of hazards.
 class ReportLog {
  public:
   /// Keeps the reference; the schema is up to date.
@@ -22,18 +21,16 @@ class ReportLog {
 
   /// See the functions of ZoneStore with these names.
   std::optional<ZoneStore::KnownReport> FindReport(const Uuid& report_uuid);
-  std::optional<ReportedFix> FindLastReport(const std::string& vehicle_id);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                    const std::string& image_sha256, std::int64_t received_ns);
   void WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
                    std::int64_t received_ns);
-  void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
 
  private:
   /// SOCI binds to places, not to values.
   struct Row {
     std::string uuid, hazard_uuid, vehicle_id, drive_id, image_sha256, reason;
-    double confidence = 0, latitude = 0, longitude = 0, sigma_m = 0;
+    double confidence = 0, latitude = 0, longitude = 0;
     double covariance_ee = 0, covariance_en = 0, covariance_nn = 0;
     long long hazard_id = 0, stamp_ns = 0, received_ns = 0;
     int answer = 0;
@@ -41,10 +38,8 @@ class ReportLog {
 
   Row row_;
   soci::statement find_report_;
-  soci::statement find_last_report_;
   soci::statement write_report_;
   soci::statement write_answer_;
-  soci::statement write_last_report_;
 };
 
 }  // namespace livemap::zone

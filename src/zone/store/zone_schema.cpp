@@ -14,7 +14,7 @@ using Statements = std::vector<const char*>;
 // databases understand: times are ns since 1970 (UTC), positions WGS84 degrees, covariances m^2 in
 // east-north axes, uuids their usual text.
 
-const Statements& ToVersion1() {
+const Statements& ZoneSchemaToVersion1() {
   static const Statements kStatements{
       R"(CREATE TABLE hazards (
            uuid VARCHAR(36) PRIMARY KEY,
@@ -61,7 +61,7 @@ const Statements& ToVersion1() {
 /// Hazards get a life, events their states. Rows refer to hazards by a small rising number, and
 /// only the uuids of reports are indexed: what a commit touches at random places is what it costs.
 /// All that version 1 had on its map was told to drivers.
-const Statements& ToVersion2() {
+const Statements& ZoneSchemaToVersion2() {
   static const Statements kStatements{"ALTER TABLE hazards RENAME TO hazards_1",
                                       "ALTER TABLE reports RENAME TO reports_1",
                                       "ALTER TABLE events RENAME TO events_1",
@@ -161,7 +161,7 @@ const Statements& ToVersion2() {
 }
 
 /// What is held against vehicles, by VehicleKey as a signed number.
-const Statements& ToVersion3() {
+const Statements& ZoneSchemaToVersion3() {
   static const Statements kStatements{
       R"(CREATE TABLE trust (
            vehicle_key BIGINT PRIMARY KEY,
@@ -173,7 +173,7 @@ const Statements& ToVersion3() {
 }
 
 /// Map changes. A report names its feature by uuid: it is kept when the feature is forgotten.
-const Statements& ToVersion4() {
+const Statements& ZoneSchemaToVersion4() {
   static const Statements kStatements{
       R"(CREATE TABLE map_changes (
            id INTEGER PRIMARY KEY,
@@ -227,7 +227,46 @@ const Statements& ToVersion4() {
   return kStatements;
 }
 
-int Version(soci::session& session) {
+/// Where vehicles were, for the rule of speed; the last report's place is the first of them. What
+/// officials decided, with what was before, so that it can be taken back.
+const Statements& ZoneSchemaToVersion5() {
+  static const Statements kStatements{
+      R"(CREATE TABLE IF NOT EXISTS places (
+           vehicle_id TEXT NOT NULL,
+           stamp_ns BIGINT NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           sigma_m DOUBLE PRECISION NOT NULL,
+           messages BIGINT NOT NULL,
+           PRIMARY KEY (vehicle_id, stamp_ns)))",
+      R"(INSERT INTO places
+           SELECT vehicle_id, stamp_ns, latitude, longitude, sigma_m, 1 FROM last_reports
+            WHERE typeof(vehicle_id) = 'text' AND typeof(stamp_ns) = 'integer' AND
+                  typeof(latitude) = 'real' AND typeof(longitude) = 'real' AND
+                  typeof(sigma_m) = 'real' ON CONFLICT DO NOTHING)",
+      "DROP TABLE last_reports",
+      R"(CREATE TABLE IF NOT EXISTS decisions (
+           id INTEGER PRIMARY KEY,
+           kind INTEGER NOT NULL,
+           subject TEXT NOT NULL,
+           official TEXT NOT NULL,
+           reason TEXT NOT NULL,
+           at_ns BIGINT NOT NULL,
+           hazards BIGINT NOT NULL,
+           undone_by BIGINT NOT NULL,
+           before TEXT NOT NULL,
+           effects TEXT NOT NULL))",
+      "CREATE INDEX IF NOT EXISTS decisions_by_subject ON decisions (subject)",
+      R"(CREATE TABLE IF NOT EXISTS withdrawals (
+           decision_id BIGINT NOT NULL,
+           hazard_uuid VARCHAR(36) NOT NULL,
+           before TEXT NOT NULL,
+           PRIMARY KEY (decision_id, hazard_uuid)))",
+      "INSERT INTO livemap_schema (version) VALUES (5)"};
+  return kStatements;
+}
+
+int ZoneSchemaVersion(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
   session << "SELECT coalesce(max(version), 0) FROM livemap_schema", soci::into(version);
@@ -237,7 +276,7 @@ int Version(soci::session& session) {
 }  // namespace
 
 void MigrateZoneStore(soci::session& session, const std::string& path) {
-  const int version = Version(session);
+  const int version = ZoneSchemaVersion(session);
   if (version > kZoneSchemaVersion) {
     throw StoreError("store: database '" + path + "' has schema version " +
                      std::to_string(version) + ", this program knows versions up to " +
@@ -247,8 +286,9 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
     throw StoreError("store: database '" + path + "' has schema version " +
                      std::to_string(version) + ", which no program wrote");
   }
-  const std::array<const Statements*, kZoneSchemaVersion> steps{&ToVersion1(), &ToVersion2(),
-                                                                &ToVersion3(), &ToVersion4()};
+  const std::array<const Statements*, kZoneSchemaVersion> steps{
+      &ZoneSchemaToVersion1(), &ZoneSchemaToVersion2(), &ZoneSchemaToVersion3(),
+      &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5()};
   for (int step = version; step < kZoneSchemaVersion; ++step) {
     soci::transaction transaction(session);
     for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;

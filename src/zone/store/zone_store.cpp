@@ -6,24 +6,27 @@
 #include <algorithm>
 
 #include "common/sqlite.h"
+#include "zone/store/decision_table.h"
 #include "zone/store/event_log.h"
 #include "zone/store/hazard_table.h"
 #include "zone/store/learned_tables.h"
 #include "zone/store/map_change_table.h"
+#include "zone/store/place_table.h"
 #include "zone/store/queries.h"
 #include "zone/store/report_log.h"
 #include "zone/store/store_validation.h"
+#include "zone/store/stored_histories.h"
 #include "zone/store/zone_schema.h"
 
 namespace livemap::zone {
 namespace {
 
-std::string WhyDamaged(const std::string& path, const std::string& verdict) {
+std::string WhyZoneStoreDamaged(const std::string& path, const std::string& verdict) {
   return "store: database '" + path + "' is damaged and left alone: " + verdict +
          "; how to recover what it holds stands in docs/how-to/recover-a-store.md";
 }
 
-std::string ConnectionText(const std::string& path) {
+std::string ZoneStoreConnection(const std::string& path) {
   if (path.find('"') != std::string::npos) {
     throw StoreError("store: path '" + path + "' holds a quotation mark, which is not accepted");
   }
@@ -31,7 +34,7 @@ std::string ConnectionText(const std::string& path) {
 }
 
 /// Brings the database into the state that the tables expect. Throws StoreError.
-soci::session& Prepare(soci::session& session, const std::string& path) {
+soci::session& PrepareZoneStore(soci::session& session, const std::string& path) {
   session << "PRAGMA synchronous=FULL";
   std::string mode;
   session << "PRAGMA journal_mode=WAL", soci::into(mode);
@@ -43,7 +46,7 @@ soci::session& Prepare(soci::session& session, const std::string& path) {
   session << "PRAGMA wal_autocheckpoint=10000", soci::into(pages);
   std::string verdict;
   session << "PRAGMA quick_check(1)", soci::into(verdict);
-  if (verdict != "ok") throw StoreError(WhyDamaged(path, verdict));
+  if (verdict != "ok") throw StoreError(WhyZoneStoreDamaged(path, verdict));
   MigrateZoneStore(session, path);
   return session;
 }
@@ -53,12 +56,15 @@ soci::session& Prepare(soci::session& session, const std::string& path) {
 class ZoneStore::Implementation {
  public:
   explicit Implementation(const std::string& path)
-      : session_(soci::sqlite3, ConnectionText(path)),
-        hazards_(Prepare(session_, path)),
+      : session_(soci::sqlite3, ZoneStoreConnection(path)),
+        hazards_(PrepareZoneStore(session_, path)),
         reports_(session_),
         events_(session_),
         learned_(session_),
-        map_changes_(session_) {}
+        map_changes_(session_),
+        places_(session_),
+        decisions_(session_),
+        histories_(ZoneStoreConnection(path)) {}
 
   soci::session session_;
   HazardTable hazards_;
@@ -66,6 +72,9 @@ class ZoneStore::Implementation {
   EventLog events_;
   LearnedTables learned_;
   MapChangeTable map_changes_;
+  PlaceTable places_;
+  DecisionTable decisions_;
+  StoredHistories histories_;
 };
 
 ZoneStore::ZoneStore(const std::string& path) {
@@ -75,7 +84,7 @@ ZoneStore::ZoneStore(const std::string& path) {
     const std::string words = error.get_error_message();
     const bool damaged = words.find("malformed") != std::string::npos ||
                          words.find("not a database") != std::string::npos;
-    if (damaged) throw StoreError(WhyDamaged(path, words));
+    if (damaged) throw StoreError(WhyZoneStoreDamaged(path, words));
     throw StoreError("store: opening '" + path + "' failed: " + words);
   }
 }
@@ -113,13 +122,9 @@ std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_u
   return implementation_->reports_.FindReport(report_uuid);
 }
 
-std::optional<ReportedFix> ZoneStore::FindLastReport(const std::string& vehicle_id) {
-  return implementation_->reports_.FindLastReport(vehicle_id);
-}
-
 std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t sequence,
-                                               std::size_t limit) {
-  return implementation_->events_.Load(hazard, sequence, limit);
+                                               std::size_t limit) const {
+  return implementation_->histories_.OfHazard(hazard, sequence, limit);
 }
 
 StoreDamage ZoneStore::LoadMapChanges(const std::function<void(MapChangeRow)>& take) {
@@ -134,8 +139,36 @@ std::optional<ZoneStore::KnownMapChangeReport> ZoneStore::FindMapChangeReport(
 }
 
 std::vector<StoredMapChangeEvent> ZoneStore::LoadMapChangeEvents(std::uint64_t sequence,
-                                                                 std::size_t limit) {
-  return implementation_->map_changes_.LoadEvents(sequence, limit);
+                                                                 std::size_t limit) const {
+  return implementation_->histories_.OfMapChange(sequence, limit);
+}
+
+StoreDamage ZoneStore::LoadPlaces(const std::function<void(const std::string&, KnownPlace)>& take) {
+  return implementation_->places_.Load(take);
+}
+
+std::vector<KnownPlace> ZoneStore::FindPlaces(const std::string& vehicle_id, std::size_t limit) {
+  return implementation_->places_.Find(vehicle_id, limit);
+}
+
+std::vector<DecisionRecord> ZoneStore::LoadDecisions(const std::string& subject,
+                                                     std::size_t limit) {
+  return implementation_->decisions_.LoadDecisions(subject, limit);
+}
+
+std::optional<DecisionRecord> ZoneStore::FindNewestDecision(const std::string& subject) {
+  return implementation_->decisions_.FindNewestDecision(subject);
+}
+
+std::optional<DecisionRecord> ZoneStore::FindStandingDistrust(const std::string& vehicle_id,
+                                                              std::uint64_t before) {
+  return implementation_->decisions_.FindStandingDistrust(vehicle_id, before);
+}
+
+StoreDamage ZoneStore::CheckWithdrawals() { return implementation_->decisions_.CheckWithdrawals(); }
+
+std::vector<Withdrawal> ZoneStore::LoadWithdrawals(std::uint64_t decision, std::size_t limit) {
+  return implementation_->decisions_.LoadWithdrawals(decision, limit);
 }
 
 void ZoneStore::Begin() {
@@ -178,8 +211,37 @@ void ZoneStore::WriteTrust(std::uint64_t vehicle, const TrustRecord& record) {
   implementation_->learned_.WriteTrust(vehicle, record);
 }
 
-void ZoneStore::WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix) {
-  implementation_->reports_.WriteLastReport(vehicle_id, fix);
+void ZoneStore::WritePlace(const std::string& vehicle_id, const KnownPlace& place) {
+  implementation_->places_.Write(vehicle_id, place);
+}
+
+void ZoneStore::DropPlace(const std::string& vehicle_id, std::int64_t stamp_ns) {
+  implementation_->places_.Drop(vehicle_id, stamp_ns);
+}
+
+std::optional<std::string> ZoneStore::PrunePlaces(const std::string& after, std::int64_t before_ns,
+                                                  std::size_t max_places) {
+  return implementation_->places_.Prune(after, before_ns, max_places);
+}
+
+std::uint64_t ZoneStore::WriteDecision(const DecisionRecord& decision) {
+  return implementation_->decisions_.WriteDecision(decision);
+}
+
+void ZoneStore::MarkDecisionUndone(std::uint64_t decision, std::uint64_t undone_by) {
+  implementation_->decisions_.MarkUndone(decision, undone_by);
+}
+
+void ZoneStore::AddDecidedHazards(std::uint64_t decision, std::uint64_t hazards) {
+  implementation_->decisions_.AddHazards(decision, hazards);
+}
+
+void ZoneStore::WriteWithdrawal(std::uint64_t decision, const Withdrawal& withdrawal) {
+  implementation_->decisions_.WriteWithdrawal(decision, withdrawal);
+}
+
+void ZoneStore::DropWithdrawal(std::uint64_t decision, const Uuid& hazard) {
+  implementation_->decisions_.DropWithdrawal(decision, hazard);
 }
 
 void ZoneStore::WriteMapChange(const MapChangeRow& row) {

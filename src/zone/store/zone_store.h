@@ -13,6 +13,7 @@
 #include "zone/belief/hazard_lifecycle.h"
 #include "zone/belief/survival_model.h"
 #include "zone/belief/vehicle_trust.h"
+#include "zone/model/decision.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 #include "zone/model/store_damage.h"
@@ -23,10 +24,18 @@ struct PollAnswer;
 
 namespace livemap::zone {
 
+/// A hazard from which a vehicle's words were withdrawn, with its life of before.
+struct Withdrawal {
+  Uuid hazard;
+  std::string before;  ///< PackPresence.
+};
+
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
-/// was learned of classes and of vehicles, where each vehicle's last report lies, and the same of
-/// map changes. SQLite in WAL mode with synchronous=FULL, through SOCI. Not thread-safe: one writer
-/// owns it.
+/// was learned of classes and of vehicles, where each vehicle was, and the same of map changes.
+/// SQLite in WAL mode with synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
+/// Only LoadEvents and LoadMapChangeEvents may be called by any thread at any time: they read what
+/// is committed, over a connection of their own, so that nobody who reads a history keeps the
+/// writer waiting.
 ///
 /// Every function throws StoreError with the database's own words when it fails.
 class ZoneStore {
@@ -61,12 +70,15 @@ class ZoneStore {
   };
   /// A committed report.
   std::optional<KnownReport> FindReport(const Uuid& report_uuid);
-  /// Where the vehicle's last accepted report lies; none too where the row is broken.
-  std::optional<ReportedFix> FindLastReport(const std::string& vehicle_id);
+  /// Where vehicles were (PlaceBook): every sound row, of no vehicle twice at one stamp; those of
+  /// one vehicle follow each other, the newest first.
+  StoreDamage LoadPlaces(const std::function<void(const std::string&, KnownPlace)>& take);
+  /// The newest `limit` of one vehicle, the newest first; broken rows are left out.
+  std::vector<KnownPlace> FindPlaces(const std::string& vehicle_id, std::size_t limit);
   /// The newest `limit` events of a hazard whose newest one is `sequence`, oldest first; broken
   /// rows are left out.
   std::vector<StoredEvent> LoadEvents(const Uuid& hazard, std::uint64_t sequence,
-                                      std::size_t limit);
+                                      std::size_t limit) const;
 
   /// Map changes: as the functions above.
   struct MapChangeRow {
@@ -81,7 +93,23 @@ class ZoneStore {
   };
   std::optional<KnownMapChangeReport> FindMapChangeReport(const Uuid& report_uuid);
   /// The newest `limit` events of a feature whose newest one is `sequence`, oldest first.
-  std::vector<StoredMapChangeEvent> LoadMapChangeEvents(std::uint64_t sequence, std::size_t limit);
+  std::vector<StoredMapChangeEvent> LoadMapChangeEvents(std::uint64_t sequence,
+                                                        std::size_t limit) const;
+
+  /// The newest `limit` decisions about a hazard, a map change or a vehicle
+  /// (DecisionRecord::subject), the newest first; broken rows are left out.
+  std::vector<DecisionRecord> LoadDecisions(const std::string& subject, std::size_t limit);
+  /// The newest decision about the subject that is no undo; broken rows are left out.
+  std::optional<DecisionRecord> FindNewestDecision(const std::string& subject);
+  /// The newest distrust of the vehicle that stands, of those whose id is below `before`; broken
+  /// rows are left out.
+  std::optional<DecisionRecord> FindStandingDistrust(const std::string& vehicle_id,
+                                                     std::uint64_t before);
+  /// Up to `limit` hazards from which a distrust withdrew something that is not restored yet, and
+  /// fewer only when there are no more; broken rows are left out.
+  std::vector<Withdrawal> LoadWithdrawals(std::uint64_t decision, std::size_t limit);
+  /// The rows of withdrawals that LoadWithdrawals leaves out.
+  StoreDamage CheckWithdrawals();
 
   /// Writes happen between Begin and Commit; Commit returns when they are on disk.
   void Begin();
@@ -89,7 +117,7 @@ class ZoneStore {
   /// Never throws: after a full disk the database may have rolled back by itself.
   void Rollback() noexcept;
 
-  /// Adds the hazard, or replaces the row of the same id.
+  /// Adds the hazard, or replaces the row of the same id, which keeps its class's name.
   void WriteHazard(const HazardRow& row);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                    const std::string& image_sha256, std::int64_t received_ns);
@@ -100,7 +128,23 @@ class ZoneStore {
                    std::int64_t received_ns);
   void WriteLife(const std::string& class_name, const LearnedLifetime& learned);
   void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
-  void WriteLastReport(const std::string& vehicle_id, const ReportedFix& fix);
+  /// Adds the place, or replaces that of the same vehicle and stamp.
+  void WritePlace(const std::string& vehicle_id, const KnownPlace& place);
+  void DropPlace(const std::string& vehicle_id, std::int64_t stamp_ns);
+  /// Of the first vehicle whose id comes after `after`: drops its places of before `before_ns`,
+  /// except its newest, and those beyond its newest `max_places`, at least 1. The vehicle's id;
+  /// none when there is no further one. Broken rows stay.
+  std::optional<std::string> PrunePlaces(const std::string& after, std::int64_t before_ns,
+                                         std::size_t max_places);
+  /// Adds the decision under a new id, which is returned.
+  std::uint64_t WriteDecision(const DecisionRecord& decision);
+  /// The decision was taken back by the other one.
+  void MarkDecisionUndone(std::uint64_t decision, std::uint64_t undone_by);
+  /// The decision changed so many hazards more.
+  void AddDecidedHazards(std::uint64_t decision, std::uint64_t hazards);
+  /// Keeps what a distrust withdrew, unless that hazard has a row of this decision already.
+  void WriteWithdrawal(std::uint64_t decision, const Withdrawal& withdrawal);
+  void DropWithdrawal(std::uint64_t decision, const Uuid& hazard);
   void WriteMapChange(const MapChangeRow& row);
   /// Forgets a feature and its history; what vehicles told of it stays, so that they are answered.
   void DropMapChange(std::uint64_t id);

@@ -255,6 +255,30 @@ TEST_F(HazardLifeTest, ALateWordCountsLessThanAFreshOne) {
   EXPECT_LT(late.log_odds, before + 2.2);
 }
 
+TEST_F(HazardLifeTest, AWordSoLateThatItSaysNothingNeitherSupportsNorMakesTheHazardOlder) {
+  Begin(1);
+  for (const std::uint64_t vehicle : {2UL, 3UL}) {
+    const LifecycleUpdate step = rules_.Apply(
+        cone_, Word(EvidenceKind::kSighting, vehicle, kStart - 29 * kDay), kStart, life_);
+    EXPECT_FALSE(step.counted);
+    EXPECT_FALSE(step.transition);
+  }
+  EXPECT_EQ(life_.state, HazardState::kCandidate);
+  EXPECT_EQ(Supporters(life_), 1U);
+  EXPECT_EQ(life_.first_seen_ns, kStart);
+  EXPECT_EQ(See(4, kStart + kSecond).lesson.stood_s, 1);
+}
+
+TEST_F(HazardLifeTest, OneHazardTeachesOfNoMoreThanTenLives) {
+  Begin(1);
+  std::int64_t now_ns = kStart;
+  while (now_ns < kStart + 60 * kDay) See(1, now_ns += kDay / 2);
+  ASSERT_EQ(life_.state, HazardState::kCandidate);
+  const LifecycleUpdate step = See(2, now_ns);
+  ASSERT_EQ(life_.state, HazardState::kActive);
+  EXPECT_DOUBLE_EQ(step.lesson.stood_s, 10 * cone_.survival.MeanLifeS());
+}
+
 TEST_F(HazardLifeTest, AnOlderMessageDoesNotTurnTheNewerWordOfItsVehicle) {
   MakeActive();
   Deny(9, kStart + kHour);

@@ -17,10 +17,12 @@ class HazardVerdictsTest : public HazardLifeTest {
   void Learn(const LifecycleUpdate& step) {
     for (const Verdict& verdict : step.verdicts) trust_.Judge(verdict, life_.at_ns);
   }
-  double Hostile(std::uint64_t vehicle) const { return trust_.Hostile(vehicle, life_.at_ns); }
+  double MaliciousProbability(std::uint64_t vehicle) const {
+    return trust_.MaliciousProbability(vehicle, life_.at_ns);
+  }
   LifecycleUpdate Speak(EvidenceKind kind, std::uint64_t vehicle, std::int64_t at_ns) {
     Evidence word = Word(kind, vehicle, at_ns);
-    word.hostile = Hostile(vehicle);
+    word.malicious = MaliciousProbability(vehicle);
     const LifecycleUpdate step = rules_.Apply(cone_, word, at_ns, life_);
     Learn(step);
     return step;
@@ -38,13 +40,13 @@ class HazardVerdictsTest : public HazardLifeTest {
 TEST_F(HazardVerdictsTest, WhoInventsAndIsDeniedAtOnceIsBelievedLess) {
   Begin(1);
   Speak(EvidenceKind::kAnswerNo, 2, kStart + 60 * kSecond);
-  EXPECT_NEAR(Hostile(1), 0.05, 1e-9) << "one word against another says nothing";
+  EXPECT_NEAR(MaliciousProbability(1), 0.05, 1e-9) << "one word against another says nothing";
   const LifecycleUpdate step = Speak(EvidenceKind::kAnswerNo, 3, kStart + 120 * kSecond);
   ASSERT_EQ(life_.state, HazardState::kGone);
   EXPECT_GT(RatioOf(step, 1), 0.8);
-  EXPECT_GT(Hostile(1), 0.1);
-  EXPECT_NEAR(Hostile(2), 0.05, 1e-9);
-  EXPECT_NEAR(Hostile(3), 0.05, 1e-9);
+  EXPECT_GT(MaliciousProbability(1), 0.1);
+  EXPECT_NEAR(MaliciousProbability(2), 0.05, 1e-9);
+  EXPECT_NEAR(MaliciousProbability(3), 0.05, 1e-9);
 }
 
 TEST_F(HazardVerdictsTest, OneContradictionIsForgivenWhereOneVehicleConfirmsAndTwoAreNot) {
@@ -53,7 +55,7 @@ TEST_F(HazardVerdictsTest, OneContradictionIsForgivenWhereOneVehicleConfirmsAndT
   HazardState state = HazardState::kActive;
   for (; state == HazardState::kActive && contradictions < 5; ++contradictions) {
     Evidence word = Word(EvidenceKind::kSighting, 1, kStart);
-    word.hostile = Hostile(1);
+    word.malicious = MaliciousProbability(1);
     rules_.Begin(cone_, word, kStart, life_);
     state = life_.state;
     Speak(EvidenceKind::kAnswerNo, 2, kStart + 60 * kSecond);
@@ -91,8 +93,8 @@ TEST_F(HazardVerdictsTest, WhoDeniesWhatOthersSeeAfterwardsIsBelievedLess) {
   Speak(EvidenceKind::kAnswerNo, 9, kStart + kHour);
   Speak(EvidenceKind::kAnswerYes, 3, kStart + 2 * kHour);
   const LifecycleUpdate step = Speak(EvidenceKind::kAnswerYes, 4, kStart + 3 * kHour);
-  EXPECT_GT(Hostile(9), 0.11);
-  EXPECT_NEAR(Hostile(3), 0.05, 1e-9);
+  EXPECT_GT(MaliciousProbability(9), 0.11);
+  EXPECT_NEAR(MaliciousProbability(3), 0.05, 1e-9);
   // Judged once.
   EXPECT_EQ(RatioOf(step, 9), 0);
 }
@@ -142,7 +144,7 @@ TEST_F(HazardVerdictsTest, ASuspectConfirmsNothingAndDeniesNothing) {
 TEST_F(HazardVerdictsTest, OneVehicleSufficesOnlyIfItCounts) {
   cone_.confirmations = 1;
   Evidence word = Word(EvidenceKind::kSighting, 6, kStart);
-  word.hostile = 0.6;
+  word.malicious = 0.6;
   rules_.Begin(cone_, word, kStart, life_);
   EXPECT_EQ(life_.state, HazardState::kCandidate);
   EXPECT_EQ(life_.last_yes_ns, kStart);
@@ -158,7 +160,7 @@ TEST_F(HazardVerdictsTest, SuspectsDriveNoVoiceAwayThatCounts) {
   ASSERT_EQ(Supporters(life_), 6U);
   for (std::uint64_t vehicle = 100; vehicle < 200; ++vehicle) {
     Evidence word = Word(EvidenceKind::kAnswerNo, vehicle, kStart + kHour);
-    word.hostile = 0.9;
+    word.malicious = 0.9;
     rules_.Apply(cone_, word, kStart + kHour, life_);
   }
   EXPECT_EQ(Supporters(life_), 6U);
@@ -170,7 +172,7 @@ TEST_F(HazardVerdictsTest, WhatWasJudgedIsStoredWithTheVoice) {
   Deny(9, kStart + kHour);
   See(3, kStart + 2 * kHour);
   Evidence word = Word(EvidenceKind::kSighting, 6, kStart + 3 * kHour);
-  word.hostile = 0.6;
+  word.malicious = 0.6;
   rules_.Apply(cone_, word, kStart + 3 * kHour, life_);
   const auto unpacked = UnpackPresence(PackPresence(life_));
   ASSERT_TRUE(unpacked);

@@ -15,7 +15,7 @@ using ::testing::ThrowsMessage;
 
 TEST(VehicleTrust, NobodyIsKnownAndEverybodyIsANewcomer) {
   const VehicleTrust trust;
-  EXPECT_NEAR(trust.Hostile(7, kStart), 0.05, 1e-9);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 0.05, 1e-9);
   EXPECT_EQ(trust.vehicles(), 0U);
 }
 
@@ -24,11 +24,11 @@ TEST(VehicleTrust, ContradictedWordsMakeSuspectAndConfirmedOnesClear) {
   trust.Judge({7, 1.5, 1}, kStart);
   trust.Judge({7, 1.5, 1}, kStart);
   // ln(0.05 / 0.95) + 3.
-  EXPECT_NEAR(trust.Hostile(7, kStart), 1 / (1 + std::exp(2.944439 - 3)), 1e-6);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 1 / (1 + std::exp(2.944439 - 3)), 1e-6);
   for (std::uint64_t voucher = 20; voucher < 40; ++voucher) {
     trust.Judge({7, -0.5, voucher}, kStart);
   }
-  EXPECT_NEAR(trust.Hostile(7, kStart), 0.05, 1e-9);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 0.05, 1e-9);
 }
 
 TEST(VehicleTrust, NobodyIsBelievedMoreThanANewcomerHoweverManyVouchForIt) {
@@ -36,10 +36,10 @@ TEST(VehicleTrust, NobodyIsBelievedMoreThanANewcomerHoweverManyVouchForIt) {
   for (std::uint64_t voucher = 20; voucher < 1000; ++voucher) {
     trust.Judge({7, -0.5, voucher}, kStart);
   }
-  EXPECT_NEAR(trust.Hostile(7, kStart), 0.05, 1e-9);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 0.05, 1e-9);
   EXPECT_EQ(trust.vehicles(), 0U) << "nothing is held against it";
   trust.Judge({7, 1.5, 1}, kStart);
-  EXPECT_GT(trust.Hostile(7, kStart), 0.18);
+  EXPECT_GT(trust.MaliciousProbability(7, kStart), 0.18);
 }
 
 TEST(VehicleTrust, ASmallCliqueCannotClearItsMembersHoweverOftenItVouches) {
@@ -47,7 +47,7 @@ TEST(VehicleTrust, ASmallCliqueCannotClearItsMembersHoweverOftenItVouches) {
   for (int lie = 0; lie < 4; ++lie) trust.Judge({7, 1.5, 1}, kStart);
   for (std::uint64_t i = 0; i < 1000; ++i) trust.Judge({7, -0.5, 20 + i % 8}, kStart);
   // Each of the eight counts once: 6 - 8 * 0.5.
-  EXPECT_NEAR(trust.Hostile(7, kStart), 1 / (1 + std::exp(2.944439 - 2)), 1e-6);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 1 / (1 + std::exp(2.944439 - 2)), 1e-6);
 }
 
 TEST(VehicleTrust, AnOfficialVouchesAsOftenAsHeLikes) {
@@ -55,15 +55,17 @@ TEST(VehicleTrust, AnOfficialVouchesAsOftenAsHeLikes) {
   trust.Judge({7, 3, 0}, kStart);
   trust.Judge({7, -1, 0}, kStart);
   trust.Judge({7, -1, 0}, kStart);
-  EXPECT_NEAR(trust.Hostile(7, kStart), 1 / (1 + std::exp(2.944439 - 1)), 1e-6);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 1 / (1 + std::exp(2.944439 - 1)), 1e-6);
 }
 
 TEST(VehicleTrust, SuspicionFadesAndIsBounded) {
   VehicleTrust trust;
   for (int i = 0; i < 100; ++i) trust.Judge({7, 1.5, 1}, kStart);
-  EXPECT_NEAR(trust.Hostile(7, kStart), 1 / (1 + std::exp(2.944439 - 6)), 1e-6);
-  EXPECT_NEAR(trust.Hostile(7, kStart + 10 * kDay), 1 / (1 + std::exp(2.944439 - 6 / M_E)), 1e-6);
-  EXPECT_NEAR(trust.Hostile(7, kStart - kDay), trust.Hostile(7, kStart), 1e-9)
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart), 1 / (1 + std::exp(2.944439 - 6)), 1e-6);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart + 10 * kDay),
+              1 / (1 + std::exp(2.944439 - 6 / M_E)), 1e-6);
+  EXPECT_NEAR(trust.MaliciousProbability(7, kStart - kDay), trust.MaliciousProbability(7, kStart),
+              1e-9)
       << "a clock that was set back clears nobody";
   EXPECT_EQ(trust.Count(0.5, kStart), 1U);
   EXPECT_EQ(trust.Count(0.5, kStart + 90 * kDay), 0U);
@@ -77,8 +79,8 @@ TEST(VehicleTrust, ForgetsTheLeastSuspectedWhenThereAreTooMany) {
   trust.Judge({2, 1, 9}, kStart);
   trust.Judge({3, 1.5, 9}, kStart);
   EXPECT_EQ(trust.vehicles(), 2U);
-  EXPECT_NEAR(trust.Hostile(2, kStart), 0.05, 1e-9);
-  EXPECT_GT(trust.Hostile(1, kStart), trust.Hostile(3, kStart));
+  EXPECT_NEAR(trust.MaliciousProbability(2, kStart), 0.05, 1e-9);
+  EXPECT_GT(trust.MaliciousProbability(1, kStart), trust.MaliciousProbability(3, kStart));
 }
 
 TEST(VehicleTrust, PackedUnpackedAndRestoredItIsTheSame) {
@@ -93,7 +95,8 @@ TEST(VehicleTrust, PackedUnpackedAndRestoredItIsTheSame) {
   EXPECT_EQ(unpacked.next, record.next);
   VehicleTrust restored;
   EXPECT_TRUE(restored.Restore(7, record));
-  EXPECT_EQ(restored.Hostile(7, kStart + kDay), trust.Hostile(7, kStart + kDay));
+  EXPECT_EQ(restored.MaliciousProbability(7, kStart + kDay),
+            trust.MaliciousProbability(7, kStart + kDay));
 }
 
 TEST(VehicleTrust, RefusesRecordsThatAreNone) {

@@ -68,6 +68,32 @@ TEST_F(CandidateIntakeTest, AFrameThatComesTwiceIsDetectedOnce) {
   EXPECT_EQ(intake.waiting(), 1U);
 }
 
+TEST_F(CandidateIntakeTest, AFrameThatIsSentAgainDoesNotAgreeWithItself) {
+  OffloadIntake intake = Intake();
+  EXPECT_EQ(intake.Add(CandidateAt(0), kZoneNowNs), "");
+  protocol::OffloadedFrame far = CandidateAt(1);
+  far.base.position = {47.5, 19.04};
+  for (int i = 0; i < 5; ++i) EXPECT_NE(intake.Add(far, kZoneNowNs), "") << i;
+  EXPECT_EQ(intake.counters().too_fast, 1U);
+  EXPECT_EQ(intake.counters().repeated, 4U);
+  EXPECT_EQ(intake.waiting(), 1U);
+}
+
+TEST_F(CandidateIntakeTest, AFullTableForgetsTheLongestSilentVehicleAlone) {
+  config_.allowance.max_vehicles = 2;
+  OffloadIntake intake = Intake();
+  const auto after = [](double seconds) {
+    return kZoneNowNs + static_cast<std::int64_t>(seconds * 1e9);
+  };
+  EXPECT_EQ(intake.Add(CandidateAt(0, "car-1"), after(0)), "");
+  EXPECT_EQ(intake.Add(CandidateAt(30, "car-2"), after(30)), "");
+  EXPECT_EQ(intake.Add(CandidateAt(70, "car-3"), after(70)), "");
+  protocol::OffloadedFrame far = CandidateAt(71, "car-2");
+  far.base.position = {47.5, 19.04};
+  EXPECT_NE(intake.Add(far, after(71)), "");
+  EXPECT_EQ(intake.counters().too_fast, 1U);
+}
+
 TEST_F(CandidateIntakeTest, TheSameBoxInTheSameFrameIsTheSameReportAfterARestartToo) {
   const auto uuid_now = [this] {
     OffloadIntake intake = Intake();

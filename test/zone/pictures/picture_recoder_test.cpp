@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "common/error.h"
 #include "imaging/image_header.h"
+#include "test/zone/zone_fixture.h"
 
 namespace livemap::zone {
 namespace {
@@ -145,6 +147,15 @@ TEST(RecodePicture, RefusesHugeDimensionsBeforeDecoding) {
               ThrowsMessage<Error>(HasSubstr("accepted are 20000000")));
 }
 
+TEST(DecodingWork, OfAPngWhoseHeaderSaysMoreThanAnInt64HoldsIsTheMost) {
+  // Width, height, depth, colour type and interlacing are 0x6b6b6b6b or 0x6b each.
+  Bytes png{0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 0x0d, 'I', 'H', 'D', 'R'};
+  png.resize(png.size() + 100, 0x6b);
+  EXPECT_EQ(DecodingWork(png), std::numeric_limits<std::int64_t>::max());
+  EXPECT_THAT([&] { RecodePicture(png); },
+              ThrowsMessage<Error>(HasSubstr("says it has 1802201963 x 1802201963 pixels")));
+}
+
 TEST(RecodePicture, RefusesTooManyBytes) {
   PictureLimits limits;
   limits.max_bytes = 100;
@@ -231,6 +242,50 @@ TEST(RecodePicture, RefusesAProgressivePictureOfThousandsOfScans) {
   for (int i = 0; i < 1000; ++i) jpeg.insert(jpeg.end() - 2, last.begin(), last.end());
   EXPECT_THAT([&] { RecodePicture(jpeg); },
               ThrowsMessage<Error>(HasSubstr("has more than 32 scans")));
+}
+
+TEST(RecodePicture, RefusesAPictureThatCostsMoreThanItsPixelsSay) {
+  PictureLimits limits;
+  limits.max_work_px = 64 * 48 * 4;
+  EXPECT_NO_THROW(RecodePicture(Encode(".jpg", Scene(64, 48)), limits));
+  EXPECT_THAT(
+      [&] {
+        RecodePicture(Encode(".jpg", Scene(64, 48), {cv::IMWRITE_JPEG_PROGRESSIVE, 1}), limits);
+      },
+      ThrowsMessage<Error>(HasSubstr("accepted are 12288")));
+}
+
+TEST(RecodePicture, RefusesAnArithmeticJpeg) {
+  Bytes jpeg = Encode(".jpg", Scene(64, 48));
+  jpeg[StatedSizeAt(jpeg) - 4] = 0xc9;
+  EXPECT_THAT([&] { RecodePicture(jpeg); }, ThrowsMessage<Error>(HasSubstr("as no camera does")));
+}
+
+TEST(DecodingWork, IsThePixelsOfAPlainJpegAndMoreForEachScan) {
+  EXPECT_EQ(DecodingWork(Encode(".jpg", Scene(64, 48))), 64 * 48);
+  const Bytes progressive = Encode(".jpg", Scene(64, 48), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  EXPECT_GE(DecodingWork(progressive), 6 * 64 * 48);
+}
+
+TEST(DecodingWork, CountsABombOfScansInBigPicturesAboveTheLimit) {
+  const Bytes bomb = Encode(".jpg", Scene(4470, 4470), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  EXPECT_LT(bomb.size(), 1U << 20);
+  EXPECT_GT(DecodingWork(bomb), PictureLimits().max_work_px);
+  EXPECT_LE(DecodingWork(Encode(".jpg", Scene(1920, 1080), {cv::IMWRITE_JPEG_PROGRESSIVE, 1})),
+            PictureLimits().max_work_px);
+}
+
+TEST(DecodingWork, APngCostsByItsBytesPerPixelAndItsInterlacing) {
+  EXPECT_EQ(DecodingWork(Encode(".png", Scene(64, 48))), 64 * 48);
+  Bytes deep = Encode(".png", cv::Mat::zeros(48, 64, CV_16UC4));
+  EXPECT_EQ(DecodingWork(deep), 64 * 48 * 3);
+  deep[28] = 1;  // Adam7.
+  EXPECT_EQ(DecodingWork(deep), 64 * 48 * 6);
+}
+
+TEST(DecodingWork, IsNothingForWhatIsNoPicture) {
+  EXPECT_EQ(DecodingWork({}), 0);
+  EXPECT_EQ(DecodingWork({0xff, 0xd8, 0xff}), 0);
 }
 
 TEST(RecodePicture, TheHeaderDecidesNotTheNameOfTheFormat) {

@@ -197,6 +197,18 @@ TEST_F(PollSchedulerTest, AVehicleThatCannotSeeLeavesTheQuestionToTheNext) {
   EXPECT_THAT(Asked(later + 2 * kSecond), ::testing::ElementsAre("b"));
 }
 
+TEST_F(PollSchedulerTest, AnAnswerLargerThanItsPollAllowsTakesNoMoreThanTheEstimate) {
+  Set(1, Active(5400, kStart), kStart);
+  const std::int64_t later = kStart + 2 * kHour;
+  Approach("a", later);
+  ASSERT_EQ(Asked(later).size(), 1u);
+  const double estimate = scheduler_->bytes();
+  EXPECT_TRUE(scheduler_->Answered(newest_, 1e12, later + kSecond));
+  EXPECT_EQ(scheduler_->bytes(), estimate);
+  Approach("b", later + kSecond);
+  EXPECT_THAT(Asked(later + kSecond), ::testing::ElementsAre("b")) << "the budget is not spent";
+}
+
 TEST_F(PollSchedulerTest, APollThatNobodyAnswersExpiresAndTheNextVehicleIsAsked) {
   Set(1, Active(5400, kStart), kStart);
   const std::int64_t later = kStart + 2 * kHour;

@@ -180,6 +180,32 @@ TEST_F(RegistryTest, QueryNearAnswersNearestFirstAcrossTheAntimeridian) {
   EXPECT_EQ(registry_.QueryNear(here, 5000.0, 10).size(), 3U);
 }
 
+TEST_F(RegistryTest, HazardsOfOneWitnessAreCountedAlsoAfterARollback) {
+  constexpr std::uint64_t kWitness = 11;
+  constexpr std::uint64_t kOther = 12;
+  const auto hear = [this](HazardRegistry::Slot slot, std::vector<std::uint64_t> vehicles) {
+    PresenceRecord life = registry_.Record(slot).life;
+    life.voices = {};
+    for (std::size_t i = 0; i < vehicles.size(); ++i) life.voices.at(i).vehicle = vehicles[i];
+    registry_.SetLife(slot, life, 0.5, sequence_, kNowNs);
+  };
+  const auto first = Add(MakeReport({1, 1}));
+  hear(first, {kWitness});
+  EXPECT_EQ(registry_.CountRestingOn(kWitness), 1U);
+  registry_.Begin();
+  hear(Add(MakeReport({2, 2})), {kWitness});
+  hear(first, {kOther, kWitness});
+  EXPECT_EQ(registry_.CountRestingOn(kWitness), 1U);
+  SetState(first, HazardState::kGone);
+  hear(Add(MakeReport({3, 3})), {kOther});
+  EXPECT_EQ(registry_.CountRestingOn(kOther), 1U);
+  registry_.Rollback();
+  EXPECT_EQ(registry_.CountRestingOn(kWitness), 1U);
+  EXPECT_EQ(registry_.CountRestingOn(kOther), 0U);
+  SetState(first, HazardState::kRejected);
+  EXPECT_EQ(registry_.CountRestingOn(kWitness), 0U) << "off the map";
+}
+
 TEST_F(RegistryTest, RollbackRestoresEverythingSinceBegin) {
   const auto kept = Add(MakeReport({1, 1}));
   const auto removed = Add(MakeReport({2, 2}));

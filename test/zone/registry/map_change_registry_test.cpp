@@ -68,6 +68,19 @@ TEST_F(MapChangeRegistryTest, OneVehicleNeverConfirmsHoweverOftenItTells) {
   EXPECT_EQ(Only().drives, 50U);
 }
 
+TEST_F(MapChangeRegistryTest, OneVehicleCannotPullAFeatureAwayDriveByDrive) {
+  Confirm();
+  const MapChangeFeature before = Only();
+  for (int drive = 0; drive < 20; ++drive) {
+    protocol::MapChangeReport report = MakeMapChange("car-1", "drive-" + std::to_string(drive));
+    report.position = EastOf(2);
+    Tell(report);
+  }
+  EXPECT_EQ(geo::GeodesicDistanceM(Only().position, before.position), 0);
+  EXPECT_EQ(Only().confidence, before.confidence);
+  EXPECT_GE(Only().drives, 20U);
+}
+
 TEST_F(MapChangeRegistryTest, TheSameDriveTellingTwiceCountsOnce) {
   Tell(MakeMapChange());
   const MapChangeFeature before = Only();

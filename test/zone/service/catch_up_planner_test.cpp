@@ -81,6 +81,28 @@ TEST_F(CatchUpTest, WhatDidNotHelpIsToldAgainEverMoreRarely) {
   EXPECT_LE(previous, 61);
 }
 
+TEST_F(CatchUpTest, AVehicleThatSaysItKnowsMoreThanWasAnnouncedIsToldEverMoreRarely) {
+  ASSERT_TRUE(Say(5000));
+  int previous = 0;
+  for (int i = 0; i < 3; ++i) {
+    planner_.Told("car-1", now_ns_);
+    const int seconds = SecondsUntilTold(5000 + static_cast<std::uint64_t>(i), 100);
+    EXPECT_GT(seconds, previous);
+    previous = seconds;
+  }
+}
+
+TEST_F(CatchUpTest, AVehicleThatForgetsAgainAndAgainIsToldEverMoreRarely) {
+  ASSERT_TRUE(Say(0));
+  int seconds = 0;
+  for (int i = 0; i < 4; ++i) {
+    planner_.Told("car-1", now_ns_);
+    EXPECT_FALSE(Say(100));
+    seconds = SecondsUntilTold(0, 100);
+  }
+  EXPECT_GT(seconds, 15);
+}
+
 TEST_F(CatchUpTest, AVehicleThatMovedFarIsToldAllAroundItsNewPlace) {
   Say(100);
   planner_.Told("car-1", now_ns_);

@@ -37,6 +37,27 @@ class ZoneLifeTest : public ZoneTest {
     ReportBy("car-1");
     return ReportBy("car-2");
   }
+  /// Reports the hazard 4 m east of where it is.
+  void Pull(const Uuid& hazard, const std::string& vehicle) {
+    now_ns_ += 1'000'000'000;
+    const geo::GeoPoint at = Zone().Find(hazard)->position;
+    protocol::Report report = MakeReport(geo::GeodesicDestination(at, 1.5707963267948966, 4));
+    report.vehicle_id = vehicle;
+    report.stamp_ns = now_ns_ - 1;
+    report.covariance_m2 = Eigen::Matrix2d::Identity() * 0.1;
+    report.image = MakeJpeg(64, 48, 100, static_cast<std::uint8_t>(now_ns_ / 1'000'000'000));
+    EXPECT_EQ(Zone().Handle(report).hazard_uuid, hazard);
+  }
+  void ExpectUnmovedBy(const std::string& vehicle, const Uuid& hazard) {
+    const Hazard before = *Zone().Find(hazard);
+    Pull(hazard, vehicle);
+    const Hazard after = *Zone().Find(hazard);
+    EXPECT_EQ(geo::GeodesicDistanceM(after.position, before.position), 0);
+    EXPECT_EQ(after.confidence, before.confidence);
+    EXPECT_EQ(after.image_sha256, before.image_sha256);
+    EXPECT_EQ(after.last_seen_ns, before.last_seen_ns);
+    EXPECT_EQ(after.sightings, before.sightings + 1);
+  }
   HazardState State(const Uuid& hazard) { return Zone().Find(hazard)->state; }
   /// Comes from the south, passes the place and drives on.
   void DriveBy(const std::string& vehicle, double from_m, double to_m) {
@@ -164,6 +185,46 @@ TEST_F(ZoneLifeTest, AnOfficialRevokesARejection) {
   EXPECT_EQ(State(hazard), HazardState::kActive);
   EXPECT_EQ(Zone().Events(hazard, 1).front().reason, "confirmed by Bert: no shadow after all");
   EXPECT_THROW(Zone().Confirm(hazard, "Bert", "a\nb"), Error);
+}
+
+TEST_F(ZoneLifeTest, OneVehicleCannotPullAHazardAwayStepByStep) {
+  const Uuid hazard = ActiveHazard();
+  Pull(hazard, "car-9");
+  const Hazard pulled_once = *Zone().Find(hazard);
+  for (int i = 0; i < 20; ++i) Pull(hazard, "car-9");
+  EXPECT_LE(geo::GeodesicDistanceM(Zone().Find(hazard)->position, kPlace), 4.0);
+  EXPECT_EQ(Zone().Find(hazard)->confidence, pulled_once.confidence);
+  EXPECT_EQ(Zone().Find(hazard)->sightings, 23U);
+  EXPECT_EQ(Zone().Find(hazard)->last_seen_ns, now_ns_ - 1) << "that it was seen counts";
+}
+
+TEST_F(ZoneLifeTest, ASightingBeyondTheVehiclesAllowanceMovesNothing) {
+  ZoneService::Config config = Config();
+  config.allowance.evidence_per_hour = 1;
+  zone_ = std::make_unique<ZoneService>(
+      config, [this] { return now_ns_; }, 42);
+  const Uuid hazard = ReportBy("car-1");
+  Pull(hazard, "car-9");
+  // That was all its evidence for an hour.
+  const Uuid other = Zone().Handle(MakeReport({40.5, -79.94})).hazard_uuid;
+  ExpectUnmovedBy("car-9", other);
+}
+
+TEST_F(ZoneLifeTest, ASightingOfAVehicleThatIsNotBelievedMovesNothing) {
+  const Uuid hazard = ActiveHazard();
+  protocol::Report elsewhere = MakeReport({40.5, -79.94});
+  elsewhere.vehicle_id = "car-9";
+  Zone().Handle(elsewhere);
+  ASSERT_TRUE(Zone().Distrust("car-9", "Anna", "invents"));
+  ExpectUnmovedBy("car-9", hazard);
+}
+
+TEST_F(ZoneLifeTest, ARejectedHazardIsNotMoved) {
+  const Uuid hazard = ActiveHazard();
+  ASSERT_TRUE(Zone().Reject(hazard, "Anna", ""));
+  ExpectUnmovedBy("car-3", hazard);
+  now_ns_ += 2 * kDayNs;
+  ExpectUnmovedBy("car-4", hazard);
 }
 
 TEST_F(ZoneLifeTest, WhatIsOffTheMapIsListedByItsState) {
@@ -331,6 +392,38 @@ TEST_F(ZoneLifeTest, AYesKeepsItAndBringsItsPicture) {
   EXPECT_TRUE(Zone().ImagePath(Zone().Find(hazard)->image_sha256));
   // Drivers know already.
   EXPECT_EQ(Zone().AnnouncedSequence(), announced);
+}
+
+TEST_F(ZoneLifeTest, AYesCountsWithoutAPictureThatIsLargerThanItsPollAllows) {
+  const Uuid hazard = ActiveHazard();
+  now_ns_ += kDayNs / 2;
+  const protocol::Poll order = Asked("car-8");
+  ASSERT_GT(order.max_picture_bytes, 0U);
+  DriveBy("car-8", -45, -15);
+  protocol::PollAnswer answer = AnswerTo(order, protocol::PollAnswer::Answer::kYes);
+  answer.image = MakeJpeg(64, 48, order.max_picture_bytes, 7);
+  EXPECT_TRUE(Zone().HandleAnswer(answer));
+  EXPECT_EQ(State(hazard), HazardState::kActive);
+  EXPECT_EQ(Zone().Find(hazard)->image_sha256, "");
+  EXPECT_EQ(Zone().Statistics().image_bytes, 0U);
+}
+
+TEST_F(ZoneLifeTest, AYesCountsWithoutAPictureThatNobodyAskedFor) {
+  const Uuid hazard = ActiveHazard();
+  protocol::Report pictured = MakeReport(kPlace);
+  pictured.vehicle_id = "car-3";
+  pictured.image = MakeJpeg(64, 48, 100, 1);
+  Zone().Handle(pictured);
+  const std::string picture = Zone().Find(hazard)->image_sha256;
+  ASSERT_NE(picture, "");
+  now_ns_ += kDayNs / 2;
+  const protocol::Poll order = Asked("car-8");
+  ASSERT_EQ(order.max_picture_bytes, 0U);
+  DriveBy("car-8", -45, -15);
+  protocol::PollAnswer answer = AnswerTo(order, protocol::PollAnswer::Answer::kYes);
+  answer.image = MakeJpeg(64, 48, 100, 7);
+  EXPECT_TRUE(Zone().HandleAnswer(answer));
+  EXPECT_EQ(Zone().Find(hazard)->image_sha256, picture);
 }
 
 }  // namespace

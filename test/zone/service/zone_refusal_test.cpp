@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/error.h"
+#include "common/sqlite.h"
 #include "test/zone/zone_fixture.h"
 #include "zone/admission/speed_rule.h"
 #include "zone/service/zone_service.h"
@@ -171,6 +172,33 @@ TEST_F(ZoneRefusalTest, ReportsBeyondTheHourlyCapGetNoReceiptAndAreTakenLater) {
     EXPECT_EQ(zone.Handle(reports[i]).status, protocol::Receipt::Status::kCommitted);
   }
   EXPECT_EQ(zone.Query(std::nullopt, 0, 100).size(), 9U);
+}
+
+TEST_F(ZoneRefusalTest, APictureCostsItsVehicleOnceAndOnlyWhenItsReportIsCommitted) {
+  ZoneService::Config config = Config();
+  config.pictures.pixels_per_hour = 2 * 64 * 48;
+  ZoneService zone(config, Clock(), 1);
+  std::vector<protocol::Report> reports;
+  for (std::uint8_t i = 0; i < 3; ++i) {
+    reports.push_back(MakeReport({40 + 0.01 * i, 8}));
+    reports.back().image = MakeJpeg(64, 48, 10, i);
+  }
+  SqliteDatabase saboteur(DatabasePath(), true);
+  saboteur.Execute(
+      "CREATE TRIGGER no_space BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'full'); END");
+  for (int i = 0; i < 5; ++i) EXPECT_THROW(zone.HandleBatch({reports[0]}), StoreError);
+  saboteur.Execute("DROP TRIGGER no_space");
+  // Twice in one batch, and sent again.
+  zone.HandleBatch({reports[0], reports[0]});
+  zone.HandleBatch({reports[0]});
+  zone.HandleBatch({reports[1], reports[2]});
+  std::size_t pictures = 0;
+  for (const Hazard& hazard : zone.Query(std::nullopt, 0, 10)) {
+    pictures += hazard.image_sha256.empty() ? 0U : 1U;
+  }
+  EXPECT_EQ(pictures, 2U);
+  const auto refused = zone.Statistics().pictures_refused;
+  EXPECT_EQ(refused[static_cast<std::size_t>(PictureRefusal::kTooMany)], 1U);
 }
 
 TEST_F(ZoneRefusalTest, EveryKindOfRefusalHasItsName) {

@@ -181,12 +181,42 @@ TEST_F(ZoneServiceTest, RefusesNewHazardsBeyondTheMaximumButCountsSightings) {
   EXPECT_EQ(zone.Handle(MakeReport({1, 1})).status, protocol::Receipt::Status::kCommitted);
 }
 
+TEST_F(ZoneServiceTest, OnlySoManyHazardsRestOnOneVehiclesWordAlone) {
+  ZoneService::Config config = Config();
+  config.max_hazards_by_one_vehicle = 3;
+  auto zone = std::make_unique<ZoneService>(config, Clock(), 1);
+  const auto report = [&](const std::string& vehicle, double latitude) {
+    protocol::Report made = MakeReport({latitude, 1});
+    made.vehicle_id = vehicle;
+    return zone->Handle(made);
+  };
+  for (int i = 0; i < 3; ++i) report("car-1", i);
+  const protocol::Receipt refused = report("car-1", 3);
+  EXPECT_EQ(refused.status, protocol::Receipt::Status::kRefused);
+  EXPECT_EQ(refused.reason, "3 hazards rest on this vehicle's word alone, at most 3 may");
+  EXPECT_EQ(report("car-1", 1).status, protocol::Receipt::Status::kCommitted) << "a known one";
+  EXPECT_EQ(report("car-2", 3).status, protocol::Receipt::Status::kCommitted) << "its own share";
+  zone.reset();
+  zone = std::make_unique<ZoneService>(config, Clock(), 2);
+  EXPECT_EQ(report("car-1", 4).status, protocol::Receipt::Status::kRefused) << "after a restart";
+  // A second witness, and an official: neither rests on the one word any more.
+  const Uuid seen_by_two = report("car-2", 0).hazard_uuid;
+  EXPECT_EQ(report("car-1", 4).status, protocol::Receipt::Status::kCommitted);
+  EXPECT_EQ(report("car-1", 5).status, protocol::Receipt::Status::kRefused);
+  EXPECT_TRUE(zone->Confirm(report("car-1", 4).hazard_uuid, "Anna"));
+  EXPECT_EQ(report("car-1", 5).status, protocol::Receipt::Status::kCommitted);
+  EXPECT_TRUE(IsOnMap(zone->Find(seen_by_two)->state));
+  const auto kind = static_cast<std::size_t>(RefusalKind::kOneWitness);
+  EXPECT_EQ(zone->Statistics().refused_by_kind.at(kind), 2U);
+}
+
 TEST_F(ZoneServiceTest, PicturesThatNoHazardShowsGoFirst) {
   ZoneService::Config config = Config();
   config.image_cap_bytes = 2.5 * 1021;
   ZoneService zone(config, Clock(), 1);
   const auto report_with = [&](const geo::GeoPoint& position, std::uint8_t value) {
     protocol::Report report = MakeReport(position);
+    report.vehicle_id = "car-" + std::to_string(value);
     report.image = MakeJpeg(9, 9, 1000, value);
     return *zone.Find(zone.Handle(report).hazard_uuid);
   };
@@ -219,6 +249,34 @@ TEST_F(ZoneServiceTest, RemembersVehiclesForTheRetentionTimeAndTellsSubscribers)
   EXPECT_EQ(told, (std::vector<std::string>{"car-1", "car-3"}));
   EXPECT_EQ(zone.Statistics().vehicle_positions_refused, 2U);
   zone.Unsubscribe(id);
+}
+
+TEST_F(ZoneServiceTest, OfAVehiclesManyPositionsReadersHearFourASecondAndTheLastOne) {
+  std::int64_t now_ns = kNowNs;
+  ZoneService zone(
+      Config(), [&] { return now_ns; }, 1);
+  std::vector<std::string> told;
+  zone.Subscribe([&](const ZoneEvent& event) {
+    if (event.vehicle) told.push_back(event.vehicle->drive_id);
+  });
+  const auto advance = [&] {
+    told.clear();
+    zone.Advance();
+    return told;
+  };
+  for (int i = 0; i < 101; ++i) {
+    EXPECT_TRUE(zone.UpdateVehicle({"car-1", std::to_string(i), {1, 1}, 0, 0, now_ns}));
+    now_ns += kOneSecond / 100;
+  }
+  EXPECT_EQ(told, (std::vector<std::string>{"0", "25", "50", "75", "100"}));
+  EXPECT_EQ(zone.Statistics().vehicle_positions, 101U) << "all are judged and counted";
+  EXPECT_TRUE(zone.UpdateVehicle({"car-1", "last", {1, 1}, 0, 0, now_ns}));
+  EXPECT_TRUE(zone.UpdateVehicle({"car-2", "other", {1, 1}, 0, 0, now_ns}));
+  EXPECT_EQ(told.back(), "other") << "every vehicle has its own share";
+  EXPECT_TRUE(advance().empty()) << "it is not time yet";
+  now_ns += kOneSecond;
+  EXPECT_EQ(advance(), (std::vector<std::string>{"last"}));
+  EXPECT_TRUE(advance().empty()) << "it was told";
 }
 
 TEST_F(ZoneServiceTest, TheNumberOfVehiclesIsBounded) {

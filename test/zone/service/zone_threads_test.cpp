@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <future>
 #include <set>
 #include <thread>
 #include <vector>
 
+#include "common/sqlite.h"
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
@@ -65,6 +68,80 @@ TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
   ASSERT_EQ(sequences.size(), 300U);
   for (std::size_t i = 0; i < sequences.size(); ++i) EXPECT_EQ(sequences[i], i + 1);
   EXPECT_EQ(zone.Query(std::nullopt, 0, 1000).size(), 40U);
+}
+
+/// A commit that the disk holds up: another connection has the database's write lock, for which a
+/// commit waits ten seconds and then fails.
+class SlowCommit {
+ public:
+  SlowCommit(ZoneService& zone, const std::string& database) : other_(database, true) {
+    other_.Execute("BEGIN IMMEDIATE");
+    writer_ = std::thread([this, &zone, report = MakeReport({1, 1})] {
+      try {
+        is_committed_ = zone.Handle(report).status == protocol::Receipt::Status::kCommitted;
+      } catch (const StoreError&) {
+      }
+    });
+    // For it to get there; with less time a test would pass, too, but prove nothing.
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  /// Whether it went well: nobody waited for it before.
+  bool LetGo() {
+    other_.Execute("ROLLBACK");
+    writer_.join();
+    return is_committed_;
+  }
+
+ private:
+  SqliteDatabase other_;
+  std::thread writer_;
+  bool is_committed_ = false;
+};
+
+TEST_F(ZoneThreadsTest, TheNewestSequenceIsToldWhileACommitWaitsForTheDisk) {
+  ZoneService zone(Config(), Clock(), 1);
+  zone.Handle(MakeReport());
+  SlowCommit commit(zone, DatabasePath());
+  EXPECT_EQ(zone.Sequence(), 1U);
+  EXPECT_EQ(zone.AnnouncedSequence(), 1U);
+  EXPECT_TRUE(commit.LetGo());
+  EXPECT_EQ(zone.Sequence(), 2U);
+  EXPECT_EQ(zone.AnnouncedSequence(), 2U);
+}
+
+TEST_F(ZoneThreadsTest, AHistoryIsReadWhileTheWriterIsAtWork) {
+  ZoneService zone(Config(), Clock(), 1);
+  const Uuid hazard = zone.Handle(MakeReport()).hazard_uuid;
+  std::promise<std::size_t> events;
+  std::future<std::size_t> read = events.get_future();
+  std::thread reader;
+  bool is_read = false;
+  // Subscribers are called by the writer, which waits for them.
+  const int id = zone.Subscribe([&](const ZoneEvent&) {
+    reader = std::thread([&] { events.set_value(zone.Events(hazard, 10).size()); });
+    is_read = read.wait_for(std::chrono::seconds(20)) == std::future_status::ready;
+  });
+  zone.Handle(MakeReport());
+  reader.join();
+  zone.Unsubscribe(id);
+  EXPECT_TRUE(is_read);
+  EXPECT_EQ(read.get(), 2U) << "and sees what was committed";
+}
+
+TEST_F(ZoneThreadsTest, TheViewOfBeforeIsHandedOutWhileOneCallerWaitsForANewOne) {
+  ZoneService zone(Config(), Clock(), 1);
+  zone.Handle(MakeReport());
+  ASSERT_TRUE(zone.View());
+  SlowCommit commit(zone, DatabasePath());
+  std::atomic<int> views{0};
+  std::vector<std::thread> callers;
+  for (int i = 0; i < 2; ++i) {
+    callers.emplace_back([&] { views += zone.View() ? 1 : 0; });
+  }
+  while (views == 0) std::this_thread::yield();
+  EXPECT_TRUE(commit.LetGo());
+  for (std::thread& caller : callers) caller.join();
+  EXPECT_EQ(views, 2);
 }
 
 /// Comes from the south towards `place` and passes it.

@@ -87,13 +87,13 @@ TEST_F(ZoneBrokenRowsTest, BrokenEventsLivesTrustAndPlacesAreLeftOut) {
   const std::vector<Uuid> hazards = MakeHazards();
   Write(
       "UPDATE events SET to_state = 9 WHERE sequence = 1;"
-      "UPDATE last_reports SET latitude = 9e999;"
+      "UPDATE places SET latitude = 9e999;"
       "INSERT INTO lives VALUES ('pothole', -1, 1), ('deer', 9e999, 0);"
       "INSERT INTO trust VALUES (1, -1, 0, ''), (2, 1, 0, 'x'), (3, 1, -5, '0 0 0 0 0 0 0 0 0')");
   ZoneService zone(Config(), Clock(), 2);
   EXPECT_TRUE(zone.Events(hazards[0], 10).empty());
   EXPECT_EQ(zone.Events(hazards[1], 10).size(), 1U);
-  EXPECT_EQ(zone.Statistics().store_damage.rows, 5U);
+  EXPECT_EQ(zone.Statistics().store_damage.rows, 6U);
   EXPECT_EQ(zone.Handle(MakeReport({50, 1})).status, protocol::Receipt::Status::kCommitted);
 }
 
@@ -116,9 +116,9 @@ TEST_F(ZoneBrokenRowsTest, WhatIsHeldAgainstVehiclesOutlivesARestartAndOldSchema
     invent(zone, 1);
   }
   // As version 2 wrote it.
-  Write(
-      "DROP TABLE trust; DROP TABLE map_changes; DROP TABLE map_change_reports; "
-      "DROP TABLE map_change_events; DELETE FROM livemap_schema WHERE version >= 3");
+  Write(std::string(kLastReportsTable) +
+        "DROP TABLE trust; DROP TABLE map_changes; DROP TABLE map_change_reports; "
+        "DROP TABLE map_change_events; DELETE FROM livemap_schema WHERE version >= 3");
   {
     ZoneService zone(config, Clock(), 2);
     EXPECT_EQ(zone.Statistics().suspect_vehicles, 0U);

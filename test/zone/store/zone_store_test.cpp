@@ -26,7 +26,7 @@ class ZoneStoreTest : public ZoneTest {
         std::to_string(zone.Sequence()) + " " + std::to_string(zone.AnnouncedSequence()) + "\n";
     for (const Hazard& hazard : zone.Query(std::nullopt, 1, 100000)) {
       text += hazard.uuid.ToString() + " " + std::to_string(hazard.sequence) + " " +
-              StateName(hazard.state) + " " + std::to_string(hazard.presence) + " " +
+              HazardStateName(hazard.state) + " " + std::to_string(hazard.presence) + " " +
               std::to_string(hazard.vehicles) + " " + std::to_string(hazard.sightings) + "\n";
       for (const StoredEvent& event : zone.Events(hazard.uuid, 100)) {
         text += "  " + std::to_string(event.sequence) + " " + event.reason + "\n";

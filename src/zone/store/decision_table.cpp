@@ -1,0 +1,219 @@
+#include "zone/store/decision_table.h"
+
+#include <algorithm>
+
+#include "common/time.h"
+#include "protocol/text_rules.h"
+#include "zone/model/hazard.h"
+#include "zone/store/queries.h"
+#include "zone/store/store_validation.h"
+
+namespace livemap::zone {
+namespace {
+
+constexpr char kSoundDecision[] =
+    "typeof(kind) = 'integer' AND typeof(official) = 'text' AND "
+    "length(CAST(official AS BLOB)) <= 64 AND typeof(reason) = 'text' AND "
+    "length(CAST(reason AS BLOB)) <= 200 AND typeof(at_ns) = 'integer' AND "
+    "typeof(hazards) = 'integer' AND typeof(undone_by) = 'integer' AND typeof(before) = 'text' AND "
+    "length(CAST(before AS BLOB)) <= 5000 AND typeof(effects) = 'text' AND "
+    "length(CAST(effects AS BLOB)) <= 500";
+constexpr char kDecisionColumns[] =
+    "SELECT id, kind, official, reason, at_ns, hazards, undone_by, before, effects FROM decisions "
+    "WHERE subject = :s AND ";
+/// As this program writes a uuid: one that no row may have could never be dropped by it.
+constexpr char kSoundWithdrawal[] =
+    "typeof(hazard_uuid) = 'text' AND length(CAST(hazard_uuid AS BLOB)) = 36 AND "
+    "hazard_uuid LIKE '________-____-____-____-____________' AND "
+    "replace(hazard_uuid, '-', '') NOT GLOB '*[^0-9a-f]*' AND "
+    "length(replace(hazard_uuid, '-', '')) = 32 AND "
+    "typeof(before) = 'text' AND length(CAST(before AS BLOB)) <= 500";
+
+template <typename Row>
+bool IsSound(const Row& row) {
+  return row.id >= 1 && row.id < kMaxSequence && IsIndex(row.kind, kDecisionKinds) &&
+         protocol::IsPrintableText(row.official, kMaxStoredTextBytes) &&
+         (row.reason.empty() || protocol::IsPrintableText(row.reason, kMaxEventReasonBytes)) &&
+         IsStamp(row.at_ns) && row.hazards >= 0 && row.undone_by >= 0 &&
+         row.undone_by < kMaxSequence;
+}
+
+}  // namespace
+
+DecisionTable::DecisionTable(soci::session& session)
+    : session_(session),
+      find_((session.prepare << kDecisionColumns << kSoundDecision << " ORDER BY id DESC LIMIT :l",
+             soci::use(row_.subject), soci::use(row_.limit), soci::into(row_.id),
+             soci::into(row_.kind), soci::into(row_.official), soci::into(row_.reason),
+             soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
+             soci::into(row_.before), soci::into(row_.effects))),
+      find_newest_((session.prepare << kDecisionColumns << kSoundDecision
+                                    << " AND kind <> :k AND id < :b ORDER BY id DESC LIMIT 1",
+                    soci::use(row_.subject), soci::use(row_.wanted_kind), soci::use(row_.below),
+                    soci::into(row_.id), soci::into(row_.kind), soci::into(row_.official),
+                    soci::into(row_.reason), soci::into(row_.at_ns), soci::into(row_.hazards),
+                    soci::into(row_.undone_by), soci::into(row_.before), soci::into(row_.effects))),
+      find_distrust_((session.prepare << kDecisionColumns << kSoundDecision
+                                      << " AND kind = :k AND undone_by = 0 AND id < :b "
+                                         "ORDER BY id DESC LIMIT 1",
+                      soci::use(row_.subject), soci::use(row_.wanted_kind), soci::use(row_.below),
+                      soci::into(row_.id), soci::into(row_.kind), soci::into(row_.official),
+                      soci::into(row_.reason), soci::into(row_.at_ns), soci::into(row_.hazards),
+                      soci::into(row_.undone_by), soci::into(row_.before),
+                      soci::into(row_.effects))),
+      write_((session.prepare
+                  << "INSERT INTO decisions (kind, subject, official, reason, at_ns, hazards, "
+                     "undone_by, before, effects) VALUES (:k, :s, :o, :r, :a, :h, :u, :b, :e)",
+              soci::use(row_.kind), soci::use(row_.subject), soci::use(row_.official),
+              soci::use(row_.reason), soci::use(row_.at_ns), soci::use(row_.hazards),
+              soci::use(row_.undone_by), soci::use(row_.before), soci::use(row_.effects))),
+      undo_((session.prepare << "UPDATE decisions SET undone_by = :u WHERE id = :i",
+             soci::use(row_.undone_by), soci::use(row_.id))),
+      add_((session.prepare << "UPDATE decisions SET hazards = hazards + :h WHERE id = :i",
+            soci::use(row_.hazards), soci::use(row_.id))),
+      find_withdrawals_(
+          (session.prepare << "SELECT hazard_uuid, before FROM withdrawals WHERE decision_id = :d "
+                              "AND "
+                           << kSoundWithdrawal << " ORDER BY hazard_uuid LIMIT :l",
+           soci::use(row_.id), soci::use(row_.limit), soci::into(row_.hazard_uuid),
+           soci::into(row_.before))),
+      write_withdrawal_((session.prepare << "INSERT INTO withdrawals (decision_id, hazard_uuid, "
+                                            "before) VALUES (:d, :h, :b) ON CONFLICT "
+                                            "(decision_id, hazard_uuid) DO NOTHING",
+                         soci::use(row_.id), soci::use(row_.hazard_uuid), soci::use(row_.before))),
+      drop_withdrawal_((session.prepare << "DELETE FROM withdrawals WHERE decision_id = :d AND "
+                                           "hazard_uuid = :h",
+                        soci::use(row_.id), soci::use(row_.hazard_uuid))) {}
+
+DecisionRecord DecisionTable::ToDecision() const {
+  DecisionRecord decision;
+  decision.id = static_cast<std::uint64_t>(row_.id);
+  decision.kind = static_cast<DecisionKind>(row_.kind);
+  decision.subject = row_.subject;
+  decision.official = row_.official;
+  decision.reason = row_.reason;
+  decision.at_ns = row_.at_ns;
+  decision.hazards = static_cast<std::uint64_t>(row_.hazards);
+  decision.undone_by = static_cast<std::uint64_t>(row_.undone_by);
+  decision.before = row_.before;
+  decision.effects = row_.effects;
+  return decision;
+}
+
+std::vector<DecisionRecord> DecisionTable::LoadDecisions(const std::string& subject,
+                                                         std::size_t limit) {
+  return ExplainStore("reading decisions", [&] {
+    std::vector<DecisionRecord> decisions;
+    row_.subject = subject;
+    row_.limit = static_cast<long long>(limit);
+    find_.execute();
+    while (find_.fetch()) {
+      if (IsSound(row_)) decisions.push_back(ToDecision());
+    }
+    return decisions;
+  });
+}
+
+/// The newest sound row that `find` finds below `before`; it fetches one at a time.
+std::optional<DecisionRecord> DecisionTable::FindBelow(soci::statement& find,
+                                                       const std::string& subject,
+                                                       std::uint64_t before) {
+  return ExplainStore("reading decisions", [&]() -> std::optional<DecisionRecord> {
+    row_.subject = subject;
+    row_.below = static_cast<long long>(std::min<std::uint64_t>(before, kMaxSequence));
+    while (FetchOne(find)) {
+      if (IsSound(row_)) return ToDecision();
+      row_.below = row_.id;
+    }
+    return std::nullopt;
+  });
+}
+
+std::optional<DecisionRecord> DecisionTable::FindNewestDecision(const std::string& subject) {
+  row_.wanted_kind = static_cast<int>(DecisionKind::kUndo);
+  return FindBelow(find_newest_, subject, UINT64_MAX);
+}
+
+std::optional<DecisionRecord> DecisionTable::FindStandingDistrust(const std::string& vehicle_id,
+                                                                  std::uint64_t before) {
+  row_.wanted_kind = static_cast<int>(DecisionKind::kDistrustVehicle);
+  return FindBelow(find_distrust_, vehicle_id, before);
+}
+
+std::uint64_t DecisionTable::WriteDecision(const DecisionRecord& decision) {
+  return ExplainStore("writing a decision", [&] {
+    row_.kind = static_cast<int>(decision.kind);
+    row_.subject = decision.subject;
+    row_.official = decision.official;
+    row_.reason = decision.reason;
+    row_.at_ns = decision.at_ns;
+    row_.hazards = static_cast<long long>(decision.hazards);
+    row_.undone_by = static_cast<long long>(decision.undone_by);
+    row_.before = decision.before;
+    row_.effects = decision.effects;
+    write_.execute(true);
+    long long id = 0;
+    session_ << "SELECT max(id) FROM decisions", soci::into(id);
+    return static_cast<std::uint64_t>(std::max(id, 0LL));
+  });
+}
+
+void DecisionTable::MarkUndone(std::uint64_t decision, std::uint64_t undone_by) {
+  ExplainStore("marking a decision as undone", [&] {
+    row_.id = static_cast<long long>(decision);
+    row_.undone_by = static_cast<long long>(undone_by);
+    undo_.execute(true);
+  });
+}
+
+void DecisionTable::AddHazards(std::uint64_t decision, std::uint64_t hazards) {
+  ExplainStore("counting what a decision changed", [&] {
+    row_.id = static_cast<long long>(decision);
+    row_.hazards = static_cast<long long>(hazards);
+    add_.execute(true);
+  });
+}
+
+std::vector<Withdrawal> DecisionTable::LoadWithdrawals(std::uint64_t decision, std::size_t limit) {
+  return ExplainStore("reading what was withdrawn", [&] {
+    std::vector<Withdrawal> withdrawals;
+    row_.id = static_cast<long long>(decision);
+    row_.limit = static_cast<long long>(limit);
+    find_withdrawals_.execute();
+    while (find_withdrawals_.fetch()) {
+      const auto hazard = Uuid::Parse(row_.hazard_uuid);
+      if (hazard) withdrawals.push_back({*hazard, row_.before});
+    }
+    return withdrawals;
+  });
+}
+
+StoreDamage DecisionTable::CheckWithdrawals() {
+  return ExplainStore("reading what was withdrawn", [&] {
+    StoreDamage damage;
+    long long broken = 0;
+    session_ << "SELECT count(*) FROM withdrawals WHERE NOT (" << kSoundWithdrawal << ")",
+        soci::into(broken);
+    for (; broken > 0; --broken) damage.Note("a row of withdrawals has no uuid or no lifecycle");
+    return damage;
+  });
+}
+
+void DecisionTable::WriteWithdrawal(std::uint64_t decision, const Withdrawal& withdrawal) {
+  ExplainStore("writing what was withdrawn", [&] {
+    row_.id = static_cast<long long>(decision);
+    row_.hazard_uuid = withdrawal.hazard.ToString();
+    row_.before = withdrawal.before;
+    write_withdrawal_.execute(true);
+  });
+}
+
+void DecisionTable::DropWithdrawal(std::uint64_t decision, const Uuid& hazard) {
+  ExplainStore("dropping what was withdrawn", [&] {
+    row_.id = static_cast<long long>(decision);
+    row_.hazard_uuid = hazard.ToString();
+    drop_withdrawal_.execute(true);
+  });
+}
+
+}  // namespace livemap::zone
