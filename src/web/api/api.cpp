@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "common/error.h"
-#include "web/api/collections.h"
 #include "web/json/json.h"
 #include "zone/pictures/picture_recoder.h"
 
@@ -11,8 +10,6 @@ namespace livemap::web {
 namespace {
 
 constexpr std::string_view kImagePrefix = "/images/";
-constexpr std::string_view kHazardPrefix = "/api/v1/hazards/";
-constexpr std::string_view kEventsEnding = "/events";
 constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
 
 /// Only this server's own files run or load; tiles are the one exception, and only as images.
@@ -27,9 +24,7 @@ bool StartsWith(std::string_view text, std::string_view prefix) {
   return text.substr(0, prefix.size()) == prefix;
 }
 
-bool EndsWith(std::string_view text, std::string_view end) {
-  return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
-}
+HttpResponse NoPicture() { return MakeErrorAnswer(404, "the zone has no picture of this name"); }
 
 HttpResponse PostOnly() {
   HttpResponse answer = MakeErrorAnswer(405, "the method is not allowed, accepted is POST");
@@ -43,22 +38,18 @@ zone::PictureLimits LimitsOf(const WebConfig& options) {
   return limits;
 }
 
-/// What a client should do that shows the states that the query asks for.
-zone::HazardAction ActionFor(const zone::Hazard& hazard, const HazardQuery& query) {
-  return query.Selects(hazard.state) ? ReplayAction(hazard) : zone::HazardAction::kRemoved;
-}
-
 /// 304 where the client already has this very content.
-HttpResponse CacheableAnswer(StaticFile file, const char* cache_control,
-                             const HttpRequest& question) {
+HttpResponse CacheableAnswer(std::shared_ptr<const std::vector<std::uint8_t>> content,
+                             const std::string& content_type, const std::string& etag,
+                             const char* cache_control, const HttpRequest& question) {
   HttpResponse answer;
-  answer.headers.emplace_back("ETag", file.etag);
+  answer.headers.emplace_back("ETag", etag);
   answer.headers.emplace_back("Cache-Control", cache_control);
-  answer.content_type = std::move(file.content_type);
-  if (question.if_none_match.find(file.etag) != std::string::npos) {
+  answer.content_type = content_type;
+  if (question.if_none_match.find(etag) != std::string::npos) {
     answer.status = 304;
   } else {
-    answer.content = std::move(file.content);
+    answer.kept = std::move(content);
   }
   return answer;
 }
@@ -72,25 +63,64 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       catalogue_(catalogue),
       trails_(trails),
       officials_(options_, zone, catalogue),
+      hazards_(zone, catalogue),
       map_changes_(zone),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
                 {LimitsOf(options).max_bytes, options.picture_cache_bytes}),
       page_(options.web_root),
       leaflet_(options.leaflet_root + "/leaflet"),
-      page_policy_(PagePolicy(TileSource(options.tile_url))) {}
+      page_policy_(PagePolicy(TileSource(options.tile_url))),
+      picture_queue_(pictures_, {}) {}
+
+bool Api::IsForPicture(const HttpRequest& question) {
+  return StartsWith(question.target, kImagePrefix);
+}
+
+void Api::Answer(const HttpRequest& question, const Done& done) {
+  std::optional<std::pair<std::string, std::string>> found;
+  try {
+    found = FindPicture(question);
+  } catch (const BadRequest&) {  // Answered below.
+  }
+  if (!found) return done(Answer(question));
+  const auto& [sha256, path] = *found;
+  const auto serve = [this, question, sha256 = sha256, done](const auto& picture) {
+    done(Finish(Picture(sha256, picture, question)));
+  };
+  if (picture_queue_.Ask(question.client, sha256, path, serve)) return;
+  done(Finish(MakeBusyAnswer("too many pictures are being made now")));
+}
+
+std::optional<std::pair<std::string, std::string>> Api::FindPicture(
+    const HttpRequest& question) const {
+  if (question.method != "GET" && question.method != "HEAD") return std::nullopt;
+  if (!IsForPicture(question)) return std::nullopt;
+  std::string sha256 = ParseTarget(question.target).path.substr(kImagePrefix.size());
+  auto path = zone_.ImagePath(sha256);
+  if (!path) return std::nullopt;
+  return std::pair(std::move(sha256), *std::move(path));
+}
+
+Api::PictureCounters Api::picture_counters() const {
+  return {pictures_.refused(), pictures_.last_refusal(), picture_queue_.busy()};
+}
 
 HttpResponse Api::Answer(const HttpRequest& question) {
   HttpResponse answer;
   try {
     const bool is_read = question.method == "GET" || question.method == "HEAD";
-    answer = is_read ? Route(ParseTarget(question.target), question) : AnswerPost(question);
+    answer = is_read ? AnswerGet(question) : AnswerPost(question);
   } catch (const BadRequest& mistake) {
     answer = ErrorAnswer(400, mistake.what());
   } catch (const std::exception&) {
     // The zone's log names the cause; a stranger gets no paths or SQL.
-    answer = ErrorAnswer(503, "the zone's store does not answer");
+    answer = MakeBusyAnswer("the zone's store does not answer");
   }
+  return Finish(std::move(answer));
+}
+
+HttpResponse Api::Finish(HttpResponse answer) const {
   const bool has_policy =
       std::any_of(answer.headers.begin(), answer.headers.end(),
                   [](const auto& header) { return header.first == "Content-Security-Policy"; });
@@ -107,6 +137,19 @@ HttpResponse Api::ErrorAnswer(int status, const std::string& sentence) const {
   return MakeErrorAnswer(status, sentence);
 }
 
+/// Each way looks at the token once: twice would count a wrong one twice.
+HttpResponse Api::AnswerGet(const HttpRequest& question) {
+  const RequestTarget target = ParseTarget(question.target);
+  const auto decision = ParseDecisionTarget(target.path);
+  if (decision && HasPreview(decision->decision)) {
+    RefuseQueryParameters(target);
+    return officials_.Preview(*decision, question);
+  }
+  HttpResponse answer = Route(target, question);
+  if (!question.authorization.empty()) answer.by_official = officials_.IsOfficial(question);
+  return answer;
+}
+
 /// Any method but GET and HEAD.
 HttpResponse Api::AnswerPost(const HttpRequest& question) {
   const RequestTarget target = ParseTarget(question.target);
@@ -115,7 +158,8 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
     RefuseQueryParameters(target);
     return officials_.Decide(*decision, question);
   }
-  const char* accepted = decision ? "POST" : "GET, HEAD";
+  const bool has_preview = decision && HasPreview(decision->decision);
+  const char* accepted = has_preview ? "GET, HEAD, POST" : decision ? "POST" : "GET, HEAD";
   HttpResponse answer =
       ErrorAnswer(405, std::string("the method is not allowed, accepted is ") + accepted);
   answer.headers.emplace_back("Allow", accepted);
@@ -125,7 +169,8 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
 HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question) {
   const std::string& path = target.path;
   if (StartsWith(path, "/api/")) return RouteApi(target);
-  if (StartsWith(path, kImagePrefix)) return Picture(path.substr(kImagePrefix.size()), question);
+  // One that there is comes from the queue: nothing is decoded here.
+  if (StartsWith(path, kImagePrefix)) return NoPicture();
   if (path == "/healthz") {
     return JsonAnswer({{"status", "ok"}, {"sequence", zone_.Sequence()}});
   }
@@ -143,61 +188,37 @@ HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question
 
 HttpResponse Api::RouteApi(const RequestTarget& target) const {
   const std::string& path = target.path;
-  if (path == "/api/v1/hazards") return Hazards(ParseHazardQuery(target));
-  if (StartsWith(path, kHazardPrefix) && EndsWith(path, kEventsEnding)) {
-    const std::size_t id_bytes = path.size() - kHazardPrefix.size() - kEventsEnding.size();
-    return Events(path.substr(kHazardPrefix.size(), id_bytes), ParseEventsQuery(target));
-  }
   const bool is_decision = ParseDecisionTarget(path).has_value();
+  if (!is_decision && StartsWith(path, kHazardAddress)) return hazards_.Answer(target);
   if (!is_decision && StartsWith(path, kMapChangeAddress)) return map_changes_.Answer(target);
   RefuseQueryParameters(target);
   if (is_decision) return PostOnly();
-  if (StartsWith(path, kHazardPrefix)) return OneHazard(path.substr(kHazardPrefix.size()));
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
   if (path == "/api/v1/vehicles") return Vehicles();
   if (path == "/api/v1/config") return PageConfig();
   return ErrorAnswer(404, "there is nothing at this address");
 }
 
-HttpResponse Api::Hazards(const HazardQuery& query) const {
-  const std::uint64_t sequence = zone_.Sequence();  // Before the list.
-  // Since a sequence all that changed is looked at: what left the selection is told too.
-  const std::vector<zone::Hazard> hazards =
-      zone_.Query(query.box, query.since.value_or(0), query.limit,
-                  query.since ? zone::HazardStates() : query.states);
-  return ListAnswer(sequence, query.limit, hazards, [&](const zone::Hazard& hazard) {
-    Json feature = HazardFeature(hazard, catalogue_);
-    if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
-    return feature;
-  });
-}
-
-HttpResponse Api::OneHazard(const std::string& id) const {
-  const auto uuid = Uuid::Parse(id);
-  if (!uuid) throw BadRequest("the hazard's id is no UUID");
-  const auto hazard = zone_.Find(*uuid);
-  if (!hazard) return ErrorAnswer(404, "the zone knows no hazard with this id");
-  Json feature = HazardFeature(*hazard, catalogue_);
-  feature["properties"]["active"] = zone::IsOnMap(hazard->state);
-  return JsonAnswer(feature, "application/geo+json");
-}
-
-HttpResponse Api::Events(const std::string& id, std::size_t limit) const {
-  const auto uuid = Uuid::Parse(id);
-  if (!uuid) throw BadRequest("the hazard's id is no UUID");
-  if (!zone_.Find(*uuid)) return ErrorAnswer(404, "the zone knows no hazard with this id");
-  return EventsAnswer(*uuid, zone_.Events(*uuid, limit), EventJson);
-}
-
 HttpResponse Api::Vehicles() const {
-  Json features = Json::array();
-  for (const zone::VehicleState& vehicle : zone_.Vehicles()) {
-    features.push_back(VehicleFeature(vehicle, trails_.Get(vehicle.vehicle_id)));
-  }
-  Json collection;
-  collection["type"] = "FeatureCollection";
-  collection["features"] = std::move(features);
-  return JsonAnswer(collection, "application/geo+json");
+  auto pieces = [this, last = std::string(), is_begun = false,
+                 has_items = false](std::string& piece) mutable {
+    if (!is_begun) piece += R"({"type":"FeatureCollection","features":[)";
+    is_begun = true;
+    // A few: each may have a long trail.
+    constexpr std::size_t kVehiclesPerRead = 8;
+    const auto vehicles = zone_.VehiclesAfter(last, kVehiclesPerRead);
+    for (const zone::VehicleState& vehicle : vehicles) {
+      if (has_items) piece += ',';
+      has_items = true;
+      piece += ToText(VehicleFeature(vehicle, trails_.Get(vehicle.vehicle_id)));
+      last = vehicle.vehicle_id;
+      if (piece.size() >= kPieceBytes) return true;
+    }
+    if (vehicles.size() == kVehiclesPerRead) return true;
+    piece += "]}";
+    return false;
+  };
+  return PiecesAnswer(std::move(pieces), "application/geo+json");
 }
 
 HttpResponse Api::PageConfig() const {
@@ -207,20 +228,23 @@ HttpResponse Api::PageConfig() const {
   config["tile_attribution"] = options_.tile_attribution;
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
   config["officials"] = officials_.is_open();
+  config["view"] = nullptr;
+  if (const auto view = zone_.View()) {
+    config["view"] = {{"south", view->south_west.latitude_deg},
+                      {"west", view->south_west.longitude_deg},
+                      {"north", view->north_east.latitude_deg},
+                      {"east", view->north_east.longitude_deg}};
+  }
   return JsonAnswer(config);
 }
 
 /// A vehicle's file itself never leaves the zone.
-HttpResponse Api::Picture(const std::string& sha256, const HttpRequest& question) {
-  const auto path = zone_.ImagePath(sha256);
-  const zone::PictureCache::File picture = path ? pictures_.Get(sha256, *path) : nullptr;
-  if (!picture) return ErrorAnswer(404, "the zone has no picture of this name");
-  StaticFile file;
-  file.content.assign(picture->begin(), picture->end());
-  file.content_type = "image/jpeg";
-  file.etag = '"' + sha256 + '-' + std::to_string(options_.picture_side_px) + '"';
+HttpResponse Api::Picture(const std::string& sha256, const zone::PictureCache::File& picture,
+                          const HttpRequest& question) const {
+  if (!picture) return NoPicture();
+  const std::string etag = '"' + sha256 + '-' + std::to_string(options_.picture_side_px) + '"';
   HttpResponse answer =
-      CacheableAnswer(std::move(file), "public, max-age=31536000, immutable", question);
+      CacheableAnswer(picture, "image/jpeg", etag, "public, max-age=31536000, immutable", question);
   // Even opened on its own it may do nothing.
   answer.headers.emplace_back("Content-Security-Policy", "default-src 'none'; sandbox");
   return answer;
@@ -228,9 +252,9 @@ HttpResponse Api::Picture(const std::string& sha256, const HttpRequest& question
 
 HttpResponse Api::File(const StaticFiles& files, std::string_view name,
                        const HttpRequest& question) const {
-  auto file = files.Find(name);
+  const auto file = files.Find(name);
   if (!file) return ErrorAnswer(404, "there is nothing at this address");
-  return CacheableAnswer(*std::move(file), "no-cache", question);
+  return CacheableAnswer(file->content, file->content_type, file->etag, "no-cache", question);
 }
 
 }  // namespace livemap::web

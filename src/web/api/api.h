@@ -1,9 +1,14 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "protocol/hazard_catalogue.h"
+#include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
 #include "web/api/official_api.h"
 #include "web/api/query.h"
@@ -12,6 +17,7 @@
 #include "web/http/static_files.h"
 #include "web/http/web_config.h"
 #include "zone/pictures/picture_cache.h"
+#include "zone/pictures/picture_queue.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {
@@ -24,21 +30,46 @@ class Api {
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
+  /// Every request but a picture's, of which it knows none.
   HttpResponse Answer(const HttpRequest& question);
+  /// Every request: a picture that is not made yet is answered later, from another thread. `done`
+  /// is called once, must not block, and is dropped without a call when the Api goes away.
+  using Done = std::function<void(HttpResponse answer)>;
+  void Answer(const HttpRequest& question, const Done& done);
+  /// Lets go of whoever waits for a picture, without a call: when it returns, none is being called.
+  void Stop() { picture_queue_.Stop(); }
+  /// Whether the request has a valid token. Nothing is counted: Answer does that. Quick.
+  bool IsByOfficial(const HttpRequest& question) const {
+    return !question.authorization.empty() && officials_.HasRightToken(question);
+  }
+  /// Whether the request asks for a picture, which may take long.
+  static bool IsForPicture(const HttpRequest& question);
+
+  /// How pictures fared since the start: how many were refused and why the last of them was, and
+  /// how many asked in vain because too many waited.
+  struct PictureCounters {
+    std::uint64_t refused = 0;
+    std::string last_refusal;
+    std::uint64_t busy = 0;
+  };
+  PictureCounters picture_counters() const;
 
   /// A JSON answer `{"error": sentence}` with the server's security headers.
   HttpResponse ErrorAnswer(int status, const std::string& sentence) const;
 
  private:
+  HttpResponse AnswerGet(const HttpRequest& question);
   HttpResponse AnswerPost(const HttpRequest& question);
   HttpResponse Route(const RequestTarget& target, const HttpRequest& question);
   HttpResponse RouteApi(const RequestTarget& target) const;
-  HttpResponse Hazards(const HazardQuery& query) const;
-  HttpResponse OneHazard(const std::string& id) const;
-  HttpResponse Events(const std::string& id, std::size_t limit) const;
   HttpResponse Vehicles() const;
   HttpResponse PageConfig() const;
-  HttpResponse Picture(const std::string& sha256, const HttpRequest& question);
+  /// The picture's hash and file; none when the request asks for another thing.
+  std::optional<std::pair<std::string, std::string>> FindPicture(const HttpRequest& question) const;
+  HttpResponse Picture(const std::string& sha256, const zone::PictureCache::File& picture,
+                       const HttpRequest& question) const;
+  /// With the headers that every answer has.
+  HttpResponse Finish(HttpResponse answer) const;
   HttpResponse File(const StaticFiles& files, std::string_view name,
                     const HttpRequest& question) const;
 
@@ -47,11 +78,13 @@ class Api {
   const protocol::HazardCatalogue& catalogue_;
   const VehicleTrails& trails_;
   OfficialApi officials_;
+  const HazardApi hazards_;
   const MapChangeApi map_changes_;
   zone::PictureCache pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;
-  const std::string page_policy_;  ///< Content-Security-Policy of the page.
+  const std::string page_policy_;     ///< Content-Security-Policy of the page.
+  zone::PictureQueue picture_queue_;  ///< Last: its thread uses what stands above.
 };
 
 }  // namespace livemap::web

@@ -6,8 +6,6 @@
 namespace livemap::web {
 namespace {
 
-constexpr std::string_view kHistoryEnding = "/events";
-
 HttpResponse UnknownMapChange() {
   return MakeErrorAnswer(404, "the zone knows no map change with this id");
 }
@@ -30,27 +28,31 @@ HttpResponse MapChangeApi::Answer(const RequestTarget& target) const {
   const std::string rest = target.path.substr(std::string_view(kMapChangeAddress).size());
   if (rest.empty()) return List(ParseMapChangeQuery(target));
   if (rest.front() != '/') return MakeErrorAnswer(404, "there is nothing at this address");
-  const std::string id = rest.substr(1);
-  const bool history =
-      id.size() >= kHistoryEnding.size() &&
-      id.compare(id.size() - kHistoryEnding.size(), std::string::npos, kHistoryEnding.data()) == 0;
-  if (history) {
-    return Events(id.substr(0, id.size() - kHistoryEnding.size()), ParseEventsQuery(target));
-  }
+  if (const auto id = IdOfHistory(rest)) return Events(*id, ParseEventsQuery(target));
   RefuseQueryParameters(target);
-  return One(id);
+  return One(rest.substr(1));
 }
 
 HttpResponse MapChangeApi::List(const MapChangeQuery& query) const {
-  const std::uint64_t sequence = zone_.Sequence();  // Before the list.
+  zone::Walk<zone::MapChangeState> walk;
+  walk.box = query.box;
+  walk.after = query.since.value_or(0);
+  walk.until = zone_.Sequence();  // Before the list.
   // Since a sequence all that changed is looked at: what left the selection is told too.
-  const auto changes = zone_.QueryMapChanges(query.box, query.since.value_or(0), query.limit,
-                                             query.since ? zone::MapChangeStates() : query.states);
-  return ListAnswer(sequence, query.limit, changes, [&](const zone::MapChangeFeature& change) {
+  if (!query.since) {
+    walk.states = query.states.empty() ? zone::OpenStates() : query.states;
+  } else if (*query.since == 0) {
+    walk.states = zone::OpenStates();
+  }
+  const auto read = [this](const auto& where, std::size_t limit) {
+    return zone_.ReadMapChanges(where, limit);
+  };
+  const auto to_feature = [query](const zone::MapChangeFeature& change) {
     Json feature = MapChangeGeoJson(change);
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(change, query));
     return feature;
-  });
+  };
+  return ListAnswer(std::move(walk), query.limit, read, to_feature);
 }
 
 HttpResponse MapChangeApi::One(const std::string& id) const {

@@ -15,6 +15,36 @@ bool IsJsonType(const std::string& content_type) {
   return type == "application/json" || type == "application/json ";
 }
 
+constexpr char kHazardIsGone[] = "the hazard is gone; seen again it is a new one";
+constexpr char kMapChangeIsUndone[] = "the map change is undone; told again it is a new one";
+constexpr char kUnknownVehicle[] = "the zone has never heard of a vehicle of this name";
+
+/// None when the decision is taken back, now or before.
+std::optional<HttpResponse> WhyNotUndone(zone::ZoneService::Undone undone, const std::string& what,
+                                         const std::string& why_gone) {
+  switch (undone) {
+    case zone::ZoneService::Undone::kDone:
+    case zone::ZoneService::Undone::kBefore:
+      return std::nullopt;
+    case zone::ZoneService::Undone::kNothing:
+      return MakeErrorAnswer(409, "no decision about the " + what + " is known to undo");
+    case zone::ZoneService::Undone::kOther:
+      return MakeErrorAnswer(
+          409, "another decision about the " + what + " was made since, and nothing is undone");
+    case zone::ZoneService::Undone::kGone:
+      return MakeErrorAnswer(409, why_gone);
+    case zone::ZoneService::Undone::kUnknown:
+      break;
+  }
+  return MakeErrorAnswer(404, "the zone knows no " + what + " with this id");
+}
+
+/// What was decided about, with the id by which an undo names this decision.
+HttpResponse DecidedAnswer(Json feature, std::uint64_t decision_id) {
+  feature["properties"]["decision_id"] = decision_id;
+  return JsonAnswer(feature, "application/geo+json");
+}
+
 }  // namespace
 
 OfficialApi::OfficialApi(const WebConfig& options, zone::ZoneService& zone,
@@ -22,8 +52,8 @@ OfficialApi::OfficialApi(const WebConfig& options, zone::ZoneService& zone,
     : options_(options),
       zone_(zone),
       catalogue_(catalogue),
-      gate_(options.token_file.empty() ? std::vector<Official>()
-                                       : ReadTokenFile(options.token_file)) {}
+      authenticator_(options.token_file.empty() ? std::vector<Official>()
+                                                : ReadTokenFile(options.token_file)) {}
 
 std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& question,
                                                        std::string& official) {
@@ -31,7 +61,7 @@ std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& questi
     return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
   OfficialAuthenticator::Answer answer =
-      gate_.Check(question.authorization, question.client, Seconds(SteadyNs()));
+      authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()));
   std::optional<HttpResponse> refusal;
   switch (answer.verdict) {
     case OfficialAuthenticator::Verdict::kAllowed:
@@ -56,34 +86,73 @@ std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& questi
   return refusal;
 }
 
+bool OfficialApi::IsOfficial(const HttpRequest& question) {
+  return authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()))
+             .verdict == OfficialAuthenticator::Verdict::kAllowed;
+}
+
+bool OfficialApi::HasRightToken(const HttpRequest& question) const {
+  return authenticator_.IsRight(question.authorization, question.client, Seconds(SteadyNs()));
+}
+
 HttpResponse OfficialApi::Decide(const DecisionTarget& target, const HttpRequest& question) {
   std::string official;
   if (auto refusal = WhyNotAllowed(question, official)) return *std::move(refusal);
+  HttpResponse answer = DecideAs(official, target, question);
+  answer.by_official = true;
+  return answer;
+}
+
+HttpResponse OfficialApi::DecideAs(const std::string& official, const DecisionTarget& target,
+                                   const HttpRequest& question) {
   if (!question.body.empty() && !IsJsonType(question.content_type)) {
     return MakeErrorAnswer(415, "the body's type is not accepted, accepted is application/json");
   }
+  try {
+    return DecideNow(official, target, question);
+  } catch (const zone::DecisionConflict& conflict) {
+    HttpResponse answer = JsonAnswer({{"error", conflict.what()}, {"changed", true}});
+    answer.status = 409;
+    return answer;
+  }
+}
+
+HttpResponse OfficialApi::DecideNow(const std::string& official, const DecisionTarget& target,
+                                    const HttpRequest& question) {
   if (target.decision == Decision::kMapChange) {
     return DecideMapChange(target, official, question.body);
   }
-  const std::string reason = ParseDecisionBody(target.decision, question.body);
-  if (target.decision == Decision::kDistrust) return Distrust(target.id, official, reason);
-  return DecideHazard(target, official, reason);
+  const DecisionBody body = ParseDecisionBody(target.decision, question.body);
+  if (target.decision == Decision::kDistrust || target.decision == Decision::kTrust) {
+    return DecideVehicle(target, official, body.reason);
+  }
+  if (target.decision == Decision::kUndo) return UndoHazard(target.id, official, body);
+  return DecideHazard(target, official, body);
 }
 
 HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::string& official,
-                                       const std::string& reason) {
+                                       const DecisionBody& body) {
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   const auto hazard = zone_.Find(*uuid);
   if (!hazard) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
-  const bool decided = target.decision == Decision::kReject
-                           ? zone_.Reject(*uuid, official, reason)
-                           : zone_.Confirm(*uuid, official, reason);
+  const auto decided = target.decision == Decision::kReject
+                           ? zone_.Reject(*uuid, official, body.reason, body.seen)
+                           : zone_.Confirm(*uuid, official, body.reason, body.seen);
   if (!decided) {
     return MakeErrorAnswer(409, hazard->state == zone::HazardState::kRejected
                                     ? "the hazard is rejected already"
-                                    : "the hazard is gone; seen again it is a new one");
+                                    : kHazardIsGone);
   }
+  return DecidedAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), *decided);
+}
+
+HttpResponse OfficialApi::UndoHazard(const std::string& id, const std::string& official,
+                                     const DecisionBody& body) {
+  const auto uuid = Uuid::Parse(id);
+  if (!uuid) throw BadRequest("the hazard's id is no UUID");
+  const auto undone = zone_.Undo(*uuid, official, body.reason, body.decision_id);
+  if (auto refusal = WhyNotUndone(undone, "hazard", kHazardIsGone)) return *std::move(refusal);
   return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), "application/geo+json");
 }
 
@@ -92,23 +161,68 @@ HttpResponse OfficialApi::DecideMapChange(const DecisionTarget& target, const st
   const MapChangeDecision decision = ParseMapChangeDecision(body);
   const auto uuid = Uuid::Parse(target.id);
   if (!uuid) throw BadRequest("the map change's id is no UUID");
+  if (decision.undoes) {
+    const auto undone = zone_.UndoMapChange(*uuid, official, decision.reason, decision.decision_id);
+    if (auto refusal = WhyNotUndone(undone, "map change", kMapChangeIsUndone)) {
+      return *std::move(refusal);
+    }
+    return JsonAnswer(MapChangeGeoJson(*zone_.FindMapChange(*uuid)), "application/geo+json");
+  }
   const auto feature = zone_.FindMapChange(*uuid);
   if (!feature) return MakeErrorAnswer(404, "the zone knows no map change with this id");
-  const bool decided = decision.confirms ? zone_.ConfirmMapChange(*uuid, official, decision.reason)
+  const auto decided = decision.confirms ? zone_.ConfirmMapChange(*uuid, official, decision.reason)
                                          : zone_.DismissMapChange(*uuid, official, decision.reason);
   if (!decided) {
     return MakeErrorAnswer(409, feature->state == zone::MapChangeState::kDismissed
                                     ? "the map change is dismissed already"
-                                    : "the map change is undone; told again it is a new one");
+                                    : kMapChangeIsUndone);
   }
-  return JsonAnswer(MapChangeGeoJson(*zone_.FindMapChange(*uuid)), "application/geo+json");
+  return DecidedAnswer(MapChangeGeoJson(*zone_.FindMapChange(*uuid)), *decided);
 }
 
-HttpResponse OfficialApi::Distrust(const std::string& vehicle, const std::string& official,
-                                   const std::string& reason) {
-  const auto withdrawn = zone_.Distrust(vehicle, official, reason);
-  if (!withdrawn) return MakeErrorAnswer(404, "the zone has never heard of a vehicle of this name");
-  return JsonAnswer({{"vehicle", vehicle}, {"hazards", *withdrawn}});
+HttpResponse OfficialApi::DecideVehicle(const DecisionTarget& target, const std::string& official,
+                                        const std::string& reason) {
+  const auto changed = target.decision == Decision::kDistrust
+                           ? zone_.Distrust(target.id, official, reason)
+                           : zone_.Trust(target.id, official, reason);
+  if (!changed) return MakeErrorAnswer(404, kUnknownVehicle);
+  return JsonAnswer({{"vehicle", target.id}, {"hazards", *changed}});
+}
+
+HttpResponse OfficialApi::Preview(const DecisionTarget& target, const HttpRequest& question) {
+  std::string official;
+  if (auto refusal = WhyNotAllowed(question, official)) return *std::move(refusal);
+  HttpResponse answer = PreviewDistrust(target.id);
+  answer.by_official = true;
+  return answer;
+}
+
+HttpResponse OfficialApi::PreviewDistrust(const std::string& vehicle) const {
+  const auto preview = zone_.PreviewDistrust(vehicle);
+  if (!preview) return MakeErrorAnswer(404, kUnknownVehicle);
+  Json answer;
+  answer["vehicle"] = vehicle;
+  answer["distrusted"] = preview->is_distrusted;
+  answer["hazards"] = preview->hazards;
+  answer["would_change"] = preview->would_change;
+  answer["would_vanish"] = preview->would_vanish;
+  answer["examples"] = Json::array();
+  for (const zone::DistrustExample& example : preview->examples) {
+    answer["examples"].push_back({{"id", example.hazard},
+                                  {"class", example.class_name},
+                                  {"from", example.from},
+                                  {"to", example.to}});
+  }
+  answer["decisions"] = Json::array();
+  for (const zone::DecisionRecord& decision : preview->decisions) {
+    answer["decisions"].push_back({{"decision", DecisionName(decision.kind)},
+                                   {"official", decision.official},
+                                   {"reason", decision.reason},
+                                   {"hazards", decision.hazards},
+                                   {"time", Rfc3339(decision.at_ns)},
+                                   {"undone", decision.undone_by != 0}});
+  }
+  return JsonAnswer(answer);
 }
 
 }  // namespace livemap::web

@@ -20,23 +20,36 @@ class OfficialApi {
               const protocol::HazardCatalogue& catalogue);
 
   /// Whether anybody may decide at all.
-  bool is_open() const { return gate_.is_open(); }
+  bool is_open() const { return authenticator_.is_open(); }
+  /// Whether the request has a token that Decide would accept; a wrong one is not counted.
+  bool HasRightToken(const HttpRequest& question) const;
+  /// Whether the request has a valid token; a wrong one is counted.
+  bool IsOfficial(const HttpRequest& question);
   /// Answers a POST to a decision's address.
   HttpResponse Decide(const DecisionTarget& target, const HttpRequest& question);
+  /// Answers a GET of it: what the decision would do (HasPreview), for officials only.
+  HttpResponse Preview(const DecisionTarget& target, const HttpRequest& question);
 
  private:
+  HttpResponse DecideAs(const std::string& official, const DecisionTarget& target,
+                        const HttpRequest& question);
+  HttpResponse DecideNow(const std::string& official, const DecisionTarget& target,
+                         const HttpRequest& question);
   HttpResponse DecideHazard(const DecisionTarget& target, const std::string& official,
-                            const std::string& reason);
+                            const DecisionBody& body);
+  HttpResponse UndoHazard(const std::string& id, const std::string& official,
+                          const DecisionBody& body);
   HttpResponse DecideMapChange(const DecisionTarget& target, const std::string& official,
                                const std::string& body);
-  HttpResponse Distrust(const std::string& vehicle, const std::string& official,
-                        const std::string& reason);
+  HttpResponse DecideVehicle(const DecisionTarget& target, const std::string& official,
+                             const std::string& reason);
+  HttpResponse PreviewDistrust(const std::string& vehicle) const;
   std::optional<HttpResponse> WhyNotAllowed(const HttpRequest& question, std::string& official);
 
   const WebConfig& options_;
   zone::ZoneService& zone_;
   const protocol::HazardCatalogue& catalogue_;
-  OfficialAuthenticator gate_;
+  OfficialAuthenticator authenticator_;
 };
 
 }  // namespace livemap::web

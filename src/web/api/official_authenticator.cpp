@@ -10,8 +10,9 @@
 
 #include "common/error.h"
 #include "common/sha256.h"
+#include "common/text_file.h"
 #include "common/time.h"
-#include "zone/admission/report_validation.h"
+#include "protocol/text_rules.h"
 
 namespace livemap::web {
 namespace {
@@ -49,7 +50,7 @@ Official ParseOfficial(std::string_view line, const std::string& where) {
   const std::string name(line.substr(0, blank));
   const std::string_view token =
       blank == std::string_view::npos ? std::string_view() : line.substr(blank + 1);
-  if (!zone::IsPrintableText(name, kMaxNameBytes) || !IsToken(token)) {
+  if (!protocol::IsAcceptableName(name, kMaxNameBytes) || !IsToken(token)) {
     throw Error(where + " is not accepted, accepted is NAME TOKEN: a name of 1 to " +
                 std::to_string(kMaxNameBytes) + " bytes, one blank, a token of " +
                 std::to_string(kMinTokenBytes) + " to " + std::to_string(kMaxTokenBytes) +
@@ -78,7 +79,8 @@ std::vector<Official> ParseTokenFile(const std::string& text, const std::string&
     const std::size_t end = rest.find('\n');
     std::string_view line = rest.substr(0, end);
     rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    // Blanks and a carriage return that editors leave at the end of a line.
+    line = line.substr(0, line.find_last_not_of(" \t\r") + 1);
     if (line.empty() || line.front() == '#') continue;
     const std::string where = "token file '" + name + "', line " + std::to_string(number) + ",";
     Official official = ParseOfficial(line, where);
@@ -108,7 +110,7 @@ std::vector<Official> ReadTokenFile(const std::string& path) {
     throw Error("token file '" + path +
                 "' may be read or written by everybody, accepted is mode 0600 or 0640");
   }
-  return ParseTokenFile(ReadFile(path, kMaxTokenFileBytes), path);
+  return ParseTokenFile(ReadTextFile(path, kMaxTokenFileBytes), path);
 }
 
 OfficialAuthenticator::OfficialAuthenticator(std::vector<Official> officials)
@@ -123,11 +125,16 @@ OfficialAuthenticator::Answer OfficialAuthenticator::Check(const std::string& au
   const std::string token = BearerToken(authorization);
   if (token.empty()) return {Verdict::kNoToken, ""};
   const std::int64_t now_ns = Nanoseconds(now_s);
-  if (!MayTry(client, now_ns)) return {Verdict::kTooManyWrong, ""};
-  const auto name = NameOf(token);
-  if (name) return {Verdict::kAllowed, *name};
+  const bool may_try = MayTry(client, now_ns);
+  if (const auto name = Recognize(token, may_try)) return {Verdict::kAllowed, *name};
+  if (!may_try) return {Verdict::kTooManyWrong, ""};
   CountMistake(client, now_ns);
   return {Verdict::kWrongToken, ""};
+}
+
+std::optional<std::string> OfficialAuthenticator::Recognize(const std::string& token,
+                                                            bool may_try) const {
+  return may_try || token.size() >= kUnguessableBytes ? NameOf(token) : std::nullopt;
 }
 
 /// Compares hashes, which tell nothing of how much of a token was right, with every official's.
@@ -140,7 +147,13 @@ std::optional<std::string> OfficialAuthenticator::NameOf(const std::string& toke
   return found == nullptr ? std::nullopt : std::optional<std::string>(found->name);
 }
 
-bool OfficialAuthenticator::MayTry(const std::string& client, std::int64_t now_ns) {
+bool OfficialAuthenticator::IsRight(const std::string& authorization, const std::string& client,
+                                    double now_s) const {
+  const std::string token = BearerToken(authorization);
+  return !token.empty() && Recognize(token, MayTry(client, Nanoseconds(now_s))).has_value();
+}
+
+bool OfficialAuthenticator::MayTry(const std::string& client, std::int64_t now_ns) const {
   const MutexLock lock(mutex_);
   const auto* attempts = attempts_.Find(client);
   return attempts == nullptr || attempts->front().TokensAt(now_ns) >= 1;

@@ -28,7 +28,10 @@ std::vector<Official> ParseTokenFile(const std::string& text, const std::string&
 std::vector<Official> ReadTokenFile(const std::string& path);
 
 /// Lets officials in by the bearer token of their request. Wrong tokens are counted against the
-/// client that sends them: after a few, nothing of it is looked at for a while. Thread-safe.
+/// client that sends them: after a few, no short token of it is looked at for a while. A long one
+/// always is, so that nobody behind an official's address can keep the official out: however fast
+/// it guesses, a random token of kUnguessableBytes is not found, as one that a person made up might
+/// be. Thread-safe.
 class OfficialAuthenticator {
  public:
   enum class Verdict {
@@ -36,7 +39,7 @@ class OfficialAuthenticator {
     kClosed,       ///< There are no officials.
     kNoToken,      ///< None was sent.
     kWrongToken,   ///< Counted against the client.
-    kTooManyWrong  ///< Not even looked at.
+    kTooManyWrong  ///< Wrong, or too short to be looked at now.
   };
   struct Answer {
     Verdict verdict = Verdict::kClosed;
@@ -46,6 +49,9 @@ class OfficialAuthenticator {
   /// A client may be wrong so often at once, and again each time so long has passed.
   static constexpr int kMaxWrong = 10;
   static constexpr double kSecondsPerWrong = 30;
+  /// A token of so many bytes is looked at whatever its client has sent: 32 hexadecimal digits are
+  /// 128 bits, for which a billion guesses a second need 10^22 years.
+  static constexpr std::size_t kUnguessableBytes = 32;
 
   explicit OfficialAuthenticator(std::vector<Official> officials);
 
@@ -53,14 +59,18 @@ class OfficialAuthenticator {
   /// `authorization` is the header's value, `now_s` a clock that never goes back. Takes the same
   /// time for every token.
   Answer Check(const std::string& authorization, const std::string& client, double now_s);
+  /// Whether Check would allow it; counts nothing.
+  bool IsRight(const std::string& authorization, const std::string& client, double now_s) const;
 
  private:
   std::optional<std::string> NameOf(const std::string& token) const;
-  bool MayTry(const std::string& client, std::int64_t now_ns);
+  /// Whose token it is; none where it is wrong or not looked at.
+  std::optional<std::string> Recognize(const std::string& token, bool may_try) const;
+  bool MayTry(const std::string& client, std::int64_t now_ns) const;
   void CountMistake(const std::string& client, std::int64_t now_ns);
 
   const std::vector<Official> officials_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   /// For each client that was wrong, how often it may be wrong still.
   KeyedTokenBuckets<1> attempts_ GUARDED_BY(mutex_);
 };

@@ -12,6 +12,9 @@ namespace {
 
 constexpr std::size_t kMaxTargetBytes = 4096;
 constexpr std::size_t kMaxParameters = 32;
+constexpr std::array<zone::HazardState, zone::kHazardStates> kAllHazardStates{
+    zone::HazardState::kCandidate, zone::HazardState::kActive, zone::HazardState::kVerifying,
+    zone::HazardState::kGone, zone::HazardState::kRejected};
 
 /// A client's text as part of an error sentence: short, so that the answer stays small.
 std::string Quoted(std::string_view text) {
@@ -118,11 +121,14 @@ std::size_t ParseLimit(const std::string& text, std::size_t most) {
 }
 
 /// "a, b and c".
+const char* NameOfState(zone::HazardState state) { return zone::HazardStateName(state); }
+const char* NameOfState(zone::MapChangeState state) { return zone::MapChangeStateName(state); }
+
 template <typename State, std::size_t kCount>
 std::string StateNames(const std::array<State, kCount>& all) {
-  std::string names = zone::StateName(all.front());
+  std::string names = NameOfState(all.front());
   for (std::size_t i = 1; i < kCount; ++i) {
-    names += (i + 1 < kCount ? ", " : " and ") + std::string(zone::StateName(all[i]));
+    names += (i + 1 < kCount ? ", " : " and ") + std::string(NameOfState(all[i]));
   }
   return names;
 }
@@ -132,7 +138,7 @@ std::set<State> ParseStates(const std::string& text, const std::array<State, kCo
   std::set<State> states;
   Split(text, ',', [&](std::string_view piece) {
     for (const State state : all) {
-      if (piece == zone::StateName(state) && states.insert(state).second) return;
+      if (piece == NameOfState(state) && states.insert(state).second) return;
     }
     throw BadRequest("state is " + Quoted(text) + ", accepted are " + StateNames(all) +
                      ", each once, with commas between");
@@ -202,11 +208,17 @@ RequestTarget ParseTarget(std::string_view target) {
 }
 
 HazardQuery ParseHazardQuery(const RequestTarget& target) {
-  return ParseListQuery<HazardQuery>(
-      target,
-      std::array<zone::HazardState, zone::kHazardStates>{
-          zone::HazardState::kCandidate, zone::HazardState::kActive, zone::HazardState::kVerifying,
-          zone::HazardState::kGone, zone::HazardState::kRejected});
+  return ParseListQuery<HazardQuery>(target, kAllHazardStates);
+}
+
+PointsQuery ParsePointsQuery(const RequestTarget& target) {
+  RefuseRepeated(target);
+  PointsQuery query;
+  for (const auto& [name, value] : target.parameters) {
+    if (name != "state") RefuseUnknown(name, "accepted is state");
+    query.states = ParseStates(value, kAllHazardStates);
+  }
+  return query;
 }
 
 MapChangeQuery ParseMapChangeQuery(const RequestTarget& target) {

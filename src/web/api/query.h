@@ -52,6 +52,14 @@ constexpr std::size_t kMaxHazardsPerAnswer = 50000;
 /// parameters are refused, so that a misspelt filter never answers with everything.
 HazardQuery ParseHazardQuery(const RequestTarget& target);
 
+/// What `GET /api/v1/hazards/points` asks for.
+struct PointsQuery {
+  zone::HazardStates states;  ///< Only these; empty: all that are on the map.
+};
+
+/// Reads `state` as ParseHazardQuery does; refuses every other parameter.
+PointsQuery ParsePointsQuery(const RequestTarget& target);
+
 /// What `GET /api/v1/changes` asks for; as HazardQuery.
 struct MapChangeQuery {
   std::optional<geo::GeoBox> box;

@@ -54,12 +54,25 @@ std::optional<StaticFile> StaticFiles::Find(std::string_view relative) const {
   const auto type = TypeByExtension(path);
   std::error_code failure;
   if (!type || !std::filesystem::is_regular_file(path, failure)) return std::nullopt;
+  Kept now;
+  now.bytes = std::filesystem::file_size(path, failure);
+  if (failure) return std::nullopt;
+  now.changed = std::filesystem::last_write_time(path, failure);
+  if (failure) return std::nullopt;
+  const MutexLock lock(mutex_);
+  const auto known = kept_.find(path.string());
+  if (known != kept_.end() && known->second.bytes == now.bytes &&
+      known->second.changed == now.changed) {
+    return known->second.file;
+  }
   try {
-    StaticFile file;
-    file.content = ReadFile(path.string(), kMaxFileBytes);
-    file.content_type = *type;
-    file.etag = '"' + Sha256Hex(file.content).substr(0, 32) + '"';
-    return file;
+    const std::string content = ReadFile(path.string(), kMaxFileBytes);
+    now.file.content =
+        std::make_shared<const std::vector<std::uint8_t>>(content.begin(), content.end());
+    now.file.content_type = *type;
+    now.file.etag = '"' + Sha256Hex(content).substr(0, 32) + '"';
+    kept_[path.string()] = now;
+    return now.file;
   } catch (const Error&) {
     return std::nullopt;  // Vanished between the two looks, unreadable, or too large.
   }

@@ -1,5 +1,6 @@
 #include "web/http/web_config.h"
 
+#include <boost/asio/ip/address.hpp>
 #include <filesystem>
 #include <regex>
 
@@ -17,6 +18,14 @@ void RequireFile(const std::string& option, const std::string& root, const std::
 void RequirePositive(const std::string& option, double value) {
   if (value > 0 && value < 1e9) return;
   throw Error(option + " is " + std::to_string(value) + ", accepted is a number above 0");
+}
+
+void RequireAddress(const std::string& option, const std::string& address) {
+  boost::system::error_code failure;
+  boost::asio::ip::make_address(address, failure);
+  if (failure) {
+    throw Error(option + " holds '" + address + "', accepted are IPv4 and IPv6 addresses");
+  }
 }
 
 }  // namespace
@@ -46,7 +55,6 @@ void Validate(const WebConfig& options) {
   }
   RequireFile("web_root", options.web_root, "index.html");
   RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.min.js");
-  RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.markercluster.min.js");
   TileSource(options.tile_url);
   if (!geo::IsValid(options.centre)) {
     throw Error("centre is " + std::to_string(options.centre.latitude_deg) + ", " +
@@ -61,8 +69,13 @@ void Validate(const WebConfig& options) {
                 ", accepted is 16 to 16384");
   }
   RequirePositive("max_connections", static_cast<double>(options.max_connections));
+  RequirePositive("max_connections_per_client",
+                  static_cast<double>(options.max_connections_per_client));
+  for (const std::string& proxy : options.proxies) RequireAddress("proxies", proxy);
+  RequirePositive("max_held_bytes", static_cast<double>(options.max_held_bytes));
   RequirePositive("request_timeout_s", options.request_timeout_s);
   RequirePositive("answer_timeout_s", options.answer_timeout_s);
+  RequirePositive("picture_timeout_s", options.picture_timeout_s);
   RequirePositive("ping_timeout_s", options.ping_timeout_s);
   RequirePositive("heartbeat_s", options.heartbeat_s);
   RequirePositive("max_queued_messages", static_cast<double>(options.max_queued_messages));

@@ -13,28 +13,36 @@ struct WebConfig {
   std::string address = "127.0.0.1";  ///< Where to listen; "0.0.0.0" serves the whole network.
   int port = 8080;                    ///< 0 takes any free port.
   std::string web_root;               ///< Folder of the page (index.html).
-  std::string leaflet_root = "/usr/share/javascript";  ///< Holds leaflet/ with its cluster plugin.
+  std::string leaflet_root = "/usr/share/javascript";  ///< Holds Debian's leaflet/.
   std::string tile_url;          ///< E.g. "https://tiles.example/{z}/{x}/{y}.png"; empty: offline.
   std::string tile_attribution;  ///< Plain text; most tile providers require it.
   std::string title = "LiveMap";
   geo::GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
   std::vector<std::string> allowed_origins;
-  /// Officials and their tokens (web/official_gate.h); empty: nobody may confirm or reject.
+  /// Officials and their tokens (web/api/official_authenticator.h); empty: nobody may decide.
   std::string token_file;
   int picture_side_px = 1280;                  ///< Longest side of a served picture.
   std::size_t picture_cache_bytes = 64 << 20;  ///< Served pictures kept in memory.
   int threads = 2;
-  std::size_t max_connections = 256;  ///< Further ones are answered 503 and closed.
-  double request_timeout_s = 15;      ///< For a request's header, also the idle time between two.
-  double answer_timeout_s = 60;       ///< For writing one answer.
-  double ping_timeout_s = 30;         ///< A stream that answers no ping for this long is closed.
-  double heartbeat_s = 10;            ///< A stream says something at least this often.
+  /// Who comes when all are taken takes the place of one that waits, or is answered 503
+  /// (web/server/connection_table.h). `max_connections` are shared by all, the reserve included.
+  std::size_t max_connections = 256;
+  std::size_t max_connections_per_client = 64;  ///< Of an IPv4 address or an IPv6 /64 network.
+  std::size_t reserved_connections = 32;        ///< For officials and /healthz; at most a quarter.
+  /// Addresses of proxies, which have no share: all their clients have one address.
+  std::vector<std::string> proxies;
+  double request_timeout_s = 15;  ///< For a request with its body, also the idle time between two.
+  double answer_timeout_s = 20;   ///< For writing each 32 KiB of an answer.
+  double picture_timeout_s = 10;  ///< Who waits so long for a picture is answered 503.
+  std::size_t max_held_bytes = 64 << 20;  ///< Of all answers that are being written.
+  double ping_timeout_s = 20;  ///< A stream that answers no ping for this long is closed.
+  double heartbeat_s = 5;      ///< A stream says something at least this often.
   /// Messages that wait for one live-stream client; one that falls further behind is closed with a
   /// reason and catches up when it reconnects.
   std::size_t max_queued_messages = 2048;
   std::size_t max_queued_bytes = 4 << 20;
-  std::size_t socket_send_buffer_bytes = 0;  ///< SO_SNDBUF; 0 leaves it to the system.
+  std::size_t socket_send_buffer_bytes = 128 << 10;  ///< SO_SNDBUF; 0 leaves it to the system.
 };
 
 /// Throws Error naming the first option that cannot be served, its value and what is accepted.

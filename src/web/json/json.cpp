@@ -92,7 +92,7 @@ Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& 
   properties["label"] = catalogue.Get(hazard.class_name).label;
   properties["confidence"] = Rounded(static_cast<double>(hazard.confidence), 4);
   properties["sightings"] = hazard.sightings;
-  properties["state"] = zone::StateName(hazard.state);
+  properties["state"] = zone::HazardStateName(hazard.state);
   properties["presence"] = Rounded(static_cast<double>(hazard.presence), 4);
   properties["vehicles"] = hazard.vehicles;
   properties["first_seen"] = Rfc3339(hazard.first_seen_ns);
@@ -108,8 +108,8 @@ Json EventJson(const zone::StoredEvent& event) {
   Json json;
   json["sequence"] = event.sequence;
   json["action"] = ActionName(event.action);
-  json["from"] = event.from ? Json(zone::StateName(*event.from)) : Json(nullptr);
-  json["to"] = zone::StateName(event.to);
+  json["from"] = event.from ? Json(zone::HazardStateName(*event.from)) : Json(nullptr);
+  json["to"] = zone::HazardStateName(event.to);
   json["reason"] = event.reason;
   json["time"] = Rfc3339(event.at_ns);
   return json;

@@ -49,7 +49,7 @@ Json MapChangeGeoJson(const zone::MapChangeFeature& feature) {
   properties["label"] = LabelOf(feature.class_name);
   properties["colour"] = ColourOf(feature.class_name);
   properties["direction"] = feature.vanished ? "vanished" : "appeared";
-  properties["state"] = zone::StateName(feature.state);
+  properties["state"] = zone::MapChangeStateName(feature.state);
   properties["confidence"] = Rounded(static_cast<double>(feature.confidence), 4);
   properties["vehicles"] = feature.Vehicles();
   properties["drives"] = feature.drives;
@@ -66,8 +66,8 @@ Json MapChangeGeoJson(const zone::MapChangeFeature& feature) {
 Json MapChangeEventJson(const zone::StoredMapChangeEvent& event) {
   Json json;
   json["sequence"] = event.sequence;
-  json["from"] = event.from ? Json(zone::StateName(*event.from)) : Json(nullptr);
-  json["to"] = zone::StateName(event.to);
+  json["from"] = event.from ? Json(zone::MapChangeStateName(*event.from)) : Json(nullptr);
+  json["to"] = zone::MapChangeStateName(event.to);
   json["reason"] = event.reason;
   json["time"] = Rfc3339(event.at_ns);
   return json;

@@ -2,12 +2,17 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
+#include <utility>
 
 #include "protocol/hazard_catalogue.h"
 #include "web/api/api.h"
 #include "web/api/event_hub.h"
+#include "web/http/client_name.h"
 #include "web/http/web_config.h"
+#include "web/server/connection_table.h"
+#include "web/server/work_queue.h"
 
 namespace livemap::web {
 
@@ -18,26 +23,32 @@ struct WebContext {
   const protocol::HazardCatalogue& catalogue;
   Api& api;
   EventHub& hub;
-  std::atomic<std::size_t> connections{0};
+  ConnectionTable& table;
+  /// Makes answers, so that the threads that read and write sockets never wait for the store.
+  WorkQueue& work;
+  const TrustedProxies& proxies;
+  std::atomic<std::size_t> held_bytes{0};  ///< Of the answers that are being written.
 };
 
-/// Counts one open connection for as long as it lives; it moves from the HTTP to the WebSocket
-/// session.
+/// One open connection's place in the table for as long as it lives; it moves from the HTTP to the
+/// WebSocket session.
 class ConnectionSlot {
  public:
-  explicit ConnectionSlot(WebContext& context) : context_(&context) { ++context.connections; }
+  ConnectionSlot(WebContext& context, ConnectionTable::Id id) : context_(&context), id_(id) {}
   ~ConnectionSlot() {
-    if (context_ != nullptr) --context_->connections;
+    if (context_ != nullptr) context_->table.Remove(id_);
   }
-  ConnectionSlot(ConnectionSlot&& other) noexcept : context_(other.context_) {
+  ConnectionSlot(ConnectionSlot&& other) noexcept : context_(other.context_), id_(other.id_) {
     other.context_ = nullptr;
   }
   ConnectionSlot& operator=(ConnectionSlot&&) = delete;
 
   WebContext& context() const { return *context_; }
+  ConnectionTable::Id id() const { return id_; }
 
  private:
   WebContext* context_;
+  ConnectionTable::Id id_;
 };
 
 }  // namespace livemap::web

@@ -1,11 +1,15 @@
 #include "web/server/http_session.h"
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/dispatch.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/write.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <utility>
 
+#include "common/clock.h"
 #include "web/http/origin.h"
 #include "web/server/websocket_session.h"
 
@@ -15,7 +19,13 @@ namespace {
 namespace beast = boost::beast;
 namespace http = beast::http;
 
-constexpr std::uint32_t kMaxHeaderBytes = 8192;
+constexpr std::size_t kMaxHeaderBytes = 8192;
+/// Of what was read ahead: a header, a body, and some of the requests behind it.
+constexpr std::size_t kMaxReadAheadBytes = 4 * kMaxHeaderBytes;
+/// What a refused client may still send until it has read the answer.
+constexpr std::size_t kMaxDrainedBytes = 1 << 20;
+constexpr std::chrono::seconds kDrainTime{2};
+constexpr const char* kNoPlace = "the server has no place for another connection now";
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
@@ -26,10 +36,23 @@ std::string Field(const http::request<http::string_body>& request, http::field n
   return std::string(value.data(), value.size());
 }
 
+/// All that stands in fields of this name, in their order: a client's own comes before the proxy's.
+std::string ForwardedFor(const http::request<http::string_body>& request) {
+  std::string text;
+  const auto [begin, end] = request.equal_range("X-Forwarded-For");
+  for (auto field = begin; field != end; ++field) {
+    text += text.empty() ? "" : ",";
+    text.append(field->value().data(), field->value().size());
+  }
+  return text;
+}
+
 /// HTTP's reason phrases come from Beast; this maps a failed parse to an answer.
 int StatusOfParseError(const beast::error_code& failure) {
   if (failure == http::error::body_limit) return 413;
-  return failure == http::error::header_limit ? 431 : 400;
+  const bool is_long =
+      failure == http::error::header_limit || failure == http::error::buffer_overflow;
+  return is_long ? 431 : 400;
 }
 
 bool IsParseError(const beast::error_code& failure) {
@@ -37,33 +60,54 @@ bool IsParseError(const beast::error_code& failure) {
          failure != http::error::end_of_stream && failure != http::error::partial_message;
 }
 
-/// An IPv4 address; of an IPv6 one the network, of which a single customer has every address.
-std::string ClientOf(const boost::asio::ip::tcp::socket& socket) {
+bool IsLoopback(const boost::asio::ip::tcp::socket& socket) {
   beast::error_code failure;
   const auto endpoint = socket.remote_endpoint(failure);
-  if (failure) return "";
-  if (endpoint.address().is_v4()) return endpoint.address().to_string();
-  auto bytes = endpoint.address().to_v6().to_bytes();
-  if (endpoint.address().to_v6().is_v4_mapped()) return endpoint.address().to_string();
-  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
-  return boost::asio::ip::make_address_v6(bytes).to_string();
+  return !failure && endpoint.address().is_loopback();
 }
 
 }  // namespace
 
-HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, WebContext& context)
-    : stream_(std::move(socket)), slot_(context), client_(ClientOf(stream_.socket())) {}
+HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, ConnectionSlot slot,
+                         std::string client)
+    : stream_(std::move(socket)),
+      slot_(std::move(slot)),
+      peer_(std::move(client)),
+      client_(peer_),
+      buffer_(kMaxReadAheadBytes),
+      deadline_(stream_.get_executor()) {}
+
+HttpSession::~HttpSession() { ReleaseHeld(); }
 
 void HttpSession::Start() {
+  const std::weak_ptr<HttpSession> weak = weak_from_this();
+  context().table.SetEnd(slot_.id(), [weak, executor = stream_.get_executor()] {
+    boost::asio::post(executor, [weak] {
+      if (const auto self = weak.lock()) self->Close();
+    });
+  });
   boost::asio::dispatch(stream_.get_executor(),
                         [self = shared_from_this()] { self->ReadRequest(); });
 }
 
+void HttpSession::SetPhase(ConnectionTable::Phase phase) {
+  context().table.SetPhase(slot_.id(), phase, SteadyNs());
+}
+
+void HttpSession::SetClient(std::string client) {
+  if (client == client_) return;
+  client_ = std::move(client);
+  context().table.SetClient(slot_.id(), client_, SteadyNs());
+}
+
 void HttpSession::ReadRequest() {
+  // What a proxy has open between two requests is nobody's share.
+  SetClient(peer_);
+  SetPhase(ConnectionTable::Phase::kWaiting);
   parser_.emplace();
-  parser_->header_limit(kMaxHeaderBytes);
+  parser_->header_limit(static_cast<std::uint32_t>(kMaxHeaderBytes));
   parser_->body_limit(kMaxBodyBytes);
-  stream_.expires_after(Milliseconds(slot_.context().options.request_timeout_s));
+  stream_.expires_after(Milliseconds(context().options.request_timeout_s));
   http::async_read_header(stream_, buffer_, *parser_,
                           [self = shared_from_this()](beast::error_code failure, std::size_t) {
                             self->OnHeader(failure);
@@ -75,20 +119,36 @@ void HttpSession::AnswerUnreadable(beast::error_code failure) {
   const int status = StatusOfParseError(failure);
   const char* sentence = status == 413 ? "the request's body is too large or not accepted"
                                        : "the request's header is malformed or too large";
-  Write(slot_.context().api.ErrorAnswer(status, sentence), false, false);
+  form_ = AnswerForm();
+  Refuse(context().api.ErrorAnswer(status, sentence));
 }
 
 void HttpSession::OnHeader(beast::error_code failure) {
   if (failure) return AnswerUnreadable(failure);
+  const Request& request = parser_->get();
+  form_ = AnswerForm();
+  form_.head_only = request.method() == http::verb::head;
+  form_.chunked = request.version() >= 11;
+  form_.keep_alive = request.version() >= 11 && request.keep_alive();
+  if (context().proxies.names().count(peer_) != 0) {
+    beast::error_code gone;
+    const auto endpoint = stream_.socket().remote_endpoint(gone);
+    if (gone) return Close();
+    SetClient(context().proxies.ClientOf(endpoint.address(), ForwardedFor(request)));
+  }
+  form_.gzip = AcceptsGzip(Field(request, http::field::accept_encoding));
+  // On the reserve only officials are served, and whoever watches over the zone. Whether a token is
+  // an official's is seen with the answer.
+  if (request[http::field::authorization].empty() && !HasPlace(request.target() == "/healthz")) {
+    return Refuse(MakeBusyAnswer(kNoPlace));
+  }
   if (parser_->is_done()) {
-    if (!UpgradeToStream(parser_->get())) AnswerRequest();
+    if (!UpgradeToStream(request)) AnswerRequest();
     return;
   }
-  if (parser_->get().method() == http::verb::post) return ReadBody();
+  if (request.method() == http::verb::post) return ReadBody();
   // A body that is not read would be taken for the next request: the connection ends.
-  const bool head_only = parser_->get().method() == http::verb::head;
-  Write(slot_.context().api.ErrorAnswer(413, "a request with a body is not accepted"), false,
-        head_only);
+  Refuse(context().api.ErrorAnswer(413, "a request with a body is not accepted"));
 }
 
 /// Within the time that the header had, too.
@@ -112,55 +172,175 @@ void HttpSession::AnswerRequest() {
   question.host = Field(request, http::field::host);
   question.client = client_;
   question.body = request.body();
-  HttpResponse answer = slot_.context().api.Answer(question);
-  Write(std::move(answer), request.keep_alive(), question.method == "HEAD");
+  rank_ =
+      context().api.IsByOfficial(question) ? WorkQueue::Rank::kOfficial : WorkQueue::Rank::kReader;
+  SetPhase(ConnectionTable::Phase::kWorking);
+  if (question.target == "/healthz") {
+    // Whoever watches over the zone does not wait for anybody's answer.
+    Begin(AnswerTo(question));
+    return WritePart();
+  }
+  if (Api::IsForPicture(question)) return AwaitPicture(question);
+  WriteAfter([this, question = std::move(question)] { Begin(AnswerTo(question)); });
+}
+
+bool HttpSession::HasPlace(bool is_health) {
+  const bool is_local = client_ == peer_ && IsLoopback(stream_.socket());
+  return (is_health && is_local) || context().table.MayServe(slot_.id());
+}
+
+HttpResponse HttpSession::AnswerTo(const HttpRequest& question) {
+  HttpResponse answer = context().api.Answer(question);
+  if (question.authorization.empty()) return answer;  // It has a place.
+  if (answer.by_official) context().table.MakeOfficial(slot_.id());
+  const bool may_be_told = answer.by_official || answer.status >= 400;
+  if (may_be_told || HasPlace(question.target == "/healthz")) return answer;
+  return MakeBusyAnswer(kNoPlace);
+}
+
+void HttpSession::AwaitPicture(const HttpRequest& question) {
+  const auto serve = [self = shared_from_this()](std::uint64_t number, HttpResponse answer) {
+    if (number != self->question_) return;
+    ++self->question_;
+    self->deadline_.cancel();
+    const bool may_be_served = self->context().table.MayServe(self->slot_.id());
+    self->Begin(may_be_served ? std::move(answer) : MakeBusyAnswer(kNoPlace));
+    self->WritePart();
+  };
+  deadline_.expires_after(Milliseconds(context().options.picture_timeout_s));
+  deadline_.async_wait([serve, number = question_](beast::error_code failure) {
+    if (!failure) serve(number, MakeBusyAnswer("the picture is not made yet", 2));
+  });
+  context().api.Answer(question, [serve, number = question_,
+                                  executor = stream_.get_executor()](HttpResponse answer) {
+    boost::asio::post(executor, [serve, number, answer = std::move(answer)]() mutable {
+      serve(number, std::move(answer));
+    });
+  });
 }
 
 bool HttpSession::UpgradeToStream(const Request& request) {
   if (!beast::websocket::is_upgrade(request)) return false;
-  WebContext& context = slot_.context();
   HttpResponse refusal;
   try {
     const RequestTarget target = ParseTarget(std::string(request.target()));
     if (target.path != "/ws") return false;
     const auto since = ParseStreamQuery(target);
-    if (IsAllowedOrigin(Field(request, http::field::origin), Field(request, http::field::host),
-                        context.options.allowed_origins)) {
+    const bool may_open =
+        IsAllowedOrigin(Field(request, http::field::origin), Field(request, http::field::host),
+                        context().options.allowed_origins);
+    // A token that nobody has looked at yet holds no place on the reserve.
+    const bool has_place = may_open && context().table.MayServe(slot_.id()) &&
+                           context().table.BecomeStream(slot_.id(), SteadyNs());
+    if (has_place) {
       stream_.expires_never();
-      std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), since)
+      std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), client_, since)
           ->Start(request);
       return true;
     }
-    refusal = context.api.ErrorAnswer(403, "pages of another origin may not open the live stream");
+    refusal = may_open
+                  ? MakeBusyAnswer("there is no place for another live stream of your address now")
+                  : context().api.ErrorAnswer(
+                        403, "pages of another origin may not open the live stream");
   } catch (const BadRequest& mistake) {
-    refusal = context.api.ErrorAnswer(400, mistake.what());
+    refusal = context().api.ErrorAnswer(400, mistake.what());
   }
-  Write(std::move(refusal), false, false);
+  Refuse(std::move(refusal));
   return true;
 }
 
-void HttpSession::Write(HttpResponse answer, bool keep_alive, bool head_only) {
-  response_ = Response(static_cast<http::status>(answer.status), 11);
-  for (const auto& [name, value] : answer.headers) response_.set(name, value);
-  if (!answer.content_type.empty()) response_.set(http::field::content_type, answer.content_type);
-  response_.keep_alive(keep_alive);
-  if (answer.status == 304) {
-    response_.erase(http::field::content_type);
-  } else {
-    response_.content_length(answer.content.size());
-  }
-  if (!head_only) response_.body() = std::move(answer.content);
-  stream_.expires_after(Milliseconds(slot_.context().options.answer_timeout_s));
-  http::async_write(stream_, response_,
-                    [self = shared_from_this()](beast::error_code failure, std::size_t) {
-                      if (failure || self->response_.need_eof()) return self->Close();
-                      self->ReadRequest();
-                    });
+void HttpSession::Refuse(HttpResponse answer) {
+  form_.keep_alive = false;
+  Begin(std::move(answer));
+  WritePart();
 }
 
-void HttpSession::Close() {
+void HttpSession::Begin(HttpResponse answer) {
+  writer_ = std::make_unique<AnswerWriter>(std::move(answer), form_);
+  const std::size_t wanted = writer_->HeldBytes();
+  held_bytes_ = wanted;
+  if (context().held_bytes.fetch_add(wanted) + wanted > context().options.max_held_bytes) {
+    // The few bytes that say so are not counted.
+    ReleaseHeld();
+    writer_ = std::make_unique<AnswerWriter>(
+        MakeBusyAnswer("the server writes as many answers as it may now"), form_);
+  }
+  MakePart();
+}
+
+void HttpSession::MakePart() {
+  try {
+    if (!writer_->Next(part_)) part_.clear();
+  } catch (const std::exception&) {
+    // The client must not take half an answer for a whole one.
+    part_.clear();
+    writer_.reset();
+  }
+}
+
+void HttpSession::WriteAfter(WorkQueue::Job job) {
+  SetPhase(ConnectionTable::Phase::kWorking);
+  context().work.Post(client_, rank_, [self = shared_from_this(), job = std::move(job)] {
+    job();
+    boost::asio::post(self->stream_.get_executor(), [self] { self->WritePart(); });
+  });
+}
+
+void HttpSession::WritePart() {
+  if (!writer_) return Close();
+  if (part_.empty() && !writer_->IsDone()) {
+    if (!stream_.socket().is_open()) return;  // Ended meanwhile: nobody waits for more.
+    return WriteAfter([this] { MakePart(); });
+  }
+  SetPhase(ConnectionTable::Phase::kWriting);
+  stream_.expires_after(Milliseconds(context().options.answer_timeout_s));
+  boost::asio::async_write(stream_, boost::asio::buffer(part_),
+                           [self = shared_from_this()](beast::error_code failure, std::size_t) {
+                             self->OnPartWritten(failure);
+                           });
+}
+
+void HttpSession::OnPartWritten(beast::error_code failure) {
+  if (failure) return Close();
+  if (!writer_->IsDone()) return WriteAfter([this] { MakePart(); });
+  const bool keeps_alive = writer_->keep_alive();
+  writer_.reset();
+  part_ = std::string();
+  ReleaseHeld();
+  if (keeps_alive) {
+    ReadRequest();
+  } else {
+    CloseGently();
+  }
+}
+
+void HttpSession::ReleaseHeld() {
+  if (held_bytes_ == 0) return;  // The place, and with it the context, may be another session's.
+  context().held_bytes -= held_bytes_;
+  held_bytes_ = 0;
+}
+
+/// A socket that is closed while the client still sends is reset, and the client may lose the
+/// answer that it was about to read.
+void HttpSession::CloseGently() {
   beast::error_code ignored;
   stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
+  SetPhase(ConnectionTable::Phase::kWaiting);
+  stream_.expires_after(kDrainTime);
+  Drain();
 }
+
+void HttpSession::Drain() {
+  buffer_.clear();
+  stream_.async_read_some(
+      buffer_.prepare(kMaxReadAheadBytes),
+      [self = shared_from_this()](beast::error_code failure, std::size_t bytes) {
+        self->drained_bytes_ += bytes;
+        if (failure || self->drained_bytes_ > kMaxDrainedBytes) return self->Close();
+        self->Drain();
+      });
+}
+
+void HttpSession::Close() { stream_.close(); }
 
 }  // namespace livemap::web

@@ -1,44 +1,86 @@
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "web/http/answer_writer.h"
 #include "web/server/connection.h"
 
 namespace livemap::web {
 
-/// One HTTP/1.1 connection: reads a request, lets Api answer it, and so on until the client or a
-/// time-out ends it. Only a POST may have a body, a small one. A request for the live stream turns
-/// it into a WebSocketSession.
+/// One HTTP/1.1 connection: reads a request, lets Api answer it, writes the answer part by part,
+/// and so on until the client, a time-out or the table of connections ends it. Only a POST may have
+/// a body, a small one. A request for the live stream turns it into a WebSocketSession.
+///
+/// Requests are answered one after the other, also when a client sends several at once. Answers are
+/// made on the context's working threads, a piece at a time: between two pieces other clients have
+/// their turn. Nothing is made before what was made is written.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(boost::asio::ip::tcp::socket socket, WebContext& context);
+  /// `client`: TrustedProxies::ClientOf the other end of the socket.
+  HttpSession(boost::asio::ip::tcp::socket socket, ConnectionSlot slot, std::string client);
+  ~HttpSession();
+  HttpSession(const HttpSession&) = delete;
+  HttpSession& operator=(const HttpSession&) = delete;
   void Start();
 
  private:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
-  using Response = boost::beast::http::response<boost::beast::http::string_body>;
 
   void ReadRequest();
   void OnHeader(boost::beast::error_code failure);
   void ReadBody();
   void AnswerRequest();
+  /// The answer, or the word that there is no place for who is no official. Any thread.
+  HttpResponse AnswerTo(const HttpRequest& question);
+  /// Whether it is served without a token: not on the reserve, but for /healthz from the loopback.
+  bool HasPlace(bool is_health);
+  /// A picture is made elsewhere; who waits for it too long is told to come again.
+  void AwaitPicture(const HttpRequest& question);
+  /// The request is this client's, or again nobody's but the other end's.
+  void SetClient(std::string client);
   void AnswerUnreadable(boost::beast::error_code failure);
   /// True when the request was for the live stream and the connection has left this session.
   bool UpgradeToStream(const Request& request);
-  void Write(HttpResponse answer, bool keep_alive, bool head_only);
+  /// An answer that needs no work: an error.
+  void Refuse(HttpResponse answer);
+  /// Makes the writer, or one that says that the server is busy. Any thread.
+  void Begin(HttpResponse answer);
+  /// Makes the next part. Any thread.
+  void MakePart();
+  /// Has `job` done on a working thread when it is this client's turn, then writes the part that it
+  /// made.
+  void WriteAfter(WorkQueue::Job job);
+  /// Has the next part made where this one is not made yet.
+  void WritePart();
+  void OnPartWritten(boost::beast::error_code failure);
+  void ReleaseHeld();
+  void SetPhase(ConnectionTable::Phase phase);
+  void CloseGently();
+  void Drain();
   void Close();
+  WebContext& context() const { return slot_.context(); }
 
   boost::beast::tcp_stream stream_;
   ConnectionSlot slot_;
-  const std::string client_;  ///< Whom wrong tokens are counted against.
+  const std::string peer_;  ///< The other end of the socket: a client, or a proxy.
+  std::string client_;      ///< Whose request it is: work and wrong tokens count against it.
+  WorkQueue::Rank rank_ = WorkQueue::Rank::kReader;  ///< Of the request that is being answered.
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
-  Response response_;
+  AnswerForm form_;
+  std::unique_ptr<AnswerWriter> writer_;
+  std::string part_;
+  std::size_t held_bytes_ = 0;  ///< What this session adds to the context's.
+  std::size_t drained_bytes_ = 0;
+  boost::asio::steady_timer deadline_;  ///< Of a picture.
+  std::uint64_t question_ = 0;  ///< Counts the pictures that were waited for: a late one is known.
 };
 
 }  // namespace livemap::web

@@ -1,5 +1,6 @@
 #include "web/server/web_server.h"
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -8,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "web/api/api.h"
 #include "web/api/event_hub.h"
@@ -21,14 +23,30 @@ namespace net = boost::asio;
 using boost::system::error_code;
 using net::ip::tcp;
 
+namespace {
+
+ConnectionTable::Config TableConfig(const WebConfig& options, const TrustedProxies& proxies) {
+  ConnectionTable::Config config;
+  config.max_connections = options.max_connections;
+  config.max_per_client = options.max_connections_per_client;
+  config.reserved_connections = std::min(options.reserved_connections, options.max_connections / 4);
+  config.proxies = proxies.names();
+  return config;
+}
+
+}  // namespace
+
 class WebServer::Implementation {
  public:
   Implementation(const Options& options, zone::ZoneService& zone,
                  const protocol::HazardCatalogue& catalogue)
       : options_(options),
+        proxies_(options_.proxies),
         hub_(zone, catalogue, trails_),
         api_(options_, zone, catalogue, trails_),
-        context_{options_, zone, catalogue, api_, hub_},
+        table_(TableConfig(options_, proxies_)),
+        context_{options_, zone, catalogue, api_, hub_, table_, work_, proxies_},
+        work_(options_.threads),
         accept_strand_(net::make_strand(io_)),
         acceptor_(accept_strand_),
         accept_pause_(accept_strand_) {
@@ -41,12 +59,17 @@ class WebServer::Implementation {
 
   ~Implementation() {
     hub_.Stop();  // The zone's threads must not call sessions that go away with io_.
+    api_.Stop();  // Neither must what makes pictures.
     io_.stop();
     for (std::thread& thread : threads_) thread.join();
+    work_.Stop();
   }
 
   int port() const { return port_; }
-  std::size_t connections() const { return context_.connections; }
+  std::size_t connections() const { return table_.size(); }
+  Counters counters() const {
+    return {table_.ended(), table_.refused(), context_.held_bytes, api_.picture_counters()};
+  }
 
  private:
   void Listen() {
@@ -86,29 +109,37 @@ class WebServer::Implementation {
 
   void Serve(tcp::socket socket) {
     error_code ignored;
-    if (context_.connections >= options_.max_connections) {
+    const auto peer = socket.remote_endpoint(ignored).address();
+    std::string client = ignored ? "" : proxies_.ClientOf(peer);
+    const auto place = table_.Admit(client, SteadyNs());
+    if (!place) {
       static constexpr char kBusy[] =
-          "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+          "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nRetry-After: 1\r\n"
+          "Connection: close\r\n\r\n";
       socket.non_blocking(true, ignored);
       socket.write_some(net::buffer(kBusy, sizeof(kBusy) - 1), ignored);
       return;
     }
+    ConnectionSlot slot(context_, *place);
     socket.set_option(tcp::no_delay(true), ignored);
     if (options_.socket_send_buffer_bytes > 0) {
       socket.set_option(
           net::socket_base::send_buffer_size(static_cast<int>(options_.socket_send_buffer_bytes)),
           ignored);
     }
-    std::make_shared<HttpSession>(std::move(socket), context_)->Start();
+    std::make_shared<HttpSession>(std::move(socket), std::move(slot), std::move(client))->Start();
   }
 
   // The order matters: sessions, which io_ destroys with its pending work, use all above it.
   const Options options_;
+  const TrustedProxies proxies_;
   VehicleTrails trails_;
   EventHub hub_;
   Api api_;
+  ConnectionTable table_;
   WebContext context_;
   net::io_context io_;
+  WorkQueue work_;
   net::strand<net::io_context::executor_type> accept_strand_;
   tcp::acceptor acceptor_;
   net::steady_timer accept_pause_;
@@ -125,6 +156,8 @@ WebServer::WebServer(const Options& options, zone::ZoneService& zone,
 WebServer::~WebServer() = default;
 
 int WebServer::port() const { return implementation_->port(); }
+
+WebServer::Counters WebServer::counters() const { return implementation_->counters(); }
 
 std::size_t WebServer::connections() const { return implementation_->connections(); }
 

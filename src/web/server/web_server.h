@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "protocol/hazard_catalogue.h"
+#include "web/api/api.h"
 #include "web/http/web_config.h"
 #include "zone/service/zone_service.h"
 
@@ -28,6 +30,14 @@ class WebServer {
   int port() const;
   /// Open connections, HTTP and live streams together.
   std::size_t connections() const;
+  /// What became of connections and pictures since the start.
+  struct Counters {
+    std::uint64_t connections_ended = 0;    ///< For others that needed their place.
+    std::uint64_t connections_refused = 0;  ///< There was no place.
+    std::uint64_t held_bytes = 0;           ///< Of the answers that are being written now.
+    Api::PictureCounters pictures;
+  };
+  Counters counters() const;
 
  private:
   class Implementation;

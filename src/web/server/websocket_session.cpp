@@ -16,7 +16,7 @@ namespace {
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 
-constexpr std::size_t kReplayPage = 256;
+constexpr std::size_t kReplayPage = 64;
 /// Clients have nothing to say: enough for a courtesy, too little to cost anything.
 constexpr std::size_t kMaxClientMessageBytes = 1024;
 constexpr std::chrono::seconds kCloseGrace{2};
@@ -28,14 +28,21 @@ std::shared_ptr<const std::string> Shared(const Json& json) {
 }  // namespace
 
 WebSocketSession::WebSocketSession(beast::tcp_stream stream, ConnectionSlot slot,
-                                   std::optional<std::uint64_t> since)
+                                   std::string client, std::optional<std::uint64_t> since)
     : slot_(std::move(slot)),
+      client_(std::move(client)),
       stream_(std::move(stream)),
       close_deadline_(stream_.get_executor()),
       heartbeat_(stream_.get_executor()),
       since_(since) {}
 
 void WebSocketSession::Start(const Request& upgrade) {
+  const std::weak_ptr<WebSocketSession> weak = weak_from_this();
+  slot_.context().table.SetEnd(slot_.id(), [weak, executor = stream_.get_executor()] {
+    boost::asio::post(executor, [weak] {
+      if (const auto self = weak.lock()) self->GiveUpPlace();
+    });
+  });
   websocket::stream_base::timeout timeout{};
   const auto ping_timeout_ms =
       static_cast<std::int64_t>(slot_.context().options.ping_timeout_s * 1000);
@@ -50,7 +57,17 @@ void WebSocketSession::Start(const Request& upgrade) {
   });
 }
 
+void WebSocketSession::GiveUpPlace() {
+  if (is_accepted_) {
+    CloseWith(websocket::close_code::try_again_later,
+              "another client needs the place: reconnect later");
+  } else {
+    beast::get_lowest_layer(stream_).close();
+  }
+}
+
 void WebSocketSession::OnAccepted() {
+  is_accepted_ = true;
   WebContext& context = slot_.context();
   // Joined before the store is asked: what the store does not tell any more, the hub will.
   context.hub.Join(shared_from_this());
@@ -61,9 +78,6 @@ void WebSocketSession::OnAccepted() {
     // sequence of this message, it forgets what it knew and loads the list.
     told_sequence_ = std::min(since_.value_or(newest), newest);
     Enqueue(Shared({{"type", "hello"}, {"sequence", newest}}));
-    for (const zone::VehicleState& vehicle : context.zone.Vehicles()) {
-      Enqueue(Shared(VehicleMessage(vehicle)));
-    }
   } catch (const std::exception&) {
     return CloseAsFailed();
   }
@@ -94,6 +108,8 @@ void WebSocketSession::Read() {
                          self->slot_.context().hub.Leave(self.get());
                          self->close_deadline_.cancel();
                          self->heartbeat_.cancel();
+                         // Else a write that nobody reads would go on until its time-out.
+                         beast::get_lowest_layer(self->stream_).close();
                          return;
                        }
                        self->read_buffer_.clear();
@@ -129,35 +145,81 @@ void WebSocketSession::OnMessage(const LiveMessage& message) {
 }
 
 /// Called when the queue has run dry during the replay.
-void WebSocketSession::ReplayPage() {
-  WebContext& context = slot_.context();
-  try {
-    // Read before the lists, and the end of both: what happens between the two comes later.
-    const std::uint64_t newest = context.zone.Sequence();
-    const auto hazards = context.zone.Query(std::nullopt, told_sequence_, kReplayPage);
-    const auto changes = context.zone.QueryMapChanges(std::nullopt, told_sequence_, kReplayPage);
-    std::uint64_t end = newest;
-    if (hazards.size() == kReplayPage) end = std::min(end, hazards.back().sequence);
-    if (changes.size() == kReplayPage) end = std::min(end, changes.back().sequence);
-    std::map<std::uint64_t, std::shared_ptr<const std::string>> messages;
-    for (const zone::Hazard& hazard : hazards) {
-      if (hazard.sequence > end) break;
-      messages[hazard.sequence] =
-          Shared(HazardMessage(ReplayAction(hazard), hazard, context.catalogue));
+void WebSocketSession::StartReplayPage() {
+  if (replay_is_read_) return;
+  replay_is_read_ = true;
+  const auto read = [self = shared_from_this(), after = last_vehicle_, told = told_sequence_] {
+    Replay replay;
+    try {
+      replay = after ? self->ReadVehicles(*after, told) : self->ReadEvents(told);
+    } catch (const std::exception&) {
+      replay.failed = true;
     }
-    for (const zone::MapChangeFeature& change : changes) {
-      if (change.sequence > end) break;
-      messages[change.sequence] = Shared(MapChangeMessage(ReplayAction(change), change));
-    }
-    for (auto& entry : messages) Enqueue(std::move(entry.second));
-    told_sequence_ = std::max(told_sequence_, end);
-    if (end == newest && announced_sequence_ <= told_sequence_) {
-      state_ = State::kLive;
-      Enqueue(Shared({{"type", "live"}, {"sequence", told_sequence_}}));
-    }
-  } catch (const std::exception&) {
-    return CloseAsFailed();
+    boost::asio::post(self->stream_.get_executor(), [self, replay = std::move(replay)]() mutable {
+      self->TakeReplay(std::move(replay));
+    });
+  };
+  slot_.context().work.Post(client_, WorkQueue::Rank::kReader, read);
+}
+
+WebSocketSession::Replay WebSocketSession::ReadVehicles(const std::string& after,
+                                                        std::uint64_t told_sequence) const {
+  Replay replay;
+  replay.told_sequence = told_sequence;
+  replay.newest = UINT64_MAX;  // Events are still to come.
+  const auto vehicles = slot_.context().zone.VehiclesAfter(after, kReplayPage);
+  for (const zone::VehicleState& vehicle : vehicles) {
+    replay.messages.push_back(Shared(VehicleMessage(vehicle)));
   }
+  if (vehicles.size() == kReplayPage) replay.last_vehicle = vehicles.back().vehicle_id;
+  return replay;
+}
+
+WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequence) const {
+  const WebContext& context = slot_.context();
+  Replay replay;
+  // Read before the lists, and the end of both: what happens between the two comes later.
+  replay.newest = context.zone.Sequence();
+  zone::Walk<zone::HazardState> hazard_walk;
+  zone::Walk<zone::MapChangeState> change_walk;
+  hazard_walk.after = change_walk.after = told_sequence;
+  hazard_walk.until = change_walk.until = replay.newest;
+  if (told_sequence == 0) {
+    hazard_walk.states = zone::StatesOnMap();
+    change_walk.states = zone::OpenStates();
+  }
+  const auto hazards = context.zone.ReadHazards(hazard_walk, kReplayPage);
+  const auto changes = context.zone.ReadMapChanges(change_walk, kReplayPage);
+  std::uint64_t end = replay.newest;
+  if (!hazards.is_last) end = std::min(end, hazards.sequence);
+  if (!changes.is_last) end = std::min(end, changes.sequence);
+  std::map<std::uint64_t, std::shared_ptr<const std::string>> messages;
+  for (const zone::Hazard& hazard : hazards.items) {
+    if (hazard.sequence > end) break;
+    messages[hazard.sequence] =
+        Shared(HazardMessage(ReplayAction(hazard), hazard, context.catalogue));
+  }
+  for (const zone::MapChangeFeature& change : changes.items) {
+    if (change.sequence > end) break;
+    messages[change.sequence] = Shared(MapChangeMessage(ReplayAction(change), change));
+  }
+  for (auto& entry : messages) replay.messages.push_back(std::move(entry.second));
+  replay.told_sequence = std::max(told_sequence, end);
+  return replay;
+}
+
+void WebSocketSession::TakeReplay(Replay replay) {
+  replay_is_read_ = false;
+  if (state_ == State::kClosing) return;
+  if (replay.failed) return CloseAsFailed();
+  for (auto& message : replay.messages) Enqueue(std::move(message));
+  last_vehicle_ = std::move(replay.last_vehicle);
+  told_sequence_ = replay.told_sequence;
+  if (told_sequence_ >= replay.newest && announced_sequence_ <= told_sequence_) {
+    state_ = State::kLive;
+    Enqueue(Shared({{"type", "live"}, {"sequence", told_sequence_}}));
+  }
+  WriteNext();
 }
 
 void WebSocketSession::Enqueue(std::shared_ptr<const std::string> text) {
@@ -167,8 +229,8 @@ void WebSocketSession::Enqueue(std::shared_ptr<const std::string> text) {
 
 void WebSocketSession::WriteNext() {
   if (writing_ || state_ == State::kClosing) return;
-  while (queue_.empty() && state_ == State::kReplaying) ReplayPage();
-  if (queue_.empty() || state_ == State::kClosing) return;
+  if (queue_.empty() && state_ == State::kReplaying) StartReplayPage();
+  if (queue_.empty()) return;
   writing_ = true;
   stream_.async_write(boost::asio::buffer(*queue_.front()),
                       [self = shared_from_this()](beast::error_code failure, std::size_t) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "web/server/connection.h"
 
@@ -16,18 +17,20 @@ namespace livemap::web {
 
 /// One client of the live stream.
 ///
-/// It first *replays* what happened after the client's `since`, page by page from the store, and
-/// then is *live*: events go from the hub into its queue. Events that come during the replay are
-/// not queued but remembered by their sequence; the replay goes on until it has passed them. So
-/// no event is lost or told twice, and memory stays bounded however long the client was away.
-/// A live client whose queue is full is closed with a reason; it reconnects with `since`.
+/// It first *replays* what happened after the client's `since`, page by page from the store, read
+/// on the context's working threads, and then is *live*: events go from the hub into its queue.
+/// Events that come during the replay are not queued but remembered by their sequence; the replay
+/// goes on until it has passed them. So no event is lost or told twice, and memory stays bounded
+/// however long the client was away. A live client whose queue is full is closed with a reason; it
+/// reconnects with `since`.
 class WebSocketSession : public LiveListener,
                          public std::enable_shared_from_this<WebSocketSession> {
  public:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// Without `since` the client is told only what happens from now on.
-  WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot,
+  /// `client`: see ClientOf.
+  WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot, std::string client,
                    std::optional<std::uint64_t> since);
 
   void Start(const Request& upgrade);
@@ -37,9 +40,23 @@ class WebSocketSession : public LiveListener,
   enum class State { kReplaying, kLive, kClosing };
 
   void OnAccepted();
+  /// The table of connections needs it for another client.
+  void GiveUpPlace();
   void Read();
   void OnMessage(const LiveMessage& message);
-  void ReplayPage();
+  /// What the store tells of one page.
+  struct Replay {
+    std::vector<std::shared_ptr<const std::string>> messages;
+    std::optional<std::string> last_vehicle;  ///< None when all vehicles were told.
+    std::uint64_t told_sequence = 0;
+    std::uint64_t newest = 0;
+    bool failed = false;
+  };
+  void StartReplayPage();
+  /// On a working thread.
+  Replay ReadVehicles(const std::string& after, std::uint64_t told_sequence) const;
+  Replay ReadEvents(std::uint64_t told_sequence) const;
+  void TakeReplay(Replay replay);
   void Enqueue(std::shared_ptr<const std::string> text);
   void BeatLater();
   void WriteNext();
@@ -49,6 +66,7 @@ class WebSocketSession : public LiveListener,
   void CloseWith(boost::beast::websocket::close_code code, const char* reason);
 
   ConnectionSlot slot_;
+  const std::string client_;  ///< Whose turn it is to have a page read.
   boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
   boost::asio::steady_timer close_deadline_;
   boost::asio::steady_timer heartbeat_;
@@ -59,7 +77,10 @@ class WebSocketSession : public LiveListener,
   std::uint64_t announced_sequence_ = 0;  ///< The newest event that came during the replay.
   std::deque<std::shared_ptr<const std::string>> queue_;  ///< The front one is being written.
   std::size_t queued_bytes_ = 0;
+  bool is_accepted_ = false;
   bool writing_ = false;
+  bool replay_is_read_ = false;                   ///< A working thread reads the next page.
+  std::optional<std::string> last_vehicle_ = "";  ///< Told so far; none when all were.
 };
 
 }  // namespace livemap::web

@@ -184,6 +184,7 @@ TEST_F(ApiTest, AnswersClassesVehiclesConfigAndHealth) {
   vehicle.position.latitude_deg += 0.001;
   vehicle.course_rad = 1.5;
   vehicle.stamp_ns += 1'000'000'000;
+  fixture_.now_ns += 1'000'000'000;
   ASSERT_TRUE(fixture_.zone->UpdateVehicle(vehicle));
 
   const nlohmann::json vehicles = Get(port(), "/api/v1/vehicles").Json();
@@ -194,6 +195,15 @@ TEST_F(ApiTest, AnswersClassesVehiclesConfigAndHealth) {
             fixture_.catalogue.classes().size());
   EXPECT_EQ(Get(port(), "/api/v1/config").Json()["tile_url"], nullptr);
   EXPECT_EQ(Get(port(), "/healthz").Json()["status"], "ok");
+}
+
+TEST_F(ApiTest, TheConfigurationSaysWhereThePageOpens) {
+  EXPECT_EQ(Get(port(), "/api/v1/config").Json()["view"], nullptr);
+  fixture_.zone->Handle(fixture_.MakeReport("pothole", {-17.8, 179.9999}));
+  const auto view = Get(port(), "/api/v1/config").Json()["view"];
+  EXPECT_GT(view["west"].get<double>(), view["east"].get<double>());
+  EXPECT_LT(view["south"].get<double>(), -17.8);
+  EXPECT_GT(view["north"].get<double>(), -17.8);
 }
 
 TEST_F(ApiTest, ServesAPictureForEverAndHarmlessly) {
@@ -253,7 +263,8 @@ TEST_F(ApiTest, ServesThePageWithHeadersThatForbidForeignScript) {
   EXPECT_EQ(page.Field("X-Content-Type-Options"), "nosniff");
   EXPECT_EQ(Get(port(), "/map.js").Field("Content-Type"), "text/javascript; charset=utf-8");
   EXPECT_EQ(Get(port(), "/vendor/leaflet/leaflet.min.js").status, 200);
-  EXPECT_EQ(Get(port(), "/vendor/leaflet/leaflet.markercluster.min.js").status, 200);
+  EXPECT_EQ(Get(port(), "/worker/zone_worker.js").Field("Content-Type"),
+            "text/javascript; charset=utf-8");
   EXPECT_EQ(Get(port(), "/", {{"If-None-Match", page.Field("ETag")}}).status, 304);
 }
 

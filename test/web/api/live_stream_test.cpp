@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <regex>
 #include <set>
+#include <string>
 #include <thread>
 
+#include "common/text_file.h"
 #include "test/web/http/http_client.h"
 #include "test/web/zone_fixture.h"
 #include "web/server/web_server.h"
@@ -183,6 +186,13 @@ TEST_F(LiveStreamTest, AQuietStreamBeats) {
   const WebServer lively(options, *fixture_.zone, fixture_.catalogue);
   StreamClient client(lively.port());
   EXPECT_EQ(client.NextOfType("beat")["sequence"], 0);
+}
+
+TEST(LiveStream, BeatsTwiceBeforeThePageTakesItForDead) {
+  const std::string page = ReadTextFile(TestOptions().web_root + "/worker/live_feed.js", 1 << 20);
+  std::smatch silence;
+  ASSERT_TRUE(std::regex_search(page, silence, std::regex("SILENCE_MS = ([0-9]+);")));
+  EXPECT_LT(2 * WebConfig().heartbeat_s, std::stod(silence[1]) / 1000);
 }
 
 TEST_F(LiveStreamTest, ClosedClientsFreeTheirConnections) {

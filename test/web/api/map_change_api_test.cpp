@@ -117,6 +117,21 @@ TEST_F(MapChangeApiTest, AnOfficialDismissesAndPutsBackAndTheHistorySaysWhy) {
   EXPECT_EQ(events[2]["to"], "confirmed");
 }
 
+TEST_F(MapChangeApiTest, AnUndoThatNamesItsDecisionLeavesALaterOneAlone) {
+  const std::string id = Tell();
+  const auto decide = [&](const std::string& body) { return Decide(id, body, tokens_.token()); };
+  const auto dismissed = decide(R"({"decision": "dismiss", "reason": "a shadow"})").Json();
+  const auto confirmed = decide(R"({"decision": "confirm"})").Json();
+  const auto undo = [&](const nlohmann::json& decided) {
+    return decide(
+        nlohmann::json{{"decision", "undo"}, {"decision_id", decided["properties"]["decision_id"]}}
+            .dump());
+  };
+  EXPECT_EQ(undo(dismissed).status, 409);
+  EXPECT_EQ(undo(confirmed).Json()["properties"]["state"], "dismissed");
+  EXPECT_EQ(decide(R"({"decision": "confirm", "decision_id": 1})").status, 400);
+}
+
 TEST_F(MapChangeApiTest, NobodyDecidesWithoutATokenOrAsNobodyShould) {
   const std::string id = Tell();
   EXPECT_EQ(Decide(id, R"({"decision": "confirm"})", "").status, 401);

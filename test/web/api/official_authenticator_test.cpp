@@ -19,6 +19,7 @@ using testing::ThrowsMessage;
 
 const std::string kToken = "0123456789abcdef0123456789abcdef";
 const std::string kOther = "fedcba9876543210fedcba9876543210";
+const std::string kShort = "0123456789abcdef";
 
 TEST(ParseTokenFile, ReadsNamesAndForgetsTokens) {
   const auto officials = ParseTokenFile(
@@ -71,13 +72,25 @@ TEST(ReadTokenFile, RefusesAFileThatEverybodyMayRead) {
               ThrowsMessage<Error>(HasSubstr("cannot be read")));
 }
 
+TEST(ReadTokenFile, MarksAndLineEndsOfOtherSystemsDoNotCount) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/tokens";
+  std::ofstream(path, std::ios::binary)
+      << "\xef\xbb\xbfmiller " << kToken << " \r\nmeier " << kOther;
+  ASSERT_EQ(chmod(path.c_str(), 0600), 0);
+  EXPECT_EQ(ReadTokenFile(path).size(), 2U);
+  std::ofstream(path, std::ios::binary) << "\xff\xfem";
+  EXPECT_THAT([&] { ReadTokenFile(path); }, ThrowsMessage<Error>(HasSubstr("UTF-16")));
+}
+
 class OfficialGateTest : public testing::Test {
  protected:
   Verdict Try(const std::string& token, double now_s = 0, const std::string& client = "10.0.0.1") {
     return gate_.Check("Bearer " + token, client, now_s).verdict;
   }
 
-  OfficialAuthenticator gate_{ParseTokenFile("miller " + kToken + "\nsmith " + kOther, "tokens")};
+  OfficialAuthenticator gate_{
+      ParseTokenFile("miller " + kToken + "\nsmith " + kOther + "\nbrown " + kShort, "tokens")};
 };
 
 TEST_F(OfficialGateTest, KnowsWhoseTokenItIs) {
@@ -101,15 +114,24 @@ TEST_F(OfficialGateTest, WithoutOfficialsItStaysClosed) {
   EXPECT_FALSE(nobody.is_open());
 }
 
-TEST_F(OfficialGateTest, AfterTooManyWrongTokensNotEvenTheRightOneIsLookedAtForAWhile) {
+TEST_F(OfficialGateTest, AfterTooManyWrongTokensNoShortOneIsLookedAtForAWhile) {
   for (int i = 0; i < OfficialAuthenticator::kMaxWrong; ++i)
     EXPECT_EQ(Try("wrong"), Verdict::kWrongToken);
   EXPECT_EQ(Try("wrong"), Verdict::kTooManyWrong);
-  EXPECT_EQ(Try(kToken), Verdict::kTooManyWrong);
-  EXPECT_EQ(Try(kToken, 0, "10.0.0.2"), Verdict::kAllowed) << "another client is kept out too";
-  EXPECT_EQ(Try(kToken, OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kAllowed);
+  EXPECT_EQ(Try(kShort), Verdict::kTooManyWrong);
+  EXPECT_FALSE(gate_.IsRight("Bearer " + kShort, "10.0.0.1", 0));
+  EXPECT_EQ(Try(kShort, 0, "10.0.0.2"), Verdict::kAllowed) << "another client is kept out too";
+  EXPECT_EQ(Try(kShort, OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kAllowed);
   EXPECT_EQ(Try("wrong", OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kWrongToken);
   EXPECT_EQ(Try("wrong", OfficialAuthenticator::kSecondsPerWrong + 1), Verdict::kTooManyWrong);
+}
+
+TEST_F(OfficialGateTest, ALongTokenPassesHoweverManyWrongOnesItsAddressSends) {
+  for (int i = 0; i <= OfficialAuthenticator::kMaxWrong; ++i) Try("wrong");
+  EXPECT_EQ(gate_.Check("Bearer " + kToken, "10.0.0.1", 0).official, "miller");
+  EXPECT_TRUE(gate_.IsRight("Bearer " + kToken, "10.0.0.1", 0));
+  EXPECT_EQ(Try(kOther.substr(1) + "x"), Verdict::kTooManyWrong);
+  EXPECT_FALSE(gate_.IsRight("Bearer " + kOther.substr(1) + "x", "10.0.0.1", 0));
 }
 
 TEST_F(OfficialGateTest, ManyClientsDoNotFillTheMemoryNorFreeTheOneThatGoesOn) {

@@ -1,0 +1,140 @@
+#include "web/api/hazard_api.h"
+
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "web/api/collections.h"
+#include "web/json/json.h"
+
+namespace livemap::web {
+namespace {
+
+constexpr std::array<const char*, 11> kPointColumns{
+    "id",         "latitude",  "longitude", "class",     "state",   "presence",
+    "confidence", "sightings", "vehicles",  "updated_s", "sequence"};
+
+/// What a client should do that shows the states that the query asks for.
+zone::HazardAction ActionFor(const zone::Hazard& hazard, const HazardQuery& query) {
+  return query.Selects(hazard.state) ? ReplayAction(hazard) : zone::HazardAction::kRemoved;
+}
+
+void AppendNumber(std::string& text, double number, int digits) {
+  std::array<char, 64> buffer;
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), number,
+                                 std::chars_format::fixed, digits);
+  std::string_view written(buffer.data(), static_cast<std::size_t>(end.ptr - buffer.data()));
+  while (written.back() == '0') written.remove_suffix(1);
+  if (written.back() == '.') written.remove_suffix(1);
+  text += written;
+}
+
+/// One line of the points, in the order of kPointColumns. Written by hand: a list has a hundred
+/// thousand of them.
+void AppendPoint(std::string& text, const zone::Hazard& hazard) {
+  text += "[\"";
+  text += hazard.uuid.ToString();
+  text += "\",";
+  AppendNumber(text, hazard.position.latitude_deg, 7);
+  text += ',';
+  AppendNumber(text, hazard.position.longitude_deg, 7);
+  text += ',';
+  text += ToText(hazard.class_name);
+  text += ",\"";
+  text += zone::HazardStateName(hazard.state);
+  text += "\",";
+  AppendNumber(text, static_cast<double>(hazard.presence), 4);
+  text += ',';
+  AppendNumber(text, static_cast<double>(hazard.confidence), 4);
+  text += ',' + std::to_string(hazard.sightings) + ',' + std::to_string(hazard.vehicles) + ',';
+  const std::int64_t updated_ms = hazard.updated_ns / 1'000'000;
+  AppendNumber(text, static_cast<double>(updated_ms) / 1000.0, 3);
+  text += ',' + std::to_string(hazard.sequence) + "]\n";
+}
+
+HttpResponse UnknownHazard() {
+  return MakeErrorAnswer(404, "the zone knows no hazard with this id");
+}
+
+Uuid ParseHazardId(const std::string& id) {
+  const auto uuid = Uuid::Parse(id);
+  if (!uuid) throw BadRequest("the hazard's id is no UUID");
+  return *uuid;
+}
+
+}  // namespace
+
+HttpResponse HazardApi::Answer(const RequestTarget& target) const {
+  const std::string rest = target.path.substr(std::string_view(kHazardAddress).size());
+  if (rest.empty()) return List(ParseHazardQuery(target));
+  if (rest.front() != '/') return MakeErrorAnswer(404, "there is nothing at this address");
+  if (rest == "/points") return Points(ParsePointsQuery(target));
+  if (const auto id = IdOfHistory(rest)) return Events(*id, ParseEventsQuery(target));
+  RefuseQueryParameters(target);
+  return One(rest.substr(1));
+}
+
+HttpResponse HazardApi::List(const HazardQuery& query) const {
+  zone::Walk<zone::HazardState> walk;
+  walk.box = query.box;
+  walk.after = query.since.value_or(0);
+  walk.until = zone_.Sequence();  // Before the list.
+  // Since a sequence all that changed is looked at: what left the selection is told too.
+  if (!query.since) {
+    walk.states = query.states.empty() ? zone::StatesOnMap() : query.states;
+  } else if (*query.since == 0) {
+    walk.states = zone::StatesOnMap();
+  }
+  const auto read = [this](const auto& where, std::size_t limit) {
+    return zone_.ReadHazards(where, limit);
+  };
+  const auto to_feature = [this, query](const zone::Hazard& hazard) {
+    Json feature = HazardFeature(hazard, catalogue_);
+    if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
+    return feature;
+  };
+  return ListAnswer(std::move(walk), query.limit, read, to_feature);
+}
+
+HttpResponse HazardApi::Points(const PointsQuery& query) const {
+  zone::Walk<zone::HazardState> walk;
+  walk.states = query.states.empty() ? zone::StatesOnMap() : query.states;
+  walk.until = zone_.Sequence();  // Before the points.
+  std::size_t count = 0;
+  const auto counts = zone_.HazardCounts();
+  for (const zone::HazardState state : walk.states) {
+    count += counts[static_cast<std::size_t>(state)];
+  }
+  Json header;
+  header["sequence"] = walk.until;
+  header["count"] = count;
+  header["columns"] = kPointColumns;
+  auto pieces = [this, walk = std::move(walk),
+                 head = ToText(header) + "\n"](std::string& piece) mutable {
+    piece += head;
+    head.clear();
+    const auto page = zone_.ReadHazards(walk, kItemsPerRead);
+    for (const zone::Hazard& hazard : page.items) AppendPoint(piece, hazard);
+    walk.after = page.sequence;
+    return !page.is_last;
+  };
+  return PiecesAnswer(std::move(pieces), "application/x-ndjson");
+}
+
+HttpResponse HazardApi::One(const std::string& id) const {
+  const auto hazard = zone_.Find(ParseHazardId(id));
+  if (!hazard) return UnknownHazard();
+  Json feature = HazardFeature(*hazard, catalogue_);
+  feature["properties"]["active"] = zone::IsOnMap(hazard->state);
+  return JsonAnswer(feature, "application/geo+json");
+}
+
+HttpResponse HazardApi::Events(const std::string& id, std::size_t limit) const {
+  const Uuid uuid = ParseHazardId(id);
+  if (!zone_.Find(uuid)) return UnknownHazard();
+  return EventsAnswer(uuid, zone_.Events(uuid, limit), EventJson);
+}
+
+}  // namespace livemap::web

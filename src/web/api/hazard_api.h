@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "protocol/hazard_catalogue.h"
+#include "web/api/query.h"
+#include "web/http/http_message.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap::web {
+
+/// The list of hazards; "/points", "/UUID" and "/UUID/events" stand below it.
+constexpr const char* kHazardAddress = "/api/v1/hazards";
+
+/// Answers what may be read of hazards (docs/reference/http-api.md). Thread-safe; store failures
+/// and bad requests come out as exceptions.
+class HazardApi {
+ public:
+  /// Keeps the references.
+  HazardApi(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue)
+      : zone_(zone), catalogue_(catalogue) {}
+
+  /// `target.path` starts with kHazardAddress and is no decision's.
+  HttpResponse Answer(const RequestTarget& target) const;
+
+ private:
+  HttpResponse List(const HazardQuery& query) const;
+  HttpResponse Points(const PointsQuery& query) const;
+  HttpResponse One(const std::string& id) const;
+  HttpResponse Events(const std::string& id, std::size_t limit) const;
+
+  zone::ZoneService& zone_;
+  const protocol::HazardCatalogue& catalogue_;
+};
+
+}  // namespace livemap::web
