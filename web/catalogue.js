@@ -2,16 +2,23 @@
 
 import { element } from './dom.js';
 
-/** Icons in /icons; a class that asks for another gets 'hazard'. */
+/** Icons in icons/; a class that asks for another gets 'hazard'. */
 const ICONS = new Set([
   'barrier', 'construction_machine', 'debris', 'deer', 'hazard', 'pothole', 'road_work_sign',
   'stopped_accident', 'traffic_cone',
 ]);
 
+export const OTHER_LABEL = 'Other kinds';
+
 export class Catalogue {
   constructor(answer) {
     this.fallback = answer.default;
     this.classes = new Map(answer.classes.map((entry) => [entry.class, entry]));
+  }
+
+  /** Label and colour of the worker's group: 0 is of all classes that are not in the catalogue. */
+  group(number) {
+    return [...this.classes.values()][number - 1] ?? { ...this.fallback, label: OTHER_LABEL };
   }
 
   label(className) {

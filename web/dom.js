@@ -24,6 +24,36 @@ export function byId(id) {
   return document.getElementById(id);
 }
 
+/** Writes only what is new: the browser lays out anew what is written. */
+export function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+/** Runs `work()`, which answers a promise, one at a time; calls during a run ask for one more. A run
+ * that fails does not end the next ones. */
+export function oneAtATime(work) {
+  let running = false;
+  let again = false;
+  return async () => {
+    again = true;
+    if (running) return;
+    running = true;
+    try {
+      while (again) {
+        again = false;
+        await work();
+      }
+    } finally {
+      running = false;
+    }
+  };
+}
+
+/** Lets the browser answer in between. */
+export function nextTask() {
+  return new Promise((resolve) => { setTimeout(resolve); });
+}
+
 /** Calls `work` once, `delay` ms after the first of a burst of calls. */
 export function throttled(work, delay) {
   let timer = null;

@@ -1,32 +1,34 @@
 // The live map's page: puts map, panel and live feed together.
 
 import { Catalogue } from './catalogue.js';
-import { ClassFilter, StateFilter } from './class_filter.js';
-import { ChangeView } from './change_view.js';
-import { AttributionText, FitControl } from './controls.js';
-import { byId, throttled } from './dom.js';
+import { ClassFilter, StateFilter } from './panel/class_filter.js';
+import { ChangeView } from './panel/change_view.js';
+import { AttributionText, FitControl } from './layers/controls.js';
+import { byId, nextTask, throttled } from './dom.js';
 import { plural } from './format.js';
-import { Graticule } from './graticule.js';
-import { HazardHistory } from './hazard_history.js';
-import { HazardLayer } from './hazard_layer.js';
-import { HazardList } from './hazard_list.js';
-import { popupContent } from './hazard_popup.js';
-import { HazardStore } from './hazard_store.js';
-import { LiveFeed, getJson, loadHazards } from './live_feed.js';
-import { Officials } from './officials.js';
-import { Sheet } from './sheet.js';
-import { VehicleLayer } from './vehicle_layer.js';
+import { Graticule } from './layers/graticule.js';
+import { HazardHistory } from './popups/hazard_history.js';
+import { HazardLayer } from './layers/hazard_layer.js';
+import { HazardList, hazardRow } from './panel/hazard_list.js';
+import { popupContent } from './popups/hazard_popup.js';
+import { nearLongitude } from './mercator.js';
+import { Officials } from './popups/officials.js';
+import { Sheet } from './panel/sheet.js';
+import { unitBox } from './layers/sign_layer.js';
+import { whenStill } from './layers/still_map.js';
+import { VehicleLayer } from './layers/vehicle_layer.js';
+import { ZoneData } from './zone_data.js';
+import { getJson } from './zone_lists.js';
 
 const L = window.L;
 const STATES = { connecting: 'Connecting', live: 'Live', offline: 'Reconnecting' };
 
-/** Markers are for the mouse; by keyboard one goes through the list, which has one tab stop. */
-L.Marker.mergeOptions({ keyboard: false });
+/** The zone looks so rarely anew where most hazards are. */
+const VIEW_AGE_MS = 11000;
 
 function createMap(config) {
   const map = L.map('map', {
-    attributionControl: false, zoomControl: false, maxZoom: 21, minZoom: 3, preferCanvas: true,
-    zoomSnap: 0.5, worldCopyJump: true,
+    attributionControl: false, zoomControl: false, maxZoom: 21, minZoom: 3, zoomSnap: 0.5,
   });
   const [longitude, latitude] = config.centre;
   map.setView([latitude, longitude], 14);
@@ -43,153 +45,140 @@ function createMap(config) {
 }
 
 class Page {
-  constructor(config, classes) {
+  constructor(map, data, config, classes) {
+    this.data = data;
     this.catalogue = new Catalogue(classes);
-    this.store = new HazardStore();
     this.sheet = new Sheet();
-    this.map = createMap(config);
+    this.map = map;
     this.vehicles = new VehicleLayer(this.map, !config.tile_url,
       (vehicle) => this.officials.vehicleButtons(vehicle));
-    this.layer = new HazardLayer(this.map, this.catalogue,
+    this.layer = new HazardLayer(this.map, data, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue,
         [this.history.section(hazard), ...this.officials.buttons(hazard)]),
+      (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
-    this.history = new HazardHistory((id) => this.layer.refresh(id));
+    this.history = new HazardHistory((id) => this.layer.redraw(id));
     this.officials = new Officials(config.officials, (text) => this.say(text),
       (subject, focus) => this.focusPopup(subject, focus));
-    this.changes = new ChangeView(this.map, (change) => this.officials.changeButtons(change),
-      this.sheet.coveredHeight(), () => this.stepAside());
-    this.list = new HazardList(this.catalogue, (hazard) => this.choose(hazard));
-    this.filter = new ClassFilter(this.store, this.catalogue, () => this.showAll());
-    this.states = new StateFilter(this.store, () => this.showAll(),
-      config.officials ? (shown) => this.showRejected(shown) : null);
+    this.changes = new ChangeView(this.map, data, (change) => this.officials.changeButtons(change),
+      this.sheet.coveredHeight(), () => this.stepAside(), (focus) => this.sheet.focusBack(focus));
     this.inView = byId('in-view');
-    this.updateSoon = throttled(() => this.updatePanel(), 120);
-    this.announced = [];
+    this.list = new HazardList(data, this.catalogue, (hazard) => this.choose(hazard),
+      () => (this.inView.checked ? unitBox(this.map.getBounds()) : null));
+    this.filter = new ClassFilter(data, this.catalogue, () => this.showAll());
+    this.states = new StateFilter(data, () => this.showAll(),
+      config.officials ? (shown) => this.showRejected(shown) : null);
+    this.announced = { count: 0, first: '' };
     this.announceSoon = throttled(() => this.announce(), 800);
-    /** Until somebody moves the map, it keeps everything in view. */
-    this.keepsAllInView = true;
-    this.chosen = null;
+    /** Until somebody moves the map, it shows what the zone says. */
+    this.followsZone = true;
+    this.hasLists = false;
+    this.refitSoon = throttled(() => this.refit(), 1000);
+    this.refitLater = throttled(() => this.refit(), VIEW_AGE_MS);
     this.map.addControl(new FitControl(() => {
-      this.keepsAllInView = true;
-      this.fit();
+      this.followsZone = false;
+      this.fitAll();
     }));
+    keepControlsFirst(this.map);
+    // At once: an animation would draw everything twice.
+    if (config.view) this.fit(config.view, { animate: false });
     this.listen();
   }
 
   listen() {
     for (const gesture of ['pointerdown', 'wheel', 'keydown']) {
-      this.map.getContainer().addEventListener(gesture, () => { this.keepsAllInView = false; },
-        { passive: true, capture: true });
+      this.map.getContainer().addEventListener(gesture, (event) => {
+        // Tab only looks where things are.
+        if (event.key !== 'Tab' && event.key !== 'Shift') this.followsZone = false;
+      }, { passive: true, capture: true });
     }
     this.map.on('moveend', () => {
-      if (this.inView.checked) this.updateSoon();
+      if (this.inView.checked) this.list.refresh();
     });
-    this.map.on('popupopen', (event) => this.onPopupOpen(event.popup));
-    this.map.on('popupclose', (event) => this.onPopupClose(event.popup));
-    this.inView.addEventListener('change', () => this.updatePanel());
+    this.map.on('popupopen popupclose', ({ type, popup }) => {
+      this.map.getContainer().classList.toggle('with-popup', type === 'popupopen');
+      // At once: while Leaflet lets it fade, a click would still reach its buttons.
+      if (type === 'popupclose') popup.getElement()?.remove();
+    });
+    this.inView.addEventListener('change', () => this.list.refresh());
     document.addEventListener('keydown', (event) => {
       if (event.key !== 'Escape' || this.officials.isAsking()) return;
       this.map.closePopup();
       this.sheet.toggle(false);
     });
+    document.addEventListener('visibilitychange', () => {
+      if (!document.hidden && this.followsZone) this.refitSoon();
+    });
     setInterval(() => {
-      this.updateSoon();
+      this.list.refresh();
       this.vehicles.updateRows();
       this.changes.updateSoon();
     }, 5000);
   }
 
-  start() {
-    const feed = new LiveFeed({
-      onList: (features) => this.onList(features),
-      onHazard: (action, feature) => this.onHazard(action, feature),
-      onChangeList: (features) => this.changes.replaceAll(features),
-      onChange: (action, feature) => this.onChange(action, feature),
-      onVehicle: (feature) => {
-        this.vehicles.put(feature);
-        this.keepInView(feature);
-      },
-      onState: (state) => showState(state),
-    });
-    return feed.start();
+  onState(state) {
+    showState(state);
   }
 
-  onList(features) {
-    this.store.replaceAll(features);
+  onLists() {
+    // The first lists came with the view; later ones are of another store.
+    if (this.hasLists && this.followsZone) this.refitSoon();
+    this.hasLists = true;
     this.showAll();
-    if (this.store.keepsRejected) this.showRejected(true);
-    if (this.keepsAllInView) this.fit();
   }
 
-  onHazard(action, feature) {
-    const result = this.store.apply(action, feature);
-    if (!result) return;
-    const { change, hazard } = result;
-    if (change === 'gone') this.layer.remove(hazard);
-    else if (this.store.isShown(hazard)) this.layer.put(hazard);
-    else this.layer.remove(hazard);
-    if (change === 'new' && this.store.isShown(hazard)) {
+  onChanged({ news, vehicles }) {
+    for (const feature of vehicles) this.vehicles.put(feature);
+    for (const hazard of news.hazards) {
       this.layer.highlight(hazard);
       this.list.markFresh(hazard);
-      this.announced.push(hazard.label);
+    }
+    if (news.hazardCount > 0) {
+      if (this.announced.count === 0) this.announced.first = news.hazards[0].label;
+      this.announced.count += news.hazardCount;
       this.announceSoon();
     }
-    if (change === 'new') this.keepInView(feature);
-    this.updateSoon();
+    if (news.changeCount > 0) {
+      const { title } = news.changes[news.changes.length - 1];
+      this.say(news.changeCount === 1 ? `New map change: ${title}`
+        : `${news.changeCount} new map changes, the last: ${title}`);
+    }
+    this.keepInView([...news.hazards, ...news.changes]);
+    this.showAll();
   }
 
-  onChange(action, feature) {
-    const fresh = this.changes.apply(action, feature);
-    if (!fresh) return;
-    this.say(`New map change: ${fresh.title}`);
-    this.keepInView(feature);
+  onWatched(kind, id, record) {
+    const layer = kind === 'changes' ? this.changes.layer : this.layer;
+    layer.onWatched(id, record);
   }
 
   /** For officials who look at what was rejected. From now on events keep it current. */
   async showRejected(shown) {
-    this.store.keepsRejected = shown;
-    if (shown) {
-      try {
-        const list = await loadHazards('rejected');
-        if (this.store.keepsRejected) this.store.addRejected(list.features);
-      } catch (failure) {
-        this.store.keepsRejected = false;
-      }
-    }
-    if (!this.store.keepsRejected) this.store.dropRejected();
+    const done = await this.data.showRejected(shown);
     this.showAll();
-    if (shown && !this.store.keepsRejected) this.states.sayRejectedFailed();
+    if (!done) this.states.sayRejectedFailed();
   }
 
   showAll() {
-    this.layer.show(this.store.shown());
-    this.updatePanel();
-  }
-
-  updatePanel() {
-    const shown = this.store.shown();
-    const bounds = this.map.getBounds();
-    const listed = this.inView.checked
-      ? shown.filter((hazard) => bounds.contains([hazard.latitude, hazard.longitude]))
-      : shown;
-    this.list.show(listed, this.store.size);
+    this.layer.refresh();
+    this.list.refresh();
+    this.changes.updateSoon();
     this.filter.update();
     this.states.update();
-    this.sheet.say(this.store.size === 0 ? 'No hazards yet' : plural(shown.length, 'hazard'));
+    const { hazards } = this.data.sizes;
+    this.sheet.say(hazards === 0 ? 'No hazards yet' : plural(hazards, 'hazard'));
   }
 
   /** From the list: to the hazard on the map, with its popup open and focused. */
   choose(hazard) {
     this.stepAside();
-    this.chosen = hazard.id;
-    this.layer.open(hazard);
+    this.layer.open(hazard, () => this.sheet.focusBack(() => this.list.focusHazard(hazard.id)));
   }
 
   /** Nothing else moves or covers the map while somebody looks at one place. */
   stepAside() {
     this.sheet.toggle(false);
-    this.keepsAllInView = false;
+    this.followsZone = false;
     this.vehicles.follow(null);
   }
 
@@ -200,51 +189,65 @@ class Page {
     else this.vehicles.focusPopup(vehicle.id, focus);
   }
 
-  onPopupOpen(popup) {
-    const content = popup.getElement().querySelector('.popup');
-    if (this.chosen !== null && content?.dataset.hazard === this.chosen) {
-      content.focus({ preventScroll: true });
-    }
+  /** Goes where the zone says that most hazards are: no vehicle decides it alone. The map of an empty
+   * zone stays where it is. */
+  async refit() {
+    // Nobody sees it, and the browser would do all of it at once when somebody does.
+    if (document.hidden) return;
+    const config = await getJson('/api/v1/config').catch(() => null);
+    if (!config?.view) return;
+    whenStill(this.map, () => { if (this.followsZone) this.fit(config.view); });
   }
 
-  onPopupClose(popup) {
-    const held = popup.getElement()?.contains(document.activeElement);
-    if (this.chosen !== null && (held || document.activeElement === document.body)) {
-      this.list.focusHazard(this.chosen);
-    }
-    this.chosen = null;
+  /** Shows everything that there is. */
+  async fitAll() {
+    const box = await this.data.ask('bounds', 'hazards', { places: this.vehicles.places() });
+    if (box) whenStill(this.map, () => this.fit(box));
   }
 
-  /** Shows everything that there is; an empty map stays where the zone lies. */
-  fit() {
-    const bounds = this.vehicles.bounds().extend(this.changes.bounds());
-    for (const hazard of this.store.hazards.values()) {
-      bounds.extend([hazard.latitude, hazard.longitude]);
-    }
-    if (!bounds.isValid()) return;
+  /** East less than west: across 180 degrees. `options` are Leaflet's of fitBounds. */
+  fit({ west, south, east, north }, options = {}) {
+    const centre = nearLongitude(west, this.map.getCenter().lng);
+    const width = east < west ? east + 360 - west : east - west;
     // Pins stand above their place, and on a phone the sheet covers the map's foot.
-    this.map.fitBounds(bounds, {
+    this.map.fitBounds([[south, centre], [north, centre + width]], {
       paddingTopLeft: [40, 64], paddingBottomRight: [40, 40 + this.sheet.coveredHeight()],
-      maxZoom: 18,
+      maxZoom: 18, ...options,
     });
   }
 
-  keepInView(feature) {
-    const [longitude, latitude] = feature.geometry.coordinates;
-    if (this.keepsAllInView && !this.map.getBounds().contains([latitude, longitude])) this.fit();
+  /** What is new and not in view may change the zone's view, in a while. */
+  keepInView(records) {
+    if (!this.followsZone) return;
+    const bounds = this.map.getBounds();
+    if (records.every((record) => bounds.contains(this.layer.placeOf(record)))) return;
+    this.refitSoon();
+    this.refitLater();
   }
 
   announce() {
-    const [first] = this.announced;
-    this.say(this.announced.length === 1
-      ? `New hazard: ${first}` : `${this.announced.length} new hazards, the first: ${first}`);
-    this.announced = [];
+    const { count, first } = this.announced;
+    this.say(count === 1 ? `New hazard: ${first}`
+      : `${count.toLocaleString('en')} new hazards, the first: ${first}`);
+    this.announced = { count: 0, first: '' };
   }
 
   /** To those who listen instead of looking. */
   say(text) {
     byId('announcer').textContent = text;
   }
+}
+
+/** Where there is little room the list has it; a tap opens the rest. */
+function makeRoomForList() {
+  if (window.innerHeight >= 640 && window.innerWidth > 760) return;
+  for (const section of document.querySelectorAll('details.section')) section.open = false;
+}
+
+/** Few buttons come before many signs, for those who go by Tab. */
+function keepControlsFirst(map) {
+  const container = map.getContainer();
+  container.prepend(container.querySelector('.leaflet-control-container'));
 }
 
 function showState(state) {
@@ -254,23 +257,44 @@ function showState(state) {
   node.textContent = STATES[state];
 }
 
-async function main() {
-  let answers;
-  try {
-    answers = await Promise.all(
-      ['config', 'classes', 'vehicles'].map((name) => getJson(`/api/v1/${name}`)));
-  } catch (failure) {
-    // The page is here already, the zone is not yet: try until it answers.
-    showState('offline');
-    setTimeout(main, 2000);
-    return;
+/** The page is here already, the zone is perhaps not yet: tries until it answers. */
+async function askUntilAnswered(path) {
+  for (;;) {
+    try {
+      return await getJson(path);
+    } catch (failure) {
+      showState('offline');
+      await new Promise((resolve) => { setTimeout(resolve, 1000); });
+    }
   }
-  const [config, classes, vehicles] = answers;
-  document.title = config.title;
-  byId('title').textContent = config.title;
-  const page = new Page(config, classes);
-  for (const feature of vehicles.features) page.vehicles.put(feature);
-  await page.start();
 }
 
-main();
+async function main() {
+  makeRoomForList();
+  // The worker loads the hazards while the page asks for the rest.
+  let page = null;
+  const early = [];
+  const later = (name) => (...told) => {
+    if (page) page[name](...told);
+    else early.push([name, told]);
+  };
+  const data = new ZoneData({
+    onState: later('onState'), onLists: later('onLists'), onChanged: later('onChanged'),
+    onWatched: later('onWatched'),
+  });
+  const [config, classes, vehicles] = await Promise.all(
+    ['config', 'classes', 'vehicles'].map((name) => askUntilAnswered(`/api/v1/${name}`)));
+  document.title = config.title;
+  byId('title').textContent = config.title;
+  // One after the other: all at a stretch, on a busy machine, is a freeze.
+  const map = createMap(config);
+  await nextTask();
+  const built = new Page(map, data, config, classes);
+  await nextTask();
+  for (const feature of vehicles.features) built.vehicles.put(feature);
+  for (const [name, told] of early) built[name](...told);
+  page = built;
+}
+
+// The browser has enough to do with all these modules.
+nextTask().then(main);

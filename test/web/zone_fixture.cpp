@@ -27,6 +27,7 @@ ZoneFixture::ZoneFixture() {
   config.speed.max_speed_mps = 1e9;  // Reports of one vehicle lie all over the town.
   config.allowance.reports_per_hour = 1e9;
   config.map_changes_per_hour = 1e9;
+  config.max_hazards_by_one_vehicle = 1'000'000;
   config.directory = folder_.path();
   config.catalogue = catalogue;
   zone = std::make_unique<zone::ZoneService>(

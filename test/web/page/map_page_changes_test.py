@@ -49,7 +49,7 @@ class Desktop(MapPage):
         self.picture("map_change_popup")
         self.zone.change("barrier", LAT, LON, vehicle="car-2")
         self.wait_fact(change, "Confirmed", "2 vehicles, 2 drives")
-        self.assertEqual(self.count('.change [data-state="confirmed"]'), 1)
+        self.wait(lambda: self.count('.change [data-state="confirmed"]') == 1, "the square stays dashed")
         for vehicle in ("car-3", "car-4"):
             self.zone.change("barrier", LAT, LON, vanished=True, vehicle=vehicle)
         self.wait(lambda: self.count(".change") == 0, "what was undone stays")
@@ -115,6 +115,13 @@ class Desktop(MapPage):
         self.wait(lambda: self.count(".change") == 0, "it stays on the map")
         self.wait(lambda: "Dismissed: Barrier appeared" in
                   self.find("#announcer").get_attribute("textContent"), "nothing is announced")
+        self.click("#notice-undo")
+        self.wait_for('.change [data-state="confirmed"]')
+        self.open_change(change)
+        self.click('.popup [data-focus="dismiss"]')
+        self.find("#decision-reason").send_keys("a shadow")
+        self.click("#decision-submit")
+        self.wait(lambda: self.count(".change") == 0, "it stays on the map")
         self.zone.change("barrier", LAT, LON, vehicle="car-9")
         self.zone.change("bin", LAT + FAR, LON)
         self.wait_for(".change")

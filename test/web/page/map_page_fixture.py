@@ -15,7 +15,7 @@ try:
     from selenium import webdriver
     from selenium.common.exceptions import (
         ElementClickInterceptedException, ElementNotInteractableException, NoSuchElementException,
-        StaleElementReferenceException, TimeoutException)
+        StaleElementReferenceException, TimeoutException, WebDriverException)
     from selenium.webdriver.chrome.service import Service
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
@@ -144,6 +144,15 @@ class MapPage(unittest.TestCase):
             self.picture("failed")
             raise AssertionError(f"{what}; the browser's log: {log}") from None
 
+    def zoom_until_pins(self, count):
+        """Closer, step by step, until so many hazards have a pin of their own."""
+        def closer():
+            if self.count(".pin") < count:
+                self.click(".leaflet-control-zoom-in")
+                time.sleep(1)  # Leaflet ignores a click while it zooms.
+            return self.count(".pin") >= count
+        self.wait(closer, f"not {count} pins")
+
     def wait_state(self, state):
         self.wait(lambda: self.find("#connection").get_attribute("data-state") == state,
                   f"the page is not {state}")
@@ -189,6 +198,19 @@ class MapPage(unittest.TestCase):
     def open_popup_of(self, hazard_id):
         self.click(f'#hazard-list button[data-hazard="{hazard_id}"]')
         self.wait_for_text(f'.popup[data-hazard="{hazard_id}"]', "")
+        self.wait_still()
+
+    def wait_still(self):
+        """Until the map rests, five looks long, and the popup is whole: a click meets what it is meant for."""
+        seen = []
+
+        def rests():
+            seen.append(self.browser.execute_script("""
+                if (document.querySelector('.leaflet-pan-anim, .leaflet-zoom-anim, .picture-coming')) return null;
+                return document.querySelector('.leaflet-map-pane').style.transform
+                  + document.querySelector('.leaflet-control-scale-line').textContent;"""))
+            return seen[-1] is not None and seen[-5:] == 5 * [seen[-1]]
+        self.wait(rests, "the map does not come to rest")
 
     def wait_for_text(self, selector, *parts):
         # What still fades in has no text yet for the driver.

@@ -9,7 +9,7 @@ Skips as map_page_test.py does.
 import sys
 
 from map_page_fixture import (
-    HOSTILE, LAT, LON, Keys, MapPage, run_tests, start_browser, stop_browser, street)
+    HOSTILE, LAT, LON, Keys, MapPage, run_tests, start_browser, stop_browser, street, webdriver)
 
 
 class OfficialsPage(MapPage):
@@ -17,6 +17,9 @@ class OfficialsPage(MapPage):
 
     def text(self, selector):
         return self.find(selector).text
+
+    def mouse(self):
+        return webdriver.ActionChains(self.browser)
 
     def state_in_popup(self, hazard, state):
         self.wait_for_text(f'.popup[data-hazard="{hazard}"] .state', state)
@@ -144,6 +147,72 @@ class Desktop(OfficialsPage):
         self.assertTrue(self.find("#decision-token").is_displayed())
         self.assert_quiet()
 
+    def test_a_button_that_is_pressed_while_news_of_the_hazard_comes_is_clicked(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.mouse().move_to_element(self.find('.popup [data-focus="reject"]')).click_and_hold().perform()
+        self.zone.report("pothole", LAT, LON, vehicle="car-2")
+        self.wait_for_text(".popup", "2 times", "Active")
+        self.mouse().release().perform()
+        self.wait(lambda: self.find("#decision").is_displayed(), "the click is lost")
+        self.assert_quiet()
+
+    def test_news_of_a_hazard_leaves_its_open_history_where_one_has_scrolled_to(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        for number in range(12):
+            self.zone.do("confirm", id=hazard)
+            self.zone.report("pothole", LAT, LON, vehicle=f"car-{number}")
+        self.open()
+        self.open_popup_of(hazard)
+        self.click(".popup summary")
+        self.wait_for(".history-list li", 10)
+        self.browser.execute_script("document.querySelector('.history-list').scrollTop = 70")
+        lines = self.count(".history-list li")
+        self.zone.report("pothole", LAT, LON, vehicle="car-20")
+        self.wait_for(".history-list li", lines + 1)
+        self.assertEqual(self.browser.execute_script("return document.querySelector('.history-list').scrollTop"), 70)
+        self.assert_quiet()
+
+    def test_a_popup_that_another_one_replaces_takes_no_click_any_more(self):
+        first = self.zone.report("pothole", LAT, LON)
+        second = self.zone.report("debris", LAT + 0.002, LON)
+        self.open()
+        self.open_popup_of(first)
+        popups = self.browser.execute_async_script("""
+            const [second, done] = arguments;
+            const pane = document.querySelector('.leaflet-popup-pane');
+            new MutationObserver((_, observer) => {
+              const ids = [...pane.querySelectorAll('.popup')].map((popup) => popup.dataset.hazard);
+              if (!ids.includes(second)) return;
+              observer.disconnect();
+              done(ids);
+            }).observe(pane, { childList: true, subtree: true });
+            document.querySelector(`#hazard-list button[data-hazard="${second}"]`).click();""", second)
+        self.assertEqual(popups, [second])
+        self.assert_quiet()
+
+    def test_what_was_sent_is_said_also_to_who_closes_the_question_before_the_answer(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("confirm")
+        self.write("#decision-token", self.zone.token)
+        # The network is slow: the request goes when the test says so.
+        self.browser.execute_script("""
+            const real = window.fetch;
+            window.fetch = async (address, options) => {
+              if (options?.method === 'POST') await new Promise((go) => { window.sendNow = go; });
+              return real(address, options);
+            };""")
+        self.submit()
+        self.wait(lambda: self.browser.execute_script("return window.sendNow !== undefined"), "nothing is sent")
+        self.press(Keys.ESCAPE)
+        self.wait_closed()
+        self.browser.execute_script("window.sendNow()")
+        self.wait_for_text("#notice", "Confirmed: Pothole")
+        self.assert_quiet()
+
     def test_officials_look_at_what_was_rejected_and_put_it_back(self):
         hazard = self.zone.report("pothole", LAT, LON)
         self.zone.report("debris", LAT + 0.002, LON)
@@ -201,16 +270,123 @@ class Desktop(OfficialsPage):
         self.wait_for_text("#decision-error", "Please say why")
         self.write("#decision-reason", "its key was stolen")
         self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_for_text("#decision-preview", "2 hazards", "1 of them vanishes")
         self.picture("distrust")
+        self.assertEqual(self.count("#hazard-list button"), 2, "it was done without being shown first")
         self.submit()
         self.wait_closed()
         self.wait(lambda: self.count("#hazard-list button") == 1 and
                   self.pin_state("candidate") == 1, "its words still count")
+        self.wait_for_text("#notice", "Distrusted: car-2, 2 hazards changed")
+        self.picture("distrusted")
         self.open_popup_of(shared)
         self.state_in_popup(shared, "Unconfirmed")
         self.wait_for_text(".popup", "1 vehicle")
         self.click(".popup summary")
         self.wait_for_text(".history-list", "words of car-2 withdrawn by miller: its key was stolen")
+        self.assert_quiet()
+
+    def test_distrust_is_taken_back_at_once_or_later(self):
+        self.zone.report("pothole", LAT, LON)
+        self.zone.report("pothole", LAT, LON, vehicle="car-2")
+        self.zone.report("debris", LAT + 0.002, LON, vehicle="car-2")
+        self.zone.drive([(LAT, LON), (LAT + 0.0005, LON)], vehicle="car-2")
+        self.open()
+        for take_back in (self.undo_in_notice, self.trust_in_popup):
+            self.wait(lambda: self.pin_state("active") == 1 and self.count("#hazard-list button") == 2,
+                      "the hazards are not as before")
+            if not self.count(".vehicle-popup"):
+                self.click("#vehicles button")
+            self.ask("distrust")
+            self.write("#decision-reason", "its key was stolen")
+            if self.find("#decision-token").is_displayed():
+                self.write("#decision-token", self.zone.token)
+                self.submit()
+            self.wait_for_text("#decision-preview", "2 hazards")
+            self.submit()
+            self.wait_closed()
+            self.wait(lambda: self.count("#hazard-list button") == 1, "its words still count")
+            take_back()
+            self.wait(lambda: "Trusted again: car-2, 2 hazards changed" in self.text("#notice"), "not said")
+        self.wait(lambda: self.pin_state("active") == 1 and self.count("#hazard-list button") == 2,
+                  "the hazards are not as before")
+        self.assert_quiet()
+
+    def undo_in_notice(self):
+        self.click("#notice-undo")
+
+    def trust_in_popup(self):
+        self.ask("trust")
+        self.submit()
+        self.wait_closed()
+
+    def test_undo_brings_back_the_state_before_the_mistake(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.reject(hazard, "wrong one", self.zone.token)
+        self.wait_closed()
+        self.wait(lambda: self.count("#hazard-list button") == 0, "the hazard stays")
+        self.wait_for_text("#notice", "Rejected: Pothole")
+        self.picture("notice")
+        self.click("#notice-undo")
+        self.wait(lambda: self.count("#hazard-list button") == 1, "it does not come back")
+        self.wait(lambda: "Undone: Pothole" in self.text("#notice"), "not said")
+        self.assertFalse(self.find("#notice-undo").is_displayed(), "an undo is offered twice")
+        self.open_popup_of(hazard)
+        # A candidate before, a candidate again: put back it would be active.
+        self.state_in_popup(hazard, "Unconfirmed")
+        self.click("#notice-close")
+        self.assertFalse(self.find("#notice").is_displayed())
+        self.assert_quiet()
+
+    def test_the_notice_does_not_undo_what_another_official_has_decided_since(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.reject(hazard, "wrong one", self.zone.token)
+        self.wait_closed()
+        self.wait_for_text("#notice", "Rejected: Pothole")
+        self.assertTrue(self.zone.do("confirm", id=hazard)["confirmed"])
+        self.wait(lambda: self.count("#hazard-list button") == 1, "it does not come back")
+        self.click("#notice-undo")
+        self.wait_for_text("#notice", "Another decision about the hazard was made since, and nothing is undone.")
+        self.open_popup_of(hazard)
+        self.state_in_popup(hazard, "Active")
+
+    def test_a_decision_is_undone_later_from_the_popup_and_only_once(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("confirm")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_closed()
+        self.state_in_popup(hazard, "Active")
+        self.ask("undo")
+        self.submit()
+        self.wait_closed()
+        self.state_in_popup(hazard, "Unconfirmed")
+        # What was undone is undone: once more changes nothing.
+        self.ask("undo")
+        self.submit()
+        self.wait_closed()
+        self.state_in_popup(hazard, "Unconfirmed")
+        self.assert_quiet()
+
+    def test_confirming_thrice_is_one_line_of_the_history(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        for _ in range(3):
+            self.ask("confirm")
+            if self.find("#decision-token").is_displayed():
+                self.write("#decision-token", self.zone.token)
+            self.submit()
+            self.wait_closed()
+            self.state_in_popup(hazard, "Active")
+        self.click(".popup summary")
+        self.wait_for_text(".history-list", "confirmed by miller")
+        self.assertEqual(self.text(".history-list").count("confirmed by miller"), 1)
         self.assert_quiet()
 
     def test_the_speed_of_a_vehicle_that_is_silent_is_not_shown(self):
@@ -279,6 +455,27 @@ class Desktop(OfficialsPage):
         self.wait_for_text("#decision-error", "This hazard is no longer on the map")
         self.assert_quiet_but(409)
 
+    def test_a_hazard_that_changed_under_the_question_is_left_and_what_changed_is_said(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.open_popup_of(hazard)
+        self.ask("reject")
+        self.zone.report("pothole", LAT, LON, vehicle="car-2")
+        self.write("#decision-reason", "nothing there")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_for_text("#decision-error", "it was candidate and is active now")
+        self.click("#decision-cancel")
+        self.wait_closed()
+        self.state_in_popup(hazard, "Active")
+        self.ask("reject")
+        self.write("#decision-reason", "nothing there")
+        self.write("#decision-token", self.zone.token)
+        self.submit()
+        self.wait_closed()
+        self.wait(lambda: self.count("#hazard-list button") == 0, "the second look decides nothing")
+        self.assert_quiet_but(409)
+
     def test_everything_is_decided_by_keyboard(self):
         hazard = self.zone.report("pothole", LAT, LON)
         self.open()
@@ -288,7 +485,7 @@ class Desktop(OfficialsPage):
         self.wait(lambda: self.browser.execute_script(
             "return document.activeElement.matches(`.popup[data-hazard='${arguments[0]}']`)", hazard),
             "the popup has no focus")
-        for _ in range(8):
+        for _ in range(10):
             self.press(Keys.TAB)
             if self.browser.execute_script(
                     "return document.activeElement.dataset.focus") == "reject":
@@ -324,6 +521,9 @@ class Desktop(OfficialsPage):
         self.wait_for_text(".popup", "2 times")
         self.wait(lambda: self.count(".history-list li") >= 4, "the open history lags behind")
         self.picture("history")
+        self.wait(lambda: self.browser.execute_script(
+            "return document.querySelector('.leaflet-popup').getBoundingClientRect().top") >= 0,
+            "the popup grows out of the window")
         self.assert_quiet()
 
     def test_without_officials_there_are_no_buttons(self):
@@ -351,7 +551,7 @@ class Phone(OfficialsPage):
         self.zone.report("deer", *road[80])
         self.zone.report("W" * 64, *road[100])
         self.open()
-        self.wait_for(".pin", 4)
+        self.zoom_until_pins(4)
         self.picture("phone_states")
         self.click("#sheet-handle")
         self.picture("phone_states_list")

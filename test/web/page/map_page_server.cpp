@@ -7,6 +7,7 @@
 //   {"do": "change", "class": C, "lat": D, "lon": D, "vanished": false, "vehicle": V} -> {"id"}
 //   {"do": "remove", "id": UUID}                                        -> {"removed"}
 //   {"do": "confirm", "id": UUID}           as an official              -> {"confirmed"}
+//   {"do": "reject", "id": UUID}            as an official              -> {"rejected"}
 //   {"do": "pass", "seconds": S}            the zone's clock goes on    -> {"passed"}
 //   {"do": "close_decisions"}               the server starts anew without a token file
 //   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
@@ -78,6 +79,7 @@ class Session {
     if (verb == "change") return AddMapChange(command);
     if (verb == "remove") return Remove(command);
     if (verb == "confirm") return Confirm(command);
+    if (verb == "reject") return Reject(command);
     if (verb == "pass") return Pass(command);
     if (verb == "close_decisions") return CloseDecisions();
     if (verb == "fill") return Fill(command);
@@ -117,6 +119,13 @@ class Session {
     const auto uuid = livemap::Uuid::Parse(command.at("id"));
     const std::string official = livemap::web::TokenFile::official();
     return {{"confirmed", uuid && fixture_.zone->Confirm(*uuid, official)}};
+  }
+
+  Json Reject(const Json& command) {
+    Tick();
+    const auto uuid = livemap::Uuid::Parse(command.at("id"));
+    const std::string official = livemap::web::TokenFile::official();
+    return {{"rejected", uuid && fixture_.zone->Reject(*uuid, official, "test")}};
   }
 
   Json AddReport(const Json& command) {
@@ -167,8 +176,9 @@ class Session {
         const double along = 0.00011 * (i / 60) + 1e-5 * std::uniform_real_distribution<>()(random);
         const double across = 0.0018 * (i % 30);
         const bool east = i % 60 < 30;
+        const double longitude = corner.longitude_deg + (east ? along * 1.31 : across);
         const GeoPoint position{corner.latitude_deg + (east ? across * 0.76 : along),
-                                corner.longitude_deg + (east ? along * 1.31 : across)};
+                                longitude < 180 ? longitude : longitude - 360};
         auto report = fixture_.MakeReport(classes[random() % classes.size()], position);
         report.confidence = 0.5F + 0.49F * std::uniform_real_distribution<float>()(random);
         reports.push_back(report);
@@ -179,6 +189,8 @@ class Session {
   }
 
   Json MoveVehicle(const Json& command) {
+    // As far apart that each position is told.
+    ahead_ns_ += livemap::zone::VehicleTable::kTellNs;
     Tick();
     livemap::zone::VehicleState vehicle;
     vehicle.vehicle_id = command.at("id");

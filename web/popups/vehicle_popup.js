@@ -1,8 +1,8 @@
 // What a click on a vehicle shows. The vehicle goes on driving while it is open, so the facts change
 // in place and the buttons stay.
 
-import { element } from './dom.js';
-import { ago, localTime, utcTime } from './format.js';
+import { element } from '../dom.js';
+import { ago, localTime, utcTime } from '../format.js';
 
 /** Without news for so long a vehicle may be elsewhere and otherwise fast. */
 const FRESH_MS = 15000;

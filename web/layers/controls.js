@@ -1,6 +1,6 @@
 // Leaflet controls of our own: a button that shows everything, and the tiles' attribution.
 
-import { element, svgElement } from './dom.js';
+import { element, svgElement } from '../dom.js';
 
 const L = window.L;
 

@@ -1,6 +1,6 @@
 // On a phone the panel is a sheet at the bottom edge: a tap or a swipe on its handle opens it.
 
-import { byId } from './dom.js';
+import { byId, setText } from '../dom.js';
 
 const SWIPE_PX = 24;
 
@@ -34,13 +34,20 @@ export class Sheet {
     return this.handle.offsetHeight;
   }
 
+  /** Calls `focus()`, which gives the focus to something in the panel; where that is closed, the
+   * handle that opens it has the focus. */
+  focusBack(focus) {
+    if (this.coveredHeight() > 0 && !this.isOpen()) this.handle.focus({ preventScroll: true });
+    else focus();
+  }
+
   toggle(open) {
     this.panel.classList.toggle('open', open);
     this.handle.setAttribute('aria-expanded', String(open));
   }
 
   say(text) {
-    this.summary.textContent = text;
+    setText(this.summary, text);
   }
 
   swipe(y) {

@@ -1,9 +1,9 @@
 // What happened to a hazard: fetched when somebody opens the history in its popup.
 
-import { element } from './dom.js';
-import { localTime, utcTime } from './format.js';
-import { stateLabel } from './hazard_state.js';
-import { getJson } from './live_feed.js';
+import { element } from '../dom.js';
+import { localTime, utcTime } from '../format.js';
+import { stateLabel } from '../hazard_state.js';
+import { getJson } from '../zone_lists.js';
 
 const MOST_EVENTS = 50;
 
@@ -23,14 +23,14 @@ export class HazardHistory {
     if (open && this.sequence !== hazard.sequence) this.load(hazard);
     const details = element('details', { class: 'history', open: open ? '' : null },
       element('summary', { 'data-focus': 'history' }, 'History'), ...(open ? [this.content()] : []));
-    details.addEventListener('toggle', () => {
-      if (details.open === (this.openId === hazard.id)) return;
-      this.openId = details.open ? hazard.id : null;
+    details.ontoggle = ({ currentTarget }) => {
+      if (currentTarget.open === (this.openId === hazard.id)) return;
+      this.openId = currentTarget.open ? hazard.id : null;
       this.sequence = null;
       this.events = null;
       this.failed = false;
       this.onChange(hazard.id);
-    });
+    };
     return details;
   }
 

@@ -1,8 +1,8 @@
 // What a click on a map change shows.
 
-import { changeBadge } from './change_layer.js';
-import { element } from './dom.js';
-import { percent, plural, position } from './format.js';
+import { changeBadge } from '../layers/change_layer.js';
+import { element } from '../dom.js';
+import { percent, plural, position } from '../format.js';
 import { facts, time } from './hazard_popup.js';
 
 /** The zone counts so many vehicles. */

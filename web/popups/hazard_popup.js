@@ -1,28 +1,66 @@
 // What a click on a hazard shows.
 
-import { element } from './dom.js';
-import { localTime, percent, plural, position, utcTime } from './format.js';
-import { REJECTED, stateLabel, stateMeaning } from './hazard_state.js';
+import { addressOf } from '../address.js';
+import { element } from '../dom.js';
+import { localTime, percent, plural, position, utcTime } from '../format.js';
+import { REJECTED, stateLabel, stateMeaning } from '../hazard_state.js';
 
 /** A hazard remembers so many vehicles. */
 const MOST_VEHICLES = 6;
 
 /** Only the server's own pictures: a path of /images with a content hash. */
 function safeImage(url) {
-  return typeof url === 'string' && /^\/images\/[0-9a-f]{64}$/.test(url) ? url : null;
+  return typeof url === 'string' && /^\/images\/[0-9a-f]{64}$/.test(url) ? addressOf(url) : null;
 }
 
-function picture(hazard) {
+/** The zone makes one picture after the other, and sends away whom it keeps waiting. */
+const RETRY_MS = 2000;
+const COMING = 'The zone is busy: the picture comes in a moment';
+const GONE = 'The picture is no longer kept';
+
+/** What the zone says of a picture: an HTTP status, 0 for no answer. */
+async function statusOf(url) {
+  try {
+    return (await fetch(url, { method: 'HEAD', credentials: 'omit' })).status;
+  } catch (failure) {
+    return 0;
+  }
+}
+
+/** Asks for a picture that did not come until the zone has it, has it no more, or nobody looks at
+ * `note` any longer. `wasThere`: the zone had it before, and it could not be shown. */
+async function awaitPicture(note, hazard, url, wasThere) {
+  for (;;) {
+    const status = await statusOf(url);
+    if (!note.isConnected) return;
+    if (status === 404 || (status === 200 && wasThere)) {
+      note.textContent = status === 404 ? GONE : 'The picture cannot be shown';
+      return;
+    }
+    if (status === 200) {
+      note.replaceWith(picture(hazard, true));
+      return;
+    }
+    note.textContent = COMING;
+    await new Promise((resolve) => { setTimeout(resolve, RETRY_MS); });
+    if (!note.isConnected) return;
+  }
+}
+
+function picture(hazard, wasThere = false) {
+  // Not known yet: the place is kept, so that the popup does not jump.
+  if (hazard.image === undefined) return element('div', { class: 'picture picture-coming' });
   const url = safeImage(hazard.image);
   if (!url) return element('p', { class: 'no-picture' }, 'No picture came with this report');
   const image = element('img', {
     class: 'picture', src: url, width: 300, height: 200,
     alt: `Camera picture with the ${hazard.label} marked`,
   });
-  image.addEventListener('error', () => {
-    image.closest('.picture-link')
-      .replaceWith(element('p', { class: 'no-picture' }, 'The picture is no longer kept'));
-  });
+  image.onerror = ({ currentTarget }) => {
+    const note = element('p', { class: 'no-picture' }, '\u2026');
+    currentTarget.closest('.picture-link').replaceWith(note);
+    awaitPicture(note, hazard, url, wasThere);
+  };
   return element('a', {
     class: 'picture-link', href: url, target: '_blank', rel: 'noopener',
     title: 'Open the picture in full size',
@@ -58,16 +96,18 @@ function bar(share) {
   return [meter, percent(share)];
 }
 
-/** The popup's content as a detached element; `extras` are what people can do with the hazard. */
+/** The popup's content as a detached element; `extras` are what people can do with the hazard.
+ * Lists know less of a hazard than it has: what is undefined is shown when it has come. */
 export function popupContent(hazard, catalogue, extras) {
-  const sigma = hazard.sigma === null ? '' : ` \u00b1 ${hazard.sigma.toFixed(1)} m`;
+  const sigma = Number.isFinite(hazard.sigma) ? ` \u00b1 ${hazard.sigma.toFixed(1)} m` : '';
   const state = element('span', { class: `state state-${hazard.state}` }, stateLabel(hazard.state));
   const isRejected = hazard.state === REJECTED.name;
   const rows = [
     ['State', state, element('span', { class: 'meaning' }, stateMeaning(hazard.state))],
     ['Position', element('span', { class: 'copyable' },
       position(hazard.latitude, hazard.longitude)), sigma],
-    ['Last seen', time(hazard.lastSeen)],
+    // Its line is kept until it has come, so that the popup does not grow under the mouse.
+    ['Last seen', hazard.lastSeen === undefined ? '\u2026' : time(hazard.lastSeen)],
     ...(hazard.firstSeen === hazard.lastSeen ? [] : [['First seen', time(hazard.firstSeen)]]),
     ['Reported', plural(hazard.sightings, 'time')],
     [isRejected ? 'Seen since' : 'Seen by', seenBy(hazard)],

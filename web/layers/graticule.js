@@ -1,7 +1,8 @@
 // The background where there are no map tiles: a grid of parallels and meridians with their
 // coordinates at the edges, finer as one zooms in.
 
-import { coordinate } from './format.js';
+import { coordinate } from '../format.js';
+import { wrappedLongitude } from '../mercator.js';
 
 const L = window.L;
 const LEAST_SPACING_PX = 110;
@@ -26,7 +27,10 @@ export const Graticule = L.Layer.extend({
     map.on('move resize viewreset zoomend', this.draw, this);
     map.on('zoomanim', this.fade, this);
     this.scheme = matchMedia('(prefers-color-scheme: dark)');
-    this.scheme.addEventListener('change', () => this.draw());
+    this.scheme.addEventListener('change', () => {
+      this.colours = null;
+      this.draw();
+    });
     this.draw();
   },
 
@@ -45,13 +49,7 @@ export const Graticule = L.Layer.extend({
     this.canvas.height = size.y * scale;
     const context = this.canvas.getContext('2d');
     context.scale(scale, scale);
-    const style = getComputedStyle(map.getContainer());
-    this.colours = {
-      minor: style.getPropertyValue('--grid-minor').trim(),
-      major: style.getPropertyValue('--grid-major').trim(),
-      label: style.getPropertyValue('--grid-label').trim(),
-      halo: style.getPropertyValue('--map-ground').trim(),
-    };
+    this.colours ??= this.findColours();
     context.font = '11px system-ui, "Segoe UI", "DejaVu Sans", sans-serif';
 
     const middle = size.divideBy(2);
@@ -59,6 +57,17 @@ export const Graticule = L.Layer.extend({
     const b = map.containerPointToLatLng(middle.add([100, 100]));
     this.drawLines(context, size, stepFor(Math.abs(b.lng - a.lng) / 100), true);
     this.drawLines(context, size, stepFor(Math.abs(b.lat - a.lat) / 100), false);
+  },
+
+  /** Asked for once: each time the browser would bring the style of the whole page up to date. */
+  findColours() {
+    const style = getComputedStyle(this._map.getContainer());
+    return {
+      minor: style.getPropertyValue('--grid-minor').trim(),
+      major: style.getPropertyValue('--grid-major').trim(),
+      label: style.getPropertyValue('--grid-label').trim(),
+      halo: style.getPropertyValue('--map-ground').trim(),
+    };
   },
 
   /** Meridians (`upright`) or parallels. */
@@ -88,7 +97,7 @@ export const Graticule = L.Layer.extend({
 
   drawLabel(context, size, at, degrees, step, upright) {
     const text = upright
-      ? coordinate(((degrees + 540) % 360) - 180, 'E', 'W', digitsFor(step))
+      ? coordinate(wrappedLongitude(degrees), 'E', 'W', digitsFor(step))
       : coordinate(degrees, 'N', 'S', digitsFor(step));
     const x = upright ? at + 5 : 8;
     const y = upright ? 15 : at - 5;
