@@ -116,6 +116,12 @@ class BagToolsTest(unittest.TestCase):
         road = self.survey()
         self.assert_refused(run("from_survey", self.path("nowhere"), self.bag), "nowhere")
         self.assert_refused(run("from_survey", road, self.bag, "--sped", 3), "--sped")
+        table = os.path.join(road, "frames.csv")
+        with open(table, encoding="ascii") as file:
+            before = file.read()
+        self.assert_refused(run("from_survey", road, table), "frames.csv", "would be overwritten")
+        with open(table, encoding="ascii") as file:
+            self.assertEqual(file.read(), before)
         self.assert_refused(run("from_survey", road, self.bag, "--speed-mps", "fast"), "fast")
         self.assert_refused(run("from_survey", road, self.bag, "--start", "91,0"), "91,0")
         route = self.path("route.geojson")
@@ -161,6 +167,9 @@ class BagToolsTest(unittest.TestCase):
         images = messages(self.bag, "/camera/image_raw")
         self.assertAlmostEqual((images[1].header.stamp - images[0].header.stamp).to_sec(), 0.2)
         self.assertEqual(messages(self.bag, "/ground_truth/pose")[1].pose.position.y, 5)
+        os.remove(self.bag)
+        self.assert_refused(run("from_kitti", self.path("kitti"), self.bag, "--start-time", "2038-02-01T00:00:00Z"),
+                            "2038-02-01", "before 2038-01-19")
 
     def test_kitti_bag_holds_the_right_eye_with_its_baseline(self):
         for side, eye in enumerate(("image_2", "image_3")):

@@ -19,13 +19,16 @@ import threading
 import time
 import unittest
 
+import cv2
+import numpy
+
 SCRIPT = pathlib.Path(sys.argv.pop()).resolve()
 sys.path.insert(0, str(SCRIPT.parent / "lib"))
-import demo_system  # noqa: E402
+from listening_port import free_port  # noqa: E402
 import perception_figures as figures  # noqa: E402
 import perception_page  # noqa: E402
 
-POTHOLE = ["pothole", 100, 100, 140, 120]
+WIDTH, HEIGHT = 400, 300
 RIGHT, WRONG = [100, 100, 138, 120], [300, 100, 340, 120]
 
 
@@ -35,18 +38,30 @@ def report(uuid, stamp, box, wall=0.0, name="pothole", picture=0):
 
 
 class FiguresTest(unittest.TestCase):
-    # Frames every 5 m; potholes in the first two, and 20 m later in one more.
+    # Frames every 5 m; a pothole at 100, 100 to 140, 120 in the first two, and 20 m later in one more.
     stamps = [10, 20, 30, 40, 50, 60, 70]
-    chainage = [0, 5, 10, 15, 20, 25, 30]
-    boxes = {10: [POTHOLE], 20: [POTHOLE], 60: [POTHOLE], 70: [["traffic_cone", *WRONG]]}
+    with_pothole = {10, 20, 60}
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
+        for part in ("images", "labels"):
+            (cls.folder / part).mkdir()
+        rows = ["frame,chainage_m,potholes"]
+        for place, stamp in enumerate(cls.stamps):
+            rows.append(f"{stamp:06},{5 * place},{int(stamp in cls.with_pothole)}")
+            cv2.imwrite(str(cls.folder / "images" / f"{stamp:06}.png"), numpy.zeros((HEIGHT, WIDTH, 3), numpy.uint8))
+            label = f"0 {120 / WIDTH} {110 / HEIGHT} {40 / WIDTH} {20 / HEIGHT}\n" if stamp in cls.with_pothole else ""
+            (cls.folder / "labels" / f"{stamp:06}.txt").write_text(label)
+        (cls.folder / "frames.csv").write_text("\n".join(rows) + "\n")
 
     def found(self, *reports):
-        run = {"vehicle": list(reports), "zone": []}
-        return figures.found_events(run, "big", (self.stamps, self.boxes, self.chainage), "pothole")
+        return figures.found_events({"vehicle": list(reports), "zone": []}, "big", self.stamps, self.folder)
 
-    def test_an_event_is_a_run_of_labelled_frames_at_most_12_m_apart(self):
-        self.assertEqual(figures.events_of(self.stamps, self.chainage, self.boxes, "pothole"), [[10, 20], [60]])
-        self.assertAlmostEqual(figures.road_km([0, 5, 1000]), 0.017)
+    def test_nothing_reported_finds_no_event_of_the_road_driven(self):
+        told = self.found()
+        self.assertEqual((told["events"], told["found"], told["false"]), (2, 0, 0))
+        self.assertAlmostEqual(told["km"], 0.03)
 
     def test_an_event_is_found_by_a_report_whose_box_hits_a_label_of_its_own_frame(self):
         self.assertEqual(self.found(report("a", 20, RIGHT), report("a", 20, RIGHT))["found"], 1)
@@ -55,7 +70,6 @@ class FiguresTest(unittest.TestCase):
         self.assertEqual({key: told[key] for key in ("events", "found", "false")}, {"events": 2, "found": 1, "false": 2})
 
     def test_half_an_overlap_is_a_hit_and_less_is_none(self):
-        self.assertAlmostEqual(figures.iou([0, 0, 10, 10], [0, 0, 10, 5]), 0.5)
         self.assertEqual(self.found(report("a", 60, [100, 100, 140, 110]))["found"], 1)
         self.assertEqual(self.found(report("a", 60, [100, 100, 140, 109]))["found"], 0)
 
@@ -86,7 +100,7 @@ class LinkTest(unittest.TestCase):
     def test_the_round_trip_is_as_long_and_as_scattered_as_asked_for_and_bytes_are_counted(self):
         server = socket.create_server(("127.0.0.1", 0))
         threading.Thread(target=self.echo, args=(server,), daemon=True).start()
-        port = demo_system.free_port()
+        port = free_port()
         with tempfile.TemporaryDirectory() as folder:
             counts = pathlib.Path(folder) / "counts.json"
             relay = subprocess.Popen(

@@ -69,6 +69,38 @@ class EvaluateLocalizationTest(unittest.TestCase):
         hidden, told = self.figures("--noise-m 3 --hide-noise"), self.figures("--noise-m 3")
         self.assertNotEqual(hidden["nees_mean"], told["nees_mean"])
 
+    def test_where_nothing_is_fused_the_figures_are_null_with_a_reason_and_exit_1(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_drive(folder)
+            path = os.path.join(folder, "gnss_ublox.csv")
+            with open(path, encoding="ascii") as file:
+                head, *rows = file.read().splitlines()
+            with open(path, "w", encoding="ascii") as file:
+                # All fixes come after the last true pose.
+                file.write("\n".join([head, *(f"{float(row.split(',')[0]) + 500},{row.split(',', 1)[1]}" for row in rows)]))
+            done = subprocess.run([PROGRAM, "--json", folder], capture_output=True, text=True, timeout=120, check=False)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        figures = json.loads(done.stdout)
+        self.assertEqual(figures["n"], 0)
+        for key in ("fix_rmse_m", "fused_rmse_m", "fused_p50_m", "fused_p95_m", "fused_max_m", "first_fused_s", "nees_mean"):
+            self.assertIsNone(figures[key], key)
+        self.assertIn("no true pose has a fused one", figures["reason"])
+        self.assertIn("the fixes reach from 600.000 to 612.000 s, the true poses from 100.000 to 112.000 s", figures["reason"])
+        self.assertIn(figures["reason"], done.stderr)
+
+    def test_a_gap_in_the_recording_is_told(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_drive(folder)
+            path = os.path.join(folder, "can_speed.csv")
+            with open(path, encoding="ascii") as file:
+                head, *rows = file.read().splitlines()
+            with open(path, "w", encoding="ascii") as file:
+                file.write("\n".join([head, *(row for row in rows if not 104 < float(row.split(",")[0]) < 108)]))
+            done = subprocess.run([PROGRAM, "--json", folder], capture_output=True, text=True, timeout=120, check=False)
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (0, 1), done.stderr)
+        self.assertIn("the wheel speed with a true heading has a gap", done.stderr)
+        self.assertEqual((json.loads(done.stdout)["odometry_gaps"], json.loads(done.stdout)["truth_gaps"]), (1, 0))
+
     def test_flags_that_would_change_nothing_are_refused(self):
         for flags, words in (("--outlier-m 5", "--outlier-m needs --outliers"),
                              ("--hide-noise", "--hide-noise needs --noise-m"),

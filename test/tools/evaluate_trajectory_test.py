@@ -80,6 +80,16 @@ class EvaluateTrajectoryTest(unittest.TestCase):
         self.assertAlmostEqual(self.figures(poses, poses)["duration_s"], 4.9)
         self.assertAlmostEqual(self.figures("--rate", "20", poses, poses)["duration_s"], 2.45)
 
+    def test_kitti_files_of_different_lengths_are_told(self):
+        rows = [f"1 0 0 {i} 0 1 0 {i % 3} 0 0 1 0\n" for i in range(50)]
+        whole, short = self.write_text("whole.txt", "".join(rows)), self.write_text("short.txt", "".join(rows[3:]))
+        self.assertIs(self.figures(whole, whole)["unequal_lengths"], False)
+        done = run("--json", whole, short)
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (0, 1), done.stderr)
+        self.assertIs(json.loads(done.stdout)["unequal_lengths"], True)
+        for words in (whole, "50 poses", short, "47", "line by line"):
+            self.assertIn(words, done.stderr)
+
     def test_without_json_it_is_a_table(self):
         done = run("--scale", "--delta-frames", "1", self.truth, self.drifting)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -89,23 +99,78 @@ class EvaluateTrajectoryTest(unittest.TestCase):
 
     def test_mistakes_are_one_sentence_and_exit_2(self):
         cut = self.write_text("cut.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0\n")
-        far = self.write_text("far.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n")
+        still = self.write("still.txt", 0.0)
+        comma = self.write_text("comma.txt", "1,0,0,0,0,0,0,1\n")
+        nanoseconds = self.write_text("euroc.txt", "1403636579763555584 0 0 0 0 0 0 1\n")
         for arguments, expected in [
                 ([], "got 0 arguments"), ([self.truth], "got 1 arguments"),
                 (["--bogus", self.truth, self.truth], "--bogus"),
+                (["--align", "sim3", still, self.truth], "the truth does not move"),
+                (["--align", "sim3", self.truth, still], "the estimate does not move"),
+                ([self.truth, comma], "separated by ','"),
+                ([self.truth, nanoseconds], "looks like nanoseconds"),
                 (["/nowhere", self.truth], "/nowhere"), ([self.truth, self.folder], self.folder),
-                ([self.truth, cut], "line 2 of '" + cut), ([self.truth, far], "0 of the 2"),
+                ([self.truth, cut], "line 2 of '" + cut),
                 (["--align", "best", self.truth, self.truth], "none, se3, sim3 and origin"),
                 (["--align", "se3", "--scale", self.truth, self.truth], "--scale"),
                 (["--delta", "0", self.truth, self.truth], "--delta"),
                 (["--delta-frames", "1.5", self.truth, self.truth], "whole number"),
                 (["--max-difference", "nan", self.truth, self.truth], "nan"),
+                (["--align=", self.truth, self.truth], "--align is '', accepted is KIND"),
+                (["--align", "", self.truth, self.truth], "--align is ''"),
+                (["--align", "--json", self.truth, self.truth], "'--align' needs a value: KIND"),
+                (["--align", "--rate=5", self.truth, self.truth], "'--align' needs a value: KIND"),
                 (["--rate", "-1", self.truth, self.truth], "--rate")]:
             done = run(*arguments)
             self.assertEqual(done.returncode, 2, arguments)
             self.assertEqual(done.stdout, "", arguments)
             self.assertEqual(done.stderr.strip().count("\n"), 0, done.stderr)
             self.assertIn(expected, done.stderr)
+
+    def test_what_shares_no_time_is_null_with_a_reason_and_exit_1(self):
+        far = self.write_text("far.txt", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n")
+        one = self.write_text("one.txt", "1000 0 0 0 0 0 0 1\n")
+        for estimate, words in ((far, "0 of the 2"), (one, "1 of the 1")):
+            done = run("--json", self.truth, estimate)
+            self.assertEqual((done.returncode, done.stderr.strip().count("\n")), (1, 0), done.stderr)
+            figures = json.loads(done.stdout)
+            self.assertIn(words, figures["reason"])
+            self.assertIn(figures["reason"], done.stderr)
+            self.assertEqual((figures["truth_poses"], figures["ate_rmse_m"], figures["rpe_rmse_m_per_s"]),
+                             (1501, None, None))
+            done = run(self.truth, estimate)
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertIn(words, done.stderr)
+
+    def test_a_pose_that_is_said_twice_is_taken_once_with_a_note(self):
+        with open(self.truth, encoding="ascii") as file:
+            lines = file.read().splitlines()
+        twice = self.write_text("twice.txt", "\n".join([*lines[:5], lines[4], *lines[5:]]) + "\n")
+        done = run("--json", twice, self.truth)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["pairs"], 1501)
+        self.assertIn(f"1 line of '{twice}', the first of them line 6", done.stderr)
+        stamp = lines[4].split()[0]
+        torn = self.write_text("torn.txt", "\n".join([*lines[:5], stamp + " 99 0 0 0 0 0 1", *lines[5:]]))
+        done = run(torn, self.truth)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("lines 5 and 6", done.stderr)
+
+    def test_marks_and_line_ends_of_other_systems_do_not_count(self):
+        with open(self.truth, "rb") as file:
+            stored = file.read()
+        for name, text in (("marked", b"\xef\xbb\xbf" + stored), ("windows", stored.replace(b"\n", b" \r\n")),
+                           ("mac", stored.replace(b"\n", b"\r")), ("cut", stored[:-1] + b"\n\n\n")):
+            path = os.path.join(self.folder, name)
+            with open(path, "wb") as file:
+                file.write(text)
+            self.assertEqual(self.figures(path, self.truth)["pairs"], 1501, name)
+        path = os.path.join(self.folder, "wide")
+        with open(path, "wb") as file:
+            file.write(stored.decode("ascii").encode("utf-16"))
+        done = run(path, self.truth)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("byte order mark of UTF-16", done.stderr)
 
     def test_it_has_help(self):
         done = run("--help")

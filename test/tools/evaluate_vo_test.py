@@ -175,6 +175,49 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertIn("baseline_m in camera.yaml", self.refused(tum, "--stereo"))
         self.assertIn("no right camera", self.refused(self.room, "--stereo"))
 
+    def test_a_kitti_folder_is_read_in_number_order_and_paired_by_number(self):
+        kitti, odd = (os.path.join(self.temporary.name, name) for name in ("numbers", "numbers_odd"))
+        as_kitti(self.street, kitti)
+        sound = self.figures(kitti, "--stereo")
+        shutil.copytree(kitti, odd)
+        for side in ("image_0", "image_1"):
+            for number in range(16):
+                folder = os.path.join(odd, side)
+                os.rename(os.path.join(folder, f"{number:06}.png"),
+                          os.path.join(folder, f"{number}.{'PNG' if number % 2 else 'jpeg'}"))
+        self.assertEqual(self.figures(odd, "--stereo")["ate_rmse_m"], sound["ate_rmse_m"])
+        shutil.copy(os.path.join(odd, "image_0", "1.PNG"), os.path.join(odd, "image_0", "001.png"))
+        refusal = self.refused(odd, "--stereo")
+        self.assertIn("/001.png", refusal)
+        self.assertIn("/1.PNG", refusal)
+        for side in ("image_0", "image_1"):
+            for number in (4, 5):
+                os.remove(os.path.join(kitti, side, f"{number:06}.png"))
+        lost = self.figures(kitti, "--stereo")
+        self.assertEqual((lost["frames"], lost["pairs"]), (14, 14))
+        self.assertAlmostEqual(lost["longest_gap_s"], 0.3)
+        self.assertLess(lost["ate_rmse_m"], 0.01 * lost["length_m"])
+
+    def test_a_sequence_whose_truth_is_of_another_time_has_no_errors(self):
+        other = os.path.join(self.temporary.name, "other_time")
+        shutil.copytree(self.room, other)
+        with open(os.path.join(other, "groundtruth.txt"), "w", encoding="ascii") as file:
+            file.write("5000 0 0 0 0 0 0 1\n5001 0 0 0 0 0 0 1\n")
+        done = run("--json", other)
+        figures = json.loads(done.stdout)
+        self.assertEqual((done.returncode, figures["ate_rmse_m"], figures["rpe_rmse_m_per_s"]), (1, None, None))
+        self.assertIn("0 of the 30 estimated poses", figures["reason"])
+        self.assertGreater(figures["median_ms"], 0)
+
+    def test_a_depth_image_of_another_kind_is_named(self):
+        wrong = os.path.join(self.temporary.name, "wrong_depth")
+        shutil.copytree(self.room, wrong)
+        first = sorted(os.listdir(os.path.join(wrong, "depth")))[0]
+        write_blank_png(os.path.join(wrong, "depth", first), 320, 240)
+        refusal = self.refused(wrong)
+        self.assertIn(os.path.join(wrong, "depth", first), refusal)
+        self.assertIn("8 bits, three channels", refusal)
+
     def test_one_eye_follows_a_street_in_metres_by_the_speed(self):
         street, kitti = (os.path.join(self.temporary.name, name) for name in ("one_eye", "one_eye_kitti"))
         shutil.copytree(self.street, street)
@@ -233,9 +276,12 @@ class EvaluateVoTest(unittest.TestCase):
             shutil.copy(os.path.join(still, "image_0", "000000.png"),
                         os.path.join(still, "image_0", f"{number:06}.png"))
         out = os.path.join(self.temporary.name, "still.txt")
-        figures, words = self.figures_and_words(still, "--out", out)
+        done = run("--json", still, "--out", out)
+        self.assertEqual(done.returncode, 1, "nothing was measured")
+        figures, words = json.loads(done.stdout), done.stderr
         self.assertEqual((figures["frames"], figures["initialising"], figures["lost"]), (16, 16, 0))
-        self.assertEqual(list(figures), list(moving))
+        self.assertEqual(list(figures), [*moving, "reason"])
+        self.assertIn("never started in 16 frames", figures["reason"])
         for key in ("ate_rmse_m", "ate_max_m", "segment_translation_percent", "end_error_percent", "pairs"):
             self.assertIsNone(figures[key], key)
         self.assertIn("never started in 16 frames", words)
@@ -281,6 +327,12 @@ class EvaluateVoTest(unittest.TestCase):
         self.assertIn("which is no file",
                       self.refused(self.room, "--edges", "structured", "--edge-model", "/nowhere/model.yml.gz"))
         self.assertIn("is no folder", self.refused(os.path.join(self.room, "camera.yaml")))
+        truth = os.path.join(self.room, "groundtruth.txt")
+        with open(truth, encoding="ascii") as file:
+            before = file.read()
+        self.assertIn("would be overwritten", self.refused(self.room, "--out", truth))
+        with open(truth, encoding="ascii") as file:
+            self.assertEqual(file.read(), before)
         empty = os.path.join(self.temporary.name, "empty")
         os.mkdir(empty)
         self.assertIn("is no sequence", self.refused(empty))

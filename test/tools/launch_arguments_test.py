@@ -3,13 +3,13 @@
 
 import pathlib
 import subprocess
-import tempfile
 import unittest
 from xml.etree import ElementTree
 
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+BAG = ROOT / "rosbags/town.bag"
 NODES = {
     "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "geo_localization": "geo_localization",
                 "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
@@ -66,6 +66,11 @@ class LaunchArguments(unittest.TestCase):
     def test_texts_that_yaml_would_read_as_numbers_or_quotes_stay_as_they_are(self):
         dumped = parameters("vehicle.launch", "vehicle:=007", "drive:=2024_01", "zone:=1e3", "directory:=/home/o'neill")
         self.assertEqual(dumped["/hazard_reporting/database"], "/home/o'neill/local_hazards.sqlite3")
+        odd = "/a b/$HOME \\t \"q\" #1: {x: y}, o'neill \u00fc"
+        for launch, file in (("vehicle.launch", "/local_hazards.sqlite3"), ("zone.launch", "")):
+            dumped_odd = parameters(launch, f"directory:={odd}", f"identity:={odd}")
+            self.assertIn(odd + file, dumped_odd.values(), launch)
+            self.assertEqual(dumped_odd["/mqtt_bridge/key_file"], f"{odd}/key.pem")
         self.assertEqual([dumped["/mqtt_bridge/user"], dumped["/hazard_reporting/drive_id"], dumped["/mqtt_bridge/zone"]],
                          ["007", "2024_01", "1e3"])
         credit = """(c) l'Institut, "open" data: {all} #1"""
@@ -130,21 +135,19 @@ class LaunchArguments(unittest.TestCase):
         wanted = {(): True, ("use_truth:=true",): False, ("detect:=false",): False,
                   ("use_truth:=true", "detect:=true"): True}
         for arguments, runs in wanted.items():
-            started = nodes("replay.launch", "bag:=drive.bag", *arguments)
+            started = nodes("replay.launch", f"bag:={BAG}", *arguments)
             self.assertEqual(started.returncode, 0, started.stderr)
             self.assertEqual("/hazard_detection" in started.stdout.split(), runs, arguments)
 
     def test_the_tf_of_a_bag_goes_where_it_is_wanted(self):
         for arguments, topic in (((), "tf"), (("bag_tf:=ground_truth/tf",), "ground_truth/tf")):
             command = subprocess.run(["/usr/bin/roslaunch", "--args", "/player",
-                                      str(ROOT / "launch" / "replay.launch"), "bag:=drive.bag", *arguments],
+                                      str(ROOT / "launch" / "replay.launch"), f"bag:={BAG}", *arguments],
                                      check=True, capture_output=True, text=True).stdout
             self.assertIn(f" tf:={topic} ", command)
 
     def test_a_replay_hands_its_arguments_on_to_the_vehicle(self):
-        with tempfile.NamedTemporaryFile(suffix=".bag") as bag:
-            dumped = parameters("replay.launch", f"bag:={bag.name}", "vehicle:=car-7",
-                                "hazard_reporting:={max_range_m: 12.5}")
+        dumped = parameters("replay.launch", f"bag:={BAG}", "vehicle:=car-7", "hazard_reporting:={max_range_m: 12.5}")
         self.assertEqual(dumped["/mqtt_bridge/user"], "car-7")
         self.assertEqual(dumped["/hazard_reporting/max_range_m"], 12.5)
 

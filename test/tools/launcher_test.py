@@ -80,6 +80,20 @@ class LauncherTest(unittest.TestCase):
         self.assertIn(OF_TOOLS, sections["tools"])
         self.assertIn(OF_DEVELOPMENT, sections["development"])
 
+    def test_a_stamp_without_the_environment_that_it_promises_is_not_believed(self):
+        """As a power loss may leave it: setup said "ready", and everything else "run ./livemap setup first"."""
+        self.stub("dpkg-query", f"sed -n 's/^[a-z].*/& installed/p' '{ROOT}/apt-packages.txt'")
+        install = self.tree / "install"
+        install.mkdir()
+        (install / ".livemap-built-run").touch()
+        (install / "setup.bash").touch()
+        objects = self.tree / "build/colcon/livemap"
+        objects.mkdir(parents=True)
+        (objects / "torn.o").touch()
+        answer = self.call("setup")
+        self.assertIn("livemap: building", answer.stderr)
+        self.assertFalse((objects / "torn.o").exists())
+
     def test_a_wrong_argument_of_setup_is_refused_with_what_is_accepted(self):
         for arguments in (["--development"], ["--dev", "now"]):
             answer = self.call("setup", *arguments)

@@ -5,13 +5,15 @@
 #include "datasets/survey.h"
 #include "tools/bags/drive_bag.h"
 #include "tools/common/command_line.h"
+#include "tools/common/output_path.h"
+#include "tools/common/progress.h"
 #include "tools/common/share_path.h"
 
 namespace livemap::tools {
 namespace {
 
-std::vector<Detection> ToBoxes(const std::vector<datasets::LabelledBox>& labels,
-                               const geo::CameraIntrinsics& camera) {
+std::vector<Detection> SurveyBoxes(const std::vector<datasets::LabelledBox>& labels,
+                                   const geo::CameraIntrinsics& camera) {
   std::vector<Detection> boxes;
   for (const datasets::LabelledBox& label : labels) {
     const auto edge = [](double centre, double size, double side, int pixels) {
@@ -31,7 +33,7 @@ std::vector<Detection> ToBoxes(const std::vector<datasets::LabelledBox>& labels,
   return boxes;
 }
 
-int Run(int argc, char** argv) {
+int BagFromSurvey(int argc, char** argv) {
   std::vector<Flag> flags = DriveFlags();
   flags.push_back(
       {"max-gap-s", "S", "cut stretches without frames down to this time (0: keep all)"});
@@ -41,6 +43,7 @@ int Run(int argc, char** argv) {
                    "stamped by chainage over speed (16 m/s).",
                    2, flags);
   if (!line.Parse(argc, argv)) return 0;
+  CheckOutputFile("OUT.bag", line.Positional(1), {line.Positional(0)});
   const DriveSetup setup = ReadDriveSetup(line, SharePath("config/cameras/road_survey.yaml"), 16);
   const datasets::SurveyDrive drive = datasets::ReadSurveyDrive(line.Positional(0));
   const std::vector<datasets::FramePlace> places =
@@ -57,7 +60,7 @@ int Run(int argc, char** argv) {
     const geo::CameraIntrinsics& camera = setup.camera.intrinsics;
     const datasets::ImageFile image =
         datasets::ReadImageFile(frame.image_path, camera.width, camera.height);
-    bag.AddFrame(last_s, image.bytes, ToBoxes(frame.boxes, camera));
+    bag.AddFrame(last_s, image.bytes, SurveyBoxes(frame.boxes, camera));
     progress.At(i + 1);
   }
   bag.Finish(last_s);
@@ -70,5 +73,6 @@ int Run(int argc, char** argv) {
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_bag_from_survey", argc, argv, livemap::tools::Run);
+  return livemap::tools::RunProgram("livemap_bag_from_survey", argc, argv,
+                                    livemap::tools::BagFromSurvey);
 }

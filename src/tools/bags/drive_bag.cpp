@@ -17,8 +17,9 @@
 namespace livemap::tools {
 namespace {
 
-geometry_msgs::TransformStamped ToTransform(const Eigen::Isometry3d& pose, const ros::Time& stamp,
-                                            const std::string& parent, const std::string& child) {
+geometry_msgs::TransformStamped DriveTransform(const Eigen::Isometry3d& pose,
+                                               const ros::Time& stamp, const std::string& parent,
+                                               const std::string& child) {
   geometry_msgs::TransformStamped transform;
   transform.header.stamp = stamp;
   transform.header.frame_id = parent;
@@ -34,8 +35,8 @@ geometry_msgs::TransformStamped ToTransform(const Eigen::Isometry3d& pose, const
   return transform;
 }
 
-sensor_msgs::NavSatFix ToFix(const geo::GeoPoint& position, double sigma_m,
-                             const ros::Time& stamp) {
+sensor_msgs::NavSatFix DriveFix(const geo::GeoPoint& position, double sigma_m,
+                                const ros::Time& stamp) {
   sensor_msgs::NavSatFix fix;
   fix.header.stamp = stamp;
   fix.header.frame_id = "base_link";
@@ -50,7 +51,7 @@ sensor_msgs::NavSatFix ToFix(const geo::GeoPoint& position, double sigma_m,
   return fix;
 }
 
-sensor_msgs::NavSatFix NoFix(const ros::Time& stamp) {
+sensor_msgs::NavSatFix DriveWithoutFix(const ros::Time& stamp) {
   sensor_msgs::NavSatFix fix;
   fix.header.stamp = stamp;
   fix.header.frame_id = "base_link";
@@ -61,7 +62,7 @@ sensor_msgs::NavSatFix NoFix(const ros::Time& stamp) {
   return fix;
 }
 
-geo::GeoPoint ParsePosition(const std::string& text) {
+geo::GeoPoint ParseDrivePosition(const std::string& text) {
   const std::vector<std::string> parts = datasets::Split(text, ',');
   const std::optional<double> latitude =
       parts.size() == 2 ? datasets::ParseFinite(parts[0]) : std::nullopt;
@@ -81,7 +82,7 @@ datasets::Route ReadDriveRoute(const CommandLine& line) {
     return datasets::ReadRoute(line.Text("route", ""));
   }
   // A quiet straight road in Pittsburgh, for a drive that may lie anywhere.
-  const geo::GeoPoint start = ParsePosition(line.Text("start", "40.4433,-79.9436"));
+  const geo::GeoPoint start = ParseDrivePosition(line.Text("start", "40.4433,-79.9436"));
   return datasets::Route::Straight(start,
                                    line.Number("bearing", 90, -360, 360) * geo::kRadiansPerDegree);
 }
@@ -176,8 +177,8 @@ void DriveBag::WriteStaticTransforms() {
   const ros::Time stamp = Stamp(-kLeadS);
   tf2_msgs::TFMessage transforms;
   transforms.transforms = {
-      ToTransform(setup_.camera.mounting.BaseFromCamera(), stamp, "base_link", "camera_link"),
-      ToTransform(datasets::CameraFromOptical(), stamp, "camera_link", kOpticalFrame)};
+      DriveTransform(setup_.camera.mounting.BaseFromCamera(), stamp, "base_link", "camera_link"),
+      DriveTransform(datasets::CameraFromOptical(), stamp, "camera_link", kOpticalFrame)};
   bag_.WriteLatched("/tf_static", stamp, transforms);
 }
 
@@ -188,18 +189,18 @@ void DriveBag::AdvanceTo(double time_s) {
     const geo::GeoPoint truth =
         setup_.place ? setup_.place(fix_s) : setup_.route.At(fix_s * setup_.speed_mps).position;
     const ros::Time stamp = Stamp(fix_s);
-    bag_.Write("/ground_truth/fix", stamp, ToFix(truth, 0, stamp));
+    bag_.Write("/ground_truth/fix", stamp, DriveFix(truth, 0, stamp));
     std::optional<Eigen::Vector2d> error_m = receiver_.ErrorAt(fix_s);
     const Eigen::Vector2d multipath_m =
         setup_.multipath_m ? setup_.multipath_m(fix_s) : Eigen::Vector2d::Zero();
     if (!error_m) {
-      bag_.Write("/fix", stamp, NoFix(stamp));
+      bag_.Write("/fix", stamp, DriveWithoutFix(stamp));
       continue;
     }
     *error_m += multipath_m;
     const geo::GeoPoint seen =
         geo::GeodesicDestination(truth, std::atan2(error_m->x(), error_m->y()), error_m->norm());
-    bag_.Write("/fix", stamp, ToFix(seen, receiver_.sigma_m(), stamp));
+    bag_.Write("/fix", stamp, DriveFix(seen, receiver_.sigma_m(), stamp));
   }
 }
 

@@ -1,7 +1,5 @@
 #include "tools/common/command_line.h"
 
-#include <unistd.h>
-
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -16,8 +14,8 @@
 namespace livemap::tools {
 namespace {
 
-[[noreturn]] void RefuseNumber(const std::string& flag, const std::string& text, const char* kind,
-                               double min, double max) {
+[[noreturn]] void RefuseFlagNumber(const std::string& flag, const std::string& text,
+                                   const char* kind, double min, double max) {
   std::ostringstream sentence;
   sentence << "--" << flag << " is '" << text << "', accepted is " << kind << " from " << min
            << " to " << max;
@@ -41,6 +39,11 @@ const Flag* CommandLine::Find(const std::string& name) const {
 }
 
 bool CommandLine::Parse(int argc, char** argv) {
+  const auto is_known_flag = [this](const std::string& argument) {
+    if (argument.compare(0, 2, "--") != 0) return false;
+    const std::string name = argument.substr(2, argument.find('=') - 2);
+    return name == "help" || Find(name) != nullptr;
+  };
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--help" || argument == "-h") {
@@ -66,10 +69,13 @@ bool CommandLine::Parse(int argc, char** argv) {
       values_[name] = "";
     } else if (equals != std::string::npos) {
       values_[name] = argument.substr(equals + 1);
-    } else if (i + 1 < argc) {
+    } else if (i + 1 < argc && !is_known_flag(argv[i + 1])) {
       values_[name] = argv[++i];
     } else {
       throw Error("the flag '--" + name + "' needs a value: " + flag->value);
+    }
+    if (!flag->value.empty() && values_[name].empty()) {
+      throw Error("--" + name + " is '', accepted is " + flag->value);
     }
   }
   const bool as_wanted = wanted_positionals_ == kOneOrMore
@@ -101,7 +107,7 @@ double CommandLine::Number(const std::string& flag, double otherwise, double min
   if (found == values_.end()) return otherwise;
   const std::optional<double> value = datasets::ParseFinite(found->second);
   if (!value || *value < min || *value > max) {
-    RefuseNumber(flag, found->second, "a number", min, max);
+    RefuseFlagNumber(flag, found->second, "a number", min, max);
   }
   return *value;
 }
@@ -111,7 +117,7 @@ int CommandLine::Whole(const std::string& flag, int otherwise, int min, int max)
   if (found == values_.end()) return otherwise;
   const std::optional<double> value = datasets::ParseFinite(found->second);
   if (!value || *value < min || *value > max || *value != std::floor(*value)) {
-    RefuseNumber(flag, found->second, "a whole number", min, max);
+    RefuseFlagNumber(flag, found->second, "a whole number", min, max);
   }
   return static_cast<int>(*value);
 }
@@ -134,26 +140,12 @@ std::uint64_t CommandLine::Seed(const std::string& flag, std::uint64_t otherwise
   return value;
 }
 
-Progress::Progress(std::string what, std::size_t total)
-    : what_(std::move(what)), total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
+void SayNothingMeasured(const char* name, const std::string& reason) {
+  std::fprintf(stderr, "%s: nothing was measured: %s\n", name, reason.c_str());
+}
 
-void Progress::At(std::size_t done) {
-  if (total_ == 0) return;
-  if (terminal_) {
-    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin_;
-    const double left_s =
-        done > 0 ? passed.count() * static_cast<double>(total_ - done) / static_cast<double>(done)
-                 : 0;
-    // Blanks wipe what a longer line has left.
-    std::fprintf(stderr, "\r%s %zu of %zu, %.0f s left   %s", what_.c_str(), done, total_, left_s,
-                 done == total_ ? "\n" : "");
-    std::fflush(stderr);
-    return;
-  }
-  const std::size_t tenth = done * 10 / total_;
-  if (tenth == said_tenth_) return;
-  said_tenth_ = tenth;
-  std::fprintf(stderr, "%s %zu of %zu\n", what_.c_str(), done, total_);
+void SayNotes(const char* name, const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) std::fprintf(stderr, "%s: %s\n", name, note.c_str());
 }
 
 int RunProgram(const char* name, int argc, char** argv, int (*body)(int, char**)) {

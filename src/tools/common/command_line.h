@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -32,8 +31,8 @@ class CommandLine {
   CommandLine(std::string usage, std::string about, std::size_t positionals,
               std::vector<Flag> flags);
 
-  /// False when the help was asked for and has been printed. Negative numbers are values, not
-  /// flags.
+  /// False when the help was asked for and has been printed. Negative numbers are values; a flag of
+  /// this program is never one, and no value is empty. Throws Error for what it does not take.
   bool Parse(int argc, char** argv);
 
   bool Has(const std::string& flag) const { return values_.count(flag) > 0; }
@@ -60,20 +59,11 @@ class CommandLine {
   std::vector<std::string> positionals_;
 };
 
-/// How far long work is: one line that rewrites itself on a terminal, with the time left, else
-/// plain lines, each about a tenth of the whole, on standard error.
-class Progress {
- public:
-  Progress(std::string what, std::size_t total);
-  void At(std::size_t done);
+/// Where nothing was measured: says so with `reason` on standard error.
+void SayNothingMeasured(const char* name, const std::string& reason);
 
- private:
-  const std::string what_;
-  const std::size_t total_;
-  const bool terminal_;
-  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  std::size_t said_tenth_ = 0;
-};
+/// What a reader has mended in a file (datasets::Sequence::notes), a line each on standard error.
+void SayNotes(const char* name, const std::vector<std::string>& notes);
 
 /// Runs a program's body: an Error is printed as its sentence and gives exit status 2, any other
 /// exception 1.

@@ -27,7 +27,7 @@ struct Options {
 };
 
 /// Before the work: what cannot be written is refused.
-void CheckDrawable(const std::string& path) {
+void CheckDetectImageOutput(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder)) {
     throw Error("--draw is '" + path + "', whose folder does not exist");
@@ -39,7 +39,7 @@ void CheckDrawable(const std::string& path) {
 }
 
 /// None when --help was asked for and printed.
-std::optional<Options> ParseOptions(int argc, char** argv) {
+std::optional<Options> ParseDetectImageOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_detect_image [FLAGS] IMAGE...",
       "Prints what the detector finds in each image, one line of JSON per image:\n"
@@ -64,12 +64,12 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
     throw Error("--draw is given with " + std::to_string(options.images.size()) +
                 " images, accepted is one");
   }
-  if (!options.draw.empty()) CheckDrawable(options.draw);
+  if (!options.draw.empty()) CheckDetectImageOutput(options.draw);
   return options;
 }
 
-nlohmann::ordered_json ToJson(const std::string& path, cv::Size size,
-                              const std::vector<perception::HazardDetection>& found) {
+nlohmann::ordered_json DetectedImageJson(const std::string& path, cv::Size size,
+                                         const std::vector<perception::HazardDetection>& found) {
   nlohmann::ordered_json json = {{"image", path},
                                  {"width", size.width},
                                  {"height", size.height},
@@ -83,14 +83,14 @@ nlohmann::ordered_json ToJson(const std::string& path, cv::Size size,
   return json;
 }
 
-void Draw(cv::Mat image, const std::vector<perception::HazardDetection>& found,
-          const std::string& path) {
+void DrawDetectedImage(cv::Mat image, const std::vector<perception::HazardDetection>& found,
+                       const std::string& path) {
   perception::AnnotateImage(image, found);
   if (!cv::imwrite(path, image)) throw Error("'" + path + "' cannot be written");
 }
 
-int Run(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
+int DetectImage(int argc, char** argv) {
+  const std::optional<Options> options = ParseDetectImageOptions(argc, argv);
   if (!options) return 0;
   perception::ModelManifest manifest = perception::ReadModelManifest(options->model);
   if (options->threshold) {
@@ -103,10 +103,10 @@ int Run(int argc, char** argv) {
     const std::vector<perception::HazardDetection> found = detector.Detect(image);
     using Json = nlohmann::ordered_json;
     // A path need not be UTF-8: what is not is replaced.
-    std::cout
-        << ToJson(path, image.size(), found).dump(-1, ' ', false, Json::error_handler_t::replace)
-        << "\n";
-    if (!options->draw.empty()) Draw(image, found, options->draw);
+    std::cout << DetectedImageJson(path, image.size(), found)
+                     .dump(-1, ' ', false, Json::error_handler_t::replace)
+              << "\n";
+    if (!options->draw.empty()) DrawDetectedImage(image, found, options->draw);
   }
   return 0;
 }
@@ -115,5 +115,6 @@ int Run(int argc, char** argv) {
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_detect_image", argc, argv, livemap::tools::Run);
+  return livemap::tools::RunProgram("livemap_detect_image", argc, argv,
+                                    livemap::tools::DetectImage);
 }

@@ -29,15 +29,18 @@ std::string JoinNames(const std::vector<std::string>& names) {
 
 cv::Mat ReadImage(const std::string& path) {
   constexpr std::size_t kMaxBytes = std::size_t{64} * 1024 * 1024;
-  constexpr std::int64_t kMaxPixels = 100'000'000;
   const std::string bytes = ReadFile(path, kMaxBytes);
+  return DecodePhoto(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), path);
+}
+
+cv::Mat DecodePhoto(const std::uint8_t* bytes, std::size_t size, const std::string& name) {
+  constexpr std::int64_t kMaxPixels = 100'000'000;
   try {
-    cv::Mat image = imaging::DecodeImage(reinterpret_cast<const std::uint8_t*>(bytes.data()),
-                                         bytes.size(), kMaxPixels);
+    cv::Mat image = imaging::DecodeImage(bytes, size, kMaxPixels);
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
     return image;
   } catch (const Error& error) {
-    throw Error("image '" + path + "': " + error.what());
+    throw Error("image '" + name + "': " + error.what());
   }
 }
 

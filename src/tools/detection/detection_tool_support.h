@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -12,5 +14,7 @@ std::string JoinNames(const std::vector<std::string>& names);
 
 /// A JPEG or PNG file as BGR, 8 bit; throws Error naming the file. At most 100 megapixels.
 cv::Mat ReadImage(const std::string& path);
+/// The same of a file's bytes; `name` names it in errors.
+cv::Mat DecodePhoto(const std::uint8_t* bytes, std::size_t size, const std::string& name);
 
 }  // namespace livemap::tools

@@ -36,9 +36,9 @@ struct ShownError {
 };
 
 /// A part of a picture, enlarged to a tile.
-class Tile {
+class ErrorSheetTile {
  public:
-  Tile(const cv::Mat& picture, const cv::Rect2f& around) {
+  ErrorSheetTile(const cv::Mat& picture, const cv::Rect2f& around) {
     const float width = std::max(kContext * std::max(around.width, around.height),
                                  kMinShare * static_cast<float>(picture.cols));
     const float height = width * static_cast<float>(kTile.height) / static_cast<float>(kTile.width);
@@ -70,9 +70,9 @@ class Tile {
   cv::Point2f offset_;
 };
 
-cv::Mat Show(const evaluation::ScoredFrame& frame, const std::string& picture,
-             const ShownError& error, double threshold) {
-  Tile tile(ReadImage(picture), error.box);
+cv::Mat ShowErrorOnSheet(const evaluation::ScoredFrame& frame, const std::string& picture,
+                         const ShownError& error, double threshold) {
+  ErrorSheetTile tile(ReadImage(picture), error.box);
   for (const cv::Rect2f& box : frame.difficult) tile.Draw(box, kDifficultColour);
   for (const evaluation::ScoredBox& detection : frame.detections) {
     // Far below the threshold a detector has boxes everywhere.
@@ -86,7 +86,7 @@ cv::Mat Show(const evaluation::ScoredFrame& frame, const std::string& picture,
   return tile.image();
 }
 
-std::vector<ShownError> Missed(const evaluation::ScoredDrive& drive, double threshold) {
+std::vector<ShownError> MissedEventSheets(const evaluation::ScoredDrive& drive, double threshold) {
   std::vector<ShownError> shown;
   for (const evaluation::MissedEvent& missed : evaluation::FindMissedEvents(drive, threshold)) {
     const std::vector<cv::Rect2f>& labels = drive[missed.frame].labels;
@@ -98,7 +98,7 @@ std::vector<ShownError> Missed(const evaluation::ScoredDrive& drive, double thre
   return shown;
 }
 
-std::vector<ShownError> False(const evaluation::ScoredDrive& drive, double threshold) {
+std::vector<ShownError> FalseReportSheets(const evaluation::ScoredDrive& drive, double threshold) {
   std::vector<ShownError> shown;
   for (const evaluation::FalseReport& report : evaluation::FindFalseReports(drive, threshold)) {
     shown.push_back({report.frame, report.detection.box, report.detection.score,
@@ -107,7 +107,7 @@ std::vector<ShownError> False(const evaluation::ScoredDrive& drive, double thres
   return shown;
 }
 
-std::ofstream OpenList(const fs::path& path) {
+std::ofstream OpenErrorList(const fs::path& path) {
   const bool is_new = !fs::exists(path);
   std::ofstream list(path, std::ios::app);
   if (is_new) list << "class,kind,cause,score,x,y,width,height,picture\n";
@@ -122,15 +122,15 @@ void WriteErrorSheets(const std::string& directory, const std::string& class_nam
   std::error_code failed;
   fs::create_directories(directory, failed);
   if (failed) throw Error("folder '" + directory + "' cannot be made: " + failed.message());
-  std::ofstream list = OpenList(fs::path(directory) / "errors.csv");
+  std::ofstream list = OpenErrorList(fs::path(directory) / "errors.csv");
   for (const bool is_miss : {true, false}) {
     const std::string kind = is_miss ? "missed" : "false";
     std::vector<cv::Mat> tiles;
     for (const auto& [drive, pictures] : drives) {
       for (const ShownError& error :
-           is_miss ? Missed(*drive, threshold) : False(*drive, threshold)) {
+           is_miss ? MissedEventSheets(*drive, threshold) : FalseReportSheets(*drive, threshold)) {
         const std::string& picture = (*pictures)[error.frame];
-        tiles.push_back(Show((*drive)[error.frame], picture, error, threshold));
+        tiles.push_back(ShowErrorOnSheet((*drive)[error.frame], picture, error, threshold));
         list << class_name << "," << kind << "," << error.cause << "," << error.score << ","
              << error.box.x << "," << error.box.y << "," << error.box.width << ","
              << error.box.height << "," << picture << "\n";

@@ -7,16 +7,19 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <system_error>
 
 #include "common/error.h"
 #include "evaluation/detection/detection_report.h"
+#include "evaluation/detection/detection_table.h"
 #include "evaluation/detection/labelled_folder.h"
 #include "evaluation/detection/tracking_evaluation.h"
 #include "evaluation/quantile.h"
 #include "imaging/decode.h"
 #include "perception/detection/hazard_detector.h"
 #include "tools/common/command_line.h"
+#include "tools/common/progress.h"
 #include "tools/common/shipped_model.h"
 #include "tools/detection/detection_tool_support.h"
 #include "tools/detection/error_sheets.h"
@@ -27,6 +30,7 @@ namespace {
 struct Options {
   std::vector<std::string> folders;
   std::string model;
+  std::string detections;
   bool json = false;
   bool sweep = false;
   bool tracking = false;
@@ -40,7 +44,7 @@ struct Options {
 };
 
 /// None when --help was asked for and printed.
-std::optional<Options> ParseOptions(int argc, char** argv) {
+std::optional<Options> ParseEvaluateDetectionOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_detection [FLAGS] DIR...",
       "Runs the detector over labelled images and prints how well it does, all DIRs pooled. A DIR\n"
@@ -49,6 +53,9 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
       "km. docs/reference/measures.md defines the figures.",
       CommandLine::kOneOrMore,
       {{"json", "", "one line of JSON instead of a table"},
+       {"detections", "FILE",
+        "measure what this CSV file lists, all of it, instead of what the model\n"
+        "finds in the one DIR: image,class,score,x_min,y_min,x_max,y_max (px)"},
        {"model", "FILE", "manifest of the model, default models/hazards-base.yaml, as a vehicle's"},
        {"split", "NAME", "part of a DIR whose images/ and labels/ are divided, e.g. val"},
        {"label-classes", "A,B", "names of the label files' classes 0, 1, ..., default classes.txt"},
@@ -69,6 +76,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   Options options;
   options.folders = line.Positionals();
   options.model = line.Text("model", "");
+  options.detections = line.Text("detections", "");
   if (options.model.empty()) options.model = ShippedModel(kDefaultDetector);
   options.json = line.Has("json");
   options.sweep = line.Has("sweep");
@@ -80,6 +88,18 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   line.CheckNeeds({{"camera", options.tracking, "--tracking"},
                    {"repeat-gain", options.tracking, "--tracking"},
                    {"low-share", options.tracking, "--tracking"}});
+  if (!options.detections.empty()) {
+    if (options.folders.size() != 1) {
+      throw Error("--detections is about one DIR, given are " +
+                  std::to_string(options.folders.size()));
+    }
+    for (const char* of_a_run : {"engine", "threads", "lowest-score", "tracking"}) {
+      if (line.Has(of_a_run)) {
+        throw Error(std::string("--") + of_a_run +
+                    " is about a run of the model, with --detections there is none");
+      }
+    }
+  }
   const std::string camera = line.Text("camera", "");
   if (!camera.empty()) options.tracked.camera = datasets::ReadCameraFile(camera);
   options.tracker.repeat_gain = line.Number("repeat-gain", options.tracker.repeat_gain, 0, 1);
@@ -99,11 +119,17 @@ struct ClassFrames {
   std::vector<evaluation::ScoredFrame> photos;
 };
 
-/// Runs the detector over everything and sorts labels and detections by class.
-class Evaluation {
+/// Runs the detector over everything, or looks up what the table of --detections lists, and sorts
+/// labels and detections by class.
+class DetectionEvaluation {
  public:
-  Evaluation(const perception::ModelManifest& manifest, const Options& options)
-      : options_(options), thresholds_(manifest.thresholds) {
+  DetectionEvaluation(const perception::ModelManifest& manifest, const Options& options)
+      : options_(options), classes_(manifest.classes), thresholds_(manifest.thresholds) {
+    if (!options.detections.empty()) {
+      // Whoever made the table has chosen already: all of it counts.
+      std::fill(thresholds_.begin(), thresholds_.end(), 0.0F);
+      return;
+    }
     perception::ModelManifest everything = manifest;
     for (float& threshold : everything.thresholds) {
       threshold = std::min(threshold, static_cast<float>(options.lowest_score));
@@ -113,6 +139,7 @@ class Evaluation {
   }
 
   void Run(const std::vector<evaluation::LabelledFolder>& folders) {
+    if (!detector_) ReadTable(folders.front());
     std::size_t total = 0;
     for (const evaluation::LabelledFolder& folder : folders) total += folder.frames.size();
     Progress progress("detecting", total);
@@ -121,18 +148,19 @@ class Evaluation {
 
   evaluation::DetectionReport Report() const {
     evaluation::DetectionReport report;
-    report.model = detector_->manifest().name;
-    report.frames = milliseconds_.size();
-    report.inference_ms_p50 = evaluation::Quantile(milliseconds_, 0.5);
-    report.inference_ms_p95 = evaluation::Quantile(milliseconds_, 0.95);
-    const std::vector<std::string>& classes = detector_->manifest().classes;
-    for (std::size_t i = 0; i < classes.size(); ++i) {
-      const auto frames = by_class_.find(classes[i]);
+    report.model = detector_ ? detector_->manifest().name : options_.detections;
+    report.frames = frames_;
+    if (!milliseconds_.empty()) {
+      report.inference_ms_p50 = evaluation::Quantile(milliseconds_, 0.5);
+      report.inference_ms_p95 = evaluation::Quantile(milliseconds_, 0.95);
+    }
+    for (std::size_t i = 0; i < classes_.size(); ++i) {
+      const auto frames = by_class_.find(classes_[i]);
       if (frames == by_class_.end()) continue;
       const auto& [drives, pictures, photos] = frames->second;
       // Through the float that the detector compares with, so that its boundary cases count alike.
       evaluation::ClassReport entry{
-          classes[i], evaluation::EvaluateClass(drives, photos, double{thresholds_[i]}), {}};
+          classes_[i], evaluation::EvaluateClass(drives, photos, double{thresholds_[i]}), {}};
       if (options_.sweep) {
         std::vector<double> thresholds;
         for (int step = 1; step < 20; ++step) thresholds.push_back(0.05 * step);
@@ -147,6 +175,58 @@ class Evaluation {
   }
 
  private:
+  /// A line about a picture that is not there, or about a class that nobody knows, would silently
+  /// not count.
+  void ReadTable(const evaluation::LabelledFolder& folder) {
+    std::vector<std::string> known = classes_;
+    for (const std::string& name : folder.classes) {
+      if (std::count(known.begin(), known.end(), name) == 0) known.push_back(name);
+    }
+    table_ = evaluation::ReadDetectionTable(options_.detections, known);
+    std::set<std::string> pictures;
+    for (const evaluation::LabelledFrame& frame : folder.frames) {
+      pictures.insert(std::filesystem::path(frame.image_path).stem().string());
+    }
+    for (const auto& [picture, found] : table_) {
+      if (pictures.count(picture) == 0) {
+        throw Error("'" + options_.detections + "' names the picture '" + picture +
+                    "', which is not among those of '" + folder.path + "'");
+      }
+    }
+  }
+
+  /// A box that lies beside the picture is in other units or another picture's.
+  void CheckBoxes(const std::string& picture, cv::Size size,
+                  const std::vector<perception::HazardDetection>& found) const {
+    const cv::Rect2f whole(0, 0, static_cast<float>(size.width), static_cast<float>(size.height));
+    for (const perception::HazardDetection& detection : found) {
+      const cv::Rect2f& box = detection.box;
+      if (!(box & whole).empty()) continue;
+      std::ostringstream sentence;
+      sentence << "'" << options_.detections << "' has for the picture '" << picture << "' the box "
+               << box.x << "," << box.y << "," << box.br().x << "," << box.br().y
+               << ", accepted are boxes that overlap its " << size.width << "x" << size.height
+               << " px";
+      throw Error(sentence.str());
+    }
+  }
+
+  std::vector<perception::HazardDetection> DetectionsIn(const evaluation::LabelledFrame& frame,
+                                                        const cv::Mat& image) {
+    if (!detector_) {
+      const auto found = table_.find(std::filesystem::path(frame.image_path).stem().string());
+      if (found == table_.end()) return {};
+      CheckBoxes(frame.image_path, image.size(), found->second);
+      return found->second;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<perception::HazardDetection> found = detector_->Detect(image);
+    milliseconds_.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+            .count());
+    return found;
+  }
+
   /// What the tracker reports on the class's drives, at several degrees of certainty.
   void AddTracking(const std::vector<evaluation::ScoredDrive>& drives,
                    evaluation::ClassReport& entry) const {
@@ -188,19 +268,18 @@ class Evaluation {
   }
 
   void RunFolder(const evaluation::LabelledFolder& folder, Progress& progress) {
+    // Two numbers of the label files may stand for one class, which counts once.
+    const std::set<std::string> names(folder.classes.begin(), folder.classes.end());
     std::map<std::string, std::vector<evaluation::ScoredFrame>> scored;
     std::vector<perception::TrackerFrame> recording;
     std::vector<std::string> pictures;
     for (const evaluation::LabelledFrame& frame : folder.frames) {
       const cv::Mat image = ReadImage(frame.image_path);
       pictures.push_back(frame.image_path);
-      const auto start = std::chrono::steady_clock::now();
-      const std::vector<perception::HazardDetection> found = detector_->Detect(image);
-      milliseconds_.push_back(
-          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-              .count());
+      const std::vector<perception::HazardDetection> found = DetectionsIn(frame, image);
+      ++frames_;
       // A class that is not labelled here says nothing about detections of it.
-      for (const std::string& name : folder.classes) {
+      for (const std::string& name : names) {
         scored[name].push_back(Score(frame, found, image.size(), name));
       }
       if (options_.tracking && folder.is_drive) {
@@ -208,7 +287,7 @@ class Evaluation {
         recording.push_back(evaluation::ToTrackerFrame(found, image.size(), frame.chainage_m,
                                                        last_ns, options_.tracked));
       }
-      progress.At(milliseconds_.size());
+      progress.At(frames_);
     }
     for (auto& [name, frames] : scored) {
       ClassFrames& all = by_class_[name];
@@ -251,16 +330,19 @@ class Evaluation {
   }
 
   const Options& options_;
+  std::vector<std::string> classes_;
   std::vector<float> thresholds_;
-  std::unique_ptr<perception::HazardDetector> detector_;
+  std::unique_ptr<perception::HazardDetector> detector_;  ///< None with --detections.
+  evaluation::DetectionTable table_;                      ///< With --detections.
   std::map<std::string, ClassFrames> by_class_;
-  std::vector<double> milliseconds_;
+  std::size_t frames_ = 0;
+  std::vector<double> milliseconds_;                               ///< Of the detector's runs.
   std::vector<std::vector<perception::TrackerFrame>> recordings_;  ///< By folder; with --tracking.
   std::map<std::string, std::vector<std::size_t>> drive_recordings_;  ///< By class, as its drives.
 };
 
 /// A folder given twice would count double.
-void RefuseRepeated(const std::vector<std::string>& folders) {
+void RefuseRepeatedFolders(const std::vector<std::string>& folders) {
   std::set<std::filesystem::path> seen;
   for (const std::string& path : folders) {
     std::error_code unknown;  // A folder that does not exist is the reader's to refuse.
@@ -271,16 +353,17 @@ void RefuseRepeated(const std::vector<std::string>& folders) {
 }
 
 /// All folders, read before the long work, so that a mistake in the last one shows at once.
-std::vector<evaluation::LabelledFolder> ReadFolders(const Options& options,
-                                                    const perception::ModelManifest& manifest) {
+std::vector<evaluation::LabelledFolder> ReadFoldersToEvaluate(
+    const Options& options, const perception::ModelManifest& manifest) {
   evaluation::LabelledFolderConfig reading = options.labels;
   reading.model_classes = manifest.classes;
   std::vector<evaluation::LabelledFolder> folders;
-  RefuseRepeated(options.folders);
+  RefuseRepeatedFolders(options.folders);
   for (const std::string& path : options.folders) {
     std::optional<std::string> deduced;
     folders.push_back(evaluation::ReadLabelledFolder(path, reading, &deduced));
     if (deduced) std::cerr << *deduced << "\n";
+    SayNotes("livemap_evaluate_detection", folders.back().notes);
     const std::vector<std::string>& classes = folders.back().classes;
     const bool known = std::any_of(classes.begin(), classes.end(), [&](const std::string& name) {
       return std::count(manifest.classes.begin(), manifest.classes.end(), name) != 0;
@@ -298,23 +381,27 @@ std::vector<evaluation::LabelledFolder> ReadFolders(const Options& options,
   return folders;
 }
 
-int Run(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
+int EvaluateDetection(int argc, char** argv) {
+  const std::optional<Options> options = ParseEvaluateDetectionOptions(argc, argv);
   if (!options) return 0;
   const perception::ModelManifest manifest = perception::ReadModelManifest(options->model);
-  const std::vector<evaluation::LabelledFolder> folders = ReadFolders(*options, manifest);
-  Evaluation evaluation(manifest, *options);
+  const std::vector<evaluation::LabelledFolder> folders = ReadFoldersToEvaluate(*options, manifest);
+  DetectionEvaluation evaluation(manifest, *options);
   evaluation.Run(folders);
   const evaluation::DetectionReport report = evaluation.Report();
   if (!options->errors.empty()) std::cerr << "errors: " << options->errors << "/errors.csv\n";
   std::cout << (options->json ? evaluation::ToJson(report).dump() + "\n"
                               : evaluation::ToText(report));
-  return 0;
+  const std::optional<std::string> why = evaluation::WhyNothingMeasured(report);
+  if (!why) return 0;
+  SayNothingMeasured("livemap_evaluate_detection", *why);
+  return 1;
 }
 
 }  // namespace
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_evaluate_detection", argc, argv, livemap::tools::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_detection", argc, argv,
+                                    livemap::tools::EvaluateDetection);
 }

@@ -14,9 +14,11 @@
 #include "change/measures/change_report.h"
 #include "change/methods/change_method.h"
 #include "change/methods/change_network.h"
+#include "change/registration/edge_registration.h"
 #include "change/registration/registration.h"
 #include "common/error.h"
 #include "tools/common/command_line.h"
+#include "tools/common/progress.h"
 #include "tools/common/shipped_model.h"
 
 namespace livemap::tools {
@@ -39,7 +41,7 @@ struct Options {
 };
 
 /// Where results go: not among the pictures that they are about.
-void CheckWritable(const std::string& folder, const std::vector<std::string>& data) {
+void CheckChangeOutput(const std::string& folder, const std::vector<std::string>& data) {
   std::error_code unknown;
   if (std::filesystem::exists(folder, unknown) && !std::filesystem::is_directory(folder, unknown)) {
     throw Error("--write is '" + folder + "', which is no folder");
@@ -54,7 +56,7 @@ void CheckWritable(const std::string& folder, const std::vector<std::string>& da
 }
 
 /// None when --help was asked for and printed.
-std::optional<Options> ParseOptions(int argc, char** argv) {
+std::optional<Options> ParseEvaluateChangeOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_change [FLAGS] DIR...",
       "Compares what a method says about pairs of pictures with the truth. DIR has VL-CMU-CD's\n"
@@ -91,7 +93,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   options.predictions = line.Text("predictions", "");
   options.reversed_predictions = line.Text("reversed-predictions", "");
   options.write = line.Text("write", "");
-  if (!options.write.empty()) CheckWritable(options.write, options.directories);
+  if (!options.write.empty()) CheckChangeOutput(options.write, options.directories);
   for (const std::string& folder : {options.predictions, options.reversed_predictions}) {
     std::error_code unknown;
     if (!folder.empty() && !std::filesystem::is_directory(folder, unknown)) {
@@ -114,13 +116,13 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   return options;
 }
 
-double MillisecondsSince(std::chrono::steady_clock::time_point start) {
+double ChangeMillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
       .count();
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
+std::optional<double> MedianChangeTime(std::vector<double> values) {
+  if (values.empty()) return std::nullopt;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -134,9 +136,9 @@ double ChangedShare(const cv::Mat& truth) {
   return known == 0 ? 0 : 1 - static_cast<double>(unchanged) / known;
 }
 
-class Evaluation {
+class ChangeEvaluation {
  public:
-  explicit Evaluation(const Options& options) : options_(options) {
+  explicit ChangeEvaluation(const Options& options) : options_(options) {
     report_.registration = options.predictions.empty() ? options.registration : "none";
     report_.method = options.predictions;
     report_.has_reversed = !options.reversed_predictions.empty();
@@ -171,8 +173,8 @@ class Evaluation {
   }
 
   change::ChangeReport Report() {
-    report_.method_ms_p50 = Median(method_ms_);
-    report_.registration_ms_p50 = Median(registration_ms_);
+    report_.method_ms_p50 = MedianChangeTime(method_ms_);
+    report_.registration_ms_p50 = MedianChangeTime(registration_ms_);
     return report_;
   }
 
@@ -205,7 +207,7 @@ class Evaluation {
     aligned_ = Align(files, pair);
     const auto start = std::chrono::steady_clock::now();
     change::ChangeProbabilities probabilities = Measured(aligned_);
-    if (registered_) method_ms_.push_back(MillisecondsSince(start));
+    if (registered_) method_ms_.push_back(ChangeMillisecondsSince(start));
     return probabilities;
   }
 
@@ -260,7 +262,7 @@ class Evaluation {
     }
     const change::WarpedPicture warped =
         change::WarpByHomography(pair.before, registration.after_from_before);
-    registration_ms_.push_back(MillisecondsSince(start));
+    registration_ms_.push_back(ChangeMillisecondsSince(start));
     return {warped.picture, pair.after, warped.valid};
   }
 
@@ -275,19 +277,19 @@ class Evaluation {
 };
 
 /// Whose scores lie in the folder, so that nobody draws them as another method's.
-void WriteOrigin(const std::string& folder, const std::string& method,
-                 const std::vector<std::string>& directories) {
+void WriteOriginOfChange(const std::string& folder, const std::string& method,
+                         const std::vector<std::string>& directories) {
   const std::string path = folder + "/scores.json";
   std::ofstream file(path);
   file << nlohmann::json{{"method", method}, {"directories", directories}}.dump() << "\n";
   if (!file.flush()) throw Error("file '" + path + "' cannot be written");
 }
 
-int Run(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
+int EvaluateChange(int argc, char** argv) {
+  const std::optional<Options> options = ParseEvaluateChangeOptions(argc, argv);
   if (!options) return 0;
   const std::vector<change::ChangePairFiles> pairs = change::FindChangePairs(options->directories);
-  Evaluation evaluation(*options);
+  ChangeEvaluation evaluation(*options);
   Progress progress("comparing", pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     evaluation.Add(pairs[i]);
@@ -301,16 +303,21 @@ int Run(int argc, char** argv) {
     throw Error("none of " + std::to_string(pairs.size()) + " pairs has changed by the share of " +
                 std::to_string(options->min_changed) + " that --least-changed accepts");
   }
-  if (!options->write.empty()) WriteOrigin(options->write, report.method, report.directories);
+  if (!options->write.empty())
+    WriteOriginOfChange(options->write, report.method, report.directories);
   std::cout << (options->json
                     ? change::ToJson(report, options->curves ? kCurvePoints : 0).dump() + "\n"
                     : change::ToText(report));
-  return 0;
+  const std::optional<std::string> why = change::WhyNothingMeasured(report);
+  if (!why) return 0;
+  SayNothingMeasured("livemap_evaluate_change", *why);
+  return 1;
 }
 
 }  // namespace
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_evaluate_change", argc, argv, livemap::tools::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_change", argc, argv,
+                                    livemap::tools::EvaluateChange);
 }

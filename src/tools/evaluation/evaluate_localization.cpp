@@ -25,7 +25,7 @@ struct Options {
   localization::LocalizerConfig config;
 };
 
-void ReadDropout(const std::string& text, evaluation::LocalizationTrial& trial) {
+void ReadLocalizationDropout(const std::string& text, evaluation::LocalizationTrial& trial) {
   const std::vector<std::string> parts = datasets::Split(text, ',');
   const auto start_s = parts.size() == 2 ? datasets::ParseFinite(parts[0]) : std::nullopt;
   const auto length_s = parts.size() == 2 ? datasets::ParseFinite(parts[1]) : std::nullopt;
@@ -38,7 +38,7 @@ void ReadDropout(const std::string& text, evaluation::LocalizationTrial& trial) 
 }
 
 /// None when --help was asked for and printed.
-std::optional<Options> ParseOptions(int argc, char** argv) {
+std::optional<Options> ParseEvaluateLocalizationOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_localization [FLAGS] DIR",
       "Fuses the fixes of a recorded drive with odometry from its wheel speed and a simulated "
@@ -71,7 +71,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   trial.noise_m = line.Number("noise-m", trial.noise_m, 0, 1000);
   trial.outlier_share = line.Number("outliers", trial.outlier_share, 0, 1);
   trial.outlier_m = line.Number("outlier-m", trial.outlier_m, 0, 10000);
-  if (line.Has("dropout-s")) ReadDropout(line.Text("dropout-s", ""), trial);
+  if (line.Has("dropout-s")) ReadLocalizationDropout(line.Text("dropout-s", ""), trial);
   trial.fix_sigma_m = line.Number("fix-sigma-m", trial.fix_sigma_m, 0.01, 100);
   trial.states_noise = !line.Has("hide-noise");
   trial.gyro_bias_sigma_rps = geo::kRadiansPerDegree * line.Number("gyro-bias-dps", 0.05, 0, 10);
@@ -87,8 +87,8 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 }
 
 /// A drop-out that takes no fix away would change nothing.
-void CheckDropout(const datasets::PositionDrive& drive,
-                  const evaluation::LocalizationTrial& trial) {
+void CheckLocalizationDropout(const datasets::PositionDrive& drive,
+                              const evaluation::LocalizationTrial& trial) {
   if (trial.dropout_s <= 0) return;
   const auto after_s = [&drive](const datasets::RecordedFix& fix) {
     return Seconds(fix.stamp_ns - drive.fixes.front().stamp_ns);
@@ -106,16 +106,20 @@ void CheckDropout(const datasets::PositionDrive& drive,
   throw Error(sentence.str());
 }
 
-int Run(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
+int EvaluateLocalizationFiles(int argc, char** argv) {
+  const std::optional<Options> options = ParseEvaluateLocalizationOptions(argc, argv);
   if (!options) return 0;
   const datasets::PositionDrive drive = datasets::ReadComma2k19(options->folder);
-  CheckDropout(drive, options->trial);
+  CheckLocalizationDropout(drive, options->trial);
   const evaluation::LocalizationReport report =
       evaluation::EvaluateLocalization(drive, options->config, options->trial);
+  SayNotes("livemap_evaluate_localization", evaluation::NotesOf(report));
   std::cout << (options->json ? evaluation::ToJson(report).dump() + "\n"
                               : evaluation::ToText(report));
-  return 0;
+  const std::optional<std::string> why = evaluation::WhyNothingMeasured(report);
+  if (!why) return 0;
+  SayNothingMeasured("livemap_evaluate_localization", *why);
+  return 1;
 }
 
 }  // namespace
@@ -123,5 +127,5 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   return livemap::tools::RunProgram("livemap_evaluate_localization", argc, argv,
-                                    livemap::tools::Run);
+                                    livemap::tools::EvaluateLocalizationFiles);
 }

@@ -2,15 +2,19 @@
 
 #include <cmath>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "common/error.h"
+#include "evaluation/nothing_measured.h"
 #include "evaluation/trajectory/trajectory.h"
 #include "evaluation/trajectory/trajectory_report.h"
 #include "tools/common/command_line.h"
 
 namespace livemap::tools {
 namespace {
+
+constexpr char kName[] = "livemap_evaluate_trajectory";
 
 struct Options {
   std::string truth_path;
@@ -20,7 +24,7 @@ struct Options {
   evaluation::TrajectoryConfig evaluation;
 };
 
-evaluation::AlignmentKind ChosenAlignment(const CommandLine& line) {
+evaluation::AlignmentKind ChosenTrajectoryAlignment(const CommandLine& line) {
   const std::string name = line.Text("align", line.Has("scale") ? "sim3" : "se3");
   const std::optional<evaluation::AlignmentKind> kind = evaluation::ParseAlignmentKind(name);
   if (!kind) throw Error("--align is '" + name + "', accepted are none, se3, sim3 and origin");
@@ -30,7 +34,7 @@ evaluation::AlignmentKind ChosenAlignment(const CommandLine& line) {
   return *kind;
 }
 
-std::size_t DeltaFrames(const CommandLine& line) {
+std::size_t TrajectoryDeltaFrames(const CommandLine& line) {
   const double frames = line.Number("delta-frames", 0, 1, 1e6);
   if (frames != std::floor(frames)) {
     throw Error("--delta-frames is '" + line.Text("delta-frames", "") +
@@ -40,7 +44,7 @@ std::size_t DeltaFrames(const CommandLine& line) {
 }
 
 /// None when --help was asked for and printed.
-std::optional<Options> ParseOptions(int argc, char** argv) {
+std::optional<Options> ParseEvaluateTrajectoryOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_trajectory [FLAGS] TRUTH ESTIMATE",
       "Compares two trajectories: absolute error (ATE) and relative error (RPE) as the TUM RGB-D\n"
@@ -67,30 +71,59 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
   association.max_difference_s =
       line.Number("max-difference", association.max_difference_s, 1e-6, 1000);
   association.offset_s = line.Number("offset", 0, -4e9, 4e9);
-  options.evaluation.alignment = ChosenAlignment(line);
+  options.evaluation.alignment = ChosenTrajectoryAlignment(line);
   options.evaluation.rpe_delta_s =
       line.Number("delta", options.evaluation.rpe_delta_s, 0.001, 100000);
-  options.evaluation.rpe_delta_frames = DeltaFrames(line);
+  options.evaluation.rpe_delta_frames = TrajectoryDeltaFrames(line);
   return options;
 }
 
-int Run(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
+int EvaluateTrajectoryFiles(int argc, char** argv) {
+  const std::optional<Options> options = ParseEvaluateTrajectoryOptions(argc, argv);
   if (!options) return 0;
+  std::vector<std::string> notes;
   const std::vector<datasets::StampedPose> truth =
-      evaluation::ReadTrajectory(options->truth_path, options->kitti_rate_hz);
+      evaluation::ReadTrajectory(options->truth_path, options->kitti_rate_hz, &notes);
   const std::vector<datasets::StampedPose> estimate =
-      evaluation::ReadTrajectory(options->estimate_path, options->kitti_rate_hz);
-  const evaluation::TrajectoryFigures figures =
-      evaluation::EvaluateTrajectory(truth, estimate, options->evaluation);
-  std::cout << (options->json ? evaluation::ToJson(figures).dump() + "\n"
-                              : evaluation::ToText(figures));
-  return 0;
+      evaluation::ReadTrajectory(options->estimate_path, options->kitti_rate_hz, &notes);
+  // Without stamps, a line that is missing anywhere shifts all pairs behind it.
+  const bool unequal_lengths = truth.size() != estimate.size() &&
+                               evaluation::HasKittiLayout(options->truth_path) &&
+                               evaluation::HasKittiLayout(options->estimate_path);
+  if (unequal_lengths) {
+    notes.push_back("'" + options->truth_path + "' has " + std::to_string(truth.size()) +
+                    " poses and '" + options->estimate_path + "' " +
+                    std::to_string(estimate.size()) +
+                    ": they are paired line by line from the first one on");
+  }
+  SayNotes(kName, notes);
+  try {
+    const evaluation::TrajectoryFigures figures =
+        evaluation::EvaluateTrajectory(truth, estimate, options->evaluation);
+    nlohmann::ordered_json json = evaluation::ToJson(figures);
+    json["unequal_lengths"] = unequal_lengths;
+    std::cout << (options->json ? json.dump() + "\n" : evaluation::ToText(figures));
+    return 0;
+  } catch (const evaluation::NothingMeasured& nothing) {
+    SayNothingMeasured(kName, nothing.what());
+    if (options->json) {
+      nlohmann::ordered_json json = evaluation::NullFigures();
+      json["pairs"] =
+          evaluation::Associate(truth, estimate, options->evaluation.association).truth.size();
+      json["truth_poses"] = truth.size();
+      json["estimate_poses"] = estimate.size();
+      json["unequal_lengths"] = unequal_lengths;
+      json["reason"] = nothing.what();
+      std::cout << json.dump() << "\n";
+    }
+    return 1;
+  }
 }
 
 }  // namespace
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_evaluate_trajectory", argc, argv, livemap::tools::Run);
+  return livemap::tools::RunProgram("livemap_evaluate_trajectory", argc, argv,
+                                    livemap::tools::EvaluateTrajectoryFiles);
 }

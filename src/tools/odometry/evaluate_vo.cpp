@@ -7,16 +7,18 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <sstream>
 
 #include "common/error.h"
 #include "datasets/sequences.h"
+#include "evaluation/nothing_measured.h"
 #include "evaluation/quantile.h"
 #include "evaluation/trajectory/trajectory_report.h"
 #include "tools/common/command_line.h"
+#include "tools/common/output_path.h"
+#include "tools/common/progress.h"
 #include "tools/odometry/monocular_method.h"
 #include "tools/odometry/sequence_pictures.h"
 #include "tools/odometry/stereo_source.h"
@@ -24,6 +26,8 @@
 
 namespace livemap::tools {
 namespace {
+
+constexpr char kName[] = "livemap_evaluate_vo";
 
 struct Options {
   std::string sequence;
@@ -40,21 +44,21 @@ struct Options {
       monocular_flag;  ///< One that was given and is about monocular odometry only, or none.
 };
 
-odometry::EdgeSource ReadEdgeSource(const CommandLine& line) {
+odometry::EdgeSource ReadVoEdgeSource(const CommandLine& line) {
   const std::string name = line.Text("edge-source", "keyframe");
   if (name == "keyframe") return odometry::EdgeSource::kKeyframe;
   if (name == "new-image" || name == "new_image") return odometry::EdgeSource::kNewImage;
   throw Error("--edge-source is '" + name + "'; accepted are keyframe, new-image");
 }
 
-std::optional<imaging::StereoConfig> ReadStereo(const CommandLine& line) {
+std::optional<imaging::StereoConfig> ReadStereoVo(const CommandLine& line) {
   if (!line.Has("stereo")) return std::nullopt;
   imaging::StereoConfig config;
   config.scale = line.Whole("stereo-scale", config.scale, 1, 4);
   return config;
 }
 
-MonocularOptions ReadMonocular(const CommandLine& line) {
+MonocularOptions ReadMonocularVo(const CommandLine& line) {
   MonocularOptions options;
   options.scale_source = odometry::ParseScaleSource(line.Text("scale", "speed"));
   options.speed_sigma_mps = line.Number("speed-sigma", 0, 0, 100);
@@ -64,7 +68,7 @@ MonocularOptions ReadMonocular(const CommandLine& line) {
   return options;
 }
 
-odometry::EdgeExtractor::Config ReadEdges(const CommandLine& line) {
+odometry::EdgeExtractor::Config ReadVoEdges(const CommandLine& line) {
   odometry::EdgeExtractor::Config edges;
   edges.kind = odometry::ParseEdgeKind(line.Text("edges", "canny"));
   edges.structured_model = line.Text("edge-model", "");
@@ -77,7 +81,7 @@ odometry::EdgeExtractor::Config ReadEdges(const CommandLine& line) {
 
 /// Flags that would be passed over, and those that contradict each other, are refused. Whether a
 /// sequence has depth is not known yet.
-void CheckFlags(const CommandLine& line) {
+void CheckVoFlags(const CommandLine& line) {
   const bool ours = line.Text("method", "edge") == "edge";
   const bool structured = line.Text("edges", "canny") == "structured";
   const bool height = line.Text("scale", "speed") == "height";
@@ -98,7 +102,7 @@ void CheckFlags(const CommandLine& line) {
 }
 
 /// None when --help was asked for and printed.
-std::optional<Options> ParseOptions(int argc, char** argv) {
+std::optional<Options> ParseEvaluateVoOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_vo [FLAGS] SEQ",
       "Follows the camera of a sequence in TUM layout (associations.txt, or rgb.txt with or "
@@ -134,19 +138,23 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
        {"method", "NAME", "edge (default), or OpenCV's: rgbd, rgbd-icp"},
        {"out", "FILE", "write the trajectory, TUM lines"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
-  CheckFlags(line);
+  CheckVoFlags(line);
   Options options;
   options.sequence = line.Positional(0);
   options.camera_file = line.Text("camera", "");
   options.method = line.Text("method", options.method);
   options.out = line.Text("out", "");
+  if (!options.out.empty()) {
+    CheckOutputFile("--out", options.out,
+                    {options.sequence, line.Text("camera", options.sequence)});
+  }
   options.json = line.Has("json");
   options.step = line.Whole("step", 1, 1, 1000);
-  options.odometry.edges = ReadEdges(line);
-  options.odometry.edge_source = ReadEdgeSource(line);
-  options.stereo = ReadStereo(line);
+  options.odometry.edges = ReadVoEdges(line);
+  options.odometry.edge_source = ReadVoEdgeSource(line);
+  options.stereo = ReadStereoVo(line);
   options.mono = line.Has("mono");
-  options.monocular = ReadMonocular(line);
+  options.monocular = ReadMonocularVo(line);
   for (const char* flag : {"scale", "speed-sigma"}) {
     if (line.Has(flag)) options.monocular_flag = flag;
   }
@@ -155,7 +163,7 @@ std::optional<Options> ParseOptions(int argc, char** argv) {
 }
 
 /// In TUM's layout, or in KITTI's, which has a calib.txt.
-datasets::Sequence ReadSequence(const Options& options) {
+datasets::Sequence ReadVoSequence(const Options& options) {
   constexpr double kKittiRateHz = 10;
   const std::filesystem::path root(options.sequence);
   const auto has = [&root](const char* name) { return std::filesystem::exists(root / name); };
@@ -185,13 +193,13 @@ struct Run {
 };
 
 /// Whether monocular is all that is possible, or all that was asked for.
-bool IsMonocular(const datasets::Sequence& sequence, const Options& options) {
+bool IsMonocularVo(const datasets::Sequence& sequence, const Options& options) {
   if (options.stereo) return false;
   return options.mono || sequence.frames.front().depth_path.empty();
 }
 
 /// The frame's part of the run; poses begin with the frame at the origin.
-void AddStep(const VoMethod::Step& step, std::int64_t stamp_ns, Run& run) {
+void AddVoStep(const VoMethod::Step& step, std::int64_t stamp_ns, Run& run) {
   run.lost += step.lost ? 1U : 0U;
   run.keyframes += step.keyframe ? 1U : 0U;
   if (step.initialising) {
@@ -205,9 +213,9 @@ void AddStep(const VoMethod::Step& step, std::int64_t stamp_ns, Run& run) {
   run.trajectory.push_back({stamp_ns, step.world_from_camera});
 }
 
-std::unique_ptr<VoMethod> MethodFor(const datasets::Sequence& sequence,
-                                    const geo::CameraIntrinsics& camera, const Options& options) {
-  if (!IsMonocular(sequence, options)) {
+std::unique_ptr<VoMethod> VoMethodFor(const datasets::Sequence& sequence,
+                                      const geo::CameraIntrinsics& camera, const Options& options) {
+  if (!IsMonocularVo(sequence, options)) {
     if (!options.monocular_flag.empty()) {
       throw Error(
           "--" + options.monocular_flag +
@@ -223,10 +231,10 @@ std::unique_ptr<VoMethod> MethodFor(const datasets::Sequence& sequence,
                              static_cast<std::size_t>(options.step));
 }
 
-Run FollowSequence(const datasets::Sequence& sequence, const Options& options) {
+Run FollowSequenceByVo(const datasets::Sequence& sequence, const Options& options) {
   const geo::CameraIntrinsics camera = IntrinsicsOf(sequence);
-  const auto method = MethodFor(sequence, camera, options);
-  const bool has_depth = !IsMonocular(sequence, options) && !options.stereo;
+  const auto method = VoMethodFor(sequence, camera, options);
+  const bool has_depth = !IsMonocularVo(sequence, options) && !options.stereo;
   Run run;
   std::optional<StereoSource> stereo;
   if (options.stereo) stereo.emplace(sequence, camera, *options.stereo);
@@ -237,9 +245,9 @@ Run FollowSequence(const datasets::Sequence& sequence, const Options& options) {
     if (has_depth && source.depth_path.empty()) {
       throw Error("'" + source.image_path + "' has no depth, but the pictures before it have");
     }
-    const cv::Mat colour = ReadPicture(source.image_path, camera, cv::IMREAD_COLOR);
+    const cv::Mat colour = ReadColourPicture(source.image_path, camera);
     if (stereo) depth = stereo->Depth(source, colour);
-    if (has_depth) depth = ReadPicture(source.depth_path, camera, cv::IMREAD_UNCHANGED);
+    if (has_depth) depth = ReadDepthPicture(source.depth_path, camera);
     if (stereo) run.stereo_milliseconds.push_back(stereo->milliseconds());
     const auto start = std::chrono::steady_clock::now();
     cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
@@ -247,14 +255,14 @@ Run FollowSequence(const datasets::Sequence& sequence, const Options& options) {
     run.milliseconds.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
             .count());
-    AddStep(step, source.stamp_ns, run);
+    AddVoStep(step, source.stamp_ns, run);
     progress.At(i + 1);
   }
   return run;
 }
 
 /// Before the work, not after it. What the file holds stays until then, and none is left behind.
-void CheckWritable(const std::string& path) {
+void CheckVoOutput(const std::string& path) {
   std::error_code ignored;
   const bool was_there = std::filesystem::exists(path, ignored);
   if (!std::ofstream(path, std::ios::app)) {
@@ -263,8 +271,8 @@ void CheckWritable(const std::string& path) {
   if (!was_there) std::filesystem::remove(path, ignored);
 }
 
-void WriteTrajectory(const std::string& path,
-                     const std::vector<datasets::StampedPose>& trajectory) {
+void WriteVoTrajectory(const std::string& path,
+                       const std::vector<datasets::StampedPose>& trajectory) {
   std::ofstream file(path);
   file << "# timestamp tx ty tz qx qy qz qw (camera to world)\n";
   for (const datasets::StampedPose& pose : trajectory) {
@@ -281,22 +289,38 @@ void WriteTrajectory(const std::string& path,
   if (!file) throw Error("the trajectory '" + path + "' cannot be written");
 }
 
-void SayItNeverStarted(const datasets::Sequence& sequence, const Options& options, const Run& run) {
-  std::cerr << "livemap_evaluate_vo: visual odometry never started in " << run.milliseconds.size()
-            << " frames: "
-            << (IsMonocular(sequence, options)
-                    ? "a monocular camera must move far enough, in small steps, to see depth"
-                    : "no frame has enough edges with depth")
-            << "; there are no poses, and the errors are null\n";
+std::string WhyItNeverStarted(const datasets::Sequence& sequence, const Options& options,
+                              const Run& run) {
+  return "visual odometry never started in " + std::to_string(run.milliseconds.size()) +
+         " frames: " +
+         (IsMonocularVo(sequence, options)
+              ? "a monocular camera must move far enough, in small steps, to see depth"
+              : "no frame has enough edges with depth") +
+         "; there are no poses, and the errors are null";
+}
+
+/// What the trajectory is worth; null with a reason where nothing can be measured though there is
+/// truth.
+nlohmann::ordered_json ErrorsOf(const datasets::Sequence& sequence, const Options& options,
+                                const Run& run) {
+  nlohmann::ordered_json json = evaluation::NullFigures();
+  if (run.trajectory.empty()) {
+    json["reason"] = WhyItNeverStarted(sequence, options, run);
+    return json;
+  }
+  // Its times are figures, too: without truth they are what was asked for.
+  if (sequence.poses.empty()) return json;
+  try {
+    return evaluation::ToJson(evaluation::EvaluateTrajectory(sequence.poses, run.trajectory, {}));
+  } catch (const evaluation::NothingMeasured& nothing) {
+    json["reason"] = nothing.what();
+    return json;
+  }
 }
 
 nlohmann::ordered_json Report(const datasets::Sequence& sequence, const Options& options,
                               const Run& run) {
-  const bool has_figures = !sequence.poses.empty() && !run.trajectory.empty();
-  nlohmann::ordered_json json =
-      has_figures
-          ? evaluation::ToJson(evaluation::EvaluateTrajectory(sequence.poses, run.trajectory, {}))
-          : evaluation::NullFigures();
+  nlohmann::ordered_json json = ErrorsOf(sequence, options, run);
   json["median_ms"] = evaluation::Quantile(run.milliseconds, 0.5);
   json["p95_ms"] = evaluation::Quantile(run.milliseconds, 0.95);
   if (options.stereo) json["stereo_ms"] = evaluation::Quantile(run.stereo_milliseconds, 0.5);
@@ -305,52 +329,58 @@ nlohmann::ordered_json Report(const datasets::Sequence& sequence, const Options&
   json["lost"] = run.lost;
   json["keyframes"] = run.keyframes;
   json["method"] = options.method;
-  json["depth"] = options.stereo ? "stereo" : IsMonocular(sequence, options) ? "mono" : "images";
+  json["depth"] = options.stereo ? "stereo" : IsMonocularVo(sequence, options) ? "mono" : "images";
+  if (json.contains("reason")) {  // At the end, where people look.
+    const nlohmann::ordered_json reason = json["reason"];
+    json.erase("reason");
+    json["reason"] = reason;
+  }
   return json;
 }
 
 /// Four digits of what is measured; counts whole.
-std::string Text(const nlohmann::ordered_json& value) {
+std::string VoReportText(const nlohmann::ordered_json& value) {
   if (!value.is_number_float()) return value.dump();
   std::ostringstream text;
   text << std::setprecision(4) << value.get<double>();
   return text.str();
 }
 
-void Print(const nlohmann::ordered_json& report) {
+void PrintVoReport(const nlohmann::ordered_json& report) {
   for (const char* key :
        {"frames", "initialising", "lost", "keyframes", "ate_rmse_m", "rpe_rmse_m_per_s",
         "rpe_rmse_deg_per_s", "kitti_translation_percent", "segment_translation_percent",
         "end_error_percent", "median_ms", "p95_ms", "stereo_ms"}) {
     if (report.contains(key)) {
-      std::cout << std::left << std::setw(28) << std::setfill(' ') << key << Text(report[key])
-                << "\n";
+      std::cout << std::left << std::setw(28) << std::setfill(' ') << key
+                << VoReportText(report[key]) << "\n";
     }
   }
 }
 
-int RunEvaluation(int argc, char** argv) {
-  const std::optional<Options> options = ParseOptions(argc, argv);
+int EvaluateVo(int argc, char** argv) {
+  const std::optional<Options> options = ParseEvaluateVoOptions(argc, argv);
   if (!options) return 0;
   cv::setNumThreads(1);
-  const datasets::Sequence sequence = ReadSequence(*options);
-  if (!options->out.empty()) CheckWritable(options->out);
-  const Run run = FollowSequence(sequence, *options);
-  if (run.trajectory.empty()) SayItNeverStarted(sequence, *options, run);
+  const datasets::Sequence sequence = ReadVoSequence(*options);
+  SayNotes(kName, sequence.notes);
+  if (!options->out.empty()) CheckVoOutput(options->out);
+  const Run run = FollowSequenceByVo(sequence, *options);
   const nlohmann::ordered_json report = Report(sequence, *options, run);
   if (options->json) {
     std::cout << report.dump() << "\n";
   } else {
-    Print(report);
+    PrintVoReport(report);
   }
-  if (!options->out.empty()) WriteTrajectory(options->out, run.trajectory);
-  return 0;
+  if (!options->out.empty()) WriteVoTrajectory(options->out, run.trajectory);
+  if (!report.contains("reason")) return 0;
+  SayNothingMeasured(kName, report["reason"].get<std::string>());
+  return 1;
 }
 
 }  // namespace
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_evaluate_vo", argc, argv,
-                                    livemap::tools::RunEvaluation);
+  return livemap::tools::RunProgram("livemap_evaluate_vo", argc, argv, livemap::tools::EvaluateVo);
 }

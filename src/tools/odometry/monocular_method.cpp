@@ -13,15 +13,15 @@ namespace {
 
 using SpeedByStamp = std::map<std::int64_t, double>;
 
-const datasets::StampedPose& NearestPose(const std::vector<datasets::StampedPose>& poses,
-                                         std::int64_t stamp_ns) {
+const datasets::StampedPose& NearestTruePose(const std::vector<datasets::StampedPose>& poses,
+                                             std::int64_t stamp_ns) {
   return *std::min_element(poses.begin(), poses.end(), [&](const auto& one, const auto& other) {
     return std::abs(one.stamp_ns - stamp_ns) < std::abs(other.stamp_ns - stamp_ns);
   });
 }
 
-SpeedByStamp TrueSpeeds(const datasets::Sequence& sequence, std::size_t step,
-                        const MonocularOptions& options) {
+SpeedByStamp TrueSpeedsForMonocular(const datasets::Sequence& sequence, std::size_t step,
+                                    const MonocularOptions& options) {
   if (sequence.poses.size() < 2) {
     throw Error(
         "a single camera takes its metres from the speed between true poses, and the sequence has "
@@ -33,8 +33,9 @@ SpeedByStamp TrueSpeeds(const datasets::Sequence& sequence, std::size_t step,
     const std::size_t before = i >= step ? i - step : i;
     const std::size_t after = i + step < sequence.frames.size() ? i + step : i;
     const datasets::StampedPose& from =
-        NearestPose(sequence.poses, sequence.frames[before].stamp_ns);
-    const datasets::StampedPose& to = NearestPose(sequence.poses, sequence.frames[after].stamp_ns);
+        NearestTruePose(sequence.poses, sequence.frames[before].stamp_ns);
+    const datasets::StampedPose& to =
+        NearestTruePose(sequence.poses, sequence.frames[after].stamp_ns);
     const double seconds = static_cast<double>(to.stamp_ns - from.stamp_ns) * 1e-9;
     if (!(seconds > 0)) continue;
     const double way_m =
@@ -90,7 +91,7 @@ std::unique_ptr<VoMethod> MakeMonocularMethod(const MonocularOptions& options,
   monocular.camera_pitch_rad = options.camera_pitch_rad;
   SpeedByStamp speeds;
   if (options.scale_source == odometry::ScaleSource::kSpeed)
-    speeds = TrueSpeeds(sequence, step, options);
+    speeds = TrueSpeedsForMonocular(sequence, step, options);
   return std::make_unique<MonocularMethod>(monocular, intrinsics, std::move(speeds));
 }
 

@@ -1,14 +1,16 @@
 #include "tools/odometry/sequence_pictures.h"
 
-#include <opencv2/imgcodecs.hpp>
-
 #include "datasets/image_file.h"
 
 namespace livemap::tools {
 
-cv::Mat ReadPicture(const std::string& path, const geo::CameraIntrinsics& camera, int flags) {
-  const datasets::ImageFile file = datasets::ReadImageFile(path, camera.width, camera.height);
-  return cv::imdecode(file.bytes, flags);
+cv::Mat ReadColourPicture(const std::string& path, const geo::CameraIntrinsics& camera) {
+  return datasets::ReadPictureFile(path, camera.width, camera.height,
+                                   imaging::DecodeConfig::Pixels::kColour);
+}
+
+cv::Mat ReadDepthPicture(const std::string& path, const geo::CameraIntrinsics& camera) {
+  return datasets::ReadDepthFile(path, camera.width, camera.height);
 }
 
 geo::CameraIntrinsics IntrinsicsOf(const datasets::Sequence& sequence) {

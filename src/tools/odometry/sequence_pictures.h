@@ -7,8 +7,11 @@
 
 namespace livemap::tools {
 
-/// A picture of the camera's size, decoded with OpenCV's `flags`. Throws Error naming the file.
-cv::Mat ReadPicture(const std::string& path, const geo::CameraIntrinsics& camera, int flags);
+/// A colour picture (CV_8UC3) of the camera's size, upright. Throws Error naming the file.
+cv::Mat ReadColourPicture(const std::string& path, const geo::CameraIntrinsics& camera);
+
+/// A depth image (CV_16UC1) of the camera's size. Throws Error naming the file.
+cv::Mat ReadDepthPicture(const std::string& path, const geo::CameraIntrinsics& camera);
 
 /// The sequence's camera; one without width and height has those of the first picture.
 geo::CameraIntrinsics IntrinsicsOf(const datasets::Sequence& sequence);

@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <chrono>
-#include <opencv2/imgcodecs.hpp>
 
 #include "common/error.h"
-#include "datasets/image_file.h"
+#include "tools/odometry/sequence_pictures.h"
 
 namespace livemap::tools {
 namespace {
 
 /// A rectified camera, `right_m` beside the left one.
-imaging::CameraCalibration Camera(const geo::CameraIntrinsics& k, double right_m) {
+imaging::CameraCalibration StereoCamera(const geo::CameraIntrinsics& k, double right_m) {
   imaging::CameraCalibration camera;
   camera.width = k.width;
   camera.height = k.height;
@@ -20,9 +19,9 @@ imaging::CameraCalibration Camera(const geo::CameraIntrinsics& k, double right_m
   return camera;
 }
 
-imaging::StereoDepth MakeStereo(const datasets::Sequence& sequence,
-                                const geo::CameraIntrinsics& intrinsics,
-                                const imaging::StereoConfig& config) {
+imaging::StereoDepth MakeStereoOfSequence(const datasets::Sequence& sequence,
+                                          const geo::CameraIntrinsics& intrinsics,
+                                          const imaging::StereoConfig& config) {
   const auto alone =
       std::find_if(sequence.frames.begin(), sequence.frames.end(),
                    [](const datasets::SequenceFrame& frame) { return frame.right_path.empty(); });
@@ -39,7 +38,7 @@ imaging::StereoDepth MakeStereo(const datasets::Sequence& sequence,
         "the sequence has no baseline: --stereo wants baseline_m in camera.yaml, or P1 in "
         "calib.txt");
   }
-  return {config, Camera(intrinsics, 0), Camera(intrinsics, sequence.baseline_m)};
+  return {config, StereoCamera(intrinsics, 0), StereoCamera(intrinsics, sequence.baseline_m)};
 }
 
 }  // namespace
@@ -47,12 +46,10 @@ imaging::StereoDepth MakeStereo(const datasets::Sequence& sequence,
 StereoSource::StereoSource(const datasets::Sequence& sequence,
                            const geo::CameraIntrinsics& intrinsics,
                            const imaging::StereoConfig& config)
-    : stereo_(MakeStereo(sequence, intrinsics, config)), intrinsics_(intrinsics) {}
+    : stereo_(MakeStereoOfSequence(sequence, intrinsics, config)), intrinsics_(intrinsics) {}
 
 cv::Mat StereoSource::Depth(const datasets::SequenceFrame& frame, const cv::Mat& left) {
-  const datasets::ImageFile file =
-      datasets::ReadImageFile(frame.right_path, intrinsics_.width, intrinsics_.height);
-  const cv::Mat right = cv::imdecode(file.bytes, cv::IMREAD_COLOR);
+  const cv::Mat right = ReadColourPicture(frame.right_path, intrinsics_);
   const auto start = std::chrono::steady_clock::now();
   cv::Mat depth = stereo_.Compute(left, right);
   milliseconds_ =

@@ -6,9 +6,10 @@
 namespace livemap::tools {
 namespace {
 
-class EdgeMethod : public VoMethod {
+class EdgeVoMethod : public VoMethod {
  public:
-  EdgeMethod(const odometry::EdgeOdometry::Config& config, const geo::CameraIntrinsics& intrinsics)
+  EdgeVoMethod(const odometry::EdgeOdometry::Config& config,
+               const geo::CameraIntrinsics& intrinsics)
       : odometry_(config, intrinsics) {}
   Step Track(const odometry::RgbdFrame& frame) override {
     const odometry::VoResult result = odometry_.Track(frame);
@@ -20,9 +21,9 @@ class EdgeMethod : public VoMethod {
   odometry::EdgeOdometry odometry_;
 };
 
-class OpenCvMethod : public VoMethod {
+class OpenCvVoMethod : public VoMethod {
  public:
-  OpenCvMethod(const std::string& type, const geo::CameraIntrinsics& intrinsics)
+  OpenCvVoMethod(const std::string& type, const geo::CameraIntrinsics& intrinsics)
       : odometry_(MakeOpenCvOdometry(type, intrinsics)) {}
   Step Track(const odometry::RgbdFrame& frame) override {
     cv::Ptr<cv::rgbd::OdometryFrame> current = PrepareOpenCvFrame(*odometry_, frame);
@@ -47,9 +48,9 @@ class OpenCvMethod : public VoMethod {
 std::unique_ptr<VoMethod> MakeVoMethod(const std::string& name,
                                        const odometry::EdgeOdometry::Config& config,
                                        const geo::CameraIntrinsics& intrinsics) {
-  if (name == "edge") return std::make_unique<EdgeMethod>(config, intrinsics);
-  if (name == "rgbd") return std::make_unique<OpenCvMethod>("RgbdOdometry", intrinsics);
-  if (name == "rgbd-icp") return std::make_unique<OpenCvMethod>("RgbdICPOdometry", intrinsics);
+  if (name == "edge") return std::make_unique<EdgeVoMethod>(config, intrinsics);
+  if (name == "rgbd") return std::make_unique<OpenCvVoMethod>("RgbdOdometry", intrinsics);
+  if (name == "rgbd-icp") return std::make_unique<OpenCvVoMethod>("RgbdICPOdometry", intrinsics);
   throw Error("--method is '" + name + "'; accepted are edge, rgbd, rgbd-icp");
 }
 

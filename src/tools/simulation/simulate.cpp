@@ -6,6 +6,7 @@
 
 #include "simulation/motion/vehicle_motion.h"
 #include "tools/common/command_line.h"
+#include "tools/common/progress.h"
 #include "tools/simulation/simulate_change.h"
 #include "tools/simulation/simulate_room.h"
 #include "tools/simulation/simulation_flags.h"
@@ -14,7 +15,7 @@
 namespace livemap::tools {
 namespace {
 
-std::vector<Flag> Flags() {
+std::vector<Flag> SimulateFlags() {
   return {{"seed", "N", "of the world; the same seed gives the same bytes (1)"},
           {"condition", "NAME", "day, dusk, rain or snow (day)"},
           {"seconds", "S", "length of the drive (20; --room: 5)"},
@@ -41,7 +42,7 @@ std::vector<Flag> Flags() {
           {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
 }
 
-simulation::DrivingStyle ReadStyle(const CommandLine& line) {
+simulation::DrivingStyle ReadDrivingStyle(const CommandLine& line) {
   simulation::DrivingStyle style;
   style.speed_mps = line.Number("speed", style.speed_mps, 0.5, 30);
   style.seconds = line.Number("seconds", 20, 0.1, 7200);
@@ -50,8 +51,8 @@ simulation::DrivingStyle ReadStyle(const CommandLine& line) {
 }
 
 /// The camera's view at a time, and where it will be when the exposure ends.
-simulation::CameraExposure ViewAt(const simulation::VehicleMotion& motion,
-                                  const SimulationSetup& setup, double time_s) {
+simulation::CameraExposure SimulatedViewAt(const simulation::VehicleMotion& motion,
+                                           const SimulationSetup& setup, double time_s) {
   const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
   simulation::CameraExposure camera;
   camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
@@ -63,13 +64,13 @@ simulation::CameraExposure ViewAt(const simulation::VehicleMotion& motion,
 
 /// A street's blocks come and go by megabytes. What they give back shall go back to the system, not
 /// stay in pieces between what lives on: glibc would raise its bound for that with every block.
-void KeepMemoryFlat() {
+void KeepSimulateMemoryFlat() {
   mallopt(M_MMAP_THRESHOLD, 64 * 1024);
   mallopt(M_TRIM_THRESHOLD, 128 * 1024);
 }
 
-int Run(int argc, char** argv) {
-  std::vector<Flag> flags = Flags();
+int Simulate(int argc, char** argv) {
+  std::vector<Flag> flags = SimulateFlags();
   for (const Flag& flag : SimulationBagFlags()) flags.push_back(flag);
   for (const Flag& flag : ChangeFlags()) flags.push_back(flag);
   for (const Flag& flag : RoomFlags()) flags.push_back(flag);
@@ -78,7 +79,7 @@ int Run(int argc, char** argv) {
       "Renders a drive through a generated street with the truth about everything in it.", 0,
       flags);
   if (!line.Parse(argc, argv)) return 0;
-  KeepMemoryFlat();
+  KeepSimulateMemoryFlat();
   if (WantsRoom(line)) return SimulateRoom(line);
   RefuseRoomFlags(line);
   if (line.Has("change")) return SimulateChange(line);
@@ -86,7 +87,7 @@ int Run(int argc, char** argv) {
   RefuseNoOutput(line);
   const std::uint64_t seed = line.Seed("seed", 1);
   const simulation::Condition condition = ReadCondition(line, "condition", "day");
-  const simulation::DrivingStyle style = ReadStyle(line);
+  const simulation::DrivingStyle style = ReadDrivingStyle(line);
   const double seconds = style.seconds;
   const double rate_hz = line.Number("rate", 10, 0.1, 100);
   SimulationSetup setup = ReadSimulationSetup(line);
@@ -109,7 +110,7 @@ int Run(int argc, char** argv) {
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < frames; ++i) {
     const double time_s = static_cast<double>(i) / rate_hz;
-    simulation::CameraExposure camera = ViewAt(motion, setup, time_s);
+    simulation::CameraExposure camera = SimulatedViewAt(motion, setup, time_s);
     const auto number = static_cast<std::uint32_t>(i);
     const simulation::SimulatedFrame frame = renderer.Render(camera, number);
     cv::Mat right;
@@ -135,5 +136,5 @@ int Run(int argc, char** argv) {
 }  // namespace livemap::tools
 
 int main(int argc, char** argv) {
-  return livemap::tools::RunProgram("livemap_simulate", argc, argv, livemap::tools::Run);
+  return livemap::tools::RunProgram("livemap_simulate", argc, argv, livemap::tools::Simulate);
 }

@@ -9,10 +9,10 @@
 
 #include "common/error.h"
 #include "simulation/datasets/change_dataset_writer.h"
-#include "simulation/datasets/dataset_writers.h"
 #include "simulation/motion/pass_drive.h"
 #include "simulation/objects/counter_random.h"
 #include "tools/common/contact_sheet.h"
+#include "tools/common/progress.h"
 #include "tools/simulation/simulation_flags.h"
 #include "tools/simulation/simulation_outputs.h"
 #include "tools/simulation/simulation_setup.h"
@@ -43,7 +43,7 @@ struct ChangeRun {
   std::string preview;
 };
 
-ChangeRun ReadRun(const CommandLine& line) {
+ChangeRun ReadChangeRun(const CommandLine& line) {
   for (const char* flag :
        {"tum", "yolo", "video", "bag", "hazards", "truth-preview", "stops", "stereo"}) {
     if (line.Has(flag)) {
@@ -74,7 +74,7 @@ ChangeRun ReadRun(const CommandLine& line) {
   return run;
 }
 
-simulation::Street MakeStreet(const ChangeRun& run, simulation::StreetPass::Which which) {
+simulation::Street MakeChangedStreet(const ChangeRun& run, simulation::StreetPass::Which which) {
   const simulation::Condition condition =
       which == simulation::StreetPass::Which::kFirst ? run.first : run.second;
   return {run.world,
@@ -85,10 +85,10 @@ simulation::Street MakeStreet(const ChangeRun& run, simulation::StreetPass::Whic
 }
 
 /// The first pass, of which only the pictures are rendered that a pair wants.
-class FirstPass {
+class FirstChangePass {
  public:
-  explicit FirstPass(const ChangeRun& run)
-      : street_(MakeStreet(run, simulation::StreetPass::Which::kFirst)),
+  explicit FirstChangePass(const ChangeRun& run)
+      : street_(MakeChangedStreet(run, simulation::StreetPass::Which::kFirst)),
         drive_(street_, Manner(run), run.setup.mounting, run.setup.camera.exposure_s),
         renderer_(street_, run.setup.camera, simulation::MakeLighting(run.first, run.seed),
                   run.options) {}
@@ -120,8 +120,8 @@ class FirstPass {
   simulation::PassPicture picture_;
 };
 
-void AddToSheet(const simulation::PassPicture& first, const simulation::PassPicture& second,
-                const cv::Mat& mask, std::vector<cv::Mat>& sheet) {
+void AddChangeToSheet(const simulation::PassPicture& first, const simulation::PassPicture& second,
+                      const cv::Mat& mask, std::vector<cv::Mat>& sheet) {
   const double scale = kDiagramWidth / second.frame.bgr.cols;
   for (const cv::Mat& picture :
        {first.frame.bgr, second.frame.bgr, simulation::OverlayChanges(second.frame.bgr, mask)}) {
@@ -148,9 +148,9 @@ void RefuseChangeFlags(const CommandLine& line) {
 }
 
 int SimulateChange(const CommandLine& line) {
-  const ChangeRun run = ReadRun(line);
-  FirstPass first(run);
-  const simulation::Street street = MakeStreet(run, simulation::StreetPass::Which::kSecond);
+  const ChangeRun run = ReadChangeRun(line);
+  FirstChangePass first(run);
+  const simulation::Street street = MakeChangedStreet(run, simulation::StreetPass::Which::kSecond);
   const simulation::PassDrive drive(
       street, simulation::DrawSecondManner(run.seed, run.speed_mps, run.rate_hz, run.seconds),
       run.setup.mounting, run.setup.camera.exposure_s);
@@ -174,7 +174,7 @@ int SimulateChange(const CommandLine& line) {
     const simulation::ChangeView view = truth.Look(camera);
     writer.Add(near, second, view);
     const bool shown = i % every == every / 2 && sheet.size() < 3 * kPreviewRows;
-    if (!run.preview.empty() && shown) AddToSheet(near, second, view.mask, sheet);
+    if (!run.preview.empty() && shown) AddChangeToSheet(near, second, view.mask, sheet);
     progress.At(i + 1);
   }
   writer.Finish(street, run.setup.datum, truth.changes());

@@ -7,10 +7,11 @@
 #include <string>
 
 #include "common/error.h"
-#include "simulation/datasets/dataset_writers.h"
+#include "simulation/datasets/tum_writer.h"
 #include "simulation/room/patterned_wall.h"
 #include "simulation/room/simulated_room.h"
 #include "tools/common/contact_sheet.h"
+#include "tools/common/progress.h"
 #include "tools/simulation/simulation_outputs.h"
 #include "tools/simulation/simulation_setup.h"
 
@@ -21,8 +22,8 @@ constexpr int kPreviewPictures = 12;
 constexpr float kGain = 1.3F;
 
 /// The wall as the simulator's other pictures are: with depth, grey in all three channels.
-simulation::SimulatedFrame SeeWall(const simulation::SimulatedCamera& camera,
-                                   const Eigen::Isometry3d& world_from_optical, double gain) {
+simulation::SimulatedFrame SeeRoomWall(const simulation::SimulatedCamera& camera,
+                                       const Eigen::Isometry3d& world_from_optical, double gain) {
   const simulation::PatternedWall::View view =
       simulation::PatternedWall::See(camera.intrinsics, world_from_optical, gain, 0);
   simulation::SimulatedFrame frame;
@@ -82,7 +83,7 @@ int SimulateRoom(const CommandLine& line) {
     const double gain = 1 + flicker * std::sin(2 * M_PI * time_s);
     const Eigen::Isometry3d pose = room.WorldFromOptical(time_s, vigour);
     simulation::SimulatedFrame frame =
-        wall ? SeeWall(setup.camera, first_pose.inverse() * pose, gain)
+        wall ? SeeRoomWall(setup.camera, first_pose.inverse() * pose, gain)
              : room.Render(setup.camera, pose, static_cast<std::uint32_t>(i),
                            static_cast<float>(kGain * gain), rays, threads);
     frame.depth = simulation::SenseDepth(frame.depth, setup.camera.intrinsics, setup.depth,

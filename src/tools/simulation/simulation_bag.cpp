@@ -22,7 +22,7 @@ constexpr double kTwistRateHz = 50;
 /// Keeps the odometer's numbers apart from the receiver's.
 constexpr std::uint64_t kOdometerStream = 0x6f646f6d65746572ULL;
 
-DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
+DriveSetup SimulatedDriveSetup(const SimulationBag::Setup& setup) {
   const geo::LocalFrame map(setup.datum);
   const auto place = [map, state = setup.state](double time_s) {
     return map.ToGeo(state(time_s).world_from_base.translation().head<2>());
@@ -42,7 +42,7 @@ DriveSetup ToDriveSetup(const SimulationBag::Setup& setup) {
 }
 
 /// Of the hazards that a detector should find.
-std::vector<Detection> ToBoxes(const std::vector<simulation::HazardInView>& hazards) {
+std::vector<Detection> SimulatedBoxes(const std::vector<simulation::HazardInView>& hazards) {
   std::vector<Detection> boxes;
   for (const simulation::HazardInView& hazard : hazards) {
     if (hazard.difficult) continue;
@@ -58,7 +58,7 @@ std::vector<Detection> ToBoxes(const std::vector<simulation::HazardInView>& haza
   return boxes;
 }
 
-geometry_msgs::Vector3 ToVector(const Eigen::Vector3d& vector) {
+geometry_msgs::Vector3 BagVector(const Eigen::Vector3d& vector) {
   geometry_msgs::Vector3 message;
   message.x = vector.x();
   message.y = vector.y();
@@ -66,8 +66,8 @@ geometry_msgs::Vector3 ToVector(const Eigen::Vector3d& vector) {
   return message;
 }
 
-nav_msgs::Odometry ToOdometry(const simulation::VehicleKinematics& state,
-                              const std_msgs::Header& header) {
+nav_msgs::Odometry SimulatedOdometry(const simulation::VehicleKinematics& state,
+                                     const std_msgs::Header& header) {
   nav_msgs::Odometry odometry;
   odometry.header = header;
   odometry.header.frame_id = "map";
@@ -81,12 +81,12 @@ nav_msgs::Odometry ToOdometry(const simulation::VehicleKinematics& state,
   odometry.pose.pose.orientation.y = rotation.y();
   odometry.pose.pose.orientation.z = rotation.z();
   odometry.pose.pose.orientation.w = rotation.w();
-  odometry.twist.twist.linear = ToVector(state.velocity_mps);
-  odometry.twist.twist.angular = ToVector(state.turn_rate_radps);
+  odometry.twist.twist.linear = BagVector(state.velocity_mps);
+  odometry.twist.twist.angular = BagVector(state.turn_rate_radps);
   return odometry;
 }
 
-sensor_msgs::Image ToDepthImage(const cv::Mat& depth, const std_msgs::Header& header) {
+sensor_msgs::Image SimulatedDepthImage(const cv::Mat& depth, const std_msgs::Header& header) {
   sensor_msgs::Image image;
   image.header = header;
   image.height = static_cast<std::uint32_t>(depth.rows);
@@ -108,7 +108,7 @@ class RosSimulationBag : public SimulationBag {
  public:
   RosSimulationBag(const std::string& path, const Setup& setup)
       : setup_(setup),
-        bag_(path, ToDriveSetup(setup)),
+        bag_(path, SimulatedDriveSetup(setup)),
         odometer_(setup.seed ^ kOdometerStream),
         next_twist_(-static_cast<std::int64_t>(DriveBag::kLeadS * kTwistRateHz)),
         info_(PinholeCameraInfo(setup.camera.intrinsics)),
@@ -119,13 +119,15 @@ class RosSimulationBag : public SimulationBag {
   void Add(double time_s, const simulation::SimulatedFrame& frame, const cv::Mat& depth,
            const cv::Mat& right, const std::vector<simulation::HazardInView>& hazards) override {
     WriteTwistsUntil(time_s);
-    const std_msgs::Header header = bag_.AddFrame(time_s, ToJpeg(frame.bgr), ToBoxes(hazards));
+    const std_msgs::Header header =
+        bag_.AddFrame(time_s, ToJpeg(frame.bgr), SimulatedBoxes(hazards));
     bag_.Writer().Write("/ground_truth/odom", header.stamp,
-                        ToOdometry(setup_.state(time_s), header));
+                        SimulatedOdometry(setup_.state(time_s), header));
     if (!depth.empty()) {
       info_.header = header;
       bag_.Writer().Write("/camera/depth/camera_info", header.stamp, info_);
-      bag_.Writer().Write("/camera/depth/image_raw", header.stamp, ToDepthImage(depth, header));
+      bag_.Writer().Write("/camera/depth/image_raw", header.stamp,
+                          SimulatedDepthImage(depth, header));
     }
     if (right.empty()) return;
     // image_geometry wants both cameras in the left one's frame.

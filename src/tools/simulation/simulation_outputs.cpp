@@ -5,7 +5,9 @@
 
 #include "common/error.h"
 #include "datasets/sensors/gnss_multipath.h"
+#include "simulation/datasets/hazard_geojson.h"
 #include "simulation/datasets/output_files.h"
+#include "simulation/datasets/truth_pictures.h"
 #include "simulation/world/skyline.h"
 #include "tools/common/contact_sheet.h"
 #include "tools/simulation/simulation_flags.h"
@@ -20,7 +22,7 @@ constexpr double kDefaultBaselineM = 0.25;
 /// Keeps these numbers apart from the receiver's.
 constexpr std::uint64_t kMultipathStream = 0x6d756c7469706174ULL;
 
-void WriteSheet(const std::string& path, const std::vector<cv::Mat>& pictures, int columns) {
+void WriteOutputSheet(const std::string& path, const std::vector<cv::Mat>& pictures, int columns) {
   if (!cv::imwrite(path, ContactSheet(pictures, columns))) {
     throw Error("the contact sheet '" + path + "' cannot be written");
   }
@@ -147,8 +149,8 @@ void SimulationOutputs::Finish(const simulation::Street& street, double end_s) {
   if (bag_) bag_->Finish(end_s, hazards);
   if (tum_) tum_->Finish();
   if (yolo_) yolo_->Finish();
-  if (!preview_path_.empty()) WriteSheet(preview_path_, preview_, 4);
-  if (!truth_path_.empty()) WriteSheet(truth_path_, truth_, 3);
+  if (!preview_path_.empty()) WriteOutputSheet(preview_path_, preview_, 4);
+  if (!truth_path_.empty()) WriteOutputSheet(truth_path_, truth_, 3);
   if (hazards_path_.empty()) return;
   std::ofstream file = simulation::OpenFile(hazards_path_);
   file << hazards;

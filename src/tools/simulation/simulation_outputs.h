@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "simulation/datasets/dataset_writers.h"
+#include "simulation/datasets/tum_writer.h"
+#include "simulation/datasets/yolo_writer.h"
 #include "tools/simulation/simulation_bag.h"
 #include "tools/simulation/simulation_setup.h"
 

@@ -11,9 +11,9 @@ namespace {
 constexpr double kDefaultFieldOfViewDeg = 66;
 
 /// "a<separator>b" as two numbers.
-std::pair<double, double> ReadPair(const CommandLine& line, const std::string& flag,
-                                   const std::string& otherwise, char separator,
-                                   const std::string& accepted) {
+std::pair<double, double> ReadSetupPair(const CommandLine& line, const std::string& flag,
+                                        const std::string& otherwise, char separator,
+                                        const std::string& accepted) {
   const std::string text = line.Text(flag, otherwise);
   const std::vector<std::string> parts = datasets::Split(text, separator);
   if (parts.size() == 2) {
@@ -38,7 +38,7 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
     setup.mounting = file.mounting;
   } else {
     const std::string accepted = "WxH in whole pixels from 64 to 4096, such as 640x480";
-    const auto [width, height] = ReadPair(line, "size", "640x480", 'x', accepted);
+    const auto [width, height] = ReadSetupPair(line, "size", "640x480", 'x', accepted);
     for (const double side : {width, height}) {
       if (side < 64 || side > 4096 || side != std::floor(side)) {
         throw Error("--size is '" + line.Text("size", "") + "', accepted is " + accepted);
@@ -50,7 +50,7 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
     k.cx = 0.5 * (width - 1);
     k.cy = 0.5 * (height - 1);
   }
-  const auto [k1, k2] = ReadPair(line, "distortion", "0,0", ',', "K1,K2 from -0.4 to 0.4");
+  const auto [k1, k2] = ReadSetupPair(line, "distortion", "0,0", ',', "K1,K2 from -0.4 to 0.4");
   if (std::abs(k1) > 0.4 || std::abs(k2) > 0.4) {
     throw Error("--distortion is '" + line.Text("distortion", "") +
                 "', accepted is K1,K2 from -0.4 to 0.4");
@@ -72,7 +72,7 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
   }
   setup.camera.blur_samples = static_cast<int>(line.Number("blur", 0, 0, 64));
   const std::string place = "LAT,LON in degrees";
-  const auto [latitude, longitude] = ReadPair(line, "start", "48.8566,9.0", ',', place);
+  const auto [latitude, longitude] = ReadSetupPair(line, "start", "48.8566,9.0", ',', place);
   setup.datum = {latitude, longitude};
   if (!geo::IsValid(setup.datum)) {
     throw Error("--start is '" + line.Text("start", "") + "', accepted is " + place);
