@@ -20,6 +20,7 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "lib"))
 import demo_observers as observers  # noqa: E402
 import demo_system as system  # noqa: E402
+from listening_port import free_port  # noqa: E402
 import perception_recorder
 
 ZONE, VEHICLE = "bench", "vehicle-1"
@@ -44,7 +45,7 @@ class MeasuredSystem(system.LiveMapSystem):
         """The port at which the vehicle finds its broker."""
         if not link:
             return self.broker_port
-        port = system.free_port()
+        port = free_port()
         self.start("link", [system.program("lte_relay.py"), "--port", str(port), "--to-port", str(self.broker_port),
                             "--counts", str(self.directory / "link.json")]
                    + [part for key, value in link.items() for part in (f"--{key.replace('_', '-')}", str(value))])

@@ -1,6 +1,5 @@
 """What the broker with passwords and the one with certificates share: names, private files, rights, limits."""
 
-import argparse
 import os
 import re
 import shutil
@@ -16,14 +15,6 @@ DEFAULT_MAX_MESSAGE_BYTES = 1 << 20
 
 class Usage(Exception):
     """A wrong argument, told in one sentence."""
-
-
-class OneSentenceParser(argparse.ArgumentParser):
-    """Wrong flags are one sentence on stderr and exit 2, without the usage text."""
-
-    def error(self, message):
-        sys.stderr.write(f"{self.prog}: {message}\n")
-        sys.exit(2)
 
 
 def require_id(text, what):
@@ -51,10 +42,11 @@ def require_listener(port, address, max_message_bytes):
 
 
 def require_directory(text):
-    """The full path of a folder that mosquitto.conf can name."""
+    """The full path of a folder that mosquitto.conf can name: what stands behind a setting's name, up to the line's end,
+    is its value."""
     directory = os.path.abspath(text)
-    if re.search(r"\s", directory) or not directory.isprintable():
-        raise Usage(f"directory {directory!r} is not accepted, mosquitto reads no path with a space")
+    if re.search(r"[\x00-\x1f\x7f]", directory):
+        raise Usage(f"directory {directory!r} is not accepted, a path without control characters is")
     return directory
 
 
@@ -67,8 +59,8 @@ def find_program(name):
 
 
 def write_private(path, content):
-    """Replaces a file at once, readable by its owner alone; it is on disk when this returns."""
-    data = content.encode("ascii") if isinstance(content, str) else content
+    """Replaces a file at once, readable by its owner alone; it is on disk, under its name, when this returns."""
+    data = content.encode("utf-8", "surrogateescape") if isinstance(content, str) else content
     temporary = path + ".new"
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, "wb") as file:
@@ -76,6 +68,16 @@ def write_private(path, content):
         file.flush()
         os.fsync(file.fileno())
     os.replace(temporary, path)
+    sync_folder(os.path.dirname(path))
+
+
+def sync_folder(path):
+    """Without it a power loss can take back the names of files that are on disk."""
+    descriptor = os.open(path or ".", os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def vehicle_rights(zone):

@@ -18,7 +18,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from broker_files import ZONE_USER, Usage, require_id, write_private
+from broker_files import ZONE_USER, Usage, require_id, sync_folder, write_private
 
 REGISTER = "register.json"
 FORMAT = 1
@@ -90,6 +90,34 @@ def make_root(zone):
     return key, certificate
 
 
+def public_bytes(key):
+    return key.public_bytes(serialization.Encoding.DER, serialization.PublicFormat.SubjectPublicKeyInfo)
+
+
+def fault_of(folder):
+    """What is wrong with the folder of a key, its certificate and the authority's; None where they fit together."""
+    path = folder
+    try:
+        loaded = []
+        for name, load_one in (("key.pem", lambda data: serialization.load_pem_private_key(data, password=None)),
+                               ("certificate.pem", x509.load_pem_x509_certificate),
+                               ("ca.pem", x509.load_pem_x509_certificate)):
+            path = os.path.join(folder, name)
+            with open(path, "rb") as file:
+                loaded.append(load_one(file.read()))
+        key, certificate, authority = loaded
+        path = os.path.join(folder, "certificate.pem")
+        if public_bytes(key.public_key()) != public_bytes(certificate.public_key()):
+            return f"'{path}' is not of the key beside it"
+        if certificate.issuer != authority.subject:
+            return f"'{path}' is not of the authority beside it"
+    except OSError as error:
+        return f"'{path}' cannot be read ({error.strerror})"
+    except (ValueError, TypeError):
+        return f"'{path}' is damaged"
+    return None
+
+
 class Authority:
     """The authority below `directory`; `open` and `create` hold its lock for as long as the `with` block."""
 
@@ -154,18 +182,19 @@ class Authority:
             write_private(os.path.join(work, "ca.pem"), certificate_pem(self.certificate))
             shutil.rmtree(folder, ignore_errors=True)
             os.rename(work, folder)
+            sync_folder(os.path.dirname(folder))
         finally:
             shutil.rmtree(work, ignore_errors=True)
 
     def issue_own(self, hosts):
         """The broker's folder (anew when its hosts changed) and that of the zone's own client."""
         life = datetime.timedelta(days=AUTHORITY_DAYS)
-        if self.register.get("hosts") != hosts or not os.path.isdir(self.path("broker")):
+        if self.register.get("hosts") != hosts or fault_of(self.path("broker")):
             self.issue_folder(self.path("broker"), lambda key: self.sign(
                 "broker", key, life, ExtendedKeyUsageOID.SERVER_AUTH, hosts))
             self.register["hosts"] = hosts
             self.save()
-        if not os.path.isdir(self.path("zone")):
+        if fault_of(self.path("zone")):
             self.issue_folder(self.path("zone"), lambda key: self.sign(
                 ZONE_USER, key, life, ExtendedKeyUsageOID.CLIENT_AUTH))
 

@@ -16,14 +16,14 @@ import websocket
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock
 
-from demo_system import StartError
+from system_error import StartError
 
 # Key-values of /diagnostics that the summary is made of, per nodelet.
 COUNTS = {
     "camera_ingest": ("frames_in", "frames_published", "frames_dropped", "frames_bad"),
     "hazard_detection": ("frames_in", "frames_processed", "frames_dropped", "detections"),
     "hazard_reporting": ("detections", "reports_created", "committed", "refused", "pending",
-                         "duplicates_suppressed"),
+                         "duplicates_suppressed", "waiting_frames"),
     "mqtt_bridge": ("uplink_bytes",),
 }
 # Only small vehicles have this one.
@@ -173,6 +173,7 @@ class VehicleObserver:
         with self.lock:
             return {
                 "frames_in": self._count("camera_ingest", "frames_in"),
+                "frames_published": self._count("camera_ingest", "frames_published"),
                 "frames_processed": self._count("hazard_detection", "frames_processed"),
                 "frames_dropped": (self._count("camera_ingest", "frames_dropped")
                                    + self._count("camera_ingest", "frames_bad")
@@ -186,6 +187,7 @@ class VehicleObserver:
                 "committed": self._count("hazard_reporting", "committed"),
                 "refused": self._count("hazard_reporting", "refused"),
                 "pending": self._count("hazard_reporting", "pending"),
+                "frames_waiting": self._count("hazard_reporting", "waiting_frames"),
                 "uplink_bytes": self._count("mqtt_bridge", "uplink_bytes"),
             }
 
@@ -200,7 +202,7 @@ class VehicleObserver:
             detected = self.clock_s() > drive.start_s + drive.duration_s + 1.0
         return (counts["frames_in"] >= drive.frames and detected
                 and counts["committed"] + counts["refused"] >= counts["reports_created"]
-                and counts["pending"] == 0)
+                and counts["frames_waiting"] == 0 and counts["pending"] == 0)
 
 
 def wait_for_master(uri, timeout_s=30):
@@ -248,17 +250,12 @@ MATCH_RADIUS_M = 5.0
 """A hazard on the map within so far of a true one of its class is that one."""
 
 
-def compare_with_truth(hazards, truth_file, radius_m=MATCH_RADIUS_M):
+def compare_with_truth(hazards, truth, radius_m=MATCH_RADIUS_M):
     """Found and missed true hazards, false ones on the map, and the error of the found ones' positions.
 
-    Only hazards that the vehicle went by can be missed. One hazard on the map stands for all of its class
+    `truth` is what read_true_hazards gives. Only hazards that the vehicle went by can be missed. One hazard on the map stands for all of its class
     within `radius_m`, as the zone merges them.
     """
-    with open(truth_file) as file:
-        features = json.load(file)["features"]
-    truth = [{"class": f["properties"]["class"], "longitude": f["geometry"]["coordinates"][0],
-              "latitude": f["geometry"]["coordinates"][1], "passed": f["properties"].get("passed", True)}
-             for f in features]
     classes = {name: compare_class([t for t in truth if t["class"] == name],
                                    [h for h in hazards if h["class"] == name], radius_m)
                for name in sorted({t["class"] for t in truth} | {h["class"] for h in hazards})}

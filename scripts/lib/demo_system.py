@@ -3,6 +3,7 @@
 import collections
 import os
 import pathlib
+import re
 import signal
 import socket
 import subprocess
@@ -10,22 +11,16 @@ import time
 import urllib.error
 import urllib.request
 
-import rosbag
 import rospkg
+
+import drive_bag
+import listening_port
+from process_end import how_it_ended
+from system_error import StartError
 
 Drive = collections.namedtuple("Drive", "frames start_s duration_s")
 PROGRAMS = pathlib.Path(__file__).resolve().parents[1]
-CAMERA_TOPICS = ("camera/image_raw/compressed", "camera/image_raw")
-
-
-class StartError(RuntimeError):
-    """A part that did not start or died, in one sentence."""
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+PROGRAM_WORDS = re.compile(r"(?:livemap|livemap_broker): (.+)")
 
 
 def program(name):
@@ -43,8 +38,13 @@ def package_file(name):
     source = PROGRAMS.parent / name
     if source.is_file():
         return source
+    return require_workspace() / name
+
+
+def require_workspace():
+    """The folder of the package that ROS knows."""
     try:
-        return pathlib.Path(rospkg.RosPack().get_path("livemap")) / name
+        return pathlib.Path(rospkg.RosPack().get_path("livemap"))
     except rospkg.ResourceNotFound as error:
         raise StartError("ROS does not know the package livemap; source install/setup.bash or call ./livemap demo") from error
 
@@ -59,28 +59,28 @@ def run_tool(command, log):
         code = subprocess.call(command, stdout=output, stderr=subprocess.STDOUT)
     if code != 0:
         words = pathlib.Path(log).read_text().strip().splitlines()
-        raise StartError(words[-1] if words else f"{command[0]} ended with code {code}")
+        raise StartError(words[-1] if words and code > 0 else f"{os.path.basename(command[0])} {how_it_ended(code)}")
 
 
-def is_bag(path):
-    """Whether rosbag can open the file."""
-    try:
-        rosbag.Bag(str(path)).close()
-        return True
-    except (rosbag.ROSBagException, OSError):
-        return False
+def read_bag(path, positions=False, depth=None, boxes=False):
+    """Number of camera frames and duration of a drive; StartError where a vehicle could use no frame of it.
+
+    `positions`: the drive must also place hazards, by fixes and the camera's mounting; `depth` names the topic of
+    depth images that it must have; `boxes`: it must answer for the detector.
+    """
+    drive, topics = drive_bag.DriveBag([path]), drive_bag.DEFAULT_TOPICS
+    faults = drive_bag.faults_of(drive, topics, mounting_comes_from_bag=positions, depth=depth, boxes=boxes,
+                                 fixes=positions)
+    if faults:
+        raise StartError(drive_bag.as_sentence(drive, faults))
+    return Drive(frames=drive.frames(topics.image, drive.transport_of(topics.image)), start_s=drive.start_s,
+                 duration_s=max(drive.end_s - drive.start_s, 1e-3))
 
 
-def read_bag(path):
-    """Number of camera frames and duration of a drive."""
-    with rosbag.Bag(str(path)) as bag:
-        topics = bag.get_type_and_topic_info().topics
-        counts = [info.message_count for name, info in topics.items()
-                  if name.lstrip("/") in CAMERA_TOPICS]
-        if not counts:
-            raise StartError(f"bag '{path}' has no topic {' or '.join(CAMERA_TOPICS)}")
-        return Drive(frames=sum(counts), start_s=bag.get_start_time(),
-                     duration_s=max(bag.get_end_time() - bag.get_start_time(), 1e-3))
+def doubts_about(path):
+    """Sentences about stamps of the drive that a vehicle may stumble over."""
+    topics = drive_bag.DEFAULT_TOPICS
+    return drive_bag.DriveBag([path]).doubts_about_stamps([topics.camera_info, topics.fix])
 
 
 class LiveMapSystem:
@@ -92,10 +92,11 @@ class LiveMapSystem:
     zone_arguments = {}
 
     def __init__(self, directory, zone, vehicle, web_port=0):
-        self.directory = pathlib.Path(directory)
+        # Nodes run in ROS's own folder, so nothing relative is handed to them.
+        self.directory = pathlib.Path(directory).resolve()
         self.zone, self.vehicle = zone, vehicle
-        self.broker_port, self.zone_port, self.vehicle_port = free_port(), free_port(), free_port()
-        self.web_port = web_port or free_port()
+        self.broker_port, self.zone_port, self.vehicle_port = (listening_port.free_port() for _ in range(3))
+        self.web_port = web_port or listening_port.free_port()
         self.url = f"http://127.0.0.1:{self.web_port}/"
         self.zone_master = f"http://127.0.0.1:{self.zone_port}"
         self.vehicle_master = f"http://127.0.0.1:{self.vehicle_port}"
@@ -131,7 +132,7 @@ class LiveMapSystem:
                 stdin=subprocess.DEVNULL, start_new_session=True)
 
     def launch(self, name, port, file, arguments):
-        self.start(name, ["roslaunch", f"--port={port}", launch_file(file)]
+        self.start(name, [program("livemap_launch"), launch_file(file), f"--port={port}"]
                    + [f"{key}:={value}" for key, value in arguments.items()],
                    master=f"http://127.0.0.1:{port}")
 
@@ -143,6 +144,9 @@ class LiveMapSystem:
         self.wait_for("the broker", lambda: self.accepts(self.broker_port))
 
     def start_zone(self, rviz=False):
+        taken = listening_port.why_not("127.0.0.1", self.web_port)
+        if taken:
+            raise StartError(f"the live map cannot be served: {taken}")
         self.start_broker()
         self.launch_zone(rviz)
 
@@ -198,5 +202,14 @@ class LiveMapSystem:
     def check_alive(self):
         for name, process in self.processes.items():
             if process.poll() is not None:
-                raise StartError(f"the {name} ended with code {process.returncode}, "
+                raise StartError(f"the {name} {self.how_it_ended(name, process.returncode)}, "
                                  f"see {self.directory / (name + '.log')}")
+
+    def how_it_ended(self, name, code):
+        """In the words of what ended first, where it has any; else what the system says of the process."""
+        try:
+            last = (self.directory / f"{name}.log").read_text(errors="replace").strip().splitlines()[-1:]
+        except OSError:
+            last = []
+        told = PROGRAM_WORDS.fullmatch(last[0]) if last and code > 0 else None
+        return f"ended: {told.group(1)}" if told else how_it_ended(code)

@@ -2,69 +2,34 @@
 
 import bisect
 import csv
+import json
 import pathlib
 import statistics
+import subprocess
+import tempfile
 
 import rosbag
 
-# As src/evaluation has them: two labelled frames further apart belong to two events; a hit overlaps by so much.
-EVENT_GAP_M = 12.0
-HIT_IOU = 0.5
+import demo_system as system
+from process_end import how_it_ended
+from system_error import StartError
+from true_hazards import read_true_hazards
+
 IMAGE_TOPICS = ("camera/image_raw/compressed", "camera/image_raw")
-TRUTH_TOPIC = "ground_truth/boxes"
+LABELLED_CLASS = "pothole"
 
 
-def iou(a, b):
-    """Intersection over union of two boxes x_min, y_min, x_max, y_max."""
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    if width <= 0 or height <= 0:
-        return 0.0
-    both = width * height
-    return both / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - both)
-
-
-def read_truth(bag):
-    """Stamps (ns) of a drive's images in order, and by stamp the true boxes [class, x_min, y_min, x_max, y_max]."""
-    stamps, boxes = [], {}
+def read_stamps(bag):
+    """Stamps (ns) of a drive's images, in order."""
     with rosbag.Bag(str(bag)) as messages:
-        for topic, message, _ in messages.read_messages():
-            topic = topic.lstrip("/")
-            if topic in IMAGE_TOPICS:
-                stamps.append(message.header.stamp.to_nsec())
-            elif topic == TRUTH_TOPIC:
-                boxes[message.header.stamp.to_nsec()] = [
-                    [d.class_name, d.x_min, d.y_min, d.x_max, d.y_max] for d in message.detections]
-    return stamps, boxes
+        return [message.header.stamp.to_nsec() for topic, message, _ in messages.read_messages()
+                if topic.lstrip("/") in IMAGE_TOPICS]
 
 
-def read_chainage(drive):
-    """Metres along the road of a survey drive's frames, in order."""
-    with open(pathlib.Path(drive) / "frames.csv", newline="", encoding="utf-8") as file:
-        return [float(row["chainage_m"]) for row in csv.DictReader(file)]
-
-
-def events_of(stamps, chainage, boxes, name):
-    """The events of one class: lists of the stamps of their frames."""
-    events, last = [], None
-    for stamp, metres in zip(stamps, chainage):
-        if not any(box[0] == name for box in boxes.get(stamp, [])):
-            continue
-        if last is None or metres - last > EVENT_GAP_M:
-            events.append([])
-        events[-1].append(stamp)
-        last = metres
-    return events
-
-
-def road_km(chainage):
-    """As src/evaluation counts it: a gap is at most as long as events are apart."""
-    return sum(min(after - before, EVENT_GAP_M) for before, after in zip(chainage, chainage[1:])) / 1000
-
-
-def is_hit(report, boxes):
-    return any(box[0] == report["class"] and iou(report["box"], box[1:]) >= HIT_IOU
-               for box in boxes.get(report["stamp"], []))
+def read_frames(drive):
+    """Names of a survey drive's frames, in order."""
+    with open(pathlib.Path(drive) / "frames.csv", newline="", encoding="utf-8-sig") as file:
+        return [row["frame"] for row in csv.DictReader(file)]
 
 
 def first_of_each(entries):
@@ -84,14 +49,24 @@ def reports_of(run, profile):
     return first_of_each(of_kind(run["zone" if profile == "small" else "vehicle"], "report", "hazard/report"))
 
 
-def found_events(run, profile, truth, name):
-    """How many events of the class have a report that hits one of their labels, of how many; and false reports."""
-    stamps, boxes, chainage = truth
-    reports = [report for report in reports_of(run, profile) if report["class"] == name]
-    hits = {report["stamp"] for report in reports if is_hit(report, boxes)}
-    events = events_of(stamps, chainage, boxes, name)
-    return {"events": len(events), "found": sum(any(stamp in hits for stamp in event) for event in events),
-            "false": sum(not is_hit(report, boxes) for report in reports), "km": road_km(chainage)}
+def found_events(run, profile, stamps, folder):
+    """How many of the drive's events have a report that hits one of their labels, and false reports, as
+    `livemap evaluate detection` counts them: a report is the only detection of its frame."""
+    names = dict(zip(stamps, read_frames(folder)))
+    reports = [report for report in reports_of(run, profile) if report["class"] == LABELLED_CLASS]
+    with tempfile.TemporaryDirectory() as scratch:
+        table = pathlib.Path(scratch) / "reports.csv"
+        table.write_text("image,class,score,x_min,y_min,x_max,y_max\n" + "".join(
+            f"{names[report['stamp']]},{report['class']},1,{','.join(map(str, report['box']))}\n"
+            for report in reports if report["stamp"] in names), encoding="utf-8")
+        done = subprocess.run([system.program("livemap_evaluate_detection"), "--json", "--detections", str(table), str(folder)],
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        raise StartError(f"livemap_evaluate_detection {how_it_ended(done.returncode)}: {done.stderr.strip()}")
+    told = json.loads(done.stdout)["classes"][LABELLED_CLASS]
+    elsewhere = sum(report["stamp"] not in names for report in reports)
+    return {"events": told["events"], "found": round((told["event_recall"] or 0) * told["events"]),
+            "false": told["false_detections"] + elsewhere, "km": told["km"]}
 
 
 class ReplayClock:
@@ -181,9 +156,8 @@ def boil_down(run, figures):
     if profile == "small":
         told["processed"] = counts["frames_judged"]
     if drive["folder"]:
-        stamps, boxes = read_truth(drive["bag"])
-        told["found"] = found_events(figures, small, (stamps, boxes, read_chainage(drive["folder"])), "pothole")
+        told["found"] = found_events(figures, small, read_stamps(drive["bag"]), drive["folder"])
     else:
-        truth = demo_observers.compare_with_truth(figures["stored"], drive["truth"])
+        truth = demo_observers.compare_with_truth(figures["stored"], read_true_hazards(drive["truth"]))
         told["found"] = {"events": truth["hazards"], "found": truth["found"], "false": truth["false"], "km": None}
     return told

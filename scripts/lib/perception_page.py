@@ -55,7 +55,7 @@ class Group:
 
     def false_per_km(self):
         km = [run["found"]["km"] for run in self.runs]
-        return None if None in km else self.found("false") / sum(km)
+        return None if None in km or not sum(km) else self.found("false") / sum(km)
 
     def mbit_s(self, extra_bytes=0.0):
         return (self.sum("uplink_bytes") + extra_bytes) * MBIT / self.sum("drive_s")
@@ -142,7 +142,7 @@ def detection_section(results):
         in {seconds:.0f} s, so {frames / max(seconds, 1e-9):.1f} is the most there (the thesis's camera gave 30; what
         the engines could do stands below). The SVC's classifier looks at 3 frames a second and leaves the others out
         on purpose; *dropped* counts the frames that came too fast. Radius of duplicates {results['usual_radius_m']}
-        m. A false report is each whose box overlaps no label of its frame by IoU {figures.HIT_IOU}; `livemap evaluate
+        m. A false report is each whose box overlaps no label of its frame by IoU 0.5; `livemap evaluate
         detection` counts those within 12 m as one, so its figure is another. Mbit/s is the uplink as the bridge
         counts it, of reports, pictures, positions and everything else.""")
     if detector:
@@ -151,7 +151,7 @@ def detection_section(results):
             places, its event recall is {number(detector['event_recall'], 3)} of {detector['events']} events at
             {number(detector.get('false_per_km'), 1)} false reports per km. Event recall in the table is harder: an
             event counts when a *report* reached the zone whose box overlaps a label of its own frame by IoU
-            {figures.HIT_IOU}. Hazards that are too far away or badly placed to report, or suppressed as duplicates,
+            0.5. Hazards that are too far away or badly placed to report, or suppressed as duplicates,
             are missed.""")
     else:
         text += prose("""The drive is simulated: recall is the share of true hazards that are on the zone's map within 5 m
@@ -165,8 +165,9 @@ def uplink_section(results, out):
     points, cells = [], []
 
     def add(name, label, kind, group, mbit_s):
-        points.append({"label": label, "kind": kind, "recall": group.recall() or 0.0, "mbit_s": mbit_s,
-                       "by": "places" if results["simulated"] else "events"})
+        if group.recall() is not None:  # Without events there is no place in the plot, not even 0.
+            points.append({"label": label, "kind": kind, "recall": group.recall(), "mbit_s": mbit_s,
+                           "by": "places" if results["simulated"] else "events"})
         cells.append([name, f"{number(group.recall(), 3)} ({group.found('found')} of {group.found('events')})",
                       group.sum("reports"), group.sum("on_map"), number(mbit_s, 4)])
 
