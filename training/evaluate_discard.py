@@ -19,6 +19,7 @@ import numpy as np
 import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
+from common.figures import NothingMeasured, share, text
 from detector.data import POTHOLE, VALIDATION_SECTIONS, DataError, DriveFrame, read_drive
 from detector.manifest import Manifest, ManifestError, read_manifest, sha256_of
 from detector.metrics import NEAR_M, ScoredFrame, drive_figures
@@ -159,18 +160,20 @@ def run(options: argparse.Namespace) -> None:
         drives.drive(name, read_drive(options.data / "road_survey" / name))
     frames = sum(len(drive) for drive in drives.big.values())
     print(f"{frames} frames, {drives.seconds:.0f} s at {options.speed_mps} m/s, threshold {threshold}")
-    print(f"judged {drives.judged}, candidates {drives.candidates}, sent {drives.sent}, {drives.bytes / max(drives.sent, 1) / 1000:.1f} kB each")
-    print(f"uplink {8e-6 * drives.bytes / max(drives.seconds, 1e-9):.3f} Mbit/s")
+    print(f"judged {drives.judged}, candidates {drives.candidates}, sent {drives.sent}, {text(share(drives.bytes / 1000, drives.sent), 1)} kB each")
+    print(f"uplink {text(share(8e-6 * drives.bytes, drives.seconds))} Mbit/s")
     for name, seen in (("detector on board", drives.big), ("small vehicle", drives.small)):
         found = drive_figures(seen, manifest.thresholds["pothole"])
         print(
-            f"{name}: event recall {found.event_recall:.3f} (IoU 0.3: {found.event_recall_iou30:.3f}) of {found.event_count}, "
-            f"false reports {found.false_reports_per_km:.1f} per km on {found.km:.2f} km"
+            f"{name}: event recall {text(found.event_recall)} (IoU 0.3: {text(found.event_recall_iou30)}) of {found.event_count}, "
+            f"false reports {text(found.false_reports_per_km, 1)} per km on {found.km:.2f} km"
         )
+        if not found.event_count and not found.km:
+            raise NothingMeasured("the sections have no event and no length.")
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
-    """Exit status: 0 measured, 2 the command line, a model or the data is wrong."""
+    """Exit status: 0 measured, 1 there was nothing to measure, 2 the command line, a model or the data is wrong."""
     parser = argparse.ArgumentParser(description="Uplink and event recall of the small vehicle.")
     parser.add_argument("--manifest", type=Path, default=Path("models/early-discard.yaml"), help="the classifier")
     parser.add_argument("--detector", type=Path, default=Path("models/hazards-base.yaml"), help="the zone's")
@@ -182,6 +185,9 @@ def main(arguments: Optional[List[str]] = None) -> int:
     cv2.setNumThreads(options.threads)
     try:
         run(options)
+    except NothingMeasured as error:
+        print(f"evaluate_discard: nothing was measured: {error}", file=sys.stderr)
+        return 1
     except (ManifestError, DataError) as error:
         print(f"evaluate_discard: {error}", file=sys.stderr)
         return 2

@@ -20,6 +20,7 @@ import torch
 import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
+from common.figures import text
 from change import data, inference, onnx_model
 from change.exported import load_exported
 from change.manifest import write_manifest
@@ -128,7 +129,7 @@ def calibrate(arguments: argparse.Namespace) -> dict:
     parts = {part: sum(pair.part == part for pair in pairs) for part in ("changes", "unchanged", "photos")}
     print("pairs: " + ", ".join(f"{part} {count}" for part, count in parts.items()))
     for name, value in report.figures().items():
-        print(f"{name}: {value:.4f}")
+        print(f"{name}: {text(value, 4)}")
     found = {name: report.of("changes").at_false_positive_rate(rate)["threshold"] for name, rate in zip(names, FALSE_POSITIVE_RATES)}
     return {"changed": max(found[names[0]], LEAST_CHANGED), **found}
 

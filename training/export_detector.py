@@ -5,7 +5,7 @@
 
 The averaged weights are exported; with several --checkpoint flags, of runs that began from one another, the
 mean of all (model soup, Wortsman et al. 2022). Thresholds are calibrated on the validation parts of the data, with
-the exported file run by OpenCV: the pothole's by the limit on false reports, the cone's by the best F1, those of
+the exported file run by OpenCV (in 8 bits, by torch): the pothole's by the limit on false reports, the cone's by the best F1, those of
 classes without real pictures by the best F1 on simulated drives (--simulated; seeds that training has not seen), those of
 a user's own by the best F1 on pictures that were held back (--own).
 """
@@ -24,11 +24,13 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from detector import CLASSES, data, inference, onnx_model, pretrained, sets
+from detector.int8_model import int8_forward
 from detector.manifest import ManifestError, classes_of, write_manifest
 from detector.metrics import average_precision, best_f1_threshold, calibrate_threshold
 from detector.network import SIZES, STRIDES, Detector
 from detector.packing import pack, round_weights
 from detector.validation import DetectorRunner, detect_labelled, validate
+from export_int8 import add_calibration_arguments, enter_int8_file, make_int8_file
 from export_torch import ExportError, add_torch_file
 
 TOLERANCE = 1e-3
@@ -200,11 +202,15 @@ def run(arguments: argparse.Namespace) -> None:
         weights = pack(weights)
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", weights, arguments.input)
 
-    runner = DetectorRunner(onnx_model.opencv_forward(weights), view)
+    int8_file = make_int8_file(weights, view, arguments) if arguments.precision == "int8" else None
+    # Scores in 8 bits are a little lower: the thresholds are those of the form that vehicles run.
+    runner = DetectorRunner(int8_forward(int8_file, view) if int8_file else onnx_model.opencv_forward(weights), view)
     thresholds = calibrate(runner, arguments, loaded.classes, drives, cones)
     manifest = arguments.out / f"{arguments.name}.yaml"
     write_manifest(manifest, weights, thresholds, view, arguments.engine)
     add_torch_file(manifest)
+    if int8_file:
+        enter_int8_file(manifest, int8_file, view)
     print(f"wrote {weights} and its manifest, thresholds {thresholds}")
 
 
@@ -222,6 +228,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--scales", type=view_scales, default=(1.0,), metavar="S,...", help="views of the picture whose findings are fused (1)")
     parser.add_argument("--mirrored", action="store_true", help="the mirrored picture is looked at besides, at the same scales")
     parser.add_argument("--engine", choices=("opencv", "torch"), default="", help="entered into the manifest; else the vehicle's default")
+    parser.add_argument("--precision", choices=("fp32", "int8"), default="fp32", help="int8: a file in 8 bits besides, which libtorch runs (fp32)")
+    add_calibration_arguments(parser)
     parser.add_argument("--packed", action="store_true", help="weights of half the precision, in gzip files")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)

@@ -25,6 +25,7 @@ from detector.data import VALIDATION_SECTIONS, DataError, DriveFrame
 from detector.manifest import sha256_of
 from detector.onnx_model import golden_image
 from early_discard import INPUT_HEIGHT, INPUT_WIDTH, labels
+from common.figures import text
 from early_discard.figures import ScoredDrive, figures, score_drive, threshold_for_recall
 from early_discard.network import Features, Head, NetworkError, export
 
@@ -101,9 +102,9 @@ def say(name: str, drives: Dict[str, ScoredDrive], threshold: float) -> None:
     """One line of figures."""
     found = figures(drives, threshold)
     print(
-        f"{name}: {found.frames} frames, {found.hazard_frames} with a hazard, AUC {found.ranking:.3f}; at {threshold:.3f} recall "
-        f"{found.recall:.3f}, precision {found.precision:.3f}, sent {found.share_sent:.3f}, "
-        f"events {found.event_recall:.3f} of {found.events}", flush=True,
+        f"{name}: {found.frames} frames, {found.hazard_frames} with a hazard, AUC {text(found.ranking)}; at {threshold:.3f} recall "
+        f"{text(found.recall)}, precision {text(found.precision)}, sent {text(found.share_sent)}, "
+        f"events {text(found.event_recall)} of {found.events}", flush=True,
     )
 
 

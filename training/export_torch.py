@@ -11,7 +11,7 @@ import argparse
 import re
 import sys
 from pathlib import Path
-from typing import List, Optional
+from typing import Dict, List, Optional
 
 import numpy as np
 import yaml
@@ -29,14 +29,19 @@ class ExportError(Exception):
     """Nothing usable was exported; the text is one sentence for the user."""
 
 
-def with_torch_file(manifest: str, torch_file: Path) -> str:
-    """The manifest's text with the two keys of `torch_file` after the hash of the ONNX file, replacing older ones."""
-    kept = re.sub(r"^torch_(file|sha256):.*\n", "", manifest, flags=re.MULTILINE)
-    keys = f"torch_file: {torch_file.name}\ntorch_sha256: {sha256_of(torch_file)}\n"
-    changed, count = re.subn(r"^(sha256:.*\n)", lambda found: found.group(1) + keys, kept, flags=re.MULTILINE)
+def with_keys(manifest: str, keys: Dict[str, str], after: str, hint: str = "") -> str:
+    """The manifest's text with these keys after the line of key `after`, replacing older ones; all else stays, comments included."""
+    kept = re.sub(rf"^({'|'.join(keys)}):.*\n", "", manifest, flags=re.MULTILINE)
+    lines = "".join(f"{key}: {value}\n" for key, value in keys.items())
+    changed, count = re.subn(rf"^({after}:.*\n)", lambda found: found.group(1) + lines, kept, flags=re.MULTILINE)
     if count != 1:
-        raise ExportError(f"The manifest has {count} lines that begin with 'sha256:', accepted is one.")
+        raise ExportError(f"The manifest has {count} lines that begin with '{after}:', accepted is one{hint}.")
     return changed
+
+
+def with_torch_file(manifest: str, torch_file: Path) -> str:
+    """The manifest's text with the two keys of `torch_file` after the hash of the ONNX file."""
+    return with_keys(manifest, {"torch_file": torch_file.name, "torch_sha256": sha256_of(torch_file)}, after="sha256")
 
 
 def add_torch_file(manifest: Path) -> Path:

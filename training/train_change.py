@@ -24,7 +24,8 @@ from change.training import Settings, batches, make_optimizer, to_input
 from change.validation import RegisteredPair, photo_pairs, registered_pairs, torch_detector, validate
 from common.training import (
     EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
-    checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, prepare_device,
+    checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, load_checkpoint,
+    prepare_device,
 )
 
 VALIDATION_PHOTOS = 60
@@ -100,7 +101,7 @@ class Trainer(Run):
             return {}
         detect = torch_detector(self.ema.model, self.device, self.settings.precision)
         figures = validate(detect, pairs).figures()
-        return {**figures, self.BEST: figures.get(BEST_FIGURE, figures.get("photos_f1_at_0.01", 0.0))}
+        return {**figures, self.BEST: figures.get(BEST_FIGURE, figures.get("photos_f1_at_0.01")) or 0.0}
 
 
 def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
@@ -149,7 +150,7 @@ def run(arguments: argparse.Namespace) -> None:
     if begun:
         trainer.restore(begun)
     elif arguments.start_from:
-        trainer.start_from(torch.load(checkpoint_to_start_from(arguments), map_location=device))
+        trainer.start_from(load_checkpoint(checkpoint_to_start_from(arguments), device))
     source = read_source(arguments.pairs, arguments.data, arguments.out / "registration.npz", False, arguments.registered)
     if settings.pretrain and not source.scenes:
         raise UsageError(f"--pretrain: below {arguments.pairs} there are no scenes of training/simulate_change.py; set it to 0.")

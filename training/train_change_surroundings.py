@@ -33,6 +33,7 @@ from change.metrics import PixelCounts
 from change.network import ChangeNetwork
 from change.surroundings import Surroundings, encoded_of, with_present_names
 from change.validation import FALSE_POSITIVE_RATES, aligned
+from common.figures import text
 from common.training import (
     UsageError, add_run_arguments, check_arguments, checkpoint_to_resume, checkpoint_to_start_from, exit_status, learning_rate_factor,
     prepare_device, save_atomically,
@@ -198,8 +199,9 @@ def run(options: argparse.Namespace) -> None:
         epoch += 1
         found = figures(network, validation)
         state = {"settings": {"architecture": "change-small"}, "average": network.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch}
-        if sum(found.values()) > best:
-            best = sum(found.values())
+        score = sum(value or 0.0 for value in found.values())
+        if score > best:
+            best = score
             save_atomically({**state, "average": corrected(network, validation).state_dict(), "best": best}, options.out / "best.pt")
         save_atomically({**state, "best": best}, options.out / "last.pt")
         report(f"epoch {epoch}/{options.epochs} loss {loss:.4f}", found, f"{time.monotonic() - began:.0f} s")
@@ -207,7 +209,7 @@ def run(options: argparse.Namespace) -> None:
 
 def report(what: str, found: dict, more: str = "") -> None:
     """A line of progress."""
-    print(" ".join([what, *(f"{name} {value:.4f}" for name, value in found.items()), more]).rstrip(), flush=True)
+    print(" ".join([what, *(f"{name} {text(value, 4)}" for name, value in found.items()), more]).rstrip(), flush=True)
 
 
 def main(arguments: Optional[List[str]] = None) -> int:

@@ -18,7 +18,8 @@ import torch
 sys.path.insert(0, str(Path(__file__).parent))
 from common.training import (
     EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
-    checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, prepare_device,
+    checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, load_checkpoint,
+    prepare_device,
 )
 from detector import data, sets
 from detector.augment import Augmenter
@@ -128,7 +129,7 @@ class Trainer(Run):
         """Figures of the averaged weights on the validation parts; those by class and set go to the history only."""
         runner = DetectorRunner(torch_forward(self.ema.model, self.device, self.settings.precision))
         parts = validate_held_out(runner, held_out, self.settings.classes)
-        report, survey, photos = {}, 0.0, 0.0
+        report, survey, photos = {}, None, None
         if drives:
             result = validate(runner, drives, cones)
             figures, survey, photos = result.best_drive_figures(), result.pothole_ap(0.5), result.cone_ap(0.5)
@@ -216,7 +217,7 @@ def run(arguments: argparse.Namespace) -> None:
     elif arguments.start_from:
         checkpoint = checkpoint_to_start_from(arguments)
         if not exported(arguments):
-            trainer.start_from(torch.load(checkpoint, map_location=device))
+            trainer.start_from(load_checkpoint(checkpoint, device))
     pictures = read_pictures(arguments, settings)
     of_sets = sets.read_pictures(catalogue_of(arguments), arguments.data, arguments.leave_out, settings.cut_outs)
     pictures.update(of_sets.groups)

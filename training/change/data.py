@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 import yaml
 
-from detector.data import VALIDATION_SECTIONS, DataError
+from common.files import DataError, PictureFolder, list_pictures, read_text
+from detector.data import VALIDATION_SECTIONS
 
 from . import registration
 from .classes import CLASSES, COLOURS, MISCELLANEOUS, NO_CHANGE
@@ -23,6 +24,9 @@ from .inference import INPUT_HEIGHT, INPUT_WIDTH, letterbox
 
 IGNORED = 255
 """In a mask: neither changed nor unchanged."""
+
+MOST_UNKNOWN = 0.01
+"""Of a mask's pixels, how many may have colours of no class, as where outlines were smoothed."""
 
 PLANE_DEPTHS_M = (9.0, 14.0, 25.0)
 """Walls onto which a pair of known poses is registered where the pictures do not match."""
@@ -69,23 +73,51 @@ def read_image(path: Path) -> np.ndarray:
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
+def is_grey(stored: np.ndarray) -> bool:
+    """Whether a mask has one channel, or colours that are all black, white or between."""
+    return stored.ndim == 2 or bool((stored[..., 0] == stored[..., 1]).all() and (stored[..., 1] == stored[..., 2]).all())
+
+
+def is_ambiguous(stored: np.ndarray) -> bool:
+    """Whether a mask in colour could be one of change and no change, or of indices: it is grey, and not all white."""
+    return is_grey(stored) and bool((stored[..., :3] != 255).any())
+
+
+def has_neighbour_with_classes(path: Path) -> bool:
+    """Whether another mask of the folder has classes, which tells what black and white, or 0 and 255, are in all."""
+    stored = (cv2.imread(str(other), cv2.IMREAD_UNCHANGED) for other in list_pictures(path.parent))
+    return any(mask is not None and (not is_grey(mask) or mask.ndim == 2 and np.isin(mask, range(1, len(CLASSES))).any()) for mask in stored)
+
+
 def read_mask(path: Path) -> np.ndarray:
     """A ground truth, of indices (one channel) or in the published colours (three or four), to H x W uint8."""
     stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if stored is None:
         raise DataError(f"Cannot read the mask {path}.")
+    if stored.dtype != np.uint8:
+        raise DataError(f"The mask {path} has {8 * stored.itemsize} bits, accepted are 8.")
     if stored.ndim == 2:
         if (stored[stored != IGNORED] >= len(CLASSES)).any():
             raise DataError(f"The mask {path} has a value that is neither a class (0 to {len(CLASSES) - 1}) nor {IGNORED}.")
-        if IGNORED in stored and set(np.unique(stored)) <= {NO_CHANGE, IGNORED}:
+        if IGNORED in stored and set(np.unique(stored)) <= {NO_CHANGE, IGNORED} and not has_neighbour_with_classes(path):
             raise DataError(f"The mask {path} says change or not (0 and 255 alone); training needs classes.")
         return stored.astype(np.uint8)
+    if stored.shape[2] == 4 and (stored[..., 3] != 255).any():
+        raise DataError(f"The mask {path} has transparent pixels, accepted is a mask without any.")
+    if is_ambiguous(stored) and not has_neighbour_with_classes(path):
+        raise DataError(
+            f"The mask {path} has three channels that are all black, white or grey, which may mean change in white or the published "
+            "colours (white: no change), accepted are one channel or colours."
+        )
     rgb = stored[..., 2::-1].astype(np.int32)
     codes = (rgb[..., 0] << 16) + (rgb[..., 1] << 8) + rgb[..., 2]
     mask = np.full(codes.shape, IGNORED, np.uint8)
     known = list(enumerate(COLOURS)) + [(CLASSES.index("rubbish"), MISCELLANEOUS)]
     for index, (red, green, blue) in known:
         mask[codes == (red << 16) + (green << 8) + blue] = index
+    unknown = int(((mask == IGNORED) & (codes != 0)).sum())
+    if unknown > MOST_UNKNOWN * mask.size:
+        raise DataError(f"The mask {path} has {unknown} of {mask.size} pixels in colours of no class, accepted is up to one in a hundred.")
     return mask
 
 
@@ -105,7 +137,8 @@ def fit_mask(mask: np.ndarray) -> np.ndarray:
 
 def pair_paths(root: Path) -> List[Path]:
     """The ground truths (.../NNN/GT/gtII.png) of all pairs below a folder, in order."""
-    paths = sorted(root.glob("**/GT/gt*.png"))
+    folders = sorted(path for path in root.glob("**/GT") if path.is_dir())
+    paths = [path for folder in folders for path in list_pictures(folder) if path.stem.startswith("gt") and path.stem != "gt"]
     if not paths:
         raise DataError(f"No pair (NNN/GT/gtII.png) below the folder {root}.")
     return paths
@@ -118,12 +151,11 @@ def read_poses(data_set: Path) -> Dict[str, np.ndarray]:
         return {}
     parts = ("tx", "ty", "tz", "qx", "qy", "qz", "qw")
     try:
-        with open(path, newline="") as file:
-            return {
-                row["pair"]: np.array([[float(row[f"{which}_{part}"]) for part in parts] for which in ("first", "second")])
-                for row in csv.DictReader(file)
-            }
-    except (KeyError, ValueError) as error:
+        return {
+            row["pair"]: np.array([[float(row[f"{which}_{part}"]) for part in parts] for which in ("first", "second")])
+            for row in csv.DictReader(read_text(path).splitlines())
+        }
+    except (KeyError, TypeError, ValueError) as error:
         raise DataError(f"Cannot read {path}: {error!r}.") from error
 
 
@@ -133,7 +165,7 @@ def read_intrinsics(data_set: Path) -> Optional[np.ndarray]:
     if not path.is_file():
         return None
     try:
-        content = yaml.safe_load(path.read_text())
+        content = yaml.safe_load(read_text(path))
         scale = min(INPUT_WIDTH / content["width"], INPUT_HEIGHT / content["height"])
         return registration.camera_matrix(*(float(content[key]) * scale for key in ("fx", "fy", "cx", "cy")))
     except (KeyError, TypeError, ValueError, yaml.YAMLError) as error:
@@ -143,7 +175,8 @@ def read_intrinsics(data_set: Path) -> Optional[np.ndarray]:
 def read_pair(truth: Path, poses: Dict[str, np.ndarray], intrinsics: Optional[np.ndarray]) -> Pair:
     """One pair by its ground truth's path."""
     pictures, number = truth.parent.parent / "RGB", truth.stem[2:]
-    first, second = (read_image(pictures / f"{which}_{number}.png") for which in (1, 2))
+    folder = PictureFolder(pictures)
+    first, second = (read_image(folder.find(f"{which}_{number}") or pictures / f"{which}_{number}.png") for which in (1, 2))
     content = fitted_size(*second.shape[:2])
     pose = poses.get(f"{truth.parent.parent.name}/{number}")
     fallbacks = []
@@ -204,7 +237,7 @@ def read_pairs(root: Path, cache: Optional[Path] = None, registered: bool = Fals
 def read_scenes(root: Path) -> List[Scene]:
     """What stands in the streets of training/simulate_change.py: pictures of `none` with the masks of `all`."""
     scenes = []
-    for mask_path in sorted(root.glob("*/all/raw/*/GT/gt*.png")):
+    for mask_path in sorted(root.glob("*/all/raw/*/GT/gt*.png")):  # As simulate_change.py writes them.
         street = mask_path.parents[4]
         picture = street / "none" / "raw" / mask_path.parents[1].name / "RGB" / f"2_{mask_path.stem[2:]}.png"
         if picture.is_file():
@@ -217,9 +250,9 @@ def read_photos(data: Path, validation: bool) -> Dict[str, List[np.ndarray]]:
     sections = sorted(path.parent for path in (data / "road_survey").glob("*/frames.csv"))
     frames = [
         path for section in sections if (section.name in VALIDATION_SECTIONS) == validation
-        for path in sorted((section / "images").glob("*.jpg"))[::3]
+        for path in list_pictures(section / "images")[::3]
     ]
-    streets = sorted((data / "traffic_cones" / "images" / ("val" if validation else "train")).glob("*.jpg"))
+    streets = list_pictures(data / "traffic_cones" / "images" / ("val" if validation else "train"))
     if not frames or not streets:
         raise DataError(f"The folder {data} lacks photos (road_survey/*/images, traffic_cones/images).")
     return {"survey": [shrink(read_image(path)) for path in frames], "streets": [shrink(read_image(path)) for path in streets]}

@@ -1,8 +1,10 @@
 """The thesis's figures (tables 4.1 and 4.2): pooled over the pixels of all pairs."""
 
-from typing import Dict
+from typing import Dict, Optional
 
 import numpy as np
+
+from common.figures import share
 
 from .classes import CLASSES, NO_CHANGE
 from .data import IGNORED
@@ -32,14 +34,14 @@ class PixelCounts:
         pairs = np.bincount(truth.astype(np.int64) * len(CLASSES) + found, minlength=len(CLASSES) ** 2)
         self.confusion += pairs.reshape(len(CLASSES), len(CLASSES))
 
-    def at_false_positive_rate(self, rate: float) -> Dict[str, float]:
-        """Precision, recall and F1 at the lowest threshold whose false positive rate is not above `rate`."""
+    def at_false_positive_rate(self, rate: float) -> Dict[str, Optional[float]]:
+        """Precision, recall and F1 at the lowest threshold whose false positive rate is not above `rate`; None: nothing was counted."""
         unchanged, changed = np.cumsum(self.scores[:, ::-1], axis=1)
         allowed = np.nonzero(unchanged <= rate * max(unchanged[-1], 1))[0]
         false, true = (int(counts[allowed[-1]]) if len(allowed) else 0 for counts in (unchanged, changed))
-        precision, recall = true / max(true + false, 1), true / max(int(changed[-1]), 1)
+        missed = int(changed[-1]) - true
         return {
-            "precision": precision, "recall": recall, "f1": 2 * precision * recall / max(precision + recall, 1e-12),
+            "precision": share(true, true + false), "recall": share(true, true + missed), "f1": share(2 * true, 2 * true + false + missed),
             "threshold": self.threshold_of(allowed[-1]) if len(allowed) else 1.0,
         }
 
@@ -49,16 +51,13 @@ class PixelCounts:
         log_odds = (2 * (BINS - 1 - bins_from_above) / BINS - 1) * HIGHEST_LOG_ODDS
         return float(1 / (1 + np.exp(-log_odds)))
 
-    def best_class_figures(self) -> Dict[str, float]:
-        """Where each pixel takes its most probable class; multi_class is over changed pixels that are found changed."""
+    def best_class_figures(self) -> Dict[str, Optional[float]]:
+        """Where each pixel takes its most probable class; multi_class is over changed pixels that are found changed. None: nothing was counted."""
         table = self.confusion.astype(float)
         hits = table[1:, 1:]
-        true, total = hits.sum(), max(table.sum(), 1)
-        precision, recall = true / max(table[:, 1:].sum(), 1), true / max(table[1:].sum(), 1)
+        true, found, there, total = hits.sum(), table[:, 1:].sum(), table[1:].sum(), table.sum()
         return {
-            "binary_accuracy": (true + table[0, 0]) / total, "precision": precision, "recall": recall,
-            "f1": 2 * precision * recall / max(precision + recall, 1e-12),
-            "multi_class": np.trace(hits) / max(true, 1),
-            "false_positive_rate": table[0, 1:].sum() / max(table[0].sum(), 1),
-            "changed_share": table[1:].sum() / total,
+            "binary_accuracy": share(true + table[0, 0], total), "precision": share(true, found), "recall": share(true, there),
+            "f1": share(2 * true, found + there), "multi_class": share(np.trace(hits), true),
+            "false_positive_rate": share(table[0, 1:].sum(), table[0].sum()), "changed_share": share(there, total),
         }

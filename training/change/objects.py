@@ -6,6 +6,7 @@ from typing import Dict, List, Sequence
 import cv2
 import numpy as np
 
+from common.files import PictureFolder, list_pictures, read_text
 from common.pasting import CONE, CutOut, cut_box
 from detector.data import DataError
 
@@ -56,11 +57,12 @@ def read_cones(data: Path, validation: bool) -> List[CutOut]:
     """Cones of the street photos that are large enough."""
     split, found = "val" if validation else "train", []
     folder = data / "traffic_cones"
+    pictures = PictureFolder(folder / "images" / split)
     for label_path in sorted((folder / "labels" / split).glob("*.txt")):
-        rows = [[float(value) for value in line.split()] for line in label_path.read_text().splitlines() if line.strip()]
+        rows = [[float(value) for value in line.split()] for line in read_text(label_path).splitlines() if line.strip()]
         if not rows:
             continue
-        image = read_image(folder / "images" / split / f"{label_path.stem}.jpg")
+        image = read_image(pictures.find(label_path.stem) or folder / "images" / split / f"{label_path.stem}.jpg")
         for _, x, y, wide, high in rows:
             if high * image.shape[0] < 40 or wide * image.shape[1] < 16 or high > 0.7:
                 continue
@@ -77,7 +79,7 @@ def read_signs(data: Path, validation: bool) -> List[CutOut]:
     """Signs from their crops, each on a grey post: one in five of a kind is kept for validation."""
     found = []
     for kind in sorted(path for path in (data / "sign_crops").glob("*") if path.is_dir()):
-        for number, path in enumerate(sorted(kind.glob("*.png"))):
+        for number, path in enumerate(list_pictures(kind)):
             if (number % VALIDATION_SIGNS == 0) == validation:
                 crop = cv2.resize(read_image(path), (64, 64), interpolation=cv2.INTER_LINEAR)
                 found.append(CutOut(on_post(crop, SIGN_OUTLINES.get(kind.name, "round")), CLASSES.index("sign")))

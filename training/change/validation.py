@@ -1,7 +1,7 @@
 """Figures on held-out pairs, as the vehicle would see them: registered by features, the network's whole picture."""
 
 from dataclasses import dataclass, field
-from typing import Callable, Dict, List, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -113,9 +113,9 @@ class Report:
         """The counts of one part, empty at first."""
         return self.counts.setdefault(part, PixelCounts())
 
-    def figures(self) -> Dict[str, float]:
-        """The figures by name; a part without pairs has none."""
-        figures: Dict[str, float] = {}
+    def figures(self) -> Dict[str, Optional[float]]:
+        """The figures by name; a part without pairs has none, and None is what nothing was counted for."""
+        figures: Dict[str, Optional[float]] = {}
         for part in ("changes", "reversed", "photos"):
             if part not in self.counts:
                 continue

@@ -16,6 +16,8 @@ import torch
 from torch import nn
 from torch.utils.data import Dataset
 
+from .figures import text
+
 
 class UsageError(Exception):
     """The command line or a file it names is wrong; the text is one sentence for the user."""
@@ -74,8 +76,25 @@ def decayed_groups(model: nn.Module, weight_decay: float) -> List[dict]:
 def save_atomically(content: Dict[str, Any], path: Path) -> None:
     """Write a checkpoint so that a kill at any moment leaves the old or the new one, never a torn one."""
     temporary = path.with_suffix(".tmp")
-    torch.save(content, temporary)
+    with open(temporary, "wb") as file:
+        torch.save(content, file)
+        # Else a power loss can leave the new name on bytes that were never written.
+        file.flush()
+        os.fsync(file.fileno())
     os.replace(temporary, path)
+
+
+def load_checkpoint(path: Path, device: Any = "cpu") -> Dict[str, Any]:
+    """Read what save_atomically wrote; an older program or another tool may have left a torn file."""
+    try:
+        return torch.load(path, map_location=device)
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # torch tries one format after the other, each with exceptions of its own
+        raise UsageError(
+            f"{path} is torn or no checkpoint ({' '.join(str(error).split())[:120] or type(error).__name__}); "
+            "remove it to begin anew, or put a whole one in its place."
+        ) from error
 
 
 class Run:
@@ -137,7 +156,7 @@ class Run:
                     self.best = report[self.BEST]
                     save_atomically(self.state(), out / "best.pt")
             save_atomically(self.state(), out / "last.pt")
-            line = " ".join(f"{name} {value:.4f}" for name, value in report.items())
+            line = " ".join(f"{name} {text(value, 4)}" for name, value in report.items())
             print(f"epoch {self.epoch}/{epochs} {line} {time.monotonic() - began:.0f} s", flush=True)
 
 
@@ -203,7 +222,7 @@ def checkpoint_to_resume(arguments: argparse.Namespace, device: torch.device) ->
         return None
     if not arguments.resume:
         raise UsageError(f"{last} exists; continue it with --resume or choose another --out.")
-    return torch.load(last, map_location=device)
+    return load_checkpoint(last, device)
 
 
 def checkpoint_to_start_from(arguments: argparse.Namespace) -> Path:

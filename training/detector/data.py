@@ -5,6 +5,7 @@ more than the network on a CPU.
 """
 
 import csv
+import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Dict, List, Sequence, Tuple
 
 import cv2
 import numpy as np
+
+from common.files import DataError, PictureFolder, list_pictures, read_text
 
 from . import CLASSES
 
@@ -25,10 +28,6 @@ CLASS_NAME = "[a-z][a-z0-9_]{0,63}"
 """What a class may be called; a report's class has 64 bytes."""
 
 POTHOLE, TRAFFIC_CONE = CLASSES.index("pothole"), CLASSES.index("traffic_cone")
-
-
-class DataError(Exception):
-    """A data folder is missing or not as its layout says; the text is one sentence for the user."""
 
 
 @dataclass
@@ -60,8 +59,8 @@ def read_yolo_labels(path: Path, width: int, height: int, class_ids: Sequence[in
     `class_ids` are ours in the order of the file's; -1: not one of ours, left out.
     """
     try:
-        rows = [[float(value) for value in line.split()] for line in path.read_text().splitlines() if line.strip()]
-    except (OSError, ValueError) as error:
+        rows = [[float(value) for value in line.split()] for line in read_text(path).splitlines() if line.strip()]
+    except ValueError as error:
         raise DataError(f"Cannot read the labels {path}: {error}.") from error
     if any(len(row) != 5 for row in rows):
         raise DataError(f"The label file {path} has a line without exactly 5 numbers (class cx cy w h).")
@@ -89,19 +88,16 @@ def read_picture(image_path: Path, label_path: Path, class_ids: Sequence[int]) -
 
 
 def read_folder(images: Path, labels: Path, class_ids: Sequence[int]) -> List[Picture]:
-    """All JPEG images of a folder in the order of their names."""
-    paths = sorted(images.glob("*.jpg"))
+    """All images of a folder in the natural order of their names."""
+    paths = list_pictures(images)
     if not paths:
-        raise DataError(f"The folder {images} holds no .jpg image.")
+        raise DataError(f"The folder {images} holds no .jpg, .jpeg or .png image.")
     return [read_picture(path, labels / (path.stem + ".txt"), class_ids) for path in paths]
 
 
 def read_names(path: Path) -> List[str]:
     """Names of classes, one per line."""
-    try:
-        return path.read_text().split()
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"Cannot read {path}: {error}.") from error
+    return read_text(path).split()
 
 
 def read_class_names(folder: Path) -> List[str]:
@@ -167,13 +163,16 @@ def weigh_by_rarest_class(pictures: List[Picture]) -> None:
 def read_drive(section: Path) -> List[DriveFrame]:
     """The frames of one survey section, sorted by chainage (metres along the road)."""
     try:
-        with open(section / "frames.csv", newline="") as file:
-            rows = [(float(row["chainage_m"]), row["frame"]) for row in csv.DictReader(file)]
-    except (OSError, KeyError, ValueError) as error:
-        raise DataError(f"Cannot read {section / 'frames.csv'}: {error}.") from error
+        table = csv.DictReader(read_text(section / "frames.csv").splitlines())
+        rows = [(float(row["chainage_m"]), row["frame"]) for row in table]
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"Cannot read {section / 'frames.csv'}: {error!r}.") from error
+    if any(not math.isfinite(chainage_m) for chainage_m, _ in rows):
+        raise DataError(f"{section / 'frames.csv'} has a chainage that is no finite number.")
+    pictures = PictureFolder(section / "images")
     return [
         DriveFrame(
-            read_picture(section / "images" / f"{frame}.jpg", section / "labels" / f"{frame}.txt", [POTHOLE]),
+            read_picture(pictures.find(frame) or section / "images" / f"{frame}.jpg", section / "labels" / f"{frame}.txt", [POTHOLE]),
             chainage_m,
         )
         for chainage_m, frame in sorted(rows)

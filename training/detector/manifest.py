@@ -3,7 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, Tuple
+from typing import Dict, Optional, Tuple
 
 import yaml
 
@@ -23,6 +23,8 @@ class Manifest:
     classes: Tuple[str, ...]
     view: inference.ViewConfig
     thresholds: Dict[str, float]
+    int8: Optional[Path] = None  # the TorchScript file in 8 bits
+    precision: str = "fp32"
 
 
 def sha256_of(path: Path) -> str:
@@ -53,8 +55,16 @@ def write_manifest(
     path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None))
 
 
-def read_manifest(path: Path) -> Manifest:
-    """Read a manifest and check its weights against it."""
+def check_hash(path: Path, weights: Path, digest: str) -> None:
+    """Refuse weights that are missing or others than the manifest's."""
+    if not weights.is_file():
+        raise ManifestError(f"{path}: the weights {weights} do not exist.")
+    if sha256_of(weights) != digest:
+        raise ManifestError(f"{path}: the SHA-256 of {weights} is not the manifest's {digest}.")
+
+
+def read_manifest(path: Path, known_classes: bool = True) -> Manifest:
+    """Read a manifest and check its weights against it; `known_classes`: its classes must begin with CLASSES."""
     try:
         content = yaml.safe_load(path.read_text())
         strides = [int(stride) for stride in content["head"]["strides"]]
@@ -63,16 +73,19 @@ def read_manifest(path: Path) -> Manifest:
             tuple(STRIDES[0] / first for first in strides[:: len(STRIDES)]), bool(content["head"].get("mirrored", False)),
         )
         thresholds = {name: float(value) for name, value in content["thresholds"].items()}
-        manifest = Manifest(path.parent / content["file"], tuple(content["classes"]), view, thresholds)
-        digest = content["sha256"]
+        int8 = path.parent / content["int8_file"] if "int8_file" in content else None
+        manifest = Manifest(
+            path.parent / content["file"], tuple(content["classes"]), view, thresholds, int8, content.get("precision", "fp32"))
+        digest, int8_digest = content["sha256"], content["int8_sha256"] if int8 else None
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ManifestError(f"Cannot read the manifest {path}: {error!r}.") from error
-    if manifest.classes[: len(CLASSES)] != CLASSES:
+    if known_classes and manifest.classes[: len(CLASSES)] != CLASSES:
         raise ManifestError(f"{path}: classes are {manifest.classes}, which do not begin with {CLASSES}.")
-    if not manifest.weights.is_file():
-        raise ManifestError(f"{path}: the weights {manifest.weights} do not exist.")
-    if sha256_of(manifest.weights) != digest:
-        raise ManifestError(f"{path}: the SHA-256 of {manifest.weights} is not the manifest's {digest}.")
+    if manifest.precision not in ("fp32", "int8") or (manifest.precision == "int8" and not int8):
+        raise ManifestError(f"{path}: precision is '{manifest.precision}', accepted are fp32, and int8 with an int8_file.")
+    check_hash(path, manifest.weights, digest)
+    if int8:
+        check_hash(path, int8, int8_digest)
     return manifest
 
 

@@ -6,9 +6,11 @@ are N x 5, corners and score.
 """
 
 from dataclasses import dataclass, field
-from typing import Dict, List, Sequence
+from typing import Dict, List, Optional, Sequence
 
 import numpy as np
+
+from common.figures import share
 
 from .boxes import areas, pairwise_iou
 
@@ -42,8 +44,8 @@ Drive = Sequence[ScoredFrame]
 """Frames in the order of their chainage."""
 
 
-def average_precision(frames: Sequence[ScoredFrame], iou: float) -> float:
-    """Area under the precision envelope over all recalls (all-point interpolation).
+def average_precision(frames: Sequence[ScoredFrame], iou: float) -> Optional[float]:
+    """Area under the precision envelope over all recalls (all-point interpolation); None without labels.
 
     Detections are matched greedily from the best score down; a label is matched once.
     """
@@ -64,7 +66,9 @@ def average_precision(frames: Sequence[ScoredFrame], iou: float) -> float:
                 continue
             scores.append(score)
             hits.append(hit)
-    if not label_count or not scores:
+    if not label_count:
+        return None
+    if not scores:
         return 0.0
     hits = np.array(hits)[np.argsort(-np.array(scores), kind="stable")]
     true_positives = np.cumsum(hits)
@@ -110,10 +114,15 @@ def highest_false_scores(drive: Drive, iou: float) -> np.ndarray:
     return np.array([false_scores(frame, iou).max(initial=-1.0) for frame in drive])
 
 
+def find_false(frame: ScoredFrame, iou: float) -> np.ndarray:
+    """Which detections overlap no label."""
+    overlaps = pairwise_iou(frame.detections[:, :4], frame.labels)
+    return ~(overlaps >= iou).any(axis=1) & ~frame.about_difficult()
+
+
 def false_scores(frame: ScoredFrame, iou: float) -> np.ndarray:
     """Scores of the detections that overlap no label."""
-    overlaps = pairwise_iou(frame.detections[:, :4], frame.labels)
-    return frame.detections[~(overlaps >= iou).any(axis=1) & ~frame.about_difficult(), 4]
+    return frame.detections[find_false(frame, iou), 4]
 
 
 def false_reports(drive: Drive, highest_false: np.ndarray, threshold: float) -> int:
@@ -127,25 +136,25 @@ def false_reports(drive: Drive, highest_false: np.ndarray, threshold: float) -> 
 
 @dataclass
 class DriveFigures:
-    """Figures of all drives together at one threshold."""
+    """Figures of all drives together at one threshold; None: no event, or no driven road."""
 
     threshold: float
     event_count: int
-    event_recall: float
-    event_recall_iou30: float
+    event_recall: Optional[float]
+    event_recall_iou30: Optional[float]
     km: float
-    false_reports_per_km: float
-    false_detections_per_km: float
+    false_reports_per_km: Optional[float]
+    false_detections_per_km: Optional[float]
 
 
 def drive_figures(drives: Dict[str, Drive], threshold: float) -> DriveFigures:
     """Event recall and false reports at a threshold. False means IoU below 0.5 with every label."""
-    km = max(sum(driven_km(drive) for drive in drives.values()), 1e-9)
+    km = sum(driven_km(drive) for drive in drives.values())
     runs = [run for drive in drives.values() for run in events(drive)]
-    recall = lambda iou: float(np.mean([recall_score(run, iou) >= threshold for run in runs])) if runs else 0.0
+    recall = lambda iou: float(np.mean([recall_score(run, iou) >= threshold for run in runs])) if runs else None
     reports = sum(false_reports(drive, highest_false_scores(drive, 0.5), threshold) for drive in drives.values())
     detections = sum((false_scores(frame, 0.5) >= threshold).sum() for drive in drives.values() for frame in drive)
-    return DriveFigures(threshold, len(runs), recall(0.5), recall(0.3), km, reports / km, float(detections / km))
+    return DriveFigures(threshold, len(runs), recall(0.5), recall(0.3), km, share(reports, km), share(detections, km))
 
 
 def calibrate_threshold(drives: Dict[str, Drive], reports_per_km: float) -> float:
@@ -163,11 +172,11 @@ def calibrate_threshold(drives: Dict[str, Drive], reports_per_km: float) -> floa
 
 def best_f1_threshold(frames: Sequence[ScoredFrame], iou: float) -> float:
     """The threshold, in hundredths, with the best harmonic mean of precision and recall."""
-    return max((round(0.01 * step, 2) for step in range(5, 100)), key=lambda limit: f1_score(frames, limit, iou))
+    return max((round(0.01 * step, 2) for step in range(5, 100)), key=lambda limit: f1_score(frames, limit, iou) or 0.0)
 
 
-def f1_score(frames: Sequence[ScoredFrame], threshold: float, iou: float) -> float:
-    """Harmonic mean of precision and recall of the detections at a threshold."""
+def f1_score(frames: Sequence[ScoredFrame], threshold: float, iou: float) -> Optional[float]:
+    """Harmonic mean of precision and recall of the detections at a threshold; None without labels and detections."""
     true_positives = detection_count = 0
     for frame in frames:
         detections = frame.detections[frame.detections[:, 4] >= threshold]
@@ -175,4 +184,4 @@ def f1_score(frames: Sequence[ScoredFrame], threshold: float, iou: float) -> flo
         true_positives += min((overlaps >= iou).any(axis=1).sum(), (overlaps >= iou).any(axis=0).sum())
         detection_count += (overlaps >= iou).any(axis=1).sum() + (false_scores(frame, iou) >= threshold).sum()
     label_count = sum(len(frame.labels) for frame in frames)
-    return 2 * true_positives / max(detection_count + label_count, 1)
+    return share(2 * true_positives, detection_count + label_count)

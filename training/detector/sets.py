@@ -5,7 +5,6 @@ training/real_hazards.yaml is such a file, and explains the entries.
 
 import fnmatch
 import hashlib
-import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence, Tuple
@@ -13,6 +12,7 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import numpy as np
 import yaml
 
+from common.files import list_pictures, read_text
 from common.pasting import CutOut
 
 from . import CLASSES, signs
@@ -39,7 +39,7 @@ class LabelledSet:
     weight: float = 1.0
 
     def is_held_out(self, names: Sequence[str]) -> List[bool]:
-        """Which of the pictures, in the order of natural_key, are never trained on."""
+        """Which of the pictures, in natural order, are never trained on."""
         if self.block:
             return [index // self.block % EVERY_BLOCK == FIRST_BLOCK for index in range(len(names))]
         return [matches(name, self.patterns) for name in names]
@@ -68,11 +68,6 @@ def matches(name: str, patterns: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def natural_key(name: str) -> List:
-    """Sorts names with their numbers read as numbers: img-9 before img-10."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", name)]
-
-
 def read_set(name: str, entry: dict) -> LabelledSet:
     """One entry of the file, checked."""
     known = {"folder", "classes", "labelled", "absent", "held_out", "skip", "background", "weight"}
@@ -96,7 +91,7 @@ def read_set(name: str, entry: dict) -> LabelledSet:
 def read_catalogue(path: Path) -> Catalogue:
     """Read a file of sets."""
     try:
-        text = path.read_text()
+        text = read_text(path)
         content = yaml.safe_load(text)
         sets = tuple(read_set(name, entry) for name, entry in content["sets"].items())
         rename = {str(theirs): str(ours) for theirs, ours in content.get("rename", {}).items()}
@@ -112,13 +107,24 @@ def class_ids_of(one: LabelledSet, folder: Path, rename: Dict[str, str]) -> List
     return [CLASSES.index(name) if name in CLASSES else -1 for name in names]
 
 
+def set_paths(one: LabelledSet, data: Path) -> List[Path]:
+    """The picture files of a set."""
+    paths = [path for path in list_pictures(data / one.folder / "images") if not matches(path.stem, one.skip)]
+    if not paths:
+        raise DataError(f"The folder {data / one.folder / 'images'} holds no .jpg, .jpeg or .png image.")
+    return paths
+
+
+def training_paths(one: LabelledSet, data: Path) -> List[Path]:
+    """Those of its training part."""
+    paths = set_paths(one, data)
+    return [path for path, held_out in zip(paths, one.is_held_out([path.stem for path in paths])) if not held_out]
+
+
 def read_split(one: LabelledSet, data: Path, rename: Dict[str, str]) -> Split:
     """The pictures of a set."""
     folder = data / one.folder
-    paths = sorted((folder / "images").glob("*.jpg"), key=lambda path: natural_key(path.stem))
-    paths = [path for path in paths if not matches(path.stem, one.skip)]
-    if not paths:
-        raise DataError(f"The folder {folder / 'images'} holds no .jpg image.")
+    paths = set_paths(one, data)
     class_ids = class_ids_of(one, folder, rename)
     labelled, absent = ([CLASSES.index(name) for name in names] for names in (one.labelled, one.absent))
     split = Split([], [])

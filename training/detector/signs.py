@@ -11,6 +11,8 @@ from typing import List, Sequence
 import cv2
 import numpy as np
 
+from common.files import list_pictures
+
 from . import CLASSES, inference
 from .boxes import pairwise_iou
 from .data import DataError, Picture
@@ -108,7 +110,7 @@ def read_faces(folder: Path, kind: str, held_out: bool) -> Faces:
     """The faces of one part; held-out ones are crops alone."""
     faces = Faces([], [], not held_out)
     for kind_folder in sorted(path for path in folder.glob("*") if path.is_dir()):
-        for number, path in enumerate(sorted(kind_folder.glob("*.png"))):
+        for number, path in enumerate(list_pictures(kind_folder)):
             if (number % HELD_OUT_SIGNS == 0) != held_out:
                 continue
             crop = cv2.imread(str(path), cv2.IMREAD_COLOR)
@@ -117,7 +119,7 @@ def read_faces(folder: Path, kind: str, held_out: bool) -> Faces:
             rgba = cut_face(cv2.cvtColor(crop, cv2.COLOR_BGR2RGB), OUTLINES.get(kind_folder.name, "round"))
             (faces.road_work if kind_folder.name == kind else faces.other).append(Face(rgba, kind_folder.name == kind))
     if not faces.road_work or not faces.other:
-        raise DataError(f"The folder {folder} needs crops (*.png) of {kind} and of another kind of sign.")
+        raise DataError(f"The folder {folder} needs crops (PNG or JPEG) of {kind} and of another kind of sign.")
     return faces
 
 

@@ -1,10 +1,12 @@
 """Running a network over the validation parts of the data."""
 
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import torch
+
+from common.figures import mean
 
 from . import inference
 from .data import POTHOLE, TRAFFIC_CONE, DriveFrame, Picture
@@ -59,11 +61,11 @@ class Validation:
     cones: List[ScoredFrame]
     others_on_drives: Dict[int, Dict[str, List[ScoredFrame]]]  # by class and drive; drives label potholes only: nearly all are false
 
-    def pothole_ap(self, iou: float) -> float:
+    def pothole_ap(self, iou: float) -> Optional[float]:
         """Average precision over the frames of all drives."""
         return average_precision([frame for drive in self.potholes.values() for frame in drive], iou)
 
-    def cone_ap(self, iou: float) -> float:
+    def cone_ap(self, iou: float) -> Optional[float]:
         """Average precision over the cone photos."""
         return average_precision(self.cones, iou)
 
@@ -72,15 +74,22 @@ class Validation:
         return drive_figures(self.potholes, calibrate_threshold(self.potholes, FALSE_REPORTS_PER_KM))
 
 
+def scored_frames(picture: Picture, found: List[np.ndarray], classes: Sequence[str]) -> Dict[str, ScoredFrame]:
+    """Labels and what was found, of each class that the picture labels."""
+    frames = {}
+    for class_id in sorted(set(picture.labelled_classes)):
+        labels, difficult = (boxes[ids == class_id] for boxes, ids in (
+            (picture.boxes, picture.classes), (picture.difficult, picture.difficult_classes)))
+        frames[classes[class_id]] = ScoredFrame(labels, found[class_id], difficult=difficult)
+    return frames
+
+
 def detect_labelled(runner: DetectorRunner, pictures: List[Picture], classes: Sequence[str]) -> Dict[str, List[ScoredFrame]]:
     """Detections and labels by class, in pictures that label it."""
     frames: Dict[str, List[ScoredFrame]] = {}
     for picture in pictures:
-        found = runner.detect(picture.image)
-        for class_id in sorted(set(picture.labelled_classes)):
-            labels, difficult = (boxes[classes == class_id] for boxes, classes in (
-                (picture.boxes, picture.classes), (picture.difficult, picture.difficult_classes)))
-            frames.setdefault(classes[class_id], []).append(ScoredFrame(labels, found[class_id], difficult=difficult))
+        for name, frame in scored_frames(picture, runner.detect(picture.image), classes).items():
+            frames.setdefault(name, []).append(frame)
     return frames
 
 
@@ -88,7 +97,7 @@ def detect_labelled(runner: DetectorRunner, pictures: List[Picture], classes: Se
 class ClassFigure:
     """Average precision of one class over held-out pictures."""
 
-    ap50: float
+    ap50: Optional[float]  # None without labels
     labels: int
     pictures: int
 
@@ -119,16 +128,16 @@ def validate_held_out(runner: DetectorRunner, parts: Dict[str, List[Picture]], c
     )
 
 
-def selection_figure(held_out: HeldOut, pothole_ap: float, cone_ap: float) -> float:
+def selection_figure(held_out: HeldOut, pothole_ap: Optional[float], cone_ap: Optional[float]) -> float:
     """Which weights are best: the mean AP50 over classes.
 
     Potholes and cones count the mean of the pooled held-out parts and of the older validation part (survey sections,
-    cone photos): neither chooses alone.
+    cone photos): neither chooses alone. Parts without labels do not count; 0 where none has any.
     """
-    by_class = {name: [figure.ap50] for name, figure in held_out.pooled.items()}
+    by_class: Dict[str, List[Optional[float]]] = {name: [figure.ap50] for name, figure in held_out.pooled.items()}
     by_class.setdefault("pothole", []).append(pothole_ap)
     by_class.setdefault("traffic_cone", []).append(cone_ap)
-    return float(np.mean([np.mean(figures) for figures in by_class.values()]))
+    return mean(mean(figures) for figures in by_class.values()) or 0.0
 
 
 def validate(runner: DetectorRunner, drives: Dict[str, List[DriveFrame]], cones: List[Picture]) -> Validation:

@@ -1,7 +1,7 @@
 """What a classifier's scores are worth: recall of frames and of events, precision, share of frames that are sent."""
 
 from dataclasses import dataclass
-from typing import Dict, List
+from typing import Dict, List, Optional
 
 import numpy as np
 
@@ -47,24 +47,24 @@ class Figures:
 
     frames: int
     hazard_frames: int
-    recall: float
-    precision: float
-    share_sent: float
+    recall: Optional[float]  # None without hazards.
+    precision: Optional[float]  # None where nothing is sent.
+    share_sent: Optional[float]  # None without frames.
     events: int
-    event_recall: float
-    ranking: float  # Probability that a frame with a hazard scores above one without (AUC).
+    event_recall: Optional[float]  # None without events.
+    ranking: Optional[float]  # Probability that a frame with a hazard scores above one without (AUC); None without both kinds.
 
 
 def figures(drives: Dict[str, ScoredDrive], threshold: float) -> Figures:
     """Figures at a threshold."""
-    scores = np.concatenate([drive.scores for drive in drives.values()])
-    hazards = np.concatenate([drive.hazards for drive in drives.values()])
+    scores = np.concatenate([np.zeros(0), *(drive.scores for drive in drives.values())])
+    hazards = np.concatenate([np.zeros(0, bool), *(drive.hazards for drive in drives.values())])
     events = np.array([score for drive in drives.values() for score in event_scores(drive)])
     sent = scores >= threshold
     calm, worth = scores[~hazards], scores[hazards]
-    above = (worth[:, None] > calm[None]).mean() + 0.5 * (worth[:, None] == calm[None]).mean() if len(calm) and len(worth) else 0
+    above = (worth[:, None] > calm[None]).mean() + 0.5 * (worth[:, None] == calm[None]).mean() if len(calm) and len(worth) else None
     return Figures(
-        len(scores), int(hazards.sum()), float(sent[hazards].mean()) if hazards.any() else 0.0,
-        float(hazards[sent].mean()) if sent.any() else 0.0, float(sent.mean()), len(events),
-        float((events >= threshold).mean()) if len(events) else 0.0, float(above),
+        len(scores), int(hazards.sum()), float(sent[hazards].mean()) if hazards.any() else None,
+        float(hazards[sent].mean()) if sent.any() else None, float(sent.mean()) if len(sent) else None, len(events),
+        float((events >= threshold).mean()) if len(events) else None, None if above is None else float(above),
     )

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import yaml
 
+from common.files import read_text
 from detector import CLASSES, data
 from detector.data import DataError, DriveFrame, Picture
 
@@ -47,7 +48,7 @@ class Camera:
 def read_camera(path: Path) -> Camera:
     """A camera file as the simulator and the bag tools read it."""
     try:
-        content: Dict[str, Any] = yaml.safe_load(path.read_text())
+        content: Dict[str, Any] = yaml.safe_load(read_text(path))
         lens = {name: float(content[name]) for name in ("fx", "fy", "cx", "cy")}
         mounting = {name: float(content["mounting"][name]) for name in ("height_m", "roll_deg", "pitch_deg", "yaw_deg")}
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
@@ -100,7 +101,7 @@ def read_simulated(root: Path) -> List[Tuple[str, List[Picture]]]:
     result = []
     for drive in drives:
         camera = read_camera(drive / "camera.yaml")
-        names = (drive / "classes.txt").read_text().split()
+        names = read_text(drive / "classes.txt").split()
         class_ids = [CLASSES.index(name) if name in CLASSES else -1 for name in names]
         pictures = data.read_folder(drive / "images", drive / "labels", class_ids)
         result.append((drive.name, [prepared(picture, camera) for picture in pictures]))

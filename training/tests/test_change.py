@@ -57,12 +57,48 @@ class Reading(unittest.TestCase):
         np.testing.assert_array_equal(pairs[1].mask, mask)
         np.testing.assert_array_equal(pairs[0].second, second)
 
-    def test_an_unknown_colour_is_ignored_and_an_unknown_index_refused(self):
+    def test_a_few_unknown_colours_are_ignored_and_many_and_an_unknown_index_refused(self):
         path = self.root / "gt00.png"
-        cv2.imwrite(str(path), np.zeros((4, 4, 3), np.uint8))
-        self.assertTrue((data.read_mask(path) == IGNORED).all())
+        mask = np.full((10, 20, 3), 255, np.uint8)
+        mask[0, 0] = (1, 2, 3)
+        mask[0, 1] = 0
+        cv2.imwrite(str(path), mask)
+        self.assertEqual((data.read_mask(path) == IGNORED).sum(), 2)
+        mask[1, :5] = (1, 2, 3)
+        cv2.imwrite(str(path), mask)
+        with self.assertRaisesRegex(data.DataError, "6 of 200"):
+            data.read_mask(path)
         cv2.imwrite(str(path), np.full((4, 4), 10, np.uint8))
         with self.assertRaisesRegex(data.DataError, "neither a class"):
+            data.read_mask(path)
+
+    def test_a_grey_mask_in_three_channels_is_read_where_a_neighbour_has_colours_and_refused_elsewhere(self):
+        path = self.root / "gt00.png"
+        mask = np.full((10, 20, 3), 255, np.uint8)
+        mask[:, 10:] = 0
+        for ambiguous in (mask, mask * 0, mask // 255 * 3):
+            cv2.imwrite(str(path), ambiguous)
+            with self.assertRaisesRegex(data.DataError, "gt00.png has three channels"):
+                data.read_mask(path)
+        cv2.imwrite(str(path), mask)
+        cv2.imwrite(str(self.root / "gt01.png"), np.full((4, 4, 3), (0, 242, 255), np.uint8))
+        self.assertEqual((data.read_mask(path) == IGNORED).sum(), 100)
+
+    def test_0_and_255_are_left_out_where_a_neighbour_has_classes(self):
+        path = self.root / "gt00.png"
+        cv2.imwrite(str(path), np.array([[0, 255]], np.uint8))
+        with self.assertRaisesRegex(data.DataError, "change or not"):
+            data.read_mask(path)
+        cv2.imwrite(str(self.root / "gt01.png"), np.array([[0, 7]], np.uint8))
+        np.testing.assert_array_equal(data.read_mask(path), [[0, IGNORED]])
+
+    def test_a_mask_with_transparent_pixels_or_16_bits_is_refused(self):
+        path = self.root / "gt00.png"
+        cv2.imwrite(str(path), np.zeros((4, 4, 4), np.uint8))
+        with self.assertRaisesRegex(data.DataError, "transparent"):
+            data.read_mask(path)
+        cv2.imwrite(str(path), np.zeros((4, 4), np.uint16))
+        with self.assertRaisesRegex(data.DataError, "16 bits"):
             data.read_mask(path)
 
     def test_miscellaneous_is_rubbish(self):

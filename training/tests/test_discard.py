@@ -103,6 +103,13 @@ class Figures(unittest.TestCase):
         self.assertEqual((found.event_recall, found.events), (1.0, 2))
         self.assertAlmostEqual(found.ranking, 5 / 6)
 
+    def test_what_nothing_was_counted_for_is_none(self):
+        calm = figures.ScoredDrive(np.array([0.1, 0.2]), np.zeros(2, bool), np.array([0.0, 10.0]))
+        found = figures.figures({"a": calm}, 0.3)
+        self.assertEqual((found.recall, found.precision, found.event_recall, found.ranking), (None, None, None, None))
+        self.assertEqual(found.share_sent, 0.0)
+        self.assertIsNone(figures.figures({}, 0.3).share_sent)
+
     def test_the_threshold_keeps_the_recall(self):
         many = figures.ScoredDrive(np.arange(1, 11) / 20, np.ones(10, bool), np.arange(10.0))
         threshold = figures.threshold_for_recall({"a": many}, 0.9)

@@ -4,10 +4,12 @@ import unittest
 
 import numpy as np
 
+from detector.data import Picture
 from detector.metrics import (
-    ScoredFrame, average_precision, best_f1_threshold, calibrate_threshold, drive_figures, driven_km, events,
+    ScoredFrame, average_precision, best_f1_threshold, calibrate_threshold, drive_figures, driven_km, events, f1_score,
     false_reports, highest_false_scores,
 )
+from detector.mistakes import mistakes_of
 
 BOX = [100, 100, 140, 120]
 SHIFTED = [104, 100, 144, 120]  # IoU with BOX 36 / 44
@@ -33,9 +35,23 @@ class AveragePrecision(unittest.TestCase):
         frames = [frame(labels=[BOX], detections=[SHIFTED + [0.9]])]
         self.assertEqual(average_precision(frames, 0.9), 0.0)
 
-    def test_nothing_detected_or_labelled(self):
+    def test_without_detections_is_zero_and_without_labels_none(self):
         self.assertEqual(average_precision([frame(labels=[BOX])], 0.5), 0.0)
-        self.assertEqual(average_precision([frame(detections=[BOX + [0.5]])], 0.5), 0.0)
+        self.assertIsNone(average_precision([frame(detections=[BOX + [0.5]])], 0.5))
+        self.assertIsNone(average_precision([], 0.5))
+
+
+class Mistakes(unittest.TestCase):
+    PICTURE = Picture(np.zeros((400, 640, 3), np.uint8), np.zeros((0, 4)), np.zeros(0, int), [0])
+
+    def test_are_labels_found_below_the_threshold_and_detections_above_it_that_overlap_none(self):
+        one = frame(labels=[BOX, FAR], detections=[SHIFTED + [0.3], [500, 100, 540, 120, 0.6], [500, 200, 540, 220, 0.4]])
+        found = mistakes_of("pothole", "roads", self.PICTURE, one, 0.5)
+        self.assertEqual([(mistake.kind, list(mistake.box), mistake.score) for mistake in found],
+                         [("missed", BOX, 0.3), ("missed", FAR, 0.0), ("false", [500, 100, 540, 120], 0.6)])
+
+    def test_are_none_where_every_label_was_found(self):
+        self.assertEqual(mistakes_of("pothole", "roads", self.PICTURE, frame(labels=[BOX], detections=[SHIFTED + [0.6]]), 0.5), [])
 
 
 class DifficultObjects(unittest.TestCase):
@@ -71,6 +87,13 @@ class Drives(unittest.TestCase):
         figures = drive_figures({"drive": drive}, 0.3)
         self.assertEqual((figures.event_count, figures.event_recall), (2, 0.5))
         self.assertAlmostEqual(figures.false_reports_per_km, 1 / 0.030)
+
+    def test_figures_of_nothing_are_none(self):
+        for drives in ({}, {"drive": [frame(0, detections=[FAR + [0.9]])]}):
+            found = drive_figures(drives, 0.3)
+            self.assertEqual((found.event_count, found.event_recall, found.event_recall_iou30), (0, None, None))
+            self.assertEqual((found.false_reports_per_km, found.false_detections_per_km), (None, None))
+        self.assertIsNone(f1_score([frame()], 0.5, 0.5))
 
     def test_threshold_is_the_lowest_within_the_limit(self):
         drive = [frame(0, detections=[FAR + [0.405]]), frame(10)]

@@ -7,16 +7,19 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import cv2
+import numpy as np
 import torch
 import yaml
 
 import convert_backbone
 import evaluate_detector
 import export_detector
+import export_int8
 import export_torch
 import train_detector
 from common import training
-from detector import CLASSES, onnx_model, pretrained
+from detector import CLASSES, inference, int8_model, onnx_model, pretrained
 from detector.manifest import sha256_of
 from detector.network import SIZES, Backbone, Detector, Widths
 
@@ -77,6 +80,18 @@ class Programs(unittest.TestCase):
         for name, tensor in whole["average"].items():
             torch.testing.assert_close(continued["average"][name], tensor, rtol=0, atol=0, msg=name)
 
+    def test_a_torn_checkpoint_is_named_with_the_way_out(self):
+        self.assertEqual(self.train("torn"), (0, ""))
+        last = self.root / "torn" / "last.pt"
+        whole = last.read_bytes()
+        for data in (b"", bytes(len(whole)), whole[: len(whole) // 2]):
+            last.write_bytes(data)
+            status, said = self.train("torn", "--resume")
+            self.assertEqual(status, 2, said)
+            self.assertEqual(len(said.splitlines()), 1, said)
+            self.assertIn(f"{last} is torn or no checkpoint", said)
+            self.assertIn("remove it to begin anew", said)
+
     def test_begins_with_a_pretrained_backbone_and_leaves_a_frozen_part_of_it(self):
         torch.manual_seed(2)
         blocks = pretrained.blocks_of(Backbone(Widths()))
@@ -106,7 +121,7 @@ class Programs(unittest.TestCase):
         torch.save({"settings": {"size": "medium"}, "average": detector.state_dict()}, checkpoint)
         exported = quietly(
             export_detector, "--checkpoint", checkpoint, "--name", "tiny", "--out", models, "--data", self.data, "--packed",
-            "--input", "320x240", "--engine", "torch", "--scales", "1,0.8",
+            "--input", "320x240", "--engine", "torch", "--scales", "1,0.8", "--precision", "int8", "--count", "4",
         )
         self.assertEqual(exported, (0, ""))
         arguments = ("--manifest", models / "tiny.yaml", "--data", self.data)
@@ -118,6 +133,11 @@ class Programs(unittest.TestCase):
         self.assertEqual((manifest["head"]["views"], manifest["head"]["strides"]), (2, [4, 8, 16, 5, 10, 20]))
         whole, smaller = 80 * 60 + 40 * 30 + 20 * 15, 64 * 48 + 32 * 24 + 16 * 12
         self.assertEqual((golden["width"], golden["anchor_points"]), (320, whole + smaller))
+        self.assertEqual((manifest["precision"], manifest["int8_file"]), ("int8", "tiny.int8.pt.gz"))
+        self.assertEqual(manifest["int8_sha256"], sha256_of(models / "tiny.int8.pt.gz"))
+        self.assertEqual([row["index"] for row in golden["int8_rows"]], [row["index"] for row in golden["rows"]])
+        self.assertEqual(quietly(evaluate_detector, *arguments, "--precision", "fp32"), (0, ""))
+        self.check_eight_bits(models, golden)
         small = ("--size", "small", "--start-from", models / "tiny.onnx.gz")
         self.assertEqual(self.train("small", *small), (0, ""))
         self.assertIn("size small", self.train("small", "--size", "base", "--resume")[1])
@@ -126,6 +146,45 @@ class Programs(unittest.TestCase):
         status, errors = quietly(evaluate_detector, *arguments)
         self.assertEqual(status, 2)
         self.assertIn("SHA-256", errors)
+
+    def check_eight_bits(self, models: Path, golden: dict):
+        """Both views answer nearly as in float32: boxes within parts of a cell, the certain objectness exactly."""
+        pixels = onnx_model.golden_image(320, 240)
+        expected = onnx_model.opencv_outputs(models / "tiny.onnx.gz", inference.normalise(pixels)[None])
+        found = int8_model.int8_outputs(models / "tiny.int8.pt.gz", (1.0, 0.8))(pixels)
+        self.assertEqual(found.shape, expected.shape)
+        self.assertTrue((found[..., 4] == expected[..., 4]).all())
+        first = 80 * 60 + 40 * 30 + 20 * 15
+        for rows in (slice(0, first), slice(first, None)):
+            self.assertLess(np.abs(found - expected)[:, rows, :4].mean(), 0.1)
+            self.assertLess(np.abs(found - expected)[:, rows, 5:].max(), 0.05)
+        for row in golden["int8_rows"]:
+            np.testing.assert_allclose(found[0, row["index"]], row["values"], atol=golden["int8_tolerance"])
+
+    def test_a_file_in_eight_bits_is_entered_once_and_leaves_the_rest_of_the_manifest(self):
+        source = Path(__file__).resolve().parents[2] / "test" / "perception" / "inference"
+        models, pictures = self.root / "eight_bits", self.root / "blocks"
+        models.mkdir()
+        pictures.mkdir()
+        rng = np.random.default_rng(1)
+        for index in range(3):
+            cv2.imwrite(str(pictures / f"{index}.png"), np.kron(rng.integers(0, 256, (6, 8, 3)), np.ones((8, 8, 1))).astype(np.uint8))
+        for name in ("tiny.onnx", "tiny.pt"):
+            (models / name).write_bytes((source / name).read_bytes())
+        text = (source / "tiny.yaml").read_text()
+        (models / "tiny.yaml").write_text("# A comment.\n" + text)
+        for _ in range(2):
+            arguments = (models / "tiny.yaml", "--data", "none", "--pictures", pictures, "--count", 3)
+            self.assertEqual(quietly(export_int8, *arguments), (0, ""))
+            lines = (models / "tiny.yaml").read_text().splitlines()
+            entered = ["int8_file: tiny.int8.pt", f"int8_sha256: {sha256_of(models / 'tiny.int8.pt')}", "precision: int8", "engine: torch"]
+            self.assertEqual([line for line in lines if line not in entered], ["# A comment.", *text.splitlines()])
+            self.assertEqual([lines.count(line) for line in entered], [1, 1, 1, 1])
+        self.assertNotIn(str(source.parents[1]).encode(), (models / "tiny.int8.pt").read_bytes(), "a path of this machine")
+        (models / "tiny.yaml").write_text(text.replace("mean: [0, 0, 0]", "mean: [0, 0, 1]"))
+        self.assertIn("normalisation", quietly(export_int8, *arguments)[1])
+        (models / "tiny.yaml").write_text(text)
+        self.assertIn("picture", quietly(export_int8, models / "tiny.yaml", "--data", "none")[1])
 
     def test_a_class_of_the_users_own_is_trained_and_exported_without_a_change_of_the_programs(self):
         own = write_own(self.root / "own")
@@ -169,6 +228,15 @@ class Programs(unittest.TestCase):
         self.assertEqual(quietly(export_detector, *export, "--name", "photos", "--out", models, "--data", self.data, "--sets", listed), (0, ""))
         measured = ("--manifest", models / "photos.yaml", "--data", self.data, "--sets", listed)
         self.assertEqual(quietly(evaluate_detector, *measured), (0, ""))
+        sheets = self.root / "mistakes"
+        self.assertEqual(quietly(evaluate_detector, *measured, "--mistakes", sheets), (0, ""))
+        listed_mistakes = (sheets / "mistakes.csv").read_text().splitlines()
+        self.assertEqual(listed_mistakes[0], "class,kind,set,image,score,x_min,y_min,x_max,y_max")
+        self.assertGreater(len(listed_mistakes), 1)
+        kinds = {tuple(line.split(",")[:2]) for line in listed_mistakes[1:]}
+        self.assertEqual({path.stem for path in sheets.glob("*.jpg")}, {"-".join(kind) for kind in kinds})
+        status, errors = quietly(evaluate_detector, *measured, "--mistakes", sheets)
+        self.assertEqual((status, "accepted is a new folder" in errors), (2, True))
         self.assertIn("left_out", self.train("sets", "--sets", listed, "--cut-outs", "--leave-out", "cattle", "--resume")[1])
         listed.write_text(listed.read_text() + "# Another split.\n")
         self.assertIn("sets", self.train("sets", "--sets", listed, "--cut-outs", "--resume")[1])
@@ -224,6 +292,7 @@ class Programs(unittest.TestCase):
             (train_detector, ("--own", nowhere, "--out", self.root / "new")),
             (evaluate_detector, ("--manifest", nowhere)),
             (export_torch, (nowhere,)),
+            (export_int8, (nowhere, "--data", "none")),
         ]
         for program, arguments in cases:
             status, errors = quietly(program, *arguments)
