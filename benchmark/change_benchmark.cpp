@@ -16,6 +16,7 @@
 
 #include "change/memory/place_index.h"
 #include "change/methods/change_network.h"
+#include "change/registration/edge_registration.h"
 #include "change/registration/image_features.h"
 #include "change/registration/registration.h"
 #include "run_benchmarks.h"

@@ -5,7 +5,8 @@
 //     livemap_detector_benchmark [--benchmark_filter=REGEX] [Google Benchmark's flags]
 //
 // LIVEMAP_MODEL names another manifest than models/hazards-base.yaml, LIVEMAP_THREADS the threads
-// of the engine (default: all cores), LIVEMAP_ENGINE the engine (default: the manifest's).
+// of the engine (default: all cores), LIVEMAP_ENGINE the engine and LIVEMAP_PRECISION fp32 or int8
+// (default: the manifest's).
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -49,6 +50,19 @@ int Threads() {
 std::optional<perception::EngineKind> Engine() {
   const char* engine = std::getenv("LIVEMAP_ENGINE");
   return perception::ParseEngineChoice(engine != nullptr ? engine : "auto", "LIVEMAP_ENGINE");
+}
+
+/// The model's manifest in the precision that is asked for.
+perception::ModelManifest Manifest() {
+  perception::ModelManifest manifest = perception::ReadModelManifest(ModelPath());
+  const char* asked = std::getenv("LIVEMAP_PRECISION");
+  if (asked == nullptr) return manifest;
+  for (const auto precision : {perception::Precision::kFp32, perception::Precision::kInt8}) {
+    if (perception::NameOf(precision) != asked) continue;
+    manifest.precision = precision;
+    return manifest;
+  }
+  throw Error("LIVEMAP_PRECISION is '" + std::string(asked) + "', accepted are fp32 and int8");
 }
 
 /// Memory of this process that is in RAM, MiB.
@@ -102,12 +116,12 @@ perception::ModelManifest CandidateManifest() {
 
 void BM_FrameToDetections(benchmark::State& state) {
   try {
-    perception::HazardDetector detector(perception::ReadModelManifest(ModelPath()), Threads(),
-                                        Engine());
+    perception::HazardDetector detector(Manifest(), Threads(), Engine());
     const cv::Mat frame =
         NoiseFrame(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
     for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(detector.Detect(frame));
-    state.SetLabel(detector.manifest().name + ", " + perception::NameOf(detector.Engine()));
+    state.SetLabel(detector.manifest().name + ", " + perception::NameOf(detector.Engine()) + ", " +
+                   perception::NameOf(detector.ComputesIn()));
     state.SetItemsProcessed(state.iterations());
   } catch (const Error& error) {
     state.SkipWithError(error.what());
@@ -127,7 +141,7 @@ void BM_Pool(benchmark::State& state) {
   const auto threads = static_cast<int>(state.range(2));
   constexpr int kFrames = 16;
   try {
-    const perception::ModelManifest manifest = perception::ReadModelManifest(ModelPath());
+    const perception::ModelManifest manifest = Manifest();
     const double before_mib = ResidentMib();
     using Pool = perception::DetectorPool<cv::Mat, std::vector<perception::HazardDetection>>;
     std::vector<Pool::Engine> engines;

@@ -17,6 +17,7 @@
 #include "poll_scheduler_cost.h"
 #include "zone/registry/hazard_registry.h"
 #include "zone/service/zone_service.h"
+#include "zone_load/report_street.h"
 
 namespace livemap::bench {
 namespace {
@@ -26,7 +27,7 @@ constexpr char kUsage[] =
     "\n"
     "Prints the cost of one registration in memory at 1000 to N (default 1000000) hazards and how\n"
     "it grows, what a second of 10 000 vehicles costs the poll scheduler, then committed reports "
-    "per second on SQLite, S seconds (default 2) for each line.\n";
+    "per second on SQLite and the processor time of each, S seconds (default 2) for each line.\n";
 
 constexpr std::int64_t kNowNs = 1'700'000'000'000'000'000;
 constexpr double kSpacingM = 12.0;
@@ -183,11 +184,16 @@ std::vector<std::uint8_t> MakePicture(std::size_t bytes, std::mt19937& generator
   return picture;
 }
 
-void PrintStore(std::size_t batch_reports, std::size_t picture_bytes, double seconds) {
+/// Commits batches of what `next` makes until they took so many seconds, in a store of its own, and
+/// prints a line of what a report costs.
+template <typename Next>
+void PrintStore(const char* name, std::size_t batch_reports, std::size_t picture_bytes,
+                double seconds, const Next& next) {
   std::string directory =
       (std::filesystem::temp_directory_path() / "livemap_zone_benchmark_XXXXXX").string();
   if (mkdtemp(directory.data()) == nullptr) throw Error("cannot make '" + directory + "'");
   double spent_s = 0;
+  double processor_s = 0;
   std::size_t count = 0;
   {
     zone::ZoneService::Config config;
@@ -198,24 +204,51 @@ void PrintStore(std::size_t batch_reports, std::size_t picture_bytes, double sec
     config.allowance.evidence_per_hour = 1e9;
     zone::ZoneService zone(
         config, [] { return kNowNs; }, 1);
-    Town town(100000);
-    std::mt19937 generator(2);
     while (spent_s < seconds) {
       std::vector<protocol::Report> reports;
-      for (std::size_t i = 0; i < batch_reports; ++i) {
-        reports.push_back(i % 2 == 0 ? town.News() : town.Sighting());
-        if (picture_bytes > 0) reports.back().image = MakePicture(picture_bytes, generator);
-      }
+      for (std::size_t i = 0; i < batch_reports; ++i) reports.push_back(next(count + i));
       const auto start = std::chrono::steady_clock::now();
+      const double processor_start_s = ThreadSeconds();
       zone.HandleBatch(reports);
+      processor_s += ThreadSeconds() - processor_start_s;
       spent_s += SecondsSince(start);
       count += batch_reports;
     }
   }
   std::filesystem::remove_all(directory);
-  std::printf("%10zu %14zu %18.0f\n", batch_reports, picture_bytes,
-              static_cast<double>(count) / spent_s);
+  std::printf("%10zu %14zu %9s %18.0f %17.1f\n", batch_reports, picture_bytes, name,
+              static_cast<double>(count) / spent_s, 1e6 * processor_s / static_cast<double>(count));
   std::fflush(stdout);
+}
+
+void PrintStores(double seconds) {
+  std::printf("committed reports/s on SQLite (WAL, synchronous=FULL), half new, half sightings\n");
+  std::printf("%10s %14s %9s %18s %17s\n", "per commit", "picture, bytes", "vehicles", "reports/s",
+              "processor us each");
+  Town town(100000);
+  std::mt19937 generator(2);
+  // A thousand vehicles that all report at one moment.
+  const auto standing = [&](std::size_t picture_bytes) {
+    return [&, picture_bytes](std::size_t i) {
+      protocol::Report report = i % 2 == 0 ? town.News() : town.Sighting();
+      if (picture_bytes > 0) report.image = MakePicture(picture_bytes, generator);
+      return report;
+    };
+  };
+  for (const std::size_t batch : {1U, 100U, 500U}) {
+    PrintStore("stand", batch, 0, seconds, standing(0));
+  }
+  PrintStore("stand", 500, 20000, seconds, standing(20000));
+  // So few drive on with every report that their pasts are full.
+  constexpr std::uint32_t kDriving = 20;
+  const ReportStreet street(kDriving, kNowNs - 5LL * 86400 * 1'000'000'000);
+  PrintStore("drive", 500, 0, seconds, [&](std::size_t i) {
+    const auto vehicle = static_cast<std::uint32_t>(i % kDriving);
+    protocol::Report report = street.ReportOf(vehicle, static_cast<std::uint32_t>(i / kDriving));
+    report.uuid = town.NextUuid();
+    report.vehicle_id = "car-" + std::to_string(vehicle);
+    return report;
+  });
 }
 
 /// The positive number after `name`; `fallback` when the option is not given.
@@ -246,10 +279,7 @@ int Run(const std::vector<std::string>& arguments) {
   const double seconds = Option(arguments, "--store-seconds", 2.0);
   PrintRegistry(static_cast<std::size_t>(max_hazards));
   PrintPollScheduler(static_cast<std::size_t>(max_hazards));
-  std::printf("committed reports/s on SQLite (WAL, synchronous=FULL), half new, half sightings\n");
-  std::printf("%10s %14s %18s\n", "per commit", "picture, bytes", "reports/s");
-  for (const std::size_t batch : {1U, 100U, 500U}) PrintStore(batch, 0, seconds);
-  PrintStore(500, 20000, seconds);
+  PrintStores(seconds);
   return 0;
 }
 

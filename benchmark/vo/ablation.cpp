@@ -3,7 +3,7 @@
 #include "evaluation/quantile.h"
 #include "measurements.h"
 #include "thread_time.h"
-#include "tools/common/command_line.h"
+#include "tools/common/progress.h"
 
 namespace livemap::bench {
 namespace {

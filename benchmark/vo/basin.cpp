@@ -7,7 +7,7 @@
 #include "geo/wgs84.h"
 #include "measurements.h"
 #include "pair_alignment.h"
-#include "tools/common/command_line.h"
+#include "tools/common/progress.h"
 
 namespace livemap::bench {
 namespace {

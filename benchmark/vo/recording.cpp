@@ -1,7 +1,6 @@
 #include "recording.h"
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "common/error.h"
@@ -39,14 +38,14 @@ Recording::Recording(const std::string& directory, const std::string& camera_fil
 }
 
 cv::Mat Recording::ReadColour(std::size_t index) const {
-  return tools::ReadPicture(sequence_.frames[index].image_path, camera_, cv::IMREAD_COLOR);
+  return tools::ReadColourPicture(sequence_.frames[index].image_path, camera_);
 }
 
 odometry::RgbdFrame Recording::ReadDepth(std::size_t index) const {
   const datasets::SequenceFrame& source = sequence_.frames[index];
   odometry::RgbdFrame frame;
   frame.stamp_ns = source.stamp_ns;
-  frame.depth = tools::ReadPicture(source.depth_path, camera_, cv::IMREAD_UNCHANGED);
+  frame.depth = tools::ReadDepthPicture(source.depth_path, camera_);
   frame.depth_units_per_m = sequence_.depth_scale;
   return frame;
 }

@@ -8,7 +8,7 @@
 #include "evaluation/trajectory/trajectory_alignment.h"
 #include "measurements.h"
 #include "thread_time.h"
-#include "tools/common/command_line.h"
+#include "tools/common/progress.h"
 #include "tools/odometry/vo_method.h"
 
 namespace livemap::bench {

@@ -14,7 +14,7 @@ void Study::Tell(std::size_t vehicle, std::size_t index, zone::EvidenceKind kind
   Thing& thing = things_[index];
   const zone::ClassModel entry = ClassOf(thing);
   zone::Evidence evidence{kind, keys_[vehicle], now_ns};
-  if (config_.trust) evidence.hostile = trust_.Hostile(evidence.vehicle, now_ns);
+  if (config_.trust) evidence.malicious = trust_.MaliciousProbability(evidence.vehicle, now_ns);
   const bool against = kind == zone::EvidenceKind::kAnswerNo;
   zone::LifecycleUpdate step;
   if (thing.item == kNone) {
@@ -140,7 +140,8 @@ void Study::Finish() {
   }
   for (std::size_t i = 0; i < keys_.size(); ++i) {
     figures_.hostile += hostile_[i] ? 1 : 0;
-    if (trust_.Hostile(keys_[i], Stamp(last_s_)) < rules_.config().suspect_above) continue;
+    if (trust_.MaliciousProbability(keys_[i], Stamp(last_s_)) < rules_.config().suspect_above)
+      continue;
     ++(hostile_[i] ? figures_.hostile_suspects : figures_.honest_suspects);
   }
   figures_.polls = polling_.polls();

@@ -91,10 +91,7 @@ Fleet::Fleet(const Config& config)
   }
 }
 
-Fleet::~Fleet() {
-  sending_ = false;
-  for (const auto& vehicle : vehicles_) vehicle->client.reset();
-}
+Fleet::~Fleet() { sending_ = false; }
 
 std::unique_ptr<transport::MqttClient> Fleet::Connect(
     const std::string& id, const std::string& topic,

@@ -61,11 +61,11 @@ class Fleet {
   };
   struct Vehicle {
     std::string id;
-    std::unique_ptr<transport::MqttClient> client;
     Mutex mutex;
     std::unordered_map<Uuid, Waiting> waiting GUARDED_BY(mutex);
     std::mt19937_64 random GUARDED_BY(mutex);
     std::uint32_t next_step GUARDED_BY(mutex) = 0;
+    std::unique_ptr<transport::MqttClient> client;  ///< Its thread uses what stands above.
   };
 
   std::unique_ptr<transport::MqttClient> Connect(
@@ -81,8 +81,6 @@ class Fleet {
 
   const Config config_;
   const ReportStreet street_;
-  std::vector<std::unique_ptr<Vehicle>> vehicles_;
-  std::unique_ptr<transport::MqttClient> listener_;
   std::atomic<bool> sending_{true};
   std::atomic<bool> counting_{false};
   std::atomic<bool> answered_{false};  ///< At least one report.
@@ -91,6 +89,10 @@ class Fleet {
   Result result_ GUARDED_BY(result_mutex_);
   /// By place, when sent.
   std::unordered_map<std::uint64_t, Clock::time_point> confirmed_ GUARDED_BY(result_mutex_);
+
+  // The clients' threads use all that stands above, so they end before it.
+  std::vector<std::unique_ptr<Vehicle>> vehicles_;
+  std::unique_ptr<transport::MqttClient> listener_;
 };
 
 }  // namespace livemap::bench
