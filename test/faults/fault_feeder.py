@@ -40,7 +40,7 @@ class Feeder:
         self.publishers = {
             topic: rospy.Publisher(topic, message_class, queue_size=50, latch=latch)
             for topic, message_class, latch in [
-                ("hazard/detections", DetectionArray, False), ("hazard/annotated", Image, False),
+                ("hazard/detections", DetectionArray, False), ("camera_rect/image", Image, False),
                 ("fix", NavSatFix, False), ("camera_rect/camera_info", CameraInfo, True)]}
         self.publishers["camera_rect/camera_info"].publish(self.camera())
 
@@ -54,7 +54,7 @@ class Feeder:
         return info
 
     def picture(self, time_s):
-        message = street.annotated(time_s)
+        message = street.camera_image(time_s)
         message.width, message.height, message.step = PICTURE_WIDTH, PICTURE_HEIGHT, 3 * PICTURE_WIDTH
         noise = numpy.random.default_rng(int(time_s * 1000)).integers(0, 256, PICTURE_HEIGHT * message.step, numpy.uint8)
         message.data = noise.tobytes()
@@ -75,7 +75,7 @@ class Feeder:
             self.publishers["fix"].publish(street.fix(tick / FIXES_PER_S))
             if self.going and tick % 2 == 0:
                 time_s = (tick - 0.5) / FIXES_PER_S
-                self.publishers["hazard/annotated"].publish(self.picture(time_s))
+                self.publishers["camera_rect/image"].publish(self.picture(time_s))
                 self.publishers["hazard/detections"].publish(street.detections(time_s, *self.things(tick)))
 
     def connected(self):

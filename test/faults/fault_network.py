@@ -98,6 +98,8 @@ class Wire:
         run(*self.at_zone(), "nft", "-f", "-", stdin=None, input=TABLE.format(rule=RULES[what]).encode())
 
     def close(self):
+        # The kernel takes a killed namespace down later than wait returns: the next wire would find this one's name.
+        subprocess.run(["ip", "link", "del", "veth-v"], check=False, stdin=subprocess.DEVNULL)
         self.holder.kill()
         self.holder.wait()
 

@@ -1,12 +1,15 @@
 """The page of the fault rounds: what their records say, in a table."""
 
 import datetime
-import os
 import pathlib
 import statistics
+import sys
 import textwrap
 
 from fault_kinds import KINDS
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts" / "lib"))
+import measured_on  # noqa: E402
 
 HEAD = """# Faults: what is lost
 
@@ -57,11 +60,7 @@ def quantile(values, share):
 
 
 def machine():
-    model = "unknown processor"
-    for line in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-        if line.startswith("model name"):
-            model = line.split(":", 1)[1].strip()
-    return f"{os.cpu_count()} cores ({model}, shared)"
+    return f"{measured_on.cores()} cores ({measured_on.processor()}, shared)"
 
 
 def row(kind, records):

@@ -22,6 +22,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(ROOT / "scripts" / "lib"))
 import demo_system as system  # noqa: E402
+from listening_port import free_port  # noqa: E402
 
 ZONE, VEHICLES = "faults", ("car-1", "car-2")
 START_S = 90
@@ -81,7 +82,7 @@ class World:
         self.small_stores = small_stores and self.inside
         self.wire = network.Wire() if self.inside else network.Loopback()
         self.processes = {}
-        self.ports = {name: system.free_port() for name in ("broker", "zone", *VEHICLES)}
+        self.ports = {name: free_port() for name in ("broker", "zone", *VEHICLES)}
         self.relays = {}
         self.ledger = ledger.Ledger([self.outbox(vehicle) for vehicle in VEHICLES],
                                     self.directory / "zone/zone.sqlite3")
@@ -174,7 +175,12 @@ class World:
         self.run("broker", ["mosquitto", "-c", self.directory / "identity/mosquitto.conf"], at_zone=True)
 
     def start_zone(self):
+        # Each thing is a class of its own: a catalogue without classes takes every name.
+        catalogue = self.directory / "hazards.yaml"
+        known = yaml.safe_load((ROOT / "config/hazards.yaml").read_text(encoding="utf-8"))
+        catalogue.write_text(yaml.safe_dump(dict(known, classes={})), encoding="ascii")
         self.run("zone", ["roslaunch", "--wait", system.launch_file("zone.launch"), f"zone:={ZONE}",
+                          f"hazards:={catalogue}",
                           f"directory:={self.directory / 'zone'}", f"broker_port:={self.ports['broker']}",
                           f"identity:={self.directory / 'identity/zone'}",
                           f"zone_cloudlet:={flow(zone_settings())}"], at_zone=True, master=self.ports["zone"])
@@ -182,7 +188,7 @@ class World:
     def start_relay(self, vehicle):
         if self.inside and vehicle == VEHICLES[0]:
             return
-        port = system.free_port()
+        port = free_port()
         relay = self.run(f"relay_{vehicle}", [
             sys.executable, HERE / "fault_relay.py", "--port", port, "--to-address", self.wire.broker_address,
             "--to-port", self.ports["broker"]], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

@@ -1,5 +1,6 @@
-// The readers of files that a drive is made of: survey tables and labels, routes, TUM and KITTI
-// lists, camera files, image headers. The first byte chooses the reader. A TUM list is also paired
+// The readers of files that a drive is made of, or that are about one: survey tables and labels,
+// tables of detections, routes, TUM and KITTI lists, camera files, image headers. The first byte
+// chooses the reader, of the two tables the text does. A TUM list is also paired
 // with itself, every second line, as pictures with depth images.
 #include <algorithm>
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include "datasets/route.h"
 #include "datasets/sequences.h"
 #include "datasets/survey.h"
+#include "evaluation/detection/detection_table.h"
 #include "imaging/image_header.h"
 
 namespace {
@@ -37,7 +39,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     switch (data[0] % 8) {
       case 0:
-        livemap::datasets::ParseSurveyTable(text, "input");
+        if (text.rfind("image,", 0) == 0) {
+          livemap::evaluation::ParseDetectionTable(text, "input");
+        } else {
+          livemap::datasets::ParseSurveyTable(text, "input");
+        }
         break;
       case 1:
         livemap::datasets::ParseYoloLabels(text, "input");

@@ -8,6 +8,7 @@
 #include "common/error.h"
 #include "imaging/decode.h"
 #include "imaging/image_header.h"
+#include "zone/pictures/jpeg_walk.h"
 #include "zone/pictures/picture_recoder.h"
 
 namespace livemap::fuzz {
@@ -61,6 +62,7 @@ void FuzzOne(const std::uint8_t* data, std::size_t size) {
         break;
       case 2:
         zone::WhyNoWholeJpeg(file, data[1]);
+        Require(zone::DecodingWork(file) >= 0);
         break;
       default:
         Require(!imaging::DecodeImage(file.data(), file.size(), kMaxPixels).empty());

@@ -8,6 +8,7 @@
 #include "web/api/official_authenticator.h"
 #include "web/api/official_decision.h"
 #include "web/api/query.h"
+#include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
 
@@ -42,6 +43,11 @@ void CheckHazardQuery(const livemap::web::RequestTarget& target) {
     // Refused.
   }
   try {
+    Require(livemap::web::ParsePointsQuery(target).states.size() <= livemap::zone::kHazardStates);
+  } catch (const livemap::web::BadRequest&) {
+    // Refused.
+  }
+  try {
     livemap::web::ParseStreamQuery(target);
   } catch (const livemap::web::BadRequest&) {
     // Refused.
@@ -58,7 +64,8 @@ void CheckDecision(const std::string& text) {
   try {
     const livemap::web::MapChangeDecision decision = livemap::web::ParseMapChangeDecision(text);
     Require(decision.reason.size() <= livemap::web::kMaxDecisionReasonBytes);
-    Require(decision.confirms || !decision.reason.empty());
+    Require(decision.confirms || decision.undoes || !decision.reason.empty());
+    Require(decision.undoes || !decision.decision_id);
   } catch (const livemap::web::BadRequest& mistake) {
     Require(std::string(mistake.what()).find("accepted is") != std::string::npos);
   }
@@ -67,7 +74,7 @@ void CheckDecision(const std::string& text) {
           livemap::web::OfficialAuthenticator::Verdict::kAllowed);
   for (const auto decision : {livemap::web::Decision::kConfirm, livemap::web::Decision::kReject}) {
     try {
-      const std::string reason = livemap::web::ParseDecisionBody(decision, text);
+      const std::string reason = livemap::web::ParseDecisionBody(decision, text).reason;
       Require(reason.size() <= livemap::web::kMaxDecisionReasonBytes);
       Require(!reason.empty() || decision == livemap::web::Decision::kConfirm);
       for (const char c : reason) Require(static_cast<unsigned char>(c) >= 0x20);
@@ -77,6 +84,18 @@ void CheckDecision(const std::string& text) {
   }
 }
 
+/// A header names codings, and content of any kind is compressed so that it comes out again.
+void CheckEncoding(const std::string& text) {
+  if (text.find_first_of("zZ*") == std::string::npos) {
+    Require(!livemap::web::AcceptsGzip(text));
+  }
+  livemap::web::GzipStream stream;
+  const std::size_t half = text.size() / 2;
+  std::string compressed = stream.Compress(text.substr(0, half), false);
+  compressed += stream.Compress(text.substr(half), true);
+  Require(compressed.size() >= 18 && compressed[0] == '\x1f' && compressed[1] == '\x8b');
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -84,6 +103,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const livemap::web::StaticFiles files(LIVEMAP_SOURCE_DIR "/web/icons");
   livemap::web::IsAllowedOrigin(text, "map.example", {"https://city.example"});
   CheckDecision(text);
+  CheckEncoding(text);
   // The input as a whole, and as what stands behind the address that has parameters.
   for (const std::string& address : {text, "/api/v1/hazards?" + text}) {
     try {

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <random>
 
+#include "protocol/text_rules.h"
 #include "test/fuzz/store_script.h"
-#include "zone/admission/report_validation.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::fuzz {
@@ -76,6 +76,8 @@ struct Template {
       const auto all = zone.Query(std::nullopt, 0, 10);
       zone.Reject(all.at(2).uuid, "Anna", "a shadow");
       zone.Confirm(all.at(3).uuid, "Anna");
+      zone.Handle(MakeReport(50, "car-7", 47));
+      zone.Distrust("car-7", "Anna", "stolen");
       zone.HandleMapChanges({MakeMapChange(1, "car-1", 50), MakeMapChange(2, "car-2", 50),
                              MakeMapChange(3, "car-1", 51)});
     }
@@ -86,7 +88,9 @@ struct Template {
               ReadFuzzTable(open, "reports", "uuid"),
               ReadFuzzTable(open, "lives", "class_name"),
               ReadFuzzTable(open, "trust", "vehicle_key"),
-              ReadFuzzTable(open, "last_reports", "vehicle_id"),
+              ReadFuzzTable(open, "places", "vehicle_id"),
+              ReadFuzzTable(open, "decisions", "id"),
+              ReadFuzzTable(open, "withdrawals", "hazard_uuid"),
               ReadFuzzTable(open, "map_changes", "id"),
               ReadFuzzTable(open, "map_change_events", "sequence"),
               ReadFuzzTable(open, "map_change_reports", "uuid"),
@@ -101,7 +105,7 @@ struct Template {
 };
 
 void RequireSound(const zone::Hazard& hazard) {
-  Require(!hazard.uuid.IsNil() && zone::IsPrintableText(hazard.class_name, 64));
+  Require(!hazard.uuid.IsNil() && protocol::IsPrintableText(hazard.class_name, 64));
   Require(hazard.confidence >= 0 && hazard.confidence <= 1);
   Require(hazard.presence >= 0 && hazard.presence <= 1);
   Require(geo::IsValid(hazard.position) && hazard.covariance_m2.allFinite());
@@ -113,7 +117,7 @@ void RequireSound(const zone::Hazard& hazard) {
 }
 
 void RequireSound(const zone::MapChangeFeature& feature) {
-  Require(!feature.uuid.IsNil() && zone::IsPrintableText(feature.class_name, 64));
+  Require(!feature.uuid.IsNil() && protocol::IsPrintableText(feature.class_name, 64));
   Require(feature.confidence >= 0 && feature.confidence <= 1);
   Require(geo::IsValid(feature.position) && feature.covariance_m2.allFinite());
   Require(feature.covariance_m2.determinant() > 0 && feature.covariance_m2(0, 0) > 0);
@@ -131,6 +135,17 @@ void RequireWorking(zone::ZoneService& zone, const Template& made) {
       Require(event.reason.size() <= 200 && event.at_ns >= 0);
     }
   }
+  // What officials decided can be looked at and taken back, whatever the rows say.
+  for (const zone::Hazard& hazard : zone.Query(std::nullopt, 1, 1000)) {
+    if (hazard.uuid == made.spared.uuid) continue;
+    zone.Undo(hazard.uuid, "Bert");
+    RequireSound(*zone.Find(hazard.uuid));
+  }
+  if (const auto preview = zone.PreviewDistrust("car-7")) {
+    Require(preview->would_vanish <= preview->would_change);
+    Require(preview->would_change <= preview->hazards);
+  }
+  zone.Trust("car-7", "Bert");
   for (const zone::Hazard& hazard : zone.QueryNear({42, 8}, 1e6, 100)) RequireSound(hazard);
   for (const zone::MapChangeFeature& feature : zone.QueryMapChanges(std::nullopt, 1, 1000)) {
     RequireSound(feature);

@@ -14,8 +14,8 @@ from sensor_msgs.msg import CameraInfo, Image, NavSatFix, NavSatStatus
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from livemap.msg import (ChangedObjects, Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
-                         LinkState, PicturePart, PictureRequest, ReportReceipt, VehiclePosition)
+from livemap.msg import (BestViews, ChangedObjects, Detection, DetectionArray, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
+                         LinkState, ReportReceipt, VehiclePosition)
 from node_testing import NodeletUnderTest, eventually, parameters_of
 
 LATITUDE, LONGITUDE = 40.4433, -79.9436
@@ -87,7 +87,7 @@ def detections(time_s, *found):
     return message
 
 
-def annotated(time_s):
+def camera_image(time_s):
     message = Image(width=WIDTH, height=HEIGHT, encoding="bgr8", step=3 * WIDTH)
     message.header.stamp = stamp(time_s)
     message.header.frame_id = OPTICAL
@@ -111,15 +111,14 @@ class Vehicle(NodeletUnderTest):
         self.publishers = {
             topic: self.advertise(topic, message_class, latch=latch)
             for topic, message_class, latch in [
-                ("hazard/detections", DetectionArray, False), *self.sources(),
+                ("hazard/detections", DetectionArray, False), *self.events(), ("camera_rect/image", Image, False),
                 ("fix", NavSatFix, False), ("camera_rect/camera_info", CameraInfo, True),
                 ("hazard/notice", HazardNotice, False), ("hazard/receipt", ReportReceipt, False),
                 ("hazard/poll", HazardPoll, False), ("link_state", LinkState, True),
                 ("change/report", ChangedObjects, False)]}
         for topic, message_class in [("hazard/report", HazardReport), ("vehicle/position", VehiclePosition),
                                      ("hazard/local_map", MarkerArray), ("path", Path),
-                                     ("hazard/poll_answer", HazardPollAnswer),
-                                     ("hazard/picture_request", PictureRequest)]:
+                                     ("hazard/poll_answer", HazardPollAnswer)]:
             self.subscribe(topic, message_class)
         self.mounting = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self.ends.append(self.mounting)
@@ -127,23 +126,11 @@ class Vehicle(NodeletUnderTest):
     def uses_events(self):
         return self.parameters.get("use_events", True)
 
-    def sources(self):
-        """Where sightings and their pictures come from."""
-        if self.uses_events():
-            return [("hazard/events", DetectionArray, False), ("hazard/picture", Image, False),
-                    ("hazard/picture_part", PicturePart, False)]
-        return [("hazard/annotated", Image, False)]
-
-    def answer_picture_requests(self, draw=None):
-        """The detector's side: the picture of the image that is asked for."""
-        def answer(request):
-            picture = (draw or annotated)((request.stamp - stamp(0)).to_sec())
-            picture.header.stamp = request.stamp
-            if request.part.width:
-                self.publish("hazard/picture_part", PicturePart(image=picture, part=request.part))
-            else:
-                self.publish("hazard/picture", picture)
-        self.ends.append(rospy.Subscriber(f"/{self.name}/hazard/picture_request", PictureRequest, answer))
+    def events(self):
+        """The tracker's topics, where it counts."""
+        if not self.uses_events():
+            return []
+        return [("hazard/events", DetectionArray, False), ("hazard/best_views", BestViews, False)]
 
     def link(self, state):
         self.publish("link_state", LinkState(state=state))
@@ -189,10 +176,9 @@ class Vehicle(NodeletUnderTest):
         for tenth in range(round(10 * from_s), round(10 * to_s) + 1):
             self.publish("fix", fix(tenth / 10))
 
-    def see(self, time_s, *found):
-        """As the detector says it, and the tracker: the objects at their best view."""
-        if not self.uses_events():
-            self.publish("hazard/annotated", annotated(time_s))
+    def see(self, time_s, *found, image=None):
+        """The camera's image, and what the detector says of it, and the tracker: the objects at their best view."""
+        self.publish("camera_rect/image", image or camera_image(time_s))
         self.publish("hazard/detections", detections(time_s, *found))
         if self.uses_events() and found:
             self.publish("hazard/events", detections(time_s, *found))

@@ -8,6 +8,7 @@ import re
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import threading
 import xmlrpc.client
@@ -16,11 +17,8 @@ import yaml
 
 from node_testing import PATIENCE_S, SOURCE_DIRECTORY, TEST_DIRECTORY, eventually, start_child
 
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+sys.path.insert(0, os.path.join(SOURCE_DIRECTORY, "scripts", "lib"))
+from listening_port import free_port  # noqa: E402
 
 
 def port_answers(port):
@@ -53,13 +51,20 @@ class Broker:
         self.port = free_port()
         self.directory = tempfile.mkdtemp(prefix="livemap_broker_")
         self.process = None
+        self.log = tempfile.NamedTemporaryFile(suffix=".log")
 
     def start(self):
         self.process = start_child(
             [os.path.join(SOURCE_DIRECTORY, "scripts", "livemap_broker"), "--directory",
              self.directory, "--port", str(self.port), "--zone", "test", "--vehicles",
-             "car-1,car-2,car-3", "__name:=broker", "__log:=/dev/null"])
-        eventually(lambda: port_answers(self.port), "the broker answers")
+             "car-1,car-2,car-3", "__name:=broker", "__log:=/dev/null"], stdout=self.log, stderr=subprocess.STDOUT)
+        eventually(self._answers, "the broker answers")
+
+    def _answers(self):
+        if self.process.poll() is not None:
+            with open(self.log.name, encoding="utf-8", errors="replace") as file:
+                raise AssertionError(f"the broker ended with code {self.process.returncode}: {file.read()}")
+        return port_answers(self.port)
 
     def kill(self):
         self.process.kill()

@@ -25,6 +25,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "scripts" / "lib"), str(ROOT / "test" / "support")]
 import demo_system as system  # noqa: E402
 from demo_observers import parse_time  # noqa: E402
+from listening_port import free_port  # noqa: E402
 from node_testing import eventually  # noqa: E402
 
 SPEED_MPS, SECONDS, RATE_HZ = 8, 15, 5
@@ -90,7 +91,7 @@ class Zone(system.LiveMapSystem):
 
     def start_pass(self, vehicle, bag, drive):
         """`vehicle` drives down the street once, with what it remembers of its other drives."""
-        self.vehicle_port = system.free_port()
+        self.vehicle_port = free_port()
         self.vehicle_master = f"http://127.0.0.1:{self.vehicle_port}"
         self.launch(f"{vehicle}-{drive}", self.vehicle_port, "replay.launch", {
             "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,

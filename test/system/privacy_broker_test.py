@@ -138,7 +138,7 @@ class PassingVehicle(NodeletUnderTest):
         self.detections = self.subscribe("hazard/detections", DetectionArray)
         self.mounting = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
         self.ends.append(self.mounting)
-        detection = {"model": TINY_MODEL, "queue_size": 100, "privacy": privacy}
+        detection = {"model": TINY_MODEL, "queue_size": 100}
         if use_events:
             detection["tracking"] = True
         self.start_nodelet("manager", "manager")
@@ -146,7 +146,9 @@ class PassingVehicle(NodeletUnderTest):
                 ("hazard_detection", "HazardDetectionNodelet", detection),
                 ("hazard_reporting", "HazardReportingNodelet",
                  {"database": os.path.join(tempfile.mkdtemp(), "hazards.sqlite3"), "use_events": use_events,
-                  "max_ground_sigma_m": 5.0, "picture_wait_s": 5.0, "jpeg_quality": 95, "poll_jpeg_quality": 95,
+                  "privacy": privacy, "privacy_finder": "cascades", "max_ground_sigma_m": 5.0, "picture_wait_s": 5.0,
+                  "jpeg_quality": 95,
+                  "poll_jpeg_quality": 95,
                   # Nobody answers: a few reports, each once, so that the answers to polls find their way.
                   "max_pending": 3, "resend_first_s": 600.0, "resend_longest_s": 600.0}),
                 ("mqtt_bridge", "MqttBridgeNodelet",

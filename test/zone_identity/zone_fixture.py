@@ -5,12 +5,16 @@ import pathlib
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 
 from mqtt_sender import PATIENCE_S, Sender, tls_context
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts/lib"))
+from listening_port import free_port  # noqa: E402
+
 ZONE = "test"
 
 
@@ -18,12 +22,6 @@ def livemap_zone(*arguments):
     """Runs `./livemap zone ARGUMENTS`'s program; the finished process with its output."""
     return subprocess.run(["/usr/bin/python3", str(ROOT / "scripts" / "livemap_zone_identity"), *map(str, arguments)],
                           capture_output=True, text=True, check=False)
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def topic(vehicle, name):
