@@ -12,6 +12,7 @@
 #include "common/frame_queue.h"
 #include "common/mutex.h"
 #include "imaging/rectifier.h"
+#include "nodelets/camera_ingest/calibration_cache.h"
 #include "nodelets/camera_ingest/frame_processor.h"
 #include "nodelets/camera_ingest/ingest_reader.h"
 #include "nodelets/camera_ingest/ingest_stereo.h"

@@ -6,7 +6,6 @@
 #include <boost/make_shared.hpp>
 #include <functional>
 
-#include "common/clock.h"
 #include "common/error.h"
 #include "imaging/decode.h"
 #include "imaging/orientation.h"
@@ -16,9 +15,6 @@ namespace livemap::nodelets {
 namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
-
-// More cameras than one vehicle has: a publisher that makes up frame_ids must not fill the memory.
-constexpr std::size_t kMaxCameras = 64;
 
 std::string Size(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
@@ -69,36 +65,6 @@ bool NeedsConversion(const std::string& encoding) {
 }
 
 }  // namespace
-
-void CalibrationCache::Put(const sensor_msgs::CameraInfoConstPtr& info) {
-  {
-    const MutexLock lock(mutex_);
-    if (by_frame_id_.size() >= kMaxCameras && by_frame_id_.count(info->header.frame_id) == 0)
-      return;
-    by_frame_id_[info->header.frame_id] = info;
-  }
-  arrived_.NotifyAll();
-}
-
-sensor_msgs::CameraInfoConstPtr CalibrationCache::Find(const std::string& frame_id, double wait_s) {
-  const MutexLock lock(mutex_);
-  const auto deadline = SteadyDeadline(wait_s);
-  while (!closed_ && by_frame_id_.count(frame_id) == 0 && arrived_.WaitUntil(mutex_, deadline)) {
-  }
-  const auto found = by_frame_id_.find(frame_id);
-  if (found == by_frame_id_.end()) {
-    throw Error("there is no camera_info of frame_id '" + frame_id + "'");
-  }
-  return found->second;
-}
-
-void CalibrationCache::Close() {
-  {
-    const MutexLock lock(mutex_);
-    closed_ = true;
-  }
-  arrived_.NotifyAll();
-}
 
 const imaging::Rectifier& FrameProcessor::RectifierFor(const sensor_msgs::CameraInfo& info) {
   const imaging::CameraCalibration calibration = ros_io::FromMessage(info);

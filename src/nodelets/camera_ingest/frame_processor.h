@@ -5,12 +5,9 @@
 #include <sensor_msgs/Image.h>
 
 #include <cstdint>
-#include <map>
 #include <memory>
-#include <string>
 
 #include "common/error.h"
-#include "common/mutex.h"
 #include "imaging/rectifier.h"
 
 namespace livemap::nodelets {
@@ -32,23 +29,6 @@ class SizeMismatch : public Error {
 struct ProcessedFrame {
   sensor_msgs::ImageConstPtr image;  ///< The incoming pointer itself when nothing had to change.
   sensor_msgs::CameraInfoConstPtr info;
-};
-
-/// The newest calibration of each camera, by frame_id. Thread-safe.
-class CalibrationCache {
- public:
-  void Put(const sensor_msgs::CameraInfoConstPtr& info);
-  /// Waits up to `wait_s` when there is none yet: the first camera_info may come just behind the
-  /// first image. Throws Error when there is still none.
-  sensor_msgs::CameraInfoConstPtr Find(const std::string& frame_id, double wait_s);
-  /// Ends all waiting.
-  void Close();
-
- private:
-  Mutex mutex_;
-  ConditionVariable arrived_;
-  std::map<std::string, sensor_msgs::CameraInfoConstPtr> by_frame_id_ GUARDED_BY(mutex_);
-  bool closed_ GUARDED_BY(mutex_) = false;
 };
 
 /// Checks, decodes, rectifies and resizes one frame after the other. Not thread-safe.
