@@ -147,7 +147,8 @@ void BM_Pool(benchmark::State& state) {
     std::vector<Pool::Engine> engines;
     for (int i = 0; i < state.range(1); ++i) {
       const auto detector = std::make_shared<perception::HazardDetector>(manifest, threads, kind);
-      engines.emplace_back([detector](const cv::Mat& frame) { return detector->Detect(frame); });
+      engines.emplace_back(
+          [detector](const cv::Mat& frame, std::size_t) { return detector->Detect(frame); });
     }
     Pool pool(std::move(engines), kFrames, [](const Pool::Outcome&) {});
     const cv::Mat frame = NoiseFrame(640, 400);

@@ -1,6 +1,5 @@
 #include "geo/spatial_grid.h"
 
-#include <GeographicLib/Geocentric.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,14 +9,6 @@
 
 namespace livemap::geo {
 namespace {
-
-/// Earth-centred position of a place on the ellipsoid, metres.
-Eigen::Vector3d GridPlaceOf(const GeoPoint& place) {
-  Eigen::Vector3d earth_m;
-  GeographicLib::Geocentric::WGS84().Forward(place.latitude_deg, place.longitude_deg, 0.0,
-                                             earth_m.x(), earth_m.y(), earth_m.z());
-  return earth_m;
-}
 
 /// Geodesic distance of two places that are a chord apart. Solving the geodesic costs a
 /// microsecond; over some kilometres the ellipsoid is a sphere, and an arc is longer than its chord
@@ -53,7 +44,7 @@ SpatialGrid::Slot SpatialGrid::SlotOf(const Eigen::Vector3d& earth_m, std::uint3
 void SpatialGrid::Insert(const GeoPoint& place, std::uint64_t id) {
   if (!IsValid(place)) throw Error("a place of a spatial grid is no valid position");
   if (2 * (entries_.size() + 1) > slots_.size()) Grow();
-  const Eigen::Vector3d earth_m = GridPlaceOf(place);
+  const Eigen::Vector3d earth_m = EarthCentred(place);
   PutSlot(SlotOf(earth_m, static_cast<std::uint32_t>(entries_.size())));
   entries_.push_back({earth_m, place, id});
 }
@@ -74,7 +65,7 @@ std::optional<std::size_t> SpatialGrid::FindPlace(const Slot& like, const GeoPoi
 
 bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
   if (!IsValid(place)) return false;
-  const auto found = FindPlace(SlotOf(GridPlaceOf(place), kEmpty), place, id);
+  const auto found = FindPlace(SlotOf(EarthCentred(place), kEmpty), place, id);
   if (!found) return false;
   const std::uint32_t index = slots_[*found].entry;
   ClearSlot(*found);
@@ -91,10 +82,10 @@ bool SpatialGrid::Erase(const GeoPoint& place, std::uint64_t id) {
 bool SpatialGrid::Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t id) {
   if (!IsValid(from)) return false;
   if (!IsValid(to)) throw Error("a place of a spatial grid is no valid position");
-  const auto found = FindPlace(SlotOf(GridPlaceOf(from), kEmpty), from, id);
+  const auto found = FindPlace(SlotOf(EarthCentred(from), kEmpty), from, id);
   if (!found) return false;
   const std::uint32_t index = slots_[*found].entry;
-  const Eigen::Vector3d earth_m = GridPlaceOf(to);
+  const Eigen::Vector3d earth_m = EarthCentred(to);
   const Slot slot = SlotOf(earth_m, index);
   if (slot.hash == slots_[*found].hash) {
     slots_[*found] = slot;
@@ -109,7 +100,7 @@ bool SpatialGrid::Move(const GeoPoint& from, const GeoPoint& to, std::uint64_t i
 std::optional<SpatialGrid::Neighbour> SpatialGrid::Nearest(const GeoPoint& centre,
                                                            double radius_m) const {
   if (!IsValid(centre) || !(radius_m >= 0)) return std::nullopt;
-  Search search{centre, GridPlaceOf(centre), radius_m, std::nullopt};
+  Search search{centre, EarthCentred(centre), radius_m, std::nullopt};
   const Cell low = CellAt(search.earth_m.array() - search.ChordM());
   const Cell high = CellAt(search.earth_m.array() + search.ChordM());
   // In a large table every cell is a cache miss: ask for several at once, then read them.
@@ -137,7 +128,7 @@ std::vector<SpatialGrid::Neighbour> SpatialGrid::Within(const GeoPoint& centre,
                                                         double radius_m) const {
   std::vector<Neighbour> found;
   if (!IsValid(centre) || !(radius_m >= 0)) return found;
-  const Search search{centre, GridPlaceOf(centre), radius_m, std::nullopt};
+  const Search search{centre, EarthCentred(centre), radius_m, std::nullopt};
   const Cell low = CellAt(search.earth_m.array() - search.ChordM());
   const Cell high = CellAt(search.earth_m.array() + search.ChordM());
   std::vector<std::uint32_t> hashes;

@@ -27,6 +27,13 @@ double GeodesicDistanceM(const GeoPoint& a, const GeoPoint& b) {
   return distance_m;
 }
 
+Eigen::Vector3d EarthCentred(const GeoPoint& point) {
+  Eigen::Vector3d earth_m;
+  GeographicLib::Geocentric::WGS84().Forward(point.latitude_deg, point.longitude_deg, 0.0,
+                                             earth_m.x(), earth_m.y(), earth_m.z());
+  return earth_m;
+}
+
 GeoPoint GeodesicDestination(const GeoPoint& start, double bearing_rad, double distance_m) {
   GeoPoint end;
   GeographicLib::Geodesic::WGS84().Direct(start.latitude_deg, start.longitude_deg,

@@ -20,6 +20,15 @@ TEST(Wgs84, DistanceMatchesPublishedGeodesics) {
   EXPECT_NEAR(GeodesicDistanceM({0, 179.99999}, {0, -179.99999}), 2.2264, 0.001);
 }
 
+TEST(Wgs84, AChordIsAlmostAsLongAsTheGeodesic) {
+  for (const GeoPoint start :
+       {GeoPoint{40, -79}, GeoPoint{89.99999, 10}, GeoPoint{-17, 179.9999}}) {
+    const GeoPoint end = GeodesicDestination(start, 1.0, 100.0);
+    EXPECT_NEAR((EarthCentred(start) - EarthCentred(end)).norm(), 100.0, 1e-6);
+  }
+  EXPECT_NEAR(EarthCentred({0, 90}).y(), 6378137.0, 1e-6);
+}
+
 TEST(Wgs84, DestinationLiesAtTheDistanceAlsoAcrossPoleAndAntimeridian) {
   for (const GeoPoint start : {GeoPoint{40, -79}, GeoPoint{89.99999, 10}, GeoPoint{-90, 0},
                                GeoPoint{-17, 179.99999}, GeoPoint{69, -180}}) {

@@ -7,6 +7,8 @@
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -46,13 +48,15 @@ class HazardDetectionPart : public NodeletPart {
   using Clock = std::chrono::steady_clock;
   struct Frame {
     sensor_msgs::ImageConstPtr image;
-    std::uint64_t round = 0;  ///< How often time had been set back when it came.
+    std::uint64_t round = 0;   ///< How often time had been set back when it came.
+    bool in_one_view = false;  ///< The one in all views was just before it.
   };
   /// What an engine makes of an image.
   struct Seen {
     cv_bridge::CvImageConstPtr bgr;
     std::vector<perception::HazardDetection> found;
     double ms = 0;  ///< conversion and detection
+    bool in_one_view = false;
   };
   using Pool = perception::DetectorPool<Frame, Seen>;
 
@@ -97,23 +101,33 @@ class HazardDetectionPart : public NodeletPart {
         [this](Diagnostics::Status& status) { Diagnose(status); });
     const image_transport::TransportHints hints("raw", ros::TransportHints().tcpNoDelay(),
                                                 getPrivateNodeHandle());
-    subscriber_ = transport.subscribe("camera_rect/image", 0,
-                                      boost::function<void(const sensor_msgs::ImageConstPtr&)>(
-                                          [this](const sensor_msgs::ImageConstPtr& image) {
-                                            if (stamps_->IsUsable("an image", image->header.stamp))
-                                              pool_->Push({image, round_});
-                                          }),
-                                      ros::VoidPtr(), hints);
+    subscriber_ = transport.subscribe(
+        "camera_rect/image", 0,
+        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
+            [this](const sensor_msgs::ImageConstPtr& image) { OnImage(image); }),
+        ros::VoidPtr(), hints);
+  }
+
+  void OnImage(const sensor_msgs::ImageConstPtr& image) {
+    if (!stamps_->IsUsable("an image", image->header.stamp)) return;
+    const double stamp_s = image->header.stamp.toSec();
+    const bool in_one_view = config_.all_views_hz > 0 &&
+                             std::abs(stamp_s - all_views_stamp_s_) * config_.all_views_hz < 1;
+    if (!in_one_view) all_views_stamp_s_ = stamp_s;
+    pool_->Push({image, round_, in_one_view});
   }
 
   void StartPool() {
     std::vector<Pool::Engine> engines;
     for (const std::unique_ptr<perception::HazardDetector>& detector : detectors_) {
-      engines.emplace_back([&detector](const Frame& frame) {
+      engines.emplace_back([this, &detector](const Frame& frame, std::size_t waiting) {
         const Clock::time_point start = Clock::now();
         Seen seen;
         seen.bgr = cv_bridge::toCvShare(frame.image, "bgr8");
-        seen.found = detector->Detect(seen.bgr->image);
+        seen.in_one_view = frame.in_one_view || IsBehind(waiting);
+        seen.found =
+            detector->Detect(seen.bgr->image, seen.in_one_view ? perception::Look::kFirstView
+                                                               : perception::Look::kAllViews);
         seen.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
         return seen;
       });
@@ -126,6 +140,12 @@ class HazardDetectionPart : public NodeletPart {
                                        Drop(outcome.error);
                                      }
                                    });
+  }
+
+  /// Whether so many images wait that the model's first view must do.
+  bool IsBehind(std::size_t waiting) const {
+    const auto limit = static_cast<std::size_t>(config_.one_view_from_waiting);
+    return limit > 0 && waiting >= limit;
   }
 
   void Drop(const std::string& error) {
@@ -155,6 +175,7 @@ class HazardDetectionPart : public NodeletPart {
       figures_.detections += found.size();
       ++figures_.processed_in_window;
       figures_.ms_in_window += seen.ms;
+      figures_.in_one_view += seen.in_one_view ? 1 : 0;
     }
     // Last: who reports a hazard does not wait for masks and boxes that somebody looks at.
     if ((config_.annotate_empty || !found.empty()) &&
@@ -244,6 +265,7 @@ class HazardDetectionPart : public NodeletPart {
     status.add("frames_dropped", counters.dropped);  // unusable ones among them
     status.add("frames_waiting", counters.waiting);
     status.add("frames_unusable", figures.bad);
+    status.add("frames_in_one_view", figures.in_one_view);
     status.add("frames_annotated", figures.annotated);
     const perception::PictureMasker::Counters pictures = masker_->counters();
     status.add("pictures_withheld", pictures.withheld);
@@ -277,6 +299,7 @@ class HazardDetectionPart : public NodeletPart {
     std::uint64_t bad = 0;
     std::uint64_t annotated = 0;
     std::uint64_t detections = 0;
+    std::uint64_t in_one_view = 0;
     std::uint64_t processed_in_window = 0;
     double ms_in_window = 0;
   };
@@ -290,7 +313,9 @@ class HazardDetectionPart : public NodeletPart {
   /// None: tracking is off.
   std::unique_ptr<HazardTracking> tracking_ PT_GUARDED_BY(tracking_mutex_);
   std::uint64_t tracked_round_ GUARDED_BY(tracking_mutex_) = 0;  ///< Of the newest image in it.
-  std::uint64_t round_ = 0;                                      ///< The subscriber's own.
+  // The subscriber's own:
+  std::uint64_t round_ = 0;
+  double all_views_stamp_s_ = -std::numeric_limits<double>::infinity();
   std::unique_ptr<perception::PictureMasker> masker_;
   std::unique_ptr<StampChecks> stamps_;
   image_transport::Subscriber subscriber_;

@@ -131,7 +131,7 @@ class HazardReportingPart : public NodeletPart {
           reporter_->SetMounting(frame, mounting);
         });
     subscribers_ = {
-        node.subscribe("hazard/detections", 100, &Self::OnDetections, this),
+        node.subscribe("hazard/detections", 1000, &Self::OnDetections, this),
         node.subscribe("link_state", 1, &Self::OnLink, this),
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),

@@ -28,8 +28,9 @@ namespace livemap::perception {
 template <typename Item, typename Result>
 class DetectorPool {
  public:
-  /// One engine's work on one item; called on that engine's thread only. May throw.
-  using Engine = std::function<Result(const Item&)>;
+  /// One engine's work on one item, behind which `waiting` others wait for an engine; called on
+  /// that engine's thread only. May throw.
+  using Engine = std::function<Result(const Item&, std::size_t waiting)>;
 
   /// What became of an item.
   struct Outcome {
@@ -115,10 +116,11 @@ class DetectorPool {
       const std::uint64_t number = taken_++;
       Outcome outcome{std::move(queue_.front()), std::nullopt, ""};
       queue_.pop_front();
+      const std::size_t waiting = queue_.size();
       ++in_flight_;
       lock.Unlock();
       try {
-        outcome.result = engine(outcome.item);
+        outcome.result = engine(outcome.item, waiting);
       } catch (const std::exception& error) {
         outcome.error = error.what();
       } catch (...) {

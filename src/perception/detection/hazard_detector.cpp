@@ -20,20 +20,22 @@ HazardDetector::HazardDetector(const ModelManifest& manifest,
   }
 }
 
-std::vector<HazardDetection> HazardDetector::Detect(const cv::Mat& bgr) {
-  DetectionsOfViews views = Views(bgr);
-  if (manifest_.head.mirrored) {
+std::vector<HazardDetection> HazardDetector::Detect(const cv::Mat& bgr, Look look) {
+  DetectionsOfViews views = Views(bgr, look);
+  if (manifest_.head.mirrored && look == Look::kAllViews) {
     cv::flip(bgr, mirrored_, 1);
-    for (std::vector<HazardDetection>& view : Mirrored(Views(mirrored_), bgr.cols)) {
+    for (std::vector<HazardDetection>& view : Mirrored(Views(mirrored_, look), bgr.cols)) {
       views.push_back(std::move(view));
     }
   }
   return JoinViews(std::move(views), manifest_);
 }
 
-DetectionsOfViews HazardDetector::Views(const cv::Mat& bgr) {
-  const cv::Mat predictions = engine_->Run(
-      ComputesIn() == Precision::kInt8 ? letterbox_.FillPixels(bgr) : letterbox_.Fill(bgr));
+DetectionsOfViews HazardDetector::Views(const cv::Mat& bgr, Look look) {
+  const cv::Mat input =
+      ComputesIn() == Precision::kInt8 ? letterbox_.FillPixels(bgr) : letterbox_.Fill(bgr);
+  const cv::Mat predictions =
+      look == Look::kAllViews ? engine_->Run(input) : engine_->RunFirstView(input);
   return DecodeViews(predictions, manifest_, letterbox_.Scale(bgr.size()), bgr.size());
 }
 

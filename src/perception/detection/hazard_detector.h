@@ -13,6 +13,13 @@
 
 namespace livemap::perception {
 
+/// What a network that looks more than once (ModelManifest::Head::views) looks at.
+enum class Look {
+  kAllViews,
+  /// The first view alone, where the engine computes views apart: for who has no time for all.
+  kFirstView,
+};
+
 /// Finds hazards in single images: letterbox, network, decoding, thresholds, suppression. Not
 /// thread-safe: one detector per thread.
 class HazardDetector {
@@ -26,7 +33,7 @@ class HazardDetector {
 
   /// Detections in `bgr` (8 bit, 3 channels, not empty; anything else throws Error), in pixels of
   /// that image, descending confidence.
-  std::vector<HazardDetection> Detect(const cv::Mat& bgr);
+  std::vector<HazardDetection> Detect(const cv::Mat& bgr, Look look = Look::kAllViews);
 
   const ModelManifest& manifest() const { return manifest_; }
   /// The library that runs it.
@@ -35,7 +42,7 @@ class HazardDetector {
   Precision ComputesIn() const { return engine_->ComputesIn(); }
 
  private:
-  DetectionsOfViews Views(const cv::Mat& bgr);
+  DetectionsOfViews Views(const cv::Mat& bgr, Look look);
 
   ModelManifest manifest_;
   std::unique_ptr<InferenceEngine> engine_;

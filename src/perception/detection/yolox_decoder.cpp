@@ -138,17 +138,19 @@ class YoloxKeptBoxes {
   std::vector<cv::Rect2f> boxes_;
 };
 
-void CheckYoloxShape(const cv::Mat& predictions, const ModelManifest& manifest) {
+/// Of how many views the rows are: all, or the first.
+std::size_t CountYoloxViews(const cv::Mat& predictions, const ModelManifest& manifest) {
   const int columns = 5 + static_cast<int>(manifest.classes.size());
-  const bool accepted = predictions.type() == CV_32F && predictions.dims == 3 &&
-                        predictions.isContinuous() && predictions.size[0] == 1 &&
-                        predictions.size[1] == manifest.AnchorCount() &&
-                        predictions.size[2] == columns;
-  if (!accepted) {
-    throw Error("the output of model '" + manifest.name +
-                "' has another shape, accepted is float32 of 1 x " +
-                std::to_string(manifest.AnchorCount()) + " x " + std::to_string(columns));
+  if (predictions.type() == CV_32F && predictions.dims == 3 && predictions.isContinuous() &&
+      predictions.size[0] == 1 && predictions.size[2] == columns) {
+    if (predictions.size[1] == manifest.AnchorCount()) {
+      return static_cast<std::size_t>(manifest.head.views);
+    }
+    if (predictions.size[1] == manifest.AnchorCountOfView(0)) return 1;
   }
+  throw Error("the output of model '" + manifest.name +
+              "' has another shape, accepted is float32 of 1 x " +
+              std::to_string(manifest.AnchorCount()) + " x " + std::to_string(columns));
 }
 
 /// A view may be surer than the mean of all: what is weak in one is looked at too.
@@ -202,14 +204,13 @@ std::vector<HazardDetection> SuppressOverlaps(std::vector<HazardDetection> candi
 
 DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& manifest,
                               double scale, cv::Size image_size) {
-  CheckYoloxShape(predictions, manifest);
+  DetectionsOfViews views(CountYoloxViews(predictions, manifest));
   const std::size_t columns = 5 + manifest.classes.size();
   const std::vector<float> thresholds = YoloxThresholdsOfViews(manifest);
   const float* values = predictions.ptr<float>();
-  const auto view_count = static_cast<std::size_t>(manifest.head.views);
-  const std::size_t levels = manifest.head.strides.size() / view_count;
-  DetectionsOfViews views(view_count);
-  for (std::size_t level = 0; level < manifest.head.strides.size(); ++level) {
+  const std::size_t levels =
+      manifest.head.strides.size() / static_cast<std::size_t>(manifest.head.views);
+  for (std::size_t level = 0; level < views.size() * levels; ++level) {
     const int stride = manifest.head.strides[level];
     for (int row = 0; row < manifest.input.height / stride; ++row) {
       for (int column = 0; column < manifest.input.width / stride; ++column) {
@@ -226,8 +227,8 @@ DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& m
 }
 
 std::vector<HazardDetection> JoinViews(DetectionsOfViews views, const ModelManifest& manifest) {
-  if (views.size() == 1) return std::move(views[0]);
-  return AboveYoloxThresholds(FuseViews(views, kFusionIou), manifest);
+  return AboveYoloxThresholds(
+      views.size() == 1 ? std::move(views[0]) : FuseViews(views, kFusionIou), manifest);
 }
 
 DetectionsOfViews Mirrored(DetectionsOfViews views, int width) {

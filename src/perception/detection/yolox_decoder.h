@@ -24,6 +24,7 @@ std::vector<HazardDetection> DecodeYolox(const cv::Mat& predictions, const Model
 
 /// The first half of DecodeYolox: the detections of each view, suppressed, in descending
 /// confidence. Of a network that looks more than once they reach down to `kMinOfView`.
+/// `predictions` may be the rows of the first view alone, which gives one view.
 DetectionsOfViews DecodeViews(const cv::Mat& predictions, const ModelManifest& manifest,
                               double scale, cv::Size image_size);
 

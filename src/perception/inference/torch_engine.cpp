@@ -152,26 +152,8 @@ class Int8Engine final : public InferenceEngine {
     CheckOutput(*this, manifest, file_);
   }
 
-  cv::Mat Run(const cv::Mat& pixels) override {
-    if (pixels.type() != CV_8UC3 || !pixels.isContinuous() || pixels.size() != views_[0].size) {
-      throw Error("model file '" + file_ + "' cannot run on an input of " +
-                  ShapeText(ShapeOf(pixels)) + ", its manifest accepts 8 bits of " +
-                  std::to_string(views_[0].size.height) + " x " +
-                  std::to_string(views_[0].size.width) + " x 3");
-    }
-    const c10::InferenceMode inference_only;
-    threads_.Use();
-    float* rows = output_.ptr<float>();
-    for (View& view : views_) {
-      cv::Mat seen = pixels;
-      if (view.size != pixels.size()) {
-        cv::resize(pixels, scaled_, view.size, 0, 0, cv::INTER_LINEAR);
-        seen = scaled_;
-      }
-      rows = RunView(view, seen, rows);
-    }
-    return output_;
-  }
+  cv::Mat Run(const cv::Mat& pixels) override { return RunViews(pixels, views_.size()); }
+  cv::Mat RunFirstView(const cv::Mat& pixels) override { return RunViews(pixels, 1); }
 
   EngineKind Kind() const override { return EngineKind::kTorch; }
   Precision ComputesIn() const override { return Precision::kInt8; }
@@ -182,6 +164,32 @@ class Int8Engine final : public InferenceEngine {
     cv::Size size;  ///< px
     int anchors;
   };
+
+  /// The rows of the first `count` views.
+  cv::Mat RunViews(const cv::Mat& pixels, std::size_t count) {
+    if (pixels.type() != CV_8UC3 || !pixels.isContinuous() || pixels.size() != views_[0].size) {
+      throw Error("model file '" + file_ + "' cannot run on an input of " +
+                  ShapeText(ShapeOf(pixels)) + ", its manifest accepts 8 bits of " +
+                  std::to_string(views_[0].size.height) + " x " +
+                  std::to_string(views_[0].size.width) + " x 3");
+    }
+    const c10::InferenceMode inference_only;
+    threads_.Use();
+    float* rows = output_.ptr<float>();
+    int anchors = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      View& view = views_[i];
+      anchors += view.anchors;
+      cv::Mat seen = pixels;
+      if (view.size != pixels.size()) {
+        cv::resize(pixels, scaled_, view.size, 0, 0, cv::INTER_LINEAR);
+        seen = scaled_;
+      }
+      rows = RunView(view, seen, rows);
+    }
+    const int shape[] = {1, anchors, static_cast<int>(columns_)};
+    return {3, shape, CV_32F, output_.data};
+  }
 
   /// Writes the view's rows to `rows` and returns what follows them.
   float* RunView(View& view, const cv::Mat& seen, float* rows) {

@@ -29,6 +29,17 @@ void ReadDetectionNetwork(ParameterReader& parameters, HazardDetectionConfig& co
                   "engines, as many more results may wait for an earlier image's result. When one "
                   "more image comes, the oldest is dropped and counted in frames_dropped: for a "
                   "live map the newest image is worth most. A longer queue only adds latency.");
+  parameters.Read("all_views_hz", config.all_views_hz, {0, 1000},
+                  "How often a second, by the images' stamps, a model that looks at images several "
+                  "times does so. It looks once at those between, which takes less than half the "
+                  "time: they show nearly the same, and others need the cores too. Needs a model "
+                  "whose engine computes views apart (precision int8). 0: always all views.",
+                  "Hz");
+  parameters.Read("one_view_from_waiting", config.one_view_from_waiting, {0, 1000},
+                  "While at least this many images wait, a model that looks at each image several "
+                  "times looks once, which takes less than half the time: rather one look than a "
+                  "dropped image. frames_in_one_view counts them. It needs a model whose engine "
+                  "computes views apart (precision int8). 0: always all views.");
   ListImageTransport(parameters,
                      " Inside the manager raw images move by pointer. compressed is for a camera "
                      "on another machine; the receiving thread decodes.");

@@ -19,13 +19,15 @@ struct HazardTrackingConfig {
 
 /// Defaults of the hazard_detection nodelet.
 struct HazardDetectionConfig {
-  std::string model;            ///< Path of the manifest; must be given.
-  std::string engine = "auto";  ///< auto (the manifest's choice), opencv or torch.
-  int engines = 1;              ///< Networks that work side by side on frames in turn.
-  int threads = 2;              ///< Of each engine; OpenCV's are one pool; 0 = all cores.
-  int queue_size = 4;           ///< Frames that may wait.
-  bool annotate_empty = false;  ///< Publish the picture also when nothing was found.
-  bool privacy = true;          ///< Mask faces and number plates in hazard/annotated.
+  std::string model;              ///< Path of the manifest; must be given.
+  std::string engine = "auto";    ///< auto (the manifest's choice), opencv or torch.
+  int engines = 2;                ///< Networks that work side by side on frames in turn.
+  double all_views_hz = 16;       ///< Images a second that are looked at in all views; 0: all.
+  int one_view_from_waiting = 1;  ///< Images that wait, from which on one look must do; 0: never.
+  int threads = 1;                ///< Of each engine; OpenCV's are one pool; 0 = all cores.
+  int queue_size = 4;             ///< Frames that may wait.
+  bool annotate_empty = false;    ///< Publish the picture also when nothing was found.
+  bool privacy = true;            ///< Mask faces and number plates in hazard/annotated.
   perception::PrivacyMask::Config mask;
   HazardTrackingConfig tracking;
   double max_stamp_ahead_s = 5.0;   ///< Of the clock: see StampGate::Config.

@@ -17,10 +17,10 @@
 namespace livemap::vehicle {
 
 /// Makes the ordered pictures one after the other on a thread of its own, because finding faces
-/// takes longer than anything else that a report needs. Every order is answered exactly once,
-/// within `max_wait_s`: with its pictures, or with none where the maker withheld or lost them, the
-/// queue was full or the time was over. So no report waits for ever, and no more than
-/// `max_waiting` images wait.
+/// takes longer than anything else that a report needs. The thread runs at a low priority. Every
+/// order is answered exactly once, within `max_wait_s`: with its pictures, or with none where the
+/// maker withheld or lost them, the queue was full or the time was over. So no report waits for
+/// ever, and no more than `max_waiting` images wait.
 ///
 /// Typical usage: Order as orders come up, and Deliver often; both, and all answers, on the one
 /// thread that owns it.

@@ -178,19 +178,19 @@ void HazardReporter::Process(double now_s, double steady_s) {
   }
 }
 
-/// Whether the frames before it will have reported all that it shows.
+/// Whether the frames before it will have reported all that it shows. While pictures are late many
+/// frames wait, and each is compared with all before it.
 bool HazardReporter::IsCoveredByEarlierFrame(
     std::deque<WaitingFrame>::const_iterator waiting) const {
-  const auto is_same = [this](const PlacedSighting& one, const PlacedSighting& other) {
-    const std::string& name = one.sighting.class_name;
-    return name == other.sighting.class_name &&
-           geo::GeodesicDistanceM(one.place.position, other.place.position) <=
-               catalogue_.Get(name).duplicate_radius_m;
-  };
   const auto will_be_known = [&](const PlacedSighting& candidate) {
+    const std::string& name = candidate.sighting.class_name;
+    const double radius_m = catalogue_.Get(name).duplicate_radius_m;
+    const auto is_same = [&](const PlacedSighting& other) {
+      return (candidate.earth_m - other.earth_m).squaredNorm() <= radius_m * radius_m &&
+             name == other.sighting.class_name;
+    };
     return std::any_of(waiting_.begin(), waiting, [&](const WaitingFrame& earlier) {
-      return std::any_of(earlier.candidates.begin(), earlier.candidates.end(),
-                         [&](const PlacedSighting& other) { return is_same(candidate, other); });
+      return std::any_of(earlier.candidates.begin(), earlier.candidates.end(), is_same);
     });
   };
   return std::all_of(waiting->candidates.begin(), waiting->candidates.end(), will_be_known);
@@ -336,8 +336,10 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose&
     const auto ground =
         PlaceOnRoad(waiting.frame, sighting, fused ? base.course_variance_rad2 : 0.0);
     if (!ground) continue;
+    const placement::PlacedHazard place =
+        placement::PlaceHazard(base, Eigen::Vector2d::Zero(), *ground);
     waiting.candidates.push_back(
-        {sighting, placement::PlaceHazard(base, Eigen::Vector2d::Zero(), *ground), std::nullopt});
+        {sighting, place, geo::EarthCentred(place.position), std::nullopt});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
   waiting.placed = true;

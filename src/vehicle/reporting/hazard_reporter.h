@@ -197,6 +197,7 @@ class HazardReporter {
   struct PlacedSighting {
     placement::Sighting sighting;
     placement::PlacedHazard place;
+    Eigen::Vector3d earth_m;         // geo::EarthCentred of the place.
     std::optional<std::size_t> cut;  // Of the order; none where it was known already.
   };
   struct WaitingFrame {

@@ -86,7 +86,7 @@ TEST(DetectorPool, UnevenEnginesAnswerInTheOrderOfTheFrames) {
   std::atomic<int> by_slow{0};
   std::atomic<int> by_fast{0};
   const auto engine = [](std::atomic<int>& count, int slowest_ms) {
-    return [&count, slowest_ms](const int& frame) {
+    return [&count, slowest_ms](const int& frame, std::size_t) {
       // Uneven between the engines and from frame to frame.
       std::this_thread::sleep_for(milliseconds(1 + (frame * 7) % slowest_ms));
       ++count;
@@ -115,7 +115,7 @@ TEST(DetectorPool, DropsNothingWhileTheEnginesTogetherKeepUp) {
   // Frames each 20 ms; engines of 30 ms on average (5 to 55): one alone would lose a third, two
   // have a quarter to spare.
   Received received;
-  const auto engine = [](const int& frame) {
+  const auto engine = [](const int& frame, std::size_t) {
     std::this_thread::sleep_for(milliseconds(frame % 2 == 0 ? 5 : 55));
     return frame;
   };
@@ -133,7 +133,7 @@ TEST(DetectorPool, BeyondThatTheOldestWaitingFramesGoAndAreCounted) {
   Received received;
   Gate gate;
   std::atomic<int> started{0};
-  const auto engine = [&](const int& frame) {
+  const auto engine = [&](const int& frame, std::size_t) {
     ++started;
     gate.Pass();
     return frame;
@@ -152,9 +152,28 @@ TEST(DetectorPool, BeyondThatTheOldestWaitingFramesGoAndAreCounted) {
   EXPECT_THAT(received.items(), ElementsAre(0, 1, 8, 9));
 }
 
+TEST(DetectorPool, TellsAnEngineHowManyWaitBehindItsItem) {
+  Received received;
+  Gate gate;
+  std::atomic<int> started{0};
+  Pool pool({[&](const int&, std::size_t waiting) {
+              ++started;
+              gate.Pass();
+              return static_cast<int>(waiting);
+            }},
+            10, received.Taker());
+  pool.Push(0);
+  while (started < 1) std::this_thread::yield();
+  for (int frame = 1; frame < 4; ++frame) pool.Push(frame);
+  gate.Open();
+  ASSERT_TRUE(received.Await(4));
+  pool.Close();
+  EXPECT_THAT(received.results(), ElementsAre(0, 2, 1, 0));
+}
+
 TEST(DetectorPool, AnEngineThatThrowsDoesNotStallTheOthersNorTheOrder) {
   Received received;
-  const auto engine = [](const int& frame) {
+  const auto engine = [](const int& frame, std::size_t) {
     std::this_thread::sleep_for(milliseconds((frame * 5) % 7));
     if (frame % 3 == 1) throw std::runtime_error("frame " + std::to_string(frame));
     if (frame == 5) throw 5;
@@ -174,10 +193,11 @@ TEST(DetectorPool, AnEngineThatThrowsDoesNotStallTheOthersNorTheOrder) {
 
 TEST(DetectorPool, ACallbackThatThrowsCountsItsFrameAsDropped) {
   std::atomic<int> called{0};
-  Pool pool({[](const int& frame) { return frame; }}, 10, [&](const Pool::Outcome& outcome) {
-    ++called;
-    if (outcome.item == 1) throw std::runtime_error("no");
-  });
+  Pool pool({[](const int& frame, std::size_t) { return frame; }}, 10,
+            [&](const Pool::Outcome& outcome) {
+              ++called;
+              if (outcome.item == 1) throw std::runtime_error("no");
+            });
   for (int frame = 0; frame < 3; ++frame) pool.Push(frame);
   while (called < 3 || pool.counters().waiting > 0) std::this_thread::yield();
   EXPECT_EQ(pool.counters().processed, 2U);
@@ -189,7 +209,7 @@ TEST(DetectorPool, EnginesRunAheadOfAHangingOneOnlyByTheQueuesSize) {
   Gate gate;
   std::atomic<int> hung{0};
   std::atomic<int> worked{0};
-  const auto engine = [&](const int& frame) {
+  const auto engine = [&](const int& frame, std::size_t) {
     if (frame == 0) {
       ++hung;
       gate.Pass();
@@ -217,7 +237,7 @@ TEST(DetectorPool, EnginesRunAheadOfAHangingOneOnlyByTheQueuesSize) {
 
 TEST(DetectorPool, ClosingEndsAtOnceAndCountsWhatWaited) {
   Received received;
-  const auto engine = [](const int& frame) {
+  const auto engine = [](const int& frame, std::size_t) {
     std::this_thread::sleep_for(milliseconds(20));
     return frame;
   };
@@ -233,7 +253,7 @@ TEST(DetectorPool, ClosingEndsAtOnceAndCountsWhatWaited) {
 
 TEST(DetectorPool, EveryFrameIsAccountedForAtAnyMomentUnderLoadFromSeveralThreads) {
   Received received;
-  const auto engine = [](const int& frame) { return frame; };
+  const auto engine = [](const int& frame, std::size_t) { return frame; };
   Pool pool({engine, engine, engine}, 3, received.Taker());
   std::atomic<bool> balanced{true};
   const auto push = [&] {

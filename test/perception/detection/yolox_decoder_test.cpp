@@ -77,6 +77,19 @@ TEST(YoloxDecoder, ViewsAreFusedAndTheirMeanIsHeldAgainstTheThreshold) {
   EXPECT_FLOAT_EQ(found[0].box.width, 32);
 }
 
+TEST(YoloxDecoder, TheRowsOfTheFirstViewAloneAreHeldAgainstTheThresholdAsTheyAre) {
+  ModelManifest manifest = TwoLevelManifest();  // pothole 0.5; one level each: 48 and 12 rows
+  manifest.head.views = 2;
+  cv::Mat both = NothingSeen(manifest);
+  SetRow(both, 8 + 1, {0, 0, std::log(2.0F), std::log(2.0F), 0.95F, 1, 0});
+  SetRow(both, 3 * 8 + 3, {0, 0, 0, 0, 0.4F, 1, 0});
+  const int first[] = {1, 48, 7};
+  const cv::Mat predictions(3, first, CV_32F, both.data);
+  const std::vector<HazardDetection> found = DecodeYolox(predictions, manifest, kScale, kPicture);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_FLOAT_EQ(found[0].confidence, 0.95F);
+}
+
 TEST(YoloxDecoder, BoxesAreCutToTheImage) {
   const ModelManifest manifest = TwoLevelManifest();
   cv::Mat predictions = NothingSeen(manifest);
