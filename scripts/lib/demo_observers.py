@@ -21,7 +21,7 @@ from system_error import StartError
 # Key-values of /diagnostics that the summary is made of, per nodelet.
 COUNTS = {
     "camera_ingest": ("frames_in", "frames_published", "frames_dropped", "frames_bad"),
-    "hazard_detection": ("frames_in", "frames_processed", "frames_dropped", "detections"),
+    "hazard_detection": ("frames_in", "frames_processed", "frames_dropped", "frames_in_one_view", "detections"),
     "hazard_reporting": ("detections", "reports_created", "committed", "refused", "pending",
                          "duplicates_suppressed", "waiting_frames"),
     "mqtt_bridge": ("uplink_bytes",),
@@ -179,6 +179,7 @@ class VehicleObserver:
                                    + self._count("camera_ingest", "frames_bad")
                                    + self._count("hazard_detection", "frames_dropped")
                                    + self._count(DISCARD, "frames_dropped")),
+                "frames_in_one_view": self._count("hazard_detection", "frames_in_one_view"),
                 "frames_judged": self._count(DISCARD, "frames_judged"),
                 "detections": self._count("hazard_detection", "detections"),
                 "detections_taken": self._count("hazard_reporting", "detections"),

@@ -237,16 +237,17 @@ def saturated_section(results):
         return ""
     pools = results.get("pools", {})
     cells = [[run["model"], pool_rate(pools.get(run["model"]), "opencv"), pool_rate(pools.get(run["model"]), "torch"),
-              number(run["processed_hz"], 1), f"{run['dropped']} of {run['frames']}", run["committed"]] for run in runs]
+              number(run["processed_hz"], 1), f"{run['dropped']} of {run['frames']}", run.get("in_one_view", "-"), run["committed"]] for run in runs]
     return "## From the camera to the report\n" + prose(f"""
         A simulated street (seed 20201, 20 s) through a camera of 640x400 pixels and {runs[0]['camera_hz']} frames/s,
-        as the thesis's camera gave them. That is more than a vehicle here can do; it drops the rest, oldest first. So
-        the frames that it processes give the rate of the whole: decoding, rectification, detector (as many engines as
-        cores, one thread each, the engine of the model's manifest), placing, masking of the reports' pictures,
-        report. Player, broker and zone take their share of the same cores. *Pool*: the same engines alone, as in the
-        table above.""") + "\n" + table(
+        as the thesis's camera gave them. The frames that the vehicle processes give the rate of the whole: decoding,
+        rectification, detector (the defaults: two engines of one thread, the engine of the model's manifest), placing,
+        masking of the reports' pictures, report. What is too much is dropped, oldest first. *In one view*: of the
+        processed frames, those that a model of two views looked at once (`all_views_hz`, `one_view_from_waiting`).
+        Player, broker and zone take their share of the same cores. *Pool*: the same engines alone, as in the table
+        above.""") + "\n" + table(
         ["model", "pool, OpenCV (frames/s)", "pool, libtorch (frames/s)", "camera to report (frames/s)", "dropped",
-         "reports in the zone's store"], cells)
+         "in one view", "reports in the zone's store"], cells)
 
 
 def starved(results):
