@@ -17,11 +17,10 @@ import torch
 sys.path.insert(0, str(Path(__file__).parent))
 from common.figures import NothingMeasured, mean, text
 from detector import data, sets
-from detector.int8_model import int8_forward
+from detector.int8_model import forward_of
 from detector.manifest import Manifest, ManifestError, read_manifest
 from detector.mistakes import find_mistakes, write_mistakes
 from detector.metrics import drive_figures, f1_score
-from detector.onnx_model import opencv_forward
 from detector.validation import DetectorRunner, ForwardFunction, HeldOut, Validation, validate, validate_held_out
 
 
@@ -86,10 +85,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     try:
         manifest = read_manifest(options.manifest)
         drives, cones = data.read_validation_drives(options.data), data.read_validation_cones(options.data)
-        precision = options.precision or manifest.precision
-        if precision == "int8" and not manifest.int8:
-            raise ManifestError(f"{options.manifest} has no int8_file: --precision int8 wants one, training/export_int8.py adds it.")
-        run = int8_forward(manifest.int8, manifest.view) if precision == "int8" else opencv_forward(manifest.weights)
+        run = forward_of(manifest, options.precision)
         runner = DetectorRunner(run, manifest.view)
         if options.sets:
             parts = sets.read_pictures(sets.read_catalogue(options.sets), options.data).held_out

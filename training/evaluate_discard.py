@@ -20,10 +20,10 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from common.figures import NothingMeasured, share, text
+from detector.int8_model import forward_of
 from detector.data import POTHOLE, VALIDATION_SECTIONS, DataError, DriveFrame, read_drive
 from detector.manifest import Manifest, ManifestError, read_manifest, sha256_of
 from detector.metrics import NEAR_M, ScoredFrame, drive_figures
-from detector.onnx_model import opencv_forward
 from detector.validation import DetectorRunner
 from export_discard import Scorer
 
@@ -108,7 +108,7 @@ class Drives:
     """Both profiles over the drives, and what they saw and sent."""
 
     def __init__(self, detector: Manifest, classify: Scorer, threshold: float, settings: dict, speed_mps: float):
-        self.runner = DetectorRunner(opencv_forward(detector.weights), detector.view)
+        self.runner = DetectorRunner(forward_of(detector), detector.view)
         self.classify, self.threshold = classify, threshold
         self.settings, self.speed_mps = settings, speed_mps
         self.big: Dict[str, List[ScoredFrame]] = {}

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
 """Export the small vehicle's classifier as ONNX with its manifest and golden outputs, and print its figures.
 
-    training/export_discard.py --data ../shared/data --out models --training build/training/discard --simulated DIR
+    training/export_discard.py --data ../shared/data --sets training/real_hazards.yaml --out models \
+        --training build/training/discard
 
-The threshold is the lower one of those that send 0.95 of the frames with a hazard on the survey sections kept for
-calibration and on simulated drives (--simulated; seeds that training has not seen): on roads that no part of the
-network has seen 0.9 are left of that. Figures are of the validation
-sections, which chose nothing.
+The threshold is the lowest one of those that send 0.95 of the frames with a hazard on the survey sections kept for
+calibration, on the photos of the sets kept for it (--sets) and on simulated drives (--simulated; seeds that training has
+not seen). Figures are of the validation sections and of the sets' held-out parts, which chose nothing.
 """
 
 import argparse
@@ -20,13 +20,13 @@ import torch
 import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
-from detector import inference
+from detector import inference, sets
 from detector.data import VALIDATION_SECTIONS, DataError, DriveFrame
 from detector.manifest import sha256_of
 from detector.onnx_model import golden_image
-from early_discard import INPUT_HEIGHT, INPUT_WIDTH, labels
+from early_discard import INPUT_HEIGHT, INPUT_WIDTH, labels, photos
 from common.figures import text
-from early_discard.figures import ScoredDrive, figures, score_drive, threshold_for_recall
+from early_discard.figures import ScoredDrive, as_drive, by_class, figures, score_drive, score_photos, threshold_for_recall
 from early_discard.network import Features, Head, NetworkError, export
 
 TOLERANCE = 1e-3
@@ -116,6 +116,15 @@ def score_simulated(root: Path, scorer: Scorer) -> Dict[str, ScoredDrive]:
     }
 
 
+def say_photos(catalogue: sets.Catalogue, data: Path, scorer: Scorer, threshold: float) -> None:
+    """The photos that nothing was trained or chosen on, by set and by class."""
+    held_out = {name: score_photos(part, scorer) for name, part in photos.read_held_out(catalogue, data).items()}
+    drives = {name: as_drive(part) for name, part in held_out.items()}
+    say("held-out photos", drives, threshold)
+    for name, drive in {**drives, **by_class(held_out)}.items():
+        say(f"  {name}", {name: drive}, threshold)
+
+
 def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, measure, describe."""
     if not arguments.out.is_dir():
@@ -131,21 +140,27 @@ def run(arguments: argparse.Namespace) -> None:
     }
     if not any(drive.hazards.any() for drive in calibration.values()):
         raise ExportError(f"No frame with a hazard in the sections {', '.join(labels.CALIBRATION_SECTIONS)} below {arguments.data}.")
-    thresholds = [threshold_for_recall(calibration, RECALL)]
-    simulated = score_simulated(arguments.simulated, scorer) if arguments.simulated else {}
-    if simulated:
-        thresholds.append(threshold_for_recall(simulated, RECALL))
-    threshold = min(thresholds)
-    print(f"thresholds for recall {RECALL}: survey {thresholds[0]}" + (f", simulated {thresholds[1]}" if simulated else ""))
+    kinds = {"survey": calibration}
+    if arguments.sets:
+        catalogue = sets.read_catalogue(arguments.sets)
+        chosen = {name: score_photos(part, scorer) for name, part in photos.read_calibration(catalogue, arguments.data).items()}
+        kinds["photos"] = {name: as_drive(part) for name, part in chosen.items()}
+    if arguments.simulated:
+        kinds["simulated"] = score_simulated(arguments.simulated, scorer)
+    counted = {name: drives for name, drives in kinds.items() if any(drive.hazards.any() for drive in drives.values())}
+    thresholds = {name: threshold_for_recall(drives, RECALL) for name, drives in counted.items()}
+    threshold = min(thresholds.values())
+    print(f"thresholds for recall {RECALL}: " + ", ".join(f"{name} {value:.3f}" for name, value in thresholds.items()))
     validation = {
         name: score_drive(drive, scorer)
         for name, drive in labels.read_sections(arguments.data, lambda name: name in VALIDATION_SECTIONS).items()
     }
-    for name, drives in (("calibration", calibration), ("simulated", simulated), ("validation", validation)):
-        if drives:
-            say(name, drives, threshold)
+    for name, drives in (*((f"threshold's {kind}", drives) for kind, drives in kinds.items()), ("validation", validation)):
+        say(name, drives, threshold)
     for name, drive in validation.items():
         say(f"  {name}", {name: drive}, threshold)
+    if arguments.sets:
+        say_photos(catalogue, arguments.data, scorer, threshold)
     write_manifest(arguments.out / f"{arguments.name}.yaml", weights, threshold)
     write_golden(arguments.out / f"{arguments.name}.golden.yaml", scorer)
 
@@ -157,6 +172,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--name", default="early-discard", help="name of the model")
     parser.add_argument("--out", type=Path, default=Path("models"), help="folder of the models")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
+    parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data, as in training")
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives that training has not seen")
     parser.add_argument("--threads", type=int, default=1, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Train the small vehicle's send / don't-send classifier.
 
-    training/train_discard.py --data ../shared/data --simulated build/training/simulated --out build/training/discard
+    training/train_discard.py --data ../shared/data --sets training/real_hazards.yaml --judge models/hazards-base.yaml \
+        --out build/training/discard
 
 A run that was stopped, at whatever moment, continues with the same command and --resume.
 """
@@ -23,11 +24,15 @@ from common.training import (
     EpochSamples, Run, add_run_arguments, check_arguments, checkpoint_to_resume, decayed_groups, exit_status, fields_given,
     learning_rate_factor, prepare_device,
 )
-from detector.augment import Augmenter, Recipe
-from detector.data import DataError
+from detector import sets
+from detector.augment import GROUP_SHARES, Augmenter, Recipe
+from detector.data import DataError, Picture
 from detector.loss import Target
+from detector.int8_model import forward_of
+from detector.manifest import ManifestError, read_manifest, sha256_of
 from detector.training import collate
-from early_discard import INPUT_HEIGHT, INPUT_WIDTH, labels
+from detector.validation import DetectorRunner
+from early_discard import INPUT_HEIGHT, INPUT_WIDTH, labels, photos
 from early_discard.loss import losses
 from early_discard.network import Features, Head, NetworkError, cut_backbone
 
@@ -36,6 +41,9 @@ RECIPE = Recipe(
     shadow=0.2, relight=0.15, erase=0.0, hue=4.0, saturation=0.4, brightness=0.3, white=0.05,
 )
 """Whole frames, mirrored, moved and relit a little: what the vehicle's camera sees."""
+
+SHARES = {**GROUP_SHARES, "survey_potholes": 0.24, "survey_empty": 0.24, "closeups": 0.03, "cones": 0.14, "set": 0.35}
+"""Photos of sets nearly always show a hazard: as many survey frames without one stand beside them."""
 
 DEFAULT_DETECTOR = Path(__file__).parents[1] / "models" / "hazards-small.onnx"
 
@@ -50,13 +58,17 @@ class Settings:
     batch: int = 16
     learning_rate: float = 2e-3
     weight_decay: float = 0.05
+    sets: str = ""  # digest of the file of sets: another split is another run
+    judge: str = ""  # digest of the judge's weights
 
 
 class Samples:
     """Features and targets of the samples, in memory as 16-bit floats (0.27 MB each)."""
 
     def __init__(self, pictures: dict, features: Features, settings: Settings):
-        augmenter = Augmenter(pictures, RECIPE, INPUT_WIDTH, INPUT_HEIGHT)
+        augmenter = Augmenter(
+            pictures, RECIPE, INPUT_WIDTH, INPUT_HEIGHT, letterbox=(INPUT_WIDTH, INPUT_HEIGHT), shares_of_kinds=SHARES
+        )
         drawn = EpochSamples(augmenter, settings.seed, 0, settings.samples)
         self.features: List[np.ndarray] = []
         self.targets: List[Target] = []
@@ -104,6 +116,8 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Train the send / don't-send classifier.")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--simulated", type=Path, help="folder of simulated drives (training/simulate_drives.py)")
+    parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data to train on too")
+    parser.add_argument("--judge", type=Path, metavar="MANIFEST", help="a detector that looks for what the sets do not label")
     parser.add_argument("--detector", type=Path, default=DEFAULT_DETECTOR, help="ONNX file whose first stages are taken over")
     add_run_arguments(parser, "build/training/discard", defaults, ("seed", "samples", "epochs", "batch"), threads=1)
     parser.add_argument("--learning-rate", type=float, default=defaults.learning_rate)
@@ -113,7 +127,26 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """Settings of the command line, checked."""
     check_arguments(arguments)
-    return Settings(**fields_given(Settings, arguments))
+    given = fields_given(Settings, arguments)
+    given["sets"] = sets.read_catalogue(arguments.sets).digest if arguments.sets else ""
+    given["judge"] = sha256_of(read_manifest(arguments.judge).weights)[:12] if arguments.judge else ""
+    return Settings(**given)
+
+
+def open_judge(path: Path) -> photos.Judge:
+    """The detector of a manifest, in the precision that it names."""
+    manifest = read_manifest(path)
+    return DetectorRunner(forward_of(manifest), manifest.view).detect
+
+
+def read_pictures(arguments: argparse.Namespace) -> Dict[str, List[Picture]]:
+    """All that the head learns from, by group."""
+    pictures = labels.read_training_pictures(arguments.data, arguments.simulated)
+    if arguments.sets:
+        judge = open_judge(arguments.judge) if arguments.judge else None
+        calm = labels.read_calm_roads(arguments.data)
+        pictures.update(photos.read_groups(sets.read_catalogue(arguments.sets), arguments.data, judge, calm, arguments.seed))
+    return pictures
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -125,7 +158,7 @@ def run(arguments: argparse.Namespace) -> None:
     begun = checkpoint_to_resume(arguments, device)
     if begun:
         trainer.restore(begun)
-    pictures = labels.read_training_pictures(arguments.data, arguments.simulated)
+    pictures = read_pictures(arguments)
     counted = {name: f"{sum(map(labels.holds_hazard, group))} of {len(group)}" for name, group in pictures.items()}
     print(f"frames to send: {counted}", flush=True)
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -139,7 +172,7 @@ def run(arguments: argparse.Namespace) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Exit status: 0 trained, 2 the command line or the data is wrong."""
     parsed = parse_arguments(arguments)
-    return exit_status("train_discard", lambda: run(parsed), (NetworkError, DataError))
+    return exit_status("train_discard", lambda: run(parsed), (NetworkError, DataError, ManifestError))
 
 
 if __name__ == "__main__":

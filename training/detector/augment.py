@@ -143,12 +143,14 @@ def ratio(rng: np.random.Generator, spread: float) -> float:
     return float(np.exp(rng.uniform(-1, 1) * np.log(spread)))
 
 
-def group_shares(weights: Dict[str, float], simulated_share: float) -> Dict[str, float]:
+def group_shares(
+    weights: Dict[str, float], simulated_share: float, shares_of_kinds: Dict[str, float] = GROUP_SHARES
+) -> Dict[str, float]:
     """How often each group is drawn, from the sums of its pictures' weights. They add up to 1."""
     kinds = {kind_of(name) for name in weights}
     simulated_share = simulated_share if "simulated" in kinds else 0.0
-    real = sum(GROUP_SHARES[kind] for kind in sorted(kinds) if kind != "simulated")
-    of_kind = {kind: simulated_share if kind == "simulated" else GROUP_SHARES[kind] * (1.0 - simulated_share) / real for kind in kinds}
+    real = sum(shares_of_kinds[kind] for kind in sorted(kinds) if kind != "simulated")
+    of_kind = {kind: simulated_share if kind == "simulated" else shares_of_kinds[kind] * (1.0 - simulated_share) / real for kind in kinds}
     sums = {kind: sum(weight for name, weight in weights.items() if kind_of(name) == kind) for kind in kinds}
     return {name: of_kind[kind_of(name)] * weight / sums[kind_of(name)] for name, weight in weights.items()}
 
@@ -159,13 +161,15 @@ class Augmenter:
     def __init__(
         self, groups: Dict[str, List[Picture]], recipe: Recipe, width: int, height: int,
         simulated_share: float = GROUP_SHARES["simulated"], classes: Sequence[str] = CLASSES, pasted: Optional[sets.Pasted] = None,
+        letterbox: Tuple[int, int] = (inference.INPUT_WIDTH, inference.INPUT_HEIGHT), shares_of_kinds: Dict[str, float] = GROUP_SHARES,
     ):
+        self.letterbox = letterbox  # width and height of the input that shows a picture of any size
         self.pasted = pasted  # what is put into the pictures of the group "composed"
         self.groups, self.recipe, self.class_count = groups, recipe, len(classes)
         self.width, self.height = width, height
         self.names = sorted((name for name in groups if groups[name]), key=lambda name: list(GROUP_SHARES).index(kind_of(name)))
         weights = {name: np.array([picture.weight for picture in groups[name]]) for name in self.names}
-        self.shares = group_shares({name: float(weight.sum()) for name, weight in weights.items()}, simulated_share)
+        self.shares = group_shares({name: float(weight.sum()) for name, weight in weights.items()}, simulated_share, shares_of_kinds)
         self.picture_shares = {name: weight / weight.sum() for name, weight in weights.items()}
         self.backgrounds = {
             name: np.array([background_weight(name, class_name) for class_name in classes], np.float32) for name in self.names
@@ -175,7 +179,7 @@ class Augmenter:
         """How large a view shows a picture, before the recipe's spread."""
         scale = GROUP_SCALES.get(kind, 1.0)
         if kind in LETTERBOXED:
-            scale *= inference.letterbox_scale(*picture.image.shape[1::-1], inference.INPUT_WIDTH, inference.INPUT_HEIGHT)
+            scale *= inference.letterbox_scale(*picture.image.shape[1::-1], *self.letterbox)
         if kind == "set" and rng.random() < self.recipe.far:
             scale *= rng.uniform(FARTHEST, 1.0)
         return scale

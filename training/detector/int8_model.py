@@ -25,6 +25,8 @@ from torch.ao.nn import quantized
 from torch.nn.intrinsic import quantized as fused
 
 from .inference import MEAN, STD, ViewConfig
+from .manifest import Manifest, ManifestError
+from .onnx_model import opencv_forward
 from .packing import model_bytes
 from .torch_model import OnnxNetwork, UnknownOperator, without_sources
 from .validation import ForwardFunction
@@ -335,3 +337,13 @@ def int8_forward(path: Path, view: ViewConfig) -> ForwardFunction:
         return predictions[:, :4], predictions[:, 4:5] * predictions[:, 5:]
 
     return run
+
+
+def forward_of(manifest: Manifest, precision: str = "") -> ForwardFunction:
+    """A runner of a model in the precision that is asked for, else in its manifest's."""
+    precision = precision or manifest.precision
+    if precision != "int8":
+        return opencv_forward(manifest.weights)
+    if not manifest.int8:
+        raise ManifestError(f"{manifest.weights} has no int8_file: --precision int8 wants one, training/export_int8.py adds it.")
+    return int8_forward(manifest.int8, manifest.view)

@@ -9,6 +9,7 @@ from detector.data import DriveFrame
 from detector.metrics import runs_of
 
 from .labels import holds_hazard
+from .photos import LabelledPhoto
 
 
 @dataclass
@@ -27,6 +28,36 @@ def score_drive(frames: List[DriveFrame], score) -> ScoredDrive:
         np.array([holds_hazard(frame.picture) for frame in frames]),
         np.array([frame.chainage_m for frame in frames]),
     )
+
+
+@dataclass
+class ScoredPhoto:
+    """One photo of a set that labels some classes."""
+
+    score: float
+    classes: List[str]  # of its reportable boxes
+    is_empty: bool  # no box at all
+
+
+def score_photos(photos: List[LabelledPhoto], score) -> List[ScoredPhoto]:
+    """Scores of photos by `score(image)`."""
+    return [ScoredPhoto(score(photo.picture.image), photo.classes, not len(photo.picture.boxes)) for photo in photos]
+
+
+def as_drive(photos: List[ScoredPhoto]) -> ScoredDrive:
+    """Photos as frames that lie far apart; those with far boxes alone are left out."""
+    counted = [photo for photo in photos if photo.classes or photo.is_empty]
+    return ScoredDrive(
+        np.array([photo.score for photo in counted]), np.array([bool(photo.classes) for photo in counted], bool),
+        1000.0 * np.arange(len(counted)),
+    )
+
+
+def by_class(photos: Dict[str, List[ScoredPhoto]]) -> Dict[str, ScoredDrive]:
+    """Photos with a reportable box, by its class."""
+    every = [photo for group in photos.values() for photo in group]
+    names = sorted({name for photo in every for name in photo.classes})
+    return {name: as_drive([photo for photo in every if name in photo.classes]) for name in names}
 
 
 def event_scores(drive: ScoredDrive) -> List[float]:

@@ -7,6 +7,7 @@ least PHOTO_LEAST_HEIGHT of the picture's width high, as a cone of 0.7 m is at 3
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Tuple
 
@@ -24,6 +25,17 @@ REPORTABLE, FAR = 0, 1
 """Classes of boxes here. The first is also the class that the augmentation gives to potholes that it pastes."""
 
 PHOTO_LEAST_HEIGHT = 0.025
+LEAST_HEIGHTS = {"debris": 0.011}
+"""What lies on a road is 0.3 m high."""
+
+
+class Background(Enum):
+    """What is known about the places of a picture that nobody labelled."""
+
+    KNOWN = 1  # no hazard is there
+    LIKELY = 2  # none of some classes, and hardly one of the others: counts a little
+    UNKNOWN = 3
+
 
 SURVEY_CAMERA = Path(__file__).parents[2] / "config" / "cameras" / "road_survey.yaml"
 
@@ -79,18 +91,28 @@ def is_reportable(picture: Picture, camera: Optional[Camera]) -> np.ndarray:
     if camera is not None:
         return ground_distances_m(camera, picture.boxes) <= MAX_RANGE_M
     heights = picture.boxes[:, 3] - picture.boxes[:, 1]
-    return heights >= PHOTO_LEAST_HEIGHT * picture.image.shape[1]
+    least = np.array([LEAST_HEIGHTS.get(name, PHOTO_LEAST_HEIGHT) for name in CLASSES])
+    return heights >= least[picture.classes] * picture.image.shape[1]
 
 
-def prepared(picture: Picture, camera: Optional[Camera]) -> Picture:
-    """The picture as the classifier sees it: shrunk, with boxes of class REPORTABLE or FAR instead of classes of hazards."""
+def prepared(picture: Picture, camera: Optional[Camera], background: Background = Background.KNOWN, covering: bool = False) -> Picture:
+    """The picture as the classifier sees it: shrunk, with boxes of class REPORTABLE or FAR instead of classes of hazards.
+
+    `covering`: so that it covers the input and views cut it, instead of lying within it.
+    """
     classes = np.where(is_reportable(picture, camera), REPORTABLE, FAR).astype(np.int64)
     height, width = picture.image.shape[:2]
-    scale = min(INPUT_WIDTH / width, INPUT_HEIGHT / height)
+    scale = (max if covering else min)(INPUT_WIDTH / width, INPUT_HEIGHT / height)
     size = (round(width * scale), round(height * scale))
     image = cv2.resize(picture.image, size, interpolation=cv2.INTER_LINEAR)  # As the vehicle does it.
-    boxes = (picture.boxes * np.tile([size[0] / width, size[1] / height], 2)).astype(np.float32)
-    return Picture(image, boxes, classes, range(len(CLASSES)), picture.name, picture.weight)
+    boxes, difficult = (
+        (corners * np.tile([size[0] / width, size[1] / height], 2)).astype(np.float32) for corners in (picture.boxes, picture.difficult)
+    )
+    every = range(len(CLASSES))
+    return Picture(
+        image, boxes, classes, every if background is Background.KNOWN else (), picture.name, picture.weight, difficult,
+        np.full(len(difficult), FAR), every if background is Background.LIKELY else (),
+    )
 
 
 def read_simulated(root: Path) -> List[Tuple[str, List[Picture]]]:
@@ -123,8 +145,14 @@ def is_training_section(name: str) -> bool:
     return name not in data.VALIDATION_SECTIONS and name not in CALIBRATION_SECTIONS
 
 
+def read_calm_roads(folder: Path) -> List[Picture]:
+    """Survey frames without a label, of the sections to learn from, as they are."""
+    sections = [path for path in data.section_folders(folder) if is_training_section(path.name)]
+    return [frame.picture for path in sections for frame in data.read_drive(path) if not len(frame.picture.boxes)]
+
+
 def read_training_pictures(folder: Path, simulated: Optional[Path]) -> Dict[str, List[Picture]]:
-    """Training pictures by the groups of the detector's augmentation."""
+    """Training pictures by the groups of the detector's augmentation; photos.py adds those of the sets."""
     frames = []
     for drive in read_sections(folder, is_training_section).values():
         for frame in drive:

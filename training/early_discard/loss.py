@@ -41,7 +41,8 @@ def cell_targets(targets: List[Target], rows: int, columns: int) -> Tensor:
 def losses(logits: Tensor, targets: List[Target]) -> Tuple[Tensor, Tensor]:
     """Mean loss of the cells (per hazard cell) and of the frames.
 
-    A frame without a reportable box but with unknown places is judged by its known cells only.
+    Calm cells count as much as the target's background does. A frame with a reportable box is judged by the cells of such
+    boxes, one without by its known cells.
     """
     logits = logits.float()[:, 0]
     cells = cell_targets(targets, *logits.shape[1:]).to(logits.device)
@@ -49,7 +50,12 @@ def losses(logits: Tensor, targets: List[Target]) -> Tuple[Tensor, Tensor]:
     wanted = cells.clamp(min=0)
     plain = F.binary_cross_entropy_with_logits(logits, wanted, reduction="none")
     wrongness = (logits.sigmoid() - wanted).abs()
-    of_cells = (plain * wrongness.detach() ** FOCUS * known).sum() / wanted.sum().clamp(min=8.0)
-    highest = logits.masked_fill(~known, -30.0).flatten(1).max(dim=1).values
-    of_frames = F.binary_cross_entropy_with_logits(highest, wanted.flatten(1).max(dim=1).values)
-    return of_cells, of_frames
+    calm_weights = torch.stack([target.labelled.min() for target in targets]).to(logits.device)
+    weights = torch.where(wanted > 0, wanted, known * calm_weights[:, None, None])
+    of_cells = (plain * wrongness.detach() ** FOCUS * weights).sum() / wanted.sum().clamp(min=8.0)
+    hazardous = wanted.flatten(1).max(dim=1).values
+    judged = torch.where(hazardous[:, None, None] > 0, cells == HAZARD, known)
+    highest = logits.masked_fill(~judged, -30.0).flatten(1).max(dim=1).values
+    frame_weights = torch.where(hazardous > 0, hazardous, calm_weights)
+    of_frames = F.binary_cross_entropy_with_logits(highest, hazardous, reduction="none") * frame_weights
+    return of_cells, of_frames.sum() / frame_weights.sum().clamp(min=1.0)

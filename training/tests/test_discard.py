@@ -19,9 +19,9 @@ from detector import CLASSES, onnx_model
 from detector.data import Picture
 from detector.loss import Target
 from detector.network import Detector
-from early_discard import INPUT_HEIGHT, INPUT_WIDTH, figures, labels, loss, network
+from early_discard import INPUT_HEIGHT, INPUT_WIDTH, figures, labels, loss, network, photos
 
-from .synthetic import TRAINING_SECTION, write_data
+from .synthetic import TRAINING_SECTION, write_data, write_sets
 
 LEVEL = labels.Camera(500, 500, 319.5, 199.5, 1.6, 0, 0, 0)
 """A camera that looks straight ahead, 1.6 m above the road."""
@@ -85,6 +85,65 @@ class Loss(unittest.TestCase):
         wrong[1, 0, 4:6, 4:8] = 6
         for one, other in zip(loss.losses(right, targets), loss.losses(wrong, targets)):
             self.assertLess(float(one), float(other))
+
+
+    def test_background_that_says_nothing_teaches_nothing(self):
+        logits = torch.full((2, 1, 26, 40), 3.0)
+        silent, calm = target([], []), target([], [])
+        silent.labelled = torch.zeros(len(CLASSES))
+        self.assertEqual([float(part) for part in loss.losses(logits[:1], [silent])], [0.0, 0.0])
+        alone, both = (float(loss.losses(logits[: len(given)], given)[1]) for given in ([calm], [calm, silent]))
+        self.assertAlmostEqual(alone, both, places=5)
+
+    def test_a_frame_with_a_hazard_is_judged_where_the_hazard_is(self):
+        boxes, elsewhere = target([[32, 32, 64, 48]], [labels.REPORTABLE]), torch.full((1, 1, 26, 40), -3.0)
+        elsewhere[0, 0, 20, 20] = 3.0
+        self.assertGreater(float(loss.losses(elsewhere, [boxes])[1]), 3.0)
+
+
+def seen(score):
+    """A judge that finds a cone of that score in every picture."""
+    found = [np.zeros((0, 5)) for _ in CLASSES]
+    found[CLASSES.index("traffic_cone")] = np.array([[10, 10, 50, 60, score]])
+    return lambda image: found
+
+
+class Photos(unittest.TestCase):
+    image = np.zeros((400, 400, 3), np.uint8)
+
+    def photo(self, labelled, absent=()):
+        ids = [[CLASSES.index(name) for name in names] for names in (labelled, absent)]
+        return Picture(self.image, np.zeros((0, 4), np.float32), np.zeros(0, np.int64), ids[0], absent_classes=ids[1])
+
+    def test_what_nobody_looked_for_makes_the_background_unknown(self):
+        for photo, judge, expected in (
+            (self.photo(CLASSES), None, labels.Background.KNOWN),
+            (self.photo(CLASSES[:1]), None, labels.Background.UNKNOWN),
+            (self.photo(CLASSES[:1], CLASSES[1:]), None, labels.Background.LIKELY),
+            (self.photo(CLASSES[:1]), seen(0.0), labels.Background.LIKELY),
+        ):
+            self.assertEqual(photos.judged(photo, judge)[1], expected)
+
+    def test_what_the_judge_finds_of_an_unlabelled_class_is_unknown(self):
+        for labelled, score, expected in ((["pothole"], 0.2, 1), (["pothole"], 0.05, 0), (["traffic_cone"], 0.2, 0)):
+            picture, background = photos.judged(self.photo(labelled), seen(score))
+            self.assertEqual(len(picture.difficult), expected)
+            self.assertEqual(len(labels.prepared(picture, None, background).difficult), expected)
+
+    def test_a_photo_is_shown_whole_and_filling_the_view(self):
+        whole, cut = photos.views_of(self.photo(CLASSES), labels.Background.KNOWN)
+        self.assertEqual(whole.image.shape[:2], (INPUT_HEIGHT, INPUT_HEIGHT))
+        self.assertEqual(cut.image.shape[:2], (INPUT_WIDTH, INPUT_WIDTH))
+
+    def test_low_debris_counts_where_a_cone_of_its_height_does_not(self):
+        box = np.array([[0, 0, 9, 6]], np.float32)
+        for name, expected in (("debris", [True]), ("traffic_cone", [False])):
+            self.assertEqual(labels.is_reportable(Picture(self.image, box, np.array([CLASSES.index(name)]), []), None).tolist(), expected)
+
+    def test_photos_with_far_boxes_alone_are_not_counted(self):
+        scored = [figures.ScoredPhoto(0.9, ["debris"], False), figures.ScoredPhoto(0.5, [], False), figures.ScoredPhoto(0.1, [], True)]
+        self.assertEqual(figures.as_drive(scored).hazards.tolist(), [True, False])
+        self.assertEqual(figures.by_class({"a": scored})["debris"].scores.tolist(), [0.9])
 
 
 class Figures(unittest.TestCase):
@@ -176,6 +235,21 @@ class Programs(unittest.TestCase):
         found.setInput(np.zeros((1, 3, INPUT_HEIGHT, INPUT_WIDTH), np.float32))
         self.assertEqual(found.forward().shape, (1, 1))
 
+    def test_it_learns_from_sets_and_is_measured_on_their_held_out_parts(self):
+        catalogue = write_sets(self.data)
+        self.assertEqual(self.train("sets", "--sets", catalogue), (0, ""))
+        models = self.root / "models_of_sets"
+        models.mkdir()
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            self.assertEqual(export_discard.main([
+                "--training", str(self.root / "sets"), "--data", str(self.data), "--out", str(models), "--sets", str(catalogue),
+            ]), 0)
+        for name in ("cattle", "holes", "composed", "deer", "pothole"):
+            self.assertRegex(said.getvalue(), f"  {name}: [1-9]")
+        status, errors = self.train("sets", "--resume")
+        self.assertEqual((status, len(errors.splitlines())), (2, 1), errors)
+
     def test_it_is_small(self):
         self.assertLess(sum(parameter.numel() for parameter in network.Head().parameters()) + 155616, 500000)
 
@@ -186,6 +260,8 @@ class Programs(unittest.TestCase):
             (train_discard, ("--epochs", 0)),
             (train_discard, ("--batch", 1)),
             (train_discard, ("--data", self.data, "--out", self.root / "new", "--detector", nowhere)),
+            (train_discard, ("--data", self.data, "--out", self.root / "new", "--sets", nowhere)),
+            (train_discard, ("--data", self.data, "--out", self.root / "new", "--judge", nowhere)),
             (export_discard, ("--training", nowhere, "--data", self.data, "--out", self.root)),
             (export_discard, ("--out", nowhere)),
         ):

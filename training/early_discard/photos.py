@@ -1,0 +1,106 @@
+"""Photos of the sets (training/real_hazards.yaml) made ready for the classifier.
+
+A set labels some classes only. A frame with a labelled hazard is worth sending, whatever else it shows. Its other places,
+and frames without a label, teach that there is nothing only where somebody looked: all classes are labelled or said to be
+absent, or the zone's detector looked for those that are not (a judge). What the judge finds of them, however unsure, makes
+its place unknown.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Callable, Dict, List, Optional, Tuple
+
+import numpy as np
+
+from detector import CLASSES, sets
+from detector.data import Picture
+
+from .labels import Background, is_reportable, prepared
+
+CALIBRATION_SETS = ("pothole_dash_turkey", "road_obstacle21", "accident_cctv")
+"""Sources that the classifier never learns from: its threshold is chosen on their training parts."""
+
+DOUBTFUL = 0.1
+"""Score from which on the judge's find makes a place unknown."""
+
+SCENES, SCENES_WEIGHT = 480, 0.4
+"""Streets with hazards put into them, and how often they are drawn beside the photos of the sets."""
+
+Judge = Callable[[np.ndarray], List[np.ndarray]]
+"""Detections (M x 5) per class of an H x W x 3 picture."""
+
+
+@dataclass
+class LabelledPhoto:
+    """A photo to measure on, prepared."""
+
+    picture: Picture
+    classes: List[str]  # of its reportable boxes
+
+
+def judged(picture: Picture, judge: Optional[Judge]) -> Tuple[Picture, Background]:
+    """A set's picture with its unknown places, and what its background says."""
+    unlabelled = sorted(set(range(len(CLASSES))) - set(picture.labelled_classes))
+    if not unlabelled:
+        return picture, Background.KNOWN
+    if judge is None:
+        return picture, Background.LIKELY if set(unlabelled) <= set(picture.absent_classes) else Background.UNKNOWN
+    found = judge(picture.image)
+    doubtful = np.vstack([picture.difficult, *(found[class_id][found[class_id][:, 4] >= DOUBTFUL, :4] for class_id in unlabelled)])
+    return replace(picture, difficult=doubtful.astype(np.float32)), Background.LIKELY
+
+
+def views_of(picture: Picture, background: Background) -> List[Picture]:
+    """A photo as the vehicle's program would show it, and, where that leaves bars beside it, also without them."""
+    whole, cut = prepared(picture, None, background), prepared(picture, None, background, covering=True)
+    whole.weight = cut.weight = picture.weight / 2
+    return [whole, cut]
+
+
+def compose_scenes(pasted: sets.Pasted, streets: List[Tuple[Picture, Background]], seed: int) -> List[Picture]:
+    """Streets with signs and hazards of other photos put into them, prepared."""
+    scenes = []
+    for index in range(SCENES):
+        rng = np.random.default_rng([seed, 9, index])
+        street, background = streets[rng.integers(len(streets))]
+        scenes.append(prepared(pasted.into(rng, street), None, background))
+    return scenes
+
+
+def read_groups(
+    catalogue: sets.Catalogue, data: Path, judge: Optional[Judge], calm: List[Picture], seed: int
+) -> Dict[str, List[Picture]]:
+    """The photos to learn from, a group for each set, and scenes: `calm` are roads without a hazard, into which hazards are put as well."""
+    splits = sets.read_splits(catalogue, data)
+    learnt = {name: [judged(one, judge) for one in split.training] for name, split in splits.items() if name not in CALIBRATION_SETS}
+    groups = {
+        f"set:{name}": [view for picture, background in pictures for view in views_of(picture, background)]
+        for name, pictures in learnt.items()
+    }
+    if catalogue.signs:
+        faces = sets.signs.read_faces(data / catalogue.signs["folder"], catalogue.signs["kind"], held_out=False)
+        cut_outs = sets.read_cut_outs([[picture for picture, _ in pictures] for pictures in learnt.values()])
+        pasted = sets.Pasted(faces, catalogue.signs["class"], cut_outs)
+        streets = [one for entry in catalogue.sets if entry.background for one in learnt.get(entry.name, [])]
+        scenes = compose_scenes(pasted, streets + [(picture, Background.KNOWN) for picture in calm], seed)
+        weight = SCENES_WEIGHT * sum(picture.weight for group in groups.values() for picture in group) / len(scenes)
+        groups["set:composed"] = [replace(scene, weight=weight) for scene in scenes]
+    return groups
+
+
+def labelled_photo(picture: Picture) -> LabelledPhoto:
+    """A set's picture to measure on."""
+    classes = sorted({CLASSES[class_id] for class_id in picture.classes[is_reportable(picture, None)].tolist()})
+    return LabelledPhoto(prepared(picture, None, Background.UNKNOWN), classes)
+
+
+def read_calibration(catalogue: sets.Catalogue, data: Path) -> Dict[str, List[LabelledPhoto]]:
+    """By set, the photos that the threshold is chosen on."""
+    chosen = [one for one in catalogue.sets if one.name in CALIBRATION_SETS]
+    return {one.name: [labelled_photo(picture) for picture in sets.read_split(one, data, catalogue.rename).training] for one in chosen}
+
+
+def read_held_out(catalogue: sets.Catalogue, data: Path) -> Dict[str, List[LabelledPhoto]]:
+    """By set, and for the composed scenes, the photos that nothing was trained or chosen on."""
+    held_out = sets.read_pictures(catalogue, data).held_out
+    return {name: [labelled_photo(picture) for picture in pictures] for name, pictures in held_out.items()}
