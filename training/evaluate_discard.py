@@ -105,7 +105,7 @@ def read_classifier(manifest: Path) -> Tuple[Scorer, float]:
 
 
 class Drives:
-    """Both profiles over the drives, and what they saw and sent."""
+    """Both profiles over the drives, and what they saw and sent; between them what a classifier could reach that sends all it sees."""
 
     def __init__(self, detector: Manifest, classify: Scorer, threshold: float, settings: dict, speed_mps: float):
         self.runner = DetectorRunner(forward_of(detector), detector.view)
@@ -113,6 +113,7 @@ class Drives:
         self.settings, self.speed_mps = settings, speed_mps
         self.big: Dict[str, List[ScoredFrame]] = {}
         self.small: Dict[str, List[ScoredFrame]] = {}
+        self.looked_at: Dict[str, List[ScoredFrame]] = {}
         self.seconds, self.bytes, self.judged, self.candidates, self.sent = 0.0, 0, 0, 0, 0
 
     def potholes(self, picture) -> np.ndarray:
@@ -123,20 +124,19 @@ class Drives:
         """One drive; stretches without pictures are cut to NEAR_M, as replays cut them."""
         sender = Sender(self.settings, self.threshold)
         at_m, last_m = 0.0, frames[0].chainage_m
-        big, small = [], []
+        big, looked_at, small = [], [], []
         for frame in frames:
             at_m += min(frame.chainage_m - last_m, NEAR_M)
             last_m = frame.chainage_m
             picture, time_s = frame.picture, at_m / self.speed_mps
-            big.append(ScoredFrame(picture.boxes, self.potholes(picture), frame.chainage_m))
-            file = None
-            if sender.takes(time_s):
+            nothing, found = np.zeros((0, 5)), self.potholes(picture)
+            file, is_looked_at = None, sender.takes(time_s)
+            if is_looked_at:
                 file = sender.send(picture.image, self.classify(picture.image), time_s, at_m)
-            found = np.zeros((0, 5))
-            if file is not None:
-                found = self.potholes_of_file(file, picture)
-            small.append(ScoredFrame(picture.boxes, found, frame.chainage_m))
-        self.big[name], self.small[name] = big, small
+            arrived = nothing if file is None else self.potholes_of_file(file, picture)
+            for frames_of, detections in ((big, found), (looked_at, found if is_looked_at else nothing), (small, arrived)):
+                frames_of.append(ScoredFrame(picture.boxes, detections, frame.chainage_m, difficult=picture.difficult))
+        self.big[name], self.looked_at[name], self.small[name] = big, looked_at, small
         self.seconds += at_m / self.speed_mps
         self.judged, self.candidates = self.judged + sender.judged, self.candidates + sender.candidates
         self.sent, self.bytes = self.sent + len(sender.sent_bytes), self.bytes + sum(sender.sent_bytes)
@@ -155,14 +155,15 @@ def run(options: argparse.Namespace) -> None:
     manifest = read_manifest(options.detector)
     classify, threshold = read_classifier(options.manifest)
     settings = yaml.safe_load(CONFIG.read_text())
+    settings["rate_hz"] = options.rate_hz or settings["rate_hz"]
     drives = Drives(manifest, classify, threshold, settings, options.speed_mps)
     for name in options.sections:
-        drives.drive(name, read_drive(options.data / "road_survey" / name))
+        drives.drive(name, read_drive(options.data / options.labels / name))
     frames = sum(len(drive) for drive in drives.big.values())
     print(f"{frames} frames, {drives.seconds:.0f} s at {options.speed_mps} m/s, threshold {threshold}")
     print(f"judged {drives.judged}, candidates {drives.candidates}, sent {drives.sent}, {text(share(drives.bytes / 1000, drives.sent), 1)} kB each")
     print(f"uplink {text(share(8e-6 * drives.bytes, drives.seconds))} Mbit/s")
-    for name, seen in (("detector on board", drives.big), ("small vehicle", drives.small)):
+    for name, seen in (("detector on board", drives.big), ("frames looked at", drives.looked_at), ("small vehicle", drives.small)):
         found = drive_figures(seen, manifest.thresholds["pothole"])
         print(
             f"{name}: event recall {text(found.event_recall)} (IoU 0.3: {text(found.event_recall_iou30)}) of {found.event_count}, "
@@ -179,6 +180,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--detector", type=Path, default=Path("models/hazards-base.yaml"), help="the zone's")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--sections", nargs="+", default=list(VALIDATION_SECTIONS), help="of the road survey")
+    parser.add_argument("--labels", default="road_survey", help="folder of the sections below --data: road_survey_second_labels for these")
+    parser.add_argument("--rate-hz", type=float, help="frames per second that the classifier looks at, else config/early_discard.yaml's")
     parser.add_argument("--speed-mps", type=float, default=16.0)
     parser.add_argument("--threads", type=int, default=1, help="threads of OpenCV")
     options = parser.parse_args(arguments)

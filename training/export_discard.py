@@ -68,7 +68,7 @@ def check_against_torch(scorer: Scorer, backbone: Path, head: torch.nn.Module) -
         image = np.random.default_rng(seed).integers(0, 256, (INPUT_HEIGHT, INPUT_WIDTH, 3), np.uint8)
         image = cv2.GaussianBlur(image, (0, 0), 1.0 + 3 * seed)
         with torch.no_grad():
-            expected = float(head(torch.from_numpy(features.of(image))[None]))
+            expected = float(head(*(torch.from_numpy(level)[None] for level in features.of(image))))
         if not abs(scorer(image) - expected) <= TOLERANCE:
             raise ExportError(f"OpenCV's output differs from torch's by {abs(scorer(image) - expected):.2g} > {TOLERANCE}.")
 

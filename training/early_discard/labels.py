@@ -95,14 +95,15 @@ def is_reportable(picture: Picture, camera: Optional[Camera]) -> np.ndarray:
     return heights >= least[picture.classes] * picture.image.shape[1]
 
 
-def prepared(picture: Picture, camera: Optional[Camera], background: Background = Background.KNOWN, covering: bool = False) -> Picture:
+def prepared(picture: Picture, camera: Optional[Camera], background: Background = Background.KNOWN, zoom: float = 0.0) -> Picture:
     """The picture as the classifier sees it: shrunk, with boxes of class REPORTABLE or FAR instead of classes of hazards.
 
-    `covering`: so that it covers the input and views cut it, instead of lying within it.
+    `zoom`: how much larger it is than what just covers the input, so that views cut it; 0: it lies within the input.
     """
     classes = np.where(is_reportable(picture, camera), REPORTABLE, FAR).astype(np.int64)
     height, width = picture.image.shape[:2]
-    scale = (max if covering else min)(INPUT_WIDTH / width, INPUT_HEIGHT / height)
+    fits = INPUT_WIDTH / width, INPUT_HEIGHT / height
+    scale = zoom * max(fits) if zoom else min(fits)
     size = (round(width * scale), round(height * scale))
     image = cv2.resize(picture.image, size, interpolation=cv2.INTER_LINEAR)  # As the vehicle does it.
     boxes, difficult = (

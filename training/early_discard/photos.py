@@ -23,6 +23,8 @@ CALIBRATION_SETS = ("pothole_dash_turkey", "road_obstacle21", "accident_cctv")
 DOUBTFUL = 0.1
 """Score from which on the judge's find makes a place unknown."""
 
+ZOOMS = (0.0, 1.0, 1.8)
+
 SCENES, SCENES_WEIGHT = 480, 0.4
 """Streets with hazards put into them, and how often they are drawn beside the photos of the sets."""
 
@@ -47,14 +49,12 @@ def judged(picture: Picture, judge: Optional[Judge]) -> Tuple[Picture, Backgroun
         return picture, Background.LIKELY if set(unlabelled) <= set(picture.absent_classes) else Background.UNKNOWN
     found = judge(picture.image)
     doubtful = np.vstack([picture.difficult, *(found[class_id][found[class_id][:, 4] >= DOUBTFUL, :4] for class_id in unlabelled)])
-    return replace(picture, difficult=doubtful.astype(np.float32)), Background.LIKELY
+    return replace(picture, difficult=doubtful.astype(np.float32)), Background.KNOWN
 
 
 def views_of(picture: Picture, background: Background) -> List[Picture]:
-    """A photo as the vehicle's program would show it, and, where that leaves bars beside it, also without them."""
-    whole, cut = prepared(picture, None, background), prepared(picture, None, background, covering=True)
-    whole.weight = cut.weight = picture.weight / 2
-    return [whole, cut]
+    """A photo as the vehicle's program would show it, filling the input, and from nearer: parts of it, many without a hazard."""
+    return [replace(prepared(picture, None, background, zoom), weight=picture.weight / len(ZOOMS)) for zoom in ZOOMS]
 
 
 def compose_scenes(pasted: sets.Pasted, streets: List[Tuple[Picture, Background]], seed: int) -> List[Picture]:
