@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Callable, Dict, List, Optional, Tuple
 
+import cv2
 import numpy as np
 
 from detector import CLASSES, sets
@@ -24,9 +25,16 @@ DOUBTFUL = 0.1
 """Score from which on the judge's find makes a place unknown."""
 
 ZOOMS = (0.0, 1.0, 1.8)
+"""Views of a photo: within the input, filling it, and from nearer."""
 
-SCENES, SCENES_WEIGHT = 480, 0.4
-"""Streets with hazards put into them, and how often they are drawn beside the photos of the sets."""
+SCENES = 480
+"""Streets with hazards put into them."""
+
+SCENES_WEIGHT, PAINTED_OUT_WEIGHT = 0.4, 0.5
+"""How often scenes, and streets whose hazards are painted out, are drawn beside the photos of the sets, which count 1."""
+
+MOST_PAINTED = 0.12
+"""Of a picture, up to which its hazards are painted out."""
 
 Judge = Callable[[np.ndarray], List[np.ndarray]]
 """Detections (M x 5) per class of an H x W x 3 picture."""
@@ -57,6 +65,25 @@ def views_of(picture: Picture, background: Background) -> List[Picture]:
     return [replace(prepared(picture, None, background, zoom), weight=picture.weight / len(ZOOMS)) for zoom in ZOOMS]
 
 
+def painted_out(picture: Picture) -> Optional[Picture]:
+    """The street without its hazards, their places filled from around them (Telea 2004); None where they are too large."""
+    height, width = picture.image.shape[:2]
+    mask = np.zeros((height, width), np.uint8)
+    for left, top, right, bottom in picture.boxes:
+        margin_x, margin_y = max(0.15 * (right - left), 2), max(0.15 * (bottom - top), 2)
+        corners = np.clip([left - margin_x, top - margin_y, right + margin_x, bottom + margin_y], 0, [width, height] * 2).astype(int)
+        mask[corners[1] : corners[3], corners[0] : corners[2]] = 255
+    if mask.mean() > MOST_PAINTED * 255:
+        return None
+    image = cv2.inpaint(picture.image, mask, 4, cv2.INPAINT_TELEA)
+    return replace(picture, image=image, boxes=picture.boxes[:0], classes=picture.classes[:0])
+
+
+def weighted(group: List[Picture], weight: float) -> List[Picture]:
+    """Pictures that all weigh the same, together `weight`."""
+    return [replace(picture, weight=weight / len(group)) for picture in group]
+
+
 def compose_scenes(pasted: sets.Pasted, streets: List[Tuple[Picture, Background]], seed: int) -> List[Picture]:
     """Streets with signs and hazards of other photos put into them, prepared."""
     scenes = []
@@ -77,14 +104,17 @@ def read_groups(
         f"set:{name}": [view for picture, background in pictures for view in views_of(picture, background)]
         for name, pictures in learnt.items()
     }
+    total = sum(picture.weight for group in groups.values() for picture in group)
+    streets = [one for entry in catalogue.sets if entry.background for one in learnt.get(entry.name, [])]
+    painted = [(painted_out(picture), background) for picture, background in streets]
+    emptied = [view for picture, background in painted if picture for view in views_of(picture, background)]
+    groups["set:painted_out"] = weighted(emptied, PAINTED_OUT_WEIGHT * total)
     if catalogue.signs:
         faces = sets.signs.read_faces(data / catalogue.signs["folder"], catalogue.signs["kind"], held_out=False)
         cut_outs = sets.read_cut_outs([[picture for picture, _ in pictures] for pictures in learnt.values()])
         pasted = sets.Pasted(faces, catalogue.signs["class"], cut_outs)
-        streets = [one for entry in catalogue.sets if entry.background for one in learnt.get(entry.name, [])]
         scenes = compose_scenes(pasted, streets + [(picture, Background.KNOWN) for picture in calm], seed)
-        weight = SCENES_WEIGHT * sum(picture.weight for group in groups.values() for picture in group) / len(scenes)
-        groups["set:composed"] = [replace(scene, weight=weight) for scene in scenes]
+        groups["set:composed"] = weighted(scenes, SCENES_WEIGHT * total)
     return groups
 
 
