@@ -42,7 +42,7 @@ RECIPE = Recipe(
 )
 """Whole frames, mirrored, moved and relit a little: what the vehicle's camera sees."""
 
-SHARES = {**GROUP_SHARES, "survey_potholes": 0.18, "survey_empty": 0.22, "closeups": 0.02, "cones": 0.16, "set": 0.42}
+SHARES = {**GROUP_SHARES, "survey_potholes": 0.17, "survey_empty": 0.23, "closeups": 0.02, "cones": 0.16, "set": 0.42}
 """Photos of sets nearly always show a hazard: as many survey frames without one stand beside them."""
 
 DEFAULT_DETECTOR = Path(__file__).parents[1] / "models" / "hazards-small.onnx"

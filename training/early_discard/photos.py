@@ -30,7 +30,7 @@ ZOOMS = (0.0, 1.0, 1.8)
 SCENES = 480
 """Streets with hazards put into them."""
 
-SCENES_WEIGHT, PAINTED_OUT_WEIGHT = 0.4, 0.5
+SCENES_WEIGHT, PAINTED_OUT_WEIGHT = 0.25, 1.5
 """How often scenes, and streets whose hazards are painted out, are drawn beside the photos of the sets, which count 1."""
 
 MOST_PAINTED = 0.12

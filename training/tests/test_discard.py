@@ -136,6 +136,17 @@ class Photos(unittest.TestCase):
         self.assertEqual(cut.image.shape[:2], (INPUT_WIDTH, INPUT_WIDTH))
         self.assertGreater(near.image.shape[1], INPUT_WIDTH)
 
+    def test_a_painted_out_street_shows_the_road_where_its_hazard_was(self):
+        image = np.full((400, 640, 3), 120, np.uint8)
+        image[210:240, 310:350] = 20
+        for box, expected in (([308, 208, 352, 242], True), ([20, 20, 620, 380], False)):
+            street = Picture(image, np.array([box], np.float32), np.array([0]), [0])
+            painted = photos.painted_out(street)
+            self.assertEqual(painted is not None, expected)
+            if painted:
+                self.assertEqual(len(painted.boxes), 0)
+                self.assertGreater(int(painted.image.min()), 110)
+
     def test_low_debris_counts_where_a_cone_of_its_height_does_not(self):
         box = np.array([[0, 0, 9, 6]], np.float32)
         for name, expected in (("debris", [True]), ("traffic_cone", [False])):
