@@ -24,7 +24,7 @@ class OffloadSender {
  public:
   struct Config {
     std::string drive_id;
-    double rate_hz = 3.0;  ///< Frames that the classifier sees.
+    double rate_hz = 5.0;  ///< Frames that the classifier sees.
     /// Road between two frames that are sent: a standing car does not stream, m.
     double min_spacing_m = 3.0;
     double max_bytes_per_s = 60000;  ///< Of pictures, in the long run.
