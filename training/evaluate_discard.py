@@ -20,8 +20,8 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from common.figures import NothingMeasured, share, text
+from detector.data import POTHOLE, VALIDATION_SECTIONS, DataError, DriveFrame, read_drive, read_yolo_labels
 from detector.int8_model import forward_of
-from detector.data import POTHOLE, VALIDATION_SECTIONS, DataError, DriveFrame, read_drive
 from detector.manifest import Manifest, ManifestError, read_manifest, sha256_of
 from detector.metrics import NEAR_M, ScoredFrame, drive_figures
 from detector.validation import DetectorRunner
@@ -150,6 +150,19 @@ class Drives:
         return found
 
 
+def read_section(data: Path, labels: str, name: str) -> List[DriveFrame]:
+    """A survey section with the labels of the folder `labels` below `data`."""
+    frames = read_drive(data / "road_survey" / name)
+    if labels != "road_survey":
+        for picture in (frame.picture for frame in frames):
+            height, width = picture.image.shape[:2]
+            files = [data / labels / name / kind / f"{picture.name}.txt" for kind in ("labels", "difficult")]
+            picture.boxes = read_yolo_labels(files[0], width, height, [POTHOLE])[0]
+            if files[1].exists():  # as a picture's own are read
+                picture.difficult = read_yolo_labels(files[1], width, height, [POTHOLE])[0]
+    return frames
+
+
 def run(options: argparse.Namespace) -> None:
     """Measure and print."""
     manifest = read_manifest(options.detector)
@@ -158,7 +171,7 @@ def run(options: argparse.Namespace) -> None:
     settings["rate_hz"] = options.rate_hz or settings["rate_hz"]
     drives = Drives(manifest, classify, threshold, settings, options.speed_mps)
     for name in options.sections:
-        drives.drive(name, read_drive(options.data / options.labels / name))
+        drives.drive(name, read_section(options.data, options.labels, name))
     frames = sum(len(drive) for drive in drives.big.values())
     print(f"{frames} frames, {drives.seconds:.0f} s at {options.speed_mps} m/s, threshold {threshold}")
     print(f"judged {drives.judged}, candidates {drives.candidates}, sent {drives.sent}, {text(share(drives.bytes / 1000, drives.sent), 1)} kB each")
@@ -180,7 +193,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--detector", type=Path, default=Path("models/hazards-base.yaml"), help="the zone's")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the data sets")
     parser.add_argument("--sections", nargs="+", default=list(VALIDATION_SECTIONS), help="of the road survey")
-    parser.add_argument("--labels", default="road_survey", help="folder of the sections below --data: road_survey_second_labels for these")
+    parser.add_argument("--labels", default="road_survey", help="folder of the labels below --data: road_survey_second_labels for the second ones")
     parser.add_argument("--rate-hz", type=float, help="frames per second that the classifier looks at, else config/early_discard.yaml's")
     parser.add_argument("--speed-mps", type=float, default=16.0)
     parser.add_argument("--threads", type=int, default=1, help="threads of OpenCV")

@@ -121,8 +121,10 @@ def say_photos(catalogue: sets.Catalogue, data: Path, scorer: Scorer, threshold:
     held_out = {name: score_photos(part, scorer) for name, part in photos.read_held_out(catalogue, data).items()}
     drives = {name: as_drive(part) for name, part in held_out.items()}
     say("held-out photos", drives, threshold)
-    for name, drive in {**drives, **by_class(held_out)}.items():
+    for name, drive in drives.items():
         say(f"  {name}", {name: drive}, threshold)
+    for name, drive in by_class(held_out).items():
+        say(f"  class {name}", {name: drive}, threshold)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -257,7 +257,7 @@ class Programs(unittest.TestCase):
             self.assertEqual(export_discard.main([
                 "--training", str(self.root / "sets"), "--data", str(self.data), "--out", str(models), "--sets", str(catalogue),
             ]), 0)
-        for name in ("cattle", "holes", "composed", "deer", "pothole"):
+        for name in ("cattle", "holes", "composed", "class deer", "class pothole"):
             self.assertRegex(said.getvalue(), f"  {name}: [1-9]")
         status, errors = self.train("sets", "--resume")
         self.assertEqual((status, len(errors.splitlines())), (2, 1), errors)
