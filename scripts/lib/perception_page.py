@@ -140,7 +140,7 @@ def detection_section(results):
     text = "## Table 3.2: detection\n" + prose(f"""
         Frames/s is what was processed (of the SVC: judged by its classifier) of what the drives hold: {frames} frames
         in {seconds:.0f} s, so {frames / max(seconds, 1e-9):.1f} is the most there (the thesis's camera gave 30; what
-        the engines could do stands below). The SVC's classifier looks at 3 frames a second and leaves the others out
+        the engines could do stands below). The SVC's classifier looks at five frames a second at most and leaves others out
         on purpose; *dropped* counts the frames that came too fast. Radius of duplicates {results['usual_radius_m']}
         m. A false report is each whose box overlaps no label of its frame by IoU 0.5; `livemap evaluate
         detection` counts those within 12 m as one, so its figure is another. Mbit/s is the uplink as the bridge
