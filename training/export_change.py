@@ -22,10 +22,10 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parent))
 from common.figures import text
 from change import data, inference, onnx_model
-from change.exported import load_exported
+from change.exported import load_averaged
 from change.manifest import write_manifest
-from change.network import ARCHITECTURES, ChangeNetwork, Network
-from change.surroundings import ensemble_of, with_present_names
+from change.network import ChangeNetwork, Network
+from change.surroundings import ensemble_of
 from change.validation import FALSE_POSITIVE_RATES, photo_pairs, registered_pairs, validate
 from train_change import VALIDATION_PHOTOS, read_source
 
@@ -46,19 +46,6 @@ UNCALIBRATED_THRESHOLD = 0.5
 
 class ExportError(Exception):
     """Nothing usable was exported; the text is one sentence for the user."""
-
-
-def load_averaged(checkpoint: Path) -> Network:
-    """The averaged weights of a checkpoint, or the weights of a whole exported graph."""
-    if checkpoint.suffix == ".onnx":
-        return load_exported(checkpoint)
-    try:
-        state = torch.load(checkpoint, map_location="cpu")
-        network = ARCHITECTURES[state["settings"]["architecture"]]()
-        network.load_state_dict(with_present_names(state["average"]))
-    except (OSError, KeyError, RuntimeError, TypeError) as error:
-        raise ExportError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
-    return network.eval()
 
 
 def load_ensemble(checkpoints: List[Path]) -> Network:

@@ -5,6 +5,11 @@
         --data ../shared/data --out build/training/change_small --seed 1
 
 A run that was stopped, at whatever moment, continues with the same command and --resume.
+
+    training/train_change.py --refine --start-from models/change-small.onnx --sets training/real_hazards.yaml --pretrain 0 \
+        --pairs build/training/change --data ../shared/data --out build/training/change_roads
+
+goes on with a finished network, of which the export will do, and teaches it small things on the roads of street photos.
 """
 
 import argparse
@@ -15,10 +20,11 @@ from typing import List, Optional, Sequence
 import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
-from change import data, objects
+from change import data, objects, roads
 from change.augment import Augmenter, SceneAugmenter, Source
+from change.exported import hold_normalisation, load_averaged
 from change.loss import change_loss, class_weights
-from change.network import ARCHITECTURES, widened
+from change.network import ARCHITECTURES, Network, widened
 from change.surroundings import with_present_names
 from change.training import Settings, batches, make_optimizer, to_input
 from change.validation import RegisteredPair, photo_pairs, registered_pairs, torch_detector, validate
@@ -41,10 +47,10 @@ class Trainer(Run):
     BEST = "selection"
     GRADIENT_NORM = 5.0
 
-    def __init__(self, settings: Settings, device: torch.device):
+    def __init__(self, settings: Settings, device: torch.device, network: Optional[Network] = None):
         torch.manual_seed(settings.seed)
         self.device = device
-        network = ARCHITECTURES[settings.architecture]().to(device)
+        network = (network or ARCHITECTURES[settings.architecture]()).to(device)
         super().__init__(settings, network, make_optimizer(network, settings))
 
     def start_from(self, state: dict) -> None:
@@ -81,6 +87,8 @@ class Trainer(Run):
         loader = batches(samples, max(round(settings.batch * share), 1), workers)
         total = 0.0
         self.model.train()
+        if settings.refine:
+            hold_normalisation(self.model)
         for step, (first, second, truth) in enumerate(loader):
             self.set_rate(self.rate(self.epoch + step / len(loader)))
             second = to_input(second, self.device)
@@ -88,12 +96,18 @@ class Trainer(Run):
                 if pretraining:
                     logits = self.model.classify(second)
                 else:
-                    logits = self.model(to_input(first, self.device), second)
+                    logits = (self.refined if settings.refine else self.model)(to_input(first, self.device), second)
             loss = change_loss(logits, truth.to(self.device), weights)
             self.step(loss)
             total += loss.item()
         self.epoch += 1
         return {"pretrain_loss" if pretraining else "loss": total / len(loader)}
+
+    def refined(self, first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
+        """Logits with the verdict of the surroundings; what the warp did not show is ignored in the truth, so that all counts as seen."""
+        levels = [self.model.encode(picture) for picture in (first, second)]
+        height, width = (size // self.model.logits_stride for size in first.shape[2:])
+        return self.model.refined(*levels, torch.zeros(len(first), 1, height, width, device=self.device))
 
     def validate(self, pairs: Sequence[RegisteredPair]) -> dict:
         """Figures of the averaged weights on held-out pairs; none while the encoder is pretrained."""
@@ -112,7 +126,9 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument("--validation", type=Path, help="held-out pairs, laid out alike")
     parser.add_argument("--registered", action="store_true", help="the pictures of all pairs lie upon each other already")
     parser.add_argument("--data", type=Path, help="folder of the data sets: photos to paste objects into")
-    parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with, also of a narrower network")
+    parser.add_argument("--sets", type=Path, metavar="FILE", help="sets of labelled photos below --data (training/real_hazards.yaml): their streets, and hazards cut out of them")
+    parser.add_argument("--start-from", type=Path, metavar="CHECKPOINT", help="averaged weights to begin a new run with, also of a narrower network, or with --refine a whole exported NAME.onnx")
+    parser.add_argument("--refine", action="store_true", help="train all of a finished network, with its surroundings, and measure no normalisation anew")
     parser.add_argument("--architecture", choices=tuple(ARCHITECTURES), default=defaults.architecture)
     add_run_arguments(parser, "build/training/change_small", defaults, ("seed", "pretrain", "epochs", "samples_per_epoch", "batch"))
     add_loop_arguments(parser, defaults, validate_every=8)
@@ -122,9 +138,19 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """Settings of the command line, checked."""
     check_arguments(arguments)
+    if arguments.refine and (arguments.pretrain or arguments.start_from is None):
+        raise UsageError("--refine goes on with a finished network: it needs --start-from and --pretrain 0.")
+    if not arguments.refine and arguments.start_from is not None and arguments.start_from.suffix == ".onnx":
+        raise UsageError("--start-from: an exported network can only be trained with --refine.")
+    if arguments.sets is not None and arguments.data is None:
+        raise UsageError("--sets needs --data, the folder that the sets lie below.")
     if not 0 <= arguments.pretrain < arguments.epochs:
         raise UsageError(f"--pretrain must be from 0 to less than --epochs, not {arguments.pretrain}.")
     return Settings(**fields_given(Settings, arguments))
+
+
+PAIRS_KEPT_APART = Path(__file__).parent / "change_pairs.yaml"
+"""Which real pairs there are to measure on: their pictures are not trained on."""
 
 
 def read_source(pairs: Path, photos: Optional[Path], cache: Path, validation: bool, registered: bool = False) -> Source:
@@ -145,16 +171,23 @@ def run(arguments: argparse.Namespace) -> None:
     """Train from the checkpoint, or from the start, to the last epoch."""
     settings = settings_from(arguments)
     device = prepare_device(arguments)
-    trainer = Trainer(settings, device)
+    finished = load_averaged(checkpoint_to_start_from(arguments)) if settings.refine else None
+    trainer = Trainer(settings, device, finished)
     begun = checkpoint_to_resume(arguments, device)
     if begun:
         trainer.restore(begun)
-    elif arguments.start_from:
+    elif arguments.start_from and finished is None:
         trainer.start_from(load_checkpoint(checkpoint_to_start_from(arguments), device))
     source = read_source(arguments.pairs, arguments.data, arguments.out / "registration.npz", False, arguments.registered)
+    if arguments.sets is not None:
+        source.roads = roads.read_roads(arguments.data, arguments.sets, PAIRS_KEPT_APART)
+        print(
+            f"roads: {len(source.roads.photos)} photos, {len(source.roads.places)} pairs of them show one place, "
+            f"{sum(map(len, source.roads.cut_outs.values()))} hazards cut out", flush=True,
+        )
     if settings.pretrain and not source.scenes:
         raise UsageError(f"--pretrain: below {arguments.pairs} there are no scenes of training/simulate_change.py; set it to 0.")
-    if not source.registered and not source.photos:
+    if not source.registered and not source.photos and source.roads is None:
         raise UsageError(f"No pair below {arguments.pairs} could be registered, and there are no photos.")
     held_out: List[RegisteredPair] = []
     if arguments.validation:

@@ -17,6 +17,7 @@ from .classes import NO_CHANGE
 from .data import IGNORED, Pair, Scene
 from .inference import PAD_VALUE, fill_invalid
 from .paste import paste_pair
+from .roads import Roads
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Recipe:
     width: int = 224
     height: int = 192
     identical: float = 0.15  # one picture twice: nothing has changed
+    roads: float = 0.6  # of the rest: street photos at full resolution, where there are such
     photos: float = 0.25  # of the rest: photos with pasted objects, where there are photos
     swap: float = 0.5
     mirror: float = 0.5
@@ -48,6 +50,7 @@ class Source:
     scenes: List[Scene] = field(default_factory=list)
     photos: Dict[str, List[np.ndarray]] = field(default_factory=dict)  # by group
     cut_outs: Dict[int, List[CutOut]] = field(default_factory=dict)  # by class
+    roads: Optional[Roads] = None
 
     def __post_init__(self):
         self.registered = [pair for pair in self.pairs if pair.homographies()]
@@ -171,7 +174,7 @@ class Augmenter:
     """Draws samples of one recipe."""
 
     def __init__(self, source: Source, recipe: Recipe):
-        if not source.registered and not source.photos:
+        if not source.registered and not source.photos and source.roads is None:
             raise ValueError("there are neither registered pairs nor photos")
         self.source, self.recipe = source, recipe
         self.groups = sorted(source.photos)
@@ -203,6 +206,8 @@ class Augmenter:
     def draw_pair(self, rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """First and second picture, mask, and the homography from the first to the second."""
         source = self.source
+        if source.roads is not None and (not source.registered and not source.photos or rng.random() < self.recipe.roads):
+            return (*source.roads.draw(rng), np.eye(3))
         from_photo = self.groups and (not source.registered or rng.random() < self.recipe.photos)
         if not from_photo:
             pair = source.registered[rng.integers(len(source.registered))]

@@ -1,6 +1,7 @@
 """Taking up the weights of an exported network again, where its checkpoint is not at hand."""
 
 from pathlib import Path
+from typing import Iterable
 
 import onnx
 import torch
@@ -10,7 +11,7 @@ from torch import nn
 from detector.data import DataError
 
 from .blocks import ConvBlock
-from .network import ChangeNetwork
+from .network import ARCHITECTURES, ChangeNetwork, Network
 from .surroundings import with_present_names
 
 
@@ -26,8 +27,7 @@ def load_exported(path: Path) -> ChangeNetwork:
         stored = with_present_names(stored)
     except Exception as error:  # python3-onnx passes on what protobuf throws.
         raise DataError(f"Cannot read the exported network {path}: {error}.") from error
-    refiners = {name.split(".")[2] for name in stored if name.startswith("surroundings.refiners.")}
-    network = ChangeNetwork(refiners=max(len(refiners), 1)).eval()
+    network = ChangeNetwork(refiners=max(refiners_of(stored), 1)).eval()
     for name, module in network.named_modules():
         if isinstance(module, ConvBlock):
             put_into(module, stored, f"{name}.0")
@@ -39,6 +39,32 @@ def load_exported(path: Path) -> ChangeNetwork:
     if any(not name.startswith("surroundings.") for name in missing):
         raise DataError(f"{path} is no exported change-small: it has no {missing[0]}.")
     return network
+
+
+def load_averaged(checkpoint: Path) -> Network:
+    """The averaged weights of a checkpoint, or the weights of a whole exported graph."""
+    if checkpoint.suffix == ".onnx":
+        return load_exported(checkpoint)
+    try:
+        state = torch.load(checkpoint, map_location="cpu")
+        weights, architecture = with_present_names(state["average"]), ARCHITECTURES[state["settings"]["architecture"]]
+        network = ChangeNetwork(refiners=max(refiners_of(weights), 1)) if architecture is ChangeNetwork else architecture()
+        network.load_state_dict(weights)
+    except Exception as error:  # torch tries one format after the other, each with exceptions of its own
+        raise DataError(f"Cannot read the checkpoint {checkpoint}: {error}.") from error
+    return network.eval()
+
+
+def refiners_of(weights: Iterable[str]) -> int:
+    """How many refiners weights of these names have."""
+    return len({name.split(".")[2] for name in weights if name.startswith("surroundings.refiners.")})
+
+
+def hold_normalisation(network: nn.Module) -> None:
+    """Keep every normalisation as it is while the network trains: what an export folded into the convolutions is not measured anew."""
+    for module in network.modules():
+        if isinstance(module, nn.BatchNorm2d):
+            module.eval()
 
 
 def put_into(block: ConvBlock, stored: dict, name: str) -> None:

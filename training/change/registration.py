@@ -1,6 +1,6 @@
 """Homographies between the pictures of a pair: from their edges or SIFT matches as the vehicle finds them, or from known poses."""
 
-from typing import Optional
+from typing import Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -28,6 +28,10 @@ LEAST_EVIDENCE = 0.82
 """Of correlation, lead and agreement in detail together."""
 
 
+Features = Tuple[Sequence[cv2.KeyPoint], Optional[np.ndarray]]
+"""Keypoints and descriptors of a picture."""
+
+
 def overlap(homography: np.ndarray, width: int, height: int) -> float:
     """Share of a picture that its partner, warped by the homography, fills."""
     ones = np.full((height, width), 255, np.uint8)
@@ -37,22 +41,27 @@ def overlap(homography: np.ndarray, width: int, height: int) -> float:
 def by_features(first: np.ndarray, second: np.ndarray) -> Optional[np.ndarray]:
     """3 x 3 that takes pixels of the first picture (H x W x 3 uint8) to the second; None where they do not match."""
     sift = cv2.SIFT_create(FEATURES, contrastThreshold=0.02)
-    sides = [sift.detectAndCompute(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), None) for image in (first, second)]
-    if any(descriptors is None or len(descriptors) < LEAST_INLIERS for _, descriptors in sides):
-        return None
-    matches = cv2.BFMatcher().knnMatch(sides[0][1], sides[1][1], k=2)
+    homography, _ = match(*(sift.detectAndCompute(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), None) for image in (first, second)))
+    height, width = second.shape[:2]
+    return homography if homography is not None and overlap(homography, width, height) >= LEAST_OVERLAP else None
+
+
+def match(first: Features, second: Features) -> Tuple[Optional[np.ndarray], int]:
+    """The homography that most matches of two pictures' features agree on, from the first to the second, and how many; None: too few."""
+    if any(descriptors is None or len(descriptors) < LEAST_INLIERS for _, descriptors in (first, second)):
+        return None, 0
+    matches = cv2.BFMatcher().knnMatch(first[1], second[1], k=2)
     good = [pair[0] for pair in matches if len(pair) == 2 and pair[0].distance < RATIO * pair[1].distance]
     if len(good) < LEAST_INLIERS:
-        return None
+        return None, 0
     points = [np.float32([keypoints[index].pt for index in indices]) for keypoints, indices in (
-        (sides[0][0], [match.queryIdx for match in good]), (sides[1][0], [match.trainIdx for match in good]),
+        (first[0], [match.queryIdx for match in good]), (second[0], [match.trainIdx for match in good]),
     )]
     cv2.setRNGSeed(1)
     homography, inliers = cv2.findHomography(points[0], points[1], cv2.RANSAC, REPROJECTION_PX, maxIters=1000)
     if homography is None or inliers.sum() < LEAST_INLIERS:
-        return None
-    height, width = second.shape[:2]
-    return homography if overlap(homography, width, height) >= LEAST_OVERLAP else None
+        return None, 0
+    return homography, int(inliers.sum())
 
 
 def edge_cells(image: np.ndarray, columns: int = EDGE_COLUMNS) -> np.ndarray:

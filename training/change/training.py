@@ -29,6 +29,7 @@ class Settings:
     weight_decay: float = 0.02
     settle: float = 0.25  # last fraction of the epochs: whole pictures, weaker changes
     precision: str = "bf16"
+    refine: bool = False  # all is trained, the surroundings' verdict included, and no normalisation is measured anew
 
     def recipe_of(self, epoch: int) -> Recipe:
         """How the samples of an epoch are made."""
