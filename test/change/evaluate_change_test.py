@@ -189,6 +189,35 @@ class EvaluateChangeTest(unittest.TestCase):
         figures = self.figures("--method", "daisy", "--register", "none", flat)
         self.assertEqual(figures["at_fpr"], own["at_fpr"])
 
+    def test_pairs_of_two_visits_are_measured_on_the_road_by_their_own_homography(self):
+        visits = self.path("visits")
+        shift = np.array([[1, 0, 6], [0, 1, 0], [0, 0, 1]], float)
+        for pair, mask in self.masks().items():
+            folder = os.path.join(visits, pair.replace("/", "_"))
+            os.makedirs(folder, exist_ok=True)
+            first, second = (cv2.imread(os.path.join(self.data, f"raw/000/RGB/{which}_{pair[-2:]}.png")) for which in (1, 2))
+            moved = cv2.warpPerspective(first, np.linalg.inv(shift), (320, 240))
+            for name, image in (("t0", second), ("t1", moved), ("mask", ((mask > 0) * 255).astype(np.uint8)),
+                                ("ignore", np.repeat(np.uint8([[0] * 40 + [255] * 280]), 240, axis=0))):
+                cv2.imwrite(os.path.join(folder, name + ".png"), image)
+            np.savetxt(os.path.join(folder, "H_t1_to_t0.txt"), shift)
+        everywhere = self.figures("--method", "difference", "--register", "given", visits)
+        road = self.figures("--method", "difference", "--register", "given", "--region", "road", visits)
+        self.assertEqual((everywhere["pairs"], everywhere["region"], road["region"]), (PAIRS, "all", "road"))
+        self.assertEqual(everywhere["pixels"], PAIRS * 240 * 40)
+        self.assertLess(road["pixels"], everywhere["pixels"])
+        # What the warp does not show, 6 columns, is not compared.
+        self.assertEqual(everywhere["unseen"]["pixels"], PAIRS * 240 * 6)
+        self.assertEqual(everywhere["compared"]["pixels"] + everywhere["unseen"]["pixels"], everywhere["pixels"])
+        self.assertIsNone(everywhere["on_board"])
+        apart = self.figures("--method", "difference", "--register", "none", visits)
+        self.assertGreater(everywhere["roc_area"], apart["roc_area"])
+        board = self.figures("--register", "given", visits)["on_board"]
+        self.assertGreaterEqual(board["threshold"], 0.5)
+        done = run(PROGRAM, "--register", "given", self.data)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("has no H_t1_to_t0.txt", done.stderr)
+
     def test_without_json_it_is_a_table(self):
         done = run(PROGRAM, "--method", "daisy", self.data)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -209,7 +238,8 @@ class EvaluateChangeTest(unittest.TestCase):
                 (["--write", self.data + "/camera.yaml", self.data], "is no folder"),
                 (["--predictions", certain_of_nothing, self.data], "accepted is 1"),
                 (["--predictions", "/nowhere", self.data], "'/nowhere' is not a folder"),
-                (["--register", "well", self.data], "none, edges, homography and both"),
+                (["--register", "well", self.data], "none, given, edges, homography and both"),
+                (["--region", "sky", self.data], "all and road"),
                 (["--predictions", empty, self.data], "000/00' is missing"),
                 (["--method", "daisy", "--predictions", empty, self.data], "--method"),
                 (["--method", "daisy", "--model", "tiny.yaml", self.data], "--model"),

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include "change/methods/change_probabilities.h"
 #include "common/error.h"
@@ -105,6 +107,44 @@ void AddFlatPairs(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
     pairs.push_back({stem, PictureOf(before, folder / "t0", stem, mask),
                      PictureOf(after, folder / "t1", stem, mask), mask, "", all_masks});
   }
+}
+
+bool IsVisitPair(const fs::path& folder) {
+  const PictureFolder pictures(folder.string(), PictureNames::kNamed);
+  return pictures.Find("t0") && pictures.Find("t1") && pictures.Find("mask");
+}
+
+void AddVisitPairs(const fs::path& folder, std::vector<ChangePairFiles>& pairs) {
+  const auto masks = std::make_shared<MaskFolder>(MaskFolder::OfChangeOrNot());
+  for (const fs::path& visit : FoldersIn(folder)) {
+    if (!IsVisitPair(visit)) continue;
+    const PictureFolder pictures(visit.string(), PictureNames::kNamed);
+    ChangePairFiles files{visit.filename().string(),
+                          *pictures.Find("t1"),
+                          *pictures.Find("t0"),
+                          *pictures.Find("mask"),
+                          "",
+                          masks};
+    files.ignored = pictures.Find("ignore").value_or("");
+    const fs::path homography = visit / "H_t1_to_t0.txt";
+    std::error_code unknown;
+    if (fs::exists(homography, unknown)) files.homography = homography.string();
+    pairs.push_back(std::move(files));
+  }
+}
+
+cv::Matx33d ReadPairHomography(const std::string& path) {
+  constexpr std::size_t kMaxBytes = 4096;
+  std::istringstream text(ReadFile(path, kMaxBytes));
+  cv::Matx33d homography;
+  int count = 0;
+  for (double value = 0; text >> value; ++count) {
+    if (count < 9 && std::isfinite(value)) homography.val[count] = value;
+  }
+  if (count != 9 || !text.eof() || std::abs(cv::determinant(homography)) < 1e-12) {
+    throw Error("homography '" + path + "' is not nine numbers of a matrix that can be inverted");
+  }
+  return homography;
 }
 
 /// The class that a published colour stands for; none for a colour of no class.
@@ -261,12 +301,13 @@ std::vector<ChangePairFiles> FindChangePairs(const std::string& directory) {
     AddPairsOfSequences(folder / "raw", pairs);
   } else {
     AddPairsOfSequences(folder, pairs);
+    if (pairs.empty()) AddVisitPairs(folder, pairs);
   }
   if (pairs.empty() || pairs.size() > kMaxPairs) {
     throw Error("folder '" + directory + "' has " + std::to_string(pairs.size()) +
                 " pairs, accepted are 1 to " + std::to_string(kMaxPairs) +
-                " as raw/NNN/RGB/1_II.png, 2_II.png and raw/NNN/GT/gtII.png, or as t0/, t1/ and "
-                "mask/");
+                " as raw/NNN/RGB/1_II.png, 2_II.png and raw/NNN/GT/gtII.png, as t0/, t1/ and "
+                "mask/, or as NAME/t0.jpg, NAME/t1.jpg and NAME/mask.png");
   }
   std::sort(pairs.begin(), pairs.end(),
             [](const auto& a, const auto& b) { return NaturalLess(a.name, b.name); });
@@ -347,6 +388,12 @@ ChangeMask ReadChangeMask(const std::string& path, MaskFolder& masks) {
 
 }  // namespace
 
+MaskFolder MaskFolder::OfChangeOrNot() {
+  MaskFolder folder("");
+  folder.has_classes_ = false;
+  return folder;
+}
+
 bool MaskFolder::HasClasses() {
   if (!has_classes_) {
     const PictureFolder masks(path_, PictureNames::kNamed);
@@ -375,6 +422,17 @@ ChangePair LoadChangePair(const ChangePairFiles& files) {
   };
   check(pair.before, files.before);
   check(pair.truth, files.truth);
+  if (!files.ignored.empty()) {
+    const cv::Mat ignored = ReadPicture(files.ignored, imaging::DecodeConfig::Pixels::kAsStored);
+    check(ignored, files.ignored);
+    if (ignored.type() != CV_8UC1) {
+      throw Error("mask '" + files.ignored + "' has " +
+                  PixelText(static_cast<int>(8 * ignored.elemSize1()), ignored.channels()) +
+                  ", accepted are 8 bits and one channel");
+    }
+    pair.truth.setTo(int{kLeftOutPixel}, ignored > 0);
+  }
+  if (!files.homography.empty()) pair.after_from_before = ReadPairHomography(files.homography);
   if (files.direction.empty()) return pair;
   pair.direction = ReadPicture(files.direction, imaging::DecodeConfig::Pixels::kAsStored);
   check(pair.direction, files.direction);

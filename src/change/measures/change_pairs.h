@@ -17,6 +17,8 @@ namespace livemap::change {
 class MaskFolder {
  public:
   explicit MaskFolder(std::string path) : path_(std::move(path)) {}
+  /// One whose masks say change or not, and nothing of classes: none is looked at.
+  static MaskFolder OfChangeOrNot();
 
   /// Whether a mask has classes: a value from 1 to 9 in one channel, or a colour that is no grey.
   /// Looks at the files once, until one has; throws Error naming one that cannot be read. Not
@@ -37,12 +39,17 @@ struct ChangePairFiles {
   /// Path of the mask that says what appeared and what vanished; empty: the data set has none.
   std::string direction;
   std::shared_ptr<MaskFolder> masks{};  ///< Of the folder of `truth`; null: looked at anew.
+  std::string ignored{};     ///< Path of a mask whose pixels above 0 are left out; empty: none.
+  std::string homography{};  ///< Path of the homography from before to after; empty: none.
 };
 
 /// Finds the pairs of a data set, sorted by name:
 /// - `raw/NNN/RGB/1_II.png`, `2_II.png`, `raw/NNN/GT/gtII.png`, as VL-CMU-CD and `livemap simulate
 ///   --change` have them; `directory` may also be the folder `raw`, or one of the NNN;
-/// - `t0/NAME`, `t1/NAME`, `mask/NAME`, as it is passed on for two-class work (jpg or png).
+/// - `t0/NAME`, `t1/NAME`, `mask/NAME`, as it is passed on for two-class work (jpg or png);
+/// - `NAME/t0`, `NAME/t1`, `NAME/mask` (0 and 255, in the view of t0), perhaps `NAME/ignore` and
+///   `NAME/H_t1_to_t0.txt` (nine numbers, row by row), as pairs of two visits are passed on. t1 is
+///   the picture that is warped, and so counts as the earlier one.
 /// Numbers are in number order; a picture belongs to a mask by its number, however many leading
 /// zeros each has, and extensions may be spelled in any way (PictureFolder).
 /// Where a file `raw/NNN/GT_direction/gtII.png` is, as the simulator writes it, it comes along.
@@ -61,6 +68,8 @@ struct ChangePair {
   cv::Mat direction;  ///< CV_8UC1: 0, kAppearedPixel, kVanishedPixel; empty without its file.
   /// False: the mask knows change and no change only, 1 and 0.
   bool with_classes = true;
+  /// Pixel of `before` to pixel of `after`, where the data set says it.
+  std::optional<cv::Matx33d> after_from_before{};
   /// Pixels of the mask whose colour is none of the published ones; they are left out.
   std::size_t unknown_colour_pixels = 0;
 };
@@ -69,7 +78,7 @@ struct ChangePair {
 /// channels, is one of classes where another mask of its folder has some. Throws Error naming the
 /// path: missing, above 64 MiB or 64 megapixels, corrupt, of another size than the others, a mask
 /// that DecodeChangeMask refuses or that a JPEG's losses have changed, or one of direction with
-/// other values.
+/// other values, or a homography that is not nine finite numbers.
 ChangePair LoadChangePair(const ChangePairFiles& files);
 
 /// What a mask file's pixels mean.

@@ -78,6 +78,26 @@ Json ChangeClassesJson(const PooledChangeScores& pooled, std::size_t curve_point
   return json;
 }
 
+/// Figures of some of the pixels, without classes.
+Json ReportPartJson(const std::optional<PooledChangeScores>& part) {
+  if (!part) return nullptr;
+  Json json;
+  json["pixels"] = part->pixels();
+  json["change_pixels"] = part->change().positives();
+  json["at_fpr"] = ReportOperationsJson(part->change());
+  json["ap"] = ReportFigureOrNull(part->change().AveragePrecision());
+  return json;
+}
+
+/// At the threshold from which on a vehicle tells of a change, of what it compares.
+Json ReportOnBoardJson(const ChangeReport& report) {
+  if (!report.on_board_threshold || !report.compared) return nullptr;
+  Json json;
+  json["threshold"] = *report.on_board_threshold;
+  json.update(ReportCountsJson(report.compared->change().AtThreshold(*report.on_board_threshold)));
+  return json;
+}
+
 Json ReportFiguresJson(const ChangeFigures& figures, std::size_t curve_points) {
   const PooledChangeScores& pooled = figures.pooled;
   Json json;
@@ -153,6 +173,22 @@ std::string ReportFiguresText(const ChangeFigures& figures) {
   return text;
 }
 
+/// What was compared and what was guessed, each on its own.
+std::string ReportPartsText(const ChangeReport& report) {
+  std::string text;
+  for (const auto& [name, part] : {std::pair("compared", &report.compared),
+                                   std::pair("shown by no earlier picture", &report.unseen)}) {
+    if (!*part || (*part)->pixels() == 0) continue;
+    const auto operation = (*part)->change().AtFalsePositiveRate(0.01);
+    text += ReportCountsLine(name, operation ? operation->counts : BinaryCounts());
+    text.insert(text.size() - 1,
+                "  at a FPR of 0.01, " + std::to_string((*part)->pixels()) + " pixels");
+  }
+  if (!report.on_board_threshold || !report.compared) return text;
+  return text + ReportCountsLine("compared, as on board",
+                                 report.compared->change().AtThreshold(*report.on_board_threshold));
+}
+
 }  // namespace
 
 void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& classes,
@@ -188,6 +224,7 @@ Json ToJson(const ChangeReport& report, std::size_t curve_points) {
   json["method"] = report.method;
   json["directories"] = report.directories;
   json["registration"] = report.registration;
+  json["region"] = report.region;
   json["pairs"] = report.forward.community.pairs().size();
   json["refused_pairs"] = report.refused;
   json["left_out_pairs"] = report.hardly_changed;
@@ -196,6 +233,9 @@ Json ToJson(const ChangeReport& report, std::size_t curve_points) {
   json["method_ms_p50"] = ReportFigureOrNull(report.method_ms_p50);
   json["registration_ms_p50"] = ReportFigureOrNull(report.registration_ms_p50);
   json.update(ReportFiguresJson(report.forward, curve_points));
+  json["compared"] = ReportPartJson(report.compared);
+  json["unseen"] = ReportPartJson(report.unseen);
+  json["on_board"] = ReportOnBoardJson(report);
   json["directions"] = nullptr;
   if (report.directions) {
     json["directions"] = {{"right", report.directions->right},
@@ -215,7 +255,8 @@ std::string ToText(const ChangeReport& report) {
     text += ", " + std::to_string(report.hardly_changed) + " left out as hardly changed";
   }
   if (report.refused > 0) text += ", " + std::to_string(report.refused) + " refused";
-  text += "\n" + ReportFiguresText(report.forward);
+  if (report.region != "all") text += ", region: " + report.region;
+  text += "\n" + ReportFiguresText(report.forward) + ReportPartsText(report);
   if (report.directions) {
     text += "  directions of regions: " + std::to_string(report.directions->right) + " right, " +
             std::to_string(report.directions->wrong) + " wrong, " +

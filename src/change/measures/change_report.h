@@ -35,7 +35,8 @@ void CountDirections(const std::vector<ChangeRegion>& regions, const cv::Mat& cl
 struct ChangeReport {
   std::string method;                    ///< Its name, or the folder of predictions.
   std::vector<std::string> directories;  ///< Absolute paths of the data.
-  std::string registration;              ///< "none", "edges", "homography" or "both".
+  std::string registration;              ///< "none", "given", "edges", "homography" or "both".
+  std::string region = "all";            ///< Of ChangeRegionNames.
   std::size_t refused = 0;               ///< Pairs that could not be registered: no change is said.
   std::vector<std::string> refusals;     ///< "NAME: why", in order.
   std::size_t hardly_changed = 0;        ///< Pairs left out as too little of them has changed.
@@ -44,6 +45,11 @@ struct ChangeReport {
   std::optional<double> method_ms_p50;
   std::optional<double> registration_ms_p50;  ///< Of a pair, with its warp.
   ChangeFigures forward;
+  /// Of `forward`'s pixels those that both pictures show, and those that no earlier picture shows,
+  /// where a network guesses; none where the method did not run.
+  std::optional<PooledChangeScores> compared;
+  std::optional<PooledChangeScores> unseen;
+  std::optional<double> on_board_threshold;   ///< A network's, from its manifest.
   std::optional<DirectionCounts> directions;  ///< None where no pair has them in truth.
   bool has_reversed = false;
   ChangeFigures reversed;  ///< The two aligned pictures swapped.

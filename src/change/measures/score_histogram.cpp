@@ -1,6 +1,7 @@
 #include "change/measures/score_histogram.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace livemap::change {
@@ -38,6 +39,16 @@ std::optional<ScoreHistogram::Operation> ScoreHistogram::AtFalsePositiveRate(dou
     operation.threshold = static_cast<double>(bin) / (kBins - 1);
   }
   return operation;
+}
+
+BinaryCounts ScoreHistogram::AtThreshold(double threshold) const {
+  const auto first = static_cast<std::size_t>(std::ceil(threshold * (kBins - 1) - 1e-6));
+  BinaryCounts counts;
+  for (std::size_t bin = 0; bin < kBins; ++bin) {
+    (bin >= first ? counts.true_positive : counts.false_negative) += positives_[bin];
+    (bin >= first ? counts.false_positive : counts.true_negative) += negatives_[bin];
+  }
+  return counts;
 }
 
 std::optional<double> ScoreHistogram::RocArea() const {

@@ -41,6 +41,8 @@ class ScoreHistogram {
   /// The lowest threshold whose share of false positives is not above `rate`: nothing between two
   /// scores is invented. None without negatives.
   std::optional<Operation> AtFalsePositiveRate(double rate) const;
+  /// What comes of a given threshold, within [0, 1].
+  BinaryCounts AtThreshold(double threshold) const;
   /// Area under the ROC curve, trapezoids; none without positives or negatives.
   std::optional<double> RocArea() const;
   /// Area under the precision-recall curve as the sum of precision times the gain in recall from

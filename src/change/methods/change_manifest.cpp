@@ -66,9 +66,13 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
     manifest.encoder = ReadManifestGraph(graphs, "encoder", directory);
     manifest.head = ReadManifestGraph(graphs, "head", directory);
     const perception::ManifestSection input =
-        root.Sub("input", {"width", "height", "channels", "resize", "pad_value", "invalid"});
+        root.Sub("input", {"width", "height", "channels", "resize", "pad_value", "invalid"},
+                 {"closer_look"});
     manifest.input = perception::ReadManifestInput(input);
     input.Choice("invalid", {"other_picture"});
+    if (input.Has("closer_look")) {
+      manifest.closer_look = static_cast<double>(input.Number("closer_look", 0.1, 0.9));
+    }
     manifest.normalisation = perception::ReadManifestNormalisation(root);
     const perception::ManifestSection head = root.Sub("head", {"type", "levels", "output"});
     head.Choice("type", {"change"});

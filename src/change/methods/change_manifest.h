@@ -21,6 +21,9 @@ struct ChangeManifest {
   Graph encoder;  ///< One picture to its features.
   Graph head;     ///< Features of both and validity to probabilities.
   perception::ModelManifest::Input input;
+  /// Share of a picture's width whose middle the network also looks at by itself, so that small
+  /// things on the road ahead keep their pixels; 0: at the whole alone.
+  double closer_look = 0;
   perception::ModelManifest::Normalisation normalisation;
   int levels = 0;      ///< Of features, 1 to 10.
   std::string output;  ///< Name of the probabilities.

@@ -57,12 +57,13 @@ ChangeProbabilities ChangeMethod::Estimate(const AlignedPair& pair) {
   return Infer(pair);
 }
 
-std::vector<std::string> ChangeMethodNames() { return {"dense-sift", "daisy"}; }
+std::vector<std::string> ChangeMethodNames() { return {"difference", "dense-sift", "daisy"}; }
 
 std::unique_ptr<ChangeMethod> MakeChangeMethod(const std::string& name) {
+  if (name == "difference") return MakeAbsoluteDifference();
   if (name == "dense-sift") return MakeDenseSiftDifference();
   if (name == "daisy") return MakeDaisyDifference();
-  throw Error("method '" + name + "' is unknown, accepted are dense-sift and daisy");
+  throw Error("method '" + name + "' is unknown, accepted are difference, dense-sift and daisy");
 }
 
 }  // namespace livemap::change

@@ -51,6 +51,10 @@ ChangeProbabilities NothingChanged(cv::Size size, bool tells_classes);
 std::unique_ptr<ChangeMethod> MakeDenseSiftDifference();
 std::unique_ptr<ChangeMethod> MakeDaisyDifference();
 
+/// The least that a method must beat: how far the colours of a pixel are apart, the mean of the
+/// three channels, 0 to 1.
+std::unique_ptr<ChangeMethod> MakeAbsoluteDifference();
+
 /// Names that MakeChangeMethod accepts.
 std::vector<std::string> ChangeMethodNames();
 /// Throws Error naming what is accepted.

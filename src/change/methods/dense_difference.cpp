@@ -109,7 +109,28 @@ class DenseDaisyDifference : public ChangeMethod {
   }
 };
 
+class AbsoluteDifference : public ChangeMethod {
+ public:
+  bool tells_classes() const override { return false; }
+
+ protected:
+  ChangeProbabilities Infer(const AlignedPair& pair) override {
+    cv::Mat apart;
+    cv::absdiff(pair.before, pair.after, apart);
+    cv::Mat score;
+    cv::transform(apart, score, cv::Matx13d(1.0 / 3, 1.0 / 3, 1.0 / 3));
+    score.convertTo(score, CV_32FC1, 1.0 / 255);
+    ChangeProbabilities probabilities;
+    probabilities.of_class = {1.0 - score, score};
+    return probabilities;
+  }
+};
+
 }  // namespace
+
+std::unique_ptr<ChangeMethod> MakeAbsoluteDifference() {
+  return std::make_unique<AbsoluteDifference>();
+}
 
 std::unique_ptr<ChangeMethod> MakeDenseSiftDifference() {
   return std::make_unique<DenseSiftDifference>();

@@ -11,6 +11,7 @@
 
 #include "change/measures/change_pairs.h"
 #include "change/measures/change_predictions.h"
+#include "change/measures/change_region.h"
 #include "change/measures/change_report.h"
 #include "change/methods/change_method.h"
 #include "change/methods/change_network.h"
@@ -34,7 +35,8 @@ struct Options {
   std::string reversed_predictions;
   std::string write;
   std::uint64_t seed = 1;
-  std::string registration;  ///< "none", "edges", "homography" or "both".
+  std::string registration;  ///< "none", "given", "edges", "homography" or "both".
+  std::string region;        ///< Of change::ChangeRegionNames.
   double min_changed = 0;    ///< Share of the pixels that count; pairs below are left out.
   bool json = false;
   bool curves = false;
@@ -60,20 +62,23 @@ std::optional<Options> ParseEvaluateChangeOptions(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_change [FLAGS] DIR...",
       "Compares what a method says about pairs of pictures with the truth. DIR has VL-CMU-CD's\n"
-      "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it) or t0/, t1/, "
-      "mask/.\n"
+      "layout (raw/NNN/RGB, raw/NNN/GT, as livemap simulate --change writes it), t0/, t1/, "
+      "mask/,\nor NAME/t0.jpg, t1.jpg, mask.png, with ignore.png and H_t1_to_t0.txt where there "
+      "are "
+      "such.\n"
       "The method is a network (--model), a classical one (--method), or a folder of predictions\n"
       "(--predictions: NAME.npy or NAME.png per pair). docs/reference/measures.md defines the "
       "figures and the files.",
       CommandLine::kOneOrMore,
       {{"json", "", "one line of JSON instead of a table"},
-       {"method", "NAME", "dense-sift or daisy"},
+       {"method", "NAME", "difference, dense-sift or daisy"},
        {"model", "FILE", "manifest of a network of change (models/change-small.yaml)"},
        {"predictions", "DIR", "read predictions instead of running a method"},
        {"reversed-predictions", "DIR", "the same for the pairs with their pictures swapped"},
        {"register", "HOW",
-        "of the earlier picture: none, edges, homography, or both: edges first, as on board "
-        "(both)"},
+        "of the earlier picture: none, given (the pair's own homography), edges, homography, or "
+        "both: edges first, as on board (both)"},
+       {"region", "NAME", "of the pictures: all, or road: below the horizon, a trapezoid (all)"},
        {"seed", "N", "of the registration's draws (1)"},
        {"least-changed", "SHARE", "leave out pairs of which a smaller share has changed (0)"},
        {"curves", "", "with --json: curves, figures per pair, refusals"},
@@ -102,10 +107,15 @@ std::optional<Options> ParseEvaluateChangeOptions(int argc, char** argv) {
   }
   options.seed = line.Seed("seed", 1);
   options.registration = line.Text("register", "both");
-  if (options.registration != "none" && options.registration != "edges" &&
-      options.registration != "homography" && options.registration != "both") {
+  const std::vector<std::string> ways{"none", "given", "edges", "homography", "both"};
+  if (std::find(ways.begin(), ways.end(), options.registration) == ways.end()) {
     throw Error("--register is '" + options.registration +
-                "', accepted are none, edges, homography and both");
+                "', accepted are none, given, edges, homography and both");
+  }
+  options.region = line.Text("region", "all");
+  const std::vector<std::string> regions = change::ChangeRegionNames();
+  if (std::find(regions.begin(), regions.end(), options.region) == regions.end()) {
+    throw Error("--region is '" + options.region + "', accepted are all and road");
   }
   if (options.method.empty() && options.model.empty() && options.predictions.empty()) {
     options.model = ShippedModel("change-small");
@@ -141,8 +151,11 @@ class ChangeEvaluation {
   explicit ChangeEvaluation(const Options& options) : options_(options) {
     report_.registration = options.predictions.empty() ? options.registration : "none";
     report_.method = options.predictions;
+    report_.region = options.region;
     report_.has_reversed = !options.reversed_predictions.empty();
     if (!options.predictions.empty()) return;
+    report_.compared.emplace();
+    report_.unseen.emplace();
     if (options.model.empty()) {
       method_ = change::MakeChangeMethod(options.method);
       report_.method = options.method;
@@ -150,13 +163,16 @@ class ChangeEvaluation {
       auto network = change::MakeChangeNetwork(options.model);
       report_.method = network->manifest().name;
       regions_.min_confidence = network->manifest().changed;
+      report_.on_board_threshold = network->manifest().changed;
       method_ = std::move(network);
     }
     report_.has_reversed = true;
   }
 
   void Add(const change::ChangePairFiles& files) {
-    const change::ChangePair pair = change::LoadChangePair(files);
+    change::ChangePair pair = change::LoadChangePair(files);
+    pair.truth.setTo(int{change::kLeftOutPixel},
+                     change::ChangeRegionMask(options_.region, pair.truth.size()) == 0);
     if (ChangedShare(pair.truth) < options_.min_changed) {
       ++report_.hardly_changed;
       return;
@@ -164,6 +180,7 @@ class ChangeEvaluation {
     report_.unknown_colour_pixels += pair.unknown_colour_pixels;
     const change::ChangeProbabilities forward = Forward(files, pair);
     Count(files.name, forward, pair, report_.forward);
+    if (method_ != nullptr) CountParts(forward, pair);
     if (registered_ && !pair.direction.empty()) CountRegions(forward, pair);
     if (report_.has_reversed) Count(files.name, Reversed(files, pair), pair, report_.reversed);
     if (options_.write.empty()) return;
@@ -183,6 +200,17 @@ class ChangeEvaluation {
                     const change::ChangePair& pair, change::ChangeFigures& figures) {
     figures.pooled.Add(probabilities, pair.truth, pair.with_classes);
     figures.community.Add(name, probabilities, pair.truth);
+  }
+
+  /// What was compared apart from what was not: a guess is no comparison.
+  void CountParts(const change::ChangeProbabilities& probabilities,
+                  const change::ChangePair& pair) {
+    cv::Mat compared = pair.truth.clone();
+    compared.setTo(int{change::kLeftOutPixel}, aligned_.valid == 0);
+    report_.compared->Add(probabilities, compared, pair.with_classes);
+    cv::Mat unseen = pair.truth.clone();
+    unseen.setTo(int{change::kLeftOutPixel}, aligned_.valid != 0);
+    report_.unseen->Add(probabilities, unseen, pair.with_classes);
   }
 
   void CountRegions(const change::ChangeProbabilities& measured, const change::ChangePair& pair) {
@@ -251,6 +279,14 @@ class ChangeEvaluation {
     registered_ = true;
     if (options_.registration == "none") {
       return {pair.before, pair.after, cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255))};
+    }
+    if (options_.registration == "given") {
+      if (!pair.after_from_before) {
+        throw Error("--register given: the pair '" + files.name + "' has no H_t1_to_t0.txt");
+      }
+      const change::WarpedPicture given =
+          change::WarpByHomography(pair.before, *pair.after_from_before);
+      return {given.picture, pair.after, given.valid};
     }
     const auto start = std::chrono::steady_clock::now();
     const change::Registration registration = Register(pair);

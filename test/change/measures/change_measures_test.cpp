@@ -5,6 +5,7 @@
 
 #include "change/measures/binary_counts.h"
 #include "change/measures/change_pairs.h"
+#include "change/measures/change_region.h"
 #include "change/measures/change_report.h"
 #include "change/measures/community_change_scores.h"
 #include "change/measures/pooled_change_scores.h"
@@ -79,6 +80,29 @@ TEST(ScoreHistogram, InventsNothingBetweenEqualScores) {
   EXPECT_FALSE(operation->counts.precision());
   EXPECT_DOUBLE_EQ(*scores.RocArea(), 0.5);
   EXPECT_DOUBLE_EQ(*scores.AveragePrecision(), 0.5);
+}
+
+TEST(ScoreHistogram, CountsAtAGivenThreshold) {
+  ScoreHistogram scores;
+  scores.Add(0.8F, true);
+  scores.Add(0.3F, true);
+  scores.Add(0.5F, false);
+  const BinaryCounts counts = scores.AtThreshold(0.5);
+  EXPECT_EQ(counts.true_positive, 1U);
+  EXPECT_EQ(counts.false_negative, 1U);
+  EXPECT_EQ(counts.false_positive, 1U);
+  EXPECT_EQ(scores.AtThreshold(1.0).false_positive, 0U);
+}
+
+TEST(ChangeRegion, OfTheRoadIsATrapezoidBelowTheHorizon) {
+  const cv::Mat road = ChangeRegionMask("road", {100, 100});
+  const auto at = [&road](int x, int y) { return int{road.at<std::uint8_t>(y, x)}; };
+  EXPECT_EQ(at(50, 40), 0) << "above the horizon";
+  EXPECT_EQ(at(50, 45), 255);
+  EXPECT_EQ(at(20, 45), 0) << "beside the road";
+  EXPECT_EQ(at(1, 85), 255);
+  EXPECT_EQ(cv::countNonZero(ChangeRegionMask("all", {8, 4})), 32);
+  EXPECT_THROW(ChangeRegionMask("sky", {8, 4}), Error);
 }
 
 TEST(ScoreHistogram, AreasAreThoseCountedByHand) {
@@ -214,12 +238,14 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   auto json = ToJson(report, 0);
   std::vector<std::string> keys;
   for (const auto& [key, value] : json.items()) keys.push_back(key);
-  EXPECT_THAT(keys, testing::ElementsAre("method", "directories", "registration", "pairs",
-                                         "refused_pairs", "left_out_pairs", "unknown_colour_pixels",
-                                         "method_ms_p50", "registration_ms_p50", "pixels",
-                                         "change_pixels", "left_out_pixels", "at_fpr", "roc_area",
-                                         "ap", "argmax", "multi_class_accuracy", "classes",
-                                         "confusion", "community", "directions", "reversed"));
+  EXPECT_THAT(
+      keys, testing::ElementsAre("method", "directories", "registration", "region", "pairs",
+                                 "refused_pairs", "left_out_pairs", "unknown_colour_pixels",
+                                 "method_ms_p50", "registration_ms_p50", "pixels", "change_pixels",
+                                 "left_out_pixels", "at_fpr", "roc_area", "ap", "argmax",
+                                 "multi_class_accuracy", "classes", "confusion", "community",
+                                 "compared", "unseen", "on_board", "directions", "reversed"));
+  EXPECT_TRUE(json["compared"].is_null());
   EXPECT_EQ(json["at_fpr"]["0.01"]["f1"], 1.0);
   EXPECT_EQ(json["at_fpr"]["0.01"]["f1_at_full_recall"], 1.0);
   EXPECT_EQ(json["multi_class_accuracy"], 1.0);
@@ -230,6 +256,25 @@ TEST(ChangeReport, HasTheKeysThatTheDocumentPromises) {
   EXPECT_EQ(json["pair_figures"][0]["name"], "000/00");
   EXPECT_EQ(json["curve"]["recall"].back(), 1.0);
   EXPECT_THAT(ToText(report), testing::HasSubstr("multi-class accuracy  1.0000"));
+}
+
+TEST(ChangeReport, TellsWhatWasComparedApartFromWhatWasGuessed) {
+  ChangeReport report;
+  const ChangeProbabilities scores = Scores(1, 4, {0.9F, 0.2F, 0.6F, 0.8F});
+  report.forward.pooled.Add(scores, Mask(1, {1, 0, 0, 1}), false);
+  report.compared.emplace();
+  report.compared->Add(scores, Mask(1, {1, 0, 0, kLeftOutPixel}), false);
+  report.unseen.emplace();
+  report.unseen->Add(scores, Mask(1, {kLeftOutPixel, kLeftOutPixel, kLeftOutPixel, 1}), false);
+  report.on_board_threshold = 0.5;
+  const auto json = ToJson(report, 0);
+  EXPECT_EQ(json["compared"]["pixels"], 3);
+  EXPECT_EQ(json["compared"]["at_fpr"]["0.01"]["f1"], 1.0);
+  EXPECT_EQ(json["unseen"]["change_pixels"], 1);
+  EXPECT_TRUE(json["unseen"]["at_fpr"]["0.01"].is_null()) << "nothing there is unchanged";
+  EXPECT_EQ(json["on_board"]["precision"], 0.5);
+  EXPECT_EQ(json["on_board"]["recall"], 1.0);
+  EXPECT_THAT(ToText(report), testing::HasSubstr("shown by no earlier picture"));
 }
 
 TEST(ChangeReport, OfMasksThatLeaveEverythingOutIsNullWithAReason) {

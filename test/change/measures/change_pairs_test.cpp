@@ -64,6 +64,40 @@ class ChangePairsTest : public testing::Test {
   test::TemporaryDirectory folder_;
 };
 
+TEST_F(ChangePairsTest, ReadsAFolderAPairWithWhatIsIgnoredAndTheHomography) {
+  for (const std::string name : {"004_027", "012_003"}) {
+    Write(name + "/t0.jpg", Picture(8, 6, 50));
+    Write(name + "/t1.jpg", Picture(8, 6, 150));
+    cv::Mat mask = cv::Mat::zeros(6, 8, CV_8UC1);
+    mask.at<std::uint8_t>(2, 3) = 255;
+    Write(name + "/mask.png", mask);
+    Write(name + "/t0_objects.png", mask);
+  }
+  cv::Mat ignored = cv::Mat::zeros(6, 8, CV_8UC1);
+  ignored.row(0) = 255;
+  Write("004_027/ignore.png", ignored);
+  std::ofstream(folder_.path() + "/004_027/H_t1_to_t0.txt") << "1 0 5\n0 1 0\n0 0 1e0\n";
+  std::ofstream(folder_.path() + "/README.md") << "notes";
+  EXPECT_THAT(Names(), testing::ElementsAre("004_027", "012_003"));
+  const std::vector<ChangePairFiles> files = FindChangePairs(folder_.path());
+  const ChangePair pair = LoadChangePair(files[0]);
+  EXPECT_NEAR(pair.before.at<cv::Vec3b>(0, 0)[0], 150, 2) << "the truth is in the view of t0";
+  EXPECT_NEAR(pair.after.at<cv::Vec3b>(0, 0)[0], 50, 2);
+  EXPECT_FALSE(pair.with_classes);
+  EXPECT_EQ(pair.truth.at<std::uint8_t>(2, 3), 1);
+  EXPECT_EQ(pair.truth.at<std::uint8_t>(0, 3), kLeftOutPixel);
+  ASSERT_TRUE(pair.after_from_before.has_value());
+  EXPECT_EQ((*pair.after_from_before)(0, 2), 5);
+  const ChangePair plain = LoadChangePair(files[1]);
+  EXPECT_EQ(plain.truth.at<std::uint8_t>(0, 3), 0);
+  EXPECT_FALSE(plain.after_from_before.has_value());
+  for (const std::string text : {"1 0 5 0 1 0 0 0", "1 0 5 0 1 0 0 0 one", "0 0 0 0 0 0 0 0 0"}) {
+    std::ofstream(folder_.path() + "/004_027/H_t1_to_t0.txt") << text;
+    EXPECT_THAT(WhyRefused([&] { LoadChangePair(files[0]); }),
+                AllOf(HasSubstr("H_t1_to_t0.txt"), HasSubstr("nine numbers")));
+  }
+}
+
 TEST_F(ChangePairsTest, FindsThePublishedLayoutFromEveryFolderOfIt) {
   WriteSequencePair("raw/001", "00");
   WriteSequencePair("raw/000", "10");

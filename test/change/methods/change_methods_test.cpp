@@ -85,6 +85,15 @@ TEST(ChangeMethods, UnknownOnesAreNamed) {
   for (const std::string& name : ChangeMethodNames()) EXPECT_NE(MakeChangeMethod(name), nullptr);
 }
 
+TEST(ChangeMethods, TheDifferenceIsTheMeanOfTheChannels) {
+  const cv::Mat before(2, 3, CV_8UC3, cv::Scalar(10, 20, 30));
+  const cv::Mat after(2, 3, CV_8UC3, cv::Scalar(40, 20, 90));
+  const ChangeProbabilities found =
+      MakeChangeMethod("difference")->Run({before, after, cv::Mat(2, 3, CV_8UC1, cv::Scalar(255))});
+  EXPECT_NEAR(found.of_class[1].at<float>(1, 2), 30.0 / 255, 1e-5);
+  EXPECT_NEAR(found.of_class[0].at<float>(1, 2), 1 - 30.0 / 255, 1e-5);
+}
+
 TEST(Daisy, ARampPointsOneWayInEveryHistogram) {
   cv::Mat ramp(80, 80, CV_8UC1);
   for (int row = 0; row < 80; ++row) {
