@@ -123,6 +123,8 @@ def calibrate(arguments: argparse.Namespace) -> dict:
 
 def run(arguments: argparse.Namespace) -> None:
     """Export, check, calibrate, describe."""
+    if arguments.closer_look and not 0.1 <= arguments.closer_look <= 0.9:
+        raise ExportError(f"--closer-look must be 0 or from 0.1 to 0.9, not {arguments.closer_look}.")
     if not arguments.out.is_dir():
         raise ExportError(f"The folder {arguments.out} does not exist.")
     network = onnx_model.export(load_ensemble(arguments.checkpoint or [DEFAULT_CHECKPOINT]), arguments.out, arguments.name)
@@ -133,7 +135,7 @@ def run(arguments: argparse.Namespace) -> None:
     check_against_torch(arguments.out, arguments.name, network)
     write_golden(arguments.out, arguments.name)
     levels = len(network.encode(torch.zeros(1, 3, inference.INPUT_HEIGHT, inference.INPUT_WIDTH)))
-    write_manifest(arguments.out, arguments.name, levels, calibrate(arguments))
+    write_manifest(arguments.out, arguments.name, levels, calibrate(arguments), arguments.closer_look)
     print(f"wrote {arguments.out / arguments.name}.yaml and its graphs")
 
 
@@ -146,6 +148,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--validation", type=Path, help="held-out pairs (training/simulate_change.py --plain)")
     parser.add_argument("--registered", action="store_true", help="the pictures of all pairs lie upon each other already")
     parser.add_argument("--data", type=Path, help="folder of the data sets: held-out photos to paste objects into")
+    parser.add_argument("--closer-look", type=float, default=0.0, metavar="SHARE", help="of a picture's width: its middle is looked at a second time, so that small things keep their pixels (0: not)")
     parser.add_argument("--threads", type=int, default=2, help="threads of OpenCV and torch")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(options.threads)

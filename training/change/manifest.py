@@ -24,8 +24,11 @@ class Manifest:
     thresholds: Dict[str, float]
 
 
-def write_manifest(folder: Path, name: str, levels: int, thresholds: Dict[str, float]) -> None:
-    """Describe the graphs NAME.onnx, NAME.encoder.onnx and NAME.head.onnx of a folder."""
+def write_manifest(folder: Path, name: str, levels: int, thresholds: Dict[str, float], closer_look: float = 0.0) -> None:
+    """Describe the graphs NAME.onnx, NAME.encoder.onnx and NAME.head.onnx of a folder.
+
+    `closer_look` is the share of a picture's width whose middle is looked at a second time; 0: not at all.
+    """
     files = {part: file_of(folder, name, part) for part in PARTS}
     content = {
         "name": name,
@@ -35,6 +38,7 @@ def write_manifest(folder: Path, name: str, levels: int, thresholds: Dict[str, f
         "input": {
             "width": inference.INPUT_WIDTH, "height": inference.INPUT_HEIGHT, "channels": "rgb", "resize": "letterbox",
             "pad_value": inference.PAD_VALUE, "invalid": "other_picture",
+            **({"closer_look": closer_look} if closer_look else {}),
         },
         "normalisation": {"mean": [inference.MEAN] * 3, "std": [inference.STD] * 3},
         "head": {"type": "change", "levels": levels, "output": OUTPUT},

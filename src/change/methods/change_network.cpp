@@ -141,6 +141,19 @@ ChangeProbabilities ChangeNetwork::Compare(const ChangeFeatures& before,
 }
 
 ChangeProbabilities ChangeNetwork::Infer(const AlignedPair& pair) {
+  ChangeProbabilities probabilities = Look(pair);
+  const cv::Rect middle = CloserLook(pair.after.size(), manifest_.closer_look,
+                                     {manifest_.input.width, manifest_.input.height});
+  if (middle.empty()) return probabilities;
+  const ChangeProbabilities closer =
+      Look({pair.before(middle), pair.after(middle), pair.valid(middle)});
+  for (std::size_t i = 0; i < closer.of_class.size(); ++i) {
+    closer.of_class[i].copyTo(probabilities.of_class[i](middle));
+  }
+  return probabilities;
+}
+
+ChangeProbabilities ChangeNetwork::Look(const AlignedPair& pair) {
   const cv::Mat before = FillUnknown(pair.before, pair.after, pair.valid);
   const std::vector<cv::Mat> answers = whole_.Run({{"first", before_letterbox_.Fill(before)},
                                                    {"second", after_letterbox_.Fill(pair.after)},
@@ -178,6 +191,16 @@ ChangeProbabilities ChangeNetwork::Enlarged(const cv::Mat& answer, cv::Size size
     probabilities.of_class.push_back(enlarged);
   }
   return probabilities;
+}
+
+cv::Rect CloserLook(cv::Size size, double share, cv::Size input) {
+  constexpr double kMiddleRow = 0.55;
+  const int width = cvRound(share * size.width);
+  const int height = std::min(size.height, cvRound(1.0 * width * input.height / input.width));
+  if (width <= input.width || height <= 0) return {};
+  const int top =
+      std::clamp(cvRound(kMiddleRow * size.height - height / 2.0), 0, size.height - height);
+  return {(size.width - width) / 2, top, width, height};
 }
 
 std::unique_ptr<ChangeNetwork> MakeChangeNetwork(const std::string& path, int threads) {

@@ -25,7 +25,9 @@ struct ChangeFeatures {
 
 /// The network of change (thesis, section 4.4) on OpenCV's DNN module, on the CPU. Pictures may
 /// have any size: they are letterboxed to the network's, and its answer is enlarged to theirs.
-/// Where the pair is not valid the probability of no change is 1. Not thread-safe.
+/// Where the manifest says so, Run looks a second time at the middle of large pictures (CloserLook)
+/// and takes that answer there. Where the pair is not valid the probability of no change is 1. Not
+/// thread-safe.
 class ChangeNetwork final : public ChangeMethod {
  public:
   /// Loads the three graphs and runs each once. Throws Error when a file is missing, has another
@@ -38,9 +40,9 @@ class ChangeNetwork final : public ChangeMethod {
 
   /// `picture`: CV_8UC3, BGR; Error otherwise.
   ChangeFeatures Encode(const cv::Mat& picture);
-  /// The same answer as Run, from features of both pictures. Where `valid` (CV_8UC1, their size)
-  /// is 0 the warped picture must have shown the other's pixels, see FillUnknown. Throws Error when
-  /// sizes or features do not fit.
+  /// The same answer as Run's of the whole pictures, from features of both. Where `valid` (CV_8UC1,
+  /// their size) is 0 the warped picture must have shown the other's pixels, see FillUnknown.
+  /// Throws Error when sizes or features do not fit.
   ChangeProbabilities Compare(const ChangeFeatures& before, const ChangeFeatures& after,
                               const cv::Mat& valid);
 
@@ -50,6 +52,8 @@ class ChangeNetwork final : public ChangeMethod {
  private:
   using NamedTensors = std::vector<std::pair<std::string, cv::Mat>>;
 
+  /// The network's answer to a pair, or to a part of one.
+  ChangeProbabilities Look(const AlignedPair& pair);
   void CheckWhole();
   void CheckParts();
   /// Throws Error unless it is what the manifest says of the probabilities.
@@ -70,6 +74,12 @@ class ChangeNetwork final : public ChangeMethod {
   perception::OnnxGraph encoder_;
   perception::OnnxGraph head_;
 };
+
+/// The part of a picture of `size` that is looked at more closely: `share` of its width, as high as
+/// the network's `input` is for its width, around 0.55 of the height, within the picture.
+/// Empty where that shows no more than the whole does: `share` is 0, or the part is no larger than
+/// the input.
+cv::Rect CloserLook(cv::Size size, double share, cv::Size input);
 
 /// Reads `path` and makes the network. Throws Error as ReadChangeManifest and ChangeNetwork do.
 std::unique_ptr<ChangeNetwork> MakeChangeNetwork(const std::string& path, int threads = 0);

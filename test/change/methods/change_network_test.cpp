@@ -138,6 +138,34 @@ TEST_F(ChangeNetworkTest, PicturesOfAnotherSizeThanTheNetworksAreLetterboxed) {
             0.1);
 }
 
+TEST(CloserLook, ShowsTheMiddleOfLargePicturesLarger) {
+  const cv::Size input(320, 256);
+  EXPECT_EQ(CloserLook({960, 480}, 0.583, input), cv::Rect(200, 32, 560, 448));
+  EXPECT_EQ(CloserLook({640, 480}, 0.583, input), cv::Rect(133, 115, 373, 298));
+  EXPECT_TRUE(CloserLook({320, 240}, 0.583, input).empty()) << "it would only be enlarged";
+  EXPECT_TRUE(CloserLook({960, 480}, 0, input).empty());
+  EXPECT_EQ(CloserLook({2000, 300}, 0.583, input).height, 300);
+}
+
+TEST_F(ChangeNetworkTest, ACloserLookIsTheAnswerToTheMiddleAlone) {
+  const auto once = MakeChangeNetwork(ModelFolder() + "/tiny.yaml");
+  ChangeNetwork twice(ParseChangeManifest(
+      With("invalid: other_picture", "invalid: other_picture, closer_look: 0.6"), "here.yaml",
+      ModelFolder()));
+  const AlignedPair pair = Scaled(Pair(0), {640, 512});
+  const cv::Rect middle = CloserLook({640, 512}, 0.6, {320, 256});
+  ASSERT_EQ(middle.width, 384);
+  const ChangeProbabilities found = twice.Run(pair);
+  const ChangeProbabilities whole = once->Run(pair);
+  const ChangeProbabilities alone = once->Run(
+      {pair.before(middle).clone(), pair.after(middle).clone(), pair.valid(middle).clone()});
+  for (std::size_t i = 0; i < found.of_class.size(); ++i) {
+    EXPECT_LE(cv::norm(found.of_class[i](middle), alone.of_class[i], cv::NORM_INF), 1e-5);
+    EXPECT_EQ(found.of_class[i].at<float>(0, 0), whole.of_class[i].at<float>(0, 0));
+  }
+  EXPECT_GT(Apart(found, whole), 10 * kSame);
+}
+
 TEST_F(ChangeNetworkTest, PicturesAndFeaturesThatDoNotFitAreRefused) {
   const auto network = MakeChangeNetwork(ModelFolder() + "/tiny.yaml");
   const AlignedPair pair = Pair(0);
@@ -164,6 +192,8 @@ TEST_F(ChangeNetworkTest, AManifestThatIsWrongIsRefusedNamingWhatIsAccepted) {
   EXPECT_THAT(ErrorOf(With("name: tiny", "name: tiny\nlicence: mine")), HasSubstr("unknown key"));
   EXPECT_THAT(ErrorOf(With("invalid: other_picture", "invalid: black")),
               AllOf(HasSubstr("input.invalid is 'black'"), HasSubstr("other_picture")));
+  EXPECT_THAT(ErrorOf(With("invalid: other_picture", "invalid: other_picture, closer_look: 1")),
+              HasSubstr("input.closer_look is '1'"));
   EXPECT_THAT(ErrorOf(With("levels: 5", "levels: 0")), HasSubstr("head.levels is '0'"));
   EXPECT_THAT(ErrorOf(With("changed: 0.5", "changed: 1.5")), HasSubstr("thresholds.changed"));
 }
