@@ -5,7 +5,7 @@ of one place from a set, registered onto each other. Things are hazards cut out 
 what lies on a road is seldom of a class that one has pictures of.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Dict, List, Sequence, Tuple
@@ -248,7 +248,7 @@ def read_roads(data: Path, catalogue_path: Path, pairs_path: Path) -> Roads:
     places: List[PlacePair] = []
     for one in catalogue.sets:
         skipped = one.skip + tuple(kept_apart) if one.name == place_set else one.skip
-        pictures = sets.read_split(sets.replace(one, skip=skipped), data, catalogue.rename).training
+        pictures = sets.read_split(replace(one, skip=skipped), data, catalogue.rename).training
         for class_id, found in read_cut_outs([pictures]).items():
             ours = CLASSES.index(CLASS_OF[HAZARDS[class_id]])
             cut.setdefault(ours, []).extend(CutOut(each.rgba, ours) for each in found)
