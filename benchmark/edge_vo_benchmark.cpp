@@ -8,6 +8,7 @@
 #include "odometry/edge/canny_detector.h"
 #include "odometry/edge/edge_odometry.h"
 #include "run_benchmarks.h"
+#include "simulation/room/room_motion.h"
 #include "simulation/room/simulated_room.h"
 #include "tools/odometry/vo_method.h"
 
@@ -28,7 +29,8 @@ const std::vector<odometry::RgbdFrame>& Frames() {
     std::vector<odometry::RgbdFrame> made;
     for (int i = 0; i < kFrames; ++i) {
       const simulation::SimulatedFrame seen =
-          room.Render(simulation::SimulatedCamera(), room.WorldFromOptical(i / 30.0, 1),
+          room.Render(simulation::SimulatedCamera(),
+                      RoomCameraPose(room.plan(), simulation::RoomMotion::kHand, i / 30.0, 1),
                       static_cast<std::uint32_t>(i), 1.3F, 1, 2);
       odometry::RgbdFrame frame;
       cv::cvtColor(seen.bgr, frame.grey, cv::COLOR_BGR2GRAY);

@@ -25,6 +25,7 @@ Model SensorModelOf(const geo::CameraIntrinsics& camera, DepthSensor sensor, dou
   if (sensor == DepthSensor::kKinect) {
     return {focal, 0.075F, 0.06F, 0.125F, 0.5F, 10, 0.06F};
   }
+  if (sensor == DepthSensor::kRough) return {focal, 0.075F, 0.08F, 0.125F, 0.4F, 40, 10};
   return {focal, static_cast<float>(baseline_m), 0.12F, 0, 0.8F, 80, 0.25F};
 }
 
@@ -64,18 +65,38 @@ std::vector<float> DepthOfOtherEye(const cv::Mat& depth, int row, const Model& m
   return seen;
 }
 
+/// Depths of the neighbourhood carried over edges, and patches of nothing.
+cv::Mat RoughenDepth(const cv::Mat& depth, std::uint32_t seed) {
+  constexpr int kBleedPx = 3;
+  constexpr float kPatchPx = 14, kHole = 0.62F;
+  cv::Mat rough(depth.size(), CV_32FC1);
+  for (int row = 0; row < depth.rows; ++row) {
+    for (int column = 0; column < depth.cols; ++column) {
+      const auto x = static_cast<float>(column), y = static_cast<float>(row);
+      const float shift = kBleedPx * Noise(x / kPatchPx, y / kPatchPx, seed);
+      const auto from = static_cast<int>(std::lround(x + shift));
+      const bool hole = Noise(x / kPatchPx + 500, y / kPatchPx, seed + 1) > kHole;
+      rough.at<float>(row, column) =
+          hole ? 0 : depth.at<float>(row, std::clamp(from, 0, depth.cols - 1));
+    }
+  }
+  return rough;
+}
+
 }  // namespace
 
 std::optional<DepthSensor> ParseDepthSensor(const std::string& name) {
   if (name == "exact") return DepthSensor::kExact;
   if (name == "kinect") return DepthSensor::kKinect;
   if (name == "stereo") return DepthSensor::kStereo;
+  if (name == "rough") return DepthSensor::kRough;
   return std::nullopt;
 }
 
-cv::Mat SenseDepth(const cv::Mat& depth, const geo::CameraIntrinsics& camera, DepthSensor sensor,
+cv::Mat SenseDepth(const cv::Mat& exact, const geo::CameraIntrinsics& camera, DepthSensor sensor,
                    double baseline_m, std::uint32_t seed) {
-  if (sensor == DepthSensor::kExact) return depth;
+  if (sensor == DepthSensor::kExact) return exact;
+  const cv::Mat depth = sensor == DepthSensor::kRough ? RoughenDepth(exact, seed) : exact;
   const Model model = SensorModelOf(camera, sensor, baseline_m);
   cv::Mat sensed(depth.size(), CV_32FC1, cv::Scalar(0));
   for (int row = 0; row < depth.rows; ++row) {

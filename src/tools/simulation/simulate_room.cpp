@@ -4,11 +4,13 @@
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <string>
 
 #include "common/error.h"
 #include "simulation/datasets/tum_writer.h"
 #include "simulation/room/patterned_wall.h"
+#include "simulation/room/room_motion.h"
 #include "simulation/room/simulated_room.h"
 #include "tools/common/contact_sheet.h"
 #include "tools/common/progress.h"
@@ -20,6 +22,57 @@ namespace {
 
 constexpr int kPreviewPictures = 12;
 constexpr float kGain = 1.3F;
+constexpr double kExposureStepS = 0.4;
+
+/// Camera and light of --room and --wall.
+struct RoomView {
+  simulation::RoomMotion motion = simulation::RoomMotion::kHand;
+  double vigour = 1;
+  double flicker = 0;
+  double exposure_steps = 0;
+  double rolling_s = 0;
+
+  double GainAt(double time_s) const {
+    const bool brighter = std::fmod(time_s, 2 * kExposureStepS) >= kExposureStepS;
+    return (1 + flicker * std::sin(2 * M_PI * time_s)) * (brighter ? 1 + exposure_steps : 1);
+  }
+};
+
+RoomView ReadRoomView(const CommandLine& line) {
+  RoomView view;
+  const std::string name = line.Text("motion", "hand");
+  const auto motion = simulation::ParseRoomMotion(name);
+  if (!motion) {
+    throw Error("--motion is '" + name +
+                "', accepted are: hand, walking, fast-turn, shake, car, from-speed");
+  }
+  view.motion = *motion;
+  view.vigour = line.Number("vigour", 1, 0, 20);
+  view.flicker = line.Number("flicker", 0, 0, 0.9);
+  view.exposure_steps = line.Number("exposure-steps", 0, 0, 1);
+  view.rolling_s = line.Number("rolling-shutter", 0, 0, 0.1);
+  return view;
+}
+
+simulation::RoomPlan ReadRoomPlan(const CommandLine& line, simulation::RoomMotion motion) {
+  const std::uint64_t seed = line.Seed("seed", 1);
+  if (!line.Has("varied")) {
+    if (motion == simulation::RoomMotion::kCar) {
+      throw Error("--motion car needs --varied: the standard room is too small for one");
+    }
+    return simulation::StandardRoomPlan(seed);
+  }
+  return simulation::VariedRoomPlan(seed, motion == simulation::RoomMotion::kCar
+                                              ? simulation::RoomScale::kHall
+                                              : simulation::RoomScale::kRoom);
+}
+
+/// The wall has neither a plan nor a sensor.
+void RefuseRoomOnlyFlags(const CommandLine& line) {
+  for (const char* flag : {"varied", "motion", "noise", "rolling-shutter"}) {
+    if (line.Has(flag)) throw Error("--" + std::string(flag) + " is --room's, not --wall's");
+  }
+}
 
 /// The wall as the simulator's other pictures are: with depth, grey in all three channels.
 simulation::SimulatedFrame SeeRoomWall(const simulation::SimulatedCamera& camera,
@@ -40,7 +93,13 @@ std::vector<Flag> RoomFlags() {
           {"wall", "", "as --room, but a wall with a smooth pattern: exact to the grey level"},
           {"vigour", "X",
            "of the hand of --room and --wall; 1 is calm, about 0.15 m/s and 8 deg/s (1)"},
-          {"flicker", "X", "of their light: gain swings by this share, once a second (0)"}};
+          {"flicker", "X", "of their light: gain swings by this share, once a second (0)"},
+          {"exposure-steps", "X", "their gain jumps up by this share and back, every 0.4 s (0)"},
+          {"varied", "", "a --room whose size, clutter and patterns --seed draws, too"},
+          {"motion", "NAME",
+           "of --room's camera: hand, walking, fast-turn, shake, car or from-speed (hand)"},
+          {"noise", "X", "of --room's sensor, times the usual (1)"},
+          {"rolling-shutter", "S", "time from --room's first row to the last (0)"}};
 }
 
 void RefuseRoomFlags(const CommandLine& line) {
@@ -65,27 +124,35 @@ int SimulateRoom(const CommandLine& line) {
   }
   if (!line.Has("tum")) throw Error(name + " needs --tum DIR, where the sequence goes");
   const double rate_hz = line.Number("rate", 30, 0.1, 100);
-  const double vigour = line.Number("vigour", 1, 0, 20);
-  const double flicker = line.Number("flicker", 0, 0, 0.9);
+  const RoomView view = ReadRoomView(line);
+  if (wall) RefuseRoomOnlyFlags(line);
   const int rays = line.Has("one-ray") ? 1 : 2;
   const auto threads = static_cast<int>(line.Number("threads", 2, 1, 64));
   const auto frames = static_cast<int>(line.Number("seconds", 5, 0.1, 600) * rate_hz);
   const std::string preview = ReadSheetPath(line, "preview");
-  const SimulationSetup setup = ReadSimulationSetup(line);
-  const simulation::SimulatedRoom room(line.Seed("seed", 1));
+  SimulationSetup setup = ReadSimulationSetup(line);
+  const auto noise = static_cast<float>(line.Number("noise", 1, 0, 20));
+  setup.camera.shot_noise *= noise;
+  setup.camera.read_noise *= noise;
+  const simulation::SimulatedRoom room(ReadRoomPlan(line, view.motion));
+  const auto pose_at = [&](double time_s) {
+    return RoomCameraPose(room.plan(), view.motion, time_s, view.vigour);
+  };
   simulation::TumWriter writer(line.Text("tum", ""), setup.camera,
                                line.Number("depth-scale", simulation::kTumDepthScale, 100, 10000));
-  const Eigen::Isometry3d first_pose = room.WorldFromOptical(0, vigour);
+  const Eigen::Isometry3d first_pose = pose_at(0);
   std::vector<cv::Mat> pictures;
   Progress progress("frame", static_cast<std::size_t>(frames));
   for (int i = 0; i < frames; ++i) {
     const double time_s = i / rate_hz;
-    const double gain = 1 + flicker * std::sin(2 * M_PI * time_s);
-    const Eigen::Isometry3d pose = room.WorldFromOptical(time_s, vigour);
+    const double gain = view.GainAt(time_s);
+    const Eigen::Isometry3d pose = pose_at(time_s);
+    std::optional<Eigen::Isometry3d> last_row;
+    if (view.rolling_s > 0) last_row = pose_at(time_s + view.rolling_s);
     simulation::SimulatedFrame frame =
         wall ? SeeRoomWall(setup.camera, first_pose.inverse() * pose, gain)
              : room.Render(setup.camera, pose, static_cast<std::uint32_t>(i),
-                           static_cast<float>(kGain * gain), rays, threads);
+                           static_cast<float>(kGain * gain), rays, threads, last_row);
     frame.depth = simulation::SenseDepth(frame.depth, setup.camera.intrinsics, setup.depth,
                                          setup.baseline_m, static_cast<std::uint32_t>(i));
     if (i * kPreviewPictures / frames != (i - 1) * kPreviewPictures / frames || i == 0) {

@@ -61,7 +61,8 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
   const std::optional<simulation::DepthSensor> depth =
       simulation::ParseDepthSensor(line.Text("depth", "exact"));
   if (!depth) {
-    throw Error("--depth is '" + line.Text("depth", "") + "', accepted are: exact, kinect, stereo");
+    throw Error("--depth is '" + line.Text("depth", "") +
+                "', accepted are: exact, kinect, stereo, rough");
   }
   setup.depth = *depth;
   if (line.Has("stereo") && !line.Has("tum") && !line.Has("bag")) {

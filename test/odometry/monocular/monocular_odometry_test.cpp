@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "simulation/room/room_motion.h"
 #include "simulation/room/simulated_room.h"
 
 namespace livemap::odometry {
@@ -33,7 +34,8 @@ struct Walk {
 const Walk& TheWalk() {
   static const Walk walk = [] {
     const simulation::SimulatedRoom room(1);
-    const Eigen::Isometry3d start = room.WorldFromOptical(0, 1);
+    const Eigen::Isometry3d start =
+        RoomCameraPose(room.plan(), simulation::RoomMotion::kHand, 0, 1);
     Walk made;
     for (int i = 0; i < kFrames; ++i) {
       const double way = kSpeedMps * kFrameS * i;
@@ -100,7 +102,7 @@ TEST(MonocularOdometry, DepthsOfItsEdgesAreThoseOfTheRoom) {
   }
   const simulation::SimulatedFrame truth =
       room.Render(WalkCamera(),
-                  room.WorldFromOptical(0, 1) *
+                  RoomCameraPose(room.plan(), simulation::RoomMotion::kHand, 0, 1) *
                       TheWalk().first_from_camera[static_cast<std::size_t>(last_keyframe)],
                   0, 1.3F, 1, 2);
   std::size_t known = 0, right = 0;

@@ -46,6 +46,19 @@ TEST(DepthSensor, StereoIsBlindBesideWhatHidesTheGround) {
   EXPECT_NEAR(sensed.at<float>(100, 175), 4, 0.1);
 }
 
+TEST(DepthSensor, ARoughOneLetsEdgesBleedAndLeavesPatchesOut) {
+  cv::Mat depth(240, 320, CV_32FC1, cv::Scalar(4));
+  depth.colRange(150, 200) = 2;
+  const cv::Mat sensed = SenseDepth(depth, kCamera, DepthSensor::kRough, 0, 7);
+  int bled = 0;
+  for (int row = 0; row < 240; ++row) bled += std::abs(sensed.at<float>(row, 148) - 2) < 0.2F;
+  EXPECT_GT(bled, 20) << "two pixels beside the near thing";
+  EXPECT_LT(bled, 200);
+  const double holes = 1 - cv::countNonZero(sensed.colRange(210, 310)) / (240 * 100.0);
+  EXPECT_GT(holes, 0.01);
+  EXPECT_LT(holes, 0.3);
+}
+
 TEST(DepthSensor, ExactDepthStaysAsItIs) {
   const cv::Mat depth(24, 32, CV_32FC1, cv::Scalar(7.5));
   EXPECT_EQ(SenseDepth(depth, kCamera, DepthSensor::kExact, 0.25, 7).data, depth.data);
