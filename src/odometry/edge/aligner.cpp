@@ -16,7 +16,9 @@ constexpr double kMadToSigma = 1.4826;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
 constexpr float kNearestM = 0.01F;
-constexpr double kMinGain = 0.25;  // A black image must not explain everything.
+constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on any edge;
+constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
+constexpr double kMinGain = 0.25;      // A black image must not explain everything.
 
 using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
 using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
@@ -133,6 +135,7 @@ double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
 void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
   const auto k = static_cast<float>(config_.huber_k * sigma);
   normal_.setZero();
+  scatter_.setZero();
   gradient_.setZero();
   Eigen::Array<float, static_cast<int>(kChunk), kUnknowns> columns, weighted;
   const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
@@ -157,14 +160,17 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
       weight.head(n) = visible * (k / residual.abs().max(k));
       return weight;
     }();
+    Step part = Step::Zero();
     for (int i = 0; i < unknowns; ++i) {
       weighted.col(i).head(n) = weight_all.head(n) * columns.col(i).head(n);
-      gradient_[i] += static_cast<double>((weighted.col(i).head(n) * residual).sum());
+      part[i] = static_cast<double>((weighted.col(i).head(n) * residual).sum());
       for (int j = 0; j <= i; ++j) {
         normal_(i, j) +=
             static_cast<double>((weighted.col(i).head(n) * columns.col(j).head(n)).sum());
       }
     }
+    gradient_ += part;
+    scatter_ += part * part.transpose();
   }
   normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
 }
@@ -240,6 +246,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);
   result.cost = cost;
   Summarise(sigma, result);
+  CountExplained(points, camera, result);
   return result;
 }
 
@@ -249,6 +256,25 @@ double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
   Whiten(points, state.new_from_reference);
   Evaluate(points, grey, camera, state, candidate_);
   return RobustCost(candidate_, sigma);
+}
+
+void Aligner::CountExplained(const EdgePoints& points, const geo::CameraIntrinsics& camera,
+                             AlignmentResult& result) const {
+  const auto per_px_x = static_cast<float>(1 / camera.fx);
+  const auto per_px_y = static_cast<float>(1 / camera.fy);
+  const auto gain = static_cast<float>(result.state.gain);
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, points.size() - begin);
+    const auto z = AlignerPart(points.z, begin, count);
+    const auto gradient_x = AlignerPart(points.jacobian[0], begin, count) * z * per_px_x;
+    const auto gradient_y = AlignerPart(points.jacobian[1], begin, count) * z * per_px_y;
+    const auto bound =
+        (gain * kExplainedPx * (gradient_x.square() + gradient_y.square()).sqrt()).max(kNoiseGrey);
+    result.explained += static_cast<std::size_t>(
+        ((AlignerPart(current_.value, begin, count).abs() <= bound).cast<float>() *
+         AlignerPart(current_.visible, begin, count))
+            .sum());
+  }
 }
 
 void Aligner::Summarise(double sigma, AlignmentResult& result) const {
@@ -265,7 +291,12 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
     const Eigen::Matrix<double, 6, 2> mixed = normal_.topRightCorner<6, 2>();
     if (std::abs(light.determinant()) > 0) pose -= mixed * light.inverse() * mixed.transpose();
   }
-  result.information = result.state.gain * result.state.gain * pose;
+  const double square_gain = result.state.gain * result.state.gain;
+  result.information = square_gain * pose;
+  const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
+  const Eigen::LDLT<Eigen::MatrixXd> factors(normal_.topLeftCorner(unknowns, unknowns));
+  const Eigen::MatrixXd half = factors.solve(scatter_.topLeftCorner(unknowns, unknowns));
+  result.covariance = factors.solve(half.transpose()).topLeftCorner<6, 6>() / square_gain;
 }
 
 }  // namespace livemap::odometry

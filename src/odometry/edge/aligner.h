@@ -35,14 +35,25 @@ struct AlignmentResult {
   /// Inverse covariance of the right-hand perturbation delta: new_from_reference * Exp(delta), for
   /// residuals of variance 1 that are independent of each other.
   Matrix6d information = Matrix6d::Zero();
+  /// Covariance of delta by how much parts of the image contradict each other (equation 9): edge
+  /// pixels that err together, by a depth or by aliasing, count once, and exact ones err little.
+  Matrix6d covariance = Matrix6d::Zero();
   double sigma = 0;         ///< Robust standard deviation of the residuals, grey levels.
   double cost = 0;          ///< Mean robust cost, squared grey levels.
   std::size_t points = 0;   ///< Of the reference.
   std::size_t visible = 0;  ///< Of them, those that fall into the new image.
   std::size_t inliers = 0;  ///< Of them, those with full weight.
+  /// Of them, those whose residual is less than half of what a pixel's shift along the gradient
+  /// would make of it, or noise. At a false minimum most edges lie beside each other, however large
+  /// sigma has grown.
+  std::size_t explained = 0;
   int iterations = 0;
   double Overlap() const {
     return points == 0 ? 0 : static_cast<double>(visible) / static_cast<double>(points);
+  }
+  /// Share of the visible points that are explained.
+  double Agreement() const {
+    return visible == 0 ? 0 : static_cast<double>(explained) / static_cast<double>(visible);
   }
 };
 
@@ -85,12 +96,15 @@ class Aligner {
   void BuildNormalEquations(const EdgePoints& points, double sigma);
   bool Solve(double damping, Step& step) const;
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
+  void CountExplained(const EdgePoints& points, const geo::CameraIntrinsics& camera,
+                      AlignmentResult& result) const;
   void Summarise(double sigma, AlignmentResult& result) const;
 
   AlignmentConfig config_;
   Residuals current_, candidate_;
   std::vector<float> whitening_;  // Factors of the residuals; empty: all 1.
   Normal normal_;
+  Normal scatter_;  // Sum over parts of the image of their gradient's square.
   Step gradient_;
 };
 

@@ -17,6 +17,8 @@ constexpr double kMaxPredictionS = 0.5;
 constexpr double kMinCondition = 1e-12;
 /// Light that fades further than this, or grows, between two images is a covered lens.
 constexpr double kMinBelievedGain = 0.3;
+/// Of the newest frame in the mean of the agreements.
+constexpr double kAgreementShare = 0.2;
 
 AlignmentConfig OdometryOfRotationOnly(AlignmentConfig config) {
   config.rotation_only = true;
@@ -39,16 +41,12 @@ const char* VoStateName(VoState state) {
 
 EdgeOdometry::EdgeOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics)
     : config_(config),
+      cameras_(LevelCamerasOf(CheckedCamera(intrinsics))),
       extractor_(config.edges),
       selector_(config.points.seed),
       aligner_(config.alignment),
-      rotation_aligner_(OdometryOfRotationOnly(config.alignment)) {
-  cameras_[0] = CheckedCamera(intrinsics);
-  levels_ = CountLevels({intrinsics.width, intrinsics.height});
-  for (std::size_t level = 1; level < cameras_.size(); ++level) {
-    cameras_[level] = HalvedIntrinsics(cameras_[level - 1]);
-  }
-}
+      rotation_aligner_(OdometryOfRotationOnly(config.alignment)),
+      wide_search_(config.alignment, cameras_) {}
 
 EdgeOdometry::~EdgeOdometry() = default;
 
@@ -59,10 +57,12 @@ void EdgeOdometry::Reset() {
   last_ = {};
   last_stamp_ns_.reset();
   light_ = {};
+  settled_ = false;
+  usual_agreement_ = agreement_deviation_ = 0;
 }
 
 void EdgeOdometry::Check(const RgbdFrame& frame) const {
-  CheckPictures(frame, cameras_[0]);
+  CheckPictures(frame, cameras_.camera[0]);
   if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
     throw Error("a frame's stamp of " + std::to_string(frame.stamp_ns) +
                 " ns is not later than the last one's, " + std::to_string(*last_stamp_ns_) + " ns");
@@ -72,6 +72,7 @@ void EdgeOdometry::Check(const RgbdFrame& frame) const {
 VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
   Check(frame);
   frame_images_.Build(frame.grey);
+  frame_features_.Clear();
   VoResult result;
   if (keyframe_ == nullptr) {
     result = last_;
@@ -83,8 +84,8 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
     result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
     const bool gives_up = result.state == VoState::kLost &&
                           Seconds(frame.stamp_ns - tracked_stamp_ns_) >= config_.give_up_s;
-    result.keyframe_due =
-        gives_up || (attempt.good && WantsKeyframe(attempt.fine, result.world_from_camera));
+    result.keyframe_due = gives_up || (attempt.good && settled_ &&
+                                       WantsKeyframe(attempt.fine, result.world_from_camera));
     if (result.keyframe_due) {
       result.new_keyframe = MakeKeyframe(frame, {}, result);
       if (gives_up && result.new_keyframe) result.state = VoState::kTracking;
@@ -103,6 +104,7 @@ bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_de
   if (!MakeKeyframe(frame, inverse_depth_sigma, last_)) return false;
   last_.state = VoState::kTracking;
   last_.twist = twist;
+  settled_ = twist.has_value();
   tracked_stamp_ns_ = *last_stamp_ns_;
   return true;
 }
@@ -118,12 +120,13 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_d
   fresh->stamp_ns = frame.stamp_ns;
   fresh->world_from_camera = result.world_from_camera;
   fresh->covariance = result.covariance;
-  fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, levels_);
+  fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, cameras_.levels);
   fresh->inverse_depth_sigmas.Clear();
+  fresh->features.Clear();
   if (!inverse_depth_sigma.empty()) {
     constexpr DepthPyramid::Range kAny = {std::numeric_limits<float>::min(),
                                           std::numeric_limits<float>::max()};
-    fresh->inverse_depth_sigmas.Build(inverse_depth_sigma, 1, kAny, levels_);
+    fresh->inverse_depth_sigmas.Build(inverse_depth_sigma, 1, kAny, cameras_.levels);
   }
   std::swap(fresh->images, frame_images_);
   if (!SelectPoints(*fresh)) {
@@ -152,7 +155,7 @@ void EdgeOdometry::ReserveBuffers() {
     spare_.push_back(std::make_unique<Keyframe>());
     Keyframe& keyframe = *spare_.back();
     keyframe.images.Build(frame_images_[0]);
-    keyframe.depths.Build(empty_depth, 1, config_.depth_range, levels_);
+    keyframe.depths.Build(empty_depth, 1, config_.depth_range, cameras_.levels);
     for (std::size_t level = 0; level < kMaxLevels; ++level) {
       keyframe.points[level].Reserve(static_cast<std::size_t>(config_.max_points[level]));
     }
@@ -166,6 +169,7 @@ void EdgeOdometry::ReserveBuffers() {
   extractor_.Reserve(size);
   aligner_.Reserve(most);
   rotation_aligner_.Reserve(most);
+  wide_search_.Reserve(most, thumbnail);
 }
 
 /// Makes room for a new keyframe: the newest goes when it is close to the one before it, else the
@@ -185,17 +189,18 @@ void EdgeOdometry::ForgetNearOnes() {
 }
 
 bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
-  for (int level = 0; level < levels_; ++level) {
+  for (int level = 0; level < cameras_.levels; ++level) {
     const auto index = static_cast<std::size_t>(level);
     PointSelection selection = config_.points;
     selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
     const cv::Mat& grey = keyframe.images[level];
     const ReferenceLevel reference = {grey, keyframe.depths[level],
                                       keyframe.inverse_depth_sigmas[level]};
-    selector_.Select(reference, extractor_.Extract(grey), cameras_[index], selection,
+    selector_.Select(reference, extractor_.Extract(grey), cameras_.camera[index], selection,
                      keyframe.points[index]);
   }
-  selector_.SelectAll(keyframe.images.thumbnail(), cameras_[static_cast<std::size_t>(levels_)],
+  selector_.SelectAll(keyframe.images.thumbnail(),
+                      cameras_.camera[static_cast<std::size_t>(cameras_.levels)],
                       keyframe.thumbnail_points);
   return keyframe.points[0].size() >= static_cast<std::size_t>(config_.min_points);
 }
@@ -207,8 +212,8 @@ const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
   selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
   const ReferenceLevel reference = {keyframe.images[level], keyframe.depths[level],
                                     keyframe.inverse_depth_sigmas[level]};
-  selector_.Select(reference, extractor_.Extract(frame_images_[level]), cameras_[index], selection,
-                   masked_points_);
+  selector_.Select(reference, extractor_.Extract(frame_images_[level]), cameras_.camera[index],
+                   selection, masked_points_);
   return masked_points_;
 }
 
@@ -221,9 +226,9 @@ AlignmentState EdgeOdometry::BestStart(const EdgePoints& points, int level,
   for (const Eigen::Isometry3d& guess : guesses) {
     AlignmentState state = light_;
     state.new_from_reference = guess;
-    const double cost =
-        aligner_.CostAt(points, frame_images_[level], cameras_[static_cast<std::size_t>(level)],
-                        state, config_.lost_sigma / 2);
+    const double cost = aligner_.CostAt(points, frame_images_[level],
+                                        cameras_.camera[static_cast<std::size_t>(level)], state,
+                                        config_.lost_sigma / 2);
     if (cost >= least_cost) continue;
     least_cost = cost;
     best = state;
@@ -236,11 +241,11 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
   Attempt attempt;
   attempt.keyframe = &keyframe;
   AlignmentState state;
-  for (int level = levels_ - 1; level >= 0; --level) {
+  for (int level = cameras_.levels - 1; level >= 0; --level) {
     const EdgePoints& points = PointsOf(keyframe, level);
-    if (level == levels_ - 1) state = BestStart(points, level, guesses);
+    if (level == cameras_.levels - 1) state = BestStart(points, level, guesses);
     attempt.fine = aligner_.Align(points, frame_images_[level],
-                                  cameras_[static_cast<std::size_t>(level)], state);
+                                  cameras_.camera[static_cast<std::size_t>(level)], state);
     state = attempt.fine.state;
     attempt.iterations += attempt.fine.iterations;
   }
@@ -248,17 +253,89 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
   return attempt;
 }
 
+/// Where the camera is now if its motion goes on as it was; none when that is not known.
+std::optional<Eigen::Isometry3d> EdgeOdometry::Predicted(std::int64_t stamp_ns) const {
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
+  if (!last_.twist || step_s > kMaxPredictionS) return std::nullopt;
+  return last_.world_from_camera * Se3Exp(*last_.twist * step_s);
+}
+
 EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   // The thesis's equation 5.7: the motion goes on as it was; or the camera stands.
   Guesses guesses;
-  const Eigen::Isometry3d& world_from_last = last_.world_from_camera;
-  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
-  if (config_.constant_motion && last_.twist && step_s <= kMaxPredictionS) {
-    const Eigen::Isometry3d predicted = world_from_last * Se3Exp(*last_.twist * step_s);
-    guesses.Add(predicted.inverse() * keyframe_->world_from_camera);
+  const auto predicted = Predicted(stamp_ns);
+  if (config_.constant_motion && predicted) {
+    guesses.Add(predicted->inverse() * keyframe_->world_from_camera);
   }
-  guesses.Add(world_from_last.inverse() * keyframe_->world_from_camera);
-  return TrackFrom(*keyframe_, guesses);
+  guesses.Add(last_.world_from_camera.inverse() * keyframe_->world_from_camera);
+  const Attempt followed = TrackFrom(*keyframe_, guesses);
+  if (!IsDoubtful(followed, stamp_ns)) return followed;
+  if (followed.good) guesses.Add(followed.fine.state.new_from_reference);
+  const Attempt found = SearchFrom(*keyframe_, guesses);
+  return found.good ? found : followed;
+}
+
+/// By how much a frame's agreement may fall short of the last ones' without being strange.
+double EdgeOdometry::UsualDrop() const {
+  return std::max(config_.agreement_drop, 3 * agreement_deviation_);
+}
+
+/// Whether an alignment that began at a guess may have ended in a false minimum.
+bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const {
+  if (!attempt.good || !settled_) return true;
+  const double drop = usual_agreement_ - attempt.fine.Agreement();
+  if (drop > UsualDrop()) return true;
+  if (drop < UsualDrop() / 4) return false;
+  const auto predicted = Predicted(stamp_ns);
+  if (!predicted) return true;
+  const Eigen::Isometry3d reference_from_new = attempt.fine.state.new_from_reference.inverse();
+  return Motion(*attempt.keyframe, *predicted,
+                attempt.keyframe->world_from_camera * reference_from_new) > config_.surprise;
+}
+
+/// One search among the proposals.
+EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
+                                                const MotionProposals& proposals) {
+  const auto points_of = [this, &keyframe](int level) -> const EdgePoints& {
+    return PointsOf(keyframe, level);
+  };
+  const WideSearch::Outcome outcome = wide_search_.Search(proposals, frame_images_, points_of);
+  Attempt attempt;
+  attempt.keyframe = &keyframe;
+  attempt.fine = outcome.best;
+  attempt.ambiguous = outcome.ambiguous;
+  attempt.rival = outcome.rival;
+  attempt.iterations = outcome.iterations;
+  attempt.good = IsGood(attempt.fine);
+  return attempt;
+}
+
+/// Searches among the guesses and what thumbnails say; where that is not convincing, around what was
+/// found and among what features say.
+EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses& guesses) {
+  MotionProposals proposals;
+  for (const Eigen::Isometry3d& guess : guesses) proposals.Add(guess);
+  proposals.Add(Eigen::Isometry3d::Identity());
+  WideSearch::ProposeAround(*guesses.begin(), proposals);
+  if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
+  const Attempt first = SearchAmong(keyframe, proposals);
+  const double enough = std::max(config_.feature_agreement, usual_agreement_ - UsualDrop());
+  if (first.good && !first.ambiguous && first.fine.Agreement() >= enough) return first;
+  proposals = {};
+  proposals.Add(first.fine.state.new_from_reference);
+  if (first.ambiguous) proposals.Add(first.rival);
+  WideSearch::ProposeAround(first.fine.state.new_from_reference, proposals);
+  if (!frame_features_.found) FindFeatures(frame_images_[0], frame_features_);
+  if (!keyframe.features.found) FindFeatures(keyframe.images[0], keyframe.features);
+  const auto motion = NewFromReferenceByFeatures(keyframe.features, keyframe.depths[0],
+                                                 frame_features_, cameras_.camera[0]);
+  if (motion) {
+    proposals.Add(*motion);
+    WideSearch::ProposeAround(*motion, proposals);
+  }
+  Attempt second = SearchAmong(keyframe, proposals);
+  second.iterations += first.iterations;
+  return second;
 }
 
 /// The rotation that brings the keyframe's thumbnail nearest to the current one's, with the
@@ -268,7 +345,7 @@ Eigen::Isometry3d EdgeOdometry::RotationGuess(Keyframe& keyframe, const Eigen::I
   state.new_from_reference.linear() = from.linear();
   const AlignmentResult turned =
       rotation_aligner_.Align(keyframe.thumbnail_points, frame_images_.thumbnail(),
-                              cameras_[static_cast<std::size_t>(levels_)], state);
+                              cameras_.camera[static_cast<std::size_t>(cameras_.levels)], state);
   Eigen::Isometry3d guess = turned.state.new_from_reference;
   guess.translation() = from.translation();
   return guess;
@@ -288,7 +365,7 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
          {RotationGuess(keyframe, held), held, standing, RotationGuess(keyframe, standing)}) {
       guesses.Add(guess);
     }
-    attempt = TrackFrom(keyframe, guesses);
+    attempt = SearchFrom(keyframe, guesses);
   }
   return attempt;
 }
@@ -300,7 +377,8 @@ bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
          determined.info() == Eigen::Success && determined.rcond() > kMinCondition &&
          result.visible >= static_cast<std::size_t>(config_.min_points) &&
          result.Overlap() >= config_.min_overlap && result.sigma <= config_.lost_sigma &&
-         result.state.gain > kMinBelievedGain && result.state.gain < 1 / kMinBelievedGain;
+         result.Agreement() >= config_.min_agreement && result.state.gain > kMinBelievedGain &&
+         result.state.gain < 1 / kMinBelievedGain;
 }
 
 bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
@@ -322,7 +400,7 @@ bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
 double EdgeOdometry::Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
                             const Eigen::Isometry3d& world_from_other) const {
   const Vector6d twist = Se3Log(world_from_other.inverse() * world_from_one);
-  return cameras_[0].fx / cameras_[0].width *
+  return cameras_.camera[0].fx / cameras_.camera[0].width *
          (twist.head<3>().norm() * keyframe.points[0].mean_inverse_depth + twist.tail<3>().norm());
 }
 
@@ -337,13 +415,22 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   result.world_from_camera = Renormalised(keyframe_->world_from_camera * reference_from_new);
   // new_from_reference Exp(d) turned around is Exp(-d) reference_from_new: carried to the
   // right-hand side of the new pose by the adjoint.
-  const Matrix6d relative = config_.covariance_factor * fine.sigma * fine.sigma *
-                            fine.information.ldlt().solve(Matrix6d::Identity());
+  Matrix6d relative = config_.covariance_factor * fine.covariance;
+  if (attempt.ambiguous) {
+    const Vector6d to_rival =
+        Se3Log(fine.state.new_from_reference.inverse() * attempt.rival);
+    relative += to_rival * to_rival.transpose();
+  }
   const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);
   result.covariance = to_new * (keyframe_->covariance + relative) * to_new.transpose();
   result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
-  if (last_.state == VoState::kTracking) {
+  settled_ = !attempt.ambiguous;
+  if (usual_agreement_ == 0) usual_agreement_ = fine.Agreement();
+  const double deviation = fine.Agreement() - usual_agreement_;
+  usual_agreement_ += kAgreementShare * deviation;
+  agreement_deviation_ += kAgreementShare * (std::abs(deviation) - agreement_deviation_);
+  if (last_.state == VoState::kTracking && settled_) {
     result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
     // Both ends err by the alignment with the keyframe.
     result.twist_covariance = 2 / (step_s * step_s) * (to_new * relative * to_new.transpose());
@@ -353,6 +440,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   result.inliers = fine.inliers;
   result.sigma = fine.sigma;
   result.overlap = fine.Overlap();
+  result.agreement = fine.Agreement();
   result.iterations = attempt.iterations;
   return result;
 }

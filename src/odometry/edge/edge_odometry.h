@@ -11,6 +11,7 @@
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/edge/keyframe.h"
 #include "odometry/edge/rgbd_frame.h"
+#include "odometry/edge/wide_search.h"
 
 namespace livemap::odometry {
 
@@ -41,6 +42,7 @@ struct VoResult {
   std::size_t inliers = 0;  ///< Of them.
   double sigma = 0;         ///< Of the residuals, grey levels.
   double overlap = 0;       ///< Share of the keyframe's points in view.
+  double agreement = 0;     ///< Share of those in view whose residual is explained.
   int iterations = 0;       ///< All levels.
 };
 
@@ -78,6 +80,16 @@ class EdgeOdometry {
     double min_overlap = 0.25;
     /// or residuals of this standard deviation, grey levels.
     double lost_sigma = 30;
+    /// or when less than this share of the points in view is explained.
+    double min_agreement = 0.5;
+    /// An alignment is doubted, and the motion searched widely, when its agreement is smaller by
+    /// this than what the last frames had, and by three times their mean deviation,
+    double agreement_drop = 0.04;
+    /// or smaller than theirs by a fourth of that while the points are further than so much from
+    /// where the last motion brings them, share of the image's width.
+    double surprise = 0.006;
+    /// A search asks features, too, when its outcome has less agreement than this.
+    double feature_agreement = 0.65;
     /// Keyframes that are kept to find back, and how far apart: motion as above.
     int keyframes_kept = 8;
     double kept_motion = 0.1;
@@ -88,8 +100,8 @@ class EdgeOdometry {
     /// deviation after one second, m and rad.
     double lost_speed_mps = 1.0;
     double lost_turn_rps = 1.0;
-    /// Neighbouring edge pixels err together: the covariance of independent ones times this.
-    double covariance_factor = 15;
+    /// What the alignment states of its own covariance is multiplied by this.
+    double covariance_factor = 1;
   };
 
   /// Throws Error naming what is wrong with the intrinsics or the configuration.
@@ -133,6 +145,8 @@ class EdgeOdometry {
     AlignmentResult fine;
     int iterations = 0;
     bool good = false;
+    bool ambiguous = false;
+    Eigen::Isometry3d rival = Eigen::Isometry3d::Identity();  ///< If ambiguous.
   };
 
   bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
@@ -143,6 +157,11 @@ class EdgeOdometry {
   const EdgePoints& PointsOf(Keyframe& keyframe, int level);
   Eigen::Isometry3d RotationGuess(Keyframe& keyframe, const Eigen::Isometry3d& from);
   Attempt Follow(std::int64_t stamp_ns);
+  std::optional<Eigen::Isometry3d> Predicted(std::int64_t stamp_ns) const;
+  double UsualDrop() const;
+  bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
+  Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
+  Attempt SearchFrom(Keyframe& keyframe, const Guesses& guesses);
   Attempt FindBack();
   bool IsGood(const AlignmentResult& result) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
@@ -154,11 +173,12 @@ class EdgeOdometry {
   VoResult Hold(std::int64_t stamp_ns);
 
   Config config_;
-  std::array<geo::CameraIntrinsics, kMaxLevels + 1> cameras_;  // The last one is the thumbnail's.
-  int levels_ = 1;
+  LevelCameras cameras_;
   EdgeExtractor extractor_;
   PointSelector selector_;
   Aligner aligner_, rotation_aligner_;
+  WideSearch wide_search_;
+  PictureFeatures frame_features_;
   ImagePyramid frame_images_;
   EdgePoints masked_points_;
 
@@ -167,7 +187,10 @@ class EdgeOdometry {
   Keyframe* keyframe_ = nullptr;
   double keyframe_first_sigma_ = 0;
   int frames_since_keyframe_ = 0;
-  AlignmentState light_;  // Gain and bias of the last frame.
+  bool settled_ = false;            // Whether the last motion was told apart from all others.
+  double usual_agreement_ = 0;      // Of the last frames,
+  double agreement_deviation_ = 0;  // and how much they differ from it.
+  AlignmentState light_;            // Gain and bias of the last frame.
 
   VoResult last_;
   std::optional<std::int64_t> last_stamp_ns_;

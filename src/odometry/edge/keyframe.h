@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "odometry/edge/edge_extractor.h"
+#include "odometry/edge/feature_motion.h"
 #include "odometry/edge/image_pyramid.h"
 #include "odometry/edge/point_selector.h"
 #include "odometry/se3.h"
@@ -23,6 +24,7 @@ struct Keyframe {
   DepthPyramid inverse_depth_sigmas;
   std::array<EdgePoints, kMaxLevels> points;  ///< Under its own edges.
   EdgePoints thumbnail_points;                ///< Every pixel of the thumbnail, for rotations.
+  PictureFeatures features;                   ///< Found when they are first needed.
 };
 
 }  // namespace livemap::odometry

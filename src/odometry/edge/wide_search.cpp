@@ -1,0 +1,143 @@
+#include "odometry/edge/wide_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "odometry/se3.h"
+
+namespace livemap::odometry {
+namespace {
+
+/// Weight of a point out of view, against one in view that is not explained.
+constexpr double kUnseenWeight = 0.3;
+/// Candidates that go on from the coarsest level, and from each finer one.
+constexpr std::size_t kCoarseSurvivors = 6;
+constexpr std::size_t kFineSurvivors = 3;
+/// Closer than this on their level two candidates are one, px.
+constexpr double kSameCandidatePx = 1.5;
+/// A rival whose score is this close to the best one's makes the outcome ambiguous,
+constexpr double kAmbiguousScore = 0.04;
+/// if it is at least so far away, px of the finest level.
+constexpr double kRivalPx = 3;
+/// Of ProposeAround, rad, and how many turns of each.
+constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
+constexpr int kRingTurns = 8;
+/// Moves along the optical axis, in mean depths, and turns about it, rad.
+constexpr std::array<double, 4> kAxisMoves = {-0.25, -0.1, 0.1, 0.25};
+constexpr std::array<double, 2> kAxisTurns = {-0.1, 0.1};
+
+Eigen::Isometry3d MotionOfTwist(double vx, double vy, double vz, double wx, double wy, double wz) {
+  Vector6d twist;
+  twist << vx, vy, vz, wx, wy, wz;
+  return Se3Exp(twist);
+}
+
+}  // namespace
+
+LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest) {
+  LevelCameras cameras;
+  cameras.camera[0] = finest;
+  cameras.levels = CountLevels({finest.width, finest.height});
+  for (std::size_t level = 1; level < cameras.camera.size(); ++level) {
+    cameras.camera[level] = HalvedIntrinsics(cameras.camera[level - 1]);
+  }
+  return cameras;
+}
+
+double ExplainedScore(const AlignmentResult& result) {
+  const auto visible = static_cast<double>(result.visible);
+  const double counted = visible + kUnseenWeight * (static_cast<double>(result.points) - visible);
+  return counted > 0 && std::isfinite(result.cost) ? static_cast<double>(result.explained) / counted
+                                                   : 0;
+}
+
+double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,
+                     double mean_inverse_depth, double focal_px) {
+  const Vector6d twist = Se3Log(one.inverse() * other);
+  return focal_px * (twist.head<3>().norm() * mean_inverse_depth + twist.tail<3>().norm());
+}
+
+void WideSearch::Reserve(std::size_t points, std::size_t thumbnail_pixels) {
+  aligner_.Reserve(points);
+  shifts_.Reserve(thumbnail_pixels);
+}
+
+void WideSearch::ProposeAround(const Eigen::Isometry3d& motion, MotionProposals& proposals) {
+  for (const double radius : kRingRadii) {
+    for (int i = 0; i < kRingTurns; ++i) {
+      const double angle = 2 * M_PI * i / kRingTurns;
+      proposals.Add(MotionOfTwist(0, 0, 0, radius * std::cos(angle), radius * std::sin(angle), 0) *
+                    motion);
+    }
+  }
+}
+
+bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& images,
+                               MotionProposals& proposals) {
+  const ShiftSearch::Shifts shifts = shifts_.Find(keyframe.images.thumbnail(), images.thumbnail());
+  if (shifts.count == 0) return false;
+  const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(cameras_.levels)];
+  const double depth_m = 1 / std::max(1e-3, keyframe.points[0].mean_inverse_depth);
+  for (const ShiftSearch::Shift& shift : shifts) {
+    const double right = shift.x / camera.fx, down = shift.y / camera.fy;
+    proposals.Add(MotionOfTwist(0, 0, 0, -down, right, 0));
+    proposals.Add(MotionOfTwist(right * depth_m, down * depth_m, 0, 0, 0, 0));
+  }
+  for (const double move : kAxisMoves) proposals.Add(MotionOfTwist(0, 0, move * depth_m, 0, 0, 0));
+  for (const double turn : kAxisTurns) proposals.Add(MotionOfTwist(0, 0, 0, 0, 0, turn));
+  return true;
+}
+
+/// Aligns the candidates on a level and keeps the best that differ.
+void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level,
+                        std::size_t keep) {
+  const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
+  for (std::size_t i = 0; i < count_; ++i) {
+    Candidate& candidate = candidates_[i];
+    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state);
+    candidate.score = ExplainedScore(candidate.result);
+  }
+  std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
+            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count_ && kept < keep; ++i) {
+    const Eigen::Isometry3d& motion = candidates_[i].result.state.new_from_reference;
+    const bool known =
+        std::any_of(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(kept),
+                    [&](const Candidate& better) {
+                      return PixelsBetween(better.result.state.new_from_reference, motion,
+                                           points.mean_inverse_depth, camera.fx) < kSameCandidatePx;
+                    });
+    if (!known) candidates_[kept++] = candidates_[i];
+  }
+  count_ = kept;
+}
+
+WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const ImagePyramid& images,
+                                       const PointsOfLevel& points_of) {
+  Outcome outcome;
+  count_ = 0;
+  for (const Eigen::Isometry3d& motion : proposals) {
+    candidates_[count_] = {};
+    candidates_[count_++].result.state.new_from_reference = motion;
+  }
+  if (count_ == 0) return outcome;
+  double mean_inverse_depth = 0;
+  for (int level = cameras_.levels - 1; level >= 0; --level) {
+    const EdgePoints& points = points_of(level);
+    Refine(points, images[level], level,
+           level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors);
+    for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
+    mean_inverse_depth = points.mean_inverse_depth;
+  }
+  outcome.best = candidates_[0].result;
+  for (std::size_t i = 1; i < count_ && !outcome.ambiguous; ++i) {
+    outcome.rival = candidates_[i].result.state.new_from_reference;
+    outcome.ambiguous = candidates_[i].score > candidates_[0].score - kAmbiguousScore &&
+                        PixelsBetween(outcome.best.state.new_from_reference, outcome.rival,
+                                      mean_inverse_depth, cameras_.camera[0].fx) > kRivalPx;
+  }
+  return outcome;
+}
+
+}  // namespace livemap::odometry

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <opencv2/core.hpp>
+
+#include "odometry/edge/aligner.h"
+#include "odometry/edge/image_pyramid.h"
+#include "odometry/edge/keyframe.h"
+#include "odometry/edge/shift_search.h"
+
+namespace livemap::odometry {
+
+/// Motions to begin an alignment with, new_from_reference.
+class MotionProposals {
+ public:
+  static constexpr std::size_t kMost = 48;
+  /// More than kMost are passed over.
+  void Add(const Eigen::Isometry3d& motion) {
+    if (count_ < kMost) motions_[count_++] = motion;
+  }
+  const Eigen::Isometry3d* begin() const { return motions_.data(); }
+  const Eigen::Isometry3d* end() const { return motions_.data() + count_; }
+
+ private:
+  std::array<Eigen::Isometry3d, kMost> motions_;
+  std::size_t count_ = 0;
+};
+
+/// The cameras of an image's levels.
+struct LevelCameras {
+  std::array<geo::CameraIntrinsics, kMaxLevels + 1> camera;  ///< The last one is the thumbnail's.
+  int levels = 1;
+};
+LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest);
+
+/// Looks for a motion of which nothing is known: many alignments on the coarsest level, of which
+/// the best go on to the finer ones. The winner is who explains the largest share of the edges, so
+/// that a false minimum loses to the true one even where both are minima. Keeps its buffers; not
+/// thread-safe.
+class WideSearch {
+ public:
+  struct Outcome {
+    AlignmentResult best;
+    /// Another motion explains nearly as much: the picture repeats itself.
+    bool ambiguous = false;
+    Eigen::Isometry3d rival = Eigen::Isometry3d::Identity();  ///< That motion.
+    int iterations = 0;
+  };
+  /// The points to align on a level; asked for once per level.
+  using PointsOfLevel = std::function<const EdgePoints&(int level)>;
+
+  WideSearch(const AlignmentConfig& config, const LevelCameras& cameras)
+      : aligner_(config), cameras_(cameras) {}
+
+  /// Memory for so many points and for thumbnails of so many pixels.
+  void Reserve(std::size_t points, std::size_t thumbnail_pixels);
+
+  /// Adds what the thumbnails say, each of their best shifts as a turn and as a move, and moves along
+  /// the optical axis. False when there is nothing to see.
+  bool ProposeShifts(const Keyframe& keyframe, const ImagePyramid& images,
+                     MotionProposals& proposals);
+
+  /// Adds turns around a motion: by as much as a repeated pattern is left by one of its periods, more
+  /// than an alignment can mend and less than a thumbnail shows.
+  static void ProposeAround(const Eigen::Isometry3d& motion, MotionProposals& proposals);
+
+  Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
+                 const PointsOfLevel& points_of);
+
+ private:
+  struct Candidate {
+    AlignmentResult result;
+    double score = 0;
+  };
+
+  void Refine(const EdgePoints& points, const cv::Mat& grey, int level, std::size_t keep);
+
+  Aligner aligner_;
+  LevelCameras cameras_;
+  ShiftSearch shifts_;
+  std::array<Candidate, MotionProposals::kMost> candidates_;
+  std::size_t count_ = 0;
+};
+
+/// Share of the points that an alignment explains; those out of view count in part, so that looking
+/// away explains nothing.
+double ExplainedScore(const AlignmentResult& result);
+
+/// How far points at `mean_inverse_depth` (1/m) move over the image between two motions, px.
+double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,
+                     double mean_inverse_depth, double focal_px);
+
+}  // namespace livemap::odometry
