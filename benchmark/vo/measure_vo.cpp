@@ -17,6 +17,9 @@ nlohmann::ordered_json Measure(const std::string& what, const Recording& recordi
     return MeasureAblation(recording, static_cast<std::size_t>(line.Number("runs", 5, 1, 1000)));
   }
   if (what == "pixels") return MeasurePixels(recording);
+  if (what == "world") {
+    return MeasureWorld(recording, static_cast<std::size_t>(line.Whole("step", 1, 1, 1000)));
+  }
   BasinOptions options;
   options.pairs = static_cast<std::size_t>(line.Number("pairs", 30, 1, 100000));
   return MeasureBasin(recording, options);
@@ -24,13 +27,14 @@ nlohmann::ordered_json Measure(const std::string& what, const Recording& recordi
 
 int Run(int argc, char** argv) {
   tools::CommandLine line(
-      "livemap_measure_vo [FLAGS] tables|ablation|pixels|basin SEQ",
+      "livemap_measure_vo [FLAGS] tables|ablation|pixels|basin|world SEQ",
       "Measures visual odometry on an RGB-D sequence in TUM layout, one thread, and "
       "prints one line of JSON.\n"
       "  tables    every kind of edges and rule for keyframes beside OpenCV's methods\n"
       "  ablation  shares of the edge pixels against as many random pixels\n"
       "  pixels    time against the number of pixels\n"
-      "  basin     how wrong the first guess may be",
+      "  basin     how wrong the first guess may be\n"
+      "  world     errors of the default and of the covariance it states",
       2,
       {{"camera", "FILE",
         "the camera, laid out as camera.yaml, default the "
@@ -38,11 +42,14 @@ int Run(int argc, char** argv) {
        {"frames", "N", "the first N frames only, default all"},
        {"edge-model", "FILE", "tables: OpenCV's model of structured edges (left out)"},
        {"runs", "N", "ablation: draws of each share, default 5"},
-       {"pairs", "N", "basin: pairs of neighbouring frames, default 30"}});
+       {"pairs", "N", "basin: pairs of neighbouring frames, default 30"},
+       {"step", "N", "world: every Nth frame only, default 1"}});
   if (!line.Parse(argc, argv)) return 0;
   const std::string& what = line.Positional(0);
-  if (what != "tables" && what != "ablation" && what != "pixels" && what != "basin") {
-    throw Error("'" + what + "' is no measurement; accepted are tables, ablation, pixels, basin");
+  if (what != "tables" && what != "ablation" && what != "pixels" && what != "basin" &&
+      what != "world") {
+    throw Error("'" + what +
+                "' is no measurement; accepted are tables, ablation, pixels, basin, world");
   }
   cv::setNumThreads(1);
   const Recording recording(line.Positional(1), line.Text("camera", ""),

@@ -24,6 +24,11 @@ nlohmann::ordered_json MeasureAblation(const Recording& recording, std::size_t r
 /// pixels to every pixel of the image.
 nlohmann::ordered_json MeasurePixels(const Recording& recording);
 
+/// The default alone on every `step`th frame: errors, frames lost, the largest error of a step, and
+/// the mean normalised squared errors of its steps per degree of freedom, which are 1 where the
+/// stated covariance is true; null where no step had one.
+nlohmann::ordered_json MeasureWorld(const Recording& recording, std::size_t step);
+
 struct BasinOptions {
   std::size_t pairs = 30;  ///< Of neighbouring frames, spread over the recording.
   std::uint32_t seed = 1;

@@ -174,7 +174,7 @@ class BenchVoTest(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
         done = run(MEASURE, "speed", self.own)
         self.assertEqual(done.returncode, 2)
-        self.assertIn("tables, ablation, pixels, basin", done.stderr)
+        self.assertIn("tables, ablation, pixels, basin, world", done.stderr)
         done = run(MEASURE, "tables", "/nowhere")
         self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1))
         done = run(MEASURE, "tables", self.own, "--edge-model", "/nowhere")

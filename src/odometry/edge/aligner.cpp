@@ -296,7 +296,10 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
   const Eigen::LDLT<Eigen::MatrixXd> factors(normal_.topLeftCorner(unknowns, unknowns));
   const Eigen::MatrixXd half = factors.solve(scatter_.topLeftCorner(unknowns, unknowns));
-  result.covariance = factors.solve(half.transpose()).topLeftCorner<6, 6>() / square_gain;
+  // Parts that the unknowns were fitted to contradict each other less than others would.
+  const double parts = std::max(2.0, static_cast<double>(current_.value.size()) / kChunk / 6);
+  result.covariance =
+      parts / (parts - 1) / square_gain * factors.solve(half.transpose()).topLeftCorner<6, 6>();
 }
 
 }  // namespace livemap::odometry

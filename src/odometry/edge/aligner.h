@@ -35,8 +35,8 @@ struct AlignmentResult {
   /// Inverse covariance of the right-hand perturbation delta: new_from_reference * Exp(delta), for
   /// residuals of variance 1 that are independent of each other.
   Matrix6d information = Matrix6d::Zero();
-  /// Covariance of delta by how much parts of the image contradict each other (equation 9): edge
-  /// pixels that err together, by a depth or by aliasing, count once, and exact ones err little.
+  /// Covariance of delta by how much parts of the image contradict each other: edge pixels that err
+  /// together, by a depth or by aliasing, count once, and exact ones err little.
   Matrix6d covariance = Matrix6d::Zero();
   double sigma = 0;         ///< Robust standard deviation of the residuals, grey levels.
   double cost = 0;          ///< Mean robust cost, squared grey levels.

@@ -17,6 +17,8 @@ constexpr double kMaxPredictionS = 0.5;
 constexpr double kMinCondition = 1e-12;
 /// Light that fades further than this, or grows, between two images is a covered lens.
 constexpr double kMinBelievedGain = 0.3;
+/// What a search finds must explain this much more to be preferred to what was there.
+constexpr double kBetterScore = 0.03;
 /// Of the newest frame in the mean of the agreements.
 constexpr double kAgreementShare = 0.2;
 
@@ -58,6 +60,7 @@ void EdgeOdometry::Reset() {
   last_stamp_ns_.reset();
   light_ = {};
   settled_ = false;
+  ambiguous_frames_ = 0;
   usual_agreement_ = agreement_deviation_ = 0;
 }
 
@@ -272,7 +275,8 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   if (!IsDoubtful(followed, stamp_ns)) return followed;
   if (followed.good) guesses.Add(followed.fine.state.new_from_reference);
   const Attempt found = SearchFrom(*keyframe_, guesses);
-  return found.good ? found : followed;
+  const bool better = ExplainedScore(found.fine) > ExplainedScore(followed.fine) + kBetterScore;
+  return found.good && (better || found.ambiguous || !followed.good) ? found : followed;
 }
 
 /// By how much a frame's agreement may fall short of the last ones' without being strange.
@@ -310,8 +314,8 @@ EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
   return attempt;
 }
 
-/// Searches among the guesses and what thumbnails say; where that is not convincing, around what was
-/// found and among what features say.
+/// Searches among the guesses and what thumbnails say; where that is not convincing, around what
+/// was found and among what features say.
 EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses& guesses) {
   MotionProposals proposals;
   for (const Eigen::Isometry3d& guess : guesses) proposals.Add(guess);
@@ -417,15 +421,15 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   // right-hand side of the new pose by the adjoint.
   Matrix6d relative = config_.covariance_factor * fine.covariance;
   if (attempt.ambiguous) {
-    const Vector6d to_rival =
-        Se3Log(fine.state.new_from_reference.inverse() * attempt.rival);
+    const Vector6d to_rival = Se3Log(fine.state.new_from_reference.inverse() * attempt.rival);
     relative += to_rival * to_rival.transpose();
   }
   const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);
   result.covariance = to_new * (keyframe_->covariance + relative) * to_new.transpose();
   result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
-  settled_ = !attempt.ambiguous;
+  ambiguous_frames_ = attempt.ambiguous ? ambiguous_frames_ + 1 : 0;
+  settled_ = ambiguous_frames_ == 0 || ambiguous_frames_ > config_.max_ambiguous_frames;
   if (usual_agreement_ == 0) usual_agreement_ = fine.Agreement();
   const double deviation = fine.Agreement() - usual_agreement_;
   usual_agreement_ += kAgreementShare * deviation;

@@ -87,7 +87,9 @@ class EdgeOdometry {
     double agreement_drop = 0.04;
     /// or smaller than theirs by a fourth of that while the points are further than so much from
     /// where the last motion brings them, share of the image's width.
-    double surprise = 0.006;
+    double surprise = 0.012;
+    /// So many frames in a row may wait for a keyframe because their motion is ambiguous.
+    int max_ambiguous_frames = 2;
     /// A search asks features, too, when its outcome has less agreement than this.
     double feature_agreement = 0.65;
     /// Keyframes that are kept to find back, and how far apart: motion as above.
@@ -101,7 +103,7 @@ class EdgeOdometry {
     double lost_speed_mps = 1.0;
     double lost_turn_rps = 1.0;
     /// What the alignment states of its own covariance is multiplied by this.
-    double covariance_factor = 1;
+    double covariance_factor = 0.9;
   };
 
   /// Throws Error naming what is wrong with the intrinsics or the configuration.
@@ -187,6 +189,7 @@ class EdgeOdometry {
   Keyframe* keyframe_ = nullptr;
   double keyframe_first_sigma_ = 0;
   int frames_since_keyframe_ = 0;
+  int ambiguous_frames_ = 0;        // In a row.
   bool settled_ = false;            // Whether the last motion was told apart from all others.
   double usual_agreement_ = 0;      // Of the last frames,
   double agreement_deviation_ = 0;  // and how much they differ from it.

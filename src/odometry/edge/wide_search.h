@@ -58,13 +58,13 @@ class WideSearch {
   /// Memory for so many points and for thumbnails of so many pixels.
   void Reserve(std::size_t points, std::size_t thumbnail_pixels);
 
-  /// Adds what the thumbnails say, each of their best shifts as a turn and as a move, and moves along
-  /// the optical axis. False when there is nothing to see.
+  /// Adds what the thumbnails say, each of their best shifts as a turn and as a move, and moves
+  /// along the optical axis. False when there is nothing to see.
   bool ProposeShifts(const Keyframe& keyframe, const ImagePyramid& images,
                      MotionProposals& proposals);
 
-  /// Adds turns around a motion: by as much as a repeated pattern is left by one of its periods, more
-  /// than an alignment can mend and less than a thumbnail shows.
+  /// Adds turns around a motion: by as much as a repeated pattern is left by one of its periods,
+  /// more than an alignment can mend and less than a thumbnail shows.
   static void ProposeAround(const Eigen::Isometry3d& motion, MotionProposals& proposals);
 
   Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
