@@ -291,7 +291,7 @@ def head_section(results):
         odometry](../explanation/odometry.md) explains the method. [Stereo and monocular
         odometry](stereo-and-monocular-odometry.md) has the figures without a depth sensor, and a summary of this
         page; here every sequence has depth. The method was built for the bars below; the record does not say on which
-        sequences its parameters were chosen.""") + prose(
+        sequences its parameters were chosen. [Rooms that differ](odometry-rooms.md) says how it does elsewhere.""") + prose(
             f"""Machine:
         {machine['cores']} cores, {machine['cpu']}, {others}. All methods run on one thread (`cv::setNumThreads(1)`)
         in one process, beside each other, OpenCV's with their default settings; n is the number of frames{measured}.

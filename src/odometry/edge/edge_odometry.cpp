@@ -252,7 +252,7 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
     state = attempt.fine.state;
     attempt.iterations += attempt.fine.iterations;
   }
-  attempt.good = IsGood(attempt.fine);
+  attempt.good = IsGood(keyframe, attempt.fine);
   return attempt;
 }
 
@@ -310,7 +310,7 @@ EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
   attempt.ambiguous = outcome.ambiguous;
   attempt.rival = outcome.rival;
   attempt.iterations = outcome.iterations;
-  attempt.good = IsGood(attempt.fine);
+  attempt.good = IsGood(keyframe, attempt.fine);
   return attempt;
 }
 
@@ -374,10 +374,12 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
   return attempt;
 }
 
-bool EdgeOdometry::IsGood(const AlignmentResult& result) const {
+bool EdgeOdometry::IsGood(const Keyframe& keyframe, const AlignmentResult& result) const {
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
-  return std::isfinite(result.cost) && result.state.new_from_reference.matrix().allFinite() &&
+  return std::isfinite(result.cost) &&
+         IsBelievableMove(result.state.new_from_reference, keyframe.points[0].mean_inverse_depth) &&
+         result.state.new_from_reference.matrix().allFinite() &&
          determined.info() == Eigen::Success && determined.rcond() > kMinCondition &&
          result.visible >= static_cast<std::size_t>(config_.min_points) &&
          result.Overlap() >= config_.min_overlap && result.sigma <= config_.lost_sigma &&

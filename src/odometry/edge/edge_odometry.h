@@ -165,7 +165,7 @@ class EdgeOdometry {
   Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
   Attempt SearchFrom(Keyframe& keyframe, const Guesses& guesses);
   Attempt FindBack();
-  bool IsGood(const AlignmentResult& result) const;
+  bool IsGood(const Keyframe& keyframe, const AlignmentResult& result) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
   double Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
                 const Eigen::Isometry3d& world_from_other) const;

@@ -8,6 +8,8 @@
 namespace livemap::odometry {
 namespace {
 
+/// No move of which half of the picture is left is longer.
+constexpr double kMostMeanDepths = 1.5;
 /// Weight of a point out of view, against one in view that is not explained.
 constexpr double kUnseenWeight = 0.3;
 /// Candidates that go on from the coarsest level, and from each finer one.
@@ -49,6 +51,10 @@ double ExplainedScore(const AlignmentResult& result) {
   const double counted = visible + kUnseenWeight * (static_cast<double>(result.points) - visible);
   return counted > 0 && std::isfinite(result.cost) ? static_cast<double>(result.explained) / counted
                                                    : 0;
+}
+
+bool IsBelievableMove(const Eigen::Isometry3d& motion, double mean_inverse_depth) {
+  return motion.translation().norm() * mean_inverse_depth < kMostMeanDepths;
 }
 
 double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,
@@ -95,7 +101,9 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
     candidate.result = aligner_.Align(points, grey, camera, candidate.result.state);
-    candidate.score = ExplainedScore(candidate.result);
+    const bool believable =
+        IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth);
+    candidate.score = believable ? ExplainedScore(candidate.result) : 0;
   }
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });

@@ -89,6 +89,10 @@ class WideSearch {
 /// away explains nothing.
 double ExplainedScore(const AlignmentResult& result);
 
+/// Whether a motion leaves the points in sight: from far away all of them fall into one pixel,
+/// which explains any of low contrast.
+bool IsBelievableMove(const Eigen::Isometry3d& motion, double mean_inverse_depth);
+
 /// How far points at `mean_inverse_depth` (1/m) move over the image between two motions, px.
 double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,
                      double mean_inverse_depth, double focal_px);

@@ -106,6 +106,11 @@ TEST(WideSearch, WideStepsAreFollowed) {
   EXPECT_LT(MovingThroughRoom(6, RoomMotion::kWalking, 1.5).WorstErrorM(7, 4 / 30.0), 0.01);
 }
 
+TEST(WideSearch, AMoveThatBringsAllPointsIntoOnePixelIsNotBelieved) {
+  EXPECT_TRUE(IsBelievableMove(Pose(0.4, 0, 1.5, 0, 0, 0.3), 0.5));
+  EXPECT_FALSE(IsBelievableMove(Pose(0, 0, 40, 0, 0, 0), 0.5));
+}
+
 TEST(ExplainedScore, LookingAwayExplainsNothing) {
   AlignmentResult all, few;
   all.points = few.points = 1000;
