@@ -20,6 +20,8 @@ constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on 
 constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
 constexpr double kMinGain = 0.25;      // A black image must not explain everything.
 
+/// Of the unknowns that are solved for; lies on the stack.
+using UpToEight = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8>;
 using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
 using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
 
@@ -294,12 +296,12 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   const double square_gain = result.state.gain * result.state.gain;
   result.information = square_gain * pose;
   const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
-  const Eigen::LDLT<Eigen::MatrixXd> factors(normal_.topLeftCorner(unknowns, unknowns));
-  const Eigen::MatrixXd half = factors.solve(scatter_.topLeftCorner(unknowns, unknowns));
+  const Eigen::LDLT<UpToEight> factors(normal_.topLeftCorner(unknowns, unknowns));
+  const UpToEight half = factors.solve(scatter_.topLeftCorner(unknowns, unknowns));
   // Parts that the unknowns were fitted to contradict each other less than others would.
   const double parts = std::max(2.0, static_cast<double>(current_.value.size()) / kChunk / 6);
-  result.covariance =
-      parts / (parts - 1) / square_gain * factors.solve(half.transpose()).topLeftCorner<6, 6>();
+  const UpToEight whole = factors.solve(half.transpose());
+  result.covariance = parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>();
 }
 
 }  // namespace livemap::odometry
