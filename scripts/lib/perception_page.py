@@ -287,7 +287,7 @@ def write(results, out):
         ({'simulated' if results['simulated'] else 'road survey at 16 m/s, stretches without pictures cut to 1 s'}),
         each configuration driven once per drive. The vehicles are real ones of `launch/vehicle.launch`, played from
         bags by `launch/replay.launch`; GPS fixes are simulated along the road. The detector, on board and in the
-        zone, is {results['model']}, one engine of two threads, as those launch files have it. The validation sections
+        zone, is {results['model']}, two engines of one thread, as those launch files have it. The validation sections
         of the survey (386RS169832, 251BDF0530, 080BDF0070, 290RS070691) chose the weights and thresholds of the
         detectors that ship, so figures on them are somewhat optimistic.""")
     text += prose("""*BVC* is the thesis's big vehicle cloudlet, `vehicle.launch profile:=big`: the detector runs on

@@ -148,7 +148,7 @@ class PageTest(unittest.TestCase):
         results = {"quick": True, "simulated": False, "usual_radius_m": 5, "drives": ["d"], "date": "2026-01-01",
                    "version": "v", "model": "hazards-most", "machine": {"cpu": "c", "cores": 2}, "detector": None, "engines": engines,
                    "link": {"rtt_ms": 205.6, "rtt_sigma_ms": 50.2, "up_mbit_s": 10.0, "down_mbit_s": 30.0},
-                   "saturated": [{"model": "hazards-small", "camera_hz": 30, "frames": 200, "processed": 140, "dropped": 60,
+                   "saturated": [{"model": "hazards-small", "camera_hz": 30, "frames": 200, "processed": 140, "dropped": 60, "in_one_view": 120,
                                   "processed_hz": 21.0, "committed": 9, "load": [1.0, 2.0]}],
                    "streams": [{"frames": 100, "seconds": 30.0, "bytes": 3000000}],
                    "runs": [self.run_of("big", 1), self.run_of("big", 5), self.run_of("big", 5, link=True),
@@ -163,7 +163,7 @@ class PageTest(unittest.TestCase):
                      "| BVC | 3.0 | 10 of 100 | - | 0.700 (7 of 10) | 2.0 | 0.008 | 5 |",
                      "| BVC, 1 m | 0.700 (7 of 10) | 5 | 4 | 0.0080 |", "| perfect detector, 5 m | 0.700 (7 of 10) | 5 | 4 | 0.0213 |",
                      "| H.264 stream, 3.3 frames/s | - | - | - | 0.8000 |", "| torch | 1 | 1 | 10.0 | 2.50 | 50 |",
-                     "the SVC's rows are missing", "**The quick form**", "| hazards-small | 4.0 | 10.0 | 21.0 | 60 of 200 | 9 |",
+                     "the SVC's rows are missing", "**The quick form**", "| hazards-small | 4.0 | 10.0 | 21.0 | 60 of 200 | 120 | 9 |",
                      "The detector, on board and in the zone, is hazards-most,",
                      "Measured with version earlier: d_perfect_5m_loopback."):
             self.assertIn(part, lines)
