@@ -14,7 +14,7 @@ NODES = {
     "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "geo_localization": "geo_localization",
                 "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
                 "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard",
-                "change_detection": "change_detection"},
+                "change_detection": "change_detection", "gps_receiver": "gps_receiver"},
     "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone", "candidate_intake": "candidate_intake",
              "hazard_detection": "hazard_detection"},
 }
@@ -50,7 +50,7 @@ class LaunchArguments(unittest.TestCase):
                 defaults = yaml.safe_load((ROOT / "config" / f"{file}.yaml").read_text())
                 wanted = {key: changed(value) for key, value in defaults.items()}
                 optional = {"edge_vo": ["vo:=true"], "geo_localization": ["vo:=true"], "early_discard": ["profile:=small"],
-                            "change_detection": ["changes:=true"]}.get(node, [])
+                            "change_detection": ["changes:=true"], "gps_receiver": ["receiver:=gpsd"]}.get(node, [])
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")
@@ -86,6 +86,16 @@ class LaunchArguments(unittest.TestCase):
         refused = nodes("vehicle.launch", "profile:=tiny")
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("profile:=tiny is neither big nor small", refused.stderr)
+
+    def test_a_vehicle_reads_a_receiver_of_its_own_only_when_told_to(self):
+        self.assertNotIn("/gps_receiver", nodes("vehicle.launch").stdout)
+        self.assertIn("/gps_receiver", nodes("vehicle.launch", "receiver:=gpsd").stdout)
+        dumped = parameters("vehicle.launch", "receiver:=gpsd", "localize:=true", "gps_receiver:={device: /dev/ttyACM0}")
+        self.assertEqual(dumped["/gps_receiver/device"], "/dev/ttyACM0")
+        self.assertEqual(dumped["/geo_localization/latency_s"], 0.0, "it stamps the measurement")
+        refused = nodes("vehicle.launch", "receiver:=/dev/ttyACM0")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("receiver:=/dev/ttyACM0 is neither none nor gpsd", refused.stderr)
 
     def test_a_vehicle_detects_changes_only_when_told_to(self):
         self.assertNotIn("/change_detection", nodes("vehicle.launch").stdout)

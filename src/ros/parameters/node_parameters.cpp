@@ -10,6 +10,7 @@
 #include "ros/parameters/early_discard_parameters.h"
 #include "ros/parameters/edge_vo_parameters.h"
 #include "ros/parameters/geo_localization_parameters.h"
+#include "ros/parameters/gps_receiver_parameters.h"
 #include "ros/parameters/hazard_detection_parameters.h"
 #include "ros/parameters/hazard_reporting_parameters.h"
 #include "ros/parameters/mqtt_bridge_parameters.h"
@@ -34,6 +35,7 @@ const std::map<std::string, Reader>& Readers() {
       {"early_discard", [](P& p, const S&) { ReadEarlyDiscardConfig(p, kNowNs); }},
       {"edge_vo", [](P& p, const S&) { ReadEdgeVoConfig(p); }},
       {"geo_localization", [](P& p, const S&) { ReadGeoLocalizationConfig(p); }},
+      {"gps_receiver", [](P& p, const S&) { ReadGpsReceiverConfig(p); }},
       {"hazard_detection", [](P& p, const S&) { ReadHazardDetectionConfig(p); }},
       {"hazard_reporting", [](P& p, const S&) { ReadHazardReportingConfig(p, kNowNs); }},
       {"mqtt_bridge", [](P& p, const S&) { ReadBridgeConfig(p); }},
@@ -107,6 +109,7 @@ const std::vector<NodeParameters>& AllNodeParameters() {
       {"early_discard", "early_discard", "early_discard_parameters.cpp", {}},
       {"edge_vo", "edge_vo", "edge_vo_parameters.cpp", {}},
       {"geo_localization", "geo_localization", "geo_localization_parameters.cpp", {}},
+      {"gps_receiver", "gps_receiver", "gps_receiver_parameters.cpp", {}},
       {"hazard_detection", "hazard_detection", "hazard_detection_parameters.cpp", {}},
       {"hazard_reporting", "hazard_reporting", "hazard_reporting_parameters.cpp", {}},
       {"mqtt_bridge_vehicle", "mqtt_bridge", "mqtt_bridge_parameters.cpp", {{"role", "vehicle"}}},
