@@ -54,9 +54,12 @@ Eigen::Vector2d PlaneSigmas(const ReceiverReport& report, double sigmas) {
   return Eigen::Vector2d::Constant(shared >= kMinSigmaM ? shared : kNotStated);
 }
 
-std::optional<Eigen::Matrix2d> PlaneCovariance(const ReceiverReport& report, double sigmas) {
+std::optional<Eigen::Matrix2d> PlaneCovariance(const ReceiverReport& report,
+                                               const ReceiverConfig& config) {
+  const bool is_given = config.velocity_sigma_mps > 0;
   const std::optional<double> along =
-      SigmaOf(report.speed_error_mps, sigmas, kMinSigmaMps, kMaxErrorMps);
+      is_given ? config.velocity_sigma_mps
+               : SigmaOf(report.speed_error_mps, config.error_sigmas, kMinSigmaMps, kMaxErrorMps);
   if (!along) return std::nullopt;
   if (!std::isfinite(report.course_deg)) {
     // Into any direction alike: half of the square of the speed along either axis.
@@ -64,8 +67,9 @@ std::optional<Eigen::Matrix2d> PlaneCovariance(const ReceiverReport& report, dou
     return Eigen::Matrix2d(variance * Eigen::Matrix2d::Identity());
   }
   double across = *along;
-  const std::optional<double> course_deg = SigmaOf(report.course_error_deg, sigmas, 1e-6, 180);
-  if (course_deg) {
+  const std::optional<double> course_deg =
+      SigmaOf(report.course_error_deg, config.error_sigmas, 1e-6, 180);
+  if (course_deg && !is_given) {
     across = std::max(report.speed_mps * *course_deg * geo::kRadiansPerDegree, kMinSigmaMps);
   }
   const double course_rad = report.course_deg * geo::kRadiansPerDegree;
@@ -114,7 +118,7 @@ JudgedVelocity VelocityOf(const ReceiverReport& report, const ReceiverConfig& co
     velocity.plane_mps =
         report.speed_mps * Eigen::Vector2d(std::sin(course_rad), std::cos(course_rad));
   }
-  velocity.plane_covariance = PlaneCovariance(report, config.error_sigmas);
+  velocity.plane_covariance = PlaneCovariance(report, config);
   if (report.mode == ReceiverReport::kSpace &&
       IsWithin(report.climb_mps, -config.max_speed_mps, config.max_speed_mps)) {
     velocity.climb_mps = report.climb_mps;

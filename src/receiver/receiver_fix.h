@@ -14,6 +14,8 @@ struct ReceiverConfig {
   /// How many standard deviations gpsd's error estimates are, along one axis. gpsd_json(5) guesses
   /// that they have a confidence of 95 %.
   double error_sigmas = 1.96;
+  /// Standard deviation of the velocity along each axis, m/s, for gpsd's estimate; 0: that counts.
+  double velocity_sigma_mps = 0;
   /// A faster vehicle is none, m/s; also the fastest climb.
   double max_speed_mps = 100;
 };
@@ -71,8 +73,9 @@ JudgedFix FixOf(const ReceiverReport& report, const ReceiverConfig& config);
 
 /// The velocity of a report with a fix. The error along the course is gpsd's error of the speed.
 /// Across it, it is the speed times the error of the course; where none is stated, that of the
-/// speed, since a receiver measures Doppler shifts alike in all directions. A speed without course
-/// (the vehicle stands) is a velocity of 0 with the speed as a further error.
+/// speed, since a receiver measures Doppler shifts alike in all directions. ReceiverConfig may
+/// state another error. A speed without course (the vehicle stands) is a velocity of 0 with the
+/// speed as a further error.
 JudgedVelocity VelocityOf(const ReceiverReport& report, const ReceiverConfig& config);
 
 /// The verdict as the end of a sentence, such as "it has a position and no time".

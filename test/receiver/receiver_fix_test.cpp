@@ -160,6 +160,18 @@ TEST(ReceiverVelocity, IsAsUncertainAcrossAsAlongWithoutAnErrorOfTheCourse) {
                   .velocity->plane_covariance->isApprox(0.04 * Eigen::Matrix2d::Identity()));
 }
 
+TEST(ReceiverVelocity, HasTheErrorOfTheDataSheetWhereThatIsGiven) {
+  ReceiverConfig config;
+  config.velocity_sigma_mps = 0.1;
+  for (const double error : {kNotStated, 42.0}) {
+    ReceiverReport report = GoodReport();
+    report.speed_error_mps = error;
+    EXPECT_TRUE(VelocityOf(report, config)
+                    .velocity->plane_covariance->isApprox(0.01 * Eigen::Matrix2d::Identity()))
+        << error;
+  }
+}
+
 TEST(ReceiverVelocity, IsNoneAndUncertainByTheSpeedWithoutACourse) {
   ReceiverReport report = GoodReport();
   report.course_deg = kNotStated;

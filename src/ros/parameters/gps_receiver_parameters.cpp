@@ -49,6 +49,12 @@ void ReadReceiverMeasurements(ParameterReader& parameters, receiver::ReceiverWat
                   "How many standard deviations an error estimate of gpsd is. gpsd guesses that "
                   "its estimates have a confidence of 95 %; set 1 for a receiver whose own "
                   "estimates are standard deviations.");
+  parameters.Read(
+      "velocity_sigma_mps", watch.conversion.velocity_sigma_mps, {0, 100},
+      "Standard deviation of the velocity along each axis of the plane, by the "
+      "receiver's data sheet; 0: gpsd's estimate, which is far too large for a receiver "
+      "that states none itself.",
+      "m/s");
   parameters.Read("max_speed_mps", watch.conversion.max_speed_mps, {1, 1000},
                   "A velocity above it is refused. A fix that needs one is counted as a jump and "
                   "published: those who know the track judge it.",
