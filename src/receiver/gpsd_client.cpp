@@ -97,8 +97,12 @@ int Milliseconds(double seconds) { return static_cast<int>(std::ceil(seconds * 1
 /// One connection, from its opening to its loss.
 class GpsdClient::Session {
  public:
-  Session(const GpsdConfig& config, const GpsdCallbacks& callbacks)
-      : config_(config), callbacks_(callbacks), data_(std::make_unique<gps_data_t>()) {}
+  Session(const GpsdConfig& config, const GpsdCallbacks& callbacks,
+          const std::atomic<bool>& stopping)
+      : config_(config),
+        callbacks_(callbacks),
+        stopping_(stopping),
+        data_(std::make_unique<gps_data_t>()) {}
   ~Session() {
     if (open_) gps_close(data_.get());
   }
@@ -136,7 +140,7 @@ class GpsdClient::Session {
 
   /// Reads all that has come. Why the connection is lost; nothing while it holds.
   std::optional<std::string> Read() {
-    while (true) {
+    while (!stopping_) {
       data_->set = 0;
       line_[0] = '\0';
       errno = 0;
@@ -147,6 +151,7 @@ class GpsdClient::Session {
       unanswered_ = 0;
       Tell();
     }
+    return std::nullopt;
   }
 
   /// Asks a silent gpsd whether it lives; the reason once it does not answer.
@@ -194,6 +199,7 @@ class GpsdClient::Session {
 
   const GpsdConfig& config_;
   const GpsdCallbacks& callbacks_;
+  const std::atomic<bool>& stopping_;
   std::unique_ptr<gps_data_t> data_;  // Larger than a stack likes.
   std::array<char, kMaxLineBytes + 1> line_{};
   bool open_ = false;
@@ -232,8 +238,8 @@ std::string GpsdClient::Converse() {
   const transport::TcpProbeResult probe =
       transport::ProbeTcp(config_.host, config_.port, config_.connect_timeout_s, stop_.fd());
   if (probe.numeric_address.empty()) return probe.error;
-  Session session(config_, callbacks_);
-  const std::string refused = session.Open(probe.numeric_address);
+  Session session(config_, callbacks_, stopping_);
+  std::string refused = session.Open(probe.numeric_address);
   if (!refused.empty()) return refused;
   while (true) {
     std::array<pollfd, 2> waited = {pollfd{session.fd(), POLLIN, 0}, pollfd{stop_.fd(), POLLIN, 0}};

@@ -45,7 +45,8 @@ class GpsdClient {
  public:
   /// Starts the thread. Throws Error when the reconnect delays are none.
   GpsdClient(const GpsdConfig& config, GpsdCallbacks callbacks);
-  /// Joins the thread: at once, but for a host name that is being resolved.
+  /// Joins the thread: at once, but for a host name that is being resolved, or a host that
+  /// vanished between two connections.
   ~GpsdClient();
   GpsdClient(const GpsdClient&) = delete;
   GpsdClient& operator=(const GpsdClient&) = delete;

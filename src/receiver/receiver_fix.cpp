@@ -47,8 +47,7 @@ FixQuality QualityOf(int status) {
 
 /// Errors east and north as standard deviations, m; NaN where the report has none.
 Eigen::Vector2d PlaneSigmas(const ReceiverReport& report, double sigmas) {
-  const Eigen::Vector2d stated =
-      Eigen::Vector2d(report.east_error_m, report.north_error_m) / sigmas;
+  Eigen::Vector2d stated = Eigen::Vector2d(report.east_error_m, report.north_error_m) / sigmas;
   if (stated.allFinite() && stated.minCoeff() >= kMinSigmaM) return stated;
   const double shared = report.radial_error_m / (sigmas * kRadialSigmas);
   return Eigen::Vector2d::Constant(shared >= kMinSigmaM ? shared : kNotStated);

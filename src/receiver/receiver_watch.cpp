@@ -173,7 +173,7 @@ ReceiverState ReceiverWatch::state(std::int64_t steady_ns) const {
 
 std::string ReceiverWatch::Describe(std::int64_t steady_ns) const {
   const ReceiverState now = state(steady_ns);
-  const std::string sentence = NameOf(now);
+  std::string sentence = NameOf(now);
   switch (now) {
     case ReceiverState::kNoGpsd:
       return sentence + ": " + reason_ + "; is gpsd installed and started (systemctl status gpsd)?";

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -67,7 +68,7 @@ class FakeGpsd {
     while (true) {
       HangUp();
       peer_ = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
-      const std::string wish = ReadLine();
+      std::string wish = ReadLine();
       if (!wish.empty()) return wish;
     }
   }
@@ -294,6 +295,16 @@ TEST_F(GpsdClientTest, HangsUpOnALineWithoutEnd) {
   EXPECT_THAT(told_.Connection(1), HasSubstr("is lost"));
   Greet();
   EXPECT_EQ(told_.Connection(2), "connected");
+}
+
+TEST_F(GpsdClientTest, EndsWhileGpsdTalksWithoutPause) {
+  Start();
+  Greet();
+  EXPECT_EQ(told_.Connection(0), "connected");
+  std::thread talker([this] { gpsd_.SayUntilHungUp(kFixReport); });
+  EXPECT_GE(told_.Reports(1000).size(), 1000U);
+  client_.reset();
+  talker.join();
 }
 
 TEST(GpsdClient, SaysWhyNobodyAnswersAndEndsAtOnce) {

@@ -7,12 +7,13 @@
 namespace livemap::receiver {
 namespace {
 
-constexpr std::int64_t kStartNs = 1'795'653'934'000'000'000;
+constexpr std::int64_t kClockStartNs = 1'795'653'934'000'000'000;
 
 /// A report measured `at_s` that comes `late_s` later, while the clock is `ahead_s` ahead.
 void AddReport(ReceiverClock& clock, double at_s, double late_s, double ahead_s) {
   const std::int64_t came_ns = Nanoseconds(at_s + late_s);
-  clock.Add(kStartNs + Nanoseconds(at_s), kStartNs + came_ns + Nanoseconds(ahead_s), came_ns);
+  clock.Add(kClockStartNs + Nanoseconds(at_s), kClockStartNs + came_ns + Nanoseconds(ahead_s),
+            came_ns);
 }
 
 TEST(ReceiverClock, KnowsNothingBeforeTheFirstReport) { EXPECT_FALSE(ReceiverClock().offset_s()); }

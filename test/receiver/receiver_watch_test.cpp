@@ -44,7 +44,7 @@ class ReceiverWatchTest : public testing::Test {
   }
   ReceiverWatch::Taken Take(const ReceiverReport& report) {
     seconds_ += 0.1;
-    const ReceiverWatch::Taken taken = watch_.OnReport(report, Now());
+    ReceiverWatch::Taken taken = watch_.OnReport(report, Now());
     seconds_ += 0.9;
     return taken;
   }
