@@ -200,7 +200,7 @@ class World:
         if vehicle in self.relays:
             host, port = "127.0.0.1", self.relays[vehicle][1]
         self.run(vehicle, ["roslaunch", "-p", self.ports[vehicle], system.launch_file("vehicle.launch"),
-                           "detect:=false", "respawn_delay:=0", f"vehicle:={vehicle}", f"zone:={ZONE}",
+                           "detect:=false", "vo:=false", "respawn_delay:=0", f"vehicle:={vehicle}", f"zone:={ZONE}",
                            f"directory:={self.directory / vehicle}", f"broker_host:={host}", f"broker_port:={port}",
                            f"identity:={self.directory / 'identity/vehicles' / vehicle}"], master=self.ports[vehicle])
 

@@ -96,7 +96,7 @@ class Zone(system.LiveMapSystem):
         self.launch(f"{vehicle}-{drive}", self.vehicle_port, "replay.launch", {
             "bag": bag, "rate": REPLAY_RATE, "delay": 8, "vehicle": vehicle, "zone": self.zone, "drive": drive,
             "directory": self.directory / vehicle, "broker_port": self.broker_port,
-            "password_file": self.password_file(vehicle), "use_truth": "true",
+            "password_file": self.password_file(vehicle), "use_truth": "true", "vo": "false",
             "changes": "true"})
 
     def end_pass(self, vehicle, bag, drive):

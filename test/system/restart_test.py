@@ -52,7 +52,7 @@ class Drive:
     def start_vehicle(self):
         self.live_map.start("vehicle", ["roslaunch", "--wait", system.launch_file("replay.launch")] + [
             f"{key}:={value}" for key, value in {
-                "bag": self.bag, "paused": "true", "delay": 0, "use_truth": "true",
+                "bag": self.bag, "paused": "true", "delay": 0, "use_truth": "true", "vo": "false",
                 "vehicle": VEHICLE, "zone": ZONE,
                 # Nobody is in the town, and the masks' work would let a busy machine drop frames.
                 "hazard_reporting": "{privacy: false}",

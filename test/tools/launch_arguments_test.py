@@ -125,11 +125,29 @@ class LaunchArguments(unittest.TestCase):
                                      check=True, capture_output=True, text=True).stdout
             self.assertIn(f" camera/depth/image_raw:={topic} ", command)
 
+    def test_odometry_runs_with_the_eyes_there_are_unless_told_otherwise(self):
+        """By default with one eye or more; by depth alone where that is asked for; not at all on a small vehicle."""
+        wanted = {(): "auto", ("vo:=auto",): "auto", ("vo:=true",): "depth", ("vo:=false",): None,
+                  ("profile:=small",): None, ("profile:=small", "vo:=auto"): "auto"}
+        for arguments, eye in wanted.items():
+            for launch in (["vehicle.launch"], ["replay.launch", f"bag:={BAG}", "check:=false"]):
+                dumped = parameters(*launch, *arguments)
+                self.assertEqual(dumped.get("/edge_vo/eye"), eye, (launch, arguments))
+                runs = eye is not None
+                self.assertEqual("/geo_localization/latency_s" in dumped, runs, (launch, arguments))
+                self.assertEqual(dumped["/hazard_reporting/position_source"], "fused" if runs else "gps")
+                self.assertIs(dumped["/hazard_reporting/publish_tf"], not runs)
+                self.assertIs(dumped["/hazard_reporting/use_depth"], "vo:=true" in arguments)
+        self.assertIs(parameters("vehicle.launch", "stereo:=true")["/hazard_reporting/use_depth"], True)
+        refused = nodes("vehicle.launch", "vo:=both")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("vo:=both is neither auto, true nor false", refused.stderr)
+
     def test_positions_by_fusion_are_refused_without_it_and_told_what_they_need(self):
-        refused = nodes("vehicle.launch", "position_source:=fused")
+        refused = nodes("vehicle.launch", "vo:=false", "position_source:=fused")
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("position_source:=fused needs localize:=true", refused.stderr)
-        for arguments in (("vo:=true",), ("localize:=true",), ("vo:=true", "position_source:=gps")):
+        for arguments in ((), ("vo:=true",), ("vo:=false", "localize:=true"), ("vo:=true", "position_source:=gps")):
             accepted = nodes("vehicle.launch", *arguments)
             self.assertEqual(accepted.returncode, 0, accepted.stderr)
 

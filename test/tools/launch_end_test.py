@@ -144,7 +144,7 @@ class LaunchEnd(unittest.TestCase):
         self.assertIn(f"(process {os.getpid()})", line)
 
     def test_a_launch_file_that_is_refused_ends_with_1(self):
-        process = self.start("vehicle.launch", "position_source:=fused")
+        process = self.start("vehicle.launch", "vo:=false", "position_source:=fused")
         self.assertEqual(process.wait(PATIENCE_S), 1)
         self.assertIn("position_source:=fused needs localize:=true", self.words()[1])
 

@@ -1,9 +1,11 @@
 #include <cv_bridge/cv_bridge.h>
+#include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <image_transport/image_transport.h>
 #include <message_filters/sync_policies/approximate_time.h>
 #include <message_filters/sync_policies/exact_time.h>
 #include <message_filters/synchronizer.h>
 #include <nav_msgs/Path.h>
+#include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_eigen/tf2_eigen.h>
@@ -13,26 +15,54 @@
 #include <algorithm>
 #include <boost/function.hpp>
 #include <chrono>
+#include <cmath>
 #include <memory>
+#include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <vector>
 
 #include "nodelets/bounded_tf_listener.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/edge_vo/eye_choice.h"
+#include "nodelets/edge_vo/mono_eye.h"
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "nodelets/stamp_checks.h"
 #include "odometry/edge/edge_view.h"
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/depth_conversions.h"
+#include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/odometry_conversions.h"
 #include "ros/parameters/edge_vo_parameters.h"
 
 namespace livemap::nodelets {
+namespace {
 
-/// Visual odometry on board: image, depth and calibration in; `odom`, tf, `vo/path`, and when
-/// somebody listens `vo/edges` and `vo/points` out. All callbacks run one at a time, in the
-/// nodelet's own queue.
+EyeChoice::Config EyeChoiceOf(const ros_io::EdgeVoConfig& config) {
+  EyeChoice::Config choice;
+  choice.wait_s = config.eye_wait_s;
+  if (config.eye == "depth") choice.wanted = EyeChoice::Wanted::kDepth;
+  if (config.eye == "mono") choice.wanted = EyeChoice::Wanted::kMono;
+  return choice;
+}
+
+/// What the odometry of one eye has of its own stays.
+odometry::MonocularOdometry::Config MonocularOf(const ros_io::EdgeVoConfig& config) {
+  odometry::MonocularOdometry::Config monocular;
+  const odometry::DepthPyramid::Range range = monocular.odometry.depth_range;
+  const odometry::PointSelection points = monocular.odometry.points;
+  monocular.odometry = config.odometry;
+  monocular.odometry.depth_range = range;
+  monocular.odometry.points = points;
+  monocular.background = config.background_keyframes;
+  return monocular;
+}
+
+}  // namespace
+
+/// Visual odometry on board: image and calibration in, with depth or without; `odom`, tf,
+/// `vo/path`, and when somebody listens `vo/edges` and `vo/points` out. All callbacks run one at a
+/// time, in the nodelet's own queue.
 class EdgeVoPart : public NodeletPart {
  private:
   using ImageConstPtr = sensor_msgs::ImageConstPtr;
@@ -44,6 +74,9 @@ class EdgeVoPart : public NodeletPart {
   using Exact = message_filters::sync_policies::ExactTime<A, B, C>;
   template <class A, class B, class C>
   using Approximate = message_filters::sync_policies::ApproximateTime<A, B, C>;
+  using ImagePolicy =
+      message_filters::sync_policies::ExactTime<sensor_msgs::Image, sensor_msgs::CameraInfo>;
+  using TwistConstPtr = geometry_msgs::TwistWithCovarianceStampedConstPtr;
 
   /// Messages that came on an input topic since the last warning.
   struct Arrivals {
@@ -59,6 +92,7 @@ class EdgeVoPart : public NodeletPart {
     config_ = ros_io::ReadEdgeVoConfig(parameters);
     // A mistake in the configuration is one now, not at the first image.
     const odometry::EdgeExtractor checked(config_.odometry.edges);
+    choice_ = std::make_unique<EyeChoice>(EyeChoiceOf(config_));
     frames_.odom = config_.odom_frame;
     frames_.base = config_.base_frame;
     path_.header.frame_id = config_.odom_frame;
@@ -89,7 +123,9 @@ class EdgeVoPart : public NodeletPart {
         "camera_rect/image", 0,
         boost::function<void(const ImageConstPtr&)>([this](const ImageConstPtr& image) {
           ++arrivals_.images;
-          if (IsUsable("an image", *image)) Synchronize<0>(image);
+          if (!IsUsable("an image", *image)) return;
+          if (images_) images_->add<0>(image);
+          Synchronize<0>(image);
         }),
         ros::VoidPtr(), raw);
     depth_subscriber_ = transport.subscribe(
@@ -102,13 +138,56 @@ class EdgeVoPart : public NodeletPart {
     info_subscriber_ = node.subscribe<sensor_msgs::CameraInfo>(
         "camera_rect/camera_info", 0, [this](const InfoConstPtr& info) {
           ++arrivals_.infos;
-          if (IsUsable("a calibration", *info)) Synchronize<2>(info);
+          if (!IsUsable("a calibration", *info)) return;
+          if (images_) images_->add<1>(info);
+          Synchronize<2>(info);
         });
+    if (choice_->eye() != Eye::kDepth) SubscribeToMetres();
     silence_timer_ = node.createSteadyTimer(ros::WallDuration(config_.silence_warning_s),
                                             &EdgeVoPart::OnSilenceTimer, this);
   }
 
+  /// What tells one eye metres.
+  void SubscribeToMetres() {
+    ros::NodeHandle& node = getNodeHandle();
+    fix_subscriber_ = node.subscribe<sensor_msgs::NavSatFix>(
+        "fix", 100, [this](const sensor_msgs::NavSatFixConstPtr& fix) {
+          if (mono_ && IsUsable("a fix", *fix)) mono_->AddFix(ros_io::ToFix(*fix));
+        });
+    receiver_subscriber_ = node.subscribe<geometry_msgs::TwistWithCovarianceStamped>(
+        "gps/velocity", 100, [this](const TwistConstPtr& velocity) {
+          if (!mono_ || !IsUsable("a receiver's speed", *velocity)) return;
+          const auto& linear = velocity->twist.twist.linear;
+          mono_->AddSpeed(
+              odometry::MetresSource::kReceiver, ros_io::FromRosTime(velocity->header.stamp),
+              std::hypot(linear.x, linear.y), SigmaOf(*velocity, config_.receiver_sigma_mps));
+        });
+    if (config_.wheel_velocity_topic.empty()) return;
+    wheel_subscriber_ = node.subscribe<geometry_msgs::TwistWithCovarianceStamped>(
+        config_.wheel_velocity_topic, 100, [this](const TwistConstPtr& velocity) {
+          if (!mono_ || !IsUsable("a wheels' speed", *velocity)) return;
+          mono_->AddSpeed(
+              odometry::MetresSource::kWheels, ros_io::FromRosTime(velocity->header.stamp),
+              velocity->twist.twist.linear.x, SigmaOf(*velocity, config_.wheel_sigma_mps));
+        });
+  }
+
+  /// Of the speed over ground, the less certain axis; `otherwise` where the message states none.
+  static double SigmaOf(const geometry_msgs::TwistWithCovarianceStamped& velocity,
+                        double otherwise) {
+    constexpr std::size_t kYY = 7;
+    const auto& covariance = velocity.twist.covariance;
+    const double variance = std::max(covariance[0], covariance[kYY]);
+    return variance > 0 ? std::sqrt(variance) : otherwise;
+  }
+
   void MakeSynchronizer() {
+    if (config_.eye != "depth") {
+      images_ = std::make_unique<message_filters::Synchronizer<ImagePolicy>>(
+          ImagePolicy(static_cast<std::uint32_t>(config_.queue_size)));
+      images_->registerCallback(&EdgeVoPart::OnImage, this);
+    }
+    if (config_.eye == "mono") return;
     const auto queue = static_cast<std::uint32_t>(config_.queue_size);
     if (config_.sync == "exact") {
       exact_ = std::make_unique<Synchronizer<Exact>>(
@@ -136,48 +215,132 @@ class EdgeVoPart : public NodeletPart {
   /// the synchroniser would stay there, newer than all that comes.
   void OnTimeReset() {
     MakeSynchronizer();
-    if (!odometry_) return;
+    choice_->OnTimeReset();
+    if (!odometry_ && !mono_) return;
     NODELET_WARN("the images' stamps went back: odometry starts anew");
-    odometry_->Reset();
+    ResetOdometry();
+  }
+
+  void ResetOdometry() {
+    if (odometry_) odometry_->Reset();
+    if (mono_) mono_->Reset();
     StartAnew();
   }
 
+  /// An image with its calibration, with or without depth.
+  void OnImage(const ImageConstPtr& image, const InfoConstPtr& info) {
+    const Eye before = choice_->eye();
+    if (!choice_->OnImage(ros_io::FromRosTime(image->header.stamp))) return;
+    if (before == Eye::kUndecided) {
+      NODELET_INFO("for %.1f s no depth came with the images: one eye follows them",
+                   config_.eye_wait_s);
+    }
+    ++arrivals_.frames;
+    try {
+      PrepareMono(*info, image->header);
+      Follow(image->header, [&](odometry::RgbdFrame& frame) {
+        const auto grey = cv_bridge::toCvShare(image, sensor_msgs::image_encodings::MONO8);
+        frame.grey = grey->image;
+        return mono_->Track(ros_io::FromRosTime(image->header.stamp), frame.grey);
+      });
+    } catch (const std::exception& error) {
+      Drop(error);
+    }
+  }
+
+  void Drop(const std::exception& error) {
+    ++figures_.dropped;
+    NODELET_WARN_THROTTLE(kSayAgainS, "dropped a frame: %s", error.what());
+  }
+
+  /// An image with its calibration and its depth.
   void OnFrame(const ImageConstPtr& image, const ImageConstPtr& depth, const InfoConstPtr& info) {
+    const Eye before = choice_->eye();
+    if (!choice_->OnDepth(ros_io::FromRosTime(image->header.stamp))) return;
+    if (before == Eye::kMono) LeaveMono(image->header.stamp);
     ++arrivals_.frames;
     try {
       Prepare(*info, image->header);
-      const auto begin = std::chrono::steady_clock::now();
-      const odometry::RgbdFrame frame = ToFrame(image, depth);
-      const odometry::VoResult result = odometry_->Track(frame);
-      figures_.milliseconds.push_back(
-          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-              .count());
-      last_ = result;
-      last_stamp_ = image->header.stamp;
-      ++figures_.frames;
-      figures_.lost += result.state == odometry::VoState::kLost ? 1U : 0U;
-      figures_.keyframes += result.new_keyframe ? 1U : 0U;
-      if (result.state != odometry::VoState::kInitialising) Publish(result, frame, image->header);
+      Follow(image->header, [&](odometry::RgbdFrame& frame) {
+        frame = ToFrame(image, depth);
+        return odometry_->Track(frame);
+      });
     } catch (const std::exception& error) {
-      ++figures_.dropped;
-      NODELET_WARN_THROTTLE(kSayAgainS, "dropped a frame: %s", error.what());
+      Drop(error);
     }
+  }
+
+  /// One image, as `track` does it, which fills in the frame.
+  template <class Track>
+  void Follow(const std_msgs::Header& header, const Track& track) {
+    const auto begin = std::chrono::steady_clock::now();
+    odometry::RgbdFrame frame;
+    odometry::VoResult result = track(frame);
+    figures_.milliseconds.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+            .count());
+    JoinOn(result);
+    // Of the image with which depth took over one eye has told already.
+    const bool is_new = header.stamp > last_stamp_;
+    last_ = result;
+    last_stamp_ = header.stamp;
+    ++figures_.frames;
+    figures_.lost += result.state == odometry::VoState::kLost ? 1U : 0U;
+    figures_.keyframes += result.new_keyframe ? 1U : 0U;
+    if (result.state != odometry::VoState::kInitialising && is_new) Publish(result, frame, header);
+  }
+
+  /// Depth goes on where one eye was, as far as its last motion tells.
+  void LeaveMono(const ros::Time& stamp) {
+    NODELET_INFO("depth came with the images: it is followed instead of one eye");
+    joint_ = last_.world_from_camera;
+    joint_covariance_ = last_.covariance;
+    if (last_.twist) {
+      *joint_ = *joint_ * odometry::Se3Exp(*last_.twist * (stamp - last_stamp_).toSec());
+    }
+    mono_.reset();
+  }
+
+  /// To the path of the odometry before.
+  void JoinOn(odometry::VoResult& result) const {
+    if (!joint_) return;
+    const odometry::Matrix6d to_now = odometry::Se3Adjoint(result.world_from_camera.inverse());
+    result.covariance += to_now * joint_covariance_ * to_now.transpose();
+    result.world_from_camera = *joint_ * result.world_from_camera;
+  }
+
+  bool IsSameCamera(const geo::CameraIntrinsics& camera) const {
+    return camera.fx == camera_.fx && camera.fy == camera_.fy && camera.cx == camera_.cx &&
+           camera.cy == camera_.cy && camera.width == camera_.width &&
+           camera.height == camera_.height;
+  }
+
+  void TakeMounting(const std_msgs::Header& header) {
+    const geometry_msgs::TransformStamped mounting = tf_buffer_.lookupTransform(
+        config_.base_frame, header.frame_id, ros::Time(0), ros::Duration(0));
+    frames_.base_from_optical = tf2::transformToEigen(mounting);
   }
 
   /// Calibration and mounting; a new calibration starts anew.
   void Prepare(const sensor_msgs::CameraInfo& info, const std_msgs::Header& header) {
     const geo::CameraIntrinsics camera = ros_io::ToRectifiedIntrinsics(info);
-    const bool same = odometry_ && camera.fx == camera_.fx && camera.fy == camera_.fy &&
-                      camera.cx == camera_.cx && camera.cy == camera_.cy &&
-                      camera.width == camera_.width && camera.height == camera_.height;
-    if (same) return;
+    if (odometry_ && IsSameCamera(camera)) return;
     if (odometry_) NODELET_WARN("the calibration changed: odometry starts anew");
-    const geometry_msgs::TransformStamped mounting = tf_buffer_.lookupTransform(
-        config_.base_frame, header.frame_id, ros::Time(0), ros::Duration(0));
-    frames_.base_from_optical = tf2::transformToEigen(mounting);
+    TakeMounting(header);
     camera_ = camera;
     const bool first = odometry_ == nullptr;
     odometry_ = std::make_unique<odometry::EdgeOdometry>(config_.odometry, camera);
+    if (!first) StartAnew();
+  }
+
+  void PrepareMono(const sensor_msgs::CameraInfo& info, const std_msgs::Header& header) {
+    const geo::CameraIntrinsics camera = ros_io::ToRectifiedIntrinsics(info);
+    if (mono_ && IsSameCamera(camera)) return;
+    if (mono_) NODELET_WARN("the calibration changed: odometry starts anew");
+    TakeMounting(header);
+    camera_ = camera;
+    const bool first = mono_ == nullptr;
+    mono_ = std::make_unique<MonoEye>(MonocularOf(config_), camera, frames_.base_from_optical);
     if (!first) StartAnew();
   }
 
@@ -202,19 +365,36 @@ class EdgeVoPart : public NodeletPart {
       tf_broadcaster_.sendTransform(transform);
     }
     ExtendPath(odometry);
-    const odometry::Keyframe& keyframe = *odometry_->keyframe();
+    ShowEdges(result, frame, header);
+  }
+
+  /// For those who listen.
+  void ShowEdges(const odometry::VoResult& result, const odometry::RgbdFrame& frame,
+                 const std_msgs::Header& header) {
+    const odometry::Keyframe* keyframe =
+        mono_ ? mono_->odometry().keyframe() : odometry_->keyframe();
+    if (keyframe == nullptr) return;
+    const double metres_per_unit = mono_ ? mono_->odometry().metres_per_unit() : 1.0;
+    Eigen::Isometry3d camera_from_keyframe;
+    if (mono_) {
+      camera_from_keyframe = mono_->odometry().CameraFromKeyframe();
+    } else {
+      const Eigen::Isometry3d joint = joint_.value_or(Eigen::Isometry3d::Identity());
+      camera_from_keyframe =
+          result.world_from_camera.inverse() * joint * keyframe->world_from_camera;
+    }
     if (edges_publisher_.getNumSubscribers() > 0) {
-      const Eigen::Isometry3d camera_from_keyframe =
-          result.world_from_camera.inverse() * keyframe.world_from_camera;
       edges_publisher_.publish(
           cv_bridge::CvImage(
               header, sensor_msgs::image_encodings::BGR8,
-              odometry::DrawEdges(frame.grey, keyframe, camera_from_keyframe, camera_))
+              odometry::DrawEdges(frame.grey, *keyframe, camera_from_keyframe, camera_))
               .toImageMsg());
     }
     if (result.new_keyframe && cloud_publisher_.getNumSubscribers() > 0) {
+      camera_from_keyframe.translation() *= metres_per_unit;
       cloud_publisher_.publish(
-          ros_io::ToEdgeCloud(keyframe, frames_, config_.cloud_voxel_m, header.stamp));
+          ros_io::ToEdgeCloud(*keyframe, result.world_from_camera * camera_from_keyframe,
+                              metres_per_unit, frames_, config_.cloud_voxel_m, header.stamp));
     }
   }
 
@@ -240,12 +420,13 @@ class EdgeVoPart : public NodeletPart {
   void StartAnew() {
     path_.poses.clear();
     last_ = {};
+    last_stamp_ = {};
+    joint_.reset();
     ++figures_.resets;
   }
 
   bool OnReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    if (odometry_) odometry_->Reset();
-    StartAnew();
+    ResetOdometry();
     response.success = true;
     response.message = "the next frame is the origin";
     return true;
@@ -255,6 +436,15 @@ class EdgeVoPart : public NodeletPart {
     const Arrivals came = arrivals_;
     arrivals_ = {};
     if (came.frames > 0) return;
+    if (choice_->eye() == Eye::kMono) {
+      NODELET_WARN_THROTTLE(kSayAgainS,
+                            "no frame for %.1f s, one eye follows images and calibrations of the "
+                            "same stamps: %d images on %s, %d calibrations on %s came",
+                            config_.silence_warning_s, came.images,
+                            image_subscriber_.getTopic().c_str(), came.infos,
+                            info_subscriber_.getTopic().c_str());
+      return;
+    }
     NODELET_WARN_THROTTLE(
         kSayAgainS,
         "no frame for %.1f s, stamps synchronised '%s': %d images on %s, %d depth images on %s, "
@@ -269,8 +459,8 @@ class EdgeVoPart : public NodeletPart {
     const bool tracking = last_.state == odometry::VoState::kTracking;
     status.summary(tracking ? Level::OK : Level::WARN, odometry::VoStateName(last_.state));
     std::vector<double>& times = figures_.milliseconds;
-    const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
-    std::nth_element(times.begin(), middle, times.end());
+    std::sort(times.begin(), times.end());
+    status.add("eye", EyeName(choice_->eye()));
     status.add("state", odometry::VoStateName(last_.state));
     status.add("frames", figures_.frames);
     status.add("frames_dropped", figures_.dropped);
@@ -278,7 +468,9 @@ class EdgeVoPart : public NodeletPart {
     status.add("keyframes", figures_.keyframes);
     status.add("resets", figures_.resets);
     stamps_->Diagnose(status);
-    status.add("milliseconds_median", times.empty() ? 0.0 : *middle);
+    status.add("milliseconds_median", times.empty() ? 0.0 : times[times.size() / 2]);
+    status.add("milliseconds_p95", times.empty() ? 0.0 : times[times.size() * 95 / 100]);
+    DiagnoseMetres(status);
     status.add("edges", last_.points);
     status.add("inliers", last_.inliers);
     status.add("residual_sigma", last_.sigma);
@@ -290,10 +482,27 @@ class EdgeVoPart : public NodeletPart {
     times.clear();
   }
 
+  /// Depth knows its metres.
+  void DiagnoseMetres(Diagnostics::Status& status) const {
+    if (!mono_) {
+      status.add("metres", choice_->eye() == Eye::kDepth ? "depth" : "none");
+      status.add("metres_sigma", "");
+      return;
+    }
+    const std::optional<double> sigma = mono_->odometry().metres_sigma();
+    status.add("metres", MetresSourceName(mono_->odometry().metres_source()));
+    status.add("metres_sigma", sigma ? std::to_string(*sigma) : std::string());
+  }
+
   ros_io::EdgeVoConfig config_;
   ros_io::OdometryFrames frames_;
   geo::CameraIntrinsics camera_;
-  std::unique_ptr<odometry::EdgeOdometry> odometry_;
+  std::unique_ptr<EyeChoice> choice_;
+  std::unique_ptr<odometry::EdgeOdometry> odometry_;  // By depth.
+  std::unique_ptr<MonoEye> mono_;                     // By one eye.
+  /// Where depth took over from one eye, in the world of both.
+  std::optional<Eigen::Isometry3d> joint_;
+  odometry::Matrix6d joint_covariance_ = odometry::Matrix6d::Zero();
   odometry::VoResult last_;
   ros::Time last_stamp_;
   Arrivals arrivals_;
@@ -308,10 +517,11 @@ class EdgeVoPart : public NodeletPart {
   image_transport::Publisher edges_publisher_;
   ros::ServiceServer reset_service_;
 
+  std::unique_ptr<message_filters::Synchronizer<ImagePolicy>> images_;
   std::unique_ptr<Synchronizer<Exact>> exact_;
   std::unique_ptr<Synchronizer<Approximate>> approximate_;
   image_transport::Subscriber image_subscriber_, depth_subscriber_;
-  ros::Subscriber info_subscriber_;
+  ros::Subscriber info_subscriber_, fix_subscriber_, receiver_subscriber_, wheel_subscriber_;
   ros::SteadyTimer silence_timer_;            // After the subscribers, which it names.
   std::unique_ptr<Diagnostics> diagnostics_;  // Last: it uses the rest.
 };

@@ -112,6 +112,12 @@ bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_de
   return true;
 }
 
+bool EdgeOdometry::AddEarlierKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
+                                      const VoResult& result) {
+  frame_images_.Build(frame.grey);
+  return MakeKeyframe(frame, inverse_depth_sigma, result);
+}
+
 /// Makes the current frame the one that later frames are aligned with; false, and nothing changed,
 /// when it has no depth or too few edges.
 bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,

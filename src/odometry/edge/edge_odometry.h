@@ -124,6 +124,13 @@ class EdgeOdometry {
   bool AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
                    const std::optional<Vector6d>& twist);
 
+  /// Makes a frame that was followed before the last one a keyframe, when it gets its depth later:
+  /// its picture, stamp and depth (CV_32FC1), the standard deviations as above, and what Track()
+  /// said of it. Called between two frames; images() is not valid until the next one. False, and
+  /// nothing else changed, when there are too few edges with depth.
+  bool AddEarlierKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
+                          const VoResult& result);
+
   /// Of the last frame, the finest level smoothed; valid until it is made a keyframe.
   const ImagePyramid& images() const { return frame_images_; }
 

@@ -5,7 +5,6 @@
 
 #include "common/error.h"
 #include "common/time.h"
-#include "odometry/monocular/road_height.h"
 
 namespace livemap::odometry {
 namespace {
@@ -15,11 +14,31 @@ constexpr double kScaleWayM = 1.0;
 constexpr double kFastestMps = 200;
 /// Of the camera's height: the load, the road's crown.
 constexpr double kHeightSigmaM = 0.05;
+/// What all heights of one drive have in common, and no mean of them lessens: pitch, the road's
+/// crown. A share of the height, and of one that a better source has taught.
+constexpr double kSharedHeightSigma = 0.03;
+constexpr double kSharedTaughtSigma = 0.01;
+/// A height that a better source of metres has taught: of the newest in the mean of the logarithms.
+constexpr double kHeightShare = 0.1;
+/// Metres less certain than this teach no height.
+constexpr double kTeachingSigma = 0.05;
+/// A rough speed less certain than this gives the start no length.
+constexpr double kWorstStartSigma = 0.5;
 
 /// A motion with its translation times `factor`.
 Eigen::Isometry3d StretchedMonocularMotion(Eigen::Isometry3d motion, double factor) {
   motion.translation() *= factor;
   return motion;
+}
+
+DepthLearner::Config LearnerOfMonocular(const MonocularOdometry::Config& config) {
+  DepthLearner::Config learner;
+  learner.edges = config.odometry.edges;
+  learner.depth = config.depth;
+  learner.views_kept = config.views_kept;
+  learner.finds_road = config.scale_source != ScaleSource::kSpeed;
+  learner.camera_pitch_rad = config.camera_pitch_rad;
+  return learner;
 }
 
 }  // namespace
@@ -41,23 +60,39 @@ MonocularOdometry::MonocularOdometry(const Config& config, const geo::CameraIntr
     : config_(config),
       camera_(intrinsics),
       odometry_(config.odometry, intrinsics),
-      extractor_(config.odometry.edges),
-      map_(config.depth, intrinsics),
+      learner_(LearnerOfMonocular(config), intrinsics),
       start_(config.start, intrinsics),
-      scale_(config.scale) {
-  if (config.views_kept < 1 || config.views_kept > 100) {
-    throw Error("views_kept is " + std::to_string(config.views_kept) + "; 1 to 100 is accepted");
+      scale_(config.scale),
+      fixes_(config.fixes) {
+  if (config.keyframe_delay < 0 || config.keyframe_delay > 1000) {
+    throw Error("keyframe_delay is " + std::to_string(config.keyframe_delay) +
+                "; 0 to 1000 is accepted");
+  }
+  if (config.background || config.keyframe_delay > 0) {
+    worker_ =
+        std::make_unique<KeyframeWorker>(learner_, config.background ? 0 : config.keyframe_delay);
   }
 }
 
 void MonocularOdometry::Reset() {
+  if (worker_) worker_->Cancel();
   odometry_.Reset();
   start_ = TwoViewStart(config_.start, camera_);
   scale_.Reset();
-  views_.clear();
-  started_ = false;
+  fixes_.Reset();
+  learner_.Clear();
+  started_ = lost_ = false;
+  source_ = MetresSource::kNone;
+  shared_sigma_ = 0;
+  log_height_.reset();
   last_frame_.reset();
   last_ = {};
+}
+
+std::optional<double> MonocularOdometry::metres_sigma() const {
+  const std::optional<double> sigma = scale_.log_sigma();
+  if (!sigma) return sigma;
+  return std::hypot(*sigma, shared_sigma_);
 }
 
 VoResult MonocularOdometry::Track(const MonocularFrame& frame) {
@@ -67,11 +102,21 @@ VoResult MonocularOdometry::Track(const MonocularFrame& frame) {
     throw Error("a speed of " + std::to_string(*frame.speed_mps) + " m/s came with a frame; 0 to " +
                 std::to_string(kFastestMps) + " is accepted");
   }
+  now_ns_ = frame.stamp_ns;
   AddWay(frame);
   last_ = started_ ? Continue(frame) : Start(frame);
   last_frame_ = frame;
   last_frame_->grey.release();
+  ForgetOldSource();
   return last_;
+}
+
+/// A source that is silent tells nothing: the metres stay as they are, less certain with every
+/// keyframe, or a lesser source tells them.
+void MonocularOdometry::ForgetOldSource() {
+  const double age_s =
+      config_.source_age_s + (source_ == MetresSource::kFixes ? config_.fixes.longest_s : 0);
+  if (Seconds(now_ns_ - told_ns_) > age_s) source_ = MetresSource::kNone;
 }
 
 /// The way since the last frame, by the mean of the speeds at its ends.
@@ -80,6 +125,8 @@ void MonocularOdometry::AddWay(const MonocularFrame& frame) {
   const double step_s = Seconds(frame.stamp_ns - last_frame_->stamp_ns);
   way_m_ += 0.5 * (*last_frame_->speed_mps + *frame.speed_mps) * step_s;
   way_s_ += step_s;
+  // Speeds of neighbouring frames err alike.
+  way_sigma_m_ += frame.speed_sigma_mps.value_or(config_.speed_sigma_mps) * step_s;
 }
 
 void MonocularOdometry::BeginStart(const MonocularFrame& frame) {
@@ -87,16 +134,24 @@ void MonocularOdometry::BeginStart(const MonocularFrame& frame) {
   start_images_.Build(frame.grey);
   start_.Begin(start_images_[0]);
   start_stamp_ns_ = frame.stamp_ns;
-  way_m_ = way_s_ = way_units_ = 0;
+  way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+}
+
+/// The last pose once more, less certain if it is lost.
+VoResult MonocularOdometry::Held(const MonocularFrame& frame) const {
+  VoResult held = last_;
+  held.new_keyframe = false;
+  held.twist.reset();
+  held.twist_covariance.setZero();
+  if (held.state == VoState::kLost) {
+    GrowWhileLost(config_.odometry, Seconds(last_frame_->stamp_ns - lost_since_ns_),
+                  Seconds(frame.stamp_ns - lost_since_ns_), held.covariance);
+  }
+  return held;
 }
 
 VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
-  VoResult result = last_;
-  result.new_keyframe = false;
-  if (result.state == VoState::kLost) {
-    GrowWhileLost(config_.odometry, Seconds(last_frame_->stamp_ns - lost_since_ns_),
-                  Seconds(frame.stamp_ns - lost_since_ns_), result.covariance);
-  }
+  VoResult result = Held(frame);
   odometry_.Reset();
   odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
   const cv::Mat& smooth = odometry_.images()[0];
@@ -110,92 +165,177 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
     return result;
   }
   // The units of the map: metres, if the speed tells them.
-  const bool knows_way = config_.scale_source == ScaleSource::kSpeed && way_m_ > 0;
+  const bool knows_way = config_.scale_source != ScaleSource::kCameraHeight && way_m_ > 0 &&
+                         way_sigma_m_ <= kWorstStartSigma * way_m_;
   scale_.Reset();
+  fixes_.Reset();
   const double units = knows_way ? way_m_ : 1.0;
-  if (knows_way) scale_.Measure(way_m_, config_.speed_sigma_mps * way_s_, units);
+  if (knows_way) {
+    scale_.Measure(way_m_, way_sigma_m_, units);
+    HasTold(frame.speed_source, 0);
+  }
   const Eigen::Isometry3d first_from_new = StretchedMonocularMotion(direction->inverse(), units);
-
-  views_.clear();
-  views_.push_back({start_.first().clone(), first_from_new.inverse()});
-  map_.Clear();
-  LearnDepths(Eigen::Isometry3d::Identity());
-  const double step_s = Seconds(frame.stamp_ns - start_stamp_ns_);
-  if (!odometry_.AddKeyframe(map_.DepthImage(), map_.SigmaImage(),
-                             Se3Log(first_from_new) / step_s)) {
+  if (!MakeFirstKeyframe(frame, first_from_new)) {
     BeginStart(frame);
     return result;
   }
   started_ = true;
+  lost_ = false;
+  last_unscaled_ = Eigen::Isometry3d::Identity();
+  way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+  fixes_.AddPose(frame.stamp_ns, Eigen::Isometry3d::Identity());
   start_pose_ = result.world_from_camera;
   start_covariance_ = result.covariance;
-  last_unscaled_ = Eigen::Isometry3d::Identity();
-  way_m_ = way_s_ = way_units_ = 0;
-  result.world_from_camera = result.world_from_camera * first_from_new;
-  result.state = VoState::kTracking;
   result.new_keyframe = true;
   result.keyframe_stamp_ns = frame.stamp_ns;
+  if (!KnowsMetres()) {
+    start_stamp_ns_ = frame.stamp_ns;
+    return result;
+  }
+  const double scale = scale_.metres_per_unit();
+  result.world_from_camera =
+      result.world_from_camera * StretchedMonocularMotion(first_from_new, scale);
+  result.state = VoState::kTracking;
   return result;
 }
 
+/// The depths of the start's second frame, by those that its first frame shows.
+bool MonocularOdometry::MakeFirstKeyframe(const MonocularFrame& frame,
+                                          const Eigen::Isometry3d& first_from_new) {
+  if (worker_) worker_->Cancel();
+  learner_.Restart(start_.first(), first_from_new.inverse());
+  const LearntDepths learnt = learner_.Learn(odometry_.images()[0], Eigen::Isometry3d::Identity(),
+                                             scale_.metres_per_unit());
+  OnLearnt(learnt);
+  const double step_s = Seconds(frame.stamp_ns - start_stamp_ns_);
+  return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma,
+                               Se3Log(first_from_new) / step_s);
+}
+
 VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
+  const bool took_keyframe = TakeKeyframe();
   VoResult unscaled = odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
+  unscaled.new_keyframe = took_keyframe;
   if (unscaled.state != VoState::kTracking) {
-    if (last_.state == VoState::kTracking) lost_since_ns_ = frame.stamp_ns;
-    way_m_ = way_s_ = way_units_ = 0;
-    VoResult held = InMetres(unscaled);
+    if (!lost_) lost_since_ns_ = frame.stamp_ns;
+    lost_ = true;
+    way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+    fixes_.Reset();
+    VoResult held = InMetres(frame, unscaled);
     if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
     return held;
   }
+  lost_ = false;
   MeasureScale(unscaled.world_from_camera);
+  MeasureByFixes(frame.stamp_ns, unscaled.world_from_camera);
   if (unscaled.keyframe_due) {
-    LearnDepths(unscaled.world_from_camera);
-    unscaled.new_keyframe =
-        odometry_.AddKeyframe(map_.DepthImage(), map_.SigmaImage(), unscaled.twist);
+    unscaled.new_keyframe = MakeKeyframe(frame, unscaled) || unscaled.new_keyframe;
   }
-  return InMetres(unscaled);
+  return InMetres(frame, unscaled);
 }
 
-/// Depths of the present frame's edges, from the last keyframes' and from where the earlier
-/// keyframes see them: the newest view, which is the nearest, first.
-void MonocularOdometry::LearnDepths(const Eigen::Isometry3d& world_from_camera) {
-  const cv::Mat& smooth = odometry_.images()[0];
-  const View& last = views_.back();
-  map_.SetRange(config_.depth.min_depth_m / scale_.metres_per_unit(),
-                config_.depth.max_depth_m / scale_.metres_per_unit());
-  map_.MoveTo(extractor_.Extract(smooth), world_from_camera.inverse() * last.world_from_camera);
-  for (auto view = views_.rbegin(); view != views_.rend(); ++view) {
-    map_.Measure(smooth, view->grey, view->world_from_camera.inverse() * world_from_camera,
-                 view == views_.rbegin());
+/// Makes the present frame a keyframe, or has it made.
+bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled) {
+  const double scale = scale_.metres_per_unit();
+  if (!worker_) {
+    const LearntDepths learnt =
+        learner_.Learn(odometry_.images()[0], unscaled.world_from_camera, scale);
+    OnLearnt(learnt);
+    return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma, unscaled.twist);
   }
-  map_.Regularise();
+  if (worker_->busy()) return false;
+  worker_->Give(
+      {frame.stamp_ns, frame.grey.clone(), odometry_.images()[0].clone(), unscaled, scale});
+  return false;
+}
+
+/// A keyframe that was made in the background becomes the one that frames are aligned with.
+bool MonocularOdometry::TakeKeyframe() {
+  if (!worker_) return false;
+  const std::optional<KeyframeWorker::Made> made = worker_->Take();
+  if (!made) return false;
+  OnLearnt(made->learnt);
+  return odometry_.AddEarlierKeyframe(
+      {made->order.stamp_ns, made->order.grey, made->learnt.depth, 1},
+      made->learnt.inverse_depth_sigma, made->order.result);
+}
+
+void MonocularOdometry::OnLearnt(const LearntDepths& learnt) {
   scale_.Drift();
+  if (learnt.road_height) MeasureByHeight(*learnt.road_height);
+}
+
+/// By the height that the camera is said to have; where a better source has told metres, by the one
+/// that it had then.
+void MonocularOdometry::MeasureByHeight(double height_units) {
+  if (config_.scale_source == ScaleSource::kSpeed) return;
   if (config_.scale_source == ScaleSource::kCameraHeight) {
-    const std::optional<double> height =
-        RoadHeight(map_.edges(), camera_, config_.camera_pitch_rad);
-    if (height) scale_.Measure(config_.camera_height_m, kHeightSigmaM, *height);
+    scale_.Measure(config_.camera_height_m, kHeightSigmaM, height_units);
+    HasTold(MetresSource::kHeight, kSharedHeightSigma);
+    return;
   }
-  if (views_.size() >= static_cast<std::size_t>(config_.views_kept)) {
-    views_.push_back(std::move(views_.front()));  // Its memory serves again.
-    views_.pop_front();
-  } else {
-    views_.emplace_back();
+  const bool better_tells = source_ != MetresSource::kNone && source_ != MetresSource::kHeight;
+  if (better_tells) {
+    if (scale_.log_sigma().value_or(1) > kTeachingSigma) return;
+    const double log_height = std::log(height_units * scale_.metres_per_unit());
+    log_height_ = log_height_.value_or(log_height);
+    *log_height_ += kHeightShare * (log_height - *log_height_);
+    return;
   }
-  smooth.copyTo(views_.back().grey);
-  views_.back().world_from_camera = world_from_camera;
+  const double height_m = log_height_ ? std::exp(*log_height_) : config_.camera_height_m;
+  if (!(height_m > kHeightSigmaM)) return;
+  scale_.Measure(height_m, kHeightSigmaM, height_units);
+  HasTold(MetresSource::kHeight, log_height_ ? kSharedTaughtSigma : kSharedHeightSigma);
+}
+
+void MonocularOdometry::HasTold(MetresSource source, double shared_sigma) {
+  source_ = source;
+  shared_sigma_ = shared_sigma;
+  told_ns_ = now_ns_;
 }
 
 void MonocularOdometry::MeasureScale(const Eigen::Isometry3d& world_from_camera) {
   way_units_ += (last_unscaled_.inverse() * world_from_camera).translation().norm();
-  if (config_.scale_source != ScaleSource::kSpeed || way_m_ < kScaleWayM) return;
-  if (way_m_ >= config_.min_speed_mps * way_s_) {
-    scale_.Measure(way_m_, config_.speed_sigma_mps * way_s_, way_units_);
+  if (config_.scale_source == ScaleSource::kCameraHeight || way_m_ < kScaleWayM) return;
+  const bool by_fixes = last_frame_ && last_frame_->speed_source == MetresSource::kFixes;
+  if (way_m_ >= config_.min_speed_mps * way_s_ && !by_fixes) {
+    scale_.Measure(way_m_, way_sigma_m_, way_units_);
+    HasTold(last_frame_->speed_source, 0);
   }
-  way_m_ = way_s_ = way_units_ = 0;
+  way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+}
+
+void MonocularOdometry::MeasureByFixes(std::int64_t stamp_ns,
+                                       const Eigen::Isometry3d& world_from_camera) {
+  if (config_.scale_source != ScaleSource::kBest) return;
+  fixes_.AddPose(stamp_ns, world_from_camera);
+  const auto measured = fixes_.Measure();
+  if (!measured) return;
+  const bool better_tells = source_ == MetresSource::kWheels || source_ == MetresSource::kReceiver;
+  if (better_tells) return;
+  scale_.Measure(measured->metres, measured->sigma_m, measured->units);
+  HasTold(MetresSource::kFixes, 0);
+}
+
+bool MonocularOdometry::KnowsMetres() const {
+  return config_.scale_source != ScaleSource::kBest || scale_.log_sigma().has_value();
+}
+
+/// The frame was followed, but how far it is nobody knows yet: the path begins later.
+VoResult MonocularOdometry::WithoutMetres(const MonocularFrame& frame, const VoResult& unscaled) {
+  VoResult held = Held(frame);
+  held.new_keyframe = unscaled.new_keyframe;
+  held.keyframe_stamp_ns = unscaled.keyframe_stamp_ns;
+  last_unscaled_ = unscaled.world_from_camera;
+  start_stamp_ns_ = frame.stamp_ns;
+  start_pose_ = held.world_from_camera;
+  start_covariance_ = held.covariance;
+  return held;
 }
 
 /// The step since the last frame, added to the path in metres.
-VoResult MonocularOdometry::InMetres(const VoResult& unscaled) {
+VoResult MonocularOdometry::InMetres(const MonocularFrame& frame, const VoResult& unscaled) {
+  if (!KnowsMetres()) return WithoutMetres(frame, unscaled);
   const double scale = scale_.metres_per_unit();
   VoResult result = unscaled;
   const Eigen::Isometry3d step = last_unscaled_.inverse() * unscaled.world_from_camera;
@@ -209,7 +349,7 @@ VoResult MonocularOdometry::InMetres(const VoResult& unscaled) {
   const Matrix6d to_now = Se3Adjoint(result.world_from_camera.inverse() * start_pose_);
   result.covariance += to_now * start_covariance_ * to_now.transpose();
   // A wrong scale moves the camera along the whole way from its start.
-  const double log_sigma = scale_.log_sigma().value_or(1.0);
+  const double log_sigma = metres_sigma().value_or(1.0);
   const Eigen::Vector3d back =
       (result.world_from_camera.inverse() * start_pose_).translation() * log_sigma;
   result.covariance.topLeftCorner<3, 3>() += back * back.transpose();

@@ -1,15 +1,18 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
-#include <vector>
+#include <string>
 
 #include "odometry/edge/edge_odometry.h"
-#include "odometry/monocular/inverse_depth_map.h"
+#include "odometry/monocular/depth_learner.h"
+#include "odometry/monocular/fix_baseline.h"
+#include "odometry/monocular/keyframe_worker.h"
 #include "odometry/monocular/metric_scale.h"
 #include "odometry/monocular/two_view_start.h"
+#include "odometry/monocular/vehicle_speed.h"
 
 namespace livemap::odometry {
 
@@ -19,18 +22,26 @@ struct MonocularFrame {
   cv::Mat grey;  ///< CV_8UC1, rectified.
   /// Speed over ground, m/s, for instance of the satellite receiver.
   std::optional<double> speed_mps;
+  /// Standard deviation of it, m/s; none: Config::speed_sigma_mps.
+  std::optional<double> speed_sigma_mps;
+  /// Whose speed it is. That of fixes serves the start alone: AddFix measures better.
+  MetresSource speed_source = MetresSource::kReceiver;
 };
 
 /// What tells metres from the units of a monocular map.
 enum class ScaleSource {
   kSpeed,         ///< MonocularFrame::speed_mps
   kCameraHeight,  ///< The camera's height over the road.
+  /// The best of what there is: MonocularFrame::speed_mps, then AddFix(), then the camera's height.
+  /// Until one of them has told, the pose is held.
+  kBest,
 };
 /// "speed", "height"; Error names what is accepted.
 ScaleSource ParseScaleSource(const std::string& name);
 
 /// Edge-direct visual odometry with one camera: EdgeOdometry over an inverse-depth map on the edges
-/// that it builds by itself (thesis, section 5.2.1), and a metric scale. Not thread-safe.
+/// that it builds by itself (thesis, section 5.2.1), and a metric scale. Not thread-safe: its
+/// thread for keyframes is its own affair.
 class MonocularOdometry {
  public:
   struct Config {
@@ -43,8 +54,18 @@ class MonocularOdometry {
     double min_speed_mps = 1.0;    ///< Slower than that, a speed says nothing about the scale.
     double camera_height_m = 1.6;  ///< Of kCameraHeight: over the road.
     double camera_pitch_rad = 0;   ///< Of kCameraHeight: positive looks down.
+    /// A source of metres counts for so long after it has told, s; fixes, which tell more rarely,
+    /// for FixBaseline::Config::longest_s more.
+    double source_age_s = 5.0;
+    FixBaseline::Config fixes;
     /// Keyframes that a new one's depths are measured against.
     int views_kept = 4;
+    /// The depths of a keyframe, which take longer than many frames, are learnt beside the frames,
+    /// on a thread, and taken over when they are ready. False: within the frame's time.
+    bool background = false;
+    /// Without a thread, but handed over so many frames later: a run that can be repeated; 0: at
+    /// once.
+    int keyframe_delay = 0;
     /// Without a motion at the start, and lost: the two-view start begins anew after this, s.
     double give_up_s = 1.0;
     Config();
@@ -57,43 +78,67 @@ class MonocularOdometry {
   /// the camera has moved far enough to see depth. Throws as EdgeOdometry::Track().
   VoResult Track(const MonocularFrame& frame);
 
+  /// A fix of kBest; it may come before the frame of its moment or after it.
+  void AddFix(const geo::Fix& fix) { fixes_.AddFix(fix); }
+
   void Reset();
 
   /// Of the frame that the last two-view start began with. With the first pose: of the frame that
   /// stands at the origin, which the first frame need not be.
   std::int64_t start_stamp_ns() const { return start_stamp_ns_; }
-  const InverseDepthMap& depths() const { return map_; }
+  /// Not while a keyframe is made in the background.
+  const InverseDepthMap& depths() const { return learner_.map(); }
+  /// The keyframe that the last frame was aligned with, in units of the map; none before the first.
+  const Keyframe* keyframe() const { return started_ ? odometry_.keyframe() : nullptr; }
+  /// From that keyframe to the last frame's camera, in units of the map.
+  Eigen::Isometry3d CameraFromKeyframe() const {
+    return last_unscaled_.inverse() * odometry_.keyframe()->world_from_camera;
+  }
   double metres_per_unit() const { return scale_.metres_per_unit(); }
+  /// Standard deviation of the metres, a share of them; none while they are not known.
+  std::optional<double> metres_sigma() const;
+  /// What has told the metres lately; kNone: nothing has, and they are held as they were.
+  MetresSource metres_source() const { return source_; }
 
  private:
-  /// An earlier keyframe, in units of the map.
-  struct View {
-    cv::Mat grey;
-    Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
-  };
-
   VoResult Start(const MonocularFrame& frame);
   VoResult Continue(const MonocularFrame& frame);
+  VoResult Held(const MonocularFrame& frame) const;
   void BeginStart(const MonocularFrame& frame);
-  void LearnDepths(const Eigen::Isometry3d& world_from_camera);
+  bool MakeFirstKeyframe(const MonocularFrame& frame, const Eigen::Isometry3d& first_from_new);
+  bool MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled);
+  bool TakeKeyframe();
+  void OnLearnt(const LearntDepths& learnt);
   void AddWay(const MonocularFrame& frame);
   void MeasureScale(const Eigen::Isometry3d& world_from_camera);
-  VoResult InMetres(const VoResult& unscaled);
+  void MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& world_from_camera);
+  void MeasureByHeight(double height_units);
+  void HasTold(MetresSource source, double shared_sigma);
+  void ForgetOldSource();
+  bool KnowsMetres() const;
+  VoResult InMetres(const MonocularFrame& frame, const VoResult& unscaled);
+  VoResult WithoutMetres(const MonocularFrame& frame, const VoResult& unscaled);
 
   Config config_;
   geo::CameraIntrinsics camera_;
   EdgeOdometry odometry_;
-  EdgeExtractor extractor_;
-  InverseDepthMap map_;
+  DepthLearner learner_;
   TwoViewStart start_;
   MetricScale scale_;
+  FixBaseline fixes_;
 
-  std::deque<View> views_;  // Newest last: the present keyframe.
   ImagePyramid start_images_;
   bool started_ = false;
-  double way_m_ = 0;      // By the speed, since the last measurement of the scale.
-  double way_s_ = 0;      // Duration of it.
-  double way_units_ = 0;  // By visual odometry, since then.
+  bool lost_ = false;
+  double way_m_ = 0;        // By the speed, since the last measurement of the scale.
+  double way_s_ = 0;        // Duration of it,
+  double way_sigma_m_ = 0;  // and its standard deviation.
+  double way_units_ = 0;    // By visual odometry, since then.
+  MetresSource source_ = MetresSource::kNone;
+  std::int64_t now_ns_ = 0;           // Of the present frame.
+  std::int64_t told_ns_ = 0;          // Of the last frame for which source_ told metres.
+  double shared_sigma_ = 0;           // Of source_: what no mean of it lessens, a share.
+  std::optional<double> log_height_;  // Of the camera, as a better source has it, log m.
   std::int64_t start_stamp_ns_ = 0;
   std::int64_t lost_since_ns_ = 0;
   std::optional<MonocularFrame> last_frame_;
@@ -101,6 +146,7 @@ class MonocularOdometry {
   Matrix6d start_covariance_ = Matrix6d::Zero();
   Eigen::Isometry3d last_unscaled_ = Eigen::Isometry3d::Identity();
   VoResult last_;
+  std::unique_ptr<KeyframeWorker> worker_;  // None: keyframes are made within the frame's time.
 };
 
 }  // namespace livemap::odometry

@@ -1,7 +1,10 @@
 #include "odometry/monocular/two_view_start.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
@@ -19,6 +22,12 @@ constexpr double kConfidence = 0.9999;
 Eigen::Vector3d StartRayOf(const cv::Point2f& pixel, const geo::CameraIntrinsics& camera) {
   return {(static_cast<double>(pixel.x) - camera.cx) / camera.fx,
           (static_cast<double>(pixel.y) - camera.cy) / camera.fy, 1};
+}
+
+double MedianOfWays(std::vector<double>& ways) {
+  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
+  std::nth_element(ways.begin(), middle, ways.end());
+  return *middle;
 }
 
 }  // namespace
@@ -78,12 +87,38 @@ double TwoViewStart::MedianWayPx() const {
     const cv::Point2f way = end_[i] - begin_[i];
     ways.push_back(std::hypot(way.x, way.y));
   }
-  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
-  std::nth_element(ways.begin(), middle, ways.end());
-  return *middle;
+  return MedianOfWays(ways);
+}
+
+/// What the turn that explains the corners' ways best (Kabsch 1976, twice: the second time by those
+/// that the first explains) leaves of them.
+double TwoViewStart::MedianParallaxPx() const {
+  std::vector<double> left(begin_.size(), 0.0);
+  double limit_px = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 2; ++round) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < begin_.size(); ++i) {
+      if (left[i] > limit_px) continue;
+      sum += StartRayOf(end_[i], camera_).normalized() *
+             StartRayOf(begin_[i], camera_).normalized().transpose();
+    }
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Eigen::Matrix3d handed = Eigen::Matrix3d::Identity();
+    handed(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+    const Eigen::Matrix3d turn = svd.matrixU() * handed * svd.matrixV().transpose();
+    for (std::size_t i = 0; i < begin_.size(); ++i) {
+      const Eigen::Vector3d seen = turn * StartRayOf(begin_[i], camera_);
+      const Eigen::Vector3d now = StartRayOf(end_[i], camera_);
+      left[i] = camera_.fx * (seen.hnormalized() - now.hnormalized()).norm();
+    }
+    std::vector<double> ways = left;
+    limit_px = MedianOfWays(ways);
+  }
+  return limit_px;
 }
 
 std::optional<Eigen::Isometry3d> TwoViewStart::Motion() const {
+  if (MedianParallaxPx() < config_.min_parallax * camera_.width) return std::nullopt;
   const cv::Matx33d k(camera_.fx, 0, camera_.cx, 0, camera_.fy, camera_.cy, 0, 0, 1);
   cv::Mat inliers;
   const cv::Mat essential = cv::findEssentialMat(begin_, end_, k, cv::USAC_MAGSAC, kConfidence,

@@ -27,6 +27,9 @@ class TwoViewStart {
     /// image's width.
     double longest_way = 0.2;
     double inlier_px = 1.0;
+    /// A turn alone must leave a median way of so much: a camera that turns on the spot shows no
+    /// depth. Share of the image's width.
+    double min_parallax = 0.004;
   };
 
   TwoViewStart(const Config& config, const geo::CameraIntrinsics& camera);
@@ -48,6 +51,7 @@ class TwoViewStart {
  private:
   void KeepFollowed(const std::vector<cv::Point2f>& now, const std::vector<std::uint8_t>& found);
   double MedianWayPx() const;
+  double MedianParallaxPx() const;
   std::optional<Eigen::Isometry3d> Motion() const;
   void Refine(Eigen::Isometry3d& new_from_first) const;
   Eigen::VectorXd SampsonErrors(const Eigen::Isometry3d& new_from_first) const;

@@ -54,17 +54,19 @@ nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFr
 }
 
 sensor_msgs::PointCloud2 ToEdgeCloud(const odometry::Keyframe& keyframe,
-                                     const OdometryFrames& frames, double voxel_m,
-                                     const ros::Time& stamp) {
+                                     const Eigen::Isometry3d& world_from_keyframe,
+                                     double metres_per_unit, const OdometryFrames& frames,
+                                     double voxel_m, const ros::Time& stamp) {
   const Eigen::Isometry3f odom_from_keyframe =
-      (frames.base_from_optical * keyframe.world_from_camera).cast<float>();
+      (frames.base_from_optical * world_from_keyframe).cast<float>();
+  const auto scale = static_cast<float>(metres_per_unit);
   const odometry::EdgePoints& points = keyframe.points[0];
   auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZI>>();
   cloud->reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     pcl::PointXYZI point;
     point.getVector3fMap() =
-        odom_from_keyframe * Eigen::Vector3f(points.x[i], points.y[i], points.z[i]);
+        odom_from_keyframe * (scale * Eigen::Vector3f(points.x[i], points.y[i], points.z[i]));
     point.intensity = points.intensity[i];
     cloud->push_back(point);
   }

@@ -30,9 +30,11 @@ nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFr
                               const ros::Time& stamp);
 
 /// The keyframe's edge points in odom with their grey values as intensity, thinned to one point per
-/// cube of `voxel_m` (0: all).
+/// cube of `voxel_m` (0: all). `world_from_keyframe` is its pose in metres, and `metres_per_unit`
+/// what the unit of its points is.
 sensor_msgs::PointCloud2 ToEdgeCloud(const odometry::Keyframe& keyframe,
-                                     const OdometryFrames& frames, double voxel_m,
-                                     const ros::Time& stamp);
+                                     const Eigen::Isometry3d& world_from_keyframe,
+                                     double metres_per_unit, const OdometryFrames& frames,
+                                     double voxel_m, const ros::Time& stamp);
 
 }  // namespace livemap::ros_io

@@ -86,6 +86,32 @@ void ReadVoLoss(ParameterReader& parameters, odometry::EdgeOdometry::Config& odo
                   "rad");
 }
 
+void ReadVoEye(ParameterReader& parameters, EdgeVoConfig& config) {
+  parameters.Section("One eye",
+                     "Without depth the metres come from the first of these that there is: the "
+                     "wheels' speed, the receiver's speed on gps/velocity, the fixes, the camera's "
+                     "height over the road, which tf states.");
+  parameters.ReadChoice("eye", config.eye, {"auto", "depth", "mono"},
+                        "By what the camera is followed: depth (images with depth, of a depth "
+                        "camera or of two eyes), mono (the images alone), or auto (depth where "
+                        "depth images come together with the images, else mono). "
+                        "vehicle.launch sets it by the argument `vo`.");
+  parameters.Read("eye_wait_s", config.eye_wait_s, {0, 60},
+                  "With eye: auto, images without depth for so long mean that there is none.", "s");
+  parameters.Read("background_keyframes", config.background_keyframes,
+                  "Whether one eye's keyframes are made on a thread of their own while images are "
+                  "followed. False: within the image's time, so that a replay gives the same "
+                  "poses again.");
+  parameters.Read("wheel_velocity_topic", config.wheel_velocity_topic,
+                  "Topic of the wheels' speed (geometry_msgs/TwistWithCovarianceStamped, the speed "
+                  "is linear.x); empty: none.");
+  parameters.Read("wheel_sigma_mps", config.wheel_sigma_mps, {0.001, 100},
+                  "Standard deviation of the wheels' speed where the message states none.", "m/s");
+  parameters.Read("receiver_sigma_mps", config.receiver_sigma_mps, {0.001, 100},
+                  "Standard deviation of the receiver's speed where the message states none.",
+                  "m/s");
+}
+
 }  // namespace
 
 EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
@@ -93,6 +119,7 @@ EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
   ReadVoEdges(parameters, config.odometry);
   ReadVoKeyframes(parameters, config.odometry);
   ReadVoLoss(parameters, config.odometry);
+  ReadVoEye(parameters, config);
   parameters.Section("Topics and frames");
   parameters.ReadChoice("sync", config.sync, {"exact", "approximate"},
                         "How image, depth and calibration are matched by their stamps.");

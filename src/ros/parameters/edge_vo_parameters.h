@@ -10,9 +10,15 @@ namespace livemap::ros_io {
 /// Defaults of the edge_vo nodelet; the reader states their meanings.
 struct EdgeVoConfig {
   odometry::EdgeOdometry::Config odometry;
-  std::string sync = "exact";       ///< "exact" or "approximate".
-  int queue_size = 10;              ///< Messages that may wait for their partners.
-  double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
+  std::string eye = "auto";  ///< "auto", "depth" or "mono".
+  double eye_wait_s = 2.0;   ///< Of auto: images without depth for so long mean that there is none.
+  bool background_keyframes = true;  ///< Of one eye.
+  std::string wheel_velocity_topic;  ///< Empty: none.
+  double wheel_sigma_mps = 0.1;      ///< Where a message states none.
+  double receiver_sigma_mps = 0.2;   ///< Where a message states none.
+  std::string sync = "exact";        ///< "exact" or "approximate".
+  int queue_size = 10;               ///< Messages that may wait for their partners.
+  double depth_units_per_m = 1000;   ///< Of 16-bit depth (REP 118).
   std::string odom_frame = "odom";
   std::string base_frame = "base_link";
   bool publish_tf = true;  ///< odom -> base_link.

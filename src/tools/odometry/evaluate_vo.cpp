@@ -65,6 +65,7 @@ MonocularOptions ReadMonocularVo(const CommandLine& line) {
   options.camera_height_m = line.Number("camera-height", options.camera_height_m, 0.01, 100);
   options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
   options.seed = line.Seed("seed", options.seed);
+  options.keyframe_delay = line.Whole("keyframe-delay", options.keyframe_delay, 0, 1000);
   return options;
 }
 
@@ -135,6 +136,9 @@ std::optional<Options> ParseEvaluateVoOptions(int argc, char** argv) {
        {"camera-height", "M", "of --scale height: over the road, default 1.65"},
        {"camera-pitch", "RAD", "of --scale height: positive looks down, default 0"},
        {"seed", "N", "of the speed's noise, default 1"},
+       {"keyframe-delay", "N",
+        "monocular: frames until a keyframe is taken over, as on board, where it is made beside "
+        "them; default 0"},
        {"method", "NAME", "edge (default), or OpenCV's: rgbd, rgbd-icp"},
        {"out", "FILE", "write the trajectory, TUM lines"}});
   if (!line.Parse(argc, argv)) return std::nullopt;
@@ -155,7 +159,7 @@ std::optional<Options> ParseEvaluateVoOptions(int argc, char** argv) {
   options.stereo = ReadStereoVo(line);
   options.mono = line.Has("mono");
   options.monocular = ReadMonocularVo(line);
-  for (const char* flag : {"scale", "speed-sigma"}) {
+  for (const char* flag : {"scale", "speed-sigma", "keyframe-delay"}) {
     if (line.Has(flag)) options.monocular_flag = flag;
   }
   options.odometry.keyframe_every = line.Whole("keyframe-every", 0, 1, 10000);
@@ -217,9 +221,11 @@ std::unique_ptr<VoMethod> VoMethodFor(const datasets::Sequence& sequence,
                                       const geo::CameraIntrinsics& camera, const Options& options) {
   if (!IsMonocularVo(sequence, options)) {
     if (!options.monocular_flag.empty()) {
-      throw Error(
-          "--" + options.monocular_flag +
-          " gives monocular odometry its scale: it needs --mono, or a sequence without depth");
+      throw Error("--" + options.monocular_flag +
+                  (options.monocular_flag == "keyframe-delay"
+                       ? " delays the keyframes of monocular odometry"
+                       : " gives monocular odometry its scale") +
+                  ": it needs --mono, or a sequence without depth");
     }
     return MakeVoMethod(options.method, options.odometry, camera);
   }

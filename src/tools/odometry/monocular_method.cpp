@@ -89,6 +89,7 @@ std::unique_ptr<VoMethod> MakeMonocularMethod(const MonocularOptions& options,
   monocular.speed_sigma_mps = std::max(monocular.speed_sigma_mps, options.speed_sigma_mps);
   monocular.camera_height_m = options.camera_height_m;
   monocular.camera_pitch_rad = options.camera_pitch_rad;
+  monocular.keyframe_delay = options.keyframe_delay;
   SpeedByStamp speeds;
   if (options.scale_source == odometry::ScaleSource::kSpeed)
     speeds = TrueSpeedsForMonocular(sequence, step, options);

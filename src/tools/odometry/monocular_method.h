@@ -17,6 +17,7 @@ struct MonocularOptions {
   std::uint64_t seed = 1;      ///< Of that noise.
   double camera_height_m = 1.65;
   double camera_pitch_rad = 0;  ///< Positive looks down.
+  int keyframe_delay = 0;       ///< Frames until a keyframe is taken over, as on board.
 };
 
 /// Follows the sequence, of which every `step`th frame comes, by monocular odometry; depth is not

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <thread>
 #include <vector>
 
 #include "common/error.h"
+#include "geo/wgs84.h"
 #include "simulation/room/room_motion.h"
 #include "simulation/room/simulated_room.h"
 
@@ -188,6 +191,132 @@ TEST(MonocularOdometry, IsDeterministicAndResetForgetsEverything) {
   for (int i = 0; i < 10; ++i) second = odometry.Track(Frame(i));
   EXPECT_EQ(first.state, second.state);
   EXPECT_TRUE(first.world_from_camera.matrix() == second.world_from_camera.matrix());
+}
+
+/// As on board: metres by whatever there is.
+MonocularOdometry::Config OnBoard() {
+  MonocularOdometry::Config config = Slow();
+  config.scale_source = ScaleSource::kBest;
+  config.camera_height_m = 0;
+  config.fixes.lever_m = 0;
+  return config;
+}
+
+/// The receiver's fix at the moment of an image of the walk, exact to a centimetre.
+geo::Fix FixOfWalk(int i) {
+  const Eigen::Vector3d place =
+      TheWalk().first_from_camera[static_cast<std::size_t>(i)].translation();
+  geo::Fix fix;
+  fix.stamp_ns = Frame(i).stamp_ns;
+  fix.position = geo::LocalFrame({48.8566, 9.0}).ToGeo({place.x(), place.z()});
+  fix.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
+  return fix;
+}
+
+/// The walk's frames and fixes with stamps after 1970, as fixes must have.
+MonocularFrame LaterFrame(int i, std::optional<double> speed_mps) {
+  MonocularFrame frame = Frame(i, speed_mps);
+  frame.stamp_ns += 1'700'000'000'000'000'000;
+  return frame;
+}
+
+TEST(MonocularOdometry, WithoutMetresThePoseIsHeldUntilFixesTellThem) {
+  MonocularOdometry odometry(OnBoard(), WalkCamera().intrinsics);
+  VoResult result;
+  int told = -1;
+  for (int i = 0; i < kFrames; ++i) {
+    if (i > 0) {
+      geo::Fix fix = FixOfWalk(i - 1);  // A little late, as a receiver's are.
+      fix.stamp_ns += 1'700'000'000'000'000'000;
+      odometry.AddFix(fix);
+    }
+    result = odometry.Track(LaterFrame(i, std::nullopt));
+    if (result.state == VoState::kTracking && told < 0) told = i;
+    if (told < 0) {
+      EXPECT_EQ(result.state, VoState::kInitialising);
+      EXPECT_TRUE(result.world_from_camera.isApprox(Eigen::Isometry3d::Identity()));
+    }
+  }
+  ASSERT_GT(told, 0);
+  EXPECT_EQ(odometry.metres_source(), MetresSource::kFixes);
+  // The path begins with the last frame before.
+  const double way_m = kSpeedMps * kFrameS * (kFrames - told);
+  EXPECT_NEAR(result.world_from_camera.translation().norm(), way_m, 0.1 * way_m);
+  ASSERT_TRUE(odometry.metres_sigma());
+  EXPECT_LT(*odometry.metres_sigma(), 0.1);
+}
+
+TEST(MonocularOdometry, WhenTheSpeedEndsTheMetresAreHeldLessAndLessCertain) {
+  MonocularOdometry::Config config = OnBoard();
+  config.source_age_s = 0.3;
+  MonocularOdometry odometry(config, WalkCamera().intrinsics);
+  VoResult result;
+  std::optional<double> with_speed;
+  for (int i = 0; i < kFrames; ++i) {
+    result =
+        odometry.Track(LaterFrame(i, i < 10 ? std::optional<double>(kSpeedMps) : std::nullopt));
+    if (i == 9) {
+      with_speed = odometry.metres_sigma();
+      EXPECT_EQ(odometry.metres_source(), MetresSource::kReceiver);
+    }
+  }
+  EXPECT_EQ(odometry.metres_source(), MetresSource::kNone);
+  ASSERT_TRUE(with_speed);
+  EXPECT_GE(*odometry.metres_sigma(), *with_speed);
+  EXPECT_LT(WalkErrorM(result, kFrames - 1), 0.06 * kSpeedMps * kFrameS * (kFrames - 1));
+}
+
+TEST(MonocularOdometry, ACameraThatTurnsOnTheSpotDoesNotStart) {
+  const simulation::SimulatedRoom room(1);
+  const Eigen::Isometry3d start = RoomCameraPose(room.plan(), simulation::RoomMotion::kHand, 0, 1);
+  MonocularOdometry odometry(Slow(), WalkCamera().intrinsics);
+  for (int i = 0; i < 8; ++i) {
+    Vector6d twist = Vector6d::Zero();
+    twist[4] = 0.02 * i;
+    const simulation::SimulatedFrame seen =
+        room.Render(WalkCamera(), start * Se3Exp(twist), static_cast<std::uint32_t>(i), 1.3F, 1, 2);
+    MonocularFrame frame = Frame(i);
+    cv::cvtColor(seen.bgr, frame.grey, cv::COLOR_BGR2GRAY);
+    EXPECT_EQ(odometry.Track(frame).state, VoState::kInitialising) << i;
+  }
+}
+
+TEST(MonocularOdometry, AKeyframeThatComesFramesLaterGivesThePathAllTheSame) {
+  MonocularOdometry::Config config = Slow();
+  config.keyframe_delay = 2;
+  MonocularOdometry odometry(config, WalkCamera().intrinsics);
+  VoResult result;
+  int keyframes = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    result = odometry.Track(Frame(i));
+    keyframes += result.new_keyframe ? 1 : 0;
+  }
+  EXPECT_EQ(result.state, VoState::kTracking);
+  EXPECT_GT(keyframes, 2);
+  EXPECT_LT(WalkErrorM(result, kFrames - 1), 0.05 * kSpeedMps * kFrameS * (kFrames - 1));
+  odometry.Reset();
+  VoResult second;
+  for (int i = 0; i < kFrames; ++i) second = odometry.Track(Frame(i));
+  EXPECT_TRUE(result.world_from_camera.matrix() == second.world_from_camera.matrix())
+      << "it can be repeated";
+}
+
+TEST(MonocularOdometry, MakesKeyframesOnAThreadOfTheirOwn) {
+  MonocularOdometry::Config config = Slow();
+  config.background = true;
+  MonocularOdometry odometry(config, WalkCamera().intrinsics);
+  VoResult result;
+  int keyframes = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    result = odometry.Track(Frame(i));
+    keyframes += result.new_keyframe ? 1 : 0;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // As a camera's images come.
+  }
+  EXPECT_EQ(result.state, VoState::kTracking);
+  EXPECT_GT(keyframes, 1);
+  EXPECT_LT(WalkErrorM(result, kFrames - 1), 0.1 * kSpeedMps * kFrameS * (kFrames - 1));
+  odometry.Reset();  // With a keyframe in work or not.
+  EXPECT_EQ(odometry.Track(Frame(0)).state, VoState::kInitialising);
 }
 
 TEST(MonocularOdometry, RefusesWrongImagesAndStampsAndGoesOn) {

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <deque>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "odometry/edge/edge_extractor.h"
+#include "odometry/monocular/inverse_depth_map.h"
+
+namespace livemap::odometry {
+
+/// What a keyframe without depth of its own has learnt, in units of the map.
+struct LearntDepths {
+  cv::Mat depth;                      ///< CV_32FC1, 0 unknown: InverseDepthMap::DepthImage.
+  cv::Mat inverse_depth_sigma;        ///< Same places: InverseDepthMap::SigmaImage.
+  std::optional<double> road_height;  ///< Of the camera over the road, where that was asked for.
+};
+
+/// Learns the inverse depths on the edges of one keyframe after another, from where the last
+/// keyframes see them. Keeps its buffers; not thread-safe.
+class DepthLearner {
+ public:
+  struct Config {
+    EdgeExtractor::Config edges;
+    InverseDepthMap::Config depth;
+    /// Keyframes that a new one's depths are measured against, 1 to 100.
+    int views_kept = 4;
+    bool finds_road = false;      ///< Whether LearntDepths::road_height is looked for.
+    double camera_pitch_rad = 0;  ///< For the road: positive looks down.
+  };
+
+  /// Throws Error when the configuration is wrong.
+  DepthLearner(const Config& config, const geo::CameraIntrinsics& camera);
+
+  /// Forgets everything. `smooth`, CV_8UC1, is the first view.
+  void Restart(const cv::Mat& smooth, const Eigen::Isometry3d& world_from_camera);
+  void Clear();
+
+  /// Goes on to a new keyframe, `smooth`, which later ones are measured against. The depths that
+  /// are looked for are those of the configuration in metres. The images are valid until the next
+  /// call.
+  LearntDepths Learn(const cv::Mat& smooth, const Eigen::Isometry3d& world_from_camera,
+                     double metres_per_unit);
+
+  const InverseDepthMap& map() const { return map_; }
+
+ private:
+  /// An earlier keyframe, in units of the map.
+  struct View {
+    cv::Mat grey;
+    Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  };
+
+  Config config_;
+  geo::CameraIntrinsics camera_;
+  EdgeExtractor extractor_;
+  InverseDepthMap map_;
+  std::deque<View> views_;  // Newest last: the present keyframe.
+};
+
+}  // namespace livemap::odometry
