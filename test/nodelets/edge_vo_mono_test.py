@@ -147,7 +147,6 @@ class OneEyeTest(unittest.TestCase):
         vehicle = self.loaded(eye="auto", eye_wait_s=0.45, wheel_velocity_topic=WHEELS)
         self.play(vehicle, (WHEELS,), mono_from_s=0.5, seconds=2.5)
         vehicle.wait_for(eye="mono", state="tracking")
-        self.assertIn("no depth came with the images", vehicle.output())
         before = vehicle.received("odom")[-1]
         next_image = [message for topic, message in self.messages if topic == IMAGE][26]
         self.messages = [m for m in self.messages if m[1].header.stamp >= next_image.header.stamp]

@@ -152,21 +152,23 @@ class EdgeVoPart : public NodeletPart {
     ros::NodeHandle& node = getNodeHandle();
     fix_subscriber_ = node.subscribe<sensor_msgs::NavSatFix>(
         "fix", 100, [this](const sensor_msgs::NavSatFixConstPtr& fix) {
-          if (mono_ && IsUsable("a fix", *fix)) mono_->AddFix(ros_io::ToFix(*fix));
+          if (!IsUsable("a fix", *fix)) return;
+          speed_.AddFix(ros_io::ToFix(*fix));
+          if (mono_) mono_->AddFix(ros_io::ToFix(*fix));
         });
     receiver_subscriber_ = node.subscribe<geometry_msgs::TwistWithCovarianceStamped>(
         "gps/velocity", 100, [this](const TwistConstPtr& velocity) {
-          if (!mono_ || !IsUsable("a receiver's speed", *velocity)) return;
+          if (!IsUsable("a receiver's speed", *velocity)) return;
           const auto& linear = velocity->twist.twist.linear;
-          mono_->AddSpeed(
+          speed_.AddSpeed(
               odometry::MetresSource::kReceiver, ros_io::FromRosTime(velocity->header.stamp),
               std::hypot(linear.x, linear.y), SigmaOf(*velocity, config_.receiver_sigma_mps));
         });
     if (config_.wheel_velocity_topic.empty()) return;
     wheel_subscriber_ = node.subscribe<geometry_msgs::TwistWithCovarianceStamped>(
         config_.wheel_velocity_topic, 100, [this](const TwistConstPtr& velocity) {
-          if (!mono_ || !IsUsable("a wheels' speed", *velocity)) return;
-          mono_->AddSpeed(
+          if (!IsUsable("a wheels' speed", *velocity)) return;
+          speed_.AddSpeed(
               odometry::MetresSource::kWheels, ros_io::FromRosTime(velocity->header.stamp),
               velocity->twist.twist.linear.x, SigmaOf(*velocity, config_.wheel_sigma_mps));
         });
@@ -224,6 +226,7 @@ class EdgeVoPart : public NodeletPart {
   void ResetOdometry() {
     if (odometry_) odometry_->Reset();
     if (mono_) mono_->Reset();
+    speed_.Reset();
     StartAnew();
   }
 
@@ -241,7 +244,8 @@ class EdgeVoPart : public NodeletPart {
       Follow(image->header, [&](odometry::RgbdFrame& frame) {
         const auto grey = cv_bridge::toCvShare(image, sensor_msgs::image_encodings::MONO8);
         frame.grey = grey->image;
-        return mono_->Track(ros_io::FromRosTime(image->header.stamp), frame.grey);
+        const std::int64_t stamp_ns = ros_io::FromRosTime(image->header.stamp);
+        return mono_->Track(stamp_ns, frame.grey, speed_.At(stamp_ns));
       });
     } catch (const std::exception& error) {
       Drop(error);
@@ -500,6 +504,7 @@ class EdgeVoPart : public NodeletPart {
   std::unique_ptr<EyeChoice> choice_;
   std::unique_ptr<odometry::EdgeOdometry> odometry_;  // By depth.
   std::unique_ptr<MonoEye> mono_;                     // By one eye.
+  odometry::VehicleSpeed speed_{{}};                  // For one eye.
   /// Where depth took over from one eye, in the world of both.
   std::optional<Eigen::Isometry3d> joint_;
   odometry::Matrix6d joint_covariance_ = odometry::Matrix6d::Zero();

@@ -19,33 +19,19 @@ odometry::MonocularOdometry::Config WithMounting(odometry::MonocularOdometry::Co
 
 MonoEye::MonoEye(const odometry::MonocularOdometry::Config& config,
                  const geo::CameraIntrinsics& camera, const Eigen::Isometry3d& base_from_optical)
-    : speed_({}), odometry_(WithMounting(config, base_from_optical), camera) {}
+    : odometry_(WithMounting(config, base_from_optical), camera) {}
 
-void MonoEye::AddSpeed(odometry::MetresSource source, std::int64_t stamp_ns, double mps,
-                       double sigma_mps) {
-  speed_.AddSpeed(source, stamp_ns, mps, sigma_mps);
-}
-
-void MonoEye::AddFix(const geo::Fix& fix) {
-  speed_.AddFix(fix);
-  odometry_.AddFix(fix);
-}
-
-odometry::VoResult MonoEye::Track(std::int64_t stamp_ns, const cv::Mat& grey) {
+odometry::VoResult MonoEye::Track(std::int64_t stamp_ns, const cv::Mat& grey,
+                                  const std::optional<odometry::VehicleSpeed::Speed>& speed) {
   odometry::MonocularFrame frame;
   frame.stamp_ns = stamp_ns;
   frame.grey = grey;
-  if (const auto speed = speed_.At(stamp_ns)) {
+  if (speed) {
     frame.speed_mps = speed->mps;
     frame.speed_sigma_mps = speed->sigma_mps;
     frame.speed_source = speed->source;
   }
   return odometry_.Track(frame);
-}
-
-void MonoEye::Reset() {
-  speed_.Reset();
-  odometry_.Reset();
 }
 
 }  // namespace livemap::nodelets

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "geo/camera_intrinsics.h"
 #include "geo/vehicle_pose.h"
@@ -11,8 +12,8 @@
 
 namespace livemap::nodelets {
 
-/// The odometry of one eye on board: MonocularOdometry with what the vehicle knows in metres: the
-/// speed of its wheels or of its receiver, its fixes, the height of its camera. Not thread-safe.
+/// The odometry of one eye on board: MonocularOdometry with what the vehicle knows in metres: its
+/// speed, its fixes, the height of its camera. Not thread-safe.
 class MonoEye {
  public:
   /// `base_from_optical` is the camera's mounting: base_link stands on the road. Throws as
@@ -20,17 +21,15 @@ class MonoEye {
   MonoEye(const odometry::MonocularOdometry::Config& config, const geo::CameraIntrinsics& camera,
           const Eigen::Isometry3d& base_from_optical);
 
-  /// Of kWheels or kReceiver; one that cannot be is passed over.
-  void AddSpeed(odometry::MetresSource source, std::int64_t stamp_ns, double mps, double sigma_mps);
-  void AddFix(const geo::Fix& fix);
-  /// Throws as MonocularOdometry::Track.
-  odometry::VoResult Track(std::int64_t stamp_ns, const cv::Mat& grey);
-  void Reset();
+  void AddFix(const geo::Fix& fix) { odometry_.AddFix(fix); }
+  /// `speed` is the vehicle's at that moment. Throws as MonocularOdometry::Track.
+  odometry::VoResult Track(std::int64_t stamp_ns, const cv::Mat& grey,
+                           const std::optional<odometry::VehicleSpeed::Speed>& speed);
+  void Reset() { odometry_.Reset(); }
 
   const odometry::MonocularOdometry& odometry() const { return odometry_; }
 
  private:
-  odometry::VehicleSpeed speed_;
   odometry::MonocularOdometry odometry_;
 };
 

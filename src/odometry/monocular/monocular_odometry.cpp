@@ -24,6 +24,10 @@ constexpr double kHeightShare = 0.1;
 constexpr double kTeachingSigma = 0.05;
 /// A rough speed less certain than this gives the start no length.
 constexpr double kWorstStartSigma = 0.5;
+/// A start without speeds for more than half of its time has no length; for less, the speed may
+/// have been another one by so much, m/s.
+constexpr double kLeastShareOfStart = 0.5;
+constexpr double kGapSigmaMps = 0.5;
 
 /// A motion with its translation times `factor`.
 Eigen::Isometry3d StretchedMonocularMotion(Eigen::Isometry3d motion, double factor) {
@@ -121,7 +125,11 @@ void MonocularOdometry::ForgetOldSource() {
 
 /// The way since the last frame, by the mean of the speeds at its ends.
 void MonocularOdometry::AddWay(const MonocularFrame& frame) {
-  if (!last_frame_ || !last_frame_->speed_mps || !frame.speed_mps) return;
+  if (!last_frame_) return;
+  if (!last_frame_->speed_mps || !frame.speed_mps) {
+    way_has_gap_ = true;
+    return;
+  }
   const double step_s = Seconds(frame.stamp_ns - last_frame_->stamp_ns);
   way_m_ += 0.5 * (*last_frame_->speed_mps + *frame.speed_mps) * step_s;
   way_s_ += step_s;
@@ -134,7 +142,21 @@ void MonocularOdometry::BeginStart(const MonocularFrame& frame) {
   start_images_.Build(frame.grey);
   start_.Begin(start_images_[0]);
   start_stamp_ns_ = frame.stamp_ns;
+  ForgetWay();
+}
+
+void MonocularOdometry::ForgetWay() {
   way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+  way_has_gap_ = false;
+}
+
+/// Where the start's first images came without a speed the vehicle went on as later.
+void MonocularOdometry::FillGapOfStart(double elapsed_s) {
+  const double gap_s = elapsed_s - way_s_;
+  if (!way_has_gap_ || gap_s <= 0 || way_s_ < kLeastShareOfStart * elapsed_s) return;
+  way_m_ *= elapsed_s / way_s_;
+  way_sigma_m_ += kGapSigmaMps * gap_s;
+  way_has_gap_ = false;
 }
 
 /// The last pose once more, less certain if it is lost.
@@ -164,9 +186,10 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
     if (start_.HasJustBegun()) BeginStart(frame);
     return result;
   }
+  FillGapOfStart(Seconds(frame.stamp_ns - start_stamp_ns_));
   // The units of the map: metres, if the speed tells them.
   const bool knows_way = config_.scale_source != ScaleSource::kCameraHeight && way_m_ > 0 &&
-                         way_sigma_m_ <= kWorstStartSigma * way_m_;
+                         !way_has_gap_ && way_sigma_m_ <= kWorstStartSigma * way_m_;
   scale_.Reset();
   fixes_.Reset();
   const double units = knows_way ? way_m_ : 1.0;
@@ -182,7 +205,7 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   started_ = true;
   lost_ = false;
   last_unscaled_ = Eigen::Isometry3d::Identity();
-  way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+  ForgetWay();
   fixes_.AddPose(frame.stamp_ns, Eigen::Isometry3d::Identity());
   start_pose_ = result.world_from_camera;
   start_covariance_ = result.covariance;
@@ -219,7 +242,7 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
   if (unscaled.state != VoState::kTracking) {
     if (!lost_) lost_since_ns_ = frame.stamp_ns;
     lost_ = true;
-    way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+    ForgetWay();
     fixes_.Reset();
     VoResult held = InMetres(frame, unscaled);
     if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
@@ -296,13 +319,17 @@ void MonocularOdometry::HasTold(MetresSource source, double shared_sigma) {
 
 void MonocularOdometry::MeasureScale(const Eigen::Isometry3d& world_from_camera) {
   way_units_ += (last_unscaled_.inverse() * world_from_camera).translation().norm();
+  if (way_has_gap_) {
+    ForgetWay();
+    return;
+  }
   if (config_.scale_source == ScaleSource::kCameraHeight || way_m_ < kScaleWayM) return;
   const bool by_fixes = last_frame_ && last_frame_->speed_source == MetresSource::kFixes;
   if (way_m_ >= config_.min_speed_mps * way_s_ && !by_fixes) {
     scale_.Measure(way_m_, way_sigma_m_, way_units_);
     HasTold(last_frame_->speed_source, 0);
   }
-  way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
+  ForgetWay();
 }
 
 void MonocularOdometry::MeasureByFixes(std::int64_t stamp_ns,

@@ -110,6 +110,8 @@ class MonocularOdometry {
   bool TakeKeyframe();
   void OnLearnt(const LearntDepths& learnt);
   void AddWay(const MonocularFrame& frame);
+  void ForgetWay();
+  void FillGapOfStart(double elapsed_s);
   void MeasureScale(const Eigen::Isometry3d& world_from_camera);
   void MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& world_from_camera);
   void MeasureByHeight(double height_units);
@@ -130,10 +132,11 @@ class MonocularOdometry {
   ImagePyramid start_images_;
   bool started_ = false;
   bool lost_ = false;
-  double way_m_ = 0;        // By the speed, since the last measurement of the scale.
-  double way_s_ = 0;        // Duration of it,
-  double way_sigma_m_ = 0;  // and its standard deviation.
-  double way_units_ = 0;    // By visual odometry, since then.
+  double way_m_ = 0;          // By the speed, since the last measurement of the scale.
+  double way_s_ = 0;          // Duration of it,
+  double way_sigma_m_ = 0;    // and its standard deviation.
+  double way_units_ = 0;      // By visual odometry, since then.
+  bool way_has_gap_ = false;  // A frame since then came without a speed.
   MetresSource source_ = MetresSource::kNone;
   std::int64_t now_ns_ = 0;           // Of the present frame.
   std::int64_t told_ns_ = 0;          // Of the last frame for which source_ told metres.
