@@ -37,4 +37,20 @@ std::optional<GroundPoint> ProjectToGround(const Eigen::Vector2d& pixel,
                                            const Eigen::Isometry3d& base_from_optical,
                                            const GroundProjectionNoise& noise);
 
+/// How a camera sees a point of the road, and what moves the point that its pixel is projected to:
+/// the derivatives of ProjectToGround, base_link's x and y.
+struct GroundSensitivity {
+  Eigen::Vector2d pixel;       ///< Where the camera sees the point.
+  Eigen::Matrix2d per_pixel;   ///< Columns: by pixel u and v, m/px.
+  Eigen::Vector2d per_pitch;   ///< By a rotation about base_link's y through the camera, m/rad.
+  Eigen::Vector2d per_height;  ///< By the camera's height, m/m.
+};
+
+/// Of the road's point `point_m` (base_link, x forward and y left). None when the camera is at or
+/// below the road, the point is not before it, or an input is not finite or the focal lengths are
+/// not positive.
+std::optional<GroundSensitivity> SensitivityOfGroundPoint(
+    const Eigen::Vector2d& point_m, const CameraIntrinsics& intrinsics,
+    const Eigen::Isometry3d& base_from_optical);
+
 }  // namespace livemap::geo

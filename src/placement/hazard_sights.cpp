@@ -1,0 +1,305 @@
+#include "placement/hazard_sights.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "common/time.h"
+#include "geo/fix_covariance.h"
+
+namespace livemap::placement {
+namespace {
+
+constexpr double kLeastSigmaM = 1e-4;  // Of one sight: keeps the equations regular.
+constexpr double kFixesApartS = 1.0;   // The scatter of fixes so far apart is independent.
+constexpr double kConvergedM = 1e-4;
+constexpr double kMaxHeadingVariance = 10;
+// Columns of the unknowns.
+constexpr int kPose = 2;
+constexpr int kPitch = 5;
+constexpr int kHeight = 6;
+constexpr int kDepth = 7;
+
+/// East-north from base_link's x and y.
+Eigen::Matrix2d SightRotation(double course_rad) {
+  const double sine = std::sin(course_rad);
+  const double cosine = std::cos(course_rad);
+  Eigen::Matrix2d rotation;
+  rotation << sine, -cosine, cosine, sine;
+  return rotation;
+}
+
+/// What a rotation by 1 rad clockwise does to a point.
+Eigen::Vector2d SightSwing(const Eigen::Vector2d& east_north_m) {
+  return {east_north_m.y(), -east_north_m.x()};
+}
+
+/// The matrix with its negative eigenvalues raised to `least`.
+Eigen::Matrix2d PositivePart(const Eigen::Matrix2d& matrix, double least = 0) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(matrix);
+  const Eigen::Vector2d raised = solver.eigenvalues().cwiseMax(least);
+  return solver.eigenvectors() * raised.asDiagonal() * solver.eigenvectors().transpose();
+}
+
+/// Of the position, without what the image has for itself.
+Eigen::Matrix2d LastingPosition(const HazardSight& sight) {
+  const double own_m2 = sight.own_position_sigma_m * sight.own_position_sigma_m;
+  return PositivePart(sight.base.covariance_m2 - own_m2 * Eigen::Matrix2d::Identity());
+}
+
+/// The part that the image has for itself never exceeds what its pose states.
+Eigen::Matrix2d OwnPosition(const HazardSight& sight) {
+  return PositivePart(sight.base.covariance_m2 - LastingPosition(sight));
+}
+
+double LastingHeading(const HazardSight& sight) {
+  return sight.base.course_variance_rad2 * (1 - sight.own_heading_share);
+}
+
+bool IsUsablePose(const geo::TrackPose& base) {
+  return geo::IsValid(base.position) && geo::IsFixCovariance(base.covariance_m2) &&
+         std::isfinite(base.course_rad) && std::isfinite(base.speed_mps) &&
+         base.course_variance_rad2 >= 0 && base.course_variance_rad2 <= kMaxHeadingVariance &&
+         base.position_course.allFinite();
+}
+
+bool IsUsableSight(const HazardSight& sight) {
+  const geo::GroundProjectionNoise& noise = sight.noise;
+  const bool noise_is_one = std::isfinite(noise.pixel_sigma_px) && noise.pixel_sigma_px >= 0 &&
+                            std::isfinite(noise.pitch_sigma_rad) && noise.pitch_sigma_rad >= 0 &&
+                            std::isfinite(noise.height_sigma_m) && noise.height_sigma_m >= 0;
+  const double depth_share = sight.depth_sigma_share.value_or(0);
+  return noise_is_one && IsUsablePose(sight.base) && sight.pixel.allFinite() &&
+         sight.foot.position_m.allFinite() && geo::IsFixCovariance(sight.foot.covariance_m2) &&
+         sight.own_position_sigma_m >= 0 && std::isfinite(sight.own_position_sigma_m) &&
+         sight.own_heading_share >= 0 && sight.own_heading_share <= 1 && depth_share >= 0 &&
+         depth_share <= 1 &&
+         geo::SensitivityOfGroundPoint(sight.foot.position_m, sight.intrinsics,
+                                       sight.base_from_optical);
+}
+
+/// A foot in base_link and what moves it, at the place where it is expected.
+struct SightFoot {
+  Eigen::Vector2d foot_m;
+  Eigen::Vector2d pitch_m;  // By one standard deviation of each.
+  Eigen::Vector2d height_m;
+  Eigen::Vector2d depth_m;
+  Eigen::Matrix2d pixel_m2;  // And of the pixel.
+};
+
+SightFoot FootByPlane(const HazardSight& sight, const Eigen::Vector2d& expected_m) {
+  auto moves = geo::SensitivityOfGroundPoint(expected_m, sight.intrinsics, sight.base_from_optical);
+  Eigen::Vector2d at_m = expected_m;
+  if (!moves) {
+    at_m = sight.foot.position_m;
+    moves = geo::SensitivityOfGroundPoint(at_m, sight.intrinsics, sight.base_from_optical);
+  }
+  SightFoot foot;
+  foot.foot_m = at_m + moves->per_pixel * (sight.pixel - moves->pixel);
+  foot.pitch_m = moves->per_pitch * sight.noise.pitch_sigma_rad;
+  foot.height_m = moves->per_height * sight.noise.height_sigma_m;
+  foot.depth_m.setZero();
+  foot.pixel_m2 = sight.noise.pixel_sigma_px * sight.noise.pixel_sigma_px * moves->per_pixel *
+                  moves->per_pixel.transpose();
+  return foot;
+}
+
+SightFoot FootByDepth(const HazardSight& sight) {
+  const Eigen::Vector3d centre = sight.base_from_optical.translation();
+  const Eigen::Vector2d& foot_m = sight.foot.position_m;
+  const Eigen::Vector3d from_camera_m = Eigen::Vector3d(foot_m.x(), foot_m.y(), 0) - centre;
+  SightFoot foot;
+  foot.foot_m = foot_m;
+  foot.pitch_m =
+      Eigen::Vector3d::UnitY().cross(from_camera_m).head<2>() * sight.noise.pitch_sigma_rad;
+  foot.height_m.setZero();
+  foot.depth_m = from_camera_m.head<2>() * *sight.depth_sigma_share;
+  foot.pixel_m2 = PositivePart(sight.foot.covariance_m2 - foot.pitch_m * foot.pitch_m.transpose() -
+                               foot.depth_m * foot.depth_m.transpose());
+  return foot;
+}
+
+}  // namespace
+
+HazardSights::Kept HazardSights::ToKept(const HazardSight& sight) const {
+  Kept kept;
+  kept.sight = sight;
+  kept.base_m = frame_->ToEnu(sight.base.position);
+  if (sights_.empty()) return kept;
+  const Kept& last = sights_.back();
+  const double dt_s = std::abs(Seconds(sight.stamp_ns - last.sight.stamp_ns));
+  // Fixes scatter, so that their distance is no way.
+  const double step_m = sight.own_position_sigma_m > 0 ? std::abs(sight.base.speed_mps) * dt_s
+                                                       : (kept.base_m - last.base_m).norm();
+  kept.way_m = last.way_m + step_m;
+  kept.share = std::min(1.0, step_m / config_.independent_way_m);
+  return kept;
+}
+
+bool HazardSights::Add(const HazardSight& sight) {
+  if (!IsUsableSight(sight)) return false;
+  if (!frame_) frame_.emplace(sight.base.position);
+  Kept kept = ToKept(sight);
+  if (!sights_.empty() && kept.way_m - sights_.back().way_m < config_.min_way_m) return false;
+  sights_.push_back(std::move(kept));
+  if (sights_.size() > static_cast<std::size_t>(config_.max_sights)) DropLeastCertain();
+  Solve();
+  return true;
+}
+
+/// Never the newest one, from which the way is counted.
+void HazardSights::DropLeastCertain() {
+  const auto worst =
+      std::max_element(sights_.begin(), std::prev(sights_.end()), [](const Kept& a, const Kept& b) {
+        return a.sight.foot.covariance_m2.trace() < b.sight.foot.covariance_m2.trace();
+      });
+  sights_.erase(worst);
+}
+
+/// That of the sight whose position is known best. What another sight's pose states above it, that
+/// sight has for itself: weights stay positive.
+HazardSights::SharedPose HazardSights::FindSharedPose() const {
+  const auto best =
+      std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
+        return LastingPosition(a.sight).trace() < LastingPosition(b.sight).trace();
+      });
+  const auto steadiest =
+      std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
+        return LastingHeading(a.sight) < LastingHeading(b.sight);
+      });
+  SharedPose shared;
+  shared.position_m2 = LastingPosition(best->sight);
+  shared.heading_rad2 = LastingHeading(steadiest->sight);
+  Eigen::Matrix3d joint = Eigen::Matrix3d::Zero();
+  joint.topLeftCorner<2, 2>() = shared.position_m2;
+  joint(2, 2) = shared.heading_rad2;
+  if (best->sight.own_heading_share == 0) {
+    joint.topRightCorner<2, 1>() = best->sight.base.position_course;
+    joint.bottomLeftCorner<1, 2>() = best->sight.base.position_course.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(joint);
+  shared.root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return shared;
+}
+
+/// Sights between the same two fixes share their scatter: it counts as often as fixes came.
+double HazardSights::FixScatterGain() const {
+  int count = 0;
+  std::int64_t first_ns = sights_.front().sight.stamp_ns;
+  std::int64_t last_ns = first_ns;
+  for (const Kept& kept : sights_) {
+    if (kept.sight.own_position_sigma_m <= 0 && kept.sight.own_heading_share <= 0) continue;
+    ++count;
+    first_ns = std::min(first_ns, kept.sight.stamp_ns);
+    last_ns = std::max(last_ns, kept.sight.stamp_ns);
+  }
+  return std::max(1.0, count / (1 + std::floor(Seconds(last_ns - first_ns) / kFixesApartS)));
+}
+
+HazardSights::Linear HazardSights::Linearise(const Kept& kept, const SharedPose& shared,
+                                             const Unknowns& at) const {
+  const HazardSight& sight = kept.sight;
+  const Eigen::Matrix2d rotation = SightRotation(sight.base.course_rad);
+  const Eigen::Vector3d pose_error = shared.root * at.segment<3>(kPose);
+  const Eigen::Vector2d seen_m = at.head<2>() + pose_error.head<2>() - kept.base_m;
+  const Eigen::Vector2d swing_m = SightSwing(seen_m);
+  const Eigen::Vector2d expected_m = rotation.transpose() * (seen_m + swing_m * pose_error.z());
+  const SightFoot foot =
+      sight.depth_sigma_share ? FootByDepth(sight) : FootByPlane(sight, expected_m);
+
+  const double lasting = config_.lasting_pitch_share;
+  const double gain = FixScatterGain();
+  Linear linear;
+  linear.place_m = kept.base_m + rotation * foot.foot_m;
+  linear.rows.leftCols<2>().setIdentity();
+  linear.rows.middleCols<3>(kPose) =
+      shared.root.topRows<2>() + swing_m * shared.root.bottomRows<1>();
+  linear.rows.col(kPitch) = rotation * foot.pitch_m * std::sqrt(lasting);
+  linear.rows.col(kHeight) = rotation * foot.height_m;
+  linear.rows.col(kDepth) = rotation * foot.depth_m;
+  const double way_sigma_m = config_.way_sigma_share * (sights_.back().way_m - kept.way_m);
+  const double own_heading = std::max(0.0, LastingHeading(sight) - shared.heading_rad2) +
+                             gain * sight.base.course_variance_rad2 * sight.own_heading_share;
+  const Eigen::Matrix2d of_camera =
+      foot.pixel_m2 + (1 - lasting) * foot.pitch_m * foot.pitch_m.transpose();
+  linear.own_m2 = rotation * of_camera * rotation.transpose() +
+                  PositivePart(LastingPosition(sight) - shared.position_m2) +
+                  gain * OwnPosition(sight) + own_heading * swing_m * swing_m.transpose();
+  linear.own_m2.diagonal().array() += way_sigma_m * way_sigma_m + kLeastSigmaM * kLeastSigmaM;
+  return linear;
+}
+
+void HazardSights::Solve() {
+  shared_ = FindSharedPose();
+  const auto best =
+      std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
+        return a.sight.foot.covariance_m2.trace() < b.sight.foot.covariance_m2.trace();
+      });
+  solution_.setZero();
+  solution_.head<2>() =
+      best->base_m + SightRotation(best->sight.base.course_rad) * best->sight.foot.position_m;
+  const Information prior = [] {
+    Information unit = Information::Identity();
+    unit(0, 0) = unit(1, 1) = 0;
+    return unit;
+  }();
+  double scatter = 1;
+  bool is_last = false;
+  for (int i = 0; i <= config_.iterations; ++i) {
+    // The last round only gives the covariance.
+    is_last = is_last || i == config_.iterations;
+    Information information = Information::Zero();
+    Unknowns right = Unknowns::Zero();
+    double squares = 0;
+    double freedom = -2;
+    for (const Kept& kept : sights_) {
+      const Linear linear = Linearise(kept, shared_, solution_);
+      const Eigen::Vector2d residual_m = linear.place_m - linear.rows * solution_;
+      const Eigen::Matrix2d own = linear.own_m2.inverse();
+      const double distance2 = residual_m.dot(own * residual_m);
+      const double doubt = 1 + distance2 / (config_.cauchy_scale * config_.cauchy_scale);
+      const double weight = kept.share / doubt;
+      information += weight * linear.rows.transpose() * own * linear.rows;
+      right += weight * linear.rows.transpose() * own * linear.place_m;
+      squares += weight * distance2;
+      freedom += 2 * kept.share;
+    }
+    if (is_last && freedom >= 2) scatter = squares / freedom;
+    const Eigen::LDLT<Information> solver(information / std::max(1.0, scatter) + prior);
+    covariance_ = solver.solve(Information::Identity());
+    if (is_last) break;
+    const Unknowns next = solver.solve(right);
+    is_last = (next - solution_).head<2>().norm() < kConvergedM;
+    solution_ = next;
+  }
+  KeepPlace(scatter);
+}
+
+void HazardSights::KeepPlace(double scatter) {
+  Eigen::Matrix<double, 2, 5> seen;
+  seen << Eigen::Matrix2d::Identity(), shared_.root.topRows<2>();
+  SightsPlace place;
+  place.place.position = frame_->ToGeo(solution_.head<2>());
+  const Eigen::Matrix2d total_m2 = covariance_.topLeftCorner<2, 2>();
+  place.place.covariance_m2 = 0.5 * (total_m2 + total_m2.transpose());
+  place.seen_from_vehicle_m2 = seen * covariance_.topLeftCorner<5, 5>() * seen.transpose();
+  place.sights = sights_.size();
+  place.scatter = scatter;
+  if (place.place.covariance_m2.allFinite() && geo::IsValid(place.place.position)) place_ = place;
+}
+
+std::optional<double> HazardSights::Distance2(const HazardSight& sight) const {
+  if (!place_ || !IsUsableSight(sight)) return std::nullopt;
+  const Linear linear = Linearise(ToKept(sight), shared_, solution_);
+  const Eigen::Vector2d residual_m = linear.place_m - linear.rows * solution_;
+  const Eigen::Matrix2d expected_m2 =
+      linear.rows * covariance_ * linear.rows.transpose() + linear.own_m2;
+  const double distance2 = residual_m.dot(expected_m2.inverse() * residual_m);
+  if (!std::isfinite(distance2)) return std::nullopt;
+  return distance2;
+}
+
+}  // namespace livemap::placement
