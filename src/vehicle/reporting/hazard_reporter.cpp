@@ -28,6 +28,11 @@ VehiclePoseLookup::Config ReporterPoseConfigOf(const HazardReporter::Config& con
 }
 
 constexpr std::size_t kMaxWaitingNotices = 20000;
+/// Sights from so many times too far away, or too uncertain, still help a hazard's place.
+constexpr double kSightReach = 3.0;
+constexpr double kFixHeadingOwnShare =
+    0.5;  // Of the course's variance; the fixes' windows overlap.
+constexpr double kForEverS = 1e9;
 
 }  // namespace
 
@@ -39,6 +44,7 @@ HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatal
       map_(config.map, catalogue, now_ns),
       vehicle_poses_(ReporterPoseConfigOf(config)),
       schedule_(config.resend, std::mt19937_64(random_())),
+      passes_(config.passes, catalogue),
       start_ns_(now_ns),
       start_steady_s_(steady_s) {
   config_.projection.max_range_m = kEndlessRangeM;
@@ -96,19 +102,20 @@ void HazardReporter::AddPose(std::int64_t stamp_ns, const geo::TrackPose& pose,
 
 void HazardReporter::StartAnew(double now_s, double steady_s) {
   Finish(steady_s);
+  passes_.Reset();
   depths_.clear();
   vehicle_poses_.Reset();
   forgot_s_ = now_s;
 }
 
 void HazardReporter::Finish(double steady_s) {
-  constexpr double kForEverS = 1e9;
   for (WaitingFrame& waiting : waiting_) {
     // Nothing of its moment can come any more.
     if (!waiting.placed) Place(waiting, kForEverS);
-    ReportCandidates(waiting, steady_s);
+    ReportCandidates(waiting, waiting.arrival_s, steady_s);
   }
   waiting_.clear();
+  ReportSettled(kForEverS, steady_s);
   picture_orders_.clear();
 }
 
@@ -176,6 +183,7 @@ void HazardReporter::Process(double now_s, double steady_s) {
       OrderPictures(*waiting);
     }
   }
+  ReportSettled(now_s, steady_s);
 }
 
 /// Whether the frames before it will have reported all that it shows. While pictures are late many
@@ -203,7 +211,8 @@ bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {
 }
 
 bool HazardReporter::IsKnown(const PlacedSighting& candidate) const {
-  return map_.Find(candidate.sighting.class_name, candidate.place.position).has_value();
+  return passes_.IsKnown(candidate.pass) || IsSettling(candidate) ||
+         map_.Find(candidate.sighting.class_name, candidate.place.position).has_value();
 }
 
 bool HazardReporter::HasUnknownHazard(const WaitingFrame& waiting) const {
@@ -215,7 +224,7 @@ bool HazardReporter::HasUnknownHazard(const WaitingFrame& waiting) const {
 bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_s) {
   if (!IsPlaced(waiting, now_s)) return false;
   if (HasUnknownHazard(waiting) && WaitsForPicture(waiting, now_s)) return false;
-  ReportCandidates(waiting, steady_s);
+  ReportCandidates(waiting, now_s, steady_s);
   return true;
 }
 
@@ -298,51 +307,83 @@ bool HazardReporter::WaitsForDepth(const WaitingFrame& waiting, double waited_s)
          depths_.count(waiting.frame.stamp_ns) == 0;
 }
 
-/// Where the sighting's foot stands in base_link; counted where it is not on the road or too far.
-std::optional<geo::GroundPoint> HazardReporter::PlaceOnRoad(const placement::SightingFrame& frame,
-                                                            const placement::Sighting& sighting,
-                                                            double heading_variance_rad2) {
-  const Eigen::Isometry3d& mounting = mountings_.at(frame.frame_id);
-  const imaging::Box& box = sighting.box;
+/// What the image says of where the sighting's foot is; counted where that is nowhere on the road.
+std::optional<placement::HazardSight> HazardReporter::SightOnRoad(
+    const placement::SightingFrame& frame, const placement::Sighting& sighting,
+    const geo::TrackPose& base, bool fused) {
+  placement::HazardSight sight;
+  sight.stamp_ns = frame.stamp_ns;
+  sight.base = base;
+  if (!fused) {
+    sight.own_position_sigma_m = config_.track.course_noise_m;
+    sight.own_heading_share = kFixHeadingOwnShare;
+  }
+  sight.pixel = placement::ContactPixel(sighting.box);
+  sight.intrinsics = *intrinsics_;
+  sight.base_from_optical = mountings_.at(frame.frame_id);
+  sight.noise = config_.projection;
   std::optional<geo::GroundPoint> ground;
   const auto depth = depths_.find(frame.stamp_ns);
   if (config_.use_depth && depth != depths_.end()) {
-    ground = placement::ContactByDepth(depth->second, box, *intrinsics_, mounting,
-                                       config_.projection, config_.depth);
-    if (ground) ++counters_.distances_by_depth;
+    ground = placement::ContactByDepth(depth->second, sighting.box, *intrinsics_,
+                                       sight.base_from_optical, config_.projection, config_.depth);
+    if (ground) {
+      sight.depth_sigma_share = config_.depth.sigma_share;
+      ++counters_.distances_by_depth;
+    }
   }
-  if (!ground && placement::IsCutBySide(box, intrinsics_->width)) {
+  if (!ground && placement::IsCutBySide(sighting.box, intrinsics_->width)) {
     ++counters_.cut_by_side;
     return std::nullopt;
   }
   if (!ground) {
-    ground = geo::ProjectToGround(placement::ContactPixel(box), *intrinsics_, mounting,
+    ground = geo::ProjectToGround(sight.pixel, *intrinsics_, sight.base_from_optical,
                                   config_.projection);
   }
   if (!ground) {
     ++counters_.not_on_ground;
     return std::nullopt;
   }
-  if (!placement::IsNearEnough(*ground, heading_variance_rad2, config_.max_range_m,
-                               config_.max_ground_sigma_m)) {
-    ++counters_.too_far;
-    return std::nullopt;
-  }
-  return ground;
+  sight.foot = *ground;
+  return sight;
 }
 
+bool HazardReporter::IsWorthASight(const placement::HazardSight& sight) const {
+  return placement::IsNearEnough(sight.foot, 0.0, kSightReach * config_.max_range_m,
+                                 kSightReach * config_.max_ground_sigma_m);
+}
+
+/// All sights help the places of what the vehicle passes; those that are near enough may be
+/// reported.
 void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& base, bool fused) {
+  waiting.placed = true;
+  std::vector<PassSights::Seen> seen;
+  std::vector<const placement::Sighting*> sightings;
   for (const placement::Sighting& sighting : waiting.frame.sightings) {
-    const auto ground =
-        PlaceOnRoad(waiting.frame, sighting, fused ? base.course_variance_rad2 : 0.0);
-    if (!ground) continue;
+    const auto sight = SightOnRoad(waiting.frame, sighting, base, fused);
+    if (!sight) continue;
+    if (!IsWorthASight(*sight)) {
+      ++counters_.too_far;
+      continue;
+    }
+    seen.push_back({sighting.class_name, *sight});
+    sightings.push_back(&sighting);
+  }
+  const std::vector<PassSights::Id> passes = passes_.Add(seen);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const placement::HazardSight& sight = seen[i].sight;
+    if (!placement::IsNearEnough(sight.foot, fused ? base.course_variance_rad2 : 0.0,
+                                 config_.max_range_m, config_.max_ground_sigma_m)) {
+      ++counters_.too_far;
+      continue;
+    }
+    const auto all = passes_.Place(passes[i]);
     const placement::PlacedHazard place =
-        placement::PlaceHazard(base, Eigen::Vector2d::Zero(), *ground);
+        all ? all->place : placement::PlaceHazard(base, Eigen::Vector2d::Zero(), sight.foot);
     waiting.candidates.push_back(
-        {sighting, place, geo::EarthCentred(place.position), std::nullopt});
+        {*sightings[i], place, geo::EarthCentred(place.position), std::nullopt, passes[i]});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
-  waiting.placed = true;
 }
 
 void HazardReporter::AddNotice(const protocol::Notice& notice) {
@@ -435,30 +476,98 @@ void HazardReporter::AttachPicture(WaitingFrame& waiting, std::size_t index,
   if (HasSizeOfFrame(waiting)) report.shown = cropped.shown;
 }
 
-void HazardReporter::ReportCandidates(WaitingFrame& waiting, double steady_s) {
+void HazardReporter::ReportCandidates(WaitingFrame& waiting, double now_s, double steady_s) {
   for (std::size_t index = 0; index < waiting.candidates.size(); ++index) {
     const PlacedSighting& candidate = waiting.candidates[index];
     if (IsKnown(candidate)) {
       ++counters_.duplicates_suppressed;
       continue;
     }
-    const protocol::Report report = MakeReport(waiting, index);
-    const int urgency = catalogue_.Get(report.class_name).urgency;
-    const double hold_until_s = steady_s + HoldS(urgency);
-    try {
-      if (map_.Add(report, UtcNs(hold_until_s)) == LocalHazardMap::AddResult::kFull) {
-        ++counters_.refused_map_full;
-        continue;
-      }
-      store_error_.clear();
-    } catch (const StoreError& error) {
-      TellStoreError(error);  // Not known either: the next sight of it tries again.
+    protocol::Report report = MakeReport(waiting, index);
+    const bool is_urgent = catalogue_.Get(report.class_name).urgency <= 1;
+    if (config_.settle_wait_s > 0 && !is_urgent && candidate.pass != 0) {
+      settling_.push_back({std::move(report), candidate.pass, now_s, steady_s});
       continue;
     }
-    ++counters_.reports_created;
-    if (report.image.empty()) ++counters_.reports_without_picture;
-    schedule_.Add(report.uuid, urgency, report.stamp_ns, steady_s, hold_until_s);
+    TakeBestPlace(candidate.pass, report);
+    AddReport(report, candidate.pass, steady_s);
   }
+}
+
+/// A report that waits for further sights is of the same hazard.
+bool HazardReporter::IsSettling(const PlacedSighting& candidate) const {
+  const std::string& name = candidate.sighting.class_name;
+  const double radius_m = catalogue_.Get(name).duplicate_radius_m;
+  return std::any_of(settling_.begin(), settling_.end(), [&](const Settling& other) {
+    if (other.pass == candidate.pass) return true;
+    const auto place = passes_.Place(other.pass);
+    const geo::GeoPoint& there = place ? place->place.position : other.report.position;
+    return other.report.class_name == name &&
+           geo::GeodesicDistanceM(there, candidate.place.position) <= radius_m;
+  });
+}
+
+/// A bag's clock may stand still after its end: the steady clock counts, too.
+bool HazardReporter::IsSettled(Settling& settling, double now_s, double steady_s) const {
+  settling.since_s = std::min(settling.since_s, now_s);  // A clock that was set back.
+  if (now_s - settling.since_s >= config_.settle_wait_s ||
+      steady_s - settling.since_steady_s >= 2 * config_.settle_wait_s) {
+    return true;
+  }
+  const auto place = passes_.Place(settling.pass);
+  return !place || placement::LargestSigmaM(place->seen_from_vehicle_m2) <= config_.settle_sigma_m;
+}
+
+/// Reports what has had its further sights.
+void HazardReporter::ReportSettled(double now_s, double steady_s) {
+  std::vector<Settling> settled;
+  for (auto settling = settling_.begin(); settling != settling_.end();) {
+    if (!IsSettled(*settling, now_s, steady_s)) {
+      ++settling;
+      continue;
+    }
+    settled.push_back(std::move(*settling));
+    settling = settling_.erase(settling);
+  }
+  for (Settling& each : settled) {
+    TakeBestPlace(each.pass, each.report);
+    AddReport(each.report, each.pass, steady_s);
+  }
+}
+
+/// The place by all sights of the pass, as long as it is remembered.
+void HazardReporter::TakeBestPlace(PassSights::Id pass, protocol::Report& report) {
+  const auto all = passes_.Place(pass);
+  if (!all) return;
+  report.position = all->place.position;
+  report.covariance_m2 = all->place.covariance_m2;
+  counters_.sights_used += all->sights;
+}
+
+void HazardReporter::AddReport(const protocol::Report& report, PassSights::Id pass,
+                               double steady_s) {
+  const int urgency = catalogue_.Get(report.class_name).urgency;
+  const double hold_until_s = steady_s + HoldS(urgency);
+  try {
+    switch (map_.Add(report, UtcNs(hold_until_s))) {
+      case LocalHazardMap::AddResult::kAdded:
+        break;
+      case LocalHazardMap::AddResult::kDuplicate:
+        ++counters_.duplicates_suppressed;
+        return;
+      case LocalHazardMap::AddResult::kFull:
+        ++counters_.refused_map_full;
+        return;
+    }
+    store_error_.clear();
+  } catch (const StoreError& error) {
+    TellStoreError(error);  // Not known either: the next sight of it tries again.
+    return;
+  }
+  passes_.MarkKnown(pass);
+  ++counters_.reports_created;
+  if (report.image.empty()) ++counters_.reports_without_picture;
+  schedule_.Add(report.uuid, urgency, report.stamp_ns, steady_s, hold_until_s);
 }
 
 std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size_t limit) {

@@ -23,6 +23,7 @@
 #include "vehicle/pictures/picture_order.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 #include "vehicle/reporting/local_hazard_map.h"
+#include "vehicle/reporting/pass_sights.h"
 
 namespace livemap::vehicle {
 
@@ -44,6 +45,9 @@ enum class LinkCost { kUnknown, kCheap, kMetered, kNone };
 ///
 /// The reporter holds images as the camera saw them, and never puts one into a report: it orders
 /// the pictures (TakePictureOrders), and takes what may leave the vehicle (AddPictures).
+///
+/// A report's place is that of all sights of the pass so far (PassSights). An urgent hazard is
+/// reported at its first sight near enough; the others wait shortly for nearer sights.
 class HazardReporter {
  public:
   struct Config {
@@ -78,6 +82,13 @@ class HazardReporter {
     double depth_wait_s = 0.3;
     placement::DepthNoise depth;
     int depth_images = 60;  ///< So many are kept: detections come late, events later.
+    /// A report that is not urgent (rank 2 or 3) waits at most this long for further sights of its
+    /// hazard, s: by the clock of the stamps, and by the steady one twice as long; 0: not at all.
+    double settle_wait_s = 1.5;
+    /// It waits no longer than until its place, seen from the vehicle, is known this well: standard
+    /// deviation along the worst axis, m.
+    double settle_sigma_m = 0.2;
+    PassSights::Config passes;
     imaging::CropConfig picture;
     /// How long a report of each rank of urgency may wait for a cheap link, s; rank 1 first. Below
     /// the age at which the zone refuses reports.
@@ -129,6 +140,7 @@ class HazardReporter {
     std::uint64_t placed_by_fusion = 0;
     std::uint64_t placed_by_fixes = 0;
     std::uint64_t distances_by_depth = 0;  ///< Sightings; the others' are by the road's plane.
+    std::uint64_t sights_used = 0;         ///< Of all reports together: their places are of these.
   };
 
   /// `random` makes uuids and jitter; `now_ns` (UTC) names a corrupt database's new name.
@@ -185,6 +197,8 @@ class HazardReporter {
   const LocalHazardMap& map() const { return map_; }
   const Counters& counters() const { return counters_; }
   std::size_t waiting_frames() const { return waiting_.size(); }
+  /// Reports that wait for further sights of their hazards.
+  std::size_t settling_reports() const { return settling_.size(); }
   LinkCost link() const { return link_; }
   /// Reports that wait for a cheap link.
   std::size_t HeldReports(double steady_s) const {
@@ -199,6 +213,14 @@ class HazardReporter {
     placement::PlacedHazard place;
     Eigen::Vector3d earth_m;         // geo::EarthCentred of the place.
     std::optional<std::size_t> cut;  // Of the order; none where it was known already.
+    PassSights::Id pass = 0;
+  };
+  /// A report that waits for further sights of its hazard.
+  struct Settling {
+    protocol::Report report;
+    PassSights::Id pass = 0;
+    double since_s = 0;
+    double since_steady_s = 0;
   };
   struct WaitingFrame {
     placement::SightingFrame frame;
@@ -224,11 +246,17 @@ class HazardReporter {
   bool Place(WaitingFrame& waiting, double waited_s);
   bool WaitsForDepth(const WaitingFrame& waiting, double waited_s) const;
   void PlaceSightings(WaitingFrame& waiting, const geo::TrackPose& base, bool fused);
-  std::optional<geo::GroundPoint> PlaceOnRoad(const placement::SightingFrame& frame,
-                                              const placement::Sighting& sighting,
-                                              double heading_variance_rad2);
+  std::optional<placement::HazardSight> SightOnRoad(const placement::SightingFrame& frame,
+                                                    const placement::Sighting& sighting,
+                                                    const geo::TrackPose& base, bool fused);
+  bool IsWorthASight(const placement::HazardSight& sight) const;
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
-  void ReportCandidates(WaitingFrame& waiting, double steady_s);
+  void ReportCandidates(WaitingFrame& waiting, double now_s, double steady_s);
+  bool IsSettling(const PlacedSighting& candidate) const;
+  bool IsSettled(Settling& settling, double now_s, double steady_s) const;
+  void ReportSettled(double now_s, double steady_s);
+  void TakeBestPlace(PassSights::Id pass, protocol::Report& report);
+  void AddReport(const protocol::Report& report, PassSights::Id pass, double steady_s);
   protocol::Report MakeReport(WaitingFrame& waiting, std::size_t index);
   void AttachPicture(WaitingFrame& waiting, std::size_t index, protocol::Report& report);
   double HoldS(int urgency) const;
@@ -247,6 +275,8 @@ class HazardReporter {
   std::optional<geo::CameraIntrinsics> intrinsics_;
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<WaitingFrame> waiting_;
+  PassSights passes_;
+  std::vector<Settling> settling_;                        // In the order of their sights.
   std::map<std::int64_t, placement::DepthImage> depths_;  // By stamp.
   std::vector<PictureOrder> picture_orders_;
   std::uint64_t last_order_ = 0;

@@ -68,6 +68,7 @@ class HazardReporterTest : public ::testing::Test {
     config_.drive_id = "drive-1";
     config_.map.path = directory_.path() + "/local.sqlite3";
     config_.max_ground_sigma_m = 100;  // Only where a test is about it.
+    config_.settle_wait_s = 0;         // Likewise.
     Restart();
   }
 

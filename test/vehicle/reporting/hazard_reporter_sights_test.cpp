@@ -1,0 +1,135 @@
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "test/vehicle/reporting/driving_reporter.h"
+
+namespace livemap::vehicle {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+/// A vehicle whose receiver is off by the same way all the time, whose heading is off, too, and
+/// whose reporter waits for further sights.
+class ReporterSightsTest : public HazardReporterTest {
+ protected:
+  ReporterSightsTest() {
+    config_.position_source = PositionSource::kFused;
+    config_.max_ground_sigma_m = 1.0;
+    config_.settle_wait_s = 1.5;
+    Restart();
+  }
+
+  void DriveTo(double time_s) {
+    for (; driven_s_ <= time_s + 1e-9; driven_s_ += 0.1) {
+      geo::TrackPose pose;
+      pose.position = geo::LocalFrame(VehicleAt(driven_s_)).ToGeo({0.5, -0.3});
+      pose.covariance_m2 = Eigen::Matrix2d::Identity();
+      pose.course_rad = kBearingRad + 0.05;
+      pose.course_variance_rad2 = 0.03 * 0.03;
+      pose.speed_mps = kSpeedMps;
+      reporter_->AddPose(StampNs(driven_s_), pose);
+    }
+  }
+
+  /// A hazard that lies so far ahead and left of where the vehicle is at 3 s.
+  void SeeAt(double time_s, const char* name, double forward_m, double left_m) {
+    DriveTo(time_s);
+    const double ahead_m = forward_m - kSpeedMps * (time_s - 3);
+    See(time_s, {{name, 0.8F, BoxAt(ahead_m, left_m)}});
+  }
+
+  static geo::GeoPoint PlaceAt(double forward_m, double left_m) {
+    const geo::GeoPoint ahead = geo::GeodesicDestination(VehicleAt(3), kBearingRad, forward_m);
+    return geo::GeodesicDestination(ahead, kBearingRad - M_PI / 2, left_m);
+  }
+
+  double driven_s_ = 2.5;
+};
+
+TEST_F(ReporterSightsTest, AHazardThatCanWaitIsReportedOnceByAllItsSights) {
+  // 24 m ahead it is too far away to be reported; that sight counts all the same.
+  for (double time_s = 3; time_s < 4.15; time_s += 0.1) SeeAt(time_s, "pothole", 24, 1);
+  ProcessWithPictures(5.5);
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  EXPECT_GT(counters().sights_used, 6u);
+  EXPECT_GT(counters().too_far, 2u);
+  // Of the heading's error, which is 1 m at 20 m, little is left; the receiver's stays.
+  const geo::GeoPoint as_located = geo::LocalFrame(PlaceAt(24, 1)).ToGeo({0.5, -0.3});
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position, as_located), 0.35);
+  EXPECT_GT(reports[0].covariance_m2.trace(), 1.99);
+  EXPECT_LT(reports[0].covariance_m2.trace(), 2.3);
+  EXPECT_FALSE(reports[0].image.empty());
+}
+
+TEST_F(ReporterSightsTest, WhatIsUrgentIsReportedAtItsFirstSightNearEnough) {
+  catalogue_ = protocol::HazardCatalogue::Parse("classes:\n  deer:\n    urgency: 1\n", "test");
+  Restart();
+  SeeAt(3.0, "deer", 12, 0);
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+  EXPECT_EQ(reporter_->settling_reports(), 0u);
+}
+
+TEST_F(ReporterSightsTest, AReportWaitsNoLongerThanItMay) {
+  SeeAt(3.0, "pothole", 12, 0);
+  EXPECT_EQ(reporter_->settling_reports(), 1u);
+  EXPECT_EQ(counters().reports_created, 0u);
+  ProcessWithPictures(3.0 + config_.settle_wait_s - 0.01);
+  EXPECT_THAT(TakeDue(), IsEmpty());
+  ProcessWithPictures(3.0 + config_.settle_wait_s + 0.01);
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
+TEST_F(ReporterSightsTest, AClockThatStandsStillHoldsNoReport) {
+  SeeAt(3.0, "pothole", 12, 0);
+  steady_s_ += 2 * config_.settle_wait_s + 0.01;
+  ProcessWithPictures(3.0);
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
+TEST_F(ReporterSightsTest, ASurePlaceDoesNotWait) {
+  config_.settle_sigma_m = 0.5;
+  Restart();
+  SeeAt(3.0, "pothole", 5.5, 0);
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
+TEST_F(ReporterSightsTest, WhatWaitsForSightsAtTheEndIsReported) {
+  SeeAt(3.0, "pothole", 12, 0);
+  reporter_->Finish(steady_s_);
+  EXPECT_EQ(counters().reports_created, 1u);
+  EXPECT_EQ(reporter_->settling_reports(), 0u);
+}
+
+TEST_F(ReporterSightsTest, WhileAReportWaitsNoOtherPictureOfItIsOrdered) {
+  SeeAt(3.0, "pothole", 12, 0);
+  SeeAt(3.2, "pothole", 12, 0);
+  EXPECT_EQ(counters().pictures_requested, 1u);
+  EXPECT_EQ(counters().duplicates_suppressed, 1u);
+  ProcessWithPictures(5);
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+}
+
+TEST_F(ReporterSightsTest, AHazardWhosePlaceMovesIsNotReportedAgain) {
+  // By headings that are far off and say so, one hazard seems to stand in two places 7 m apart.
+  config_.settle_wait_s = 0;
+  config_.max_ground_sigma_m = 10;
+  Restart();
+  for (const double time_s : {3.0, 3.5}) {
+    geo::TrackPose pose;
+    pose.position = VehicleAt(time_s);
+    pose.covariance_m2 = Eigen::Matrix2d::Identity() * 0.5;
+    pose.course_rad = kBearingRad + (time_s < 3.2 ? 0.3 : -0.3);
+    pose.course_variance_rad2 = 0.3 * 0.3;
+    pose.speed_mps = kSpeedMps;
+    reporter_->AddPose(StampNs(time_s), pose);
+    See(time_s, {{"pothole", 0.8F, BoxAt(18 - kSpeedMps * (time_s - 3), 0)}});
+  }
+  EXPECT_THAT(TakeDue(), SizeIs(1));
+  EXPECT_EQ(counters().duplicates_suppressed, 1u);
+}
+
+}  // namespace
+}  // namespace livemap::vehicle
