@@ -23,7 +23,7 @@ COUNTS = {
     "camera_ingest": ("frames_in", "frames_published", "frames_dropped", "frames_bad"),
     "hazard_detection": ("frames_in", "frames_processed", "frames_dropped", "frames_in_one_view", "detections"),
     "hazard_reporting": ("detections", "reports_created", "committed", "refused", "pending",
-                         "duplicates_suppressed", "waiting_frames"),
+                         "duplicates_suppressed", "waiting_frames", "settling_reports"),
     "mqtt_bridge": ("uplink_bytes",),
 }
 # Only small vehicles have this one.
@@ -189,6 +189,7 @@ class VehicleObserver:
                 "refused": self._count("hazard_reporting", "refused"),
                 "pending": self._count("hazard_reporting", "pending"),
                 "frames_waiting": self._count("hazard_reporting", "waiting_frames"),
+                "reports_settling": self._count("hazard_reporting", "settling_reports"),
                 "uplink_bytes": self._count("mqtt_bridge", "uplink_bytes"),
             }
 
@@ -203,7 +204,7 @@ class VehicleObserver:
             detected = self.clock_s() > drive.start_s + drive.duration_s + 1.0
         return (counts["frames_in"] >= drive.frames and detected
                 and counts["committed"] + counts["refused"] >= counts["reports_created"]
-                and counts["frames_waiting"] == 0 and counts["pending"] == 0)
+                and counts["frames_waiting"] == 0 and counts["reports_settling"] == 0 and counts["pending"] == 0)
 
 
 def wait_for_master(uri, timeout_s=30):

@@ -159,26 +159,26 @@ void HazardSights::DropLeastCertain() {
   sights_.erase(worst);
 }
 
-/// That of the sight whose position is known best. What another sight's pose states above it, that
-/// sight has for itself: weights stay positive.
+/// What another sight's pose states above it, that sight has for itself: weights stay positive.
 HazardSights::SharedPose HazardSights::FindSharedPose() const {
-  const auto best =
-      std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
-        return LastingPosition(a.sight).trace() < LastingPosition(b.sight).trace();
-      });
-  const auto steadiest =
-      std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
-        return LastingHeading(a.sight) < LastingHeading(b.sight);
-      });
+  const auto spread_m2 = [](const Kept& kept) {
+    return LastingPosition(kept.sight).trace() +
+           LastingHeading(kept.sight) * kept.sight.foot.position_m.squaredNorm();
+  };
+  const Kept& best =
+      *std::min_element(sights_.begin(), sights_.end(),
+                        [&](const Kept& a, const Kept& b) { return spread_m2(a) < spread_m2(b); });
   SharedPose shared;
-  shared.position_m2 = LastingPosition(best->sight);
-  shared.heading_rad2 = LastingHeading(steadiest->sight);
+  shared.position_m2 = LastingPosition(best.sight);
+  shared.heading_rad2 = LastingHeading(best.sight);
+  shared.base_m = best.base_m;
+  shared.way_m = best.way_m;
   Eigen::Matrix3d joint = Eigen::Matrix3d::Zero();
   joint.topLeftCorner<2, 2>() = shared.position_m2;
   joint(2, 2) = shared.heading_rad2;
-  if (best->sight.own_heading_share == 0) {
-    joint.topRightCorner<2, 1>() = best->sight.base.position_course;
-    joint.bottomLeftCorner<1, 2>() = best->sight.base.position_course.transpose();
+  if (best.sight.own_heading_share == 0) {
+    joint.topRightCorner<2, 1>() = best.sight.base.position_course;
+    joint.bottomLeftCorner<1, 2>() = best.sight.base.position_course.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(joint);
   shared.root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
@@ -203,10 +203,12 @@ HazardSights::Linear HazardSights::Linearise(const Kept& kept, const SharedPose&
                                              const Unknowns& at) const {
   const HazardSight& sight = kept.sight;
   const Eigen::Matrix2d rotation = SightRotation(sight.base.course_rad);
-  const Eigen::Vector3d pose_error = shared.root * at.segment<3>(kPose);
-  const Eigen::Vector2d seen_m = at.head<2>() + pose_error.head<2>() - kept.base_m;
+  Eigen::Matrix<double, 2, 3> pose_rows = shared.root.topRows<2>();
+  pose_rows += SightSwing(at.head<2>() - shared.base_m) * shared.root.bottomRows<1>();
+  // As the poses have it, with what they share.
+  const Eigen::Vector2d seen_m = at.head<2>() + pose_rows * at.segment<3>(kPose) - kept.base_m;
   const Eigen::Vector2d swing_m = SightSwing(seen_m);
-  const Eigen::Vector2d expected_m = rotation.transpose() * (seen_m + swing_m * pose_error.z());
+  const Eigen::Vector2d expected_m = rotation.transpose() * seen_m;
   const SightFoot foot =
       sight.depth_sigma_share ? FootByDepth(sight) : FootByPlane(sight, expected_m);
 
@@ -215,14 +217,16 @@ HazardSights::Linear HazardSights::Linearise(const Kept& kept, const SharedPose&
   Linear linear;
   linear.place_m = kept.base_m + rotation * foot.foot_m;
   linear.rows.leftCols<2>().setIdentity();
-  linear.rows.middleCols<3>(kPose) =
-      shared.root.topRows<2>() + swing_m * shared.root.bottomRows<1>();
+  linear.rows.middleCols<3>(kPose) = pose_rows;
   linear.rows.col(kPitch) = rotation * foot.pitch_m * std::sqrt(lasting);
   linear.rows.col(kHeight) = rotation * foot.height_m;
   linear.rows.col(kDepth) = rotation * foot.depth_m;
-  const double way_sigma_m = config_.way_sigma_share * (sights_.back().way_m - kept.way_m);
+  const double way_m = shared.way_m - kept.way_m;
+  const double way_sigma_m = config_.way_sigma_share * way_m;
+  const double turn_sigma_rad = config_.heading_sigma_rad_per_m * way_m;
   const double own_heading = std::max(0.0, LastingHeading(sight) - shared.heading_rad2) +
-                             gain * sight.base.course_variance_rad2 * sight.own_heading_share;
+                             gain * sight.base.course_variance_rad2 * sight.own_heading_share +
+                             turn_sigma_rad * turn_sigma_rad;
   const Eigen::Matrix2d of_camera =
       foot.pixel_m2 + (1 - lasting) * foot.pitch_m * foot.pitch_m.transpose();
   linear.own_m2 = rotation * of_camera * rotation.transpose() +
@@ -279,6 +283,7 @@ void HazardSights::Solve() {
 }
 
 void HazardSights::KeepPlace(double scatter) {
+  // The place with the error of position, but not that of the heading.
   Eigen::Matrix<double, 2, 5> seen;
   seen << Eigen::Matrix2d::Identity(), shared_.root.topRows<2>();
   SightsPlace place;

@@ -60,7 +60,9 @@ class HazardSights {
     /// Sights so far apart have errors of their own; nearer ones count in proportion, m.
     double independent_way_m = 1.0;
     /// Error of the vehicle's way between two sights, standard deviation, share of the way.
-    double way_sigma_share = 0.02;
+    double way_sigma_share = 0.03;
+    /// How much the error of the heading changes on the way, standard deviation, rad/m.
+    double heading_sigma_rad_per_m = 0.0005;
     /// Share of the pitch's variance that is the same in all sights: the mounting's, not the
     /// suspension's.
     double lasting_pitch_share = 0.5;
@@ -99,11 +101,14 @@ class HazardSights {
     Eigen::Matrix<double, 2, kUnknowns> rows;
     Eigen::Matrix2d own_m2;
   };
-  /// Error of the pose that all sights share.
+  /// Error of the poses that all sights share: that of the pose which places the hazard best. A
+  /// wrong heading turns the way of the other poses about that one, and so moves all sights alike.
   struct SharedPose {
-    Eigen::Matrix2d position_m2;
+    Eigen::Matrix2d position_m2 = Eigen::Matrix2d::Zero();
     double heading_rad2 = 0;
-    Eigen::Matrix3d root;  // Of the covariance of position and heading.
+    Eigen::Matrix3d root = Eigen::Matrix3d::Zero();  // Of their covariance.
+    Eigen::Vector2d base_m = Eigen::Vector2d::Zero();
+    double way_m = 0;
   };
 
   Kept ToKept(const HazardSight& sight) const;

@@ -115,7 +115,8 @@ class LocalizedVehicleTest(unittest.TestCase):
         self.check_hazards(vehicle)
 
     def check_hazards(self, vehicle):
-        eventually(lambda: int(vehicle.diagnostics().get("waiting_frames", 1)) == 0, "all frames are placed")
+        eventually(lambda: int(vehicle.diagnostics().get("waiting_frames", 1)) == 0
+                   and int(vehicle.diagnostics().get("settling_reports", 1)) == 0, "all hazards are placed")
         counters = {key: int(value) for key, value in vehicle.diagnostics().items() if value.isdigit()}
         self.assertGreater(counters["placed_by_fusion"], 10)
         self.assertGreater(counters["distances_by_depth"], 10)

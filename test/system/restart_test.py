@@ -83,7 +83,8 @@ class Drive:
         # Two seconds beyond the end the diagnostics know of the last frames: which wait for their pictures.
         end_s = self.drive.start_s + self.drive.duration_s
         eventually(lambda: self.vehicle.clock_s() > end_s + 2, "the clock goes on beyond the end")
-        eventually(lambda: self.vehicle.counts()["frames_waiting"] == 0, "every frame is reported")
+        eventually(lambda: self.vehicle.counts()["frames_waiting"] == self.vehicle.counts()["reports_settling"] == 0,
+                   "every frame is reported")
         eventually(lambda: self.vehicle.counts()["pending"] == 0, "every report is committed")
         return self.map.stored_hazards()
 
@@ -130,7 +131,8 @@ class RestartTest(unittest.TestCase):
         drive.play_until(0.6)
         drive.pause()
         # A frame that waits for its picture is no report yet, and dies with the process.
-        eventually(lambda: drive.vehicle.counts()["frames_waiting"] == 0, "every frame is reported")
+        eventually(lambda: drive.vehicle.counts()["frames_waiting"] == drive.vehicle.counts()["reports_settling"] == 0,
+                   "every frame is reported")
         self.assertGreater(drive.vehicle.counts()["pending"], 0, "reports wait in the store")
         manager = rosgraph.Master("/restart_test").lookupNode("/vehicle_manager")
         os.kill(xmlrpc.client.ServerProxy(manager).getPid("/restart_test")[2], signal.SIGKILL)

@@ -70,6 +70,16 @@ void ReadReportingSightings(ParameterReader& parameters, HazardReportingConfig& 
       "height. A smaller value gives fewer false hazards, but the vehicle may pass a hazard that "
       "comes near just after a restart before the course is known.",
       "m");
+  parameters.Read(
+      "settle_wait_s", reporter.settle_wait_s, {0, 60},
+      "Longest time that a report waits for further sights of its hazard, which make its place "
+      "surer. Urgent classes (rank 1) do not wait. 0: none waits.",
+      "s");
+  parameters.Read(
+      "settle_sigma_m", reporter.settle_sigma_m, {0, 1000},
+      "A report waits no longer than until its place is this certain, seen from the vehicle "
+      "(standard deviation of the worst axis).",
+      "m");
   parameters.Read("max_wait_s", reporter.max_wait_s, {0, 600},
                   "Longest time that a frame waits for fix, course and camera.", "s");
   parameters.Read("bracket_wait_s", reporter.bracket_wait_s, {0, 60},

@@ -151,6 +151,8 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("placed_by_fusion", counters.placed_by_fusion);
   status.add("placed_by_fixes", counters.placed_by_fixes);
   status.add("distances_by_depth", counters.distances_by_depth);
+  status.add("sights_used", counters.sights_used);
+  status.add("settling_reports", reporter.settling_reports());
 }
 
 void DescribePollResponder(const vehicle::PollResponder& responder,

@@ -135,9 +135,13 @@ void HazardRegistry::Merge(Slot slot, const protocol::Report& report, const Pict
   HazardRecord& record = records_[slot];
   HazardEstimate& estimate = record.estimate;
   const bool newest = report.stamp_ns >= estimate.last_seen_ns;
-  if (says == SightingSays::kWhere) {
+  if (says == SightingSays::kWhere || says == SightingSays::kSurer) {
     const geo::GeoPoint from = estimate.position;
-    Fuse(estimate, report, rule_);
+    if (says == SightingSays::kWhere) {
+      Fuse(estimate, report, rule_);
+    } else {
+      TakePlace(estimate, report, rule_);
+    }
     classes_[record.hazard_class].grid.Move(from, estimate.position, slot);
   } else {
     ++estimate.sightings;

@@ -32,7 +32,8 @@ struct PictureName {
 enum class SightingSays {
   kNothing,  ///< No more than that there was one.
   kWhen,     ///< When it was seen, and the picture.
-  kWhere     ///< That, its position and its confidence.
+  kSurer,    ///< That, and its position in place of the hazard's.
+  kWhere     ///< When it was seen, the picture; its position and confidence join the others'.
 };
 
 /// All hazards of the zone in memory: which known hazard a report belongs to, and what changed
@@ -74,6 +75,10 @@ class HazardRegistry {
   /// image's picture stays.
   void Merge(Slot slot, const protocol::Report& report, const PictureName& picture,
              std::uint64_t sequence, std::int64_t now_ns, SightingSays says = SightingSays::kWhere);
+  /// Whether a further report of the vehicle of all sightings is to be merged with kSurer.
+  bool IsSurer(Slot slot, const protocol::Report& report) const {
+    return zone::IsSurer(records_[slot].estimate, report, rule_);
+  }
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
   void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);

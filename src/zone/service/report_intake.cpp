@@ -211,7 +211,7 @@ void ReportIntake::Sight(Slot slot, const protocol::Report& report, const Pictur
   const LifecycleUpdate step =
       steps_.lifecycle().Apply(steps_.ClassOf(slot), evidence, now_ns, life);
   state_.hazards.Merge(slot, report, picture, sequence, now_ns,
-                       WhatItSays(evidence, step.counted, earlier));
+                       WhatItSays(slot, report, evidence, step.counted, earlier));
   steps_.Keep(slot, life, step, transaction);
   transaction.RecordHazardEvent(slot, before,
                                 step.transition ? step.transition->reason : "sighting", true);
@@ -219,17 +219,27 @@ void ReportIntake::Sight(Slot slot, const protocol::Report& report, const Pictur
 
 /// What is no evidence moves nothing; nor does what an official has rejected move. A vehicle's
 /// further sightings of a hazard share its errors, and each could pull the hazard a little further:
-/// only its first one says where the hazard is.
-SightingSays ReportIntake::WhatItSays(const Evidence& evidence, bool counted,
+/// only its first one joins the others'. While nobody else has spoken, a much surer one takes the
+/// place of that.
+SightingSays ReportIntake::WhatItSays(Slot slot, const protocol::Report& report,
+                                      const Evidence& evidence, bool counted,
                                       const PresenceRecord& earlier) const {
   const bool is_believed = evidence.malicious < config_.life.suspect_above;
   if (!counted || !is_believed || earlier.state == HazardState::kRejected) {
     return SightingSays::kNothing;
   }
-  const bool has_spoken =
-      std::any_of(earlier.voices.begin(), earlier.voices.end(),
-                  [&](const VehicleEvidence& one) { return one.vehicle == evidence.vehicle; });
-  return has_spoken ? SightingSays::kWhen : SightingSays::kWhere;
+  const auto is_of_vehicle = [&](const VehicleEvidence& one) {
+    return one.vehicle == evidence.vehicle;
+  };
+  const auto is_of_another = [&](const VehicleEvidence& one) {
+    return one.vehicle != 0 && !is_of_vehicle(one);
+  };
+  const auto& voices = earlier.voices;
+  if (std::none_of(voices.begin(), voices.end(), is_of_vehicle)) return SightingSays::kWhere;
+  const bool is_alone = std::none_of(voices.begin(), voices.end(), is_of_another);
+  return is_alone && !earlier.official && state_.hazards.IsSurer(slot, report)
+             ? SightingSays::kSurer
+             : SightingSays::kWhen;
 }
 
 }  // namespace livemap::zone

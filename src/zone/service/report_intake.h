@@ -75,8 +75,8 @@ class ReportIntake {
                 ZoneTransaction& transaction);
   void Sight(Slot slot, const protocol::Report& report, const PictureName& picture,
              ZoneTransaction& transaction);
-  SightingSays WhatItSays(const Evidence& evidence, bool counted,
-                          const PresenceRecord& earlier) const;
+  SightingSays WhatItSays(Slot slot, const protocol::Report& report, const Evidence& evidence,
+                          bool counted, const PresenceRecord& earlier) const;
 
   const ZoneConfig& config_;
   ZoneState& state_;

@@ -68,11 +68,14 @@ TEST_F(RegistryTest, MergingFusesPositionsByInverseCovariance) {
   sighting.covariance_m2 << 1.0, -0.3, -0.3, 3.0;
   registry_.Merge(slot, sighting, {}, ++sequence_, kNowNs);
 
-  const Eigen::Matrix2d information =
-      report.covariance_m2.inverse() + sighting.covariance_m2.inverse();
-  const Eigen::Matrix2d covariance = information.inverse();
+  // Of what they do not have in common.
+  const Eigen::Matrix2d common = FusionRule().common_share * sighting.covariance_m2;
+  const Eigen::Matrix2d own_information =
+      (report.covariance_m2 - common).inverse() + (sighting.covariance_m2 - common).inverse();
+  const Eigen::Matrix2d covariance = common + own_information.inverse();
   const Eigen::Vector2d expected =
-      covariance * (sighting.covariance_m2.inverse() * Eigen::Vector2d(1.5, -2.0));
+      own_information.inverse() *
+      ((sighting.covariance_m2 - common).inverse() * Eigen::Vector2d(1.5, -2.0));
   const Hazard hazard = registry_.Get(slot);
   EXPECT_LT((frame.ToEnu(hazard.position) - expected).norm(), 1e-5);
   EXPECT_LT((hazard.covariance_m2 - covariance).norm(), 1e-9);

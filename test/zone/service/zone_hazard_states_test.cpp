@@ -198,6 +198,44 @@ TEST_F(ZoneLifeTest, OneVehicleCannotPullAHazardAwayStepByStep) {
   EXPECT_EQ(Zone().Find(hazard)->last_seen_ns, now_ns_ - 1) << "that it was seen counts";
 }
 
+TEST_F(ZoneLifeTest, WhileAVehicleIsAloneItsSurestSightingSaysWhereTheHazardIs) {
+  const auto report_at = [&](const char* vehicle, double east_m, double variance_m2) {
+    now_ns_ += 1'000'000'000;
+    protocol::Report report = MakeReport(geo::LocalFrame(kPlace).ToGeo({east_m, 0}));
+    report.vehicle_id = vehicle;
+    report.stamp_ns = now_ns_ - 1;
+    report.covariance_m2 = Eigen::Matrix2d::Identity() * variance_m2;
+    return Zone().Handle(report).hazard_uuid;
+  };
+  const auto east_m = [&](const Uuid& id) {
+    return geo::LocalFrame(kPlace).ToEnu(Zone().Find(id)->position).x();
+  };
+  const Uuid hazard = report_at("car-1", 0, 4.0);
+  // As sure as before: they share the receiver's error, and do not average.
+  EXPECT_EQ(report_at("car-1", 2, 4.0), hazard);
+  EXPECT_NEAR(east_m(hazard), 0, 1e-6);
+  EXPECT_NEAR(Zone().Find(hazard)->covariance_m2(0, 0), 4.0, 1e-6);
+  EXPECT_EQ(report_at("car-1", 2, 1.0), hazard);
+  EXPECT_NEAR(east_m(hazard), 2, 1e-6);
+  EXPECT_NEAR(Zone().Find(hazard)->covariance_m2(0, 0), 1.0, 1e-6);
+  // Surer, but nowhere near what was stated before.
+  EXPECT_EQ(report_at("car-1", 6, 0.2), hazard);
+  EXPECT_NEAR(east_m(hazard), 2, 1e-6);
+  // Another vehicle's joins it; from then on the first one moves it no more.
+  EXPECT_EQ(report_at("car-2", 3, 1.0), hazard);
+  EXPECT_NEAR(east_m(hazard), 2.5, 1e-6);
+  EXPECT_LT(Zone().Find(hazard)->covariance_m2(0, 0), 0.6);
+  EXPECT_EQ(report_at("car-1", 2, 0.1), hazard);
+  EXPECT_NEAR(east_m(hazard), 2.5, 1e-6);
+}
+
+TEST_F(ZoneLifeTest, AVehicleThatIsAlonePullsItsHazardNoFurtherThanItsFirstWordAllows) {
+  const Uuid hazard = ReportBy("car-9");
+  const geo::GeoPoint first = Zone().Find(hazard)->position;
+  for (int i = 0; i < 40; ++i) Pull(hazard, "car-9");
+  EXPECT_LE(geo::GeodesicDistanceM(Zone().Find(hazard)->position, first), 10.0);
+}
+
 TEST_F(ZoneLifeTest, ASightingBeyondTheVehiclesAllowanceMovesNothing) {
   ZoneService::Config config = Config();
   config.allowance.evidence_per_hour = 1;
