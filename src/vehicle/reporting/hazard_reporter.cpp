@@ -348,8 +348,11 @@ std::optional<placement::HazardSight> HazardReporter::SightOnRoad(
   return sight;
 }
 
+/// A heading that is hardly known makes none, whatever it comes from: it would put one thing in
+/// several places.
 bool HazardReporter::IsWorthASight(const placement::HazardSight& sight) const {
-  return placement::IsNearEnough(sight.foot, 0.0, kSightReach * config_.max_range_m,
+  return placement::IsNearEnough(sight.foot, sight.base.course_variance_rad2,
+                                 kSightReach * config_.max_range_m,
                                  kSightReach * config_.max_ground_sigma_m);
 }
 

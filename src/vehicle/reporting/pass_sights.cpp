@@ -1,11 +1,20 @@
 #include "vehicle/reporting/pass_sights.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 
 #include "common/time.h"
 #include "placement/hazard_placement.h"
 
 namespace livemap::vehicle {
+namespace {
+
+// What noise of a box makes of a distance from image to image.
+constexpr double kMostFurther = 1.25;
+constexpr double kMostFurtherM = 1.0;
+
+}  // namespace
 
 std::vector<PassSights::Id> PassSights::Add(const std::vector<Seen>& image) {
   std::vector<Id> hazards(image.size(), 0);
@@ -29,6 +38,7 @@ std::vector<PassSights::Id> PassSights::Add(const std::vector<Seen>& image) {
     Passing& passing = passing_.at(hazards[i]);
     // One that tells nothing new is a sight of the hazard all the same.
     passing.sights.Add(image[i].sight);
+    passing.range_m = image[i].sight.foot.position_m.norm();
     passing.seen_ns = std::max(passing.seen_ns, image[i].sight.stamp_ns);
   }
   return hazards;
@@ -38,12 +48,14 @@ std::vector<PassSights::Pair> PassSights::PossiblePairs(const std::vector<Seen>&
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < image.size(); ++i) {
     const placement::HazardSight& sight = image[i].sight;
-    const double reach_m =
-        config_.gate_radii * catalogue_.Get(image[i].class_name).duplicate_radius_m;
+    const bool is_lone = IsLone(image[i], image);
+    const double gate = is_lone ? config_.lone_gate : config_.gate;
+    const double reach_m = (is_lone ? config_.lone_radii : config_.gate_radii) *
+                           catalogue_.Get(image[i].class_name).duplicate_radius_m;
     for (const auto& [id, passing] : passing_) {
       if (passing.class_name != image[i].class_name) continue;
       const std::optional<double> distance2 = passing.sights.Distance2(sight);
-      if (!distance2 || *distance2 > config_.gate) continue;
+      if (!distance2 || *distance2 > gate) continue;
       const placement::PlacedHazard alone =
           placement::PlaceHazard(sight.base, Eigen::Vector2d::Zero(), sight.foot);
       const geo::GeoPoint place = passing.sights.Place()->place.position;
@@ -55,9 +67,27 @@ std::vector<PassSights::Pair> PassSights::PossiblePairs(const std::vector<Seen>&
   return pairs;
 }
 
+/// The vehicle drives towards what it passes: the next thing of a class, which comes into view when
+/// the one before has left it, is further away.
+bool PassSights::IsLone(const Seen& seen, const std::vector<Seen>& image) const {
+  const auto in_image = std::count_if(image.begin(), image.end(), [&](const Seen& other) {
+    return other.class_name == seen.class_name;
+  });
+  const double range_m = seen.sight.foot.position_m.norm();
+  int lately = 0;
+  bool comes_nearer = true;
+  for (const auto& [id, passing] : passing_) {
+    if (passing.class_name != seen.class_name) continue;
+    if (std::abs(Seconds(seen.sight.stamp_ns - passing.seen_ns)) > config_.lone_s) continue;
+    ++lately;
+    comes_nearer = range_m <= kMostFurther * passing.range_m + kMostFurtherM;
+  }
+  return in_image == 1 && lately == 1 && comes_nearer;
+}
+
 PassSights::Id PassSights::Begin(const Seen& seen) {
   Passing passing{seen.class_name, placement::HazardSights(config_.sights), seen.sight.stamp_ns,
-                  false};
+                  seen.sight.foot.position_m.norm(), false};
   if (!passing.sights.Add(seen.sight)) return 0;
   if (passing_.size() >= static_cast<std::size_t>(config_.max_hazards)) {
     passing_.erase(std::min_element(

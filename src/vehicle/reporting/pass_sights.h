@@ -26,6 +26,11 @@ class PassSights {
     double gate = 13.8;
     /// Greatest distance of a sight's own place from its hazard, duplicate radii of the class.
     double gate_radii = 2.0;
+    /// Both where nothing can be mistaken: the image shows one thing of the class, and one was seen
+    /// within `lone_s`, no nearer than now. Courses by fixes are worse than they say.
+    double lone_gate = 60;
+    double lone_radii = 4.0;
+    double lone_s = 1.0;
     /// A hazard that has not been seen for so long is passed, s.
     double keep_s = 5.0;
     /// Hazards at once; beyond it the one longest unseen goes.
@@ -57,6 +62,7 @@ class PassSights {
     std::string class_name;
     placement::HazardSights sights;
     std::int64_t seen_ns = 0;
+    double range_m = 0;  // Of the newest sight, from base_link.
     bool is_known = false;
   };
   /// A sight that may be of a hazard.
@@ -67,6 +73,7 @@ class PassSights {
   };
 
   std::vector<Pair> PossiblePairs(const std::vector<Seen>& image) const;
+  bool IsLone(const Seen& seen, const std::vector<Seen>& image) const;
   Id Begin(const Seen& seen);
   void ForgetPassed(std::int64_t now_ns);
 

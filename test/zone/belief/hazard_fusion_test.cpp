@@ -93,7 +93,8 @@ TEST(HazardFusion, ErrorFallsWithTheVehiclesAndTheCovarianceStaysHonest) {
   for (std::size_t i = 0; i < kVehicles.size(); ++i) {
     EXPECT_GT(nees.at(i), 0.8) << kVehicles.at(i);
     EXPECT_LT(nees.at(i), 1.25) << kVehicles.at(i);
-    if (i > 0) EXPECT_LT(squares.at(i), squares.at(i - 1)) << kVehicles.at(i);
+    if (i == 0) continue;
+    EXPECT_LT(squares.at(i), squares.at(i - 1)) << kVehicles.at(i);
   }
 }
 
