@@ -1,0 +1,405 @@
+#include "tools/evaluation/alert_traffic.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <utility>
+
+#include "common/error.h"
+#include "datasets/seeded_random.h"
+
+namespace livemap::tools {
+namespace {
+
+constexpr double kLaneM = 3.5;
+constexpr double kDegree = M_PI / 180;
+constexpr double kPace = 1 / 3.6;  // From km/h to m/s.
+
+using datasets::SeededRandom;
+using Line = std::vector<Eigen::Vector2d>;
+
+double Between(SeededRandom& random, double least, double most) {
+  return least + (most - least) * random.Uniform();
+}
+
+bool Happens(SeededRandom& random, double probability) { return random.Uniform() < probability; }
+
+/// Draws a lane metre by metre.
+class Pen {
+ public:
+  Pen() = default;
+  Pen(Eigen::Vector2d place_m, double heading_rad)
+      : place_m_(std::move(place_m)), heading_rad_(heading_rad) {}
+
+  void Straight(double length_m) { Arc(length_m, 0, 0); }
+
+  /// A bend by `angle_rad` (counterclockwise), whose curvature comes and goes over a share of its
+  /// length, as on roads that are built so.
+  void Bend(double angle_rad, double radius_m, double easing = 0.5) {
+    // Trapezoid of curvature: its area is the angle.
+    const double length_m = std::abs(angle_rad) * radius_m / (1 - easing / 2);
+    const double curvature = std::copysign(1 / radius_m, angle_rad);
+    const double ease_m = easing * length_m / 2;
+    Arc(ease_m, 0, curvature);
+    Arc(length_m - 2 * ease_m, curvature, curvature);
+    Arc(ease_m, curvature, 0);
+  }
+
+  void Arc(double length_m, double from, double to) {
+    const int steps = std::max(1, static_cast<int>(std::lround(length_m)));
+    const double step_m = length_m / steps;
+    for (int i = 0; i < steps; ++i) {
+      const double curvature = from + (to - from) * (i + 0.5) / steps;
+      heading_rad_ += 0.5 * curvature * step_m;
+      place_m_ += step_m * Ahead();
+      heading_rad_ += 0.5 * curvature * step_m;
+      line_.push_back(place_m_);
+      curvatures_.push_back(curvature);
+      headings_rad_.push_back(heading_rad_);
+      steps_m_.push_back(step_m);
+    }
+  }
+
+  /// A pen at this one's place that has drawn nothing.
+  Pen Branch() const { return {place_m_, heading_rad_}; }
+  /// What lies `left_m` beside what has been drawn since point `from`.
+  Line Beside(double left_m, std::size_t from = 0) const {
+    Line beside;
+    for (std::size_t i = from; i < line_.size(); ++i) {
+      beside.push_back(line_[i] + left_m * Eigen::Vector2d(-std::sin(headings_rad_[i]),
+                                                           std::cos(headings_rad_[i])));
+    }
+    return beside;
+  }
+
+  Eigen::Vector2d Ahead() const { return {std::cos(heading_rad_), std::sin(heading_rad_)}; }
+  Eigen::Vector2d Left() const { return {-std::sin(heading_rad_), std::cos(heading_rad_)}; }
+  const Eigen::Vector2d& place_m() const { return place_m_; }
+  double heading_rad() const { return heading_rad_; }
+  const Line& line() const { return line_; }
+  const std::vector<double>& curvatures() const { return curvatures_; }
+  const std::vector<double>& steps_m() const { return steps_m_; }
+  std::size_t size() const { return line_.size(); }
+  double length_m() const {
+    double sum = 0;
+    for (const double step_m : steps_m_) sum += step_m;
+    return sum;
+  }
+
+ private:
+  Eigen::Vector2d place_m_ = Eigen::Vector2d::Zero();
+  double heading_rad_ = 0;
+  Line line_;
+  std::vector<double> curvatures_, headings_rad_, steps_m_;
+};
+
+struct Lane {
+  Line line;
+  bool other_level = false;
+};
+
+struct Stop {
+  std::size_t at;  // Point of the way.
+  double stands_s;
+};
+
+/// Streets, the vehicle's way through them, and how it may drive.
+struct Streets {
+  Pen way;
+  double limit_mps = 50 * kPace;
+  double sideways_mps2 = 2.2;  // In bends.
+  std::vector<Lane> lanes;     // All that hazards lie on, the vehicle's own included.
+  std::vector<Stop> stops;
+
+  void AddLane(Line line, bool other_level = false) {
+    lanes.push_back({std::move(line), other_level});
+  }
+};
+
+/// A street that goes on straight for a while, then bends a little.
+void GoOn(Streets& streets, SeededRandom& random, double length_m) {
+  double left_m = length_m;
+  while (left_m > 0) {
+    const double straight_m = std::min(left_m, Between(random, 100, 600));
+    streets.way.Straight(straight_m);
+    left_m -= straight_m;
+    if (left_m < 150) continue;
+    const double angle_rad = Between(random, -20, 20) * kDegree;
+    const double radius_m = Between(random, 200, 800);
+    streets.way.Bend(angle_rad, radius_m);
+    left_m -= std::abs(angle_rad) * radius_m;
+  }
+}
+
+void AddOwnStreet(Streets& streets) {
+  streets.AddLane(streets.way.line());
+  streets.AddLane(streets.way.Beside(kLaneM));
+}
+
+/// A street across the way where the pen stands now, both lanes.
+void AddAcross(Streets& streets, double angle_rad, double half_m, bool other_level) {
+  const double heading_rad = streets.way.heading_rad() + angle_rad;
+  const Eigen::Vector2d along(std::cos(heading_rad), std::sin(heading_rad));
+  const Eigen::Vector2d middle_m = streets.way.place_m() + 0.5 * kLaneM * streets.way.Left();
+  Pen pen(middle_m - half_m * along, heading_rad);
+  pen.Straight(2 * half_m);
+  streets.AddLane(pen.Beside(0.5 * kLaneM), other_level);
+  streets.AddLane(pen.Beside(-0.5 * kLaneM), other_level);
+}
+
+Streets MakeParallelStreets(SeededRandom& random) {
+  Streets streets;
+  GoOn(streets, random, 6000);
+  AddOwnStreet(streets);
+  for (const double aside_m : {15.0, 15.0 + kLaneM, -15.0, -15.0 - kLaneM}) {
+    streets.AddLane(streets.way.Beside(aside_m));
+  }
+  return streets;
+}
+
+Streets MakeOppositeCarriageways(SeededRandom& random) {
+  Streets streets;
+  streets.limit_mps = Between(random, 80, 130) * kPace;
+  while (streets.way.length_m() < 15000) {
+    streets.way.Straight(Between(random, 100, 1500));
+    streets.way.Bend(Between(random, -40, 40) * kDegree, Between(random, 500, 1500));
+  }
+  AddOwnStreet(streets);
+  const double median_m = Between(random, 9, 16);
+  streets.AddLane(streets.way.Beside(median_m + kLaneM));
+  streets.AddLane(streets.way.Beside(median_m + 2 * kLaneM));
+  return streets;
+}
+
+Streets MakeCrossings(SeededRandom& random) {
+  Streets streets;
+  while (streets.way.length_m() < 5000) {
+    GoOn(streets, random, Between(random, 60, 200));
+    AddAcross(streets, Between(random, 60, 120) * kDegree, 150, false);
+  }
+  AddOwnStreet(streets);
+  return streets;
+}
+
+Streets MakeBridges(SeededRandom& random) {
+  Streets streets;
+  while (streets.way.length_m() < 6000) {
+    GoOn(streets, random, Between(random, 150, 500));
+    AddAcross(streets, Between(random, 30, 150) * kDegree, 200, true);
+  }
+  AddOwnStreet(streets);
+  return streets;
+}
+
+Streets MakeCurves(SeededRandom& random) {
+  Streets streets;
+  streets.limit_mps = 80 * kPace;
+  while (streets.way.length_m() < 8000) {
+    streets.way.Straight(Between(random, 20, 250));
+    const double angle_rad = Between(random, 20, 90) * kDegree;
+    streets.way.Bend(Happens(random, 0.5) ? angle_rad : -angle_rad, Between(random, 60, 300));
+  }
+  AddOwnStreet(streets);
+  return streets;
+}
+
+/// From where the pen is to the arm of a roundabout that leads `turn_rad` to the left: a bend into
+/// the ring, around it, out of it.
+void DriveRoundabout(Pen& pen, double turn_rad, double ring_m) {
+  constexpr double kInto = 50 * kDegree;
+  pen.Bend(-kInto, 15);
+  pen.Arc((turn_rad + 2 * kInto) * ring_m, 1 / ring_m, 1 / ring_m);
+  pen.Bend(-kInto, 15);
+}
+
+Streets MakeRoundabouts(SeededRandom& random) {
+  Streets streets;
+  const std::array<double, 3> arms_rad{-80 * kDegree, 0, 90 * kDegree};
+  while (streets.way.length_m() < 5000) {
+    streets.way.Straight(Between(random, 150, 400));
+    const double ring_m = Between(random, 12, 22);
+    const auto taken = static_cast<std::size_t>(3 * random.Uniform());
+    const Pen before = streets.way.Branch();
+    for (std::size_t arm = 0; arm < arms_rad.size(); ++arm) {
+      Pen pen = before;
+      if (arm == taken) continue;
+      DriveRoundabout(pen, arms_rad[arm], ring_m);
+      const std::size_t from = pen.size();
+      pen.Straight(200);
+      streets.AddLane(Line(pen.line().begin() + static_cast<std::ptrdiff_t>(from),
+                           pen.line().end()));
+      streets.AddLane(pen.Beside(kLaneM, from));
+    }
+    DriveRoundabout(streets.way, arms_rad[taken], ring_m);
+  }
+  streets.way.Straight(150);
+  AddOwnStreet(streets);
+  return streets;
+}
+
+void TurnAtJunction(Pen& pen, double turn_rad) {
+  if (turn_rad == 0) {
+    pen.Straight(16);
+  } else {
+    pen.Bend(turn_rad, turn_rad > 0 ? 12 : 8);
+  }
+}
+
+Streets MakeTurns(SeededRandom& random) {
+  Streets streets;
+  const std::array<double, 3> turns_rad{0, 90 * kDegree, -90 * kDegree};
+  while (streets.way.length_m() < 4000) {
+    GoOn(streets, random, Between(random, 80, 250));
+    const double draw = random.Uniform();
+    const std::size_t taken = draw < 0.5 ? 0 : draw < 0.75 ? 1 : 2;
+    const Pen before = streets.way.Branch();
+    for (std::size_t turn = 0; turn < turns_rad.size(); ++turn) {
+      if (turn == taken) continue;
+      Pen pen = before;
+      TurnAtJunction(pen, turns_rad[turn]);
+      pen.Straight(200);
+      streets.AddLane(pen.line());
+      streets.AddLane(pen.Beside(kLaneM));
+    }
+    TurnAtJunction(streets.way, turns_rad[taken]);
+  }
+  streets.way.Straight(100);
+  AddOwnStreet(streets);
+  return streets;
+}
+
+Streets MakeStops(SeededRandom& random) {
+  Streets streets;
+  while (streets.way.length_m() < 4000) {
+    GoOn(streets, random, Between(random, 80, 300));
+    if (Happens(random, 0.5)) {
+      streets.stops.push_back({streets.way.size() - 9, Between(random, 5, 40)});
+    }
+    AddAcross(streets, Between(random, 60, 120) * kDegree, 150, false);
+  }
+  AddOwnStreet(streets);
+  return streets;
+}
+
+using MakeStreets = std::function<Streets(SeededRandom&)>;
+
+const std::vector<std::pair<std::string, MakeStreets>>& Makers() {
+  static const std::vector<std::pair<std::string, MakeStreets>> makers{
+      {"parallel", MakeParallelStreets}, {"opposite", MakeOppositeCarriageways},
+      {"crossings", MakeCrossings},      {"bridges", MakeBridges},
+      {"curves", MakeCurves},            {"roundabouts", MakeRoundabouts},
+      {"turns", MakeTurns},              {"stops", MakeStops}};
+  return makers;
+}
+
+/// Highest speeds along the way: the limit, what the bends allow, and what speeding up and braking
+/// reach.
+std::vector<double> SpeedsAlong(const Streets& streets, SeededRandom& random) {
+  const double speeding_up = Between(random, 1.0, 2.2);
+  const double braking = Between(random, 1.5, 2.8);
+  const double manner = Between(random, 0.85, 1.08);  // How this driver takes limits.
+  const std::vector<double>& curvatures = streets.way.curvatures();
+  const std::vector<double>& steps_m = streets.way.steps_m();
+  std::vector<double> speeds;
+  for (const double curvature : curvatures) {
+    const double bend = std::sqrt(streets.sideways_mps2 / std::max(1e-6, std::abs(curvature)));
+    speeds.push_back(manner * std::min(streets.limit_mps, bend));
+  }
+  for (const Stop& stop : streets.stops) speeds[stop.at] = 0;
+  speeds.front() = 0;
+  for (std::size_t i = 1; i < speeds.size(); ++i) {
+    const double before = speeds[i - 1];
+    speeds[i] = std::min(speeds[i], std::sqrt(before * before + 2 * speeding_up * steps_m[i]));
+  }
+  for (std::size_t i = speeds.size() - 1; i-- > 0;) {
+    const double after = speeds[i + 1];
+    speeds[i] = std::min(speeds[i], std::sqrt(after * after + 2 * braking * steps_m[i + 1]));
+  }
+  return speeds;
+}
+
+/// The drive in steps of time.
+std::vector<TrafficMoment> DriveAlong(const Streets& streets, SeededRandom& random) {
+  const std::vector<double> speeds = SpeedsAlong(streets, random);
+  const Line& line = streets.way.line();
+  std::vector<TrafficMoment> moments;
+  TrafficMoment at;
+  double next_s = 0;
+  const auto note_until = [&](double time_s, double moving_s, double speed_mps, double way_m,
+                              const Eigen::Vector2d& place_m) {
+    while (next_s <= time_s) {
+      const double span_s = time_s - at.time_s;
+      const double share = span_s > 0 ? (next_s - at.time_s) / span_s : 1;
+      moments.push_back({next_s, at.moving_s + share * (moving_s - at.moving_s),
+                         at.way_m + share * (way_m - at.way_m),
+                         at.speed_mps + share * (speed_mps - at.speed_mps),
+                         at.place_m + share * (place_m - at.place_m)});
+      next_s += kTrafficStepS;
+    }
+    at = {time_s, moving_s, way_m, speed_mps, place_m};
+  };
+  at.place_m = line.front();
+  auto stop = streets.stops.begin();
+  note_until(3, 0, 0, 0, line.front());
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    const double step_m = streets.way.steps_m()[i];
+    const double step_s = step_m / std::max(0.3, 0.5 * (speeds[i - 1] + speeds[i]));
+    note_until(at.time_s + step_s, at.moving_s + step_s, speeds[i], at.way_m + step_m, line[i]);
+    if (stop != streets.stops.end() && stop->at == i) {
+      note_until(at.time_s + stop->stands_s, at.moving_s, 0, at.way_m, line[i]);
+      ++stop;
+    }
+  }
+  return moments;
+}
+
+std::vector<TrafficHazard> ScatterHazards(const Streets& streets, double per_km,
+                                          SeededRandom& random) {
+  constexpr double kAsideM = 0.4;
+  const std::array<const char*, 3> classes{"pothole", "traffic_cone", "debris"};
+  std::vector<TrafficHazard> hazards;
+  for (const Lane& lane : streets.lanes) {
+    double next_m = random.Exponential(1000 / per_km);
+    double at_m = 0;
+    for (std::size_t i = 1; i < lane.line.size(); ++i) {
+      at_m += (lane.line[i] - lane.line[i - 1]).norm();
+      while (next_m < at_m) {
+        const auto chosen = static_cast<std::size_t>(3 * random.Uniform());
+        hazards.push_back(
+            {lane.line[i] + kAsideM * random.Normal(), lane.other_level, classes.at(chosen)});
+        next_m += random.Exponential(1000 / per_km);
+      }
+    }
+  }
+  return hazards;
+}
+
+}  // namespace
+
+const std::vector<std::string>& TrafficScenarios() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const auto& maker : Makers()) all.push_back(maker.first);
+    return all;
+  }();
+  return names;
+}
+
+TrafficDrive MakeTrafficDrive(const std::string& scenario, double per_km, std::uint64_t seed) {
+  const auto& makers = Makers();
+  const auto maker = std::find_if(makers.begin(), makers.end(),
+                                  [&](const auto& each) { return each.first == scenario; });
+  if (maker == makers.end()) throw Error("there is no scenario '" + scenario + "'");
+  const auto number = static_cast<std::uint64_t>(std::distance(makers.begin(), maker));
+  SeededRandom random(seed * 1000003 + number);
+  const Streets streets = maker->second(random);
+  TrafficDrive drive;
+  drive.way_m = streets.way.line();
+  drive.moments = DriveAlong(streets, random);
+  drive.hazards = ScatterHazards(streets, per_km, random);
+  return drive;
+}
+
+}  // namespace livemap::tools

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace livemap::tools {
+
+/// A hazard of simulated traffic, where it truly lies.
+struct TrafficHazard {
+  Eigen::Vector2d place_m;   ///< East, north.
+  bool other_level = false;  ///< On a bridge above the vehicle's way.
+  std::string class_name;
+};
+
+/// Where the vehicle truly is at one moment.
+struct TrafficMoment {
+  double time_s = 0;
+  double moving_s = 0;  ///< Time without the time that it stood.
+  double way_m = 0;     ///< Driven until then.
+  double speed_mps = 0;
+  Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
+};
+
+/// One drive of one vehicle along a way of its own, through streets with hazards.
+struct TrafficDrive {
+  std::vector<Eigen::Vector2d> way_m;  ///< The middle of its lane, a point every metre.
+  std::vector<TrafficMoment> moments;  ///< One every kTrafficStepS.
+  std::vector<TrafficHazard> hazards;
+};
+
+constexpr double kTrafficStepS = 0.1;
+
+/// The kinds of streets: parallel, opposite, crossings, bridges, curves, roundabouts, turns, stops.
+const std::vector<std::string>& TrafficScenarios();
+
+/// Makes up streets, a drive through them, and hazards: on every lane of every street, the
+/// vehicle's own or not, `per_km` of them on average, at places that do not depend on one another.
+/// The same seed gives the same drive. Throws Error for a scenario that there is not.
+TrafficDrive MakeTrafficDrive(const std::string& scenario, double per_km, std::uint64_t seed);
+
+}  // namespace livemap::tools

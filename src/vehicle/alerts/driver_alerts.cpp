@@ -1,0 +1,283 @@
+#include "vehicle/alerts/driver_alerts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "common/error.h"
+#include "common/time.h"
+
+namespace livemap::vehicle {
+namespace {
+
+constexpr double kMaxFrameM = 5000;  // Further from its datum the plane begins anew.
+constexpr double kPassedM = 1;       // So far behind a hazard is passed.
+constexpr double kPassedAsideM = 12; // Further aside it was never reached.
+constexpr std::size_t kMaxClassBytes = 256;
+
+/// The worst first: by rank, then the sooner, then by id, so that the order is always the same.
+bool IsWorse(const HazardAlert& a, const HazardAlert& b) {
+  return std::tie(a.urgency, a.time_s, a.id) < std::tie(b.urgency, b.time_s, b.id);
+}
+
+void CheckPositive(const char* name, double value) {
+  if (std::isfinite(value) && value > 0) return;
+  throw Error("the driver alerts' " + std::string(name) + " is " + std::to_string(value) +
+              ", accepted is more than 0");
+}
+
+}  // namespace
+
+DriverAlerts::DriverAlerts(const Config& config, const protocol::HazardCatalogue& catalogue)
+    : config_(config),
+      catalogue_(catalogue),
+      filter_(config.course),
+      grid_(geo::SpatialGrid::ForRadius(config.max_reach_m)) {
+  CheckPositive("least lead in seconds", config.min_lead_s);
+  CheckPositive("braking in m/s^2", config.braking_mps2);
+  CheckPositive("reach in metres", config.max_reach_m);
+  CheckPositive("step of the way in metres", config.way.step_m);
+  CheckPositive("spacing of bends in metres", config.way.bend_spacing_m);
+  CheckPositive("noise of a fix in metres", config.course.fix_noise_m);
+}
+
+bool DriverAlerts::Put(const AlertHazard& hazard) {
+  const bool valid = !hazard.id.IsNil() && geo::IsValid(hazard.position) &&
+                     std::isfinite(hazard.sigma_m) && hazard.sigma_m >= 0 &&
+                     hazard.class_name.size() <= kMaxClassBytes &&
+                     (!hazard.altitude_m || std::isfinite(*hazard.altitude_m));
+  if (!valid) {
+    ++counters_.invalid_hazards;
+    return false;
+  }
+  const int urgency = catalogue_.Get(hazard.class_name).urgency;
+  const auto found = numbers_.find(hazard.id);
+  if (found != numbers_.end()) {
+    Known& known = known_[found->second];
+    grid_.Move(known.hazard.position, hazard.position, found->second);
+    known = {hazard, urgency};
+    return true;
+  }
+  if (numbers_.size() >= config_.max_hazards) {
+    ++counters_.refused_full;
+    return false;
+  }
+  std::uint64_t number = known_.size();
+  if (free_numbers_.empty()) {
+    known_.push_back({hazard, urgency});
+  } else {
+    number = free_numbers_.back();
+    free_numbers_.pop_back();
+    known_[number] = {hazard, urgency};
+  }
+  grid_.Insert(hazard.position, number);
+  numbers_.emplace(hazard.id, number);
+  return true;
+}
+
+std::vector<HazardAlert> DriverAlerts::Remove(const Uuid& id) {
+  std::vector<HazardAlert> told;
+  const auto found = numbers_.find(id);
+  if (found == numbers_.end()) return told;
+  const std::uint64_t number = found->second;
+  grid_.Erase(known_[number].hazard.position, number);
+  free_numbers_.push_back(number);
+  numbers_.erase(found);
+  const auto near = near_.find(number);
+  if (near == near_.end()) return told;
+  if (near->second.told && !near->second.done) {
+    End(HazardAlert::State::kCancelled, near->second, told);
+  }
+  near_.erase(near);
+  return told;
+}
+
+std::vector<HazardAlert> DriverAlerts::StartAnew() {
+  std::vector<HazardAlert> told;
+  ForgetFar({}, told);
+  filter_.Reset();
+  frame_.reset();
+  newest_ns_.reset();
+  std::sort(told.begin(), told.end(), IsWorse);
+  return told;
+}
+
+double DriverAlerts::LeadS(int urgency, double speed_mps) const {
+  const double stopping_s = config_.reaction_s + speed_mps / (2 * config_.braking_mps2);
+  return std::max(config_.min_lead_s, stopping_s) + (urgency <= 1 ? config_.urgent_extra_s : 0);
+}
+
+/// A plane whose datum is near the vehicle.
+void DriverAlerts::FollowVehicle(const geo::GeoPoint& position) {
+  if (!frame_) {
+    frame_.emplace(position);
+    return;
+  }
+  const Eigen::Vector2d place_m = frame_->ToEnu(position);
+  if (place_m.norm() <= kMaxFrameM) return;
+  frame_.emplace(position);
+  if (place_m.norm() > 2 * kMaxFrameM) {
+    filter_.Reset();
+  } else {
+    filter_.MoveOrigin(place_m);
+  }
+}
+
+/// How far the vehicle comes in a time: its acceleration fades, and it does not drive backwards.
+double DriverAlerts::ReachM(double time_s) const {
+  const double speed = filter_.state()[CourseFilter::kSpeed];
+  double push = filter_.state()[CourseFilter::kAcceleration];
+  if (speed < config_.starting_speed_mps) push = std::max(push, config_.starting_mps2);
+  const double fading_s = config_.course.acceleration_time_s;
+  const double fade = fading_s * (1 - std::exp(-time_s / fading_s));
+  const double reach_m = speed * time_s + push * fading_s * (time_s - fade);
+  // A vehicle that brakes may go on after all.
+  return std::max({0.0, reach_m, 0.5 * speed * time_s});
+}
+
+bool DriverAlerts::OnOtherLevel(const AlertHazard& hazard, std::optional<double> altitude_m) const {
+  return hazard.altitude_m && altitude_m && std::isfinite(*altitude_m) &&
+         std::abs(*hazard.altitude_m - *altitude_m) > config_.max_altitude_difference_m;
+}
+
+std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::TrackPose& pose,
+                                           bool course_is_measured,
+                                           std::optional<double> altitude_m) {
+  std::vector<HazardAlert> told;
+  const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
+  if (!geo::IsValid(pose.position) || !std::isfinite(sigma_m)) {
+    ++counters_.invalid_positions;
+    return told;
+  }
+  FollowVehicle(pose.position);
+  CourseFilter::Sample sample;
+  sample.stamp_ns = stamp_ns;
+  sample.place_m = frame_->ToEnu(pose.position);
+  sample.stated_sigma_m = sigma_m;
+  if (course_is_measured && std::isfinite(pose.course_rad)) {
+    sample.course_rad = pose.course_rad;
+    sample.course_variance_rad2 = pose.course_variance_rad2;
+  }
+  if (!filter_.Add(sample)) {
+    ++counters_.invalid_positions;
+    return told;
+  }
+  ++counters_.positions;
+  const double time_s = newest_ns_ ? Seconds(stamp_ns - *newest_ns_) : 0;
+  newest_ns_ = stamp_ns;
+  if (!filter_.known()) return told;
+
+  const double speed = filter_.state()[CourseFilter::kSpeed];
+  const double longest_s = LeadS(1, speed) + filter_.period_s();
+  const double reach_m = std::min(config_.max_reach_m, ReachM(longest_s) + 20);
+  const WayAhead way(config_.way, filter_, reach_m);
+  const double radius_m = std::max(reach_m, config_.forget_beyond_m);
+  std::unordered_set<std::uint64_t> seen;
+  for (const auto& neighbour : grid_.Within(pose.position, radius_m)) {
+    seen.insert(neighbour.id);
+    const Known& known = known_[neighbour.id];
+    auto near = near_.find(neighbour.id);
+    if (near == near_.end()) {
+      if (near_.size() >= config_.max_near) continue;
+      near = near_.emplace(neighbour.id, Near{}).first;
+    }
+    const double hazard_sigma_m =
+        known.hazard.sigma_m > 0 ? known.hazard.sigma_m : config_.default_sigma_m;
+    WayAhead::Relation relation =
+        way.RelationOf(frame_->ToEnu(known.hazard.position),
+                       hazard_sigma_m * hazard_sigma_m + sigma_m * sigma_m);
+    if (OnOtherLevel(known.hazard, altitude_m)) relation.probability = 0;
+    Judge(known, relation, time_s, near->second, told);
+  }
+  ForgetFar(seen, told);
+  std::sort(told.begin(), told.end(), [](const HazardAlert& a, const HazardAlert& b) {
+    const bool a_begins = a.state == HazardAlert::State::kApproach;
+    const bool b_begins = b.state == HazardAlert::State::kApproach;
+    return a_begins != b_begins ? b_begins : IsWorse(a, b);
+  });
+  return told;
+}
+
+/// What the vehicle has left far behind may be approached anew.
+void DriverAlerts::ForgetFar(const std::unordered_set<std::uint64_t>& seen,
+                             std::vector<HazardAlert>& told) {
+  for (auto near = near_.begin(); near != near_.end();) {
+    if (seen.count(near->first) != 0) {
+      ++near;
+      continue;
+    }
+    if (near->second.told && !near->second.done) {
+      End(HazardAlert::State::kCancelled, near->second, told);
+    }
+    near = near_.erase(near);
+  }
+}
+
+/// Whether the driver must be told now: at the next position it would be too late.
+bool DriverAlerts::IsDue(const Near& near) const {
+  const double speed = filter_.state()[CourseFilter::kSpeed];
+  const double course_variance = filter_.covariance()(CourseFilter::kCourse, CourseFilter::kCourse);
+  const double max_sigma = config_.max_course_sigma_rad;
+  if (speed < config_.min_speed_mps || course_variance > max_sigma * max_sigma) return false;
+  if (near.alert.probability < config_.alert_above) return false;
+  return near.alert.distance_m <=
+         ReachM(LeadS(near.alert.urgency, speed) + filter_.period_s());
+}
+
+void DriverAlerts::Judge(const Known& known, const WayAhead::Relation& relation, double time_s,
+                         Near& near, std::vector<HazardAlert>& told) {
+  if (near.done) return;
+  near.alert.id = known.hazard.id;
+  near.alert.class_name = known.hazard.class_name;
+  near.alert.urgency = known.urgency;
+  if (!relation.ahead) {
+    near.alert.probability = 0;
+    if (!near.told) return;
+    if (relation.forward_m < -kPassedM) {
+      End(std::abs(relation.left_m) < kPassedAsideM ? HazardAlert::State::kPassed
+                                                    : HazardAlert::State::kCancelled,
+          near, told);
+    }
+    return;
+  }
+  const double speed = std::max(0.5, filter_.state()[CourseFilter::kSpeed]);
+  near.alert.distance_m = std::max(0.0, relation.way_m);
+  near.alert.time_s = near.alert.distance_m / speed;
+  near.alert.probability = relation.probability;
+  near.alert.side = std::abs(relation.left_m) <= config_.side_from_m ? HazardAlert::Side::kAhead
+                    : relation.left_m > 0                            ? HazardAlert::Side::kLeft
+                                                                     : HazardAlert::Side::kRight;
+  if (!near.told) {
+    if (!IsDue(near)) return;
+    near.told = true;
+    near.alert.state = HazardAlert::State::kApproach;
+    ++counters_.approaches;
+    told.push_back(near.alert);
+    return;
+  }
+  const bool stands = filter_.state()[CourseFilter::kSpeed] < config_.min_speed_mps;
+  if (stands) return;
+  near.unlikely_s = relation.probability < config_.cancel_below ? near.unlikely_s + time_s : 0;
+  if (near.unlikely_s >= config_.cancel_after_s) End(HazardAlert::State::kCancelled, near, told);
+}
+
+void DriverAlerts::End(HazardAlert::State state, Near& near, std::vector<HazardAlert>& told) {
+  near.done = true;
+  near.alert.state = state;
+  near.alert.distance_m = 0;
+  near.alert.time_s = 0;
+  near.alert.probability = 0;
+  ++(state == HazardAlert::State::kPassed ? counters_.passed : counters_.cancelled);
+  told.push_back(near.alert);
+}
+
+std::vector<HazardAlert> DriverAlerts::Ahead() const {
+  std::vector<HazardAlert> ahead;
+  for (const auto& [number, near] : near_) {
+    if (near.told && !near.done) ahead.push_back(near.alert);
+  }
+  std::sort(ahead.begin(), ahead.end(), IsWorse);
+  return ahead;
+}
+
+}  // namespace livemap::vehicle
