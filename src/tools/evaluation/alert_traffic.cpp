@@ -228,8 +228,8 @@ Streets MakeRoundabouts(SeededRandom& random) {
       DriveRoundabout(pen, arms_rad[arm], ring_m);
       const std::size_t from = pen.size();
       pen.Straight(200);
-      streets.AddLane(Line(pen.line().begin() + static_cast<std::ptrdiff_t>(from),
-                           pen.line().end()));
+      streets.AddLane(
+          Line(pen.line().begin() + static_cast<std::ptrdiff_t>(from), pen.line().end()));
       streets.AddLane(pen.Beside(kLaneM, from));
     }
     DriveRoundabout(streets.way, arms_rad[taken], ring_m);
@@ -287,10 +287,14 @@ using MakeStreets = std::function<Streets(SeededRandom&)>;
 
 const std::vector<std::pair<std::string, MakeStreets>>& Makers() {
   static const std::vector<std::pair<std::string, MakeStreets>> makers{
-      {"parallel", MakeParallelStreets}, {"opposite", MakeOppositeCarriageways},
-      {"crossings", MakeCrossings},      {"bridges", MakeBridges},
-      {"curves", MakeCurves},            {"roundabouts", MakeRoundabouts},
-      {"turns", MakeTurns},              {"stops", MakeStops}};
+      {"parallel", MakeParallelStreets},
+      {"opposite", MakeOppositeCarriageways},
+      {"crossings", MakeCrossings},
+      {"bridges", MakeBridges},
+      {"curves", MakeCurves},
+      {"roundabouts", MakeRoundabouts},
+      {"turns", MakeTurns},
+      {"stops", MakeStops}};
   return makers;
 }
 

@@ -18,11 +18,11 @@
 namespace livemap::tools {
 namespace {
 
-constexpr double kOwnLaneM = 2;        // So near the vehicle's way a hazard lies on it.
-constexpr double kNextLaneM = 5.5;     // So near it lies on the same street.
-constexpr double kLooksAheadS = 60;    // Of driving: an alert is about what comes until then.
-constexpr double kWarmUpS = 15;        // Of driving, at the start: passes do not count.
-constexpr double kLeftBehindM = 100;   // Further away an approach has ended.
+constexpr double kOwnLaneM = 2;       // So near the vehicle's way a hazard lies on it.
+constexpr double kNextLaneM = 5.5;    // So near it lies on the same street.
+constexpr double kLooksAheadS = 60;   // Of driving: an alert is about what comes until then.
+constexpr double kWarmUpS = 15;       // Of driving, at the start: passes do not count.
+constexpr double kLeftBehindM = 100;  // Further away an approach has ended.
 constexpr std::int64_t kStartNs = 1'700'000'000'000'000'000;
 constexpr double kDatumLatitude = 49.2;
 constexpr double kDatumLongitude = 7.0;
@@ -70,8 +70,8 @@ class AlertRun {
   std::vector<GivenAlert> Drive() {
     datasets::GnssReceiverModel receiver(trial_.receiver, trial_.seed * 7919 + 2);
     vehicle::FixTrack track{vehicle::FixTrack::Config()};
-    const auto every = std::max(
-        1, static_cast<int>(std::lround(1 / (trial_.fixes_per_s * kTrafficStepS))));
+    const auto every =
+        std::max(1, static_cast<int>(std::lround(1 / (trial_.fixes_per_s * kTrafficStepS))));
     for (std::size_t i = 0; i < drive_.moments.size(); i += static_cast<std::size_t>(every)) {
       const TrafficMoment& moment = drive_.moments[i];
       const auto error_m = receiver.ErrorAt(moment.time_s);
@@ -258,7 +258,8 @@ nlohmann::ordered_json ToJson(const AlertFigures& figures) {
 }
 
 std::string HeadOfAlertTable() {
-  return "scenario       hours  on way  early share  late  missed  false  false/h  beside  doubles  "
+  return "scenario       hours  on way  early share  late  missed  false  false/h  beside  doubles "
+         " "
          "lead p5/p50/p95, s\n";
 }
 
@@ -273,10 +274,9 @@ std::string ToRow(const std::string& name, const AlertFigures& figures) {
                 figures.beside, figures.doubles);
   std::string row = text.data();
   if (!led) return row + "-\n";
-  std::snprintf(text.data(), text.size(), "%.1f/%.1f/%.1f\n",
-                evaluation::Quantile(figures.leads_s, 0.05),
-                evaluation::Quantile(figures.leads_s, 0.5),
-                evaluation::Quantile(figures.leads_s, 0.95));
+  std::snprintf(
+      text.data(), text.size(), "%.1f/%.1f/%.1f\n", evaluation::Quantile(figures.leads_s, 0.05),
+      evaluation::Quantile(figures.leads_s, 0.5), evaluation::Quantile(figures.leads_s, 0.95));
   return row + text.data();
 }
 

@@ -18,8 +18,8 @@ struct AlertTrial {
   /// Of the receiver: white and slow errors, losses of the fix.
   datasets::GnssReceiverNoise receiver{0.4, 1.5, 60, 0.1, 3};
   double fixes_per_s = 5;
-  double latency_s = 0.1;     ///< From a fix's stamp until the vehicle has it.
-  double place_sigma_m = 1;   ///< Of the hazards on the zone's map, per axis; the zone tells it.
+  double latency_s = 0.1;    ///< From a fix's stamp until the vehicle has it.
+  double place_sigma_m = 1;  ///< Of the hazards on the zone's map, per axis; the zone tells it.
   std::uint64_t seed = 1;
 };
 
@@ -27,22 +27,22 @@ struct AlertTrial {
 struct AlertFigures {
   std::size_t drives = 0;
   double hours = 0;
-  std::size_t on_way = 0;      ///< Passes of hazards that lie on the vehicle's way.
-  std::size_t early = 0;       ///< Of them, alerted kWantedLeadS before or earlier.
-  std::size_t late = 0;        ///< Of them, alerted later.
+  std::size_t on_way = 0;  ///< Passes of hazards that lie on the vehicle's way.
+  std::size_t early = 0;   ///< Of them, alerted kWantedLeadS before or earlier.
+  std::size_t late = 0;    ///< Of them, alerted later.
   std::size_t alerts = 0;
   std::size_t false_alerts = 0;
-  std::size_t beside = 0;      ///< Alerts of hazards on the next lane: neither right nor false.
+  std::size_t beside = 0;  ///< Alerts of hazards on the next lane: neither right nor false.
   std::size_t doubles = 0;
-  std::vector<double> leads_s; ///< Of all passes that were alerted.
+  std::vector<double> leads_s;  ///< Of all passes that were alerted.
 
   void Add(const AlertFigures& other);
 };
 
 constexpr double kWantedLeadS = 4;
 
-/// Plays a drive to DriverAlerts as its nodelet would have it, by fixes alone, and compares what the
-/// driver is told with where the vehicle came.
+/// Plays a drive to DriverAlerts as its nodelet would have it, by fixes alone, and compares what
+/// the driver is told with where the vehicle came.
 AlertFigures TryAlerts(const TrafficDrive& drive, const AlertTrial& trial,
                        const vehicle::DriverAlerts::Config& config,
                        const protocol::HazardCatalogue& catalogue);

@@ -40,8 +40,10 @@ std::vector<std::string> ChosenScenarios(const std::string& text) {
 int EvaluateAlerts(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_alerts [FLAGS]",
-      "Drives simulated vehicles through simulated streets with hazards, and compares of which ones\n"
-      "their drivers are warned with which ones lie on their way. docs/reference/measures.md defines\n"
+      "Drives simulated vehicles through simulated streets with hazards, and compares of which "
+      "ones\n"
+      "their drivers are warned with which ones lie on their way. docs/reference/measures.md "
+      "defines\n"
       "the figures.",
       0,
       {{"json", "", "one line of JSON instead of a table"},

@@ -9,18 +9,70 @@
 namespace livemap::vehicle {
 namespace {
 
-constexpr double kMaxStepS = 0.2;      // Of the integration.
-constexpr double kMisfit = 40;         // Normalised squared distance of a position that misfits.
-constexpr int kMisfitsToRestart = 3;   // In succession.
-constexpr double kMaxPeriodS = 2;      // What counts as the time between two positions.
-constexpr double kStartSpeedMps = 3;   // Standard deviations of a state that has just begun.
+constexpr double kMaxStepS = 0.2;     // Of the integration.
+constexpr double kMisfit = 40;        // Normalised squared distance of a position that misfits.
+constexpr int kMisfitsToRestart = 3;  // In succession.
+constexpr double kMaxPeriodS = 2;     // What counts as the time between two positions.
+constexpr double kMaxSpeedMps = 80;
+constexpr double kStartSpeedMps = 3;  // Standard deviations of a state that has just begun.
 constexpr double kStartCourseRad = 0.2;
+constexpr double kLeastWeight = 1e-6;
+
+using Mode = CourseFilter::Mode;
+using State = CourseFilter::State;
+using Covariance = CourseFilter::Covariance;
+
+void MakeSymmetric(Covariance& covariance) {
+  covariance = (0.5 * (covariance + covariance.transpose())).eval();
+}
+
+/// Mean and covariance of the modes, each with its share.
+void MomentsOf(const std::array<Mode, 2>& modes, const std::array<double, 2>& shares, State& mean,
+               Covariance& covariance) {
+  mean = shares[0] * modes[0].state + shares[1] * modes[1].state;
+  covariance.setZero();
+  for (std::size_t i = 0; i < 2; ++i) {
+    const State off = modes[i].state - mean;
+    covariance += shares[i] * (modes[i].covariance + off * off.transpose());
+  }
+}
+
+/// Normalised squared distance of the position, and its likelihood.
+struct Fit {
+  double distance;
+  double likelihood;
+};
+
+Fit UpdateModePlace(const Eigen::Vector2d& place_m, double noise_m, Mode& mode) {
+  const Eigen::Matrix2d innovation =
+      mode.covariance.topLeftCorner<2, 2>() + noise_m * noise_m * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d inverse = innovation.inverse();
+  const Eigen::Vector2d error_m = place_m - mode.state.head<2>();
+  const double distance = error_m.dot(inverse * error_m);
+  const Eigen::Matrix<double, 6, 2> gain = mode.covariance.leftCols<2>() * inverse;
+  mode.state += gain * error_m;
+  mode.covariance -= (gain * mode.covariance.topRows<2>()).eval();
+  MakeSymmetric(mode.covariance);
+  mode.state[CourseFilter::kSpeed] = std::max(0.0, mode.state[CourseFilter::kSpeed]);
+  return {distance, std::exp(-0.5 * distance) / std::sqrt(innovation.determinant())};
+}
+
+void UpdateModeCourse(double course_rad, double course_variance_rad2, Mode& mode) {
+  constexpr auto kCourse = CourseFilter::kCourse;
+  const double error_rad = std::remainder(course_rad - mode.state[kCourse], 2 * M_PI);
+  const double variance = mode.covariance(kCourse, kCourse) + std::max(1e-6, course_variance_rad2);
+  const State gain = mode.covariance.col(kCourse) / variance;
+  mode.state += gain * error_rad;
+  mode.covariance -= (gain * mode.covariance.row(kCourse)).eval();
+  MakeSymmetric(mode.covariance);
+  mode.state[CourseFilter::kSpeed] = std::max(0.0, mode.state[CourseFilter::kSpeed]);
+}
 
 }  // namespace
 
-double CourseFilter::CurvatureSigma(double speed_mps) const {
+double CourseFilter::CurvatureSigma(double sideways_mps2, double speed_mps) const {
   const double square = std::max(1.0, speed_mps * speed_mps);
-  return std::min(config_.sideways_mps2 / square, config_.max_curvature);
+  return std::min(sideways_mps2 / square, config_.max_curvature);
 }
 
 double CourseFilter::NoiseM(const Sample& sample) const {
@@ -36,6 +88,7 @@ void CourseFilter::Reset() {
 
 void CourseFilter::MoveOrigin(const Eigen::Vector2d& origin_m) {
   state_.head<2>() -= origin_m;
+  for (Mode& mode : modes_) mode.state.head<2>() -= origin_m;
   if (start_) start_->place_m -= origin_m;
   if (newest_) newest_->place_m -= origin_m;
 }
@@ -46,15 +99,18 @@ bool CourseFilter::Add(const Sample& sample) {
                                               std::isfinite(sample.course_variance_rad2)));
   if (!finite) return false;
   if (newest_ && sample.stamp_ns <= newest_->stamp_ns) return false;
-  const double time_s = newest_ ? Seconds(sample.stamp_ns - newest_->stamp_ns) : 0;
-  if (time_s > config_.max_gap_s) Reset();
+  double time_s = newest_ ? Seconds(sample.stamp_ns - newest_->stamp_ns) : 0;
+  if (time_s > config_.max_gap_s) {
+    Reset();
+    time_s = 0;
+  }
   if (newest_) period_s_ += 0.2 * (std::min(time_s, kMaxPeriodS) - period_s_);
   if (!known_) {
     Start(sample);
   } else {
-    Predict(time_s);
-    UpdatePlace(sample);
-    if (known_ && sample.course_rad) UpdateCourse(sample);
+    Mix(time_s);
+    for (Mode& mode : modes_) Predict(time_s, mode);
+    if (!Update(sample)) Start(sample);
   }
   newest_ = sample;
   return true;
@@ -67,42 +123,69 @@ void CourseFilter::Start(const Sample& sample) {
   const double noise_m = NoiseM(sample);
   const double enough_m = std::max(config_.start_way_m, 5 * noise_m);
   if (!sample.course_rad && way_m.norm() < enough_m) return;
-  state_.setZero();
-  covariance_.setZero();
-  state_.head<2>() = sample.place_m;
-  covariance_.topLeftCorner<2, 2>() = noise_m * noise_m * Eigen::Matrix2d::Identity();
-  if (sample.course_rad) {
-    state_[kCourse] = *sample.course_rad;
-    covariance_(kCourse, kCourse) = sample.course_variance_rad2;
-  } else {
-    state_[kCourse] = std::atan2(way_m.x(), way_m.y());
-    covariance_(kCourse, kCourse) = kStartCourseRad * kStartCourseRad;
-  }
+  Mode mode;
+  mode.state.head<2>() = sample.place_m;
+  mode.covariance.setZero();
+  mode.covariance.topLeftCorner<2, 2>() = noise_m * noise_m * Eigen::Matrix2d::Identity();
+  mode.state[kCourse] = sample.course_rad.value_or(std::atan2(way_m.x(), way_m.y()));
+  mode.covariance(kCourse, kCourse) =
+      sample.course_rad ? sample.course_variance_rad2 : kStartCourseRad * kStartCourseRad;
   // Over the last stretch: the first ones may have been driven more slowly, or stood.
   const double last_s = newest_ ? Seconds(sample.stamp_ns - newest_->stamp_ns) : 0;
-  if (last_s > 0) state_[kSpeed] = (sample.place_m - newest_->place_m).norm() / last_s;
-  state_[kSpeed] = std::min(state_[kSpeed], 60.0);
-  covariance_(kSpeed, kSpeed) = kStartSpeedMps * kStartSpeedMps;
-  const double bend = CurvatureSigma(state_[kSpeed]);
-  covariance_(kCurvature, kCurvature) = bend * bend;
-  covariance_(kAcceleration, kAcceleration) =
+  if (last_s > 0) mode.state[kSpeed] = (sample.place_m - newest_->place_m).norm() / last_s;
+  mode.state[kSpeed] = std::min(mode.state[kSpeed], kMaxSpeedMps);
+  mode.covariance(kSpeed, kSpeed) = kStartSpeedMps * kStartSpeedMps;
+  mode.covariance(kAcceleration, kAcceleration) =
       config_.acceleration_mps2 * config_.acceleration_mps2;
+  const double steady_share = config_.steady_s / (config_.steady_s + config_.bending_s);
+  modes_ = {mode, mode};
+  modes_[0].weight = steady_share;
+  modes_[1].weight = 1 - steady_share;
+  modes_[0].sideways_mps2 = config_.steady_mps2;
+  modes_[1].sideways_mps2 = config_.sideways_mps2;
+  for (Mode& each : modes_) {
+    const double bend = CurvatureSigma(each.sideways_mps2, each.state[kSpeed]);
+    each.covariance(kCurvature, kCurvature) = bend * bend;
+  }
   known_ = true;
   misfits_ = 0;
+  Combine();
 }
 
-void CourseFilter::Predict(double time_s) {
+/// Each mode begins with what both believe, by the chance that the road was of the other kind.
+void CourseFilter::Mix(double time_s) {
+  // A vehicle that stands comes to no other road.
+  const double moving_s = state_[kSpeed] > 1 ? time_s : 0;
+  const double leaves_steady = 1 - std::exp(-moving_s / config_.steady_s);
+  const double leaves_bending = 1 - std::exp(-moving_s / config_.bending_s);
+  const double steady = modes_[0].weight;
+  const double bending = modes_[1].weight;
+  const double steady_next = steady * (1 - leaves_steady) + bending * leaves_bending;
+  const double bending_next = 1 - steady_next;
+  const std::array<double, 2> to_steady{steady * (1 - leaves_steady) / steady_next,
+                                        bending * leaves_bending / steady_next};
+  const std::array<double, 2> to_bending{steady * leaves_steady / bending_next,
+                                         bending * (1 - leaves_bending) / bending_next};
+  std::array<Mode, 2> mixed = modes_;
+  MomentsOf(modes_, to_steady, mixed[0].state, mixed[0].covariance);
+  MomentsOf(modes_, to_bending, mixed[1].state, mixed[1].covariance);
+  mixed[0].weight = steady_next;
+  mixed[1].weight = bending_next;
+  modes_ = mixed;
+}
+
+void CourseFilter::Predict(double time_s, Mode& mode) const {
   const int steps = std::max(1, static_cast<int>(std::ceil(time_s / kMaxStepS)));
-  for (int i = 0; i < steps; ++i) Step(time_s / steps);
+  for (int i = 0; i < steps; ++i) Step(time_s / steps, mode);
 }
 
-void CourseFilter::Step(double time_s) {
-  const double speed = std::max(0.0, state_[kSpeed]);
+void CourseFilter::Step(double time_s, Mode& mode) const {
+  State& state = mode.state;
+  const double speed = std::max(0.0, state[kSpeed]);
   const double way_m = speed * time_s;
-  const double sine = std::sin(state_[kCourse]);
-  const double cosine = std::cos(state_[kCourse]);
-  const double lasting_m =
-      std::max(config_.curvature_way_m, config_.curvature_time_s * speed);
+  const double sine = std::sin(state[kCourse]);
+  const double cosine = std::cos(state[kCourse]);
+  const double lasting_m = std::max(config_.curvature_way_m, config_.curvature_time_s * speed);
   const double keep_bend = std::exp(-way_m / lasting_m);
   const double keep_push = std::exp(-time_s / config_.acceleration_time_s);
 
@@ -111,59 +194,61 @@ void CourseFilter::Step(double time_s) {
   f(kEast, kSpeed) = time_s * sine;
   f(kNorth, kCourse) = -way_m * sine;
   f(kNorth, kSpeed) = time_s * cosine;
-  f(kCourse, kSpeed) = state_[kCurvature] * time_s;
+  f(kCourse, kSpeed) = state[kCurvature] * time_s;
   f(kCourse, kCurvature) = way_m;
   f(kSpeed, kAcceleration) = time_s;
   f(kCurvature, kCurvature) = keep_bend;
   f(kAcceleration, kAcceleration) = keep_push;
 
-  state_[kEast] += way_m * sine;
-  state_[kNorth] += way_m * cosine;
-  state_[kCourse] += state_[kCurvature] * way_m;
-  state_[kSpeed] = std::max(0.0, speed + state_[kAcceleration] * time_s);
-  state_[kCurvature] *= keep_bend;
-  state_[kAcceleration] *= keep_push;
-  if (state_[kSpeed] == 0) state_[kAcceleration] = std::max(0.0, state_[kAcceleration]);
+  state[kEast] += way_m * sine;
+  state[kNorth] += way_m * cosine;
+  state[kCourse] += state[kCurvature] * way_m;
+  state[kSpeed] = std::max(0.0, speed + state[kAcceleration] * time_s);
+  state[kCurvature] *= keep_bend;
+  state[kAcceleration] *= keep_push;
+  if (state[kSpeed] == 0) state[kAcceleration] = std::max(0.0, state[kAcceleration]);
 
-  covariance_ = f * covariance_ * f.transpose();
-  const double bend = CurvatureSigma(speed);
+  mode.covariance = f * mode.covariance * f.transpose();
+  const double bend = CurvatureSigma(mode.sideways_mps2, speed);
   const double push = config_.acceleration_mps2;
-  covariance_(kCurvature, kCurvature) += bend * bend * (1 - keep_bend * keep_bend);
-  covariance_(kAcceleration, kAcceleration) += push * push * (1 - keep_push * keep_push);
+  mode.covariance(kCurvature, kCurvature) += bend * bend * (1 - keep_bend * keep_bend);
+  mode.covariance(kAcceleration, kAcceleration) += push * push * (1 - keep_push * keep_push);
 }
 
-void CourseFilter::UpdatePlace(const Sample& sample) {
+/// Takes in the position. False when the vehicle moves otherwise than believed: all begins anew.
+bool CourseFilter::Update(const Sample& sample) {
   const double noise_m = NoiseM(sample);
-  const Eigen::Matrix2d innovation = covariance_.topLeftCorner<2, 2>() +
-                                     noise_m * noise_m * Eigen::Matrix2d::Identity();
-  const Eigen::Matrix2d inverse = innovation.inverse();
-  const Eigen::Vector2d error_m = sample.place_m - state_.head<2>();
-  if (error_m.dot(inverse * error_m) > kMisfit) {
-    if (++misfits_ >= kMisfitsToRestart) {
-      // It moves otherwise than believed: the course begins anew from here.
-      known_ = false;
-      misfits_ = 0;
-      start_ = sample;
+  std::array<Mode, 2> updated = modes_;
+  std::array<double, 2> weights{};
+  bool fits = false;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Fit fit = UpdateModePlace(sample.place_m, noise_m, updated[i]);
+    fits = fits || fit.distance <= kMisfit;
+    weights[i] = updated[i].weight * fit.likelihood;
+    if (sample.course_rad) {
+      UpdateModeCourse(*sample.course_rad, sample.course_variance_rad2, updated[i]);
     }
-    return;
+  }
+  const double sum = weights[0] + weights[1];
+  if (!fits || !(sum > 0)) {
+    Combine();
+    if (++misfits_ < kMisfitsToRestart) return true;
+    known_ = false;
+    misfits_ = 0;
+    start_.reset();
+    return false;
   }
   misfits_ = 0;
-  const Eigen::Matrix<double, 6, 2> gain = covariance_.leftCols<2>() * inverse;
-  state_ += gain * error_m;
-  covariance_ -= gain * covariance_.topRows<2>();
-  covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
-  if (state_[kSpeed] < 0) state_[kSpeed] = 0;
+  modes_ = updated;
+  const double steady = std::min(std::max(weights[0] / sum, kLeastWeight), 1 - kLeastWeight);
+  modes_[0].weight = steady;
+  modes_[1].weight = 1 - steady;
+  Combine();
+  return true;
 }
 
-void CourseFilter::UpdateCourse(const Sample& sample) {
-  const double error_rad = std::remainder(*sample.course_rad - state_[kCourse], 2 * M_PI);
-  const double variance =
-      covariance_(kCourse, kCourse) + std::max(1e-6, sample.course_variance_rad2);
-  const State gain = covariance_.col(kCourse) / variance;
-  state_ += gain * error_rad;
-  covariance_ -= (gain * covariance_.row(kCourse)).eval();
-  covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
-  if (state_[kSpeed] < 0) state_[kSpeed] = 0;
+void CourseFilter::Combine() {
+  MomentsOf(modes_, {modes_[0].weight, modes_[1].weight}, state_, covariance_);
 }
 
 }  // namespace livemap::vehicle

@@ -1,12 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <optional>
 
 namespace livemap::vehicle {
 
-/// Where the vehicle is, how it moves and how its way bends: a Kalman filter of positions.
+/// Where the vehicle is, how it moves and how its way bends: Kalman filters of positions.
+///
+/// Two of them run side by side: one believes that the road is steady (straight, or of a curvature
+/// that hardly changes), the other that it bends. Each has a weight, by how well it foretells the
+/// positions (interacting multiple models: H. A. P. Blom, Y. Bar-Shalom, IEEE Transactions on
+/// Automatic Control 33, 1988).
 ///
 /// State: east, north (m), course (rad, clockwise from north), speed (m/s), curvature of the way
 /// (1/m, positive to the right), acceleration (m/s^2). The course turns by the curvature over the
@@ -18,19 +24,23 @@ class CourseFilter {
   struct Config {
     /// Scatter of one fix against its neighbours, standard deviation per axis, m. The error that
     /// neighbouring fixes share does not bend the way.
-    double fix_noise_m = 0.5;
+    double fix_noise_m = 0.6;
     /// The same as a share of what the receiver states; the greater of both counts.
     double stated_share = 0.15;
-    /// Sideways acceleration that drivers choose, standard deviation, m/s^2: the curvature is about
-    /// this by the square of the speed.
+    /// Sideways acceleration that drivers choose where the road bends, standard deviation, m/s^2:
+    /// the curvature is about this by the square of the speed.
     double sideways_mps2 = 1.2;
-    double max_curvature = 0.08;      ///< Standard deviation of the curvature at most, 1/m.
-    double curvature_time_s = 2.0;    ///< How long a curvature lasts, s...
-    double curvature_way_m = 20;      ///< ...and on what way at least, m.
-    double acceleration_mps2 = 1.2;   ///< Standard deviation.
-    double acceleration_time_s = 2.5; ///< How long an acceleration lasts, s.
-    double start_way_m = 4;           ///< The course is known after so much way, m.
-    double max_gap_s = 5;             ///< After longer without a position all begins anew, s.
+    /// The same where it is steady.
+    double steady_mps2 = 0.07;
+    double steady_s = 16;              ///< How long a road stays steady, mean, s.
+    double bending_s = 6;              ///< How long it stays bending, mean, s.
+    double max_curvature = 0.08;       ///< Standard deviation of the curvature at most, 1/m.
+    double curvature_time_s = 4.0;     ///< How long a curvature lasts, s...
+    double curvature_way_m = 25;       ///< ...and on what way at least, m.
+    double acceleration_mps2 = 1.8;    ///< Standard deviation.
+    double acceleration_time_s = 2.5;  ///< How long an acceleration lasts, s.
+    double start_way_m = 4;            ///< The course is known after so much way, m.
+    double max_gap_s = 5;              ///< After longer without a position all begins anew, s.
   };
 
   /// A position at a stamp, on a plane; course and speed where something else than the positions
@@ -56,22 +66,34 @@ class CourseFilter {
   /// Moves the plane's origin to `origin_m` of the present plane.
   void MoveOrigin(const Eigen::Vector2d& origin_m);
 
+  /// One belief about the road.
+  struct Mode {
+    double weight = 0;         ///< The weights of both add up to 1.
+    double sideways_mps2 = 0;  ///< As in Config.
+    State state = State::Zero();
+    Covariance covariance = Covariance::Identity();
+  };
+
   /// Whether position, course and speed are known.
   bool known() const { return known_; }
+  /// First the steady one, then the bending one.
+  const std::array<Mode, 2>& modes() const { return modes_; }
+  /// Of both together.
   const State& state() const { return state_; }
   const Covariance& covariance() const { return covariance_; }
   /// Typical time between two positions, s.
   double period_s() const { return period_s_; }
   /// Standard deviation of the curvature of ways driven at this speed, 1/m.
-  double CurvatureSigma(double speed_mps) const;
+  double CurvatureSigma(double sideways_mps2, double speed_mps) const;
   const Config& config() const { return config_; }
 
  private:
   void Start(const Sample& sample);
-  void Predict(double time_s);
-  void Step(double time_s);
-  void UpdatePlace(const Sample& sample);
-  void UpdateCourse(const Sample& sample);
+  void Mix(double time_s);
+  void Predict(double time_s, Mode& mode) const;
+  void Step(double time_s, Mode& mode) const;
+  bool Update(const Sample& sample);
+  void Combine();
   double NoiseM(const Sample& sample) const;
 
   Config config_;
@@ -79,6 +101,7 @@ class CourseFilter {
   int misfits_ = 0;  // Positions in succession that do not fit.
   std::optional<Sample> start_, newest_;
   double period_s_ = 1;
+  std::array<Mode, 2> modes_;
   State state_ = State::Zero();
   Covariance covariance_ = Covariance::Identity();
 };

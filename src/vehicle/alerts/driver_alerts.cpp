@@ -10,9 +10,9 @@
 namespace livemap::vehicle {
 namespace {
 
-constexpr double kMaxFrameM = 5000;  // Further from its datum the plane begins anew.
-constexpr double kPassedM = 1;       // So far behind a hazard is passed.
-constexpr double kPassedAsideM = 12; // Further aside it was never reached.
+constexpr double kMaxFrameM = 5000;   // Further from its datum the plane begins anew.
+constexpr double kPassedM = 1;        // So far behind a hazard is passed.
+constexpr double kPassedAsideM = 12;  // Further aside it was never reached.
 constexpr std::size_t kMaxClassBytes = 256;
 
 /// The worst first: by rank, then the sooner, then by id, so that the order is always the same.
@@ -169,7 +169,7 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
 
   const double speed = filter_.state()[CourseFilter::kSpeed];
   const double longest_s = LeadS(1, speed) + filter_.period_s();
-  const double reach_m = std::min(config_.max_reach_m, ReachM(longest_s) + 20);
+  const double reach_m = std::min(config_.max_reach_m, 1.3 * ReachM(longest_s) + 20);
   const WayAhead way(config_.way, filter_, reach_m);
   const double radius_m = std::max(reach_m, config_.forget_beyond_m);
   std::unordered_set<std::uint64_t> seen;
@@ -183,9 +183,8 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
     }
     const double hazard_sigma_m =
         known.hazard.sigma_m > 0 ? known.hazard.sigma_m : config_.default_sigma_m;
-    WayAhead::Relation relation =
-        way.RelationOf(frame_->ToEnu(known.hazard.position),
-                       hazard_sigma_m * hazard_sigma_m + sigma_m * sigma_m);
+    WayAhead::Relation relation = way.RelationOf(
+        frame_->ToEnu(known.hazard.position), hazard_sigma_m * hazard_sigma_m + sigma_m * sigma_m);
     if (OnOtherLevel(known.hazard, altitude_m)) relation.probability = 0;
     Judge(known, relation, time_s, near->second, told);
   }
@@ -219,9 +218,8 @@ bool DriverAlerts::IsDue(const Near& near) const {
   const double course_variance = filter_.covariance()(CourseFilter::kCourse, CourseFilter::kCourse);
   const double max_sigma = config_.max_course_sigma_rad;
   if (speed < config_.min_speed_mps || course_variance > max_sigma * max_sigma) return false;
-  if (near.alert.probability < config_.alert_above) return false;
-  return near.alert.distance_m <=
-         ReachM(LeadS(near.alert.urgency, speed) + filter_.period_s());
+  if (std::min(near.alert.probability, *near.likely) < config_.alert_above) return false;
+  return near.alert.distance_m <= ReachM(LeadS(near.alert.urgency, speed) + filter_.period_s());
 }
 
 void DriverAlerts::Judge(const Known& known, const WayAhead::Relation& relation, double time_s,
@@ -230,6 +228,8 @@ void DriverAlerts::Judge(const Known& known, const WayAhead::Relation& relation,
   near.alert.id = known.hazard.id;
   near.alert.class_name = known.hazard.class_name;
   near.alert.urgency = known.urgency;
+  const double fresh = near.likely ? 1 - std::exp(-time_s / config_.sure_time_s) : 1;
+  near.likely = near.likely.value_or(0) + fresh * (relation.probability - near.likely.value_or(0));
   if (!relation.ahead) {
     near.alert.probability = 0;
     if (!near.told) return;

@@ -24,8 +24,8 @@ struct AlertHazard {
   Uuid id;
   std::string class_name;
   geo::GeoPoint position;
-  double sigma_m = 0;               ///< Of the position, per axis; 0: not known.
-  std::optional<double> altitude_m; ///< Above the ellipsoid, where known.
+  double sigma_m = 0;                ///< Of the position, per axis; 0: not known.
+  std::optional<double> altitude_m;  ///< Above the ellipsoid, where known.
 };
 
 /// Word to the driver about one hazard.
@@ -58,16 +58,17 @@ struct HazardAlert {
 class DriverAlerts {
  public:
   struct Config {
-    double min_lead_s = 4.8;      ///< An alert comes at least so long before the hazard, s.
-    double reaction_s = 1.5;      ///< Of the driver, s.
-    double braking_mps2 = 3.5;    ///< Of the vehicle, comfortably: its time to stop is added, m/s^2.
+    double min_lead_s = 5.0;    ///< An alert comes at least so long before the hazard, s.
+    double reaction_s = 1.5;    ///< Of the driver, s.
+    double braking_mps2 = 3.5;  ///< Of the vehicle, comfortably: its time to stop is added, m/s^2.
     double urgent_extra_s = 0.5;  ///< More for classes of rank 1, s.
-    double starting_mps2 = 0.8;   ///< Assumed of a vehicle slower than starting_speed_mps.
+    double starting_mps2 = 1.5;   ///< Assumed of a vehicle slower than starting_speed_mps.
     double starting_speed_mps = 7;
-    double alert_above = 0.5;       ///< Probability from which the driver is told.
-    double cancel_below = 0.05;     ///< Below it an alert is cancelled...
-    double cancel_after_s = 1.0;    ///< ...when it has been so for this long, s.
-    double min_speed_mps = 2.0;     ///< A slower vehicle is told nothing new, m/s.
+    double alert_above = 0.5;     ///< Probability from which the driver is told...
+    double sure_time_s = 0.3;     ///< ...if its running mean over this time is above it, too, s.
+    double cancel_below = 0.05;   ///< Below it an alert is cancelled...
+    double cancel_after_s = 1.0;  ///< ...when it has been so for this long, s.
+    double min_speed_mps = 2.0;   ///< A slower vehicle is told nothing new, m/s.
     double max_course_sigma_rad = 0.4;  ///< With a course less certain nothing new is told.
     double side_from_m = 2.5;           ///< Further to the side it is not ahead but left or right.
     double forget_beyond_m = 100;  ///< A hazard done with is told of again after this distance, m.
@@ -122,6 +123,7 @@ class DriverAlerts {
   struct Near {
     HazardAlert alert;
     bool told = false;
+    std::optional<double> likely;  // Running mean of the probability.
     bool done = false;             // Passed or cancelled.
     double unlikely_s = 0;         // So long it has lain off the way.
   };

@@ -17,21 +17,21 @@ namespace livemap::vehicle {
 class WayAhead {
  public:
   struct Config {
-    double lane_sigma_m = 1.0;      ///< Where in its lane something lies, standard deviation, m.
-    double bend_spacing_m = 250;    ///< Mean way between places where a road bends anew, m.
-    double others_per_m = 0.012;    ///< Other roads' hazards per own one and metre to the side.
-    double step_m = 3;              ///< Between two places of the prediction, m.
-    double max_way_m = 400;         ///< Predicted at most, m.
+    double lane_sigma_m = 1.0;    ///< Where in its lane something lies, standard deviation, m.
+    double bend_spacing_m = 250;  ///< Mean way between places where a road bends anew, m.
+    double others_per_m = 0.022;  ///< Other roads' hazards per own one and metre to the side.
+    double step_m = 3;            ///< Between two places of the prediction, m.
+    double max_way_m = 400;       ///< Predicted at most, m.
   };
 
   /// How a place lies to the way.
   struct Relation {
-    bool ahead = false;       ///< Beside the predicted way, before its end; else nothing but
-                              ///< forward_m and left_m is set.
-    double way_m = 0;         ///< Along the way.
-    double left_m = 0;        ///< Of the way where ahead; else of the straight line ahead.
-    double forward_m = 0;     ///< Along the straight line ahead, negative behind.
-    double probability = 0;   ///< That it lies on the vehicle's own way.
+    bool ahead = false;      ///< Beside the predicted way, before its end; else nothing but
+                             ///< forward_m and left_m is set.
+    double way_m = 0;        ///< Along the way.
+    double left_m = 0;       ///< Of the way where ahead; else of the straight line ahead.
+    double forward_m = 0;    ///< Along the straight line ahead, negative behind.
+    double probability = 0;  ///< That it lies on the vehicle's own way.
   };
 
   /// Predicts `way_m` metres from a filter that knows its state.
@@ -50,9 +50,17 @@ class WayAhead {
     double bend_variance_m2;  // Beside that, if it bends.
     double bend_share;        // Probability that it has bent until here.
   };
+  struct Line {
+    double weight;
+    std::vector<Point> points;
+  };
+
+  Line Predict(const CourseFilter& filter, const CourseFilter::Mode& mode, double way_m) const;
+  double OwnDensity(const Line& line, const Eigen::Vector2d& place_m, double variance_m2,
+                    Relation& relation) const;
 
   Config config_;
-  std::vector<Point> points_;
+  std::vector<Line> lines_;  // One per mode of the filter.
 };
 
 }  // namespace livemap::vehicle
