@@ -13,8 +13,8 @@ BAG = ROOT / "rosbags/town.bag"
 NODES = {
     "vehicle": {"camera_ingest": "camera_ingest", "edge_vo": "edge_vo", "geo_localization": "geo_localization",
                 "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
-                "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard",
-                "change_detection": "change_detection", "gps_receiver": "gps_receiver"},
+                 "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard", "driver_alert": "driver_alert",
+                 "change_detection": "change_detection", "gps_receiver": "gps_receiver"},
     "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone", "candidate_intake": "candidate_intake",
              "hazard_detection": "hazard_detection"},
 }

@@ -7,6 +7,7 @@
 #include "ros/parameters/camera_ingest_parameters.h"
 #include "ros/parameters/candidate_intake_parameters.h"
 #include "ros/parameters/change_detection_parameters.h"
+#include "ros/parameters/driver_alert_parameters.h"
 #include "ros/parameters/early_discard_parameters.h"
 #include "ros/parameters/edge_vo_parameters.h"
 #include "ros/parameters/geo_localization_parameters.h"
@@ -32,6 +33,7 @@ const std::map<std::string, Reader>& Readers() {
       {"camera_ingest", [](P& p, const S&) { ReadIngestConfig(p); }},
       {"candidate_intake", [](P& p, const S&) { ReadCandidateIntakeConfig(p); }},
       {"change_detection", [](P& p, const S&) { ReadChangeDetectionConfig(p, kNowNs); }},
+      {"driver_alert", [](P& p, const S&) { ReadDriverAlertConfig(p); }},
       {"early_discard", [](P& p, const S&) { ReadEarlyDiscardConfig(p, kNowNs); }},
       {"edge_vo", [](P& p, const S&) { ReadEdgeVoConfig(p); }},
       {"geo_localization", [](P& p, const S&) { ReadGeoLocalizationConfig(p); }},
@@ -106,6 +108,7 @@ const std::vector<NodeParameters>& AllNodeParameters() {
       {"camera_ingest", "camera_ingest", "camera_ingest_parameters.cpp", {}},
       {"candidate_intake", "candidate_intake", "candidate_intake_parameters.cpp", {}},
       {"change_detection", "change_detection", "change_detection_parameters.cpp", {}},
+      {"driver_alert", "driver_alert", "driver_alert_parameters.cpp", {}},
       {"early_discard", "early_discard", "early_discard_parameters.cpp", {}},
       {"edge_vo", "edge_vo", "edge_vo_parameters.cpp", {}},
       {"geo_localization", "geo_localization", "geo_localization_parameters.cpp", {}},

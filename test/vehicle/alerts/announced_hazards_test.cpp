@@ -1,0 +1,105 @@
+#include "vehicle/alerts/announced_hazards.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "test/support/temporary_directory.h"
+#include "vehicle/reporting/local_hazard_map.h"
+
+namespace livemap::vehicle {
+namespace {
+
+using Action = protocol::Notice::Action;
+
+Uuid IdOf(std::uint8_t number) {
+  Uuid id;
+  id.bytes[15] = number;
+  return id;
+}
+
+protocol::Notice NoticeOf(std::uint8_t number, Action action, std::uint64_t sequence) {
+  protocol::Notice notice;
+  notice.action = action;
+  notice.sequence = sequence;
+  notice.previous_sequence = sequence - 1;
+  notice.hazard_uuid = IdOf(number);
+  notice.class_name = "pothole";
+  notice.position = {49.2, 7.0};
+  notice.covariance_m2 = 4 * Eigen::Matrix2d::Identity();
+  notice.stamp_ns = 1'700'000'000'000'000'000;
+  return notice;
+}
+
+StoredHazards::Row RowOf(std::uint8_t number, std::uint64_t sequence) {
+  return {{IdOf(number), "pothole", {49.2, 7.0}, 0, std::nullopt}, sequence};
+}
+
+TEST(AnnouncedHazardsTest, ANoticeAddsMovesAndTakesAway) {
+  AnnouncedHazards hazards;
+  auto changes = hazards.Apply(NoticeOf(1, Action::kAdded, 5));
+  ASSERT_EQ(changes.put.size(), 1U);
+  EXPECT_DOUBLE_EQ(changes.put[0].sigma_m, 2);
+  EXPECT_EQ(hazards.Apply(NoticeOf(1, Action::kUpdated, 6)).put.size(), 1U);
+  EXPECT_TRUE(hazards.Apply(NoticeOf(1, Action::kAdded, 5)).put.empty()) << "old news";
+  changes = hazards.Apply(NoticeOf(1, Action::kRemoved, 7));
+  EXPECT_EQ(changes.gone, std::vector<Uuid>{IdOf(1)});
+  EXPECT_TRUE(hazards.Apply(NoticeOf(1, Action::kUpdated, 6)).put.empty()) << "it is gone";
+  EXPECT_EQ(hazards.size(), 0U);
+}
+
+TEST(AnnouncedHazardsTest, WhatCannotBeIsLeftOut) {
+  AnnouncedHazards hazards;
+  protocol::Notice notice = NoticeOf(1, Action::kAdded, 5);
+  notice.position.latitude_deg = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(hazards.Apply(notice).put.empty());
+  notice = NoticeOf(0, Action::kAdded, 5);
+  EXPECT_TRUE(hazards.Apply(notice).put.empty());
+  notice = NoticeOf(2, Action::kAdded, 5);
+  notice.covariance_m2.setConstant(std::numeric_limits<double>::quiet_NaN());
+  ASSERT_EQ(hazards.Apply(notice).put.size(), 1U);
+}
+
+TEST(AnnouncedHazardsTest, TheMapBringsWhatWasBeforeAndTakesWhatItNoLongerHas) {
+  AnnouncedHazards hazards;
+  EXPECT_EQ(hazards.Apply(StoredHazards{{RowOf(1, 5), RowOf(2, 6)}, 6}).put.size(), 2U);
+  hazards.Apply(NoticeOf(3, Action::kAdded, 7));
+  hazards.Apply(NoticeOf(2, Action::kRemoved, 8));
+  const auto changes = hazards.Apply(StoredHazards{{RowOf(2, 6)}, 6});
+  EXPECT_TRUE(changes.put.empty()) << "the notice of its removal is newer than the map";
+  EXPECT_EQ(changes.gone, std::vector<Uuid>{IdOf(1)});
+  EXPECT_EQ(hazards.size(), 1U) << "the third is newer than the map";
+}
+
+TEST(AnnouncedHazardsTest, AZoneThatBeganAnewCountsAnew) {
+  AnnouncedHazards hazards;
+  hazards.Apply(StoredHazards{{RowOf(1, 500), RowOf(2, 600)}, 600});
+  const auto changes = hazards.Apply(StoredHazards{{RowOf(3, 1)}, 1});
+  EXPECT_EQ(changes.put.size(), 1U);
+  EXPECT_EQ(changes.gone, (std::vector<Uuid>{IdOf(1), IdOf(2)}));
+}
+
+TEST(AnnouncedHazardsTest, ReadsTheLocalMapWhileItIsOpen) {
+  const test::TemporaryDirectory directory;
+  const std::string path = directory.path() + "/hazards.sqlite3";
+  EXPECT_FALSE(ReadStoredHazards(path)) << "there is none yet";
+  LocalHazardMap::Config config;
+  config.path = path;
+  LocalHazardMap map(config, {}, 0);
+  map.Apply({NoticeOf(1, Action::kAdded, 1), NoticeOf(2, Action::kAdded, 2),
+             NoticeOf(2, Action::kRemoved, 3)});
+  protocol::Report own;
+  own.uuid = IdOf(9);
+  own.class_name = "pothole";
+  own.position = {49.3, 7.0};
+  map.Add(own);
+  const auto stored = ReadStoredHazards(path);
+  ASSERT_TRUE(stored);
+  ASSERT_EQ(stored->rows.size(), 1U);
+  EXPECT_EQ(stored->rows[0].hazard.id, IdOf(1));
+  EXPECT_EQ(stored->rows[0].sequence, 1U);
+  EXPECT_EQ(stored->sequence, 3U);
+}
+
+}  // namespace
+}  // namespace livemap::vehicle
