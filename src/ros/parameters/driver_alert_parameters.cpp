@@ -19,7 +19,7 @@ void ReadAlertSources(ParameterReader& parameters, DriverAlertConfig& config) {
                   "Time between two readings of it.", "s");
   parameters.Read("max_hazards", config.alerts.max_hazards, {1, 1e7},
                   "Number of hazards kept in memory. Beyond it new ones are refused and counted.");
-  parameters.Read("default_sigma_m", config.alerts.default_sigma_m, {0.01, 100},
+  parameters.Read("place_sigma_m", config.alerts.default_sigma_m, {0.01, 100},
                   "Standard deviation per axis of a hazard's place where no notice tells it.", "m");
 }
 
