@@ -23,7 +23,7 @@ classes:
   debris: {label: Debris, urgency: 1}
 )";
 
-Uuid IdOf(std::uint8_t number) {
+Uuid AlertedId(std::uint8_t number) {
   Uuid id;
   id.bytes[15] = number;
   return id;
@@ -38,8 +38,8 @@ class DriverAlertsTest : public testing::Test {
   void PutHazard(std::uint8_t number, double east_m, double north_m,
                  const std::string& class_name = "pothole",
                  std::optional<double> altitude_m = std::nullopt) {
-    ASSERT_TRUE(
-        alerts_.Put({IdOf(number), class_name, frame_.ToGeo({east_m, north_m}), 1.0, altitude_m}));
+    ASSERT_TRUE(alerts_.Put(
+        {AlertedId(number), class_name, frame_.ToGeo({east_m, north_m}), 1.0, altitude_m}));
   }
 
   void Note(const std::vector<HazardAlert>& told) {
@@ -77,7 +77,7 @@ class DriverAlertsTest : public testing::Test {
   std::vector<State> StatesOf(std::uint8_t number) const {
     std::vector<State> states;
     for (const auto& [time_s, alert] : told_) {
-      if (alert.id == IdOf(number)) states.push_back(alert.state);
+      if (alert.id == AlertedId(number)) states.push_back(alert.state);
     }
     return states;
   }
@@ -191,12 +191,12 @@ TEST_F(DriverAlertsTest, TheWorstComesFirst) {
   PutHazard(3, 0, 125, "pothole");
   Drive(20, 14);
   ASSERT_GE(told_.size(), 3U);
-  EXPECT_EQ(told_[0].second.id, IdOf(2));
-  EXPECT_EQ(told_[1].second.id, IdOf(3));
-  EXPECT_EQ(told_[2].second.id, IdOf(1));
+  EXPECT_EQ(told_[0].second.id, AlertedId(2));
+  EXPECT_EQ(told_[1].second.id, AlertedId(3));
+  EXPECT_EQ(told_[2].second.id, AlertedId(1));
   const std::vector<HazardAlert> ahead = alerts_.Ahead();
   ASSERT_FALSE(ahead.empty());
-  EXPECT_EQ(ahead.front().id, IdOf(2));
+  EXPECT_EQ(ahead.front().id, AlertedId(2));
 }
 
 TEST_F(DriverAlertsTest, ARemovedHazardIsCancelledOrNeverTold) {
@@ -204,9 +204,9 @@ TEST_F(DriverAlertsTest, ARemovedHazardIsCancelledOrNeverTold) {
   PutHazard(2, 0, 500);
   Drive(260, 14);
   ASSERT_EQ(StatesOf(1), std::vector<State>{State::kApproach});
-  Note(alerts_.Remove(IdOf(1)));
-  Note(alerts_.Remove(IdOf(2)));
-  Note(alerts_.Remove(IdOf(2)));
+  Note(alerts_.Remove(AlertedId(1)));
+  Note(alerts_.Remove(AlertedId(2)));
+  Note(alerts_.Remove(AlertedId(2)));
   Drive(400, 14);
   EXPECT_EQ(StatesOf(1), (std::vector<State>{State::kApproach, State::kCancelled}));
   EXPECT_TRUE(StatesOf(2).empty());
@@ -232,11 +232,11 @@ TEST_F(DriverAlertsTest, StartingAnewCancelsWhatStands) {
 
 TEST_F(DriverAlertsTest, RefusesHazardsAndPositionsThatCannotBe) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(alerts_.Put({IdOf(1), "pothole", {nan, 7}, 1, {}}));
-  EXPECT_FALSE(alerts_.Put({IdOf(1), "pothole", {91, 7}, 1, {}}));
-  EXPECT_FALSE(alerts_.Put({IdOf(1), "pothole", kHome, nan, {}}));
-  EXPECT_FALSE(alerts_.Put({IdOf(1), "pothole", kHome, -1, {}}));
-  EXPECT_FALSE(alerts_.Put({IdOf(1), "pothole", kHome, 1, nan}));
+  EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", {nan, 7}, 1, {}}));
+  EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", {91, 7}, 1, {}}));
+  EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", kHome, nan, {}}));
+  EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", kHome, -1, {}}));
+  EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", kHome, 1, nan}));
   EXPECT_FALSE(alerts_.Put({Uuid(), "pothole", kHome, 1, {}}));
   EXPECT_EQ(alerts_.size(), 0U);
   geo::TrackPose pose;
@@ -260,12 +260,12 @@ TEST(DriverAlertsLimitsTest, RefusesMoreHazardsThanItKeeps) {
   DriverAlerts::Config config;
   config.max_hazards = 2;
   DriverAlerts alerts(config, {});
-  EXPECT_TRUE(alerts.Put({IdOf(1), "a", kHome, 1, {}}));
-  EXPECT_TRUE(alerts.Put({IdOf(2), "a", kHome, 1, {}}));
-  EXPECT_FALSE(alerts.Put({IdOf(3), "a", kHome, 1, {}}));
+  EXPECT_TRUE(alerts.Put({AlertedId(1), "a", kHome, 1, {}}));
+  EXPECT_TRUE(alerts.Put({AlertedId(2), "a", kHome, 1, {}}));
+  EXPECT_FALSE(alerts.Put({AlertedId(3), "a", kHome, 1, {}}));
   EXPECT_EQ(alerts.counters().refused_full, 1U);
-  alerts.Remove(IdOf(1));
-  EXPECT_TRUE(alerts.Put({IdOf(3), "a", kHome, 1, {}}));
+  alerts.Remove(AlertedId(1));
+  EXPECT_TRUE(alerts.Put({AlertedId(3), "a", kHome, 1, {}}));
 }
 
 TEST(DriverAlertsLimitsTest, RefusesAConfigThatCannotBe) {
@@ -279,7 +279,7 @@ TEST_F(DriverAlertsTest, TheSameDriveGivesTheSameAlerts) {
     DriverAlerts alerts(DriverAlerts::Config(), {});
     const geo::LocalFrame frame(kHome);
     for (std::uint8_t i = 1; i < 40; ++i) {
-      alerts.Put({IdOf(i), "a", frame.ToGeo({0.1 * i, 20.0 * i}), 1, {}});
+      alerts.Put({AlertedId(i), "a", frame.ToGeo({0.1 * i, 20.0 * i}), 1, {}});
     }
     std::vector<std::pair<Uuid, double>> told;
     for (int i = 0; i < 300; ++i) {
