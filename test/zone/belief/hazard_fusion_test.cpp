@@ -11,11 +11,11 @@
 namespace livemap::zone {
 namespace {
 
-constexpr geo::GeoPoint kPlace{40.44, -79.94};
+constexpr geo::GeoPoint kFusedPlace{40.44, -79.94};
 
 protocol::Report ReportAt(const Eigen::Vector2d& east_north_m, const Eigen::Matrix2d& covariance) {
   protocol::Report report;
-  report.position = geo::LocalFrame(kPlace).ToGeo(east_north_m);
+  report.position = geo::LocalFrame(kFusedPlace).ToGeo(east_north_m);
   report.covariance_m2 = covariance;
   report.confidence = 0.5F;
   report.stamp_ns = 1;
@@ -30,7 +30,7 @@ HazardEstimate FirstEstimate(const protocol::Report& report) {
 }
 
 Eigen::Vector2d PlaceOf(const HazardEstimate& estimate) {
-  return geo::LocalFrame(kPlace).ToEnu(estimate.position);
+  return geo::LocalFrame(kFusedPlace).ToEnu(estimate.position);
 }
 
 TEST(HazardFusion, EqualReportsAverageButForWhatTheyShare) {
