@@ -1,10 +1,18 @@
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
 #include <cmath>
+#include <optional>
 
+#include "common/time.h"
 #include "placement/hazard_placement.h"
 
 namespace livemap::vehicle {
+namespace {
+
+// Fused poses come several times a second. When none has come for so long, none is on its way.
+constexpr double kNoFusedPoseAfterS = 2.0;
+
+}  // namespace
 
 VehiclePoseLookup::VehiclePoseLookup(const Config& config)
     : config_(config), fixes_(config.fixes), poses_(config.poses) {}
@@ -14,7 +22,10 @@ VehiclePoseLookup::Lookup VehiclePoseLookup::At(std::int64_t stamp_ns, double wa
   if (config_.use_fused) {
     const FixTrack::Lookup fused = poses_.At(stamp_ns);
     if (fused.answer == FixTrack::Answer::kReady) return {Answer::kReady, fused.pose, true, false};
-    if (fused.answer == FixTrack::Answer::kWait && waited_s < patience.fused_wait_s) return {};
+    if (fused.answer == FixTrack::Answer::kWait && waited_s < patience.fused_wait_s &&
+        IsFusedPoseDue(stamp_ns)) {
+      return {};
+    }
   }
   const FixTrack::Lookup lookup = fixes_.At(stamp_ns);
   switch (lookup.answer) {
@@ -29,6 +40,11 @@ VehiclePoseLookup::Lookup VehiclePoseLookup::At(std::int64_t stamp_ns, double wa
       break;
   }
   return {Answer::kHopeless, {}, false, true};
+}
+
+bool VehiclePoseLookup::IsFusedPoseDue(std::int64_t stamp_ns) const {
+  const std::optional<std::int64_t> newest_ns = poses_.newest_ns();
+  return newest_ns && Seconds(stamp_ns - *newest_ns) < kNoFusedPoseAfterS;
 }
 
 geo::TrackPose VehiclePoseLookup::BaseOf(const geo::TrackPose& antenna) const {

@@ -17,7 +17,9 @@ class VehiclePoseLookup {
  public:
   /// How long an image waits, s.
   struct Patience {
-    double fused_wait_s = 1.0;    ///< For its fused pose; then the fixes count.
+    /// For its fused pose; then the fixes count. Not at all while no fused poses come: before the
+    /// localisation has found its heading, or without it.
+    double fused_wait_s = 1.0;
     double bracket_wait_s = 0.3;  ///< For a fix after it; then the fixes before it are carried on.
     double max_wait_s = 5.0;      ///< For any position.
   };
@@ -71,6 +73,8 @@ class VehiclePoseLookup {
   const PoseTrack& poses() const { return poses_; }
 
  private:
+  /// Whether fused poses have come lately, so that one for this moment may be on its way.
+  bool IsFusedPoseDue(std::int64_t stamp_ns) const;
   /// The antenna's pose as that of base_link.
   geo::TrackPose BaseOf(const geo::TrackPose& antenna) const;
 

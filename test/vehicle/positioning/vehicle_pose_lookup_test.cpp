@@ -60,6 +60,16 @@ TEST(VehiclePoseLookup, TheFixesCountWhereTheFusedPoseDoesNotCome) {
   EXPECT_EQ(lookup.At(StampNs(0.5), 0).answer, PoseAnswer::kReady) << "no fused pose will come";
 }
 
+TEST(VehiclePoseLookup, NothingWaitsForFusedPosesThatDoNotCome) {
+  VehiclePoseLookup::Config config;
+  config.use_fused = true;
+  VehiclePoseLookup lookup = Driven(config, 6);
+  EXPECT_EQ(lookup.At(StampNs(3), 0).answer, PoseAnswer::kReady) << "none has ever come";
+  lookup.AddPose(StampNs(3), FusedAt(3));
+  EXPECT_EQ(lookup.At(StampNs(4.9), 0).answer, PoseAnswer::kWait) << "they come";
+  EXPECT_EQ(lookup.At(StampNs(5.1), 0).answer, PoseAnswer::kReady) << "they have ended";
+}
+
 TEST(VehiclePoseLookup, APlaceFromBaseLinkIsThatFromTheAntenna) {
   VehiclePoseLookup::Config config;
   config.antenna_x_m = -1.5;

@@ -48,6 +48,7 @@ TEST_F(HazardReporterTest, WaitsForTheFusedPoseAndFallsBackToTheFixesWhenItDoesN
   config_.image_wait_s = 0;
   Restart();
   DriveFixes(0, 4);
+  reporter_->AddPose(StampNs(2.0), FusedPoseAt(2.0));
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_THAT(TakeDue(), IsEmpty()) << "it may come yet";
   ProcessWithPictures(3.0 + config_.fused_wait_s + 0.01);

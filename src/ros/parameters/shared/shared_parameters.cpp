@@ -64,8 +64,11 @@ void ReadBasePoseSource(ParameterReader& parameters, vehicle::VehiclePoseLookup:
                               "Whose positions and headings count: gps (the fixes alone) or fused "
                               "(localization/odometry, and the fixes where it is silent). "
                               "vehicle.launch sets it by the argument `position_source`.");
-  parameters.Read("fused_wait_s", pose.fused_wait_s, {0, 60},
-                  "Time to wait for the fused pose of an image. Then the fixes count.", "s");
+  parameters.Read(
+      "fused_wait_s", pose.fused_wait_s, {0, 60},
+      "Time to wait for the fused pose of an image. Then the fixes count, at once where no "
+      "fused pose has come for two seconds.",
+      "s");
   parameters.Read("max_fused_gap_s", pose.poses.max_gap_s, {0.01, 10},
                   "Two fused poses further apart than this are not interpolated.", "s");
   parameters.Read("bracket_wait_s", pose.bracket_wait_s, {0, 60},
