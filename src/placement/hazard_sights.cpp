@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/time.h"
 #include "geo/fix_covariance.h"
@@ -15,6 +16,7 @@ namespace {
 constexpr double kLeastSigmaM = 1e-4;  // Of one sight: keeps the equations regular.
 constexpr double kFixesApartS = 1.0;   // The scatter of fixes so far apart is independent.
 constexpr double kConvergedM = 1e-4;
+constexpr double kLeastFreedom = 2;  // Of the residuals, to say how far they scatter.
 constexpr double kMaxHeadingVariance = 10;
 // Columns of the unknowns.
 constexpr int kPose = 2;
@@ -236,49 +238,48 @@ HazardSights::Linear HazardSights::Linearise(const Kept& kept, const SharedPose&
   return linear;
 }
 
+/// The sights' weighted normal equations at `at`, without the prior.
+HazardSights::Equations HazardSights::Accumulate(const Unknowns& at) const {
+  Equations sum;
+  for (const Kept& kept : sights_) {
+    const Linear linear = Linearise(kept, shared_, at);
+    const Eigen::Vector2d residual_m = linear.place_m - linear.rows * at;
+    const Eigen::Matrix2d own = linear.own_m2.inverse();
+    const double distance2 = residual_m.dot(own * residual_m);
+    const double doubt = 1 + distance2 / (config_.cauchy_scale * config_.cauchy_scale);
+    const double weight = kept.share / doubt;
+    sum.information += weight * linear.rows.transpose() * own * linear.rows;
+    sum.right += weight * linear.rows.transpose() * own * linear.place_m;
+    sum.squares += weight * distance2;
+    sum.freedom += 2 * kept.share;
+  }
+  return sum;
+}
+
 void HazardSights::Solve() {
   shared_ = FindSharedPose();
-  const auto best =
-      std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
+  const Kept& nearest =
+      *std::min_element(sights_.begin(), sights_.end(), [](const Kept& a, const Kept& b) {
         return a.sight.foot.covariance_m2.trace() < b.sight.foot.covariance_m2.trace();
       });
   solution_.setZero();
   solution_.head<2>() =
-      best->base_m + SightRotation(best->sight.base.course_rad) * best->sight.foot.position_m;
-  const Information prior = [] {
-    Information unit = Information::Identity();
-    unit(0, 0) = unit(1, 1) = 0;
-    return unit;
-  }();
-  double scatter = 1;
-  bool is_last = false;
-  for (int i = 0; i <= config_.iterations; ++i) {
-    // The last round only gives the covariance.
-    is_last = is_last || i == config_.iterations;
-    Information information = Information::Zero();
-    Unknowns right = Unknowns::Zero();
-    double squares = 0;
-    double freedom = -2;
-    for (const Kept& kept : sights_) {
-      const Linear linear = Linearise(kept, shared_, solution_);
-      const Eigen::Vector2d residual_m = linear.place_m - linear.rows * solution_;
-      const Eigen::Matrix2d own = linear.own_m2.inverse();
-      const double distance2 = residual_m.dot(own * residual_m);
-      const double doubt = 1 + distance2 / (config_.cauchy_scale * config_.cauchy_scale);
-      const double weight = kept.share / doubt;
-      information += weight * linear.rows.transpose() * own * linear.rows;
-      right += weight * linear.rows.transpose() * own * linear.place_m;
-      squares += weight * distance2;
-      freedom += 2 * kept.share;
-    }
-    if (is_last && freedom >= 2) scatter = squares / freedom;
-    const Eigen::LDLT<Information> solver(information / std::max(1.0, scatter) + prior);
-    covariance_ = solver.solve(Information::Identity());
-    if (is_last) break;
-    const Unknowns next = solver.solve(right);
-    is_last = (next - solution_).head<2>().norm() < kConvergedM;
+      nearest.base_m + SightRotation(nearest.sight.base.course_rad) * nearest.sight.foot.position_m;
+  Information prior = Information::Identity();
+  prior(0, 0) = prior(1, 1) = 0;
+  for (int i = 0; i < config_.iterations; ++i) {
+    const Equations equations = Accumulate(solution_);
+    const Unknowns next =
+        Eigen::LDLT<Information>(equations.information + prior).solve(equations.right);
+    const double step_m = (next - solution_).head<2>().norm();
     solution_ = next;
+    if (step_m < kConvergedM) break;
   }
+  const Equations equations = Accumulate(solution_);
+  const double scatter =
+      equations.freedom >= kLeastFreedom ? equations.squares / equations.freedom : 1.0;
+  covariance_ = Eigen::LDLT<Information>(equations.information / std::max(1.0, scatter) + prior)
+                    .solve(Information::Identity());
   KeepPlace(scatter);
 }
 

@@ -111,11 +111,20 @@ class HazardSights {
     double way_m = 0;
   };
 
+  /// Normal equations of the sights.
+  struct Equations {
+    Information information = Information::Zero();
+    Unknowns right = Unknowns::Zero();
+    double squares = 0;   // Weighted, of the residuals.
+    double freedom = -2;  // Their degrees: the place takes two.
+  };
+
   Kept ToKept(const HazardSight& sight) const;
   void DropLeastCertain();
   SharedPose FindSharedPose() const;
   double FixScatterGain() const;
   Linear Linearise(const Kept& kept, const SharedPose& shared, const Unknowns& at) const;
+  Equations Accumulate(const Unknowns& at) const;
   void Solve();
   void KeepPlace(double scatter);
 

@@ -85,6 +85,40 @@ TEST(ProjectToGround, CovarianceEqualsNumericDifferentiation) {
   EXPECT_LT((point->covariance_m2 - expected).norm(), 1e-6 * expected.norm());
 }
 
+TEST(SensitivityOfGroundPoint, IsTheDerivativeOfTheProjection) {
+  const GroundProjectionNoise noise;
+  const Eigen::Isometry3d pose = Mount(0.1);
+  const Eigen::Vector2d place(14, -2);
+  const auto moves = SensitivityOfGroundPoint(place, kCamera, pose);
+  ASSERT_TRUE(moves);
+  const auto point = [&](const Eigen::Vector2d& pixel, const Eigen::Isometry3d& mounting) {
+    return ProjectToGround(pixel, kCamera, mounting, noise)->position_m;
+  };
+  EXPECT_LT((point(moves->pixel, pose) - place).norm(), 1e-9);
+  constexpr double kStep = 1e-5;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(axis);
+    const Eigen::Vector2d slope =
+        (point(moves->pixel + step, pose) - point(moves->pixel - step, pose)) / (2 * kStep);
+    EXPECT_LT((slope - moves->per_pixel.col(axis)).norm(), 1e-5);
+  }
+  const Eigen::Vector2d by_pitch =
+      (point(moves->pixel, Mount(0.1 + kStep)) - point(moves->pixel, Mount(0.1 - kStep))) /
+      (2 * kStep);
+  EXPECT_LT((by_pitch - moves->per_pitch).norm(), 1e-3);
+  const Eigen::Vector2d by_height = (point(moves->pixel, Mount(0.1, kHeightM + kStep)) -
+                                     point(moves->pixel, Mount(0.1, kHeightM - kStep))) /
+                                    (2 * kStep);
+  EXPECT_LT((by_height - moves->per_height).norm(), 1e-5);
+}
+
+TEST(SensitivityOfGroundPoint, IsNoneWhereTheCameraSeesNoSuchPoint) {
+  EXPECT_FALSE(SensitivityOfGroundPoint({-3, 0}, kCamera, Mount(0)));
+  EXPECT_FALSE(SensitivityOfGroundPoint({10, 0}, kCamera, Mount(0, -1)));
+  EXPECT_FALSE(
+      SensitivityOfGroundPoint({std::numeric_limits<double>::quiet_NaN(), 0}, kCamera, Mount(0)));
+}
+
 TEST(ProjectToGround, CovarianceEqualsTheSpreadOfNoisyProjections) {
   const GroundProjectionNoise noise{1.0, 0.002, 0.02, 100.0};
   const Eigen::Vector2d pixel(350, 330);
