@@ -73,7 +73,7 @@ void ReadReportingSightings(ParameterReader& parameters, HazardReportingConfig& 
   parameters.Read(
       "settle_wait_s", reporter.settle_wait_s, {0, 60},
       "Longest time that a report waits for further sights of its hazard, which make its place "
-      "surer. Urgent classes (rank 1) do not wait. 0: none waits.",
+      "surer. Urgent classes (rank 1) do not wait, nor do events. 0: none waits.",
       "s");
   parameters.Read(
       "settle_sigma_m", reporter.settle_sigma_m, {0, 1000},
@@ -287,6 +287,8 @@ HazardReportingConfig ReadHazardReportingConfig(ParameterReader& parameters, std
   ReadFixTrack(parameters, reporter.track);
   ReadReportingPolls(parameters, config);
   ReadReportingViews(parameters, config);
+  // An event is the one sight of its object: no further one comes.
+  if (config.use_events) reporter.settle_wait_s = 0;
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
   return config;
 }
