@@ -211,7 +211,8 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   start_covariance_ = result.covariance;
   result.new_keyframe = true;
   result.keyframe_stamp_ns = frame.stamp_ns;
-  if (!KnowsMetres()) {
+  // One height of so few depths is too rough for a step: the path begins here.
+  if (!knows_way) {
     start_stamp_ns_ = frame.stamp_ns;
     return result;
   }
