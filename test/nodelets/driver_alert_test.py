@@ -75,7 +75,7 @@ class DriverAlertTest(unittest.TestCase):
     def alerts(self):
         return [(each.hazard_uuid[0], each.state) for each in self.node.received("hazard/alert")]
 
-    def test_approach_and_passing_in_order_and_the_worst_first(self):
+    def test_approach_comes_before_passing(self):
         self.start()
         self.tell(notice(1, 1, 200), notice(2, 2, 205, class_name="debris"), notice(3, 3, 200, east_m=40),
                   notice(4, 4, 500))

@@ -10,7 +10,7 @@
 namespace livemap::vehicle {
 namespace {
 
-constexpr std::size_t kGoneKept = 100000;  // Beyond it all are forgotten: the map knows them, too.
+constexpr std::size_t kRemovedKept = 100000;  // Beyond it all are forgotten: the map knows them, too.
 
 /// Per axis; 0 where the covariance is none.
 double SigmaOf(const Eigen::Matrix2d& covariance_m2) {
@@ -64,7 +64,7 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   if (notice.action == Action::kCaughtUp || notice.hazard_uuid.IsNil()) return changes;
   if (!geo::IsValid(notice.position) || IsOld(notice.hazard_uuid, notice.sequence)) return changes;
   if (notice.action == Action::kRemoved) {
-    if (gone_.size() >= kGoneKept) gone_.clear();
+    if (gone_.size() >= kRemovedKept) gone_.clear();
     gone_[notice.hazard_uuid] = notice.sequence;
     if (sequences_.erase(notice.hazard_uuid) > 0) changes.gone.push_back(notice.hazard_uuid);
     return changes;
