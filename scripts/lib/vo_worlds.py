@@ -7,6 +7,12 @@ def cell(value, digits):
     return "-" if value is None else f"{value:.{digits}f}"
 
 
+def outcome(row):
+    """One row in words, for who waits."""
+    return (f"every {row['step']}: ATE {cell(row['ate_rmse_m'], 4)} m, "
+            f"{row['lost']} lost of {row['tracked_frames']}")
+
+
 def table(rows):
     """Markdown: a row per world and step, and what all of a step have in common."""
     lines = ["| seed | motion and sensor | every | frames | path (m) | ATE (m) | worst step (m) | lost "

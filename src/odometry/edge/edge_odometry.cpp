@@ -61,7 +61,14 @@ void EdgeOdometry::Reset() {
   light_ = {};
   settled_ = false;
   ambiguous_frames_ = 0;
+  searched_keyframes_ = 0;
+  ForgetUsual();
+}
+
+void EdgeOdometry::ForgetUsual() {
   usual_agreement_ = agreement_deviation_ = 0;
+  usual_surfaces_ = kSurfacesAtFirst;
+  surface_deviation_ = 0;
 }
 
 void EdgeOdometry::Check(const RgbdFrame& frame) const {
@@ -74,6 +81,7 @@ void EdgeOdometry::Check(const RgbdFrame& frame) const {
 
 VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
   Check(frame);
+  frame_ = frame;
   frame_images_.Build(frame.grey);
   frame_features_.Clear();
   VoResult result;
@@ -87,11 +95,15 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
     result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
     const bool gives_up = result.state == VoState::kLost &&
                           Seconds(frame.stamp_ns - tracked_stamp_ns_) >= config_.give_up_s;
-    result.keyframe_due = gives_up || (attempt.good && settled_ &&
+    const bool waits = !settled_ && attempt.fine.Overlap() >= config_.ambiguous_overlap;
+    result.keyframe_due = gives_up || (attempt.good && !waits &&
                                        WantsKeyframe(attempt.fine, result.world_from_camera));
     if (result.keyframe_due) {
       result.new_keyframe = MakeKeyframe(frame, {}, result);
-      if (gives_up && result.new_keyframe) result.state = VoState::kTracking;
+      if (gives_up && result.new_keyframe) {
+        result.state = VoState::kTracking;
+        ForgetUsual();  // It may be another place.
+      }
     }
   }
   if (result.state == VoState::kTracking) tracked_stamp_ns_ = frame.stamp_ns;
@@ -132,10 +144,15 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_d
   fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, cameras_.levels);
   fresh->inverse_depth_sigmas.Clear();
   fresh->features.Clear();
+  fresh->surfaces.Clear();
   if (!inverse_depth_sigma.empty()) {
     constexpr DepthPyramid::Range kAny = {std::numeric_limits<float>::min(),
                                           std::numeric_limits<float>::max()};
     fresh->inverse_depth_sigmas.Build(inverse_depth_sigma, 1, kAny, cameras_.levels);
+  } else {
+    const int coarsest = cameras_.levels - 1;
+    fresh->surfaces.Take(fresh->depths[coarsest],
+                         cameras_.camera[static_cast<std::size_t>(coarsest)]);
   }
   std::swap(fresh->images, frame_images_);
   if (!SelectPoints(*fresh)) {
@@ -169,6 +186,7 @@ void EdgeOdometry::ReserveBuffers() {
       keyframe.points[level].Reserve(static_cast<std::size_t>(config_.max_points[level]));
     }
     keyframe.thumbnail_points.Reserve(thumbnail);
+    keyframe.surfaces.Reserve();
   }
   const std::size_t most =
       std::max(thumbnail, static_cast<std::size_t>(*std::max_element(config_.max_points.begin(),
@@ -258,8 +276,23 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
     state = attempt.fine.state;
     attempt.iterations += attempt.fine.iterations;
   }
-  attempt.good = IsGood(keyframe, attempt.fine);
+  Judge(attempt);
   return attempt;
+}
+
+std::optional<double> EdgeOdometry::SurfacesOf(const Keyframe& keyframe,
+                                               const Eigen::Isometry3d& new_from_reference) const {
+  return keyframe.surfaces.Agreement(frame_, cameras_.camera[0], new_from_reference);
+}
+
+void EdgeOdometry::Judge(Attempt& attempt) const {
+  attempt.surfaces = SurfacesOf(*attempt.keyframe, attempt.fine.state.new_from_reference);
+  attempt.good = IsGood(*attempt.keyframe, attempt.fine) &&
+                 attempt.surfaces.value_or(1) >= config_.min_surfaces;
+}
+
+double EdgeOdometry::Score(const Attempt& attempt) {
+  return ExplainedScore(attempt.fine) * attempt.surfaces.value_or(1);
 }
 
 /// Where the camera is now if its motion goes on as it was; none when that is not known.
@@ -281,8 +314,36 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   if (!IsDoubtful(followed, stamp_ns)) return followed;
   if (followed.good) guesses.Add(followed.fine.state.new_from_reference);
   const Attempt found = SearchFrom(*keyframe_, guesses);
-  const bool better = ExplainedScore(found.fine) > ExplainedScore(followed.fine) + kBetterScore;
-  return found.good && (better || found.ambiguous || !followed.good) ? found : followed;
+  const bool better = Score(found) > Score(followed) + kBetterScore;
+  Attempt attempt = found.good && (better || found.ambiguous || !followed.good) ? found : followed;
+  TellApart(stamp_ns, attempt);
+  CastDoubt(stamp_ns, attempt);
+  return attempt;
+}
+
+/// Of two motions that explain as much, the one that goes on as the last one did is believed when
+/// the other is twice as far from that. Only a motion that was told apart predicts.
+void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
+  const auto predicted = Predicted(stamp_ns);
+  if (!attempt.ambiguous || !predicted || !settled_) return;
+  const Eigen::Isometry3d expected = predicted->inverse() * attempt.keyframe->world_from_camera;
+  const double inverse_depth = attempt.keyframe->points[0].mean_inverse_depth;
+  const double focal_px = cameras_.camera[0].fx;
+  const double here =
+      PixelsBetween(attempt.fine.state.new_from_reference, expected, inverse_depth, focal_px);
+  attempt.ambiguous = PixelsBetween(attempt.rival, expected, inverse_depth, focal_px) < 2 * here;
+}
+
+/// Whether a motion found by a search is strange all the same: a false minimum of a picture whose
+/// true one was not among the proposals. The next frame decides.
+void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
+  if (!attempt.good || attempt.ambiguous) return;
+  const bool unlike =
+      attempt.fine.Agreement() < usual_agreement_ - std::max(config_.strange_drop, UsualDrop());
+  if (!IsDisplaced(attempt) && !unlike) return;
+  attempt.ambiguous = true;
+  attempt.rival = Predicted(stamp_ns).value_or(last_.world_from_camera).inverse() *
+                  attempt.keyframe->world_from_camera;
 }
 
 /// By how much a frame's agreement may fall short of the last ones' without being strange.
@@ -290,9 +351,28 @@ double EdgeOdometry::UsualDrop() const {
   return std::max(config_.agreement_drop, 3 * agreement_deviation_);
 }
 
+/// The share of the surfaces below which a frame is strange.
+double EdgeOdometry::LeastSurfaces() const {
+  return usual_surfaces_ - std::max(config_.surface_drop, 3 * surface_deviation_);
+}
+
+/// Whether the depth of the frame contradicts the motion.
+bool EdgeOdometry::IsDisplaced(const Attempt& attempt) const {
+  return attempt.surfaces && *attempt.surfaces < LeastSurfaces();
+}
+
+/// Whether a place that was looked for without any prior looks as places did before.
+bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
+  return attempt.good &&
+         attempt.fine.Agreement() >= usual_agreement_ - std::max(config_.found_drop, UsualDrop()) &&
+         attempt.surfaces.value_or(1) >=
+             std::min(LeastSurfaces(), usual_surfaces_ - config_.found_drop);
+}
+
 /// Whether an alignment that began at a guess may have ended in a false minimum.
 bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const {
   if (!attempt.good || !settled_) return true;
+  if (IsDisplaced(attempt)) return true;
   const double drop = usual_agreement_ - attempt.fine.Agreement();
   if (drop > UsualDrop()) return true;
   if (drop < UsualDrop() / 4) return false;
@@ -309,14 +389,18 @@ EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
   const auto points_of = [this, &keyframe](int level) -> const EdgePoints& {
     return PointsOf(keyframe, level);
   };
-  const WideSearch::Outcome outcome = wide_search_.Search(proposals, frame_images_, points_of);
+  const auto plausibility = [this, &keyframe](const Eigen::Isometry3d& motion) {
+    return SurfacesOf(keyframe, motion).value_or(1);
+  };
+  const WideSearch::Outcome outcome =
+      wide_search_.Search(proposals, frame_images_, points_of, plausibility);
   Attempt attempt;
   attempt.keyframe = &keyframe;
   attempt.fine = outcome.best;
   attempt.ambiguous = outcome.ambiguous;
   attempt.rival = outcome.rival;
   attempt.iterations = outcome.iterations;
-  attempt.good = IsGood(keyframe, attempt.fine);
+  Judge(attempt);
   return attempt;
 }
 
@@ -330,7 +414,9 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
   const Attempt first = SearchAmong(keyframe, proposals);
   const double enough = std::max(config_.feature_agreement, usual_agreement_ - UsualDrop());
-  if (first.good && !first.ambiguous && first.fine.Agreement() >= enough) return first;
+  if (first.good && !first.ambiguous && first.fine.Agreement() >= enough && !IsDisplaced(first)) {
+    return first;
+  }
   proposals = {};
   proposals.Add(first.fine.state.new_from_reference);
   if (first.ambiguous) proposals.Add(first.rival);
@@ -343,6 +429,9 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
     proposals.Add(*motion);
     WideSearch::ProposeAround(*motion, proposals);
   }
+  WideSearch::ProposeMoves(first.fine.state.new_from_reference,
+                           1 / keyframe.points[0].mean_inverse_depth, proposals);
+  WideSearch::ProposeFan(*guesses.begin(), proposals);
   Attempt second = SearchAmong(keyframe, proposals);
   second.iterations += first.iterations;
   return second;
@@ -361,12 +450,16 @@ Eigen::Isometry3d EdgeOdometry::RotationGuess(Keyframe& keyframe, const Eigen::I
   return guess;
 }
 
-/// Searches the motion anew: from the thumbnails' rotation, with the newest keyframes first.
+/// Searches the motion anew: from the thumbnails' rotation, with the newest keyframe first and some
+/// of the others, so that a frame's time is bounded and each keyframe has its turn.
 EdgeOdometry::Attempt EdgeOdometry::FindBack() {
   Attempt attempt;
-  for (auto candidate = keyframes_.rbegin(); candidate != keyframes_.rend() && !attempt.good;
-       ++candidate) {
-    Keyframe& keyframe = **candidate;
+  const std::size_t count = keyframes_.size();
+  const std::size_t searches =
+      std::min(count, static_cast<std::size_t>(std::max(1, config_.searches_per_frame)));
+  for (std::size_t i = 0; i < searches && !attempt.good; ++i) {
+    const std::size_t older = i == 0 || count < 2 ? 0 : 1 + searched_keyframes_++ % (count - 1);
+    Keyframe& keyframe = *keyframes_[count - 1 - older];
     const Eigen::Isometry3d held = last_.world_from_camera.inverse() * keyframe.world_from_camera;
     const Eigen::Isometry3d standing = Eigen::Isometry3d::Identity();
     light_ = {};
@@ -376,6 +469,7 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
       guesses.Add(guess);
     }
     attempt = SearchFrom(keyframe, guesses);
+    attempt.good = IsRecognised(attempt);
   }
   return attempt;
 }
@@ -442,6 +536,11 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   const double deviation = fine.Agreement() - usual_agreement_;
   usual_agreement_ += kAgreementShare * deviation;
   agreement_deviation_ += kAgreementShare * (std::abs(deviation) - agreement_deviation_);
+  if (attempt.surfaces) {
+    const double difference = *attempt.surfaces - usual_surfaces_;
+    usual_surfaces_ += kAgreementShare * difference;
+    surface_deviation_ += kAgreementShare * (std::abs(difference) - surface_deviation_);
+  }
   if (last_.state == VoState::kTracking && settled_) {
     result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
     // Both ends err by the alignment with the keyframe.
@@ -453,6 +552,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   result.sigma = fine.sigma;
   result.overlap = fine.Overlap();
   result.agreement = fine.Agreement();
+  result.surfaces = attempt.surfaces;
   result.iterations = attempt.iterations;
   return result;
 }

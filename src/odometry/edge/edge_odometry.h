@@ -43,7 +43,10 @@ struct VoResult {
   double sigma = 0;         ///< Of the residuals, grey levels.
   double overlap = 0;       ///< Share of the keyframe's points in view.
   double agreement = 0;     ///< Share of those in view whose residual is explained.
-  int iterations = 0;       ///< All levels.
+  /// Share of the keyframe's surfaces that this frame measures where the motion has them; none
+  /// without depth on both sides.
+  std::optional<double> surfaces;
+  int iterations = 0;  ///< All levels.
 };
 
 /// Edge-direct visual odometry (thesis, chapter 5) over rectified images with depth. One thread,
@@ -82,16 +85,33 @@ class EdgeOdometry {
     double lost_sigma = 30;
     /// or when less than this share of the points in view is explained.
     double min_agreement = 0.5;
+    /// or when less than this share of the keyframe's surfaces is where this frame's depth is.
+    double min_surfaces = 0.5;
     /// An alignment is doubted, and the motion searched widely, when its agreement is smaller by
     /// this than what the last frames had, and by three times their mean deviation,
     double agreement_drop = 0.04;
+    /// or when so much less of the surfaces is where it should be than in the last frames, and
+    /// less by three times their mean deviation,
+    double surface_drop = 0.05;
+    /// A motion that was searched and agrees by so much less than the last frames is as doubtful as
+    /// an ambiguous one.
+    double strange_drop = 0.06;
+    /// A camera that finds back must agree as well as the last frames but for this, of the edges
+    /// and of the surfaces.
+    double found_drop = 0.15;
     /// or smaller than theirs by a fourth of that while the points are further than so much from
     /// where the last motion brings them, share of the image's width.
     double surprise = 0.012;
     /// So many frames in a row may wait for a keyframe because their motion is ambiguous.
     int max_ambiguous_frames = 2;
+    /// They do not wait when less of the keyframe than this is in view: it would be lost, while a
+    /// keyframe at an uncertain place is only uncertain.
+    double ambiguous_overlap = 0.7;
     /// A search asks features, too, when its outcome has less agreement than this.
     double feature_agreement = 0.65;
+    /// A camera that is lost looks for so many of the kept keyframes in each frame: for the newest,
+    /// and for the others in turn.
+    int searches_per_frame = 3;
     /// Keyframes that are kept to find back, and how far apart: motion as above.
     int keyframes_kept = 8;
     double kept_motion = 0.1;
@@ -141,6 +161,9 @@ class EdgeOdometry {
   const Keyframe* keyframe() const { return keyframe_; }
 
  private:
+  /// Share of the surfaces that is expected before anything is usual.
+  static constexpr double kSurfacesAtFirst = 0.95;
+
   /// Starts of an alignment; at most four.
   struct Guesses {
     std::array<Eigen::Isometry3d, 4> new_from_reference;
@@ -153,6 +176,7 @@ class EdgeOdometry {
     Keyframe* keyframe = nullptr;
     AlignmentResult fine;
     int iterations = 0;
+    std::optional<double> surfaces;  ///< See VoResult.
     bool good = false;
     bool ambiguous = false;
     Eigen::Isometry3d rival = Eigen::Isometry3d::Identity();  ///< If ambiguous.
@@ -168,16 +192,26 @@ class EdgeOdometry {
   Attempt Follow(std::int64_t stamp_ns);
   std::optional<Eigen::Isometry3d> Predicted(std::int64_t stamp_ns) const;
   double UsualDrop() const;
+  double LeastSurfaces() const;
+  bool IsDisplaced(const Attempt& attempt) const;
+  bool IsRecognised(const Attempt& attempt) const;
   bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
   Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
   Attempt SearchFrom(Keyframe& keyframe, const Guesses& guesses);
+  void TellApart(std::int64_t stamp_ns, Attempt& attempt) const;
+  void CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const;
   Attempt FindBack();
+  std::optional<double> SurfacesOf(const Keyframe& keyframe,
+                                   const Eigen::Isometry3d& new_from_reference) const;
+  void Judge(Attempt& attempt) const;
+  static double Score(const Attempt& attempt);
   bool IsGood(const Keyframe& keyframe, const AlignmentResult& result) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
   double Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
                 const Eigen::Isometry3d& world_from_other) const;
   void ForgetNearOnes();
   void ReserveBuffers();
+  void ForgetUsual();
   VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);
   VoResult Hold(std::int64_t stamp_ns);
 
@@ -188,6 +222,7 @@ class EdgeOdometry {
   Aligner aligner_, rotation_aligner_;
   WideSearch wide_search_;
   PictureFeatures frame_features_;
+  RgbdFrame frame_;  // The last one, as it was given.
   ImagePyramid frame_images_;
   EdgePoints masked_points_;
 
@@ -196,11 +231,14 @@ class EdgeOdometry {
   Keyframe* keyframe_ = nullptr;
   double keyframe_first_sigma_ = 0;
   int frames_since_keyframe_ = 0;
-  int ambiguous_frames_ = 0;        // In a row.
-  bool settled_ = false;            // Whether the last motion was told apart from all others.
-  double usual_agreement_ = 0;      // Of the last frames,
-  double agreement_deviation_ = 0;  // and how much they differ from it.
-  AlignmentState light_;            // Gain and bias of the last frame.
+  std::size_t searched_keyframes_ = 0;  // By a camera that is lost.
+  int ambiguous_frames_ = 0;            // In a row.
+  bool settled_ = false;                // Whether the last motion was told apart from all others.
+  double usual_agreement_ = 0;          // Of the last frames,
+  double agreement_deviation_ = 0;      // and how much they differ from it.
+  double usual_surfaces_ = kSurfacesAtFirst;  // The same of the surfaces.
+  double surface_deviation_ = 0;
+  AlignmentState light_;  // Gain and bias of the last frame.
 
   VoResult last_;
   std::optional<std::int64_t> last_stamp_ns_;

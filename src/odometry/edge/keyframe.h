@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "odometry/edge/depth_check.h"
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/edge/feature_motion.h"
 #include "odometry/edge/image_pyramid.h"
@@ -24,7 +25,9 @@ struct Keyframe {
   DepthPyramid inverse_depth_sigmas;
   std::array<EdgePoints, kMaxLevels> points;  ///< Under its own edges.
   EdgePoints thumbnail_points;                ///< Every pixel of the thumbnail, for rotations.
-  PictureFeatures features;                   ///< Found when they are first needed.
+  /// Of its measured surfaces; none where depths are estimates.
+  SurfacePoints surfaces;
+  PictureFeatures features;  ///< Found when they are first needed.
 };
 
 }  // namespace livemap::odometry

@@ -8,7 +8,8 @@
 namespace livemap::odometry {
 namespace {
 
-constexpr int kShiftsOfWidth = 5;      // One part in so many is the largest shift.
+constexpr double kShiftAcross = 0.4;   // Share of the width: the largest shift to a side,
+constexpr double kShiftAlong = 0.2;    // and up or down.
 constexpr double kShiftMinSpread = 2;  // Grey levels; less is no picture.
 constexpr double kShiftContrast = 40;  // Grey levels, of the pictures made alike.
 constexpr int kShiftNeighbourPx = 1;   // Within it a better shift stands for a worse one.
@@ -73,11 +74,13 @@ ShiftSearch::Shifts ShiftSearch::Find(const cv::Mat& reference, const cv::Mat& p
   if (!MakeShiftPictureAlike(reference, reference_) || !MakeShiftPictureAlike(picture, picture_)) {
     return found;
   }
-  const int reach = reference.cols / kShiftsOfWidth, side = 2 * reach + 1;
-  costs_.resize(static_cast<std::size_t>(side * side));
-  for (int dy = -reach; dy <= reach; ++dy) {
-    for (int dx = -reach; dx <= reach; ++dx) {
-      costs_[static_cast<std::size_t>((dy + reach) * side + dx + reach)] =
+  const int across = static_cast<int>(kShiftAcross * reference.cols);
+  const int along = static_cast<int>(kShiftAlong * reference.cols);
+  const int columns = 2 * across + 1, rows = 2 * along + 1;
+  costs_.resize(static_cast<std::size_t>(columns * rows));
+  for (int dy = -along; dy <= along; ++dy) {
+    for (int dx = -across; dx <= across; ++dx) {
+      costs_[static_cast<std::size_t>((dy + along) * columns + dx + across)] =
           ShiftCost(reference_.data(), picture_.data(), reference.size(), dx, dy);
     }
   }
@@ -85,13 +88,13 @@ ShiftSearch::Shifts ShiftSearch::Find(const cv::Mat& reference, const cv::Mat& p
     const auto best = std::min_element(costs_.begin(), costs_.end());
     if (!std::isfinite(*best)) break;
     const auto index = static_cast<int>(best - costs_.begin());
-    const int row = index / side, column = index % side;
-    found.best[found.count++] = {column - reach, row - reach, *best};
+    const int row = index / columns, column = index % columns;
+    found.best[found.count++] = {column - across, row - along, *best};
     for (int y = std::max(0, row - kShiftNeighbourPx);
-         y <= std::min(side - 1, row + kShiftNeighbourPx); ++y) {
+         y <= std::min(rows - 1, row + kShiftNeighbourPx); ++y) {
       for (int x = std::max(0, column - kShiftNeighbourPx);
-           x <= std::min(side - 1, column + kShiftNeighbourPx); ++x) {
-        costs_[static_cast<std::size_t>(y * side + x)] = std::numeric_limits<float>::infinity();
+           x <= std::min(columns - 1, column + kShiftNeighbourPx); ++x) {
+        costs_[static_cast<std::size_t>(y * columns + x)] = std::numeric_limits<float>::infinity();
       }
     }
   }

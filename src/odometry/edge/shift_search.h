@@ -28,7 +28,8 @@ class ShiftSearch {
   /// Memory for pictures of so many pixels.
   void Reserve(std::size_t pixels);
 
-  /// The best shifts up to a fifth of the width either way, best first, none next to a better one.
+  /// The best shifts up to two fifths of the width to a side and one fifth up or down, best first,
+  /// none next to a better one.
   /// Both are CV_8UC1 of one size. None when one of them is as good as even: a covered lens.
   Shifts Find(const cv::Mat& reference, const cv::Mat& picture);
 

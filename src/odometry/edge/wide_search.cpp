@@ -13,7 +13,7 @@ constexpr double kMostMeanDepths = 1.5;
 /// Weight of a point out of view, against one in view that is not explained.
 constexpr double kUnseenWeight = 0.3;
 /// Candidates that go on from the coarsest level, and from each finer one.
-constexpr std::size_t kCoarseSurvivors = 6;
+constexpr std::size_t kCoarseSurvivors = 8;
 constexpr std::size_t kFineSurvivors = 3;
 /// Closer than this on their level two candidates are one, px.
 constexpr double kSameCandidatePx = 1.5;
@@ -24,6 +24,11 @@ constexpr double kRivalPx = 10;
 /// Of ProposeAround, rad, and how many turns of each.
 constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
 constexpr int kRingTurns = 8;
+/// Of ProposeMoves, in mean depths.
+constexpr std::array<double, 5> kSideMoves = {0.03, 0.06, 0.09, 0.13, 0.18};
+constexpr std::array<double, 2> kHeightMoves = {0.05, 0.1};
+/// Of ProposeFan, rad.
+constexpr std::array<double, 7> kFanTurns = {0.07, 0.1, 0.13, 0.17, 0.21, 0.27, 0.35};
 /// Moves along the optical axis, in mean depths, and turns about it, rad.
 constexpr std::array<double, 4> kAxisMoves = {-0.25, -0.1, 0.1, 0.25};
 constexpr std::array<double, 2> kAxisTurns = {-0.1, 0.1};
@@ -78,6 +83,28 @@ void WideSearch::ProposeAround(const Eigen::Isometry3d& motion, MotionProposals&
   }
 }
 
+void WideSearch::ProposeFan(const Eigen::Isometry3d& motion, MotionProposals& proposals) {
+  for (const double turn : kFanTurns) {
+    for (const double side : {turn, -turn}) {
+      proposals.Add(MotionOfTwist(0, 0, 0, 0, side, 0) * motion);
+    }
+  }
+}
+
+void WideSearch::ProposeMoves(const Eigen::Isometry3d& motion, double depth_m,
+                              MotionProposals& proposals) {
+  for (const double move : kSideMoves) {
+    for (const double side : {move * depth_m, -move * depth_m}) {
+      proposals.Add(MotionOfTwist(side, 0, 0, 0, 0, 0) * motion);
+    }
+  }
+  for (const double move : kHeightMoves) {
+    for (const double side : {move * depth_m, -move * depth_m}) {
+      proposals.Add(MotionOfTwist(0, side, 0, 0, 0, 0) * motion);
+    }
+  }
+}
+
 bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& images,
                                MotionProposals& proposals) {
   const ShiftSearch::Shifts shifts = shifts_.Find(keyframe.images.thumbnail(), images.thumbnail());
@@ -96,14 +123,17 @@ bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& ima
 
 /// Aligns the candidates on a level and keeps the best that differ.
 void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level,
-                        std::size_t keep) {
+                        const Plausibility& plausibility) {
+  const std::size_t keep = level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
     candidate.result = aligner_.Align(points, grey, camera, candidate.result.state);
     const bool believable =
         IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth);
-    candidate.score = believable ? ExplainedScore(candidate.result) : 0;
+    candidate.score = believable ? ExplainedScore(candidate.result) *
+                                       plausibility(candidate.result.state.new_from_reference)
+                                 : 0;
   }
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
@@ -122,7 +152,8 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
 }
 
 WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const ImagePyramid& images,
-                                       const PointsOfLevel& points_of) {
+                                       const PointsOfLevel& points_of,
+                                       const Plausibility& plausibility) {
   Outcome outcome;
   count_ = 0;
   for (const Eigen::Isometry3d& motion : proposals) {
@@ -133,8 +164,7 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
   double mean_inverse_depth = 0;
   for (int level = cameras_.levels - 1; level >= 0; --level) {
     const EdgePoints& points = points_of(level);
-    Refine(points, images[level], level,
-           level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors);
+    Refine(points, images[level], level, plausibility);
     for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
     mean_inverse_depth = points.mean_inverse_depth;
   }

@@ -16,7 +16,7 @@ namespace livemap::odometry {
 /// Motions to begin an alignment with, new_from_reference.
 class MotionProposals {
  public:
-  static constexpr std::size_t kMost = 48;
+  static constexpr std::size_t kMost = 64;
   /// More than kMost are passed over.
   void Add(const Eigen::Isometry3d& motion) {
     if (count_ < kMost) motions_[count_++] = motion;
@@ -51,6 +51,8 @@ class WideSearch {
   };
   /// The points to align on a level; asked for once per level.
   using PointsOfLevel = std::function<const EdgePoints&(int level)>;
+  /// What else is known for or against a motion: a factor of its score, 0 to 1.
+  using Plausibility = std::function<double(const Eigen::Isometry3d& new_from_reference)>;
 
   WideSearch(const AlignmentConfig& config, const LevelCameras& cameras)
       : aligner_(config), cameras_(cameras) {}
@@ -67,8 +69,17 @@ class WideSearch {
   /// more than an alignment can mend and less than a thumbnail shows.
   static void ProposeAround(const Eigen::Isometry3d& motion, MotionProposals& proposals);
 
+  /// Adds turns to either side of a motion, up to a third of the view: where a pattern repeats
+  /// itself, the thumbnails show its periods and not the turn.
+  static void ProposeFan(const Eigen::Isometry3d& motion, MotionProposals& proposals);
+
+  /// Adds moves sideways, up and down from a motion, by as much as a pattern on a wall at that mean
+  /// depth, m, repeats itself.
+  static void ProposeMoves(const Eigen::Isometry3d& motion, double depth_m,
+                           MotionProposals& proposals);
+
   Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
-                 const PointsOfLevel& points_of);
+                 const PointsOfLevel& points_of, const Plausibility& plausibility);
 
  private:
   struct Candidate {
@@ -76,7 +87,8 @@ class WideSearch {
     double score = 0;
   };
 
-  void Refine(const EdgePoints& points, const cv::Mat& grey, int level, std::size_t keep);
+  void Refine(const EdgePoints& points, const cv::Mat& grey, int level,
+              const Plausibility& plausibility);
 
   Aligner aligner_;
   LevelCameras cameras_;

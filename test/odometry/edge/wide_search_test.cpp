@@ -10,42 +10,48 @@
 #include "odometry/edge/shift_search.h"
 #include "simulation/room/room_motion.h"
 #include "simulation/room/simulated_room.h"
+#include "simulation/sensors/depth_sensor.h"
 #include "test/odometry/synthetic_scene.h"
 
 namespace livemap::odometry {
 namespace {
 
+using simulation::DepthSensor;
 using simulation::RoomMotion;
 
 /// A camera that moves through a varied room.
 class MovingThroughRoom {
  public:
-  MovingThroughRoom(std::uint64_t seed, RoomMotion motion, double vigour)
+  MovingThroughRoom(std::uint64_t seed, RoomMotion motion, double vigour,
+                    DepthSensor sensor = DepthSensor::kExact)
       : room_(simulation::VariedRoomPlan(seed, simulation::RoomScale::kRoom)),
         motion_(motion),
-        vigour_(vigour) {}
+        vigour_(vigour),
+        sensor_(sensor) {}
 
   const geo::CameraIntrinsics& camera() const { return camera_.intrinsics; }
   Eigen::Isometry3d Truth(double time_s) const {
     return simulation::RoomCameraPose(room_.plan(), motion_, time_s, vigour_);
   }
   RgbdFrame See(double time_s) const {
+    const auto number = static_cast<std::uint32_t>(std::lround(30 * time_s));
     const simulation::SimulatedFrame seen =
-        room_.Render(camera_, Truth(time_s), static_cast<std::uint32_t>(30 * time_s), 1.3F, 1, 2);
+        room_.Render(camera_, Truth(time_s), number, 1.3F, 1, 2);
     RgbdFrame frame;
     frame.stamp_ns = 1'000'000'000 + static_cast<std::int64_t>(1e9 * time_s);
     cv::cvtColor(seen.bgr, frame.grey, cv::COLOR_BGR2GRAY);
-    frame.depth = seen.depth;
+    frame.depth = simulation::SenseDepth(seen.depth, camera(), sensor_, 0, number);
     return frame;
   }
   /// Largest error of a position over so many frames; every one must be tracked.
-  double WorstErrorM(int frames, double step_s) const {
+  double WorstErrorM(int frames, double step_s, double from_s = 0) const {
     EdgeOdometry odometry({}, camera());
     double worst_m = 0;
     for (int i = 0; i < frames; ++i) {
-      const VoResult result = odometry.Track(See(i * step_s));
+      const double time_s = from_s + i * step_s;
+      const VoResult result = odometry.Track(See(time_s));
       EXPECT_EQ(result.state, VoState::kTracking) << i;
-      const Eigen::Isometry3d truth = Truth(0).inverse() * Truth(i * step_s);
+      const Eigen::Isometry3d truth = Truth(from_s).inverse() * Truth(time_s);
       worst_m =
           std::max(worst_m, (result.world_from_camera.translation() - truth.translation()).norm());
     }
@@ -56,6 +62,7 @@ class MovingThroughRoom {
   simulation::SimulatedRoom room_;
   RoomMotion motion_;
   double vigour_;
+  DepthSensor sensor_;
   simulation::SimulatedCamera camera_;
 };
 
@@ -104,6 +111,16 @@ TEST(WideSearch, ACameraThatMovesFromTheFirstFrameOnIsFollowed) {
 
 TEST(WideSearch, WideStepsAreFollowed) {
   EXPECT_LT(MovingThroughRoom(6, RoomMotion::kWalking, 1.5).WorstErrorM(7, 4 / 30.0), 0.01);
+}
+
+TEST(WideSearch, HalfOfABareWallIsNotFollowedIntoAFalseMinimum) {
+  const MovingThroughRoom moving(17, RoomMotion::kWalking, 2, DepthSensor::kKinect);
+  EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 24 / 30.0), 0.05);
+}
+
+TEST(WideSearch, AStepOfAQuarterOfTheViewAlongStripesIsFollowed) {
+  const MovingThroughRoom moving(37, RoomMotion::kWalking, 2, DepthSensor::kKinect);
+  EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 20 / 30.0), 0.02);
 }
 
 TEST(WideSearch, AMoveThatBringsAllPointsIntoOnePixelIsNotBelieved) {
