@@ -95,7 +95,8 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
     result = attempt.good ? Accept(attempt, frame.stamp_ns) : Hold(frame.stamp_ns);
     const bool gives_up = result.state == VoState::kLost &&
                           Seconds(frame.stamp_ns - tracked_stamp_ns_) >= config_.give_up_s;
-    const bool waits = !settled_ && attempt.fine.Overlap() >= config_.ambiguous_overlap;
+    const bool waits =
+        !settled_ && !attempt.strange && attempt.fine.Overlap() >= config_.ambiguous_overlap;
     result.keyframe_due = gives_up || (attempt.good && !waits &&
                                        WantsKeyframe(attempt.fine, result.world_from_camera));
     if (result.keyframe_due) {
@@ -334,16 +335,20 @@ void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
   attempt.ambiguous = PixelsBetween(attempt.rival, expected, inverse_depth, focal_px) < 2 * here;
 }
 
-/// Whether a motion found by a search is strange all the same: a false minimum of a picture whose
-/// true one was not among the proposals. The next frame decides.
+/// A motion found by a search may be strange all the same, and far from what was expected: a false
+/// minimum of a picture whose true one was not among the proposals. It gives no velocity, and the
+/// next frame is searched, too.
 void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.good || attempt.ambiguous) return;
   const bool unlike =
       attempt.fine.Agreement() < usual_agreement_ - std::max(config_.strange_drop, UsualDrop());
   if (!IsDisplaced(attempt) && !unlike) return;
-  attempt.ambiguous = true;
   attempt.rival = Predicted(stamp_ns).value_or(last_.world_from_camera).inverse() *
                   attempt.keyframe->world_from_camera;
+  attempt.ambiguous = attempt.strange =
+      PixelsBetween(attempt.fine.state.new_from_reference, attempt.rival,
+                    attempt.keyframe->points[0].mean_inverse_depth,
+                    cameras_.camera[0].fx) > kRivalPx;
 }
 
 /// By how much a frame's agreement may fall short of the last ones' without being strange.
@@ -372,10 +377,9 @@ bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
 /// Whether an alignment that began at a guess may have ended in a false minimum.
 bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const {
   if (!attempt.good || !settled_) return true;
-  if (IsDisplaced(attempt)) return true;
   const double drop = usual_agreement_ - attempt.fine.Agreement();
   if (drop > UsualDrop()) return true;
-  if (drop < UsualDrop() / 4) return false;
+  if (drop < UsualDrop() / 4 && !IsDisplaced(attempt)) return false;
   const auto predicted = Predicted(stamp_ns);
   if (!predicted) return true;
   const Eigen::Isometry3d reference_from_new = attempt.fine.state.new_from_reference.inverse();

@@ -179,6 +179,7 @@ class EdgeOdometry {
     std::optional<double> surfaces;  ///< See VoResult.
     bool good = false;
     bool ambiguous = false;
+    bool strange = false;  ///< Ambiguous, but not for a rival that was found.
     Eigen::Isometry3d rival = Eigen::Isometry3d::Identity();  ///< If ambiguous.
   };
 

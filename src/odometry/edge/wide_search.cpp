@@ -17,10 +17,8 @@ constexpr std::size_t kCoarseSurvivors = 8;
 constexpr std::size_t kFineSurvivors = 3;
 /// Closer than this on their level two candidates are one, px.
 constexpr double kSameCandidatePx = 1.5;
-/// A rival whose score is this close to the best one's makes the outcome ambiguous,
+/// A rival whose score is this close to the best one's makes the outcome ambiguous.
 constexpr double kAmbiguousScore = 0.03;
-/// if it is at least so far away, px of the finest level.
-constexpr double kRivalPx = 10;
 /// Of ProposeAround, rad, and how many turns of each.
 constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
 constexpr int kRingTurns = 8;

@@ -29,6 +29,10 @@ class MotionProposals {
   std::size_t count_ = 0;
 };
 
+/// Motions that are at least so far apart on the finest level are rivals, px; nearer ones are one
+/// motion with its error.
+inline constexpr double kRivalPx = 10;
+
 /// The cameras of an image's levels.
 struct LevelCameras {
   std::array<geo::CameraIntrinsics, kMaxLevels + 1> camera;  ///< The last one is the thumbnail's.
