@@ -109,9 +109,10 @@ def share_of_keyframes(sequence):
 
 def sequences_section(sequences, missing):
     rows = [[s["name"], s["kind"], s["tables"]["frames"], f"{s['tables']['width']}x{s['tables']['height']}",
-             number(s["tables"]["length_m"], 2) if s["tables"]["frames_with_truth"] > 1 else "no truth", s["source"]]
-            for s in sequences]
-    text = "## Sequences\n" + table(["name", "kind", "frames", "size", "path (m)", "from"], rows)
+             number(s["tables"]["length_m"], 2) if s["tables"]["frames_with_truth"] > 1 else "no truth",
+             "not known" if s["kind"] == "your own" else "yes", s["source"]] for s in sequences]
+    text = "## Sequences\n" + table(["name", "kind", "frames", "size", "path (m)", "looked at while tuning", "from"],
+                                    rows)
     if missing:
         text += f"\nSkipped, no data: {', '.join(missing)}.\n"
     return text
@@ -290,8 +291,8 @@ def head_section(results):
     text = "# Visual odometry: the benchmark\n" + prose(f"""Made by `./livemap bench vo`; do not edit. [Visual
         odometry](../explanation/odometry.md) explains the method. [Stereo and monocular
         odometry](stereo-and-monocular-odometry.md) has the figures without a depth sensor, and a summary of this
-        page; here every sequence has depth. The method was built for the bars below; the record does not say on which
-        sequences its parameters were chosen. [Rooms that differ](odometry-rooms.md) says how it does elsewhere.""") + prose(
+        page; here every sequence has depth. The method was built for the bars below, and all of this page's sequences
+        were looked at while that was done. [Rooms that differ](odometry-rooms.md) says how it does elsewhere.""") + prose(
             f"""Machine:
         {machine['cores']} cores, {machine['cpu']}, {others}. All methods run on one thread (`cv::setNumThreads(1)`)
         in one process, beside each other, OpenCV's with their default settings; n is the number of frames{measured}.

@@ -23,7 +23,7 @@ constexpr double kAmbiguousScore = 0.03;
 constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
 constexpr int kRingTurns = 8;
 /// Of ProposeMoves, in mean depths.
-constexpr std::array<double, 5> kSideMoves = {0.03, 0.06, 0.09, 0.13, 0.18};
+constexpr std::array<double, 6> kSideMoves = {0.03, 0.06, 0.09, 0.13, 0.18, 0.24};
 constexpr std::array<double, 2> kHeightMoves = {0.05, 0.1};
 /// Of ProposeFan, rad.
 constexpr std::array<double, 7> kFanTurns = {0.07, 0.1, 0.13, 0.17, 0.21, 0.27, 0.35};

@@ -16,7 +16,7 @@ namespace livemap::odometry {
 /// Motions to begin an alignment with, new_from_reference.
 class MotionProposals {
  public:
-  static constexpr std::size_t kMost = 64;
+  static constexpr std::size_t kMost = 72;
   /// More than kMost are passed over.
   void Add(const Eigen::Isometry3d& motion) {
     if (count_ < kMost) motions_[count_++] = motion;
