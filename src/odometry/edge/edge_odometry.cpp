@@ -330,9 +330,19 @@ void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
   const Eigen::Isometry3d expected = predicted->inverse() * attempt.keyframe->world_from_camera;
   const double inverse_depth = attempt.keyframe->points[0].mean_inverse_depth;
   const double focal_px = cameras_.camera[0].fx;
-  const double here =
-      PixelsBetween(attempt.fine.state.new_from_reference, expected, inverse_depth, focal_px);
-  attempt.ambiguous = PixelsBetween(attempt.rival, expected, inverse_depth, focal_px) < 2 * here;
+  const auto surprise = [&](const AlignmentResult& result) {
+    return PixelsBetween(result.state.new_from_reference, expected, inverse_depth, focal_px);
+  };
+  const double of_winner = surprise(attempt.fine), of_rival = surprise(attempt.rival);
+  if (of_rival > 2 * of_winner) {
+    attempt.ambiguous = false;
+  } else if (of_winner > 2 * of_rival) {
+    Attempt other = attempt;
+    std::swap(other.fine, other.rival);
+    other.ambiguous = false;
+    Judge(other);
+    if (other.good) attempt = other;
+  }
 }
 
 /// A motion found by a search may be strange all the same, and far from what was expected: a false
@@ -343,10 +353,11 @@ void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   const bool unlike =
       attempt.fine.Agreement() < usual_agreement_ - std::max(config_.strange_drop, UsualDrop());
   if (!IsDisplaced(attempt) && !unlike) return;
-  attempt.rival = Predicted(stamp_ns).value_or(last_.world_from_camera).inverse() *
-                  attempt.keyframe->world_from_camera;
+  Eigen::Isometry3d& rival = attempt.rival.state.new_from_reference;
+  rival = Predicted(stamp_ns).value_or(last_.world_from_camera).inverse() *
+          attempt.keyframe->world_from_camera;
   attempt.ambiguous = attempt.strange =
-      PixelsBetween(attempt.fine.state.new_from_reference, attempt.rival,
+      PixelsBetween(attempt.fine.state.new_from_reference, rival,
                     attempt.keyframe->points[0].mean_inverse_depth,
                     cameras_.camera[0].fx) > kRivalPx;
 }
@@ -423,7 +434,7 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   }
   proposals = {};
   proposals.Add(first.fine.state.new_from_reference);
-  if (first.ambiguous) proposals.Add(first.rival);
+  if (first.ambiguous) proposals.Add(first.rival.state.new_from_reference);
   WideSearch::ProposeAround(first.fine.state.new_from_reference, proposals);
   if (!frame_features_.found) FindFeatures(frame_images_[0], frame_features_);
   if (!keyframe.features.found) FindFeatures(keyframe.images[0], keyframe.features);
@@ -527,7 +538,8 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   // right-hand side of the new pose by the adjoint.
   Matrix6d relative = config_.covariance_factor * fine.covariance;
   if (attempt.ambiguous) {
-    const Vector6d to_rival = Se3Log(fine.state.new_from_reference.inverse() * attempt.rival);
+    const Vector6d to_rival =
+        Se3Log(fine.state.new_from_reference.inverse() * attempt.rival.state.new_from_reference);
     relative += to_rival * to_rival.transpose();
   }
   const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);

@@ -179,8 +179,8 @@ class EdgeOdometry {
     std::optional<double> surfaces;  ///< See VoResult.
     bool good = false;
     bool ambiguous = false;
-    bool strange = false;  ///< Ambiguous, but not for a rival that was found.
-    Eigen::Isometry3d rival = Eigen::Isometry3d::Identity();  ///< If ambiguous.
+    bool strange = false;   ///< Ambiguous, but not for a rival that was found.
+    AlignmentResult rival;  ///< If ambiguous.
   };
 
   bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,

@@ -168,10 +168,11 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
   }
   outcome.best = candidates_[0].result;
   for (std::size_t i = 1; i < count_ && !outcome.ambiguous; ++i) {
-    outcome.rival = candidates_[i].result.state.new_from_reference;
-    outcome.ambiguous = candidates_[i].score > candidates_[0].score - kAmbiguousScore &&
-                        PixelsBetween(outcome.best.state.new_from_reference, outcome.rival,
-                                      mean_inverse_depth, cameras_.camera[0].fx) > kRivalPx;
+    outcome.rival = candidates_[i].result;
+    outcome.ambiguous =
+        candidates_[i].score > candidates_[0].score - kAmbiguousScore &&
+        PixelsBetween(outcome.best.state.new_from_reference, outcome.rival.state.new_from_reference,
+                      mean_inverse_depth, cameras_.camera[0].fx) > kRivalPx;
   }
   return outcome;
 }

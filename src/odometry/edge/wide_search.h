@@ -50,7 +50,7 @@ class WideSearch {
     AlignmentResult best;
     /// Another motion explains nearly as much: the picture repeats itself.
     bool ambiguous = false;
-    Eigen::Isometry3d rival = Eigen::Isometry3d::Identity();  ///< That motion.
+    AlignmentResult rival;  ///< That motion.
     int iterations = 0;
   };
   /// The points to align on a level; asked for once per level.
