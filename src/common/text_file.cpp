@@ -1,7 +1,13 @@
 #include "common/text_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <string_view>
 #include <utility>
 
@@ -52,6 +58,22 @@ void RemoveMarks(std::string& text) {
   text.resize(written);
 }
 
+/// 0, or the number of what went wrong.
+int WriteToDisk(const std::string& path, const std::string& text) {
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file < 0) return errno;
+  int error = 0;
+  std::size_t written = 0;
+  while (error == 0 && written < text.size()) {
+    const ssize_t count = write(file, text.data() + written, text.size() - written);
+    if (count < 0 && errno != EINTR) error = errno;
+    if (count > 0) written += static_cast<std::size_t>(count);
+  }
+  if (error == 0 && fsync(file) != 0) error = errno;
+  if (close(file) != 0 && error == 0) error = errno;
+  return error;
+}
+
 }  // namespace
 
 std::string DecodeText(std::string bytes, const std::string& name) {
@@ -63,6 +85,23 @@ std::string DecodeText(std::string bytes, const std::string& name) {
 
 std::string ReadTextFile(const std::string& path, std::size_t max_bytes) {
   return DecodeText(ReadFile(path, max_bytes), path);
+}
+
+void ReplaceTextFile(const std::string& path, const std::string& text) {
+  const std::string unfinished = path + ".tmp";
+  int error = WriteToDisk(unfinished, text);
+  if (error == 0 && std::rename(unfinished.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) {
+    unlink(unfinished.c_str());
+    throw Error("'" + path + "' cannot be written: " + std::strerror(error));
+  }
+  // The name, too. Where a folder cannot be opened, the file is there after all.
+  const std::size_t slash = path.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  const int directory = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) return;
+  fsync(directory);
+  close(directory);
 }
 
 }  // namespace livemap

@@ -17,4 +17,9 @@ std::string DecodeText(std::string bytes, const std::string& name);
 /// ReadFile and DecodeText in one. Throws Error naming `path` as both do.
 std::string ReadTextFile(const std::string& path, std::size_t max_bytes);
 
+/// Writes `text` to `path`, or leaves what was there: to a file beside it (`path`.tmp), which is
+/// brought to disk and then renamed, so that a kill or a power cut at any moment leaves the old
+/// file or the new one. Throws Error naming `path` and what the system says.
+void ReplaceTextFile(const std::string& path, const std::string& text);
+
 }  // namespace livemap

@@ -3,7 +3,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
+#include <locale>
 #include <set>
+#include <sstream>
 
 #include "common/error.h"
 #include "common/text_file.h"
@@ -91,6 +93,20 @@ CameraFile ParseCameraFile(const std::string& yaml, const std::string& name) {
     throw Error("the camera file '" + name + "' is no YAML: " + exception.what());
   }
   return Parse(root, name);
+}
+
+std::string FormatCameraFile(const CameraFile& camera) {
+  const geo::CameraIntrinsics& k = camera.intrinsics;
+  const CameraMounting& m = camera.mounting;
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text.precision(10);
+  text << "name: " << camera.name << "\nwidth: " << k.width << "\nheight: " << k.height
+       << "\nfx: " << k.fx << "\nfy: " << k.fy << "\ncx: " << k.cx << "\ncy: " << k.cy
+       << "\nmounting:\n  forward_m: " << m.forward_m << "\n  left_m: " << m.left_m
+       << "\n  height_m: " << m.height_m << "\n  roll_deg: " << m.roll_deg
+       << "\n  pitch_deg: " << m.pitch_deg << "\n  yaw_deg: " << m.yaw_deg << "\n";
+  return text.str();
 }
 
 CameraFile ReadCameraFile(const std::string& path) {

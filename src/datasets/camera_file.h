@@ -35,5 +35,7 @@ struct CameraFile {
 /// Throws Error naming the key, its value and what is accepted; unknown keys are refused.
 CameraFile ReadCameraFile(const std::string& path);
 CameraFile ParseCameraFile(const std::string& yaml, const std::string& name);
+/// What ParseCameraFile reads back.
+std::string FormatCameraFile(const CameraFile& camera);
 
 }  // namespace livemap::datasets

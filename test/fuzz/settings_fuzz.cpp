@@ -1,5 +1,6 @@
 // Files that an operator or researcher writes: the catalogue of hazards, the officials' tokens,
-// label files of data sets. The first byte chooses.
+// label files of data sets, and the camera's mounting, which the vehicle writes itself. The first
+// byte chooses.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -7,6 +8,7 @@
 
 #include "common/error.h"
 #include "evaluation/detection/labelled_folder.h"
+#include "odometry/mounting/mounting_file.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/api/official_authenticator.h"
 
@@ -48,6 +50,16 @@ void FuzzLabels(const std::string& text) {
   }
 }
 
+void FuzzMounting(const std::string& text) {
+  const odometry::MountingRecord record = odometry::ParseMountingFile(text, "input");
+  const odometry::Mounting& mounting = record.estimate.mounting;
+  Require(std::abs(mounting.yaw_rad) < 1.1 && std::abs(mounting.pitch_rad) < 1.1);
+  Require(!record.estimate.height_known || (mounting.height_m > 0 && mounting.height_m <= 10));
+  Require(record.estimate.sigma.yaw_rad > 0 && record.camera.fx > 0);
+  // What was read is written so that it is read again.
+  odometry::ParseMountingFile(odometry::FormatMountingFile(record), "output");
+}
+
 }  // namespace
 }  // namespace livemap::fuzz
 
@@ -55,12 +67,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
-    switch (data[0] % 3) {
+    switch (data[0] % 4) {
       case 0:
         livemap::fuzz::FuzzCatalogue(text);
         break;
       case 1:
         livemap::fuzz::FuzzTokens(text);
+        break;
+      case 3:
+        livemap::fuzz::FuzzMounting(text);
         break;
       default:
         livemap::fuzz::FuzzLabels(text);
