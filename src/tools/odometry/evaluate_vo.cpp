@@ -16,6 +16,7 @@
 #include "evaluation/nothing_measured.h"
 #include "evaluation/quantile.h"
 #include "evaluation/trajectory/trajectory_report.h"
+#include "odometry/mounting/mounting_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/output_path.h"
 #include "tools/common/progress.h"
@@ -23,6 +24,7 @@
 #include "tools/odometry/sequence_pictures.h"
 #include "tools/odometry/stereo_source.h"
 #include "tools/odometry/vo_method.h"
+#include "tools/odometry/vo_sequence.h"
 
 namespace livemap::tools {
 namespace {
@@ -65,6 +67,15 @@ MonocularOptions ReadMonocularVo(const CommandLine& line) {
   options.camera_height_m = line.Number("camera-height", options.camera_height_m, 0.01, 100);
   options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
   options.seed = line.Seed("seed", options.seed);
+  if (line.Has("mounting")) {
+    const std::string path = line.Text("mounting", "");
+    const odometry::MountingEstimate found = odometry::ReadMountingFile(path).estimate;
+    if (!found.height_known) {
+      throw Error("--mounting '" + path + "' has no height_m: it was found without a speed");
+    }
+    options.camera_height_m = found.mounting.height_m;
+    options.camera_pitch_rad = found.mounting.pitch_rad;
+  }
   options.keyframe_delay = line.Whole("keyframe-delay", options.keyframe_delay, 0, 1000);
   return options;
 }
@@ -96,7 +107,11 @@ void CheckVoFlags(const CommandLine& line) {
                    {"speed-sigma", !height, "--scale speed: the height knows no speed"},
                    {"seed", line.Has("speed-sigma"), "--speed-sigma, whose noise it is of"},
                    {"camera-height", height, "--scale height, which it is about"},
-                   {"camera-pitch", height, "--scale height, which it is about"}});
+                   {"camera-pitch", height, "--scale height, which it is about"},
+                   {"mounting", height, "--scale height, which it is about"}});
+  if (line.Has("mounting") && (line.Has("camera-height") || line.Has("camera-pitch"))) {
+    throw Error("--mounting states height and pitch: leave out --camera-height and --camera-pitch");
+  }
   if (structured && !line.Has("edge-model")) {
     throw Error("--edges structured needs --edge-model FILE, OpenCV's model of them");
   }
@@ -135,6 +150,8 @@ std::optional<Options> ParseEvaluateVoOptions(int argc, char** argv) {
        {"speed-sigma", "M/S", "of --scale speed: noise added to the speed, default 0"},
        {"camera-height", "M", "of --scale height: over the road, default 1.65"},
        {"camera-pitch", "RAD", "of --scale height: positive looks down, default 0"},
+       {"mounting", "FILE",
+        "of --scale height: height and pitch as livemap evaluate mounting --out found them"},
        {"seed", "N", "of the speed's noise, default 1"},
        {"keyframe-delay", "N",
         "monocular: frames until a keyframe is taken over, as on board, where it is made beside "
@@ -164,27 +181,6 @@ std::optional<Options> ParseEvaluateVoOptions(int argc, char** argv) {
   }
   options.odometry.keyframe_every = line.Whole("keyframe-every", 0, 1, 10000);
   return options;
-}
-
-/// In TUM's layout, or in KITTI's, which has a calib.txt.
-datasets::Sequence ReadVoSequence(const Options& options) {
-  constexpr double kKittiRateHz = 10;
-  const std::filesystem::path root(options.sequence);
-  const auto has = [&root](const char* name) { return std::filesystem::exists(root / name); };
-  if (has("calib.txt")) {
-    if (!options.camera_file.empty()) {
-      throw Error("--camera needs TUM's layout, and '" + options.sequence + "' has a calib.txt");
-    }
-    return datasets::ReadKittiSequence(options.sequence, kKittiRateHz);
-  }
-  if (std::filesystem::is_directory(root) && !has("rgb.txt") && !has("associations.txt")) {
-    throw Error("'" + options.sequence +
-                "' is no sequence: TUM's have rgb.txt or associations.txt, KITTI's calib.txt");
-  }
-  const bool wants_depth = !options.mono && !options.stereo;
-  return datasets::ReadTumSequence(
-      options.sequence, options.camera_file,
-      wants_depth ? datasets::DepthImages::kRead : datasets::DepthImages::kIgnored);
 }
 
 struct Run {
@@ -368,7 +364,10 @@ int EvaluateVo(int argc, char** argv) {
   const std::optional<Options> options = ParseEvaluateVoOptions(argc, argv);
   if (!options) return 0;
   cv::setNumThreads(1);
-  const datasets::Sequence sequence = ReadVoSequence(*options);
+  const bool wants_depth = !options->mono && !options->stereo;
+  const datasets::Sequence sequence =
+      ReadVoSequence(options->sequence, options->camera_file,
+                     wants_depth ? datasets::DepthImages::kRead : datasets::DepthImages::kIgnored);
   SayNotes(kName, sequence.notes);
   if (!options->out.empty()) CheckVoOutput(options->out);
   const Run run = FollowSequenceByVo(sequence, *options);

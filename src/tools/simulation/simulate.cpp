@@ -16,31 +16,37 @@ namespace livemap::tools {
 namespace {
 
 std::vector<Flag> SimulateFlags() {
-  return {{"seed", "N", "of the world; the same seed gives the same bytes (1)"},
-          {"condition", "NAME", "day, dusk, rain or snow (day)"},
-          {"seconds", "S", "length of the drive (20; --room: 5)"},
-          {"rate", "HZ", "pictures per second (10; --room: 30)"},
-          {"size", "WxH", "of the pictures, pixels (640x480)"},
-          {"camera", "FILE", "camera file, see config/cameras; instead of --size"},
-          {"distortion", "K1,K2", "radial distortion of the camera (0,0)"},
-          {"blur", "N", "pictures averaged over the exposure of 8 ms (0: no motion blur)"},
-          {"speed", "MPS", "aimed at on an open road, m/s (8)"},
-          {"stops", "", "wait two seconds at every second crossing"},
-          {"route", "FILE.geojson", "a LineString that the road follows, instead of --start"},
-          {"start", "LAT,LON", "of the world's origin, degrees (48.8566,9.0)"},
-          {"world", "FILE", "street and hazards: docs/reference/simulator.md (by the seed)"},
-          {"threads", "N", "that render (2)"},
-          {"one-ray", "", "one ray per pixel: twice as fast, jagged edges"},
-          {"stereo", "M", "baseline of a right camera to the right, for --tum and --bag (none)"},
-          {"depth", "SENSOR",
-           "exact, kinect, stereo or rough: how --tum and --bag-depth measure (exact)"},
-          {"preview", "FILE.png", "contact sheet of twelve moments"},
-          {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
-          {"tum", "DIR", "TUM RGB-D folder"},
-          {"depth-scale", "N", "of --tum's depth, units per metre; 1000 reaches 65 m (5000)"},
-          {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
-          {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
-          {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
+  return {
+      {"seed", "N", "of the world; the same seed gives the same bytes (1)"},
+      {"condition", "NAME", "day, dusk, rain or snow (day)"},
+      {"seconds", "S", "length of the drive (20; --room: 5)"},
+      {"rate", "HZ", "pictures per second (10; --room: 30)"},
+      {"size", "WxH", "of the pictures, pixels (640x480)"},
+      {"camera", "FILE", "camera file, see config/cameras; instead of --size"},
+      {"camera-yaw-deg", "DEG", "of the camera; positive looks left (0, or --camera's)"},
+      {"camera-pitch-deg", "DEG", "of the camera; positive looks down (4, or --camera's)"},
+      {"camera-roll-deg", "DEG", "of the camera; positive: right side down (0, or --camera's)"},
+      {"camera-height-m", "M", "of the camera over the road (1.45, or --camera's)"},
+      {"knock", "S,YAW,PITCH,ROLL", "the camera turns by so many degrees after S seconds (none)"},
+      {"distortion", "K1,K2", "radial distortion of the camera (0,0)"},
+      {"blur", "N", "pictures averaged over the exposure of 8 ms (0: no motion blur)"},
+      {"speed", "MPS", "aimed at on an open road, m/s (8)"},
+      {"stops", "", "wait two seconds at every second crossing"},
+      {"route", "FILE.geojson", "a LineString that the road follows, instead of --start"},
+      {"start", "LAT,LON", "of the world's origin, degrees (48.8566,9.0)"},
+      {"world", "FILE", "street and hazards: docs/reference/simulator.md (by the seed)"},
+      {"threads", "N", "that render (2)"},
+      {"one-ray", "", "one ray per pixel: twice as fast, jagged edges"},
+      {"stereo", "M", "baseline of a right camera to the right, for --tum and --bag (none)"},
+      {"depth", "SENSOR",
+       "exact, kinect, stereo or rough: how --tum and --bag-depth measure (exact)"},
+      {"preview", "FILE.png", "contact sheet of twelve moments"},
+      {"truth-preview", "FILE.png", "contact sheet of pictures, boxes, classes and depth"},
+      {"tum", "DIR", "TUM RGB-D folder"},
+      {"depth-scale", "N", "of --tum's depth, units per metre; 1000 reaches 65 m (5000)"},
+      {"yolo", "DIR", "labelled drive, as livemap evaluate detection reads it"},
+      {"video", "FILE.mp4", "MPEG-4 at the pictures' rate"},
+      {"hazards", "FILE", "the true hazards that were in view, GeoJSON"}};
 }
 
 simulation::DrivingStyle ReadDrivingStyle(const CommandLine& line) {
@@ -54,7 +60,7 @@ simulation::DrivingStyle ReadDrivingStyle(const CommandLine& line) {
 /// The camera's view at a time, and where it will be when the exposure ends.
 simulation::CameraExposure SimulatedViewAt(const simulation::VehicleMotion& motion,
                                            const SimulationSetup& setup, double time_s) {
-  const Eigen::Isometry3d base_from_optical = setup.mounting.BaseFromOptical();
+  const Eigen::Isometry3d base_from_optical = setup.MountingAt(time_s).BaseFromOptical();
   simulation::CameraExposure camera;
   camera.world_from_optical = motion.WorldFromBase(time_s) * base_from_optical;
   camera.world_from_optical_end =

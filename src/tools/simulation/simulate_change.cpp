@@ -45,7 +45,7 @@ struct ChangeRun {
 
 ChangeRun ReadChangeRun(const CommandLine& line) {
   for (const char* flag :
-       {"tum", "yolo", "video", "bag", "hazards", "truth-preview", "stops", "stereo"}) {
+       {"tum", "yolo", "video", "bag", "hazards", "truth-preview", "stops", "stereo", "knock"}) {
     if (line.Has(flag)) {
       throw Error("--" + std::string(flag) + " and --change exclude each other");
     }

@@ -118,7 +118,8 @@ int SimulateRoom(const CommandLine& line) {
   if (wall && line.Has("room")) throw Error("--room and --wall are two worlds; give one of them");
   for (const char* street :
        {"condition", "speed", "stops", "route", "world", "start", "blur", "yolo", "video", "bag",
-        "hazards", "truth-preview", "change", "stereo"}) {
+        "hazards", "truth-preview", "change", "stereo", "knock", "camera-yaw-deg",
+        "camera-pitch-deg", "camera-roll-deg", "camera-height-m"}) {
     if (line.Has(street))
       throw Error("--" + std::string(street) + " is a street's, not " + name + "'s");
   }

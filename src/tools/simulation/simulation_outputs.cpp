@@ -28,6 +28,14 @@ void WriteOutputSheet(const std::string& path, const std::vector<cv::Mat>& pictu
   }
 }
 
+/// As a camera file; of a camera that was knocked, the mounting at the end.
+void WriteTrueMounting(const std::string& path, const SimulationSetup& setup) {
+  std::ofstream file = simulation::OpenFile(path);
+  file << datasets::FormatCameraFile(
+      {"simulated", setup.camera.intrinsics, setup.knock ? setup.knock->after : setup.mounting});
+  simulation::CloseFile(file, path);
+}
+
 }  // namespace
 
 void RefuseNoOutput(const CommandLine& line) {
@@ -60,8 +68,9 @@ SimulationOutputs::SimulationOutputs(const CommandLine& line, const SimulationSe
   if (line.Has("hazards")) simulation::CheckWritable(hazards_path_);
   if (line.Has("tum")) {
     const double scale = line.Number("depth-scale", simulation::kTumDepthScale, 100, 10000);
-    tum_ = std::make_unique<simulation::TumWriter>(line.Text("tum", ""), setup.camera, scale,
-                                                   setup.baseline_m);
+    const std::string folder = line.Text("tum", "");
+    tum_ = std::make_unique<simulation::TumWriter>(folder, setup.camera, scale, setup.baseline_m);
+    WriteTrueMounting(folder + "/mounting.yaml", setup);
   }
   if (line.Has("yolo")) yolo_ = std::make_unique<simulation::YoloWriter>(line.Text("yolo", ""));
   if (!line.Has("video")) return;

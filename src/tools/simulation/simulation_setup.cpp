@@ -24,7 +24,41 @@ std::pair<double, double> ReadSetupPair(const CommandLine& line, const std::stri
   throw Error("--" + flag + " is '" + text + "', accepted is " + accepted);
 }
 
+/// Over what the camera's file says.
+void ReadMountingFlags(const CommandLine& line, datasets::CameraMounting& mounting) {
+  mounting.yaw_deg = line.Number("camera-yaw-deg", mounting.yaw_deg, -180, 180);
+  mounting.pitch_deg = line.Number("camera-pitch-deg", mounting.pitch_deg, -30, 89);
+  mounting.roll_deg = line.Number("camera-roll-deg", mounting.roll_deg, -45, 45);
+  mounting.height_m = line.Number("camera-height-m", mounting.height_m, 0.1, 10);
+}
+
+std::optional<CameraKnock> ReadKnock(const CommandLine& line,
+                                     const datasets::CameraMounting& mounting) {
+  if (!line.Has("knock")) return std::nullopt;
+  if (line.Has("bag")) throw Error("--knock and --bag exclude each other: a bag has one mounting");
+  const std::string text = line.Text("knock", "");
+  std::vector<double> numbers;
+  for (const std::string& part : datasets::Split(text, ',')) {
+    const std::optional<double> number = datasets::ParseFinite(part);
+    if (number && std::abs(*number) <= 7200) numbers.push_back(*number);
+  }
+  if (numbers.size() != 4 || numbers[0] < 0 || std::abs(numbers[1]) > 30 ||
+      std::abs(numbers[2]) > 30 || std::abs(numbers[3]) > 30) {
+    throw Error("--knock is '" + text +
+                "', accepted is S,YAW,PITCH,ROLL: seconds, and degrees from -30 to 30");
+  }
+  CameraKnock knock{numbers[0], mounting};
+  knock.after.yaw_deg += numbers[1];
+  knock.after.pitch_deg += numbers[2];
+  knock.after.roll_deg += numbers[3];
+  return knock;
+}
+
 }  // namespace
+
+datasets::CameraMounting SimulationSetup::MountingAt(double time_s) const {
+  return knock && time_s >= knock->time_s ? knock->after : mounting;
+}
 
 SimulationSetup ReadSimulationSetup(const CommandLine& line) {
   SimulationSetup setup;
@@ -50,6 +84,8 @@ SimulationSetup ReadSimulationSetup(const CommandLine& line) {
     k.cx = 0.5 * (width - 1);
     k.cy = 0.5 * (height - 1);
   }
+  ReadMountingFlags(line, setup.mounting);
+  setup.knock = ReadKnock(line, setup.mounting);
   const auto [k1, k2] = ReadSetupPair(line, "distortion", "0,0", ',', "K1,K2 from -0.4 to 0.4");
   if (std::abs(k1) > 0.4 || std::abs(k2) > 0.4) {
     throw Error("--distortion is '" + line.Text("distortion", "") +
