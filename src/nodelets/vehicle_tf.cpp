@@ -10,6 +10,11 @@
 #include "ros/conversions/localization_conversions.h"
 
 namespace livemap::nodelets {
+namespace {
+
+constexpr std::chrono::seconds kLookAgain(1);
+
+}  // namespace
 
 VehicleTf::VehicleTf(ros::NodeHandle& node, std::string nodelet_name, std::string map_frame,
                      std::string base_frame, double max_stamp_ahead_s)
@@ -52,7 +57,8 @@ std::optional<Eigen::Isometry3d> VehicleTf::Mounting(const std::string& optical_
 }
 
 void MountingLearner::Want(const std::string& optical_frame) {
-  if (known_.count(optical_frame) != 0) return;
+  const auto known = known_.find(optical_frame);
+  if (known != known_.end() && std::chrono::steady_clock::now() < known->second.look_again) return;
   wanted_ = optical_frame;
   Retry();
 }
@@ -61,8 +67,11 @@ void MountingLearner::Retry() {
   if (wanted_.empty()) return;
   const std::optional<Eigen::Isometry3d> mounting = vehicle_tf_.Mounting(wanted_);
   if (!mounting) return;
-  known_.insert(wanted_);
-  on_mounting_(wanted_, *mounting);
+  const auto known = known_.find(wanted_);
+  const bool changed =
+      known == known_.end() || !known->second.base_from_optical.isApprox(*mounting, 1e-9);
+  known_[wanted_] = {*mounting, std::chrono::steady_clock::now() + kLookAgain};
+  if (changed) on_mounting_(wanted_, *mounting);
   wanted_.clear();
 }
 

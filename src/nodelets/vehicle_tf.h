@@ -5,9 +5,10 @@
 #include <tf2_ros/buffer.h>
 
 #include <Eigen/Geometry>
+#include <chrono>
 #include <functional>
+#include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -39,7 +40,7 @@ class VehicleTf {
   BoundedTfListener listener_;
 };
 
-/// Learns the mountings of cameras from tf, each once, because a mounting does not change. Not
+/// Learns the mountings of cameras from tf, and follows them: edge_vo may find out better. Not
 /// thread-safe.
 class MountingLearner {
  public:
@@ -50,7 +51,7 @@ class MountingLearner {
   MountingLearner(const VehicleTf& vehicle_tf, OnMounting on_mounting)
       : vehicle_tf_(vehicle_tf), on_mounting_(std::move(on_mounting)) {}
 
-  /// An image of this camera came. Its mounting is looked up unless it is known.
+  /// An image of this camera came. Its mounting is looked up unless it was within a second.
   void Want(const std::string& optical_frame);
   /// Looks up again what was wanted last and is not known yet.
   void Retry();
@@ -58,7 +59,11 @@ class MountingLearner {
  private:
   const VehicleTf& vehicle_tf_;
   OnMounting on_mounting_;
-  std::set<std::string> known_;
+  struct Known {
+    Eigen::Isometry3d base_from_optical;
+    std::chrono::steady_clock::time_point look_again;
+  };
+  std::map<std::string, Known> known_;
   std::string wanted_;  ///< Empty: none.
 };
 

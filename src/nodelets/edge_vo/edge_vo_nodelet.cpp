@@ -16,6 +16,7 @@
 #include <boost/function.hpp>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
@@ -25,6 +26,7 @@
 #include "nodelets/diagnostics.h"
 #include "nodelets/edge_vo/eye_choice.h"
 #include "nodelets/edge_vo/mono_eye.h"
+#include "nodelets/edge_vo/mounting_watch.h"
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "nodelets/stamp_checks.h"
@@ -100,6 +102,7 @@ class EdgeVoPart : public NodeletPart {
     tf_listener_ = std::make_unique<BoundedTfListener>(tf_buffer_, node, config_.max_stamp_ahead_s);
     stamps_ = std::make_unique<StampChecks>(getName(), config_.max_stamp_ahead_s,
                                             [this] { OnTimeReset(); });
+    mounting_ = std::make_unique<MountingWatch>(node, getName(), config_, tf_buffer_);
     odometry_publisher_ = node.advertise<nav_msgs::Odometry>("odom", 10);
     path_publisher_ = node.advertise<nav_msgs::Path>("vo/path", 1);
     cloud_publisher_ = node.advertise<sensor_msgs::PointCloud2>("vo/points", 1);
@@ -292,6 +295,33 @@ class EdgeVoPart : public NodeletPart {
     figures_.lost += result.state == odometry::VoState::kLost ? 1U : 0U;
     figures_.keyframes += result.new_keyframe ? 1U : 0U;
     if (result.state != odometry::VoState::kInitialising && is_new) Publish(result, frame, header);
+    if (is_new) WatchMounting(result, frame);
+  }
+
+  /// What the frame says about the camera's mounting counts from the next frame on.
+  void WatchMounting(const odometry::VoResult& result, const odometry::RgbdFrame& frame) {
+    odometry::CalibrationFrame seen;
+    seen.stamp_ns = ros_io::FromRosTime(last_stamp_);
+    seen.grey = frame.grey;
+    seen.world_from_camera = result.world_from_camera;
+    seen.tracking = result.state == odometry::VoState::kTracking;
+    if (mono_) seen.metres_sigma = MetresSigmaForMounting();
+    if (!frame.depth.empty()) {
+      const bool coded = frame.depth.type() == CV_16UC1;
+      frame.depth.convertTo(seen.depth_m, CV_32F, coded ? 1 / frame.depth_units_per_m : 1);
+    }
+    if (const auto mounting = mounting_->Add(seen)) {
+      ros_io::ChangeMounting(result.world_from_camera, *mounting, frames_);
+    }
+  }
+
+  /// Metres that come from the camera's height say nothing about it.
+  double MetresSigmaForMounting() const {
+    const odometry::MetresSource source = mono_->odometry().metres_source();
+    const bool told =
+        source != odometry::MetresSource::kHeight && source != odometry::MetresSource::kNone;
+    const std::optional<double> sigma = mono_->odometry().metres_sigma();
+    return told && sigma ? *sigma : std::numeric_limits<double>::infinity();
   }
 
   /// Depth goes on where one eye was, as far as its last motion tells.
@@ -319,10 +349,13 @@ class EdgeVoPart : public NodeletPart {
            camera.height == camera_.height;
   }
 
-  void TakeMounting(const std_msgs::Header& header) {
-    const geometry_msgs::TransformStamped mounting = tf_buffer_.lookupTransform(
-        config_.base_frame, header.frame_id, ros::Time(0), ros::Duration(0));
-    frames_.base_from_optical = tf2::transformToEigen(mounting);
+  void TakeMounting(const std_msgs::Header& header, const geo::CameraIntrinsics& camera) {
+    const Eigen::Isometry3d mounting = mounting_->Begin(header.frame_id, camera);
+    if (last_stamp_.isZero()) {
+      frames_.base_from_optical = mounting;
+    } else {
+      ros_io::ChangeMounting(last_.world_from_camera, mounting, frames_);
+    }
   }
 
   /// Calibration and mounting; a new calibration starts anew.
@@ -330,7 +363,7 @@ class EdgeVoPart : public NodeletPart {
     const geo::CameraIntrinsics camera = ros_io::ToRectifiedIntrinsics(info);
     if (odometry_ && IsSameCamera(camera)) return;
     if (odometry_) NODELET_WARN("the calibration changed: odometry starts anew");
-    TakeMounting(header);
+    TakeMounting(header, camera);
     camera_ = camera;
     const bool first = odometry_ == nullptr;
     odometry_ = std::make_unique<odometry::EdgeOdometry>(config_.odometry, camera);
@@ -341,7 +374,7 @@ class EdgeVoPart : public NodeletPart {
     const geo::CameraIntrinsics camera = ros_io::ToRectifiedIntrinsics(info);
     if (mono_ && IsSameCamera(camera)) return;
     if (mono_) NODELET_WARN("the calibration changed: odometry starts anew");
-    TakeMounting(header);
+    TakeMounting(header, camera);
     camera_ = camera;
     const bool first = mono_ == nullptr;
     mono_ = std::make_unique<MonoEye>(MonocularOf(config_), camera, frames_.base_from_optical);
@@ -426,6 +459,7 @@ class EdgeVoPart : public NodeletPart {
     last_ = {};
     last_stamp_ = {};
     joint_.reset();
+    frames_.odom_from_first_base.setIdentity();
     ++figures_.resets;
   }
 
@@ -461,7 +495,10 @@ class EdgeVoPart : public NodeletPart {
   void Diagnose(Diagnostics::Status& status) {
     using Level = diagnostic_msgs::DiagnosticStatus;
     const bool tracking = last_.state == odometry::VoState::kTracking;
-    status.summary(tracking ? Level::OK : Level::WARN, odometry::VoStateName(last_.state));
+    const std::string complaint = mounting_->Complaint();
+    status.summary(
+        tracking && complaint.empty() ? Level::OK : Level::WARN,
+        odometry::VoStateName(last_.state) + (complaint.empty() ? complaint : ", " + complaint));
     std::vector<double>& times = figures_.milliseconds;
     std::sort(times.begin(), times.end());
     status.add("eye", EyeName(choice_->eye()));
@@ -475,6 +512,7 @@ class EdgeVoPart : public NodeletPart {
     status.add("milliseconds_median", times.empty() ? 0.0 : times[times.size() / 2]);
     status.add("milliseconds_p95", times.empty() ? 0.0 : times[times.size() * 95 / 100]);
     DiagnoseMetres(status);
+    mounting_->Diagnose(status);
     status.add("edges", last_.points);
     status.add("inliers", last_.inliers);
     status.add("residual_sigma", last_.sigma);
@@ -516,6 +554,7 @@ class EdgeVoPart : public NodeletPart {
 
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<BoundedTfListener> tf_listener_;
+  std::unique_ptr<MountingWatch> mounting_;  // After the buffer, which it reads.
   std::unique_ptr<StampChecks> stamps_;
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   ros::Publisher odometry_publisher_, path_publisher_, cloud_publisher_;

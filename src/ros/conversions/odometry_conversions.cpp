@@ -17,7 +17,23 @@ void CopyOdometryCovariance(const odometry::Matrix6d& from, boost::array<double,
 }  // namespace
 
 Eigen::Isometry3d OdomFromBase(const odometry::VoResult& result, const OdometryFrames& frames) {
-  return frames.base_from_optical * result.world_from_camera * frames.base_from_optical.inverse();
+  return frames.odom_from_first_base * frames.base_from_optical * result.world_from_camera *
+         frames.base_from_optical.inverse();
+}
+
+void ChangeMounting(const Eigen::Isometry3d& world_from_camera,
+                    const Eigen::Isometry3d& base_from_optical, OdometryFrames& frames) {
+  const auto heading = [](const Eigen::Isometry3d& pose) {
+    return std::atan2(pose.linear()(1, 0), pose.linear()(0, 0));
+  };
+  const Eigen::Isometry3d as_before = frames.odom_from_first_base * frames.base_from_optical *
+                                      world_from_camera * base_from_optical.inverse();
+  const Eigen::Isometry3d level =
+      base_from_optical * world_from_camera * base_from_optical.inverse();
+  const Eigen::AngleAxisd turn(heading(as_before) - heading(level), Eigen::Vector3d::UnitZ());
+  frames.base_from_optical = base_from_optical;
+  frames.odom_from_first_base.linear() = turn.toRotationMatrix();
+  frames.odom_from_first_base.translation() = as_before.translation() - turn * level.translation();
 }
 
 nav_msgs::Odometry ToOdometry(const odometry::VoResult& result, const OdometryFrames& frames,
@@ -58,7 +74,7 @@ sensor_msgs::PointCloud2 ToEdgeCloud(const odometry::Keyframe& keyframe,
                                      double metres_per_unit, const OdometryFrames& frames,
                                      double voxel_m, const ros::Time& stamp) {
   const Eigen::Isometry3f odom_from_keyframe =
-      (frames.base_from_optical * world_from_keyframe).cast<float>();
+      (frames.odom_from_first_base * frames.base_from_optical * world_from_keyframe).cast<float>();
   const auto scale = static_cast<float>(metres_per_unit);
   const odometry::EdgePoints& points = keyframe.points[0];
   auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZI>>();

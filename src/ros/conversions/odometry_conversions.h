@@ -19,7 +19,14 @@ struct OdometryFrames {
   /// The camera's mounting. The odometry's world is the optical frame of the first keyframe; odom
   /// is where base_link was then.
   Eigen::Isometry3d base_from_optical = Eigen::Isometry3d::Identity();
+  /// Not the identity once the mounting has changed (ChangeMounting).
+  Eigen::Isometry3d odom_from_first_base = Eigen::Isometry3d::Identity();
 };
+
+/// The camera turns out to be mounted otherwise, while it is at `world_from_camera`. The path goes
+/// on where it was and into the same direction; odom stays level.
+void ChangeMounting(const Eigen::Isometry3d& world_from_camera,
+                    const Eigen::Isometry3d& base_from_optical, OdometryFrames& frames);
 
 /// Pose of base_link in odom.
 Eigen::Isometry3d OdomFromBase(const odometry::VoResult& result, const OdometryFrames& frames);

@@ -112,6 +112,25 @@ void ReadVoEye(ParameterReader& parameters, EdgeVoConfig& config) {
                   "m/s");
 }
 
+void ReadVoMounting(ParameterReader& parameters, EdgeVoConfig& config) {
+  parameters.Section("The camera's mounting",
+                     "edge_vo finds out how the camera is mounted while the vehicle drives. Each "
+                     "number replaces the one that tf states as soon as it is surer.");
+  parameters.Read("calibrate_mounting", config.calibrate_mounting,
+                  "Whether yaw, pitch, roll and height of the camera are estimated.");
+  parameters.Read("mounting_file", config.mounting_file,
+                  "File in which the mounting is kept from drive to drive; empty: none. "
+                  "vehicle.launch sets it to a file in `directory`.");
+  parameters.Read("mounting_sigma_rad", config.mounting_sigma_rad, {0.0001, 1},
+                  "How sure tf's angles are, standard deviation.", "rad");
+  parameters.Read("mounting_sigma_m", config.mounting_sigma_m, {0.001, 1},
+                  "How sure tf's height is, standard deviation.", "m");
+  parameters.Read("publish_mounting", config.publish_mounting,
+                  "Whether a mounting that is surer replaces tf's, as a static transform of the "
+                  "frame below base_frame. False where tf's mounting is published all the time, as "
+                  "of a camera that moves.");
+}
+
 }  // namespace
 
 EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
@@ -120,6 +139,7 @@ EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
   ReadVoKeyframes(parameters, config.odometry);
   ReadVoLoss(parameters, config.odometry);
   ReadVoEye(parameters, config);
+  ReadVoMounting(parameters, config);
   parameters.Section("Topics and frames");
   parameters.ReadChoice("sync", config.sync, {"exact", "approximate"},
                         "How image, depth and calibration are matched by their stamps.");

@@ -16,9 +16,14 @@ struct EdgeVoConfig {
   std::string wheel_velocity_topic;  ///< Empty: none.
   double wheel_sigma_mps = 0.1;      ///< Where a message states none.
   double receiver_sigma_mps = 0.2;   ///< Where a message states none.
-  std::string sync = "exact";        ///< "exact" or "approximate".
-  int queue_size = 10;               ///< Messages that may wait for their partners.
-  double depth_units_per_m = 1000;   ///< Of 16-bit depth (REP 118).
+  bool calibrate_mounting = true;
+  std::string mounting_file;          ///< Empty: nothing is kept.
+  double mounting_sigma_rad = 0.035;  ///< Of tf's mounting.
+  double mounting_sigma_m = 0.05;
+  bool publish_mounting = true;     ///< On tf.
+  std::string sync = "exact";       ///< "exact" or "approximate".
+  int queue_size = 10;              ///< Messages that may wait for their partners.
+  double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
   std::string odom_frame = "odom";
   std::string base_frame = "base_link";
   bool publish_tf = true;  ///< odom -> base_link.
