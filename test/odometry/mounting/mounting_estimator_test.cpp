@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "odometry/mounting/synthetic_road.h"
+#include "test/odometry/mounting/synthetic_road.h"
 
 namespace livemap::odometry {
 namespace {

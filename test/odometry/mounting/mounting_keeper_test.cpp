@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 #include "common/text_file.h"
-#include "odometry/mounting/synthetic_road.h"
+#include "test/odometry/mounting/synthetic_road.h"
 
 namespace livemap::odometry {
 namespace {

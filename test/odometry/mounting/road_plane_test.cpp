@@ -7,7 +7,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
-#include "odometry/mounting/synthetic_road.h"
+#include "test/odometry/mounting/synthetic_road.h"
 
 namespace livemap::odometry {
 namespace {
