@@ -33,6 +33,13 @@ constexpr double kSightReach = 3.0;
 constexpr double kFixHeadingOwnShare =
     0.5;  // Of the course's variance; the fixes' windows overlap.
 constexpr double kForEverS = 1e9;
+/// A hazard that the images of so long a time do not show is out of view.
+constexpr double kOutOfViewS = 0.09;
+
+/// Whether the next image will hardly show the whole box.
+bool IsLeavingImage(const imaging::Box& box, double bottom_step_px, std::uint32_t height) {
+  return box.y_max + 1.5 * std::max(0.0, bottom_step_px) >= height - 1.0;
+}
 
 }  // namespace
 
@@ -115,7 +122,10 @@ void HazardReporter::Finish(double steady_s) {
     ReportCandidates(waiting, waiting.arrival_s, steady_s);
   }
   waiting_.clear();
-  ReportSettled(kForEverS, steady_s);
+  // Pictures that are not there yet do not come any more.
+  for (Settling& settling : settling_) ReportSettledView(settling.view, steady_s);
+  settling_.clear();
+  newest_frame_ns_ = newest_empty_ns_ = 0;
   picture_orders_.clear();
 }
 
@@ -141,7 +151,10 @@ void HazardReporter::AddFrame(const placement::SightingFrame& frame, double now_
       std::remove_if(sightings.begin(), sightings.end(),
                      [this](const placement::Sighting& sighting) { return !IsUsable(sighting); }),
       sightings.end());
-  if (sightings.empty()) return;
+  if (sightings.empty()) {
+    newest_empty_ns_ = frame.stamp_ns;
+    return;
+  }
   waiting_.push_back(std::move(waiting));
   while (waiting_.size() > static_cast<std::size_t>(config_.max_waiting_frames)) {
     counters_.dropped_no_fix += waiting_.front().frame.sightings.size();
@@ -211,7 +224,7 @@ bool HazardReporter::IsPlaced(WaitingFrame& waiting, double now_s) {
 }
 
 bool HazardReporter::IsKnown(const PlacedSighting& candidate) const {
-  return passes_.IsKnown(candidate.pass) || IsSettling(candidate) ||
+  return passes_.IsKnown(candidate.pass) ||
          map_.Find(candidate.sighting.class_name, candidate.place.position).has_value();
 }
 
@@ -228,20 +241,21 @@ bool HazardReporter::Advance(WaitingFrame& waiting, double now_s, double steady_
   return true;
 }
 
-/// One picture for each candidate that is not known; the whole of an image that is not of the
-/// frame's size.
+/// One picture for each candidate that is to be reported now; the whole of an image that is not of
+/// the frame's size.
 void HazardReporter::OrderPictures(WaitingFrame& waiting) {
   if (waiting.order != 0 || waiting.image.IsMissing()) return;
   const bool fits = HasSizeOfFrame(waiting);
   PictureOrder order;
-  order.number = waiting.order = ++last_order_;
-  order.image = waiting.image;
   for (PlacedSighting& candidate : waiting.candidates) {
-    if (IsKnown(candidate)) continue;
+    if (IsKnown(candidate) || IsToSettle(candidate)) continue;
     candidate.cut = order.cuts.size();
     order.cuts.push_back({fits ? candidate.sighting.box : imaging::Box{}, config_.picture,
                           /*is_whole_image=*/false});
   }
+  if (order.cuts.empty()) return;
+  order.number = waiting.order = ++last_order_;
+  order.image = waiting.image;
   picture_orders_.push_back(std::move(order));
   ++counters_.pictures_requested;
 }
@@ -256,7 +270,7 @@ bool HazardReporter::WaitsForPicture(WaitingFrame& waiting, double now_s) {
   if (waiting.pictures) return false;
   OrderPictures(waiting);
   if (waiting.order != 0) return true;
-  return now_s - waiting.arrival_s < config_.image_wait_s;
+  return waiting.image.IsMissing() && now_s - waiting.arrival_s < config_.image_wait_s;
 }
 
 std::vector<PictureOrder> HazardReporter::TakePictureOrders() {
@@ -266,7 +280,14 @@ std::vector<PictureOrder> HazardReporter::TakePictureOrders() {
 void HazardReporter::AddPictures(std::uint64_t order,
                                  std::vector<imaging::CroppedPicture> pictures) {
   for (WaitingFrame& waiting : waiting_) {
-    if (waiting.order == order) waiting.pictures = std::move(pictures);
+    if (waiting.order != order) continue;
+    waiting.pictures = std::move(pictures);
+    return;
+  }
+  for (Settling& settling : settling_) {
+    if (settling.view.order != order) continue;
+    settling.view.pictures = std::move(pictures);
+    return;
   }
 }
 
@@ -486,56 +507,114 @@ void HazardReporter::ReportCandidates(WaitingFrame& waiting, double now_s, doubl
       ++counters_.duplicates_suppressed;
       continue;
     }
-    protocol::Report report = MakeReport(waiting, index);
-    const bool is_urgent = catalogue_.Get(report.class_name).urgency <= 1;
-    if (config_.settle_wait_s > 0 && !is_urgent && candidate.pass != 0) {
-      settling_.push_back({std::move(report), candidate.pass, now_s, steady_s});
+    if (IsToSettle(candidate)) {
+      Settle(waiting, index, now_s, steady_s);
       continue;
     }
+    protocol::Report report = MakeReport(waiting, index);
     TakeBestPlace(candidate.pass, report);
     AddReport(report, candidate.pass, steady_s);
   }
+  newest_frame_ns_ = waiting.frame.stamp_ns;
 }
 
-/// A report that waits for further sights is of the same hazard.
-bool HazardReporter::IsSettling(const PlacedSighting& candidate) const {
+/// Whether its report waits for further sights.
+bool HazardReporter::IsToSettle(const PlacedSighting& candidate) const {
+  return config_.settle_wait_s > 0 && candidate.pass != 0 && !candidate.has_settled &&
+         catalogue_.Get(candidate.sighting.class_name).urgency > 1;
+}
+
+/// The same hazard where it waits already.
+HazardReporter::Settling* HazardReporter::FindSettling(const PlacedSighting& candidate) {
   const std::string& name = candidate.sighting.class_name;
   const double radius_m = catalogue_.Get(name).duplicate_radius_m;
-  return std::any_of(settling_.begin(), settling_.end(), [&](const Settling& other) {
-    if (other.pass == candidate.pass) return true;
-    const auto place = passes_.Place(other.pass);
-    const geo::GeoPoint& there = place ? place->place.position : other.report.position;
-    return other.report.class_name == name &&
-           geo::GeodesicDistanceM(there, candidate.place.position) <= radius_m;
-  });
+  const auto found =
+      std::find_if(settling_.begin(), settling_.end(), [&](const Settling& settling) {
+        const PlacedSighting& other = settling.view.candidates.front();
+        if (other.pass == candidate.pass) return true;
+        const auto place = passes_.Place(other.pass);
+        const geo::GeoPoint& there = place ? place->place.position : other.place.position;
+        return other.sighting.class_name == name &&
+               geo::GeodesicDistanceM(there, candidate.place.position) <= radius_m;
+      });
+  return found == settling_.end() ? nullptr : &*found;
+}
+
+/// The newest sight of a hazard is the nearest: of all pictures its own shows most.
+void HazardReporter::Settle(const WaitingFrame& waiting, std::size_t index, double now_s,
+                            double steady_s) {
+  WaitingFrame view;
+  view.frame = waiting.frame;
+  view.arrival_s = now_s;
+  view.placed = true;
+  view.image = waiting.image;
+  view.candidates = {waiting.candidates[index]};
+  view.candidates.front().has_settled = true;
+  Settling* settling = FindSettling(waiting.candidates[index]);
+  if (settling == nullptr) {
+    settling_.push_back({std::move(view), 0, now_s, steady_s, false});
+    return;
+  }
+  ++counters_.duplicates_suppressed;
+  const PlacedSighting& before = settling->view.candidates.front();
+  if (settling->is_due || view.frame.stamp_ns <= settling->view.frame.stamp_ns ||
+      before.pass != view.candidates.front().pass) {
+    return;
+  }
+  settling->bottom_step_px = static_cast<double>(view.candidates.front().sighting.box.y_max) -
+                             static_cast<double>(before.sighting.box.y_max);
+  settling->view = std::move(view);
+}
+
+bool HazardReporter::IsOutOfView(const Settling& settling) const {
+  const WaitingFrame& view = settling.view;
+  const imaging::Box& box = view.candidates.front().sighting.box;
+  if (IsLeavingImage(box, settling.bottom_step_px, view.frame.image_height)) return true;
+  std::int64_t newest_ns = newest_frame_ns_;
+  // What was seen before the empty frame may still wait for its position.
+  if (waiting_.empty() || waiting_.front().frame.stamp_ns > newest_empty_ns_) {
+    newest_ns = std::max(newest_ns, newest_empty_ns_);
+  }
+  return Seconds(newest_ns - view.frame.stamp_ns) >= kOutOfViewS;
 }
 
 /// A bag's clock may stand still after its end: the steady clock counts, too.
 bool HazardReporter::IsSettled(Settling& settling, double now_s, double steady_s) const {
   settling.since_s = std::min(settling.since_s, now_s);  // A clock that was set back.
   if (now_s - settling.since_s >= config_.settle_wait_s ||
-      steady_s - settling.since_steady_s >= 2 * config_.settle_wait_s) {
+      steady_s - settling.since_steady_s >= 2 * config_.settle_wait_s || IsOutOfView(settling)) {
     return true;
   }
-  const auto place = passes_.Place(settling.pass);
+  const auto place = passes_.Place(settling.view.candidates.front().pass);
   return !place || placement::LargestSigmaM(place->seen_from_vehicle_m2) <= config_.settle_sigma_m;
 }
 
-/// Reports what has had its further sights.
+/// Reports what has had its further sights, once its picture is there.
 void HazardReporter::ReportSettled(double now_s, double steady_s) {
-  std::vector<Settling> settled;
   for (auto settling = settling_.begin(); settling != settling_.end();) {
-    if (!IsSettled(*settling, now_s, steady_s)) {
+    WaitingFrame& view = settling->view;
+    if (!settling->is_due && IsSettled(*settling, now_s, steady_s)) {
+      settling->is_due = true;
+      view.arrival_s = now_s;
+    }
+    if (!settling->is_due || WaitsForPicture(view, now_s)) {
       ++settling;
       continue;
     }
-    settled.push_back(std::move(*settling));
+    ReportSettledView(view, steady_s);
     settling = settling_.erase(settling);
   }
-  for (Settling& each : settled) {
-    TakeBestPlace(each.pass, each.report);
-    AddReport(each.report, each.pass, steady_s);
+}
+
+void HazardReporter::ReportSettledView(WaitingFrame& view, double steady_s) {
+  const PassSights::Id pass = view.candidates.front().pass;
+  if (IsKnown(view.candidates.front())) {  // The zone has told it meanwhile.
+    ++counters_.duplicates_suppressed;
+    return;
   }
+  protocol::Report report = MakeReport(view, 0);
+  TakeBestPlace(pass, report);
+  AddReport(report, pass, steady_s);
 }
 
 /// The place by all sights of the pass, as long as it is remembered.

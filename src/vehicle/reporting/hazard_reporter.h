@@ -47,7 +47,8 @@ enum class LinkCost { kUnknown, kCheap, kMetered, kNone };
 /// the pictures (TakePictureOrders), and takes what may leave the vehicle (AddPictures).
 ///
 /// A report's place is that of all sights of the pass so far (PassSights). An urgent hazard is
-/// reported at its first sight near enough; the others wait shortly for nearer sights.
+/// reported at its first sight near enough; the others while they are in view, at most
+/// settle_wait_s later, with the picture of their newest sight.
 class HazardReporter {
  public:
   struct Config {
@@ -214,13 +215,7 @@ class HazardReporter {
     Eigen::Vector3d earth_m;         // geo::EarthCentred of the place.
     std::optional<std::size_t> cut;  // Of the order; none where it was known already.
     PassSights::Id pass = 0;
-  };
-  /// A report that waits for further sights of its hazard.
-  struct Settling {
-    protocol::Report report;
-    PassSights::Id pass = 0;
-    double since_s = 0;
-    double since_steady_s = 0;
+    bool has_settled = false;  // It waits for no further sight.
   };
   struct WaitingFrame {
     placement::SightingFrame frame;
@@ -232,6 +227,14 @@ class HazardReporter {
     std::uint64_t order = 0;  // Of its pictures; 0: none yet.
     /// Once the order was answered: one for each cut, or nothing at all.
     std::optional<std::vector<imaging::CroppedPicture>> pictures;
+  };
+  /// A hazard to be reported that waits for further sights.
+  struct Settling {
+    WaitingFrame view;          // The newest, with the hazard's sighting alone.
+    double bottom_step_px = 0;  // How far the box's lower edge came down since the view before.
+    double since_s = 0;
+    double since_steady_s = 0;
+    bool is_due = false;
   };
 
   bool IsUsable(const placement::Sighting& sighting);
@@ -252,9 +255,13 @@ class HazardReporter {
   bool IsWorthASight(const placement::HazardSight& sight) const;
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
   void ReportCandidates(WaitingFrame& waiting, double now_s, double steady_s);
-  bool IsSettling(const PlacedSighting& candidate) const;
+  bool IsToSettle(const PlacedSighting& candidate) const;
+  Settling* FindSettling(const PlacedSighting& candidate);
+  void Settle(const WaitingFrame& waiting, std::size_t index, double now_s, double steady_s);
+  bool IsOutOfView(const Settling& settling) const;
   bool IsSettled(Settling& settling, double now_s, double steady_s) const;
   void ReportSettled(double now_s, double steady_s);
+  void ReportSettledView(WaitingFrame& view, double steady_s);
   void TakeBestPlace(PassSights::Id pass, protocol::Report& report);
   void AddReport(const protocol::Report& report, PassSights::Id pass, double steady_s);
   protocol::Report MakeReport(WaitingFrame& waiting, std::size_t index);
@@ -276,7 +283,9 @@ class HazardReporter {
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<WaitingFrame> waiting_;
   PassSights passes_;
-  std::vector<Settling> settling_;                        // In the order of their sights.
+  std::deque<Settling> settling_;                         // In the order of their first sights.
+  std::int64_t newest_frame_ns_ = 0;                      // Worked off.
+  std::int64_t newest_empty_ns_ = 0;                      // Frame without a sighting.
   std::map<std::int64_t, placement::DepthImage> depths_;  // By stamp.
   std::vector<PictureOrder> picture_orders_;
   std::uint64_t last_order_ = 0;

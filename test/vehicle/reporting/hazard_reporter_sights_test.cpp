@@ -103,12 +103,37 @@ TEST_F(ReporterSightsTest, WhatWaitsForSightsAtTheEndIsReported) {
   EXPECT_EQ(reporter_->settling_reports(), 0u);
 }
 
-TEST_F(ReporterSightsTest, WhileAReportWaitsNoOtherPictureOfItIsOrdered) {
+TEST_F(ReporterSightsTest, TheReportShowsTheNewestSightAndOrdersNoPictureOfTheOthers) {
   SeeAt(3.0, "pothole", 12, 0);
   SeeAt(3.2, "pothole", 12, 0);
-  EXPECT_EQ(counters().pictures_requested, 1u);
+  EXPECT_EQ(counters().pictures_requested, 0u);
   EXPECT_EQ(counters().duplicates_suppressed, 1u);
   ProcessWithPictures(5);
+  EXPECT_EQ(counters().pictures_requested, 1u);
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  EXPECT_EQ(reports[0].stamp_ns, StampNs(3.2));
+  EXPECT_FALSE(reports[0].image.empty());
+}
+
+TEST_F(ReporterSightsTest, WhatLeavesTheImageIsReportedAtOnce) {
+  // At 16 m/s it is 5.6 m ahead at 3.4 s, and 2.4 m at 3.6 s.
+  SeeAt(3.0, "pothole", 12, 0);
+  SeeAt(3.2, "pothole", 12, 0);
+  EXPECT_EQ(reporter_->settling_reports(), 1u);
+  SeeAt(3.4, "pothole", 12, 0);
+  EXPECT_EQ(reporter_->settling_reports(), 0u);
+  const auto reports = TakeDue();
+  ASSERT_THAT(reports, SizeIs(1));
+  EXPECT_EQ(reports[0].stamp_ns, StampNs(3.4));
+}
+
+TEST_F(ReporterSightsTest, WhatNewerImagesDoNotShowIsReportedSoon) {
+  SeeAt(3.0, "pothole", 14, 0);
+  See(3.03, {});
+  EXPECT_EQ(reporter_->settling_reports(), 1u) << "the detector may have missed it once";
+  See(3.1, {});
+  EXPECT_EQ(reporter_->settling_reports(), 0u);
   EXPECT_THAT(TakeDue(), SizeIs(1));
 }
 
