@@ -13,8 +13,9 @@
 namespace livemap::placement {
 namespace {
 
-constexpr double kLeastSigmaM = 1e-4;  // Of one sight: keeps the equations regular.
-constexpr double kFixesApartS = 1.0;   // The scatter of fixes so far apart is independent.
+constexpr double kLeastSigmaM = 1e-4;      // Of one sight: keeps the equations regular.
+constexpr double kMostOwnPosition = 0.36;  // Of a pose's variance: as the localisation has it.
+constexpr double kFixesApartS = 1.0;       // The scatter of fixes so far apart is independent.
 constexpr double kConvergedM = 1e-4;
 constexpr double kLeastFreedom = 2;  // Of the residuals, to say how far they scatter.
 constexpr double kMaxHeadingVariance = 10;
@@ -46,15 +47,18 @@ Eigen::Matrix2d PositivePart(const Eigen::Matrix2d& matrix, double least = 0) {
   return solver.eigenvectors() * raised.asDiagonal() * solver.eigenvectors().transpose();
 }
 
-/// Of the position, without what the image has for itself.
+/// Of the position, without what the image has for itself: at most so much of the variance. A
+/// receiver never averages its error away by being asked often.
 Eigen::Matrix2d LastingPosition(const HazardSight& sight) {
-  const double own_m2 = sight.own_position_sigma_m * sight.own_position_sigma_m;
-  return PositivePart(sight.base.covariance_m2 - own_m2 * Eigen::Matrix2d::Identity());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
+  axes.computeDirect(sight.base.covariance_m2, Eigen::EigenvaluesOnly);
+  const double most_m2 = kMostOwnPosition * std::max(0.0, axes.eigenvalues().minCoeff());
+  const double own_m2 = std::min(sight.own_position_sigma_m * sight.own_position_sigma_m, most_m2);
+  return sight.base.covariance_m2 - own_m2 * Eigen::Matrix2d::Identity();
 }
 
-/// The part that the image has for itself never exceeds what its pose states.
 Eigen::Matrix2d OwnPosition(const HazardSight& sight) {
-  return PositivePart(sight.base.covariance_m2 - LastingPosition(sight));
+  return sight.base.covariance_m2 - LastingPosition(sight);
 }
 
 double LastingHeading(const HazardSight& sight) {
