@@ -15,12 +15,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const Mounting kTruth{Radians(1.5), Radians(3), Radians(-1), 1.41};
+const Mounting kKeptTruth{Radians(1.5), Radians(3), Radians(-1), 1.41};
 
 MountingRecord Record(double sigma_deg) {
   MountingRecord record;
   record.camera = kRoadEye;
-  record.estimate.mounting = kTruth;
+  record.estimate.mounting = kKeptTruth;
   record.estimate.sigma = {Radians(sigma_deg), Radians(sigma_deg), Radians(sigma_deg), 0.01};
   record.estimate.roll_known = record.estimate.height_known = true;
   return record;
@@ -45,9 +45,9 @@ TEST(MountingFile, IsReadAsItWasWritten) {
   const MountingRecord read = ParseMountingFile(FormatMountingFile(Record(0.1)), "m.yaml");
   EXPECT_EQ(read.camera.width, kRoadEye.width);
   EXPECT_EQ(read.camera.fx, kRoadEye.fx);
-  EXPECT_NEAR(read.estimate.mounting.yaw_rad, kTruth.yaw_rad, 1e-7);
-  EXPECT_NEAR(read.estimate.mounting.roll_rad, kTruth.roll_rad, 1e-7);
-  EXPECT_EQ(read.estimate.mounting.height_m, kTruth.height_m);
+  EXPECT_NEAR(read.estimate.mounting.yaw_rad, kKeptTruth.yaw_rad, 1e-7);
+  EXPECT_NEAR(read.estimate.mounting.roll_rad, kKeptTruth.roll_rad, 1e-7);
+  EXPECT_EQ(read.estimate.mounting.height_m, kKeptTruth.height_m);
   EXPECT_NEAR(read.estimate.sigma.pitch_rad, Radians(0.1), 1e-7);
 }
 
@@ -123,20 +123,20 @@ TEST_F(MountingKeeperTest, UsesTheParametersUntilItIsSurerThanThey) {
   MountingKeeper keeper(Config(), kRoadEye);
   EXPECT_FALSE(keeper.InUse().found);
   EXPECT_EQ(keeper.InUse().mounting.height_m, 1.6);
-  Drive(keeper, kTruth, 140);
+  Drive(keeper, kKeptTruth, 140);
   const MountingInUse used = keeper.InUse();
   EXPECT_TRUE(used.found);
-  EXPECT_NEAR(used.mounting.yaw_rad, kTruth.yaw_rad, Radians(0.15));
-  EXPECT_NEAR(used.mounting.pitch_rad, kTruth.pitch_rad, Radians(0.15));
-  EXPECT_NEAR(used.mounting.roll_rad, kTruth.roll_rad, Radians(0.15));
-  EXPECT_NEAR(used.mounting.height_m, kTruth.height_m, 0.02);
+  EXPECT_NEAR(used.mounting.yaw_rad, kKeptTruth.yaw_rad, Radians(0.15));
+  EXPECT_NEAR(used.mounting.pitch_rad, kKeptTruth.pitch_rad, Radians(0.15));
+  EXPECT_NEAR(used.mounting.roll_rad, kKeptTruth.roll_rad, Radians(0.15));
+  EXPECT_NEAR(used.mounting.height_m, kKeptTruth.height_m, 0.02);
   EXPECT_EQ(keeper.knocks(), 0);
 }
 
 TEST_F(MountingKeeperTest, RemembersFromDriveToDrive) {
   {
     MountingKeeper keeper(Config(), kRoadEye);
-    Drive(keeper, kTruth, 140);
+    Drive(keeper, kKeptTruth, 140);
     keeper.Save();
     EXPECT_EQ(keeper.problem(), "");
   }
@@ -144,18 +144,18 @@ TEST_F(MountingKeeperTest, RemembersFromDriveToDrive) {
   MountingKeeper keeper(Config(), kRoadEye);
   EXPECT_TRUE(keeper.EarlierDrives());
   EXPECT_TRUE(keeper.InUse().found);
-  EXPECT_NEAR(keeper.InUse().mounting.height_m, kTruth.height_m, 0.02);
+  EXPECT_NEAR(keeper.InUse().mounting.height_m, kKeptTruth.height_m, 0.02);
 }
 
 TEST_F(MountingKeeperTest, TellsThatTheCameraWasKnockedSinceTheLastDrive) {
   ReplaceTextFile(Config().path, FormatMountingFile(Record(0.1)));
   MountingKeeper keeper(Config(), kRoadEye);
-  Mounting after = kTruth;
+  Mounting after = kKeptTruth;
   after.pitch_rad += Radians(3);
   Drive(keeper, after, 140);
   const auto knock = keeper.TakeKnock();
   ASSERT_TRUE(knock);
-  EXPECT_NEAR(knock->before.pitch_rad, kTruth.pitch_rad, 1e-6);
+  EXPECT_NEAR(knock->before.pitch_rad, kKeptTruth.pitch_rad, 1e-6);
   EXPECT_NEAR(knock->after.pitch_rad, after.pitch_rad, Radians(0.3));
   EXPECT_EQ(keeper.knocks(), 1);
   EXPECT_FALSE(keeper.EarlierDrives());
@@ -185,7 +185,7 @@ TEST_F(MountingKeeperTest, GoesOnWhereTheFileCannotBeWritten) {
   std::ofstream(folder_ / "file") << "no folder";
   config.path = (folder_ / "file" / "mounting.yaml").string();
   MountingKeeper keeper(config, kRoadEye);
-  Drive(keeper, kTruth, 140);
+  Drive(keeper, kKeptTruth, 140);
   keeper.Save();
   EXPECT_NE(keeper.problem().find("cannot be written"), std::string::npos);
   EXPECT_TRUE(keeper.InUse().found);
