@@ -305,8 +305,13 @@ std::optional<double> HazardSights::Distance2(const HazardSight& sight) const {
   if (!place_ || !IsUsableSight(sight)) return std::nullopt;
   const Linear linear = Linearise(ToKept(sight), shared_, solution_);
   const Eigen::Vector2d residual_m = linear.place_m - linear.rows * solution_;
+  // Where its pose is the surer one, what the others state above it is their own.
+  const Eigen::Vector2d swing_m = SightSwing(solution_.head<2>() - shared_.base_m);
+  const double heading_rad2 = std::max(0.0, shared_.heading_rad2 - LastingHeading(sight));
+  const Eigen::Matrix2d of_others_m2 = PositivePart(shared_.position_m2 - LastingPosition(sight)) +
+                                       heading_rad2 * swing_m * swing_m.transpose();
   const Eigen::Matrix2d expected_m2 =
-      linear.rows * covariance_ * linear.rows.transpose() + linear.own_m2;
+      linear.rows * covariance_ * linear.rows.transpose() + linear.own_m2 + of_others_m2;
   const double distance2 = residual_m.dot(expected_m2.inverse() * residual_m);
   if (!std::isfinite(distance2)) return std::nullopt;
   return distance2;

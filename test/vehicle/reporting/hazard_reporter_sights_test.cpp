@@ -137,24 +137,5 @@ TEST_F(ReporterSightsTest, WhatNewerImagesDoNotShowIsReportedSoon) {
   EXPECT_THAT(TakeDue(), SizeIs(1));
 }
 
-TEST_F(ReporterSightsTest, AHazardWhosePlaceMovesIsNotReportedAgain) {
-  // By a heading that is far off and says so, one hazard seems to stand in two places.
-  config_.settle_wait_s = 0;
-  config_.max_ground_sigma_m = 10;
-  Restart();
-  for (const double time_s : {3.0, 3.5}) {
-    geo::TrackPose pose;
-    pose.position = VehicleAt(time_s);
-    pose.covariance_m2 = Eigen::Matrix2d::Identity() * 0.5;
-    pose.course_rad = kBearingRad + (time_s < 3.2 ? 0.35 : -0.05);
-    pose.course_variance_rad2 = time_s < 3.2 ? 0.3 * 0.3 : 0.05 * 0.05;
-    pose.speed_mps = kSpeedMps;
-    reporter_->AddPose(StampNs(time_s), pose);
-    See(time_s, {{"pothole", 0.8F, BoxAt(18 - kSpeedMps * (time_s - 3), 0)}});
-  }
-  EXPECT_THAT(TakeDue(), SizeIs(1));
-  EXPECT_EQ(counters().duplicates_suppressed, 1u);
-}
-
 }  // namespace
 }  // namespace livemap::vehicle

@@ -75,22 +75,6 @@ TEST_F(PassSightsTest, ALoneThingIsTheSameEvenWhereThePosesSayTooLittleOfTheirEr
   EXPECT_NE(again[0], both[0]) << "it may be a third one";
 }
 
-TEST_F(PassSightsTest, TheNextThingThatComesIntoViewIsAnother) {
-  PassSights passes(config_, catalogue_);
-  PassSights::Seen near = SeenAt(3, 4, 0);
-  PassSights::Seen next = SeenAt(3.1, 13, 0);
-  for (PassSights::Seen* seen : {&near, &next}) {
-    // By fixes whose course is hardly known both could be one.
-    seen->sight.base.course_variance_rad2 = 0.3 * 0.3;
-    seen->sight.own_position_sigma_m = 1.0;
-    seen->sight.base.covariance_m2 *= 9;
-    seen->sight.own_heading_share = 1;
-    seen->sight.noise.pitch_sigma_rad = 0.012;
-  }
-  const auto first = passes.Add({near});
-  EXPECT_NE(passes.Add({next})[0], first[0]);
-}
-
 TEST_F(PassSightsTest, AnotherClassIsAnotherThing) {
   PassSights passes(config_, catalogue_);
   const auto first = passes.Add({SeenAt(3, 12, 0)});
