@@ -10,7 +10,8 @@
 namespace livemap::vehicle {
 namespace {
 
-constexpr std::size_t kRemovedKept = 100000;  // Beyond it all are forgotten: the map knows them, too.
+constexpr std::size_t kRemovedKept =
+    100000;  // Beyond it all are forgotten: the map knows them, too.
 
 /// Per axis; 0 where the covariance is none.
 double SigmaOf(const Eigen::Matrix2d& covariance_m2) {
