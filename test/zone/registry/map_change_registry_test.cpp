@@ -96,15 +96,16 @@ TEST_F(MapChangeRegistryTest, TheSameDriveTellingTwiceCountsOnce) {
   EXPECT_EQ(Only().last_seen_ns, again.stamp_ns);
 }
 
-TEST_F(MapChangeRegistryTest, PositionsAreFusedByInverseCovariance) {
+TEST_F(MapChangeRegistryTest, PositionsAreFusedByWhatVehiclesDoNotShare) {
   Tell(MakeMapChange("car-1"));
   protocol::MapChangeReport other = MakeMapChange("car-2");
   other.position = EastOf(2);
   other.covariance_m2 = 4 * Eigen::Matrix2d::Identity();
   Tell(other);
   const Eigen::Vector2d place_m = geo::LocalFrame(kChangePlace).ToEnu(Only().position);
-  EXPECT_NEAR(place_m.x(), 0.4, 1e-6);
-  EXPECT_NEAR(Only().covariance_m2(0, 0), 0.8, 1e-6);
+  // A tenth of the report's 4 m^2 is common: 0.6 against 3.6 m^2 are each one's own.
+  EXPECT_NEAR(place_m.x(), 2 * 0.6 / 4.2, 1e-6);
+  EXPECT_NEAR(Only().covariance_m2(0, 0), 0.4 + 0.6 * 3.6 / 4.2, 1e-6);
   EXPECT_NEAR(Only().confidence, 0.75, 1e-6);
 }
 
