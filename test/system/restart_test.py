@@ -54,8 +54,9 @@ class Drive:
             f"{key}:={value}" for key, value in {
                 "bag": self.bag, "paused": "true", "delay": 0, "use_truth": "true", "vo": "false",
                 "vehicle": VEHICLE, "zone": ZONE,
-                # Nobody is in the town, and the masks' work would let a busy machine drop frames.
-                "hazard_reporting": "{privacy: false}",
+                # Nobody is in the town, and the masks' work would let a busy machine drop frames. How many further
+                # sights a report waits for differs from run to run, and with them its place.
+                "hazard_reporting": "{privacy: false, settle_wait_s: 0.0}",
                 "directory": self.live_map.directory / "vehicle",
                 "broker_port": self.live_map.broker_port,
                 "password_file": self.live_map.password_file(VEHICLE)}.items()],
