@@ -17,6 +17,7 @@ try:
         ElementClickInterceptedException, ElementNotInteractableException, NoSuchElementException,
         StaleElementReferenceException, TimeoutException, WebDriverException)
     from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.ui import WebDriverWait
@@ -180,7 +181,8 @@ class MapPage(unittest.TestCase):
         self.wait(clicked, f"{selector} cannot be clicked")
 
     def press(self, *keys):
-        self.browser.switch_to.active_element.send_keys(*keys)
+        # To whatever has the focus, a button that was just switched off as well.
+        ActionChains(self.browser).send_keys(*keys).perform()
 
     def picture(self, name):
         if OPTIONS.screenshots:
