@@ -116,7 +116,7 @@ class PlacementStreet {
   double heading_rad() const { return heading_rad_; }
   /// `along_m` before (< 0) or after the hazard; for one who drives that way.
   datasets::SkyVisibility SkyAt(double along_m, bool is_reverse) const {
-    const double place_m = (is_reverse ? -along_m : along_m) + kBlocks / 2 * kBlockM;
+    const double place_m = (is_reverse ? -along_m : along_m) + 0.5 * kBlocks * kBlockM;
     const int block = std::clamp(static_cast<int>(place_m / kBlockM), 0, kBlocks - 1);
     const datasets::SkyVisibility& sky = blocks_.at(static_cast<std::size_t>(block));
     return is_reverse ? datasets::SkyVisibility{sky.right_rad, sky.left_rad} : sky;
