@@ -404,8 +404,8 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose&
     const auto all = passes_.Place(passes[i]);
     const placement::PlacedHazard place =
         all ? all->place : placement::PlaceHazard(base, Eigen::Vector2d::Zero(), sight.foot);
-    waiting.candidates.push_back(
-        {*sightings[i], place, geo::EarthCentred(place.position), std::nullopt, passes[i]});
+    waiting.candidates.push_back({*sightings[i], place, geo::EarthCentred(place.position),
+                                  std::nullopt, passes[i], all ? all->sights : 1});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);
   }
 }
@@ -480,6 +480,7 @@ protocol::Report HazardReporter::MakeReport(WaitingFrame& waiting, std::size_t i
   report.box = candidate.sighting.box;
   report.position = candidate.place.position;
   report.covariance_m2 = candidate.place.covariance_m2;
+  counters_.sights_used += candidate.sights;
   report.image_width = waiting.frame.image_width;
   report.image_height = waiting.frame.image_height;
   report.image_frame_id = waiting.frame.frame_id;
@@ -511,9 +512,7 @@ void HazardReporter::ReportCandidates(WaitingFrame& waiting, double now_s, doubl
       Settle(waiting, index, now_s, steady_s);
       continue;
     }
-    protocol::Report report = MakeReport(waiting, index);
-    TakeBestPlace(candidate.pass, report);
-    AddReport(report, candidate.pass, steady_s);
+    AddReport(MakeReport(waiting, index), candidate.pass, steady_s);
   }
   newest_frame_ns_ = waiting.frame.stamp_ns;
 }
@@ -612,18 +611,7 @@ void HazardReporter::ReportSettledView(WaitingFrame& view, double steady_s) {
     ++counters_.duplicates_suppressed;
     return;
   }
-  protocol::Report report = MakeReport(view, 0);
-  TakeBestPlace(pass, report);
-  AddReport(report, pass, steady_s);
-}
-
-/// The place by all sights of the pass, as long as it is remembered.
-void HazardReporter::TakeBestPlace(PassSights::Id pass, protocol::Report& report) {
-  const auto all = passes_.Place(pass);
-  if (!all) return;
-  report.position = all->place.position;
-  report.covariance_m2 = all->place.covariance_m2;
-  counters_.sights_used += all->sights;
+  AddReport(MakeReport(view, 0), pass, steady_s);
 }
 
 void HazardReporter::AddReport(const protocol::Report& report, PassSights::Id pass,

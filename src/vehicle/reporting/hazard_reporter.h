@@ -211,10 +211,11 @@ class HazardReporter {
  private:
   struct PlacedSighting {
     placement::Sighting sighting;
-    placement::PlacedHazard place;
+    placement::PlacedHazard place;   // By all sights of the pass up to this one.
     Eigen::Vector3d earth_m;         // geo::EarthCentred of the place.
     std::optional<std::size_t> cut;  // Of the order; none where it was known already.
     PassSights::Id pass = 0;
+    std::size_t sights = 1;    // That its place is of.
     bool has_settled = false;  // It waits for no further sight.
   };
   struct WaitingFrame {
@@ -262,7 +263,6 @@ class HazardReporter {
   bool IsSettled(Settling& settling, double now_s, double steady_s) const;
   void ReportSettled(double now_s, double steady_s);
   void ReportSettledView(WaitingFrame& view, double steady_s);
-  void TakeBestPlace(PassSights::Id pass, protocol::Report& report);
   void AddReport(const protocol::Report& report, PassSights::Id pass, double steady_s);
   protocol::Report MakeReport(WaitingFrame& waiting, std::size_t index);
   void AttachPicture(WaitingFrame& waiting, std::size_t index, protocol::Report& report);
