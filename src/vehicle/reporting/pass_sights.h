@@ -25,11 +25,11 @@ class PassSights {
     /// Greatest squared Mahalanobis distance of a sight from its hazard (two degrees of freedom).
     double gate = 13.8;
     /// Greatest distance of a sight's own place from its hazard, duplicate radii of the class.
-    double gate_radii = 2.0;
+    double gate_radii = 1.0;
     /// Both where nothing can be mistaken: the image shows one thing of the class, and one was seen
     /// within `lone_s`, no nearer than now. Courses by fixes are worse than they say.
     double lone_gate = 60;
-    double lone_radii = 4.0;
+    double lone_radii = 1.0;
     double lone_s = 1.0;
     /// A hazard that has not been seen for so long is passed, s.
     double keep_s = 5.0;
