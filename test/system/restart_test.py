@@ -26,7 +26,8 @@ import demo_system as system  # noqa: E402
 from node_testing import PATIENCE_S, eventually  # noqa: E402
 
 ZONE, VEHICLE = "test", "car-1"
-SAME_PLACE_M = 0.5
+# A vehicle that was killed has forgotten the sights before: its next report of a hazard lies elsewhere.
+SAME_PLACE_M = {"broker": 0.5, "zone": 0.5, "vehicle": 4.0}
 
 
 class Drive:
@@ -159,8 +160,9 @@ class RestartTest(unittest.TestCase):
     def assert_same_hazards(self, found):
         left = list(found)
         for hazard in self.expected:
-            twin = next((f for f in left if f["class"] == hazard["class"]
-                         and observers.distance_m(f, hazard) <= SAME_PLACE_M), None)
+            twins = [each for each in left if each["class"] == hazard["class"]
+                     and observers.distance_m(each, hazard) <= SAME_PLACE_M[self.victim]]
+            twin = min(twins, key=lambda each: observers.distance_m(each, hazard), default=None)
             self.assertIsNotNone(twin, f"missing after the restart: {hazard}; there are {found}")
             left.remove(twin)
         self.assertEqual(left, [], "hazards that the undisturbed drive does not have")
