@@ -179,6 +179,7 @@ HazardSights::SharedPose HazardSights::FindSharedPose() const {
   shared.heading_rad2 = LastingHeading(best.sight);
   shared.base_m = best.base_m;
   shared.way_m = best.way_m;
+  shared.scatter_gain = FixScatterGain();
   Eigen::Matrix3d joint = Eigen::Matrix3d::Zero();
   joint.topLeftCorner<2, 2>() = shared.position_m2;
   joint(2, 2) = shared.heading_rad2;
@@ -219,7 +220,7 @@ HazardSights::Linear HazardSights::Linearise(const Kept& kept, const SharedPose&
       sight.depth_sigma_share ? FootByDepth(sight) : FootByPlane(sight, expected_m);
 
   const double lasting = config_.lasting_pitch_share;
-  const double gain = FixScatterGain();
+  const double gain = shared.scatter_gain;
   Linear linear;
   linear.place_m = kept.base_m + rotation * foot.foot_m;
   linear.rows.leftCols<2>().setIdentity();

@@ -109,6 +109,7 @@ class HazardSights {
     Eigen::Matrix3d root = Eigen::Matrix3d::Zero();  // Of their covariance.
     Eigen::Vector2d base_m = Eigen::Vector2d::Zero();
     double way_m = 0;
+    double scatter_gain = 1;  // How often the fixes' scatter counts.
   };
 
   /// Normal equations of the sights.

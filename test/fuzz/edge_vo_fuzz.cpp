@@ -2,41 +2,21 @@
 // or the frame is refused by a sentence.
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 
 #include "common/error.h"
 #include "odometry/edge/edge_odometry.h"
+#include "test/fuzz/fuzz_bytes.h"
 
 namespace {
 
-/// Reads numbers off the input, zeros once it is used up.
-class Bytes {
- public:
-  Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
-  template <typename Number>
-  Number Take() {
-    Number number{};
-    const std::size_t count = std::min(sizeof(number), size_);
-    std::memcpy(&number, data_, count);
-    data_ += count;
-    size_ -= count;
-    return number;
-  }
-  bool empty() const { return size_ == 0; }
-
- private:
-  const std::uint8_t* data_;
-  std::size_t size_;
-};
-
 /// An image of one of a few sizes and types whose pixels repeat some bytes of the input.
-cv::Mat TakeImage(Bytes& bytes, const int (&types)[3]) {
-  const auto kind = bytes.Take<std::uint8_t>();
+cv::Mat TakeImage(livemap::fuzz::FuzzBytes& bytes, const int (&types)[3]) {
+  const auto kind = bytes.Any<std::uint8_t>();
   constexpr int kSizes[4][2] = {{64, 48}, {64, 48}, {1, 1}, {40, 64}};
   const auto& size = kSizes[kind & 3U];
   cv::Mat image(size[1], size[0], types[(kind >> 2U) % 3]);
   std::uint8_t pattern[61];
-  for (std::uint8_t& byte : pattern) byte = bytes.Take<std::uint8_t>();
+  for (std::uint8_t& byte : pattern) byte = bytes.Any<std::uint8_t>();
   for (std::size_t i = 0; i < image.total() * image.elemSize(); ++i) {
     image.data[i] = pattern[(i + i / 97) % sizeof(pattern)];
   }
@@ -54,11 +34,11 @@ void CheckFinite(const livemap::odometry::VoResult& result) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  Bytes bytes(data, size);
+  livemap::fuzz::FuzzBytes bytes(data, size);
   livemap::geo::CameraIntrinsics camera{50, 50, 31.5, 23.5, 64, 48};
-  const auto flags = bytes.Take<std::uint8_t>();
-  if ((flags & 1U) != 0) camera.fx = bytes.Take<double>();
-  if ((flags & 2U) != 0) camera.cy = bytes.Take<double>();
+  const auto flags = bytes.Any<std::uint8_t>();
+  if ((flags & 1U) != 0) camera.fx = bytes.Any<double>();
+  if ((flags & 2U) != 0) camera.cy = bytes.Any<double>();
   livemap::odometry::EdgeOdometry::Config config;
   config.min_points = 10;
   config.edge_source = (flags & 4U) != 0 ? livemap::odometry::EdgeSource::kNewImage
@@ -67,7 +47,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     livemap::odometry::EdgeOdometry odometry(config, camera);
     for (std::int64_t stamp_ns = 1; !bytes.empty();) {
-      stamp_ns += bytes.Take<std::int32_t>();
+      stamp_ns += bytes.Any<std::int32_t>();
       livemap::odometry::RgbdFrame frame;
       frame.stamp_ns = stamp_ns;
       frame.grey = TakeImage(bytes, {CV_8UC1, CV_8UC1, CV_8UC3});

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <string>
 
+#include "test/fuzz/fuzz_bytes.h"
 #include "zone/offload/offload_intake.h"
 
 namespace livemap::fuzz {
@@ -18,81 +18,49 @@ void Require(bool holds) {
   if (!holds) std::abort();
 }
 
-/// The bytes as they come; zeros when they end.
-class Bytes {
- public:
-  Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
-
-  template <typename Value>
-  Value Take() {
-    Value value{};
-    const std::size_t count = std::min(sizeof(value), size_);
-    if (count > 0) std::memcpy(&value, data_, count);
-    data_ += count;
-    size_ -= count;
-    return value;
-  }
-
-  std::string TakeText(std::size_t most) {
-    const std::size_t count = std::min({most, size_, std::size_t{Take<std::uint8_t>()}});
-    const std::size_t left = std::min(count, size_);
-    std::string text(data_, data_ + left);
-    data_ += left;
-    size_ -= left;
-    return text;
-  }
-
-  std::vector<std::uint8_t> Rest() const { return {data_, data_ + size_}; }
-
- private:
-  const std::uint8_t* data_;
-  std::size_t size_;
-};
-
 /// Numbers in the order of the message; an honest one where the first byte's bit is not set, so
 /// that the rest is reached.
-protocol::OffloadedFrame Read(Bytes& bytes) {
-  const auto broken = bytes.Take<std::uint8_t>();
+protocol::OffloadedFrame Read(FuzzBytes& bytes) {
+  const auto broken = bytes.Any<std::uint8_t>();
   protocol::OffloadedFrame candidate;
-  candidate.vehicle_id = (broken & 1U) != 0 ? bytes.TakeText(80) : "car-1";
-  candidate.drive_id = bytes.TakeText(80);
-  candidate.image_frame_id = bytes.TakeText(80);
-  candidate.stamp_ns = (broken & 2U) != 0 ? bytes.Take<std::int64_t>() : kNowNs;
-  candidate.score = (broken & 2U) != 0 ? bytes.Take<float>() : 0.5F;
+  candidate.vehicle_id = (broken & 1U) != 0 ? bytes.Text(80) : "car-1";
+  candidate.drive_id = bytes.Text(80);
+  candidate.image_frame_id = bytes.Text(80);
+  candidate.stamp_ns = (broken & 2U) != 0 ? bytes.Any<std::int64_t>() : kNowNs;
+  candidate.score = (broken & 2U) != 0 ? bytes.Any<float>() : 0.5F;
   candidate.base.position = {40, -80};
   candidate.base.covariance_m2.setIdentity();
   candidate.base.course_variance_rad2 = 1e-4;
   if ((broken & 4U) != 0) {
-    candidate.base.position = {bytes.Take<double>(), bytes.Take<double>()};
-    for (int i = 0; i < 4; ++i) candidate.base.covariance_m2(i / 2, i % 2) = bytes.Take<double>();
-    candidate.base.course_rad = bytes.Take<double>();
-    candidate.base.course_variance_rad2 = bytes.Take<double>();
-    candidate.base.position_course = {bytes.Take<double>(), bytes.Take<double>()};
+    candidate.base.position = {bytes.Any<double>(), bytes.Any<double>()};
+    for (int i = 0; i < 4; ++i) candidate.base.covariance_m2(i / 2, i % 2) = bytes.Any<double>();
+    candidate.base.course_rad = bytes.Any<double>();
+    candidate.base.course_variance_rad2 = bytes.Any<double>();
+    candidate.base.position_course = {bytes.Any<double>(), bytes.Any<double>()};
   }
   candidate.intrinsics = {
-      500, 500, 319.5, 199.5, bytes.Take<std::int16_t>(), bytes.Take<std::int16_t>()};
+      500, 500, 319.5, 199.5, bytes.Any<std::int16_t>(), bytes.Any<std::int16_t>()};
   candidate.base_from_optical.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   candidate.base_from_optical.translation() << 1.5, 0, 1.6;
   if ((broken & 8U) != 0) {
-    candidate.intrinsics.fx = bytes.Take<double>();
-    candidate.intrinsics.fy = bytes.Take<double>();
-    candidate.intrinsics.cx = bytes.Take<double>();
-    candidate.intrinsics.cy = bytes.Take<double>();
+    candidate.intrinsics.fx = bytes.Any<double>();
+    candidate.intrinsics.fy = bytes.Any<double>();
+    candidate.intrinsics.cx = bytes.Any<double>();
+    candidate.intrinsics.cy = bytes.Any<double>();
     for (int i = 0; i < 12; ++i) {
-      candidate.base_from_optical.matrix()(i / 4, i % 4) = bytes.Take<double>();
+      candidate.base_from_optical.matrix()(i / 4, i % 4) = bytes.Any<double>();
     }
   }
   return candidate;
 }
 
 void FuzzCandidate(const std::uint8_t* data, std::size_t size) {
-  Bytes bytes(data, size);
+  FuzzBytes bytes(data, size);
   protocol::OffloadedFrame candidate = Read(bytes);
   placement::Sighting sighting;
-  sighting.class_name = bytes.TakeText(80);
-  sighting.confidence = bytes.Take<float>();
-  sighting.box = {bytes.Take<float>(), bytes.Take<float>(), bytes.Take<float>(),
-                  bytes.Take<float>()};
+  sighting.class_name = bytes.Text(80);
+  sighting.confidence = bytes.Any<float>();
+  sighting.box = {bytes.Any<float>(), bytes.Any<float>(), bytes.Any<float>(), bytes.Any<float>()};
   candidate.image = bytes.Rest();
   zone::OffloadIntake intake{zone::OffloadIntake::Config()};
   const std::string why = intake.Add(candidate, kNowNs);

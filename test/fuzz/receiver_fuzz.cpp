@@ -3,12 +3,12 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <string>
 
 #include "common/time.h"
 #include "geo/fix_covariance.h"
 #include "receiver/receiver_watch.h"
+#include "test/fuzz/fuzz_bytes.h"
 
 namespace {
 
@@ -16,26 +16,6 @@ using livemap::receiver::ReceiverFix;
 using livemap::receiver::ReceiverReport;
 using livemap::receiver::ReceiverVelocity;
 using livemap::receiver::ReceiverWatch;
-
-/// Reads numbers off the input, zeros once it is used up.
-class ReceiverBytes {
- public:
-  ReceiverBytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
-  template <typename Number>
-  Number Take() {
-    Number number{};
-    const std::size_t count = std::min(sizeof(number), size_);
-    std::memcpy(&number, data_, count);
-    data_ += count;
-    size_ -= count;
-    return number;
-  }
-  bool empty() const { return size_ == 0; }
-
- private:
-  const std::uint8_t* data_;
-  std::size_t size_;
-};
 
 void Require(bool holds) {
   if (!holds) std::abort();
@@ -61,20 +41,20 @@ void CheckVelocity(const ReceiverVelocity& velocity) {
 }
 
 /// A number of any bits, or one of a few sizes that pass more checks.
-double TakeNumber(ReceiverBytes& bytes) {
-  const auto kind = bytes.Take<std::uint8_t>();
-  if (kind % 4 == 0) return bytes.Take<double>();
-  return static_cast<double>(bytes.Take<std::int16_t>()) / (kind % 4 == 1 ? 1.0 : 100.0);
+double TakeNumber(livemap::fuzz::FuzzBytes& bytes) {
+  const auto kind = bytes.Any<std::uint8_t>();
+  if (kind % 4 == 0) return bytes.Any<double>();
+  return static_cast<double>(bytes.Any<std::int16_t>()) / (kind % 4 == 1 ? 1.0 : 100.0);
 }
 
-ReceiverReport TakeReport(ReceiverBytes& bytes, std::int64_t system_ns) {
+ReceiverReport TakeReport(livemap::fuzz::FuzzBytes& bytes, std::int64_t system_ns) {
   ReceiverReport report;
-  report.device = std::string(1, static_cast<char>('a' + bytes.Take<std::uint8_t>() % 3));
-  report.mode = bytes.Take<std::int8_t>();
-  report.status = bytes.Take<std::int8_t>();
-  const bool any_time = bytes.Take<std::uint8_t>() % 8 == 0;
-  report.stamp_ns = any_time ? bytes.Take<std::int64_t>()
-                             : system_ns - 1'000'000 * std::int64_t{bytes.Take<std::int16_t>()};
+  report.device = std::string(1, static_cast<char>('a' + bytes.Any<std::uint8_t>() % 3));
+  report.mode = bytes.Any<std::int8_t>();
+  report.status = bytes.Any<std::int8_t>();
+  const bool any_time = bytes.Any<std::uint8_t>() % 8 == 0;
+  report.stamp_ns = any_time ? bytes.Any<std::int64_t>()
+                             : system_ns - 1'000'000 * std::int64_t{bytes.Any<std::int16_t>()};
   for (double* const number :
        {&report.latitude_deg, &report.longitude_deg, &report.height_m, &report.east_error_m,
         &report.north_error_m, &report.radial_error_m, &report.up_error_m, &report.speed_mps,
@@ -88,28 +68,28 @@ ReceiverReport TakeReport(ReceiverBytes& bytes, std::int64_t system_ns) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  ReceiverBytes bytes(data, size);
+  livemap::fuzz::FuzzBytes bytes(data, size);
   ReceiverWatch::Config config;
-  if (bytes.Take<std::uint8_t>() % 4 == 0) config.device = "b";
+  if (bytes.Any<std::uint8_t>() % 4 == 0) config.device = "b";
   ReceiverWatch watch(config);
   ReceiverWatch::Now now{1'795'653'934'000'000'000, 1'000'000'000'000};
   while (!bytes.empty()) {
-    const std::int64_t step_ns = 1'000'000 * std::int64_t{bytes.Take<std::uint16_t>()};
+    const std::int64_t step_ns = 1'000'000 * std::int64_t{bytes.Any<std::uint16_t>()};
     now.steady_ns += step_ns;
     now.system_ns += step_ns;
-    switch (bytes.Take<std::uint8_t>() % 8) {
+    switch (bytes.Any<std::uint8_t>() % 8) {
       case 0:
-        watch.OnConnection(bytes.Take<std::uint8_t>() % 2 == 0, "because", now);
+        watch.OnConnection(bytes.Any<std::uint8_t>() % 2 == 0, "because", now);
         break;
       case 1:
-        watch.OnDevices({{"a", bytes.Take<std::uint8_t>() % 2 == 0},
-                         {"b", bytes.Take<std::uint8_t>() % 2 == 0}});
+        watch.OnDevices(
+            {{"a", bytes.Any<std::uint8_t>() % 2 == 0}, {"b", bytes.Any<std::uint8_t>() % 2 == 0}});
         break;
       case 2:
-        watch.OnSatellites("a", bytes.Take<std::int32_t>(), bytes.Take<std::int32_t>());
+        watch.OnSatellites("a", bytes.Any<std::int32_t>(), bytes.Any<std::int32_t>());
         break;
       case 3:  // Somebody sets the clock.
-        now.system_ns += 1'000'000 * std::int64_t{bytes.Take<std::int32_t>()};
+        now.system_ns += 1'000'000 * std::int64_t{bytes.Any<std::int32_t>()};
         break;
       default: {
         const ReceiverReport report = TakeReport(bytes, now.system_ns);

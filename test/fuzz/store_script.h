@@ -1,42 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "common/sqlite.h"
+#include "test/fuzz/fuzz_bytes.h"
 
 namespace livemap::fuzz {
-
-/// The fuzzer's input, taken bit by bit; zeros when it is used up.
-class FuzzBytes {
- public:
-  FuzzBytes(const std::uint8_t* data, std::size_t size) : at_(data), end_(data + size) {}
-
-  bool empty() const { return at_ == end_; }
-  std::uint8_t Byte() { return empty() ? std::uint8_t{0} : *at_++; }
-  std::size_t Below(std::size_t limit) { return Byte() % limit; }
-  std::string Text() {
-    const std::size_t size = std::min<std::size_t>(Byte(), static_cast<std::size_t>(end_ - at_));
-    std::string text(at_, at_ + size);
-    at_ += size;
-    return text;
-  }
-  template <typename Number>
-  Number Any() {
-    std::uint8_t bytes[sizeof(Number)];
-    for (std::uint8_t& byte : bytes) byte = Byte();
-    Number number;
-    std::memcpy(&number, bytes, sizeof number);
-    return number;
-  }
-
- private:
-  const std::uint8_t* at_;
-  const std::uint8_t* end_;
-};
 
 /// A folder of this process in memory where there is such a place.
 inline std::string FuzzFolder(const char* name) {
