@@ -84,8 +84,15 @@ def paste(
 
 def cast_contact_shadow(image: np.ndarray, foot: Tuple[float, float], width_px: float, darkness: float) -> None:
     """A dark spot on the road under an object, in place: no part of it."""
-    shade = np.zeros(image.shape[:2], np.float32)
     axes = (max(round(0.6 * width_px), 1), max(round(0.12 * width_px), 1))
-    cv2.ellipse(shade, (round(foot[0]), round(foot[1])), axes, 0, 0, 360, darkness, -1)
-    shade = cv2.GaussianBlur(shade, (0, 0), max(0.08 * width_px, 0.6))
-    image[:] = (image * (1 - shade[..., None])).astype(np.uint8)
+    blur_px = max(0.08 * width_px, 0.6)
+    margin = int(np.ceil(4 * blur_px)) + 1  # where the blur has nothing left: only what lies within is touched
+    left, top = max(round(foot[0]) - axes[0] - margin, 0), max(round(foot[1]) - axes[1] - margin, 0)
+    right, bottom = round(foot[0]) + axes[0] + margin, round(foot[1]) + axes[1] + margin
+    place = image[top:bottom, left:right]
+    if not place.size:
+        return
+    shade = np.zeros(place.shape[:2], np.float32)
+    cv2.ellipse(shade, (round(foot[0]) - left, round(foot[1]) - top), axes, 0, 0, 360, darkness, -1)
+    shade = cv2.GaussianBlur(shade, (0, 0), blur_px)
+    place[:] = (place * (1 - shade[..., None])).astype(np.uint8)

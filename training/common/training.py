@@ -150,12 +150,13 @@ class Run:
         while self.epoch < epochs:
             began = time.monotonic()
             report = train()
+            save_atomically(self.state(), out / "last.pt")  # a kill while it measures loses no epoch
             if measure and (self.epoch % every == 0 or self.epoch == epochs):
                 report.update(measure())
                 if report.get(self.BEST, 0.0) > self.best:
                     self.best = report[self.BEST]
                     save_atomically(self.state(), out / "best.pt")
-            save_atomically(self.state(), out / "last.pt")
+                save_atomically(self.state(), out / "last.pt")
             line = " ".join(f"{name} {text(value, 4)}" for name, value in report.items())
             print(f"epoch {self.epoch}/{epochs} {line} {time.monotonic() - began:.0f} s", flush=True)
 
