@@ -1,7 +1,6 @@
 #include "imaging/frame_source.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/videoio.hpp>
@@ -76,16 +75,13 @@ class FolderFrameSource : public FrameSource {
   std::size_t next_ = 0;
 };
 
-class CaptureFrameSource : public FrameSource {
+class VideoFrameSource : public FrameSource {
  public:
-  /// A device when `device` is not negative, else the file `path`.
-  CaptureFrameSource(std::string path, int device) : path_(std::move(path)), device_(device) {
-    if (device_ < 0) orientation_ = ReadVideoOrientation(path_);
-    CaptureFrameSource::Rewind();
-    if (device_ < 0) {
-      const double rate = capture_.get(cv::CAP_PROP_FPS);
-      if (std::isfinite(rate) && rate > 0 && rate <= 1000) rate_hz_ = rate;
-    }
+  explicit VideoFrameSource(std::string path)
+      : path_(std::move(path)), orientation_(ReadVideoOrientation(path_)) {
+    VideoFrameSource::Rewind();
+    const double rate = capture_.get(cv::CAP_PROP_FPS);
+    if (std::isfinite(rate) && rate > 0 && rate <= 1000) rate_hz_ = rate;
   }
 
   std::optional<SourceFrame> Next() override {
@@ -98,11 +94,7 @@ class CaptureFrameSource : public FrameSource {
 
   void Rewind() override {
     number_ = 0;
-    const bool opened = device_ >= 0 ? capture_.open(device_, cv::CAP_V4L2) : capture_.open(path_);
-    if (!opened) {
-      throw Error((device_ >= 0 ? "the camera device '" : "the video file '") + path_ +
-                  "' cannot be opened");
-    }
+    if (!capture_.open(path_)) throw Error("the video file '" + path_ + "' cannot be opened");
     // Whether OpenCV turns frames, and mirrors them, depends on its release and on FFmpeg's: where
     // the file says how, it is done here.
     capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, orientation_ == kUpright ? 1 : 0);
@@ -112,10 +104,9 @@ class CaptureFrameSource : public FrameSource {
 
  private:
   const std::string path_;
-  const int device_;
+  const int orientation_;
   cv::VideoCapture capture_;
   double rate_hz_ = 0;
-  int orientation_ = kUpright;
   std::uint64_t number_ = 0;
 };
 
@@ -127,20 +118,7 @@ std::unique_ptr<FrameSource> OpenFolder(const std::string& directory, std::size_
 
 std::unique_ptr<FrameSource> OpenVideo(const std::string& path) {
   if (!fs::is_regular_file(path)) throw Error("the video file '" + path + "' does not exist");
-  return std::make_unique<CaptureFrameSource>(path, -1);
-}
-
-std::unique_ptr<FrameSource> OpenDevice(const std::string& device) {
-  const std::string prefix = "/dev/video";
-  const std::string number =
-      device.compare(0, prefix.size(), prefix) == 0 ? device.substr(prefix.size()) : device;
-  const bool all_digits = !number.empty() && number.size() <= 3 &&
-                          std::all_of(number.begin(), number.end(),
-                                      [](unsigned char c) { return std::isdigit(c) != 0; });
-  if (!all_digits) {
-    throw Error("the camera device is '" + device + "', accepted is /dev/videoN or N");
-  }
-  return std::make_unique<CaptureFrameSource>(device, std::stoi(number));
+  return std::make_unique<VideoFrameSource>(path);
 }
 
 }  // namespace livemap::imaging

@@ -19,6 +19,8 @@ struct SourceFrame {
   /// How many frames of the source's rate it comes after the one before: above 1 where pictures of
   /// a folder are missing between them.
   int steps = 1;
+  /// How long ago a camera took it, by its driver's clock; 0: unknown, or no camera.
+  double age_s = 0;
 };
 
 /// One frame of a source cannot be read.
@@ -55,8 +57,5 @@ std::unique_ptr<FrameSource> OpenFolder(const std::string& directory, std::size_
 /// A video file through cv::VideoCapture, its frames upright as ReadVideoOrientation says. Throws
 /// Error when it cannot be opened.
 std::unique_ptr<FrameSource> OpenVideo(const std::string& path);
-
-/// A V4L2 device: "/dev/videoN" or "N". Throws Error when it cannot be opened.
-std::unique_ptr<FrameSource> OpenDevice(const std::string& device);
 
 }  // namespace livemap::imaging

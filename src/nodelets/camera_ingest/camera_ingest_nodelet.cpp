@@ -62,16 +62,15 @@ class CameraIngestPart : public NodeletPart {
     processor_ = std::make_unique<FrameProcessor>(
         imaging::OutputSize{config_.output_width, config_.output_height},
         static_cast<std::int64_t>(config_.max_megapixels * 1e6));
-    std::unique_ptr<imaging::FrameSource> source = OpenSource(config_);
     image_transport::ImageTransport transport(getNodeHandle());
     publisher_ = transport.advertiseCamera("camera_rect/image", 10);
     if (config_.stereo) {
       stereo_ = std::make_unique<IngestStereo>(config_, getNodeHandle(), getName());
     }
-    if (source) {
-      StartReader(std::move(source));
-    } else {
+    if (config_.source == ros_io::IngestSource::kTopic) {
       Subscribe();
+    } else {
+      StartReader();
     }
     worker_ = std::thread([this] { Work(); });
     {
@@ -112,7 +111,7 @@ class CameraIngestPart : public NodeletPart {
         ros::VoidConstPtr(), hints);
   }
 
-  void StartReader(std::unique_ptr<imaging::FrameSource> source) {
+  void StartReader() {
     // Its set_camera_info service lets a calibrator replace the calibration while this runs.
     info_manager_ = std::make_unique<camera_info_manager::CameraInfoManager>(
         ros::NodeHandle(getNodeHandle(), "camera"), config_.frame_id);
@@ -120,6 +119,10 @@ class CameraIngestPart : public NodeletPart {
       throw Error("parameter 'camera_info_url' is '" + config_.camera_info_url +
                   "', which is no readable camera calibration file");
     }
+    const sensor_msgs::CameraInfo info = info_manager_->getCameraInfo();
+    if (config_.device.width == 0) config_.device.width = static_cast<int>(info.width);
+    if (config_.device.height == 0) config_.device.height = static_cast<int>(info.height);
+    std::unique_ptr<imaging::FrameSource> source = OpenSource(config_);
     CheckCalibration(*source);
     reader_ = std::make_unique<IngestReader>(
         config_, std::move(source), [this](IngestFrame frame) { Take(std::move(frame)); },
@@ -171,6 +174,7 @@ class CameraIngestPart : public NodeletPart {
     {
       const MutexLock lock(accounts_mutex_);
       ++unread_;
+      last_unread_ = reason;
     }
     NODELET_WARN_THROTTLE(kSayAgainS, "%s", reason.c_str());
   }
@@ -229,7 +233,8 @@ class CameraIngestPart : public NodeletPart {
     } else if (more_dropped) {
       status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "behind: dropping frames");
     } else if (rate_hz_ == 0) {
-      status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "no frames");
+      status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
+                     last_unread_.empty() ? "no frames" : "no frames: " + last_unread_);
     } else {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
     }
@@ -259,6 +264,7 @@ class CameraIngestPart : public NodeletPart {
   std::uint64_t bad_ GUARDED_BY(accounts_mutex_) = 0;
   /// Bad ones that never reached the queue.
   std::uint64_t unread_ GUARDED_BY(accounts_mutex_) = 0;
+  std::string last_unread_ GUARDED_BY(accounts_mutex_);  ///< Why.
   std::uint64_t published_in_window_ GUARDED_BY(accounts_mutex_) = 0;
   CounterWatch bad_watch_ GUARDED_BY(accounts_mutex_);
   CounterWatch dropped_watch_ GUARDED_BY(accounts_mutex_);

@@ -36,7 +36,7 @@ IngestFrame ToIngestFrame(imaging::SourceFrame frame, const std_msgs::Header& he
 std::unique_ptr<imaging::FrameSource> OpenSource(const ros_io::IngestConfig& config) {
   switch (config.source) {
     case ros_io::IngestSource::kDevice:
-      return imaging::OpenDevice(config.uri);
+      return imaging::OpenDevice(config.uri, config.device);
     case ros_io::IngestSource::kVideo:
       return imaging::OpenVideo(config.uri);
     case ros_io::IngestSource::kFolder:
@@ -88,9 +88,12 @@ bool IngestReader::GoOn() {
   return false;
 }
 
-ros::Time IngestReader::StampOf(std::int64_t number) {
+ros::Time IngestReader::StampOf(std::int64_t number, double age_s) {
   const ros::Time now = ros::Time::now();
-  if (config_.stamps == "wall" || config_.source == ros_io::IngestSource::kDevice) return now;
+  if (config_.source == ros_io::IngestSource::kDevice) {
+    return now.toSec() > age_s ? now - ros::Duration(age_s) : now;
+  }
+  if (config_.stamps == "wall") return now;
   const ros::Duration since_first = period_ * static_cast<double>(number);
   // The clock was set back, or a simulated one goes slower than the file: a stamp of the future is
   // of use to nobody.
@@ -126,7 +129,7 @@ void IngestReader::Run() {
       }
       if (!PassMissing(frame->steps, number, next)) return;
       std_msgs::Header header;
-      header.stamp = StampOf(number);
+      header.stamp = StampOf(number, frame->age_s);
       header.frame_id = config_.frame_id;
       take_(ToIngestFrame(std::move(*frame), header));
     } catch (const imaging::UnreadableFrame& unreadable) {
@@ -134,6 +137,8 @@ void IngestReader::Run() {
       if (!PassMissing(unreadable.steps(), number, next)) return;
     } catch (const std::exception& exception) {
       miss_(exception.what());
+      // A camera that is not there: tried again, not all the time.
+      if (live && !SleepUntil(ros::WallTime::now() + ros::WallDuration(kReopenAfterS))) return;
     }
     ++number;
     next += ros::WallDuration(period_.toSec());

@@ -41,8 +41,9 @@ class IngestReader {
   /// Lets the time of the frames pass that are missing before one of so many steps. False when
   /// stopped while sleeping.
   bool PassMissing(int steps, std::int64_t& number, ros::WallTime& next);
-  /// Stamp of the frame of this number: see the parameter `stamps`.
-  ros::Time StampOf(std::int64_t number);
+  /// Stamp of the frame of this number, which a camera took so long ago: see the parameter
+  /// `stamps`.
+  ros::Time StampOf(std::int64_t number, double age_s);
   /// False when stopped while sleeping.
   bool SleepUntil(ros::WallTime wanted);
 

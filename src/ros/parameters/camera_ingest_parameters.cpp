@@ -29,7 +29,8 @@ void ReadIngestSource(ParameterReader& parameters, IngestConfig& config) {
       "stamps", config.stamps, {"wall", "file_order"},
       "Stamps of the frames of a video or folder: wall (ROS time when the frame is read) or "
       "file_order (ROS time at the start plus frame number / rate). Images of a topic keep their "
-      "stamps. A device's frames get the time of their arrival.");
+      "stamps. A device's frames get the time at which its driver says that they were taken, else "
+      "that of their arrival.");
   parameters.ReadChoice<IngestAtEnd>(
       "at_end", config.at_end,
       {{"stay", IngestAtEnd::kStay},
@@ -42,6 +43,30 @@ void ReadIngestSource(ParameterReader& parameters, IngestConfig& config) {
   parameters.Read("camera_info_url", config.camera_info_url,
                   "Calibration of a device, video or folder, in the ROS calibration YAML format, "
                   "for example file:///etc/livemap/camera.yaml.");
+}
+
+void ReadIngestDevice(ParameterReader& parameters, imaging::DeviceConfig& device) {
+  using imaging::DeviceFormat;
+  parameters.Section("Device");
+  parameters.Read("device_width", device.width, {0, 16384},
+                  "Width of the images that a device is asked for. 0: the calibration's. A device "
+                  "that gives another size is refused until it gives this one.",
+                  "px");
+  parameters.Read("device_height", device.height, {0, 16384},
+                  "Height of the images that a device is asked for. 0: the calibration's.", "px");
+  parameters.Read("device_rate_hz", device.rate_hz, {0, 1000},
+                  "Frames per second that a device is asked for. 0: as it is set. The device may "
+                  "give fewer, as in the dark; diagnostics say what comes.",
+                  "Hz");
+  parameters.ReadChoice<DeviceFormat>(
+      "device_format", device.format,
+      {{"mjpeg", DeviceFormat::kMjpeg}, {"yuyv", DeviceFormat::kYuyv}, {"any", DeviceFormat::kAny}},
+      "How a device sends its images. mjpeg: as JPEG, which USB 2 wants for large images at 30 Hz. "
+      "yuyv: uncompressed. any: as it is set.");
+  parameters.Read("device_exposure_ms", device.exposure_ms, {0, 1000},
+                  "Exposure time of a device. 0: the camera chooses. At 50 km/h the road moves "
+                  "14 mm in 1 ms.",
+                  "ms");
 }
 
 void ReadIngestOutput(ParameterReader& parameters, IngestConfig& config) {
@@ -123,6 +148,7 @@ const char* IngestSourceName(IngestSource source) {
 IngestConfig ReadIngestConfig(ParameterReader& parameters) {
   IngestConfig config;
   ReadIngestSource(parameters, config);
+  ReadIngestDevice(parameters, config.device);
   ReadIngestOutput(parameters, config);
   ReadIngestStereo(parameters, config);
   parameters.RejectUnknown();

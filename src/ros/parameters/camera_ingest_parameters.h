@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "imaging/camera_device.h"
 #include "imaging/stereo_depth.h"
 #include "ros/parameters/shared/parameter_reader.h"
 
@@ -16,6 +17,7 @@ struct IngestConfig {
   IngestSource source = IngestSource::kTopic;
   std::string transport = "compressed";  ///< Of a topic: "raw" or "compressed".
   std::string uri;                       ///< Device, video file or image folder.
+  imaging::DeviceConfig device;          ///< Size 0: the calibration's.
   double rate_hz = 10;                   ///< Folder, and video that names no rate.
   std::string stamps = "wall";           ///< "wall" or "file_order" (start + number / rate).
   IngestAtEnd at_end = IngestAtEnd::kStay;

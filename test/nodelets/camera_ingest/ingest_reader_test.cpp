@@ -5,10 +5,13 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "common/error.h"
+#include "imaging/camera_device.h"
 #include "test/support/temporary_directory.h"
 
 namespace livemap::nodelets {
@@ -59,6 +62,52 @@ TEST_F(IngestReaderTest, AnUnreadablePictureAfterAGapLeavesLaterStampsWhereTheyB
   Write("16.png", 20000);
   EXPECT_THAT(ReadNumbers(), ElementsAre(0, 1, 2, 7, 8));
   EXPECT_THAT(missed_, ElementsAre(HasSubstr("/16.png")));
+}
+
+/// A camera that is unplugged for a while after its first picture.
+class UnpluggedForAWhile : public imaging::CameraDevice {
+ public:
+  void Open() override {
+    if (++opened_ == 2) throw Error("the camera device is not there");
+  }
+  std::optional<imaging::DevicePicture> Read() override {
+    if (++read_ == 2) return std::nullopt;
+    imaging::DevicePicture picture;
+    picture.encoded = {1};
+    picture.age_s = 0.25;
+    return picture;
+  }
+
+ private:
+  int opened_ = 0, read_ = 0;
+};
+
+TEST_F(IngestReaderTest, ACameraComesBackAfterUnpluggingAndItsFramesAreStampedWhenTheyWereTaken) {
+  config_.source = ros_io::IngestSource::kDevice;
+  std::mutex mutex;
+  std::vector<std::string> missed;
+  std::vector<double> ages_s;
+  {
+    IngestReader reader(
+        config_, imaging::MakeDeviceSource(std::make_unique<UnpluggedForAWhile>()),
+        [&](const IngestFrame& frame) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          ages_s.push_back((ros::Time::now() - frame.header().stamp).toSec());
+          std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        },
+        [&](const std::string& reason) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          missed.push_back(reason);
+        });
+    const auto back = [&] {
+      const std::lock_guard<std::mutex> lock(mutex);
+      return ages_s.size() > 1;
+    };
+    while (!back()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_THAT(missed, ElementsAre(HasSubstr("gives no image"), HasSubstr("is not there")));
+  EXPECT_GE(ages_s.front(), 0.25);
+  EXPECT_LT(ages_s.front(), 5);
 }
 
 }  // namespace
