@@ -43,6 +43,8 @@ class ConnectionSlot {
   }
   ConnectionSlot& operator=(ConnectionSlot&&) = delete;
 
+  /// False once it has moved on to another session.
+  bool is_held() const { return context_ != nullptr; }
   WebContext& context() const { return *context_; }
   ConnectionTable::Id id() const { return id_; }
 

@@ -68,7 +68,7 @@ bool ConnectionTable::MakeOrdinaryPlace(const Entry& newcomer, std::int64_t now_
 bool ConnectionTable::EndOneThatWaits(const std::string* client, std::int64_t now_ns) {
   return EndHeaviest(&Crowd::connections, [&](const Entry& entry) {
     if (client != nullptr && entry.client != *client) return false;
-    return entry.phase == Phase::kWaiting ||
+    return entry.phase == Phase::kWaiting || entry.phase == Phase::kLeaving ||
            (entry.phase == Phase::kWriting && now_ns - entry.since_ns > kSlowNs);
   });
 }
@@ -110,7 +110,10 @@ bool ConnectionTable::EndHeaviest(Number number, const std::function<bool(const 
 bool ConnectionTable::EndOneOnReserve() {
   Entry* victim = nullptr;
   for (auto& [id, entry] : entries_) {
-    if (entry.kind != Kind::kReserve || entry.phase != Phase::kWaiting || !entry.end) continue;
+    const bool waits = entry.kind == Kind::kReserve && entry.phase == Phase::kWaiting;
+    const bool is_on_reserve = entry.kind == Kind::kReserve || entry.kind == Kind::kOfficial;
+    const bool leaves = is_on_reserve && entry.phase == Phase::kLeaving;
+    if (!(waits || leaves) || !entry.end) continue;
     if (victim == nullptr || entry.since_ns < victim->since_ns) victim = &entry;
   }
   if (victim == nullptr) return false;

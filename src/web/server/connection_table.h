@@ -22,11 +22,11 @@ namespace livemap::web {
 /// weigh on a newcomer from the same network who stands beside the crowd.
 ///
 /// A client has a share. Whoever comes when the share or the table is full takes the place of a
-/// connection that waits for its client: one that is idle, whose request is not complete, or whose
-/// answer is not read. Of a full table's, that of the heaviest client ends, the longest wait first.
-/// Where nobody waits, a client takes a place of the heaviest one whose network has two connections
-/// more than the newcomer's: so no network, however many connections it opens, keeps another one
-/// out.
+/// connection that waits for its client: one that is idle, whose request is not complete, whose
+/// answer is not read, or that leaves. Of a full table's, that of the heaviest client ends, the
+/// longest wait first. Where nobody waits, a client takes a place of the heaviest one whose network
+/// has two connections more than the newcomer's: so no network, however many connections it opens,
+/// keeps another one out.
 ///
 /// Live streams never wait for their client, and have at most three quarters of the ordinary
 /// places: requests always find the others. When these are taken, the oldest stream of the heaviest
@@ -35,7 +35,8 @@ namespace livemap::web {
 /// there are.
 ///
 /// Who finds no place that way is let in on the reserve: only an official's request is served
-/// there, or one from the loopback for /healthz. Connections of officials are never ended.
+/// there, or one from the loopback for /healthz. Connections of officials are never ended before
+/// they leave.
 class ConnectionTable {
  public:
   using Id = std::uint64_t;
@@ -53,7 +54,8 @@ class ConnectionTable {
     kWaiting,  ///< For a request, or the rest of one.
     kWorking,  ///< The answer is being made.
     kWriting,  ///< The answer is on its way; slow when nothing of it went for long.
-    kStream    ///< A live stream.
+    kStream,   ///< A live stream.
+    kLeaving   ///< Its last answer is sent: it is only closed, and its place is anybody's.
   };
   /// Ends a connection; called from any thread, while the table is locked: must only post.
   using End = std::function<void()>;
@@ -70,7 +72,8 @@ class ConnectionTable {
   /// official's.
   void SetClient(Id id, const std::string& client, std::int64_t now_ns);
 
-  /// Something of the connection's went on at `now_ns`, a steady clock.
+  /// Something of the connection's went on at `now_ns`, a steady clock. A client that sees the end
+  /// of its connection may come again at once: kLeaving is set before that end is sent.
   void SetPhase(Id id, Phase phase, std::int64_t now_ns);
   /// False for one on the reserve that found no place since: only an official is served.
   bool MayServe(Id id);

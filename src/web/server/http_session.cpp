@@ -323,9 +323,10 @@ void HttpSession::ReleaseHeld() {
 /// A socket that is closed while the client still sends is reset, and the client may lose the
 /// answer that it was about to read.
 void HttpSession::CloseGently() {
+  // First: the client may come again as soon as it sees the end, and this place is free for it.
+  SetPhase(ConnectionTable::Phase::kLeaving);
   beast::error_code ignored;
   stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
-  SetPhase(ConnectionTable::Phase::kWaiting);
   stream_.expires_after(kDrainTime);
   Drain();
 }
@@ -341,6 +342,10 @@ void HttpSession::Drain() {
       });
 }
 
-void HttpSession::Close() { stream_.close(); }
+void HttpSession::Close() {
+  if (!slot_.is_held()) return;  // The connection is a live stream's now.
+  SetPhase(ConnectionTable::Phase::kLeaving);
+  stream_.close();
+}
 
 }  // namespace livemap::web

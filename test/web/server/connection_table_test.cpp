@@ -169,6 +169,28 @@ TEST_F(ConnectionTableTest, WaitingOnTheReserveIsEndedForTheNextOne) {
   EXPECT_EQ(ended_, std::vector<Id>{on_reserve.front()});
 }
 
+TEST_F(ConnectionTableTest, WhoLeavesTheReserveMakesRoomAnOfficialToo) {
+  Fill("a", 6, Phase::kWorking);
+  Fill("b", 6, Phase::kWorking);
+  std::vector<Id> officials;
+  for (int i = 0; i < 4; ++i) {
+    officials.push_back(Admit("b", i));
+    table_.MakeOfficial(officials.back());
+    table_.SetPhase(officials.back(), Phase::kWriting, i);
+  }
+  EXPECT_EQ(Admit("b", 10), 0U);
+  table_.SetPhase(officials[2], Phase::kLeaving, 20);
+  EXPECT_NE(Admit("b", 30), 0U);
+  EXPECT_EQ(ended_, std::vector<Id>{officials[2]});
+}
+
+TEST_F(ConnectionTableTest, WhoLeavesMakesRoomForItsOwnClient) {
+  const auto own = Fill("a", 8, Phase::kWorking);
+  table_.SetPhase(own[3], Phase::kLeaving, kSecondNs);
+  EXPECT_TRUE(table_.MayServe(Admit("a", kSecondNs)));
+  EXPECT_EQ(ended_, std::vector<Id>{own[3]});
+}
+
 TEST_F(ConnectionTableTest, LiveStreamsLeaveAClientRoomForRequests) {
   for (int i = 0; i < 6; ++i) EXPECT_TRUE(table_.BecomeStream(Admit("a"), 0));
   const Id next = Admit("a");
