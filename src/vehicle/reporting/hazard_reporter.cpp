@@ -33,13 +33,6 @@ constexpr double kSightReach = 3.0;
 constexpr double kFixHeadingOwnShare =
     0.5;  // Of the course's variance; the fixes' windows overlap.
 constexpr double kForEverS = 1e9;
-/// A hazard that the images of so long a time do not show is out of view.
-constexpr double kOutOfViewS = 0.09;
-
-/// Whether the next image will hardly show the whole box.
-bool IsLeavingImage(const imaging::Box& box, double bottom_step_px, std::uint32_t height) {
-  return box.y_max + 1.5 * std::max(0.0, bottom_step_px) >= height - 1.0;
-}
 
 }  // namespace
 
@@ -52,6 +45,7 @@ HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatal
       vehicle_poses_(ReporterPoseConfigOf(config)),
       schedule_(config.resend, std::mt19937_64(random_())),
       passes_(config.passes, catalogue),
+      settling_({config.settle_wait_s, config.settle_sigma_m}, catalogue),
       start_ns_(now_ns),
       start_steady_s_(steady_s) {
   config_.projection.max_range_m = kEndlessRangeM;
@@ -123,8 +117,7 @@ void HazardReporter::Finish(double steady_s) {
   }
   waiting_.clear();
   // Pictures that are not there yet do not come any more.
-  for (Settling& settling : settling_) ReportSettledView(settling.view, steady_s);
-  settling_.clear();
+  for (WaitingFrame& view : settling_.TakeAll()) ReportSettledView(view, steady_s);
   newest_frame_ns_ = newest_empty_ns_ = 0;
   picture_orders_.clear();
 }
@@ -248,7 +241,7 @@ void HazardReporter::OrderPictures(WaitingFrame& waiting) {
   const bool fits = HasSizeOfFrame(waiting);
   PictureOrder order;
   for (PlacedSighting& candidate : waiting.candidates) {
-    if (IsKnown(candidate) || IsToSettle(candidate)) continue;
+    if (IsKnown(candidate) || settling_.HasToWait(candidate)) continue;
     candidate.cut = order.cuts.size();
     order.cuts.push_back({fits ? candidate.sighting.box : imaging::Box{}, config_.picture,
                           /*is_whole_image=*/false});
@@ -284,11 +277,7 @@ void HazardReporter::AddPictures(std::uint64_t order,
     waiting.pictures = std::move(pictures);
     return;
   }
-  for (Settling& settling : settling_) {
-    if (settling.view.order != order) continue;
-    settling.view.pictures = std::move(pictures);
-    return;
-  }
+  settling_.AddPictures(order, pictures);
 }
 
 bool HazardReporter::FitsCamera(const placement::SightingFrame& frame) const {
@@ -508,8 +497,9 @@ void HazardReporter::ReportCandidates(WaitingFrame& waiting, double now_s, doubl
       ++counters_.duplicates_suppressed;
       continue;
     }
-    if (IsToSettle(candidate)) {
-      Settle(waiting, index, now_s, steady_s);
+    if (settling_.HasToWait(candidate)) {
+      const bool is_new = settling_.Add(waiting, index, passes_, now_s, steady_s);
+      if (!is_new) ++counters_.duplicates_suppressed;
       continue;
     }
     AddReport(MakeReport(waiting, index), candidate.pass, steady_s);
@@ -517,92 +507,21 @@ void HazardReporter::ReportCandidates(WaitingFrame& waiting, double now_s, doubl
   newest_frame_ns_ = waiting.frame.stamp_ns;
 }
 
-/// Whether its report waits for further sights.
-bool HazardReporter::IsToSettle(const PlacedSighting& candidate) const {
-  return config_.settle_wait_s > 0 && candidate.pass != 0 && !candidate.has_settled &&
-         catalogue_.Get(candidate.sighting.class_name).urgency > 1;
-}
-
-/// The same hazard where it waits already.
-HazardReporter::Settling* HazardReporter::FindSettling(const PlacedSighting& candidate) {
-  const std::string& name = candidate.sighting.class_name;
-  const double radius_m = catalogue_.Get(name).duplicate_radius_m;
-  const auto found =
-      std::find_if(settling_.begin(), settling_.end(), [&](const Settling& settling) {
-        const PlacedSighting& other = settling.view.candidates.front();
-        if (other.pass == candidate.pass) return true;
-        const auto place = passes_.Place(other.pass);
-        const geo::GeoPoint& there = place ? place->place.position : other.place.position;
-        return other.sighting.class_name == name &&
-               geo::GeodesicDistanceM(there, candidate.place.position) <= radius_m;
-      });
-  return found == settling_.end() ? nullptr : &*found;
-}
-
-/// The newest sight of a hazard is the nearest: of all pictures its own shows most.
-void HazardReporter::Settle(const WaitingFrame& waiting, std::size_t index, double now_s,
-                            double steady_s) {
-  WaitingFrame view;
-  view.frame = waiting.frame;
-  view.arrival_s = now_s;
-  view.placed = true;
-  view.image = waiting.image;
-  view.candidates = {waiting.candidates[index]};
-  view.candidates.front().has_settled = true;
-  Settling* settling = FindSettling(waiting.candidates[index]);
-  if (settling == nullptr) {
-    settling_.push_back({std::move(view), 0, now_s, steady_s, false});
-    return;
-  }
-  ++counters_.duplicates_suppressed;
-  const PlacedSighting& before = settling->view.candidates.front();
-  if (settling->is_due || view.frame.stamp_ns <= settling->view.frame.stamp_ns ||
-      before.pass != view.candidates.front().pass) {
-    return;
-  }
-  settling->bottom_step_px = static_cast<double>(view.candidates.front().sighting.box.y_max) -
-                             static_cast<double>(before.sighting.box.y_max);
-  settling->view = std::move(view);
-}
-
-bool HazardReporter::IsOutOfView(const Settling& settling) const {
-  const WaitingFrame& view = settling.view;
-  const imaging::Box& box = view.candidates.front().sighting.box;
-  if (IsLeavingImage(box, settling.bottom_step_px, view.frame.image_height)) return true;
-  std::int64_t newest_ns = newest_frame_ns_;
+/// Up to when images have been looked through.
+std::int64_t HazardReporter::ShownNs() const {
   // What was seen before the empty frame may still wait for its position.
-  if (waiting_.empty() || waiting_.front().frame.stamp_ns > newest_empty_ns_) {
-    newest_ns = std::max(newest_ns, newest_empty_ns_);
-  }
-  return Seconds(newest_ns - view.frame.stamp_ns) >= kOutOfViewS;
-}
-
-/// A bag's clock may stand still after its end: the steady clock counts, too.
-bool HazardReporter::IsSettled(Settling& settling, double now_s, double steady_s) const {
-  settling.since_s = std::min(settling.since_s, now_s);  // A clock that was set back.
-  if (now_s - settling.since_s >= config_.settle_wait_s ||
-      steady_s - settling.since_steady_s >= 2 * config_.settle_wait_s || IsOutOfView(settling)) {
-    return true;
-  }
-  const auto place = passes_.Place(settling.view.candidates.front().pass);
-  return !place || placement::LargestSigmaM(place->seen_from_vehicle_m2) <= config_.settle_sigma_m;
+  const bool is_empty_looked_through =
+      waiting_.empty() || waiting_.front().frame.stamp_ns > newest_empty_ns_;
+  return is_empty_looked_through ? std::max(newest_frame_ns_, newest_empty_ns_) : newest_frame_ns_;
 }
 
 /// Reports what has had its further sights, once its picture is there.
 void HazardReporter::ReportSettled(double now_s, double steady_s) {
-  for (auto settling = settling_.begin(); settling != settling_.end();) {
-    WaitingFrame& view = settling->view;
-    if (!settling->is_due && IsSettled(*settling, now_s, steady_s)) {
-      settling->is_due = true;
-      view.arrival_s = now_s;
-    }
-    if (!settling->is_due || WaitsForPicture(view, now_s)) {
-      ++settling;
-      continue;
-    }
+  settling_.WorkOff(passes_, ShownNs(), now_s, steady_s, [&](WaitingFrame& view) {
+    if (WaitsForPicture(view, now_s)) return false;
     ReportSettledView(view, steady_s);
-    settling = settling_.erase(settling);
-  }
+    return true;
+  });
 }
 
 void HazardReporter::ReportSettledView(WaitingFrame& view, double steady_s) {

@@ -14,7 +14,6 @@
 #include "geo/ground_projection.h"
 #include "imaging/report_picture.h"
 #include "placement/depth_ground_contact.h"
-#include "placement/hazard_placement.h"
 #include "placement/sighting.h"
 #include "protocol/hazard_catalogue.h"
 #include "protocol/notice.h"
@@ -24,6 +23,8 @@
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 #include "vehicle/reporting/local_hazard_map.h"
 #include "vehicle/reporting/pass_sights.h"
+#include "vehicle/reporting/settling_reports.h"
+#include "vehicle/reporting/waiting_frame.h"
 
 namespace livemap::vehicle {
 
@@ -209,35 +210,6 @@ class HazardReporter {
   const std::string& store_error() const { return store_error_; }
 
  private:
-  struct PlacedSighting {
-    placement::Sighting sighting;
-    placement::PlacedHazard place;   // By all sights of the pass up to this one.
-    Eigen::Vector3d earth_m;         // geo::EarthCentred of the place.
-    std::optional<std::size_t> cut;  // Of the order; none where it was known already.
-    PassSights::Id pass = 0;
-    std::size_t sights = 1;    // That its place is of.
-    bool has_settled = false;  // It waits for no further sight.
-  };
-  struct WaitingFrame {
-    placement::SightingFrame frame;
-    double arrival_s;
-    bool held_back = false;
-    bool placed = false;
-    std::vector<PlacedSighting> candidates;  // Once placed.
-    CameraImage image;
-    std::uint64_t order = 0;  // Of its pictures; 0: none yet.
-    /// Once the order was answered: one for each cut, or nothing at all.
-    std::optional<std::vector<imaging::CroppedPicture>> pictures;
-  };
-  /// A hazard to be reported that waits for further sights.
-  struct Settling {
-    WaitingFrame view;          // The newest, with the hazard's sighting alone.
-    double bottom_step_px = 0;  // How far the box's lower edge came down since the view before.
-    double since_s = 0;
-    double since_steady_s = 0;
-    bool is_due = false;
-  };
-
   bool IsUsable(const placement::Sighting& sighting);
   bool IsPlaced(WaitingFrame& waiting, double now_s);
   bool IsKnown(const PlacedSighting& candidate) const;
@@ -256,11 +228,7 @@ class HazardReporter {
   bool IsWorthASight(const placement::HazardSight& sight) const;
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
   void ReportCandidates(WaitingFrame& waiting, double now_s, double steady_s);
-  bool IsToSettle(const PlacedSighting& candidate) const;
-  Settling* FindSettling(const PlacedSighting& candidate);
-  void Settle(const WaitingFrame& waiting, std::size_t index, double now_s, double steady_s);
-  bool IsOutOfView(const Settling& settling) const;
-  bool IsSettled(Settling& settling, double now_s, double steady_s) const;
+  std::int64_t ShownNs() const;
   void ReportSettled(double now_s, double steady_s);
   void ReportSettledView(WaitingFrame& view, double steady_s);
   void AddReport(const protocol::Report& report, PassSights::Id pass, double steady_s);
@@ -283,7 +251,7 @@ class HazardReporter {
   std::map<std::string, Eigen::Isometry3d> mountings_;
   std::deque<WaitingFrame> waiting_;
   PassSights passes_;
-  std::deque<Settling> settling_;                         // In the order of their first sights.
+  SettlingReports settling_;
   std::int64_t newest_frame_ns_ = 0;                      // Worked off.
   std::int64_t newest_empty_ns_ = 0;                      // Frame without a sighting.
   std::map<std::int64_t, placement::DepthImage> depths_;  // By stamp.

@@ -14,26 +14,6 @@ namespace {
 /// What a vehicle sees that drives straight on.
 class PassSightsTest : public ::testing::Test {
  protected:
-  /// A thing that lies so far ahead and left of where the vehicle is at 3 s.
-  static PassSights::Seen SeenAt(double time_s, double forward_m, double left_m,
-                                 const char* class_name = "traffic_cone") {
-    PassSights::Seen seen{class_name, {}};
-    placement::HazardSight& sight = seen.sight;
-    sight.stamp_ns = StampNs(time_s);
-    sight.base.position = VehicleAt(time_s);
-    sight.base.covariance_m2 = Eigen::Matrix2d::Identity();
-    sight.base.course_rad = kBearingRad;
-    sight.base.course_variance_rad2 = 1e-4;
-    sight.base.speed_mps = kSpeedMps;
-    sight.intrinsics = Intrinsics();
-    sight.base_from_optical = Mounting();
-    sight.noise.max_range_m = 1e4;
-    sight.pixel = placement::ContactPixel(BoxAt(forward_m - kSpeedMps * (time_s - 3), left_m));
-    sight.foot =
-        *geo::ProjectToGround(sight.pixel, sight.intrinsics, sight.base_from_optical, sight.noise);
-    return seen;
-  }
-
   protocol::HazardCatalogue catalogue_;
   PassSights::Config config_;
 };
