@@ -14,6 +14,10 @@ namespace {
 
 constexpr double kMinSigmaM = 1e-3;   // No receiver is better; keeps covariances invertible.
 constexpr double kStandingMps = 0.3;  // Slower than this the vehicle stands.
+// Three fixes within so long are a straight line, but for their scatter: braking bends it by 6 cm.
+constexpr double kStraightS = 0.55;
+constexpr std::size_t kScattersAsked = 21;  // The newest ones.
+constexpr std::size_t kScattersEnough = 5;
 
 double FixSigmaM(const Eigen::Matrix2d& covariance_m2) {
   return std::sqrt(covariance_m2.trace() / 2);
@@ -92,7 +96,7 @@ std::optional<FixTrack::Point> FixTrack::ToPoint(const geo::Fix& fix) const {
   if (!geo::IsPlausible(fix)) return std::nullopt;
   const Eigen::Matrix2d covariance_m2 = geo::CovarianceOf(fix, config_.default_sigma_m) +
                                         Eigen::Matrix2d::Identity() * kMinSigmaM * kMinSigmaM;
-  return Point{fix.stamp_ns, fix.position, covariance_m2, std::nullopt};
+  return Point{fix.stamp_ns, fix.position, covariance_m2, std::nullopt, std::nullopt};
 }
 
 bool FixTrack::Reachable(const Point& from, const Point& to) const {
@@ -124,10 +128,41 @@ void FixTrack::Append(const Point& point) {
   const std::optional<Course> course_before =
       points_.empty() ? std::nullopt : points_.back().course;
   points_.push_back(point);
+  points_.back().scatter_m2 = NewestScatter();
   while (Seconds(point.stamp_ns - points_.front().stamp_ns) > config_.keep_s) points_.pop_front();
   const auto motion = MotionAt(point.stamp_ns, points_.end());
   points_.back().course = motion ? CourseOf(*motion) : std::nullopt;
   if (!points_.back().course) points_.back().course = course_before;
+}
+
+/// Of the fix before the newest one, by its two neighbours.
+std::optional<double> FixTrack::NewestScatter() const {
+  if (points_.size() < 3) return std::nullopt;
+  const Point& newest = points_.back();
+  const Point& middle = points_[points_.size() - 2];
+  const Point& oldest = points_[points_.size() - 3];
+  const double span_s = Seconds(newest.stamp_ns - oldest.stamp_ns);
+  if (span_s > kStraightS) return std::nullopt;
+  const double share = Seconds(middle.stamp_ns - oldest.stamp_ns) / span_s;
+  const geo::LocalFrame frame(middle.position);
+  const Eigen::Vector2d aside_m =
+      (1 - share) * frame.ToEnu(oldest.position) + share * frame.ToEnu(newest.position);
+  return aside_m.squaredNorm() / 2 / (1 + share * share + (1 - share) * (1 - share));
+}
+
+/// How much the newest fixes before `end` scatter, at least course_noise_m. By the median: a fix
+/// that reflections throw aside is no scatter.
+double FixTrack::ScatterM(const Points::const_iterator& end) const {
+  std::vector<double> scatters_m2;
+  for (auto point = end; point != points_.begin() && scatters_m2.size() < kScattersAsked;) {
+    --point;
+    if (point->scatter_m2) scatters_m2.push_back(*point->scatter_m2);
+  }
+  if (scatters_m2.size() < kScattersEnough) return config_.course_noise_m;
+  const auto middle = scatters_m2.begin() + static_cast<std::ptrdiff_t>(scatters_m2.size() / 2);
+  std::nth_element(scatters_m2.begin(), middle, scatters_m2.end());
+  // Half the square of two normal numbers has this median.
+  return std::max(config_.course_noise_m, std::sqrt(*middle / M_LN2));
 }
 
 /// Course of a vehicle that stands at this moment: the one it came with, else the one it leaves
@@ -226,10 +261,11 @@ std::optional<FixTrack::Motion> FixTrack::MotionAt(std::int64_t stamp_ns,
       ++newer;
     }
   }
-  return BestLineFit(samples);
+  return BestLineFit(samples, ScatterM(end));
 }
 
-std::optional<FixTrack::Motion> FixTrack::BestLineFit(const std::vector<Sample>& samples) const {
+std::optional<FixTrack::Motion> FixTrack::BestLineFit(const std::vector<Sample>& samples,
+                                                      double noise_m) const {
   // Grows the window fix by fix. A longer one averages out the scatter of the fixes, but if its
   // middle lags behind the asked moment, the vehicle may have turned or braked since: the window
   // with the smallest sum of both errors wins.
@@ -252,7 +288,7 @@ std::optional<FixTrack::Motion> FixTrack::BestLineFit(const std::vector<Sample>&
     motion.velocity_mps = (sum_tp - mean_s * sum_p) / spread;
     const double turn_mps2 = config_.turn_rate_rps * motion.velocity_mps.norm();
     const double change = std::hypot(config_.acceleration_mps2, turn_mps2) * mean_s;
-    motion.variance = config_.course_noise_m * config_.course_noise_m / spread + change * change;
+    motion.variance = noise_m * noise_m / spread + change * change;
     motion.span_s = latest_s - earliest_s;
     if (!best || motion.variance < best->variance) best = motion;
   }

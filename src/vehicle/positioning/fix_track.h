@@ -28,8 +28,9 @@ class FixTrack {
     double min_baseline_m = 2.0;
     /// Fixes further than this from the asked moment say nothing about the course, s.
     double course_window_s = 2.0;
-    /// How much one fix scatters against its neighbours, standard deviation per axis, m. The error
-    /// that neighbouring fixes share does not harm the course.
+    /// How much one fix scatters against its neighbours at least, standard deviation per axis, m.
+    /// Where the fixes themselves scatter more, that counts. The error that neighbouring fixes
+    /// share does not harm the course.
     double course_noise_m = 0.5;
     /// How fast the course of a driving vehicle changes, standard deviation, rad/s.
     double turn_rate_rps = 0.15;
@@ -107,6 +108,9 @@ class FixTrack {
     geo::GeoPoint position;
     Eigen::Matrix2d covariance_m2;
     std::optional<Course> course;  // Of the last motion up to here: a standing vehicle keeps it.
+    /// Squared distance of the fix before from the line between its neighbours, per axis and as
+    /// one fix's variance, m^2; none where they lie too far apart in time to tell.
+    std::optional<double> scatter_m2;
   };
   using Points = std::deque<Point>;
 
@@ -121,7 +125,9 @@ class FixTrack {
   /// Motion at a moment by the fixes before `end`.
   std::optional<Motion> MotionAt(std::int64_t stamp_ns, const Points::const_iterator& end) const;
   std::optional<Course> StandingCourse(const Points::const_iterator& after) const;
-  std::optional<Motion> BestLineFit(const std::vector<Sample>& samples) const;
+  std::optional<double> NewestScatter() const;
+  double ScatterM(const Points::const_iterator& end) const;
+  std::optional<Motion> BestLineFit(const std::vector<Sample>& samples, double noise_m) const;
   std::optional<Course> CourseOf(const Motion& motion) const;
 
   Config config_;

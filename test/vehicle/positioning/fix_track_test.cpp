@@ -296,5 +296,41 @@ TEST(FixTrack, WorksAcrossTheAntimeridian) {
   }
 }
 
+/// Fixes 0.1 s apart whose errors are new at each, of a straight drive to the east.
+FixTrack ScatteredDrive(double sigma_m, unsigned seed, double last_s) {
+  FixTrack track{FixTrack::Config{}};
+  std::mt19937 random(seed);
+  std::normal_distribution<double> error_m(0, sigma_m);
+  const geo::LocalFrame frame(kStart);
+  for (int i = 0; i <= static_cast<int>(last_s * 10 + 0.5); ++i) {
+    const double east_m = 8.0 * 0.1 * i + error_m(random);
+    track.Add(FixOf(0.1 * i, frame.ToGeo({east_m, error_m(random)}), sigma_m));
+  }
+  return track;
+}
+
+TEST(FixTrack, FixesThatScatterWidelyMakeTheCourseAsUncertainAsItIs) {
+  double squares = 0;
+  int known = 0;
+  constexpr int kDrives = 200;
+  for (unsigned seed = 1; seed <= kDrives; ++seed) {
+    const auto lookup = ScatteredDrive(1.5, seed, 4.0).At(StampNs(3.95));
+    if (lookup.answer != Answer::kReady) continue;
+    ++known;
+    const double error_rad = AngleBetween(lookup.pose.course_rad, M_PI / 2);
+    squares += error_rad * error_rad / lookup.pose.course_variance_rad2;
+  }
+  // With a fixed scatter of 0.5 m the mean square is 4, and many courses are 0.3 rad off.
+  EXPECT_GT(known, kDrives / 4);
+  EXPECT_LT(squares / known, 1.5);
+}
+
+TEST(FixTrack, FixesThatHardlyScatterLeaveTheCourseAsItWas) {
+  const auto sure = ScatteredDrive(0.01, 1, 4.0).At(StampNs(3.95));
+  ASSERT_EQ(sure.answer, Answer::kReady);
+  const auto exact = Drive(M_PI / 2, 8.0, 0.1, 4.0).At(StampNs(3.95));
+  EXPECT_NEAR(sure.pose.course_variance_rad2, exact.pose.course_variance_rad2, 1e-4);
+}
+
 }  // namespace
 }  // namespace livemap::vehicle
