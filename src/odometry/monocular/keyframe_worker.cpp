@@ -58,6 +58,13 @@ std::optional<KeyframeWorker::Made> KeyframeWorker::Take() {
   return std::exchange(made_, std::nullopt);
 }
 
+std::optional<KeyframeWorker::Made> KeyframeWorker::WaitAndTake() {
+  const MutexLock lock(mutex_);
+  while (busy_ && !made_) changed_.Wait(mutex_);
+  busy_ = false;
+  return std::exchange(made_, std::nullopt);
+}
+
 void KeyframeWorker::Cancel() {
   const MutexLock lock(mutex_);
   while (busy_ && !made_) changed_.Wait(mutex_);

@@ -44,6 +44,8 @@ class KeyframeWorker {
   void Give(Order order);
   /// Once per frame: what is done; none while it is not.
   std::optional<Made> Take();
+  /// What is in work, for which it waits; none when it is not busy.
+  std::optional<Made> WaitAndTake();
   /// Waits for what is in work and forgets it.
   void Cancel();
 

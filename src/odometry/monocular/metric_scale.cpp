@@ -44,4 +44,8 @@ void MetricScale::Measure(double metres, double sigma_m, double units) {
   variance_ *= 1 - gain;
 }
 
+void MetricScale::Stretch(double factor) {
+  if (factor > 0 && std::isfinite(factor)) log_scale_ += std::log(factor);
+}
+
 }  // namespace livemap::odometry

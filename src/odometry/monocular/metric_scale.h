@@ -32,6 +32,8 @@ class MetricScale {
   /// `metres` with this standard deviation are `units` of the map. Ignored unless all are finite
   /// and positive.
   void Measure(double metres, double sigma_m, double units);
+  /// What has measured it so far was wrong by this factor. Ignored unless finite and positive.
+  void Stretch(double factor);
 
  private:
   Config config_;

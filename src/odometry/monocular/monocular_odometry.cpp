@@ -22,6 +22,9 @@ constexpr double kSharedTaughtSigma = 0.01;
 constexpr double kHeightShare = 0.1;
 /// Metres less certain than this teach no height.
 constexpr double kTeachingSigma = 0.05;
+/// What a distance between fixes errs by beyond what they state, reflections above all: a share.
+constexpr double kBaselineSigma = 0.05;
+constexpr double kMostSigmas = 2.0;
 /// A rough speed less certain than this gives the start no length.
 constexpr double kWorstStartSigma = 0.5;
 /// A start without speeds for more than half of its time has no length; for less, the speed may
@@ -89,6 +92,9 @@ void MonocularOdometry::Reset() {
   source_ = MetresSource::kNone;
   shared_sigma_ = 0;
   log_height_.reset();
+  height_variance_ = 0;
+  height_told_ns_ = ordered_ns_ = 0;
+  path_.setIdentity();
   last_frame_.reset();
   last_ = {};
 }
@@ -206,7 +212,8 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   lost_ = false;
   last_unscaled_ = Eigen::Isometry3d::Identity();
   ForgetWay();
-  fixes_.AddPose(frame.stamp_ns, Eigen::Isometry3d::Identity());
+  path_.setIdentity();
+  fixes_.AddPose(frame.stamp_ns, path_);
   start_pose_ = result.world_from_camera;
   start_covariance_ = result.covariance;
   result.new_keyframe = true;
@@ -251,10 +258,10 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
   }
   lost_ = false;
   MeasureScale(unscaled.world_from_camera);
-  MeasureByFixes(frame.stamp_ns, unscaled.world_from_camera);
   if (unscaled.keyframe_due) {
     unscaled.new_keyframe = MakeKeyframe(frame, unscaled) || unscaled.new_keyframe;
   }
+  MeasureByFixes(frame.stamp_ns, last_unscaled_.inverse() * unscaled.world_from_camera);
   return InMetres(frame, unscaled);
 }
 
@@ -268,6 +275,7 @@ bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult
     return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma, unscaled.twist);
   }
   if (worker_->busy()) return false;
+  ordered_ns_ = frame.stamp_ns;
   worker_->Give(
       {frame.stamp_ns, frame.grey.clone(), odometry_.images()[0].clone(), unscaled, scale});
   return false;
@@ -276,7 +284,8 @@ bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult
 /// A keyframe that was made in the background becomes the one that frames are aligned with.
 bool MonocularOdometry::TakeKeyframe() {
   if (!worker_) return false;
-  const std::optional<KeyframeWorker::Made> made = worker_->Take();
+  const bool late = Seconds(now_ns_ - ordered_ns_) > config_.longest_keyframe_s;
+  const std::optional<KeyframeWorker::Made> made = late ? worker_->WaitAndTake() : worker_->Take();
   if (!made) return false;
   OnLearnt(made->learnt);
   return odometry_.AddEarlierKeyframe(
@@ -298,18 +307,40 @@ void MonocularOdometry::MeasureByHeight(double height_units) {
     HasTold(MetresSource::kHeight, kSharedHeightSigma);
     return;
   }
-  const bool better_tells = source_ != MetresSource::kNone && source_ != MetresSource::kHeight;
+  const bool better_tells = source_ == MetresSource::kWheels || source_ == MetresSource::kReceiver;
   if (better_tells) {
     if (scale_.log_sigma().value_or(1) > kTeachingSigma) return;
     const double log_height = std::log(height_units * scale_.metres_per_unit());
     log_height_ = log_height_.value_or(log_height);
     *log_height_ += kHeightShare * (log_height - *log_height_);
+    height_variance_ = kSharedTaughtSigma * kSharedTaughtSigma;
     return;
   }
   const double height_m = log_height_ ? std::exp(*log_height_) : config_.camera_height_m;
   if (!(height_m > kHeightSigmaM)) return;
+  if (!log_height_) {
+    log_height_ = std::log(height_m);
+    height_variance_ = kSharedHeightSigma * kSharedHeightSigma;
+  }
+  if (!scale_.log_sigma()) fixes_.Reset();  // Their distance was in units.
   scale_.Measure(height_m, kHeightSigmaM, height_units);
-  HasTold(MetresSource::kHeight, log_height_ ? kSharedTaughtSigma : kSharedHeightSigma);
+  height_told_ns_ = now_ns_;
+  // Fixes teach how high the camera is: they are still the source.
+  const MetresSource source = source_ == MetresSource::kFixes ? source_ : MetresSource::kHeight;
+  const std::int64_t told_ns = told_ns_;
+  HasTold(source, std::sqrt(height_variance_));
+  if (source == MetresSource::kFixes) told_ns_ = told_ns;
+}
+
+/// The metres by the camera's height were wrong by the exponential of `log_metres_error`: so is the
+/// height.
+void MonocularOdometry::TeachHeight(double log_metres_error, double variance) {
+  const double gain = height_variance_ / (height_variance_ + variance);
+  const double most = kMostSigmas * std::sqrt(height_variance_ + variance);
+  log_metres_error = std::clamp(log_metres_error, -most, most);
+  *log_height_ += gain * log_metres_error;
+  height_variance_ *= 1 - gain;
+  scale_.Stretch(std::exp(gain * log_metres_error));
 }
 
 void MonocularOdometry::HasTold(MetresSource source, double shared_sigma) {
@@ -333,15 +364,25 @@ void MonocularOdometry::MeasureScale(const Eigen::Isometry3d& world_from_camera)
   ForgetWay();
 }
 
-void MonocularOdometry::MeasureByFixes(std::int64_t stamp_ns,
-                                       const Eigen::Isometry3d& world_from_camera) {
+/// The way between two fixes against the path, which is in metres as soon as they are known: while
+/// the road is seen, how wrong the height is that tells them; else the metres themselves.
+void MonocularOdometry::MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& step) {
   if (config_.scale_source != ScaleSource::kBest) return;
-  fixes_.AddPose(stamp_ns, world_from_camera);
+  path_ = Renormalised(path_ * StretchedMonocularMotion(step, scale_.metres_per_unit()));
+  fixes_.AddPose(stamp_ns, path_);
   const auto measured = fixes_.Measure();
   if (!measured) return;
   const bool better_tells = source_ == MetresSource::kWheels || source_ == MetresSource::kReceiver;
-  if (better_tells) return;
-  scale_.Measure(measured->metres, measured->sigma_m, measured->units);
+  if (better_tells || !(measured->units > 0 && measured->metres > 0)) return;
+  const bool by_height = log_height_ && Seconds(now_ns_ - height_told_ns_) <= config_.source_age_s;
+  if (by_height) {
+    const double relative = measured->sigma_m / measured->metres;
+    TeachHeight(std::log(measured->metres / measured->units),
+                relative * relative + kBaselineSigma * kBaselineSigma);
+    HasTold(MetresSource::kFixes, std::sqrt(height_variance_));
+    return;
+  }
+  scale_.Measure(measured->metres, measured->sigma_m, measured->units / scale_.metres_per_unit());
   HasTold(MetresSource::kFixes, 0);
 }
 

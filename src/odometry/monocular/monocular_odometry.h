@@ -66,6 +66,9 @@ class MonocularOdometry {
     /// Without a thread, but handed over so many frames later: a run that can be repeated; 0: at
     /// once.
     int keyframe_delay = 0;
+    /// A keyframe that is not ready after this time is waited for, s: frames that go on by the one
+    /// before see too little of it, and their path runs away.
+    double longest_keyframe_s = 0.35;
     /// Without a motion at the start, and lost: the two-view start begins anew after this, s.
     double give_up_s = 1.0;
     Config();
@@ -113,8 +116,9 @@ class MonocularOdometry {
   void ForgetWay();
   void FillGapOfStart(double elapsed_s);
   void MeasureScale(const Eigen::Isometry3d& world_from_camera);
-  void MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& world_from_camera);
+  void MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& step);
   void MeasureByHeight(double height_units);
+  void TeachHeight(double log_metres_error, double variance);
   void HasTold(MetresSource source, double shared_sigma);
   void ForgetOldSource();
   bool KnowsMetres() const;
@@ -142,6 +146,10 @@ class MonocularOdometry {
   std::int64_t told_ns_ = 0;          // Of the last frame for which source_ told metres.
   double shared_sigma_ = 0;           // Of source_: what no mean of it lessens, a share.
   std::optional<double> log_height_;  // Of the camera, as a better source has it, log m.
+  Eigen::Isometry3d path_ = Eigen::Isometry3d::Identity();  // For fixes_; metres once known.
+  double height_variance_ = 0;                              // Of log_height_ by fixes.
+  std::int64_t height_told_ns_ = 0;  // Of the last frame whose road told metres.
+  std::int64_t ordered_ns_ = 0;      // Of the keyframe in work.
   std::int64_t start_stamp_ns_ = 0;
   std::int64_t lost_since_ns_ = 0;
   std::optional<MonocularFrame> last_frame_;
