@@ -112,6 +112,8 @@ struct Streets {
   double sideways_mps2 = 2.2;  // In bends.
   std::vector<Lane> lanes;     // All that hazards lie on, the vehicle's own included.
   std::vector<Stop> stops;
+  std::vector<TrafficStreet> mapped;         // What a map has: middles of carriageways.
+  std::vector<Eigen::Vector2d> junctions_m;  // Where those meet.
 
   void AddLane(Line line, bool other_level = false) {
     lanes.push_back({std::move(line), other_level});
@@ -133,9 +135,15 @@ void GoOn(Streets& streets, SeededRandom& random, double length_m) {
   }
 }
 
-void AddOwnStreet(Streets& streets) {
+void AddOwnLanes(Streets& streets) {
   streets.AddLane(streets.way.line());
   streets.AddLane(streets.way.Beside(kLaneM));
+}
+
+/// The own street as one of the map, too.
+void AddOwnStreet(Streets& streets) {
+  AddOwnLanes(streets);
+  streets.mapped.push_back({streets.way.Beside(0.5 * kLaneM)});
 }
 
 /// A street across the way where the pen stands now, both lanes.
@@ -147,6 +155,10 @@ void AddAcross(Streets& streets, double angle_rad, double half_m, bool other_lev
   pen.Straight(2 * half_m);
   streets.AddLane(pen.Beside(0.5 * kLaneM), other_level);
   streets.AddLane(pen.Beside(-0.5 * kLaneM), other_level);
+  TrafficStreet across{pen.line()};
+  across.bridge = other_level;
+  streets.mapped.push_back(std::move(across));
+  if (!other_level) streets.junctions_m.push_back(middle_m);
 }
 
 Streets MakeParallelStreets(SeededRandom& random) {
@@ -155,6 +167,9 @@ Streets MakeParallelStreets(SeededRandom& random) {
   AddOwnStreet(streets);
   for (const double aside_m : {15.0, 15.0 + kLaneM, -15.0, -15.0 - kLaneM}) {
     streets.AddLane(streets.way.Beside(aside_m));
+  }
+  for (const double middle_m : {15.0 + 0.5 * kLaneM, -15.0 - 0.5 * kLaneM}) {
+    streets.mapped.push_back({streets.way.Beside(middle_m)});
   }
   return streets;
 }
@@ -170,6 +185,10 @@ Streets MakeOppositeCarriageways(SeededRandom& random) {
   const double median_m = Between(random, 9, 16);
   streets.AddLane(streets.way.Beside(median_m + kLaneM));
   streets.AddLane(streets.way.Beside(median_m + 2 * kLaneM));
+  Line opposite = streets.way.Beside(median_m + 1.5 * kLaneM);
+  std::reverse(opposite.begin(), opposite.end());
+  streets.mapped.back().one_way = true;
+  streets.mapped.push_back({std::move(opposite), true});
   return streets;
 }
 
@@ -205,37 +224,115 @@ Streets MakeCurves(SeededRandom& random) {
   return streets;
 }
 
+constexpr double kRoundaboutInto = 50 * kDegree;
+
 /// From where the pen is to the arm of a roundabout that leads `turn_rad` to the left: a bend into
 /// the ring, around it, out of it.
 void DriveRoundabout(Pen& pen, double turn_rad, double ring_m) {
-  constexpr double kInto = 50 * kDegree;
-  pen.Bend(-kInto, 15);
-  pen.Arc((turn_rad + 2 * kInto) * ring_m, 1 / ring_m, 1 / ring_m);
-  pen.Bend(-kInto, 15);
+  pen.Bend(-kRoundaboutInto, 15);
+  pen.Arc((turn_rad + 2 * kRoundaboutInto) * ring_m, 1 / ring_m, 1 / ring_m);
+  pen.Bend(-kRoundaboutInto, 15);
+}
+
+/// Points of a line from one to another, which comes after the last.
+Line PartOf(const Line& line, std::size_t from, std::size_t to) {
+  return {line.begin() + static_cast<std::ptrdiff_t>(from),
+          line.begin() + static_cast<std::ptrdiff_t>(to)};
+}
+
+constexpr std::array<double, 3> kRoundaboutArmsRad{-80 * kDegree, 0, 90 * kDegree};
+
+/// The middle of the street from one point of the pen to its end, after `start`.
+Line MiddleSince(const Pen& pen, std::size_t from, const Line& start) {
+  Line middle = start;
+  const Line rest = pen.Beside(0.5 * kLaneM, from);
+  middle.insert(middle.end(), rest.begin(), rest.end());
+  return middle;
+}
+
+/// The ring as a map has it, and how one comes into it from where the pen stood; the places of its
+/// exits.
+std::vector<Eigen::Vector2d> MapRing(Streets& streets, const Pen& before, double ring_m) {
+  Pen pen = before;
+  const Eigen::Vector2d gate_m = before.place_m() + 0.5 * kLaneM * before.Left();
+  pen.Bend(-kRoundaboutInto, 15);
+  Line entry{gate_m};
+  entry.insert(entry.end(), pen.line().begin(), pen.line().end());
+  Line ring{pen.place_m()};
+  std::vector<Eigen::Vector2d> exits_m;
+  streets.junctions_m.push_back(gate_m);
+  streets.junctions_m.push_back(pen.place_m());
+  double driven_rad = 0;
+  const auto drive_to = [&](double angle_rad) {
+    const std::size_t from = pen.size();
+    pen.Arc((angle_rad - driven_rad) * ring_m, 1 / ring_m, 1 / ring_m);
+    driven_rad = angle_rad;
+    ring.insert(ring.end(), pen.line().begin() + static_cast<std::ptrdiff_t>(from),
+                pen.line().end());
+  };
+  for (const double arm_rad : kRoundaboutArmsRad) {
+    drive_to(arm_rad + 2 * kRoundaboutInto);
+    exits_m.push_back(pen.place_m());
+    streets.junctions_m.push_back(pen.place_m());
+  }
+  drive_to(2 * M_PI);
+  streets.mapped.push_back({std::move(entry), true, 1});
+  streets.mapped.push_back({std::move(ring), true, 1, false, true});
+  return exits_m;
+}
+
+/// From the ring to the arm whose bend out of the ring the pen has drawn since `from`; the gate of
+/// the arm.
+Eigen::Vector2d MapExit(Streets& streets, const Eigen::Vector2d& exit_m, const Pen& pen,
+                        std::size_t from) {
+  const Eigen::Vector2d gate_m = pen.place_m() + 0.5 * kLaneM * pen.Left();
+  Line exit{exit_m};
+  // The ring's last points and the bend out of it.
+  const Line bend = PartOf(pen.line(), from, pen.size());
+  exit.insert(exit.end(), bend.begin(), bend.end());
+  exit.back() = gate_m;
+  streets.junctions_m.push_back(gate_m);
+  streets.mapped.push_back({std::move(exit), true, 1});
+  return gate_m;
+}
+
+/// Where the pen, which has driven the roundabout, began to bend out of the ring.
+std::size_t BeginOfExit(const Pen& pen) {
+  std::size_t at = pen.size();
+  while (at > 0 && pen.curvatures()[at - 1] <= 0) --at;
+  return at;
 }
 
 Streets MakeRoundabouts(SeededRandom& random) {
   Streets streets;
-  const std::array<double, 3> arms_rad{-80 * kDegree, 0, 90 * kDegree};
+  Line start;
+  std::size_t street_from = 0;  // Where the way's present street begins.
   while (streets.way.length_m() < 5000) {
     streets.way.Straight(Between(random, 150, 400));
     const double ring_m = Between(random, 12, 22);
     const auto taken = static_cast<std::size_t>(3 * random.Uniform());
     const Pen before = streets.way.Branch();
-    for (std::size_t arm = 0; arm < arms_rad.size(); ++arm) {
+    streets.mapped.push_back({MiddleSince(streets.way, street_from, start)});
+    const std::vector<Eigen::Vector2d> exits_m = MapRing(streets, before, ring_m);
+    for (std::size_t arm = 0; arm < kRoundaboutArmsRad.size(); ++arm) {
       Pen pen = before;
       if (arm == taken) continue;
-      DriveRoundabout(pen, arms_rad[arm], ring_m);
+      DriveRoundabout(pen, kRoundaboutArmsRad[arm], ring_m);
+      const Eigen::Vector2d gate_m = MapExit(streets, exits_m[arm], pen, BeginOfExit(pen));
       const std::size_t from = pen.size();
       pen.Straight(200);
-      streets.AddLane(
-          Line(pen.line().begin() + static_cast<std::ptrdiff_t>(from), pen.line().end()));
+      streets.AddLane(PartOf(pen.line(), from, pen.size()));
       streets.AddLane(pen.Beside(kLaneM, from));
+      streets.mapped.push_back({MiddleSince(pen, from, {gate_m})});
     }
-    DriveRoundabout(streets.way, arms_rad[taken], ring_m);
+    DriveRoundabout(streets.way, kRoundaboutArmsRad[taken], ring_m);
+    const std::size_t exit_from = BeginOfExit(streets.way);
+    start = {MapExit(streets, exits_m[taken], streets.way, exit_from)};
+    street_from = streets.way.size();
   }
   streets.way.Straight(150);
-  AddOwnStreet(streets);
+  streets.mapped.push_back({MiddleSince(streets.way, street_from, start)});
+  AddOwnLanes(streets);
   return streets;
 }
 
@@ -248,25 +345,39 @@ void TurnAtJunction(Pen& pen, double turn_rad) {
 }
 
 Streets MakeTurns(SeededRandom& random) {
+  constexpr double kToMiddleM = 13;  // Of the junction, from where turns begin.
   Streets streets;
   const std::array<double, 3> turns_rad{0, 90 * kDegree, -90 * kDegree};
+  Line start;
+  std::size_t street_from = 0;  // Where the way's present street begins.
   while (streets.way.length_m() < 4000) {
     GoOn(streets, random, Between(random, 80, 250));
     const double draw = random.Uniform();
     const std::size_t taken = draw < 0.5 ? 0 : draw < 0.75 ? 1 : 2;
     const Pen before = streets.way.Branch();
+    const Eigen::Vector2d middle_m =
+        before.place_m() + kToMiddleM * before.Ahead() + 0.5 * kLaneM * before.Left();
+    streets.junctions_m.push_back(middle_m);
+    Line until = MiddleSince(streets.way, street_from, start);
+    until.push_back(middle_m);
+    streets.mapped.push_back({std::move(until)});
     for (std::size_t turn = 0; turn < turns_rad.size(); ++turn) {
       if (turn == taken) continue;
       Pen pen = before;
       TurnAtJunction(pen, turns_rad[turn]);
+      const std::size_t from = pen.size();
       pen.Straight(200);
       streets.AddLane(pen.line());
       streets.AddLane(pen.Beside(kLaneM));
+      streets.mapped.push_back({MiddleSince(pen, from, {middle_m})});
     }
     TurnAtJunction(streets.way, turns_rad[taken]);
+    start = {middle_m};
+    street_from = streets.way.size();
   }
   streets.way.Straight(100);
-  AddOwnStreet(streets);
+  streets.mapped.push_back({MiddleSince(streets.way, street_from, start)});
+  AddOwnLanes(streets);
   return streets;
 }
 
@@ -403,6 +514,8 @@ TrafficDrive MakeTrafficDrive(const std::string& scenario, double per_km, std::u
   drive.way_m = streets.way.line();
   drive.moments = DriveAlong(streets, random);
   drive.hazards = ScatterHazards(streets, per_km, random);
+  drive.streets = streets.mapped;
+  drive.junctions_m = streets.junctions_m;
   return drive;
 }
 

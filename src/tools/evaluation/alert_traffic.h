@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "tools/evaluation/alert_streets.h"
+
 namespace livemap::tools {
 
 /// A hazard of simulated traffic, where it truly lies.
@@ -28,6 +30,8 @@ struct TrafficDrive {
   std::vector<Eigen::Vector2d> way_m;  ///< The middle of its lane, a point every metre.
   std::vector<TrafficMoment> moments;  ///< One every kTrafficStepS.
   std::vector<TrafficHazard> hazards;
+  std::vector<TrafficStreet> streets;        ///< As a map of them would have them.
+  std::vector<Eigen::Vector2d> junctions_m;  ///< Where they meet; a bridge meets nothing.
 };
 
 constexpr double kTrafficStepS = 0.1;

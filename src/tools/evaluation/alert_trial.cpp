@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -57,7 +58,7 @@ class AlertRun {
       : drive_(drive),
         trial_(trial),
         frame_({kDatumLatitude, kDatumLongitude}),
-        alerts_(config, catalogue) {
+        alerts_(config, catalogue, MapOf(drive, trial)) {
     datasets::SeededRandom random(trial.seed * 7919 + 1);
     for (std::size_t i = 0; i < drive.hazards.size(); ++i) {
       const Eigen::Vector2d told_m =
@@ -91,6 +92,13 @@ class AlertRun {
   }
 
  private:
+  std::shared_ptr<const streets::StreetMap> MapOf(const TrafficDrive& drive,
+                                                  const AlertTrial& trial) const {
+    if (!trial.streets) return nullptr;
+    return DrawStreetMap(drive.streets, drive.junctions_m, frame_, trial.map_errors,
+                         trial.seed * 7919 + 3);
+  }
+
   void Note(const vehicle::HazardAlert& alert, double time_s) {
     const std::size_t hazard = IndexOfHazard(alert.id);
     if (alert.state == vehicle::HazardAlert::State::kApproach) {

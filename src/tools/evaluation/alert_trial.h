@@ -8,6 +8,7 @@
 
 #include "datasets/sensors/gnss_receiver_model.h"
 #include "protocol/hazard_catalogue.h"
+#include "tools/evaluation/alert_streets.h"
 #include "tools/evaluation/alert_traffic.h"
 #include "vehicle/alerts/driver_alerts.h"
 
@@ -21,6 +22,8 @@ struct AlertTrial {
   double latency_s = 0.1;    ///< From a fix's stamp until the vehicle has it.
   double place_sigma_m = 1;  ///< Of the hazards on the zone's map, per axis; the zone tells it.
   std::uint64_t seed = 1;
+  bool streets = false;  ///< The vehicle has a map of the streets, with these errors.
+  StreetMapErrors map_errors;
 };
 
 /// docs/reference/measures.md defines the figures.

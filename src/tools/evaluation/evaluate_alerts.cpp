@@ -37,6 +37,41 @@ std::vector<std::string> ChosenScenarios(const std::string& text) {
   return chosen;
 }
 
+/// Figures of all drives and of each scenario.
+struct TrafficFigures {
+  AlertFigures all;
+  std::map<std::string, AlertFigures> by_scenario;
+
+  void Add(const std::string& scenario, const AlertFigures& figures) {
+    by_scenario[scenario].Add(figures);
+    all.Add(figures);
+  }
+};
+
+nlohmann::ordered_json ToJson(const TrafficFigures& figures,
+                              const std::vector<std::string>& scenarios) {
+  nlohmann::ordered_json json = ToJson(figures.all);
+  for (const std::string& scenario : scenarios) {
+    json["scenarios"][scenario] = ToJson(figures.by_scenario.at(scenario));
+  }
+  return json;
+}
+
+void PrintTable(const TrafficFigures& figures, const std::vector<std::string>& scenarios) {
+  std::cout << HeadOfAlertTable();
+  for (const std::string& scenario : scenarios) {
+    std::cout << ToRow(scenario, figures.by_scenario.at(scenario));
+  }
+  std::cout << ToRow("all", figures.all);
+}
+
+/// With a map of the streets, without, or both, one after the other.
+std::vector<bool> ChosenStreets(const std::string& text) {
+  if (text == "both") return {false, true};
+  if (text == "true" || text == "false") return {text == "true"};
+  throw Error("--streets is '" + text + "', accepted are both, true and false");
+}
+
 int EvaluateAlerts(int argc, char** argv) {
   CommandLine line(
       "livemap_evaluate_alerts [FLAGS]",
@@ -52,14 +87,18 @@ int EvaluateAlerts(int argc, char** argv) {
         "commas; default all"},
        {"drives", "N", "per scenario, default 20"},
        {"seed", "N", "of the first drive, default 2; the others follow in steps of 2"},
+       {"streets", "WORD",
+        "true: the vehicle has a map of the streets; false: it has not; default both"},
        {"per-km", "X", "hazards per kilometre of lane, default 1"},
        {"fixes-per-s", "X", "of the receiver, default 5; 1 to 10"},
        {"fix-noise-m", "X", "new at every fix, standard deviation per axis, m, default 0.4"},
        {"fix-bias-m", "X", "slow error of the fixes, the same, m, default 1.5"},
        {"place-sigma-m", "X", "of the hazards on the zone's map, the same, m, default 1"},
+       {"absent", "X", "share of the streets that the map does not have, default 0.02"},
        {"hazards", "FILE", "catalogue of hazard classes; default: every class has rank 2"}});
   if (!line.Parse(argc, argv)) return 0;
   const std::vector<std::string> scenarios = ChosenScenarios(line.Text("scenario", ""));
+  const std::vector<bool> with_streets = ChosenStreets(line.Text("streets", "both"));
   const int drives = line.Whole("drives", 20, 1, 100000);
   const std::uint64_t seed = line.Seed("seed", 2);
   const double per_km = line.Number("per-km", 1, 0.001, 100);
@@ -68,40 +107,39 @@ int EvaluateAlerts(int argc, char** argv) {
   trial.receiver.white_sigma_m = line.Number("fix-noise-m", trial.receiver.white_sigma_m, 0, 100);
   trial.receiver.bias_sigma_m = line.Number("fix-bias-m", trial.receiver.bias_sigma_m, 0, 100);
   trial.place_sigma_m = line.Number("place-sigma-m", trial.place_sigma_m, 0, 100);
+  trial.map_errors.absent_share = line.Number("absent", trial.map_errors.absent_share, 0, 1);
   const std::string hazards = line.Text("hazards", "");
   const protocol::HazardCatalogue catalogue =
       hazards.empty() ? protocol::HazardCatalogue() : protocol::HazardCatalogue::Load(hazards);
 
   Progress progress("drives", scenarios.size() * static_cast<std::size_t>(drives));
-  std::map<std::string, AlertFigures> by_scenario;
-  AlertFigures all;
+  std::map<bool, TrafficFigures> measured;
   std::size_t done = 0;
   for (const std::string& scenario : scenarios) {
     for (int i = 0; i < drives; ++i) {
       trial.seed = seed + 2 * static_cast<std::uint64_t>(i);
       const TrafficDrive drive = MakeTrafficDrive(scenario, per_km, trial.seed);
-      const AlertFigures figures =
-          TryAlerts(drive, trial, vehicle::DriverAlerts::Config(), catalogue);
-      by_scenario[scenario].Add(figures);
-      all.Add(figures);
+      for (const bool streets : with_streets) {
+        trial.streets = streets;
+        measured[streets].Add(scenario,
+                              TryAlerts(drive, trial, vehicle::DriverAlerts::Config(), catalogue));
+      }
       progress.At(++done);
     }
   }
-  const bool nothing = all.on_way == 0;
+  const bool nothing = measured.begin()->second.all.on_way == 0;
   const std::string why = "no hazard lies on the way of any drive: more --drives or --per-km";
   if (line.Has("json")) {
-    nlohmann::ordered_json json = ToJson(all);
-    for (const std::string& scenario : scenarios) {
-      json["scenarios"][scenario] = ToJson(by_scenario[scenario]);
-    }
+    nlohmann::ordered_json json;
+    if (measured.count(false) > 0) json = ToJson(measured[false], scenarios);
+    if (measured.count(true) > 0) json["with_streets"] = ToJson(measured[true], scenarios);
     if (nothing) json["reason"] = why;
     std::cout << json.dump() << "\n";
   } else {
-    std::cout << HeadOfAlertTable();
-    for (const std::string& scenario : scenarios) {
-      std::cout << ToRow(scenario, by_scenario[scenario]);
+    for (const auto& [streets, figures] : measured) {
+      std::cout << (streets ? "with a map of the streets\n" : "by the course alone\n");
+      PrintTable(figures, scenarios);
     }
-    std::cout << ToRow("all", all);
   }
   if (!nothing) return 0;
   SayNothingMeasured("livemap_evaluate_alerts", why);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "common/error.h"
 #include "common/time.h"
@@ -28,7 +29,8 @@ void CheckPositive(const char* name, double value) {
 
 }  // namespace
 
-DriverAlerts::DriverAlerts(const Config& config, const protocol::HazardCatalogue& catalogue)
+DriverAlerts::DriverAlerts(const Config& config, const protocol::HazardCatalogue& catalogue,
+                           std::shared_ptr<const streets::StreetMap> map)
     : config_(config),
       catalogue_(catalogue),
       filter_(config.course),
@@ -39,6 +41,7 @@ DriverAlerts::DriverAlerts(const Config& config, const protocol::HazardCatalogue
   CheckPositive("step of the way in metres", config.way.step_m);
   CheckPositive("spacing of bends in metres", config.way.bend_spacing_m);
   CheckPositive("noise of a fix in metres", config.course.fix_noise_m);
+  if (map) street_way_.emplace(std::move(map), config.streets);
 }
 
 bool DriverAlerts::Put(const AlertHazard& hazard) {
@@ -96,6 +99,7 @@ std::vector<HazardAlert> DriverAlerts::StartAnew() {
   std::vector<HazardAlert> told;
   ForgetFar({}, told);
   filter_.Reset();
+  if (street_way_) street_way_->Reset();
   frame_.reset();
   newest_ns_.reset();
   std::sort(told.begin(), told.end(), IsWorse);
@@ -140,6 +144,24 @@ bool DriverAlerts::OnOtherLevel(const AlertHazard& hazard, std::optional<double>
          std::abs(*hazard.altitude_m - *altitude_m) > config_.max_altitude_difference_m;
 }
 
+/// By the streets as far as they are known and driven, else by the course.
+WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& known,
+                                            double fix_variance_m2) const {
+  const double sigma_m = known.hazard.sigma_m > 0 ? known.hazard.sigma_m : config_.default_sigma_m;
+  const Eigen::Vector2d place_m = frame_->ToEnu(known.hazard.position);
+  WayAhead::Relation relation = way.RelationOf(place_m, sigma_m * sigma_m + fix_variance_m2);
+  if (!street_way_) return relation;
+  const StreetWay::Relation street = street_way_->RelationOf(place_m, sigma_m * sigma_m);
+  const double by_course = street.unknown * relation.probability;
+  if (street.ahead && street.probability >= by_course) {
+    relation.ahead = true;
+    relation.way_m = street.way_m;
+    relation.left_m = street.left_m;
+  }
+  relation.probability = street.probability + by_course;
+  return relation;
+}
+
 std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::TrackPose& pose,
                                            bool course_is_measured,
                                            std::optional<double> altitude_m) {
@@ -165,12 +187,14 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
   ++counters_.positions;
   const double time_s = newest_ns_ ? Seconds(stamp_ns - *newest_ns_) : 0;
   newest_ns_ = stamp_ns;
+  if (street_way_) street_way_->Add(pose.position, sigma_m, filter_);
   if (!filter_.known()) return told;
 
   const double speed = filter_.state()[CourseFilter::kSpeed];
   const double longest_s = LeadS(1, speed) + filter_.period_s();
   const double reach_m = std::min(config_.max_reach_m, 1.3 * ReachM(longest_s) + 20);
   const WayAhead way(config_.way, filter_, reach_m);
+  if (street_way_) street_way_->LookAhead(*frame_, filter_, reach_m);
   const double radius_m = std::max(reach_m, config_.forget_beyond_m);
   std::unordered_set<std::uint64_t> seen;
   for (const auto& neighbour : grid_.Within(pose.position, radius_m)) {
@@ -181,10 +205,7 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
       if (near_.size() >= config_.max_near) continue;
       near = near_.emplace(neighbour.id, Near{}).first;
     }
-    const double hazard_sigma_m =
-        known.hazard.sigma_m > 0 ? known.hazard.sigma_m : config_.default_sigma_m;
-    WayAhead::Relation relation = way.RelationOf(
-        frame_->ToEnu(known.hazard.position), hazard_sigma_m * hazard_sigma_m + sigma_m * sigma_m);
+    WayAhead::Relation relation = RelationOf(way, known, sigma_m * sigma_m);
     if (OnOtherLevel(known.hazard, altitude_m)) relation.probability = 0;
     Judge(known, relation, time_s, near->second, told);
   }
@@ -219,7 +240,10 @@ bool DriverAlerts::IsDue(const Near& near) const {
   const double max_sigma = config_.max_course_sigma_rad;
   if (speed < config_.min_speed_mps || course_variance > max_sigma * max_sigma) return false;
   if (std::min(near.alert.probability, *near.likely) < config_.alert_above) return false;
-  return near.alert.distance_m <= ReachM(LeadS(near.alert.urgency, speed) + filter_.period_s());
+  const double lead_s = LeadS(near.alert.urgency, speed);
+  const bool unsure = street_way_ && near.alert.probability < config_.sure_above;
+  const double told_s = unsure ? std::min(lead_s, config_.unsure_lead_s) : lead_s;
+  return near.alert.distance_m <= ReachM(told_s + filter_.period_s());
 }
 
 void DriverAlerts::Judge(const Known& known, const WayAhead::Relation& relation, double time_s,

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -14,7 +15,9 @@
 #include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
 #include "protocol/hazard_catalogue.h"
+#include "streets/street_map.h"
 #include "vehicle/alerts/course_filter.h"
+#include "vehicle/alerts/street_way.h"
 #include "vehicle/alerts/way_ahead.h"
 
 namespace livemap::vehicle {
@@ -49,9 +52,10 @@ struct HazardAlert {
 
 /// Says which hazards lie on the vehicle's own way, early enough and once per approach.
 ///
-/// The vehicle's streets are not known: the way is predicted by how the vehicle drives (WayAhead).
-/// Each hazard is far, approached, or done with: passed or cancelled, until it is left behind far
-/// enough. A vehicle that stands is told nothing new. Deterministic. Not thread-safe.
+/// The way is predicted by how the vehicle drives (WayAhead), and where the vehicle has a map of
+/// its streets and is on one of them, by their geometry (StreetWay). Each hazard is far,
+/// approached, or done with: passed or cancelled, until it is left behind far enough. A vehicle
+/// that stands is told nothing new. Deterministic. Not thread-safe.
 ///
 /// Typical usage: Put and Remove as the map changes, Add for every position; what Add and Remove
 /// return goes to the driver in that order.
@@ -77,8 +81,13 @@ class DriverAlerts {
     double max_altitude_difference_m = 4;  ///< Beyond it, it is on another level.
     std::size_t max_hazards = 100000;      ///< Kept; beyond it new ones are refused.
     std::size_t max_near = 1000;           ///< Followed at the same time.
+    /// On streets of a map: with a probability of less than sure_above, which may be because of a
+    /// junction, the driver is told only so long before, s, when more is known.
+    double unsure_lead_s = 4.3;
+    double sure_above = 0.8;
     CourseFilter::Config course;
     WayAhead::Config way;
+    StreetWay::Config streets;
   };
 
   struct Counters {
@@ -91,8 +100,9 @@ class DriverAlerts {
     std::uint64_t cancelled = 0;
   };
 
-  /// Throws Error for a config that cannot be.
-  DriverAlerts(const Config& config, const protocol::HazardCatalogue& catalogue);
+  /// Throws Error for a config that cannot be. Without `map` the streets are not known.
+  DriverAlerts(const Config& config, const protocol::HazardCatalogue& catalogue,
+               std::shared_ptr<const streets::StreetMap> map = nullptr);
 
   /// Adds a hazard or replaces it. False when it is refused: no valid position, or too many.
   bool Put(const AlertHazard& hazard);
@@ -117,6 +127,8 @@ class DriverAlerts {
   std::size_t size() const { return numbers_.size(); }
   const Counters& counters() const { return counters_; }
   const CourseFilter& course() const { return filter_; }
+  /// That the vehicle is on a street of its map; 0 without one.
+  double on_street() const { return street_way_ ? street_way_->on_street() : 0; }
 
  private:
   /// A hazard near the vehicle.
@@ -134,6 +146,8 @@ class DriverAlerts {
 
   void FollowVehicle(const geo::GeoPoint& position);
   double ReachM(double time_s) const;
+  WayAhead::Relation RelationOf(const WayAhead& way, const Known& known,
+                                double fix_variance_m2) const;
   bool OnOtherLevel(const AlertHazard& hazard, std::optional<double> altitude_m) const;
   bool IsDue(const Near& near) const;
   void Judge(const Known& known, const WayAhead::Relation& relation, double time_s, Near& near,
@@ -144,6 +158,7 @@ class DriverAlerts {
   Config config_;
   protocol::HazardCatalogue catalogue_;
   CourseFilter filter_;
+  std::optional<StreetWay> street_way_;  // With a map of streets.
   std::optional<geo::LocalFrame> frame_;
   std::optional<std::int64_t> newest_ns_;
   geo::SpatialGrid grid_;

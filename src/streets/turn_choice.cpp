@@ -1,0 +1,108 @@
+#include "streets/turn_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace livemap::streets {
+namespace {
+
+constexpr double kLeastShare = 0.03;     // Of what the angles say, whatever the speed tells.
+constexpr double kSlowShare = 0.65;      // Of the usual speed: clearly slower.
+constexpr double kStopsShare = 0.75;     // Of a turn's speed: slower than any turn needs.
+constexpr double kBendFromM = 20;        // So near the junction the course tells the side.
+constexpr double kSharpestRad = 2.6;     // Sharper turns are driven as this one.
+constexpr double kMinTurnDistanceM = 1;  // To the turn's beginning.
+
+double NormalShareBelow(double value) { return 0.5 * std::erfc(-value / std::sqrt(2)); }
+
+/// Radius and begin of a turn that is driven from one street into the other.
+struct Corner {
+  double speed_mps;
+  double begins_m;  // Before the node.
+};
+
+Corner CornerOf(const TurnConfig& config, double angle_rad) {
+  const double half = std::tan(0.5 * std::min(std::abs(angle_rad), kSharpestRad));
+  const double radius_m = std::clamp(config.corner_m / std::max(half, 0.01), 5.0, 200.0);
+  return {std::sqrt(config.sideways_mps2 * radius_m), std::min(radius_m * half, 12.0)};
+}
+
+/// Likelihood of the speed and its change, where the vehicle will go straight on.
+double SpeedStraight(const TurnConfig& config, const Approach& approach, double corner_mps) {
+  const bool brakes = approach.push_mps2 < -config.brakes_from_mps2;
+  // It stops: that tells nothing of where it drives afterwards.
+  if (approach.speed_mps < kStopsShare * corner_mps) return 1;
+  if (brakes) return config.brakes_without_turn;
+  const bool slow = approach.speed_mps < kSlowShare * approach.usual_mps;
+  const bool speeds_up = approach.push_mps2 > config.brakes_from_mps2;
+  return slow && !speeds_up ? config.slow_without_turn : 1;
+}
+
+double SpeedTurning(const TurnConfig& config, const Approach& approach, const Corner& corner) {
+  const double to_turn_m = std::max(kMinTurnDistanceM, approach.distance_m - corner.begins_m);
+  const double too_fast =
+      approach.speed_mps * approach.speed_mps - corner.speed_mps * corner.speed_mps;
+  if (approach.speed_mps < kStopsShare * corner.speed_mps) return 1;
+  const double needed_mps2 = too_fast / (2 * to_turn_m);
+  const double not_too_late =
+      1 - NormalShareBelow((needed_mps2 - config.braking_mps2 - 1) / config.braking_sigma_mps2);
+  if (approach.push_mps2 < -config.brakes_from_mps2) {
+    const double begins =
+        NormalShareBelow((needed_mps2 - 0.4 * config.braking_mps2) / config.braking_sigma_mps2);
+    // Near the turn all braking is done.
+    return not_too_late * (too_fast < 0 ? 0.5 : std::max(begins, 0.2));
+  }
+  const double later =
+      1 - NormalShareBelow((needed_mps2 - config.braking_mps2) / config.braking_sigma_mps2);
+  const bool speeds_up = approach.push_mps2 > config.brakes_from_mps2;
+  const bool near = approach.distance_m < 2 * corner.begins_m;
+  return later * (speeds_up && near && too_fast > 0 ? 0.3 : 1);
+}
+
+double DensityOf(double value, double sigma) {
+  return std::exp(-0.5 * value * value / (sigma * sigma)) / (std::sqrt(2 * M_PI) * sigma);
+}
+
+/// Likelihood of the course against the street's, near the junction.
+double BendLikelihood(const TurnConfig& config, const Approach& approach, double angle_rad) {
+  if (!approach.bend_known || approach.distance_m > kBendFromM) return 1;
+  const double straight = DensityOf(approach.bend_rad, config.bend_sigma_rad);
+  if (std::abs(angle_rad) < config.straight_rad) return straight + 0.02;
+  // Somewhere between not begun and done.
+  const double share = approach.bend_rad / angle_rad;
+  const double begun = share > 0 && share < 1.2 ? 1 / std::abs(angle_rad) : 0;
+  return 0.5 * straight + 0.5 * begun + 0.02;
+}
+
+}  // namespace
+
+std::vector<double> TurnProbabilities(const TurnConfig& config, const Approach& approach,
+                                      const std::vector<TurnOption>& options) {
+  std::vector<double> shares;
+  double slowest_mps = 100;
+  for (const TurnOption& option : options) {
+    slowest_mps = std::min(slowest_mps, CornerOf(config, option.angle_rad).speed_mps);
+  }
+  double sum = config.unknown_weight * BendLikelihood(config, approach, 0);
+  if (!approach.in_roundabout) sum *= SpeedStraight(config, approach, slowest_mps);
+  for (const TurnOption& option : options) {
+    const bool straight = std::abs(option.angle_rad) < config.straight_rad;
+    double share = straight ? config.straight_weight : config.turn_weight;
+    if (approach.in_roundabout) share = 1;
+    if (option.same_street && !approach.in_roundabout) share *= config.same_street_weight;
+    if (option.lesser) share *= config.lesser_weight;
+    if (!approach.in_roundabout) {
+      const double by_speed =
+          straight ? SpeedStraight(config, approach, slowest_mps)
+                   : SpeedTurning(config, approach, CornerOf(config, option.angle_rad));
+      share *= std::max(by_speed, kLeastShare);
+    }
+    share *= BendLikelihood(config, approach, option.angle_rad);
+    shares.push_back(share);
+    sum += share;
+  }
+  for (double& share : shares) share /= sum;
+  return shares;
+}
+
+}  // namespace livemap::streets

@@ -1,0 +1,168 @@
+#include "vehicle/alerts/street_way.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace livemap::vehicle {
+namespace {
+
+constexpr double kMaxWayM = 1000;
+constexpr double kParallelCosine = 0.8;  // Streets of the same level cross at more than this.
+
+double NormalBelow(double value) { return 0.5 * std::erfc(-value / std::sqrt(2)); }
+
+/// How a place lies to a straight piece.
+struct Beside {
+  double along_m;  // From its begin, not beyond its ends.
+  double off_m;    // To the nearest place of it.
+  double left_m;
+  bool before;  // It lies behind the begin.
+};
+
+Beside BesideOf(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m,
+                const Eigen::Vector2d& place_m) {
+  const double length_m = (to_m - from_m).norm();
+  const Eigen::Vector2d ahead =
+      length_m > 0 ? Eigen::Vector2d((to_m - from_m) / length_m) : Eigen::Vector2d(0, 1);
+  const Eigen::Vector2d off = place_m - from_m;
+  const double along_m = std::clamp(ahead.dot(off), 0.0, length_m);
+  const double left_m = ahead.x() * off.y() - ahead.y() * off.x();
+  return {along_m, (off - along_m * ahead).norm(), left_m, ahead.dot(off) < 0};
+}
+
+}  // namespace
+
+StreetWay::StreetWay(std::shared_ptr<const streets::StreetMap> map, const Config& config)
+    : map_(std::move(map)), config_(config), matcher_(map_, config.matcher) {}
+
+void StreetWay::Reset() {
+  matcher_.Reset();
+  usual_mps_ = 0;
+  last_.reset();
+  legs_.clear();
+  others_.clear();
+}
+
+void StreetWay::Add(const geo::GeoPoint& position, double sigma_m, const CourseFilter& filter) {
+  const double speed = filter.known() ? filter.state()[CourseFilter::kSpeed] : 0;
+  const double moved_m = last_ ? geo::GeodesicDistanceM(*last_, position) : 0;
+  last_ = position;
+  usual_mps_ = std::max(speed, usual_mps_ * std::exp(-moved_m / config_.usual_way_m));
+  streets::StreetMatcher::Position now;
+  now.place = position;
+  now.sigma_m = config_.matched_fraction * sigma_m;
+  now.speed_mps = speed;
+  if (filter.known()) {
+    const double variance = filter.covariance()(CourseFilter::kCourse, CourseFilter::kCourse);
+    now.course_rad = filter.state()[CourseFilter::kCourse];
+    now.course_sigma_rad = std::sqrt(std::max(0.0, variance));
+  }
+  matcher_.Add(now);
+}
+
+void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filter, double way_m) {
+  streets::Driving driving;
+  driving.speed_mps = filter.state()[CourseFilter::kSpeed];
+  driving.push_mps2 = filter.state()[CourseFilter::kAcceleration];
+  driving.usual_mps = usual_mps_;
+  driving.course_rad = filter.state()[CourseFilter::kCourse];
+  driving.course_known = filter.known();
+  const double reach_m = std::min(way_m, kMaxWayM);
+  const streets::WaysAhead ways(config_.ways, *map_, matcher_.matches(), frame, driving, reach_m);
+  legs_ = ways.legs();
+  others_.clear();
+  if (legs_.empty() || !last_) return;
+  for (const std::uint32_t segment : map_->SegmentsNear(*last_, reach_m)) {
+    if (ways.Touches(segment)) continue;
+    const streets::StreetMap::Segment& ends = map_->SegmentAt(segment);
+    const streets::Street& street = map_->StreetOf(segment);
+    others_.push_back({frame.ToEnu(map_->PlaceOf(ends.from)), frame.ToEnu(map_->PlaceOf(ends.to)),
+                       street.HalfWidthM(), street.layer});
+  }
+}
+
+/// Of a place so far off the middle of a carriageway, over which hazards are evenly spread.
+double StreetWay::Density(double off_m, double half_width_m, double variance_m2) const {
+  const double sigma_m = std::sqrt(variance_m2 + config_.map_sigma_m * config_.map_sigma_m);
+  return (NormalBelow((off_m + half_width_m) / sigma_m) -
+          NormalBelow((off_m - half_width_m) / sigma_m)) /
+         (2 * half_width_m);
+}
+
+std::vector<StreetWay::OtherNear> StreetWay::OthersNear(const Eigen::Vector2d& place_m,
+                                                        double variance_m2) const {
+  const double reach_m = 4 * std::sqrt(variance_m2 + config_.map_sigma_m * config_.map_sigma_m);
+  std::vector<OtherNear> near;
+  for (const Other& other : others_) {
+    const Beside beside = BesideOf(other.from_m, other.to_m, place_m);
+    if (beside.off_m > other.half_width_m + reach_m) continue;
+    near.push_back({other.to_m - other.from_m, other.layer,
+                    Density(beside.off_m, other.half_width_m, variance_m2)});
+  }
+  return near;
+}
+
+/// The densest of streets that the way does not meet: on another level, or beside it and denser
+/// than the way's own.
+double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own,
+                               const streets::Leg& leg) const {
+  const int layer = map_->StreetOf(leg.travel.segment).layer;
+  const Eigen::Vector2d ahead = (leg.to_m - leg.from_m).normalized();
+  double most = 0;
+  for (const OtherNear& other : others) {
+    const bool parallel = std::abs(ahead.dot(other.along)) > kParallelCosine * other.along.norm();
+    const bool counts = other.layer != layer || (parallel && other.density > own);
+    if (counts) most = std::max(most, other.density);
+  }
+  return most;
+}
+
+StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m,
+                                          double variance_m2) const {
+  struct Best {
+    double density = 0;
+    double way_m = 0;
+    double left_m = 0;
+    std::size_t leg = 0;
+  };
+  Relation relation;
+  double matched = 0;
+  double open = 0;
+  double chosen = 0;
+  std::vector<Best> best(legs_.size());
+  const std::vector<OtherNear> others = OthersNear(place_m, variance_m2);
+  for (std::size_t i = 0; i < legs_.size(); ++i) {
+    const streets::Leg& leg = legs_[i];
+    if (leg.before < 0) matched += leg.probability;
+    if (leg.before >= 0) best[i] = best[static_cast<std::size_t>(leg.before)];
+    const Beside beside = BesideOf(leg.from_m, leg.to_m, place_m);
+    const double way_m = leg.start_m + beside.along_m;
+    if (way_m > 0 && !(leg.before < 0 && beside.before)) {
+      const double half_m = map_->StreetOf(leg.travel.segment).HalfWidthM();
+      const double density = Density(beside.off_m, half_m, variance_m2);
+      if (density > best[i].density) best[i] = {density, way_m, beside.left_m, i};
+    }
+    if (leg.ends <= 0) continue;
+    double on_leg = 0;
+    if (best[i].density > 0.01 * config_.others_per_m) {
+      const double other = OtherDensity(others, best[i].density, legs_[best[i].leg]);
+      on_leg = best[i].density / (best[i].density + other + config_.others_per_m);
+    }
+    if (leg.open && on_leg < 0.5) {
+      open += leg.ends;
+      continue;
+    }
+    relation.probability += leg.ends * on_leg;
+    if (leg.ends * on_leg > chosen && on_leg > 0.1) {
+      chosen = leg.ends * on_leg;
+      relation.ahead = true;
+      relation.way_m = best[i].way_m;
+      relation.left_m = best[i].left_m;
+    }
+  }
+  relation.unknown = std::clamp(1 - matched + open, 0.0, 1.0);
+  return relation;
+}
+
+}  // namespace livemap::vehicle
