@@ -54,9 +54,9 @@ void AddCellsOf(const geo::GeoPoint& a, const geo::GeoPoint& b, std::vector<std:
   for (int i = 0; i < pieces; ++i) {
     const geo::GeoPoint p = at(i);
     const geo::GeoPoint q = at(i + 1);
-    const auto [row, last_row] = std::minmax(RowOf(p.latitude_deg), RowOf(q.latitude_deg));
+    const auto [row, last_row] = std::minmax({RowOf(p.latitude_deg), RowOf(q.latitude_deg)});
     const auto [column, last_column] =
-        std::minmax(ColumnOf(p.longitude_deg), ColumnOf(q.longitude_deg));
+        std::minmax({ColumnOf(p.longitude_deg), ColumnOf(q.longitude_deg)});
     for (std::int64_t r = row; r <= last_row; ++r) {
       for (std::int64_t c = column; c <= last_column; ++c) keys.push_back(KeyOf(r, c));
     }
