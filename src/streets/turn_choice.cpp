@@ -27,36 +27,41 @@ Corner CornerOf(const TurnConfig& config, double angle_rad) {
   return {std::sqrt(config.sideways_mps2 * radius_m), std::min(radius_m * half, 12.0)};
 }
 
+/// Share of braking vehicles among those whose acceleration is measured so, which is uncertain.
+double BrakingShare(const TurnConfig& config, double push_mps2) {
+  return NormalShareBelow((-push_mps2 - config.brakes_from_mps2) / config.push_sigma_mps2);
+}
+
 /// Likelihood of the speed and its change, where the vehicle will go straight on.
 double SpeedStraight(const TurnConfig& config, const Approach& approach, double corner_mps) {
-  const bool brakes = approach.push_mps2 < -config.brakes_from_mps2;
   // It stops: that tells nothing of where it drives afterwards.
   if (approach.speed_mps < kStopsShare * corner_mps) return 1;
-  if (brakes) return config.brakes_without_turn;
+  const double brakes = BrakingShare(config, approach.push_mps2);
+  const double speeds_up = BrakingShare(config, -approach.push_mps2);
   const bool slow = approach.speed_mps < kSlowShare * approach.usual_mps;
-  const bool speeds_up = approach.push_mps2 > config.brakes_from_mps2;
-  return slow && !speeds_up ? config.slow_without_turn : 1;
+  const double steady = slow ? config.slow_without_turn : 1;
+  return brakes * config.brakes_without_turn + speeds_up +
+         std::max(0.0, 1 - brakes - speeds_up) * steady;
 }
 
 double SpeedTurning(const TurnConfig& config, const Approach& approach, const Corner& corner) {
+  if (approach.speed_mps < kStopsShare * corner.speed_mps) return 1;
   const double to_turn_m = std::max(kMinTurnDistanceM, approach.distance_m - corner.begins_m);
   const double too_fast =
       approach.speed_mps * approach.speed_mps - corner.speed_mps * corner.speed_mps;
-  if (approach.speed_mps < kStopsShare * corner.speed_mps) return 1;
   const double needed_mps2 = too_fast / (2 * to_turn_m);
-  const double not_too_late =
-      1 - NormalShareBelow((needed_mps2 - config.braking_mps2 - 1) / config.braking_sigma_mps2);
-  if (approach.push_mps2 < -config.brakes_from_mps2) {
-    const double begins =
-        NormalShareBelow((needed_mps2 - 0.4 * config.braking_mps2) / config.braking_sigma_mps2);
-    // Near the turn all braking is done.
-    return not_too_late * (too_fast < 0 ? 0.5 : std::max(begins, 0.2));
-  }
-  const double later =
-      1 - NormalShareBelow((needed_mps2 - config.braking_mps2) / config.braking_sigma_mps2);
-  const bool speeds_up = approach.push_mps2 > config.brakes_from_mps2;
+  const auto share_above = [&](double mps2) {
+    return NormalShareBelow((mps2 - needed_mps2) / config.braking_sigma_mps2);
+  };
+  // Who brakes has begun when it was time; who does not will do so.
+  const double begun = std::max(1 - share_above(0.4 * config.braking_mps2), 0.2);
+  const double braking = share_above(config.braking_mps2 + 1) * (too_fast < 0 ? 0.5 : begun);
+  const double later = share_above(config.braking_mps2);
   const bool near = approach.distance_m < 2 * corner.begins_m;
-  return later * (speeds_up && near && too_fast > 0 ? 0.3 : 1);
+  const double speeding_up = later * (near && too_fast > 0 ? 0.3 : 1);
+  const double brakes = BrakingShare(config, approach.push_mps2);
+  const double speeds_up = BrakingShare(config, -approach.push_mps2);
+  return brakes * braking + speeds_up * speeding_up + std::max(0.0, 1 - brakes - speeds_up) * later;
 }
 
 double DensityOf(double value, double sigma) {

@@ -33,7 +33,8 @@ struct TurnConfig {
   double sideways_mps2 = 2.2;         ///< That drivers take in turns.
   double braking_mps2 = 2.1;          ///< How drivers brake before turns, mean...
   double braking_sigma_mps2 = 0.45;   ///< ...and standard deviation.
-  double brakes_from_mps2 = 0.8;      ///< From here on a vehicle brakes or speeds up.
+  double push_sigma_mps2 = 0.4;       ///< Of the measured acceleration.
+  double brakes_from_mps2 = 1.0;      ///< From here on a vehicle brakes or speeds up.
   double brakes_without_turn = 0.12;  ///< Share of those who go straight on and brake so.
   double slow_without_turn = 0.25;    ///< The same, who drive much more slowly than before.
   double bend_sigma_rad = 0.13;       ///< Of the course against the street's, straight on.

@@ -11,9 +11,10 @@ namespace {
 
 using DrawnLine = std::vector<Eigen::Vector2d>;
 
-constexpr double kBendM = 0.5;      // Nearer to the drawn line a point needs no node.
-constexpr double kSameM = 0.6;      // So near a point of a line is the junction.
-constexpr std::size_t kSpan = 100;  // Points between two nodes at most.
+constexpr double kBendM = 0.5;       // Nearer to the drawn line a point needs no node.
+constexpr double kSameM = 0.6;       // So near a point of a line is the junction.
+constexpr std::size_t kSpan = 100;   // Points between two nodes at most.
+constexpr std::size_t kPiece = 500;  // Points of a piece at most, about.
 
 double OffLineM(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                 const Eigen::Vector2d& place) {
@@ -59,10 +60,12 @@ class MapDrawer {
       const std::optional<std::int64_t> junction = JunctionNear(street.line_m, i);
       const bool last = i + 1 == street.line_m.size();
       // A junction right at the begin of a piece is that begin.
-      if (!last && (!junction || junction == before)) continue;
-      DrawPiece(street, begin, i, before, junction);
+      const bool cut = i - begin >= kPiece && street.line_m.size() - i > kPiece / 4;
+      if (!last && !cut && (!junction || junction == before)) continue;
+      const std::int64_t node = junction ? *junction : NewNode(street.line_m[i]);
+      DrawPiece(street, begin, i, before, node);
       begin = i;
-      before = junction;
+      before = node;
     }
   }
 
@@ -99,7 +102,7 @@ class MapDrawer {
   }
 
   void DrawPiece(const TrafficStreet& street, std::size_t first, std::size_t last,
-                 const std::optional<std::int64_t>& from, const std::optional<std::int64_t>& to) {
+                 const std::optional<std::int64_t>& from, std::int64_t to) {
     streets::Street drawn;
     drawn.id = ++ways_;
     drawn.backward = !street.one_way;
@@ -115,7 +118,7 @@ class MapDrawer {
     for (std::size_t i = first + 1; i < last; ++i) {
       if (marks[i]) nodes.push_back(NewNode(street.line_m[i]));
     }
-    nodes.push_back(to ? *to : NewNode(street.line_m[last]));
+    nodes.push_back(to);
     if (random_.Uniform() >= errors_.absent_share) builder_.AddStreet(drawn, "", nodes);
   }
 

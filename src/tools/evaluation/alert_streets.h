@@ -21,9 +21,10 @@ struct TrafficStreet {
 
 /// What a map of them gets wrong.
 struct StreetMapErrors {
-  double node_least_m = 1;      ///< Each node lies so far off, in any direction, at least...
-  double node_most_m = 2;       ///< ...and at most.
-  double absent_share = 0.02;   ///< Of the pieces of streets between junctions.
+  double node_least_m = 1;  ///< Each node lies so far off, in any direction, at least...
+  double node_most_m = 2;   ///< ...and at most.
+  double absent_share =
+      0.02;  ///< Of the pieces of streets: to the next junction, some 500 m at most.
   double no_lanes_share = 0.5;  ///< Of the pieces: their lanes are not told.
 };
 

@@ -146,7 +146,7 @@ bool DriverAlerts::OnOtherLevel(const AlertHazard& hazard, std::optional<double>
 
 /// By the streets as far as they are known and driven, else by the course.
 WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& known,
-                                            double fix_variance_m2) const {
+                                            double fix_variance_m2, Near& near) const {
   const double sigma_m = known.hazard.sigma_m > 0 ? known.hazard.sigma_m : config_.default_sigma_m;
   const Eigen::Vector2d place_m = frame_->ToEnu(known.hazard.position);
   WayAhead::Relation relation = way.RelationOf(place_m, sigma_m * sigma_m + fix_variance_m2);
@@ -159,6 +159,7 @@ WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& kn
     relation.left_m = street.left_m;
   }
   relation.probability = street.probability + by_course;
+  near.unsure = street.path > 0 && street.path < config_.sure_above;
   return relation;
 }
 
@@ -205,7 +206,7 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
       if (near_.size() >= config_.max_near) continue;
       near = near_.emplace(neighbour.id, Near{}).first;
     }
-    WayAhead::Relation relation = RelationOf(way, known, sigma_m * sigma_m);
+    WayAhead::Relation relation = RelationOf(way, known, sigma_m * sigma_m, near->second);
     if (OnOtherLevel(known.hazard, altitude_m)) relation.probability = 0;
     Judge(known, relation, time_s, near->second, told);
   }
@@ -241,8 +242,7 @@ bool DriverAlerts::IsDue(const Near& near) const {
   if (speed < config_.min_speed_mps || course_variance > max_sigma * max_sigma) return false;
   if (std::min(near.alert.probability, *near.likely) < config_.alert_above) return false;
   const double lead_s = LeadS(near.alert.urgency, speed);
-  const bool unsure = street_way_ && near.alert.probability < config_.sure_above;
-  const double told_s = unsure ? std::min(lead_s, config_.unsure_lead_s) : lead_s;
+  const double told_s = near.unsure ? std::min(lead_s, config_.unsure_lead_s) : lead_s;
   return near.alert.distance_m <= ReachM(told_s + filter_.period_s());
 }
 

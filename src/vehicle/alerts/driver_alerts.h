@@ -81,10 +81,11 @@ class DriverAlerts {
     double max_altitude_difference_m = 4;  ///< Beyond it, it is on another level.
     std::size_t max_hazards = 100000;      ///< Kept; beyond it new ones are refused.
     std::size_t max_near = 1000;           ///< Followed at the same time.
-    /// On streets of a map: with a probability of less than sure_above, which may be because of a
-    /// junction, the driver is told only so long before, s, when more is known.
-    double unsure_lead_s = 4.3;
-    double sure_above = 0.8;
+    /// On streets of a map: where the vehicle takes the way to a hazard with a probability of less
+    /// than sure_above, because of junctions, the driver is told only so long before, s, when more
+    /// is known.
+    double unsure_lead_s = 4.6;
+    double sure_above = 0.93;
     CourseFilter::Config course;
     WayAhead::Config way;
     StreetWay::Config streets;
@@ -136,6 +137,7 @@ class DriverAlerts {
     HazardAlert alert;
     bool told = false;
     std::optional<double> likely;  // Running mean of the probability.
+    bool unsure = false;           // Because of junctions.
     bool done = false;             // Passed or cancelled.
     double unlikely_s = 0;         // So long it has lain off the way.
   };
@@ -146,8 +148,8 @@ class DriverAlerts {
 
   void FollowVehicle(const geo::GeoPoint& position);
   double ReachM(double time_s) const;
-  WayAhead::Relation RelationOf(const WayAhead& way, const Known& known,
-                                double fix_variance_m2) const;
+  WayAhead::Relation RelationOf(const WayAhead& way, const Known& known, double fix_variance_m2,
+                                Near& near) const;
   bool OnOtherLevel(const AlertHazard& hazard, std::optional<double> altitude_m) const;
   bool IsDue(const Near& near) const;
   void Judge(const Known& known, const WayAhead::Relation& relation, double time_s, Near& near,

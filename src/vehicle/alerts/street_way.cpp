@@ -8,6 +8,7 @@ namespace livemap::vehicle {
 namespace {
 
 constexpr double kMaxWayM = 1000;
+constexpr double kMuchDenser = 3;        // A street's edge is half as dense as its middle.
 constexpr double kParallelCosine = 0.8;  // Streets of the same level cross at more than this.
 
 double NormalBelow(double value) { return 0.5 * std::erfc(-value / std::sqrt(2)); }
@@ -74,11 +75,10 @@ void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filt
   others_.clear();
   if (legs_.empty() || !last_) return;
   for (const std::uint32_t segment : map_->SegmentsNear(*last_, reach_m)) {
-    if (ways.Touches(segment)) continue;
     const streets::StreetMap::Segment& ends = map_->SegmentAt(segment);
     const streets::Street& street = map_->StreetOf(segment);
     others_.push_back({frame.ToEnu(map_->PlaceOf(ends.from)), frame.ToEnu(map_->PlaceOf(ends.to)),
-                       street.HalfWidthM(), street.layer});
+                       street.HalfWidthM(), street.layer, ways.Touches(segment)});
   }
 }
 
@@ -97,14 +97,15 @@ std::vector<StreetWay::OtherNear> StreetWay::OthersNear(const Eigen::Vector2d& p
   for (const Other& other : others_) {
     const Beside beside = BesideOf(other.from_m, other.to_m, place_m);
     if (beside.off_m > other.half_width_m + reach_m) continue;
-    near.push_back({other.to_m - other.from_m, other.layer,
+    near.push_back({other.to_m - other.from_m, other.layer, other.meets,
                     Density(beside.off_m, other.half_width_m, variance_m2)});
   }
   return near;
 }
 
-/// The densest of streets that the way does not meet: on another level, or beside it and denser
-/// than the way's own.
+/// The densest of the streets that count against the way's own: those on another level, those
+/// beside it without meeting it that are denser, and all that are much denser. Where streets meet,
+/// a place lies on both.
 double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own,
                                const streets::Leg& leg) const {
   const int layer = map_->StreetOf(leg.travel.segment).layer;
@@ -112,7 +113,9 @@ double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own,
   double most = 0;
   for (const OtherNear& other : others) {
     const bool parallel = std::abs(ahead.dot(other.along)) > kParallelCosine * other.along.norm();
-    const bool counts = other.layer != layer || (parallel && other.density > own);
+    const bool beside = parallel && !other.meets && other.density > own;
+    const bool counts =
+        (other.layer != layer && !other.meets) || beside || other.density > kMuchDenser * own;
     if (counts) most = std::max(most, other.density);
   }
   return most;
@@ -154,6 +157,7 @@ StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m,
       continue;
     }
     relation.probability += leg.ends * on_leg;
+    if (on_leg > 0.3) relation.path += leg.ends;
     if (leg.ends * on_leg > chosen && on_leg > 0.1) {
       chosen = leg.ends * on_leg;
       relation.ahead = true;
@@ -161,6 +165,7 @@ StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m,
       relation.left_m = best[i].left_m;
     }
   }
+  if (matched > 0) relation.path /= matched;
   relation.unknown = std::clamp(1 - matched + open, 0.0, 1.0);
   return relation;
 }

@@ -25,7 +25,7 @@ class StreetWay {
  public:
   struct Config {
     double map_sigma_m = 1.2;     ///< Of the map's lines, to the side, m.
-    double others_per_m = 0.01;   ///< Hazards that lie on no street of the map, as in WayAhead.
+    double others_per_m = 0.002;  ///< Hazards that lie on no street of the map, as in WayAhead.
     double usual_way_m = 400;     ///< Way over which the usual speed is forgotten, m.
     double matched_fraction = 1;  ///< Of the fix's stated sigma that the matcher believes.
     streets::StreetMatcher::Config matcher;
@@ -38,6 +38,7 @@ class StreetWay {
     double way_m = 0;        ///< Along that way.
     double left_m = 0;       ///< Of the middle of its carriageway.
     double probability = 0;  ///< That it lies on the vehicle's way and that way on the streets.
+    double path = 0;         ///< That the vehicle's way leads there at all.
     double unknown = 1;      ///< That the vehicle's way there does not follow the map.
   };
 
@@ -59,16 +60,18 @@ class StreetWay {
   const streets::StreetMatcher& matcher() const { return matcher_; }
 
  private:
-  /// A piece of a street that does not meet the way.
+  /// A piece of a street.
   struct Other {
     Eigen::Vector2d from_m, to_m;
     double half_width_m;
     int layer;
+    bool meets;  // The way, at a node.
   };
   /// One near a place, with the density that it has there.
   struct OtherNear {
     Eigen::Vector2d along;  // From its begin to its end.
     int layer;
+    bool meets;
     double density;
   };
 
@@ -83,7 +86,7 @@ class StreetWay {
   double usual_mps_ = 0;
   std::optional<geo::GeoPoint> last_;
   std::vector<streets::Leg> legs_;
-  std::vector<Other> others_;  // Streets near that do not meet a leg.
+  std::vector<Other> others_;  // All streets near, the way's own, too.
 };
 
 }  // namespace livemap::vehicle
