@@ -44,9 +44,6 @@ void CheckRouteLength(const datasets::Route& route, double needed_m);
 /// `--start-time`, default 2026-01-01T12:00:00Z.
 ros::Time ReadStartTime(const CommandLine& line);
 
-/// A camera_info without distortion, its stamp still zero.
-sensor_msgs::CameraInfo PinholeCameraInfo(const geo::CameraIntrinsics& intrinsics);
-
 /// The topics of a real vehicle, written in time order: camera/image_raw/compressed,
 /// camera/camera_info, fix, ground_truth/boxes, ground_truth/fix and tf_static.
 class DriveBag {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "datasets/image_file.h"
+#include "tools/bags/bag_messages.h"
 #include "tools/bags/bag_writer.h"
 #include "tools/bags/drive_bag.h"
 #include "tools/common/command_line.h"

@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "datasets/sensors/wheel_odometer_model.h"
+#include "tools/bags/bag_messages.h"
 #include "tools/bags/drive_bag.h"
 
 namespace livemap::tools {
