@@ -8,6 +8,7 @@
 #include "ros/parameters/candidate_intake_parameters.h"
 #include "ros/parameters/change_detection_parameters.h"
 #include "ros/parameters/driver_alert_parameters.h"
+#include "ros/parameters/driver_speech_parameters.h"
 #include "ros/parameters/early_discard_parameters.h"
 #include "ros/parameters/edge_vo_parameters.h"
 #include "ros/parameters/geo_localization_parameters.h"
@@ -34,6 +35,7 @@ const std::map<std::string, Reader>& Readers() {
       {"candidate_intake", [](P& p, const S&) { ReadCandidateIntakeConfig(p); }},
       {"change_detection", [](P& p, const S&) { ReadChangeDetectionConfig(p, kNowNs); }},
       {"driver_alert", [](P& p, const S&) { ReadDriverAlertConfig(p); }},
+      {"driver_speech", [](P& p, const S&) { ReadDriverSpeechConfig(p); }},
       {"early_discard", [](P& p, const S&) { ReadEarlyDiscardConfig(p, kNowNs); }},
       {"edge_vo", [](P& p, const S&) { ReadEdgeVoConfig(p); }},
       {"geo_localization", [](P& p, const S&) { ReadGeoLocalizationConfig(p); }},
@@ -109,6 +111,7 @@ const std::vector<NodeParameters>& AllNodeParameters() {
       {"candidate_intake", "candidate_intake", "candidate_intake_parameters.cpp", {}},
       {"change_detection", "change_detection", "change_detection_parameters.cpp", {}},
       {"driver_alert", "driver_alert", "driver_alert_parameters.cpp", {}},
+      {"driver_speech", "driver_speech", "driver_speech_parameters.cpp", {}},
       {"early_discard", "early_discard", "early_discard_parameters.cpp", {}},
       {"edge_vo", "edge_vo", "edge_vo_parameters.cpp", {}},
       {"geo_localization", "geo_localization", "geo_localization_parameters.cpp", {}},
