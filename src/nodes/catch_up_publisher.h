@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "nodes/notice_pictures.h"
-#include "zone/service/catch_up_planner.h"
+#include "zone/inbox/catch_up_planner.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::nodes {

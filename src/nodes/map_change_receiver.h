@@ -10,7 +10,7 @@
 
 #include "common/mutex.h"
 #include "protocol/map_change_report.h"
-#include "zone/service/zone_inbox.h"
+#include "zone/inbox/zone_inbox.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::nodes {

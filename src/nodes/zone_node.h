@@ -24,9 +24,9 @@
 #include "ros/conversions/zone_conversions.h"
 #include "ros/parameters/zone_cloudlet_parameters.h"
 #include "web/server/web_server.h"
+#include "zone/inbox/catch_up_planner.h"
+#include "zone/inbox/zone_inbox.h"
 #include "zone/registry/map_origin.h"
-#include "zone/service/catch_up_planner.h"
-#include "zone/service/zone_inbox.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::nodes {

@@ -6,7 +6,7 @@
 
 #include "ros/parameters/shared/parameter_reader.h"
 #include "web/http/web_config.h"
-#include "zone/service/catch_up_planner.h"
+#include "zone/inbox/catch_up_planner.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::ros_io {

@@ -88,6 +88,18 @@ struct MapChangeStatistics {
   std::uint64_t too_fast = 0;  ///< Of those, for the speed that their places would need.
   std::uint64_t not_now = 0;   ///< Beyond a vehicle's hourly cap: not answered, sent again later.
   std::array<std::size_t, kMapChangeStates> by_state{};  ///< Features, by MapChangeState.
+
+  /// Adds what became of some reports: all counts but `by_state`.
+  void Add(const MapChangeStatistics& reports) {
+    added += reports.added;
+    merged += reports.merged;
+    denied += reports.denied;
+    known += reports.known;
+    repeated += reports.repeated;
+    refused += reports.refused;
+    too_fast += reports.too_fast;
+    not_now += reports.not_now;
+  }
 };
 
 }  // namespace livemap::zone

@@ -5,7 +5,6 @@
 #include <thread>
 #include <utility>
 
-#include "common/clock.h"
 #include "common/error.h"
 #include "common/sqlite.h"
 #include "protocol/text_rules.h"
@@ -113,23 +112,11 @@ std::vector<protocol::Receipt> ZoneService::HandleBatch(
         reports_.Apply(batch, transaction);
       });
     }
-    CountReports(batch.counted);
+    statistics_.Add(batch.counted);
   }
   reports_.Close(batch, transaction.now_ns());
   FollowUp(transaction);
   return batch.TakeReceipts();
-}
-
-void ZoneService::CountReports(const ZoneStatistics& counted) {
-  statistics_.added += counted.added;
-  statistics_.merged += counted.merged;
-  statistics_.repeated += counted.repeated;
-  statistics_.refused += counted.refused;
-  statistics_.not_now += counted.not_now;
-  statistics_.of_unknown_class += counted.of_unknown_class;
-  for (std::size_t i = 0; i < kRefusalKinds; ++i) {
-    statistics_.refused_by_kind[i] += counted.refused_by_kind[i];
-  }
 }
 
 std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
@@ -146,23 +133,11 @@ std::vector<protocol::Receipt> ZoneService::HandleMapChanges(
         map_changes_.Apply(batch, transaction);
       });
     }
-    CountMapChanges(batch.counted);
+    statistics_.map_changes.Add(batch.counted);
   }
   places_.Keep(transaction.now_ns());
   FollowUp(transaction);
   return batch.TakeReceipts();
-}
-
-void ZoneService::CountMapChanges(const MapChangeStatistics& counted) {
-  MapChangeStatistics& all = statistics_.map_changes;
-  all.added += counted.added;
-  all.merged += counted.merged;
-  all.denied += counted.denied;
-  all.known += counted.known;
-  all.repeated += counted.repeated;
-  all.refused += counted.refused;
-  all.too_fast += counted.too_fast;
-  all.not_now += counted.not_now;
 }
 
 std::vector<protocol::Poll> ZoneService::TakeDuePolls() {
@@ -326,37 +301,13 @@ bool ZoneService::HasHeardOf(const std::string& vehicle_id) const {
   return !vehicles_.Track(vehicle_id).empty() || places_.HasHeardOf(vehicle_id);
 }
 
-/// As long as it lives no other decision about the vehicle is carried out: pieces of two would undo
-/// each other's.
-class ZoneService::VehicleClaim {
- public:
-  VehicleClaim(ZoneService& zone, const std::string& vehicle_id)
-      : zone_(zone), vehicle_id_(vehicle_id) {
-    const MutexLock lock(zone_.claims_mutex_);
-    if (!zone_.claimed_vehicles_.insert(vehicle_id_).second) {
-      throw DecisionConflict(
-          "another decision about this vehicle is being carried out; decide again when it is done");
-    }
-  }
-  ~VehicleClaim() {
-    const MutexLock lock(zone_.claims_mutex_);
-    zone_.claimed_vehicles_.erase(vehicle_id_);
-  }
-  VehicleClaim(const VehicleClaim&) = delete;
-  VehicleClaim& operator=(const VehicleClaim&) = delete;
-
- private:
-  ZoneService& zone_;
-  const std::string& vehicle_id_;
-};
-
 std::optional<std::size_t> ZoneService::Distrust(const std::string& vehicle_id,
                                                  const std::string& official,
                                                  const std::string& reason) {
   const std::string why = officials_.CheckedReason(official, reason);
   if (!protocol::IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
   const std::uint64_t vehicle = VehicleKey(vehicle_id);
-  const VehicleClaim claim(*this, vehicle_id);
+  const VehicleClaims::Claim claim(claims_, vehicle_id);
   OfficialActions::VehiclePiece piece;
   std::size_t withdrawn = 0;
   Slot next = 0;
@@ -390,7 +341,7 @@ std::optional<std::size_t> ZoneService::Trust(const std::string& vehicle_id,
                                               const std::string& reason) {
   const std::string why = officials_.CheckedReason(official, reason);
   if (!protocol::IsPrintableText(vehicle_id, config_.limits.max_text_bytes)) return std::nullopt;
-  const VehicleClaim claim(*this, vehicle_id);
+  const VehicleClaims::Claim claim(claims_, vehicle_id);
   OfficialActions::VehiclePiece piece;
   for (std::size_t restored = 0;; std::this_thread::sleep_for(kPause)) {
     const MutexLock writer(writer_mutex_);
@@ -489,30 +440,8 @@ std::vector<Hazard> ZoneService::ChangedAround(const geo::GeoPoint& centre, doub
 }
 
 std::optional<geo::GeoBox> ZoneService::View() const {
-  constexpr std::int64_t kShareOfTime = 100;
   if (config_.limits.zone) return config_.limits.zone;
-  MutexLock lock(view_mutex_);
-  while (is_making_view_ && !view_due_ns_) view_changed_.Wait(view_mutex_);
-  const std::int64_t begin_ns = SteadyNs();
-  if (is_making_view_ || (view_due_ns_ && begin_ns < *view_due_ns_)) return view_;
-  is_making_view_ = true;
-  lock.Unlock();
-  std::optional<geo::GeoBox> view;
-  try {
-    view = MakeView();
-  } catch (...) {
-    lock.Lock();
-    is_making_view_ = false;
-    view_changed_.NotifyAll();
-    throw;
-  }
-  lock.Lock();
-  view_ = view;
-  const std::int64_t end_ns = SteadyNs();
-  view_due_ns_ = end_ns + kShareOfTime * (end_ns - begin_ns);
-  is_making_view_ = false;
-  view_changed_.NotifyAll();
-  return view_;
+  return view_.Get([this] { return MakeView(); });
 }
 
 std::optional<geo::GeoBox> ZoneService::MakeView() const {

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -25,6 +24,7 @@
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/owned_directory.h"
 #include "zone/pictures/picture_allowance.h"
+#include "zone/registry/shared_view.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/ageing.h"
 #include "zone/service/event_stream.h"
@@ -33,6 +33,7 @@
 #include "zone/service/official_actions.h"
 #include "zone/service/poll_coordinator.h"
 #include "zone/service/report_intake.h"
+#include "zone/service/vehicle_claims.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
@@ -115,9 +116,7 @@ class ZoneService {
   std::vector<Hazard> ChangedAround(const geo::GeoPoint& centre, double radius_m,
                                     std::uint64_t since_sequence, std::size_t limit) const;
   /// What a map shows that is opened: the zone's bounds where they are set, else where most hazards
-  /// are (ViewOf); none while there is nothing. Computed anew for at most a hundredth of the time,
-  /// so it may be a little old. Only the one caller who computes it waits, and those who come
-  /// before there is any.
+  /// are (ViewOf); none while there is nothing. It may be a little old (SharedView).
   std::optional<geo::GeoBox> View() const;
   /// Also one that is gone or rejected.
   std::optional<Hazard> Find(const Uuid& uuid) const;
@@ -231,7 +230,6 @@ class ZoneService {
   void Schedule(Slot slot, std::int64_t now_ns) REQUIRES(writer_mutex_);
   void PublishVehicle(VehicleState vehicle) REQUIRES(telling_mutex_);
   void LetHazardsAge() REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
-  class VehicleClaim;
   template <typename Decide>
   std::optional<std::uint64_t> DecideHazard(const Decide& decide);
   std::optional<std::uint64_t> DecideMapChange(const Uuid& uuid, MapChangeState to,
@@ -239,8 +237,6 @@ class ZoneService {
                                                const std::string& reason);
   bool HasHeardOf(const std::string& vehicle_id) const REQUIRES(writer_mutex_);
   std::optional<geo::GeoBox> MakeView() const EXCLUDES(data_mutex_);
-  void CountReports(const ZoneStatistics& counted) REQUIRES(data_mutex_);
-  void CountMapChanges(const MapChangeStatistics& counted) REQUIRES(data_mutex_);
   void CountAnswer(bool accepted) EXCLUDES(data_mutex_);
 
   const ZoneConfig config_;
@@ -263,20 +259,9 @@ class ZoneService {
   std::atomic<std::uint64_t> sequence_{0};
   std::atomic<std::uint64_t> announced_{0};
 
-  /// Held for moments, with no other lock taken under it.
-  Mutex claims_mutex_;
-  /// Vehicles about which a decision is carried out, piece by piece.
-  std::set<std::string> claimed_vehicles_ GUARDED_BY(claims_mutex_);
-
-  /// For the view alone. Never held while one is made.
-  mutable Mutex view_mutex_;
-  mutable ConditionVariable view_changed_;
-  mutable std::optional<geo::GeoBox> view_ GUARDED_BY(view_mutex_);
-  /// Steady clock; none before the first view.
-  mutable std::optional<std::int64_t> view_due_ns_ GUARDED_BY(view_mutex_);
-  mutable bool is_making_view_ GUARDED_BY(view_mutex_) = false;
-
   // Thread-safe each by itself.
+  VehicleClaims claims_;
+  mutable SharedView view_;
   ImageStore images_;
   VehicleTable vehicles_;
   EventStream stream_;

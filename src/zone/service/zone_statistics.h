@@ -40,6 +40,19 @@ struct ZoneStatistics {
   std::size_t suspect_vehicles = 0;  ///< Too often contradicted: they do not count as vehicles.
   MapChangeStatistics map_changes;
   StoreDamage store_damage;  ///< What was found broken in the store at start.
+
+  /// Adds what became of some reports: all counts from `added` to `not_now`.
+  void Add(const ZoneStatistics& reports) {
+    added += reports.added;
+    merged += reports.merged;
+    repeated += reports.repeated;
+    refused += reports.refused;
+    not_now += reports.not_now;
+    of_unknown_class += reports.of_unknown_class;
+    for (std::size_t i = 0; i < kRefusalKinds; ++i) {
+      refused_by_kind.at(i) += reports.refused_by_kind.at(i);
+    }
+  }
 };
 
 }  // namespace livemap::zone

@@ -11,7 +11,7 @@
 #include "protocol/map_change_report.h"
 #include "protocol/poll.h"
 #include "protocol/report.h"
-#include "zone/service/catch_up_planner.h"
+#include "zone/inbox/catch_up_planner.h"
 
 namespace livemap::zone {
 

@@ -1,4 +1,4 @@
-#include "zone/service/catch_up_planner.h"
+#include "zone/inbox/catch_up_planner.h"
 
 #include <algorithm>
 

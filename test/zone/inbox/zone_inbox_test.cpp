@@ -1,4 +1,4 @@
-#include "zone/service/zone_inbox.h"
+#include "zone/inbox/zone_inbox.h"
 
 #include <gtest/gtest.h>
 
