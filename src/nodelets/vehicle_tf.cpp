@@ -7,7 +7,7 @@
 #include "common/error.h"
 #include "geo/datum.h"
 #include "nodelets/nodelet_support.h"
-#include "ros/conversions/localization_conversions.h"
+#include "ros/conversions/positioning/localization_conversions.h"
 
 namespace livemap::nodelets {
 namespace {

@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "common/error.h"
-#include "common/frame_queue.h"
 #include "common/mutex.h"
+#include "common/queues/frame_queue.h"
 #include "imaging/rectifier.h"
 #include "nodelets/camera_ingest/calibration_cache.h"
 #include "nodelets/camera_ingest/frame_processor.h"

@@ -9,8 +9,8 @@
 #include <thread>
 #include <vector>
 
-#include "common/frame_queue.h"
 #include "common/mutex.h"
+#include "common/queues/frame_queue.h"
 #include "imaging/stereo_depth.h"
 #include "nodelets/camera_ingest/calibration_cache.h"
 #include "nodelets/camera_ingest/frame_processor.h"

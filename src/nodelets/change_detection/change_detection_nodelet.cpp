@@ -14,8 +14,8 @@
 
 #include "change/objects/change_detector.h"
 #include "change/objects/change_overlay.h"
-#include "common/frame_queue.h"
 #include "common/mutex.h"
+#include "common/queues/frame_queue.h"
 #include "nodelets/change_detection/map_change_sender.h"
 #include "nodelets/change_detection/posed_frame_queue.h"
 #include "nodelets/diagnostics.h"

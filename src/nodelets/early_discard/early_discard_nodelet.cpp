@@ -10,8 +10,8 @@
 #include <string>
 #include <thread>
 
-#include "common/frame_queue.h"
 #include "common/mutex.h"
+#include "common/queues/frame_queue.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"

@@ -34,8 +34,8 @@
 #include "ros/conversions/camera_info_conversions.h"
 #include "ros/conversions/depth_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
-#include "ros/conversions/odometry_conversions.h"
-#include "ros/parameters/edge_vo_parameters.h"
+#include "ros/conversions/positioning/odometry_conversions.h"
+#include "ros/parameters/positioning/edge_vo_parameters.h"
 
 namespace livemap::nodelets {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "nodelets/diagnostics.h"
 #include "odometry/mounting/mounting_keeper.h"
-#include "ros/parameters/edge_vo_parameters.h"
+#include "ros/parameters/positioning/edge_vo_parameters.h"
 
 namespace livemap::nodelets {
 

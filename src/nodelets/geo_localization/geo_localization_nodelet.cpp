@@ -14,8 +14,8 @@
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/hazard_conversions.h"
-#include "ros/conversions/localization_conversions.h"
-#include "ros/parameters/geo_localization_parameters.h"
+#include "ros/conversions/positioning/localization_conversions.h"
+#include "ros/parameters/positioning/geo_localization_parameters.h"
 #include "ros/parameters/shared/datum_parameter.h"
 
 namespace livemap::nodelets {

@@ -16,8 +16,8 @@
 #include "nodelets/nodelet_support.h"
 #include "receiver/gpsd_client.h"
 #include "receiver/receiver_watch.h"
-#include "ros/conversions/receiver_conversions.h"
-#include "ros/parameters/gps_receiver_parameters.h"
+#include "ros/conversions/positioning/receiver_conversions.h"
+#include "ros/parameters/positioning/gps_receiver_parameters.h"
 
 namespace livemap::nodelets {
 namespace {

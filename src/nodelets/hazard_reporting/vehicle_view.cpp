@@ -11,7 +11,7 @@
 #include "nodelets/nodelet_support.h"
 #include "placement/hazard_placement.h"
 #include "ros/conversions/hazard_conversions.h"
-#include "ros/conversions/localization_conversions.h"
+#include "ros/conversions/positioning/localization_conversions.h"
 #include "ros/views/hazard_view.h"
 
 namespace livemap::nodelets {

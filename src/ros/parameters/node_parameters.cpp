@@ -10,12 +10,12 @@
 #include "ros/parameters/driver_alert_parameters.h"
 #include "ros/parameters/driver_speech_parameters.h"
 #include "ros/parameters/early_discard_parameters.h"
-#include "ros/parameters/edge_vo_parameters.h"
-#include "ros/parameters/geo_localization_parameters.h"
-#include "ros/parameters/gps_receiver_parameters.h"
 #include "ros/parameters/hazard_detection_parameters.h"
 #include "ros/parameters/hazard_reporting_parameters.h"
 #include "ros/parameters/mqtt_bridge_parameters.h"
+#include "ros/parameters/positioning/edge_vo_parameters.h"
+#include "ros/parameters/positioning/geo_localization_parameters.h"
+#include "ros/parameters/positioning/gps_receiver_parameters.h"
 #include "ros/parameters/zone_cloudlet_parameters.h"
 
 namespace livemap::ros_io {
@@ -113,9 +113,9 @@ const std::vector<NodeParameters>& AllNodeParameters() {
       {"driver_alert", "driver_alert", "driver_alert_parameters.cpp", {}},
       {"driver_speech", "driver_speech", "driver_speech_parameters.cpp", {}},
       {"early_discard", "early_discard", "early_discard_parameters.cpp", {}},
-      {"edge_vo", "edge_vo", "edge_vo_parameters.cpp", {}},
-      {"geo_localization", "geo_localization", "geo_localization_parameters.cpp", {}},
-      {"gps_receiver", "gps_receiver", "gps_receiver_parameters.cpp", {}},
+      {"edge_vo", "edge_vo", "positioning/edge_vo_parameters.cpp", {}},
+      {"geo_localization", "geo_localization", "positioning/geo_localization_parameters.cpp", {}},
+      {"gps_receiver", "gps_receiver", "positioning/gps_receiver_parameters.cpp", {}},
       {"hazard_detection", "hazard_detection", "hazard_detection_parameters.cpp", {}},
       {"hazard_reporting", "hazard_reporting", "hazard_reporting_parameters.cpp", {}},
       {"mqtt_bridge_vehicle", "mqtt_bridge", "mqtt_bridge_parameters.cpp", {{"role", "vehicle"}}},

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/token_bucket.h"
+#include "common/queues/token_bucket.h"
 #include "protocol/offloaded_frame.h"
 #include "vehicle/pictures/picture_order.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"

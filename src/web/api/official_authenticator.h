@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/mutex.h"
-#include "common/token_bucket.h"
+#include "common/queues/token_bucket.h"
 
 namespace livemap::web {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/mutex.h"
-#include "common/turns.h"
+#include "common/queues/turns.h"
 
 namespace livemap::web {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "common/token_bucket.h"
+#include "common/queues/token_bucket.h"
 
 namespace livemap::zone {
 

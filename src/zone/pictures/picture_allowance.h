@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/token_bucket.h"
+#include "common/queues/token_bucket.h"
 #include "zone/pictures/picture_recoder.h"
 
 namespace livemap::zone {

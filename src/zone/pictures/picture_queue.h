@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "common/mutex.h"
-#include "common/turns.h"
+#include "common/queues/turns.h"
 #include "zone/pictures/picture_cache.h"
 
 namespace livemap::zone {

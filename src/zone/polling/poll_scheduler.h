@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/token_bucket.h"
+#include "common/queues/token_bucket.h"
 #include "common/uuid.h"
 #include "geo/spatial_grid.h"
 #include "zone/belief/hazard_lifecycle.h"

@@ -10,8 +10,8 @@
 #include <sstream>
 
 #include "localization/localizer_config.h"
-#include "ros/parameters/geo_localization_parameters.h"
 #include "ros/parameters/node_parameters.h"
+#include "ros/parameters/positioning/geo_localization_parameters.h"
 
 namespace livemap::ros_io {
 namespace {

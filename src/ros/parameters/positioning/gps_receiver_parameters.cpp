@@ -1,4 +1,4 @@
-#include "ros/parameters/gps_receiver_parameters.h"
+#include "ros/parameters/positioning/gps_receiver_parameters.h"
 
 #include "common/error.h"
 #include "ros/parameters/shared/shared_parameters.h"

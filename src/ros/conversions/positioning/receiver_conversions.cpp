@@ -1,9 +1,9 @@
-#include "ros/conversions/receiver_conversions.h"
+#include "ros/conversions/positioning/receiver_conversions.h"
 
 #include <limits>
 
 #include "ros/conversions/hazard_conversions.h"
-#include "ros/conversions/odometry_conversions.h"
+#include "ros/conversions/positioning/odometry_conversions.h"
 
 namespace livemap::ros_io {
 namespace {

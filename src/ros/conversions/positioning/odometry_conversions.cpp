@@ -1,4 +1,4 @@
-#include "ros/conversions/odometry_conversions.h"
+#include "ros/conversions/positioning/odometry_conversions.h"
 
 #include <pcl/filters/voxel_grid.h>
 #include <pcl/point_cloud.h>

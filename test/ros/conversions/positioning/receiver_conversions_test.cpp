@@ -1,4 +1,4 @@
-#include "ros/conversions/receiver_conversions.h"
+#include "ros/conversions/positioning/receiver_conversions.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "common/turns.h"
+#include "common/queues/turns.h"
 
 #include <gtest/gtest.h>
 

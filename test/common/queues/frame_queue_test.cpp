@@ -1,4 +1,4 @@
-#include "common/frame_queue.h"
+#include "common/queues/frame_queue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "ros/parameters/edge_vo_parameters.h"
+#include "ros/parameters/positioning/edge_vo_parameters.h"
 
 #include "ros/parameters/shared/shared_parameters.h"
 

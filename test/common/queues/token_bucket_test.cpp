@@ -1,4 +1,4 @@
-#include "common/token_bucket.h"
+#include "common/queues/token_bucket.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "ros/conversions/localization_conversions.h"
+#include "ros/conversions/positioning/localization_conversions.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "ros/conversions/localization_conversions.h"
+#include "ros/conversions/positioning/localization_conversions.h"
 
 #include <tf2_eigen/tf2_eigen.h>
 
@@ -10,7 +10,7 @@
 #include "geo/datum.h"
 #include "localization/planar.h"
 #include "ros/conversions/hazard_conversions.h"
-#include "ros/conversions/odometry_conversions.h"
+#include "ros/conversions/positioning/odometry_conversions.h"
 
 namespace livemap::ros_io {
 namespace {

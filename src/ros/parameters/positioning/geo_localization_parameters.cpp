@@ -1,4 +1,4 @@
-#include "ros/parameters/geo_localization_parameters.h"
+#include "ros/parameters/positioning/geo_localization_parameters.h"
 
 #include "ros/parameters/shared/datum_parameter.h"
 #include "ros/parameters/shared/shared_parameters.h"

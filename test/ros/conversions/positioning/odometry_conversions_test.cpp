@@ -1,4 +1,4 @@
-#include "ros/conversions/odometry_conversions.h"
+#include "ros/conversions/positioning/odometry_conversions.h"
 
 #include <gtest/gtest.h>
 
