@@ -70,7 +70,8 @@ MonocularOdometry::MonocularOdometry(const Config& config, const geo::CameraIntr
       learner_(LearnerOfMonocular(config), intrinsics),
       start_(config.start, intrinsics),
       scale_(config.scale),
-      fixes_(config.fixes) {
+      fixes_(config.fixes),
+      travel_(config.travel) {
   if (config.keyframe_delay < 0 || config.keyframe_delay > 1000) {
     throw Error("keyframe_delay is " + std::to_string(config.keyframe_delay) +
                 "; 0 to 1000 is accepted");
@@ -87,6 +88,7 @@ void MonocularOdometry::Reset() {
   start_ = TwoViewStart(config_.start, camera_);
   scale_.Reset();
   fixes_.Reset();
+  travel_.Reset();
   learner_.Clear();
   started_ = lost_ = false;
   source_ = MetresSource::kNone;
@@ -257,6 +259,15 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
     return held;
   }
   lost_ = false;
+  if (Slides(last_unscaled_.inverse() * unscaled.world_from_camera)) {
+    lost_ = true;
+    lost_since_ns_ = frame.stamp_ns;
+    fixes_.Reset();
+    last_.state = VoState::kLost;
+    const VoResult held = Held(frame);
+    BeginStart(frame);
+    return held;
+  }
   MeasureScale(unscaled.world_from_camera);
   if (unscaled.keyframe_due) {
     unscaled.new_keyframe = MakeKeyframe(frame, unscaled) || unscaled.new_keyframe;
@@ -384,6 +395,12 @@ void MonocularOdometry::MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isome
   }
   scale_.Measure(measured->metres, measured->sigma_m, measured->units / scale_.metres_per_unit());
   HasTold(MetresSource::kFixes, 0);
+}
+
+/// Whether the path is none of a car.
+bool MonocularOdometry::Slides(const Eigen::Isometry3d& step) {
+  if (config_.scale_source != ScaleSource::kBest || !KnowsMetres()) return false;
+  return !travel_.Add(StretchedMonocularMotion(step, scale_.metres_per_unit()));
 }
 
 bool MonocularOdometry::KnowsMetres() const {

@@ -11,6 +11,7 @@
 #include "odometry/monocular/fix_baseline.h"
 #include "odometry/monocular/keyframe_worker.h"
 #include "odometry/monocular/metric_scale.h"
+#include "odometry/monocular/travel_direction.h"
 #include "odometry/monocular/two_view_start.h"
 #include "odometry/monocular/vehicle_speed.h"
 
@@ -58,6 +59,8 @@ class MonocularOdometry {
     /// for FixBaseline::Config::longest_s more.
     double source_age_s = 5.0;
     FixBaseline::Config fixes;
+    /// Of kBest, which is a car's: a path that slides is given up, and the start begins anew.
+    TravelDirection::Config travel;
     /// Keyframes that a new one's depths are measured against.
     int views_kept = 4;
     /// The depths of a keyframe, which take longer than many frames, are learnt beside the frames,
@@ -122,6 +125,7 @@ class MonocularOdometry {
   void HasTold(MetresSource source, double shared_sigma);
   void ForgetOldSource();
   bool KnowsMetres() const;
+  bool Slides(const Eigen::Isometry3d& step);
   VoResult InMetres(const MonocularFrame& frame, const VoResult& unscaled);
   VoResult WithoutMetres(const MonocularFrame& frame, const VoResult& unscaled);
 
@@ -132,6 +136,7 @@ class MonocularOdometry {
   TwoViewStart start_;
   MetricScale scale_;
   FixBaseline fixes_;
+  TravelDirection travel_;
 
   ImagePyramid start_images_;
   bool started_ = false;
