@@ -11,7 +11,7 @@ namespace livemap::ros_io {
 struct EdgeVoConfig {
   odometry::EdgeOdometry::Config odometry;
   std::string eye = "auto";  ///< "auto", "depth" or "mono".
-  double eye_wait_s = 2.0;   ///< Of auto: images without depth for so long mean that there is none.
+  double eye_wait_s = 0.5;   ///< Of auto: images without depth for so long mean that there is none.
   bool background_keyframes = true;  ///< Of one eye.
   std::string wheel_velocity_topic;  ///< Empty: none.
   double wheel_sigma_mps = 0.1;      ///< Where a message states none.
