@@ -1,0 +1,70 @@
+#!/usr/bin/python3
+"""livemap vehicle install and zone install write units that systemd takes, or nothing."""
+
+import getpass
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+class ServiceTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="livemap_service_")
+        self.addCleanup(folder.cleanup)
+        self.units = pathlib.Path(folder.name)
+
+    def install(self, kind, *arguments):
+        return subprocess.run([sys.executable, str(ROOT / "scripts/livemap_service"), kind, str(ROOT), "--units", str(self.units),
+                               "--user", getpass.getuser(), *arguments], capture_output=True, text=True, timeout=60)
+
+    def unit(self, kind):
+        return (self.units / f"livemap-{kind}.service").read_text(encoding="utf-8")
+
+    def assert_refused(self, done, *words):
+        self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1, "one sentence")
+        for word in words:
+            self.assertIn(word, done.stderr)
+        self.assertEqual(list(self.units.iterdir()), [])
+
+    def test_both_units_are_taken_by_systemd_start_at_boot_and_come_back(self):
+        for kind in ("vehicle", "zone"):
+            done = self.install(kind, "zone:=town")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            unit = self.unit(kind)
+            self.assertIn(f'ExecStart="{ROOT}/livemap" "{kind}" "zone:=town"\n', unit)
+            for line in ("Restart=always", "StartLimitIntervalSec=0", "WantedBy=multi-user.target"):
+                self.assertIn(line + "\n", unit)
+        checker = shutil.which("systemd-analyze")
+        if not checker:
+            self.skipTest("no systemd-analyze")
+        done = subprocess.run([checker, "verify", *map(str, self.units.glob("*.service"))], capture_output=True, text=True)
+        self.assertEqual((done.returncode, "livemap" in done.stderr), (0, False), done.stderr)
+
+    def test_values_reach_the_vehicle_as_they_are(self):
+        done = self.install("vehicle", 'hazard_reporting:={max_range_m: 15}', 'path:=/data/50% "off" $HOME\\x')
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(r'"hazard_reporting:={max_range_m: 15}" "path:=/data/50%% \"off\" $$HOME\\x"', self.unit("vehicle"))
+
+    def test_what_the_launch_file_does_not_take_is_refused(self):
+        self.assert_refused(self.install("vehicle", "camera:=front"), "camera:=front", "vehicle.launch")
+        self.assert_refused(self.install("vehicle", "front"), "'front'")
+        self.assert_refused(self.install("zone", "directory:=~/zone"), "~/zone", "whole path")
+        self.assert_refused(self.install("vehicle", "vehicle:=car\n[Service]\nUser=root"), "control character")
+        self.assert_refused(self.install("vehicle", "--user", "nobody-of-this-name"), "nobody-of-this-name")
+
+    def test_a_unit_is_removed_again(self):
+        self.assert_refused(self.install("zone", "--remove"), "livemap-zone.service")
+        self.install("zone")
+        done = self.install("zone", "--remove")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(list(self.units.iterdir()), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
