@@ -10,18 +10,24 @@ function(livemap_module name)
   target_link_libraries(livemap_${name} PUBLIC ${MODULE_DEPENDS} PRIVATE livemap_options)
 endfunction()
 
-# livemap_gtest(NAME SOURCES a_test.cpp ... DEPENDS target ...)
+# livemap_gtest(NAME SOURCES a_test.cpp ... [THREADED b_test.cpp ...] DEPENDS target ...)
 #
 # A GoogleTest program that ctest runs as NAME. Tests that want files of the source tree read
 # LIVEMAP_SOURCE_DIR; the ones that want the real drives read LIVEMAP_DATA_DIR (environment, else
-# ../shared/data beside the source tree) and say "skipped, no data" where it is absent.
+# ../shared/data beside the source tree) and say "skipped, no data" where it is absent. Sources named
+# by THREADED have several threads: ThreadSanitizer's build of the program has these alone, as the
+# others take minutes to compile and tell it nothing.
 if(LIVEMAP_DEVELOPMENT)
   find_package(GTest REQUIRED)
 endif()
 # All of them, without what they do not need.
 add_custom_target(livemap_gtests)
 function(livemap_gtest name)
-  cmake_parse_arguments(TEST "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(TEST "" "" "SOURCES;THREADED;DEPENDS" ${ARGN})
+  if(TEST_THREADED AND LIVEMAP_SANITIZE MATCHES "thread")
+    set(TEST_SOURCES)
+  endif()
+  list(APPEND TEST_SOURCES ${TEST_THREADED})
   list(TRANSFORM TEST_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/test/)
   if(NOT LIVEMAP_DEVELOPMENT)
     # Declared, for the properties that folders set on it; never built.
