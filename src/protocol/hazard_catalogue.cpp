@@ -118,6 +118,7 @@ void ReadHazardClassProperties(const YAML::Node& node, const std::string& place,
   reader.ReadText("icon", kName, entry.icon);
   reader.ReadText("colour", kHexColour, entry.colour);
   reader.ReadNumber("duplicate_radius_m", 0.1, 1000.0, entry.duplicate_radius_m);
+  reader.ReadNumber("half_depth_m", 0.0, 20.0, entry.half_depth_m);
   reader.ReadDigit("urgency", kUrgency, entry.urgency);
   reader.ReadNumber("expected_life_s", 60.0, 1e10, entry.expected_life_s);
   reader.ReadDigit("confirmations", kConfirmations, entry.confirmations);

@@ -13,11 +13,14 @@ struct HazardClass {
   std::string icon = "hazard";      ///< Name of the map's icon.
   std::string colour = "#d62728";   ///< "#rrggbb".
   double duplicate_radius_m = 5.0;  ///< Same class within this distance is the same hazard.
-  int urgency = 2;                  ///< Rank: 1 drivers must know at once, 2 soon, 3 can wait.
-  double expected_life_s = 86400;   ///< Prior of how long such a hazard stays.
-  int confirmations = 2;            ///< Distinct vehicles before drivers are told, 1 to 5.
-  double hit_rate = 0.85;           ///< P(a vehicle that looks sees it | it is there), 0.5 to 0.99.
-  double false_rate = 0.03;         ///< P(the same | it is not there), 0.001 to 0.4.
+  /// How far the middle of such a thing lies behind the edge of it that touches the road next to
+  /// the camera, m: boxes end at that edge.
+  double half_depth_m = 0;
+  int urgency = 2;                 ///< Rank: 1 drivers must know at once, 2 soon, 3 can wait.
+  double expected_life_s = 86400;  ///< Prior of how long such a hazard stays.
+  int confirmations = 2;           ///< Distinct vehicles before drivers are told, 1 to 5.
+  double hit_rate = 0.85;          ///< P(a vehicle that looks sees it | it is there), 0.5 to 0.99.
+  double false_rate = 0.03;        ///< P(the same | it is not there), 0.001 to 0.4.
 };
 
 /// The heading under which all classes are counted that a catalogue does not name.

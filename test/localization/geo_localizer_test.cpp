@@ -441,5 +441,44 @@ TEST(LocalizerConfig, NamesTheValueThatIsWrong) {
   EXPECT_THAT([&] { GeoLocalizer{config}; }, ThrowsMessage<Error>(HasSubstr("'window_s' is nan")));
 }
 
+/// How far off the heading is in its stated standard deviations, at most, where reflections slide
+/// across the street by 5.5 m in the first 28 m, as on a simulated one.
+double WorstHeadingInSlidingReflections(const LocalizerConfig& config) {
+  SimulatedDrive drive;
+  drive.length_s = 20;
+  drive.latency_s = 0;
+  drive.motion = [](double) { return SimulatedMotion{8, 0}; };
+  drive.fix_error = [left = Rotation2(drive.start_yaw_rad).col(1).eval()](double time_s) {
+    const double aside_m =
+        time_s < 3.5 ? 4 - 5.5 * time_s / 3.5 : -1.5 * std::exp((3.5 - time_s) / 4);
+    return std::optional<Eigen::Vector2d>(aside_m * left);
+  };
+  GeoLocalizer localizer(config);
+  double worst = 0;
+  Simulate(drive, localizer, [&](double, std::int64_t stamp_ns, const PlanarPose& truth) {
+    const auto fused = localizer.Fused(stamp_ns);
+    if (!fused || fused->state == LocalizerState::kUninitialised) return;
+    const double error_rad = WrapAngle(kPi / 2 - truth.yaw_rad - fused->heading_rad);
+    worst = std::max(worst, std::abs(error_rad) / std::sqrt(fused->heading_variance_rad2));
+  });
+  return worst;
+}
+
+TEST(GeoLocalizer, ReflectionsThatSlideTurnTheHeadingByWhatALargerSharedErrorStates) {
+  LocalizerConfig config;
+  config.datum = SimulatedDrive().datum;
+  config.receiver.latency_s = config.receiver.latency_sigma_s = 0;
+  config.receiver.min_sigma_m = 1.5;
+  config.receiver.shared_time_s = 5;
+  const double before = WorstHeadingInSlidingReflections(config);
+  config.receiver.min_sigma_m = 2;
+  config.receiver.shared_sigma_m = 1.5;
+  config.start_yaw_sigma_rad = 0.08;
+  const double now = WorstHeadingInSlidingReflections(config);
+  EXPECT_GT(before, 3);
+  EXPECT_LT(now, 0.8 * before);
+  EXPECT_LT(now, 3);
+}
+
 }  // namespace
 }  // namespace livemap::localization

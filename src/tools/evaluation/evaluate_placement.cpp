@@ -97,8 +97,10 @@ std::optional<Options> ParseEvaluatePlacementOptions(int argc, char** argv) {
   // not see its reflections.
   localization::ReceiverModel& receiver = options.localizer.receiver;
   receiver.latency_s = receiver.latency_sigma_s = 0;
-  receiver.min_sigma_m = 1.5;
+  receiver.min_sigma_m = 2;
+  receiver.shared_sigma_m = 1.5;
   receiver.shared_time_s = 5;
+  options.localizer.start_yaw_sigma_rad = 0.08;
   return options;
 }
 

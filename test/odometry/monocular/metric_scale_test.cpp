@@ -94,5 +94,16 @@ TEST(RoadHeight, IsNotKnownWithoutARoad) {
   EXPECT_FALSE(RoadHeight({}, kRoadCamera, 0));
 }
 
+TEST(MetricScale, StretchesWhatHasMeasuredItWrongly) {
+  MetricScale scale({});
+  scale.Measure(3, 0.03, 2);
+  const double sigma = *scale.log_sigma();
+  scale.Stretch(1.1);
+  EXPECT_NEAR(scale.metres_per_unit(), 1.65, 1e-12);
+  EXPECT_EQ(*scale.log_sigma(), sigma);
+  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) scale.Stretch(bad);
+  EXPECT_NEAR(scale.metres_per_unit(), 1.65, 1e-12);
+}
+
 }  // namespace
 }  // namespace livemap::odometry

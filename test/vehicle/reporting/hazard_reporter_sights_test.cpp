@@ -137,5 +137,16 @@ TEST_F(ReporterSightsTest, WhatNewerImagesDoNotShowIsReportedSoon) {
   EXPECT_THAT(TakeDue(), SizeIs(1));
 }
 
+TEST_F(ReporterSightsTest, ADeepThingIsPlacedAtItsMiddleNotAtItsNearEdge) {
+  catalogue_ = protocol::HazardCatalogue::Parse("classes: {wreck: {half_depth_m: 3}}", "test");
+  Restart();
+  DriveFixes(0, 2.4);
+  See(2.0, {{"wreck", 0.9F, BoxAt(12, 0)}});
+  const auto reports = TakeDue();
+  ASSERT_EQ(reports.size(), 1U);
+  const auto middle = geo::GeodesicDestination(VehicleAt(2.0), kBearingRad, 15.0);
+  EXPECT_LT(geo::GeodesicDistanceM(reports[0].position, middle), 0.1);
+}
+
 }  // namespace
 }  // namespace livemap::vehicle
