@@ -43,7 +43,7 @@ TEST(TravelDirection, ASlowSlideIsNoticedToo) {
     if (!travel.Add(StepTo(0.002 * i))) slid = i;
   }
   EXPECT_GT(slid, 0);
-  EXPECT_LT(0.002 * slid, 0.15);
+  EXPECT_LT(0.002 * slid, 0.2);
 }
 
 TEST(TravelDirection, ATurnMovesTheCameraAside) {
