@@ -93,7 +93,7 @@ std::vector<double> TurnProbabilities(const TurnConfig& config, const Approach& 
   for (const TurnOption& option : options) {
     const bool straight = std::abs(option.angle_rad) < config.straight_rad;
     double share = straight ? config.straight_weight : config.turn_weight;
-    if (approach.in_roundabout) share = 1;
+    if (approach.in_roundabout) share = option.ring ? 1 : config.leaves_ring_weight;
     if (option.same_street && !approach.in_roundabout) share *= config.same_street_weight;
     if (option.lesser) share *= config.lesser_weight;
     if (!approach.in_roundabout) {

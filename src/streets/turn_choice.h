@@ -6,19 +6,20 @@ namespace livemap::streets {
 
 /// How a vehicle drives towards a junction.
 struct Approach {
-  double distance_m = 0;    ///< To the junction's node.
-  double speed_mps = 0;     ///< Now.
-  double push_mps2 = 0;     ///< Acceleration, negative where it brakes.
-  double usual_mps = 0;     ///< Speed on the way until here.
-  double bend_rad = 0;      ///< Its course against that of the street, to the left positive.
-  bool bend_known = false;  ///< Whether bend_rad is known.
-  bool in_roundabout = false;
+  double distance_m = 0;       ///< To the junction's node.
+  double speed_mps = 0;        ///< Now.
+  double push_mps2 = 0;        ///< Acceleration, negative where it brakes.
+  double usual_mps = 0;        ///< Speed on the way until here.
+  double bend_rad = 0;         ///< Its course against that of the street, to the left positive.
+  bool bend_known = false;     ///< Whether bend_rad is known.
+  bool in_roundabout = false;  ///< The street until the junction is the ring of a roundabout.
 };
 
 /// One way on at a junction.
 struct TurnOption {
   double angle_rad = 0;      ///< Of the way on against the way until here, to the left positive.
   bool same_street = false;  ///< It has the same name, or is the same way of the map.
+  bool ring = false;         ///< It is the ring of a roundabout.
   bool lesser = false;       ///< It is much less important than the street until here.
 };
 
@@ -27,12 +28,13 @@ struct TurnConfig {
   double straight_rad = 0.6;     ///< A way on that bends less goes straight on.
   double straight_weight = 1.0;  ///< Before anything is known of how the vehicle drives.
   double turn_weight = 0.3;
+  double leaves_ring_weight = 0.6;    ///< Of an exit against the ring's own 1.
   double same_street_weight = 1.5;    ///< Factor.
   double lesser_weight = 0.4;         ///< Factor.
   double corner_m = 10;               ///< Radius of a turn by a right angle, m.
   double sideways_mps2 = 2.2;         ///< That drivers take in turns.
-  double braking_mps2 = 2.1;          ///< How drivers brake before turns, mean...
-  double braking_sigma_mps2 = 0.45;   ///< ...and standard deviation.
+  double braking_mps2 = 2.5;          ///< How drivers brake before turns, mean...
+  double braking_sigma_mps2 = 0.5;    ///< ...and standard deviation.
   double push_sigma_mps2 = 0.4;       ///< Of the measured acceleration.
   double brakes_from_mps2 = 1.0;      ///< From here on a vehicle brakes or speeds up.
   double brakes_without_turn = 0.12;  ///< Share of those who go straight on and brake so.

@@ -7,8 +7,9 @@ namespace livemap::streets {
 namespace {
 
 constexpr int kMaxAngleSegments = 20;  // Of a way over which an angle is taken.
-constexpr double kTurnsBack = 0.2;     // At a dead end: else the map's end is not the street's.
-constexpr int kLesserKinds = 2;        // So much less important a street is rarely turned into.
+constexpr double kStraightRad = 0.35;
+constexpr double kTurnsBack = 0.2;  // At a dead end: else the map's end is not the street's.
+constexpr int kLesserKinds = 2;     // So much less important a street is rarely turned into.
 
 /// From one direction to another, to the left positive.
 double TurnBetween(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
@@ -70,6 +71,12 @@ void WaysAhead::Extend(std::size_t number, double way_m) {
   }
 }
 
+const Leg& WaysAhead::RootOf(const Leg& leg) const {
+  const Leg* root = &leg;
+  while (root->before >= 0) root = &legs_[static_cast<std::size_t>(root->before)];
+  return *root;
+}
+
 std::vector<double> WaysAhead::SharesOf(const Leg& leg, const std::vector<Travel>& onwards) const {
   if (onwards.empty()) return {};
   if (onwards.size() == 1) return {onwards[0].segment == leg.travel.segment ? kTurnsBack : 1};
@@ -80,8 +87,11 @@ std::vector<double> WaysAhead::SharesOf(const Leg& leg, const std::vector<Travel
   approach.usual_mps = driving_.usual_mps;
   const Street& street = map_.StreetOf(leg.travel.segment);
   approach.in_roundabout = street.roundabout;
-  if (driving_.course_known) {
-    const Eigen::Vector2d until = -DirectionAfter({leg.travel.segment, !leg.travel.forward});
+  const Eigen::Vector2d until = -DirectionAfter({leg.travel.segment, !leg.travel.forward});
+  const Leg& root = RootOf(leg);
+  // Before the street itself bends, the course says nothing of the junction behind the bend.
+  const bool straight = std::abs(TurnBetween(root.to_m - root.from_m, until)) < kStraightRad;
+  if (driving_.course_known && straight && !street.roundabout) {
     const Eigen::Vector2d course(std::sin(driving_.course_rad), std::cos(driving_.course_rad));
     approach.bend_rad = TurnBetween(until, course);
     approach.bend_known = true;
@@ -99,6 +109,7 @@ TurnOption WaysAhead::OptionOf(const Leg& leg, const Travel& next) const {
   const Street& here = map_.StreetOf(leg.travel.segment);
   const Street& there = map_.StreetOf(next.segment);
   option.same_street = here.id == there.id || (here.name != 0 && here.name == there.name);
+  option.ring = there.roundabout;
   option.lesser = static_cast<int>(there.kind) - static_cast<int>(here.kind) >= kLesserKinds;
   return option;
 }

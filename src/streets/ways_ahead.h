@@ -58,6 +58,7 @@ class WaysAhead {
  private:
   void Extend(std::size_t number, double way_m);
   TurnOption OptionOf(const Leg& leg, const Travel& next) const;
+  const Leg& RootOf(const Leg& leg) const;
   std::vector<double> SharesOf(const Leg& leg, const std::vector<Travel>& onwards) const;
   Eigen::Vector2d PlaceOf(std::uint32_t node) const;
   Eigen::Vector2d DirectionAfter(Travel travel) const;

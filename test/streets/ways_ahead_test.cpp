@@ -107,8 +107,7 @@ TEST_F(WaysAheadTest, ManyWaysAreBounded) {
 }
 
 TEST(TurnChoiceTest, ProbabilitiesLeaveRoomForAWayThatTheMapDoesNotHave) {
-  const std::vector<double> shares =
-      TurnProbabilities({}, {}, {{0.1, false, false}, {1.5, false, false}});
+  const std::vector<double> shares = TurnProbabilities({}, {}, {{0.1}, {1.5}});
   const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
   EXPECT_LT(sum, 1);
   EXPECT_GT(sum, 0.9);

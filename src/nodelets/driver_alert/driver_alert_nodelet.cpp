@@ -19,6 +19,8 @@
 #include "ros/conversions/alert_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/parameters/driver_alert_parameters.h"
+#include "streets/street_file.h"
+#include "streets/street_map.h"
 #include "vehicle/alerts/announced_hazards.h"
 #include "vehicle/alerts/driver_alerts.h"
 
@@ -44,7 +46,7 @@ class DriverAlertPart : public NodeletPart {
       config_.catalogue = ros::package::getPath("livemap") + "/config/hazards.yaml";
     }
     alerts_ = std::make_unique<vehicle::DriverAlerts>(
-        config_.alerts, protocol::HazardCatalogue::Load(config_.catalogue));
+        config_.alerts, protocol::HazardCatalogue::Load(config_.catalogue), ReadStreets());
     fixes_ = std::make_unique<vehicle::FixTrack>(config_.fixes);
     ros::NodeHandle& node = getNodeHandle();
     publisher_ = node.advertise<HazardAlert>("hazard/alert", 100);
@@ -68,6 +70,20 @@ class DriverAlertPart : public NodeletPart {
                                       Diagnostics::Config{getName(), "driver_alert", "driver_alert",
                                                           config_.diagnostics_period_s},
                                       [this](Diagnostics::Status& status) { Diagnose(status); });
+  }
+
+  /// Nothing where the vehicle has no street file.
+  std::shared_ptr<const streets::StreetMap> ReadStreets() {
+    if (config_.streets.empty()) return nullptr;
+    auto map = std::make_shared<const streets::StreetMap>(streets::ReadStreetFile(config_.streets));
+    const streets::StreetMap::Counters& counters = map->counters();
+    NODELET_INFO(
+        "%zu streets with %zu segments in %.0f MB; left out: %zu missing nodes, %zu "
+        "segments that are too long, %zu nodes beyond 85 degrees",
+        map->streets(), map->segments(), static_cast<double>(map->bytes()) / 1e6,
+        counters.missing_nodes, counters.long_segments, counters.off_range);
+    street_segments_ = map->segments();
+    return map;
   }
 
   void StartAnew() {
@@ -159,6 +175,8 @@ class DriverAlertPart : public NodeletPart {
     status.add("fixes_refused", fixes_refused_);
     status.add("positions", positions);
     status.add("positions_invalid", counters.invalid_positions);
+    status.add("street_segments", street_segments_);
+    status.add("on_street", alerts_->on_street());
     status.add("alerts", counters.approaches);
     status.add("alerts_passed", counters.passed);
     status.add("alerts_cancelled", counters.cancelled);
@@ -171,6 +189,7 @@ class DriverAlertPart : public NodeletPart {
   std::unique_ptr<vehicle::FixTrack> fixes_;
   vehicle::AnnouncedHazards announced_;
   std::optional<double> pose_steady_s_;  // When the newest fused pose came.
+  std::size_t street_segments_ = 0;
   std::uint64_t notices_ = 0;
   std::uint64_t fixes_used_ = 0;
   std::uint64_t fixes_refused_ = 0;

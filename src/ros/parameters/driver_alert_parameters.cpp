@@ -76,6 +76,25 @@ void ReadAlertWay(ParameterReader& parameters, vehicle::DriverAlerts::Config& al
                   "1/m");
 }
 
+void ReadAlertStreets(ParameterReader& parameters, DriverAlertConfig& config) {
+  parameters.Section("The streets that the vehicle knows",
+                     "docs/explanation/driver-alerts.md has the model.");
+  parameters.Read("streets", config.streets,
+                  "Path of an extract of OpenStreetMap with the area's streets (.osm.pbf or .osm), "
+                  "which is read once, at the start. Empty: the way is predicted by the course "
+                  "alone. vehicle.launch sets it by the argument `streets`.");
+  vehicle::DriverAlerts::Config& alerts = config.alerts;
+  parameters.Read("street_sigma_m", alerts.streets.map_sigma_m, {0.05, 50},
+                  "Standard deviation of the map's streets to their side.", "m");
+  parameters.Read("sure_above", alerts.sure_above, {0, 1},
+                  "Where the vehicle takes the way to a hazard, by the junctions before it, with a "
+                  "probability of less than this, the driver is told later.");
+  parameters.Read("unsure_lead_s", alerts.unsure_lead_s, {0.5, 60},
+                  "Namely this long before the hazard is reached.", "s");
+  parameters.Read("unsure_above", alerts.unsure_above, {0.01, 0.99},
+                  "Least probability, in place of alert_above, that it lies on the way then.");
+}
+
 }  // namespace
 
 DriverAlertConfig ReadDriverAlertConfig(ParameterReader& parameters) {
@@ -83,6 +102,7 @@ DriverAlertConfig ReadDriverAlertConfig(ParameterReader& parameters) {
   ReadAlertSources(parameters, config);
   ReadAlertTimes(parameters, config.alerts);
   ReadAlertWay(parameters, config.alerts);
+  ReadAlertStreets(parameters, config);
   parameters.Section("Position of the vehicle");
   parameters.Read("base_frame", config.base_frame, "Frame at road level: x forward, y left, z up.");
   parameters.Read("map_frame", config.map_frame, "Frame of the fused poses.");

@@ -13,6 +13,7 @@ struct DriverAlertConfig {
   std::string catalogue;  ///< Path of the hazard classes; empty: the package's.
   std::string database;   ///< Of hazard_reporting's local map; empty: notices alone count.
   double database_period_s = 10;
+  std::string streets;  ///< Extract of OpenStreetMap; empty: the course alone counts.
   vehicle::DriverAlerts::Config alerts;
   bool use_fused = false;
   double fused_wait_s = 1.0;

@@ -14,6 +14,7 @@ namespace {
 constexpr double kMaxFrameM = 5000;   // Further from its datum the plane begins anew.
 constexpr double kPassedM = 1;        // So far behind a hazard is passed.
 constexpr double kPassedAsideM = 12;  // Further aside it was never reached.
+constexpr double kNoChoice = 0.985;   // Probability of a way without a junction.
 constexpr std::size_t kMaxClassBytes = 256;
 
 /// The worst first: by rank, then the sooner, then by id, so that the order is always the same.
@@ -139,6 +140,16 @@ double DriverAlerts::ReachM(double time_s) const {
   return std::max({0.0, reach_m, 0.5 * speed * time_s});
 }
 
+/// The same where the street is known: behind a bend that it slowed down for, the vehicle will
+/// drive as fast as before.
+double DriverAlerts::ReachOnStreetM(double time_s) const {
+  const double speed = filter_.state()[CourseFilter::kSpeed];
+  const double faster = std::max(0.0, street_way_->usual_mps() - speed);
+  const double push = config_.speeding_up_mps2;
+  const double pushing_s = std::min(time_s, faster / push);
+  return speed * time_s + push * pushing_s * (time_s - 0.5 * pushing_s);
+}
+
 bool DriverAlerts::OnOtherLevel(const AlertHazard& hazard, std::optional<double> altitude_m) const {
   return hazard.altitude_m && altitude_m && std::isfinite(*altitude_m) &&
          std::abs(*hazard.altitude_m - *altitude_m) > config_.max_altitude_difference_m;
@@ -159,6 +170,7 @@ WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& kn
     relation.left_m = street.left_m;
   }
   relation.probability = street.probability + by_course;
+  near.on_way = street.path > kNoChoice;
   near.unsure = street.path > 0 && street.path < config_.sure_above;
   return relation;
 }
@@ -193,7 +205,9 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
 
   const double speed = filter_.state()[CourseFilter::kSpeed];
   const double longest_s = LeadS(1, speed) + filter_.period_s();
-  const double reach_m = std::min(config_.max_reach_m, 1.3 * ReachM(longest_s) + 20);
+  const double longest_m =
+      std::max(ReachM(longest_s), street_way_ ? ReachOnStreetM(longest_s) : 0.0);
+  const double reach_m = std::min(config_.max_reach_m, 1.3 * longest_m + 20);
   const WayAhead way(config_.way, filter_, reach_m);
   if (street_way_) street_way_->LookAhead(*frame_, filter_, reach_m);
   const double radius_m = std::max(reach_m, config_.forget_beyond_m);
@@ -240,10 +254,16 @@ bool DriverAlerts::IsDue(const Near& near) const {
   const double course_variance = filter_.covariance()(CourseFilter::kCourse, CourseFilter::kCourse);
   const double max_sigma = config_.max_course_sigma_rad;
   if (speed < config_.min_speed_mps || course_variance > max_sigma * max_sigma) return false;
-  if (std::min(near.alert.probability, *near.likely) < config_.alert_above) return false;
+  const double above = near.unsure ? config_.unsure_above : config_.alert_above;
+  if (std::min(near.alert.probability, *near.likely) < above) return false;
   const double lead_s = LeadS(near.alert.urgency, speed);
-  const double told_s = near.unsure ? std::min(lead_s, config_.unsure_lead_s) : lead_s;
-  return near.alert.distance_m <= ReachM(told_s + filter_.period_s());
+  double reach_m = ReachM(lead_s + filter_.period_s());
+  if (near.unsure) {
+    reach_m = ReachM(std::min(lead_s, config_.unsure_lead_s) + filter_.period_s());
+  } else if (near.on_way) {
+    reach_m = std::max(reach_m, ReachOnStreetM(lead_s + filter_.period_s()));
+  }
+  return near.alert.distance_m <= reach_m;
 }
 
 void DriverAlerts::Judge(const Known& known, const WayAhead::Relation& relation, double time_s,

@@ -84,8 +84,10 @@ class DriverAlerts {
     /// On streets of a map: where the vehicle takes the way to a hazard with a probability of less
     /// than sure_above, because of junctions, the driver is told only so long before, s, when more
     /// is known.
-    double unsure_lead_s = 4.6;
+    double unsure_lead_s = 4.5;
+    double unsure_above = 0.58;  ///< Probability from which the driver is told then.
     double sure_above = 0.93;
+    double speeding_up_mps2 = 1.8;  ///< Assumed on streets of a map below the usual speed.
     CourseFilter::Config course;
     WayAhead::Config way;
     StreetWay::Config streets;
@@ -137,6 +139,7 @@ class DriverAlerts {
     HazardAlert alert;
     bool told = false;
     std::optional<double> likely;  // Running mean of the probability.
+    bool on_way = false;           // The streets lead there, without a choice.
     bool unsure = false;           // Because of junctions.
     bool done = false;             // Passed or cancelled.
     double unlikely_s = 0;         // So long it has lain off the way.
@@ -148,6 +151,7 @@ class DriverAlerts {
 
   void FollowVehicle(const geo::GeoPoint& position);
   double ReachM(double time_s) const;
+  double ReachOnStreetM(double time_s) const;
   WayAhead::Relation RelationOf(const WayAhead& way, const Known& known, double fix_variance_m2,
                                 Near& near) const;
   bool OnOtherLevel(const AlertHazard& hazard, std::optional<double> altitude_m) const;

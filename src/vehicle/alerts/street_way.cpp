@@ -114,9 +114,10 @@ double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own,
   for (const OtherNear& other : others) {
     const bool parallel = std::abs(ahead.dot(other.along)) > kParallelCosine * other.along.norm();
     const bool beside = parallel && !other.meets && other.density > own;
-    const bool counts =
-        (other.layer != layer && !other.meets) || beside || other.density > kMuchDenser * own;
-    if (counts) most = std::max(most, other.density);
+    const bool other_level = other.layer != layer && !other.meets;
+    const bool counts = other_level || beside || other.density > kMuchDenser * own;
+    const double weight = other_level ? config_.other_level_weight : 1;
+    if (counts) most = std::max(most, weight * other.density);
   }
   return most;
 }

@@ -26,6 +26,9 @@ class StreetWay {
   struct Config {
     double map_sigma_m = 1.2;     ///< Of the map's lines, to the side, m.
     double others_per_m = 0.002;  ///< Hazards that lie on no street of the map, as in WayAhead.
+    /// Weight of a street on another level against the way's own: more than 1 rather keeps silent
+    /// where a place may lie on either.
+    double other_level_weight = 1.5;
     double usual_way_m = 400;     ///< Way over which the usual speed is forgotten, m.
     double matched_fraction = 1;  ///< Of the fix's stated sigma that the matcher believes.
     streets::StreetMatcher::Config matcher;
@@ -57,6 +60,8 @@ class StreetWay {
 
   /// That the vehicle is on a street of the map.
   double on_street() const { return matcher_.on_street(); }
+  /// Speed on the way until here, before the vehicle began to brake, m/s.
+  double usual_mps() const { return usual_mps_; }
   const streets::StreetMatcher& matcher() const { return matcher_; }
 
  private:
