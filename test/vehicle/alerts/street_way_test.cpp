@@ -1,0 +1,190 @@
+#include "vehicle/alerts/street_way.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "common/time.h"
+#include "streets/street_map.h"
+#include "vehicle/alerts/driver_alerts.h"
+
+namespace livemap::vehicle {
+namespace {
+
+using Polyline = std::vector<Eigen::Vector2d>;
+
+constexpr double kMomentS = 0.2;
+
+/// Streets drawn on a plane; nodes at the same place are one.
+class DrawnStreets {
+ public:
+  explicit DrawnStreets(const geo::LocalFrame& frame) : frame_(frame) {}
+
+  void Add(const Polyline& line, bool one_way = false, int layer = 0) {
+    streets::Street street;
+    street.id = ++streets_;
+    street.backward = !one_way;
+    street.layer = static_cast<std::int8_t>(layer);
+    std::vector<std::int64_t> nodes;
+    for (const Eigen::Vector2d& place_m : line) nodes.push_back(NodeAt(place_m));
+    builder_.AddStreet(street, "", nodes);
+  }
+
+  std::shared_ptr<const streets::StreetMap> Map() {
+    for (std::size_t i = 0; i < places_m_.size(); ++i) {
+      builder_.SetPlace(static_cast<std::int64_t>(i), frame_.ToGeo(places_m_[i]));
+    }
+    return std::make_shared<const streets::StreetMap>(builder_.Build());
+  }
+
+ private:
+  std::int64_t NodeAt(const Eigen::Vector2d& place_m) {
+    for (std::size_t i = 0; i < places_m_.size(); ++i) {
+      if ((places_m_[i] - place_m).norm() < 0.1) return static_cast<std::int64_t>(i);
+    }
+    places_m_.push_back(place_m);
+    return static_cast<std::int64_t>(places_m_.size()) - 1;
+  }
+
+  const geo::LocalFrame& frame_;
+  streets::StreetMapBuilder builder_;
+  Polyline places_m_;
+  std::int64_t streets_ = 0;
+};
+
+class StreetWayTest : public testing::Test {
+ protected:
+  static Uuid IdOf(std::uint8_t number) {
+    Uuid id;
+    id.bytes[15] = number;
+    return id;
+  }
+
+  void Begin() {
+    alerts_ = std::make_unique<DriverAlerts>(DriverAlerts::Config(), protocol::HazardCatalogue(),
+                                             drawn_.Map());
+  }
+
+  void PutHazard(std::uint8_t number, double east_m, double north_m) {
+    ASSERT_TRUE(alerts_->Put(
+        {IdOf(number), "pothole", frame_.ToGeo({east_m, north_m}), 1.0, std::nullopt}));
+  }
+
+  /// With exact fixes, from where the vehicle is.
+  void DriveTo(double east_m, double north_m, double speed_mps) {
+    const Eigen::Vector2d to_m(east_m, north_m);
+    while ((to_m - place_m_).norm() > speed_mps * kMomentS) {
+      place_m_ += speed_mps * kMomentS * (to_m - place_m_).normalized();
+      time_s_ += kMomentS;
+      geo::TrackPose pose;
+      pose.position = frame_.ToGeo(place_m_);
+      pose.covariance_m2 = 1.5 * 1.5 * Eigen::Matrix2d::Identity();
+      pose.course_rad = std::numeric_limits<double>::quiet_NaN();
+      for (const HazardAlert& alert : alerts_->Add(Nanoseconds(1000 + time_s_), pose)) {
+        if (alert.state == HazardAlert::State::kApproach) told_s_[alert.id.bytes[15]] = time_s_;
+      }
+    }
+  }
+
+  bool IsTold(int number) const { return told_s_.count(number) != 0; }
+
+  geo::LocalFrame frame_{{49.2, 7.0}};
+  DrawnStreets drawn_{frame_};
+  std::unique_ptr<DriverAlerts> alerts_;
+  Eigen::Vector2d place_m_{0, 0};
+  double time_s_ = 0;
+  std::map<int, double> told_s_;
+};
+
+TEST_F(StreetWayTest, WarnsBeforeASharpBendOfWhatLiesBehindIt) {
+  drawn_.Add({{0, 0}, {0, 300}, {12, 325}, {35, 337}, {400, 337}});
+  Begin();
+  PutHazard(1, 50, 337);
+  DriveTo(0, 300, 12);
+  const double at_bend_s = time_s_;
+  ASSERT_TRUE(IsTold(1)) << "by the course alone it lies aside until the vehicle turns";
+  // Some 69 m before the hazard or more.
+  EXPECT_LT(told_s_[1], at_bend_s + (69 - 4 * 12) / 12.0);
+}
+
+TEST_F(StreetWayTest, KeepsSilentAboutTheOtherCarriagewayWhereTheRoadBends) {
+  drawn_.Add({{0, 0}, {0, 500}, {60, 700}, {200, 900}}, true);
+  drawn_.Add({{188, 908}, {47, 705}, {-14, 502}, {-14, 0}}, true);
+  Begin();
+  PutHazard(1, -14, 480);
+  PutHazard(2, -10, 515);
+  PutHazard(3, 1, 490);
+  DriveTo(0, 500, 28);
+  DriveTo(60, 700, 28);
+  EXPECT_FALSE(IsTold(1));
+  EXPECT_FALSE(IsTold(2));
+  EXPECT_TRUE(IsTold(3));
+}
+
+TEST_F(StreetWayTest, KeepsSilentWhereABridgeIsRightAbove) {
+  drawn_.Add({{0, 0}, {0, 800}});
+  drawn_.Add({{-100, 400}, {100, 400}}, false, 1);
+  Begin();
+  PutHazard(1, 0, 400);
+  PutHazard(2, 7, 400);
+  PutHazard(3, 0, 440);
+  DriveTo(0, 700, 14);
+  EXPECT_FALSE(IsTold(1)) << "it may lie on either";
+  EXPECT_FALSE(IsTold(2));
+  EXPECT_TRUE(IsTold(3));
+}
+
+TEST_F(StreetWayTest, AJunctionsSquareBelongsToBothStreets) {
+  drawn_.Add({{0, 0}, {0, 400}});
+  drawn_.Add({{0, 400}, {0, 800}});
+  drawn_.Add({{-100, 400}, {0, 400}, {100, 400}});
+  Begin();
+  PutHazard(1, 0, 400);
+  PutHazard(2, 14, 400);
+  DriveTo(0, 700, 14);
+  EXPECT_TRUE(IsTold(1));
+  EXPECT_FALSE(IsTold(2));
+}
+
+TEST_F(StreetWayTest, AParallelStreetIsNotTheOwn) {
+  drawn_.Add({{0, 0}, {0, 800}});
+  drawn_.Add({{9, 0}, {9, 800}});
+  Begin();
+  PutHazard(1, 9, 400);
+  PutHazard(2, 1, 500);
+  DriveTo(0, 700, 14);
+  EXPECT_FALSE(IsTold(1));
+  EXPECT_TRUE(IsTold(2));
+}
+
+TEST_F(StreetWayTest, WhereTheMapHasNoStreetTheCourseCounts) {
+  drawn_.Add({{3000, 0}, {3000, 800}});
+  Begin();
+  PutHazard(1, 0, 400);
+  DriveTo(0, 350, 14);
+  EXPECT_EQ(alerts_->on_street(), 0);
+  EXPECT_TRUE(IsTold(1));
+}
+
+TEST_F(StreetWayTest, WhereTheMapEndsTheCourseCounts) {
+  drawn_.Add({{0, 0}, {0, 300}});
+  Begin();
+  PutHazard(1, 0, 345);
+  DriveTo(0, 295, 14);
+  EXPECT_GT(alerts_->on_street(), 0.9);
+  EXPECT_TRUE(IsTold(1));
+}
+
+TEST_F(StreetWayTest, StartingAnewForgetsTheStreet) {
+  drawn_.Add({{0, 0}, {0, 600}});
+  Begin();
+  DriveTo(0, 300, 14);
+  EXPECT_GT(alerts_->on_street(), 0.9);
+  alerts_->StartAnew();
+  EXPECT_EQ(alerts_->on_street(), 0);
+}
+
+}  // namespace
+}  // namespace livemap::vehicle
