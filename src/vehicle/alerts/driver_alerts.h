@@ -86,7 +86,7 @@ class DriverAlerts {
     /// is known.
     double unsure_lead_s = 4.5;
     double unsure_above = 0.58;  ///< Probability from which the driver is told then.
-    double sure_above = 0.93;
+    double sure_above = 0.97;
     double speeding_up_mps2 = 1.8;  ///< Assumed on streets of a map below the usual speed.
     CourseFilter::Config course;
     WayAhead::Config way;
