@@ -29,17 +29,18 @@ struct ClockOffsetAnswer {
 struct ClockOffsetConfig {
   double search_s = 30;       ///< To both sides of no offset; 1 to 300.
   double max_sigma_s = 0.25;  ///< A less certain offset is none.
-  std::uint64_t seed = 1;     ///< Of the bootstrap.
 };
 
-/// The offset at which the receiver's motion explains the picture's best: the picture's turn is
-/// taken as a multiple of the receiver's turn, and its flow as a linear function of the speed, both
-/// rising, and the offset is that of the largest likelihood of the two with unknown noise:
-/// it minimises log(1 - r_turn^2) + log(1 - r_speed^2) over a grid of 0.05 s, refined by a
-/// parabola. Its standard deviation is that of the offsets of 200 recordings drawn from pieces of
-/// this one (block bootstrap; Kuensch 1989), so that it grows when another offset is nearly as
-/// good. Stamps of `picture` are the recorder's and increase. Throws Error for a `config` out of
-/// range.
+/// The offset at which the receiver's motion explains the picture's best. Two things are compared:
+/// the picture's turn with the receiver's, and how far the vehicle is from standing: the picture's
+/// flow and the receiver's speed v, each as v / (v + 1.5 m/s), since flow tells a stop well and a
+/// speed badly. Each is taken as a rising linear function of the other with unknown noise, so that
+/// -2 log of the likelihood is the sum of n log(1 - r^2) over both, with the correlation r and the
+/// number n of independent differences, which comes from how long these stay alike. The offset of
+/// the least sum is taken on a grid of 0.05 s, and refined by a parabola, whose curvature gives the
+/// standard deviation. There is none where another offset, more than 2 s away, is nearly as likely
+/// (by less than 9). Stamps of `picture` are the recorder's and increase. Throws Error for a
+/// `config` out of range.
 ClockOffsetAnswer FindClockOffset(const std::vector<ImageMotion>& picture,
                                   const RecordedTrack& track,
                                   const ClockOffsetConfig& config = ClockOffsetConfig());

@@ -18,13 +18,23 @@ constexpr int kCellRows = 3;
 constexpr std::size_t kMinCorners = 16;
 /// The lowest part shows the bonnet and the road close ahead.
 constexpr double kUsedHeight = 0.8;
-/// Of that, where the far field is.
-constexpr double kFarHeight = 0.62;
-constexpr int kPasses = 8;
+constexpr int kPasses = 10;
+/// A corner that does not come back to where it was, pixels, was not followed.
+constexpr float kBackPixels = 0.5F;
 
 /// A followed corner: where it was from the middle, and how it moved; in image widths.
 struct FollowedCorner {
-  double x, y, dx, dy;
+  Eigen::Vector2d place, motion;
+
+  /// The motion per radian of rotation about the optical frame's axes, a column each.
+  Eigen::Matrix<double, 2, 3> PerRotation() const {
+    constexpr double f = ImageMotionMeter::kFocal;
+    const double x = place.x() / f, y = place.y() / f;
+    Eigen::Matrix<double, 2, 3> columns;
+    columns << x * y, -(1 + x * x), y,  //
+        1 + y * y, -x * y, -x;
+    return f * columns;
+  }
 };
 
 /// The best corners of every cell, so that one house does not outvote the street.
@@ -49,19 +59,24 @@ std::vector<FollowedCorner> Follow(const cv::Mat& from, const cv::Mat& to) {
   const std::vector<cv::Point2f> corners = CornersOf(from);
   std::vector<FollowedCorner> followed;
   if (corners.size() < kMinCorners) return followed;
-  std::vector<cv::Point2f> moved;
-  std::vector<unsigned char> status;
+  std::vector<cv::Point2f> moved, returned;
+  std::vector<unsigned char> there, back;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(from, to, corners, moved, status, error, cv::Size(15, 15), 3);
+  const cv::Size window(15, 15);
+  cv::calcOpticalFlowPyrLK(from, to, corners, moved, there, error, window, 3);
+  cv::calcOpticalFlowPyrLK(to, from, moved, returned, back, error, window, 3);
   const double width = from.cols;
+  const cv::Point2f middle(static_cast<float>(from.cols) / 2, static_cast<float>(from.rows) / 2);
+  const cv::Rect2f inside(1, 1, static_cast<float>(to.cols - 3), static_cast<float>(to.rows - 3));
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    const cv::Point2f end = moved[i];
-    if (status[i] == 0 || end.x < 1 || end.y < 1 || end.x > static_cast<float>(to.cols - 2) ||
-        end.y > static_cast<float>(to.rows - 2)) {
+    const cv::Point2f missed = returned[i] - corners[i];
+    if (there[i] == 0 || back[i] == 0 || !inside.contains(moved[i]) ||
+        std::hypot(missed.x, missed.y) > kBackPixels) {
       continue;
     }
-    followed.push_back({(corners[i].x - width / 2) / width, corners[i].y / width,
-                        (end.x - corners[i].x) / width, (end.y - corners[i].y) / width});
+    const cv::Point2f place = corners[i] - middle, motion = moved[i] - corners[i];
+    followed.push_back(
+        {Eigen::Vector2d(place.x, place.y) / width, Eigen::Vector2d(motion.x, motion.y) / width});
   }
   return followed;
 }
@@ -72,37 +87,32 @@ double MedianOf(std::vector<double> values) {
   return *middle;
 }
 
-/// The horizontal motion that is the same everywhere: `a` of dx = a + b x- + c x+ by Tukey's
-/// weights.
-std::optional<double> CommonMotion(const std::vector<FollowedCorner>& corners, double max_y) {
-  std::vector<FollowedCorner> far;
-  for (const FollowedCorner& corner : corners) {
-    if (corner.y < max_y) far.push_back(corner);
+/// The rotation that explains how corners moved across their direction from the middle.
+Eigen::Vector3d RotationOf(const std::vector<FollowedCorner>& corners) {
+  const auto count = static_cast<Eigen::Index>(corners.size());
+  Eigen::MatrixX3d rows(count, 3);
+  Eigen::VectorXd across(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const FollowedCorner& corner = corners[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d normal =
+        Eigen::Vector2d(-corner.place.y(), corner.place.x()) / (corner.place.norm() + 1e-3);
+    rows.row(i) = normal.transpose() * corner.PerRotation();
+    across[i] = normal.dot(corner.motion);
   }
-  if (far.size() < kMinCorners) return std::nullopt;
-  Eigen::Vector3d model = Eigen::Vector3d::Zero();
-  std::vector<double> residuals(far.size()), sizes(far.size());
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(count);
   for (int pass = 0; pass < kPasses; ++pass) {
-    for (std::size_t i = 0; i < far.size(); ++i) {
-      const Eigen::Vector3d row(1, std::min(far[i].x, 0.0), std::max(far[i].x, 0.0));
-      residuals[i] = far[i].dx - row.dot(model);
-      sizes[i] = std::abs(residuals[i]);
-    }
-    // From everything to what agrees.
-    const double scale = std::max(1e-4, 1.48 * MedianOf(sizes)) * (pass < 2 ? 10 : 4);
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * 1e-6;
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < far.size(); ++i) {
-      const double ratio = residuals[i] / scale;
-      if (std::abs(ratio) >= 1) continue;
-      const double weight = std::pow(1 - ratio * ratio, 2);
-      const Eigen::Vector3d row(1, std::min(far[i].x, 0.0), std::max(far[i].x, 0.0));
-      normal += weight * row * row.transpose();
-      right += weight * row * far[i].dx;
-    }
-    model = normal.ldlt().solve(right);
+    const Eigen::Matrix3d normal =
+        rows.transpose() * weights.asDiagonal() * rows + Eigen::Matrix3d::Identity() * 1e-4;
+    rotation = normal.ldlt().solve(rows.transpose() * (weights.asDiagonal() * across));
+    const Eigen::VectorXd residuals = across - rows * rotation;
+    std::vector<double> sizes(static_cast<std::size_t>(count));
+    Eigen::VectorXd::Map(sizes.data(), count) = residuals.cwiseAbs();
+    // From nearly everything to what agrees.
+    const double scale = std::max(3e-4, 1.48 * MedianOf(std::move(sizes))) * (pass < 3 ? 6 : 3.5);
+    weights = (1 - (residuals / scale).array().square()).max(0).square();
   }
-  return model[0];
+  return rotation;
 }
 
 }  // namespace
@@ -121,15 +131,13 @@ std::optional<ImageMotion> ImageMotionMeter::Add(const cv::Mat& grey, std::int64
   if (before.empty() || before.size() != grey.size() || step_s > kMaxStepS) return std::nullopt;
   const std::vector<FollowedCorner> corners = Follow(before, grey);
   if (corners.size() < kMinCorners) return std::nullopt;
-  const double far_y = kFarHeight * grey.rows / grey.cols;
-  const std::optional<double> common = CommonMotion(corners, far_y);
-  if (!common) return std::nullopt;
+  const Eigen::Vector3d rotation = RotationOf(corners);
   std::vector<double> speeds;
   speeds.reserve(corners.size());
   for (const FollowedCorner& corner : corners) {
-    speeds.push_back(std::hypot(corner.dx - *common, corner.dy));
+    speeds.push_back((corner.motion - corner.PerRotation() * rotation).norm());
   }
-  return ImageMotion{before_ns + (stamp_ns - before_ns) / 2, -*common / step_s,
+  return ImageMotion{before_ns + (stamp_ns - before_ns) / 2, rotation.y() / step_s,
                      MedianOf(std::move(speeds)) / step_s};
 }
 

@@ -10,24 +10,27 @@ namespace livemap::recordings {
 /// How the picture moved between two images of a camera that looks along or against the way.
 struct ImageMotion {
   std::int64_t stamp_ns = 0;  ///< Midway between the two.
-  /// How fast the far field moves to the left, image widths per second: as the vehicle turns right.
-  double turn = 0;
+  double turn_radps = 0;      ///< Of the camera about its upright axis, positive to the right.
   /// Median speed of the picture's points without the turn, image widths per second: 0 while the
   /// vehicle stands.
   double flow = 0;
 };
 
 /// Measures the motion of the picture by corners that are followed from image to image (Lucas and
-/// Kanade 1981, in a pyramid). The horizontal motion of the upper picture is taken as a turn, the
-/// same everywhere, plus what moving ahead adds: linear in the distance from the middle, for the
-/// left and the right of the road by itself. Tukey's weights leave out what moves otherwise, such
-/// as other vehicles, and burnt-in text. Not thread-safe.
+/// Kanade 1981, in a pyramid, there and back). Moving ahead moves every point away from the middle,
+/// however far it is. What a point moves across that direction is therefore the camera's rotation,
+/// which is fitted to all points with Tukey's weights: these leave out what moves otherwise, such
+/// as other vehicles and burnt-in text. The focal length is taken to be kFocal, the camera to look
+/// about along the road: errors of both scale the turn, and the clocks' offset does not depend on
+/// its scale. Not thread-safe.
 class ImageMotionMeter {
  public:
   /// Images closer in time than this are passed over.
   static constexpr double kMinStepS = 0.08;
   /// Images further apart are not compared.
   static constexpr double kMaxStepS = 0.5;
+  /// Of the focal length, in image widths: 66 degrees across.
+  static constexpr double kFocal = 0.77;
   /// Width that images should have: more shows nothing more.
   static constexpr int kWidth = 320;
 

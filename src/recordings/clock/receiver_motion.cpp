@@ -14,34 +14,41 @@ namespace {
 /// Longer gaps between positions say nothing of what was between.
 constexpr double kMaxGapS = 3.5;
 /// A slower vehicle has no course that its positions could tell.
-constexpr double kMinCourseSpeedMps = 1.2;
-/// Of the smoothing, and in intervals of the positions.
-constexpr double kMinSmoothingS = 0.5;
+constexpr double kMinCourseSpeedMps = 1.5;
+/// Standard deviations of the smoothing's weights, at least.
+constexpr double kSpeedSmoothingS = 0.5;
+constexpr double kTurnSmoothingByVelocityS = 0.7;
+constexpr double kTurnSmoothingByPositionS = 1.5;
+/// And in intervals of the positions.
 constexpr double kSmoothingIntervals = 0.9;
 /// No vehicle on a road turns faster.
 constexpr double kMaxTurnRadps = 1.5;
-/// A sampled day; more is no recording.
-constexpr std::size_t kMaxSamples = 10'000'000;
+/// Two days; more is no recording.
+constexpr std::size_t kMaxSamples = 2'000'000;
 
-/// Position and speeds of a track in a plane, and times in seconds since its begin.
+/// Velocities or else positions of a track in a plane, and times in seconds since its begin.
 struct PlaneTrack {
   std::vector<double> times_s;
-  std::vector<Eigen::Vector2d> places_m;
-  std::vector<double> speeds_mps;  ///< Empty: the receiver states none.
+  std::vector<Eigen::Vector2d> values;  ///< East and north, m/s or m.
+  bool are_velocities = false;
 };
 
 PlaneTrack InPlane(const RecordedTrack& track) {
   PlaneTrack plane;
+  plane.are_velocities = std::all_of(
+      track.positions.begin(), track.positions.end(),
+      [](const RecordedPosition& position) { return position.speed_mps && position.course_deg; });
   const geo::LocalFrame frame(track.positions[track.positions.size() / 2].position);
-  std::size_t with_speed = 0;
   for (const RecordedPosition& position : track.positions) {
     plane.times_s.push_back(Seconds(position.stamp_ns - track.begin_ns()));
-    plane.places_m.push_back(frame.ToEnu(position.position));
-    plane.speeds_mps.push_back(position.speed_mps.value_or(0));
-    with_speed += position.speed_mps ? 1U : 0U;
+    if (!plane.are_velocities) {
+      plane.values.push_back(frame.ToEnu(position.position));
+      continue;
+    }
+    const double course_rad = *position.course_deg * geo::kRadiansPerDegree;
+    plane.values.emplace_back(*position.speed_mps * std::sin(course_rad),
+                              *position.speed_mps * std::cos(course_rad));
   }
-  // Half of the speeds are worse than none: the others would stand at 0.
-  if (with_speed < track.positions.size()) plane.speeds_mps.clear();
   return plane;
 }
 
@@ -53,51 +60,35 @@ double MedianInterval(const std::vector<double>& times_s) {
   return *middle;
 }
 
-/// Parabolas through the neighbourhood of a time, weighted by a Gaussian.
-class SmoothTrack {
- public:
-  SmoothTrack(PlaneTrack track, double sigma_s) : track_(std::move(track)), sigma_s_(sigma_s) {}
-
-  /// `time_s` must not go back from call to call.
-  ReceiverMotion::Sample At(double time_s) {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    const std::vector<double>& times = track_.times_s;
-    const auto after = std::upper_bound(times.begin(), times.end(), time_s);
-    if (after == times.begin() || after == times.end() || *after - *(after - 1) > kMaxGapS) {
-      return {kNone, kNone};
-    }
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 3> right = Eigen::Matrix<double, 3, 3>::Zero();
-    const double reach_s = 3 * sigma_s_;
-    for (auto at = std::lower_bound(times.begin(), times.end(), time_s - reach_s);
-         at != times.end() && *at <= time_s + reach_s; ++at) {
-      const auto index = static_cast<std::size_t>(at - times.begin());
-      const double t = *at - time_s;
-      const double weight = std::exp(-t * t / (2 * sigma_s_ * sigma_s_));
-      const Eigen::Vector3d row(1, t, t * t / 2);
-      const double speed = track_.speeds_mps.empty() ? 0 : track_.speeds_mps[index];
-      const Eigen::Vector3d values(track_.places_m[index].x(), track_.places_m[index].y(), speed);
-      normal += weight * row * row.transpose();
-      right += weight * row * values.transpose();
-    }
-    const Eigen::FullPivLU<Eigen::Matrix3d> solver(normal);
-    if (!solver.isInvertible()) return {kNone, kNone};
-    const Eigen::Matrix3d fit = solver.solve(right);
-    const Eigen::Vector2d velocity(fit(1, 0), fit(1, 1)), acceleration(fit(2, 0), fit(2, 1));
-    ReceiverMotion::Sample sample;
-    sample.speed_mps = track_.speeds_mps.empty() ? velocity.norm() : std::max(0.0, fit(0, 2));
-    // Clockwise, as courses are counted.
-    const double cross = velocity.y() * acceleration.x() - velocity.x() * acceleration.y();
-    if (sample.speed_mps > kMinCourseSpeedMps && velocity.norm() > kMinCourseSpeedMps) {
-      sample.turn_radps = std::clamp(cross / velocity.squaredNorm(), -kMaxTurnRadps, kMaxTurnRadps);
-    }
-    return sample;
-  }
-
- private:
-  const PlaneTrack track_;
-  const double sigma_s_;
+struct SmoothMotion {
+  Eigen::Vector2d velocity, acceleration;
 };
+
+/// The polynomial through the neighbourhood of a time, weighted by a Gaussian; none in a gap.
+std::optional<SmoothMotion> Smooth(const PlaneTrack& track, double time_s, double sigma_s) {
+  const std::vector<double>& times = track.times_s;
+  const auto after = std::upper_bound(times.begin(), times.end(), time_s);
+  if (after == times.begin() || after == times.end() || *after - *(after - 1) > kMaxGapS) {
+    return std::nullopt;
+  }
+  // Of velocities the parabola's last term is left out.
+  const Eigen::Index terms = track.are_velocities ? 2 : 3;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+  const double reach_s = 3 * sigma_s;
+  for (auto at = std::lower_bound(times.begin(), times.end(), time_s - reach_s);
+       at != times.end() && *at <= time_s + reach_s; ++at) {
+    const double t = *at - time_s;
+    const double weight = std::exp(-t * t / (2 * sigma_s * sigma_s));
+    const Eigen::Vector3d row(1, t, t * t / 2);
+    normal += weight * row * row.transpose();
+    right += weight * row * track.values[static_cast<std::size_t>(at - times.begin())].transpose();
+  }
+  const Eigen::FullPivLU<Eigen::MatrixXd> solver(normal.topLeftCorner(terms, terms));
+  if (!solver.isInvertible()) return std::nullopt;
+  const Eigen::MatrixX2d fit = solver.solve(right.topRows(terms));
+  return SmoothMotion{fit.row(terms - 2).transpose(), fit.row(terms - 1).transpose()};
+}
 
 }  // namespace
 
@@ -114,17 +105,29 @@ std::optional<ReceiverMotion::Sample> ReceiverMotion::At(std::int64_t stamp_ns) 
 }
 
 ReceiverMotion MotionOf(const RecordedTrack& track) {
-  PlaneTrack plane = InPlane(track);
-  const double sigma_s =
-      std::max(kMinSmoothingS, kSmoothingIntervals * MedianInterval(plane.times_s));
+  const PlaneTrack plane = InPlane(track);
+  const double interval_s = kSmoothingIntervals * MedianInterval(plane.times_s);
   ReceiverMotion motion;
   motion.begin_ns = track.begin_ns();
-  const double length_s = plane.times_s.back();
-  SmoothTrack smooth(std::move(plane), sigma_s);
-  const auto wanted = static_cast<std::size_t>(length_s / ReceiverMotion::kStepS) + 1;
+  motion.speed_smoothing_s = std::max(kSpeedSmoothingS, interval_s);
+  motion.turn_smoothing_s = std::max(
+      plane.are_velocities ? kTurnSmoothingByVelocityS : kTurnSmoothingByPositionS, interval_s);
+  const auto wanted = static_cast<std::size_t>(plane.times_s.back() / ReceiverMotion::kStepS) + 1;
   motion.samples.reserve(std::min(wanted, kMaxSamples));
   for (std::size_t i = 0; i < std::min(wanted, kMaxSamples); ++i) {
-    motion.samples.push_back(smooth.At(static_cast<double>(i) * ReceiverMotion::kStepS));
+    const double time_s = static_cast<double>(i) * ReceiverMotion::kStepS;
+    const auto fine = Smooth(plane, time_s, motion.speed_smoothing_s);
+    const auto smooth = Smooth(plane, time_s, motion.turn_smoothing_s);
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    ReceiverMotion::Sample sample{fine && smooth ? fine->velocity.norm() : kNone, 0};
+    if (smooth && smooth->velocity.norm() > kMinCourseSpeedMps) {
+      // Clockwise, as courses are counted.
+      const double cross = smooth->velocity.y() * smooth->acceleration.x() -
+                           smooth->velocity.x() * smooth->acceleration.y();
+      sample.turn_radps =
+          std::clamp(cross / smooth->velocity.squaredNorm(), -kMaxTurnRadps, kMaxTurnRadps);
+    }
+    motion.samples.push_back(sample);
   }
   return motion;
 }

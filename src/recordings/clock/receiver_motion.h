@@ -19,14 +19,18 @@ struct ReceiverMotion {
 
   std::int64_t begin_ns = 0;
   std::vector<Sample> samples;
+  /// Standard deviations of the Gaussian weights by which they are smoothed.
+  double speed_smoothing_s = 0;
+  double turn_smoothing_s = 0;
 
   /// Between two samples; none outside and in gaps.
   std::optional<Sample> At(std::int64_t stamp_ns) const;
 };
 
-/// The motion of a track: the speed that the receiver states where it does, and else that of its
-/// positions; the turn is that of its positions. Positions are smoothed by parabolas that are
-/// fitted around each time with weights symmetric in time, which move nothing in time.
+/// The motion of a track, by the velocities that the receiver states where it states all of them,
+/// and else by its positions, which err more. Both are smoothed by polynomials that are fitted
+/// around each time with weights symmetric in time, which move nothing in time: parabolas through
+/// positions, lines through velocities.
 ReceiverMotion MotionOf(const RecordedTrack& track);
 
 }  // namespace livemap::recordings

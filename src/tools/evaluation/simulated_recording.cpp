@@ -28,6 +28,8 @@ constexpr int kPictureWidth = 256, kPictureHeight = 144;
 constexpr double kFrameRateHz = 8;
 constexpr double kFrameJitterS = 0.02;
 constexpr int kJpegQuality = 60;
+/// Of the receiver's Doppler, per axis.
+constexpr double kVelocitySigmaMps = 0.1;
 constexpr double kStopMps = 0.2;
 constexpr double kTurnDeg = 20;
 constexpr double kTurnS = 5;
@@ -48,9 +50,11 @@ struct RecordingDraw {
     mounting.yaw_deg = -3 + 6 * random.Uniform();
     mounting.pitch_deg = -1 + 6 * random.Uniform();
     rate_hz = Choose({1.0, 5.0, 10.0});
-    nmea = random.Uniform() < 0.5;
-    noise.white_sigma_m = 0.2 + 0.6 * random.Uniform();
-    noise.bias_sigma_m = 2;
+    const double file = random.Uniform();
+    nmea = file < 1.0 / 3;
+    velocities = file < 2.0 / 3;
+    noise.white_sigma_m = 0.2 + 0.4 * random.Uniform();
+    noise.bias_sigma_m = 1;
     offset_s = kMaxOffsetS * (2 * random.Uniform() - 1);
   }
 
@@ -66,6 +70,7 @@ struct RecordingDraw {
   datasets::CameraMounting mounting;
   double rate_hz;
   bool nmea;
+  bool velocities;  ///< The file states speed and course.
   datasets::GnssReceiverNoise noise;
   double offset_s;
 };
@@ -87,10 +92,24 @@ cv::Mat Compressed(const cv::Mat& bgr) {
   return cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE);
 }
 
-std::string GpxPoint(const geo::GeoPoint& place, std::int64_t stamp_ns) {
-  char text[160];
-  std::snprintf(text, sizeof text, "<trkpt lat=\"%.7f\" lon=\"%.7f\"><time>%s</time></trkpt>\n",
-                place.latitude_deg, place.longitude_deg, recordings::FormatUtc(stamp_ns).c_str());
+/// What a receiver measures at a time.
+struct MeasuredState {
+  std::int64_t stamp_ns = 0;
+  geo::GeoPoint place;
+  double speed_mps = 0;
+  double course_deg = 0;
+};
+
+std::string GpxPoint(const MeasuredState& state, bool velocities) {
+  char text[280], motion[80] = "";
+  if (velocities) {
+    std::snprintf(motion, sizeof motion,
+                  "<extensions><speed>%.3f</speed><course>%.2f</course></extensions>",
+                  state.speed_mps, state.course_deg);
+  }
+  std::snprintf(text, sizeof text, "<trkpt lat=\"%.7f\" lon=\"%.7f\"><time>%s</time>%s</trkpt>\n",
+                state.place.latitude_deg, state.place.longitude_deg,
+                recordings::FormatUtc(state.stamp_ns).c_str(), motion);
   return text;
 }
 
@@ -104,16 +123,15 @@ std::string NmeaAngle(double degrees, int digits, const char* sides) {
   return text;
 }
 
-std::string RmcSentence(const geo::GeoPoint& place, double speed_mps, double course_deg,
-                        std::int64_t stamp_ns) {
-  const std::string utc = recordings::FormatUtc(stamp_ns);  // 2026-01-31T12:34:56.789Z
+std::string RmcSentence(const MeasuredState& state) {
+  const std::string utc = recordings::FormatUtc(state.stamp_ns);  // 2026-01-31T12:34:56.789Z
   char body[160];
   std::snprintf(body, sizeof body, "GNRMC,%s%s%s,A,%s,%s,%.3f,%.2f,%s%s%s,,,A",
                 utc.substr(11, 2).c_str(), utc.substr(14, 2).c_str(), utc.substr(17, 6).c_str(),
-                NmeaAngle(place.latitude_deg, 2, "NS").c_str(),
-                NmeaAngle(place.longitude_deg, 3, "EW").c_str(), speed_mps * 3600 / 1852,
-                course_deg, utc.substr(8, 2).c_str(), utc.substr(5, 2).c_str(),
-                utc.substr(2, 2).c_str());
+                NmeaAngle(state.place.latitude_deg, 2, "NS").c_str(),
+                NmeaAngle(state.place.longitude_deg, 3, "EW").c_str(),
+                state.speed_mps * 3600 / 1852, state.course_deg, utc.substr(8, 2).c_str(),
+                utc.substr(5, 2).c_str(), utc.substr(2, 2).c_str());
   unsigned int sum = 0;
   for (const char* c = body; *c != '\0'; ++c) sum ^= static_cast<unsigned char>(*c);
   char sentence[200];
@@ -129,18 +147,18 @@ recordings::RecordedTrack LogOf(const simulation::VehicleMotion& motion, double 
   const auto count = static_cast<int>((seconds + 2 * kReceiverLeadS) * draw.rate_hz);
   for (int i = 0; i < count; ++i) {
     const double time_s = i / draw.rate_hz - kReceiverLeadS;
-    const simulation::VehicleKinematics state = motion.StateAt(time_s);
+    const simulation::VehicleKinematics truth = motion.StateAt(time_s);
     const Eigen::Vector2d error_m = receiver.ErrorAt(time_s).value_or(Eigen::Vector2d::Zero());
-    const geo::GeoPoint place = map.ToGeo(state.world_from_base.translation().head<2>() + error_m);
-    const std::int64_t stamp_ns = kTrueBeginNs + Nanoseconds(time_s);
-    if (!draw.nmea) {
-      text += GpxPoint(place, stamp_ns);
-      continue;
-    }
-    const double speed = std::max(0.0, state.velocity_mps.x() + 0.1 * draw.random.Normal().x());
-    const Eigen::Vector3d ahead = state.world_from_base.linear().col(0);
-    const double course = std::atan2(ahead.x(), ahead.y()) / geo::kRadiansPerDegree;
-    text += RmcSentence(place, speed, course < 0 ? course + 360 : course, stamp_ns);
+    MeasuredState state;
+    state.stamp_ns = kTrueBeginNs + Nanoseconds(time_s);
+    state.place = map.ToGeo(truth.world_from_base.translation().head<2>() + error_m);
+    const Eigen::Vector2d velocity =
+        (truth.world_from_base.linear() * truth.velocity_mps).head<2>() +
+        kVelocitySigmaMps * draw.random.Normal();
+    state.speed_mps = velocity.norm();
+    state.course_deg = std::atan2(velocity.x(), velocity.y()) / geo::kRadiansPerDegree;
+    if (state.course_deg < 0) state.course_deg += 360;
+    text += draw.nmea ? RmcSentence(state) : GpxPoint(state, draw.velocities);
   }
   return draw.nmea
              ? recordings::ParseNmea(text, "the simulated receiver")
@@ -178,7 +196,9 @@ SimulatedRecording SimulateRecording(std::uint64_t seed, double seconds, int thr
   SimulatedRecording recording;
   recording.offset_s = draw.offset_s;
   recording.track = LogOf(motion, seconds, seed, draw);
-  recording.receiver = std::string(draw.nmea ? "NMEA, " : "GPX, ") +
+  recording.receiver = std::string(draw.nmea         ? "NMEA, "
+                                   : draw.velocities ? "GPX with speed, "
+                                                     : "GPX, ") +
                        std::to_string(static_cast<int>(draw.rate_hz)) + " Hz";
   FindEvents(motion, seconds, recording);
   recordings::ImageMotionMeter meter;

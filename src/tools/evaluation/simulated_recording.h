@@ -23,8 +23,8 @@ struct SimulatedRecording {
 /// `seconds` is the length of the recording. The receiver begins 25 s before the recorder and ends
 /// 25 s after it, by the true clock. Drawn by the seed are street, speed, whether the driver waits
 /// at crossings, light and weather, the camera's lens (66, 90 or 110 degrees) and mounting, the
-/// frames' jitter, the receiver's errors, rate (1, 5 or 10 Hz) and file (GPX without, NMEA with
-/// speed), and the offset within 20 s.
+/// frames' jitter, the receiver's errors, rate (1, 5 or 10 Hz) and file (NMEA with speed and
+/// course, GPX with and without), and the offset within 20 s.
 SimulatedRecording SimulateRecording(std::uint64_t seed, double seconds, int threads);
 
 }  // namespace livemap::tools
