@@ -1,8 +1,7 @@
 #include "web/api/api.h"
 
-#include <algorithm>
-
 #include "common/error.h"
+#include "web/http/page_answer.h"
 #include "web/json/json.h"
 #include "zone/pictures/picture_recoder.h"
 
@@ -11,14 +10,6 @@ namespace {
 
 constexpr std::string_view kImagePrefix = "/images/";
 constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
-
-/// Only this server's own files run or load; tiles are the one exception, and only as images.
-std::string PagePolicy(const std::string& tile_source) {
-  return "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:" +
-         (tile_source.empty() ? "" : " " + tile_source) +
-         "; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
-         "frame-ancestors 'none'";
-}
 
 bool StartsWith(std::string_view text, std::string_view prefix) {
   return text.substr(0, prefix.size()) == prefix;
@@ -36,22 +27,6 @@ zone::PictureLimits LimitsOf(const WebConfig& options) {
   zone::PictureLimits limits;
   limits.longest_side_px = options.picture_side_px;
   return limits;
-}
-
-/// 304 where the client already has this very content.
-HttpResponse CacheableAnswer(std::shared_ptr<const std::vector<std::uint8_t>> content,
-                             const std::string& content_type, const std::string& etag,
-                             const char* cache_control, const HttpRequest& question) {
-  HttpResponse answer;
-  answer.headers.emplace_back("ETag", etag);
-  answer.headers.emplace_back("Cache-Control", cache_control);
-  answer.content_type = content_type;
-  if (question.if_none_match.find(etag) != std::string::npos) {
-    answer.status = 304;
-  } else {
-    answer.kept = std::move(content);
-  }
-  return answer;
 }
 
 }  // namespace
@@ -73,7 +48,7 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       page_policy_(PagePolicy(TileSource(options.tile_url))),
       picture_queue_(pictures_, {}) {}
 
-bool Api::IsForPicture(const HttpRequest& question) {
+bool Api::AnswersLater(const HttpRequest& question) const {
   return StartsWith(question.target, kImagePrefix);
 }
 
@@ -95,7 +70,7 @@ void Api::Answer(const HttpRequest& question, const Done& done) {
 std::optional<std::pair<std::string, std::string>> Api::FindPicture(
     const HttpRequest& question) const {
   if (question.method != "GET" && question.method != "HEAD") return std::nullopt;
-  if (!IsForPicture(question)) return std::nullopt;
+  if (!AnswersLater(question)) return std::nullopt;
   std::string sha256 = ParseTarget(question.target).path.substr(kImagePrefix.size());
   auto path = zone_.ImagePath(sha256);
   if (!path) return std::nullopt;
@@ -112,7 +87,7 @@ HttpResponse Api::Answer(const HttpRequest& question) {
     const bool is_read = question.method == "GET" || question.method == "HEAD";
     answer = is_read ? AnswerGet(question) : AnswerPost(question);
   } catch (const BadRequest& mistake) {
-    answer = ErrorAnswer(400, mistake.what());
+    answer = MakeErrorAnswer(400, mistake.what());
   } catch (const std::exception&) {
     // The zone's log names the cause; a stranger gets no paths or SQL.
     answer = MakeBusyAnswer("the zone's store does not answer");
@@ -121,20 +96,8 @@ HttpResponse Api::Answer(const HttpRequest& question) {
 }
 
 HttpResponse Api::Finish(HttpResponse answer) const {
-  const bool has_policy =
-      std::any_of(answer.headers.begin(), answer.headers.end(),
-                  [](const auto& header) { return header.first == "Content-Security-Policy"; });
-  if (!has_policy) answer.headers.emplace_back("Content-Security-Policy", page_policy_);
-  answer.headers.emplace_back("X-Content-Type-Options", "nosniff");
-  answer.headers.emplace_back("X-Frame-Options", "DENY");
-  answer.headers.emplace_back("Referrer-Policy", "strict-origin-when-cross-origin");
-  answer.headers.emplace_back("Cross-Origin-Resource-Policy", "same-origin");
-  answer.headers.emplace_back("Cross-Origin-Opener-Policy", "same-origin");
+  AddSecurityHeaders(page_policy_, answer);
   return answer;
-}
-
-HttpResponse Api::ErrorAnswer(int status, const std::string& sentence) const {
-  return MakeErrorAnswer(status, sentence);
 }
 
 /// Each way looks at the token once: twice would count a wrong one twice.
@@ -161,7 +124,7 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
   const bool has_preview = decision && HasPreview(decision->decision);
   const char* accepted = has_preview ? "GET, HEAD, POST" : decision ? "POST" : "GET, HEAD";
   HttpResponse answer =
-      ErrorAnswer(405, std::string("the method is not allowed, accepted is ") + accepted);
+      MakeErrorAnswer(405, std::string("the method is not allowed, accepted is ") + accepted);
   answer.headers.emplace_back("Allow", accepted);
   return answer;
 }
@@ -175,15 +138,15 @@ HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question
     return JsonAnswer({{"status", "ok"}, {"sequence", zone_.Sequence()}});
   }
   if (path == "/ws") {
-    HttpResponse answer = ErrorAnswer(426, "this address speaks WebSocket only");
+    HttpResponse answer = MakeErrorAnswer(426, "this address speaks WebSocket only");
     answer.headers.emplace_back("Upgrade", "websocket");
     return answer;
   }
   if (StartsWith(path, kLeafletPrefix)) {
-    return File(leaflet_, std::string_view(path).substr(kLeafletPrefix.size()), question);
+    return FileAnswer(leaflet_, std::string_view(path).substr(kLeafletPrefix.size()), question);
   }
-  if (path == "/") return File(page_, "index.html", question);
-  return File(page_, std::string_view(path).substr(1), question);
+  if (path == "/") return FileAnswer(page_, "index.html", question);
+  return FileAnswer(page_, std::string_view(path).substr(1), question);
 }
 
 HttpResponse Api::RouteApi(const RequestTarget& target) const {
@@ -196,7 +159,7 @@ HttpResponse Api::RouteApi(const RequestTarget& target) const {
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
   if (path == "/api/v1/vehicles") return Vehicles();
   if (path == "/api/v1/config") return PageConfig();
-  return ErrorAnswer(404, "there is nothing at this address");
+  return MakeErrorAnswer(404, "there is nothing at this address");
 }
 
 HttpResponse Api::Vehicles() const {
@@ -248,13 +211,6 @@ HttpResponse Api::Picture(const std::string& sha256, const zone::PictureCache::F
   // Even opened on its own it may do nothing.
   answer.headers.emplace_back("Content-Security-Policy", "default-src 'none'; sandbox");
   return answer;
-}
-
-HttpResponse Api::File(const StaticFiles& files, std::string_view name,
-                       const HttpRequest& question) const {
-  const auto file = files.Find(name);
-  if (!file) return ErrorAnswer(404, "there is nothing at this address");
-  return CacheableAnswer(file->content, file->content_type, file->etag, "no-cache", question);
 }
 
 }  // namespace livemap::web

@@ -14,6 +14,7 @@
 #include "web/api/query.h"
 #include "web/api/vehicle_trails.h"
 #include "web/http/http_message.h"
+#include "web/http/site.h"
 #include "web/http/static_files.h"
 #include "web/http/web_config.h"
 #include "zone/pictures/picture_cache.h"
@@ -24,26 +25,24 @@ namespace livemap::web {
 
 /// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1`
 /// (docs/reference/http-api.md). Thread-safe; never throws.
-class Api {
+class Api : public Site {
  public:
   /// Keeps references to all but `options`. Throws Error when the token file is not accepted.
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
   /// Every request but a picture's, of which it knows none.
-  HttpResponse Answer(const HttpRequest& question);
-  /// Every request: a picture that is not made yet is answered later, from another thread. `done`
-  /// is called once, must not block, and is dropped without a call when the Api goes away.
-  using Done = std::function<void(HttpResponse answer)>;
-  void Answer(const HttpRequest& question, const Done& done);
+  HttpResponse Answer(const HttpRequest& question) override;
+  /// Every request: a picture that is not made yet is answered later, from another thread.
+  void Answer(const HttpRequest& question, const Done& done) override;
   /// Lets go of whoever waits for a picture, without a call: when it returns, none is being called.
   void Stop() { picture_queue_.Stop(); }
   /// Whether the request has a valid token. Nothing is counted: Answer does that. Quick.
-  bool IsByOfficial(const HttpRequest& question) const {
+  bool IsByOfficial(const HttpRequest& question) const override {
     return !question.authorization.empty() && officials_.HasRightToken(question);
   }
   /// Whether the request asks for a picture, which may take long.
-  static bool IsForPicture(const HttpRequest& question);
+  bool AnswersLater(const HttpRequest& question) const override;
 
   /// How pictures fared since the start: how many were refused and why the last of them was, and
   /// how many asked in vain because too many waited.
@@ -53,9 +52,6 @@ class Api {
     std::uint64_t busy = 0;
   };
   PictureCounters picture_counters() const;
-
-  /// A JSON answer `{"error": sentence}` with the server's security headers.
-  HttpResponse ErrorAnswer(int status, const std::string& sentence) const;
 
  private:
   HttpResponse AnswerGet(const HttpRequest& question);
@@ -70,8 +66,6 @@ class Api {
                        const HttpRequest& question) const;
   /// With the headers that every answer has.
   HttpResponse Finish(HttpResponse answer) const;
-  HttpResponse File(const StaticFiles& files, std::string_view name,
-                    const HttpRequest& question) const;
 
   const WebConfig options_;
   zone::ZoneService& zone_;

@@ -7,22 +7,27 @@
 #include <utility>
 
 #include "protocol/hazard_catalogue.h"
-#include "web/api/api.h"
 #include "web/api/event_hub.h"
 #include "web/http/client_name.h"
+#include "web/http/site.h"
 #include "web/http/web_config.h"
 #include "web/server/connection_table.h"
 #include "web/server/work_queue.h"
 
 namespace livemap::web {
 
+/// What the live stream tells.
+struct LiveSource {
+  zone::ZoneService& zone;
+  const protocol::HazardCatalogue& catalogue;
+  EventHub& hub;
+};
+
 /// What all connections share; outlives them.
 struct WebContext {
   const WebConfig& options;
-  zone::ZoneService& zone;
-  const protocol::HazardCatalogue& catalogue;
-  Api& api;
-  EventHub& hub;
+  Site& site;
+  const LiveSource* live;  ///< None: the site has no live stream.
   ConnectionTable& table;
   /// Makes answers, so that the threads that read and write sockets never wait for the store.
   WorkQueue& work;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/clock.h"
+#include "web/api/query.h"
 #include "web/http/origin.h"
 #include "web/server/websocket_session.h"
 
@@ -120,7 +121,7 @@ void HttpSession::AnswerUnreadable(beast::error_code failure) {
   const char* sentence = status == 413 ? "the request's body is too large or not accepted"
                                        : "the request's header is malformed or too large";
   form_ = AnswerForm();
-  Refuse(context().api.ErrorAnswer(status, sentence));
+  Refuse(MakeErrorAnswer(status, sentence));
 }
 
 void HttpSession::OnHeader(beast::error_code failure) {
@@ -148,7 +149,7 @@ void HttpSession::OnHeader(beast::error_code failure) {
   }
   if (request.method() == http::verb::post) return ReadBody();
   // A body that is not read would be taken for the next request: the connection ends.
-  Refuse(context().api.ErrorAnswer(413, "a request with a body is not accepted"));
+  Refuse(MakeErrorAnswer(413, "a request with a body is not accepted"));
 }
 
 /// Within the time that the header had, too.
@@ -173,14 +174,14 @@ void HttpSession::AnswerRequest() {
   question.client = client_;
   question.body = request.body();
   rank_ =
-      context().api.IsByOfficial(question) ? WorkQueue::Rank::kOfficial : WorkQueue::Rank::kReader;
+      context().site.IsByOfficial(question) ? WorkQueue::Rank::kOfficial : WorkQueue::Rank::kReader;
   SetPhase(ConnectionTable::Phase::kWorking);
   if (question.target == "/healthz") {
     // Whoever watches over the zone does not wait for anybody's answer.
     Begin(AnswerTo(question));
     return WritePart();
   }
-  if (Api::IsForPicture(question)) return AwaitPicture(question);
+  if (context().site.AnswersLater(question)) return AwaitAnswer(question);
   WriteAfter([this, question = std::move(question)] { Begin(AnswerTo(question)); });
 }
 
@@ -190,7 +191,7 @@ bool HttpSession::HasPlace(bool is_health) {
 }
 
 HttpResponse HttpSession::AnswerTo(const HttpRequest& question) {
-  HttpResponse answer = context().api.Answer(question);
+  HttpResponse answer = context().site.Answer(question);
   if (question.authorization.empty()) return answer;  // It has a place.
   if (answer.by_official) context().table.MakeOfficial(slot_.id());
   const bool may_be_told = answer.by_official || answer.status >= 400;
@@ -198,7 +199,7 @@ HttpResponse HttpSession::AnswerTo(const HttpRequest& question) {
   return MakeBusyAnswer(kNoPlace);
 }
 
-void HttpSession::AwaitPicture(const HttpRequest& question) {
+void HttpSession::AwaitAnswer(const HttpRequest& question) {
   const auto serve = [self = shared_from_this()](std::uint64_t number, HttpResponse answer) {
     if (number != self->question_) return;
     ++self->question_;
@@ -211,8 +212,8 @@ void HttpSession::AwaitPicture(const HttpRequest& question) {
   deadline_.async_wait([serve, number = question_](beast::error_code failure) {
     if (!failure) serve(number, MakeBusyAnswer("the picture is not made yet", 2));
   });
-  context().api.Answer(question, [serve, number = question_,
-                                  executor = stream_.get_executor()](HttpResponse answer) {
+  context().site.Answer(question, [serve, number = question_,
+                                   executor = stream_.get_executor()](HttpResponse answer) {
     boost::asio::post(executor, [serve, number, answer = std::move(answer)]() mutable {
       serve(number, std::move(answer));
     });
@@ -224,7 +225,8 @@ bool HttpSession::UpgradeToStream(const Request& request) {
   HttpResponse refusal;
   try {
     const RequestTarget target = ParseTarget(std::string(request.target()));
-    if (target.path != "/ws") return false;
+    const LiveSource* const live = context().live;
+    if (live == nullptr || target.path != "/ws") return false;
     const auto since = ParseStreamQuery(target);
     const bool may_open =
         IsAllowedOrigin(Field(request, http::field::origin), Field(request, http::field::host),
@@ -234,16 +236,16 @@ bool HttpSession::UpgradeToStream(const Request& request) {
                            context().table.BecomeStream(slot_.id(), SteadyNs());
     if (has_place) {
       stream_.expires_never();
-      std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), client_, since)
+      std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), *live, client_,
+                                         since)
           ->Start(request);
       return true;
     }
     refusal = may_open
                   ? MakeBusyAnswer("there is no place for another live stream of your address now")
-                  : context().api.ErrorAnswer(
-                        403, "pages of another origin may not open the live stream");
+                  : MakeErrorAnswer(403, "pages of another origin may not open the live stream");
   } catch (const BadRequest& mistake) {
-    refusal = context().api.ErrorAnswer(400, mistake.what());
+    refusal = MakeErrorAnswer(400, mistake.what());
   }
   Refuse(std::move(refusal));
   return true;

@@ -14,7 +14,7 @@
 
 namespace livemap::web {
 
-/// One HTTP/1.1 connection: reads a request, lets Api answer it, writes the answer part by part,
+/// One HTTP/1.1 connection: reads a request, lets Site answer it, writes the answer part by part,
 /// and so on until the client, a time-out or the table of connections ends it. Only a POST may have
 /// a body, a small one. A request for the live stream turns it into a WebSocketSession.
 ///
@@ -41,8 +41,9 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   HttpResponse AnswerTo(const HttpRequest& question);
   /// Whether it is served without a token: not on the reserve, but for /healthz from the loopback.
   bool HasPlace(bool is_health);
-  /// A picture is made elsewhere; who waits for it too long is told to come again.
-  void AwaitPicture(const HttpRequest& question);
+  /// The answer, such as a picture, is made elsewhere; who waits for it too long is told to come
+  /// again.
+  void AwaitAnswer(const HttpRequest& question);
   /// The request is this client's, or again nobody's but the other end's.
   void SetClient(std::string client);
   void AnswerUnreadable(boost::beast::error_code failure);
@@ -79,8 +80,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   std::string part_;
   std::size_t held_bytes_ = 0;  ///< What this session adds to the context's.
   std::size_t drained_bytes_ = 0;
-  boost::asio::steady_timer deadline_;  ///< Of a picture.
-  std::uint64_t question_ = 0;  ///< Counts the pictures that were waited for: a late one is known.
+  boost::asio::steady_timer deadline_;  ///< Of an answer that is waited for.
+  std::uint64_t question_ = 0;          ///< Counts these: a late one is known.
 };
 
 }  // namespace livemap::web

@@ -28,8 +28,10 @@ std::shared_ptr<const std::string> Shared(const Json& json) {
 }  // namespace
 
 WebSocketSession::WebSocketSession(beast::tcp_stream stream, ConnectionSlot slot,
-                                   std::string client, std::optional<std::uint64_t> since)
+                                   const LiveSource& live, std::string client,
+                                   std::optional<std::uint64_t> since)
     : slot_(std::move(slot)),
+      live_(live),
       client_(std::move(client)),
       stream_(std::move(stream)),
       close_deadline_(stream_.get_executor()),
@@ -68,12 +70,11 @@ void WebSocketSession::GiveUpPlace() {
 
 void WebSocketSession::OnAccepted() {
   is_accepted_ = true;
-  WebContext& context = slot_.context();
   // Joined before the store is asked: what the store does not tell any more, the hub will.
-  context.hub.Join(shared_from_this());
+  live_.hub.Join(shared_from_this());
   Read();
   try {
-    const std::uint64_t newest = context.zone.Sequence();
+    const std::uint64_t newest = live_.zone.Sequence();
     // A client ahead of the store knew another one (restored from a backup, say): told by the
     // sequence of this message, it forgets what it knew and loads the list.
     told_sequence_ = std::min(since_.value_or(newest), newest);
@@ -105,7 +106,7 @@ void WebSocketSession::Read() {
                        if (failure) {
                          // The other end is gone or was closed: nothing more is queued for it.
                          self->state_ = State::kClosing;
-                         self->slot_.context().hub.Leave(self.get());
+                         self->live_.hub.Leave(self.get());
                          self->close_deadline_.cancel();
                          self->heartbeat_.cancel();
                          // Else a write that nobody reads would go on until its time-out.
@@ -167,7 +168,7 @@ WebSocketSession::Replay WebSocketSession::ReadVehicles(const std::string& after
   Replay replay;
   replay.told_sequence = told_sequence;
   replay.newest = UINT64_MAX;  // Events are still to come.
-  const auto vehicles = slot_.context().zone.VehiclesAfter(after, kReplayPage);
+  const auto vehicles = live_.zone.VehiclesAfter(after, kReplayPage);
   for (const zone::VehicleState& vehicle : vehicles) {
     replay.messages.push_back(Shared(VehicleMessage(vehicle)));
   }
@@ -176,10 +177,9 @@ WebSocketSession::Replay WebSocketSession::ReadVehicles(const std::string& after
 }
 
 WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequence) const {
-  const WebContext& context = slot_.context();
   Replay replay;
   // Read before the lists, and the end of both: what happens between the two comes later.
-  replay.newest = context.zone.Sequence();
+  replay.newest = live_.zone.Sequence();
   zone::Walk<zone::HazardState> hazard_walk;
   zone::Walk<zone::MapChangeState> change_walk;
   hazard_walk.after = change_walk.after = told_sequence;
@@ -188,8 +188,8 @@ WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequenc
     hazard_walk.states = zone::StatesOnMap();
     change_walk.states = zone::OpenStates();
   }
-  const auto hazards = context.zone.ReadHazards(hazard_walk, kReplayPage);
-  const auto changes = context.zone.ReadMapChanges(change_walk, kReplayPage);
+  const auto hazards = live_.zone.ReadHazards(hazard_walk, kReplayPage);
+  const auto changes = live_.zone.ReadMapChanges(change_walk, kReplayPage);
   std::uint64_t end = replay.newest;
   if (!hazards.is_last) end = std::min(end, hazards.sequence);
   if (!changes.is_last) end = std::min(end, changes.sequence);
@@ -197,7 +197,7 @@ WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequenc
   for (const zone::Hazard& hazard : hazards.items) {
     if (hazard.sequence > end) break;
     messages[hazard.sequence] =
-        Shared(HazardMessage(ReplayAction(hazard), hazard, context.catalogue));
+        Shared(HazardMessage(ReplayAction(hazard), hazard, live_.catalogue));
   }
   for (const zone::MapChangeFeature& change : changes.items) {
     if (change.sequence > end) break;
@@ -261,7 +261,7 @@ void WebSocketSession::CloseAsFailed() {
 void WebSocketSession::CloseWith(websocket::close_code code, const char* reason) {
   if (state_ == State::kClosing) return;
   state_ = State::kClosing;
-  slot_.context().hub.Leave(this);
+  live_.hub.Leave(this);
   heartbeat_.cancel();
   // Only the message that is being written may finish.
   queue_.resize(writing_ ? 1 : 0);

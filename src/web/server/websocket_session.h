@@ -30,8 +30,8 @@ class WebSocketSession : public LiveListener,
 
   /// Without `since` the client is told only what happens from now on.
   /// `client`: see ClientOf.
-  WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot, std::string client,
-                   std::optional<std::uint64_t> since);
+  WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot, const LiveSource& live,
+                   std::string client, std::optional<std::uint64_t> since);
 
   void Start(const Request& upgrade);
   void Deliver(const LiveMessage& message) override;
@@ -66,6 +66,7 @@ class WebSocketSession : public LiveListener,
   void CloseWith(boost::beast::websocket::close_code code, const char* reason);
 
   ConnectionSlot slot_;
+  const LiveSource& live_;
   const std::string client_;  ///< Whose turn it is to have a page read.
   boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
   boost::asio::steady_timer close_deadline_;
