@@ -15,7 +15,7 @@ NODES = {
                 "hazard_detection": "hazard_detection", "hazard_reporting": "hazard_reporting",
                  "mqtt_bridge": "mqtt_bridge_vehicle", "early_discard": "early_discard", "driver_alert": "driver_alert",
                  "change_detection": "change_detection", "gps_receiver": "gps_receiver",
-                 "driver_speech": "driver_speech"},
+                 "driver_speech": "driver_speech", "driver_page": "driver_page"},
     "zone": {"zone_cloudlet": "zone_cloudlet", "mqtt_bridge": "mqtt_bridge_zone", "candidate_intake": "candidate_intake",
              "hazard_detection": "hazard_detection"},
 }
@@ -52,7 +52,7 @@ class LaunchArguments(unittest.TestCase):
                 wanted = {key: changed(value) for key, value in defaults.items()}
                 optional = {"edge_vo": ["vo:=true"], "geo_localization": ["vo:=true"], "early_discard": ["profile:=small"],
                             "change_detection": ["changes:=true"], "gps_receiver": ["receiver:=gpsd"],
-                            "driver_speech": ["speech:=true"]}.get(node, [])
+                            "driver_speech": ["speech:=true"], "driver_page": ["page:=true"]}.get(node, [])
                 dumped = parameters(f"{launch}.launch", *optional, f"{node}:={yaml.safe_dump(wanted, default_flow_style=True, width=9999).strip()}")
                 for key, value in wanted.items():
                     self.assertEqual(dumped.get(f"/{node}/{key}"), value, f"{launch}.launch {node}: {key}")

@@ -8,6 +8,7 @@
 #include "ros/parameters/candidate_intake_parameters.h"
 #include "ros/parameters/change_detection_parameters.h"
 #include "ros/parameters/driver_alert_parameters.h"
+#include "ros/parameters/driver_page_parameters.h"
 #include "ros/parameters/driver_speech_parameters.h"
 #include "ros/parameters/early_discard_parameters.h"
 #include "ros/parameters/hazard_detection_parameters.h"
@@ -35,6 +36,7 @@ const std::map<std::string, Reader>& Readers() {
       {"candidate_intake", [](P& p, const S&) { ReadCandidateIntakeConfig(p); }},
       {"change_detection", [](P& p, const S&) { ReadChangeDetectionConfig(p, kNowNs); }},
       {"driver_alert", [](P& p, const S&) { ReadDriverAlertConfig(p); }},
+      {"driver_page", [](P& p, const S&) { ReadDriverPageConfig(p); }},
       {"driver_speech", [](P& p, const S&) { ReadDriverSpeechConfig(p); }},
       {"early_discard", [](P& p, const S&) { ReadEarlyDiscardConfig(p, kNowNs); }},
       {"edge_vo", [](P& p, const S&) { ReadEdgeVoConfig(p); }},
@@ -111,6 +113,7 @@ const std::vector<NodeParameters>& AllNodeParameters() {
       {"candidate_intake", "candidate_intake", "candidate_intake_parameters.cpp", {}},
       {"change_detection", "change_detection", "change_detection_parameters.cpp", {}},
       {"driver_alert", "driver_alert", "driver_alert_parameters.cpp", {}},
+      {"driver_page", "driver_page", "driver_page_parameters.cpp", {}},
       {"driver_speech", "driver_speech", "driver_speech_parameters.cpp", {}},
       {"early_discard", "early_discard", "early_discard_parameters.cpp", {}},
       {"edge_vo", "edge_vo", "positioning/edge_vo_parameters.cpp", {}},
