@@ -5,9 +5,9 @@
 namespace livemap::vehicle {
 namespace {
 
-const geo::GeoPoint kStart{40.4433, -79.9436};
+const geo::GeoPoint kHazard{40.4433, -79.9436};
 
-geo::GeoPoint North(double metres) { return geo::GeodesicDestination(kStart, 0, metres); }
+geo::GeoPoint North(double metres) { return geo::GeodesicDestination(kHazard, 0, metres); }
 
 HazardAlert AheadAlert(int number, double distance_m,
                        HazardAlert::State state = HazardAlert::State::kApproach) {
