@@ -47,6 +47,17 @@ class DriveBags(unittest.TestCase):
                                "\0".join(request.values()).encode().hex()], capture_output=True, text=True, timeout=60,
                               cwd=self.folder, check=False)
 
+    def test_a_recording_that_is_none_is_refused_before_anything_starts(self):
+        (self.folder / "a.mp4").touch()
+        for arguments, sentence in (
+                (["--drive", "a.mp4", "b.mp4", "--gpx", "track.gpx"], "video 'b.mp4' is no file"),
+                (["--bag", "drive.bag", "--gpx", "track.gpx"], "--gpx needs --drive VIDEO"),
+                (["--fov", "66"], "--fov needs --drive VIDEO")):
+            with self.subTest(arguments=arguments):
+                done = self.demo(*arguments)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertIn(sentence, done.stderr)
+
     def assert_refused(self, bag, *parts, code=1, arguments=()):
         """By the demo: one sentence, nothing on standard output, nothing started."""
         done = self.demo("--bag", bag, *arguments)

@@ -102,9 +102,10 @@ class NmeaLog {
     return index < fields.size() ? fields[index] : "";
   }
 
-  /// The number that `count` digits of `text` from `at` on are; none where they are no digits.
+  /// The number that `count` digits of `text` from `at` on are, at most 4; none where they are no
+  /// digits.
   static std::optional<int> DigitsAt(const std::string& text, std::size_t at, std::size_t count) {
-    if (at + count > text.size()) return std::nullopt;
+    if (at + count > text.size() || count > 4) return std::nullopt;
     int value = 0;
     for (const char c : text.substr(at, count)) {
       if (c < '0' || c > '9') return std::nullopt;

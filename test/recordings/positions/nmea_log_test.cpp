@@ -95,6 +95,8 @@ TEST(NmeaLog, WhatIsNoLogIsRefused) {
               HasSubstr("a place on the earth"));
   EXPECT_THAT(Refusal(Sentence("GPRMC,120000,A,4860.000,N,00930.000,W,1,1,310126,,")),
               HasSubstr("the coordinate '4860.000,N'"));
+  EXPECT_THAT(Refusal(Sentence("GPRMC,120000,A,48152222222222.0,N,00930.000,W,1,1,310126,,")),
+              HasSubstr("the coordinate '48152222222222.0,N'"));
 }
 
 }  // namespace
