@@ -23,22 +23,6 @@ constexpr int kMaxSide = 16384;
 constexpr char kContainers[] = "mov,matroska,avi,mpegts,mpeg,asf,flv";
 constexpr AVRational kNanosecond{1, 1'000'000'000};
 
-struct CloseFormat {
-  void operator()(AVFormatContext* format) const { avformat_close_input(&format); }
-};
-struct FreeCodec {
-  void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
-};
-struct FreeFrame {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-};
-struct FreePacket {
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-};
-struct FreeScaler {
-  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
-};
-
 std::string ReasonOf(int code) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
   av_strerror(code, text.data(), text.size());
@@ -48,6 +32,22 @@ std::string ReasonOf(int code) {
 }  // namespace
 
 struct VideoFile::Decoder {
+  struct CloseFormat {
+    void operator()(AVFormatContext* format) const { avformat_close_input(&format); }
+  };
+  struct FreeCodec {
+    void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
+  };
+  struct FreeFrame {
+    void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+  };
+  struct FreePacket {
+    void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  };
+  struct FreeScaler {
+    void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+  };
+
   std::unique_ptr<AVFormatContext, CloseFormat> format;
   std::unique_ptr<AVCodecContext, FreeCodec> codec;
   std::unique_ptr<AVFrame, FreeFrame> frame{av_frame_alloc()};

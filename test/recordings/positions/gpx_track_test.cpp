@@ -12,7 +12,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-std::string Refusal(const std::string& text) {
+std::string GpxRefusal(const std::string& text) {
   try {
     ParseGpx(text, "a.gpx");
   } catch (const Error& error) {
@@ -69,25 +69,25 @@ TEST(GpxTrack, PointsOutOfOrderRepeatedAndWithoutTimeAreMendedWithANote) {
 
 TEST(GpxTrack, TwoPlacesAtOneTimeAreRefusedByBothLines) {
   EXPECT_THAT(
-      Refusal(Gpx(Point("2026-01-31T12:00:02Z") + Point("2026-01-31T12:00:02Z", "", "9.6"))),
+      GpxRefusal(Gpx(Point("2026-01-31T12:00:02Z") + Point("2026-01-31T12:00:02Z", "", "9.6"))),
       HasSubstr("lines 3 and 4 of 'a.gpx' state two places at 2026-01-31T12:00:02.000Z"));
 }
 
 TEST(GpxTrack, WrongValuesAreRefusedWithTheirLine) {
-  EXPECT_THAT(Refusal(Gpx(Point("yesterday"))),
+  EXPECT_THAT(GpxRefusal(Gpx(Point("yesterday"))),
               AllOf(HasSubstr("line 3 of 'a.gpx'"), HasSubstr("'yesterday'")));
-  EXPECT_THAT(Refusal(Gpx(Point("2026-01-31T12:00:02Z", "", "nan"))), HasSubstr("line 3"));
-  EXPECT_THAT(Refusal(Gpx(Point("2026-01-31T12:00:02Z", "", "181"))), HasSubstr("48.25, 181"));
-  EXPECT_THAT(Refusal(Gpx(Point("2026-01-31T12:00:02Z", "<speed>-1</speed>"))),
+  EXPECT_THAT(GpxRefusal(Gpx(Point("2026-01-31T12:00:02Z", "", "nan"))), HasSubstr("line 3"));
+  EXPECT_THAT(GpxRefusal(Gpx(Point("2026-01-31T12:00:02Z", "", "181"))), HasSubstr("48.25, 181"));
+  EXPECT_THAT(GpxRefusal(Gpx(Point("2026-01-31T12:00:02Z", "<speed>-1</speed>"))),
               HasSubstr("the speed '-1'"));
-  EXPECT_THAT(Refusal("<kml></kml>"), HasSubstr("accepted is <gpx>"));
-  EXPECT_THAT(Refusal("lat,lon\n"), HasSubstr("line 1 of 'a.gpx' is no XML"));
-  EXPECT_THAT(Refusal(""), HasSubstr("'a.gpx' is no XML"));
-  EXPECT_THAT(Refusal("<!DOCTYPE gpx [<!ENTITY a \"b\">]>\n<gpx></gpx>"), HasSubstr("DOCTYPE"));
+  EXPECT_THAT(GpxRefusal("<kml></kml>"), HasSubstr("accepted is <gpx>"));
+  EXPECT_THAT(GpxRefusal("lat,lon\n"), HasSubstr("line 1 of 'a.gpx' is no XML"));
+  EXPECT_THAT(GpxRefusal(""), HasSubstr("'a.gpx' is no XML"));
+  EXPECT_THAT(GpxRefusal("<!DOCTYPE gpx [<!ENTITY a \"b\">]>\n<gpx></gpx>"), HasSubstr("DOCTYPE"));
 }
 
 TEST(GpxTrack, APlannedRouteWithoutTimesIsRefused) {
-  EXPECT_THAT(Refusal(Gpx(Point("") + Point(""))), HasSubstr("no point of 'a.gpx' has a time"));
+  EXPECT_THAT(GpxRefusal(Gpx(Point("") + Point(""))), HasSubstr("no point of 'a.gpx' has a time"));
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ std::string Rmc(const std::string& time, const std::string& date, const std::str
                   ",,");
 }
 
-std::string Refusal(const std::string& text) {
+std::string NmeaRefusal(const std::string& text) {
   try {
     ParseNmea(text, "a.nmea");
   } catch (const Error& error) {
@@ -85,17 +85,18 @@ TEST(NmeaLog, CorruptAndInvalidSentencesAreLeftOutWithANote) {
 }
 
 TEST(NmeaLog, WhatIsNoLogIsRefused) {
-  EXPECT_THAT(Refusal("hello\n"), HasSubstr("'a.nmea' has no NMEA sentence"));
-  EXPECT_THAT(Refusal("$GPRMC,1*00\n$GPRMC,2*00\n"), HasSubstr("2 sentences without a valid"));
-  EXPECT_THAT(Refusal(Rmc("250000", "310126")), HasSubstr("line 1 of 'a.nmea' has the time"));
-  EXPECT_THAT(Refusal(Rmc("120000", "310226")), HasSubstr("the date '310226'"));
-  EXPECT_THAT(Refusal(Sentence("GPGGA,000000.5,4815.000,N,00930.000,W,1,08,0.9,210.0,M,47.0,M,,")),
-              HasSubstr("has no date"));
-  EXPECT_THAT(Refusal(Sentence("GPRMC,120000,A,9115.000,N,00930.000,W,1,1,310126,,")),
+  EXPECT_THAT(NmeaRefusal("hello\n"), HasSubstr("'a.nmea' has no NMEA sentence"));
+  EXPECT_THAT(NmeaRefusal("$GPRMC,1*00\n$GPRMC,2*00\n"), HasSubstr("2 sentences without a valid"));
+  EXPECT_THAT(NmeaRefusal(Rmc("250000", "310126")), HasSubstr("line 1 of 'a.nmea' has the time"));
+  EXPECT_THAT(NmeaRefusal(Rmc("120000", "310226")), HasSubstr("the date '310226'"));
+  EXPECT_THAT(
+      NmeaRefusal(Sentence("GPGGA,000000.5,4815.000,N,00930.000,W,1,08,0.9,210.0,M,47.0,M,,")),
+      HasSubstr("has no date"));
+  EXPECT_THAT(NmeaRefusal(Sentence("GPRMC,120000,A,9115.000,N,00930.000,W,1,1,310126,,")),
               HasSubstr("a place on the earth"));
-  EXPECT_THAT(Refusal(Sentence("GPRMC,120000,A,4860.000,N,00930.000,W,1,1,310126,,")),
+  EXPECT_THAT(NmeaRefusal(Sentence("GPRMC,120000,A,4860.000,N,00930.000,W,1,1,310126,,")),
               HasSubstr("the coordinate '4860.000,N'"));
-  EXPECT_THAT(Refusal(Sentence("GPRMC,120000,A,48152222222222.0,N,00930.000,W,1,1,310126,,")),
+  EXPECT_THAT(NmeaRefusal(Sentence("GPRMC,120000,A,48152222222222.0,N,00930.000,W,1,1,310126,,")),
               HasSubstr("the coordinate '48152222222222.0,N'"));
 }
 

@@ -13,7 +13,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-std::string Refusal(const std::string& json) {
+std::string PhotoRefusal(const std::string& json) {
   try {
     ParsePhotoList(json, std::nullopt, "photos");
   } catch (const Error& error) {
@@ -57,15 +57,16 @@ TEST(PhotoList, TheZoneOfTheCamerasClockComesFromTheReceiver) {
 
 TEST(PhotoList, WhatCannotBePlacedIsRefusedByItsName) {
   const std::string timed = ",\"DateTimeOriginal\":\"2026:01:31 14:34:58\"";
-  EXPECT_THAT(Refusal("[" + PhotoEntry("a.jpg", timed) + "," + PhotoEntry("b.jpg", timed) + "]"),
-              HasSubstr("the photo 'a.jpg' has a time without a zone: --time-zone"));
-  EXPECT_THAT(Refusal("[" + PhotoEntry("a.jpg", ",\"DateTimeOriginal\":\"soon\"") + "]"),
+  EXPECT_THAT(
+      PhotoRefusal("[" + PhotoEntry("a.jpg", timed) + "," + PhotoEntry("b.jpg", timed) + "]"),
+      HasSubstr("the photo 'a.jpg' has a time without a zone: --time-zone"));
+  EXPECT_THAT(PhotoRefusal("[" + PhotoEntry("a.jpg", ",\"DateTimeOriginal\":\"soon\"") + "]"),
               HasSubstr("the photo 'a.jpg' has the time 'soon'"));
-  EXPECT_THAT(Refusal("[{\"SourceFile\":\"a.jpg\",\"GPSLatitude\":99,\"GPSLongitude\":1}]"),
+  EXPECT_THAT(PhotoRefusal("[{\"SourceFile\":\"a.jpg\",\"GPSLatitude\":99,\"GPSLongitude\":1}]"),
               HasSubstr("the photo 'a.jpg' has the position '99, 1'"));
-  EXPECT_THAT(Refusal("[{\"SourceFile\":\"a.jpg\"}]"), HasSubstr("'photos' has 0 photos"));
-  EXPECT_THAT(Refusal("{}"), HasSubstr("no list of photos"));
-  EXPECT_THAT(Refusal("[3]"), HasSubstr("entry 1"));
+  EXPECT_THAT(PhotoRefusal("[{\"SourceFile\":\"a.jpg\"}]"), HasSubstr("'photos' has 0 photos"));
+  EXPECT_THAT(PhotoRefusal("{}"), HasSubstr("no list of photos"));
+  EXPECT_THAT(PhotoRefusal("[3]"), HasSubstr("entry 1"));
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-std::string Refusal(const std::string& text) {
+std::string TableRefusal(const std::string& text) {
   try {
     ParsePositionTable(text, std::nullopt, "a.csv");
   } catch (const Error& error) {
@@ -49,18 +49,18 @@ TEST(PositionTable, BetweenSemicolonsACommaIsTheDecimalMark) {
 
 TEST(PositionTable, ATimeWithoutAZoneNeedsOne) {
   const std::string table = "time,lat,lon\n2026-01-31 14:34:56,1,2\n2026-01-31 14:34:57,1,2\n";
-  EXPECT_THAT(Refusal(table), HasSubstr("line 2 of 'a.csv' has the time '2026-01-31 14:34:56' "
-                                        "without a zone: --time-zone"));
+  EXPECT_THAT(TableRefusal(table), HasSubstr("line 2 of 'a.csv' has the time '2026-01-31 14:34:56' "
+                                             "without a zone: --time-zone"));
   EXPECT_EQ(FormatUtc(ParsePositionTable(table, 7200, "a.csv").begin_ns()),
             "2026-01-31T12:34:56.000Z");
 }
 
 TEST(PositionTable, WrongLinesAreRefused) {
-  EXPECT_THAT(Refusal(""), HasSubstr("'a.csv' is empty"));
-  EXPECT_THAT(Refusal("x,y\n1,2\n"), HasSubstr("line 1 of 'a.csv' is 'x,y'"));
-  EXPECT_THAT(Refusal("time,lat,lon\n1769862896,91,2\n"), HasSubstr("line 2 of 'a.csv'"));
-  EXPECT_THAT(Refusal("time,lat,lon\n12,1,2\n"), HasSubstr("the time '12'"));
-  EXPECT_THAT(Refusal("time,lat,lon\n1769862896,1,2\n"), HasSubstr("1 positions with a time"));
+  EXPECT_THAT(TableRefusal(""), HasSubstr("'a.csv' is empty"));
+  EXPECT_THAT(TableRefusal("x,y\n1,2\n"), HasSubstr("line 1 of 'a.csv' is 'x,y'"));
+  EXPECT_THAT(TableRefusal("time,lat,lon\n1769862896,91,2\n"), HasSubstr("line 2 of 'a.csv'"));
+  EXPECT_THAT(TableRefusal("time,lat,lon\n12,1,2\n"), HasSubstr("the time '12'"));
+  EXPECT_THAT(TableRefusal("time,lat,lon\n1769862896,1,2\n"), HasSubstr("1 positions with a time"));
 }
 
 }  // namespace
