@@ -1,5 +1,7 @@
 #include "tools/bags/recording_flags.h"
 
+#include <algorithm>
+
 #include "common/error.h"
 #include "recordings/lens.h"
 #include "recordings/positions/gpx_track.h"
