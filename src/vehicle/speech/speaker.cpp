@@ -80,7 +80,7 @@ void Speaker::OpenVoices() {
 
 bool Speaker::Open(Source& source) {
   try {
-    source.voice->Open();
+    source.voice->Open([this] { return IsClosed(); });
     source.is_open = true;
     source.error.clear();
   } catch (const Error& error) {
@@ -106,6 +106,11 @@ SpeechQueue::End Speaker::Say(const std::string& sentence) {
   }
   Publish();
   return end;
+}
+
+bool Speaker::IsClosed() {
+  const MutexLock lock(mutex_);
+  return closed_;
 }
 
 bool Speaker::MustStop() {

@@ -53,11 +53,12 @@ class Speaker {
   void Work();
   /// Opens those that are due, up to the first that works.
   void OpenVoices();
-  static bool Open(Source& source);
+  bool Open(Source& source);
   /// The next alert; none at the end.
   std::optional<HazardAlert> Await();
   SpeechQueue::End Say(const std::string& sentence);
   void Publish();
+  bool IsClosed();
   bool MustStop();
 
   const Config config_;

@@ -15,6 +15,7 @@ namespace livemap::vehicle {
 namespace {
 
 constexpr std::chrono::milliseconds kLookAgain{10};
+constexpr double kCancelTimeoutS = 1;
 
 /// How far the messages of each client have come. libspeechd's callbacks know nothing but numbers;
 /// those of messages only grow.
@@ -121,12 +122,12 @@ SpeechdVoice::SpeechdVoice(const Config& config) : config_(config) {}
 
 SpeechdVoice::~SpeechdVoice() = default;
 
-void SpeechdVoice::Open() {
+void SpeechdVoice::Open(const MustStop& must_stop) {
   connection_.reset();
   connection_ = std::make_unique<Connection>();
   connection_->Set(config_.language, config_.rate);
   connection_->SetVolume(-100);
-  Say("1", [] { return false; });
+  Say("1", must_stop);
   connection_->SetVolume(config_.volume);
 }
 
@@ -145,7 +146,7 @@ void SpeechdVoice::Say(const std::string& sentence, const MustStop& must_stop) {
     if (!is_stopped && must_stop()) {
       is_stopped = true;
       connection_->Cancel();
-      end_s = SpeechNowS() + config_.begin_timeout_s;
+      end_s = SpeechNowS() + kCancelTimeoutS;
     }
     if (SpeechNowS() > end_s) {
       connection_->Cancel();

@@ -25,7 +25,7 @@ class SpeechdVoice : public Voice {
 
   std::string name() const override { return "speech"; }
   /// Connects, and says something at volume -100: without a sound device it does not end.
-  void Open() override;
+  void Open(const MustStop& must_stop) override;
   void Say(const std::string& sentence, const MustStop& must_stop) override;
 
  private:

@@ -111,9 +111,7 @@ pid_t StartPlayer(const std::string& player, int input) {
 
 ToneVoice::ToneVoice(std::string player) : player_(std::move(player)) {}
 
-void ToneVoice::Open() {
-  Play(SilenceWav(), [] { return false; });
-}
+void ToneVoice::Open(const MustStop& must_stop) { Play(SilenceWav(), must_stop); }
 
 void ToneVoice::Say(const std::string&, const MustStop& must_stop) { Play(BeepsWav(), must_stop); }
 

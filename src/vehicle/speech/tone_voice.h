@@ -15,7 +15,7 @@ class ToneVoice : public Voice {
 
   std::string name() const override { return "tone"; }
   /// Plays silence: without a sound device the player ends with an error.
-  void Open() override;
+  void Open(const MustStop& must_stop) override;
   void Say(const std::string& sentence, const MustStop& must_stop) override;
 
  private:

@@ -18,8 +18,9 @@ class Voice {
 
   /// "speech" or "tone".
   virtual std::string name() const = 0;
-  /// Gets ready. Throws Error with one sentence that says why nothing would be heard.
-  virtual void Open() = 0;
+  /// Gets ready, or gives up soon after `must_stop`. Throws Error with one sentence that says why
+  /// nothing would be heard.
+  virtual void Open(const MustStop& must_stop) = 0;
   /// Returns when the driver has heard it, or soon after `must_stop`. Throws Error with one
   /// sentence when nothing was heard.
   virtual void Say(const std::string& sentence, const MustStop& must_stop) = 0;

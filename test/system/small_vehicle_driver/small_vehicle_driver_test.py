@@ -55,7 +55,8 @@ class SmallVehicleDriverTest(unittest.TestCase):
             stdout=self.log, stderr=self.log)
         self.addCleanup(self.stop)
         eventually(lambda: self.address, "the page has an address")
-        eventually(lambda: self.notices.get_num_connections() >= 2, "driver_alert and hazard_reporting listen")
+        eventually(lambda: self.notices.get_num_connections() and self.page()["alerts"] and self.page()["reports"],
+                   "driver_alert and hazard_reporting run")
 
     def stop(self):
         self.vehicle.send_signal(signal.SIGINT)

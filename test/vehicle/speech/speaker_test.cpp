@@ -48,7 +48,7 @@ class TestVoice : public Voice {
   TestVoice(std::string name, Heard& heard, bool is_silent)
       : name_(std::move(name)), heard_(heard), is_silent_(is_silent) {}
   std::string name() const override { return name_; }
-  void Open() override {}
+  void Open(const MustStop&) override {}
   void Say(const std::string& sentence, const MustStop& must_stop) override {
     if (is_silent_) throw Error("no sound device");
     heard_.Add(name_ + " begins " + sentence);
@@ -160,7 +160,7 @@ std::string WritePlayer(const test::TemporaryDirectory& folder, const std::strin
 
 std::string ToneFailure(const std::string& player) {
   try {
-    ToneVoice(player).Open();
+    ToneVoice(player).Open([] { return false; });
   } catch (const Error& error) {
     return error.what();
   }
