@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "web/api/query.h"
 #include "web/http/page_answer.h"
@@ -30,7 +31,8 @@ DriverSite::DriverSite(const Config& config, const protocol::HazardCatalogue& ca
     : config_(config),
       classes_(ClassesJson(catalogue)),
       files_(config.web_root),
-      page_policy_(PagePolicy("")) {
+      page_policy_(PagePolicy("")),
+      version_(static_cast<std::uint64_t>(SystemNs() / 1'000'000)) {
   const std::string page = config_.web_root + "/driver/index.html";
   std::error_code failure;
   if (!std::filesystem::is_regular_file(page, failure)) {

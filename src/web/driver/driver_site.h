@@ -57,7 +57,8 @@ class DriverSite : public Site {
   const std::string page_policy_;
   Mutex mutex_;
   std::string state_ GUARDED_BY(mutex_);  ///< As JSON.
-  std::uint64_t version_ GUARDED_BY(mutex_) = 0;
+  /// Goes on from the time of the start: what a page knows of an earlier run is another version.
+  std::uint64_t version_ GUARDED_BY(mutex_);
   std::vector<Done> waiting_ GUARDED_BY(mutex_);
   bool stopped_ GUARDED_BY(mutex_) = false;
 };

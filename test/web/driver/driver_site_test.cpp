@@ -48,7 +48,8 @@ TEST_F(DriverPage, ServesThePageItsFilesAndTheClasses) {
 TEST_F(DriverPage, TellsANewStateToWhoWaitsForIt) {
   site_.Publish({{"hazards", Json::array()}});
   const auto first = Get(port(), "/api/v1/driver").Json();
-  const std::string next = "/api/v1/driver?since=" + std::to_string(first.at("version").get<int>());
+  const std::string next =
+      "/api/v1/driver?since=" + std::to_string(first.at("version").get<std::uint64_t>());
   auto waiting = std::async(std::launch::async, [&] { return Get(port(), next).Json(); });
   EXPECT_EQ(waiting.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
   site_.Publish({{"hazards", {1}}});
