@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "page"))
@@ -22,21 +23,40 @@ def hazard(name, distance, side="ahead", number=1, urgency=2):
 
 
 class Vehicle:
-    """The server; `show` publishes a state that is good but for what is named."""
+    """The server; `show` publishes a state that is good but for what is named, and again twice a second, as driver_page
+    does."""
 
     def __init__(self):
+        self.lock = threading.Lock()
+        self.state = None
+        self.ended = threading.Event()
+        self.beat = threading.Thread(target=self.repeat)
         self.process = subprocess.Popen([OPTIONS.server], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.url = f"http://127.0.0.1:{json.loads(self.process.stdout.readline())['port']}/"
+        self.beat.start()
 
     def tell(self, state):
-        self.process.stdin.write(json.dumps(state) + "\n")
+        with self.lock:
+            self.state = state
+            self.write()
+
+    def write(self):
+        self.process.stdin.write(json.dumps(self.state) + "\n")
         self.process.stdin.flush()
         assert self.process.stdout.readline() == "{}\n"
+
+    def repeat(self):
+        while not self.ended.wait(0.5):
+            with self.lock:
+                if self.state is not None:
+                    self.write()
 
     def show(self, **changes):
         self.tell({**GOOD, **changes})
 
     def close(self):
+        self.ended.set()
+        self.beat.join()
         self.process.stdin.close()
         self.process.wait(fixture.HANG_S)
 
@@ -103,7 +123,7 @@ class CarScreen(Page):
     size = (800, 480)
 
     def test_the_next_hazard_is_large_and_counts_down(self):
-        self.open(hazards=[hazard("pothole", 240, "right"), hazard("deer", 320, number=2)], speed_mps=20, more=2)
+        self.open(hazards=[hazard("pothole", 240, "right"), hazard("deer", 320, number=2)], speed_mps=60, more=2)
         self.assertEqual(self.text("#label"), "Pothole")
         self.assertEqual(self.text("#side"), "on the right")
         self.assertEqual(self.count("#badge .glyph-pothole"), 1)
