@@ -78,7 +78,7 @@ function showParts() {
   const { camera, receiver, zone, reports, voice } = state;
   const rate = camera?.rate_hz;
   showPart('camera', camera?.level ?? 'unknown',
-    camera ? (Number.isFinite(rate) ? `${rate.toFixed(1)} images/s` : 'no rate') : 'silent');
+    camera ? (Number.isFinite(rate) ? `${rate.toFixed(1)} / s` : 'no rate') : 'silent');
   const accuracy = receiver?.accuracy_m;
   const fix = Number.isFinite(accuracy) ? `fix, \u00b1${Math.max(1, Math.round(accuracy))} m` : 'fix';
   showPart('receiver', receiver?.level ?? 'unknown', receiver ? (receiver.fix ? fix : 'no fix') : 'silent');

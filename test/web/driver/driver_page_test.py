@@ -79,6 +79,7 @@ const width = innerWidth, height = innerHeight;
 return [...document.querySelectorAll('main, #label, #distance, #bar, .parts li')].filter(node => node.checkVisibility())
   .filter(node => { const box = node.getBoundingClientRect();
     return box.left < -1 || box.top < -1 || box.right > width + 1 || box.bottom > height + 1; })
+  .concat([...document.querySelectorAll('.parts span')].filter(node => node.scrollWidth > node.clientWidth))
   .map(node => node.id || node.className || node.textContent);
 """
 
@@ -155,12 +156,12 @@ class CarScreen(Page):
     def test_it_tells_how_the_parts_are(self):
         self.open()
         self.assertEqual(self.parts(), {
-            "camera": ("good", "9.8 images/s"), "receiver": ("good", "fix, \u00b12 m"), "zone": ("good", "connected"),
+            "camera": ("good", "9.8 / s"), "receiver": ("good", "fix, \u00b12 m"), "zone": ("good", "connected"),
             "reports": ("good", "all sent"), "voice": ("good", "speech")})
         self.vehicle.show(camera={"level": "bad", "rate_hz": 0}, receiver={"level": "bad", "fix": False, "accuracy_m": None},
                           zone={"level": "warn", "connected": False}, reports={"level": "good", "pending": 3}, voice=None)
         self.wait(lambda: self.parts() == {
-            "camera": ("bad", "0.0 images/s"), "receiver": ("bad", "no fix"), "zone": ("bad", "no link"),
+            "camera": ("bad", "0.0 / s"), "receiver": ("bad", "no fix"), "zone": ("bad", "no link"),
             "reports": ("warn", "3 waiting"), "voice": ("unknown", "off")}, "the parts do not change")
         self.assertEqual(self.text("#label"), "No warnings: no position")
         self.picture("driver_parts")
