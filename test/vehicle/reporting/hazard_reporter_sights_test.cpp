@@ -139,6 +139,9 @@ TEST_F(ReporterSightsTest, WhatNewerImagesDoNotShowIsReportedSoon) {
 
 TEST_F(ReporterSightsTest, ADeepThingIsPlacedAtItsMiddleNotAtItsNearEdge) {
   catalogue_ = protocol::HazardCatalogue::Parse("classes: {wreck: {half_depth_m: 3}}", "test");
+  config_.position_source = PositionSource::kFixes;
+  config_.max_ground_sigma_m = 100;
+  config_.settle_wait_s = 0;
   Restart();
   DriveFixes(0, 2.4);
   See(2.0, {{"wreck", 0.9F, BoxAt(12, 0)}});
