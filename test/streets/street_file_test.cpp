@@ -1,9 +1,14 @@
 #include "streets/street_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <osmium/io/pbf_output.hpp>
+#include <osmium/io/reader.hpp>
+#include <osmium/io/writer.hpp>
+#include <osmium/io/xml_input.hpp>
 
 #include "common/error.h"
 
@@ -130,6 +135,27 @@ TEST(StreetFileTest, ReadsFilesByTheirEnding) {
   std::filesystem::rename(path, folder / "town.osm.pbf");
   EXPECT_THROW(ReadStreetFile((folder / "town.osm.pbf").string()), Error);
   std::filesystem::remove_all(folder);
+}
+
+TEST(StreetFileTest, ReadsThePbfThatOsmiumWrites) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("street_file_" + std::to_string(getpid()));
+  std::filesystem::create_directory(folder);
+  const std::string xml = (folder / "town.osm").string(), pbf = (folder / "town.osm.pbf").string();
+  std::ofstream(xml) << Extract(WayOf(7, 1, 4, Tag("highway", "primary") + Tag("name", "Am Tor")) +
+                                WayOf(8, 4, 9, Tag("highway", "residential")));
+  {
+    osmium::io::Reader reader{xml};
+    osmium::io::Writer writer{pbf, osmium::io::Header{}};
+    while (osmium::memory::Buffer buffer = reader.read()) writer(std::move(buffer));
+    writer.close();
+  }
+  const StreetMap of_xml = ReadStreetFile(xml), of_pbf = ReadStreetFile(pbf);
+  std::filesystem::remove_all(folder);
+  ASSERT_EQ(of_pbf.segments(), of_xml.segments());
+  ASSERT_GT(of_pbf.segments(), 0U);
+  EXPECT_EQ(of_pbf.NameOf(of_pbf.StreetOf(0)), "Am Tor");
+  EXPECT_EQ(of_pbf.StreetOf(0).id, of_xml.StreetOf(0).id);
 }
 
 TEST(StreetFileTest, CountsBeyondTheLimitsAreRefused) {
