@@ -8,6 +8,8 @@
 namespace livemap::vehicle {
 namespace {
 
+constexpr double kEndTimeoutS = 3;  // A voice that hears of its end takes less.
+
 double SpeakerNowS() { return static_cast<double>(SteadyNs()) * 1e-9; }
 
 }  // namespace
@@ -20,15 +22,27 @@ Speaker::Speaker(const Config& config, SpokenLanguage language,
     source.voice = std::move(voice);
     sources_.push_back(std::move(source));
   }
-  thread_ = std::thread([this] { Work(); });
+  thread_ = std::thread([this] {
+    Work();
+    const MutexLock lock(mutex_);
+    ended_ = true;
+    changed_.NotifyAll();
+  });
 }
 
 Speaker::~Speaker() {
   {
     const MutexLock lock(mutex_);
     closed_ = true;
+    changed_.NotifyAll();
+    const auto deadline = SteadyDeadline(kEndTimeoutS);
+    while (!ended_ && changed_.WaitUntil(mutex_, deadline)) {
+    }
+    // A voice that hangs does not ask whether it must stop.
+    if (!ended_) {
+      for (const Source& source : sources_) source.voice->Abort();
+    }
   }
-  changed_.NotifyAll();
   thread_.join();
 }
 

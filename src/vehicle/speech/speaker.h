@@ -63,14 +63,15 @@ class Speaker {
 
   const Config config_;
   const SpokenLanguage language_;
-  std::vector<Source> sources_;  ///< The thread's own.
+  std::vector<Source> sources_;  ///< The thread's own, but for Abort().
 
   mutable Mutex mutex_;
   ConditionVariable changed_;
   SpeechQueue queue_ GUARDED_BY(mutex_);
   bool stop_ GUARDED_BY(mutex_) = false;  ///< What is being said.
   bool closed_ GUARDED_BY(mutex_) = false;
-  State voices_ GUARDED_BY(mutex_);  ///< What state() says of the voices.
+  bool ended_ GUARDED_BY(mutex_) = false;  ///< The thread's work.
+  State voices_ GUARDED_BY(mutex_);        ///< What state() says of the voices.
   std::thread thread_;
 };
 

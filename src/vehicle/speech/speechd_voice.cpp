@@ -1,6 +1,7 @@
 #include "vehicle/speech/speechd_voice.h"
 
 #include <libspeechd.h>
+#include <sys/socket.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -10,6 +11,7 @@
 #include "common/clock.h"
 #include "common/error.h"
 #include "common/mutex.h"
+#include "vehicle/speech/speech_server.h"
 
 namespace livemap::vehicle {
 namespace {
@@ -67,9 +69,9 @@ double SpeechNowS() { return static_cast<double>(SteadyNs()) * 1e-9; }
 /// Open as long as it lives.
 class SpeechdVoice::Connection {
  public:
-  Connection() {
+  explicit Connection(const SPDConnectionAddress* address) {
     char* reason = nullptr;
-    handle_ = spd_open2("livemap", "driver", nullptr, SPD_MODE_THREADED, nullptr, 1, &reason);
+    handle_ = spd_open2("livemap", "driver", nullptr, SPD_MODE_THREADED, address, 0, &reason);
     const std::string why = reason == nullptr ? "it does not answer" : reason;
     std::free(reason);
     if (handle_ == nullptr) throw Error("speech-dispatcher cannot be reached: " + why);
@@ -102,6 +104,7 @@ class SpeechdVoice::Connection {
     return static_cast<std::size_t>(message);
   }
   void Cancel() { spd_cancel(handle_); }
+  int socket() const { return handle_->socket; }
   bool HasBegun(std::size_t message) const {
     return SpeechProgress::Instance().Get(client_).begun >= message;
   }
@@ -122,9 +125,44 @@ SpeechdVoice::SpeechdVoice(const Config& config) : config_(config) {}
 
 SpeechdVoice::~SpeechdVoice() = default;
 
+void SpeechdVoice::Connect(const MustStop& must_stop) {
+  char* reason = nullptr;
+  const std::unique_ptr<SPDConnectionAddress, decltype(&SPDConnectionAddress__free)> address(
+      spd_get_default_address(&reason), SPDConnectionAddress__free);
+  std::free(reason);
+  if (!address) throw Error("SPEECHD_ADDRESS names no address of a speech-dispatcher");
+  // Whoever is there must answer: libspeechd would wait for it for ever.
+  if (address->method == SPD_METHOD_UNIX_SOCKET) {
+    const std::string path = address->unix_socket_name;
+    SpeechServer server = AskSpeechServer(path, config_.answer_timeout_s, must_stop);
+    if (server == SpeechServer::kAbsent && !must_stop()) {
+      StartSpeechServer(path, config_.answer_timeout_s, must_stop);
+      server = AskSpeechServer(path, config_.answer_timeout_s, must_stop);
+    }
+    if (server == SpeechServer::kAbsent) {
+      throw Error("speech-dispatcher cannot be reached: nobody listens at " + path);
+    }
+    if (server == SpeechServer::kSilent) {
+      throw Error("speech-dispatcher cannot be reached: it does not answer at " + path);
+    }
+  }
+  connection_ = std::make_unique<Connection>(address.get());
+  const MutexLock lock(mutex_);
+  socket_ = connection_->socket();
+}
+
+void SpeechdVoice::Abort() {
+  const MutexLock lock(mutex_);
+  if (socket_ >= 0) shutdown(socket_, SHUT_RDWR);
+}
+
 void SpeechdVoice::Open(const MustStop& must_stop) {
+  {
+    const MutexLock lock(mutex_);
+    socket_ = -1;
+  }
   connection_.reset();
-  connection_ = std::make_unique<Connection>();
+  Connect(must_stop);
   connection_->Set(config_.language, config_.rate);
   connection_->SetVolume(-100);
   Say("1", must_stop);

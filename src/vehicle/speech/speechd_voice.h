@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "common/mutex.h"
 #include "vehicle/speech/voice.h"
 
 namespace livemap::vehicle {
@@ -17,7 +18,8 @@ class SpeechdVoice : public Voice {
     int rate = 0;                 ///< -100 the slowest to 100 the fastest.
     int volume = 100;             ///< -100 silent to 100 the loudest.
     double begin_timeout_s = 3;
-    double end_timeout_s = 15;  ///< From its begin.
+    double end_timeout_s = 15;    ///< From its begin.
+    double answer_timeout_s = 3;  ///< Of the server, and of its start.
   };
 
   explicit SpeechdVoice(const Config& config);
@@ -27,12 +29,17 @@ class SpeechdVoice : public Voice {
   /// Connects, and says something at volume -100: without a sound device it does not end.
   void Open(const MustStop& must_stop) override;
   void Say(const std::string& sentence, const MustStop& must_stop) override;
+  void Abort() override;
 
  private:
   class Connection;
 
+  void Connect(const MustStop& must_stop);
+
   const Config config_;
   std::unique_ptr<Connection> connection_;
+  Mutex mutex_;
+  int socket_ GUARDED_BY(mutex_) = -1;  ///< Of the connection; -1: there is none.
 };
 
 }  // namespace livemap::vehicle

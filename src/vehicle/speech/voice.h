@@ -24,6 +24,8 @@ class Voice {
   /// Returns when the driver has heard it, or soon after `must_stop`. Throws Error with one
   /// sentence when nothing was heard.
   virtual void Say(const std::string& sentence, const MustStop& must_stop) = 0;
+  /// Has a call that hangs in another thread end with Error, soon. The voice is of no use after it.
+  virtual void Abort() {}
 };
 
 }  // namespace livemap::vehicle

@@ -4,6 +4,7 @@ announced on its way, in that order, and no more of it when it is passed or remo
 
 import json
 import os
+import pathlib
 import signal
 import sys
 import tempfile
@@ -16,7 +17,9 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, os.pardir, "support"))
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "scripts" / "lib"), str(ROOT / "test" / "support")]
+import demo_system as system  # noqa: E402
 from hazard_reporting_fixture import place  # noqa: E402
 from livemap.msg import HazardNotice  # noqa: E402
 from node_testing import eventually, start_child  # noqa: E402
@@ -49,7 +52,7 @@ class SmallVehicleDriverTest(unittest.TestCase):
         self.notices = rospy.Publisher("/hazard/notice", HazardNotice, queue_size=10)
         self.log = open(os.path.join(folder.name, "log"), "w+", encoding="utf-8")
         self.vehicle = start_child(
-            ["roslaunch", "livemap", "vehicle.launch", "profile:=small", "speech:=true", "page:=true",
+            ["roslaunch", system.launch_file("vehicle.launch"), "profile:=small", "speech:=true", "page:=true",
              f"directory:={folder.name}", "broker_port:=1", "driver_page:={page_port: 0, period_s: 0.1}",
              "driver_speech:={begin_timeout_s: 20.0}"],
             stdout=self.log, stderr=self.log)

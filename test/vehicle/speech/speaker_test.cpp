@@ -97,6 +97,35 @@ std::vector<std::unique_ptr<Voice>> TestVoices(Heard& heard, bool speech_is_sile
   return voices;
 }
 
+/// A voice whose server hangs: it never asks whether it must stop.
+class HangingVoice : public Voice {
+ public:
+  std::string name() const override { return "speech"; }
+  void Open(const MustStop&) override {
+    MutexLock lock(mutex_);
+    while (!aborted_) changed_.Wait(mutex_);
+    throw Error("the server is gone");
+  }
+  void Say(const std::string&, const MustStop&) override {}
+  void Abort() override {
+    const MutexLock lock(mutex_);
+    aborted_ = true;
+    changed_.NotifyAll();
+  }
+
+ private:
+  Mutex mutex_;
+  ConditionVariable changed_;
+  bool aborted_ GUARDED_BY(mutex_) = false;
+};
+
+TEST(Speaker, EndsThoughAVoiceHangs) {
+  std::vector<std::unique_ptr<Voice>> voices;
+  voices.push_back(std::make_unique<HangingVoice>());
+  Speaker speaker({}, TestLanguage(), std::move(voices));
+  speaker.Take(SpeakerAlert(1));
+}
+
 TEST(Speaker, ASentenceEndsBeforeTheNextBegins) {
   Heard heard;
   Speaker speaker({}, TestLanguage(), TestVoices(heard, false, false));
