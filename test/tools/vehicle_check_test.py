@@ -226,9 +226,12 @@ class VehicleCheckTest(unittest.TestCase):
     def test_a_calibration_that_cannot_be_is_told(self):
         self.assert_check(self.check()["calibration"], "ok", "640x400", "520 pixels")
         for focal, width, words in ((0, 640, "focal length of 0"), (5, 640, "no camera for a road"), (520, 3, "3x400"),
-                                    ("[a]", 640, "camera_matrix is no list of 9 numbers"), (".nan", 640, "camera_matrix")):
+                                    ("[a]", 640, "camera_matrix has no rows"), (".nan", 640, "camera_matrix")):
             self.calibrate(focal, width)
             self.assert_check(self.check()["calibration"], "fault", words)
+        whole = CALIBRATION.format(focal=520, width=640)
+        (self.folder / "camera.yaml").write_text(whole.replace("distortion_coefficients", "other"))
+        self.assert_check(self.check()["calibration"], "fault", "distortion_coefficients has no rows")
         (self.folder / "camera.yaml").write_text("{a: [")
         self.assert_check(self.check()["calibration"], "fault", "is no YAML")
         os.unlink(self.folder / "camera.yaml")

@@ -145,14 +145,16 @@ class Implausible(Exception):
     """What of a calibration cannot be."""
 
 
-def numbers_of(value, count, name):
-    data = value.get("data") if isinstance(value, dict) else value
+def numbers_of(content, name, count=None):
+    """The numbers of a matrix, as ROS reads them: it wants rows, cols and data. `count`: how many are accepted."""
     try:
-        found = [float(number) for number in data]
-    except (TypeError, ValueError):
-        found = []
-    if len(found) != count or not all(map(math.isfinite, found)):
-        raise Implausible(f"{name} is no list of {count} numbers")
+        matrix = content[name]
+        wanted = matrix["rows"] * matrix["cols"]
+        found = [float(number) for number in matrix["data"]]
+    except (KeyError, TypeError, ValueError):
+        raise Implausible(f"{name} has no rows, cols and data of numbers") from None
+    if len(found) != wanted or count not in (None, wanted) or not all(map(math.isfinite, found)):
+        raise Implausible(f"{name} does not hold {count or wanted} numbers")
     return found
 
 
@@ -197,11 +199,13 @@ def calibration(values, live):
         size = [content.get("image_width"), content.get("image_height")]
         if not all(isinstance(side, int) and not isinstance(side, bool) for side in size):
             raise Implausible("image_width and image_height are no whole numbers")
-        matrix = numbers_of(content.get("camera_matrix"), 9, "camera_matrix")
-        numbers_of(content.get("projection_matrix"), 12, "projection_matrix")
+        matrix = numbers_of(content, "camera_matrix", 9)
+        numbers_of(content, "rectification_matrix", 9)
+        numbers_of(content, "projection_matrix", 12)
+        numbers_of(content, "distortion_coefficients")
     except Implausible as reason:
         return fault(f"'{path}': {reason}", mend)
-    return judged(f"'{path}'", *size, matrix, str(content.get("distortion_model", "")), mend)
+    return judged(f"'{path}'", *size, matrix, str(content.get("distortion_model") or ""), mend)
 
 
 def judged(name, width, height, matrix, distortion, mend):

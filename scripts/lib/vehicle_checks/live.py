@@ -174,11 +174,12 @@ def receiver(live):
 
 
 def mounting(live):
-    def judge(_level, _summary, first, last):
+    def judge(_level, _summary, _first, last):
         problem, knocks = last.get("mounting_problem", ""), number_of(last, "mounting_knocks")
         pitch = number_of(last, "mounting_pitch_deg")
         figures = {"pitch_deg": pitch, "knocks": knocks}
-        found = f"of {last.get('mounting', 'unknown')}" + (f", {pitch:.1f} degrees down" if pitch is not None else "")
+        sources = {"tf": "as tf has it", "found": "as the vehicle found it", "parameters": "as its arguments say"}
+        found = sources.get(last.get("mounting"), "unknown") + (f", {pitch:.1f} degrees down" if pitch is not None else "")
         if problem or knocks:
             return warning(f"{found}; {problem or f'knocked {knocks:.0f} times'}",
                            "fix the camera firmly, and measure its mounting again", **figures)
@@ -192,7 +193,7 @@ def detector(live):
         dropped = risen(first, last, "frames_dropped")
         figures = {"rate_hz": rate, "detection_ms": took, "dropped": dropped}
         if not rate:
-            return fault(f"nothing is detected on: {summary}", "see the running picture", **figures)
+            return fault(f"no picture is looked at: {summary}", "see the running picture", **figures)
         found = (f"{last.get('model')}, {rate:.1f} pictures a second" + (f", {took:.0f} ms each" if took else "")
                  + f", {'unknown' if dropped is None else dropped} dropped while looking")
         if level:
@@ -221,6 +222,6 @@ def reports(live):
             return unknown("hazard_reporting does not say how many reports wait", **figures)
         found = f"{waiting:.0f} reports wait for the zone's receipt"
         if waiting > MANY_REPORTS or level:
-            return warning(f"{found}: {summary}", "see the broker above; they are sent when the zone answers", **figures)
+            return warning(f"{found}: {summary}", "see receiver and broker above; reports are sent again until the zone answers", **figures)
         return ok(found, **figures)
     return of_node(live, "hazard_reporting", judge)
