@@ -223,6 +223,12 @@ class VehicleCheckTest(unittest.TestCase):
             self.assert_check(found[name], "unknown", "no ROS master runs")
         self.assertIsNone(found["picture"]["values"]["rate_hz"])
 
+    def test_a_ros_master_that_says_nothing_costs_seconds(self):
+        peer = SilentPeer()
+        self.addCleanup(peer.close)
+        self.master = f"http://127.0.0.1:{peer.port}"
+        self.assert_check(self.check("input:=topic", code=1)["picture"], "unknown", "no ROS master answers")
+
     def test_a_calibration_that_cannot_be_is_told(self):
         self.assert_check(self.check()["calibration"], "ok", "640x400", "520 pixels")
         for focal, width, words in ((0, 640, "focal length of 0"), (5, 640, "no camera for a road"), (520, 3, "3x400"),
