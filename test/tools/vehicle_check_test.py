@@ -48,6 +48,41 @@ DETECTOR = """#!/bin/sh
 while :; do echo '{"image":"picture.png","detections":[]}'; sleep 0.1; done
 """
 
+# A vehicle's manager by its name, with what its nodes say on /diagnostics, and the drivers' topics.
+VEHICLE = """
+import json, sys, time
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from sensor_msgs.msg import CameraInfo, CompressedImage, NavSatFix
+rospy.init_node("vehicle_manager" if sys.argv[1] == "vehicle" else "driver", disable_signals=True)
+lines = json.loads(sys.argv[2])
+image = rospy.Publisher("/camera/image_raw/compressed", CompressedImage, queue_size=10)
+info = rospy.Publisher("/camera/camera_info", CameraInfo, queue_size=10)
+fix = rospy.Publisher("/fix", NavSatFix, queue_size=10)
+diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+turn = 0
+while True:
+    turn += 1
+    image.publish(CompressedImage(data=b"picture"))
+    info.publish(CameraInfo(width=640, height=400, distortion_model="plumb_bob", K=[520, 0, 320, 0, 520, 200, 0, 0, 1]))
+    fix.publish(NavSatFix())
+    diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(
+        hardware_id=name, level=level, message=message,
+        values=[KeyValue(key, str(turn if value == "rises" else value)) for key, value in values.items()])
+        for name, (level, message, values) in lines.items()]))
+    time.sleep(0.1)
+"""
+WELL = {"camera_ingest": (0, "running", {"rate_hz": 9.5, "frames_dropped": 3}),
+        "hazard_detection": (0, "running", {"rate_hz": 9.0, "detection_ms": 50, "frames_dropped": 0, "model": "m"}),
+        "edge_vo": (0, "tracking", {"mounting": "found", "mounting_pitch_deg": 2.0, "mounting_knocks": 0, "mounting_problem": ""}),
+        "mqtt_bridge": (0, "connected", {"connected": "True", "broker": "b:1", "user": "car-1", "publishes_refused": 0}),
+        "hazard_reporting": (0, "running", {"pending": 0})}
+# Where these nodes say that something is wrong.
+UNWELL = {"camera_ingest": (1, "behind: dropping frames", {"rate_hz": 9.5, "frames_dropped": "rises"}),
+          "edge_vo": (1, "tracking", {"mounting": "found", "mounting_pitch_deg": "nan", "mounting_knocks": 1}),
+          "mqtt_bridge": (1, "refused \x1b[2J", {"connected": "False", "broker": "b:1"}),
+          "hazard_reporting": (0, "running", {"pending": 101})}
+
 
 def sentence(text):
     checksum = 0
@@ -228,6 +263,56 @@ class VehicleCheckTest(unittest.TestCase):
         self.addCleanup(peer.close)
         self.master = f"http://127.0.0.1:{peer.port}"
         self.assert_check(self.check("input:=topic", code=1)["picture"], "unknown", "no ROS master answers")
+
+    def ros(self, name, lines):
+        """A ROS master, on which the drivers speak, and a vehicle where `name` is one."""
+        port = free_port()
+        self.master = f"http://127.0.0.1:{port}"
+        environment = dict(os.environ, ROS_MASTER_URI=self.master, ROS_HOME=str(self.folder), ROS_IP="127.0.0.1")
+        for command in ((shutil.which("rosmaster"), "--core", "-p", str(port)), (sys.executable, "-c", VEHICLE, name, json.dumps(lines))):
+            process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            self.addCleanup(process.wait)
+            self.addCleanup(process.kill)
+            time.sleep(4)
+
+    @unittest.skipUnless(shutil.which("rosmaster"), "no rosmaster")
+    def test_topics_of_drivers_are_heard_before_a_vehicle_runs(self):
+        self.ros("driver", {})
+        found = self.check("input:=topic")
+        for name in ("picture", "receiver"):
+            self.assert_check(found[name], "ok")
+            self.assertAlmostEqual(found[name]["values"]["rate_hz"], 10, delta=4)
+        self.assert_check(found["calibration"], "ok", "640x400")
+        self.assertNotIn("running picture", found)
+        found = self.check("input:=topic", "image:=front", "camera_info:=fix", "fix:=camera/camera_info")
+        self.assert_check(found["picture"], "fault", "nothing came on /front/compressed")
+        self.assert_check(found["calibration"], "fault", "another type")
+        self.assert_check(found["receiver"], "fault", "another type")
+
+    @unittest.skipUnless(shutil.which("rosmaster"), "no rosmaster")
+    def test_a_running_vehicle_is_asked_apart_from_files_and_devices(self):
+        self.ros("vehicle", WELL)
+        found = self.check("input:=topic")
+        for name in ("picture", "broker", "reports", "mounting", "detector"):
+            entry = found[f"running {name}"]
+            self.assertEqual((entry["status"], entry["source"]), ("ok", "running vehicle"), entry)
+        self.assertEqual(found["running picture"]["values"], {"rate_hz": 9.5, "dropped": 0})
+        self.assertEqual(found["picture"]["source"], "files and devices")
+        self.assertIsNone(found["frames per second"]["values"]["frames_per_second"])
+        gps = self.check("input:=topic", "receiver:=gpsd", f"gps_receiver:={{port: {free_port()}}}")
+        self.assert_check(gps["running receiver"], "fault", "gps_receiver says nothing")
+
+    @unittest.skipUnless(shutil.which("rosmaster"), "no rosmaster")
+    def test_a_running_vehicle_that_is_unwell_is_told(self):
+        self.ros("vehicle", UNWELL)
+        found = self.check("input:=topic", code=1)
+        self.assert_check(found["running picture"], "warning", "behind: dropping frames")
+        self.assertGreater(found["running picture"]["values"]["dropped"], 5)
+        self.assert_check(found["running mounting"], "warning", "knocked 1 times")
+        self.assertIsNone(found["running mounting"]["values"]["pitch_deg"])
+        self.assert_check(found["running broker"], "fault", "not connected to b:1: refused [2J")
+        self.assert_check(found["running reports"], "warning", "101 reports wait")
+        self.assert_check(found["running detector"], "fault", "hazard_detection says nothing")
 
     def test_a_calibration_that_cannot_be_is_told(self):
         self.assert_check(self.check()["calibration"], "ok", "640x400", "520 pixels")

@@ -189,6 +189,8 @@ def calibration(values, live):
         if heard.last is None:
             return fault(f"nothing came on {topic} within {heard.seconds:.0f} s", mend)
         info = heard.last
+        if not hasattr(info, "distortion_model"):
+            return fault(f"{topic} is of another type than sensor_msgs/CameraInfo", mend)
         return judged(topic, info.width, info.height, list(info.K), info.distortion_model, mend)
     try:
         path = calibration_file(values)

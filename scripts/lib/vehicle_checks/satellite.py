@@ -121,6 +121,8 @@ def of_topic(values, live):
         return unknown(f"{topic}: {heard}", mend, rate_hz=None)
     if heard.last is None:
         return fault(f"nothing came on {topic} within {heard.seconds:.0f} s", mend, rate_hz=None)
+    if not hasattr(heard.last, "position_covariance_type"):
+        return fault(f"{topic} is of another type than sensor_msgs/NavSatFix", mend, rate_hz=None)
     rate = heard.rate_hz
     figures = {"rate_hz": None if rate is None else round(rate, 2)}
     if heard.last.status.status < 0:
