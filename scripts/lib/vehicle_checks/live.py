@@ -82,7 +82,8 @@ class Live:
             from diagnostic_msgs.msg import DiagnosticArray
             from sensor_msgs.msg import CameraInfo, NavSatFix
             known = {"sensor_msgs/CameraInfo": CameraInfo, "sensor_msgs/NavSatFix": NavSatFix}
-            rospy.init_node("livemap_vehicle_check", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
+            # Without an argv of its own rospy would take launch arguments for names to be replaced.
+            rospy.init_node("livemap_vehicle_check", argv=[], anonymous=True, disable_signals=True, log_level=rospy.FATAL)
             self._started = True
             rospy.Subscriber("/diagnostics", DiagnosticArray, self._take)
             for topic, heard in self._heard.items():
