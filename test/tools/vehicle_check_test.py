@@ -397,7 +397,7 @@ class VehicleCheckTest(unittest.TestCase):
         (own / "key.pem").chmod(0o600)
         revoked = self.check(*self.by_identity(zone, "car-1", own), code=1)
         self.assert_check(revoked["identity"], "ok")
-        self.assert_check(revoked["broker"], "fault")
+        self.assert_check(revoked["broker"], "fault", "refuses")
 
     def test_an_expired_certificate_and_one_of_another_zone_are_told(self):
         zone, other = self.zone(), self.zone()

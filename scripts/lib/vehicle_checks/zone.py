@@ -12,7 +12,7 @@ from vehicle_checks.finding import Unreadable, fault, ok, read_file, unknown, wa
 
 CONNECT_S, ANSWER_S = 4.0, 4.0
 # How long a broker that refuses a certificate takes to say so, at most.
-ALERT_S = 1.5
+ALERT_S = 1.0
 SOON_DAYS = 30
 REFUSALS = {0x80: "unspecified error", 0x81: "malformed packet", 0x84: "it does not speak MQTT 5",
             0x85: "client id not valid", 0x86: "wrong user name or password", 0x87: "not authorised", 0x88: "server unavailable",
@@ -211,8 +211,10 @@ def speak(plain, context, values, where, host, vehicle_runs):
             return refused(where, error)
     with connection:
         try:
+            if context:
+                wait_for_refusal(connection)
             if vehicle_runs:
-                return without_login(connection, context, where)
+                return ok(f"{where} answers{' and takes the certificate' if context else ''}; the running vehicle is logged in")
             return log_in(connection, values, where)
         except socket.timeout:
             return fault(f"{where} accepts connections and says nothing", "is a broker of LiveMap at this port? restart it")
@@ -227,20 +229,20 @@ def refused(where, error):
         return fault(f"{where} refuses this vehicle's certificate: {words}", f"revoked, ended or of another zone: {ENROLL}")
     if "WRONG_VERSION" in reason or "NOT_A" in reason or "UNEXPECTED_EOF" in reason:
         return fault(f"{where} speaks no TLS", "broker_port:= the port with certificates (8883), or no identity:=")
-    return fault(f"{where} ended the connection: {reason or getattr(error, 'strerror', None) or error}",
+    return fault(f"{where} refuses the connection: {reason or getattr(error, 'strerror', None) or error}",
                  "see the broker's log; a revoked certificate ends like this, and a port that wants one")
 
 
-def without_login(connection, context, where):
-    """A broker refuses a certificate in TLS 1.3 after the handshake, or says nothing."""
-    if context:
-        try:
-            if receive(connection, 1, ALERT_S) == b"":
-                return refused(where, OSError("without a word"))
-        except socket.timeout:
-            pass
-        return ok(f"{where} answers and takes the certificate; the running vehicle is logged in")
-    return ok(f"{where} answers; the running vehicle is logged in")
+def wait_for_refusal(connection):
+    """A broker refuses a certificate in TLS 1.3 after the handshake, or says nothing: OSError where it refuses.
+
+    What is sent too early meets a closed connection, and its reason is lost.
+    """
+    try:
+        if receive(connection, 1, ALERT_S) == b"":
+            raise OSError("it ended the connection where it looks at the vehicle's certificate")
+    except socket.timeout:
+        pass
 
 
 def log_in(connection, values, where):
