@@ -223,6 +223,7 @@ def reports(live):
             return unknown("hazard_reporting does not say how many reports wait", **figures)
         found = f"{waiting:.0f} reports wait for the zone's receipt"
         if waiting > MANY_REPORTS or level:
-            return warning(f"{found}: {summary}", "see receiver and broker above; reports are sent again until the zone answers", **figures)
+            return warning(f"{found}: {summary}", "see receiver and broker above; reports are sent until the zone answers",
+                           **figures)
         return ok(found, **figures)
     return of_node(live, "hazard_reporting", judge)

@@ -15,9 +15,10 @@ CONNECT_S, ANSWER_S = 4.0, 4.0
 ALERT_S = 1.0
 SOON_DAYS = 30
 REFUSALS = {0x80: "unspecified error", 0x81: "malformed packet", 0x84: "it does not speak MQTT 5",
-            0x85: "client id not valid", 0x86: "wrong user name or password", 0x87: "not authorised", 0x88: "server unavailable",
-            0x89: "server busy", 0x8A: "banned", 0x8C: "bad authentication method", 0x9F: "too many connections", 1: "it does not speak MQTT 5",
-            4: "wrong user name or password", 5: "not authorised"}
+            0x85: "client id not valid", 0x86: "wrong user name or password", 0x87: "not authorised",
+            0x88: "server unavailable", 0x89: "server busy", 0x8A: "banned", 0x8C: "bad authentication method",
+            0x9F: "too many connections", 1: "it does not speak MQTT 5", 4: "wrong user name or password",
+            5: "not authorised"}
 ENROLL = "./livemap zone enroll VEHICLE on the zone's machine, then copy its folder (docs/how-to/enroll-a-vehicle.md)"
 
 
@@ -28,7 +29,7 @@ class Identity:
         folder = values["identity"]
         names = (("ca_file", "ca.pem"), ("certificate_file", "certificate.pem"), ("key_file", "key.pem"))
         self.ca, self.certificate, self.key = (
-            str(values.parameter("mqtt_bridge", parameter, default="") or "") or (os.path.join(folder, file) if folder else "")
+            str(values.parameter("mqtt_bridge", parameter, default="") or "") or (folder and os.path.join(folder, file))
             for parameter, file in names)
 
     def __bool__(self):
