@@ -52,7 +52,7 @@ void DriverPageState::Take(const diagnostic_msgs::DiagnosticArray& diagnostics, 
         std::find(kShownNodes.begin(), kShownNodes.end(), status.hardware_id) != kShownNodes.end();
     if (!is_shown) continue;
     Line line;
-    line.level = status.level;
+    line.level = static_cast<std::uint8_t>(status.level);
     line.heard_s = now_s;
     for (const diagnostic_msgs::KeyValue& pair : status.values) line.values[pair.key] = pair.value;
     lines_[status.hardware_id] = std::move(line);

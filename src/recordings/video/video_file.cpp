@@ -22,6 +22,7 @@ constexpr int kMaxSide = 16384;
 /// FFmpeg's names of what recorders, phones and action cameras write.
 constexpr char kContainers[] = "mov,matroska,avi,mpegts,mpeg,asf,flv";
 constexpr AVRational kNanosecond{1, 1'000'000'000};
+constexpr AVRational kMicrosecond{1, AV_TIME_BASE};  // FFmpeg's own unit.
 
 std::string ReasonOf(int code) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
@@ -33,19 +34,19 @@ std::string ReasonOf(int code) {
 
 struct VideoFile::Decoder {
   struct CloseFormat {
-    void operator()(AVFormatContext* format) const { avformat_close_input(&format); }
+    void operator()(AVFormatContext* it) const { avformat_close_input(&it); }
   };
   struct FreeCodec {
-    void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
+    void operator()(AVCodecContext* it) const { avcodec_free_context(&it); }
   };
   struct FreeFrame {
-    void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+    void operator()(AVFrame* it) const { av_frame_free(&it); }
   };
   struct FreePacket {
-    void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+    void operator()(AVPacket* it) const { av_packet_free(&it); }
   };
   struct FreeScaler {
-    void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+    void operator()(SwsContext* it) const { sws_freeContext(it); }
   };
 
   std::unique_ptr<AVFormatContext, CloseFormat> format;
@@ -206,8 +207,7 @@ std::int64_t VideoFile::duration_ns() const {
     return av_rescale_q(stream.duration, stream.time_base, kNanosecond);
   }
   const std::int64_t whole = decoder_->format->duration;
-  return whole == AV_NOPTS_VALUE || whole < 0 ? 0
-                                              : av_rescale_q(whole, AV_TIME_BASE_Q, kNanosecond);
+  return whole == AV_NOPTS_VALUE || whole < 0 ? 0 : av_rescale_q(whole, kMicrosecond, kNanosecond);
 }
 
 std::optional<std::int64_t> VideoFile::creation_ns() const {

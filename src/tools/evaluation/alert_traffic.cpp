@@ -285,7 +285,7 @@ std::vector<Eigen::Vector2d> MapRing(Streets& streets, const Pen& before, double
 /// the arm.
 Eigen::Vector2d MapExit(Streets& streets, const Eigen::Vector2d& exit_m, const Pen& pen,
                         std::size_t from) {
-  const Eigen::Vector2d gate_m = pen.place_m() + 0.5 * kLaneM * pen.Left();
+  Eigen::Vector2d gate_m = pen.place_m() + 0.5 * kLaneM * pen.Left();
   Line exit{exit_m};
   // The ring's last points and the bend out of it.
   const Line bend = PartOf(pen.line(), from, pen.size());
