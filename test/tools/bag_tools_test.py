@@ -234,6 +234,8 @@ class BagToolsTest(unittest.TestCase):
         self.assert_refused(run("from_dashcam", first, self.bag, *camera), "no positions of its own", "--gpx")
         self.assert_refused(run("from_dashcam", first, self.bag, *gpx, *camera, "--start-time", "2026-01-31T14:00:00Z"),
                             "of different times", "--recorder-zone +02:00")
+        self.assert_refused(run("from_dashcam", first, self.bag, *gpx, *camera, "--start-time", "2026-01-31T14:00:00",
+                                "--recorder-zone", "+01:00"), "of different times", "--recorder-zone +02:00")
         self.assert_refused(run("from_dashcam", self.path("track.gpx"), self.bag, *gpx, *camera), "track.gpx", "no whole video")
         write(self.path("bad.csv"), "time,lat,lon\n2026-01-31T12:00:00Z,91,9\n")
         self.assert_refused(run("from_dashcam", first, self.bag, "--csv", self.path("bad.csv"), *camera), "line 2", "bad.csv")

@@ -55,8 +55,26 @@ class ServiceTest(unittest.TestCase):
         self.assert_refused(self.install("vehicle", "camera:=front"), "camera:=front", "vehicle.launch")
         self.assert_refused(self.install("vehicle", "front"), "'front'")
         self.assert_refused(self.install("zone", "directory:=~/zone"), "~/zone", "whole path")
+        self.assert_refused(self.install("vehicle", "camera_info_url:=file://~/camera.yaml"), "camera.yaml", "whole path")
+        self.assert_refused(self.install("vehicle", "identity:=car-1"), "car-1", "whole path")
+        self.assert_refused(self.install("vehicle", "--master-port", "80"), "80", "1024")
         self.assert_refused(self.install("vehicle", "vehicle:=car\n[Service]\nUser=root"), "control character")
         self.assert_refused(self.install("vehicle", "--user", "nobody-of-this-name"), "nobody-of-this-name")
+
+    def test_a_unit_of_somebody_else_is_left_alone(self):
+        own = self.units / "livemap-zone.service"
+        own.write_text("[Unit]\n", encoding="utf-8")
+        for arguments in ([], ["--remove"]):
+            done = self.install("zone", *arguments)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("is not of this command", done.stderr)
+        self.assertEqual(own.read_text(encoding="utf-8"), "[Unit]\n")
+
+    def test_vehicle_and_zone_have_masters_of_their_own(self):
+        self.install("vehicle")
+        self.install("zone")
+        self.assertIn("ROS_MASTER_URI=http://localhost:11311\n", self.unit("vehicle"))
+        self.assertIn("ROS_MASTER_URI=http://localhost:11312\n", self.unit("zone"))
 
     def test_a_unit_is_removed_again(self):
         self.assert_refused(self.install("zone", "--remove"), "livemap-zone.service")

@@ -102,8 +102,9 @@ Recording ReadRecording(const CommandLine& line, const std::vector<std::string>&
 }
 
 /// Throws Error where recording and track are of other times, with the zone that may be meant.
-void CheckTimes(const Recording& recording, const recordings::RecordedTrack& track,
-                double reach_s) {
+/// `zone_s` is the recorder's as it was given.
+void CheckTimes(const Recording& recording, const recordings::RecordedTrack& track, double reach_s,
+                int zone_s) {
   const std::int64_t reach_ns = Nanoseconds(reach_s);
   const auto overlap = [&](std::int64_t shift_ns) {
     return recording.begin_ns() + shift_ns - reach_ns < track.end_ns() &&
@@ -117,7 +118,7 @@ void CheckTimes(const Recording& recording, const recordings::RecordedTrack& tra
            << recordings::FormatUtc(track.end_ns()) << ", are of different times";
   constexpr std::int64_t kQuarterS = 900;
   for (std::int64_t quarters = -56; quarters <= 56; ++quarters) {
-    if (!overlap(-quarters * kQuarterS * 1'000'000'000)) continue;
+    if (!overlap((zone_s - quarters * kQuarterS) * 1'000'000'000)) continue;
     char zone[16];
     std::snprintf(zone, sizeof zone, "%c%02d:%02d", quarters < 0 ? '-' : '+',
                   static_cast<int>(std::abs(quarters) / 4),
@@ -250,7 +251,8 @@ int BagFromDashcam(int argc, char** argv) {
   setup.track = *track;
   CheckTimes(recording, *track,
              line.Has("offset") ? std::abs(line.Number("offset", 0, -86400, 86400))
-                                : line.Number("search", 30, 1, 300));
+                                : line.Number("search", 30, 1, 300),
+             ReadTimeZone(line, "recorder-zone").value_or(0));
   const double offset_s = OffsetOf(line, recording, *track);
   RecordingBag bag(out, setup, recording.begin_ns() + Nanoseconds(offset_s));
   const FrameCounts counts = WriteFrames(recording, *track, offset_s, config, bag);
