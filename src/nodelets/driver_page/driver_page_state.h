@@ -24,8 +24,8 @@ class DriverPageState {
   void Take(const sensor_msgs::NavSatFix& fix, double now_s);
   void Take(const diagnostic_msgs::DiagnosticArray& diagnostics, double now_s);
 
-  /// {"hazards": [the nearest three], "more", "dark", "camera", "receiver", "zone", "reports",
-  /// "voice"}; what is not known is null.
+  /// {"hazards": [the nearest three], "more", "speed_mps", "dark", "alerts", "camera", "receiver",
+  /// "zone", "reports", "voice"}; what is not known is null.
   web::Json At(double now_s) const;
 
  private:

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <string_view>
 #include <thread>
@@ -45,11 +46,15 @@ class LocalSocket {
   bool Send(std::string_view text) const {
     return send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   }
-  /// Whether a byte has come within so many milliseconds.
+  /// Whether anything has come within so many milliseconds; the end of the connection counts.
   bool Hears(int milliseconds) const {
     pollfd wanted{fd_, POLLIN, 0};
+    return poll(&wanted, 1, milliseconds) == 1;
+  }
+  /// Whether what has come is more than the end.
+  bool HasText() const {
     char byte = 0;
-    return poll(&wanted, 1, milliseconds) == 1 && recv(fd_, &byte, 1, 0) == 1;
+    return recv(fd_, &byte, 1, 0) == 1;
   }
 
  private:
@@ -68,7 +73,8 @@ SpeechServer AskSpeechServer(const std::string& socket_path, double timeout_s,
   if (!server.Send(kFarewell)) return SpeechServer::kSilent;
   const double end_s = ServerNowS() + timeout_s;
   while (ServerNowS() < end_s && !must_stop()) {
-    if (server.Hears(kLookAgainMs)) return SpeechServer::kAnswers;
+    if (!server.Hears(kLookAgainMs)) continue;
+    return server.HasText() ? SpeechServer::kAnswers : SpeechServer::kSilent;
   }
   return SpeechServer::kSilent;
 }
