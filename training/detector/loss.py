@@ -7,7 +7,7 @@ data set does not label a class can be left out of that class's loss.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import List, Tuple
 
 import torch
@@ -33,22 +33,54 @@ class Target:
 
 
 @dataclass
-class Assignment:
-    """What each anchor point of one image shall predict."""
+class TargetBatch:
+    """Targets of B images, filled up to the most labels G and ignored regions K that one of them has.
 
-    scores: Tensor  # N x C in [0, 1]
-    boxes: Tensor  # P x 4, one row per positive anchor point
-    positive: Tensor  # N, bool
-    weights: Tensor  # N x C in [0, 1]: 0 where the score is not judged
+    Together, so that a loss asks a GPU for a few large operations instead of many small ones per image.
+    """
+
+    boxes: Tensor  # B x G x 4, zero where there is no label
+    classes: Tensor  # B x G, int64
+    present: Tensor  # B x G, bool: is there a label?
+    ignored: Tensor  # B x K x 4, zero where there is no region
+    labelled: Tensor  # B x C
+
+    @staticmethod
+    def of(targets: List[Target]) -> "TargetBatch":
+        """At least one column of labels and of regions, so that none of them is a case of its own."""
+        most = max(1, *(len(target.boxes) for target in targets))
+        most_ignored = max(1, *(len(target.ignored) for target in targets))
+        filled = lambda rows, count: F.pad(rows, (0, 0) * (rows.dim() - 1) + (0, count - len(rows)))
+        return TargetBatch(
+            torch.stack([filled(target.boxes, most) for target in targets]),
+            torch.stack([filled(target.classes, most) for target in targets]),
+            torch.stack([torch.arange(most) < len(target.boxes) for target in targets]),
+            torch.stack([filled(target.ignored, most_ignored) for target in targets]),
+            torch.stack([target.labelled for target in targets]),
+        )
+
+    def to(self, device: torch.device) -> "TargetBatch":
+        """The same on a device."""
+        return TargetBatch(*(getattr(self, field.name).to(device) for field in fields(self)))
+
+
+@dataclass
+class Assignment:
+    """What each anchor point of B images shall predict."""
+
+    scores: Tensor  # B x N x C in [0, 1]
+    boxes: Tensor  # B x N x 4, meaningful where positive
+    positive: Tensor  # B x N, bool
+    weights: Tensor  # B x N x C in [0, 1]: 0 where the score is not judged
 
 
 def pairwise_iou(first: Tensor, second: Tensor) -> Tensor:
-    """N x 4 and M x 4 corners to N x M intersections over unions."""
-    left_top = torch.maximum(first[:, None, :2], second[None, :, :2])
-    right_bottom = torch.minimum(first[:, None, 2:], second[None, :, 2:])
-    intersection = (right_bottom - left_top).clamp(min=0).prod(dim=2)
-    area = lambda boxes: (boxes[:, 2:] - boxes[:, :2]).clamp(min=0).prod(dim=1)
-    return intersection / (area(first)[:, None] + area(second)[None] - intersection).clamp(min=1e-9)
+    """B x N x 4 and B x G x 4 corners to B x N x G intersections over unions."""
+    left_top = torch.maximum(first[:, :, None, :2], second[:, None, :, :2])
+    right_bottom = torch.minimum(first[:, :, None, 2:], second[:, None, :, 2:])
+    intersection = (right_bottom - left_top).clamp(min=0).prod(dim=3)
+    area = lambda boxes: (boxes[..., 2:] - boxes[..., :2]).clamp(min=0).prod(dim=2)
+    return intersection / (area(first)[:, :, None] + area(second)[:, None] - intersection).clamp(min=1e-9)
 
 
 def complete_iou(predicted: Tensor, wanted: Tensor) -> Tensor:
@@ -68,10 +100,10 @@ def complete_iou(predicted: Tensor, wanted: Tensor) -> Tensor:
 
 
 def points_inside(points: Tensor, boxes: Tensor, reach: Tensor) -> Tensor:
-    """N x G: is point n inside box g, where a box reaches at least reach[n] from its centre?"""
-    centres, half_sizes = (boxes[:, :2] + boxes[:, 2:]) / 2, (boxes[:, 2:] - boxes[:, :2]) / 2
-    limits = torch.maximum(half_sizes[None], reach[:, None, None])
-    return ((points[:, None] - centres[None]).abs() < limits).all(dim=2)
+    """N x 2 points and B x G x 4 boxes to B x N x G: is a point inside, where a box reaches at least reach[n] from its centre?"""
+    centres, half_sizes = (boxes[..., :2] + boxes[..., 2:]) / 2, (boxes[..., 2:] - boxes[..., :2]) / 2
+    limits = torch.maximum(half_sizes[:, None], reach[None, :, None, None])
+    return ((points[None, :, None] - centres[:, None]).abs() < limits).all(dim=3)
 
 
 class TaskAlignedLoss:
@@ -81,50 +113,45 @@ class TaskAlignedLoss:
         self.grid, self.strides = (tensor.to(device) for tensor in anchor_points(height, width))
         self.centres = (self.grid + 0.5) * self.strides[:, None]
 
-    def assign(self, scores: Tensor, boxes: Tensor, target: Target) -> Assignment:
-        """Labels of one image to anchor points, given the scores (N x C) and boxes (N x 4) predicted now."""
-        wanted_scores = torch.zeros_like(scores)
-        weights = target.labelled.expand_as(scores).clone()
-        weights[points_inside(self.centres, target.ignored, 0 * self.strides).any(dim=1)] = 0
-        positive = torch.zeros(len(scores), dtype=torch.bool, device=scores.device)
-        if not len(target.boxes):
-            return Assignment(wanted_scores, boxes[:0], positive, weights)
+    def assign(self, scores: Tensor, boxes: Tensor, targets: TargetBatch) -> Assignment:
+        """Labels to anchor points, given the scores (B x N x C) and boxes (B x N x 4) predicted now."""
+        weights = targets.labelled[:, None].expand_as(scores)
+        ignored = points_inside(self.centres, targets.ignored, 0 * self.strides).any(dim=2)
+        weights = weights.masked_fill(ignored[..., None], 0)
 
-        candidates = points_inside(self.centres, target.boxes, self.strides)
-        iou = pairwise_iou(boxes, target.boxes)
-        fit = scores[:, target.classes].pow(ALPHA) * iou.pow(BETA) * candidates
-        best = fit.topk(min(POSITIVES_PER_LABEL, len(fit)), dim=0)
-        chosen = torch.zeros_like(candidates).scatter_(0, best.indices, best.values > 0) & candidates
+        candidates = points_inside(self.centres, targets.boxes, self.strides) & targets.present[:, None]
+        iou = pairwise_iou(boxes, targets.boxes)
+        score_of_label = scores.gather(2, targets.classes[:, None].expand_as(iou))
+        fit = score_of_label.pow(ALPHA) * iou.pow(BETA) * candidates
+        best = fit.topk(min(POSITIVES_PER_LABEL, fit.shape[1]), dim=1)
+        chosen = torch.zeros_like(candidates).scatter_(1, best.indices, best.values > 0) & candidates
 
         # An anchor point chosen by several labels serves the one that it overlaps most.
-        label_of_point = torch.where(chosen, iou, torch.full_like(iou, -1.0)).argmax(dim=1)
-        positive = chosen.any(dim=1)
-        points = positive.nonzero()[:, 0]
-        labels = label_of_point[points]
+        label_of_point = torch.where(chosen, iou, torch.full_like(iou, -1.0)).argmax(dim=2)
+        positive = chosen.any(dim=2)
+        class_of_point = targets.classes.gather(1, label_of_point)[..., None]
 
         # Scores to learn: the fit, scaled per label so that its best point learns that label's best IoU.
         fit = torch.where(chosen, fit, torch.zeros_like(fit))
-        scale = (iou * chosen).amax(dim=0) / fit.amax(dim=0).clamp(min=1e-12)
-        classes = target.classes[labels]
-        wanted_scores[points, classes] = (fit * scale)[points, labels]
+        scale = (iou * chosen).amax(dim=1) / fit.amax(dim=1).clamp(min=1e-12)
+        learnt = (fit * scale[:, None]).gather(2, label_of_point[..., None])
+        wanted_scores = torch.zeros_like(scores).scatter_(2, class_of_point, learnt * positive[..., None])
         # An object is of one class: it is background of the others a little, even where these are not labelled.
-        weights[points] = weights[points].clamp(min=OTHER_CLASS_WEIGHT)
-        weights[points, classes] = 1
-        return Assignment(wanted_scores, target.boxes[labels], positive, weights)
+        of_object = weights.clamp(min=OTHER_CLASS_WEIGHT).scatter(2, class_of_point, 1.0)
+        weights = torch.where(positive[..., None], of_object, weights)
+        wanted_boxes = targets.boxes.gather(1, label_of_point[..., None].expand_as(boxes))
+        return Assignment(wanted_scores, wanted_boxes, positive, weights)
 
-    def __call__(self, raw: Tensor, targets: List[Target]) -> Tuple[Tensor, Tensor]:
+    def __call__(self, raw: Tensor, targets: TargetBatch) -> Tuple[Tensor, Tensor]:
         """Raw predictions (B x N x (4 + C)) and targets to (box loss, score loss), weighted."""
         raw = raw.float()
         boxes, logits = decode_boxes(raw[..., :4], self.grid, self.strides), raw[..., 4:]
         with torch.no_grad():
-            assignments = [self.assign(s.sigmoid(), b, t) for s, b, t in zip(logits, boxes, targets)]
-        wanted = torch.stack([assignment.scores for assignment in assignments])
-        weights = torch.stack([assignment.weights for assignment in assignments])
-        normaliser = wanted.sum().clamp(min=1.0)
-        score_loss = (F.binary_cross_entropy_with_logits(logits, wanted, reduction="none") * weights).sum()
+            wanted = self.assign(logits.sigmoid(), boxes, targets)
+        normaliser = wanted.scores.sum().clamp(min=1.0)
+        score_loss = (F.binary_cross_entropy_with_logits(logits, wanted.scores, reduction="none") * wanted.weights).sum()
 
-        positive = torch.stack([assignment.positive for assignment in assignments])
-        importance = wanted[positive].sum(dim=1)
-        overlap = complete_iou(boxes[positive], torch.cat([assignment.boxes for assignment in assignments]))
+        importance = wanted.scores[wanted.positive].sum(dim=1)
+        overlap = complete_iou(boxes[wanted.positive], wanted.boxes[wanted.positive])
         box_loss = ((1 - overlap) * importance).sum()
         return BOX_WEIGHT * box_loss / normaliser, SCORE_WEIGHT * score_loss / normaliser

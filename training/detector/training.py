@@ -13,7 +13,7 @@ from common.training import EpochSamples, decayed_groups
 from . import CLASSES, inference
 from .augment import FRAMES, GROUP_SHARES, LIGHT, SETTLING, Recipe, Sample
 from .inference import MEAN, STD
-from .loss import Target
+from .loss import Target, TargetBatch
 from .network import Detector
 
 
@@ -72,16 +72,20 @@ def collate(samples: List[Sample]) -> Tuple[Tensor, List[Target]]:
     return images, targets
 
 
+def collate_batch(samples: List[Sample]) -> Tuple[Tensor, TargetBatch]:
+    """The same with the targets filled up, which the workers do."""
+    images, targets = collate(samples)
+    return images, TargetBatch.of(targets)
+
+
 def batches(samples: EpochSamples, batch: int, workers: int) -> DataLoader:
     """Batches of an epoch in order; the samples themselves are random."""
-    return DataLoader(samples, batch_size=batch, num_workers=workers, collate_fn=collate, drop_last=True)
+    return DataLoader(samples, batch_size=batch, num_workers=workers, collate_fn=collate_batch, drop_last=True)
 
 
-def to_device(images: Tensor, targets: List[Target], device: torch.device) -> Tuple[Tensor, List[Target]]:
+def to_device(images: Tensor, targets: TargetBatch, device: torch.device) -> Tuple[Tensor, TargetBatch]:
     """A batch on the device, its images normalised."""
-    images = (images.to(device).float() - MEAN) / STD
-    moved = [Target(t.boxes.to(device), t.classes.to(device), t.ignored.to(device), t.labelled.to(device)) for t in targets]
-    return images, moved
+    return (images.to(device).float() - MEAN) / STD, targets.to(device)
 
 
 def make_optimizer(model: Detector, settings: Settings) -> torch.optim.Optimizer:
