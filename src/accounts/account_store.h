@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/mutex.h"
+
+namespace livemap {
+class SqliteDatabase;
+}
+
+namespace livemap::accounts {
+
+/// What somebody may do with a zone's map. Each may do what those before it may.
+enum class Role {
+  kViewer,    ///< Sees vehicles, their trails, and hazards that drivers are not told of.
+  kOfficial,  ///< Decides about hazards, map changes and vehicles.
+  kAdmin      ///< Also what is about the zone itself.
+};
+/// "viewer", "official" or "admin".
+const char* RoleName(Role role);
+std::optional<Role> RoleOf(const std::string& name);
+
+/// Somebody who may log in.
+struct Account {
+  std::string name;
+  Role role = Role::kViewer;
+  std::int64_t created_ns = 0;              ///< System clock, UTC ns since 1970, as all here.
+  std::int64_t password_ns = 0;             ///< When the password was set.
+  std::optional<std::int64_t> last_log_in;  ///< None: never yet.
+};
+
+/// Who has logged in.
+struct Person {
+  std::string name;
+  Role role = Role::kViewer;
+};
+
+/// The people of a zone and their sessions, in a SQLite file that the server and `livemap zone
+/// user` share: what one changes holds for the other at once. Of passwords the file has argon2id
+/// hashes, of sessions SHA-256 hashes of random tokens. Thread-safe. Everything throws StoreError
+/// when the file cannot be read or written.
+///
+/// Typical usage:
+///   AccountStore accounts("/var/lib/livemap/zone/accounts.sqlite", {});
+///   const auto person = accounts.CheckPassword(name, password);
+///   if (person) answer.cookie = accounts.OpenSession(person->name, SystemNs());
+class AccountStore {
+ public:
+  struct Config {
+    double session_s = 12 * 3600;  ///< A session ends so long after it was opened.
+  };
+  static constexpr std::size_t kMaxNameBytes = 64;
+  static constexpr std::size_t kMaxAccounts = 10'000;
+  static constexpr std::size_t kMaxSessionsOfOne = 20;  ///< The oldest goes for one more.
+
+  /// Opens the file, or makes one that only its owner may read.
+  AccountStore(const std::string& path, const Config& config);
+  ~AccountStore();
+  AccountStore(const AccountStore&) = delete;
+  AccountStore& operator=(const AccountStore&) = delete;
+
+  /// Throws Error naming what is accepted for a name, a password or too many accounts, and for a
+  /// name that there is.
+  void Add(const std::string& name, Role role, const std::string& password, std::int64_t now_ns);
+  /// Ends all sessions of the account. These three throw Error for a name that there is not.
+  void SetPassword(const std::string& name, const std::string& password, std::int64_t now_ns);
+  void SetRole(const std::string& name, Role role);
+  void Remove(const std::string& name);
+  /// In the order of their names.
+  std::vector<Account> List() const;
+  bool HasAccounts() const;
+
+  /// Whose name and password these are; none where they are wrong, and nobody can tell by the time
+  /// it takes whether there is such a name. Slow (HashPassword).
+  std::optional<Person> CheckPassword(const std::string& name, const std::string& password) const;
+  /// A new session's token, 64 hexadecimal digits.
+  std::string OpenSession(const std::string& name, std::int64_t now_ns);
+  /// Whose session it is; none where it is none, has ended or was closed. Quick.
+  std::optional<Person> FindSession(const std::string& token, std::int64_t now_ns) const;
+  void CloseSession(const std::string& token);
+
+  /// Random, kept in the file: tells this zone's cookies from another's of the same host.
+  const std::string& id() const { return id_; }
+  const Config& config() const { return config_; }
+
+ private:
+  /// The hash of an account's password and its role; none where there is no such account.
+  std::optional<std::pair<std::string, Role>> FindHash(const std::string& name) const;
+  /// Throws Error where no row was changed.
+  void RequireChange(const std::string& name) const REQUIRES(mutex_);
+
+  const Config config_;
+  mutable Mutex mutex_;
+  const std::unique_ptr<SqliteDatabase> database_ PT_GUARDED_BY(mutex_);
+  std::string id_;
+};
+
+}  // namespace livemap::accounts

@@ -1,0 +1,181 @@
+// livemap zone user: the people who may log in to a zone's map.
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "accounts/account_store.h"
+#include "common/clock.h"
+#include "common/error.h"
+
+namespace {
+
+using livemap::Error;
+using livemap::accounts::AccountStore;
+using livemap::accounts::Role;
+
+constexpr char kHelp[] =
+    R"(usage: ./livemap zone user add NAME --role viewer|official|admin [--directory DIR]
+       ./livemap zone user passwd NAME [--directory DIR]
+       ./livemap zone user role NAME --role viewer|official|admin [--directory DIR]
+       ./livemap zone user remove NAME [--directory DIR]
+       ./livemap zone user list [--directory DIR]
+
+The people who may log in to the zone's map. A viewer sees vehicles and unconfirmed hazards, an
+official also decides, an admin may do everything. What is changed holds at once, also while the zone
+runs; a new password and a removal end all sessions. The password is asked for twice, or read from the
+first line of standard input where that is no terminal.
+
+  --role ROLE       what the person may do
+  --directory DIR   folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)
+)";
+
+struct Arguments {
+  std::string action;
+  std::string name;
+  std::string role;
+  std::string directory;
+};
+
+/// Throws Error for what is not accepted.
+Arguments Parse(const std::vector<std::string>& words) {
+  Arguments arguments;
+  std::vector<std::string> places;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    std::string* value = nullptr;
+    if (words[i] == "--role") value = &arguments.role;
+    if (words[i] == "--directory") value = &arguments.directory;
+    if (value == nullptr) {
+      if (words[i].compare(0, 2, "--") == 0) {
+        throw Error("unknown flag '" + words[i] + "', accepted are --role and --directory");
+      }
+      places.push_back(words[i]);
+      continue;
+    }
+    if (i + 1 == words.size()) throw Error(words[i] + " needs a value");
+    *value = words[++i];
+  }
+  if (places.empty()) throw Error("accepted are add, passwd, role, remove and list (see --help)");
+  arguments.action = places[0];
+  const bool is_list = arguments.action == "list";
+  if (places.size() != (is_list ? 1U : 2U)) {
+    throw Error(arguments.action + (is_list ? " takes no name" : " takes one name"));
+  }
+  if (!is_list) arguments.name = places[1];
+  return arguments;
+}
+
+/// What a terminal shows of what is typed comes back when it ends.
+class SilentTerminal {
+ public:
+  SilentTerminal() {
+    is_terminal_ = tcgetattr(STDIN_FILENO, &before_) == 0;
+    termios silent = before_;
+    silent.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    if (is_terminal_) tcsetattr(STDIN_FILENO, TCSAFLUSH, &silent);
+  }
+  ~SilentTerminal() {
+    if (is_terminal_) tcsetattr(STDIN_FILENO, TCSAFLUSH, &before_);
+  }
+  SilentTerminal(const SilentTerminal&) = delete;
+  SilentTerminal& operator=(const SilentTerminal&) = delete;
+  bool is_terminal() const { return is_terminal_; }
+
+ private:
+  termios before_{};
+  bool is_terminal_ = false;
+};
+
+std::string ReadLine(const char* question, bool asks) {
+  if (asks) std::cerr << question << std::flush;
+  std::string line;
+  std::getline(std::cin, line);
+  if (asks) std::cerr << '\n';
+  return line;
+}
+
+std::string ReadPassword() {
+  const SilentTerminal terminal;
+  std::string password = ReadLine("Password: ", terminal.is_terminal());
+  if (terminal.is_terminal() && ReadLine("Again: ", true) != password) {
+    throw Error("the two passwords differ");
+  }
+  return password;
+}
+
+Role RequireRole(const std::string& name) {
+  const auto role = livemap::accounts::RoleOf(name);
+  if (role) return *role;
+  throw Error("role '" + name + "' is not accepted, accepted are viewer, official and admin");
+}
+
+std::string Utc(std::int64_t at_ns) {
+  const std::time_t seconds = at_ns / 1'000'000'000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text.data();
+}
+
+void List(const AccountStore& accounts) {
+  for (const auto& account : accounts.List()) {
+    const std::string last = account.last_log_in ? Utc(*account.last_log_in) : "never logged in";
+    std::cout << account.name << '\t' << livemap::accounts::RoleName(account.role) << '\t' << last
+              << '\n';
+  }
+}
+
+AccountStore Open(const Arguments& arguments) {
+  std::string directory = arguments.directory;
+  if (directory.empty()) {
+    const char* const home = std::getenv("HOME");
+    directory = std::string(home == nullptr ? "" : home) + "/.livemap/zone";
+  }
+  std::filesystem::create_directories(directory);
+  return AccountStore(directory + "/accounts.sqlite", {});
+}
+
+void Run(const Arguments& arguments) {
+  const std::int64_t now_ns = livemap::SystemNs();
+  const std::string& name = arguments.name;
+  if (arguments.action == "add") {
+    const Role role = RequireRole(arguments.role);
+    Open(arguments).Add(name, role, ReadPassword(), now_ns);
+  } else if (arguments.action == "passwd") {
+    Open(arguments).SetPassword(name, ReadPassword(), now_ns);
+  } else if (arguments.action == "role") {
+    Open(arguments).SetRole(name, RequireRole(arguments.role));
+  } else if (arguments.action == "remove") {
+    Open(arguments).Remove(name);
+  } else if (arguments.action == "list") {
+    List(Open(arguments));
+  } else {
+    throw Error("'" + arguments.action + "' is not accepted, accepted are add, passwd, role, " +
+                "remove and list");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  for (const std::string& word : words) {
+    if (word != "--help" && word != "-h") continue;
+    std::cout << kHelp;
+    return 0;
+  }
+  try {
+    Run(Parse(words));
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "livemap zone user: " << error.what() << '\n';
+    return 2;
+  }
+}
