@@ -13,6 +13,7 @@ import { HazardList, hazardRow } from './panel/hazard_list.js';
 import { popupContent } from './popups/hazard_popup.js';
 import { nearLongitude } from './mercator.js';
 import { Officials } from './popups/officials.js';
+import { askToLogIn, session, startSession } from './session.js';
 import { Sheet } from './panel/sheet.js';
 import { unitBox } from './layers/sign_layer.js';
 import { whenStill } from './layers/still_map.js';
@@ -58,7 +59,7 @@ class Page {
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
     this.history = new HazardHistory((id) => this.layer.redraw(id));
-    this.officials = new Officials(config.officials, (text) => this.say(text),
+    this.officials = new Officials(config.officials && session.role !== 'viewer', (text) => this.say(text),
       (subject, focus) => this.focusPopup(subject, focus));
     this.changes = new ChangeView(this.map, data, (change) => this.officials.changeButtons(change),
       this.sheet.coveredHeight(), () => this.stepAside(), (focus) => this.sheet.focusBack(focus));
@@ -271,6 +272,11 @@ async function askUntilAnswered(path) {
 
 async function main() {
   makeRoomForList();
+  startSession(await askUntilAnswered('/api/v1/session'));
+  if (!session.sees.told) {
+    askToLogIn('This map is for those who have an account.');
+    return;
+  }
   // The worker loads the hazards while the page asks for the rest.
   let page = null;
   const early = [];
@@ -282,8 +288,9 @@ async function main() {
     onState: later('onState'), onLists: later('onLists'), onChanged: later('onChanged'),
     onWatched: later('onWatched'),
   });
-  const [config, classes, vehicles] = await Promise.all(
-    ['config', 'classes', 'vehicles'].map((name) => askUntilAnswered(`/api/v1/${name}`)));
+  const wanted = ['config', 'classes', ...(session.sees.vehicles ? ['vehicles'] : [])];
+  const [config, classes, vehicles = { features: [] }] = await Promise.all(
+    wanted.map((name) => askUntilAnswered(`/api/v1/${name}`)));
   document.title = config.title;
   byId('title').textContent = config.title;
   // One after the other: all at a stretch, on a busy machine, is a freeze.

@@ -13,8 +13,10 @@ export async function getJson(path) {
   return answer.json();
 }
 
-/** All map changes that are on the map: {sequence, features}. */
-export async function loadChanges() {
+/** All map changes that are on the map: {sequence, features}. With `none` there are none to be seen,
+ * up to any sequence. */
+export async function loadChanges(none = false) {
+  if (none) return { sequence: Infinity, features: [] };
   const path = `/api/v1/changes?limit=${PAGE}`;
   let page = await getJson(path);
   const latest = new Map();

@@ -10,7 +10,7 @@
 #include "evaluation/detection/labelled_folder.h"
 #include "odometry/mounting/mounting_file.h"
 #include "protocol/hazard_catalogue.h"
-#include "web/api/official_authenticator.h"
+#include "web/access/official_authenticator.h"
 
 namespace livemap::fuzz {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "common/uuid.h"
-#include "web/api/official_authenticator.h"
+#include "web/access/official_authenticator.h"
 #include "web/api/official_decision.h"
 #include "web/api/query.h"
 #include "web/http/gzip_stream.h"

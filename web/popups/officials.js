@@ -1,12 +1,13 @@
 // Officials confirm and reject hazards, confirm and dismiss map changes, distrust vehicles, and take
 // all of this back.
-// The token is asked for once and kept as long as the tab lives, in sessionStorage; it is only ever
-// sent to this server.
+// Who has logged in decides by the session. Where the zone has no accounts, a token is asked for once
+// and kept as long as the tab lives, in sessionStorage; it is only ever sent to this server.
 
 import { addressOf, storageKey } from '../address.js';
 import { byId, element } from '../dom.js';
 import { ago, localTime, plural, position } from '../format.js';
 import { REJECTED } from '../hazard_state.js';
+import { askToLogIn, session } from '../session.js';
 
 const KEY = storageKey('livemap.token');
 const HAZARDS_HISTORY = 'kept in the hazard\u2019s history';
@@ -76,14 +77,25 @@ function saveToken(token) {
   }
 }
 
+function lacksToken() {
+  return !session.decides() && savedToken() === '';
+}
+
+/** What says who decides. */
+function credentialsOf(token) {
+  return session.decides()
+    ? { credentials: 'same-origin', headers: { 'X-CSRF-Token': session.csrfToken } }
+    : { credentials: 'omit', headers: { Authorization: `Bearer ${token}` } };
+}
+
 /** Asks the zone as an official: {told} or, in words, what is {wrong: {status, sentence}}. */
 async function ask(subject, { call, none }, token, body = null) {
   let answer;
+  const { credentials, headers } = credentialsOf(token);
   try {
     answer = await fetch(addressOf(`${subject.address}/${call}`), {
-      method: body === null ? 'GET' : 'POST', cache: 'no-store', credentials: 'omit',
-      headers: { Authorization: `Bearer ${token}`,
-        ...(body === null ? {} : { 'Content-Type': 'application/json' }) },
+      method: body === null ? 'GET' : 'POST', cache: 'no-store', credentials,
+      headers: { ...headers, ...(body === null ? {} : { 'Content-Type': 'application/json' }) },
       body: body === null ? undefined : JSON.stringify(body),
     });
   } catch (failure) {
@@ -109,6 +121,7 @@ function bodyOf(subject, decision, reason, undoes) {
 }
 
 function sentenceFor(status, error, subject, isNamed) {
+  if (status === 401 && session.decides()) return 'Your session has ended. Reload the page and log in.';
   if (status === 401) return 'This token is not known here. Check it and try again.';
   const what = subject.change ? 'map change' : 'hazard';
   if (status === 409 && !isNamed) return `This ${what} is no longer on the map.`;
@@ -216,6 +229,10 @@ export class Officials {
   }
 
   ask(subject, decision, undoes = undefined) {
+    if (session.hasAccounts && lacksToken()) {
+      askToLogIn('Log in as an official to decide.');
+      return;
+    }
     this.subject = subject;
     this.decision = decision;
     this.undoes = undoes;
@@ -228,10 +245,10 @@ export class Officials {
     this.submit.textContent = decision.preview ? 'Show what changes' : decision.button;
     this.submit.classList.toggle('decide-reject', decision.bad === true);
     this.reason.value = '';
-    this.show('', savedToken() === '');
+    this.show('', lacksToken());
     this.dialog.showModal();
     this.reason.focus();
-    if (decision.preview && savedToken() !== '') this.showPreview(savedToken());
+    if (decision.preview && !lacksToken()) this.showPreview(savedToken());
   }
 
   /** An error, and whether the token must be given. */
@@ -262,7 +279,7 @@ export class Officials {
     const token = this.token.value.trim() || savedToken();
     const reason = this.reason.value.trim().replace(/\s+/g, ' ');
     if (decision.bad && reason === '') return this.refuse('Please say why.', this.reason);
-    if (token === '') return this.refuse('Please enter your token.', this.token);
+    if (token === '' && lacksToken()) return this.refuse('Please enter your token.', this.token);
     if (/[^\x21-\x7e]/.test(token)) {
       return this.refuse('A token has no blanks or special letters.', this.token);
     }
@@ -312,11 +329,11 @@ export class Officials {
 
   takeWrong(wrong) {
     if (wrong.status === 401) saveToken('');
-    this.refuse(wrong.sentence, wrong.status === 401 ? this.token : this.submit);
+    this.refuse(wrong.sentence, wrong.status === 401 && lacksToken() ? this.token : this.submit);
   }
 
   refuse(sentence, field) {
-    this.show(sentence, savedToken() === '');
+    this.show(sentence, lacksToken());
     field.focus();
     if (field === this.token) field.select();
   }

@@ -36,8 +36,9 @@ export class LiveFeed {
     this.handlers.onState('connecting');
     try {
       if (this.sequence === null) {
+        const { sees } = await getJson('/api/v1/session');
         const [classes, points, changes] = await Promise.all(
-          [getJson('/api/v1/classes'), loadPoints(), loadChanges()]);
+          [getJson('/api/v1/classes'), loadPoints(), loadChanges(!sees.candidates)]);
         // Each list is complete up to its own: from the smaller one on nothing is left out.
         this.sequence = Math.min(points.sequence, changes.sequence);
         this.handlers.onLists({ classes, points, changes });

@@ -331,8 +331,23 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("web_picture_timeout_s", web.picture_timeout_s, {0.1, 3600},
                   "Whoever waits for a picture longer is answered 503.", "s");
   parameters.Read("web_token_file", web.token_file,
-                  "File of the officials who may confirm, reject and distrust, a line NAME TOKEN "
-                  "each (docs/how-to/use-the-map.md). Empty: nobody.");
+                  "File of the programs, and of officials without an account, that may confirm, "
+                  "reject and distrust, a line NAME TOKEN each (docs/how-to/use-the-map.md). "
+                  "Empty: none.");
+  web.accounts_file = config.zone.directory + "/accounts.sqlite";
+  parameters.Read("web_session_s", web.session_s, {60, 3e6},
+                  "Somebody who has logged in (./livemap zone user) must do so again after this "
+                  "time.",
+                  "s");
+  parameters.ReadChoice<web::PublicSees>(
+      "web_public_sees", web.public_sees,
+      {{"nothing", web::PublicSees::kNothing},
+       {"told", web::PublicSees::kTold},
+       {"all", web::PublicSees::kAll}},
+      "What somebody sees who has not logged in, where the zone has accounts: nothing, told "
+      "(hazards that drivers are told of) or all (all hazards and map changes). Vehicles and their "
+      "trails are then for those who have logged in, always. Without accounts everybody sees "
+      "everything.");
   parameters.Read("web_picture_side_px", web.picture_side_px, {16, 16384},
                   "Longest side of a picture as people see it.", "px");
   parameters.Read("web_picture_cache_bytes", web.picture_cache_bytes, {0, 2e9},

@@ -1,4 +1,4 @@
-#include "web/api/official_authenticator.h"
+#include "web/access/official_authenticator.h"
 
 #include <sys/stat.h>
 

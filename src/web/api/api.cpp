@@ -8,6 +8,7 @@
 namespace livemap::web {
 namespace {
 
+constexpr std::string_view kSessionAddress = "/api/v1/session";
 constexpr std::string_view kImagePrefix = "/images/";
 constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
 
@@ -37,7 +38,8 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       zone_(zone),
       catalogue_(catalogue),
       trails_(trails),
-      officials_(options_, zone, catalogue),
+      access_(options_),
+      officials_(access_, zone, catalogue),
       hazards_(zone, catalogue),
       map_changes_(zone),
       pictures_([limits = LimitsOf(options)](
@@ -70,7 +72,7 @@ void Api::Answer(const HttpRequest& question, const Done& done) {
 std::optional<std::pair<std::string, std::string>> Api::FindPicture(
     const HttpRequest& question) const {
   if (question.method != "GET" && question.method != "HEAD") return std::nullopt;
-  if (!AnswersLater(question)) return std::nullopt;
+  if (!AnswersLater(question) || !VisibilityFor(question).told) return std::nullopt;
   std::string sha256 = ParseTarget(question.target).path.substr(kImagePrefix.size());
   auto path = zone_.ImagePath(sha256);
   if (!path) return std::nullopt;
@@ -100,6 +102,22 @@ HttpResponse Api::Finish(HttpResponse answer) const {
   return answer;
 }
 
+bool Api::IsByOfficial(const HttpRequest& question) const {
+  try {
+    return access_.IsByOfficial(question);
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+Visibility Api::VisibilityFor(const HttpRequest& question) const {
+  try {
+    return access_.VisibilityFor(question);
+  } catch (const std::exception&) {
+    return {false, false, false};
+  }
+}
+
 /// Each way looks at the token once: twice would count a wrong one twice.
 HttpResponse Api::AnswerGet(const HttpRequest& question) {
   const RequestTarget target = ParseTarget(question.target);
@@ -109,7 +127,7 @@ HttpResponse Api::AnswerGet(const HttpRequest& question) {
     return officials_.Preview(*decision, question);
   }
   HttpResponse answer = Route(target, question);
-  if (!question.authorization.empty()) answer.by_official = officials_.IsOfficial(question);
+  answer.by_official = access_.CheckOfficial(question);
   return answer;
 }
 
@@ -121,6 +139,15 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
     RefuseQueryParameters(target);
     return officials_.Decide(*decision, question);
   }
+  if (target.path == kSessionAddress) {
+    RefuseQueryParameters(target);
+    if (question.method == "POST") return access_.LogIn(question);
+    if (question.method == "DELETE") return access_.LogOut(question);
+    HttpResponse refusal =
+        MakeErrorAnswer(405, "the method is not allowed, accepted are GET, HEAD, POST and DELETE");
+    refusal.headers.emplace_back("Allow", "GET, HEAD, POST, DELETE");
+    return refusal;
+  }
   const bool has_preview = decision && HasPreview(decision->decision);
   const char* accepted = has_preview ? "GET, HEAD, POST" : decision ? "POST" : "GET, HEAD";
   HttpResponse answer =
@@ -131,9 +158,11 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
 
 HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question) {
   const std::string& path = target.path;
-  if (StartsWith(path, "/api/")) return RouteApi(target);
+  if (StartsWith(path, "/api/")) return RouteApi(target, question);
   // One that there is comes from the queue: nothing is decoded here.
-  if (StartsWith(path, kImagePrefix)) return NoPicture();
+  if (StartsWith(path, kImagePrefix)) {
+    return VisibilityFor(question).told ? NoPicture() : LogInFirst();
+  }
   if (path == "/healthz") {
     return JsonAnswer({{"status", "ok"}, {"sequence", zone_.Sequence()}});
   }
@@ -149,15 +178,21 @@ HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question
   return FileAnswer(page_, std::string_view(path).substr(1), question);
 }
 
-HttpResponse Api::RouteApi(const RequestTarget& target) const {
+HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& question) const {
   const std::string& path = target.path;
+  const Visibility sees = access_.VisibilityFor(question);
   const bool is_decision = ParseDecisionTarget(path).has_value();
-  if (!is_decision && StartsWith(path, kHazardAddress)) return hazards_.Answer(target);
-  if (!is_decision && StartsWith(path, kMapChangeAddress)) return map_changes_.Answer(target);
+  if (!is_decision && StartsWith(path, kHazardAddress)) {
+    return sees.told ? hazards_.Answer(target, sees.candidates) : LogInFirst();
+  }
+  if (!is_decision && StartsWith(path, kMapChangeAddress)) {
+    return sees.candidates ? map_changes_.Answer(target) : LogInFirst();
+  }
   RefuseQueryParameters(target);
   if (is_decision) return PostOnly();
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
-  if (path == "/api/v1/vehicles") return Vehicles();
+  if (path == "/api/v1/vehicles") return sees.vehicles ? Vehicles() : LogInFirst();
+  if (path == kSessionAddress) return access_.Session(question);
   if (path == "/api/v1/config") return PageConfig();
   return MakeErrorAnswer(404, "there is nothing at this address");
 }
@@ -190,7 +225,7 @@ HttpResponse Api::PageConfig() const {
   config["tile_url"] = options_.tile_url.empty() ? Json(nullptr) : Json(options_.tile_url);
   config["tile_attribution"] = options_.tile_attribution;
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
-  config["officials"] = officials_.is_open();
+  config["officials"] = access_.is_open();
   config["view"] = nullptr;
   if (const auto view = zone_.View()) {
     config["view"] = {{"south", view->south_west.latitude_deg},

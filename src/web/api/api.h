@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "protocol/hazard_catalogue.h"
+#include "web/access/access.h"
 #include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
 #include "web/api/official_api.h"
@@ -27,7 +28,8 @@ namespace livemap::web {
 /// (docs/reference/http-api.md). Thread-safe; never throws.
 class Api : public Site {
  public:
-  /// Keeps references to all but `options`. Throws Error when the token file is not accepted.
+  /// Keeps references to all but `options`. Throws Error when the token file or the accounts are
+  /// not accepted.
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
@@ -37,10 +39,10 @@ class Api : public Site {
   void Answer(const HttpRequest& question, const Done& done) override;
   /// Lets go of whoever waits for a picture, without a call: when it returns, none is being called.
   void Stop() { picture_queue_.Stop(); }
-  /// Whether the request has a valid token. Nothing is counted: Answer does that. Quick.
-  bool IsByOfficial(const HttpRequest& question) const override {
-    return !question.authorization.empty() && officials_.HasRightToken(question);
-  }
+  /// Whether the request is an official's. Nothing is counted: Answer does that. Quick.
+  bool IsByOfficial(const HttpRequest& question) const override;
+  /// Nothing at all where the accounts cannot be read.
+  Visibility VisibilityFor(const HttpRequest& question) const override;
   /// Whether the request asks for a picture, which may take long.
   bool AnswersLater(const HttpRequest& question) const override;
 
@@ -57,7 +59,7 @@ class Api : public Site {
   HttpResponse AnswerGet(const HttpRequest& question);
   HttpResponse AnswerPost(const HttpRequest& question);
   HttpResponse Route(const RequestTarget& target, const HttpRequest& question);
-  HttpResponse RouteApi(const RequestTarget& target) const;
+  HttpResponse RouteApi(const RequestTarget& target, const HttpRequest& question) const;
   HttpResponse Vehicles() const;
   HttpResponse PageConfig() const;
   /// The picture's hash and file; none when the request asks for another thing.
@@ -71,6 +73,7 @@ class Api : public Site {
   zone::ZoneService& zone_;
   const protocol::HazardCatalogue& catalogue_;
   const VehicleTrails& trails_;
+  Access access_;
   OfficialApi officials_;
   const HazardApi hazards_;
   const MapChangeApi map_changes_;

@@ -46,6 +46,7 @@ void EventHub::Publish(const zone::ZoneEvent& event) {
   LiveMessage message;
   if (event.hazard) {
     message.sequence = event.hazard->hazard.sequence;
+    message.is_told = event.hazard->announced;
     message.text = std::make_shared<const std::string>(
         ToText(HazardMessage(event.hazard->action, event.hazard->hazard, catalogue_)));
   } else if (event.map_change) {

@@ -16,6 +16,7 @@ namespace livemap::web {
 struct LiveMessage {
   std::shared_ptr<const std::string> text;
   std::uint64_t sequence = 0;  ///< Of an event; 0 for a vehicle position.
+  bool is_told = false;        ///< Drivers hear of it, too.
 };
 
 /// A client of the live stream.

@@ -1,11 +1,13 @@
 #include "web/api/hazard_api.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdint>
 #include <string_view>
 #include <utility>
 
+#include "web/access/access.h"
 #include "web/api/collections.h"
 #include "web/json/json.h"
 
@@ -58,6 +60,24 @@ HttpResponse UnknownHazard() {
   return MakeErrorAnswer(404, "the zone knows no hazard with this id");
 }
 
+/// Leaves the states of which drivers are told, all of them where none are named; false where none
+/// are left.
+bool KeepTold(zone::HazardStates& states) {
+  const zone::HazardStates wanted = states.empty() ? zone::StatesOnMap() : states;
+  states.clear();
+  for (const zone::HazardState state : wanted) {
+    if (zone::IsTold(state)) states.insert(state);
+  }
+  return !states.empty();
+}
+
+/// Those of which drivers never heard.
+void RemoveUntold(std::vector<zone::Hazard>& hazards) {
+  hazards.erase(std::remove_if(hazards.begin(), hazards.end(),
+                               [](const auto& hazard) { return hazard.announced_sequence == 0; }),
+                hazards.end());
+}
+
 Uuid ParseHazardId(const std::string& id) {
   const auto uuid = Uuid::Parse(id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
@@ -66,17 +86,20 @@ Uuid ParseHazardId(const std::string& id) {
 
 }  // namespace
 
-HttpResponse HazardApi::Answer(const RequestTarget& target) const {
+HttpResponse HazardApi::Answer(const RequestTarget& target, bool all) const {
   const std::string rest = target.path.substr(std::string_view(kHazardAddress).size());
-  if (rest.empty()) return List(ParseHazardQuery(target));
+  if (rest.empty()) return List(ParseHazardQuery(target), all);
   if (rest.front() != '/') return MakeErrorAnswer(404, "there is nothing at this address");
-  if (rest == "/points") return Points(ParsePointsQuery(target));
-  if (const auto id = IdOfHistory(rest)) return Events(*id, ParseEventsQuery(target));
+  if (rest == "/points") return Points(ParsePointsQuery(target), all);
+  if (const auto id = IdOfHistory(rest)) {
+    return all ? Events(*id, ParseEventsQuery(target)) : LogInFirst();
+  }
   RefuseQueryParameters(target);
-  return One(rest.substr(1));
+  return One(rest.substr(1), all);
 }
 
-HttpResponse HazardApi::List(const HazardQuery& query) const {
+HttpResponse HazardApi::List(HazardQuery query, bool all) const {
+  if (!all && !KeepTold(query.states)) return LogInFirst();
   zone::Walk<zone::HazardState> walk;
   walk.box = query.box;
   walk.after = query.since.value_or(0);
@@ -87,8 +110,10 @@ HttpResponse HazardApi::List(const HazardQuery& query) const {
   } else if (*query.since == 0) {
     walk.states = zone::StatesOnMap();
   }
-  const auto read = [this](const auto& where, std::size_t limit) {
-    return zone_.ReadHazards(where, limit);
+  const auto read = [this, all](const auto& where, std::size_t limit) {
+    auto page = zone_.ReadHazards(where, limit);
+    if (!all) RemoveUntold(page.items);
+    return page;
   };
   const auto to_feature = [this, query](const zone::Hazard& hazard) {
     Json feature = HazardFeature(hazard, catalogue_);
@@ -98,7 +123,8 @@ HttpResponse HazardApi::List(const HazardQuery& query) const {
   return ListAnswer(std::move(walk), query.limit, read, to_feature);
 }
 
-HttpResponse HazardApi::Points(const PointsQuery& query) const {
+HttpResponse HazardApi::Points(PointsQuery query, bool all) const {
+  if (!all && !KeepTold(query.states)) return LogInFirst();
   zone::Walk<zone::HazardState> walk;
   walk.states = query.states.empty() ? zone::StatesOnMap() : query.states;
   walk.until = zone_.Sequence();  // Before the points.
@@ -123,9 +149,9 @@ HttpResponse HazardApi::Points(const PointsQuery& query) const {
   return PiecesAnswer(std::move(pieces), "application/x-ndjson");
 }
 
-HttpResponse HazardApi::One(const std::string& id) const {
+HttpResponse HazardApi::One(const std::string& id, bool all) const {
   const auto hazard = zone_.Find(ParseHazardId(id));
-  if (!hazard) return UnknownHazard();
+  if (!hazard || (!all && hazard->announced_sequence == 0)) return UnknownHazard();
   Json feature = HazardFeature(*hazard, catalogue_);
   feature["properties"]["active"] = zone::IsOnMap(hazard->state);
   return JsonAnswer(feature, "application/geo+json");

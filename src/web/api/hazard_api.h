@@ -20,13 +20,14 @@ class HazardApi {
   HazardApi(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue)
       : zone_(zone), catalogue_(catalogue) {}
 
-  /// `target.path` starts with kHazardAddress and is no decision's.
-  HttpResponse Answer(const RequestTarget& target) const;
+  /// `target.path` starts with kHazardAddress and is no decision's. Without `all` only of hazards
+  /// that drivers are told of, and nothing of their history, in which officials are named.
+  HttpResponse Answer(const RequestTarget& target, bool all) const;
 
  private:
-  HttpResponse List(const HazardQuery& query) const;
-  HttpResponse Points(const PointsQuery& query) const;
-  HttpResponse One(const std::string& id) const;
+  HttpResponse List(HazardQuery query, bool all) const;
+  HttpResponse Points(PointsQuery query, bool all) const;
+  HttpResponse One(const std::string& id, bool all) const;
   HttpResponse Events(const std::string& id, std::size_t limit) const;
 
   zone::ZoneService& zone_;

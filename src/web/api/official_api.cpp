@@ -1,19 +1,11 @@
 #include "web/api/official_api.h"
 
-#include "common/clock.h"
 #include "common/time.h"
-#include "web/http/origin.h"
+#include "web/http/request_body.h"
 #include "web/json/map_change_json.h"
 
 namespace livemap::web {
 namespace {
-
-/// "application/json", with or without parameters. A page of another origin cannot send it without
-/// asking first, which this server never allows.
-bool IsJsonType(const std::string& content_type) {
-  const std::string type = content_type.substr(0, content_type.find(';'));
-  return type == "application/json" || type == "application/json ";
-}
 
 constexpr char kHazardIsGone[] = "the hazard is gone; seen again it is a new one";
 constexpr char kMapChangeIsUndone[] = "the map change is undone; told again it is a new one";
@@ -47,57 +39,9 @@ HttpResponse DecidedAnswer(Json feature, std::uint64_t decision_id) {
 
 }  // namespace
 
-OfficialApi::OfficialApi(const WebConfig& options, zone::ZoneService& zone,
-                         const protocol::HazardCatalogue& catalogue)
-    : options_(options),
-      zone_(zone),
-      catalogue_(catalogue),
-      authenticator_(options.token_file.empty() ? std::vector<Official>()
-                                                : ReadTokenFile(options.token_file)) {}
-
-std::optional<HttpResponse> OfficialApi::WhyNotAllowed(const HttpRequest& question,
-                                                       std::string& official) {
-  if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
-    return MakeErrorAnswer(403, "pages of another origin may not decide anything");
-  }
-  OfficialAuthenticator::Answer answer =
-      authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()));
-  std::optional<HttpResponse> refusal;
-  switch (answer.verdict) {
-    case OfficialAuthenticator::Verdict::kAllowed:
-      official = std::move(answer.official);
-      return std::nullopt;
-    case OfficialAuthenticator::Verdict::kClosed:
-      return MakeErrorAnswer(
-          403, "nobody may decide anything here: the server was started without a token file");
-    case OfficialAuthenticator::Verdict::kNoToken:
-      refusal = MakeErrorAnswer(401, "a token is needed: Authorization: Bearer TOKEN");
-      break;
-    case OfficialAuthenticator::Verdict::kWrongToken:
-      refusal = MakeErrorAnswer(401, "the token is wrong");
-      break;
-    case OfficialAuthenticator::Verdict::kTooManyWrong:
-      refusal = MakeErrorAnswer(
-          429, "too many wrong tokens came from your address, try again in a minute");
-      refusal->headers.emplace_back("Retry-After", "60");
-      return refusal;
-  }
-  refusal->headers.emplace_back("WWW-Authenticate", "Bearer realm=\"livemap\"");
-  return refusal;
-}
-
-bool OfficialApi::IsOfficial(const HttpRequest& question) {
-  return authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()))
-             .verdict == OfficialAuthenticator::Verdict::kAllowed;
-}
-
-bool OfficialApi::HasRightToken(const HttpRequest& question) const {
-  return authenticator_.IsRight(question.authorization, question.client, Seconds(SteadyNs()));
-}
-
 HttpResponse OfficialApi::Decide(const DecisionTarget& target, const HttpRequest& question) {
   std::string official;
-  if (auto refusal = WhyNotAllowed(question, official)) return *std::move(refusal);
+  if (auto refusal = access_.WhyNotOfficial(question, official)) return *std::move(refusal);
   HttpResponse answer = DecideAs(official, target, question);
   answer.by_official = true;
   return answer;
@@ -106,7 +50,7 @@ HttpResponse OfficialApi::Decide(const DecisionTarget& target, const HttpRequest
 HttpResponse OfficialApi::DecideAs(const std::string& official, const DecisionTarget& target,
                                    const HttpRequest& question) {
   if (!question.body.empty() && !IsJsonType(question.content_type)) {
-    return MakeErrorAnswer(415, "the body's type is not accepted, accepted is application/json");
+    return WrongBodyType();
   }
   try {
     return DecideNow(official, target, question);
@@ -191,7 +135,7 @@ HttpResponse OfficialApi::DecideVehicle(const DecisionTarget& target, const std:
 
 HttpResponse OfficialApi::Preview(const DecisionTarget& target, const HttpRequest& question) {
   std::string official;
-  if (auto refusal = WhyNotAllowed(question, official)) return *std::move(refusal);
+  if (auto refusal = access_.WhyNotOfficial(question, official)) return *std::move(refusal);
   HttpResponse answer = PreviewDistrust(target.id);
   answer.by_official = true;
   return answer;

@@ -18,6 +18,8 @@ struct HttpRequest {
   std::string if_none_match;
   std::string authorization;
   std::string content_type;
+  std::string cookie;
+  std::string csrf_token;  ///< Of the X-CSRF-Token header.
   std::string origin;
   std::string host;
   std::string client;  ///< Whom wrong tokens are counted against: an address or its network.

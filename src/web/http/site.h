@@ -6,6 +6,17 @@
 
 namespace livemap::web {
 
+/// What somebody may see of a zone.
+struct Visibility {
+  bool told = true;        ///< Hazards that drivers are told of, and their pictures.
+  bool candidates = true;  ///< All other hazards, map changes, and what happened to them.
+  bool vehicles = true;    ///< Where vehicles are, and their trails.
+
+  friend bool operator==(const Visibility& a, const Visibility& b) {
+    return a.told == b.told && a.candidates == b.candidates && a.vehicles == b.vehicles;
+  }
+};
+
 /// What an HttpServer serves. Thread-safe; never throws.
 class Site {
  public:
@@ -23,8 +34,10 @@ class Site {
   virtual bool AnswersLater(const HttpRequest& question) const = 0;
   /// Answers any request, now or later. `done` is dropped without a call when the site goes away.
   virtual void Answer(const HttpRequest& question, const Done& done) = 0;
-  /// Whether the request has a valid token. Quick.
+  /// Whether the request is an official's. Quick.
   virtual bool IsByOfficial(const HttpRequest& question) const = 0;
+  /// What whoever asks may see. Quick.
+  virtual Visibility VisibilityFor(const HttpRequest& /*question*/) const { return {}; }
 };
 
 }  // namespace livemap::web

@@ -8,6 +8,13 @@
 
 namespace livemap::web {
 
+/// What somebody sees who has not logged in, where the zone has accounts.
+enum class PublicSees {
+  kNothing,
+  kTold,  ///< Hazards that drivers are told of.
+  kAll    ///< All hazards and map changes. Vehicles are for those who have logged in, always.
+};
+
 /// Settings of the zone's web server, with their defaults.
 struct WebConfig {
   std::string address = "127.0.0.1";  ///< Where to listen; "0.0.0.0" serves the whole network.
@@ -20,8 +27,13 @@ struct WebConfig {
   geo::GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
   std::vector<std::string> allowed_origins;
-  /// Officials and their tokens (web/api/official_authenticator.h); empty: nobody may decide.
+  /// Officials and their tokens (web/access/official_authenticator.h); empty: nobody may decide.
   std::string token_file;
+  /// People who may log in (accounts/account_store.h); empty: nobody. While the file has no
+  /// account, everybody sees everything.
+  std::string accounts_file;
+  double session_s = 12 * 3600;                ///< A log-in lasts so long.
+  PublicSees public_sees = PublicSees::kAll;   ///< Where there are accounts.
   int picture_side_px = 1280;                  ///< Longest side of a served picture.
   std::size_t picture_cache_bytes = 64 << 20;  ///< Served pictures kept in memory.
   int threads = 2;

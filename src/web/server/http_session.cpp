@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/clock.h"
+#include "web/access/access.h"
 #include "web/api/query.h"
 #include "web/http/origin.h"
 #include "web/server/websocket_session.h"
@@ -140,7 +141,9 @@ void HttpSession::OnHeader(beast::error_code failure) {
   form_.gzip = AcceptsGzip(Field(request, http::field::accept_encoding));
   // On the reserve only officials are served, and whoever watches over the zone. Whether a token is
   // an official's is seen with the answer.
-  if (request[http::field::authorization].empty() && !HasPlace(request.target() == "/healthz")) {
+  const bool may_be_official =
+      !request[http::field::authorization].empty() || !request[http::field::cookie].empty();
+  if (!may_be_official && !HasPlace(request.target() == "/healthz")) {
     return Refuse(MakeBusyAnswer(kNoPlace));
   }
   if (parser_->is_done()) {
@@ -161,18 +164,24 @@ void HttpSession::ReadBody() {
                    });
 }
 
-void HttpSession::AnswerRequest() {
-  const Request& request = parser_->get();
+HttpRequest HttpSession::Question(const Request& request) const {
   HttpRequest question;
   question.method = std::string(request.method_string());
   question.target = std::string(request.target());
   question.if_none_match = Field(request, http::field::if_none_match);
   question.authorization = Field(request, http::field::authorization);
   question.content_type = Field(request, http::field::content_type);
+  question.cookie = Field(request, http::field::cookie);
+  question.csrf_token = std::string(request["X-CSRF-Token"]);
   question.origin = Field(request, http::field::origin);
   question.host = Field(request, http::field::host);
   question.client = client_;
   question.body = request.body();
+  return question;
+}
+
+void HttpSession::AnswerRequest() {
+  HttpRequest question = Question(parser_->get());
   rank_ =
       context().site.IsByOfficial(question) ? WorkQueue::Rank::kOfficial : WorkQueue::Rank::kReader;
   SetPhase(ConnectionTable::Phase::kWorking);
@@ -192,7 +201,7 @@ bool HttpSession::HasPlace(bool is_health) {
 
 HttpResponse HttpSession::AnswerTo(const HttpRequest& question) {
   HttpResponse answer = context().site.Answer(question);
-  if (question.authorization.empty()) return answer;  // It has a place.
+  if (question.authorization.empty() && question.cookie.empty()) return answer;  // It has a place.
   if (answer.by_official) context().table.MakeOfficial(slot_.id());
   const bool may_be_told = answer.by_official || answer.status >= 400;
   if (may_be_told || HasPlace(question.target == "/healthz")) return answer;
@@ -228,6 +237,11 @@ bool HttpSession::UpgradeToStream(const Request& request) {
     const LiveSource* const live = context().live;
     if (live == nullptr || target.path != "/ws") return false;
     const auto since = ParseStreamQuery(target);
+    HttpRequest question = Question(request);
+    if (!context().site.VisibilityFor(question).told) {
+      Refuse(LogInFirst());
+      return true;
+    }
     const bool may_open =
         IsAllowedOrigin(Field(request, http::field::origin), Field(request, http::field::host),
                         context().options.allowed_origins);
@@ -236,8 +250,8 @@ bool HttpSession::UpgradeToStream(const Request& request) {
                            context().table.BecomeStream(slot_.id(), SteadyNs());
     if (has_place) {
       stream_.expires_never();
-      std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), *live, client_,
-                                         since)
+      std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), *live,
+                                         std::move(question), since)
           ->Start(request);
       return true;
     }

@@ -36,6 +36,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void ReadRequest();
   void OnHeader(boost::beast::error_code failure);
   void ReadBody();
+  /// What the site is asked, with the body as far as it was read.
+  HttpRequest Question(const Request& request) const;
   void AnswerRequest();
   /// The answer, or the word that there is no place for who is no official. Any thread.
   HttpResponse AnswerTo(const HttpRequest& question);

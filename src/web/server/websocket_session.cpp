@@ -28,15 +28,18 @@ std::shared_ptr<const std::string> Shared(const Json& json) {
 }  // namespace
 
 WebSocketSession::WebSocketSession(beast::tcp_stream stream, ConnectionSlot slot,
-                                   const LiveSource& live, std::string client,
+                                   const LiveSource& live, HttpRequest upgrade,
                                    std::optional<std::uint64_t> since)
     : slot_(std::move(slot)),
       live_(live),
-      client_(std::move(client)),
+      upgrade_(std::move(upgrade)),
+      sees_(slot_.context().site.VisibilityFor(upgrade_)),
       stream_(std::move(stream)),
       close_deadline_(stream_.get_executor()),
       heartbeat_(stream_.get_executor()),
-      since_(since) {}
+      since_(since) {
+  if (!sees_.vehicles) last_vehicle_.reset();
+}
 
 void WebSocketSession::Start(const Request& upgrade) {
   const std::weak_ptr<WebSocketSession> weak = weak_from_this();
@@ -92,6 +95,11 @@ void WebSocketSession::BeatLater() {
   heartbeat_.expires_after(std::chrono::milliseconds(period_ms));
   heartbeat_.async_wait([self = shared_from_this()](beast::error_code failure) {
     if (failure || self->state_ == State::kClosing) return;
+    // Who logged out, or was logged out, is told no more.
+    if (!(self->slot_.context().site.VisibilityFor(self->upgrade_) == self->sees_)) {
+      return self->CloseWith(websocket::close_code::try_again_later,
+                             "what you may see has changed: reconnect");
+    }
     if (self->queue_.empty()) {
       self->Enqueue(Shared({{"type", "beat"}, {"sequence", self->told_sequence_}}));
       self->WriteNext();
@@ -127,6 +135,7 @@ void WebSocketSession::OnMessage(const LiveMessage& message) {
   if (state_ == State::kClosing) return;
   const WebConfig& options = slot_.context().options;
   const bool is_vehicle = message.sequence == 0;
+  if (is_vehicle && !sees_.vehicles) return;
   if (is_vehicle) {
     // A position is soon followed by the next: it never fills a queue that hazards need.
     if (state_ != State::kLive || queue_.size() > options.max_queued_messages / 2) return;
@@ -138,6 +147,7 @@ void WebSocketSession::OnMessage(const LiveMessage& message) {
   } else {
     told_sequence_ = message.sequence;
   }
+  if (!is_vehicle && !sees_.candidates && !message.is_told) return;
   Enqueue(message.text);
   if (queue_.size() > options.max_queued_messages || queued_bytes_ > options.max_queued_bytes) {
     return CloseAsTooSlow();
@@ -160,7 +170,7 @@ void WebSocketSession::StartReplayPage() {
       self->TakeReplay(std::move(replay));
     });
   };
-  slot_.context().work.Post(client_, WorkQueue::Rank::kReader, read);
+  slot_.context().work.Post(upgrade_.client, WorkQueue::Rank::kReader, read);
 }
 
 WebSocketSession::Replay WebSocketSession::ReadVehicles(const std::string& after,
@@ -196,11 +206,12 @@ WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequenc
   std::map<std::uint64_t, std::shared_ptr<const std::string>> messages;
   for (const zone::Hazard& hazard : hazards.items) {
     if (hazard.sequence > end) break;
+    if (!sees_.candidates && hazard.announced_sequence == 0) continue;
     messages[hazard.sequence] =
         Shared(HazardMessage(ReplayAction(hazard), hazard, live_.catalogue));
   }
   for (const zone::MapChangeFeature& change : changes.items) {
-    if (change.sequence > end) break;
+    if (change.sequence > end || !sees_.candidates) break;
     messages[change.sequence] = Shared(MapChangeMessage(ReplayAction(change), change));
   }
   for (auto& entry : messages) replay.messages.push_back(std::move(entry.second));

@@ -29,9 +29,9 @@ class WebSocketSession : public LiveListener,
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// Without `since` the client is told only what happens from now on.
-  /// `client`: see ClientOf.
+  /// `upgrade` is who asked: what it may see is looked up again as long as the stream lives.
   WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot, const LiveSource& live,
-                   std::string client, std::optional<std::uint64_t> since);
+                   HttpRequest upgrade, std::optional<std::uint64_t> since);
 
   void Start(const Request& upgrade);
   void Deliver(const LiveMessage& message) override;
@@ -67,7 +67,8 @@ class WebSocketSession : public LiveListener,
 
   ConnectionSlot slot_;
   const LiveSource& live_;
-  const std::string client_;  ///< Whose turn it is to have a page read.
+  const HttpRequest upgrade_;
+  const Visibility sees_;
   boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
   boost::asio::steady_timer close_deadline_;
   boost::asio::steady_timer heartbeat_;

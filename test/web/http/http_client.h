@@ -64,7 +64,7 @@ class StreamClient {
   using Stream = boost::beast::websocket::stream<boost::asio::ip::tcp::socket>;
 
   explicit StreamClient(int port, const std::string& target = "/ws", const std::string& origin = "",
-                        int receive_buffer_bytes = 0)
+                        int receive_buffer_bytes = 0, const std::string& cookie = "")
       : stream_(io_) {
     namespace websocket = boost::beast::websocket;
     auto& socket = stream_.next_layer();
@@ -75,8 +75,9 @@ class StreamClient {
     const auto loopback = boost::asio::ip::make_address("127.0.0.1");
     socket.connect({loopback, static_cast<unsigned short>(port)});
     stream_.set_option(
-        websocket::stream_base::decorator([origin](websocket::request_type& request) {
+        websocket::stream_base::decorator([origin, cookie](websocket::request_type& request) {
           if (!origin.empty()) request.set(boost::beast::http::field::origin, origin);
+          if (!cookie.empty()) request.set(boost::beast::http::field::cookie, cookie);
         }));
     stream_.handshake("127.0.0.1:" + std::to_string(port), target);
   }

@@ -10,6 +10,9 @@
 //   {"do": "reject", "id": UUID}            as an official              -> {"rejected"}
 //   {"do": "pass", "seconds": S}            the zone's clock goes on    -> {"passed"}
 //   {"do": "close_decisions"}               the server starts anew without a token file
+//   {"do": "accounts", "public": "all"}     the server starts anew with the accounts jones (viewer)
+//                                           and miller (official)       -> {"password"}
+//   {"do": "log_out_all"}                   their passwords are set again -> {"password"}
 //   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
 //   {"do": "vehicle", "id": V, "lat": D, "lon": D, "course": RAD, "speed": MPS} -> {"accepted"}
 //   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
@@ -17,6 +20,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -25,6 +29,7 @@
 #include <string>
 #include <vector>
 
+#include "accounts/account_store.h"
 #include "common/clock.h"
 #include "common/error.h"
 #include "test/web/zone_fixture.h"
@@ -63,6 +68,8 @@ std::vector<std::uint8_t> DrawnPicture(const std::string& class_name) {
   return file;
 }
 
+constexpr char kPassword[] = "correct horse battery";
+
 class Session {
  public:
   Session() {
@@ -82,6 +89,8 @@ class Session {
     if (verb == "reject") return Reject(command);
     if (verb == "pass") return Pass(command);
     if (verb == "close_decisions") return CloseDecisions();
+    if (verb == "accounts") return OpenAccounts(command);
+    if (verb == "log_out_all") return SetPasswords();
     if (verb == "fill") return Fill(command);
     if (verb == "vehicle") return MoveVehicle(command);
     if (verb == "start") return Start();
@@ -112,6 +121,31 @@ class Session {
     server_.reset();
     options_.token_file.clear();
     return Start();
+  }
+
+  /// Each call with accounts of its own.
+  Json OpenAccounts(const Json& command) {
+    const std::map<std::string, livemap::web::PublicSees> choices{
+        {"nothing", livemap::web::PublicSees::kNothing},
+        {"told", livemap::web::PublicSees::kTold},
+        {"all", livemap::web::PublicSees::kAll}};
+    server_.reset();
+    options_.public_sees = choices.at(command.at("public"));
+    options_.accounts_file =
+        accounts_folder_.path() + "/" + std::to_string(++account_files_) + ".sqlite";
+    livemap::accounts::AccountStore accounts(options_.accounts_file, {});
+    accounts.Add("jones", livemap::accounts::Role::kViewer, kPassword, livemap::SystemNs());
+    accounts.Add("miller", livemap::accounts::Role::kOfficial, kPassword, livemap::SystemNs());
+    Start();
+    return {{"password", kPassword}};
+  }
+
+  Json SetPasswords() {
+    livemap::accounts::AccountStore accounts(options_.accounts_file, {});
+    for (const char* name : {"jones", "miller"}) {
+      accounts.SetPassword(name, kPassword, livemap::SystemNs());
+    }
+    return {{"password", kPassword}};
   }
 
   Json Confirm(const Json& command) {
@@ -204,6 +238,8 @@ class Session {
   livemap::web::TokenFile tokens_;
   livemap::web::ZoneFixture fixture_;
   std::int64_t ahead_ns_ = 0;  ///< Of the zone's clock before the system's.
+  livemap::web::TemporaryFolder accounts_folder_;
+  int account_files_ = 0;
   livemap::web::WebConfig options_;
   std::unique_ptr<livemap::web::WebServer> server_;
 };

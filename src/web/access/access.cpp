@@ -1,0 +1,254 @@
+#include "web/access/access.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "common/clock.h"
+#include "common/sha256.h"
+#include "common/time.h"
+#include "web/http/origin.h"
+#include "web/http/request_body.h"
+#include "web/json/json.h"
+
+namespace livemap::web {
+namespace {
+
+constexpr std::size_t kMaxCountedNames = 8192;
+
+HttpResponse Unauthorized(const std::string& sentence) {
+  HttpResponse answer = MakeErrorAnswer(401, sentence);
+  answer.headers.emplace_back("WWW-Authenticate", "Bearer realm=\"livemap\"");
+  return answer;
+}
+
+HttpResponse TooMany(const std::string& sentence) {
+  HttpResponse answer = MakeErrorAnswer(429, sentence);
+  answer.headers.emplace_back("Retry-After", "60");
+  return answer;
+}
+
+/// Whoever can read an answer to the session knows it; a page of another origin cannot.
+std::string CsrfTokenOf(const std::string& session_token) {
+  return Sha256Hex("csrf " + session_token);
+}
+
+Json PersonJson(const accounts::Person& person, const std::string& session_token) {
+  return {{"name", person.name},
+          {"role", accounts::RoleName(person.role)},
+          {"csrf_token", CsrfTokenOf(session_token)}};
+}
+
+struct LogInBody {
+  std::string name;
+  std::string password;
+};
+
+/// None where the body is anything but {"name": TEXT, "password": TEXT}.
+std::optional<LogInBody> ParseLogIn(const std::string& body) {
+  const auto json = nlohmann::json::parse(body, nullptr, false);
+  if (!json.is_object() || json.size() != 2) return std::nullopt;
+  const auto name = json.find("name");
+  const auto password = json.find("password");
+  if (name == json.end() || !name->is_string()) return std::nullopt;
+  if (password == json.end() || !password->is_string()) return std::nullopt;
+  return LogInBody{*name, *password};
+}
+
+/// Sets a flag as long as it lives, where nobody else had.
+class Turn {
+ public:
+  explicit Turn(std::atomic_flag& flag) : flag_(flag), is_mine_(!flag.test_and_set()) {}
+  ~Turn() {
+    if (is_mine_) flag_.clear();
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  bool is_mine() const { return is_mine_; }
+
+ private:
+  std::atomic_flag& flag_;
+  const bool is_mine_;
+};
+
+}  // namespace
+
+HttpResponse LogInFirst() { return Unauthorized("log in to see this"); }
+
+std::string CookieValue(std::string_view header, std::string_view name) {
+  while (!header.empty()) {
+    const std::size_t end = header.find(';');
+    std::string_view pair = header.substr(0, end);
+    header.remove_prefix(end == std::string_view::npos ? header.size() : end + 1);
+    pair.remove_prefix(std::min(pair.find_first_not_of(' '), pair.size()));
+    if (pair.size() > name.size() && pair[name.size()] == '=' &&
+        pair.substr(0, name.size()) == name) {
+      return std::string(pair.substr(name.size() + 1));
+    }
+  }
+  return "";
+}
+
+Access::Access(const WebConfig& options)
+    : options_(options),
+      authenticator_(options.token_file.empty() ? std::vector<Official>()
+                                                : ReadTokenFile(options.token_file)),
+      attempts_({TokenBucket({kMaxWrongPasswords, kMaxWrongPasswords * kSecondsPerWrongPassword})},
+                kMaxCountedNames, KeyedTokenBuckets<1>::Eviction::kAlways) {
+  if (options.accounts_file.empty()) return;
+  accounts_.emplace(options.accounts_file, accounts::AccountStore::Config{options.session_s});
+}
+
+/// Of this zone alone: browsers keep cookies by host, and ports do not count.
+std::string Access::CookieName() const { return "livemap_" + accounts_->id(); }
+
+std::string Access::SessionToken(const HttpRequest& question) const {
+  return accounts_ && !question.cookie.empty() ? CookieValue(question.cookie, CookieName()) : "";
+}
+
+std::optional<accounts::Person> Access::PersonOf(const HttpRequest& question) const {
+  const std::string token = SessionToken(question);
+  return token.empty() ? std::nullopt : accounts_->FindSession(token, SystemNs());
+}
+
+bool Access::IsByOfficial(const HttpRequest& question) const {
+  if (!question.authorization.empty()) {
+    return authenticator_.IsRight(question.authorization, question.client, Seconds(SteadyNs()));
+  }
+  const auto person = PersonOf(question);
+  return person && person->role >= accounts::Role::kOfficial;
+}
+
+bool Access::CheckOfficial(const HttpRequest& question) {
+  if (question.authorization.empty()) return IsByOfficial(question);
+  return authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()))
+             .verdict == OfficialAuthenticator::Verdict::kAllowed;
+}
+
+Visibility Access::VisibilityFor(const HttpRequest& question) const {
+  if (!HasAccounts() || IsByOfficial(question) || PersonOf(question)) return {};
+  Visibility visibility;
+  visibility.vehicles = false;
+  visibility.candidates = options_.public_sees == PublicSees::kAll;
+  visibility.told = options_.public_sees != PublicSees::kNothing;
+  return visibility;
+}
+
+std::optional<HttpResponse> Access::WhyForged(const HttpRequest& question,
+                                              const std::string& session_token) const {
+  if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
+    return MakeErrorAnswer(403, "pages of another origin may not decide anything");
+  }
+  // Both are hashes of one length: what is compared tells nothing of the token.
+  if (session_token.empty() || question.csrf_token == CsrfTokenOf(session_token)) {
+    return std::nullopt;
+  }
+  return MakeErrorAnswer(403, "the header X-CSRF-Token is not the session's");
+}
+
+std::optional<HttpResponse> Access::WhyNotOfficial(const HttpRequest& question,
+                                                   std::string& official) {
+  const auto person = question.authorization.empty() ? PersonOf(question) : std::nullopt;
+  if (auto forged = WhyForged(question, person ? SessionToken(question) : "")) return forged;
+  if (person) {
+    if (person->role < accounts::Role::kOfficial) {
+      return MakeErrorAnswer(403, "a viewer may not decide anything");
+    }
+    official = person->name;
+    return std::nullopt;
+  }
+  OfficialAuthenticator::Answer answer =
+      authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()));
+  switch (answer.verdict) {
+    case OfficialAuthenticator::Verdict::kAllowed:
+      official = std::move(answer.official);
+      return std::nullopt;
+    case OfficialAuthenticator::Verdict::kClosed:
+      if (HasAccounts()) return Unauthorized("log in to decide anything");
+      return MakeErrorAnswer(403,
+                             "nobody may decide anything here: the server was started without a "
+                             "token file and has no accounts");
+    case OfficialAuthenticator::Verdict::kNoToken:
+      return Unauthorized(HasAccounts() ? "log in, or send a token: Authorization: Bearer TOKEN"
+                                        : "a token is needed: Authorization: Bearer TOKEN");
+    case OfficialAuthenticator::Verdict::kWrongToken:
+      return Unauthorized("the token is wrong");
+    case OfficialAuthenticator::Verdict::kTooManyWrong:
+      break;
+  }
+  return TooMany("too many wrong tokens came from your address, try again in a minute");
+}
+
+bool Access::MayTryPassword(const std::string& client, const std::string& name) const {
+  const std::int64_t now_ns = SteadyNs();
+  const MutexLock lock(mutex_);
+  for (const std::string& key : {"c:" + client, "a:" + name}) {
+    const auto* attempts = attempts_.Find(key);
+    if (attempts != nullptr && attempts->front().TokensAt(now_ns) < 1) return false;
+  }
+  return true;
+}
+
+void Access::CountWrongPassword(const std::string& client, const std::string& name) {
+  const std::int64_t now_ns = SteadyNs();
+  const MutexLock lock(mutex_);
+  for (const std::string& key : {"c:" + client, "a:" + name}) {
+    attempts_.Use(key, now_ns)->front().Spend(1);
+  }
+}
+
+/// Secure: browsers send it by HTTPS, or to this machine itself.
+std::string Access::Cookie(const std::string& token, double lasts_s) const {
+  return CookieName() + "=" + token + "; Path=/; Secure; HttpOnly; SameSite=Strict; Max-Age=" +
+         std::to_string(static_cast<std::int64_t>(lasts_s));
+}
+
+HttpResponse Access::LogIn(const HttpRequest& question) {
+  if (auto forged = WhyForged(question, "")) return *std::move(forged);
+  if (!HasAccounts()) return MakeErrorAnswer(403, "this zone has no accounts");
+  if (!IsJsonType(question.content_type)) return WrongBodyType();
+  const auto body = ParseLogIn(question.body);
+  if (!body) {
+    return MakeErrorAnswer(400,
+                           "the body is not accepted, accepted are the texts name and password");
+  }
+  // By its hash: a name may be as long as a body.
+  const std::string counted = Sha256Hex(body->name);
+  if (!MayTryPassword(question.client, counted)) {
+    return TooMany("too many passwords were wrong, try again in a minute");
+  }
+  const Turn turn(hashes_);
+  if (!turn.is_mine()) return MakeBusyAnswer("somebody else logs in just now");
+  const auto person = accounts_->CheckPassword(body->name, body->password);
+  if (!person) {
+    CountWrongPassword(question.client, counted);
+    return Unauthorized("the name or the password is wrong");
+  }
+  const std::string token = accounts_->OpenSession(person->name, SystemNs());
+  HttpResponse answer = JsonAnswer(PersonJson(*person, token));
+  answer.headers.emplace_back("Set-Cookie", Cookie(token, options_.session_s));
+  return answer;
+}
+
+HttpResponse Access::LogOut(const HttpRequest& question) {
+  const std::string token = SessionToken(question);
+  if (!PersonOf(question)) return Unauthorized("nobody has logged in");
+  if (auto forged = WhyForged(question, token)) return *std::move(forged);
+  accounts_->CloseSession(token);
+  HttpResponse answer = JsonAnswer({{"name", nullptr}});
+  answer.headers.emplace_back("Set-Cookie", Cookie("", 0));
+  return answer;
+}
+
+HttpResponse Access::Session(const HttpRequest& question) const {
+  const auto person = PersonOf(question);
+  Json answer = person ? PersonJson(*person, SessionToken(question)) : Json{{"name", nullptr}};
+  const Visibility visibility = VisibilityFor(question);
+  answer["has_accounts"] = HasAccounts();
+  answer["sees"] = {{"told", visibility.told},
+                    {"candidates", visibility.candidates},
+                    {"vehicles", visibility.vehicles}};
+  return JsonAnswer(answer);
+}
+
+}  // namespace livemap::web

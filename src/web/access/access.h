@@ -1,0 +1,83 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "accounts/account_store.h"
+#include "common/mutex.h"
+#include "common/queues/token_bucket.h"
+#include "web/access/official_authenticator.h"
+#include "web/http/http_message.h"
+#include "web/http/site.h"
+#include "web/http/web_config.h"
+
+namespace livemap::web {
+
+/// The value of the cookie of this name in a Cookie header (RFC 6265, section 4.2); empty where it
+/// has none.
+std::string CookieValue(std::string_view header, std::string_view name);
+
+/// Knows who asks: an official by the bearer token of a program, or somebody who has logged in by
+/// the cookie of a session. A request by cookie that changes something also needs the session's
+/// CSRF token in X-CSRF-Token, which no page of another origin can read. Thread-safe; failures of
+/// the account store come out as exceptions.
+class Access {
+ public:
+  /// Keeps a reference to the options. Throws Error when the token file or the accounts are not
+  /// accepted.
+  explicit Access(const WebConfig& options);
+
+  /// Whether anybody may decide at all.
+  bool is_open() const { return authenticator_.is_open() || HasAccounts(); }
+  bool HasAccounts() const { return accounts_ && accounts_->HasAccounts(); }
+  /// Whose session the request's cookie is of; none where it is none's.
+  std::optional<accounts::Person> PersonOf(const HttpRequest& question) const;
+  /// Whether the request is an official's; a wrong token is not counted. Quick.
+  bool IsByOfficial(const HttpRequest& question) const;
+  /// The same, and a wrong token is counted against the client.
+  bool CheckOfficial(const HttpRequest& question);
+  /// What whoever asks may see. Quick.
+  Visibility VisibilityFor(const HttpRequest& question) const;
+  /// None where the request may decide something in the name of `official`, else the refusal.
+  std::optional<HttpResponse> WhyNotOfficial(const HttpRequest& question, std::string& official);
+
+  /// `POST /api/v1/session` with `{"name", "password"}`: opens a session, whose cookie it sets.
+  HttpResponse LogIn(const HttpRequest& question);
+  /// `DELETE /api/v1/session`: closes it.
+  HttpResponse LogOut(const HttpRequest& question);
+  /// `GET /api/v1/session`: who has logged in, and what may be seen.
+  HttpResponse Session(const HttpRequest& question) const;
+
+  /// So many passwords of one account, or from one client, may be wrong at once, and another each
+  /// time the seconds have passed.
+  static constexpr int kMaxWrongPasswords = 10;
+  static constexpr double kSecondsPerWrongPassword = 60;
+
+ private:
+  std::string CookieName() const;
+  std::string SessionToken(const HttpRequest& question) const;
+  /// The cookie of a session, or of none any more.
+  std::string Cookie(const std::string& token, double lasts_s) const;
+  bool MayTryPassword(const std::string& client, const std::string& name) const;
+  void CountWrongPassword(const std::string& client, const std::string& name);
+  /// Refuses pages of other origins, and forged requests of a session.
+  std::optional<HttpResponse> WhyForged(const HttpRequest& question,
+                                        const std::string& session_token) const;
+
+  const WebConfig& options_;
+  OfficialAuthenticator authenticator_;
+  mutable std::optional<accounts::AccountStore> accounts_;
+  /// One password at a time is hashed: each takes 64 MiB and a thread that others wait for.
+  std::atomic_flag hashes_ = ATOMIC_FLAG_INIT;
+  mutable Mutex mutex_;
+  /// By client and by account, "c:NAME" and "a:NAME".
+  KeyedTokenBuckets<1> attempts_ GUARDED_BY(mutex_);
+};
+
+/// Status 401: reading this needs a log-in.
+HttpResponse LogInFirst();
+
+}  // namespace livemap::web
