@@ -3,6 +3,7 @@
 import { Catalogue } from './catalogue.js';
 import { ClassFilter, StateFilter } from './panel/class_filter.js';
 import { ChangeView } from './panel/change_view.js';
+import { DecisionList } from './panel/decision_list.js';
 import { AttributionText, FitControl } from './layers/controls.js';
 import { byId, nextTask, throttled } from './dom.js';
 import { plural } from './format.js';
@@ -59,10 +60,13 @@ class Page {
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
     this.history = new HazardHistory((id) => this.layer.redraw(id));
-    this.officials = new Officials(config.officials && session.role !== 'viewer', (text) => this.say(text),
-      (subject, focus) => this.focusPopup(subject, focus));
+    this.officials = new Officials(config.officials && session.role !== 'viewer', (text) => {
+      this.say(text);
+      this.trail.refresh();
+    }, (subject, focus) => this.focusPopup(subject, focus));
     this.changes = new ChangeView(this.map, data, (change) => this.officials.changeButtons(change),
       this.sheet.coveredHeight(), () => this.stepAside(), (focus) => this.sheet.focusBack(focus));
+    this.trail = new DecisionList((hazard, id) => this.officials.askUndo(hazard, id));
     this.inView = byId('in-view');
     this.list = new HazardList(data, this.catalogue, (hazard) => this.choose(hazard),
       () => (this.inView.checked ? unitBox(this.map.getBounds()) : null));

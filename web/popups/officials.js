@@ -228,6 +228,11 @@ export class Officials {
     }))];
   }
 
+  /** Of the decision with that id alone. */
+  askUndo(hazard, id) {
+    this.ask(hazardSubject(hazard), DECISIONS.undo, id);
+  }
+
   ask(subject, decision, undoes = undefined) {
     if (session.hasAccounts && lacksToken()) {
       askToLogIn('Log in as an official to decide.');

@@ -188,6 +188,10 @@ HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& quest
   if (!is_decision && StartsWith(path, kMapChangeAddress)) {
     return sees.candidates ? map_changes_.Answer(target) : LogInFirst();
   }
+  // Who has logged in may know who decided; while there are no accounts, everybody.
+  if (path == "/api/v1/decisions") {
+    return sees.vehicles ? officials_.Decisions(ParseDecisionsQuery(target)) : LogInFirst();
+  }
   RefuseQueryParameters(target);
   if (is_decision) return PostOnly();
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));

@@ -141,6 +141,47 @@ HttpResponse OfficialApi::Preview(const DecisionTarget& target, const HttpReques
   return answer;
 }
 
+/// "hazard", "map_change" or "vehicle".
+const char* OfficialApi::KindOfSubject(const zone::DecisionRecord& decision) const {
+  switch (decision.kind) {
+    case zone::DecisionKind::kConfirmHazard:
+    case zone::DecisionKind::kRejectHazard:
+      return "hazard";
+    case zone::DecisionKind::kConfirmMapChange:
+    case zone::DecisionKind::kDismissMapChange:
+      return "map_change";
+    case zone::DecisionKind::kDistrustVehicle:
+    case zone::DecisionKind::kTrustVehicle:
+      return "vehicle";
+    case zone::DecisionKind::kUndo:
+      break;
+  }
+  const auto uuid = Uuid::Parse(decision.subject);
+  return uuid && zone_.Find(*uuid) ? "hazard" : "map_change";
+}
+
+HttpResponse OfficialApi::Decisions(const DecisionsQuery& query) const {
+  Json answer;
+  answer["decisions"] = Json::array();
+  const auto decisions = zone_.Decisions(query.before, query.limit);
+  for (const zone::DecisionRecord& decision : decisions) {
+    const bool is_undone = decision.undone_by != 0;
+    answer["decisions"].push_back({{"id", decision.id},
+                                   {"decision", DecisionName(decision.kind)},
+                                   {"about", KindOfSubject(decision)},
+                                   {"subject", decision.subject},
+                                   {"official", decision.official},
+                                   {"reason", decision.reason},
+                                   {"hazards", decision.hazards},
+                                   {"time", Rfc3339(decision.at_ns)},
+                                   {"undone_by", is_undone ? Json(decision.undone_by) : Json()}});
+  }
+  // As many as were asked for: there may be more.
+  const bool is_cut = decisions.size() == query.limit;
+  answer["next"] = is_cut ? Json(decisions.back().id) : Json();
+  return JsonAnswer(answer);
+}
+
 HttpResponse OfficialApi::PreviewDistrust(const std::string& vehicle) const {
   const auto preview = zone_.PreviewDistrust(vehicle);
   if (!preview) return MakeErrorAnswer(404, kUnknownVehicle);

@@ -4,6 +4,7 @@
 
 #include "web/access/access.h"
 #include "web/api/official_decision.h"
+#include "web/api/query.h"
 #include "web/http/http_message.h"
 #include "zone/service/zone_service.h"
 
@@ -22,6 +23,9 @@ class OfficialApi {
   /// Answers a GET of it: what the decision would do (HasPreview), for officials only.
   HttpResponse Preview(const DecisionTarget& target, const HttpRequest& question);
 
+  /// Answers `GET /api/v1/decisions`: who decided what.
+  HttpResponse Decisions(const DecisionsQuery& query) const;
+
  private:
   HttpResponse DecideAs(const std::string& official, const DecisionTarget& target,
                         const HttpRequest& question);
@@ -35,6 +39,7 @@ class OfficialApi {
                                const std::string& body);
   HttpResponse DecideVehicle(const DecisionTarget& target, const std::string& official,
                              const std::string& reason);
+  const char* KindOfSubject(const zone::DecisionRecord& decision) const;
   HttpResponse PreviewDistrust(const std::string& vehicle) const;
 
   Access& access_;

@@ -238,6 +238,21 @@ std::size_t ParseEventsQuery(const RequestTarget& target) {
   return limit;
 }
 
+DecisionsQuery ParseDecisionsQuery(const RequestTarget& target) {
+  RefuseRepeated(target);
+  DecisionsQuery query;
+  for (const auto& [name, value] : target.parameters) {
+    if (name == "before") {
+      query.before = ParseSequence(value);
+    } else if (name == "limit") {
+      query.limit = ParseLimit(value, kMaxEventsPerAnswer);
+    } else {
+      RefuseUnknown(name, "accepted are before and limit");
+    }
+  }
+  return query;
+}
+
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target) {
   RefuseRepeated(target);
   std::optional<std::uint64_t> since;

@@ -81,6 +81,15 @@ constexpr std::size_t kMaxEventsPerAnswer = 1000;
 /// The `limit` parameter of a hazard's history, 100 by default; refuses every other parameter.
 std::size_t ParseEventsQuery(const RequestTarget& target);
 
+/// What `GET /api/v1/decisions` asks for.
+struct DecisionsQuery {
+  std::uint64_t before = UINT64_MAX;  ///< Only decisions with a lower id.
+  std::size_t limit = 100;            ///< At most kMaxEventsPerAnswer.
+};
+
+/// Reads `before` and `limit`; refuses every other parameter.
+DecisionsQuery ParseDecisionsQuery(const RequestTarget& target);
+
 /// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);
 

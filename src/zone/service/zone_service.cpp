@@ -484,6 +484,15 @@ std::vector<StoredEvent> ZoneService::Events(const Uuid& hazard, std::size_t lim
   return store->LoadEvents(hazard, sequence, limit);
 }
 
+std::vector<DecisionRecord> ZoneService::Decisions(std::uint64_t before, std::size_t limit) const {
+  const ZoneStore* store = nullptr;
+  {
+    const ReaderLock lock(data_mutex_);
+    store = &StateForReaders().store;
+  }
+  return store->LoadAllDecisions(before, limit);
+}
+
 std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,
                                                            std::uint64_t since_sequence,
                                                            std::size_t limit,

@@ -124,6 +124,10 @@ class ZoneService {
   /// StoreError. Waits for no writer, unless one commits just now.
   std::vector<StoredEvent> Events(const Uuid& hazard, std::size_t limit) const;
 
+  /// The audit trail: the newest `limit` decisions of all officials whose id is below `before`, the
+  /// newest first. Throws StoreError. Waits for no writer, unless one commits just now.
+  std::vector<DecisionRecord> Decisions(std::uint64_t before, std::size_t limit) const;
+
   /// An official's decisions; they return the decision's id. The same decision by the same official
   /// for the same reason returns the id of the one before, and changes nothing, while it holds.
   /// Each is committed with its event, whose reason names the official (printable UTF-8 of at most

@@ -22,6 +22,7 @@ class DecisionTable {
 
   /// See the functions of ZoneStore with these names.
   std::vector<DecisionRecord> LoadDecisions(const std::string& subject, std::size_t limit);
+  std::vector<DecisionRecord> LoadAllDecisions(std::uint64_t before, std::size_t limit);
   std::optional<DecisionRecord> FindNewestDecision(const std::string& subject);
   std::optional<DecisionRecord> FindStandingDistrust(const std::string& vehicle_id,
                                                      std::uint64_t before);

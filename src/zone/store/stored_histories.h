@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/mutex.h"
+#include "zone/store/decision_table.h"
 #include "zone/store/event_log.h"
 #include "zone/store/map_change_table.h"
 
@@ -24,7 +25,8 @@ class StoredHistories {
   explicit StoredHistories(const std::string& connection)
       : session_(soci::sqlite3, connection),
         events_(OnlyReading(session_)),
-        map_changes_(session_) {}
+        map_changes_(session_),
+        decisions_(session_) {}
 
   /// EventLog::Load. Throws as that does.
   std::vector<StoredEvent> OfHazard(const Uuid& hazard, std::uint64_t sequence, std::size_t limit) {
@@ -35,6 +37,11 @@ class StoredHistories {
   std::vector<StoredMapChangeEvent> OfMapChange(std::uint64_t sequence, std::size_t limit) {
     const MutexLock lock(mutex_);
     return map_changes_.LoadEvents(sequence, limit);
+  }
+  /// DecisionTable::LoadAllDecisions. Throws as that does.
+  std::vector<DecisionRecord> OfOfficials(std::uint64_t before, std::size_t limit) {
+    const MutexLock lock(mutex_);
+    return decisions_.LoadAllDecisions(before, limit);
   }
 
  private:
@@ -47,6 +54,7 @@ class StoredHistories {
   soci::session session_;
   EventLog events_ GUARDED_BY(mutex_);
   MapChangeTable map_changes_ GUARDED_BY(mutex_);
+  DecisionTable decisions_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::zone

@@ -143,6 +143,11 @@ std::vector<StoredMapChangeEvent> ZoneStore::LoadMapChangeEvents(std::uint64_t s
   return implementation_->histories_.OfMapChange(sequence, limit);
 }
 
+std::vector<DecisionRecord> ZoneStore::LoadAllDecisions(std::uint64_t before,
+                                                        std::size_t limit) const {
+  return implementation_->histories_.OfOfficials(before, limit);
+}
+
 StoreDamage ZoneStore::LoadPlaces(const std::function<void(const std::string&, KnownPlace)>& take) {
   return implementation_->places_.Load(take);
 }

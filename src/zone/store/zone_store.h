@@ -96,6 +96,9 @@ class ZoneStore {
   std::vector<StoredMapChangeEvent> LoadMapChangeEvents(std::uint64_t sequence,
                                                         std::size_t limit) const;
 
+  /// The newest `limit` decisions of all officials whose id is below `before`, the newest first;
+  /// broken rows are left out. Any thread may.
+  std::vector<DecisionRecord> LoadAllDecisions(std::uint64_t before, std::size_t limit) const;
   /// The newest `limit` decisions about a hazard, a map change or a vehicle
   /// (DecisionRecord::subject), the newest first; broken rows are left out.
   std::vector<DecisionRecord> LoadDecisions(const std::string& subject, std::size_t limit);

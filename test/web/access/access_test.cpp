@@ -115,6 +115,41 @@ TEST_F(AccessTest, AnOfficialDecidesByTheSessionInHisName) {
   EXPECT_THAT(history.body, HasSubstr("miller"));
 }
 
+TEST_F(AccessTest, TheAuditTrailSaysWhoDecidedWhatAndWhatWasTakenBack) {
+  const std::string hazard = Add();
+  const Browser browser = LogIn("miller");
+  const auto rejected = Reject(hazard, browser.ThatDecides()).Json()["properties"]["decision_id"];
+  ASSERT_EQ(Request(port(), "POST", "/api/v1/hazards/" + hazard + "/undo", browser.ThatDecides(),
+                    R"({"reason": "the wrong one"})")
+                .status,
+            200);
+  EXPECT_EQ(Get(port(), "/api/v1/decisions").status, 401) << "strangers are told who decides";
+  const auto trail = Get(port(), "/api/v1/decisions", LogIn("jones").WithCookie()).Json();
+  ASSERT_EQ(trail["decisions"].size(), 2U);
+  const auto& undo = trail["decisions"][0];
+  const auto& reject = trail["decisions"][1];
+  EXPECT_EQ(reject["id"], rejected);
+  EXPECT_EQ(reject["decision"], "reject");
+  EXPECT_EQ(reject["about"], "hazard");
+  EXPECT_EQ(reject["subject"], hazard);
+  EXPECT_EQ(reject["official"], "miller");
+  EXPECT_EQ(reject["reason"], "filled yesterday");
+  EXPECT_EQ(reject["undone_by"], undo["id"]);
+  EXPECT_EQ(undo["decision"], "undo");
+  EXPECT_EQ(undo["about"], "hazard");
+  EXPECT_EQ(undo["undone_by"], nullptr);
+  EXPECT_EQ(trail["next"], nullptr);
+
+  const auto page = Get(port(), "/api/v1/decisions?limit=1", browser.WithCookie()).Json();
+  EXPECT_EQ(page["next"], undo["id"]);
+  const auto rest =
+      Get(port(), "/api/v1/decisions?before=" + page["next"].dump(), browser.WithCookie()).Json();
+  ASSERT_EQ(rest["decisions"].size(), 1U);
+  EXPECT_EQ(rest["decisions"][0]["id"], rejected);
+  EXPECT_EQ(Get(port(), "/api/v1/decisions?limit=0", browser.WithCookie()).status, 400);
+  EXPECT_EQ(Get(port(), "/api/v1/decisions?official=miller", browser.WithCookie()).status, 400);
+}
+
 TEST_F(AccessTest, WithoutTheSessionsOwnCsrfTokenNothingIsDecided) {
   const std::string hazard = Add();
   Browser browser = LogIn("miller");

@@ -8,7 +8,7 @@ Skips as map_page_test.py does.
 
 import sys
 
-from map_page_fixture import LAT, LON, Keys, run_tests, start_browser, stop_browser, street
+from map_page_fixture import HOSTILE, LAT, LON, Keys, run_tests, start_browser, stop_browser, street
 from map_page_officials_test import OfficialsPage
 
 
@@ -48,6 +48,30 @@ class LogIn(OfficialsPage):
         self.wait(lambda: other.execute_script(rows) == 0, "it stays in the logged-out browser")
         self.click("#notice-undo")
         self.wait(lambda: other.execute_script(rows) == 1, "it does not come back")
+        self.assert_quiet()
+
+    def test_the_audit_trail_says_who_decided_and_takes_it_back(self):
+        self.open_accounts()
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.assertFalse(self.find("#trail-section").is_displayed(), "strangers see who decided")
+        self.log_in("miller")
+        self.wait_logged_in("miller")
+        self.click("#trail-section summary")
+        self.wait_for_text("#trail-note", "Nobody has decided anything yet.")
+        self.open_popup_of(hazard)
+        self.ask("reject")
+        self.write("#decision-reason", HOSTILE)
+        self.submit()
+        self.wait_closed()
+        self.wait_for_text("#trail", "Rejected a hazard", "miller", HOSTILE)
+        self.picture("trail")
+        self.click("#trail .trail-row button")
+        self.wait_for_text("#decision-title", "Take the newest decision back?")
+        self.submit()
+        self.wait_closed()
+        self.wait_for_text("#trail", "Took back a decision about a hazard", "taken back")
+        self.wait(lambda: self.count("#hazard-list button") == 1, "the hazard does not come back")
         self.assert_quiet()
 
     def test_a_wrong_password_is_said_and_may_be_mended(self):
