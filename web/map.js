@@ -14,6 +14,7 @@ import { HazardList, hazardRow } from './panel/hazard_list.js';
 import { popupContent } from './popups/hazard_popup.js';
 import { nearLongitude } from './mercator.js';
 import { Officials } from './popups/officials.js';
+import { ReviewQueue } from './panel/review_queue.js';
 import { askToLogIn, session, startSession } from './session.js';
 import { Sheet } from './panel/sheet.js';
 import { unitBox } from './layers/sign_layer.js';
@@ -67,6 +68,7 @@ class Page {
     this.changes = new ChangeView(this.map, data, (change) => this.officials.changeButtons(change),
       this.sheet.coveredHeight(), () => this.stepAside(), (focus) => this.sheet.focusBack(focus));
     this.trail = new DecisionList((hazard, id) => this.officials.askUndo(hazard, id));
+    this.review = new ReviewQueue((hazard) => this.choose(hazard), () => this.trail.refresh());
     this.inView = byId('in-view');
     this.list = new HazardList(data, this.catalogue, (hazard) => this.choose(hazard),
       () => (this.inView.checked ? unitBox(this.map.getBounds()) : null));
@@ -107,7 +109,7 @@ class Page {
     });
     this.inView.addEventListener('change', () => this.list.refresh());
     document.addEventListener('keydown', (event) => {
-      if (event.key !== 'Escape' || this.officials.isAsking()) return;
+      if (event.key !== 'Escape' || document.querySelector('dialog[open]')) return;
       this.map.closePopup();
       this.sheet.toggle(false);
     });

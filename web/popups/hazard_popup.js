@@ -21,7 +21,7 @@ const GONE = 'The picture is no longer kept';
 /** What the zone says of a picture: an HTTP status, 0 for no answer. */
 async function statusOf(url) {
   try {
-    return (await fetch(url, { method: 'HEAD', credentials: 'omit' })).status;
+    return (await fetch(url, { method: 'HEAD', credentials: 'same-origin' })).status;
   } catch (failure) {
     return 0;
   }
@@ -38,7 +38,7 @@ async function awaitPicture(note, hazard, url, wasThere) {
       return;
     }
     if (status === 200) {
-      note.replaceWith(picture(hazard, true));
+      note.replaceWith(pictureOf(hazard, true));
       return;
     }
     note.textContent = COMING;
@@ -47,7 +47,8 @@ async function awaitPicture(note, hazard, url, wasThere) {
   }
 }
 
-function picture(hazard, wasThere = false) {
+/** The hazard's picture, or why there is none. */
+export function pictureOf(hazard, wasThere = false) {
   // Not known yet: the place is kept, so that the popup does not jump.
   if (hazard.image === undefined) return element('div', { class: 'picture picture-coming' });
   const url = safeImage(hazard.image);
@@ -118,7 +119,7 @@ export function popupContent(hazard, catalogue, extras) {
     class: 'popup', role: 'dialog', tabindex: '-1', 'aria-label': hazard.label,
     'data-hazard': hazard.id,
   },
-  picture(hazard),
+  pictureOf(hazard),
   element('h3', { class: 'popup-title' }, catalogue.badge(hazard.className, hazard.state),
     element('span', {}, hazard.label)),
   facts(rows),

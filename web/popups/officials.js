@@ -120,6 +120,12 @@ function bodyOf(subject, decision, reason, undoes) {
     ...(isSeen ? { sequence: hazard.sequence, position: [hazard.longitude, hazard.latitude] } : {}) };
 }
 
+/** Decides about a hazard as it was seen, without a question: as ask. */
+export function decideOn(hazard, name, reason, undoes = undefined) {
+  const decision = DECISIONS[name];
+  return ask(hazardSubject(hazard), decision, savedToken(), bodyOf({ hazard }, decision, reason, undoes));
+}
+
 function sentenceFor(status, error, subject, isNamed) {
   if (status === 401 && session.decides()) return 'Your session has ended. Reload the page and log in.';
   if (status === 401) return 'This token is not known here. Check it and try again.';

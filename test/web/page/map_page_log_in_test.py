@@ -50,6 +50,57 @@ class LogIn(OfficialsPage):
         self.wait(lambda: other.execute_script(rows) == 1, "it does not come back")
         self.assert_quiet()
 
+    def test_the_queue_is_walked_by_keyboard(self):
+        self.open_accounts()
+        hazards = [self.zone.report("pothole", LAT + 0.001 * i, LON) for i in range(3)]
+        self.open()
+        self.assertFalse(self.find("#review-open").is_displayed(), "strangers review")
+        self.log_in("miller")
+        self.wait_logged_in("miller")
+        self.wait_for("#hazard-list button", 3)
+        self.find("#review-open").send_keys(Keys.ENTER)
+        self.wait_for_text("#review-place", "1 of 3")
+        self.wait(lambda: self.browser.execute_script(
+            "return document.querySelector('#review-picture img')?.naturalWidth > 0"), "no picture")
+        self.picture("review")
+        self.press("n")
+        self.wait_for_text("#review-place", "2 of 3")
+        self.press("r")
+        self.wait_for_text("#review-place", "3 of 3")
+        self.wait(lambda: self.count("#hazard-list button") == 2, "the second is not rejected")
+        self.press("u")
+        self.wait_for_text("#review-place", "2 of 3")
+        self.wait(lambda: self.count("#hazard-list button") == 3, "the second does not come back")
+        self.press("c")
+        self.wait_for_text("#review-place", "3 of 3")
+        self.press("c")
+        self.wait_for_text("#review-subject", "That was the last one.")
+        self.press(Keys.ESCAPE)
+        self.wait(lambda: not self.find("#review").is_displayed(), "the queue stays")
+        self.wait(lambda: self.pin_state("active") == 2 and self.pin_state("candidate") == 1,
+                  "two were confirmed")
+        self.assertEqual(len(hazards), 3)
+        self.assert_quiet()
+
+    def test_letters_in_the_reason_decide_nothing(self):
+        self.open_accounts()
+        self.zone.report("pothole", LAT, LON)
+        self.open()
+        self.log_in("miller")
+        self.wait_logged_in("miller")
+        self.click("#review-open")
+        self.wait_for_text("#review-place", "1 of 1")
+        self.write("#review-reason", "concrete run")
+        self.assertIn("1 of 1", self.text("#review-place"))
+        self.write("#review-reason", "")
+        self.find("#review-reason").send_keys(Keys.ENTER)
+        self.wait_for_text("#review-error", "say why")
+        self.write("#review-reason", "a shadow")
+        self.find("#review-reason").send_keys(Keys.ENTER)
+        self.wait_for_text("#review-subject", "That was the last one.")
+        self.wait(lambda: self.count("#hazard-list button") == 0, "it is not rejected")
+        self.assert_quiet()
+
     def test_the_audit_trail_says_who_decided_and_takes_it_back(self):
         self.open_accounts()
         hazard = self.zone.report("pothole", LAT, LON)
@@ -163,6 +214,10 @@ class Phone(OfficialsPage):
         self.log_in("miller")
         self.wait_logged_in("miller")
         self.picture("phone_logged_in")
+        self.click("#sheet-handle")
+        self.click("#review-open")
+        self.wait_for_text("#review-place", "1 of 1")
+        self.picture("phone_review")
         self.assert_quiet()
 
 
