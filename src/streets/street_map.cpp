@@ -87,6 +87,22 @@ std::size_t StreetMap::bytes() const {
          BytesOf(in_cells_);
 }
 
+geo::GeoBox StreetMap::Bounds() const {
+  if (segments_.empty()) return {};
+  const geo::GeoPoint first = PlaceOf(segments_.front().from);
+  geo::GeoBox box{first, first};
+  for (const Segment& segment : segments_) {
+    for (const std::uint32_t node : {segment.from, segment.to}) {
+      const geo::GeoPoint place = PlaceOf(node);
+      box.south_west.latitude_deg = std::min(box.south_west.latitude_deg, place.latitude_deg);
+      box.south_west.longitude_deg = std::min(box.south_west.longitude_deg, place.longitude_deg);
+      box.north_east.latitude_deg = std::max(box.north_east.latitude_deg, place.latitude_deg);
+      box.north_east.longitude_deg = std::max(box.north_east.longitude_deg, place.longitude_deg);
+    }
+  }
+  return box;
+}
+
 geo::GeoPoint StreetMap::PlaceOf(std::uint32_t node) const {
   return {places_[node].latitude / kUnitsPerDegree, places_[node].longitude / kUnitsPerDegree};
 }
@@ -118,6 +134,12 @@ std::vector<std::uint32_t> StreetMap::SegmentsNear(const geo::GeoPoint& place,
   std::sort(near.begin(), near.end());
   near.erase(std::unique(near.begin(), near.end()), near.end());
   return near;
+}
+
+std::vector<std::uint32_t> StreetMap::SegmentsAt(std::uint32_t node) const {
+  const std::size_t count = incident_begin_[node + 1] - incident_begin_[node];
+  const auto begin = incident_.begin() + incident_begin_[node];
+  return {begin, begin + static_cast<std::ptrdiff_t>(std::min(count, kMaxChoices))};
 }
 
 std::vector<Travel> StreetMap::Continuations(const Travel& travel) const {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "geo/geo_box.h"
 #include "geo/wgs84.h"
 
 namespace livemap::streets {
@@ -84,6 +85,8 @@ class StreetMap {
   const Counters& counters() const { return counters_; }
   /// Bytes in memory.
   std::size_t bytes() const;
+  /// The smallest box in degrees, west <= east, with all segments; of size 0 where there are none.
+  geo::GeoBox Bounds() const;
 
   /// `number` is less than segments().
   const Segment& SegmentAt(std::uint32_t number) const { return segments_[number]; }
@@ -112,6 +115,8 @@ class StreetMap {
   /// some that lie up to a cell (some 200 m) further; at most 20 000. Nothing for a place that is
   /// not valid, or a radius that is not in 0 to 5000 m.
   std::vector<std::uint32_t> SegmentsNear(const geo::GeoPoint& place, double radius_m) const;
+  /// Segments that begin or end at a node, by number; at most 64 of them.
+  std::vector<std::uint32_t> SegmentsAt(std::uint32_t node) const;
   /// How one may legally drive on at the end of a travel, by number of the segment. Turning back
   /// counts only where there is nothing else. At most 64 segments at a node count.
   std::vector<Travel> Continuations(const Travel& travel) const;
