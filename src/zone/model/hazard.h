@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -34,6 +35,8 @@ struct Hazard {
   std::uint32_t vehicles = 1;  ///< Distinct vehicles that speak for it.
   /// Of its last event that drivers were told; 0: they never heard of it.
   std::uint64_t announced_sequence = 0;
+  /// Of a vehicle that saw it, clockwise from north: how the place is passed. NaN: not known.
+  double course_rad = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What happened to the officials' map; as stored: the numbers never change.

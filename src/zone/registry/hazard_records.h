@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct HazardRecord {
   std::uint32_t id = 0;            ///< In the store, from 1.
   std::uint32_t hazard_class = 0;  ///< Place in the registry's list of classes.
   float presence = 1;
+  float course_rad = std::numeric_limits<float>::quiet_NaN();  ///< As Hazard::course_rad.
   PackedPicture picture;
   PresenceRecord life;  ///< With the state.
 };

@@ -90,6 +90,7 @@ void HazardRegistry::Restore(const Hazard& hazard, const PresenceRecord& life, s
   record.id = id;
   record.hazard_class = ClassOf(hazard.class_name);
   record.presence = hazard.presence;
+  record.course_rad = static_cast<float>(hazard.course_rad);
   record.picture = PackedPicture(hazard.image_sha256, hazard.image_format);
   record.life = life;
   last_id_ = std::max(last_id_, id);
@@ -103,6 +104,23 @@ std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string&
   const Class& known = classes_[found->second];
   const auto nearest = known.grid.Nearest(position, known.radius_m);
   return nearest ? std::optional<Slot>(static_cast<Slot>(nearest->id)) : std::nullopt;
+}
+
+std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(
+    const std::string& class_name, const geo::GeoPoint& position,
+    const std::function<bool(Slot)>& may_match) const {
+  const std::optional<Slot> nearest = FindMatch(class_name, position);
+  if (!nearest || may_match(*nearest)) return nearest;
+  const Class& known = classes_[class_places_.at(class_name)];
+  std::vector<geo::SpatialGrid::Neighbour> near = known.grid.Within(position, known.radius_m);
+  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) {
+    return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.id < b.id;
+  });
+  for (const geo::SpatialGrid::Neighbour& other : near) {
+    const auto slot = static_cast<Slot>(other.id);
+    if (slot != *nearest && may_match(slot)) return slot;
+  }
+  return std::nullopt;
 }
 
 HazardRegistry::Slot HazardRegistry::Add(const protocol::Report& report,
@@ -181,6 +199,11 @@ void HazardRegistry::SetLife(Slot slot, const PresenceRecord& life, double prese
   NoteChange(slot);
 }
 
+void HazardRegistry::SetCourse(Slot slot, double course_rad) {
+  RememberForUndo(slot);
+  records_[slot].course_rad = static_cast<float>(course_rad);
+}
+
 void HazardRegistry::SetPicture(Slot slot, const PictureName& picture) {
   RememberForUndo(slot);
   records_[slot].picture = PackedPicture(picture.sha256, picture.format);
@@ -210,6 +233,7 @@ Hazard HazardRegistry::Get(Slot slot) const {
   hazard.presence = record.presence;
   hazard.vehicles = Supporters(record.life);
   hazard.announced_sequence = record.announced_sequence;
+  hazard.course_rad = static_cast<double>(record.course_rad);
   return hazard;
 }
 

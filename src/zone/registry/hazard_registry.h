@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -62,6 +63,9 @@ class HazardRegistry {
   /// The nearest hazard of this class that is not gone within the class's radius (geodesic), the
   /// older one among equals. `position` must be valid.
   std::optional<Slot> FindMatch(const std::string& class_name, const geo::GeoPoint& position) const;
+  /// The same among those for which `may_match` answers true.
+  std::optional<Slot> FindMatch(const std::string& class_name, const geo::GeoPoint& position,
+                                const std::function<bool(Slot)>& may_match) const;
 
   /// Puts in a new hazard of the report's class, or of `class_name`; SetLife gives it its life.
   Slot Add(const protocol::Report& report, const PictureName& picture, const Uuid& uuid,
@@ -82,6 +86,8 @@ class HazardRegistry {
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
   void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);
+  /// In which direction the place is passed (Hazard::course_rad).
+  void SetCourse(Slot slot, double course_rad);
   /// A newer picture.
   void SetPicture(Slot slot, const PictureName& picture);
   /// Drivers are told of the hazard as it is now.

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/time.h"
 
@@ -12,6 +13,8 @@ namespace {
 constexpr double kStepM = 5;        // Between looks along a straight piece of way.
 constexpr double kMaxSteps = 1000;  // A track from outside may jump.
 constexpr double kMinTravelM = 2;   // Less says nothing of the direction.
+constexpr double kCourseWindowS = 5;
+constexpr double kMinCourseMps = 1.5;  // The course of a slower vehicle is noise.
 
 struct Look {
   Eigen::Vector2d offset_m;  // From the vehicle to the place, east and north.
@@ -73,6 +76,28 @@ bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
     if (SeesBetweenTrackPoints(track[i - 1], point, before_m, at_m, begin, end, rule)) return true;
   }
   return false;
+}
+
+double CourseAt(const std::vector<TrackPoint>& track, std::int64_t stamp_ns) {
+  const TrackPoint* nearest = nullptr;
+  const TrackPoint* first = nullptr;
+  const TrackPoint* last = nullptr;
+  for (const TrackPoint& point : track) {
+    const double off_s = std::abs(Seconds(point.stamp_ns - stamp_ns));
+    if (!geo::IsValid(point.position) || off_s > kCourseWindowS) continue;
+    if (first == nullptr) first = &point;
+    last = &point;
+    const bool moves = std::isfinite(point.course_rad) && point.speed_mps >= kMinCourseMps;
+    if (!moves) continue;
+    if (nearest == nullptr || off_s < std::abs(Seconds(nearest->stamp_ns - stamp_ns))) {
+      nearest = &point;
+    }
+  }
+  if (nearest != nullptr) return nearest->course_rad;
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  if (first == nullptr) return kNotKnown;
+  const Eigen::Vector2d travel_m = geo::LocalFrame(first->position).ToEnu(last->position);
+  return travel_m.norm() > kMinTravelM ? std::atan2(travel_m.x(), travel_m.y()) : kNotKnown;
 }
 
 }  // namespace livemap::zone

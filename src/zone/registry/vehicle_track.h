@@ -30,4 +30,9 @@ struct SightRule {
 bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
               const geo::GeoPoint& place, const SightRule& rule = {});
 
+/// In which direction a vehicle of this track drove at `stamp_ns`, clockwise from north: its course
+/// at the point nearest in time where it moved, else the direction of its way within 5 s before and
+/// after. NaN where the track has no point so near in time, or it stood.
+double CourseAt(const std::vector<TrackPoint>& track, std::int64_t stamp_ns);
+
 }  // namespace livemap::zone

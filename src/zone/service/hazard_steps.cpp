@@ -1,5 +1,8 @@
 #include "zone/service/hazard_steps.h"
 
+#include "streets/street_place.h"
+#include "zone/model/hazard_spot.h"
+
 namespace livemap::zone {
 
 HazardSteps::HazardSteps(const ZoneConfig& config, ZoneState& state)
@@ -18,14 +21,32 @@ Evidence HazardSteps::EvidenceOf(EvidenceKind kind, const std::string& vehicle_i
 }
 
 std::optional<HazardSteps::Slot> HazardSteps::MatchNow(const protocol::Report& report,
+                                                       double course_rad,
                                                        ZoneTransaction& transaction) {
-  const HazardRegistry& hazards = state_.hazards;
-  const std::string class_name = hazards.HeadingOf(report.class_name);
-  auto match = hazards.FindMatch(class_name, report.position);
-  while (match && PassTime(*match, transaction) && hazards.State(*match) == HazardState::kGone) {
-    match = hazards.FindMatch(class_name, report.position);
+  auto match = FindMatch(report, course_rad);
+  while (match && PassTime(*match, transaction) &&
+         state_.hazards.State(*match) == HazardState::kGone) {
+    match = FindMatch(report, course_rad);
   }
   return match;
+}
+
+std::optional<HazardSteps::Slot> HazardSteps::FindMatch(const protocol::Report& report,
+                                                        double course_rad) const {
+  const HazardRegistry& hazards = state_.hazards;
+  const std::string class_name = hazards.HeadingOf(report.class_name);
+  const streets::StreetMap* const map = config_.streets.get();
+  if (map == nullptr) return hazards.FindMatch(class_name, report.position);
+  const auto on =
+      streets::FindCarriageway(*map, SpotOf(report.position, report.covariance_m2, course_rad));
+  if (!on) return hazards.FindMatch(class_name, report.position);
+  return hazards.FindMatch(class_name, report.position, [&](Slot slot) {
+    const HazardRecord& record = hazards.Record(slot);
+    const auto known = streets::FindCarriageway(
+        *map, SpotOf(record.estimate.position, record.estimate.covariance_m2,
+                     static_cast<double>(record.course_rad)));
+    return !known || !streets::LieOnOppositeCarriageways(*map, *on, *known);
+  });
 }
 
 bool HazardSteps::PassTime(Slot slot, ZoneTransaction& transaction) {

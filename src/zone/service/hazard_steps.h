@@ -37,7 +37,10 @@ class HazardSteps {
                       std::int64_t now_ns) const;
 
   /// The map's hazard that the report is a sighting of, after time has done what is due to it.
-  std::optional<Slot> MatchNow(const protocol::Report& report, ZoneTransaction& transaction);
+  /// Where the zone knows its streets, a hazard on the other carriageway of the street is another
+  /// one (streets::LieOnOppositeCarriageways). `course_rad` is of the pass; NaN: not known.
+  std::optional<Slot> MatchNow(const protocol::Report& report, double course_rad,
+                               ZoneTransaction& transaction);
   /// Does what time has made due; false when that was nothing.
   bool PassTime(Slot slot, ZoneTransaction& transaction);
   /// `life` is what `step` made of the hazard's life: it is kept and taught, without an event.
@@ -49,6 +52,8 @@ class HazardSteps {
                    ZoneTransaction& transaction);
 
  private:
+  std::optional<Slot> FindMatch(const protocol::Report& report, double course_rad) const;
+
   const ZoneConfig& config_;
   ZoneState& state_;
   const HazardLifecycle lifecycle_;

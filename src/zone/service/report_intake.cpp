@@ -1,6 +1,8 @@
 #include "zone/service/report_intake.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "imaging/image_header.h"
@@ -25,14 +27,16 @@ std::vector<protocol::Receipt> ReportIntake::Batch::TakeReceipts() {
 
 ReportIntake::ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps,
                            ImageStore& images, PictureAllowance& pictures,
-                           VehicleAllowance& allowance, PlaceBook& places)
+                           VehicleAllowance& allowance, PlaceBook& places,
+                           const VehicleTable& vehicles)
     : config_(config),
       state_(state),
       steps_(steps),
       images_(images),
       pictures_(pictures),
       allowance_(allowance),
-      places_(places) {}
+      places_(places),
+      vehicles_(vehicles) {}
 
 ReportIntake::Batch ReportIntake::Examine(const std::vector<protocol::Report>& reports,
                                           std::int64_t now_ns) {
@@ -125,7 +129,8 @@ void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
     ++batch.counted.repeated;
     return;
   }
-  auto slot = steps_.MatchNow(report, transaction);
+  const double course_rad = CourseOfPass(report, transaction.now_ns());
+  auto slot = steps_.MatchNow(report, course_rad, transaction);
   if (!slot) {
     if (const auto why = WhyNoNewHazard(report, transaction.now_ns())) {
       Refuse(*why, pending.index, batch);
@@ -133,10 +138,10 @@ void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
     }
   }
   if (slot) {
-    Sight(*slot, report, pending.picture, transaction);
+    Sight(*slot, report, course_rad, pending.picture, transaction);
     ++batch.counted.merged;
   } else {
-    slot = Register(report, pending.picture, transaction);
+    slot = Register(report, course_rad, pending.picture, transaction);
     ++batch.counted.added;
   }
   const HazardRecord& record = state_.hazards.Record(*slot);
@@ -144,6 +149,13 @@ void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
   if (!pending.picture.sha256.empty()) batch.spent[report.vehicle_id] += pending.picture_cost;
   batch.hazard_of_report.emplace(report.uuid, record.uuid);
   batch.receipts[pending.index] = Committed(report, record.uuid);
+}
+
+/// In which direction the vehicle drove when it saw the hazard; NaN where the zone does not know,
+/// or knows no streets for which it matters.
+double ReportIntake::CourseOfPass(const protocol::Report& report, std::int64_t now_ns) const {
+  if (!config_.streets) return std::numeric_limits<double>::quiet_NaN();
+  return CourseAt(vehicles_.Track(report.vehicle_id), steps_.SeenNs(report.stamp_ns, now_ns));
 }
 
 /// What several vehicles saw counts against none of them, so that only a vehicle that nobody else
@@ -172,7 +184,7 @@ std::optional<Refusal> ReportIntake::WhyNoNewHazard(const protocol::Report& repo
   return std::nullopt;
 }
 
-ReportIntake::Slot ReportIntake::Register(const protocol::Report& report,
+ReportIntake::Slot ReportIntake::Register(const protocol::Report& report, double course_rad,
                                           const PictureName& picture,
                                           ZoneTransaction& transaction) {
   HazardRegistry& hazards = state_.hazards;
@@ -182,6 +194,7 @@ ReportIntake::Slot ReportIntake::Register(const protocol::Report& report,
   const Slot slot = hazards.Add(report, hazards.HeadingOf(report.class_name), picture, uuid,
                                 transaction.TakeSequence(), now_ns);
   transaction.NameHazard(slot, report.class_name);
+  if (!std::isnan(course_rad)) transaction.KeepCourse(slot, course_rad);
   PresenceRecord life;
   const Evidence evidence =
       steps_.EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, now_ns);
@@ -193,8 +206,8 @@ ReportIntake::Slot ReportIntake::Register(const protocol::Report& report,
   return slot;
 }
 
-void ReportIntake::Sight(Slot slot, const protocol::Report& report, const PictureName& picture,
-                         ZoneTransaction& transaction) {
+void ReportIntake::Sight(Slot slot, const protocol::Report& report, double course_rad,
+                         const PictureName& picture, ZoneTransaction& transaction) {
   const ZoneTransaction::Before before = transaction.BeforeOf(slot);
   const std::int64_t now_ns = transaction.now_ns();
   const std::uint64_t sequence = transaction.TakeSequence();
@@ -210,8 +223,11 @@ void ReportIntake::Sight(Slot slot, const protocol::Report& report, const Pictur
       steps_.EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, now_ns);
   const LifecycleUpdate step =
       steps_.lifecycle().Apply(steps_.ClassOf(slot), evidence, now_ns, life);
-  state_.hazards.Merge(slot, report, picture, sequence, now_ns,
-                       WhatItSays(slot, report, evidence, step.counted, earlier));
+  const SightingSays says = WhatItSays(slot, report, evidence, step.counted, earlier);
+  state_.hazards.Merge(slot, report, picture, sequence, now_ns, says);
+  const bool is_new_course = says != SightingSays::kNothing && !std::isnan(course_rad) &&
+                             std::isnan(state_.hazards.Record(slot).course_rad);
+  if (is_new_course) transaction.KeepCourse(slot, course_rad);
   steps_.Keep(slot, life, step, transaction);
   transaction.RecordHazardEvent(slot, before,
                                 step.transition ? step.transition->reason : "sighting", true);

@@ -14,6 +14,7 @@
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/picture_allowance.h"
+#include "zone/registry/vehicle_table.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
@@ -52,7 +53,8 @@ class ReportIntake {
 
   /// All outlive it.
   ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps, ImageStore& images,
-               PictureAllowance& pictures, VehicleAllowance& allowance, PlaceBook& places);
+               PictureAllowance& pictures, VehicleAllowance& allowance, PlaceBook& places,
+               const VehicleTable& vehicles);
 
   /// First pass, which changes nothing: what was committed before, what is refused, pictures to
   /// disk. A picture whose report is never committed is unreferenced and goes first. `reports`
@@ -71,10 +73,11 @@ class ReportIntake {
   std::optional<Refusal> WhyNoNewHazard(const protocol::Report& report, std::int64_t now_ns) const;
   static void Refuse(const Refusal& refusal, std::size_t index, Batch& batch);
   void ApplyOne(const PendingReport& pending, Batch& batch, ZoneTransaction& transaction);
-  Slot Register(const protocol::Report& report, const PictureName& picture,
+  double CourseOfPass(const protocol::Report& report, std::int64_t now_ns) const;
+  Slot Register(const protocol::Report& report, double course_rad, const PictureName& picture,
                 ZoneTransaction& transaction);
-  void Sight(Slot slot, const protocol::Report& report, const PictureName& picture,
-             ZoneTransaction& transaction);
+  void Sight(Slot slot, const protocol::Report& report, double course_rad,
+             const PictureName& picture, ZoneTransaction& transaction);
   SightingSays WhatItSays(Slot slot, const protocol::Report& report, const Evidence& evidence,
                           bool counted, const PresenceRecord& earlier) const;
 
@@ -85,6 +88,7 @@ class ReportIntake {
   PictureAllowance& pictures_;
   VehicleAllowance& allowance_;
   PlaceBook& places_;
+  const VehicleTable& vehicles_;
 };
 
 }  // namespace livemap::zone

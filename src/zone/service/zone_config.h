@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <string>
 
 #include "protocol/hazard_catalogue.h"
 #include "protocol/poll.h"
+#include "streets/street_map.h"
 #include "zone/admission/report_validation.h"
 #include "zone/admission/speed_rule.h"
 #include "zone/admission/vehicle_allowance.h"
@@ -45,6 +47,8 @@ struct ZoneConfig {
   /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
   bool replay = false;
   protocol::HazardCatalogue catalogue;
+  /// Those of the zone, by which places have names and carriageways; null: the zone knows none.
+  std::shared_ptr<const streets::StreetMap> streets;
 };
 
 /// The settings as the zone works by them: what one part takes over from another is filled in.

@@ -36,7 +36,7 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
       allowance_(config_.allowance),
       pictures_(config_.pictures),
       steps_(config_, state_),
-      reports_(config_, state_, steps_, images_, pictures_, allowance_, places_),
+      reports_(config_, state_, steps_, images_, pictures_, allowance_, places_, vehicles_),
       map_changes_(config_, state_, places_),
       polls_(config_, state_, steps_, images_, pictures_, allowance_, vehicles_, places_),
       officials_(config_, state_, steps_),

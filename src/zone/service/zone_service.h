@@ -215,6 +215,8 @@ class ZoneService {
   /// Of the newest event that drivers were told; 0 without one. As Sequence.
   std::uint64_t AnnouncedSequence() const { return announced_; }
   ZoneStatistics Statistics() const;
+  /// The streets that the zone knows; null: none. They do not change.
+  const streets::StreetMap* streets() const { return config_.streets.get(); }
 
  private:
   using Slot = HazardRegistry::Slot;

@@ -1,6 +1,7 @@
 #include "zone/service/zone_state.h"
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "common/error.h"
 
@@ -34,8 +35,13 @@ void ZoneState::Load() {
   damage += store.LoadTrust([this](std::uint64_t vehicle, const TrustRecord& record) {
     if (!trust.Restore(vehicle, record)) throw Error("a vehicle's trust is no such record");
   });
-  damage += store.LoadHazards([this](const ZoneStore::HazardRow& row) {
+  std::unordered_map<std::uint64_t, double> courses;
+  damage += store.LoadCourses(
+      [&](std::uint64_t id, double course_rad) { courses.emplace(id, course_rad); });
+  damage += store.LoadHazards([&](const ZoneStore::HazardRow& row) {
     Hazard hazard = row.hazard;
+    const auto course = courses.find(row.id);
+    if (course != courses.end()) hazard.course_rad = course->second;
     // A store of before the catalogue ruled may hold any names.
     hazard.class_name = hazards.HeadingOf(hazard.class_name);
     hazards.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));

@@ -109,6 +109,11 @@ void ZoneTransaction::NameHazard(Slot slot, const std::string& reported_class) {
   reported_classes_[slot] = protocol::Trimmed(reported_class);
 }
 
+void ZoneTransaction::KeepCourse(Slot slot, double course_rad) {
+  state_.hazards.SetCourse(slot, course_rad);
+  courses_[slot] = course_rad;
+}
+
 void ZoneTransaction::RecordMapChangeEvent(MapChangeEvent event) {
   ++sequence_;
   map_change_events_.push_back(std::move(event));
@@ -140,6 +145,9 @@ void ZoneTransaction::Write() {
     const auto reported = reported_classes_.find(slot);
     if (reported != reported_classes_.end()) row.hazard.class_name = reported->second;
     store.WriteHazard(row);
+  }
+  for (const auto& [slot, course_rad] : courses_) {
+    store.WriteCourse(state_.hazards.Record(slot).id, course_rad);
   }
   for (std::size_t i = 0; i < hazard_events_.size(); ++i) {
     store.WriteEvent(hazard_events_[i], places_[i].hazard_id, places_[i].previous_sequence);

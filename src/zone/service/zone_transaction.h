@@ -82,6 +82,8 @@ class ZoneTransaction {
   /// A new hazard was reported under this name, whatever the catalogue calls it now: the store
   /// keeps the name, so that one start with a wrong catalogue loses none.
   void NameHazard(Slot slot, const std::string& reported_class);
+  /// The hazard is passed in this direction: in memory and in the store.
+  void KeepCourse(Slot slot, double course_rad);
   /// The event, whose sequence was `sequence() + 1`.
   void RecordMapChangeEvent(MapChangeEvent event);
 
@@ -126,6 +128,7 @@ class ZoneTransaction {
   std::vector<PictureChange> pictures_;
   std::vector<Slot> touched_;                              ///< Repeats until it is written.
   std::map<Slot, std::string> reported_classes_;           ///< Of new hazards.
+  std::map<Slot, double> courses_;                         ///< Of hazards that had none.
   std::map<std::string, LearnedLifetime> learned_before_;  ///< By class.
   std::map<std::uint64_t, TrustRecord> trust_before_;      ///< By vehicle.
   std::vector<AcceptedReport> reports_;

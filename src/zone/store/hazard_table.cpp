@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::int16_t kReporterWeight1000 = 1000;  // A voice of which only a report is known.
 
+constexpr double kMaxCourseRad = 2 * M_PI;
+
 constexpr char kSoundHazard[] =
     "typeof(uuid) = 'text' AND length(CAST(uuid AS BLOB)) = 36 AND "
     "typeof(class_name) = 'text' AND length(CAST(class_name AS BLOB)) <= 64 AND "
@@ -105,7 +107,12 @@ HazardTable::HazardTable(soci::session& session)
            soci::use(row_.last_seen_ns), soci::use(row_.updated_ns), soci::use(row_.sequence),
            soci::use(row_.announced_sequence), soci::use(row_.image_sha256),
            soci::use(row_.image_format), soci::use(row_.state), soci::use(row_.presence),
-           soci::use(row_.vehicles), soci::use(row_.life))) {}
+           soci::use(row_.vehicles), soci::use(row_.life))),
+      write_course_((session.prepare
+                         << "INSERT INTO hazard_courses (hazard_id, course_rad) VALUES (:i, :c) "
+                            "ON CONFLICT (hazard_id) DO UPDATE SET "
+                            "course_rad = excluded.course_rad",
+                     soci::use(row_.id), soci::use(row_.course_rad))) {}
 
 ZoneStore::HazardRow HazardTable::ToHazard(const Row& row) {
   ZoneStore::HazardRow result;
@@ -192,6 +199,30 @@ StoreDamage HazardTable::Load(const std::function<void(ZoneStore::HazardRow)>& t
       }
       take(std::move(hazard));
     });
+  });
+}
+
+StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, double)>& take) {
+  return ExplainStore("loading the courses of hazards", [&] {
+    long long id = 0;
+    double course_rad = 0;
+    soci::statement query =
+        (session_.prepare << "SELECT hazard_id, course_rad FROM hazard_courses WHERE "
+                             "typeof(course_rad) IN ('real', 'integer')",
+         soci::into(id), soci::into(course_rad));
+    return LoadRows(session_, "hazard_courses", query, [&] {
+      const bool sound = id >= 1 && id <= kMaxRowId && std::abs(course_rad) <= kMaxCourseRad;
+      if (!sound) throw Error("hazard " + std::to_string(id) + " has a course that is none");
+      take(static_cast<std::uint64_t>(id), course_rad);
+    });
+  });
+}
+
+void HazardTable::WriteCourse(std::uint64_t hazard_id, double course_rad) {
+  ExplainStore("writing the course of a hazard", [&] {
+    row_.id = static_cast<long long>(hazard_id);
+    row_.course_rad = std::remainder(course_rad, kMaxCourseRad);
+    write_course_.execute(true);
   });
 }
 

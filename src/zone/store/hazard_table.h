@@ -21,17 +21,19 @@ class HazardTable {
   HazardTable(const HazardTable&) = delete;
   HazardTable& operator=(const HazardTable&) = delete;
 
-  /// See ZoneStore::LoadHazards, LastHazardId and WriteHazard.
+  /// See ZoneStore::LoadHazards, LoadCourses, LastHazardId, WriteHazard and WriteCourse.
   StoreDamage Load(const std::function<void(ZoneStore::HazardRow)>& take);
+  StoreDamage LoadCourses(const std::function<void(std::uint64_t, double)>& take);
   std::uint64_t LastId();
   void Write(const ZoneStore::HazardRow& hazard);
+  void WriteCourse(std::uint64_t hazard_id, double course_rad);
 
  private:
   /// SOCI binds to places, not to values.
   struct Row {
     std::string uuid, class_name, image_sha256, image_format, life;
     double confidence = 0, latitude = 0, longitude = 0, presence = 0;
-    double covariance_ee = 0, covariance_en = 0, covariance_nn = 0;
+    double covariance_ee = 0, covariance_en = 0, covariance_nn = 0, course_rad = 0;
     long long id = 0, sightings = 0, first_seen_ns = 0, last_seen_ns = 0, updated_ns = 0;
     long long sequence = 0, announced_sequence = 0;
     int state = 0, vehicles = 0;
@@ -44,6 +46,7 @@ class HazardTable {
   soci::session& session_;
   Row row_;
   soci::statement write_;
+  soci::statement write_course_;
 };
 
 }  // namespace livemap::zone

@@ -266,6 +266,16 @@ const Statements& ZoneSchemaToVersion5() {
   return kStatements;
 }
 
+/// In which direction hazards are passed. Hazards of before have none.
+const Statements& ZoneSchemaToVersion6() {
+  static const Statements kStatements{
+      R"(CREATE TABLE IF NOT EXISTS hazard_courses (
+           hazard_id INTEGER PRIMARY KEY,
+           course_rad DOUBLE PRECISION NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (6)"};
+  return kStatements;
+}
+
 int ZoneSchemaVersion(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -288,7 +298,7 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
   }
   const std::array<const Statements*, kZoneSchemaVersion> steps{
       &ZoneSchemaToVersion1(), &ZoneSchemaToVersion2(), &ZoneSchemaToVersion3(),
-      &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5()};
+      &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5(), &ZoneSchemaToVersion6()};
   for (int step = version; step < kZoneSchemaVersion; ++step) {
     soci::transaction transaction(session);
     for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;

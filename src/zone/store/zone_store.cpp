@@ -95,6 +95,10 @@ StoreDamage ZoneStore::LoadHazards(const std::function<void(HazardRow)>& take) {
   return implementation_->hazards_.Load(take);
 }
 
+StoreDamage ZoneStore::LoadCourses(const std::function<void(std::uint64_t, double)>& take) {
+  return implementation_->hazards_.LoadCourses(take);
+}
+
 StoreDamage ZoneStore::LoadLives(
     const std::function<void(const std::string&, LearnedLifetime)>& take) {
   return implementation_->learned_.LoadLives(take);
@@ -192,6 +196,10 @@ void ZoneStore::Rollback() noexcept {
 }
 
 void ZoneStore::WriteHazard(const HazardRow& row) { implementation_->hazards_.Write(row); }
+
+void ZoneStore::WriteCourse(std::uint64_t hazard_id, double course_rad) {
+  implementation_->hazards_.WriteCourse(hazard_id, course_rad);
+}
 
 void ZoneStore::WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                             const std::string& image_sha256, std::int64_t received_ns) {

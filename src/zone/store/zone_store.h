@@ -54,9 +54,11 @@ class ZoneStore {
     PresenceRecord life;
   };
   /// Every hazard, in ascending order of sequence. One of an older schema gets a life that says
-  /// what that schema knew. What the three Load functions give to `take` is sound; a row that the
+  /// what that schema knew. What the four Load functions give to `take` is sound; a row that the
   /// program cannot have written, or for which `take` throws Error, is left out and told.
   StoreDamage LoadHazards(const std::function<void(HazardRow)>& take);
+  /// The directions in which hazards are passed, by id of the hazard, radians clockwise from north.
+  StoreDamage LoadCourses(const std::function<void(std::uint64_t, double)>& take);
   StoreDamage LoadLives(const std::function<void(const std::string&, LearnedLifetime)>& take);
   StoreDamage LoadTrust(const std::function<void(std::uint64_t, const TrustRecord&)>& take);
   /// The greatest id that a row of a hazard has, sound or not; 0 without rows. What lies beyond the
@@ -122,6 +124,8 @@ class ZoneStore {
 
   /// Adds the hazard, or replaces the row of the same id, which keeps its class's name.
   void WriteHazard(const HazardRow& row);
+  /// Adds the course, or replaces that of the same hazard.
+  void WriteCourse(std::uint64_t hazard_id, double course_rad);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                    const std::string& image_sha256, std::int64_t received_ns);
   /// `previous_sequence`: of the hazard's event before; 0 without one.

@@ -92,5 +92,24 @@ TEST(CouldSee, AWildTrackEndsInBoundedTime) {
   EXPECT_FALSE(CouldSee(track, 50 * kSecond, {0.001, 179}));
 }
 
+TEST(VehicleTrackTest, TheCourseOfAPassIsThatOfTheNearestMomentInMotion) {
+  const geo::LocalFrame frame({40.44, -79.94});
+  const auto point = [&](double at_s, double north_m, double course_rad, double speed_mps) {
+    return TrackPoint{static_cast<std::int64_t>(at_s * 1e9), frame.ToGeo({0, north_m}), course_rad,
+                      speed_mps};
+  };
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<TrackPoint> turning{point(0, 0, 0.1, 10), point(1, 10, 0.5, 10),
+                                        point(2, 20, 0.9, 0.2)};
+  EXPECT_EQ(CourseAt(turning, 200'000'000), 0.1);
+  EXPECT_EQ(CourseAt(turning, 1'900'000'000), 0.5);
+  EXPECT_TRUE(std::isnan(CourseAt(turning, 60'000'000'000)));
+  EXPECT_TRUE(std::isnan(CourseAt({}, 0)));
+  // Without a course, by the way driven; a vehicle that stands has none.
+  EXPECT_NEAR(CourseAt({point(0, 0, unknown, 3), point(2, -6, unknown, 3)}, 1'000'000'000), M_PI,
+              1e-6);
+  EXPECT_TRUE(std::isnan(CourseAt({point(0, 0, unknown, 0), point(2, 0.5, unknown, 0)}, 0)));
+}
+
 }  // namespace
 }  // namespace livemap::zone
