@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <fstream>
+#include <utility>
 
 #include "geo/wgs84.h"
 
@@ -21,7 +22,7 @@ std::vector<std::uint8_t> OnePixelPng() {
           0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
 }
 
-ZoneFixture::ZoneFixture() {
+ZoneFixture::ZoneFixture(std::shared_ptr<const streets::StreetMap> streets) {
   catalogue = protocol::HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
   zone::ZoneService::Config config;
   config.speed.max_speed_mps = 1e9;  // Reports of one vehicle lie all over the town.
@@ -30,6 +31,7 @@ ZoneFixture::ZoneFixture() {
   config.max_hazards_by_one_vehicle = 1'000'000;
   config.directory = folder_.path();
   config.catalogue = catalogue;
+  config.streets = std::move(streets);
   zone = std::make_unique<zone::ZoneService>(
       config, [this] { return now_ns.load(); }, 1);
 }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "protocol/hazard_catalogue.h"
+#include "streets/street_map.h"
 #include "web/server/web_server.h"
 #include "zone/service/zone_service.h"
 
@@ -50,7 +51,8 @@ class ZoneFixture {
  public:
   static constexpr std::int64_t kStartNs = 1'767'225'600'000'000'000;  // 2026-01-01T00:00:00Z
 
-  ZoneFixture();
+  /// `streets`: those that the zone knows; null: none.
+  explicit ZoneFixture(std::shared_ptr<const streets::StreetMap> streets = nullptr);
 
   /// A report that the zone accepts, without a picture.
   protocol::Report MakeReport(const std::string& class_name, const geo::GeoPoint& position);

@@ -42,6 +42,7 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       officials_(access_, zone, catalogue),
       hazards_(zone, catalogue),
       map_changes_(zone),
+      streets_(zone.streets()),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
                 {LimitsOf(options).max_bytes, options.picture_cache_bytes}),
@@ -188,6 +189,7 @@ HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& quest
   if (!is_decision && StartsWith(path, kMapChangeAddress)) {
     return sees.candidates ? map_changes_.Answer(target) : LogInFirst();
   }
+  if (path == kStreetAddress) return streets_.Answer(target, question);
   // Who has logged in may know who decided; while there are no accounts, everybody.
   if (path == "/api/v1/decisions") {
     return sees.vehicles ? officials_.Decisions(ParseDecisionsQuery(target)) : LogInFirst();
@@ -230,8 +232,12 @@ HttpResponse Api::PageConfig() const {
   config["tile_attribution"] = options_.tile_attribution;
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
   config["officials"] = access_.is_open();
+  config["streets"] = zone_.streets() != nullptr;
   config["view"] = nullptr;
-  if (const auto view = zone_.View()) {
+  auto view = zone_.View();
+  // A zone without hazards is still where its streets are.
+  if (!view) view = streets_.bounds();
+  if (view) {
     config["view"] = {{"south", view->south_west.latitude_deg},
                       {"west", view->south_west.longitude_deg},
                       {"north", view->north_east.latitude_deg},

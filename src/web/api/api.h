@@ -13,6 +13,7 @@
 #include "web/api/map_change_api.h"
 #include "web/api/official_api.h"
 #include "web/api/query.h"
+#include "web/api/street_api.h"
 #include "web/api/vehicle_trails.h"
 #include "web/http/http_message.h"
 #include "web/http/site.h"
@@ -77,6 +78,7 @@ class Api : public Site {
   OfficialApi officials_;
   const HazardApi hazards_;
   const MapChangeApi map_changes_;
+  const StreetApi streets_;
   zone::PictureCache pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;

@@ -47,8 +47,8 @@ void EventHub::Publish(const zone::ZoneEvent& event) {
   if (event.hazard) {
     message.sequence = event.hazard->hazard.sequence;
     message.is_told = event.hazard->announced;
-    message.text = std::make_shared<const std::string>(
-        ToText(HazardMessage(event.hazard->action, event.hazard->hazard, catalogue_)));
+    message.text = std::make_shared<const std::string>(ToText(
+        HazardMessage(event.hazard->action, event.hazard->hazard, catalogue_, zone_.streets())));
   } else if (event.map_change) {
     message.sequence = event.map_change->feature.sequence;
     message.text = std::make_shared<const std::string>(

@@ -7,9 +7,11 @@
 #include <string_view>
 #include <utility>
 
+#include "streets/street_place.h"
 #include "web/access/access.h"
 #include "web/api/collections.h"
 #include "web/json/json.h"
+#include "zone/model/hazard_spot.h"
 
 namespace livemap::web {
 namespace {
@@ -17,6 +19,9 @@ namespace {
 constexpr std::array<const char*, 11> kPointColumns{
     "id",         "latitude",  "longitude", "class",     "state",   "presence",
     "confidence", "sightings", "vehicles",  "updated_s", "sequence"};
+
+/// Further columns where the zone knows its streets.
+constexpr std::array<const char*, 3> kStreetColumns{"street", "near", "direction"};
 
 /// What a client should do that shows the states that the query asks for.
 zone::HazardAction ActionFor(const zone::Hazard& hazard, const HazardQuery& query) {
@@ -35,7 +40,7 @@ void AppendNumber(std::string& text, double number, int digits) {
 
 /// One line of the points, in the order of kPointColumns. Written by hand: a list has a hundred
 /// thousand of them.
-void AppendPoint(std::string& text, const zone::Hazard& hazard) {
+void AppendPoint(std::string& text, const zone::Hazard& hazard, const streets::StreetMap* streets) {
   text += "[\"";
   text += hazard.uuid.ToString();
   text += "\",";
@@ -53,7 +58,14 @@ void AppendPoint(std::string& text, const zone::Hazard& hazard) {
   text += ',' + std::to_string(hazard.sightings) + ',' + std::to_string(hazard.vehicles) + ',';
   const std::int64_t updated_ms = hazard.updated_ns / 1'000'000;
   AppendNumber(text, static_cast<double>(updated_ms) / 1000.0, 3);
-  text += ',' + std::to_string(hazard.sequence) + "]\n";
+  text += ',' + std::to_string(hazard.sequence);
+  if (streets != nullptr) {
+    const streets::StreetWords words = streets::DescribeSpot(*streets, zone::SpotOf(hazard));
+    for (const std::string& word : {words.street, words.near, words.direction}) {
+      text += ',' + (word.empty() ? "null" : ToText(word));
+    }
+  }
+  text += "]\n";
 }
 
 HttpResponse UnknownHazard() {
@@ -116,7 +128,7 @@ HttpResponse HazardApi::List(HazardQuery query, bool all) const {
     return page;
   };
   const auto to_feature = [this, query](const zone::Hazard& hazard) {
-    Json feature = HazardFeature(hazard, catalogue_);
+    Json feature = HazardFeature(hazard, catalogue_, zone_.streets());
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
     return feature;
   };
@@ -136,13 +148,16 @@ HttpResponse HazardApi::Points(PointsQuery query, bool all) const {
   Json header;
   header["sequence"] = walk.until;
   header["count"] = count;
-  header["columns"] = kPointColumns;
+  Json& columns = header["columns"] = kPointColumns;
+  if (zone_.streets() != nullptr) {
+    for (const char* name : kStreetColumns) columns.push_back(name);
+  }
   auto pieces = [this, walk = std::move(walk),
                  head = ToText(header) + "\n"](std::string& piece) mutable {
     piece += head;
     head.clear();
     const auto page = zone_.ReadHazards(walk, kItemsPerRead);
-    for (const zone::Hazard& hazard : page.items) AppendPoint(piece, hazard);
+    for (const zone::Hazard& hazard : page.items) AppendPoint(piece, hazard, zone_.streets());
     walk.after = page.sequence;
     return !page.is_last;
   };
@@ -152,7 +167,7 @@ HttpResponse HazardApi::Points(PointsQuery query, bool all) const {
 HttpResponse HazardApi::One(const std::string& id, bool all) const {
   const auto hazard = zone_.Find(ParseHazardId(id));
   if (!hazard || (!all && hazard->announced_sequence == 0)) return UnknownHazard();
-  Json feature = HazardFeature(*hazard, catalogue_);
+  Json feature = HazardFeature(*hazard, catalogue_, zone_.streets());
   feature["properties"]["active"] = zone::IsOnMap(hazard->state);
   return JsonAnswer(feature, "application/geo+json");
 }

@@ -88,7 +88,7 @@ HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::
                                     ? "the hazard is rejected already"
                                     : kHazardIsGone);
   }
-  return DecidedAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), *decided);
+  return DecidedAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_, zone_.streets()), *decided);
 }
 
 HttpResponse OfficialApi::UndoHazard(const std::string& id, const std::string& official,
@@ -97,7 +97,8 @@ HttpResponse OfficialApi::UndoHazard(const std::string& id, const std::string& o
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   const auto undone = zone_.Undo(*uuid, official, body.reason, body.decision_id);
   if (auto refusal = WhyNotUndone(undone, "hazard", kHazardIsGone)) return *std::move(refusal);
-  return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_), "application/geo+json");
+  return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_, zone_.streets()),
+                    "application/geo+json");
 }
 
 HttpResponse OfficialApi::DecideMapChange(const DecisionTarget& target, const std::string& official,

@@ -228,6 +228,40 @@ MapChangeQuery ParseMapChangeQuery(const RequestTarget& target) {
                   zone::MapChangeState::kUndone, zone::MapChangeState::kDismissed});
 }
 
+StreetQuery ParseStreetQuery(const RequestTarget& target) {
+  constexpr std::uint64_t kMaxZoom = 22;
+  constexpr double kMaxPx = 2048;
+  RefuseRepeated(target);
+  StreetQuery query;
+  bool has_box = false;
+  bool has_zoom = false;
+  for (const auto& [name, value] : target.parameters) {
+    if (name == "bbox") {
+      query.box = ParseBox(value);
+      has_box = true;
+    } else if (name == "zoom") {
+      const auto zoom = WholeNumber(value);
+      if (!zoom || *zoom > kMaxZoom) {
+        throw BadRequest("zoom is " + Quoted(value) + ", accepted is a whole number from 0 to 22");
+      }
+      query.zoom = static_cast<int>(*zoom);
+      has_zoom = true;
+    } else {
+      RefuseUnknown(name, "accepted are bbox and zoom");
+    }
+  }
+  if (!has_box || !has_zoom) throw BadRequest("bbox and zoom must both be given");
+  const auto& [south_west, north_east] = query.box;
+  const double px_deg = 360 / (256 * std::pow(2, query.zoom));
+  const double width_deg = north_east.longitude_deg - south_west.longitude_deg;
+  const double height_deg = north_east.latitude_deg - south_west.latitude_deg;
+  if (width_deg < 0 || std::max(width_deg, height_deg) > kMaxPx * px_deg) {
+    throw BadRequest("bbox is too wide for the zoom, accepted are boxes of at most " +
+                     std::to_string(kMaxPx * px_deg) + " degrees that do not cross 180 degrees");
+  }
+  return query;
+}
+
 std::size_t ParseEventsQuery(const RequestTarget& target) {
   RefuseRepeated(target);
   std::size_t limit = 100;

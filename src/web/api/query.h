@@ -75,6 +75,17 @@ struct MapChangeQuery {
 /// As ParseHazardQuery; states are proposed, confirmed, undone and dismissed.
 MapChangeQuery ParseMapChangeQuery(const RequestTarget& target);
 
+/// What `GET /api/v1/streets` asks for.
+struct StreetQuery {
+  geo::GeoBox box;  ///< West <= east.
+  int zoom = 0;     ///< Of web maps: the world is 256 * 2^zoom pixels wide.
+};
+
+/// Reads `bbox` and `zoom` (0 to 22), both of which must be given. Throws BadRequest, too, for a
+/// box across the antimeridian and for one of more than 2048 pixels of that zoom in width or
+/// height.
+StreetQuery ParseStreetQuery(const RequestTarget& target);
+
 /// The most events of a hazard that one answer may hold.
 constexpr std::size_t kMaxEventsPerAnswer = 1000;
 

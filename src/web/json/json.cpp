@@ -7,6 +7,9 @@
 #include <cstdio>
 #include <ctime>
 
+#include "streets/street_place.h"
+#include "zone/model/hazard_spot.h"
+
 namespace livemap::web {
 namespace {
 
@@ -17,6 +20,19 @@ Json Coordinates(const geo::GeoPoint& position) {
 Json ImageUrl(const zone::Hazard& hazard) {
   if (hazard.image_sha256.empty()) return nullptr;
   return "/images/" + hazard.image_sha256;
+}
+
+Json TextOrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+/// Where on the streets it lies; what is not known is null, and `street_note` says why.
+void AddStreet(const zone::Hazard& hazard, const streets::StreetMap* streets, Json& properties) {
+  streets::StreetWords words;
+  words.note = "the zone has no street file";
+  if (streets != nullptr) words = streets::DescribeSpot(*streets, zone::SpotOf(hazard));
+  properties["street"] = TextOrNull(words.street);
+  properties["near"] = TextOrNull(words.near);
+  properties["direction"] = TextOrNull(words.direction);
+  properties["street_note"] = TextOrNull(words.note);
 }
 
 }  // namespace
@@ -84,7 +100,8 @@ zone::HazardAction ReplayAction(const zone::Hazard& hazard) {
   return hazard.sightings <= 1 ? zone::HazardAction::kAdded : zone::HazardAction::kUpdated;
 }
 
-Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& catalogue) {
+Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& catalogue,
+                   const streets::StreetMap* streets) {
   Json feature = PointFeature(hazard.uuid.ToString(), hazard.position);
   Json& properties = feature["properties"];
   properties["id"] = hazard.uuid.ToString();
@@ -99,6 +116,7 @@ Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& 
   properties["last_seen"] = Rfc3339(hazard.last_seen_ns);
   properties["updated"] = Rfc3339(hazard.updated_ns);
   properties["position_sigma_m"] = PositionSigma(hazard.covariance_m2);
+  AddStreet(hazard, streets, properties);
   properties["image"] = ImageUrl(hazard);
   properties["sequence"] = hazard.sequence;
   return feature;
@@ -116,12 +134,12 @@ Json EventJson(const zone::StoredEvent& event) {
 }
 
 Json HazardMessage(zone::HazardAction action, const zone::Hazard& hazard,
-                   const protocol::HazardCatalogue& catalogue) {
+                   const protocol::HazardCatalogue& catalogue, const streets::StreetMap* streets) {
   Json message;
   message["type"] = "hazard";
   message["action"] = ActionName(action);
   message["sequence"] = hazard.sequence;
-  message["feature"] = HazardFeature(hazard, catalogue);
+  message["feature"] = HazardFeature(hazard, catalogue, streets);
   return message;
 }
 

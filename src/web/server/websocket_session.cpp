@@ -208,7 +208,7 @@ WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequenc
     if (hazard.sequence > end) break;
     if (!sees_.candidates && hazard.announced_sequence == 0) continue;
     messages[hazard.sequence] =
-        Shared(HazardMessage(ReplayAction(hazard), hazard, live_.catalogue));
+        Shared(HazardMessage(ReplayAction(hazard), hazard, live_.catalogue, live_.zone.streets()));
   }
   for (const zone::MapChangeFeature& change : changes.items) {
     if (change.sequence > end || !sees_.candidates) break;
