@@ -42,3 +42,9 @@ export function percent(share) {
 export function plural(count, singular, many = `${singular}s`) {
   return `${count.toLocaleString('en')} ${count === 1 ? singular : many}`;
 }
+
+/** Where on the streets a hazard lies: "Forbes Ave, near S Craig St, eastbound"; empty where nothing is
+ * known of it. */
+export function streetText({ street, near, bound }) {
+  return [street, near && `near ${near}`, bound].filter(Boolean).join(', ');
+}

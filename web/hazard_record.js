@@ -23,6 +23,10 @@ export function hazardOf(feature) {
     sigma: properties.position_sigma_m,
     image: properties.image,
     sequence: properties.sequence,
+    street: properties.street,
+    near: properties.near,
+    bound: properties.direction,
+    streetNote: properties.street_note,
   };
 }
 
@@ -45,6 +49,9 @@ export function hazardsOf({ columns, rows }, labelOf) {
       vehicles: row[at.vehicles],
       updated: 1000 * row[at.updated_s],
       sequence: row[at.sequence],
+      street: row[at.street],
+      near: row[at.near],
+      bound: row[at.direction],
     };
   });
 }

@@ -19,6 +19,7 @@ import { askToLogIn, session, startSession } from './session.js';
 import { Sheet } from './panel/sheet.js';
 import { unitBox } from './layers/sign_layer.js';
 import { whenStill } from './layers/still_map.js';
+import { StreetLayer } from './layers/street_layer.js';
 import { VehicleLayer } from './layers/vehicle_layer.js';
 import { ZoneData } from './zone_data.js';
 import { getJson } from './zone_lists.js';
@@ -42,6 +43,11 @@ function createMap(config) {
     new Graticule().addTo(map);
     map.getContainer().classList.add('without-tiles');
   }
+  if (config.streets) {
+    new StreetLayer(map);
+    map.getContainer().classList.add('with-streets');
+    map.addControl(new AttributionText('\u00a9 OpenStreetMap contributors'));
+  }
   L.control.zoom({ position: 'bottomright' }).addTo(map);
   L.control.scale({ position: 'bottomleft', maxWidth: 140 }).addTo(map);
   return map;
@@ -53,10 +59,10 @@ class Page {
     this.catalogue = new Catalogue(classes);
     this.sheet = new Sheet();
     this.map = map;
-    this.vehicles = new VehicleLayer(this.map, !config.tile_url,
+    this.vehicles = new VehicleLayer(this.map, !config.tile_url && !config.streets,
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
-      (hazard) => popupContent(hazard, this.catalogue,
+      (hazard) => popupContent(hazard, this.catalogue, config.streets,
         [this.history.section(hazard), ...this.officials.buttons(hazard)]),
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());

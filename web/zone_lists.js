@@ -13,6 +13,15 @@ export async function getJson(path) {
   return answer.json();
 }
 
+/** The streets of a box [west, south, east, north] in degrees at a zoom: GeoJSON. They change only with
+ * the zone's file, so the browser may keep them for a while. */
+export async function getStreets(box, zoom) {
+  const path = `/api/v1/streets?bbox=${box.join(',')}&zoom=${zoom}`;
+  const answer = await fetch(addressOf(path), { signal: AbortSignal.timeout(PATIENCE_MS) });
+  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+  return answer.json();
+}
+
 /** All map changes that are on the map: {sequence, features}. With `none` there are none to be seen,
  * up to any sequence. */
 export async function loadChanges(none = false) {

@@ -2,7 +2,7 @@
 // rows that one sees, and some around them, are in the document.
 
 import { byId, element, oneAtATime, setText } from '../dom.js';
-import { ago, percent, plural, utcTime } from '../format.js';
+import { ago, percent, plural, streetText, utcTime } from '../format.js';
 import { REJECTED, stateLabel } from '../hazard_state.js';
 
 /** As --row in style.css. */
@@ -35,8 +35,10 @@ function fill(row, hazard) {
   row.badge.classList.toggle('hollow', hazard.state === 'candidate');
   row.badge.classList.toggle('struck', hazard.state === REJECTED.name);
   const state = hazard.state === 'active' ? '' : `${stateLabel(hazard.state)} \u00b7 `;
-  setText(row.facts,
-    `${state}${plural(hazard.sightings, 'report')} \u00b7 ${percent(hazard.confidence)} sure`);
+  const known = `${plural(hazard.sightings, 'report')} \u00b7 ${percent(hazard.confidence)} sure`;
+  const where = streetText(hazard);
+  setText(row.facts, `${state}${where || known}`);
+  row.facts.title = where ? `${where} \u00b7 ${known}` : '';
 }
 
 export class HazardList {
@@ -49,6 +51,7 @@ export class HazardList {
     this.list = byId('hazard-list');
     this.count = byId('list-count');
     this.note = byId('list-note');
+    this.search = byId('list-search');
     this.fresh = new Set();
     this.rows = new Map();
     this.length = 0;
@@ -59,6 +62,10 @@ export class HazardList {
     this.list.addEventListener('click', (event) => {
       const row = event.target.closest('button');
       if (row) onChoose(this.rows.get(row.dataset.hazard).hazard);
+    });
+    this.search.addEventListener('input', () => {
+      this.list.scrollTop = 0;
+      this.refresh();
     });
     this.list.addEventListener('keydown', (event) => this.onKey(event));
     this.list.addEventListener('scroll', () => this.refresh());
@@ -74,7 +81,8 @@ export class HazardList {
     const first = Math.max(0, Math.floor(this.list.scrollTop / ROW_PX) - SPARE_ROWS);
     const seen = Math.ceil(this.list.clientHeight / ROW_PX);
     this.render(await this.data.ask('rows', 'hazards', {
-      offset: first, limit: seen + 2 * SPARE_ROWS, box: this.box(), wanted: this.anchor(),
+      offset: first, limit: seen + 2 * SPARE_ROWS, box: this.box(), text: this.search.value,
+      wanted: this.anchor(),
     }));
   }
 
@@ -206,7 +214,7 @@ export class HazardList {
       return;
     }
     const { index } = await this.data.ask('rows', 'hazards',
-      { offset: 0, limit: 0, box: this.box(), wanted: id });
+      { offset: 0, limit: 0, box: this.box(), text: this.search.value, wanted: id });
     if (index >= 0) this.focusIndex(index);
     else this.list.focus({ preventScroll: true });
   }
@@ -221,5 +229,5 @@ function place(row, index) {
 
 function noteText(shown, total) {
   if (total === 0) return 'No hazards yet. They appear here the moment a vehicle reports one.';
-  return shown === 0 ? 'No hazard matches the filters here.' : '';
+  return shown === 0 ? 'No hazard matches the search and filters here.' : '';
 }

@@ -2,7 +2,7 @@
 
 import { addressOf } from '../address.js';
 import { element } from '../dom.js';
-import { localTime, percent, plural, position, utcTime } from '../format.js';
+import { localTime, percent, plural, position, streetText, utcTime } from '../format.js';
 import { REJECTED, stateLabel, stateMeaning } from '../hazard_state.js';
 
 /** A hazard remembers so many vehicles. */
@@ -97,14 +97,23 @@ function bar(share) {
   return [meter, percent(share)];
 }
 
+/** What is known of the street, and why something is not; nothing in a zone without streets. */
+function streetRows(hazard, hasStreets) {
+  if (!hasStreets) return [];
+  const note = hazard.streetNote ? [element('span', { class: 'meaning' }, hazard.streetNote)] : [];
+  const unknown = hazard.streetNote === undefined ? '\u2026' : 'Not known';
+  return [['Street', streetText(hazard) || unknown, ...note]];
+}
+
 /** The popup's content as a detached element; `extras` are what people can do with the hazard.
  * Lists know less of a hazard than it has: what is undefined is shown when it has come. */
-export function popupContent(hazard, catalogue, extras) {
+export function popupContent(hazard, catalogue, hasStreets, extras) {
   const sigma = Number.isFinite(hazard.sigma) ? ` \u00b1 ${hazard.sigma.toFixed(1)} m` : '';
   const state = element('span', { class: `state state-${hazard.state}` }, stateLabel(hazard.state));
   const isRejected = hazard.state === REJECTED.name;
   const rows = [
     ['State', state, element('span', { class: 'meaning' }, stateMeaning(hazard.state))],
+    ...streetRows(hazard, hasStreets),
     ['Position', element('span', { class: 'copyable' },
       position(hazard.latitude, hazard.longitude)), sigma],
     // Its line is kept until it has come, so that the popup does not grow under the mouse.

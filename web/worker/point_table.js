@@ -6,6 +6,13 @@ import { unitX, unitY } from '../mercator.js';
 
 const FIRST_CAPACITY = 1024;
 
+/** Whether every one of `words`, in small letters, stands in what one knows of the record. */
+function holds(record, words) {
+  const { label, className, street, near, bound } = record;
+  const text = `${label} ${className} ${street ?? ''} ${near ?? ''} ${bound ?? ''}`.toLowerCase();
+  return words.every((word) => text.includes(word));
+}
+
 function grown(array, capacity) {
   const larger = new array.constructor(capacity);
   larger.set(array);
@@ -123,16 +130,18 @@ export class PointTable {
   }
 
   /** The shown ones, the newest first, from number `offset` on at most `limit`; in the `box` of
-   * units ({west, east, north, south}) where one is given. `index` is the place of the record
-   * `wanted`, -1 where it is not among them. */
-  rows({ offset, limit, box = null, wanted = null }) {
+   * units ({west, east, north, south}) where one is given, and with every word of `text`. `index` is
+   * the place of the record `wanted`, -1 where it is not among them. */
+  rows({ offset, limit, box = null, text = '', wanted = null }) {
     const rows = [];
+    const words = text.toLowerCase().split(/\s+/).filter((word) => word !== '');
     const wantedSlot = this.slots.get(wanted) ?? -1;
     let index = -1;
     let count = 0;
     for (let i = 0; i < this.size; i += 1) {
       const slot = this.order[i];
       if (!this.isShown(slot) || (box && this.shiftInto(box, slot) === null)) continue;
+      if (words.length > 0 && !holds(this.records[slot], words)) continue;
       if (slot === wantedSlot) index = count;
       if (count >= offset && rows.length < limit) rows.push(this.records[slot]);
       count += 1;

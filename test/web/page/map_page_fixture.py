@@ -33,8 +33,8 @@ HANG_S = 40  # Bounds a hang; no test measures speed by it.
 class ZoneProcess:
     """The C++ server; `do` sends one command and returns its answer."""
 
-    def __init__(self):
-        self.process = subprocess.Popen([OPTIONS.server], stdin=subprocess.PIPE,
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen([OPTIONS.server, *arguments], stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
         started = self.read()
         self.port, self.token = started["port"], started["token"]
@@ -116,6 +116,7 @@ def stop_browser(browser):
 class MapPage(unittest.TestCase):
     size = (1280, 800)
     dark = False
+    server_arguments = ()
 
     @classmethod
     def setUpClass(cls):
@@ -123,7 +124,7 @@ class MapPage(unittest.TestCase):
         cls.addClassCleanup(stop_browser, cls.browser)
 
     def setUp(self):
-        self.zone = ZoneProcess()
+        self.zone = ZoneProcess(*self.server_arguments)
         self.addCleanup(self.zone.close)
         self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
         self.browser.get_log("browser")

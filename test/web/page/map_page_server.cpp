@@ -1,5 +1,6 @@
-// A real zone and its real web server for the browser tests and for pictures of the page. It takes
-// one JSON command per line on standard input and answers each with one line of JSON:
+// A real zone and its real web server for the browser tests and for pictures of the page. Its one
+// argument, if any, is the zone's street file. It takes one JSON command per line on standard input
+// and answers each with one line of JSON:
 //
 //   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
 //                                                                       -> {"id", "status",
@@ -27,11 +28,13 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "accounts/account_store.h"
 #include "common/clock.h"
 #include "common/error.h"
+#include "streets/street_file.h"
 #include "test/web/zone_fixture.h"
 
 namespace {
@@ -72,7 +75,8 @@ constexpr char kPassword[] = "correct horse battery";
 
 class Session {
  public:
-  Session() {
+  explicit Session(std::shared_ptr<const livemap::streets::StreetMap> streets)
+      : fixture_(std::move(streets)) {
     options_ = livemap::web::TestOptions();
     options_.token_file = tokens_.path();
     Start();
@@ -246,9 +250,14 @@ class Session {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
   try {
-    Session session;
+    std::shared_ptr<const livemap::streets::StreetMap> streets;
+    if (argc > 1) {
+      streets = std::make_shared<const livemap::streets::StreetMap>(
+          livemap::streets::ReadStreetFile(argv[1]));
+    }
+    Session session(std::move(streets));
     std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
               << std::endl;
     std::string line;
