@@ -5,12 +5,14 @@
 #include <livemap/ReportReceipt.h>
 
 #include <chrono>
+#include <memory>
 #include <random>
 #include <utility>
 
 #include "common/clock.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
+#include "streets/street_file.h"
 
 namespace livemap::nodes {
 namespace {
@@ -24,6 +26,23 @@ constexpr std::chrono::milliseconds kTellPause{50};
 /// After a failed commit; the vehicles send the reports again anyway.
 constexpr std::chrono::seconds kStorePause{1};
 
+/// With the streets of its file, where it names one. Throws Error for a file that is refused.
+ros_io::ZoneCloudletConfig WithStreets(ros_io::ZoneCloudletConfig config) {
+  if (config.streets.empty()) return config;
+  const std::int64_t begin_ns = SteadyNs();
+  const auto map =
+      std::make_shared<const streets::StreetMap>(streets::ReadStreetFile(config.streets));
+  const streets::StreetMap::Counters& left_out = map->counters();
+  ROS_INFO(
+      "%zu streets with %zu segments from '%s' in %.0f MB and %.1f s; left out: %zu missing nodes, "
+      "%zu segments that are too long, %zu nodes beyond 85 degrees",
+      map->streets(), map->segments(), config.streets.c_str(),
+      static_cast<double>(map->bytes()) / 1e6, static_cast<double>(SteadyNs() - begin_ns) / 1e9,
+      left_out.missing_nodes, left_out.long_segments, left_out.off_range);
+  config.zone.streets = map;
+  return config;
+}
+
 zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
   zone::ZoneInbox::Config limits;
   limits.max_reports = static_cast<std::size_t>(config.queue_reports);
@@ -36,7 +55,7 @@ zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
 
 ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
                    ros_io::ZoneCloudletConfig config)
-    : config_(std::move(config)),
+    : config_(WithStreets(std::move(config))),
       // Never simulated time: a store outlives any replay.
       zone_(config_.zone, SystemNs, EntropySeededGenerator()()),
       inbox_(InboxLimits(config_)),

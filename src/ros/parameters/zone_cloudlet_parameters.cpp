@@ -271,6 +271,16 @@ void ReadZonePolls(ParameterReader& parameters, zone::ZoneService::Config& zone)
                   "Time by which an answer's stamp may be off.", "s");
 }
 
+void ReadZoneStreets(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  parameters.Section("The streets that the zone knows",
+                     "docs/how-to/show-streets.md. Made by others, from OpenStreetMap.");
+  parameters.Read("streets", config.streets,
+                  "Path of an extract of OpenStreetMap with the zone's streets (.osm.pbf or .osm). "
+                  "Hazards get the names of their streets, those of the two carriageways of a "
+                  "street are kept apart, and the live map draws the streets. Empty: none of "
+                  "this. zone.launch sets it by the argument `streets`.");
+}
+
 void ReadZoneMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
   parameters.Section("rviz");
   parameters.Read("map_frame", config.map_frame, "Frame of hazard/markers: x east, y north.");
@@ -379,6 +389,7 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   ReadZoneCatchUp(parameters, config);
   ReadZoneLife(parameters, config.zone);
   ReadZonePolls(parameters, config.zone);
+  ReadZoneStreets(parameters, config);
   ReadZoneMarkers(parameters, config);
   ReadZoneWeb(parameters, package_path, config);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
