@@ -1,5 +1,6 @@
 // The live map's page: puts map, panel and live feed together.
 
+import { addressOf } from './address.js';
 import { Catalogue } from './catalogue.js';
 import { ClassFilter, StateFilter } from './panel/class_filter.js';
 import { ChangeView } from './panel/change_view.js';
@@ -30,14 +31,20 @@ const STATES = { connecting: 'Connecting', live: 'Live', offline: 'Reconnecting'
 /** The zone looks so rarely anew where most hazards are. */
 const VIEW_AGE_MS = 11000;
 
+function hasTiles(config) {
+  return config.tile_url !== null || config.tiles !== null;
+}
+
 function createMap(config) {
   const map = L.map('map', {
     attributionControl: false, zoomControl: false, maxZoom: 21, minZoom: 3, zoomSnap: 0.5,
   });
   const [longitude, latitude] = config.centre;
   map.setView([latitude, longitude], 14);
-  if (config.tile_url) {
-    L.tileLayer(config.tile_url, { maxZoom: 21, maxNativeZoom: 19 }).addTo(map);
+  if (hasTiles(config)) {
+    const { min_zoom: least, max_zoom: most } = config.tiles ?? { min_zoom: 0, max_zoom: 19 };
+    L.tileLayer(config.tile_url ?? `${addressOf('/tiles/')}{z}/{x}/{y}`,
+      { maxZoom: 21, minZoom: least, maxNativeZoom: most }).addTo(map);
     if (config.tile_attribution) map.addControl(new AttributionText(config.tile_attribution));
   } else {
     new Graticule().addTo(map);
@@ -59,7 +66,7 @@ class Page {
     this.catalogue = new Catalogue(classes);
     this.sheet = new Sheet();
     this.map = map;
-    this.vehicles = new VehicleLayer(this.map, !config.tile_url && !config.streets,
+    this.vehicles = new VehicleLayer(this.map, !hasTiles(config) && !config.streets,
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue, config.streets,

@@ -108,8 +108,8 @@ StreetKind StreetLines::LeastKindAt(int zoom) {
   if (zoom >= 15) return StreetKind::kService;
   if (zoom >= 13) return StreetKind::kResidential;
   if (zoom >= 12) return StreetKind::kTertiary;
-  if (zoom >= 10) return StreetKind::kSecondary;
-  return zoom >= 8 ? StreetKind::kPrimary : StreetKind::kTrunk;
+  if (zoom >= 11) return StreetKind::kSecondary;
+  return zoom >= 9 ? StreetKind::kPrimary : StreetKind::kTrunk;
 }
 
 std::vector<std::uint32_t> StreetLines::RunsIn(const Level& level, const Run& box) const {

@@ -31,8 +31,8 @@ class StreetLines {
   explicit StreetLines(const StreetMap& map);
 
   /// The least important kind of street that is drawn at a zoom of web maps (the world is
-  /// 256 * 2^zoom pixels wide): motorways and trunks always, primary ones from 8 on, secondary from
-  /// 10, tertiary from 12, residential from 13, service from 15.
+  /// 256 * 2^zoom pixels wide): motorways and trunks always, primary ones from 9 on, secondary from
+  /// 11, tertiary from 12, residential from 13, service from 15.
   static StreetKind LeastKindAt(int zoom);
 
   /// The lines that touch the box, which may not cross the antimeridian, of the kinds of that zoom,

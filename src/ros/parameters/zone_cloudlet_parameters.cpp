@@ -316,6 +316,9 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("tile_attribution", web.tile_attribution,
                   "Credit that the tiles' provider asks for. zone.launch sets it by the argument "
                   "`tile_attribution`.");
+  parameters.Read("tiles", web.tile_file,
+                  "Path of a file of raster map tiles (.mbtiles), in place of tile_url. Empty: "
+                  "none. zone.launch sets it by the argument `tiles`.");
   parameters.Read("web_title", web.title, "Title of the page.");
   parameters.Read("web_threads", web.threads, {1, 64}, "Number of threads of the web server.");
   parameters.Read("web_max_connections", web.max_connections, {1, 100000},

@@ -1,6 +1,7 @@
 #include "web/api/api.h"
 
 #include "common/error.h"
+#include "common/sha256.h"
 #include "web/http/page_answer.h"
 #include "web/json/json.h"
 #include "zone/pictures/picture_recoder.h"
@@ -11,6 +12,9 @@ namespace {
 constexpr std::string_view kSessionAddress = "/api/v1/session";
 constexpr std::string_view kImagePrefix = "/images/";
 constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
+constexpr std::string_view kTilePrefix = "/tiles/";
+/// Even opened on its own it may do nothing.
+constexpr const char* kPicturePolicy = "default-src 'none'; sandbox";
 
 bool StartsWith(std::string_view text, std::string_view prefix) {
   return text.substr(0, prefix.size()) == prefix;
@@ -49,7 +53,9 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       page_(options.web_root),
       leaflet_(options.leaflet_root + "/leaflet"),
       page_policy_(PagePolicy(TileSource(options.tile_url))),
-      picture_queue_(pictures_, {}) {}
+      picture_queue_(pictures_, {}) {
+  if (!options_.tile_file.empty()) tiles_.emplace(options_.tile_file);
+}
 
 bool Api::AnswersLater(const HttpRequest& question) const {
   return StartsWith(question.target, kImagePrefix);
@@ -175,6 +181,10 @@ HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question
   if (StartsWith(path, kLeafletPrefix)) {
     return FileAnswer(leaflet_, std::string_view(path).substr(kLeafletPrefix.size()), question);
   }
+  if (StartsWith(path, kTilePrefix)) {
+    RefuseQueryParameters(target);
+    return Tile(path, question);
+  }
   if (path == "/") return FileAnswer(page_, "index.html", question);
   return FileAnswer(page_, std::string_view(path).substr(1), question);
 }
@@ -203,6 +213,18 @@ HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& quest
   return MakeErrorAnswer(404, "there is nothing at this address");
 }
 
+HttpResponse Api::Tile(const std::string& path, const HttpRequest& question) const {
+  const auto place = ParseTilePath(path);
+  const auto tile = place && tiles_ ? tiles_->Find(place->zoom, place->x, place->y) : std::nullopt;
+  if (!tile) return MakeErrorAnswer(404, "there is no tile at this address");
+  const std::string etag =
+      '"' + Sha256Hex(tile->content->data(), tile->content->size()).substr(0, 32) + '"';
+  HttpResponse answer =
+      CacheableAnswer(tile->content, tile->media_type, etag, "public, max-age=3600", question);
+  answer.headers.emplace_back("Content-Security-Policy", kPicturePolicy);
+  return answer;
+}
+
 HttpResponse Api::Vehicles() const {
   auto pieces = [this, last = std::string(), is_begun = false,
                  has_items = false](std::string& piece) mutable {
@@ -229,7 +251,11 @@ HttpResponse Api::PageConfig() const {
   Json config;
   config["title"] = options_.title;
   config["tile_url"] = options_.tile_url.empty() ? Json(nullptr) : Json(options_.tile_url);
-  config["tile_attribution"] = options_.tile_attribution;
+  const bool says_itself = tiles_ && options_.tile_attribution.empty();
+  config["tile_attribution"] = says_itself ? tiles_->attribution() : options_.tile_attribution;
+  config["tiles"] = nullptr;
+  if (tiles_)
+    config["tiles"] = {{"min_zoom", tiles_->min_zoom()}, {"max_zoom", tiles_->max_zoom()}};
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
   config["officials"] = access_.is_open();
   config["streets"] = zone_.streets() != nullptr;
@@ -253,8 +279,7 @@ HttpResponse Api::Picture(const std::string& sha256, const zone::PictureCache::F
   const std::string etag = '"' + sha256 + '-' + std::to_string(options_.picture_side_px) + '"';
   HttpResponse answer =
       CacheableAnswer(picture, "image/jpeg", etag, "public, max-age=31536000, immutable", question);
-  // Even opened on its own it may do nothing.
-  answer.headers.emplace_back("Content-Security-Policy", "default-src 'none'; sandbox");
+  answer.headers.emplace_back("Content-Security-Policy", kPicturePolicy);
   return answer;
 }
 

@@ -19,6 +19,7 @@
 #include "web/http/site.h"
 #include "web/http/static_files.h"
 #include "web/http/web_config.h"
+#include "web/tiles/tile_file.h"
 #include "zone/pictures/picture_cache.h"
 #include "zone/pictures/picture_queue.h"
 #include "zone/service/zone_service.h"
@@ -29,8 +30,8 @@ namespace livemap::web {
 /// (docs/reference/http-api.md). Thread-safe; never throws.
 class Api : public Site {
  public:
-  /// Keeps references to all but `options`. Throws Error when the token file or the accounts are
-  /// not accepted.
+  /// Keeps references to all but `options`. Throws Error when the token file, the accounts or the
+  /// file of tiles is not accepted.
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
@@ -61,6 +62,7 @@ class Api : public Site {
   HttpResponse AnswerPost(const HttpRequest& question);
   HttpResponse Route(const RequestTarget& target, const HttpRequest& question);
   HttpResponse RouteApi(const RequestTarget& target, const HttpRequest& question) const;
+  HttpResponse Tile(const std::string& path, const HttpRequest& question) const;
   HttpResponse Vehicles() const;
   HttpResponse PageConfig() const;
   /// The picture's hash and file; none when the request asks for another thing.
@@ -79,6 +81,7 @@ class Api : public Site {
   const HazardApi hazards_;
   const MapChangeApi map_changes_;
   const StreetApi streets_;
+  std::optional<TileFile> tiles_;
   zone::PictureCache pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;

@@ -56,6 +56,10 @@ void Validate(const WebConfig& options) {
   RequireFile("web_root", options.web_root, "index.html");
   RequireFile("leaflet_root", options.leaflet_root, "leaflet/leaflet.min.js");
   TileSource(options.tile_url);
+  if (!options.tile_url.empty() && !options.tile_file.empty()) {
+    throw Error("tile_url is '" + options.tile_url + "' and the file of tiles is '" +
+                options.tile_file + "', accepted is one of the two");
+  }
   if (!geo::IsValid(options.centre)) {
     throw Error("centre is " + std::to_string(options.centre.latitude_deg) + ", " +
                 std::to_string(options.centre.longitude_deg) +

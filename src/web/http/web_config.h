@@ -23,6 +23,7 @@ struct WebConfig {
   std::string leaflet_root = "/usr/share/javascript";  ///< Holds Debian's leaflet/.
   std::string tile_url;          ///< E.g. "https://tiles.example/{z}/{x}/{y}.png"; empty: offline.
   std::string tile_attribution;  ///< Plain text; most tile providers require it.
+  std::string tile_file;         ///< Raster tiles in one file (MBTiles), in place of tile_url.
   std::string title = "LiveMap";
   geo::GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".

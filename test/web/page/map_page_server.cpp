@@ -1,6 +1,6 @@
-// A real zone and its real web server for the browser tests and for pictures of the page. Its one
-// argument, if any, is the zone's street file. It takes one JSON command per line on standard input
-// and answers each with one line of JSON:
+// A real zone and its real web server for the browser tests and for pictures of the page. Its
+// arguments, if any, are the zone's street file and a file of tiles. It takes one JSON command per
+// line on standard input and answers each with one line of JSON:
 //
 //   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
 //                                                                       -> {"id", "status",
@@ -75,10 +75,11 @@ constexpr char kPassword[] = "correct horse battery";
 
 class Session {
  public:
-  explicit Session(std::shared_ptr<const livemap::streets::StreetMap> streets)
+  Session(std::shared_ptr<const livemap::streets::StreetMap> streets, std::string tile_file)
       : fixture_(std::move(streets)) {
     options_ = livemap::web::TestOptions();
     options_.token_file = tokens_.path();
+    options_.tile_file = std::move(tile_file);
     Start();
   }
 
@@ -257,7 +258,7 @@ int main(int argc, char** argv) {
       streets = std::make_shared<const livemap::streets::StreetMap>(
           livemap::streets::ReadStreetFile(argv[1]));
     }
-    Session session(std::move(streets));
+    Session session(std::move(streets), argc > 2 ? argv[2] : "");
     std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
               << std::endl;
     std::string line;

@@ -9,8 +9,11 @@ Skips as map_page_test.py does.
 import math
 import os
 import shutil
+import sqlite3
+import struct
 import sys
 import tempfile
+import zlib
 from xml.sax.saxutils import quoteattr
 
 from map_page_fixture import LAT, LON, MapPage, run_tests
@@ -57,14 +60,43 @@ def write_town(path):
         file.write(f'<osm version="0.6">{"".join(nodes)}{"".join(ways)}</osm>')
 
 
+def write_tiles(path):
+    """One picture for every tile around the town at the zooms 10 to 14, in a file as MBTiles defines it."""
+    def chunk(kind, content):
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+    rows = b"".join(b"\0" + (b"\x90\xb0\x88" * 255 + b"\x60\x80\x58") for _ in range(256))
+    png = (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 256, 256, 8, 2, 0, 0, 0))
+           + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE metadata (name TEXT, value TEXT)")
+    database.execute("CREATE TABLE tiles (zoom_level INTEGER, tile_column INTEGER, tile_row INTEGER, tile_data BLOB)")
+    database.executemany("INSERT INTO metadata VALUES (?, ?)", [
+        ("minzoom", "10"), ("maxzoom", "14"), ("attribution", SCRIPT + "The City")])
+    for zoom in range(10, 15):
+        count = 2 ** zoom
+        column = int((LON / 360 + 0.5) * count)
+        sine = math.sin(math.radians(LAT))
+        row = int((0.5 + math.log((1 + sine) / (1 - sine)) / (4 * math.pi)) * count)
+        database.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", [
+            (zoom, column + x, row + y, png) for x in range(-6, 7) for y in range(-6, 7)])
+    database.commit()
+    database.close()
+
+
 class Streets(MapPage):
+    has_tiles = False
+
     @classmethod
     def setUpClass(cls):
         folder = tempfile.mkdtemp(prefix="livemap_streets_")
         cls.addClassCleanup(shutil.rmtree, folder)
-        path = os.path.join(folder, "town.osm")
-        write_town(path)
-        cls.server_arguments = (path,)
+        paths = [os.path.join(folder, "town.osm")]
+        write_town(paths[0])
+        if cls.has_tiles:
+            paths.append(os.path.join(folder, "city.mbtiles"))
+            write_tiles(paths[1])
+        cls.server_arguments = paths
         super().setUpClass()
 
     def label(self):
@@ -135,6 +167,18 @@ class Desktop(Streets):
         search.clear()
         search.send_keys("westbound")
         self.wait(lambda: "westbound" in self.find(".hazard-list .row").text, "no westbound hazard")
+        self.assert_quiet()
+
+
+class Tiles(Streets):
+    has_tiles = True
+
+    def test_tiles_of_a_file_lie_under_the_streets(self):
+        self.open()
+        self.wait(lambda: self.count(".leaflet-tile-loaded") > 3 and "Street" in self.label(), "no tiles")
+        self.wait_for_text(".attribution", "The City")
+        self.assertEqual(self.count("img[src='x']"), 0)
+        self.picture("streets_tiles")
         self.assert_quiet()
 
 
