@@ -45,7 +45,6 @@ function createMap(config) {
     const { min_zoom: least, max_zoom: most } = config.tiles ?? { min_zoom: 0, max_zoom: 19 };
     L.tileLayer(config.tile_url ?? `${addressOf('/tiles/')}{z}/{x}/{y}`,
       { maxZoom: 21, minZoom: least, maxNativeZoom: most }).addTo(map);
-    if (config.tile_attribution) map.addControl(new AttributionText(config.tile_attribution));
   } else {
     new Graticule().addTo(map);
     map.getContainer().classList.add('without-tiles');
@@ -53,8 +52,10 @@ function createMap(config) {
   if (config.streets) {
     new StreetLayer(map);
     map.getContainer().classList.add('with-streets');
-    map.addControl(new AttributionText('\u00a9 OpenStreetMap contributors'));
   }
+  const credits = [hasTiles(config) && config.tile_attribution,
+    config.streets && '\u00a9 OpenStreetMap contributors'].filter(Boolean);
+  if (credits.length > 0) map.addControl(new AttributionText(credits.join(' \u00b7 ')));
   L.control.zoom({ position: 'bottomright' }).addTo(map);
   L.control.scale({ position: 'bottomleft', maxWidth: 140 }).addTo(map);
   return map;
