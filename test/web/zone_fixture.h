@@ -62,6 +62,9 @@ class ZoneFixture {
   /// Adds `count` hazards of `class_name` about 20 m apart, going north from `start`.
   void AddRow(const std::string& class_name, const geo::GeoPoint& start, std::size_t count);
 
+  /// File of the zone's database.
+  std::string database() const { return folder_.path() + "/zone.sqlite3"; }
+
   protocol::HazardCatalogue catalogue;
   std::atomic<std::int64_t> now_ns{kStartNs};
   std::unique_ptr<zone::ZoneService> zone;

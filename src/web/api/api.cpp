@@ -1,9 +1,14 @@
 #include "web/api/api.h"
 
+#include <utility>
+
+#include "common/clock.h"
 #include "common/error.h"
 #include "common/sha256.h"
+#include "common/time.h"
 #include "web/http/page_answer.h"
 #include "web/json/json.h"
+#include "web/metrics/metrics_text.h"
 #include "zone/pictures/picture_recoder.h"
 
 namespace livemap::web {
@@ -90,7 +95,19 @@ Api::PictureCounters Api::picture_counters() const {
   return {pictures_.refused(), pictures_.last_refusal(), picture_queue_.busy()};
 }
 
+void Api::TellServer(std::function<ServerMetrics()> server) {
+  const MutexLock lock(server_mutex_);
+  server_ = std::move(server);
+}
+
 HttpResponse Api::Answer(const HttpRequest& question) {
+  const std::int64_t begin_ns = SteadyNs();
+  HttpResponse answer = AnswerNow(question);
+  answer_times_.Add(Seconds(SteadyNs() - begin_ns));
+  return answer;
+}
+
+HttpResponse Api::AnswerNow(const HttpRequest& question) {
   HttpResponse answer;
   try {
     const bool is_read = question.method == "GET" || question.method == "HEAD";
@@ -173,6 +190,8 @@ HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question
   if (path == "/healthz") {
     return JsonAnswer({{"status", "ok"}, {"sequence", zone_.Sequence()}});
   }
+  if (path == "/readyz") return Readiness();
+  if (path == "/metrics") return Metrics();
   if (path == "/ws") {
     HttpResponse answer = MakeErrorAnswer(426, "this address speaks WebSocket only");
     answer.headers.emplace_back("Upgrade", "websocket");
@@ -223,6 +242,25 @@ HttpResponse Api::Tile(const std::string& path, const HttpRequest& question) con
       CacheableAnswer(tile->content, tile->media_type, etag, "public, max-age=3600", question);
   answer.headers.emplace_back("Content-Security-Policy", kPicturePolicy);
   return answer;
+}
+
+HttpResponse Api::Metrics() const {
+  ServerMetrics server;
+  {
+    const MutexLock lock(server_mutex_);
+    if (server_) server = server_();
+  }
+  server.answers = answer_times_.counts();
+  HttpResponse answer;
+  answer.content_type = kMetricsType;
+  answer.content = ZoneMetricsText(zone_, server);
+  answer.headers.emplace_back("Cache-Control", "no-store");
+  return answer;
+}
+
+HttpResponse Api::Readiness() const {
+  if (zone_.IsStoreWell()) return JsonAnswer({{"status", "ready"}});
+  return MakeBusyAnswer("the store does not keep what is written");
 }
 
 HttpResponse Api::Vehicles() const {

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "common/histogram.h"
+#include "common/mutex.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/access/access.h"
 #include "web/api/hazard_api.h"
@@ -19,6 +21,7 @@
 #include "web/http/site.h"
 #include "web/http/static_files.h"
 #include "web/http/web_config.h"
+#include "web/metrics/zone_metrics.h"
 #include "web/tiles/tile_file.h"
 #include "zone/pictures/picture_cache.h"
 #include "zone/pictures/picture_queue.h"
@@ -35,6 +38,8 @@ class Api : public Site {
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
       const VehicleTrails& trails);
 
+  /// From now on metrics tell what this says of the server, whose answers nobody else counts.
+  void TellServer(std::function<ServerMetrics()> server);
   /// Every request but a picture's, of which it knows none.
   HttpResponse Answer(const HttpRequest& question) override;
   /// Every request: a picture that is not made yet is answered later, from another thread.
@@ -58,11 +63,14 @@ class Api : public Site {
   PictureCounters picture_counters() const;
 
  private:
+  HttpResponse AnswerNow(const HttpRequest& question);
   HttpResponse AnswerGet(const HttpRequest& question);
   HttpResponse AnswerPost(const HttpRequest& question);
   HttpResponse Route(const RequestTarget& target, const HttpRequest& question);
   HttpResponse RouteApi(const RequestTarget& target, const HttpRequest& question) const;
   HttpResponse Tile(const std::string& path, const HttpRequest& question) const;
+  HttpResponse Metrics() const;
+  HttpResponse Readiness() const;
   HttpResponse Vehicles() const;
   HttpResponse PageConfig() const;
   /// The picture's hash and file; none when the request asks for another thing.
@@ -82,6 +90,9 @@ class Api : public Site {
   const MapChangeApi map_changes_;
   const StreetApi streets_;
   std::optional<TileFile> tiles_;
+  DurationHistogram answer_times_;
+  mutable Mutex server_mutex_;
+  std::function<ServerMetrics()> server_ GUARDED_BY(server_mutex_);
   zone::PictureCache pictures_;
   const StaticFiles page_;
   const StaticFiles leaflet_;

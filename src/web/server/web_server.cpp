@@ -15,9 +15,19 @@ class WebServer::Implementation {
       : hub_(zone, catalogue, trails_),
         api_(options, zone, catalogue, trails_),
         live_{zone, catalogue, hub_},
-        server_(options, api_, &live_) {}
+        server_(options, api_, &live_) {
+    api_.TellServer([this] {
+      const HttpServer::Counters counted = server_.counters();
+      return ServerMetrics{server_.connections(),
+                           counted.connections_ended,
+                           counted.connections_refused,
+                           counted.held_bytes,
+                           {}};
+    });
+  }
 
   ~Implementation() {
+    api_.TellServer({});
     hub_.Stop();  // The zone's threads must not call sessions that go away with the server.
     api_.Stop();  // Neither must what makes pictures.
   }

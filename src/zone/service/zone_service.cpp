@@ -5,8 +5,10 @@
 #include <thread>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "common/sqlite.h"
+#include "common/time.h"
 #include "protocol/text_rules.h"
 
 namespace livemap::zone {
@@ -61,8 +63,10 @@ void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
     transaction.Run(body);
   } catch (const StoreError&) {
     ++store_errors_;
+    store_well_ = false;
     throw;
   }
+  store_well_ = true;
   sequence_ = StateForReaders().sequence;
   announced_ = StateForReaders().announced;
 }
@@ -107,16 +111,29 @@ std::vector<protocol::Receipt> ZoneService::HandleBatch(
   {
     const WriterLock lock(data_mutex_);
     if (!batch.pending.empty()) {
+      const std::int64_t begin_ns = SteadyNs();
       Commit(transaction, [&] {
         writer_mutex_.AssertHeld();
         reports_.Apply(batch, transaction);
       });
+      commit_times_.Add(Seconds(SteadyNs() - begin_ns));
     }
     statistics_.Add(batch.counted);
   }
+  NoteAges(batch, transaction.now_ns());
   reports_.Close(batch, transaction.now_ns());
   FollowUp(transaction);
   return batch.TakeReceipts();
+}
+
+/// Stamps of a drive that is played back say nothing of how long reports take.
+void ZoneService::NoteAges(const ReportIntake::Batch& batch, std::int64_t now_ns) {
+  if (config_.replay) return;
+  for (const ReportIntake::PendingReport& pending : batch.pending) {
+    const auto& receipt = batch.receipts[pending.index];
+    if (!receipt || receipt->status != protocol::Receipt::Status::kCommitted) continue;
+    report_ages_.Add(Seconds(now_ns - (*batch.reports)[pending.index].stamp_ns));
+  }
 }
 
 std::vector<protocol::Receipt> ZoneService::HandleMapChanges(

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/histogram.h"
 #include "common/mutex.h"
 #include "common/sqlite.h"
 #include "geo/geo_box.h"
@@ -215,6 +216,13 @@ class ZoneService {
   /// Of the newest event that drivers were told; 0 without one. As Sequence.
   std::uint64_t AnnouncedSequence() const { return announced_; }
   ZoneStatistics Statistics() const;
+  /// Whether the store kept the newest transaction; true before the first one.
+  bool IsStoreWell() const { return store_well_; }
+  /// How long the transactions of reports took.
+  DurationHistogram::Counts commit_times() const { return commit_times_.counts(); }
+  /// Of committed reports, from their image's stamp to the commit. Not of drives that are played
+  /// back (ZoneConfig::replay).
+  DurationHistogram::Counts report_ages() const { return report_ages_.counts(); }
   /// The streets that the zone knows; null: none. They do not change.
   const streets::StreetMap* streets() const { return config_.streets.get(); }
 
@@ -244,6 +252,7 @@ class ZoneService {
   bool HasHeardOf(const std::string& vehicle_id) const REQUIRES(writer_mutex_);
   std::optional<geo::GeoBox> MakeView() const EXCLUDES(data_mutex_);
   void CountAnswer(bool accepted) EXCLUDES(data_mutex_);
+  void NoteAges(const ReportIntake::Batch& batch, std::int64_t now_ns);
 
   const ZoneConfig config_;
   const Clock now_ns_;
@@ -277,6 +286,9 @@ class ZoneService {
   std::atomic<std::uint64_t> vehicle_positions_{0};
   std::array<std::atomic<std::uint64_t>, kRefusalKinds> positions_refused_{};
   std::atomic<std::uint64_t> store_errors_{0};
+  std::atomic<bool> store_well_{true};
+  DurationHistogram commit_times_;
+  DurationHistogram report_ages_;
 
   // Collaborators on the state. Two of them have a function that wants no lock; for their other
   // functions the writer's lock is held, too.

@@ -1,0 +1,124 @@
+#include "web/metrics/zone_metrics.h"
+
+#include <array>
+
+#include "web/metrics/metrics_text.h"
+#include "zone/admission/report_validation.h"
+#include "zone/model/hazard_state.h"
+#include "zone/model/map_change_state.h"
+#include "zone/pictures/picture_allowance.h"
+
+namespace livemap::web {
+namespace {
+
+constexpr const char* kCounter = "counter";
+constexpr const char* kGauge = "gauge";
+
+void AddOne(MetricsText& text, const char* name, const char* type, const char* help, double value) {
+  text.Begin(name, type, help);
+  text.Add(value);
+}
+
+/// One sample per enumerator.
+template <typename Kind, typename Counts>
+void AddByKind(MetricsText& text, const char* label, const char* (*name_of)(Kind),
+               const Counts& counts) {
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    text.Add(label, name_of(static_cast<Kind>(i)), static_cast<double>(counts.at(i)));
+  }
+}
+
+void AddReports(MetricsText& text, const zone::ZoneStatistics& zone) {
+  text.Begin("livemap_reports_total", kCounter, "Reports of hazards, by what became of them.");
+  text.Add("outcome", "added", static_cast<double>(zone.added));
+  text.Add("outcome", "merged", static_cast<double>(zone.merged));
+  text.Add("outcome", "repeated", static_cast<double>(zone.repeated));
+  text.Add("outcome", "refused", static_cast<double>(zone.refused));
+  text.Add("outcome", "not_now", static_cast<double>(zone.not_now));
+  text.Begin("livemap_reports_refused_total", kCounter, "Reports refused for good, by reason.");
+  AddByKind(text, "reason", zone::RefusalName, zone.refused_by_kind);
+  text.Begin("livemap_map_change_reports_total", kCounter,
+             "Reports of map changes, by what became of them.");
+  text.Add("outcome", "added", static_cast<double>(zone.map_changes.added));
+  text.Add("outcome", "merged", static_cast<double>(zone.map_changes.merged));
+  text.Add("outcome", "denied", static_cast<double>(zone.map_changes.denied));
+  text.Add("outcome", "known", static_cast<double>(zone.map_changes.known));
+  text.Add("outcome", "repeated", static_cast<double>(zone.map_changes.repeated));
+  text.Add("outcome", "refused", static_cast<double>(zone.map_changes.refused));
+  text.Add("outcome", "not_now", static_cast<double>(zone.map_changes.not_now));
+}
+
+void AddVehicles(MetricsText& text, const zone::ZoneStatistics& zone) {
+  AddOne(text, "livemap_vehicle_positions_total", kCounter, "Positions of vehicles, accepted.",
+         static_cast<double>(zone.vehicle_positions));
+  text.Begin("livemap_vehicle_positions_refused_total", kCounter,
+             "Positions of vehicles that were refused, by reason.");
+  AddByKind(text, "reason", zone::RefusalName, zone.positions_refused_by_kind);
+  AddOne(text, "livemap_suspect_vehicles", kGauge, "Vehicles that do not count as witnesses.",
+         static_cast<double>(zone.suspect_vehicles));
+  AddOne(text, "livemap_polls_total", kCounter, "Questions put to vehicles.",
+         static_cast<double>(zone.polls));
+  text.Begin("livemap_poll_answers_total", kCounter, "Answers to them, by what became of them.");
+  text.Add("outcome", "counted", static_cast<double>(zone.answers));
+  text.Add("outcome", "refused", static_cast<double>(zone.answers_refused));
+}
+
+void AddMap(MetricsText& text, const zone::ZoneService& service, const zone::ZoneStatistics& zone) {
+  text.Begin("livemap_hazards", kGauge, "Hazards, by state.");
+  AddByKind(text, "state", zone::HazardStateName, zone.hazards_by_state);
+  text.Begin("livemap_map_changes", kGauge, "Map changes, by state.");
+  AddByKind(text, "state", zone::MapChangeStateName, zone.map_changes.by_state);
+  AddOne(text, "livemap_sequence", kGauge, "Number of the newest event.",
+         static_cast<double>(service.Sequence()));
+  AddOne(text, "livemap_picture_bytes", kGauge, "Pictures on disk.",
+         static_cast<double>(zone.image_bytes));
+  text.Begin("livemap_pictures_refused_total", kCounter,
+             "Pictures of accepted reports that were not kept, by reason.");
+  AddByKind(text, "reason", zone::PictureRefusalName, zone.pictures_refused);
+}
+
+void AddStore(MetricsText& text, const zone::ZoneService& service,
+              const zone::ZoneStatistics& zone) {
+  AddOne(text, "livemap_store_errors_total", kCounter, "Transactions that the store did not keep.",
+         static_cast<double>(zone.store_errors));
+  AddOne(text, "livemap_store_damaged_rows", kGauge, "Rows found broken at the start.",
+         static_cast<double>(zone.store_damage.rows));
+  AddOne(text, "livemap_ready", kGauge, "1 while the store keeps what is written, else 0.",
+         service.IsStoreWell() ? 1 : 0);
+  text.Begin("livemap_commit_seconds", "histogram", "Time that batches of reports take.");
+  text.Add(service.commit_times());
+  text.Begin("livemap_report_age_seconds", "histogram",
+             "Time from a report's image to its commit: drive, outbox, network and zone.");
+  text.Add(service.report_ages());
+}
+
+void AddServer(MetricsText& text, const ServerMetrics& server) {
+  AddOne(text, "livemap_web_connections", kGauge, "Open connections, live streams included.",
+         static_cast<double>(server.connections));
+  AddOne(text, "livemap_web_connections_ended_total", kCounter,
+         "Connections that had to make room for others.",
+         static_cast<double>(server.connections_ended));
+  AddOne(text, "livemap_web_connections_refused_total", kCounter,
+         "Connections for which there was no room.",
+         static_cast<double>(server.connections_refused));
+  AddOne(text, "livemap_web_held_bytes", kGauge, "Of answers that are being written.",
+         static_cast<double>(server.held_bytes));
+  text.Begin("livemap_web_answer_seconds", "histogram",
+             "Time until an answer begins, without pictures.");
+  text.Add(server.answers);
+}
+
+}  // namespace
+
+std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server) {
+  const zone::ZoneStatistics statistics = zone.Statistics();
+  MetricsText text;
+  AddReports(text, statistics);
+  AddVehicles(text, statistics);
+  AddMap(text, zone, statistics);
+  AddStore(text, zone, statistics);
+  AddServer(text, server);
+  return text.text();
+}
+
+}  // namespace livemap::web

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "common/histogram.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap::web {
+
+/// What the server itself counts.
+struct ServerMetrics {
+  std::size_t connections = 0;
+  std::uint64_t connections_ended = 0;
+  std::uint64_t connections_refused = 0;
+  std::uint64_t held_bytes = 0;
+  DurationHistogram::Counts answers;  ///< Time from a request to its answer, without pictures.
+};
+
+/// All metrics of the zone (docs/reference/metrics.md), in the text format of Prometheus. No metric
+/// names a vehicle or a place.
+std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server);
+
+}  // namespace livemap::web

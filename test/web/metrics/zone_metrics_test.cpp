@@ -1,0 +1,123 @@
+#include "web/metrics/zone_metrics.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "common/sqlite.h"
+#include "test/web/http/http_client.h"
+#include "test/web/zone_fixture.h"
+#include "web/metrics/metrics_text.h"
+#include "web/server/web_server.h"
+
+namespace livemap::web {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class ZoneMetricsTest : public testing::Test {
+ protected:
+  std::string Metrics() {
+    const HttpResult answer = Get(server_.port(), "/metrics");
+    EXPECT_EQ(answer.status, 200);
+    EXPECT_EQ(answer.Field("Content-Type"), kMetricsType);
+    return answer.body;
+  }
+
+  ZoneFixture fixture_;
+  WebServer server_{TestOptions(), *fixture_.zone, fixture_.catalogue};
+};
+
+TEST_F(ZoneMetricsTest, CountsReportsRefusalsAndAges) {
+  fixture_.AddRow("pothole", {40.44, -79.94}, 2);
+  protocol::Report late = fixture_.MakeReport("pothole", {40.44, -79.94});
+  late.stamp_ns -= 20'000'000'000;
+  fixture_.zone->Handle(late);
+  protocol::Report wrong = fixture_.MakeReport("pothole", {40.44, -79.94});
+  wrong.confidence = 2;
+  fixture_.zone->Handle(wrong);
+  const std::string metrics = Metrics();
+  EXPECT_THAT(metrics, HasSubstr("# TYPE livemap_reports_total counter\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_reports_total{outcome=\"added\"} 2\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_reports_total{outcome=\"merged\"} 1\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_reports_refused_total{reason=\"malformed\"} 1\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_hazards{state=\"candidate\"} 2\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_report_age_seconds_bucket{le=\"10\"} 2\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_report_age_seconds_bucket{le=\"30\"} 3\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_report_age_seconds_bucket{le=\"+Inf\"} 3\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_report_age_seconds_sum 20\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_web_connections 1\n"));
+  // No metric grows with what strangers send.
+  EXPECT_THAT(metrics, Not(HasSubstr("car-1")));
+}
+
+TEST_F(ZoneMetricsTest, EveryLineIsOfTheTextFormatAndEveryFamilyHasOneType) {
+  std::istringstream lines(Metrics());
+  const std::regex comment("# (HELP|TYPE) (livemap_[a-z_]+) .+");
+  const std::regex sample("(livemap_[a-z_]+)(\\{[a-z]+=\"[^\"]*\"\\})? [0-9.e+-]+");
+  std::set<std::string> typed;
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch parts;
+    const bool is_comment = std::regex_match(line, parts, comment);
+    EXPECT_TRUE(is_comment || std::regex_match(line, sample)) << line;
+    if (is_comment && parts[1] == "TYPE") {
+      EXPECT_TRUE(typed.insert(parts[2]).second) << line;
+    }
+  }
+  EXPECT_GT(typed.size(), 15U);
+}
+
+TEST_F(ZoneMetricsTest, TheDashboardAsksOnlyForMetricsThatThereAre) {
+  std::ifstream file(LIVEMAP_SOURCE_DIR "/config/grafana/livemap_zone.json");
+  const nlohmann::json dashboard = nlohmann::json::parse(file);
+  const std::string metrics = Metrics();
+  const std::regex name("livemap_[a-z_]+");
+  std::set<std::string> asked;
+  for (const auto& panel : dashboard["panels"]) {
+    for (const auto& target : panel["targets"]) {
+      const std::string query = target["expr"];
+      for (std::sregex_iterator found(query.begin(), query.end(), name), end; found != end;
+           ++found) {
+        asked.insert(found->str());
+      }
+    }
+  }
+  EXPECT_GT(asked.size(), 15U);
+  for (const std::string& metric : asked) {
+    const bool is_there = metrics.find('\n' + metric + ' ') != std::string::npos ||
+                          metrics.find('\n' + metric + '{') != std::string::npos;
+    EXPECT_TRUE(is_there) << metric;
+  }
+}
+
+TEST_F(ZoneMetricsTest, TheZoneIsReadyWhileItsStoreKeepsWhatIsWritten) {
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 200);
+  EXPECT_EQ(Get(server_.port(), "/readyz").Json()["status"], "ready");
+  SqliteDatabase saboteur(fixture_.database(), true);
+  saboteur.Execute(
+      "CREATE TRIGGER no_space BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'full'); END");
+  EXPECT_THROW(fixture_.AddRow("pothole", {40.44, -79.94}, 1), StoreError);
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 503);
+  EXPECT_THAT(Metrics(), HasSubstr("livemap_ready 0\n"));
+  EXPECT_THAT(Metrics(), HasSubstr("livemap_store_errors_total 1\n"));
+  saboteur.Execute("DROP TRIGGER no_space");
+  fixture_.AddRow("pothole", {40.44, -79.94}, 1);
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 200);
+}
+
+TEST(MetricsTextTest, EscapesValuesOfLabels) {
+  MetricsText text;
+  text.Begin("a", "gauge", "Help.");
+  text.Add("b", "c\"\\\n", 1.5);
+  EXPECT_EQ(text.text(), "# HELP a Help.\n# TYPE a gauge\na{b=\"c\\\"\\\\\\n\"} 1.5\n");
+}
+
+}  // namespace
+}  // namespace livemap::web
