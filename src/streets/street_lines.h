@@ -42,25 +42,57 @@ class StreetLines {
   const StreetMap& map() const { return map_; }
 
  private:
-  /// Segments of one street that follow each other, with the box around them in 1e-7 degrees.
+  /// In 1e-7 degrees.
+  struct Box {
+    std::int32_t south = INT32_MAX;
+    std::int32_t west = INT32_MAX;
+    std::int32_t north = INT32_MIN;
+    std::int32_t east = INT32_MIN;
+
+    void Include(const Box& other);
+  };
+  /// Segments of one street that follow each other.
   struct Run {
     std::uint32_t first;
     std::uint32_t count;
-    std::int32_t south, west, north, east;
+    Box box;
   };
-  /// The runs of one kind by place.
-  struct Level {
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> cells;  ///< Key and run, sorted.
-    std::vector<std::uint32_t> large;                            ///< Runs over very many cells.
+  /// Runs of one name and class that go on in each other: mappers cut streets into short ways, and
+  /// from afar a line with two points for each of them is far too much.
+  struct Chain {
+    std::uint32_t begin;  ///< In parts_.
+    std::uint32_t end;
+    Box box;
   };
+  /// A run of a chain and whether it is passed against its order.
+  struct Part {
+    std::uint32_t run;
+    bool reversed;
+  };
+  /// What lies where, by number.
+  struct Index {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> cells;  ///< Key and number, sorted.
+    std::vector<std::uint32_t> large;                            ///< Over very many cells.
+
+    void Add(std::uint32_t number, const Box& box);
+    void Sort();
+    /// Those that may lie in a box, each once.
+    std::vector<std::uint32_t> In(const Box& box) const;
+  };
+  /// Which end of which run goes on at an end of a run; by 2 * run + (1 for its last node).
+  using Joints = std::vector<std::uint32_t>;
 
   void AddRun(std::uint32_t first, std::uint32_t end);
-  std::vector<std::uint32_t> RunsIn(const Level& level, const Run& box) const;
-  StreetLine LineOf(const Run& run, double tolerance_deg) const;
+  Joints FindJoints() const;
+  void AddChains();
+  void AddPoints(const Run& run, bool reversed, std::vector<geo::GeoPoint>& points) const;
 
   const StreetMap& map_;
   std::vector<Run> runs_;
-  std::vector<Level> levels_;  ///< By StreetKind.
+  std::vector<Index> run_index_;  ///< By StreetKind.
+  std::vector<Chain> chains_;     ///< Of the classes that are drawn from afar.
+  std::vector<Part> parts_;
+  std::vector<Index> chain_index_;  ///< By StreetKind.
 };
 
 }  // namespace livemap::streets

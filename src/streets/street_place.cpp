@@ -20,6 +20,8 @@ constexpr double kNearlyAsLikely = 2;     // Log likelihood.
 constexpr double kAlongRad = 60 * geo::kRadiansPerDegree;
 constexpr double kOppositeRad = 120 * geo::kRadiansPerDegree;
 constexpr double kCrossingReachM = 400;
+constexpr double kAtCrossingM = 50;
+constexpr double kHouseReachM = 40;
 constexpr std::size_t kMaxCrossingNodes = 300;
 
 struct Candidate {
@@ -105,9 +107,13 @@ bool IsFurther(const ReachedNode& a, const ReachedNode& b) {
   return a.way_m != b.way_m ? a.way_m > b.way_m : a.node > b.node;
 }
 
-/// The name of the street that crosses next, along the street in both directions.
-std::string NearestCrossing(const StreetMap& map, const geo::GeoPoint& place,
-                            std::uint32_t segment) {
+struct Crossing {
+  std::string name;  // Of the street that crosses; empty: there is none.
+  double way_m = 0;
+};
+
+/// The street that crosses next, along the street in both directions.
+Crossing NearestCrossing(const StreetMap& map, const geo::GeoPoint& place, std::uint32_t segment) {
   const std::uint32_t street = map.SegmentAt(segment).street;
   const std::uint32_t name = map.StreetOf(segment).name;
   std::vector<ReachedNode> open;
@@ -125,7 +131,7 @@ std::string NearestCrossing(const StreetMap& map, const geo::GeoPoint& place,
     seen.push_back(here.node);
     const std::vector<std::uint32_t> at = map.SegmentsAt(here.node);
     for (const std::uint32_t next : at) {
-      if (IsNameOfOther(map, next, name)) return map.NameOf(map.StreetOf(next));
+      if (IsNameOfOther(map, next, name)) return {map.NameOf(map.StreetOf(next)), here.way_m};
     }
     for (const std::uint32_t next : at) {
       const StreetMap::Segment& ends = map.SegmentAt(next);
@@ -137,7 +143,7 @@ std::string NearestCrossing(const StreetMap& map, const geo::GeoPoint& place,
       std::push_heap(open.begin(), open.end(), IsFurther);
     }
   }
-  return "";
+  return {};
 }
 
 const char* BoundFor(double bearing_rad) {
@@ -182,7 +188,7 @@ bool LieOnOppositeCarriageways(const StreetMap& map, const Carriageway& a, const
          AngleBetween(a.bearing_rad, b.bearing_rad) > kOppositeRad;
 }
 
-StreetWords DescribeSpot(const StreetMap& map, const Spot& spot) {
+StreetWords DescribeSpot(const StreetMap& map, const Spot& spot, const AddressMap* addresses) {
   StreetWords words;
   const std::optional<Carriageway> on = FindCarriageway(map, spot);
   if (!on) {
@@ -190,7 +196,12 @@ StreetWords DescribeSpot(const StreetMap& map, const Spot& spot) {
     return words;
   }
   words.street = map.NameOf(map.StreetOf(on->travel.segment));
-  words.near = NearestCrossing(map, spot.place, on->travel.segment);
+  const Crossing crossing = NearestCrossing(map, spot.place, on->travel.segment);
+  words.near = crossing.name;
+  if (addresses != nullptr && (crossing.name.empty() || crossing.way_m > kAtCrossingM)) {
+    const std::string house = addresses->NumberNear(spot.place, words.street, kHouseReachM);
+    if (!house.empty()) words.near = "no. " + house;
+  }
   if (on->is_directed && on->is_certain) {
     words.direction = BoundFor(on->bearing_rad);
   } else {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "geo/wgs84.h"
+#include "streets/address_map.h"
 #include "streets/street_map.h"
 
 namespace livemap::streets {
@@ -36,13 +37,15 @@ bool LieOnOppositeCarriageways(const StreetMap& map, const Carriageway& a, const
 /// A place in people's words: "Forbes Ave", near "S Craig St", "eastbound".
 struct StreetWords {
   std::string street;     ///< Empty where it lies on no street, or on one without a name.
-  std::string near;       ///< The nearest street that crosses it; empty where there is none.
+  std::string near;       ///< The nearest street that crosses it, or house: "no. 4200"; or empty.
   std::string direction;  ///< "northbound", "eastbound", "southbound", "westbound" or empty.
   std::string note;       ///< Why the street, else the direction, is not known; empty: they are.
 };
 
-/// Describes where a spot lies. A crossing counts within 400 m along the street. `direction` is the
-/// street's at the place, by the quarter of the compass in which it lies.
-StreetWords DescribeSpot(const StreetMap& map, const Spot& spot);
+/// Describes where a spot lies. A crossing within 50 m along the street counts first, then the
+/// nearest house of the street within 40 m where `addresses` are given, then a crossing within 400
+/// m. `direction` is the street's at the place, by the quarter of the compass in which it lies.
+StreetWords DescribeSpot(const StreetMap& map, const Spot& spot,
+                         const AddressMap* addresses = nullptr);
 
 }  // namespace livemap::streets

@@ -4,6 +4,7 @@
 
 #include <set>
 #include <string>
+#include <vector>
 
 namespace livemap::streets {
 namespace {
@@ -70,6 +71,43 @@ TEST_F(StreetLinesTest, WhatIsTooMuchEndsWithTheLessImportant) {
   EXPECT_TRUE(cut.is_truncated);
   EXPECT_EQ(Names(lines_, cut), (std::multiset<std::string>{"Home St", "M 1"}));
   EXPECT_FALSE(lines_.Find(town_, 13, 6).is_truncated);
+}
+
+/// Of ways between nodes 1, 2, ... along a parallel, 0.01 degrees apart.
+StreetMap DrawnWays(const std::vector<std::vector<std::int64_t>>& ways, bool one_way) {
+  StreetMapBuilder builder;
+  Street street;
+  street.kind = StreetKind::kPrimary;
+  street.backward = !one_way;
+  for (const std::vector<std::int64_t>& nodes : ways) builder.AddStreet(street, "Main", nodes);
+  for (int node = 1; node <= 9; ++node) builder.SetPlace(node, {40.44, -80 + 0.01 * node});
+  return builder.Build();
+}
+
+std::size_t LinesFromAfar(const std::vector<std::vector<std::int64_t>>& ways, bool one_way) {
+  const StreetMap map = DrawnWays(ways, one_way);
+  return StreetLines(map).Find(map.Bounds(), 9, kMany).lines.size();
+}
+
+TEST_F(StreetLinesTest, FromAfarWaysThatGoOnInEachOtherAreOneLine) {
+  // In any order and direction.
+  const StreetMap map = DrawnWays({{1, 2}, {3, 2}, {3, 4, 5}, {6, 5}}, false);
+  const StreetLines lines(map);
+  const auto drawn = lines.Find(map.Bounds(), 9, kMany).lines;
+  ASSERT_EQ(drawn.size(), 1U);
+  ASSERT_EQ(drawn[0].points.size(), 2U);
+  EXPECT_NEAR(drawn[0].points.front().longitude_deg, -79.99, 1e-9);
+  EXPECT_NEAR(drawn[0].points.back().longitude_deg, -79.94, 1e-9);
+  EXPECT_EQ(lines.Find(map.Bounds(), 14, kMany).lines.size(), 4U);
+}
+
+TEST_F(StreetLinesTest, LinesAreNotJoinedWhereThreeMeetOrAgainstAOneWayStreet) {
+  EXPECT_EQ(LinesFromAfar({{1, 2}, {2, 3}}, true), 1U);
+  EXPECT_EQ(LinesFromAfar({{1, 2}, {3, 2}}, true), 2U);
+  EXPECT_EQ(LinesFromAfar({{1, 2}, {2, 3}, {2, 9}}, false), 3U);
+  // A ring is a line, too, and one way that is a ring is not joined to itself.
+  EXPECT_EQ(LinesFromAfar({{1, 2}, {2, 3}, {3, 1}}, false), 1U);
+  EXPECT_EQ(LinesFromAfar({{1, 2, 3, 1}}, false), 1U);
 }
 
 TEST_F(StreetLinesTest, BoundsHoldAllSegments) {

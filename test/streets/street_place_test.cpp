@@ -84,6 +84,17 @@ TEST_F(StreetPlaceTest, NamesNoCrossingThatIsFarAlongTheStreet) {
   EXPECT_EQ(far.near, "");
 }
 
+TEST_F(StreetPlaceTest, NamesAHouseWhereNoCrossingIsAtHand) {
+  AddressMapBuilder builder;
+  builder.SetPlace(1, frame_.ToGeo({150, 15}), "Forbes Ave", "4200");
+  builder.SetPlace(2, frame_.ToGeo({145, 5}), "S Craig St", "7");
+  builder.SetPlace(3, frame_.ToGeo({20, 15}), "Forbes Ave", "4000");
+  const AddressMap houses = builder.Build();
+  EXPECT_EQ(DescribeSpot(map_, At(148, 2, kEast), &houses).near, "no. 4200");
+  EXPECT_EQ(DescribeSpot(map_, At(20, 2, kEast), &houses).near, "S Craig St");
+  EXPECT_EQ(DescribeSpot(map_, At(240, 2, kEast), &houses).near, "S Bellefield Ave");
+}
+
 TEST_F(StreetPlaceTest, SaysWhyADirectionIsNotKnown) {
   const StreetWords unknown = Describe(60, 2, kUnknown);
   EXPECT_EQ(unknown.street, "Forbes Ave");
