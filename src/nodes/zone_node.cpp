@@ -12,6 +12,7 @@
 #include "common/clock.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
+#include "streets/address_file.h"
 #include "streets/street_file.h"
 
 namespace livemap::nodes {
@@ -40,6 +41,10 @@ ros_io::ZoneCloudletConfig WithStreets(ros_io::ZoneCloudletConfig config) {
       static_cast<double>(map->bytes()) / 1e6, static_cast<double>(SteadyNs() - begin_ns) / 1e9,
       left_out.missing_nodes, left_out.long_segments, left_out.off_range);
   config.zone.streets = map;
+  config.zone.addresses =
+      std::make_shared<const streets::AddressMap>(streets::ReadAddresses(config.streets));
+  ROS_INFO("%zu house numbers in %.0f MB", config.zone.addresses->size(),
+           static_cast<double>(config.zone.addresses->bytes()) / 1e6);
   return config;
 }
 

@@ -47,8 +47,9 @@ void EventHub::Publish(const zone::ZoneEvent& event) {
   if (event.hazard) {
     message.sequence = event.hazard->hazard.sequence;
     message.is_told = event.hazard->announced;
-    message.text = std::make_shared<const std::string>(ToText(
-        HazardMessage(event.hazard->action, event.hazard->hazard, catalogue_, zone_.streets())));
+    message.text = std::make_shared<const std::string>(
+        ToText(HazardMessage(event.hazard->action, event.hazard->hazard, catalogue_,
+                             zone_.WordsOf(event.hazard->hazard))));
   } else if (event.map_change) {
     message.sequence = event.map_change->feature.sequence;
     message.text = std::make_shared<const std::string>(

@@ -11,7 +11,6 @@
 #include "web/access/access.h"
 #include "web/api/collections.h"
 #include "web/json/json.h"
-#include "zone/model/hazard_spot.h"
 
 namespace livemap::web {
 namespace {
@@ -40,7 +39,7 @@ void AppendNumber(std::string& text, double number, int digits) {
 
 /// One line of the points, in the order of kPointColumns. Written by hand: a list has a hundred
 /// thousand of them.
-void AppendPoint(std::string& text, const zone::Hazard& hazard, const streets::StreetMap* streets) {
+void AppendPoint(std::string& text, const zone::Hazard& hazard) {
   text += "[\"";
   text += hazard.uuid.ToString();
   text += "\",";
@@ -59,13 +58,13 @@ void AppendPoint(std::string& text, const zone::Hazard& hazard, const streets::S
   const std::int64_t updated_ms = hazard.updated_ns / 1'000'000;
   AppendNumber(text, static_cast<double>(updated_ms) / 1000.0, 3);
   text += ',' + std::to_string(hazard.sequence);
-  if (streets != nullptr) {
-    const streets::StreetWords words = streets::DescribeSpot(*streets, zone::SpotOf(hazard));
-    for (const std::string& word : {words.street, words.near, words.direction}) {
-      text += ',' + (word.empty() ? "null" : ToText(word));
-    }
+}
+
+/// The same of kStreetColumns.
+void AppendWords(std::string& text, const streets::StreetWords& words) {
+  for (const std::string* word : {&words.street, &words.near, &words.direction}) {
+    text += ',' + (word->empty() ? "null" : ToText(*word));
   }
-  text += "]\n";
 }
 
 HttpResponse UnknownHazard() {
@@ -128,7 +127,7 @@ HttpResponse HazardApi::List(HazardQuery query, bool all) const {
     return page;
   };
   const auto to_feature = [this, query](const zone::Hazard& hazard) {
-    Json feature = HazardFeature(hazard, catalogue_, zone_.streets());
+    Json feature = HazardFeature(hazard, catalogue_, zone_.WordsOf(hazard));
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
     return feature;
   };
@@ -157,7 +156,11 @@ HttpResponse HazardApi::Points(PointsQuery query, bool all) const {
     piece += head;
     head.clear();
     const auto page = zone_.ReadHazards(walk, kItemsPerRead);
-    for (const zone::Hazard& hazard : page.items) AppendPoint(piece, hazard, zone_.streets());
+    for (const zone::Hazard& hazard : page.items) {
+      AppendPoint(piece, hazard);
+      if (zone_.streets() != nullptr) AppendWords(piece, zone_.WordsOf(hazard));
+      piece += "]\n";
+    }
     walk.after = page.sequence;
     return !page.is_last;
   };
@@ -167,7 +170,7 @@ HttpResponse HazardApi::Points(PointsQuery query, bool all) const {
 HttpResponse HazardApi::One(const std::string& id, bool all) const {
   const auto hazard = zone_.Find(ParseHazardId(id));
   if (!hazard || (!all && hazard->announced_sequence == 0)) return UnknownHazard();
-  Json feature = HazardFeature(*hazard, catalogue_, zone_.streets());
+  Json feature = HazardFeature(*hazard, catalogue_, zone_.WordsOf(*hazard));
   feature["properties"]["active"] = zone::IsOnMap(hazard->state);
   return JsonAnswer(feature, "application/geo+json");
 }

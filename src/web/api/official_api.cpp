@@ -88,7 +88,8 @@ HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::
                                     ? "the hazard is rejected already"
                                     : kHazardIsGone);
   }
-  return DecidedAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_, zone_.streets()), *decided);
+  const zone::Hazard now = *zone_.Find(*uuid);
+  return DecidedAnswer(HazardFeature(now, catalogue_, zone_.WordsOf(now)), *decided);
 }
 
 HttpResponse OfficialApi::UndoHazard(const std::string& id, const std::string& official,
@@ -97,7 +98,8 @@ HttpResponse OfficialApi::UndoHazard(const std::string& id, const std::string& o
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
   const auto undone = zone_.Undo(*uuid, official, body.reason, body.decision_id);
   if (auto refusal = WhyNotUndone(undone, "hazard", kHazardIsGone)) return *std::move(refusal);
-  return JsonAnswer(HazardFeature(*zone_.Find(*uuid), catalogue_, zone_.streets()),
+  const zone::Hazard hazard = *zone_.Find(*uuid);
+  return JsonAnswer(HazardFeature(hazard, catalogue_, zone_.WordsOf(hazard)),
                     "application/geo+json");
 }
 

@@ -7,9 +7,6 @@
 #include <cstdio>
 #include <ctime>
 
-#include "streets/street_place.h"
-#include "zone/model/hazard_spot.h"
-
 namespace livemap::web {
 namespace {
 
@@ -24,11 +21,8 @@ Json ImageUrl(const zone::Hazard& hazard) {
 
 Json TextOrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-/// Where on the streets it lies; what is not known is null, and `street_note` says why.
-void AddStreet(const zone::Hazard& hazard, const streets::StreetMap* streets, Json& properties) {
-  streets::StreetWords words;
-  words.note = "the zone has no street file";
-  if (streets != nullptr) words = streets::DescribeSpot(*streets, zone::SpotOf(hazard));
+/// What is not known is null, and `street_note` says why.
+void AddStreet(const streets::StreetWords& words, Json& properties) {
   properties["street"] = TextOrNull(words.street);
   properties["near"] = TextOrNull(words.near);
   properties["direction"] = TextOrNull(words.direction);
@@ -101,7 +95,7 @@ zone::HazardAction ReplayAction(const zone::Hazard& hazard) {
 }
 
 Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& catalogue,
-                   const streets::StreetMap* streets) {
+                   const streets::StreetWords& words) {
   Json feature = PointFeature(hazard.uuid.ToString(), hazard.position);
   Json& properties = feature["properties"];
   properties["id"] = hazard.uuid.ToString();
@@ -116,7 +110,7 @@ Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& 
   properties["last_seen"] = Rfc3339(hazard.last_seen_ns);
   properties["updated"] = Rfc3339(hazard.updated_ns);
   properties["position_sigma_m"] = PositionSigma(hazard.covariance_m2);
-  AddStreet(hazard, streets, properties);
+  AddStreet(words, properties);
   properties["image"] = ImageUrl(hazard);
   properties["sequence"] = hazard.sequence;
   return feature;
@@ -134,12 +128,12 @@ Json EventJson(const zone::StoredEvent& event) {
 }
 
 Json HazardMessage(zone::HazardAction action, const zone::Hazard& hazard,
-                   const protocol::HazardCatalogue& catalogue, const streets::StreetMap* streets) {
+                   const protocol::HazardCatalogue& catalogue, const streets::StreetWords& words) {
   Json message;
   message["type"] = "hazard";
   message["action"] = ActionName(action);
   message["sequence"] = hazard.sequence;
-  message["feature"] = HazardFeature(hazard, catalogue, streets);
+  message["feature"] = HazardFeature(hazard, catalogue, words);
   return message;
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocol/hazard_catalogue.h"
-#include "streets/street_map.h"
+#include "streets/street_place.h"
 #include "zone/model/hazard.h"
 #include "zone/service/zone_service.h"
 
@@ -39,17 +39,17 @@ const char* ActionName(zone::HazardAction action);
 /// What a client that knows nothing newer than the hazard's predecessor should do with it.
 zone::HazardAction ReplayAction(const zone::Hazard& hazard);
 
-/// The hazard as a GeoJSON Feature (RFC 7946, position as [longitude, latitude]). `streets` are
-/// those that the zone knows; null: none, and nothing is said of where the hazard lies on them.
+/// The hazard as a GeoJSON Feature (RFC 7946, position as [longitude, latitude]). `words` say where
+/// it lies on the streets (ZoneService::WordsOf).
 Json HazardFeature(const zone::Hazard& hazard, const protocol::HazardCatalogue& catalogue,
-                   const streets::StreetMap* streets);
+                   const streets::StreetWords& words);
 
 /// One line of a hazard's history: sequence, action, from, to, reason, time.
 Json EventJson(const zone::StoredEvent& event);
 
 /// The message of the live stream for one hazard event.
 Json HazardMessage(zone::HazardAction action, const zone::Hazard& hazard,
-                   const protocol::HazardCatalogue& catalogue, const streets::StreetMap* streets);
+                   const protocol::HazardCatalogue& catalogue, const streets::StreetWords& words);
 
 /// Positions as (longitude, latitude) degrees, oldest first.
 using TrailPositions = std::vector<std::pair<double, double>>;

@@ -207,8 +207,8 @@ WebSocketSession::Replay WebSocketSession::ReadEvents(std::uint64_t told_sequenc
   for (const zone::Hazard& hazard : hazards.items) {
     if (hazard.sequence > end) break;
     if (!sees_.candidates && hazard.announced_sequence == 0) continue;
-    messages[hazard.sequence] =
-        Shared(HazardMessage(ReplayAction(hazard), hazard, live_.catalogue, live_.zone.streets()));
+    messages[hazard.sequence] = Shared(
+        HazardMessage(ReplayAction(hazard), hazard, live_.catalogue, live_.zone.WordsOf(hazard)));
   }
   for (const zone::MapChangeFeature& change : changes.items) {
     if (change.sequence > end || !sees_.candidates) break;

@@ -6,6 +6,7 @@
 
 #include "protocol/hazard_catalogue.h"
 #include "protocol/poll.h"
+#include "streets/address_map.h"
 #include "streets/street_map.h"
 #include "zone/admission/report_validation.h"
 #include "zone/admission/speed_rule.h"
@@ -49,6 +50,8 @@ struct ZoneConfig {
   protocol::HazardCatalogue catalogue;
   /// Those of the zone, by which places have names and carriageways; null: the zone knows none.
   std::shared_ptr<const streets::StreetMap> streets;
+  /// The house numbers of the same file; null: none are said.
+  std::shared_ptr<const streets::AddressMap> addresses;
 };
 
 /// The settings as the zone works by them: what one part takes over from another is filled in.

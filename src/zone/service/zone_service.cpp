@@ -10,6 +10,7 @@
 #include "common/sqlite.h"
 #include "common/time.h"
 #include "protocol/text_rules.h"
+#include "zone/model/hazard_spot.h"
 
 namespace livemap::zone {
 namespace {
@@ -547,6 +548,15 @@ std::vector<StoredMapChangeEvent> ZoneService::MapChangeEvents(const Uuid& uuid,
 
 std::optional<std::string> ZoneService::ImagePath(const std::string& sha256) const {
   return images_.Path(sha256);
+}
+
+streets::StreetWords ZoneService::WordsOf(const Hazard& hazard) const {
+  if (config_.streets) {
+    return streets::DescribeSpot(*config_.streets, SpotOf(hazard), config_.addresses.get());
+  }
+  streets::StreetWords words;
+  words.note = "the zone has no street file";
+  return words;
 }
 
 int ZoneService::Subscribe(Subscriber subscriber) {

@@ -16,6 +16,7 @@
 #include "protocol/map_change_report.h"
 #include "protocol/poll.h"
 #include "protocol/report.h"
+#include "streets/street_place.h"
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/model/decision.h"
 #include "zone/model/hazard.h"
@@ -225,6 +226,9 @@ class ZoneService {
   DurationHistogram::Counts report_ages() const { return report_ages_.counts(); }
   /// The streets that the zone knows; null: none. They do not change.
   const streets::StreetMap* streets() const { return config_.streets.get(); }
+  /// Where on them the hazard lies; nothing but a note where the zone knows none. Quick, any
+  /// thread.
+  streets::StreetWords WordsOf(const Hazard& hazard) const;
 
  private:
   using Slot = HazardRegistry::Slot;

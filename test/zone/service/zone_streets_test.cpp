@@ -6,10 +6,10 @@
 
 #include "common/sqlite.h"
 #include "geo/wgs84.h"
+#include "streets/address_map.h"
 #include "streets/street_map.h"
 #include "streets/street_place.h"
 #include "test/zone/zone_fixture.h"
-#include "zone/model/hazard_spot.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::zone {
@@ -72,7 +72,7 @@ class ZoneStreetsTest : public ZoneTest {
     return receipt.hazard_uuid;
   }
   static std::string DirectionOf(const ZoneService& zone, const Uuid& hazard) {
-    return streets::DescribeSpot(*zone.streets(), SpotOf(*zone.Find(hazard))).direction;
+    return zone.WordsOf(*zone.Find(hazard)).direction;
   }
 
   geo::LocalFrame frame_{{40.44, -79.94}};
@@ -125,6 +125,19 @@ TEST_F(ZoneStreetsTest, AHazardOfBeforeTakesTheCourseOfTheNextPassAndKeepsIt) {
   ZoneService zone(WithStreets(), Clock(), 1);
   EXPECT_EQ(DirectionOf(zone, hazard), "westbound");
   EXPECT_NE(Pass(zone, "car-3", 0, -2, kEast), hazard);
+}
+
+TEST_F(ZoneStreetsTest, AHazardIsDescribedByItsStreetAndHouse) {
+  ZoneService::Config config = WithStreets();
+  streets::AddressMapBuilder houses;
+  houses.SetPlace(1, frame_.ToGeo({10, -285}), "Main St", "12");
+  config.addresses = std::make_shared<const streets::AddressMap>(houses.Build());
+  ZoneService zone(config, Clock(), 1);
+  const Uuid hazard = Pass(zone, "car-1", 0, -300, kWest);
+  const streets::StreetWords words = zone.WordsOf(*zone.Find(hazard));
+  EXPECT_EQ(words.street, "Main St");
+  EXPECT_EQ(words.near, "no. 12");
+  EXPECT_EQ(words.direction, "westbound");
 }
 
 TEST_F(ZoneStreetsTest, ABrokenCourseInTheStoreIsLeftOutAndTold) {
