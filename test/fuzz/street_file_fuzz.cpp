@@ -1,13 +1,17 @@
-// Street files in XML and PBF, and what a vehicle asks of the streets that the reader accepts.
+// Street files in XML and PBF, and what a vehicle and a zone ask of the streets that the reader
+// accepts.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
 
 #include "common/error.h"
+#include "streets/address_file.h"
 #include "streets/street_file.h"
+#include "streets/street_lines.h"
 #include "streets/street_map.h"
 #include "streets/street_matcher.h"
+#include "streets/street_place.h"
 #include "streets/ways_ahead.h"
 
 namespace {
@@ -33,6 +37,23 @@ void DriveAlong(const std::shared_ptr<const StreetMap>& map) {
   }
 }
 
+/// Words of places and lines for a page.
+void DescribeAndDraw(const StreetMap& map, const livemap::streets::AddressMap& houses) {
+  const auto segments = static_cast<std::uint32_t>(std::min<std::size_t>(map.segments(), 20));
+  for (std::uint32_t segment = 0; segment < segments; ++segment) {
+    const livemap::streets::Spot spot{map.PlaceOf(map.SegmentAt(segment).from), 3, 0.5};
+    const auto words = livemap::streets::DescribeSpot(map, spot, &houses);
+    if (words.street.size() > 256 || words.near.size() > 260) __builtin_trap();
+  }
+  const livemap::streets::StreetLines lines(map);
+  for (const int zoom : {0, 9, 14, 22}) {
+    std::size_t points = 0;
+    for (const auto& line : lines.Find(map.Bounds(), zoom, 2000).lines)
+      points += line.points.size();
+    if (points > 2000) __builtin_trap();
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -43,8 +64,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   limits.max_segments = 5000;
   const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
-    DriveAlong(std::make_shared<const StreetMap>(
-        livemap::streets::ParseStreets(bytes, data[0] % 2 == 0 ? "osm" : "pbf", "input", limits)));
+    const bool is_xml = data[0] % 2 == 0;
+    const auto map = std::make_shared<const StreetMap>(
+        livemap::streets::ParseStreets(bytes, is_xml ? "osm" : "pbf", "input", limits));
+    DriveAlong(map);
+    DescribeAndDraw(*map, is_xml ? livemap::streets::ParseAddresses(bytes, "input")
+                                 : livemap::streets::AddressMap());
   } catch (const livemap::Error&) {
     // Refused by a sentence: what the reader promises.
   }

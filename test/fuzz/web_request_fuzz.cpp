@@ -11,6 +11,7 @@
 #include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
+#include "web/tiles/tile_file.h"
 
 namespace {
 
@@ -46,6 +47,17 @@ void CheckHazardQuery(const livemap::web::RequestTarget& target) {
     Require(livemap::web::ParsePointsQuery(target).states.size() <= livemap::zone::kHazardStates);
   } catch (const livemap::web::BadRequest&) {
     // Refused.
+  }
+  try {
+    const livemap::web::StreetQuery query = livemap::web::ParseStreetQuery(target);
+    Require(query.zoom >= 0 && query.zoom <= 22);
+    Require(query.box.south_west.longitude_deg <= query.box.north_east.longitude_deg);
+  } catch (const livemap::web::BadRequest&) {
+    // Refused.
+  }
+  if (const auto tile = livemap::web::ParseTilePath(target.path)) {
+    Require(tile->zoom >= 0 && tile->zoom <= 22);
+    Require(tile->x >> tile->zoom == 0 && tile->y >> tile->zoom == 0);
   }
   try {
     livemap::web::ParseStreamQuery(target);
