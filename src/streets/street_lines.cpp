@@ -7,7 +7,7 @@
 namespace livemap::streets {
 namespace {
 
-constexpr std::size_t kKinds = static_cast<std::size_t>(StreetKind::kService) + 1;
+constexpr std::size_t kLineKinds = static_cast<std::size_t>(StreetKind::kService) + 1;
 constexpr double kLineUnits = 1e7;           // Per degree.
 constexpr std::int64_t kLineCell = 200'000;  // 0.02 degrees, some 2 km.
 constexpr std::uint64_t kMaxCellsPerLine = 400;
@@ -121,7 +121,7 @@ std::vector<std::uint32_t> StreetLines::Index::In(const Box& box) const {
 }
 
 StreetLines::StreetLines(const StreetMap& map)
-    : map_(map), run_index_(kKinds), chain_index_(kKinds) {
+    : map_(map), run_index_(kLineKinds), chain_index_(kLineKinds) {
   std::uint32_t first = 0;
   for (std::uint32_t i = 1; i <= map_.segments(); ++i) {
     const bool goes_on = i < map_.segments() &&

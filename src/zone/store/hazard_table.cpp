@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::int16_t kReporterWeight1000 = 1000;  // A voice of which only a report is known.
 
-constexpr double kMaxCourseRad = 2 * M_PI;
+constexpr double kFullTurnRad = 2 * M_PI;
 
 constexpr char kSoundHazard[] =
     "typeof(uuid) = 'text' AND length(CAST(uuid AS BLOB)) = 36 AND "
@@ -211,7 +211,7 @@ StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, dou
                              "typeof(course_rad) IN ('real', 'integer')",
          soci::into(id), soci::into(course_rad));
     return LoadRows(session_, "hazard_courses", query, [&] {
-      const bool sound = id >= 1 && id <= kMaxRowId && std::abs(course_rad) <= kMaxCourseRad;
+      const bool sound = id >= 1 && id <= kMaxRowId && std::abs(course_rad) <= kFullTurnRad;
       if (!sound) throw Error("hazard " + std::to_string(id) + " has a course that is none");
       take(static_cast<std::uint64_t>(id), course_rad);
     });
@@ -221,7 +221,7 @@ StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, dou
 void HazardTable::WriteCourse(std::uint64_t hazard_id, double course_rad) {
   ExplainStore("writing the course of a hazard", [&] {
     row_.id = static_cast<long long>(hazard_id);
-    row_.course_rad = std::remainder(course_rad, kMaxCourseRad);
+    row_.course_rad = std::remainder(course_rad, kFullTurnRad);
     write_course_.execute(true);
   });
 }
