@@ -2,6 +2,7 @@
 """livemap vehicle check against real parts: mosquitto with a zone's certificates, gpsd with a receiver, files, and peers
 that are dead."""
 
+import concurrent.futures
 import contextlib
 import datetime
 import json
@@ -15,6 +16,7 @@ import tempfile
 import threading
 import time
 import unittest
+import xmlrpc.client
 
 from cryptography.hazmat.primitives import serialization
 from cryptography.x509.oid import ExtendedKeyUsageOID
@@ -32,6 +34,7 @@ try:
     import gps.fake as gps_fake
 except ImportError:
     gps_fake = None
+WORKERS = 8
 GPSD = shutil.which("gpsd", path=os.environ.get("PATH", "") + ":/usr/sbin")
 
 CALIBRATION = """\
@@ -273,7 +276,16 @@ class VehicleCheckTest(unittest.TestCase):
             process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             self.addCleanup(process.wait)
             self.addCleanup(process.kill)
-            time.sleep(4)
+        self.wait_for_publisher("/diagnostics")
+
+    def wait_for_publisher(self, topic):
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(self.master) as master:
+                if topic in dict(master.getSystemState("/test")[2][0]):
+                    return
+            time.sleep(0.1)
+        self.fail(f"nobody publishes {topic}")
 
     @unittest.skipUnless(shutil.which("rosmaster"), "no rosmaster")
     def test_topics_of_drivers_are_heard_before_a_vehicle_runs(self):
@@ -471,5 +483,32 @@ class VehicleCheckTest(unittest.TestCase):
         self.assertFalse([c for c in shown if ord(c) < 32 and c != "\n" or c in "\x9b\u202e\u2028"], repr(shown))
 
 
+def tests_of(suite):
+    for entry in suite:
+        yield from tests_of(entry) if isinstance(entry, unittest.TestSuite) else (entry,)
+
+
+def run_side_by_side(workers):
+    """Most of a check is waiting for what does not answer, so the tests run beside one another. The number that failed."""
+    def run(test):
+        result, begin = unittest.TestResult(), time.monotonic()
+        test.run(result)
+        return test, result, time.monotonic() - begin
+
+    failed = 0
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        for done in concurrent.futures.as_completed(
+                [pool.submit(run, test) for test in tests_of(unittest.defaultTestLoader.loadTestsFromTestCase(VehicleCheckTest))]):
+            test, result, seconds = done.result()
+            faults = [trace for _, trace in result.failures + result.errors]
+            failed += bool(faults)
+            skipped = "".join(reason for _, reason in result.skipped)
+            print(f"{test.id()}: {'FAILED' if faults else f'skipped: {skipped}' if skipped else 'ok'}, {seconds:.1f} s",
+                  *faults, sep="\n", flush=True)
+    return failed
+
+
 if __name__ == "__main__":
-    unittest.main()
+    if len(sys.argv) > 1:
+        unittest.main()
+    sys.exit(1 if run_side_by_side(WORKERS) else 0)
