@@ -2,6 +2,7 @@
 
 import bisect
 import datetime
+import http.client
 import json
 import math
 import os
@@ -82,8 +83,11 @@ class MapClient:
                     for stamp, heard in self.first_heard.values()]
 
     def _get(self, path):
-        with urllib.request.urlopen(self.url + path, timeout=10) as answer:
-            return json.load(answer)
+        try:
+            with urllib.request.urlopen(self.url + path, timeout=10) as answer:
+                return json.load(answer)
+        except (OSError, ValueError) as error:
+            raise StartError(f"the live map does not answer {self.url + path}: {error}") from error
 
     def stored_sequence(self):
         return self._get("api/v1/hazards?limit=1")["sequence"]
@@ -208,12 +212,20 @@ class VehicleObserver:
 
 
 def wait_for_master(uri, timeout_s=30):
+    class Patient(xmlrpc.client.Transport):
+        """What accepts a connection and says nothing is no master."""
+
+        def make_connection(self, host):
+            connection = super().make_connection(host)
+            connection.timeout = 5
+            return connection
+
     deadline = time.monotonic() + timeout_s
     while True:
         try:
-            xmlrpc.client.ServerProxy(uri).getPid("/livemap_demo")
+            xmlrpc.client.ServerProxy(uri, transport=Patient()).getPid("/livemap_demo")
             return
-        except OSError:
+        except (OSError, http.client.HTTPException):
             if time.monotonic() > deadline:
                 raise StartError(f"the ROS master {uri} did not come up within {timeout_s} s")
             time.sleep(0.1)

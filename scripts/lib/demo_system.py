@@ -1,6 +1,7 @@
 """Starts and stops the parts of a LiveMap on one machine: two ROS masters, broker, zone, vehicle."""
 
 import collections
+import contextlib
 import os
 import pathlib
 import re
@@ -20,6 +21,10 @@ from system_error import StartError
 
 Drive = collections.namedtuple("Drive", "frames start_s duration_s")
 PROGRAMS = pathlib.Path(__file__).resolve().parents[1]
+# A program that has done nothing for so long will not go on.
+STUCK_S = 120
+# One call of a ROS service; a node may be dead and still be known to the master.
+SERVICE_S = 20
 PROGRAM_WORDS = re.compile(r"(?:livemap|livemap_broker): (.+)")
 
 
@@ -53,13 +58,47 @@ def launch_file(name):
     return str(package_file(pathlib.Path("launch") / name))
 
 
-def run_tool(command, log):
+def run_tool(command, log, stuck_s=STUCK_S):
+    """Runs one of the package's programs to its end; StartError where it fails, or neither computes nor writes any more."""
     command = [program(command[0])] + command[1:]
     with open(log, "w") as output:
-        code = subprocess.call(command, stdout=output, stderr=subprocess.STDOUT)
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+    try:
+        code = wait_while_it_works(process, log, stuck_s)
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+    if code is None:
+        raise StartError(f"{os.path.basename(command[0])} has neither computed nor written anything for {stuck_s:g} s, "
+                         "so it was ended: the disk or a file that it reads does not answer")
     if code != 0:
         words = pathlib.Path(log).read_text().strip().splitlines()
         raise StartError(words[-1] if words and code > 0 else f"{os.path.basename(command[0])} {how_it_ended(code)}")
+
+
+def wait_while_it_works(process, log, stuck_s):
+    """Its exit code; None when its processor time and its log have stood still for too long, as nothing else limits it:
+    a long recording takes as long as it takes."""
+    seen, since = None, time.monotonic()
+    while True:
+        try:
+            return process.wait(0.5)
+        except subprocess.TimeoutExpired:
+            now = (processor_ticks(process.pid), os.path.getsize(log))
+        if now != seen:
+            seen, since = now, time.monotonic()
+        elif time.monotonic() - since > stuck_s:
+            return None
+
+
+def processor_ticks(pid):
+    """Of a process and those of its children that have ended; 0 when it is gone."""
+    try:
+        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0
+    return sum(map(int, fields[11:15]))
 
 
 def read_bag(path, positions=False, depth=None, boxes=False):
@@ -170,9 +209,11 @@ class LiveMapSystem:
         environment = dict(os.environ, ROS_MASTER_URI=self.vehicle_master, ROS_HOSTNAME="127.0.0.1")
 
         def resumed():
-            return subprocess.call(
-                ["rosservice", "call", "/player/pause_playback", "data: false"], env=environment,
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return subprocess.call(
+                    ["rosservice", "call", "/player/pause_playback", "data: false"], env=environment,
+                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=SERVICE_S) == 0
+            return False
         self.wait_for("the bag's player", resumed)
 
     def password_file(self, user):

@@ -236,6 +236,9 @@ class BagToolsTest(unittest.TestCase):
                             "of different times", "--recorder-zone +02:00")
         self.assert_refused(run("from_dashcam", first, self.bag, *gpx, *camera, "--start-time", "2026-01-31T14:00:00",
                                 "--recorder-zone", "+01:00"), "of different times", "--recorder-zone +02:00")
+        self.assert_refused(run("from_dashcam", first, self.bag, *gpx, *camera, "--offset", 5000), "--offset 5000", first,
+                            gpx[1], "2026-01-31T12:", "2026-01-31T13:", "accepted is what has to be added, from -")
+        self.assert_refused(run("from_dashcam", self.path(), self.bag, *gpx, *camera), "is a folder", "video files")
         self.assert_refused(run("from_dashcam", self.path("track.gpx"), self.bag, *gpx, *camera), "track.gpx", "no whole video")
         write(self.path("bad.csv"), "time,lat,lon\n2026-01-31T12:00:00Z,91,9\n")
         self.assert_refused(run("from_dashcam", first, self.bag, "--csv", self.path("bad.csv"), *camera), "line 2", "bad.csv")

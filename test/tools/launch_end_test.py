@@ -72,6 +72,15 @@ class LaunchEnd(unittest.TestCase):
                 return int(folder.name)
         raise AssertionError(f"no {node} runs")
 
+    def test_a_tool_that_neither_computes_nor_writes_is_not_waited_for(self):
+        log = self.folder / "tool.log"
+        for program, code in (("sleep 60", None), ("for i in 1 2 3 4 5 6; do echo $i; sleep 0.5; done; exit 3", 3)):
+            with self.subTest(program), open(log, "w") as output, \
+                    subprocess.Popen(["sh", "-c", program], stdout=output) as tool:
+                self.addCleanup(tool.kill)
+                self.assertEqual(demo_system.wait_while_it_works(tool, log, stuck_s=2), code)
+                tool.kill()
+
     def test_a_zone_that_refuses_a_parameter_ends_with_1_and_its_sentence(self):
         self.assertEqual(self.last_line(self.zone("zone_cloudlet:={join_radius_m: -5}")),
                          "livemap: zone_cloudlet ended with code 1: parameter '/zone_cloudlet/join_radius_m' is -5, "

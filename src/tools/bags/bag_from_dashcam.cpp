@@ -101,10 +101,52 @@ Recording ReadRecording(const CommandLine& line, const std::vector<std::string>&
   return recording;
 }
 
+/// "'a.mp4' to 'd.mp4', 2026-01-31T12:34:56.000Z to ...", by the recorder's clock.
+std::string NamesAndTimes(const Recording& recording) {
+  const std::string& first = recording.clips.front().path;
+  const std::string& last = recording.clips.back().path;
+  return "'" + first + "'" + (last == first ? "" : " to '" + last + "'") + ", " +
+         recordings::FormatUtc(recording.begin_ns()) + " to " +
+         recordings::FormatUtc(recording.end_ns());
+}
+
+std::string NamesAndTimes(const std::string& name, const recordings::RecordedTrack& track) {
+  return name + ", " + recordings::FormatUtc(track.begin_ns()) + " to " +
+         recordings::FormatUtc(track.end_ns());
+}
+
+/// Where the positions come from, as CommandLine has it.
+std::string TrackName(const CommandLine& line) {
+  for (const char* flag : {"gpx", "nmea", "csv"}) {
+    if (line.Has(flag)) return "'" + line.Text(flag, "") + "'";
+  }
+  return "within the videos";
+}
+
+/// Throws Error where the offset that was given leaves no frame within the track's times.
+void CheckOffset(const Recording& recording, const recordings::RecordedTrack& track,
+                 double offset_s, const std::string& track_name) {
+  const std::int64_t offset_ns = Nanoseconds(offset_s);
+  if (recording.begin_ns() + offset_ns <= track.end_ns() &&
+      recording.end_ns() + offset_ns >= track.begin_ns()) {
+    return;
+  }
+  std::ostringstream sentence;
+  sentence << "--offset " << offset_s << " brings no frame into the track's times: the recording, "
+           << NamesAndTimes(recording) << " by its own clock, becomes "
+           << recordings::FormatUtc(recording.begin_ns() + offset_ns) << " to "
+           << recordings::FormatUtc(recording.end_ns() + offset_ns) << ", and the track is "
+           << NamesAndTimes(track_name, track) << "; accepted is what has to be added, from "
+           << std::ceil(Seconds(track.begin_ns() - recording.end_ns())) << " to "
+           << std::floor(Seconds(track.end_ns() - recording.begin_ns()))
+           << ", and without --offset it is found";
+  throw Error(sentence.str());
+}
+
 /// Throws Error where recording and track are of other times, with the zone that may be meant.
 /// `zone_s` is the recorder's as it was given.
 void CheckTimes(const Recording& recording, const recordings::RecordedTrack& track, double reach_s,
-                int zone_s) {
+                int zone_s, const std::string& track_name) {
   const std::int64_t reach_ns = Nanoseconds(reach_s);
   const auto overlap = [&](std::int64_t shift_ns) {
     return recording.begin_ns() + shift_ns - reach_ns < track.end_ns() &&
@@ -112,10 +154,8 @@ void CheckTimes(const Recording& recording, const recordings::RecordedTrack& tra
   };
   if (overlap(0)) return;
   std::ostringstream sentence;
-  sentence << "the recording, " << recordings::FormatUtc(recording.begin_ns()) << " to "
-           << recordings::FormatUtc(recording.end_ns()) << ", and the track, "
-           << recordings::FormatUtc(track.begin_ns()) << " to "
-           << recordings::FormatUtc(track.end_ns()) << ", are of different times";
+  sentence << "the recording, " << NamesAndTimes(recording) << ", and the track, "
+           << NamesAndTimes(track_name, track) << ", are of different times";
   constexpr std::int64_t kQuarterS = 900;
   for (std::int64_t quarters = -56; quarters <= 56; ++quarters) {
     if (!overlap((zone_s - quarters * kQuarterS) * 1'000'000'000)) continue;
@@ -229,6 +269,11 @@ int BagFromDashcam(int argc, char** argv) {
   if (videos.empty() || std::filesystem::path(out).extension() != ".bag") {
     throw Error("accepted are one or more videos, then the bag to be written, which ends in .bag");
   }
+  for (const std::string& video : videos) {
+    if (!std::filesystem::is_directory(video)) continue;
+    throw Error("VIDEO '" + video +
+                "' is a folder, accepted are the video files of one recording by their names");
+  }
   std::vector<std::string> inputs = videos;
   for (const char* flag : {"gpx", "nmea", "csv", "camera"}) {
     if (line.Has(flag)) inputs.push_back(line.Text(flag, ""));
@@ -249,10 +294,13 @@ int BagFromDashcam(int argc, char** argv) {
   if (!track) track = ReadEmbeddedTrack(videos, ReadTimeZone(line, "time-zone"));
   SayNotes(kDashcamName, track->notes);
   setup.track = *track;
-  CheckTimes(recording, *track,
-             line.Has("offset") ? std::abs(line.Number("offset", 0, -86400, 86400))
-                                : line.Number("search", 30, 1, 300),
-             ReadTimeZone(line, "recorder-zone").value_or(0));
+  const std::string track_name = TrackName(line);
+  if (line.Has("offset")) {
+    CheckOffset(recording, *track, line.Number("offset", 0, -86400, 86400), track_name);
+  } else {
+    CheckTimes(recording, *track, line.Number("search", 30, 1, 300),
+               ReadTimeZone(line, "recorder-zone").value_or(0), track_name);
+  }
   const double offset_s = OffsetOf(line, recording, *track);
   RecordingBag bag(out, setup, recording.begin_ns() + Nanoseconds(offset_s));
   const FrameCounts counts = WriteFrames(recording, *track, offset_s, config, bag);
