@@ -14,6 +14,7 @@
 #include <osmium/memory/buffer.hpp>
 #include <osmium/osm/entity_bits.hpp>
 #include <osmium/osm/node.hpp>
+#include <osmium/osm/relation.hpp>
 #include <osmium/osm/way.hpp>
 #include <vector>
 
@@ -119,6 +120,37 @@ void TakeWay(const osmium::Way& way, std::vector<std::int64_t>& nodes, StreetMap
   builder.AddStreet(*street, way.tags().get_value_by_key("name", ""), nodes);
 }
 
+/// Nothing where it is none of turns at a node, or not of cars at all times.
+std::optional<TurnRestriction> RestrictionOf(const osmium::Relation& relation) {
+  const osmium::TagList& tags = relation.tags();
+  const std::string rule =
+      tags.get_value_by_key("restriction:motorcar", tags.get_value_by_key("restriction", ""));
+  const bool only = rule.compare(0, 5, "only_") == 0;
+  if (!tags.has_tag("type", "restriction") || (!only && rule.compare(0, 3, "no_") != 0)) {
+    return std::nullopt;
+  }
+  const std::string except = tags.get_value_by_key("except", "");
+  if (except.find("motorcar") != std::string::npos ||
+      except.find("motor_vehicle") != std::string::npos) {
+    return std::nullopt;
+  }
+  TurnRestriction restriction;
+  restriction.only = only;
+  int members = 0;
+  for (const osmium::RelationMember& member : relation.members()) {
+    const std::string role = member.role();
+    const bool is_way = member.type() == osmium::item_type::way;
+    ++members;
+    if (role == "from" && is_way) restriction.from = member.ref();
+    if (role == "to" && is_way) restriction.to = member.ref();
+    if (role == "via" && member.type() == osmium::item_type::node) restriction.via = member.ref();
+  }
+  // Of several ways, or by way of another street: it is not simple, and left out.
+  const bool whole = restriction.from != 0 && restriction.via != 0 && restriction.to != 0;
+  if (members != 3 || !whole) return std::nullopt;
+  return restriction;
+}
+
 /// All objects of one kind, in the order of the file.
 template <typename Object, typename Take>
 void ForEach(const osmium::io::File& file, osmium::osm_entity_bits::type kind, const Take& take) {
@@ -136,6 +168,11 @@ StreetMap ReadStreets(const osmium::io::File& file, const std::string& name,
     std::vector<std::int64_t> nodes;
     ForEach<osmium::Way>(file, osmium::osm_entity_bits::way,
                          [&](const osmium::Way& way) { TakeWay(way, nodes, builder); });
+    ForEach<osmium::Relation>(
+        file, osmium::osm_entity_bits::relation, [&](const osmium::Relation& relation) {
+          const std::optional<TurnRestriction> restriction = RestrictionOf(relation);
+          if (restriction) builder.AddRestriction(*restriction);
+        });
     ForEach<osmium::Node>(file, osmium::osm_entity_bits::node, [&](const osmium::Node& node) {
       const osmium::Location location = node.location();
       if (location.valid()) builder.SetPlace(node.id(), {location.lat(), location.lon()});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "common/error.h"
@@ -84,7 +85,7 @@ std::size_t StreetMap::bytes() const {
   for (const std::string& name : names_) names += name.capacity();
   return names + BytesOf(streets_) + BytesOf(places_) + BytesOf(segments_) +
          BytesOf(incident_begin_) + BytesOf(incident_) + BytesOf(cells_) + BytesOf(cell_begin_) +
-         BytesOf(in_cells_);
+         BytesOf(in_cells_) + BytesOf(restricted_);
 }
 
 geo::GeoBox StreetMap::Bounds() const {
@@ -151,11 +152,28 @@ std::vector<Travel> StreetMap::Continuations(const Travel& travel) const {
   for (std::uint32_t i = incident_begin_[node]; i < end; ++i) {
     if (incident_[i] == travel.segment) continue;
     const Travel next{incident_[i], segments_[incident_[i]].from == node};
-    if (IsLegal(next)) onwards.push_back(next);
+    const std::uint32_t from = segments_[travel.segment].street;
+    if (!IsLegal(next) || IsForbidden(node, from, segments_[next.segment].street)) continue;
+    onwards.push_back(next);
   }
   const Travel back{travel.segment, !travel.forward};
   if (onwards.empty() && IsLegal(back)) onwards.push_back(back);
   return onwards;
+}
+
+bool StreetMap::IsForbidden(std::uint32_t node, std::uint32_t from, std::uint32_t to) const {
+  const auto before = [](const Restricted& each,
+                         const std::pair<std::uint32_t, std::uint32_t>& key) {
+    return std::tie(each.via, each.from) < std::tie(key.first, key.second);
+  };
+  const std::pair<std::uint32_t, std::uint32_t> key(node, from);
+  bool only_others = false;
+  for (auto each = std::lower_bound(restricted_.begin(), restricted_.end(), key, before);
+       each != restricted_.end() && each->via == node && each->from == from; ++each) {
+    if (each->to == to) return !each->only;
+    only_others = only_others || each->only;
+  }
+  return only_others;
 }
 
 Travel StreetMap::OnlyContinuation(const Travel& travel) const {
@@ -183,6 +201,11 @@ void StreetMapBuilder::AddStreet(const Street& street, const std::string& name,
   map_.streets_.push_back(kept);
   street_nodes_.insert(street_nodes_.end(), nodes.begin(), nodes.end());
   street_ends_.push_back(street_nodes_.size());
+}
+
+void StreetMapBuilder::AddRestriction(const TurnRestriction& restriction) {
+  CheckCount("restrictions of turns", restrictions_.size() + 1, limits_.max_restrictions);
+  restrictions_.push_back(restriction);
 }
 
 void StreetMapBuilder::SortNodes() {
@@ -257,6 +280,25 @@ void StreetMapBuilder::IndexNodes() {
   }
 }
 
+void StreetMapBuilder::IndexRestrictions() {
+  if (restrictions_.empty()) return;
+  std::unordered_map<std::int64_t, std::uint32_t> streets;
+  for (std::uint32_t i = 0; i < map_.streets_.size(); ++i) streets.emplace(map_.streets_[i].id, i);
+  for (const TurnRestriction& each : restrictions_) {
+    const auto from = streets.find(each.from);
+    const auto to = streets.find(each.to);
+    const auto via = std::lower_bound(node_ids_.begin(), node_ids_.end(), each.via);
+    const bool known = via != node_ids_.end() && *via == each.via;
+    if (from == streets.end() || to == streets.end() || !known) continue;
+    map_.restricted_.push_back(
+        {static_cast<std::uint32_t>(via - node_ids_.begin()), from->second, to->second, each.only});
+  }
+  std::sort(map_.restricted_.begin(), map_.restricted_.end(),
+            [](const StreetMap::Restricted& a, const StreetMap::Restricted& b) {
+              return std::tie(a.via, a.from, a.to, a.only) < std::tie(b.via, b.from, b.to, b.only);
+            });
+}
+
 void StreetMapBuilder::IndexCells() {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> entries;
   std::vector<std::uint64_t> keys;
@@ -284,6 +326,7 @@ StreetMap StreetMapBuilder::Build() {
   if (!sorted_) SortNodes();
   MakeSegments();
   IndexNodes();
+  IndexRestrictions();
   IndexCells();
   StreetMap built = std::move(map_);
   *this = StreetMapBuilder(limits_);

@@ -54,12 +54,21 @@ struct Travel {
   }
 };
 
+/// A turn at a junction that the law restricts, by the ids of OpenStreetMap.
+struct TurnRestriction {
+  std::int64_t from = 0;  ///< The way on which one comes.
+  std::int64_t via = 0;   ///< The node of the junction.
+  std::int64_t to = 0;    ///< The way onto which one turns.
+  bool only = false;      ///< It is the only way on; else it is forbidden.
+};
+
 /// How many of each a street map may have; StreetMapBuilder refuses more.
 struct StreetLimits {
   std::size_t max_streets = 4'000'000;
   std::size_t max_nodes = 40'000'000;     ///< Nodes in the streets, one in two streets twice.
   std::size_t max_segments = 20'000'000;  ///< Less than 1.5 GB in memory.
-  double max_segment_m = 20'000;          ///< A longer one is left out.
+  std::size_t max_restrictions = 4'000'000;
+  double max_segment_m = 20'000;  ///< A longer one is left out.
 };
 
 /// The drivable streets of an area: a graph of straight segments between nodes, with an index by
@@ -117,8 +126,9 @@ class StreetMap {
   std::vector<std::uint32_t> SegmentsNear(const geo::GeoPoint& place, double radius_m) const;
   /// Segments that begin or end at a node, by number; at most 64 of them.
   std::vector<std::uint32_t> SegmentsAt(std::uint32_t node) const;
-  /// How one may legally drive on at the end of a travel, by number of the segment. Turning back
-  /// counts only where there is nothing else. At most 64 segments at a node count.
+  /// How one may legally drive on at the end of a travel, by number of the segment: in the
+  /// directions of the streets and by the restrictions of turns. Turning back counts only where
+  /// there is nothing else. At most 64 segments at a node count.
   std::vector<Travel> Continuations(const Travel& travel) const;
   /// The only other segment at the travel's end, driven onwards whether that is legal or not;
   /// `travel` itself where there is none or a choice.
@@ -131,6 +141,15 @@ class StreetMap {
     std::int32_t latitude;   // 1e-7 degrees.
     std::int32_t longitude;  // The same.
   };
+  /// A restriction by the numbers of node and streets.
+  struct Restricted {
+    std::uint32_t via;
+    std::uint32_t from;
+    std::uint32_t to;
+    bool only;
+  };
+
+  bool IsForbidden(std::uint32_t node, std::uint32_t from, std::uint32_t to) const;
 
   std::vector<Street> streets_;
   std::vector<std::string> names_{""};
@@ -138,6 +157,7 @@ class StreetMap {
   std::vector<Segment> segments_;
   std::vector<std::uint32_t> incident_begin_;  // By node, one more than nodes.
   std::vector<std::uint32_t> incident_;        // Segments at the nodes.
+  std::vector<Restricted> restricted_;         // By node and street.
   std::vector<std::uint64_t> cells_;           // Sorted keys of cells that have segments.
   std::vector<std::uint32_t> cell_begin_;      // By cell, one more than cells.
   std::vector<std::uint32_t> in_cells_;        // Segments in the cells.
@@ -155,6 +175,9 @@ class StreetMapBuilder {
   /// nodes than the limits accept.
   void AddStreet(const Street& street, const std::string& name,
                  const std::vector<std::int64_t>& nodes);
+  /// Of streets that are not added, or a node that they do not have, it is ignored. Throws Error
+  /// for more than the limits accept.
+  void AddRestriction(const TurnRestriction& restriction);
   /// The first call ends the adding of streets. The place of a node counts once, the first one. One
   /// that is not valid is ignored, as if the node were missing.
   void SetPlace(std::int64_t node, const geo::GeoPoint& place);
@@ -165,6 +188,7 @@ class StreetMapBuilder {
   void SortNodes();
   void MakeSegments();
   void IndexNodes();
+  void IndexRestrictions();
   void IndexCells();
 
   StreetLimits limits_;
@@ -172,6 +196,7 @@ class StreetMapBuilder {
   std::unordered_map<std::string, std::uint32_t> name_numbers_;
   std::vector<std::int64_t> street_nodes_;  // Of all streets, one after the other.
   std::vector<std::size_t> street_ends_;    // In street_nodes_.
+  std::vector<TurnRestriction> restrictions_;
   bool sorted_ = false;
   std::vector<std::int64_t> node_ids_;  // Sorted.
   std::vector<bool> placed_;

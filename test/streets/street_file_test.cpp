@@ -81,6 +81,41 @@ TEST(StreetFileTest, LeavesOutWhatIsNotDriven) {
   EXPECT_EQ(map.StreetOf(0).id, 4);
 }
 
+std::string RestrictionOfTurn(const std::string& rule, int from, int via, int to) {
+  return "<relation id='1'><member type='way' ref='" + std::to_string(from) +
+         "' role='from'/><member type='node' ref='" + std::to_string(via) +
+         "' role='via'/><member type='way' ref='" + std::to_string(to) + "' role='to'/>" +
+         Tag("type", "restriction") + rule + "</relation>";
+}
+
+/// Ids of the ways on behind the street 1, which leads to the node 2, where 2, 3 and 4 begin.
+std::vector<std::int64_t> OnwardsWith(const std::string& relations) {
+  const std::string street = Tag("highway", "primary");
+  const StreetMap map = Parsed(WayOf(1, 1, 2, street) + WayOf(2, 2, 3, street) +
+                               WayOf(3, 2, 4, street) + WayOf(4, 2, 5, street) + relations);
+  std::vector<std::int64_t> ids;
+  for (const Travel& way : map.Continuations({0, true}))
+    ids.push_back(map.StreetOf(way.segment).id);
+  return ids;
+}
+
+TEST(StreetFileTest, RestrictionsOfTurnsCount) {
+  using Ids = std::vector<std::int64_t>;
+  const std::string no = Tag("restriction", "no_left_turn");
+  EXPECT_EQ(OnwardsWith(""), (Ids{2, 3, 4}));
+  EXPECT_EQ(OnwardsWith(RestrictionOfTurn(no, 1, 2, 3)), (Ids{2, 4}));
+  EXPECT_EQ(OnwardsWith(RestrictionOfTurn(Tag("restriction", "only_straight_on"), 1, 2, 2)),
+            (Ids{2}));
+  EXPECT_EQ(OnwardsWith(RestrictionOfTurn(no + Tag("except", "bus;motorcar"), 1, 2, 3)),
+            (Ids{2, 3, 4}));
+  EXPECT_EQ(OnwardsWith(RestrictionOfTurn(Tag("restriction:hgv", "no_left_turn"), 1, 2, 3)),
+            (Ids{2, 3, 4}));
+  // Of a street that comes from elsewhere, at another node, of streets that there are not.
+  EXPECT_EQ(OnwardsWith(RestrictionOfTurn(no, 4, 2, 3) + RestrictionOfTurn(no, 1, 3, 3) +
+                        RestrictionOfTurn(no, 1, 2, 99) + RestrictionOfTurn(no, 1, 77, 3)),
+            (Ids{2, 3, 4}));
+}
+
 TEST(StreetFileTest, WordsForNumbersAreNotTold) {
   const StreetMap map = Parsed(WayOf(1, 1, 2,
                                      Tag("highway", "primary") + Tag("lanes", "many") +
