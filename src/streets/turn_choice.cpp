@@ -10,6 +10,7 @@ constexpr double kLeastShare = 0.03;     // Of what the angles say, whatever the
 constexpr double kSlowShare = 0.65;      // Of the usual speed: clearly slower.
 constexpr double kStopsShare = 0.75;     // Of a turn's speed: slower than any turn needs.
 constexpr double kBendFromM = 20;        // So near the junction the course tells the side.
+constexpr double kLeastBend = 0.02;      // Density of any course, whatever way is driven.
 constexpr double kSharpestRad = 2.6;     // Sharper turns are driven as this one.
 constexpr double kMinTurnDistanceM = 1;  // To the turn's beginning.
 
@@ -34,12 +35,12 @@ double BrakingShare(const TurnConfig& config, double push_mps2) {
 
 /// Likelihood of the speed and its change, where the vehicle will go straight on.
 double SpeedStraight(const TurnConfig& config, const Approach& approach, double corner_mps) {
-  // It stops: that tells nothing of where it drives afterwards.
-  if (approach.speed_mps < kStopsShare * corner_mps) return 1;
+  // It stops, which says little of where it drives afterwards.
+  const bool slowed = approach.speed_mps < kSlowShare * approach.usual_mps;
+  if (approach.speed_mps < kStopsShare * corner_mps) return slowed ? config.stops_without_turn : 1;
   const double brakes = BrakingShare(config, approach.push_mps2);
   const double speeds_up = BrakingShare(config, -approach.push_mps2);
-  const bool slow = approach.speed_mps < kSlowShare * approach.usual_mps;
-  const double steady = slow ? config.slow_without_turn : 1;
+  const double steady = slowed ? config.slow_without_turn : 1;
   return brakes * config.brakes_without_turn + speeds_up +
          std::max(0.0, 1 - brakes - speeds_up) * steady;
 }
@@ -68,15 +69,28 @@ double DensityOf(double value, double sigma) {
   return std::exp(-0.5 * value * value / (sigma * sigma)) / (std::sqrt(2 * M_PI) * sigma);
 }
 
-/// Likelihood of the course against the street's, near the junction.
+/// Likelihood of the course against the street's, near the junction: a turn is driven around the
+/// node, from as far before it as behind it.
 double BendLikelihood(const TurnConfig& config, const Approach& approach, double angle_rad) {
   if (!approach.bend_known || approach.distance_m > kBendFromM) return 1;
-  const double straight = DensityOf(approach.bend_rad, config.bend_sigma_rad);
-  if (std::abs(angle_rad) < config.straight_rad) return straight + 0.02;
-  // Somewhere between not begun and done.
-  const double share = approach.bend_rad / angle_rad;
-  const double begun = share > 0 && share < 1.2 ? 1 / std::abs(angle_rad) : 0;
-  return 0.5 * straight + 0.5 * begun + 0.02;
+  const double begins_m = std::max(CornerOf(config, angle_rad).begins_m, 1.0);
+  const double done = std::clamp(0.5 - 0.5 * approach.distance_m / begins_m, 0.0, 1.0);
+  const double wander = std::hypot(config.bend_sigma_rad, approach.bend_sigma_rad);
+  const double ahead_rad = approach.bend_rad - done * angle_rad;
+  if (std::abs(angle_rad) < config.straight_rad) return DensityOf(ahead_rad, wander) + kLeastBend;
+  // Nobody swings out to the other side, or beyond the way that is taken.
+  const double off_rad = approach.bend_rad - std::clamp(approach.bend_rad, std::min(0.0, angle_rad),
+                                                        std::max(0.0, angle_rad));
+  const double within = std::exp(-0.5 * off_rad * off_rad / (wander * wander));
+  const double by_place_rad = angle_rad * config.turn_sigma_m / (2 * begins_m);
+  return within * DensityOf(ahead_rad, std::hypot(wander, by_place_rad)) + kLeastBend;
+}
+
+/// Each exit is equally likely until the vehicle would be back where it came in.
+double RingShare(const TurnConfig& config, const Approach& approach, const TurnOption& option) {
+  if (approach.exits_left == 0) return option.ring ? 1 : config.leaves_ring_weight;
+  if (!option.ring) return 1;
+  return std::max<double>(approach.exits_left - 1, config.past_entry_weight);
 }
 
 }  // namespace
@@ -93,7 +107,7 @@ std::vector<double> TurnProbabilities(const TurnConfig& config, const Approach& 
   for (const TurnOption& option : options) {
     const bool straight = std::abs(option.angle_rad) < config.straight_rad;
     double share = straight ? config.straight_weight : config.turn_weight;
-    if (approach.in_roundabout) share = option.ring ? 1 : config.leaves_ring_weight;
+    if (approach.in_roundabout) share = RingShare(config, approach, option);
     if (option.same_street && !approach.in_roundabout) share *= config.same_street_weight;
     if (option.lesser) share *= config.lesser_weight;
     if (!approach.in_roundabout) {

@@ -6,13 +6,15 @@ namespace livemap::streets {
 
 /// How a vehicle drives towards a junction.
 struct Approach {
-  double distance_m = 0;       ///< To the junction's node.
+  double distance_m = 0;       ///< To the junction's node; negative when it is passed.
   double speed_mps = 0;        ///< Now.
   double push_mps2 = 0;        ///< Acceleration, negative where it brakes.
   double usual_mps = 0;        ///< Speed on the way until here.
   double bend_rad = 0;         ///< Its course against that of the street, to the left positive.
+  double bend_sigma_rad = 0;   ///< Of bend_rad, as the course is known.
   bool bend_known = false;     ///< Whether bend_rad is known.
   bool in_roundabout = false;  ///< The street until the junction is the ring of a roundabout.
+  int exits_left = 0;          ///< Of the ring until where the vehicle came in; 0: not known.
 };
 
 /// One way on at a junction.
@@ -29,6 +31,7 @@ struct TurnConfig {
   double straight_weight = 1.0;  ///< Before anything is known of how the vehicle drives.
   double turn_weight = 0.3;
   double leaves_ring_weight = 0.6;    ///< Of an exit against the ring's own 1.
+  double past_entry_weight = 0.1;     ///< Of the ring behind its last exit, against that exit.
   double same_street_weight = 1.5;    ///< Factor.
   double lesser_weight = 0.4;         ///< Factor.
   double corner_m = 10;               ///< Radius of a turn by a right angle, m.
@@ -39,7 +42,9 @@ struct TurnConfig {
   double brakes_from_mps2 = 1.0;      ///< From here on a vehicle brakes or speeds up.
   double brakes_without_turn = 0.12;  ///< Share of those who go straight on and brake so.
   double slow_without_turn = 0.25;    ///< The same, who drive much more slowly than before.
-  double bend_sigma_rad = 0.13;       ///< Of the course against the street's, straight on.
+  double stops_without_turn = 0.5;    ///< The same, who drive even more slowly than turns need.
+  double bend_sigma_rad = 0.1;        ///< Of the course against the street's, straight on.
+  double turn_sigma_m = 5;            ///< Of the place where a turn is driven, m.
   double unknown_weight = 0.03;       ///< Of a way straight on that the map does not have.
 };
 

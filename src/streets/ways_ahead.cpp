@@ -7,6 +7,7 @@ namespace livemap::streets {
 namespace {
 
 constexpr int kMaxAngleSegments = 20;  // Of a way over which an angle is taken.
+constexpr int kMaxRingSegments = 64;   // Of a roundabout.
 constexpr double kStraightRad = 0.35;
 constexpr double kTurnsBack = 0.2;  // At a dead end: else the map's end is not the street's.
 constexpr int kLesserKinds = 2;     // So much less important a street is rarely turned into.
@@ -22,9 +23,20 @@ WaysAhead::WaysAhead(const Config& config, const StreetMap& map,
                      const std::vector<StreetMatch>& matches, const geo::LocalFrame& frame,
                      const Driving& driving, double way_m)
     : config_(config), map_(map), frame_(frame), driving_(driving) {
+  double at_junction = 0;
+  double until_node_m = 0;
   for (const StreetMatch& match : matches) {
     if (match.probability < config.least_probability) break;
-    Add(match.travel, -1, -match.along_m, match.probability);
+    if (const std::optional<double> to_node_m = InJunctionM(match)) {
+      at_junction += match.probability;
+      until_node_m += match.probability * *to_node_m;
+    } else {
+      Add(match.travel, -1, -match.along_m, match.probability);
+    }
+  }
+  if (at_junction > 0) {
+    Add(*driving.approach, -1, 0, at_junction);
+    legs_.back().start_m = until_node_m / at_junction - legs_.back().length_m();
   }
   for (std::size_t i = 0; i < legs_.size(); ++i) Extend(i, way_m);
   for (const Leg& leg : legs_) {
@@ -32,6 +44,26 @@ WaysAhead::WaysAhead(const Config& config, const StreetMap& map,
     nodes_.push_back(map_.EndOf(leg.travel));
   }
   std::sort(nodes_.begin(), nodes_.end());
+}
+
+/// Within a junction the ways on lie too near each other for places to tell them apart: there the
+/// vehicle counts as on the street by which it came. How far it is to the node, negative behind it.
+std::optional<double> WaysAhead::InJunctionM(const StreetMatch& match) const {
+  if (!driving_.approach) return std::nullopt;
+  const Travel& approach = *driving_.approach;
+  const double left_m = match.along_m;
+  if (match.travel == approach) {
+    const double length_m =
+        (PlaceOf(map_.EndOf(approach)) - PlaceOf(map_.StartOf(approach))).norm();
+    const double to_node_m = std::max(0.0, length_m - left_m);
+    if (to_node_m <= config_.junction_m) return to_node_m;
+    return std::nullopt;
+  }
+  if (map_.StartOf(match.travel) != map_.EndOf(approach) ||
+      match.travel.segment == approach.segment || left_m > config_.junction_m) {
+    return std::nullopt;
+  }
+  return -left_m;
 }
 
 bool WaysAhead::Touches(std::uint32_t segment) const {
@@ -81,12 +113,16 @@ std::vector<double> WaysAhead::SharesOf(const Leg& leg, const std::vector<Travel
   if (onwards.empty()) return {};
   if (onwards.size() == 1) return {onwards[0].segment == leg.travel.segment ? kTurnsBack : 1};
   Approach approach;
-  approach.distance_m = std::max(0.0, leg.start_m + leg.length_m());
+  approach.distance_m = leg.start_m + leg.length_m();
   approach.speed_mps = driving_.speed_mps;
   approach.push_mps2 = driving_.push_mps2;
   approach.usual_mps = driving_.usual_mps;
   const Street& street = map_.StreetOf(leg.travel.segment);
   approach.in_roundabout = street.roundabout;
+  if (street.roundabout) {
+    const std::optional<std::uint32_t> entry = RingEntryOf(leg);
+    if (entry) approach.exits_left = ExitsLeft(leg, *entry);
+  }
   const Eigen::Vector2d until = -DirectionAfter({leg.travel.segment, !leg.travel.forward});
   const Leg& root = RootOf(leg);
   // Before the street itself bends, the course says nothing of the junction behind the bend.
@@ -94,12 +130,44 @@ std::vector<double> WaysAhead::SharesOf(const Leg& leg, const std::vector<Travel
   if (driving_.course_known && straight && !street.roundabout) {
     const Eigen::Vector2d course(std::sin(driving_.course_rad), std::cos(driving_.course_rad));
     approach.bend_rad = TurnBetween(until, course);
+    approach.bend_sigma_rad = driving_.course_sigma_rad;
     approach.bend_known = true;
   }
   std::vector<TurnOption> options;
   options.reserve(onwards.size());
   for (const Travel& next : onwards) options.push_back(OptionOf(leg, next));
   return TurnProbabilities(config_.turns, approach, options);
+}
+
+/// Where the way that ends with a leg of a ring comes into the ring.
+std::optional<std::uint32_t> WaysAhead::RingEntryOf(const Leg& leg) const {
+  const Leg* ring = &leg;
+  while (ring->before >= 0) {
+    const Leg& before = legs_[static_cast<std::size_t>(ring->before)];
+    if (!map_.StreetOf(before.travel.segment).roundabout) return map_.StartOf(ring->travel);
+    ring = &before;
+  }
+  return driving_.ring_entry;
+}
+
+/// From the end of a leg of a ring on, once around at most.
+int WaysAhead::ExitsLeft(const Leg& leg, std::uint32_t entry) const {
+  int exits = 0;
+  Travel travel = leg.travel;
+  for (int i = 0; i < kMaxRingSegments && map_.EndOf(travel) != entry; ++i) {
+    const Travel* onwards = nullptr;
+    const std::vector<Travel> ways = map_.Continuations(travel);
+    for (const Travel& way : ways) {
+      if (map_.StreetOf(way.segment).roundabout) {
+        onwards = &way;
+      } else {
+        ++exits;
+      }
+    }
+    if (onwards == nullptr) break;
+    travel = Travel(*onwards);
+  }
+  return exits;
 }
 
 TurnOption WaysAhead::OptionOf(const Leg& leg, const Travel& next) const {

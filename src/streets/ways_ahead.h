@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "geo/wgs84.h"
@@ -17,7 +19,12 @@ struct Driving {
   double push_mps2 = 0;   ///< Acceleration.
   double usual_mps = 0;   ///< Speed before it began to brake.
   double course_rad = 0;  ///< Clockwise from north.
+  double course_sigma_rad = 0;
   bool course_known = false;
+  /// Towards or in a junction: the street by which the vehicle comes to it.
+  std::optional<Travel> approach;
+  /// In a roundabout: the node of the ring at which the vehicle came in.
+  std::optional<std::uint32_t> ring_entry;
 };
 
 /// A piece of the ways that a vehicle may drive.
@@ -43,6 +50,7 @@ class WaysAhead {
     std::size_t max_legs = 600;       ///< Beyond it the ways end early.
     double least_probability = 0.01;  ///< Less likely ways are left out.
     double angle_way_m = 14;          ///< Angles at junctions are taken over this way, m.
+    double junction_m = 18;           ///< So far from its node a vehicle is in a junction, m.
     TurnConfig turns;
   };
 
@@ -56,9 +64,12 @@ class WaysAhead {
   bool Touches(std::uint32_t segment) const;
 
  private:
+  std::optional<double> InJunctionM(const StreetMatch& match) const;
   void Extend(std::size_t number, double way_m);
   TurnOption OptionOf(const Leg& leg, const Travel& next) const;
   const Leg& RootOf(const Leg& leg) const;
+  std::optional<std::uint32_t> RingEntryOf(const Leg& leg) const;
+  int ExitsLeft(const Leg& leg, std::uint32_t entry) const;
   std::vector<double> SharesOf(const Leg& leg, const std::vector<Travel>& onwards) const;
   Eigen::Vector2d PlaceOf(std::uint32_t node) const;
   Eigen::Vector2d DirectionAfter(Travel travel) const;

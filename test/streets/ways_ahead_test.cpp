@@ -84,6 +84,24 @@ TEST_F(WaysAheadTest, ACourseThatBendsTellsTheSide) {
   EXPECT_LT(shares[2], 0.1);
 }
 
+TEST_F(WaysAheadTest, WhoIsMatchedBehindTheJunctionAndHasTurnedIsNotTakenToGoStraightOn) {
+  Driving driving = Steady(5);
+  driving.usual_mps = 14;
+  driving.course_rad = -0.7;
+  driving.approach = Travel{0, true};
+  const std::vector<StreetMatch> matches{{{1, true}, 3, 0, 0.6}, {{0, true}, 97, 0, 0.4}};
+  const WaysAhead ways(config_, map_, matches, frame_, driving, 100);
+  ASSERT_EQ(ways.legs().size(), 4U);
+  EXPECT_NEAR(ways.legs()[0].start_m, -100.6, 0.1) << "0.6 m behind the node, in the mean";
+  for (const Leg& leg : ways.legs()) {
+    if (leg.travel.segment == 2) {
+      EXPECT_GT(leg.probability, 0.8);
+    } else if (leg.travel.segment == 1) {
+      EXPECT_LT(leg.probability, 0.1);
+    }
+  }
+}
+
 TEST_F(WaysAheadTest, OneWayStreetsAreNoChoice) {
   map_ = CrossTown(frame_, false);
   EXPECT_EQ(Shares(10, Steady(14))[2], 0);
@@ -104,6 +122,19 @@ TEST_F(WaysAheadTest, ManyWaysAreBounded) {
   config_.max_legs = 3;
   const WaysAhead ways(config_, map_, {{{0, true}, 10, 0, 1}}, frame_, Steady(14), 400);
   EXPECT_EQ(ways.legs().size(), 3U);
+}
+
+TEST(TurnChoiceTest, ExitsOfARoundaboutAreEquallyLikelyAndTheLastOneIsTaken) {
+  TurnOption exit{0.9};
+  TurnOption ring{-0.3};
+  ring.ring = true;
+  Approach approach;
+  approach.in_roundabout = true;
+  approach.exits_left = 3;
+  const std::vector<double> first = TurnProbabilities({}, approach, {exit, ring});
+  EXPECT_NEAR(first[1] / first[0], 2, 1e-9);
+  approach.exits_left = 1;
+  EXPECT_GT(TurnProbabilities({}, approach, {exit, ring})[0], 0.85);
 }
 
 TEST(TurnChoiceTest, ProbabilitiesLeaveRoomForAWayThatTheMapDoesNotHave) {

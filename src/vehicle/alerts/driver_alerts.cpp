@@ -254,14 +254,22 @@ bool DriverAlerts::IsDue(const Near& near) const {
   const double course_variance = filter_.covariance()(CourseFilter::kCourse, CourseFilter::kCourse);
   const double max_sigma = config_.max_course_sigma_rad;
   if (speed < config_.min_speed_mps || course_variance > max_sigma * max_sigma) return false;
-  const double above = near.unsure ? config_.unsure_above : config_.alert_above;
-  if (std::min(near.alert.probability, *near.likely) < above) return false;
+  const bool late = near.unsure && near.alert.time_s < config_.late_s;
+  const double above = late          ? config_.late_above
+                       : near.unsure ? config_.unsure_above
+                                     : config_.alert_above;
+  const double probability = near.alert.probability;
+  if (probability < above) return false;
+  if (probability < config_.at_once_above && *near.likely < above) return false;
   const double lead_s = LeadS(near.alert.urgency, speed);
-  double reach_m = ReachM(lead_s + filter_.period_s());
-  if (near.unsure) {
-    reach_m = ReachM(std::min(lead_s, config_.unsure_lead_s) + filter_.period_s());
-  } else if (near.on_way) {
-    reach_m = std::max(reach_m, ReachOnStreetM(lead_s + filter_.period_s()));
+  const double wait_s =
+      (near.unsure ? std::min(lead_s, config_.unsure_lead_s) : lead_s) + filter_.period_s();
+  double reach_m = ReachM(wait_s);
+  // Before a junction, who brakes is not taken to speed up again at once.
+  const bool brakes =
+      filter_.state()[CourseFilter::kAcceleration] < -config_.brakes_from_mps2 && near.unsure;
+  if ((near.unsure || near.on_way) && !brakes) {
+    reach_m = std::max(reach_m, ReachOnStreetM(wait_s));
   }
   return near.alert.distance_m <= reach_m;
 }

@@ -85,9 +85,14 @@ class DriverAlerts {
     /// than sure_above, because of junctions, the driver is told only so long before, s, when more
     /// is known.
     double unsure_lead_s = 4.5;
-    double unsure_above = 0.58;  ///< Probability from which the driver is told then.
+    double unsure_above = 0.62;  ///< Probability from which the driver is told then.
     double sure_above = 0.97;
-    double speeding_up_mps2 = 1.8;  ///< Assumed on streets of a map below the usual speed.
+    /// Nearer than this, s, such an alert comes late anyway: from this probability.
+    double late_s = 3.9;
+    double late_above = 0.9;
+    double at_once_above = 0.9;     ///< Its running mean does not count above this one.
+    double brakes_from_mps2 = 0.3;  ///< From here on a vehicle brakes.
+    double speeding_up_mps2 = 2.4;  ///< Assumed on streets of a map below the usual speed.
     CourseFilter::Config course;
     WayAhead::Config way;
     StreetWay::Config streets;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kMaxWayM = 1000;
 constexpr double kMuchDenser = 3;        // A street's edge is half as dense as its middle.
+constexpr double kLeftRingM = 15;        // So far on another street a ring is left behind.
 constexpr double kParallelCosine = 0.8;  // Streets of the same level cross at more than this.
 
 double NormalBelow(double value) { return 0.5 * std::erfc(-value / std::sqrt(2)); }
@@ -41,6 +42,8 @@ void StreetWay::Reset() {
   matcher_.Reset();
   usual_mps_ = 0;
   last_.reset();
+  approach_.reset();
+  ring_entry_.reset();
   legs_.clear();
   others_.clear();
 }
@@ -60,6 +63,32 @@ void StreetWay::Add(const geo::GeoPoint& position, double sigma_m, const CourseF
     now.course_sigma_rad = std::sqrt(std::max(0.0, variance));
   }
   matcher_.Add(now);
+  FollowJunction();
+}
+
+/// Keeps in mind by which street the vehicle comes to a junction, until it has left that behind.
+void StreetWay::FollowJunction() {
+  if (matcher_.matches().empty()) {
+    approach_.reset();
+    return;
+  }
+  const streets::StreetMatch& likeliest = matcher_.matches().front();
+  const double zone_m = config_.ways.junction_m;
+  if (approach_) {
+    const bool in_it = map_->StartOf(likeliest.travel) == map_->EndOf(*approach_) &&
+                       likeliest.travel.segment != approach_->segment &&
+                       likeliest.along_m <= zone_m;
+    if (in_it || likeliest.travel == *approach_) return;
+    approach_.reset();
+  }
+  const streets::Street& street = map_->StreetOf(likeliest.travel.segment);
+  if (street.roundabout) {
+    if (!ring_entry_) ring_entry_ = RingEntryAhead();
+  } else if (likeliest.along_m > kLeftRingM) {
+    ring_entry_.reset();
+  }
+  const bool choice = map_->Continuations(likeliest.travel).size() > 1;
+  if (choice && !street.roundabout) approach_ = likeliest.travel;
 }
 
 void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filter, double way_m) {
@@ -68,7 +97,11 @@ void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filt
   driving.push_mps2 = filter.state()[CourseFilter::kAcceleration];
   driving.usual_mps = usual_mps_;
   driving.course_rad = filter.state()[CourseFilter::kCourse];
-  driving.course_known = filter.known();
+  driving.course_known = driving.speed_mps >= config_.bend_from_mps;
+  driving.course_sigma_rad =
+      std::sqrt(std::max(0.0, filter.covariance()(CourseFilter::kCourse, CourseFilter::kCourse)));
+  driving.approach = approach_;
+  driving.ring_entry = ring_entry_;
   const double reach_m = std::min(way_m, kMaxWayM);
   const streets::WaysAhead ways(config_.ways, *map_, matcher_.matches(), frame, driving, reach_m);
   legs_ = ways.legs();
@@ -80,6 +113,19 @@ void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filt
     others_.push_back({frame.ToEnu(map_->PlaceOf(ends.from)), frame.ToEnu(map_->PlaceOf(ends.to)),
                        street.HalfWidthM(), street.layer, ways.Touches(segment)});
   }
+}
+
+/// Of the likeliest way that led into a ring when the vehicle looked ahead last.
+std::optional<std::uint32_t> StreetWay::RingEntryAhead() const {
+  const streets::Leg* entry = nullptr;
+  for (const streets::Leg& leg : legs_) {
+    if (leg.before < 0 || !map_->StreetOf(leg.travel.segment).roundabout) continue;
+    const streets::Leg& before = legs_[static_cast<std::size_t>(leg.before)];
+    if (map_->StreetOf(before.travel.segment).roundabout) continue;
+    if (entry == nullptr || leg.probability > entry->probability) entry = &leg;
+  }
+  if (entry == nullptr) return std::nullopt;
+  return map_->StartOf(entry->travel);
 }
 
 /// Of a place so far off the middle of a carriageway, over which hazards are evenly spread.

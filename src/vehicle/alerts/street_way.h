@@ -29,6 +29,7 @@ class StreetWay {
     /// Weight of a street on another level against the way's own: more than 1 rather keeps silent
     /// where a place may lie on either.
     double other_level_weight = 1.5;
+    double bend_from_mps = 3;     ///< A slower vehicle's course does not tell where it turns.
     double usual_way_m = 400;     ///< Way over which the usual speed is forgotten, m.
     double matched_fraction = 1;  ///< Of the fix's stated sigma that the matcher believes.
     streets::StreetMatcher::Config matcher;
@@ -80,6 +81,8 @@ class StreetWay {
     double density;
   };
 
+  void FollowJunction();
+  std::optional<std::uint32_t> RingEntryAhead() const;
   double Density(double off_m, double half_width_m, double variance_m2) const;
   std::vector<OtherNear> OthersNear(const Eigen::Vector2d& place_m, double variance_m2) const;
   double OtherDensity(const std::vector<OtherNear>& others, double own,
@@ -90,6 +93,8 @@ class StreetWay {
   streets::StreetMatcher matcher_;
   double usual_mps_ = 0;
   std::optional<geo::GeoPoint> last_;
+  std::optional<streets::Travel> approach_;  // To the junction that the vehicle comes to or is in.
+  std::optional<std::uint32_t> ring_entry_;  // Node at which it came into a roundabout.
   std::vector<streets::Leg> legs_;
   std::vector<Other> others_;  // All streets near, the way's own, too.
 };
