@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <filesystem>
+#include <utility>
 
 #include "common/error.h"
 #include "common/text_file.h"
@@ -39,6 +40,26 @@ double ManifestThreshold(const perception::ManifestSection& thresholds, const st
   return static_cast<double>(thresholds.Number(key, 1e-6, 1));
 }
 
+ChangeManifest::RoadLook ReadRoadLook(const perception::ManifestSection& root,
+                                      const ChangeManifest::Graph& graph) {
+  const perception::ManifestSection section = root.Sub(
+      "road", {"width", "height", "output", "least_agreement", "features", "colours", "bias"});
+  ChangeManifest::RoadLook road;
+  road.graph = graph;
+  road.width = section.Integer("width", 64, perception::kLargestInputSide);
+  road.height = section.Integer("height", 64, perception::kLargestInputSide);
+  for (const auto& [key, size] :
+       {std::pair("width", road.width), std::pair("height", road.height)}) {
+    if (size % 8 != 0) section.Refuse(key, "a multiple of 8");
+  }
+  road.output = section.Text("output");
+  road.least_agreement = static_cast<double>(section.Number("least_agreement", 1e-6, 1));
+  road.features = static_cast<double>(section.Number("features", 0, 100));
+  road.colours = static_cast<double>(section.Number("colours", 0, 100));
+  road.bias = static_cast<double>(section.Number("bias", -100, 100));
+  return road;
+}
+
 }  // namespace
 
 ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& origin,
@@ -56,15 +77,26 @@ ChangeManifest ParseChangeManifest(const std::string& yaml, const std::string& o
     }
     const perception::ManifestSection root(
         file, origin, "",
-        {"name", "kind", "graphs", "classes", "input", "normalisation", "head", "thresholds"});
+        {"name", "kind", "graphs", "classes", "input", "normalisation", "head", "thresholds"},
+        {"road"});
     root.Choice("kind", {"change"});
     ChangeManifest manifest;
     manifest.name = root.Text("name");
     CheckManifestClasses(root);
-    const perception::ManifestSection graphs = root.Sub("graphs", {"whole", "encoder", "head"});
+    const perception::ManifestSection graphs =
+        root.Sub("graphs", {"whole", "encoder", "head"}, {"road"});
     manifest.whole = ReadManifestGraph(graphs, "whole", directory);
     manifest.encoder = ReadManifestGraph(graphs, "encoder", directory);
     manifest.head = ReadManifestGraph(graphs, "head", directory);
+    if (graphs.Has("road") != root.Has("road")) {
+      throw Error(
+          "model manifest '" + origin + "' has " +
+          (root.Has("road") ? "'road' without 'graphs.road'" : "'graphs.road' without 'road'") +
+          ", accepted are both or none");
+    }
+    if (root.Has("road")) {
+      manifest.road = ReadRoadLook(root, ReadManifestGraph(graphs, "road", directory));
+    }
     const perception::ManifestSection input =
         root.Sub("input", {"width", "height", "channels", "resize", "pad_value", "invalid"},
                  {"closer_look"});

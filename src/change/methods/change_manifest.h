@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "perception/inference/model_manifest.h"
@@ -16,6 +17,21 @@ struct ChangeManifest {
     std::string sha256;  ///< 64 lower-case hexadecimal digits.
   };
 
+  /// How the road is looked at by itself, see class RoadLook.
+  struct RoadLook {
+    Graph graph;         ///< One picture's road to a detector's features at stride 8.
+    int width = 0;       ///< Of the graph's input, pixels, a multiple of 8.
+    int height = 0;      ///< The same.
+    std::string output;  ///< Name of the features.
+    /// Least RoadAlignment::agreement at which the two roads are compared, (0, 1].
+    double least_agreement = 0.45;
+    /// Log odds of change: features * log(distance of features) + colours * log(distance of
+    /// colours) + bias.
+    double features = 0;
+    double colours = 0;
+    double bias = 0;
+  };
+
   std::string name;
   Graph whole;    ///< Two pictures and validity to probabilities.
   Graph encoder;  ///< One picture to its features.
@@ -27,6 +43,7 @@ struct ChangeManifest {
   perception::ModelManifest::Normalisation normalisation;
   int levels = 0;      ///< Of features, 1 to 10.
   std::string output;  ///< Name of the probabilities.
+  std::optional<RoadLook> road;
   /// Least 1 - probability of no change at which a pixel counts as changed, (0, 1); the others have
   /// that share of false positives on the validation pairs.
   double changed = 0.5;

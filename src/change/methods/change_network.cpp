@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "change/registration/change_region.h"
 #include "common/error.h"
 #include "perception/inference/engines.h"
 #include "perception/inference/manifest_section.h"
@@ -49,6 +50,7 @@ ChangeNetwork::ChangeNetwork(const ChangeManifest& manifest, int threads)
   if (threads > 0) cv::setNumThreads(threads);
   CheckWhole();
   CheckParts();
+  if (manifest.road) road_look_.emplace(manifest);
 }
 
 void ChangeNetwork::CheckWhole() {
@@ -144,13 +146,26 @@ ChangeProbabilities ChangeNetwork::Infer(const AlignedPair& pair) {
   ChangeProbabilities probabilities = Look(pair);
   const cv::Rect middle = CloserLook(pair.after.size(), manifest_.closer_look,
                                      {manifest_.input.width, manifest_.input.height});
-  if (middle.empty()) return probabilities;
-  const ChangeProbabilities closer =
-      Look({pair.before(middle), pair.after(middle), pair.valid(middle)});
-  for (std::size_t i = 0; i < closer.of_class.size(); ++i) {
-    closer.of_class[i].copyTo(probabilities.of_class[i](middle));
+  if (!middle.empty()) {
+    const ChangeProbabilities closer =
+        Look({pair.before(middle), pair.after(middle), pair.valid(middle)});
+    for (std::size_t i = 0; i < closer.of_class.size(); ++i) {
+      closer.of_class[i].copyTo(probabilities.of_class[i](middle));
+    }
   }
+  if (road_look_) LookAtRoad(pair, probabilities);
   return probabilities;
+}
+
+void ChangeNetwork::LookAtRoad(const AlignedPair& pair, ChangeProbabilities& probabilities) {
+  const std::optional<AlignedPair> aligned = road_look_->Align(pair);
+  if (!aligned) return;
+  ChangeProbabilities on_road = Look(*aligned);
+  RaiseChange(road_look_->LogOdds(*aligned), on_road);
+  const cv::Mat known = ChangeRegionMask("road", pair.after.size()) & aligned->valid & pair.valid;
+  for (std::size_t i = 0; i < on_road.of_class.size(); ++i) {
+    on_road.of_class[i].copyTo(probabilities.of_class[i], known);
+  }
 }
 
 ChangeProbabilities ChangeNetwork::Look(const AlignedPair& pair) {

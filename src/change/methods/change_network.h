@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "change/methods/change_manifest.h"
 #include "change/methods/change_method.h"
+#include "change/methods/road_look.h"
 #include "perception/inference/letterbox.h"
 #include "perception/inference/onnx_graph.h"
 
@@ -26,8 +28,8 @@ struct ChangeFeatures {
 /// The network of change (thesis, section 4.4) on OpenCV's DNN module, on the CPU. Pictures may
 /// have any size: they are letterboxed to the network's, and its answer is enlarged to theirs.
 /// Where the manifest says so, Run looks a second time at the middle of large pictures (CloserLook)
-/// and takes that answer there. Where the pair is not valid the probability of no change is 1. Not
-/// thread-safe.
+/// and takes that answer there, and at the road of both by itself (RoadLook). Where the pair is not
+/// valid the probability of no change is 1. Not thread-safe.
 class ChangeNetwork final : public ChangeMethod {
  public:
   /// Loads the three graphs and runs each once. Throws Error when a file is missing, has another
@@ -54,6 +56,8 @@ class ChangeNetwork final : public ChangeMethod {
 
   /// The network's answer to a pair, or to a part of one.
   ChangeProbabilities Look(const AlignedPair& pair);
+  /// Takes on the road what the network and the road look make of both roads laid onto each other.
+  void LookAtRoad(const AlignedPair& pair, ChangeProbabilities& probabilities);
   void CheckWhole();
   void CheckParts();
   /// Throws Error unless it is what the manifest says of the probabilities.
@@ -73,6 +77,7 @@ class ChangeNetwork final : public ChangeMethod {
   perception::OnnxGraph whole_;
   perception::OnnxGraph encoder_;
   perception::OnnxGraph head_;
+  std::optional<RoadLook> road_look_;
 };
 
 /// The part of a picture of `size` that is looked at more closely: `share` of its width, as high as

@@ -11,10 +11,10 @@
 
 #include "change/measures/change_pairs.h"
 #include "change/measures/change_predictions.h"
-#include "change/measures/change_region.h"
 #include "change/measures/change_report.h"
 #include "change/methods/change_method.h"
 #include "change/methods/change_network.h"
+#include "change/registration/change_region.h"
 #include "change/registration/edge_registration.h"
 #include "change/registration/registration.h"
 #include "common/error.h"

@@ -5,11 +5,11 @@
 
 #include "change/measures/binary_counts.h"
 #include "change/measures/change_pairs.h"
-#include "change/measures/change_region.h"
 #include "change/measures/change_report.h"
 #include "change/measures/community_change_scores.h"
 #include "change/measures/pooled_change_scores.h"
 #include "change/measures/score_histogram.h"
+#include "change/registration/change_region.h"
 #include "common/error.h"
 
 namespace livemap::change {

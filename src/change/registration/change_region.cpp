@@ -1,4 +1,4 @@
-#include "change/measures/change_region.h"
+#include "change/registration/change_region.h"
 
 #include <array>
 #include <opencv2/imgproc.hpp>
