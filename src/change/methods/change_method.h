@@ -14,6 +14,9 @@ struct AlignedPair {
   cv::Mat before;  ///< CV_8UC3, BGR.
   cv::Mat after;   ///< CV_8UC3, BGR, of the same size.
   cv::Mat valid;   ///< CV_8UC1: 255 where `before` is known, else 0.
+  /// True: it is `after` that was warped, into the view of `before`, as when a pair is measured in
+  /// the other order. A method that aligns parts of the pictures anew moves the warped one.
+  bool after_is_warped = false;
 };
 
 /// Throws Error unless `valid` is a mask as AlignedPair has it, of `size`.

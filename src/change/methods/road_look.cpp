@@ -1,10 +1,10 @@
 #include "change/methods/road_look.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "change/registration/change_region.h"
 #include "change/registration/road_alignment.h"
@@ -44,6 +44,7 @@ perception::ModelManifest::Input RoadInput(const ChangeManifest& manifest) {
 }
 
 /// Least distance of each cell of `one` to the 3 x 3 cells around it of `other`.
+/// `most` (CV_32FC1) keeps the greater.
 void NearestCells(const cv::Mat& one, const cv::Mat& other, cv::Size cells, cv::Mat& most) {
   for (int y = 0; y < cells.height; ++y) {
     for (int x = 0; x < cells.width; ++x) {
@@ -60,59 +61,77 @@ void NearestCells(const cv::Mat& one, const cv::Mat& other, cv::Size cells, cv::
   }
 }
 
-/// `before` in the exposure of `after`: per channel the line that most pixels within `mask` follow.
-cv::Mat InExposureOf(const cv::Mat& after, const cv::Mat& before, const cv::Mat& mask) {
-  std::vector<cv::Point> points;
-  cv::findNonZero(mask, points);
-  const std::size_t step = std::max<std::size_t>(points.size() / kExposureSamples, 1);
-  std::vector<std::array<cv::Vec3d, 2>> samples;
-  for (std::size_t i = 0; i < points.size(); i += step) {
-    samples.push_back(
-        {cv::Vec3d(before.at<cv::Vec3b>(points[i])), cv::Vec3d(after.at<cv::Vec3b>(points[i]))});
-  }
-  if (samples.empty()) return before.clone();
-  cv::Vec3d gain(1, 1, 1);
-  cv::Vec3d offset(0, 0, 0);
-  std::vector<double> weights(samples.size(), 1);
-  std::vector<double> misfits(samples.size());
-  for (int round = 0; round < kExposureRounds; ++round) {
-    for (int c = 0; c < 3; ++c) {
-      double sum = 0;
-      double x = 0;
-      double y = 0;
-      double xx = 0;
-      double xy = 0;
-      for (std::size_t i = 0; i < samples.size(); ++i) {
-        const double from = samples[i][0][c];
-        const double to = samples[i][1][c];
-        sum += weights[i];
-        x += weights[i] * from;
-        y += weights[i] * to;
-        xx += weights[i] * from * from;
-        xy += weights[i] * from * to;
-      }
-      gain[c] = std::clamp((xy - x * y / sum) / (xx - x * x / sum + 1e-3), 0.5, 2.0);
-      offset[c] = (y - gain[c] * x) / sum;
+/// Two exposures of the same pixels: a line per channel that takes the one to the other. Pixels
+/// that do not follow it, as those of things that changed, count little (weights of Geman and
+/// McClure).
+class ExposureFit {
+ public:
+  ExposureFit(const cv::Mat& from, const cv::Mat& to, const cv::Mat& mask) {
+    std::vector<cv::Point> points;
+    cv::findNonZero(mask, points);
+    const std::size_t step = std::max<std::size_t>(points.size() / kExposureSamples, 1);
+    for (std::size_t i = 0; i < points.size(); i += step) {
+      from_.emplace_back(from.at<cv::Vec3b>(points[i]));
+      to_.emplace_back(to.at<cv::Vec3b>(points[i]));
     }
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      const cv::Vec3d misfit = samples[i][0].mul(gain) + offset - samples[i][1];
-      misfits[i] = (std::abs(misfit[0]) + std::abs(misfit[1]) + std::abs(misfit[2])) / 3;
+    weights_.assign(from_.size(), 1);
+    for (int round = 0; round < kExposureRounds && !from_.empty(); ++round) {
+      for (int channel = 0; channel < 3; ++channel) FitChannel(channel);
+      Weigh();
+    }
+  }
+
+  cv::Mat Apply(const cv::Mat& from) const {
+    cv::Mat exposed;
+    cv::transform(from, exposed,
+                  cv::Matx34d(gain_[0], 0, 0, offset_[0],  //
+                              0, gain_[1], 0, offset_[1],  //
+                              0, 0, gain_[2], offset_[2]));
+    return exposed;
+  }
+
+ private:
+  void FitChannel(int channel) {
+    double sum = 0;
+    double x = 0;
+    double y = 0;
+    double xx = 0;
+    double xy = 0;
+    for (std::size_t i = 0; i < from_.size(); ++i) {
+      const double weight = weights_[i];
+      sum += weight;
+      x += weight * from_[i][channel];
+      y += weight * to_[i][channel];
+      xx += weight * from_[i][channel] * from_[i][channel];
+      xy += weight * from_[i][channel] * to_[i][channel];
+    }
+    constexpr double kLeastVariance = 1e-3;
+    gain_[channel] = std::clamp((xy - x * y / sum) / (xx - x * x / sum + kLeastVariance), 0.5, 2.0);
+    offset_[channel] = (y - gain_[channel] * x) / sum;
+  }
+
+  void Weigh() {
+    std::vector<double> misfits;
+    misfits.reserve(from_.size());
+    for (std::size_t i = 0; i < from_.size(); ++i) {
+      misfits.push_back(cv::norm(from_[i].mul(gain_) + offset_ - to_[i], cv::NORM_L1) / 3);
     }
     std::vector<double> sorted = misfits;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
     const double scale = 1.5 * std::max(*middle, 1.0);
-    for (std::size_t i = 0; i < samples.size(); ++i) {
+    for (std::size_t i = 0; i < misfits.size(); ++i) {
       const double ratio = misfits[i] / scale;
-      weights[i] = 1 / ((1 + ratio * ratio) * (1 + ratio * ratio));
+      weights_[i] = 1 / ((1 + ratio * ratio) * (1 + ratio * ratio));
     }
   }
-  cv::Mat exposed;
-  cv::transform(
-      before, exposed,
-      cv::Matx34d(gain[0], 0, 0, offset[0], 0, gain[1], 0, offset[1], 0, 0, gain[2], offset[2]));
-  return exposed;
-}
+
+  std::vector<cv::Vec3d> from_;
+  std::vector<cv::Vec3d> to_;
+  std::vector<double> weights_;
+  cv::Vec3d gain_{1, 1, 1};
+  cv::Vec3d offset_{0, 0, 0};
+};
 
 /// Least distance of each pixel of `one` to those around it of `other`, the sum of the channels;
 /// both CV_16UC3. `most` (CV_16UC1) keeps the greater.
@@ -146,7 +165,7 @@ cv::Mat ColourDistance(const AlignedPair& pair, const cv::Mat& road) {
   cv::resize(pair.before, before, {}, shrink, shrink, cv::INTER_AREA);
   cv::resize(pair.after, after, before.size(), 0, 0, cv::INTER_AREA);
   cv::resize(road & pair.valid, mask, before.size(), 0, 0, cv::INTER_NEAREST);
-  before = InExposureOf(after, before, mask);
+  before = ExposureFit(before, after, mask).Apply(before);
   const cv::Range band = RoadBand(before.rows);
   before.rowRange(band).convertTo(before, CV_16U);
   after.rowRange(band).convertTo(after, CV_16U);
@@ -183,16 +202,18 @@ RoadLook::RoadLook(const ChangeManifest& manifest)
 }
 
 std::optional<AlignedPair> RoadLook::Align(const AlignedPair& pair) const {
-  const RoadAlignment alignment = AlignRoad(pair.before, pair.after, pair.valid);
+  const cv::Mat& still = pair.after_is_warped ? pair.before : pair.after;
+  const cv::Mat& moved = pair.after_is_warped ? pair.after : pair.before;
+  const RoadAlignment alignment = AlignRoad(moved, still, pair.valid);
   if (alignment.agreement < config_.least_agreement) return std::nullopt;
-  AlignedPair aligned;
-  aligned.after = pair.after;
-  cv::warpPerspective(pair.valid, aligned.valid, alignment.after_from_before, pair.valid.size(),
+  cv::Mat valid;
+  cv::warpPerspective(pair.valid, valid, alignment.after_from_before, pair.valid.size(),
                       cv::INTER_NEAREST);
-  cv::Mat before;
-  cv::warpPerspective(pair.before, before, alignment.after_from_before, pair.before.size());
-  aligned.before = FillUnknown(before, pair.after, aligned.valid);
-  return aligned;
+  cv::Mat warped;
+  cv::warpPerspective(moved, warped, alignment.after_from_before, moved.size());
+  warped = FillUnknown(warped, still, valid);
+  if (pair.after_is_warped) return AlignedPair{still, warped, valid, true};
+  return AlignedPair{warped, still, valid};
 }
 
 cv::Mat RoadLook::LogOdds(const AlignedPair& pair) {
@@ -205,9 +226,6 @@ cv::Mat RoadLook::LogOdds(const AlignedPair& pair) {
   cv::Mat log_odds(pair.after.size(), CV_32FC1, cv::Scalar(kSurelyNot));
   in_band.copyTo(log_odds.rowRange(band));
   log_odds.setTo(kSurelyNot, (road & pair.valid) == 0);
-  cv::Mat outside = cv::Mat(pair.after.size(), CV_8UC1, cv::Scalar(255));
-  outside.rowRange(band).setTo(0);
-  log_odds.setTo(kSurelyNot, outside);
   return log_odds;
 }
 

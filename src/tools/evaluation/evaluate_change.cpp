@@ -246,7 +246,7 @@ class ChangeEvaluation {
     if (method_ == nullptr) {
       return change::ReadPrediction(options_.reversed_predictions, files.name, pair.truth.size());
     }
-    return Measured({aligned_.after, aligned_.before, aligned_.valid});
+    return Measured({aligned_.after, aligned_.before, aligned_.valid, true});
   }
 
   /// A network's scores are probabilities, so it can say how little it knows of what was not seen;
