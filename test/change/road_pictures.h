@@ -22,6 +22,6 @@ inline cv::Mat RoadPicture(std::uint64_t seed, cv::Size size = {960, 480}) {
 }
 
 /// How the road of a second drive lies that stood somewhat further back and beside.
-inline cv::Matx33d RoadWarp() { return {1.04, 0.06, -32, 0.002, 1.05, -7, 0, 0.0001, 1}; }
+inline cv::Matx33d RoadWarp() { return {1.04, 0.06, -45, 0.002, 1.05, -7, 0, 0.0001, 1}; }
 
 }  // namespace livemap::change

