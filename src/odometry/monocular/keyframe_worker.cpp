@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <utility>
 
 namespace livemap::odometry {
@@ -58,9 +59,16 @@ std::optional<KeyframeWorker::Made> KeyframeWorker::Take() {
   return std::exchange(made_, std::nullopt);
 }
 
-std::optional<KeyframeWorker::Made> KeyframeWorker::WaitAndTake() {
+std::optional<KeyframeWorker::Made> KeyframeWorker::WaitAndTake(double longest_s) {
+  if (!busy_) return std::nullopt;
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                             std::chrono::duration<double>(longest_s));
   const MutexLock lock(mutex_);
-  while (busy_ && !made_) changed_.Wait(mutex_);
+  while (!made_) {
+    if (!changed_.WaitUntil(mutex_, deadline)) break;
+  }
+  if (!made_) return std::nullopt;
   busy_ = false;
   return std::exchange(made_, std::nullopt);
 }

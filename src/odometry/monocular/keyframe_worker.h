@@ -44,8 +44,9 @@ class KeyframeWorker {
   void Give(Order order);
   /// Once per frame: what is done; none while it is not.
   std::optional<Made> Take();
-  /// What is in work, for which it waits; none when it is not busy.
-  std::optional<Made> WaitAndTake();
+  /// What is in work, for which it waits for `longest_s` at most; none when it is not busy, or is
+  /// still at it.
+  std::optional<Made> WaitAndTake(double longest_s);
   /// Waits for what is in work and forgets it.
   void Cancel();
 

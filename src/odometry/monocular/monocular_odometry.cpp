@@ -296,7 +296,8 @@ bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult
 bool MonocularOdometry::TakeKeyframe() {
   if (!worker_) return false;
   const bool late = Seconds(now_ns_ - ordered_ns_) > config_.longest_keyframe_s;
-  const std::optional<KeyframeWorker::Made> made = late ? worker_->WaitAndTake() : worker_->Take();
+  const std::optional<KeyframeWorker::Made> made =
+      late ? worker_->WaitAndTake(config_.longest_wait_s) : worker_->Take();
   if (!made) return false;
   OnLearnt(made->learnt);
   return odometry_.AddEarlierKeyframe(

@@ -66,6 +66,18 @@ TEST(KeyframeWorker, HandsOverAFixedNumberOfFramesLaterWhereThatIsWanted) {
   EXPECT_FALSE(worker.busy());
 }
 
+TEST(KeyframeWorker, WaitsForALateKeyframeNoLongerThanItMay) {
+  DepthLearner learner = WorkerLearner();
+  KeyframeWorker worker(learner, 0);
+  EXPECT_FALSE(worker.WaitAndTake(10)) << "nothing was given";
+  worker.Give(WorkerOrder(0.08, 1));
+  // Learning takes longer than nothing, unless this thread is kept waiting itself.
+  const bool is_ready = worker.WaitAndTake(0).has_value();
+  EXPECT_NE(worker.busy(), is_ready) << "what is not ready is still to come";
+  EXPECT_NE(worker.WaitAndTake(60).has_value(), is_ready);
+  EXPECT_FALSE(worker.busy());
+}
+
 TEST(KeyframeWorker, WhatIsCancelledOrInWorkAtTheEndIsForgotten) {
   DepthLearner learner = WorkerLearner();
   {
