@@ -26,8 +26,9 @@ TEST(HazardCatalogue, ShippedFileNamesEveryClassOfTheDesign) {
   }
   EXPECT_LT(catalogue.Get("deer").expected_life_s, catalogue.Get("pothole").expected_life_s);
   EXPECT_LT(catalogue.Get("stopped_accident").urgency, catalogue.Get("pothole").urgency);
-  EXPECT_EQ(catalogue.Get("pothole").half_depth_m, 0);
-  EXPECT_GT(catalogue.Get("stopped_accident").half_depth_m, 1);
+  EXPECT_GT(catalogue.Get("pothole").half_depth_m, 0);
+  EXPECT_LT(catalogue.Get("pothole").half_depth_m, 1);
+  EXPECT_GT(catalogue.Get("stopped_accident").half_depth_m, 3);
 }
 
 TEST(HazardCatalogue, ShippedFileTellsDriversOfDeerAndAccidentsByOneVehicleAndOfTheRestByTwo) {
