@@ -151,18 +151,29 @@ std::optional<double> FixTrack::NewestScatter() const {
 }
 
 /// How much the newest fixes before `end` scatter, at least course_noise_m. By the median: a fix
-/// that reflections throw aside is no scatter.
+/// that reflections throw aside is no scatter. The first fixes of a track that will show their
+/// scatter are taken to scatter as they state.
 double FixTrack::ScatterM(const Points::const_iterator& end) const {
   std::vector<double> scatters_m2;
   for (auto point = end; point != points_.begin() && scatters_m2.size() < kScattersAsked;) {
     --point;
     if (point->scatter_m2) scatters_m2.push_back(*point->scatter_m2);
   }
-  if (scatters_m2.size() < kScattersEnough) return config_.course_noise_m;
+  if (scatters_m2.size() < kScattersEnough) {
+    return std::max(config_.course_noise_m, FirstScatterM(end));
+  }
   const auto middle = scatters_m2.begin() + static_cast<std::ptrdiff_t>(scatters_m2.size() / 2);
   std::nth_element(scatters_m2.begin(), middle, scatters_m2.end());
   // Half the square of two normal numbers has this median.
   return std::max(config_.course_noise_m, std::sqrt(*middle / M_LN2));
+}
+
+/// What the last fix before `end` states; 0 where fixes come too seldom to show more.
+double FixTrack::FirstScatterM(const Points::const_iterator& end) const {
+  if (end - points_.begin() < 2) return 0;
+  const Point& last = *std::prev(end);
+  const double step_s = Seconds(last.stamp_ns - std::prev(end, 2)->stamp_ns);
+  return step_s <= kStraightS / 2 ? FixSigmaM(last.covariance_m2) : 0;
 }
 
 /// Course of a vehicle that stands at this moment: the one it came with, else the one it leaves

@@ -127,6 +127,7 @@ class FixTrack {
   std::optional<Course> StandingCourse(const Points::const_iterator& after) const;
   std::optional<double> NewestScatter() const;
   double ScatterM(const Points::const_iterator& end) const;
+  double FirstScatterM(const Points::const_iterator& end) const;
   std::optional<Motion> BestLineFit(const std::vector<Sample>& samples, double noise_m) const;
   std::optional<Course> CourseOf(const Motion& motion) const;
 

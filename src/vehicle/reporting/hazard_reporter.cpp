@@ -401,9 +401,11 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose&
     sightings.push_back(&sighting);
   }
   const std::vector<PassSights::Id> passes = passes_.Add(seen);
+  // Where fused poses are to come, fixes stand in for a while: what they place badly can wait.
+  const bool heading_counts = config_.position_source == PositionSource::kFused;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const placement::HazardSight& sight = seen[i].sight;
-    if (!placement::IsNearEnough(sight.foot, fused ? base.course_variance_rad2 : 0.0,
+    if (!placement::IsNearEnough(sight.foot, heading_counts ? base.course_variance_rad2 : 0.0,
                                  config_.max_range_m, config_.max_ground_sigma_m)) {
       ++counters_.too_far;
       continue;

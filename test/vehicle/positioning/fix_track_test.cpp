@@ -325,6 +325,20 @@ TEST(FixTrack, FixesThatScatterWidelyMakeTheCourseAsUncertainAsItIs) {
   EXPECT_LT(squares / known, 1.5);
 }
 
+TEST(FixTrack, TheFirstFixesOfATrackScatterAsTheyState) {
+  const auto first = ScatteredDrive(1.5, 1, 0.5).At(StampNs(0.45));
+  EXPECT_EQ(first.answer, Answer::kWait) << "0.5 s of fixes that are 1.5 m off tell no course";
+  EXPECT_EQ(ScatteredDrive(0.1, 1, 0.5).At(StampNs(0.45)).answer, Answer::kReady);
+}
+
+TEST(FixTrack, FixesTooSeldomToShowTheirScatterAreNotTakenByTheirWord) {
+  FixTrack track{FixTrack::Config{}};
+  for (double time_s = 0; time_s <= 3; time_s += 1) {
+    track.Add(FixOf(time_s, Straight(1.0, 8.0, time_s), 5.0));
+  }
+  EXPECT_EQ(track.At(StampNs(1.5)).answer, Answer::kReady) << "their errors hardly change";
+}
+
 TEST(FixTrack, FixesThatHardlyScatterLeaveTheCourseAsItWas) {
   const auto sure = ScatteredDrive(0.01, 1, 4.0).At(StampNs(3.95));
   ASSERT_EQ(sure.answer, Answer::kReady);
