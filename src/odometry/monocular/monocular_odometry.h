@@ -73,8 +73,9 @@ class MonocularOdometry {
     /// before see too little of it, and their path runs away.
     double longest_keyframe_s = 0.35;
     /// But no frame waits longer than this, s of the steady clock: it goes on by the keyframe
-    /// before, and the next frame waits again. About the time between two frames of a slow camera.
-    double longest_wait_s = 0.1;
+    /// before, and the next frame waits again. Less than the time between two frames of a slow
+    /// camera: on a busy machine the frames do not fall behind.
+    double longest_wait_s = 0.08;
     /// Without a motion at the start, and lost: the two-view start begins anew after this, s.
     double give_up_s = 1.0;
     Config();
