@@ -110,10 +110,11 @@ MountingEstimator::Mean MountingEstimator::MeanOf(int which, std::size_t begin, 
   if (floors) {
     const double floor = height ? config_.height_floor : config_.angle_floor_rad;
     result.variance += floor * floor;
-    if (height) {
-      const double metres = MeanOf(kMetresSigma, begin, end, false).value;
-      result.variance += metres * metres * std::min(1.0, config_.blocks_per_metres_error / count);
-    }
+  }
+  if (height) {
+    // Blocks that share the error of their metres scatter by less than they are wrong.
+    const double metres = MeanOf(kMetresSigma, begin, end, false).value;
+    result.variance += metres * metres * std::min(1.0, config_.blocks_per_metres_error / count);
   }
   return result;
 }

@@ -128,6 +128,19 @@ TEST(MountingEstimator, TakesALowerCameraForAKnockToo) {
   EXPECT_NEAR(knock->after.height_m, after.height_m, 0.03);
 }
 
+TEST(MountingEstimator, TakesNewMetresForNoKnock) {
+  // As after a start anew of one eye: all that it sees is a tenth longer, within what it states.
+  for (const double metres_sigma : {0.05, 0.005}) {
+    MountingEstimator estimator({});
+    for (int i = 0; i < 600; ++i) {
+      const double metres = i < 400 ? 1 : 1.1;
+      estimator.AddTravel(AxesInCamera(kTruth).forward, 0.5);
+      estimator.AddRoad({AxesInCamera(kTruth).down, metres * kTruth.height_m}, metres_sigma);
+    }
+    EXPECT_EQ(estimator.TakeKnock().has_value(), metres_sigma < 0.01) << metres_sigma;
+  }
+}
+
 TEST(MountingEstimator, TellsNoKnockInFiftyQuietDrives) {
   for (unsigned seed = 100; seed < 150; ++seed) {
     MountingEstimator estimator({});
