@@ -30,6 +30,9 @@ VehiclePoseLookup::Config ReporterPoseConfigOf(const HazardReporter::Config& con
 constexpr std::size_t kMaxWaitingNotices = 20000;
 /// Sights from so many times too far away, or too uncertain, still help a hazard's place.
 constexpr double kSightReach = 3.0;
+/// Of fixes that stand in for fused poses: with the same limit more of what is passed at the start
+/// of a drive would never be reported.
+constexpr double kStandInReach = 2.0;
 constexpr double kFixHeadingOwnShare =
     0.5;  // Of the course's variance; the fixes' windows overlap.
 constexpr double kForEverS = 1e9;
@@ -403,10 +406,11 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose&
   const std::vector<PassSights::Id> passes = passes_.Add(seen);
   // Where fused poses are to come, fixes stand in for a while: what they place badly can wait.
   const bool heading_counts = config_.position_source == PositionSource::kFused;
+  const double reach = heading_counts && !fused ? kStandInReach : 1;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const placement::HazardSight& sight = seen[i].sight;
     if (!placement::IsNearEnough(sight.foot, heading_counts ? base.course_variance_rad2 : 0.0,
-                                 config_.max_range_m, config_.max_ground_sigma_m)) {
+                                 config_.max_range_m, reach * config_.max_ground_sigma_m)) {
       ++counters_.too_far;
       continue;
     }

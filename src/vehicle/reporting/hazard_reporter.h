@@ -60,8 +60,8 @@ class HazardReporter {
     double max_range_m = 30.0;
     /// So does one whose place on the road is less certain than this, seen from the vehicle:
     /// standard deviation along its worst axis, m. A low camera reaches it before max_range_m. With
-    /// fused poses, and fixes that stand in for them, the heading's error at that distance counts,
-    /// too.
+    /// fused poses the heading's error at that distance counts, too; and where fixes stand in for
+    /// them, with twice this limit.
     double max_ground_sigma_m = 1.0;
     /// A frame waits at most this long for fix, course and camera; then it is dropped, s.
     double max_wait_s = 5.0;

@@ -85,15 +85,15 @@ TEST_F(HazardReporterTest, AFusedHeadingThatIsUncertainWaitsForANearerView) {
 }
 
 TEST_F(HazardReporterTest, FixesThatStandInForFusedPosesWaitForANearerViewToo) {
-  config_.max_ground_sigma_m = 1.0;
-  config_.track.course_noise_m = 1.5;  // The course is 0.1 rad off and more.
+  config_.max_ground_sigma_m = 0.5;
+  config_.track.course_noise_m = 1.8;  // The course is 0.1 rad off and more.
   for (const PositionSource source : {PositionSource::kFixes, PositionSource::kFused}) {
     config_.position_source = source;
     const bool is_fused = source == PositionSource::kFused;
     config_.map.path = directory_.path() + (is_fused ? "/fused.sqlite3" : "/fixes.sqlite3");
     Restart();
     DriveFixes(0, 4);
-    See(2.0, {{"pothole", 0.8F, BoxAt(13.5, 0)}});
+    See(2.0, {{"pothole", 0.8F, BoxAt(9, 0)}});
     EXPECT_THAT(TakeDue(), SizeIs(is_fused ? 0 : 1))
         << "the fixes alone have nothing better to wait for";
   }
