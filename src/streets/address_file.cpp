@@ -8,6 +8,7 @@
 #include <osmium/memory/buffer.hpp>
 #include <osmium/osm/entity_bits.hpp>
 #include <osmium/osm/node.hpp>
+#include <osmium/osm/node_ref.hpp>
 #include <osmium/osm/way.hpp>
 
 #include "common/error.h"
@@ -31,8 +32,12 @@ AddressMap ReadAddressesOf(const osmium::io::File& file, const std::string& name
     ForEachAddressed<osmium::Way>(file, osmium::osm_entity_bits::way, [&](const osmium::Way& way) {
       const char* const number = way.tags().get_value_by_key("addr:housenumber");
       const char* const street = way.tags().get_value_by_key("addr:street");
-      if (number == nullptr || street == nullptr || way.nodes().empty()) return;
-      builder.AddAtNode(street, number, way.nodes().front().ref());
+      if (number == nullptr || street == nullptr) return;
+      // Not front(): GCC takes the list for the library's one without nodes, and warns.
+      for (const osmium::NodeRef& node : way.nodes()) {
+        builder.AddAtNode(street, number, node.ref());
+        break;
+      }
     });
     ForEachAddressed<osmium::Node>(
         file, osmium::osm_entity_bits::node, [&](const osmium::Node& node) {
