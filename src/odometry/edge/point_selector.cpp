@@ -1,13 +1,17 @@
 #include "odometry/edge/point_selector.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 namespace livemap::odometry {
 namespace {
 
 constexpr int kBorderPx = 2;
+/// Of an edge, from 0 to half a turn.
+constexpr std::size_t kDirections = 8;
 
 float HalfPointDifference(int before, int after) {
   return 0.5F * static_cast<float>(after - before);
@@ -53,6 +57,26 @@ void AddEdgePoint(const ReferenceLevel& reference, const Pixel& pixel,
   if (!sigma.empty()) {
     points.inverse_depth_sigma.push_back(sigma.ptr<float>(pixel.y)[pixel.x]);
   }
+}
+
+/// Which of the directions a gradient has, whatever its sign.
+std::uint8_t DirectionOf(const Gradient& gradient) {
+  const float angle = std::atan2(gradient.y, gradient.x) / static_cast<float>(M_PI) + 1;
+  return static_cast<std::uint8_t>(static_cast<int>(angle * kDirections + 0.5F) % kDirections);
+}
+
+/// What each direction gets of so many: all it has, or as much as the others that have more.
+std::array<std::size_t, kDirections> FairShares(const std::array<std::size_t, kDirections>& counts,
+                                                std::size_t most) {
+  std::array<std::size_t, kDirections> order{}, shares{};
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(),
+            [&counts](std::size_t a, std::size_t b) { return counts[a] < counts[b]; });
+  for (std::size_t i = 0; i < kDirections; ++i) {
+    shares[order[i]] = std::min(counts[order[i]], most / (kDirections - i));
+    most -= shares[order[i]];
+  }
+  return shares;
 }
 
 /// Calls `visit` with every column of a mask's row, from `begin` on and before `end`, that is set.
@@ -131,13 +155,36 @@ void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges
     SelectAtRandom(reference, camera, selection, points);
     return;
   }
-  const std::size_t count = candidates_.size();
-  const std::size_t wanted = std::min(count, selection.max_points);
-  for (std::size_t i = 0; i < wanted; ++i) {
-    const Pixel& pixel = candidates_[i * count / wanted];
+  points.Clear();
+  Thin(reference.grey, selection.max_points);
+  for (const Pixel& pixel : candidates_) {
     if (IsUsablePoint(reference, pixel, selection)) AddEdgePoint(reference, pixel, camera, points);
   }
   points.Finish();
+}
+
+/// Leaves at most so many candidates, in their order. Directions that are rare keep theirs: a wall
+/// of stripes must not outvote the few edges that say how far the camera moved along it
+/// (Rusinkiewicz and Levoy 2001, normal-space sampling, of the image's gradients).
+void PointSelector::Thin(const cv::Mat& grey, std::size_t most) {
+  if (candidates_.size() <= most) return;
+  directions_.resize(candidates_.size());
+  std::array<std::size_t, kDirections> counts{};
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    directions_[i] = DirectionOf(PointGradientAt(grey, candidates_[i].x, candidates_[i].y));
+    ++counts[directions_[i]];
+  }
+  const std::array<std::size_t, kDirections> shares = FairShares(counts, most);
+  std::array<std::size_t, kDirections> seen{};
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    const std::size_t direction = directions_[i];
+    const std::size_t before = seen[direction]++ * shares[direction] / counts[direction];
+    if (seen[direction] * shares[direction] / counts[direction] > before) {
+      candidates_[kept++] = candidates_[i];
+    }
+  }
+  candidates_.resize(kept);
 }
 
 /// From the pixels under the mask. Both random choices take equally many: they are counted and

@@ -75,7 +75,10 @@ class PointSelector {
   explicit PointSelector(std::uint32_t seed = 1) : random_(seed) {}
 
   /// Memory for masks with so many pixels set.
-  void Reserve(std::size_t pixels) { candidates_.reserve(pixels); }
+  void Reserve(std::size_t pixels) {
+    candidates_.reserve(pixels);
+    directions_.reserve(pixels);
+  }
   /// Points of the reference under `edges`, an image of the same size.
   void Select(const ReferenceLevel& reference, const cv::Mat& edges,
               const geo::CameraIntrinsics& camera, const PointSelection& selection,
@@ -84,10 +87,12 @@ class PointSelector {
   void SelectAll(const cv::Mat& grey, const geo::CameraIntrinsics& camera, EdgePoints& points);
 
  private:
+  void Thin(const cv::Mat& grey, std::size_t most);
   void SelectAtRandom(const ReferenceLevel& reference, const geo::CameraIntrinsics& camera,
                       const PointSelection& selection, EdgePoints& points);
 
   std::vector<Pixel> candidates_;
+  std::vector<std::uint8_t> directions_;  // Of the candidates.
   std::mt19937 random_;
 };
 

@@ -79,6 +79,31 @@ TEST(PointSelector, ThinsEvenlyToTheAllowedNumber) {
   EXPECT_NEAR(static_cast<double>(upper), 500, 60);
 }
 
+TEST(PointSelector, AFewEdgesAcrossManyStripesAreAllKept) {
+  cv::Mat grey(240, 320, CV_8UC1);
+  for (int x = 0; x < grey.cols; ++x) grey.col(x).setTo(x / 8 % 2 == 0 ? 60 : 190);
+  grey.rowRange(120, 160).colRange(100, 160).setTo(20);
+  const cv::Mat depth(grey.size(), CV_32FC1, cv::Scalar(2)),
+      all(grey.size(), CV_8UC1, cv::Scalar(1));
+  PointSelection selection;
+  selection.max_points = 2000;
+  const auto count_across = [&](std::size_t most) {
+    selection.max_points = most;
+    PointSelector selector;
+    EdgePoints points;
+    selector.Select({grey, depth, kExact}, all, kWallCamera, selection, points);
+    EXPECT_LE(points.size(), most);
+    std::size_t across = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      across += std::abs(points.jacobian[1][i]) > 3 * std::abs(points.jacobian[0][i]) ? 1U : 0U;
+    }
+    return across;
+  };
+  const std::size_t there = count_across(1000000);
+  ASSERT_GT(there, 50U);
+  EXPECT_EQ(count_across(20000), there);
+}
+
 /// The wall under its edges, chosen as asked.
 EdgePoints PointsChosen(PixelChoice choice, double share, std::uint32_t seed,
                         std::size_t max_points = 100000) {
