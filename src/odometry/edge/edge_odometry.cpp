@@ -508,9 +508,11 @@ bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
   if (keyframe_first_sigma_ == 0) keyframe_first_sigma_ = result.sigma;
   if (config_.keyframe_every > 0 && frames_since_keyframe_ >= config_.keyframe_every) return true;
   const double step = Motion(*keyframe_, last_.world_from_camera, world_from_camera);
-  const double enough = step < config_.keyframe_motion
-                            ? config_.keyframe_motion
-                            : std::min(config_.keyframe_steps * step, config_.keyframe_max_motion);
+  const double enough =
+      step < config_.keyframe_slow * config_.keyframe_motion
+          ? config_.keyframe_motion
+          : std::min(std::max(config_.keyframe_steps * step, config_.keyframe_motion),
+                     config_.keyframe_max_motion);
   return Motion(*keyframe_, keyframe_->world_from_camera, world_from_camera) > enough ||
          result.Overlap() < config_.keyframe_overlap ||
          result.sigma > config_.keyframe_sigma_ratio * keyframe_first_sigma_;

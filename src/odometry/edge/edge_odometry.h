@@ -70,8 +70,10 @@ class EdgeOdometry {
     double keyframe_overlap = 0.6;
     /// or the points moved further than this on average, share of the image's width; if they do
     double keyframe_motion = 0.018;
-    /// in a single step already: then further than so many steps, or than this share of the width:
-    /// a keyframe costs more than a frame, and a fast camera would make every frame one,
+    /// by this part of it in a single step already: then further than so many steps, too, but not
+    /// than this share of the width: a keyframe costs more than a frame, each adds its error to the
+    /// path, and a fast camera would make every frame one,
+    double keyframe_slow = 0.5;
     double keyframe_steps = 3.5;
     double keyframe_max_motion = 0.13;
     /// or the residuals grew by this factor since the keyframe's first frame.

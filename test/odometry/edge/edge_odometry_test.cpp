@@ -137,6 +137,20 @@ TEST(EdgeOdometry, AFastCameraKeepsItsKeyframeForSomeSteps) {
   EXPECT_LE(count_keyframes(2.5), 6);
 }
 
+TEST(EdgeOdometry, ACameraOfMediumSpeedKeepsItsKeyframeForSomeStepsToo) {
+  const SyntheticWall wall(kWallCamera);
+  // 4 px a step, at 2 m: less than keyframe_motion, and more than half of it.
+  const auto pose = [](int i) { return Pose(0.03 * i, 0, 0, 0, 0, 0); };
+  EdgeOdometry odometry({}, kWallCamera);
+  int keyframes = 0;
+  for (int i = 0; i < 17; ++i) {
+    const VoResult result = odometry.Track(wall.See(Stamp(i), pose(i)));
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+    keyframes += result.new_keyframe ? 1 : 0;
+  }
+  EXPECT_LE(keyframes, 5) << "each adds its error to the path";
+}
+
 TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
   const SyntheticWall wall(kWallCamera);
   EdgeOdometry odometry({}, kWallCamera);

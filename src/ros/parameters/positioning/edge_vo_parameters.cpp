@@ -58,8 +58,9 @@ void ReadVoKeyframes(ParameterReader& parameters, odometry::EdgeOdometry::Config
   parameters.Read("keyframe_sigma_ratio", odometry.keyframe_sigma_ratio, {1, 100},
                   "A new keyframe is made when the residuals grew by this factor.");
   parameters.Read("keyframe_steps", odometry.keyframe_steps, {0, 1000},
-                  "A camera so fast that one step moves the points by more than keyframe_motion "
-                  "keeps its keyframe for so many steps; 0: every frame becomes one. "
+                  "A camera so fast that one step moves the points by more than half of "
+                  "keyframe_motion keeps its keyframe for so many steps; 0: every frame that "
+                  "moved by keyframe_motion becomes one. "
                   "keyframe_max_motion may end this earlier.");
   parameters.Renamed("keyframe_most_motion", "keyframe_max_motion");
   parameters.Read("keyframe_max_motion", odometry.keyframe_max_motion, {0, 1},
