@@ -13,6 +13,26 @@ def outcome(row):
             f"{row['lost']} lost of {row['tracked_frames']}")
 
 
+def median(rows, figure):
+    """Of the rows that have the figure; None where no row has it."""
+    values = [row[figure] for row in rows if row[figure] is not None]
+    return statistics.median(values) if values else None
+
+
+def summaries(rows):
+    """What all rows of a step have in common, a dictionary for each step."""
+    found = []
+    for step in sorted({row["step"] for row in rows}):
+        of_step = [row for row in rows if row["step"] == step]
+        found.append({
+            "step": step, "rooms": len(of_step), "ate_median_m": median(of_step, "ate_rmse_m"),
+            "ate_worst_m": max((row["ate_rmse_m"] for row in of_step if row["ate_rmse_m"] is not None), default=None),
+            "lost": sum(row["lost"] for row in of_step), "frames": sum(row["tracked_frames"] for row in of_step),
+            "nees_translation_median": median(of_step, "nees_translation"),
+            "nees_rotation_median": median(of_step, "nees_rotation")})
+    return found
+
+
 def table(rows):
     """Markdown: a row per world and step, and what all of a step have in common."""
     lines = ["| seed | motion and sensor | every | frames | path (m) | ATE (m) | worst step (m) | lost "
@@ -23,9 +43,9 @@ def table(rows):
                      f"| {row['lost']} | {cell(row['nees_translation'], 2)} | {cell(row['nees_rotation'], 2)} "
                      f"| {cell(row['median_ms'], 2)} |")
     text = "\n".join(lines) + "\n"
-    for step in sorted({row["step"] for row in rows}):
-        of_step = [row for row in rows if row["step"] == step]
-        errors = [row["ate_rmse_m"] for row in of_step]
-        text += (f"\nEvery {step}: median ATE {statistics.median(errors):.4f} m, worst {max(errors):.4f} m, "
-                 f"{sum(row['lost'] for row in of_step)} frames lost of {sum(row['tracked_frames'] for row in of_step)}.\n")
+    for summary in summaries(rows):
+        text += (f"\nEvery {summary['step']}: median ATE {cell(summary['ate_median_m'], 4)} m, worst "
+                 f"{cell(summary['ate_worst_m'], 4)} m, {summary['lost']} frames lost of {summary['frames']}; median NEES "
+                 f"{cell(summary['nees_translation_median'], 2)} (translation), "
+                 f"{cell(summary['nees_rotation_median'], 2)} (rotation).\n")
     return text
