@@ -22,6 +22,34 @@ constexpr double kBetterScore = 0.03;
 /// Of the newest frame in the mean of the agreements.
 constexpr double kAgreementShare = 0.2;
 
+/// A keyframe whose points lie in less than this share of the cells of its image takes faint edges,
+/// too: what is in one corner leaves the view at once, and says little while it is there.
+constexpr double kEnoughCovered = 0.4;
+constexpr int kCellsAcross = 8, kCellsDown = 6;
+/// Faint edges are as strong as this, grey levels per px, and their points as steep as this.
+constexpr double kFaintEdgeGradient = 2;
+constexpr float kFaintPointGradient = 0.8F;
+
+/// Share of the cells of the image that have points.
+double CoveredShare(const EdgePoints& points, const geo::CameraIntrinsics& camera) {
+  std::array<bool, kCellsAcross * kCellsDown> covered{};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double u = camera.fx * static_cast<double>(points.x[i] / points.z[i]) + camera.cx;
+    const double v = camera.fy * static_cast<double>(points.y[i] / points.z[i]) + camera.cy;
+    const int column =
+        std::clamp(static_cast<int>(u * kCellsAcross / camera.width), 0, kCellsAcross - 1);
+    const int row = std::clamp(static_cast<int>(v * kCellsDown / camera.height), 0, kCellsDown - 1);
+    covered[static_cast<std::size_t>(row * kCellsAcross + column)] = true;
+  }
+  return static_cast<double>(std::count(covered.begin(), covered.end(), true)) /
+         static_cast<double>(covered.size());
+}
+
+EdgeExtractor::Config FaintEdges(EdgeExtractor::Config config) {
+  config.min_gradient = std::min(config.min_gradient, kFaintEdgeGradient);
+  return config;
+}
+
 AlignmentConfig OdometryOfRotationOnly(AlignmentConfig config) {
   config.rotation_only = true;
   return config;
@@ -45,6 +73,7 @@ EdgeOdometry::EdgeOdometry(const Config& config, const geo::CameraIntrinsics& in
     : config_(config),
       cameras_(LevelCamerasOf(CheckedCamera(intrinsics))),
       extractor_(config.edges),
+      faint_extractor_(FaintEdges(config.edges)),
       selector_(config.points.seed),
       aligner_(config.alignment),
       rotation_aligner_(OdometryOfRotationOnly(config.alignment)),
@@ -195,6 +224,7 @@ void EdgeOdometry::ReserveBuffers() {
   masked_points_.Reserve(most);
   selector_.Reserve(frame_images_[0].total());
   extractor_.Reserve(size);
+  faint_extractor_.Reserve(size);
   aligner_.Reserve(most);
   rotation_aligner_.Reserve(most);
   wide_search_.Reserve(most, thumbnail);
@@ -224,7 +254,12 @@ bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
     const cv::Mat& grey = keyframe.images[level];
     const ReferenceLevel reference = {grey, keyframe.depths[level],
                                       keyframe.inverse_depth_sigmas[level]};
-    selector_.Select(reference, extractor_.Extract(grey), cameras_.camera[index], selection,
+    const geo::CameraIntrinsics& camera = cameras_.camera[index];
+    selector_.Select(reference, extractor_.Extract(grey), camera, selection,
+                     keyframe.points[index]);
+    if (CoveredShare(keyframe.points[index], camera) >= kEnoughCovered) continue;
+    selection.min_gradient = std::min(selection.min_gradient, kFaintPointGradient);
+    selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection,
                      keyframe.points[index]);
   }
   selector_.SelectAll(keyframe.images.thumbnail(),

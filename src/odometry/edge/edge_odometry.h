@@ -221,6 +221,7 @@ class EdgeOdometry {
   Config config_;
   LevelCameras cameras_;
   EdgeExtractor extractor_;
+  EdgeExtractor faint_extractor_;  // Of keyframes with too few edges.
   PointSelector selector_;
   Aligner aligner_, rotation_aligner_;
   WideSearch wide_search_;
