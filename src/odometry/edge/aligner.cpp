@@ -1,6 +1,7 @@
 #include "odometry/edge/aligner.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,6 +28,18 @@ using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
 
 ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::size_t count) {
   return {values.data() + begin, static_cast<Eigen::Index>(count)};
+}
+
+/// Edges of one direction leave a movement unseen: its variance is the quotient of two rounding
+/// errors, of either sign. It is large whichever sign it has.
+Matrix6d PositiveDefinite(const Matrix6d& covariance) {
+  constexpr double kUnknown = 1e6, kSmallestShare = 1e-12;
+  if (!covariance.allFinite()) return kUnknown * Matrix6d::Identity();
+  const Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(symmetric);
+  const Vector6d size = parts.eigenvalues().cwiseAbs();
+  const Vector6d variances = size.cwiseMax(kSmallestShare * size.maxCoeff());
+  return parts.eigenvectors() * variances.asDiagonal() * parts.eigenvectors().transpose();
 }
 
 }  // namespace
@@ -301,7 +314,8 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   // Parts that the unknowns were fitted to contradict each other less than others would.
   const double parts = std::max(2.0, static_cast<double>(current_.value.size()) / kChunk / 6);
   const UpToEight whole = factors.solve(half.transpose());
-  result.covariance = parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>();
+  result.covariance =
+      PositiveDefinite(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>());
 }
 
 }  // namespace livemap::odometry

@@ -93,8 +93,8 @@ std::optional<Options> ParseEvaluatePlacementOptions(int argc, char** argv) {
       line.Whole("sights", reporter.passes.sights.max_sights, 1, 100);
   reporter.settle_wait_s = line.Number("settle-s", reporter.settle_wait_s, 0, 60);
   reporter.image_wait_s = 0;
-  // As in docs/results/localization.md: the simulated receiver stamps its measurements, and does
-  // not see its reflections.
+  // As the tables of docs/results/localization.md were made: the simulated receiver stamps its
+  // measurements, and does not see its reflections.
   localization::ReceiverModel& receiver = options.localizer.receiver;
   receiver.latency_s = receiver.latency_sigma_s = 0;
   receiver.min_sigma_m = 2;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -242,6 +243,24 @@ TEST(Aligner, InformationIsTheInverseOfTheScatterOverManyNoisyImages) {
   // Six for honest covariances; bilinear interpolation halves the noise that the residuals show.
   EXPECT_GT(normalised, 2);
   EXPECT_LT(normalised, 12);
+}
+
+TEST(Aligner, StripesLeaveAMovementUnseenAndTheCovarianceSaysSo) {
+  RgbdFrame stripes;
+  stripes.grey.create(240, 320, CV_8UC1);
+  for (int x = 0; x < 320; ++x) stripes.grey.col(x).setTo(x / 16 % 2 == 0 ? 60 : 190);
+  stripes.depth = cv::Mat(240, 320, CV_32FC1, cv::Scalar(2));
+  cv::Mat noise(stripes.grey.size(), CV_16SC1), noisy;
+  cv::RNG random(3);
+  for (int i = 0; i < 20; ++i) {
+    random.fill(noise, cv::RNG::NORMAL, 0, 4);
+    cv::add(stripes.grey, noise, noisy, cv::noArray(), CV_8U);
+    const AlignmentResult result = Aligner({}).Align(PointsOf(stripes), noisy, kWallCamera, {});
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(result.covariance);
+    EXPECT_GT(parts.eigenvalues().minCoeff(), 0) << result.covariance;
+    // Up and down along the stripes by a hand's breadth at the least.
+    EXPECT_GT(result.covariance(1, 1), 0.1 * 0.1);
+  }
 }
 
 }  // namespace

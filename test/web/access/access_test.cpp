@@ -15,8 +15,8 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const geo::GeoPoint kPlace{40.4433, -79.9436};
-constexpr char kPassword[] = "correct horse battery";
+const geo::GeoPoint kSeenAt{40.4433, -79.9436};
+constexpr char kPassphrase[] = "correct horse battery";
 
 TEST(Cookies, AreFoundByTheirWholeName) {
   EXPECT_EQ(CookieValue("a=1; livemap_12=xyz; b=2", "livemap_12"), "xyz");
@@ -40,8 +40,8 @@ struct Browser {
 class AccessTest : public testing::Test {
  protected:
   AccessTest() {
-    accounts().Add("jones", accounts::Role::kViewer, kPassword, SystemNs());
-    accounts().Add("miller", accounts::Role::kOfficial, kPassword, SystemNs());
+    accounts().Add("jones", accounts::Role::kViewer, kPassphrase, SystemNs());
+    accounts().Add("miller", accounts::Role::kOfficial, kPassphrase, SystemNs());
     Start(PublicSees::kAll);
   }
 
@@ -71,13 +71,13 @@ class AccessTest : public testing::Test {
     return Post("/api/v1/session", nlohmann::json{{"name", name}, {"password", password}}.dump());
   }
   Browser LogIn(const std::string& name) {
-    const HttpResult answer = TryLogIn(name, kPassword);
+    const HttpResult answer = TryLogIn(name, kPassphrase);
     EXPECT_EQ(answer.status, 200) << answer.body;
     const std::string cookie = answer.Field("Set-Cookie");
     return {cookie.substr(0, cookie.find(';')), answer.Json().value("csrf_token", "")};
   }
   std::string Add(const std::string& class_name = "pothole") {
-    return fixture_.zone->Handle(fixture_.MakeReport(class_name, kPlace)).hazard_uuid.ToString();
+    return fixture_.zone->Handle(fixture_.MakeReport(class_name, kSeenAt)).hazard_uuid.ToString();
   }
   HttpResult Reject(const std::string& hazard, const Headers& headers) {
     return Request(port(), "POST", "/api/v1/hazards/" + hazard + "/reject", headers,
@@ -95,7 +95,7 @@ class AccessTest : public testing::Test {
 };
 
 TEST_F(AccessTest, ASessionsCookieIsForThisServerAndNoScriptReadsIt) {
-  const HttpResult answer = TryLogIn("miller", kPassword);
+  const HttpResult answer = TryLogIn("miller", kPassphrase);
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(answer.Json()["name"], "miller");
   EXPECT_EQ(answer.Json()["role"], "official");
@@ -201,17 +201,17 @@ TEST_F(AccessTest, WhatTheOperatorTakesAwayIsGoneAtOnce) {
   EXPECT_EQ(Reject(hazard, browser.ThatDecides()).status, 403);
   accounts().Remove("miller");
   EXPECT_EQ(Reject(hazard, browser.ThatDecides()).status, 401);
-  EXPECT_EQ(TryLogIn("miller", kPassword).status, 401);
+  EXPECT_EQ(TryLogIn("miller", kPassphrase).status, 401);
 }
 
 TEST_F(AccessTest, WrongPasswordsAreAnsweredAlikeAndSoonNoMore) {
-  const std::string unknown = TryLogIn("nobody", kPassword).body;
+  const std::string unknown = TryLogIn("nobody", kPassphrase).body;
   for (int i = 1; i < Access::kMaxWrongPasswords; ++i) {
     const HttpResult answer = TryLogIn("miller", "wrong password " + std::to_string(i));
     ASSERT_EQ(answer.status, 401) << i;
     EXPECT_EQ(answer.body, unknown);
   }
-  const HttpResult locked = TryLogIn("miller", kPassword);
+  const HttpResult locked = TryLogIn("miller", kPassphrase);
   EXPECT_EQ(locked.status, 429) << "the right one is still tried";
   EXPECT_EQ(locked.Field("Retry-After"), "60");
 }
@@ -274,7 +274,7 @@ TEST_F(AccessTest, AStreamTellsWhatItsClientMaySeeAndEndsWithTheLogIn) {
   stranger.NextOfType("live");
   zone::VehicleState vehicle;
   vehicle.vehicle_id = "car-1";
-  vehicle.position = kPlace;
+  vehicle.position = kSeenAt;
   vehicle.stamp_ns = ZoneFixture::kStartNs;
   ASSERT_TRUE(fixture_.zone->UpdateVehicle(vehicle));
   const std::string candidate = Add("pothole");
@@ -303,7 +303,7 @@ TEST_F(AccessTest, WithoutAnAccountEverythingIsAsItWas) {
   accounts().Remove("jones");
   accounts().Remove("miller");
   EXPECT_EQ(Get(port(), "/api/v1/vehicles").status, 200);
-  EXPECT_EQ(TryLogIn("miller", kPassword).status, 403);
+  EXPECT_EQ(TryLogIn("miller", kPassphrase).status, 403);
   EXPECT_EQ(Get(port(), "/api/v1/session").Json()["has_accounts"], false);
 }
 
