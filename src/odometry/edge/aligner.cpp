@@ -30,16 +30,21 @@ ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::s
   return {values.data() + begin, static_cast<Eigen::Index>(count)};
 }
 
-/// Edges of one direction leave a movement unseen: its variance is the quotient of two rounding
-/// errors, of either sign. It is large whichever sign it has.
-Matrix6d PositiveDefinite(const Matrix6d& covariance) {
-  constexpr double kUnknown = 1e6, kSmallestShare = 1e-12;
-  if (!covariance.allFinite()) return kUnknown * Matrix6d::Identity();
-  const Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(symmetric);
-  const Vector6d size = parts.eigenvalues().cwiseAbs();
-  const Vector6d variances = size.cwiseMax(kSmallestShare * size.maxCoeff());
-  return parts.eigenvectors() * variances.asDiagonal() * parts.eigenvectors().transpose();
+/// What the covariance says of movements that no edge shows: all but nothing. Edges of one
+/// direction leave one unseen; its variance is then a quotient of rounding errors, of either sign,
+/// or zero.
+Matrix6d WithUnseen(const Matrix6d& covariance, const Matrix6d& information) {
+  constexpr double kUnseen = 100, kSeenShare = 1e-9;  // Square metres and radians.
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> known(information);
+  const double most = known.eigenvalues().maxCoeff();
+  if (!covariance.allFinite() || !(most > 0)) return kUnseen * Matrix6d::Identity();
+  const Vector6d unseen =
+      (known.eigenvalues().array() < kSeenShare * most).cast<double>() * kUnseen;
+  const auto& directions = known.eigenvectors();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> stated(0.5 * (covariance + covariance.transpose()));
+  const Vector6d variances = stated.eigenvalues().cwiseAbs();
+  return stated.eigenvectors() * variances.asDiagonal() * stated.eigenvectors().transpose() +
+         directions * unseen.asDiagonal() * directions.transpose();
 }
 
 }  // namespace
@@ -315,7 +320,7 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   const double parts = std::max(2.0, static_cast<double>(current_.value.size()) / kChunk / 6);
   const UpToEight whole = factors.solve(half.transpose());
   result.covariance =
-      PositiveDefinite(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>());
+      WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);
 }
 
 }  // namespace livemap::odometry

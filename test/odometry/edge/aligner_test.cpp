@@ -249,12 +249,14 @@ TEST(Aligner, StripesLeaveAMovementUnseenAndTheCovarianceSaysSo) {
   RgbdFrame stripes;
   stripes.grey.create(240, 320, CV_8UC1);
   for (int x = 0; x < 320; ++x) stripes.grey.col(x).setTo(x / 16 % 2 == 0 ? 60 : 190);
+  cv::GaussianBlur(stripes.grey, stripes.grey, {3, 3}, 0);
   stripes.depth = cv::Mat(240, 320, CV_32FC1, cv::Scalar(2));
   cv::Mat noise(stripes.grey.size(), CV_16SC1), noisy;
   cv::RNG random(3);
   for (int i = 0; i < 20; ++i) {
     random.fill(noise, cv::RNG::NORMAL, 0, 4);
     cv::add(stripes.grey, noise, noisy, cv::noArray(), CV_8U);
+    ASSERT_GT(PointsOf(stripes).size(), 100U);
     const AlignmentResult result = Aligner({}).Align(PointsOf(stripes), noisy, kWallCamera, {});
     const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(result.covariance);
     EXPECT_GT(parts.eigenvalues().minCoeff(), 0) << result.covariance;

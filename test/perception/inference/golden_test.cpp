@@ -26,6 +26,7 @@ std::vector<std::string> ShippedManifests() {
     if (path.size() > suffix.size() &&
         path.compare(path.size() - suffix.size(), suffix.size(), suffix) == 0) {
       const std::string manifest = path.substr(0, path.size() - suffix.size()) + ".yaml";
+      if (!std::filesystem::exists(manifest)) continue;  // Of a part of another kind's model.
       if (!YAML::LoadFile(manifest)["kind"].IsDefined()) paths.push_back(manifest);
     }
   }
