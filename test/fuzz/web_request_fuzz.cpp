@@ -8,6 +8,7 @@
 #include "web/access/official_authenticator.h"
 #include "web/api/official_decision.h"
 #include "web/api/query.h"
+#include "web/http/cookie.h"
 #include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
@@ -60,14 +61,21 @@ void CheckHazardQuery(const livemap::web::RequestTarget& target) {
     Require(tile->x >> tile->zoom == 0 && tile->y >> tile->zoom == 0);
   }
   try {
+    Require(livemap::web::ParseDecisionsQuery(target).limit <= livemap::web::kMaxEventsPerAnswer);
+  } catch (const livemap::web::BadRequest&) {
+    // Refused.
+  }
+  try {
     livemap::web::ParseStreamQuery(target);
   } catch (const livemap::web::BadRequest&) {
     // Refused.
   }
 }
 
-/// What comes with a POST: its address, its token, its body.
+/// What comes with a POST: its address, its cookie, its token, its body.
 void CheckDecision(const std::string& text) {
+  const std::string cookie = livemap::web::CookieValue(text, "livemap_12345678");
+  Require(cookie.find(';') == std::string::npos && cookie.size() <= text.size());
   const auto target = livemap::web::ParseDecisionTarget(text);
   if (target) {
     const auto uuid = livemap::Uuid::Parse(target->id);

@@ -15,7 +15,7 @@ from sensor_msgs.msg import NavSatStatus
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
 from hazard_reporting_fixture import (COURSE_RAD, HEIGHT, OPTICAL, SPEED_MPS, WIDTH, Vehicle, camera_image, decode,
-                                      detection, detections, east_north, fix, on_street, place, stamp)
+                                      detection, detections, east_north, fix, middle_on_street, on_street, place, stamp)
 from livemap.msg import (BestViews, ChangedObject, ChangedObjects, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport,
                          LinkState, ReportReceipt)
 from node_testing import eventually  # noqa: E402
@@ -73,7 +73,7 @@ class HazardReportingTest(unittest.TestCase):
         vehicle.see(3.05, detection(12.0, -1.5))
         report = eventually(vehicle.reports, "a report")[0]
         where = east_north(report.latitude, report.longitude)
-        self.assertLess(math.dist(where, on_street(3.05, 12.0, -1.5)), 0.02)
+        self.assertLess(math.dist(where, middle_on_street(3.05, 12.0, -1.5)), 0.02)
         self.assertEqual(report.schema_version, HazardReport.SCHEMA_VERSION)
         self.assertEqual((report.class_name, report.drive_id), ("pothole", "drive-7"))
         self.assertEqual(report.vehicle_id, "")
@@ -200,7 +200,7 @@ class HazardReportingTest(unittest.TestCase):
         self.assertEqual(marker.header.frame_id, "map")
         # The map's origin is the first fix, where the course was not known yet.
         self.assertLess(math.dist((marker.pose.position.x, marker.pose.position.y),
-                                  on_street(3.05, 12.0)), 0.05)
+                                  middle_on_street(3.05, 12.0)), 0.05)
         path = eventually(lambda: [path for path in vehicle.received("path") if path.poses],
                           "a path")[-1]
         self.assertLess(math.dist((path.poses[-1].pose.position.x, path.poses[-1].pose.position.y),
@@ -341,7 +341,7 @@ class HazardReportingTest(unittest.TestCase):
         vehicle.drive(0, 4)
         report = eventually(vehicle.reports, "a report")[0]
         self.assertLess(math.dist(east_north(report.latitude, report.longitude),
-                                  on_street(3.0, 12.0)), 0.02)
+                                  middle_on_street(3.0, 12.0)), 0.02)
         vehicle.wait_for(dropped_no_fix=0)
 
     def test_sends_again_until_the_receipt_and_remembers_over_kill_nine(self):

@@ -49,6 +49,15 @@ def east_north(latitude, longitude):
             math.radians(latitude - LATITUDE) * meridian)
 
 
+POTHOLE_HALF_DEPTH_M = 0.4  # config/hazards.yaml
+
+
+def middle_on_street(time_s, forward_m, left_m=0.0):
+    """Where the middle of a pothole is put whose near edge is there, seen from the vehicle."""
+    farther = 1 + POTHOLE_HALF_DEPTH_M / math.hypot(forward_m, left_m)
+    return on_street(time_s, farther * forward_m, farther * left_m)
+
+
 def on_street(time_s, forward_m=0.0, left_m=0.0):
     """East and north of what lies so in base_link at that time of the drive."""
     way_m = SPEED_MPS * time_s + forward_m

@@ -1,12 +1,12 @@
 #include "web/access/access.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "common/clock.h"
 #include "common/sha256.h"
 #include "common/time.h"
+#include "web/http/cookie.h"
 #include "web/http/origin.h"
 #include "web/http/request_body.h"
 #include "web/json/json.h"
@@ -74,20 +74,6 @@ class Turn {
 }  // namespace
 
 HttpResponse LogInFirst() { return Unauthorized("log in to see this"); }
-
-std::string CookieValue(std::string_view header, std::string_view name) {
-  while (!header.empty()) {
-    const std::size_t end = header.find(';');
-    std::string_view pair = header.substr(0, end);
-    header.remove_prefix(end == std::string_view::npos ? header.size() : end + 1);
-    pair.remove_prefix(std::min(pair.find_first_not_of(' '), pair.size()));
-    if (pair.size() > name.size() && pair[name.size()] == '=' &&
-        pair.substr(0, name.size()) == name) {
-      return std::string(pair.substr(name.size() + 1));
-    }
-  }
-  return "";
-}
 
 Access::Access(const WebConfig& options)
     : options_(options),

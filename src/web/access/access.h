@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "accounts/account_store.h"
 #include "common/mutex.h"
@@ -15,10 +14,6 @@
 #include "web/http/web_config.h"
 
 namespace livemap::web {
-
-/// The value of the cookie of this name in a Cookie header (RFC 6265, section 4.2); empty where it
-/// has none.
-std::string CookieValue(std::string_view header, std::string_view name);
 
 /// Knows who asks: an official by the bearer token of a program, or somebody who has logged in by
 /// the cookie of a session. A request by cookie that changes something also needs the session's

@@ -18,14 +18,6 @@ using testing::Not;
 const geo::GeoPoint kSeenAt{40.4433, -79.9436};
 constexpr char kPassphrase[] = "correct horse battery";
 
-TEST(Cookies, AreFoundByTheirWholeName) {
-  EXPECT_EQ(CookieValue("a=1; livemap_12=xyz; b=2", "livemap_12"), "xyz");
-  EXPECT_EQ(CookieValue("livemap_12=", "livemap_12"), "");
-  EXPECT_EQ(CookieValue("livemap_123=xyz", "livemap_12"), "");
-  EXPECT_EQ(CookieValue("xlivemap_12=xyz;;; =;", "livemap_12"), "");
-  EXPECT_EQ(CookieValue("", "livemap_12"), "");
-}
-
 /// Somebody at a browser: keeps the cookie and the CSRF token.
 struct Browser {
   std::string cookie;
