@@ -2,6 +2,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <ctime>
@@ -28,8 +29,8 @@ constexpr char kHelp[] =
        ./livemap zone user list [--directory DIR]
 
 The people who may log in to the zone's map. A viewer sees vehicles and unconfirmed hazards, an
-official also decides, an admin may do everything. What is changed holds at once, also while the zone
-runs; a new password and a removal end all sessions. The password is asked for twice, or read from the
+official also decides, an admin may do the same as an official, so far. What is changed holds at once,
+also while the zone runs; a new password and a removal end all sessions. The password is asked for twice, or read from the
 first line of standard input where that is no terminal.
 
   --role ROLE       what the person may do
@@ -61,7 +62,12 @@ Arguments Parse(const std::vector<std::string>& words) {
     if (i + 1 == words.size()) throw Error(words[i] + " needs a value");
     *value = words[++i];
   }
-  if (places.empty()) throw Error("accepted are add, passwd, role, remove and list (see --help)");
+  const std::vector<std::string> actions{"add", "passwd", "role", "remove", "list"};
+  if (places.empty() || std::find(actions.begin(), actions.end(), places[0]) == actions.end()) {
+    throw Error(
+        (places.empty() ? "nothing" : "'" + places[0] + "'") +
+        std::string(" was given, accepted are add, passwd, role, remove and list (see --help)"));
+  }
   arguments.action = places[0];
   const bool is_list = arguments.action == "list";
   if (places.size() != (is_list ? 1U : 2U)) {
@@ -125,6 +131,7 @@ std::string Utc(std::int64_t at_ns) {
 }
 
 void List(const AccountStore& accounts) {
+  if (!accounts.HasAccounts()) std::cerr << "livemap zone user: there are no accounts\n";
   for (const auto& account : accounts.List()) {
     const std::string last = account.last_log_in ? Utc(*account.last_log_in) : "never logged in";
     std::cout << account.name << '\t' << livemap::accounts::RoleName(account.role) << '\t' << last
@@ -137,8 +144,13 @@ AccountStore Open(const Arguments& arguments) {
   if (directory.empty()) {
     const char* const home = std::getenv("HOME");
     directory = std::string(home == nullptr ? "" : home) + "/.livemap/zone";
+    std::filesystem::create_directories(directory);
   }
-  std::filesystem::create_directories(directory);
+  // Not made: what was mistyped would look like a zone without accounts.
+  if (!std::filesystem::is_directory(directory)) {
+    throw Error("there is no folder '" + directory +
+                "', accepted is the folder of the zone's store");
+  }
   return AccountStore(directory + "/accounts.sqlite", {});
 }
 
@@ -148,17 +160,18 @@ void Run(const Arguments& arguments) {
   if (arguments.action == "add") {
     const Role role = RequireRole(arguments.role);
     Open(arguments).Add(name, role, ReadPassword(), now_ns);
+    std::cout << "added " << name << " as " << livemap::accounts::RoleName(role) << '\n';
   } else if (arguments.action == "passwd") {
     Open(arguments).SetPassword(name, ReadPassword(), now_ns);
+    std::cout << name << " has a new password\n";
   } else if (arguments.action == "role") {
     Open(arguments).SetRole(name, RequireRole(arguments.role));
+    std::cout << name << " is " << arguments.role << " from now on\n";
   } else if (arguments.action == "remove") {
     Open(arguments).Remove(name);
-  } else if (arguments.action == "list") {
-    List(Open(arguments));
+    std::cout << "removed " << name << '\n';
   } else {
-    throw Error("'" + arguments.action + "' is not accepted, accepted are add, passwd, role, " +
-                "remove and list");
+    List(Open(arguments));
   }
 }
 

@@ -21,6 +21,7 @@ class ZoneUser(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="livemap_zone_user_")
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name, "zone")
+        self.folder.mkdir()
 
     def run_it(self, *words, password=PASSWORD + "\n"):
         return subprocess.run([PROGRAM, *words, "--directory", str(self.folder)], input=password, text=True,
@@ -52,9 +53,20 @@ class ZoneUser(unittest.TestCase):
         self.assert_refused(self.run_it("add", "jones", "--role", "viewer", password="short\n"), "12 to 256")
         self.assert_refused(self.run_it("add", "jones", "--role", "viewer", password=""), "12 to 256")
         self.assert_refused(self.run_it("remove", "jones"), "no account 'jones'")
-        self.assert_refused(self.run_it("dance", "jones"), "'dance'")
+        self.assert_refused(self.run_it("dance"), "'dance'", "accepted are add")
         self.assert_refused(self.run_it("list", "jones"), "no name")
         self.assert_refused(self.run_it("list", "--rule", "x"), "--rule")
+
+    def test_a_mistyped_folder_is_no_zone_without_accounts(self):
+        self.folder.rmdir()
+        self.assert_refused(self.run_it("list"), "no folder", str(self.folder))
+        self.assert_refused(self.run_it("add", "miller", "--role", "viewer"), "no folder")
+        self.assertFalse(self.folder.exists())
+
+    def test_no_accounts_are_said_to_be_none(self):
+        result = self.run_it("list")
+        self.assertEqual((result.returncode, result.stdout), (0, ""))
+        self.assertIn("no accounts", result.stderr)
 
     def test_a_terminal_is_asked_twice_and_shows_no_password(self):
         leader, follower = pty.openpty()

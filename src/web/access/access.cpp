@@ -125,10 +125,10 @@ std::optional<HttpResponse> Access::WhyForged(const HttpRequest& question,
   if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
     return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
+  const bool changes_something = question.method != "GET" && question.method != "HEAD";
+  if (session_token.empty() || !changes_something) return std::nullopt;
   // Both are hashes of one length: what is compared tells nothing of the token.
-  if (session_token.empty() || question.csrf_token == CsrfTokenOf(session_token)) {
-    return std::nullopt;
-  }
+  if (question.csrf_token == CsrfTokenOf(session_token)) return std::nullopt;
   return MakeErrorAnswer(403, "the header X-CSRF-Token is not the session's");
 }
 

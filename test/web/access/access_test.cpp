@@ -158,6 +158,15 @@ TEST_F(AccessTest, WithoutTheSessionsOwnCsrfTokenNothingIsDecided) {
   EXPECT_EQ(Reject(hazard, browser.ThatDecides()).status, 200);
 }
 
+TEST_F(AccessTest, WhatChangesNothingNeedsNoCsrfToken) {
+  Add();
+  const Browser browser = LogIn("miller");
+  const std::string vehicle = fixture_.MakeReport("pothole", kSeenAt).vehicle_id;
+  EXPECT_EQ(Get(port(), "/api/v1/vehicles/" + vehicle + "/distrust", browser.WithCookie()).status,
+            200);
+  EXPECT_EQ(Get(port(), "/api/v1/vehicles/nobody/distrust", browser.WithCookie()).status, 404);
+}
+
 TEST_F(AccessTest, AViewerAndAStrangerDecideNothing) {
   const std::string hazard = Add();
   EXPECT_EQ(Reject(hazard, LogIn("jones").ThatDecides()).status, 403);
