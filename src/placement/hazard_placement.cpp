@@ -24,4 +24,18 @@ PlacedHazard PlaceHazard(const geo::TrackPose& antenna, const Eigen::Vector2d& a
   return placed;
 }
 
+PlacedHazard MiddleOf(const PlacedHazard& foot, const geo::GeoPoint& seen_from,
+                      double half_depth_m) {
+  constexpr double kNearestFootM = 1.0;  // Nearer than this nothing lies behind anything.
+  const geo::LocalFrame frame(seen_from);
+  const Eigen::Vector2d foot_m = frame.ToEnu(foot.position);
+  const double range_m = foot_m.norm();
+  if (half_depth_m <= 0 || range_m < kNearestFootM) return foot;
+  const Eigen::Vector2d behind_m = half_depth_m / range_m * foot_m;
+  PlacedHazard middle = foot;
+  middle.position = frame.ToGeo(foot_m + behind_m);
+  middle.covariance_m2 += 0.25 * behind_m * behind_m.transpose();
+  return middle;
+}
+
 }  // namespace livemap::placement

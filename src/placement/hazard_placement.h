@@ -23,4 +23,11 @@ struct PlacedHazard {
 PlacedHazard PlaceHazard(const geo::TrackPose& antenna, const Eigen::Vector2d& antenna_in_base_m,
                          const geo::GroundPoint& ground);
 
+/// The middle of a thing whose foot, the edge on the road that the camera sees, was placed: by
+/// `half_depth_m` farther along the line from `seen_from`, where the vehicle was. How deep things
+/// of a class are differs by half of it, say, which the covariance has. A foot that is nearer than
+/// 1 m stays.
+PlacedHazard MiddleOf(const PlacedHazard& foot, const geo::GeoPoint& seen_from,
+                      double half_depth_m);
+
 }  // namespace livemap::placement

@@ -62,7 +62,7 @@ void FuzzCandidate(const std::uint8_t* data, std::size_t size) {
   sighting.confidence = bytes.Any<float>();
   sighting.box = {bytes.Any<float>(), bytes.Any<float>(), bytes.Any<float>(), bytes.Any<float>()};
   candidate.image = bytes.Rest();
-  zone::OffloadIntake intake{zone::OffloadIntake::Config()};
+  zone::OffloadIntake intake{zone::OffloadIntake::Config(), {}};
   const std::string why = intake.Add(candidate, kNowNs);
   const zone::OffloadIntake::Job* job = intake.Next(kNowNs, 0);
   Require(why.empty() == (job != nullptr));

@@ -72,5 +72,20 @@ TEST(PlaceHazard, CovarianceIsThatOfManyNoisyPlacements) {
   EXPECT_LT((sampled - placed.covariance_m2).norm(), 0.04 * placed.covariance_m2.norm());
 }
 
+TEST(MiddleOf, LiesBehindTheFootFromWhereTheVehicleSeesIt) {
+  const geo::GeoPoint vehicle{40.4433, -79.9436};
+  const geo::LocalFrame frame(vehicle);
+  PlacedHazard foot{frame.ToGeo(Eigen::Vector2d(9, 12)), Eigen::Matrix2d::Identity()};
+  const PlacedHazard middle = MiddleOf(foot, vehicle, 0.5);
+  EXPECT_LT((frame.ToEnu(middle.position) - Eigen::Vector2d(9.3, 12.4)).norm(), 1e-3);
+  // Half of the half depth, in that direction alone.
+  const Eigen::Vector2d along(0.6, 0.8), across(-0.8, 0.6);
+  EXPECT_NEAR(along.dot(middle.covariance_m2 * along), 1 + 0.25 * 0.25, 1e-9);
+  EXPECT_NEAR(across.dot(middle.covariance_m2 * across), 1, 1e-9);
+  foot.position = frame.ToGeo(Eigen::Vector2d(0.3, 0.4));
+  const PlacedHazard below = MiddleOf(foot, vehicle, 0.5);
+  EXPECT_EQ(below.position.latitude_deg, foot.position.latitude_deg);
+}
+
 }  // namespace
 }  // namespace livemap::placement

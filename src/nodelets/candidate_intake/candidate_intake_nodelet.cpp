@@ -2,6 +2,7 @@
 #include <livemap/CandidateFrame.h>
 #include <livemap/DetectionArray.h>
 #include <livemap/HazardReport.h>
+#include <ros/package.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/image_encodings.h>
 
@@ -19,6 +20,7 @@
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "perception/detection/annotation.h"
+#include "protocol/hazard_catalogue.h"
 #include "ros/conversions/detection_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
@@ -42,7 +44,11 @@ class CandidateIntakePart : public NodeletPart {
     using Self = CandidateIntakePart;
     ros_io::ParameterReader parameters(getPrivateNodeHandle());
     config_ = ros_io::ReadCandidateIntakeConfig(parameters);
-    intake_ = std::make_unique<zone::OffloadIntake>(config_.intake);
+    if (config_.catalogue.empty()) {
+      config_.catalogue = ros::package::getPath("livemap") + "/config/hazards.yaml";
+    }
+    intake_ = std::make_unique<zone::OffloadIntake>(
+        config_.intake, protocol::HazardCatalogue::Load(config_.catalogue));
     ros::NodeHandle& node = getNodeHandle();
     image_publisher_ = node.advertise<sensor_msgs::Image>("candidate/image", 100);
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 1000);

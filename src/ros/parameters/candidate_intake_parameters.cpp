@@ -54,6 +54,10 @@ void ReadIntakeVehicleLimits(ParameterReader& parameters, zone::OffloadIntake::C
 void ReadIntakeReports(ParameterReader& parameters, CandidateIntakeConfig& config) {
   zone::OffloadIntake::Config& intake = config.intake;
   parameters.Section("What is reported", "As hazard_reporting of a vehicle with a detector.");
+  parameters.Read("catalogue", config.catalogue,
+                  "Path of the catalogue of hazard classes, which says how deep things are. Empty: "
+                  "config/hazards.yaml of the package. zone.launch sets it by the argument "
+                  "`hazards`.");
   parameters.Read("min_confidence", intake.min_confidence, {0, 1},
                   "Least confidence of a detection that is reported. The detector's own threshold "
                   "stands before it.");

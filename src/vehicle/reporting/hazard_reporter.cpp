@@ -36,7 +36,6 @@ constexpr double kStandInReach = 2.0;
 constexpr double kFixHeadingOwnShare =
     0.5;  // Of the course's variance; the fixes' windows overlap.
 constexpr double kForEverS = 1e9;
-constexpr double kNearestFootM = 1.0;  // Nearer than this nothing lies behind anything.
 
 }  // namespace
 
@@ -362,23 +361,6 @@ std::optional<placement::HazardSight> HazardReporter::SightOnRoad(
   return sight;
 }
 
-/// The thing's middle lies behind its foot, from where the vehicle sees it. How deep things of a
-/// class are differs: by half of it, say.
-placement::PlacedHazard HazardReporter::MiddleOf(const placement::PlacedHazard& foot,
-                                                 const geo::TrackPose& base,
-                                                 const std::string& class_name) const {
-  const double half_depth_m = catalogue_.Get(class_name).half_depth_m;
-  const geo::LocalFrame frame(base.position);
-  const Eigen::Vector2d foot_m = frame.ToEnu(foot.position);
-  const double range_m = foot_m.norm();
-  if (half_depth_m <= 0 || range_m < kNearestFootM) return foot;
-  const Eigen::Vector2d behind_m = half_depth_m / range_m * foot_m;
-  placement::PlacedHazard middle = foot;
-  middle.position = frame.ToGeo(foot_m + behind_m);
-  middle.covariance_m2 += 0.25 * behind_m * behind_m.transpose();
-  return middle;
-}
-
 /// A heading that is hardly known makes none, whatever it comes from: it would put one thing in
 /// several places.
 bool HazardReporter::IsWorthASight(const placement::HazardSight& sight) const {
@@ -417,7 +399,8 @@ void HazardReporter::PlaceSightings(WaitingFrame& waiting, const geo::TrackPose&
     const auto all = passes_.Place(passes[i]);
     const placement::PlacedHazard foot =
         all ? all->place : placement::PlaceHazard(base, Eigen::Vector2d::Zero(), sight.foot);
-    const placement::PlacedHazard place = MiddleOf(foot, base, seen[i].class_name);
+    const placement::PlacedHazard place =
+        placement::MiddleOf(foot, base.position, catalogue_.Get(seen[i].class_name).half_depth_m);
     waiting.candidates.push_back({*sightings[i], place, geo::EarthCentred(place.position),
                                   std::nullopt, passes[i], all ? all->sights : 1});
     ++(fused ? counters_.placed_by_fusion : counters_.placed_by_fixes);

@@ -226,8 +226,6 @@ class HazardReporter {
   std::optional<placement::HazardSight> SightOnRoad(const placement::SightingFrame& frame,
                                                     const placement::Sighting& sighting,
                                                     const geo::TrackPose& base, bool fused);
-  placement::PlacedHazard MiddleOf(const placement::PlacedHazard& foot, const geo::TrackPose& base,
-                                   const std::string& class_name) const;
   bool IsWorthASight(const placement::HazardSight& sight) const;
   bool WaitsForPicture(WaitingFrame& waiting, double now_s);
   void ReportCandidates(WaitingFrame& waiting, double now_s, double steady_s);

@@ -185,8 +185,10 @@ std::optional<geo::GroundPoint> OffloadIntake::PlaceOnRoad(const protocol::Offlo
 protocol::Report OffloadIntake::ReportOf(const protocol::OffloadedFrame& frame,
                                          const placement::Sighting& sighting,
                                          const geo::GroundPoint& ground) {
-  const placement::PlacedHazard place =
+  const placement::PlacedHazard foot =
       placement::PlaceHazard(frame.base, Eigen::Vector2d::Zero(), ground);
+  const placement::PlacedHazard place = placement::MiddleOf(
+      foot, frame.base.position, catalogue_.Get(sighting.class_name).half_depth_m);
   protocol::Report report;
   report.uuid =
       OffloadReportUuid(frame.vehicle_id, frame.stamp_ns, sighting.class_name, sighting.box);

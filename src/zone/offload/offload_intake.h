@@ -12,6 +12,7 @@
 
 #include "geo/ground_projection.h"
 #include "placement/sighting.h"
+#include "protocol/hazard_catalogue.h"
 #include "protocol/offloaded_frame.h"
 #include "protocol/report.h"
 #include "zone/admission/offload_allowance.h"
@@ -72,7 +73,9 @@ class OffloadIntake {
     protocol::OffloadedFrame frame;
   };
 
-  explicit OffloadIntake(const Config& config) : config_(config), allowance_(config.allowance) {}
+  /// The catalogue says how far the middles of things lie behind what the camera sees.
+  OffloadIntake(const Config& config, protocol::HazardCatalogue catalogue)
+      : config_(config), catalogue_(std::move(catalogue)), allowance_(config.allowance) {}
 
   /// Why the frame is not taken, in one sentence; empty when it is. `now_ns` is the zone's clock.
   std::string Add(protocol::OffloadedFrame frame, std::int64_t now_ns);
@@ -113,6 +116,7 @@ class OffloadIntake {
   std::optional<double> ChallengePlace(const protocol::OffloadedFrame& frame, std::int64_t now_ns);
 
   Config config_;
+  const protocol::HazardCatalogue catalogue_;
   OffloadAllowance allowance_;
   std::deque<protocol::OffloadedFrame> waiting_;
   std::size_t waiting_bytes_ = 0;

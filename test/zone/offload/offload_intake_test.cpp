@@ -17,7 +17,9 @@ class CandidateIntakeTest : public ::testing::Test {
  protected:
   CandidateIntakeTest() { config_.max_ground_sigma_m = 100; }
 
-  OffloadIntake Intake() const { return OffloadIntake(config_); }
+  OffloadIntake Intake() const {
+    return {config_, protocol::HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml")};
+  }
 
   OffloadIntake::Config config_;
 };
