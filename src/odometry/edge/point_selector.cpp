@@ -62,7 +62,8 @@ void AddEdgePoint(const ReferenceLevel& reference, const Pixel& pixel,
 /// Which of the directions a gradient has, whatever its sign.
 std::uint8_t DirectionOf(const Gradient& gradient) {
   const float angle = std::atan2(gradient.y, gradient.x) / static_cast<float>(M_PI) + 1;
-  return static_cast<std::uint8_t>(static_cast<int>(angle * kDirections + 0.5F) % kDirections);
+  return static_cast<std::uint8_t>(static_cast<std::size_t>(angle * kDirections + 0.5F) %
+                                   kDirections);
 }
 
 /// What each direction gets of so many: all it has, or as much as the others that have more.
