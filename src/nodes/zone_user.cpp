@@ -29,9 +29,9 @@ constexpr char kHelp[] =
        ./livemap zone user list [--directory DIR]
 
 The people who may log in to the zone's map. A viewer sees vehicles and unconfirmed hazards, an
-official also decides, an admin may do the same as an official, so far. What is changed holds at once,
-also while the zone runs; a new password and a removal end all sessions. The password is asked for twice, or read from the
-first line of standard input where that is no terminal.
+official also decides, an admin may do the same as an official, so far. What is changed holds at
+once, also while the zone runs; a new password and a removal end all sessions. The password is asked
+for twice, or read from the first line of standard input where that is no terminal.
 
   --role ROLE       what the person may do
   --directory DIR   folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)

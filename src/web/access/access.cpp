@@ -112,7 +112,9 @@ bool Access::CheckOfficial(const HttpRequest& question) {
 }
 
 Visibility Access::VisibilityFor(const HttpRequest& question) const {
-  if (!HasAccounts() || IsByOfficial(question) || PersonOf(question)) return {};
+  const bool shows_token = !question.authorization.empty();
+  if (shows_token ? IsByOfficial(question) : PersonOf(question).has_value()) return {};
+  if (!HasAccounts()) return {};
   Visibility visibility;
   visibility.vehicles = false;
   visibility.candidates = options_.public_sees == PublicSees::kAll;

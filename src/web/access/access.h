@@ -64,7 +64,7 @@ class Access {
 
   const WebConfig& options_;
   OfficialAuthenticator authenticator_;
-  mutable std::optional<accounts::AccountStore> accounts_;
+  std::optional<accounts::AccountStore> accounts_;
   /// One password at a time is hashed: each takes 64 MiB and a thread that others wait for.
   std::atomic_flag hashes_ = ATOMIC_FLAG_INIT;
   mutable Mutex mutex_;
