@@ -7,18 +7,13 @@
 #include <exception>
 #include <filesystem>
 #include <optional>
-#include <osmium/io/file.hpp>
-#include <osmium/io/pbf_input.hpp>
-#include <osmium/io/reader.hpp>
-#include <osmium/io/xml_input.hpp>
-#include <osmium/memory/buffer.hpp>
-#include <osmium/osm/entity_bits.hpp>
 #include <osmium/osm/node.hpp>
 #include <osmium/osm/relation.hpp>
 #include <osmium/osm/way.hpp>
 #include <vector>
 
 #include "common/error.h"
+#include "streets/osm_objects.h"
 
 namespace livemap::streets {
 namespace {
@@ -151,29 +146,19 @@ std::optional<TurnRestriction> RestrictionOf(const osmium::Relation& relation) {
   return restriction;
 }
 
-/// All objects of one kind, in the order of the file.
-template <typename Object, typename Take>
-void ForEach(const osmium::io::File& file, osmium::osm_entity_bits::type kind, const Take& take) {
-  osmium::io::Reader reader(file, kind, osmium::io::read_meta::no);
-  while (osmium::memory::Buffer buffer = reader.read()) {
-    for (const Object& object : buffer.select<Object>()) take(object);
-  }
-  reader.close();
-}
-
 StreetMap ReadStreets(const osmium::io::File& file, const std::string& name,
                       const StreetLimits& limits) {
   try {
     StreetMapBuilder builder(limits);
     std::vector<std::int64_t> nodes;
-    ForEach<osmium::Way>(file, osmium::osm_entity_bits::way,
-                         [&](const osmium::Way& way) { TakeWay(way, nodes, builder); });
-    ForEach<osmium::Relation>(
+    ForEachObject<osmium::Way>(file, osmium::osm_entity_bits::way,
+                               [&](const osmium::Way& way) { TakeWay(way, nodes, builder); });
+    ForEachObject<osmium::Relation>(
         file, osmium::osm_entity_bits::relation, [&](const osmium::Relation& relation) {
           const std::optional<TurnRestriction> restriction = RestrictionOf(relation);
           if (restriction) builder.AddRestriction(*restriction);
         });
-    ForEach<osmium::Node>(file, osmium::osm_entity_bits::node, [&](const osmium::Node& node) {
+    ForEachObject<osmium::Node>(file, osmium::osm_entity_bits::node, [&](const osmium::Node& node) {
       const osmium::Location location = node.location();
       if (location.valid()) builder.SetPlace(node.id(), {location.lat(), location.lon()});
     });
@@ -181,7 +166,6 @@ StreetMap ReadStreets(const osmium::io::File& file, const std::string& name,
     if (map.segments() > 0) return map;
     throw Error("it has no drivable street");
   } catch (const std::exception& error) {
-    // The library throws a dozen types, of which std::exception is the only common one.
     throw Error("the street file '" + name + "' is refused: " + error.what() + "; " + kAccepted);
   }
 }
