@@ -206,7 +206,7 @@ class Phone(Full, MapPage):
 
     def test_the_sheet_shows_the_list(self):
         self.open_full()
-        self.click("#sheet-handle")
+        self.open_sheet()
         self.assert_rows(4)
         self.picture("phone_sheet")
         hazard = self.find("#hazard-list button").get_attribute("data-hazard")

@@ -181,6 +181,14 @@ class MapPage(unittest.TestCase):
             return True
         self.wait(clicked, f"{selector} cannot be clicked")
 
+    def open_sheet(self):
+        """On a phone: the panel, at rest. A click on what moves may reach what lies beside it."""
+        self.click("#sheet-handle")
+        self.wait(lambda: self.browser.execute_script(
+            "const panel = document.getElementById('panel');"
+            "return panel.classList.contains('open') && panel.getAnimations().length === 0"),
+            "the sheet does not come to rest")
+
     def press(self, *keys):
         # To whatever has the focus, a button that was just switched off as well.
         ActionChains(self.browser).send_keys(*keys).perform()

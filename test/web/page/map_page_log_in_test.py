@@ -214,14 +214,8 @@ class Phone(OfficialsPage):
         self.log_in("miller")
         self.wait_logged_in("miller")
         self.picture("phone_logged_in")
-        self.click("#sheet-handle")
-
-        def opened():
-            # The sheet comes up: a click may miss what moves.
-            if not self.find("#review").is_displayed():
-                self.find("#review-open").click()
-            return self.find("#review").is_displayed()
-        self.wait(opened, "the review does not open")
+        self.open_sheet()
+        self.click("#review-open")
         self.wait_for_text("#review-place", "1 of 1")
         self.picture("phone_review")
         self.assert_quiet()

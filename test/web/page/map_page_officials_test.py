@@ -553,7 +553,7 @@ class Phone(OfficialsPage):
         self.open()
         self.zoom_until_pins(4)
         self.picture("phone_states")
-        self.click("#sheet-handle")
+        self.open_sheet()
         self.picture("phone_states_list")
         self.open_popup_of(hazard)
         self.click(".popup summary")
@@ -568,13 +568,16 @@ class Phone(OfficialsPage):
         self.assert_quiet()
 
     def assert_inside(self, selector, top):
-        box = self.browser.execute_script(
-            "const r = document.querySelector(arguments[0]).getBoundingClientRect();"
-            "return [r.left, r.top, r.right, r.bottom]", selector)
-        self.assertGreaterEqual(box[0], 0)
-        self.assertGreaterEqual(box[1], top)
-        self.assertLessEqual(box[2], 390)
-        self.assertLessEqual(box[3], 844)
+        def box():
+            return self.browser.execute_script(
+                "const r = document.querySelector(arguments[0]).getBoundingClientRect();"
+                "return [r.left, r.top, r.right, r.bottom]", selector)
+
+        def is_inside():
+            # The map pans when a popup grows.
+            left, upper, right, lower = box()
+            return left >= 0 and upper >= top and right <= 390 and lower <= 844
+        self.wait(is_inside, f"{selector} at {box()} is not within 390 x 844 below {top}")
 
 
 class DesktopDark(OfficialsPage):

@@ -264,7 +264,7 @@ class Phone(MapPage):
         self.zoom_until_pins(3)
         self.picture("phone")
         self.assert_fits()
-        self.click("#sheet-handle")
+        self.open_sheet()
         self.wait(lambda: self.find("#hazard-list").is_displayed(), "the list does not open")
         self.picture("phone_list")
         self.assert_fits()
