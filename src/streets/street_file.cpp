@@ -112,7 +112,9 @@ void TakeWay(const osmium::Way& way, std::vector<std::int64_t>& nodes, StreetMap
   }
   nodes.clear();
   for (const osmium::NodeRef& node : way.nodes()) nodes.push_back(node.ref());
-  builder.AddStreet(*street, way.tags().get_value_by_key("name", ""), nodes);
+  // Motorways and country roads often have a number alone.
+  const char* const number = way.tags().get_value_by_key("ref", "");
+  builder.AddStreet(*street, way.tags().get_value_by_key("name", number), nodes);
 }
 
 /// Nothing where it is none of turns at a node, or not of cars at all times.

@@ -49,7 +49,9 @@ TEST(StreetFileTest, ReadsNameDirectionLevelAndWidth) {
       WayOf(7, 1, 2,
             Tag("highway", "primary") + Tag("name", "Hauptstra&#223;e") + Tag("oneway", "-1") +
                 Tag("bridge", "yes") + Tag("lanes", "3") + Tag("width", "9.5 m")) +
-      WayOf(8, 2, 3, Tag("highway", "motorway_link") + Tag("layer", "-2") + Tag("tunnel", "yes")) +
+      WayOf(8, 2, 3,
+            Tag("highway", "motorway_link") + Tag("layer", "-2") + Tag("tunnel", "yes") +
+                Tag("ref", "A 7")) +
       WayOf(9, 3, 4, Tag("highway", "residential") + Tag("junction", "roundabout")));
   ASSERT_EQ(map.segments(), 3U);
   const Street& bridge = map.StreetOf(0);
@@ -63,6 +65,7 @@ TEST(StreetFileTest, ReadsNameDirectionLevelAndWidth) {
   EXPECT_EQ(bridge.lanes, 3);
   EXPECT_FLOAT_EQ(bridge.width_m, 9.5F);
   const Street& ramp = map.StreetOf(1);
+  EXPECT_EQ(map.NameOf(ramp), "A 7") << "a number stands for a name";
   EXPECT_TRUE(ramp.link);
   EXPECT_FALSE(ramp.backward) << "motorways are one-way where nothing is said";
   EXPECT_EQ(ramp.layer, -2);
