@@ -22,14 +22,18 @@ std::vector<std::uint8_t> OnePixelPng() {
           0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
 }
 
-ZoneFixture::ZoneFixture(std::shared_ptr<const streets::StreetMap> streets) {
+ZoneFixture::ZoneFixture(std::shared_ptr<const streets::StreetMap> streets,
+                         const std::string& directory)
+    : directory_(directory.empty() ? folder_.path() : directory),
+      // A store that stays knows the identifiers of an earlier run.
+      generator_(directory.empty() ? 7 : std::random_device{}()) {
   catalogue = protocol::HazardCatalogue::Load(LIVEMAP_SOURCE_DIR "/config/hazards.yaml");
   zone::ZoneService::Config config;
   config.speed.max_speed_mps = 1e9;  // Reports of one vehicle lie all over the town.
   config.allowance.reports_per_hour = 1e9;
   config.map_changes_per_hour = 1e9;
   config.max_hazards_by_one_vehicle = 1'000'000;
-  config.directory = folder_.path();
+  config.directory = directory_;
   config.catalogue = catalogue;
   config.streets = std::move(streets);
   zone = std::make_unique<zone::ZoneService>(

@@ -51,8 +51,10 @@ class ZoneFixture {
  public:
   static constexpr std::int64_t kStartNs = 1'767'225'600'000'000'000;  // 2026-01-01T00:00:00Z
 
-  /// `streets`: those that the zone knows; null: none.
-  explicit ZoneFixture(std::shared_ptr<const streets::StreetMap> streets = nullptr);
+  /// `streets`: those that the zone knows; null: none. `directory`: where its store is and stays;
+  /// empty: in a folder that goes away with it.
+  explicit ZoneFixture(std::shared_ptr<const streets::StreetMap> streets = nullptr,
+                       const std::string& directory = "");
 
   /// A report that the zone accepts, without a picture.
   protocol::Report MakeReport(const std::string& class_name, const geo::GeoPoint& position);
@@ -63,7 +65,7 @@ class ZoneFixture {
   void AddRow(const std::string& class_name, const geo::GeoPoint& start, std::size_t count);
 
   /// File of the zone's database.
-  std::string database() const { return folder_.path() + "/zone.sqlite3"; }
+  std::string database() const { return directory_ + "/zone.sqlite3"; }
 
   protocol::HazardCatalogue catalogue;
   std::atomic<std::int64_t> now_ns{kStartNs};
@@ -71,7 +73,8 @@ class ZoneFixture {
 
  private:
   TemporaryFolder folder_;
-  std::mt19937_64 generator_{7};
+  std::string directory_;
+  std::mt19937_64 generator_;
 };
 
 /// Options that serve the source tree's page on any free port of the loopback.

@@ -1,6 +1,7 @@
 // A real zone and its real web server for the browser tests and for pictures of the page. Its
-// arguments, if any, are the zone's street file and a file of tiles. It takes one JSON command per
-// line on standard input and answers each with one line of JSON:
+// arguments, if any, are the zone's street file, a file of tiles and a folder for the store, which
+// stays; empty ones count as none. It takes one JSON command per line on standard input and answers
+// each with one line of JSON:
 //
 //   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
 //                                                                       -> {"id", "status",
@@ -75,8 +76,9 @@ constexpr char kPassword[] = "correct horse battery";
 
 class Session {
  public:
-  Session(std::shared_ptr<const livemap::streets::StreetMap> streets, std::string tile_file)
-      : fixture_(std::move(streets)) {
+  Session(std::shared_ptr<const livemap::streets::StreetMap> streets, std::string tile_file,
+          const std::string& directory)
+      : fixture_(std::move(streets), directory) {
     options_ = livemap::web::TestOptions();
     options_.token_file = tokens_.path();
     options_.tile_file = std::move(tile_file);
@@ -254,11 +256,11 @@ class Session {
 int main(int argc, char** argv) {
   try {
     std::shared_ptr<const livemap::streets::StreetMap> streets;
-    if (argc > 1) {
+    if (argc > 1 && *argv[1] != '\0') {
       streets = std::make_shared<const livemap::streets::StreetMap>(
           livemap::streets::ReadStreetFile(argv[1]));
     }
-    Session session(std::move(streets), argc > 2 ? argv[2] : "");
+    Session session(std::move(streets), argc > 2 ? argv[2] : "", argc > 3 ? argv[3] : "");
     std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
               << std::endl;
     std::string line;
