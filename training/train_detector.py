@@ -9,6 +9,7 @@ A run that was stopped, at whatever moment, continues with the same command and 
 import argparse
 import json
 import sys
+import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
@@ -49,15 +50,35 @@ class Trainer(Run):
             part.requires_grad_(False)
         super().__init__(settings, model, make_optimizer(model, settings))
         self.history: List[dict] = []  # of all validations
+        self.trained_s = self.last_epoch_s = 0.0  # of all epochs, measuring left out, and of the newest
 
     def state(self) -> dict:
         """Everything that the next epoch depends on."""
-        return {**super().state(), "history": self.history}
+        return {**super().state(), "history": self.history, "trained_s": self.trained_s, "last_epoch_s": self.last_epoch_s}
 
     def restore(self, state: dict) -> None:
         """Continue from `state`, which must come from a run with the same settings."""
         super().restore(state)
         self.history = state.get("history", [])
+        self.trained_s, self.last_epoch_s = state.get("trained_s", 0.0), state.get("last_epoch_s", 0.0)
+
+    def is_done(self) -> bool:
+        """By the clock: another epoch would end later than the schedule by more than a tenth of itself."""
+        if not self.settings.minutes:
+            return super().is_done()
+        return self.epoch > 0 and self.trained_s + 0.9 * self.last_epoch_s >= 60 * self.settings.minutes
+
+    def epoch_text(self) -> str:
+        """By the clock, how far it is instead of how many there are."""
+        if not self.settings.minutes:
+            return super().epoch_text()
+        return f"{self.epoch} at {self.trained_s / 60:.1f}/{self.settings.minutes:g} min"
+
+    def progress(self, epoch_share: float, epoch_s: float) -> float:
+        """How much of the schedule is over, 0 to 1, where so much of the epoch is, which took so long."""
+        if self.settings.minutes:
+            return min(1.0, (self.trained_s + epoch_s) / (60 * self.settings.minutes))
+        return (self.epoch + epoch_share) / self.settings.epochs
 
     def check_classes(self, begun: Tuple[str, ...]) -> None:
         """Refuse weights whose outputs would become those of other classes."""
@@ -101,7 +122,8 @@ class Trainer(Run):
         settings = self.settings
         # Dropout draws from torch's generator: seeded by epoch, a resumed run draws the same.
         torch.manual_seed(settings.seed * 100003 + self.epoch)
-        views = settings.views_of(self.epoch)
+        views = settings.views_of(self.epoch, self.trained_s)
+        began = time.monotonic()
         augmenter = Augmenter(
             pictures, views.recipe, views.width, views.height, settings.simulated_share, settings.classes, pasted
         )
@@ -113,7 +135,7 @@ class Trainer(Run):
         for part in self.frozen:
             part.eval()  # their normalisation does not follow the batches either
         for step, (images, targets) in enumerate(loader):
-            progress = (self.epoch + step / len(loader)) / settings.epochs
+            progress = self.progress(step / len(loader), time.monotonic() - began)
             self.set_rate(settings.learning_rate * learning_rate_factor(progress))
             images, targets = to_device(images, targets, self.device)
             with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=settings.precision == "bf16"):
@@ -122,6 +144,8 @@ class Trainer(Run):
             self.step(losses.sum())
             sums += losses.detach().cpu()
         self.epoch += 1
+        self.last_epoch_s = time.monotonic() - began
+        self.trained_s += self.last_epoch_s
         box_loss, score_loss = (sums / len(loader)).tolist()
         return {"box_loss": box_loss, "score_loss": score_loss}
 
@@ -162,6 +186,8 @@ def parse_arguments(arguments: Optional[List[str]]) -> argparse.Namespace:
     parser.add_argument("--backbone-rate", type=float, default=defaults.backbone_rate, help="multiple of the learning rate for the backbone")
     parser.add_argument("--simulated-share", type=float, default=defaults.simulated_share, help="of the samples, from simulated drives")
     add_run_arguments(parser, "build/training/hazards", defaults, ("seed", "epochs", "samples_per_epoch", "batch"))
+    parser.add_argument("--minutes", type=float, default=defaults.minutes,
+                        help="the schedule runs by the clock and spans so many minutes, whatever --epochs says; 0: it spans the epochs")
     add_loop_arguments(parser, defaults, validate_every=10)
     return parser.parse_args(arguments)
 
@@ -176,6 +202,8 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
     check_arguments(arguments)
     if not 0 <= arguments.backbone_rate <= 10:
         raise UsageError(f"--backbone-rate must be from 0 to 10, not {arguments.backbone_rate}.")
+    if not 0 <= arguments.minutes <= 100000:
+        raise UsageError(f"--minutes must be from 0 to 100000, not {arguments.minutes}.")
     if arguments.pretrained and arguments.start_from and not exported(arguments):
         raise UsageError("--pretrained and the checkpoint of --start-from exclude each other.")
     given = fields_given(Settings, arguments)

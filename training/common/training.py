@@ -143,22 +143,29 @@ class Run:
         self.optimizer.step()
         self.ema.update(self.model)
 
+    def is_done(self) -> bool:
+        """Whether the schedule is over."""
+        return self.epoch >= self.settings.epochs
+
+    def epoch_text(self) -> str:
+        """Which epoch was trained, for the log."""
+        return f"{self.epoch}/{self.settings.epochs}"
+
     def run(self, out: Path, train: Callable[[], dict], measure: Optional[Callable[[], dict]] = None, every: int = 1) -> None:
         """Epochs to the last one; last.pt after each, best.pt where a measurement finds the best figure so far."""
         out.mkdir(parents=True, exist_ok=True)
-        epochs = self.settings.epochs
-        while self.epoch < epochs:
+        while not self.is_done():
             began = time.monotonic()
             report = train()
             save_atomically(self.state(), out / "last.pt")  # a kill while it measures loses no epoch
-            if measure and (self.epoch % every == 0 or self.epoch == epochs):
+            if measure and (self.epoch % every == 0 or self.is_done()):
                 report.update(measure())
                 if report.get(self.BEST, 0.0) > self.best:
                     self.best = report[self.BEST]
                     save_atomically(self.state(), out / "best.pt")
                 save_atomically(self.state(), out / "last.pt")
             line = " ".join(f"{name} {text(value, 4)}" for name, value in report.items())
-            print(f"epoch {self.epoch}/{epochs} {line} {time.monotonic() - began:.0f} s", flush=True)
+            print(f"epoch {self.epoch_text()} {line} {time.monotonic() - began:.0f} s", flush=True)
 
 
 def add_run_arguments(parser: argparse.ArgumentParser, out: str, settings: Any, counts: Sequence[str], threads: int = 2) -> None:

@@ -24,6 +24,7 @@ class Settings:
     size: str = "medium"  # of network.SIZES
     seed: int = 1
     epochs: int = 120
+    minutes: float = 0.0  # the schedule runs by the clock, for so long, whatever `epochs` says; 0: by epochs
     samples_per_epoch: int = 960
     batch: int = 16
     views: str = "crops"  # of VIEWS, before settling
@@ -39,9 +40,12 @@ class Settings:
     cut_outs: bool = False  # hazards of the sets are put onto the roads of other photos
     left_out: Tuple[str, ...] = ()  # sets that are not trained on at all
 
-    def views_of(self, epoch: int) -> "Views":
-        """What an epoch shows: the last ones whole frames, weakly changed."""
-        settling = epoch >= self.epochs - round(self.settle * self.epochs)
+    def views_of(self, epoch: int, trained_s: float = 0.0) -> "Views":
+        """What an epoch shows that begins after so much training: the last ones whole frames, weakly changed."""
+        if self.minutes:
+            settling = trained_s >= (1 - self.settle) * 60 * self.minutes
+        else:
+            settling = epoch >= self.epochs - round(self.settle * self.epochs)
         return SETTLING_VIEWS if settling else VIEWS[self.views]
 
 

@@ -2,9 +2,11 @@
 
 import contextlib
 import io
+import itertools
 import json
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import cv2
@@ -22,6 +24,7 @@ from common import training
 from detector import CLASSES, inference, int8_model, onnx_model, pretrained
 from detector.manifest import sha256_of
 from detector.network import SIZES, Backbone, Detector, Widths
+from detector.training import SETTLING_VIEWS, VIEWS
 
 from .synthetic import write_data, write_own, write_sets
 
@@ -79,6 +82,18 @@ class Programs(unittest.TestCase):
         self.assertEqual(continued["epoch"], 3)
         for name, tensor in whole["average"].items():
             torch.testing.assert_close(continued["average"][name], tensor, rtol=0, atol=0, msg=name)
+
+    def test_by_the_clock_the_schedule_ends_with_its_minutes(self):
+        ticks = itertools.count(step=10)  # so many seconds from one look at the clock to the next: an epoch takes 30
+        with unittest.mock.patch.object(train_detector.time, "monotonic", lambda: float(next(ticks))):
+            self.assertEqual(self.train("clock", "--minutes", 2, "--settle", 0.5), (0, ""))
+        state = torch.load(self.root / "clock" / "last.pt")
+        self.assertEqual((state["epoch"], state["trained_s"]), (4, 120.0))
+        rates = [group["lr"] for group in state["optimizer"]["param_groups"]]
+        self.assertLess(max(rates), 0.1 * state["settings"]["learning_rate"], "the rate does not come down")
+        settings = train_detector.Settings(minutes=2, settle=0.5)
+        self.assertIs(settings.views_of(1, 59.0), VIEWS["crops"])
+        self.assertIs(settings.views_of(2, 60.0), SETTLING_VIEWS)
 
     def test_a_torn_checkpoint_is_named_with_the_way_out(self):
         self.assertEqual(self.train("torn"), (0, ""))
@@ -281,6 +296,7 @@ class Programs(unittest.TestCase):
             (train_detector, ("--start-from", nowhere, "--out", self.root / "new")),
             (train_detector, ("--batch", 1)),
             (train_detector, ("--backbone-rate", 20)),
+            (train_detector, ("--minutes", "nan")),
             (convert_backbone, ("--archive", nowhere, "--out", self.root / "new.pt")),
             (train_detector, ("--frobnicate",)),
             (export_detector, ("--out", self.root)),
