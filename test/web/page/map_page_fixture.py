@@ -24,7 +24,7 @@ try:
 except ImportError:
     webdriver = Keys = None
 
-OPTIONS = argparse.Namespace(server=None, screenshots=None)  # Set by the program.
+OPTIONS = argparse.Namespace(server=None, screenshots=None, failures=None)  # Set by the program.
 LAT, LON = 40.4433, -79.9436
 HOSTILE = "<img src=x onerror=alert(1)>"
 HANG_S = 40  # Bounds a hang; no test measures speed by it.
@@ -143,7 +143,8 @@ class MapPage(unittest.TestCase):
                                  ignored_exceptions=moving).until(lambda _: condition())
         except TimeoutException:
             log = [entry["message"] for entry in self.browser.get_log("browser")]
-            self.picture("failed")
+            if folder := OPTIONS.screenshots or OPTIONS.failures:
+                self.save_picture(folder, self.id().split(".", 1)[1])
             raise AssertionError(f"{what}; the browser's log: {log}") from None
 
     def zoom_until_pins(self, count):
@@ -195,9 +196,12 @@ class MapPage(unittest.TestCase):
 
     def picture(self, name):
         if OPTIONS.screenshots:
-            os.makedirs(OPTIONS.screenshots, exist_ok=True)
             time.sleep(0.6)  # Lets animations come to rest; nothing is asserted after it.
-            self.browser.save_screenshot(os.path.join(OPTIONS.screenshots, name + ".png"))
+            self.save_picture(OPTIONS.screenshots, name)
+
+    def save_picture(self, folder, name):
+        os.makedirs(folder, exist_ok=True)
+        self.browser.save_screenshot(os.path.join(folder, name + ".png"))
 
     def assert_quiet(self):
         """Nothing failed in the page: no script error and no breach of the policy."""
@@ -242,7 +246,8 @@ def run_tests(description):
     """The main program of a test of the page: the exit status."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--server", required=True, help="the built map_page_server")
-    parser.add_argument("--screenshots", help="folder for pictures of the page")
+    parser.add_argument("--screenshots", help="folder for pictures of the page, about a second each")
+    parser.add_argument("--failures", help="folder for pictures of the page where a test fails, and no others")
     parser.add_argument("tests", nargs="*", help="e.g. Desktop.test_an_empty_map_says_so")
     parser.parse_args(namespace=OPTIONS)
     lacking = missing()
