@@ -22,6 +22,15 @@ add_library(livemap_options INTERFACE)
 target_compile_options(livemap_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
 
+if(LIVEMAP_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "LIVEMAP_FUZZ needs -DCMAKE_CXX_COMPILER=clang++, not ${CMAKE_CXX_COMPILER_ID}")
+  endif()
+  if(NOT LIVEMAP_SANITIZE)
+    set(LIVEMAP_SANITIZE address,undefined)
+  endif()
+  add_compile_options(-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/test/fuzz/third_party_findings.txt)
+endif()
 if(LIVEMAP_SANITIZE)
   # Eigen's and Ceres's templates with checks around each access take -O2 minutes to compile.
   set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1 -DNDEBUG")

@@ -8,6 +8,10 @@ function(livemap_module name)
   target_include_directories(livemap_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
   target_include_directories(livemap_${name} SYSTEM PUBLIC ${MODULE_SYSTEM_INCLUDES})
   target_link_libraries(livemap_${name} PUBLIC ${MODULE_DEPENDS} PRIVATE livemap_options)
+  if(LIVEMAP_FUZZ)
+    # What leads the fuzzer. The modules' unit tests run with it, too.
+    target_compile_options(livemap_${name} PRIVATE -fsanitize=fuzzer-no-link)
+  endif()
 endfunction()
 
 # livemap_gtest(NAME SOURCES a_test.cpp ... [THREADED b_test.cpp ...] DEPENDS target ...)
