@@ -36,6 +36,11 @@ if(LIVEMAP_SANITIZE)
   set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1 -DNDEBUG")
   add_compile_options(-fsanitize=${LIVEMAP_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${LIVEMAP_SANITIZE})
+  # GNU ld takes seconds for a program with checks.
+  find_program(LLVM_LINKER ld.lld)
+  if(LLVM_LINKER)
+    add_link_options(-fuse-ld=lld)
+  endif()
   if(LIVEMAP_SANITIZE MATCHES "undefined")
     # The vptr check wants the type information of SOCI's classes, which its library hides.
     add_compile_options(-fno-sanitize=vptr)
