@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "page"))
 import map_page_fixture as fixture  # noqa: E402
@@ -220,7 +219,7 @@ class Phone(Page):
         self.assert_readable()
         self.vehicle.show(hazards=[hazard("W" * 64, 240, "left")], reports={"level": "good", "pending": 123456})
         self.wait(lambda: self.text("#label").startswith("WW"), "the long name is not shown")
-        time.sleep(0.3)
+        self.wait(lambda: not self.browser.execute_script(OUTSIDE), "the long name does not fit")
         self.assert_readable()
         self.picture("driver_phone_long")
 
