@@ -14,12 +14,12 @@ namespace {
 
 const Mounting kPlaneTruth{Radians(2), Radians(4), Radians(-1.5), 1.37};
 
-struct TwoViews {
+struct RoadViews {
   ImagePyramid now, before;
   Eigen::Isometry3d before_from_now = Eigen::Isometry3d::Identity();
 };
 
-void LookTwice(const SyntheticRoad& road, double way_m, TwoViews& views) {
+void LookTwice(const SyntheticRoad& road, double way_m, RoadViews& views) {
   const Eigen::Isometry3d before = road.WorldFromCamera(0), now = road.WorldFromCamera(way_m);
   views.before.Build(road.See(before));
   views.now.Build(road.See(now));
@@ -46,7 +46,7 @@ TEST(Mounting, AnglesGoToARotationAndBack) {
 }
 
 TEST(RoadPlane, IsRefinedToTheTruthFromNearby) {
-  TwoViews views;
+  RoadViews views;
   LookTwice(SyntheticRoad(kPlaneTruth), 1.0, views);
   const RoadPlaneSearch search({}, kRoadEye);
   Mounting guess = kPlaneTruth;
@@ -57,7 +57,7 @@ TEST(RoadPlane, IsRefinedToTheTruthFromNearby) {
 }
 
 TEST(RoadPlane, IsFoundByAWideSearchWithoutKnowingRollAndHeight) {
-  TwoViews views;
+  RoadViews views;
   LookTwice(SyntheticRoad(kPlaneTruth), 1.0, views);
   const RoadPlaneSearch search({}, kRoadEye);
   const Mounting guess{kPlaneTruth.yaw_rad, kPlaneTruth.pitch_rad + Radians(0.7), 0, 1.8};
@@ -66,7 +66,7 @@ TEST(RoadPlane, IsFoundByAWideSearchWithoutKnowingRollAndHeight) {
 
 TEST(RoadPlane, IsNotFoundWithoutTextureNorWhereNothingMovesLikeOne) {
   const SyntheticRoad road(kPlaneTruth);
-  TwoViews views;
+  RoadViews views;
   LookTwice(road, 1.0, views);
   const RoadPlaneSearch search({}, kRoadEye);
   ImagePyramid plain;
