@@ -3,33 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
-#include "common/error.h"
 #include "geo/geo_box.h"
+#include "web/http/request_target.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 
 namespace livemap::web {
-
-/// A request that the client must mend; answered with status 400 and this sentence.
-class BadRequest : public Error {
- public:
-  using Error::Error;
-};
-
-/// An HTTP request target in origin form, percent-decoded.
-struct RequestTarget {
-  std::string path;  ///< Starts with '/'; may hold any byte but NUL.
-  std::vector<std::pair<std::string, std::string>> parameters;  ///< In the order of the query.
-};
-
-/// Splits and decodes "/path?key=value&...". Throws BadRequest when it does not start with '/', has
-/// a malformed %-escape, a NUL byte, more than 32 parameters, or is longer than 4096 bytes.
-RequestTarget ParseTarget(std::string_view target);
 
 /// What `GET /api/v1/hazards` asks for.
 struct HazardQuery {
@@ -103,8 +83,5 @@ DecisionsQuery ParseDecisionsQuery(const RequestTarget& target);
 
 /// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);
-
-/// Throws BadRequest when the target has any parameter.
-void RefuseQueryParameters(const RequestTarget& target);
 
 }  // namespace livemap::web

@@ -94,7 +94,7 @@ std::string AnswerWriter::Begin() {
   header.append(reason.data(), reason.size()).append("\r\n");
   for (const auto& [name, value] : answer_.headers) {
     // What a cache keeps compressed is not byte for byte what it keeps as it is.
-    const bool is_weak = gzip_ && name == "ETag";
+    const bool is_weak = gzip_ && name == "ETag" && value.rfind("W/", 0) != 0;
     AddField(header, name, is_weak ? "W/" + value : value);
   }
   if (has_content && !answer_.content_type.empty()) {

@@ -28,6 +28,20 @@ void RequireAddress(const std::string& option, const std::string& address) {
   }
 }
 
+/// They stand in every feed.
+void ValidateFeeds(const WebConfig& options) {
+  static const std::regex kUrl("https?://[A-Za-z0-9._~:/%\\[\\]-]+");
+  if (!options.public_url.empty() && !std::regex_match(options.public_url, kUrl)) {
+    throw Error("public_url is '" + options.public_url +
+                "', accepted is http(s)://HOST or http(s)://HOST/PATH");
+  }
+  static const std::regex kCountry("[a-z]{2}|other");
+  if (!std::regex_match(options.feed_country, kCountry)) {
+    throw Error("feed_country is '" + options.feed_country +
+                "', accepted are two lower-case letters (ISO 3166-1) or other");
+  }
+}
+
 }  // namespace
 
 std::string TileSource(const std::string& tile_url) {
@@ -60,6 +74,7 @@ void Validate(const WebConfig& options) {
     throw Error("tile_url is '" + options.tile_url + "' and the file of tiles is '" +
                 options.tile_file + "', accepted is one of the two");
   }
+  ValidateFeeds(options);
   if (!geo::IsValid(options.centre)) {
     throw Error("centre is " + std::to_string(options.centre.latitude_deg) + ", " +
                 std::to_string(options.centre.longitude_deg) +

@@ -25,6 +25,11 @@ struct WebConfig {
   std::string tile_attribution;  ///< Plain text; most tile providers require it.
   std::string tile_file;         ///< Raster tiles in one file (MBTiles), in place of tile_url.
   std::string title = "LiveMap";
+  /// Address of this server as others reach it, "https://map.example" or with a path; links in
+  /// feeds begin with it. Empty: what the request says of its host, by http.
+  std::string public_url;
+  std::string feed_publisher;               ///< Who publishes the feeds; empty: the title.
+  std::string feed_country = "other";       ///< Of the publisher, "us"; "other": not said.
   geo::GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
   std::vector<std::string> allowed_origins;
