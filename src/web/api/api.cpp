@@ -25,6 +25,12 @@ bool StartsWith(std::string_view text, std::string_view prefix) {
   return text.substr(0, prefix.size()) == prefix;
 }
 
+/// The address itself, or one that goes on with '/'.
+bool IsAtOrBelow(std::string_view path, std::string_view address) {
+  return StartsWith(path, address) &&
+         (path.size() == address.size() || path[address.size()] == '/');
+}
+
 HttpResponse NoPicture() { return MakeErrorAnswer(404, "the zone has no picture of this name"); }
 
 HttpResponse PostOnly() {
@@ -52,6 +58,8 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       hazards_(zone, catalogue),
       map_changes_(zone),
       streets_(zone.streets()),
+      feeds_(options_, zone, catalogue),
+      ogc_(options_, zone, catalogue),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
                 {LimitsOf(options).max_bytes, options.picture_cache_bytes}),
@@ -183,6 +191,12 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
 HttpResponse Api::Route(const RequestTarget& target, const HttpRequest& question) {
   const std::string& path = target.path;
   if (StartsWith(path, "/api/")) return RouteApi(target, question);
+  if (IsAtOrBelow(path, kFeedAddress)) {
+    return feeds_.Answer(target, question, access_.VisibilityFor(question));
+  }
+  if (IsAtOrBelow(path, kOgcAddress)) {
+    return ogc_.Answer(target, question, access_.VisibilityFor(question));
+  }
   // One that there is comes from the queue: nothing is decoded here.
   if (StartsWith(path, kImagePrefix)) {
     return VisibilityFor(question).told ? NoPicture() : LogInFirst();

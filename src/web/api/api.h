@@ -11,6 +11,7 @@
 #include "common/mutex.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/access/access.h"
+#include "web/api/feed_api.h"
 #include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
 #include "web/api/official_api.h"
@@ -22,6 +23,7 @@
 #include "web/http/static_files.h"
 #include "web/http/web_config.h"
 #include "web/metrics/zone_metrics.h"
+#include "web/ogc/ogc_api.h"
 #include "web/tiles/tile_file.h"
 #include "zone/pictures/picture_cache.h"
 #include "zone/pictures/picture_queue.h"
@@ -29,8 +31,8 @@
 
 namespace livemap::web {
 
-/// Answers every HTTP request but the live stream's: pages, pictures and `/api/v1`
-/// (docs/reference/http-api.md). Thread-safe; never throws.
+/// Answers every HTTP request but the live stream's: pages, pictures, `/api/v1`
+/// (docs/reference/http-api.md) and the feeds (docs/reference/feeds.md). Thread-safe; never throws.
 class Api : public Site {
  public:
   /// Keeps references to all but `options`. Throws Error when the token file, the accounts or the
@@ -89,6 +91,8 @@ class Api : public Site {
   const HazardApi hazards_;
   const MapChangeApi map_changes_;
   const StreetApi streets_;
+  const FeedApi feeds_;
+  const OgcApi ogc_;
   std::optional<TileFile> tiles_;
   DurationHistogram answer_times_;
   mutable Mutex server_mutex_;

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/clock.h"
+#include "protocol/hazard_catalogue.h"
+#include "web/feeds/change_tags.h"
+#include "web/feeds/feed_format.h"
+#include "web/feeds/feed_query.h"
+#include "web/http/http_message.h"
+#include "web/http/request_target.h"
+#include "web/http/site.h"
+#include "web/http/web_config.h"
+#include "zone/service/zone_service.h"
+
+namespace livemap::web {
+
+/// The list of feeds; each feed stands below it.
+constexpr const char* kFeedAddress = "/feeds";
+
+/// Answers hazards in the formats of other systems (docs/reference/feeds.md), hazard by hazard
+/// while the client reads. Feeds that go to drivers tell only of hazards that drivers are told of.
+/// Thread-safe; store failures and bad requests come out as exceptions.
+class FeedApi {
+ public:
+  using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
+
+  /// Keeps the references.
+  FeedApi(const WebConfig& options, zone::ZoneService& zone,
+          const protocol::HazardCatalogue& catalogue, Clock now_ns = SystemNs);
+
+  /// `target.path` starts with kFeedAddress.
+  HttpResponse Answer(const RequestTarget& target, const HttpRequest& question,
+                      const Visibility& sees) const;
+
+ private:
+  HttpResponse List(const HttpRequest& question) const;
+  HttpResponse OneDenm(const std::string& id) const;
+  /// The hazards that the query selects, written by `format`.
+  HttpResponse Stream(std::shared_ptr<FeedFormat> format, const char* type, const FeedHead& head,
+                      FeedQuery query, bool all) const;
+  FeedHead HeadOf(const HttpRequest& question) const;
+  FeedHazard MakeHazard(const zone::Hazard& hazard, std::int64_t now_ns) const;
+
+  const WebConfig& options_;
+  zone::ZoneService& zone_;
+  const protocol::HazardCatalogue& catalogue_;
+  const Clock now_ns_;
+  const ChangeTags tags_;
+};
+
+}  // namespace livemap::web

@@ -1,0 +1,56 @@
+#include "web/feeds/feed_text.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace livemap::web {
+namespace {
+
+TEST(XmlText, EscapesMarkup) {
+  EXPECT_EQ(XmlText("<script>a & 'b' \"c\"</script>"),
+            "&lt;script&gt;a &amp; &apos;b&apos; &quot;c&quot;&lt;/script&gt;");
+}
+
+TEST(XmlText, ReplacesWhatXmlDoesNotHave) {
+  EXPECT_EQ(XmlText(std::string("a\0b\x01\x7f", 5)), "a\uFFFDb\uFFFD\uFFFD");
+  EXPECT_EQ(XmlText("\uFFFF\uFFFE"), "\uFFFD\uFFFD");
+  EXPECT_EQ(XmlText("Z\u00fcrich \U0001F98C"), "Z\u00fcrich \U0001F98C");
+}
+
+TEST(XmlText, ReplacesWhatIsNoUtf8) {
+  EXPECT_EQ(XmlText("\xff\xc3"), "\uFFFD\uFFFD");
+  EXPECT_EQ(XmlText("\xc0\xaf"), "\uFFFD\uFFFD");                 // Overlong.
+  EXPECT_EQ(XmlText("\xed\xa0\x80"), "\uFFFD\uFFFD\uFFFD");       // Half of a surrogate pair.
+  EXPECT_EQ(XmlText("\xf4\x90\x80\x80").substr(0, 3), "\uFFFD");  // Beyond U+10FFFF.
+}
+
+TEST(CsvText, QuotesWhatRfc4180SaysAndDoublesQuotes) {
+  EXPECT_EQ(CsvText("plain"), "plain");
+  EXPECT_EQ(CsvText(""), "");
+  EXPECT_EQ(CsvText("Forbes Ave"), "\"Forbes Ave\"");
+  EXPECT_EQ(CsvText("a,b"), "\"a,b\"");
+  EXPECT_EQ(CsvText("the \"Strip\""), "\"the \"\"Strip\"\"\"");
+  EXPECT_EQ(CsvText("two\r\nlines"), "\"two\r\nlines\"");
+}
+
+TEST(CsvText, KeepsSpreadsheetsFromRunningIt) {
+  for (const char* text : {"=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1", "|calc"}) {
+    const std::string field = CsvText(text);
+    EXPECT_EQ(field.substr(0, 2), "\"'") << field;
+  }
+  EXPECT_EQ(CsvText("=HYPERLINK(\"http://evil\")"), "\"'=HYPERLINK(\"\"http://evil\"\")\"");
+}
+
+TEST(AppendDegrees, WritesNoExponent) {
+  std::string text;
+  AppendDegrees(text, -1e-7);
+  EXPECT_EQ(text, "-0.0000001");
+}
+
+TEST(SecondsText, IsRfc3339) {
+  EXPECT_EQ(SecondsText(1'767'225'600'250'000'000), "2026-01-01T00:00:00Z");
+}
+
+}  // namespace
+}  // namespace livemap::web
