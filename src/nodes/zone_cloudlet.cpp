@@ -5,7 +5,9 @@
 
 #include <iostream>
 #include <string>
+#include <utility>
 
+#include "nodes/json_log.h"
 #include "nodes/zone_node.h"
 
 namespace {
@@ -36,12 +38,13 @@ int main(int argc, char** argv) {
     ros::NodeHandle node;
     ros::NodeHandle private_node("~");
     livemap::ros_io::ParameterReader parameters(private_node);
-    livemap::nodes::ZoneNode zone(
-        node, private_node,
-        livemap::ros_io::ReadZoneCloudletConfig(parameters, ros::package::getPath("livemap")));
+    auto config =
+        livemap::ros_io::ReadZoneCloudletConfig(parameters, ros::package::getPath("livemap"));
+    if (config.json_log) livemap::nodes::LogAsJson("zone_cloudlet");
+    livemap::nodes::ZoneNode zone(node, private_node, std::move(config));
     ros::spin();
   } catch (const std::exception& error) {
-    std::cerr << "zone_cloudlet: " << error.what() << "\n";
+    livemap::nodes::LogTheEnd("zone_cloudlet", error.what());
     return 1;
   }
   return 0;

@@ -8,10 +8,13 @@
 #include "web/access/official_authenticator.h"
 #include "web/api/official_decision.h"
 #include "web/api/query.h"
+#include "web/feeds/feed_query.h"
+#include "web/feeds/feed_text.h"
 #include "web/http/cookie.h"
 #include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
+#include "web/ogc/ogc_query.h"
 #include "web/tiles/tile_file.h"
 
 namespace {
@@ -72,6 +75,44 @@ void CheckHazardQuery(const livemap::web::RequestTarget& target) {
   }
 }
 
+/// What the feeds are asked for.
+void CheckFeedQuery(const livemap::web::RequestTarget& target) {
+  try {
+    const auto query = livemap::web::ParseFeedQuery(target, {true, true});
+    Require(query.states.size() <= livemap::zone::kHazardStates);
+    for (const std::string& name : query.classes) Require(!name.empty() && name.size() <= 64);
+  } catch (const livemap::web::BadRequest&) {
+    // Refused.
+  }
+  try {
+    const livemap::web::OgcQuery query = livemap::web::ParseOgcQuery(target);
+    Require(query.limit >= 1 && query.limit <= livemap::web::kMaxOgcItems);
+    Require(query.cursor <= INT64_MAX);
+    if (query.time) Require(query.time->begin_ns <= query.time->end_ns);
+    if (query.box) Require(livemap::geo::IsValid(query.box->south_west));
+    // A link to the next page asks for the same, but for the cursor.
+    const auto next =
+        livemap::web::ParseOgcQuery(livemap::web::ParseTarget(livemap::web::NextPage(target, 7)));
+    Require(next.cursor == 7 && next.limit == query.limit);
+    Require(next.box.has_value() == query.box.has_value());
+    Require(next.time.has_value() == query.time.has_value());
+  } catch (const livemap::web::BadRequest&) {
+    // Refused, or an address that is too long when it is encoded.
+  }
+}
+
+/// Texts of the database stay texts in the feeds.
+void CheckFeedText(const std::string& text) {
+  const std::string xml = livemap::web::XmlText(text);
+  Require(xml.find_first_of(std::string("<>\"\0", 4)) == std::string::npos);
+  const std::string field = livemap::web::CsvText(text);
+  const bool is_quoted = !field.empty() && field.front() == '"';
+  if (!is_quoted) Require(field.find_first_of("\",\r\n") == std::string::npos);
+  if (!is_quoted && !field.empty()) {
+    Require(std::string("=+-@").find(field.front()) == std::string::npos);
+  }
+}
+
 /// What comes with a POST: its address, its cookie, its token, its body.
 void CheckDecision(const std::string& text) {
   const std::string cookie = livemap::web::CookieValue(text, "livemap_12345678");
@@ -124,6 +165,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   livemap::web::IsAllowedOrigin(text, "map.example", {"https://city.example"});
   CheckDecision(text);
   CheckEncoding(text);
+  CheckFeedText(text);
   // The input as a whole, and as what stands behind the address that has parameters.
   for (const std::string& address : {text, "/api/v1/hazards?" + text}) {
     try {
@@ -131,6 +173,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       Require(!target.path.empty() && target.path.front() == '/');
       Require(target.path.find('\0') == std::string::npos);
       CheckHazardQuery(target);
+      CheckFeedQuery(target);
       if (files.Find(target.path.substr(1))) Require(target.path.find("..") == std::string::npos);
     } catch (const livemap::web::BadRequest&) {
       // Refused.

@@ -320,6 +320,15 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
                   "Path of a file of raster map tiles (.mbtiles), in place of tile_url. Empty: "
                   "none. zone.launch sets it by the argument `tiles`.");
   parameters.Read("web_title", web.title, "Title of the page.");
+  parameters.Read(
+      "web_public_url", web.public_url,
+      "Address at which others reach the server, for example https://map.example. Links "
+      "in feeds begin with it. Empty: http:// and the host that the request names.");
+  parameters.Read("feed_publisher", web.feed_publisher,
+                  "Who publishes the feeds (docs/reference/feeds.md). Empty: web_title.");
+  parameters.Read("feed_country", web.feed_country,
+                  "Country of who publishes the feeds: two lower-case letters (ISO 3166-1), or "
+                  "other.");
   parameters.Read("web_threads", web.threads, {1, 64}, "Number of threads of the web server.");
   parameters.Read("web_max_connections", web.max_connections, {1, 100000},
                   "Number of connections. Whoever comes when all are taken takes the place of one "
@@ -386,6 +395,10 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   if (config.hazards.empty()) config.hazards = package_path + "/config/hazards.yaml";
   config.zone.catalogue = protocol::HazardCatalogue::Load(config.hazards);
   config.zone.limits.zone = ReadZoneBounds(parameters);
+  parameters.ReadChoice<bool>(
+      "log_format", config.json_log, {{"text", false}, {"json", true}},
+      "How the node logs on standard output and standard error: text, or json, an object a line "
+      "with time, level, message and fields (docs/reference/log.md).");
   ReadZoneKept(parameters, config.zone);
   ReadZoneReportLimits(parameters, config.zone);
   ReadZoneCommits(parameters, config);

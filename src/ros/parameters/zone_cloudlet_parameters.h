@@ -29,7 +29,8 @@ struct ZoneCloudletConfig {
   double marker_period_s = 0.5;            ///< Between two pictures of the map for rviz.
   int max_markers = 20000;                 ///< Hazards shown in rviz.
   double diagnostics_period_s = 1.0;
-  bool web = true;  ///< Serve the live map.
+  bool json_log = false;  ///< The log is lines of JSON.
+  bool web = true;        ///< Serve the live map.
   web::WebConfig web_options;
 };
 

@@ -205,7 +205,9 @@ OgcQuery ParseOgcQuery(const RequestTarget& target) {
 }
 
 std::string NextPage(const RequestTarget& target, std::uint64_t cursor) {
-  std::string address = target.path + '?';
+  std::string address;
+  AppendPercentEncoded(address, target.path);
+  address += '?';
   for (const auto& [name, value] : target.parameters) {
     if (name == "cursor") continue;
     AppendPercentEncoded(address, name);
