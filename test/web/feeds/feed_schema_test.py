@@ -95,7 +95,7 @@ class Feeds(unittest.TestCase):
         for east_m in (0, 20, 40):
             cls.place("traffic_cone", east_m, -0.5 * BLOCK_M)
         cls.candidate = cls.zone.report("debris", *at(0, 1.5 * BLOCK_M))
-        cls.zone.change("traffic_sign", *at(10, 0))
+        cls.zone.change("sign", *at(10, 0))
 
     @classmethod
     def place(cls, name, east_m, north_m):

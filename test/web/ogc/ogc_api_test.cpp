@@ -161,7 +161,7 @@ TEST_F(OgcApiTest, RefusesAsTheStandardSays) {
 TEST_F(OgcApiTest, WhatMayNotBeSeenIsNotThere) {
   const std::string candidate = Add("pothole", 40.44, -79.955);
   const std::string told = Add("deer", 40.44, -79.945);
-  fixture_.zone->HandleMapChanges({fixture_.MakeMapChange("traffic_sign", {40.44, -79.945})});
+  fixture_.zone->HandleMapChanges({fixture_.MakeMapChange("sign", {40.44, -79.945})});
   const auto features = AskJson(kItems, kOgcToldOnly)["features"];
   ASSERT_EQ(features.size(), 1U);
   EXPECT_EQ(features[0]["id"], told);
