@@ -35,7 +35,7 @@ HttpResponse NotThere(const std::string& sentence) { return OgcRefusal(404, "Not
 /// Writes a FeatureCollection whose members come one by one.
 class FeatureWriter {
  public:
-  /// `self` and `next` are the page's links; `next` is made with the last feature's cursor.
+  /// The link to the next page is made of `target` and the last feature's cursor.
   FeatureWriter(std::string server, RequestTarget target, std::int64_t now_ns)
       : server_(std::move(server)), target_(std::move(target)), now_ns_(now_ns) {}
 
@@ -49,8 +49,9 @@ class FeatureWriter {
     cursor_ = cursor;
     text += ToText(feature);
   }
+  /// `self` is the page's own address.
   void End(const std::string& self, bool has_more, std::string& text) const {
-    Json links = Json::array({OgcLink(server_ + self, "self", kFeatureType, "This page")});
+    Json links = Json::array({OgcLink(self, "self", kFeatureType, "This page")});
     if (has_more) {
       links.push_back(
           OgcLink(server_ + NextPage(target_, cursor_), "next", kFeatureType, "Next page"));
@@ -113,7 +114,8 @@ HttpResponse OgcApi::Answer(const RequestTarget& target, const HttpRequest& ques
                             const Visibility& sees) const {
   if (!sees.told) return LogInFirst();
   const std::string server = ServerAddress(options_, question);
-  const Asked asked{target, sees, server, server + kOgcAddress, now_ns_()};
+  const Asked asked{target,   sees, server, server + kOgcAddress, server + question.target,
+                    now_ns_()};
   const std::string tag = tags_.TagOf(zone_.Sequence(), asked.now_ns, server, question, sees);
   try {
     HttpResponse answer = Route(asked);
@@ -201,9 +203,9 @@ HttpResponse OgcApi::Hazards(const Asked& asked, const OgcQuery& query) const {
   auto walk = HazardWalk(asked.sees);
   walk.box = query.box;
   walk.after = query.cursor;
-  const std::string self = NextPage(asked.target, query.cursor);
   return WalkAnswer(
-      FeatureWriter(asked.server, asked.target, asked.now_ns), self, std::move(walk), query.limit,
+      FeatureWriter(asked.server, asked.target, asked.now_ns), asked.self, std::move(walk),
+      query.limit,
       [this](const auto& where, std::size_t limit) { return zone_.ReadHazards(where, limit); },
       [this, query, sees = asked.sees](const zone::Hazard& hazard) {
         return MaySee(hazard, sees) && WasSeenIn(query, hazard);
@@ -219,9 +221,9 @@ HttpResponse OgcApi::MapChanges(const Asked& asked, const OgcQuery& query) const
   walk.after = query.cursor;
   walk.until = zone_.Sequence();
   walk.states = zone::OpenStates();
-  const std::string self = NextPage(asked.target, query.cursor);
   return WalkAnswer(
-      FeatureWriter(asked.server, asked.target, asked.now_ns), self, std::move(walk), query.limit,
+      FeatureWriter(asked.server, asked.target, asked.now_ns), asked.self, std::move(walk),
+      query.limit,
       [this](const auto& where, std::size_t limit) { return zone_.ReadMapChanges(where, limit); },
       [query](const zone::MapChangeFeature& change) { return WasSeenIn(query, change); },
       MapChangeGeoJson);
@@ -230,8 +232,7 @@ HttpResponse OgcApi::MapChanges(const Asked& asked, const OgcQuery& query) const
 /// All hazards are counted before the first street is written.
 HttpResponse OgcApi::Streets(const Asked& asked, const OgcQuery& query) const {
   auto pieces = [this, writer = FeatureWriter(asked.server, asked.target, asked.now_ns),
-                 self = NextPage(asked.target, query.cursor), sees = asked.sees, query,
-                 walk = HazardWalk(asked.sees),
+                 self = asked.self, sees = asked.sees, query, walk = HazardWalk(asked.sees),
                  counts = std::make_shared<StreetCounts>(*zone_.streets()), is_counted = false,
                  after = query.cursor](std::string& piece) mutable {
     if (!is_counted) {

@@ -44,6 +44,7 @@ class OgcApi {
     const Visibility& sees;
     std::string server;  ///< Address of the server.
     std::string base;    ///< Address of the landing page.
+    std::string self;    ///< Address that was asked for.
     std::int64_t now_ns;
   };
 

@@ -105,6 +105,7 @@ TEST_F(OgcApiTest, PagesByNextLinksHaveEachFeatureOnce) {
     const auto page = AskJson(address);
     EXPECT_EQ(page["numberReturned"], page["features"].size());
     EXPECT_LE(page["features"].size(), 3U);
+    EXPECT_EQ(LinkOf(page, "self"), "http://map.example" + address);
     for (const auto& feature : page["features"]) {
       EXPECT_TRUE(found.insert(feature["id"]).second);
     }

@@ -16,6 +16,8 @@
 //                                           and miller (official)       -> {"password"}
 //   {"do": "log_out_all"}                   their passwords are set again -> {"password"}
 //   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
+//   {"do": "row", "class": C, "count": N, "lat": D, "lon": D}           hazards 20 m apart, going
+//                                           north, that drivers are told of -> {"hazards"}
 //   {"do": "vehicle", "id": V, "lat": D, "lon": D, "course": RAD, "speed": MPS} -> {"accepted"}
 //   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
 //   {"do": "connections"}                                               -> {"connections"}
@@ -99,6 +101,7 @@ class Session {
     if (verb == "accounts") return OpenAccounts(command);
     if (verb == "log_out_all") return SetPasswords();
     if (verb == "fill") return Fill(command);
+    if (verb == "row") return AddToldRow(command);
     if (verb == "vehicle") return MoveVehicle(command);
     if (verb == "start") return Start();
     if (verb == "connections") return {{"connections", server_->connections()}};
@@ -223,6 +226,23 @@ class Session {
         auto report = fixture_.MakeReport(classes[random() % classes.size()], position);
         report.confidence = 0.5F + 0.49F * std::uniform_real_distribution<float>()(random);
         reports.push_back(report);
+      }
+      fixture_.zone->HandleBatch(reports);
+    }
+    return {{"hazards", fixture_.zone->Statistics().active_hazards}};
+  }
+
+  /// Two vehicles tell of each.
+  Json AddToldRow(const Json& command) {
+    Tick();
+    for (const char* vehicle : {"car-1", "car-2"}) {
+      std::vector<livemap::protocol::Report> reports;
+      for (int i = 0; i < command.at("count").get<int>(); ++i) {
+        auto report = fixture_.MakeReport(
+            command.at("class"),
+            {command.at("lat").get<double>() + 0.00018 * i, command.at("lon").get<double>()});
+        report.vehicle_id = vehicle;
+        reports.push_back(std::move(report));
       }
       fixture_.zone->HandleBatch(reports);
     }
