@@ -290,9 +290,10 @@ Json OgcApi::FindHazard(const Asked& asked, const std::string& id) const {
 
 Json OgcApi::FindStreet(const Asked& asked, const std::string& id) const {
   const auto way = WholeNumber(id);
-  if (!way) return nullptr;
   StreetCounts counts(*zone_.streets());
   auto walk = HazardWalk(asked.sees);
+  if (way) walk.box = counts.ReachOf(*way);
+  if (!walk.box) return nullptr;
   for (bool is_last = false; !is_last;) {
     const auto page = zone_.ReadHazards(walk, kFeaturesPerRead);
     for (const zone::Hazard& hazard : page.items) {

@@ -1,6 +1,8 @@
 #include "web/ogc/street_counts.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "streets/street_place.h"
 #include "zone/model/hazard_spot.h"
@@ -106,6 +108,27 @@ Json StreetCounts::Next(const OgcQuery& query, std::uint64_t after, std::uint64_
     return Feature(id, counted);
   }
   return nullptr;
+}
+
+std::optional<geo::GeoBox> StreetCounts::ReachOf(std::uint64_t id) const {
+  // More than the 60 m within which a place is said to lie on a street.
+  constexpr double kReachDeg = 0.001;
+  std::optional<geo::GeoBox> reach;
+  const auto include = [&](const geo::GeoPoint& place) {
+    const double reach_east_deg = kReachDeg / std::cos(place.latitude_deg * geo::kRadiansPerDegree);
+    if (!reach) reach = {place, place};
+    auto& [south_west, north_east] = *reach;
+    south_west = {std::min(south_west.latitude_deg, place.latitude_deg - kReachDeg),
+                  std::min(south_west.longitude_deg, place.longitude_deg - reach_east_deg)};
+    north_east = {std::max(north_east.latitude_deg, place.latitude_deg + kReachDeg),
+                  std::max(north_east.longitude_deg, place.longitude_deg + reach_east_deg)};
+  };
+  for (std::uint32_t i = 0; i < map_.segments(); ++i) {
+    if (static_cast<std::uint64_t>(map_.StreetOf(i).id) != id) continue;
+    include(map_.PlaceOf(map_.SegmentAt(i).from));
+    include(map_.PlaceOf(map_.SegmentAt(i).to));
+  }
+  return reach;
 }
 
 Json StreetCounts::Find(std::uint64_t id) const {

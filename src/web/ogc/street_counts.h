@@ -3,8 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
+#include "geo/geo_box.h"
 #include "streets/street_map.h"
 #include "web/json/json.h"
 #include "web/ogc/ogc_query.h"
@@ -23,6 +25,9 @@ class StreetCounts {
   /// The first way after `after`, by the id of OpenStreetMap, that the query selects, as a GeoJSON
   /// Feature; null: there is none. `id` becomes its id.
   Json Next(const OgcQuery& query, std::uint64_t after, std::uint64_t& id) const;
+  /// A box around the ways of that id with all hazards that may lie on them; none where the map has
+  /// no such way. It looks at every segment of the map once.
+  std::optional<geo::GeoBox> ReachOf(std::uint64_t id) const;
   /// That way; null where no hazard lies on it.
   Json Find(std::uint64_t id) const;
 

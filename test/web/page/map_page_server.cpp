@@ -232,16 +232,16 @@ class Session {
     return {{"hazards", fixture_.zone->Statistics().active_hazards}};
   }
 
-  /// Two vehicles tell of each.
+  /// Two vehicles tell of each, and no vehicle of so many that they count no more.
   Json AddToldRow(const Json& command) {
     Tick();
-    for (const char* vehicle : {"car-1", "car-2"}) {
+    for (const char* vehicle : {"first-", "second-"}) {
       std::vector<livemap::protocol::Report> reports;
       for (int i = 0; i < command.at("count").get<int>(); ++i) {
         auto report = fixture_.MakeReport(
             command.at("class"),
             {command.at("lat").get<double>() + 0.00018 * i, command.at("lon").get<double>()});
-        report.vehicle_id = vehicle;
+        report.vehicle_id = vehicle + std::to_string(i / 50);
         reports.push_back(std::move(report));
       }
       fixture_.zone->HandleBatch(reports);
